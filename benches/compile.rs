@@ -5,7 +5,7 @@
 //! Medians of single calls. The aims: a bank of three within 5 ms, the rotary stage within 50 ms, its modes within 50 ms.
 
 use bimorph::analysis::modes::modes;
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::netlist::{Bundle, Setting};
 use std::path::Path;
 use std::time::Instant;
@@ -29,7 +29,7 @@ fn median(count: usize, mut call: impl FnMut()) -> f64 {
 }
 
 fn report(name: &str, bundle: &Bundle, options: &CompileOptions) {
-    let ready = || -> Compiled { compile(bundle, options).unwrap_or_else(|e| panic!("{e}")) };
+    let ready = || -> CompiledModel { compile(bundle, options).unwrap_or_else(|e| panic!("{e}")) };
     let compiled = ready();
     let compiling = median(31, || drop(ready()));
     let ringing = median(11, || drop(modes(&compiled, 10, &[])));

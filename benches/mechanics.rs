@@ -1,7 +1,7 @@
 //! Mechanics alone: tangent, factorization, solve and one Rodas4 step of a bank of three thermal bimorphs, and one
 //! transient trial of the device with its partials.
 
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::domains::Ramp;
@@ -17,7 +17,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// The bank of the demonstration, resolved to 300 kHz at a tolerance of 1e-3.
-fn bank() -> Arc<Compiled> {
+fn bank() -> Arc<CompiledModel> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
     let bundle = Bundle::read(&path, &[]).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let options = CompileOptions { band: Some(3e5), ..CompileOptions::default() };

@@ -1,5 +1,5 @@
 //! One Trial over the stream: the cost of the wire alone (the device echoes), and a transient Trial of a lumped plate in
-//! process and over the wire; and steps of the plate as Python takes them ([`Lines`]): a trial, and its accept, which nobody waits for.
+//! process and over the wire; and steps of the plate as Python takes them ([`TrialConnections`]): a trial, and its accept, which nobody waits for.
 //!
 //! Client and server each run on one thread, as a plug-in and `bimorph serve` do. For figures that can be compared, keep
 //! both on one core, where no thread waits for another core to wake: `taskset -c 0 cargo bench --bench stream`.
@@ -10,7 +10,7 @@ use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::netlist::Bundle;
 use bimorph::service::address::Address;
-use bimorph::service::client::{Client, Lines, RemoteDevice};
+use bimorph::service::client::{Client, RemoteDevice, TrialConnections};
 use bimorph::service::proto::{self, device_reply, device_request};
 use bimorph::service::server::{MakeDevice, ServeOptions, run_with};
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -99,7 +99,7 @@ fn steps(criterion: &mut Criterion, name: &str, device: &mut dyn Device) {
 fn lines(criterion: &mut Criterion, name: &str, address: &Address) {
     let mut client = Client::connect(&address.uri(), PATIENCE).expect("connects");
     let model = client.compile(&Bundle::from_text("plate.net", NETLIST), &CompileOptions::default()).expect("compiles");
-    let lines = Lines::new().expect("a thread");
+    let lines = TrialConnections::new().expect("a thread");
     let mut line = lines.open((&address.uri(), 0), None, PATIENCE, &|| true).expect("a stream");
     let mut ask = |kind| {
         let request = proto::DeviceRequest { kind: Some(kind) }.encode_to_vec();

@@ -16,7 +16,7 @@ use bimorph::multibody::planar::Pose;
 use bimorph::multibody::relative::JointMatrix;
 use bimorph::multibody::relative::columns::Four;
 use bimorph::multibody::relative::dynamics::Stresses;
-use bimorph::multibody::relative::placed::{Eights, Placed};
+use bimorph::multibody::relative::placed::{LaneJointStates, TreeKinematics};
 use bimorph::multibody::{BlockMatrix, forces};
 use std::hint::black_box;
 use std::time::Instant;
@@ -73,8 +73,8 @@ fn by_springs(system: &System, q: &[Pose], drive: &Drive) -> (f64, f64) {
     let Joints { tree, closures, .. } = &joints;
     let mut s = q.to_vec();
     tree.coordinates_at(q, &mut s);
-    let (mut placed, mut stresses, mut w) = (Placed::new(tree), Stresses::new(tree), JointMatrix::new(tree));
-    let given = Eights::at_rest(&s);
+    let (mut placed, mut stresses, mut w) = (TreeKinematics::new(tree), Stresses::new(tree), JointMatrix::new(tree));
+    let given = LaneJointStates::at_rest(&s);
     let (mut r, mut right, mut moved) = (q.to_vec(), vec![Four::ZERO; q.len()], vec![Four::ZERO; q.len() + 1]);
     let factor = median(|| {
         placed.place(tree, black_box(&given));

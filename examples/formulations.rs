@@ -26,7 +26,7 @@ use bimorph::solve::frequency::eigen::lowest_modes;
 use bimorph::solve::path::SourcePath;
 use bimorph::solve::time::adaptive::{Adaptive, Control};
 use bimorph::solve::time::joint_rodas4::JointRodas4;
-use bimorph::solve::time::method::{Method, Motion, Work};
+use bimorph::solve::time::method::{Method, Motion, SolverCounters};
 use bimorph::solve::time::rodas4::Rodas4;
 use std::path::Path;
 use std::sync::Arc;
@@ -125,7 +125,7 @@ fn measure((file, set, start, volts, stop): &Scene<'_>, tol: f64) {
     let (bodies, loops, n) = (system.bodies(), tree.closures.len(), tree.coordinates);
     let name = file.split('/').nth(1).unwrap_or(file);
     let fine = run(system, &ramp, &at, first, tol * 1e-2, || Rodas4::new(system, &[])).0;
-    let print = |formulation: &str, coordinates: usize, (end, work, ms): (Motion, Work, f64)| {
+    let print = |formulation: &str, coordinates: usize, (end, work, ms): (Motion, SolverCounters, f64)| {
         let reach = largest(&fine.q, &vec![Pose::zeros(); bodies]);
         let deviation = largest(&end.q, &fine.q) / reach;
         println!(
@@ -221,7 +221,7 @@ fn run<M: for<'a> Method<Bodies<'a>>>(
     first: f64,
     tol: f64,
     method: impl Fn() -> M,
-) -> (Motion, Work, f64) {
+) -> (Motion, SolverCounters, f64) {
     let mut motion = at.clone();
     let mut stepper = Adaptive::new(system.bodies(), method());
     let begin = Instant::now();

@@ -8,14 +8,14 @@
 //! ways; *lanes* is the integration alone, *sweep* has the reading and the estimate too. Their ends are compared bit by bit.
 //! *parts*, on its own: what a point is made of, `part,us`.
 
-use bimorph::analysis::mesh::{Request, fitted};
+use bimorph::analysis::mesh::{MeshRequest, fitted};
 use bimorph::analysis::side_by_side;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::analysis::{modes::modes, statics::static_equilibrium};
-use bimorph::compile::{CompileOptions, Compiled, compile, draw};
+use bimorph::compile::{CompileOptions, CompiledModel, compile, draw};
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepSpec};
-use bimorph::netlist::{Bundle, Source};
-use bimorph::refine::model_order::ModelOrder;
+use bimorph::netlist::{Bundle, NetlistSource};
+use bimorph::refine::model_order::Mesh;
 use std::hint::black_box;
 use std::path::Path;
 
@@ -35,7 +35,7 @@ fn main() {
         let outputs = vec!["yoke.y".into()];
         let analysis = SweepAnalysis::Static { outputs, voltages: voltages.clone() };
         measure("static", points, analysis, &|compiled, fit| {
-            let request = Request::Static { voltages: &voltages };
+            let request = MeshRequest::Static { voltages: &voltages };
             let mesh = fit.then(|| fitted(compiled, &request).expect("a mesh"));
             black_box(static_equilibrium(mesh.as_ref().unwrap_or(compiled), &voltages).expect("an equilibrium"));
         });
@@ -43,7 +43,7 @@ fn main() {
     if wanted("modes") {
         let three = SweepAnalysis::Modes { count: 3, voltages: Vec::new() };
         measure("modes", points / 4, three, &|compiled, fit| {
-            let request = Request::Modes { count: 3, voltages: &[] };
+            let request = MeshRequest::Modes { count: 3, voltages: &[] };
             let mesh = fit.then(|| fitted(compiled, &request).expect("a mesh"));
             black_box(modes(mesh.as_ref().unwrap_or(compiled), 3, &[]).expect("modes"));
         });
@@ -62,7 +62,7 @@ fn transients(points: usize) {
     );
     let options = CompileOptions { segments: Some(2), ..CompileOptions::default() };
     let numbers = spec.point_numbers().expect("a grid");
-    let variants: Vec<Compiled> = (numbers.iter())
+    let variants: Vec<CompiledModel> = (numbers.iter())
         .map(|&n| compile(&bundle, &CompileOptions { set: spec.settings(n), ..options.clone() }).expect("the bank"))
         .collect();
     let run = TransientOptions {
@@ -80,7 +80,7 @@ fn transients(points: usize) {
             last.push(result.signals[0].2[1]);
         }
     });
-    let all: Vec<&Compiled> = variants.iter().collect();
+    let all: Vec<&CompiledModel> = variants.iter().collect();
     println!("transient,{},alone,{alone:.0},1.00", variants.len());
     let each = |rate: f64| 1e6 * variants.len() as f64 / (rate * steps as f64);
     eprintln!("transient: {steps} steps; {:.2} µs a step alone", each(alone));
@@ -117,7 +117,7 @@ fn grid(points: usize, analysis: SweepAnalysis) -> (SweepSpec, Bundle) {
 }
 
 /// Measures one analysis over `points` values of two parameters.
-fn measure(name: &str, points: usize, analysis: SweepAnalysis, one: &dyn Fn(&Compiled, bool)) {
+fn measure(name: &str, points: usize, analysis: SweepAnalysis, one: &dyn Fn(&CompiledModel, bool)) {
     let (spec, bundle) = grid(points, analysis);
     let points = spec.grid_points().expect("a grid");
     let some = spec.point_numbers().expect("a grid").into_iter().step_by(10);
@@ -151,22 +151,23 @@ fn rate(count: usize, work: impl FnOnce()) -> f64 {
 fn parts(points: usize) {
     let voltages = vec![("heat".to_owned(), 2.2)];
     let (spec, bundle) = grid(9, SweepAnalysis::Modes { count: 3, voltages: Vec::new() });
-    let source = Source::new(&bundle);
+    let source = NetlistSource::new(&bundle);
     let options = CompileOptions { set: spec.settings(4), ..CompileOptions::default() };
     let drawn = draw(&source, &options).expect("the bank");
     let compiled = drawn.clone().compile().expect("the bank");
     let part =
         |name: &str, work: &dyn Fn()| println!("{name},{:.1}", 1e6 / rate(points, || (0..points).for_each(|_| work())));
     part("draw", &|| drop(black_box(draw(&source, &options))));
-    for (name, request) in
-        [("static", Request::Static { voltages: &voltages }), ("modes", Request::Modes { count: 3, voltages: &[] })]
-    {
+    for (name, request) in [
+        ("static", MeshRequest::Static { voltages: &voltages }),
+        ("modes", MeshRequest::Modes { count: 3, voltages: &[] }),
+    ] {
         let order = fitted(&compiled, &request).expect("a mesh").order;
         let mesh = drawn.clone().on(order.clone()).expect("a mesh");
-        let twice = ModelOrder { segments: order.segments.iter().map(|n| 2 * n).collect(), ..order.clone() };
+        let twice = Mesh { segments: order.segments.iter().map(|n| 2 * n).collect(), ..order.clone() };
         part(&format!("{name} mesh"), &|| drop(black_box(drawn.clone().on(order.clone()))));
         match request {
-            Request::Static { voltages } => {
+            MeshRequest::Static { voltages } => {
                 part("second mesh", &|| drop(black_box(mesh.with_order(twice.clone()))));
                 part("equilibrium", &|| drop(black_box(static_equilibrium(&mesh, voltages))));
             }

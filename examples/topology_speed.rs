@@ -10,7 +10,7 @@
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
-use bimorph::multibody::rcr::{Lanes, Linkage, Real, Reduction, Task};
+use bimorph::multibody::rcr::{Lanes, Linkage, Real, Reduction, ReductionTask};
 use std::hint::black_box;
 use std::time::Instant;
 use topologies::Topology;
@@ -69,10 +69,10 @@ fn drawn(count: usize) {
     let mut serial = Reduction::<f64>::new(&[linkage]);
     serial.force.fill([1e-9, -1e-8, 0.0]);
     serial.place(&q, &v);
-    let met = serial.solve(Task::Accelerations, &mut out);
+    let met = serial.solve(ReductionTask::Accelerations, &mut out);
     let t = best(|| {
         serial.place(black_box(&q), black_box(&v));
-        serial.solve(Task::Accelerations, &mut out);
+        serial.solve(ReductionTask::Accelerations, &mut out);
     });
     println!("{},straight,{count},{:.1}", if met.is_some() { "singular" } else { "serial" }, t / count as f64);
 }

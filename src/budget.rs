@@ -19,7 +19,7 @@ mod stopped;
 pub use allowance::Allowance;
 pub use bounded::bounded;
 pub(crate) use clock::thread_cpu;
-pub use purse::{Purse, WINDOW};
+pub use purse::{OwnerQuota, WINDOW};
 pub use stopped::Stopped;
 
 use clock::{CHECKS_PER_LOOK, CPU_INTERVAL};
@@ -31,17 +31,17 @@ use std::time::{Duration, Instant};
 
 /// An allowance with what was used of it. Clones are the same budget.
 #[derive(Debug, Clone)]
-pub struct Budget(Arc<Shared>);
+pub struct Budget(Arc<BudgetState>);
 
 #[derive(Debug)]
-struct Shared {
+struct BudgetState {
     allowance: Allowance,
     used: AtomicUsize,
     /// 0 while it may go on; shared with budgets that are parts of one another.
     order: Arc<AtomicU8>,
 }
 
-impl Drop for Shared {
+impl Drop for BudgetState {
     fn drop(&mut self) {
         if let Some(purse) = &self.allowance.purse {
             purse.give_back(self.used.load(Ordering::Relaxed));
@@ -55,7 +55,7 @@ const LATE: u8 = 2;
 impl Budget {
     /// A fresh budget.
     pub fn new(allowance: Allowance) -> Self {
-        Self(Arc::new(Shared { allowance, used: AtomicUsize::new(0), order: Arc::default() }))
+        Self(Arc::new(BudgetState { allowance, used: AtomicUsize::new(0), order: Arc::default() }))
     }
 
     /// Takes `bytes` of what may be laid out.
@@ -82,7 +82,7 @@ impl Budget {
     }
 
     /// The same for want of time.
-    pub fn late(&self) {
+    pub fn expire(&self) {
         self.0.order.store(LATE, Ordering::Relaxed);
     }
 
@@ -101,7 +101,7 @@ impl Budget {
 }
 
 /// The budget of a thread, and when it was last looked at.
-struct Held {
+struct ThreadBudget {
     budget: Budget,
     checks: Cell<u32>,
     cpu_at_start: Option<Duration>,
@@ -111,11 +111,11 @@ struct Held {
 }
 
 thread_local! {
-    static HELD: RefCell<Option<Held>> = const { RefCell::new(None) };
+    static HELD: RefCell<Option<ThreadBudget>> = const { RefCell::new(None) };
 }
 
 /// Puts back what the thread held before, also while unwinding.
-struct Restore(Option<Held>);
+struct Restore(Option<ThreadBudget>);
 
 impl Drop for Restore {
     fn drop(&mut self) {
@@ -125,14 +125,14 @@ impl Drop for Restore {
 }
 
 /// The payload of the unwinding.
-struct Stop(Stopped);
+struct StopPayload(Stopped);
 
 /// Runs `job` under a budget.
 ///
 /// # Errors
 /// Why it was stopped. A panic of the job goes on as one.
 pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped> {
-    let held = Held {
+    let held = ThreadBudget {
         budget: budget.clone(),
         checks: Cell::new(0),
         cpu_at_start: budget.0.allowance.counts_cpu().then(thread_cpu).flatten(),
@@ -141,12 +141,12 @@ pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped>
     };
     let restore = Restore(HELD.with(|h| h.borrow_mut().replace(held)));
     let outcome = catch_unwind(AssertUnwindSafe(|| {
-        solvent();
+        check_quota();
         check();
         job()
     }));
     if budget.0.allowance.purse.is_some() {
-        HELD.with(|held| held.borrow().as_ref().map(Held::settle));
+        HELD.with(|held| held.borrow().as_ref().map(ThreadBudget::settle));
     }
     let told = HELD.with(|held| held.borrow().as_ref().map_or(Duration::ZERO, |held| held.cpu_told.get()));
     drop(restore);
@@ -154,16 +154,16 @@ pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped>
         // of what a part told the purse the whole does not tell it again
         HELD.with(|held| held.borrow().iter().for_each(|whole| whole.cpu_told.set(whole.cpu_told.get() + told)));
     }
-    outcome.or_else(|payload| match payload.downcast::<Stop>() {
+    outcome.or_else(|payload| match payload.downcast::<StopPayload>() {
         Ok(stop) => Err(stop.0),
         Err(panic) => resume_unwind(panic),
     })
 }
 
 /// Stops here if the purse is empty.
-fn solvent() {
+fn check_quota() {
     let purse = HELD.with(|held| held.borrow().as_ref().and_then(|held| held.budget.0.allowance.purse.clone()));
-    if let Some(Err(why)) = purse.map(|purse| purse.solvent()) {
+    if let Some(Err(why)) = purse.map(|purse| purse.check_cpu()) {
         unwind(why);
     }
 }
@@ -176,7 +176,7 @@ pub fn current() -> Option<Budget> {
 /// Stops here if this thread's budget is used up or withdrawn.
 #[inline]
 pub fn check() {
-    if let Some(why) = HELD.with(|held| held.borrow().as_ref().and_then(Held::look)) {
+    if let Some(why) = HELD.with(|held| held.borrow().as_ref().and_then(ThreadBudget::poll_limits)) {
         unwind(why);
     }
 }
@@ -211,12 +211,12 @@ pub fn modes(count: usize, unknowns: impl FnOnce() -> usize) {
 }
 
 fn unwind(why: Stopped) -> ! {
-    resume_unwind(Box::new(Stop(why)))
+    resume_unwind(Box::new(StopPayload(why)))
 }
 
-impl Held {
+impl ThreadBudget {
     #[inline]
-    fn look(&self) -> Option<Stopped> {
+    fn poll_limits(&self) -> Option<Stopped> {
         match self.budget.0.order.load(Ordering::Relaxed) {
             0 => {}
             LATE => return Some(Stopped::Late),
@@ -234,7 +234,7 @@ impl Held {
         }
         let now = Instant::now();
         if deadline.is_some_and(|deadline| now >= deadline) {
-            self.budget.late();
+            self.budget.expire();
             return Some(Stopped::Late);
         }
         if self.cpu_at_start.is_none() || now < self.cpu_next.get() {
@@ -242,7 +242,7 @@ impl Held {
         }
         self.cpu_next.set(now + CPU_INTERVAL);
         let used = self.settle()?;
-        if let Some(Err(why)) = self.budget.0.allowance.purse.as_ref().map(|purse| purse.solvent()) {
+        if let Some(Err(why)) = self.budget.0.allowance.purse.as_ref().map(|purse| purse.check_cpu()) {
             return Some(why);
         }
         cpu.filter(|most| used > *most).map(|most| Stopped::Cpu { seconds: most.as_secs() })
@@ -252,7 +252,7 @@ impl Held {
     fn settle(&self) -> Option<Duration> {
         let used = thread_cpu()?.saturating_sub(self.cpu_at_start?);
         if let Some(purse) = &self.budget.0.allowance.purse {
-            purse.spend(used.saturating_sub(self.cpu_told.replace(used)));
+            purse.charge_cpu(used.saturating_sub(self.cpu_told.replace(used)));
         }
         Some(used)
     }

@@ -1,13 +1,13 @@
 //! From netlist text to a ready model: netlist → structure → discretize.
 
-use crate::discretize::{DiscretizeError, Discretized, discretize_like, order, yielded};
+use crate::discretize::{Assembly, DiscretizeError, discretize_like, order, yielded};
 use crate::equations::Joints;
 use crate::multibody::planar::Pose;
-use crate::multibody::relative::Unfit;
-use crate::netlist::{Bundle, Diagnostic, Diagnostics, Setting, Source};
-use crate::options::Refused;
+use crate::multibody::relative::UnsupportedModel;
+use crate::netlist::{Bundle, Diagnostic, Diagnostics, NetlistSource, Setting};
+use crate::options::OptionError;
 use crate::refine::imperfection;
-use crate::refine::model_order::{self, ModelOrder};
+use crate::refine::model_order::{self, Mesh};
 use crate::structure::Structure;
 use std::sync::Arc;
 use thiserror::Error;
@@ -16,7 +16,7 @@ pub use crate::options::{CompileOptions, Formulation, Junctions, Scheme};
 
 /// A ready model with everything it came from.
 #[derive(Debug, Clone)]
-pub struct Compiled {
+pub struct CompiledModel {
     /// What was drawn.
     pub structure: Arc<Structure>,
     /// Netlist parameters with the values they took.
@@ -26,11 +26,11 @@ pub struct Compiled {
     /// The options it was compiled with.
     pub options: CompileOptions,
     /// Bodies, joints, gaps and electrics, and where the drawing's parts went.
-    pub parts: Discretized,
+    pub parts: Assembly,
     /// Segments of each beam, and the error estimated for them where a band was given or an analysis chose them.
-    pub order: ModelOrder,
+    pub order: Mesh,
     /// The system in joint coordinates where the formulation has them; or why they cannot be had.
-    pub joints: Option<Result<Arc<Joints>, Unfit>>,
+    pub joints: Option<Result<Arc<Joints>, UnsupportedModel>>,
     /// Its lowest mode, where that was looked for: in a circuit.
     pub lowest: Option<LowestMode>,
     /// Modes above that whose errors are known, where they were looked for: in a circuit.
@@ -61,7 +61,7 @@ pub struct LowestMode {
     pub error: f64,
 }
 
-impl Compiled {
+impl CompiledModel {
     /// Mechanical unknowns of the formulation.
     pub fn unknowns(&self) -> usize {
         match &self.joints {
@@ -74,7 +74,7 @@ impl Compiled {
     ///
     /// # Errors
     /// See [`DiscretizeError`].
-    pub fn with_order(&self, order: ModelOrder) -> Result<Self, DiscretizeError> {
+    pub fn with_order(&self, order: Mesh) -> Result<Self, DiscretizeError> {
         let rigid = |segments: &[usize]| segments.iter().map(|n| *n == 0).collect::<Vec<_>>();
         let like = (rigid(&self.order.segments) == rigid(&order.segments)).then_some(&self.parts);
         let parts = laid_out(&self.structure, &self.options, &order.segments, like)?;
@@ -98,7 +98,7 @@ impl Compiled {
 pub enum CompileError {
     /// An option is out of its range.
     #[error(transparent)]
-    Option(#[from] Refused),
+    Option(#[from] OptionError),
     /// The netlist has errors.
     #[error("{0}")]
     Netlist(Diagnostics),
@@ -111,13 +111,13 @@ pub enum CompileError {
 ///
 /// # Errors
 /// See [`CompileError`].
-pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, CompileError> {
-    draw(&Source::new(bundle), options)?.compile()
+pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<CompiledModel, CompileError> {
+    draw(&NetlistSource::new(bundle), options)?.compile()
 }
 
 /// A netlist as drawn with its options settled, before any mesh.
 #[derive(Debug, Clone)]
-pub struct Drawn {
+pub struct ParsedStructure {
     /// What was drawn.
     pub structure: Arc<Structure>,
     /// Netlist parameters with the values they took.
@@ -132,7 +132,7 @@ pub struct Drawn {
 ///
 /// # Errors
 /// See [`CompileError`].
-pub fn draw(source: &Source, options: &CompileOptions) -> Result<Drawn, CompileError> {
+pub fn draw(source: &NetlistSource, options: &CompileOptions) -> Result<ParsedStructure, CompileError> {
     options.check()?;
     let scheme = options.scheme.in_formulation(options.formulation);
     let mut options = CompileOptions { scheme, ..options.clone() };
@@ -141,20 +141,25 @@ pub fn draw(source: &Source, options: &CompileOptions) -> Result<Drawn, CompileE
     }
     let loaded = source.load(&options.set).map_err(CompileError::Netlist)?;
     let structure = if options.without_circuit { loaded.structure.without_circuit() } else { loaded.structure };
-    Ok(Drawn { structure: Arc::new(structure), parameters: loaded.parameters, warnings: loaded.warnings, options })
+    Ok(ParsedStructure {
+        structure: Arc::new(structure),
+        parameters: loaded.parameters,
+        warnings: loaded.warnings,
+        options,
+    })
 }
 
-impl Drawn {
+impl ParsedStructure {
     /// The model on the mesh that the options ask for.
     ///
     /// # Errors
     /// See [`CompileError`].
-    pub fn compile(self) -> Result<Compiled, CompileError> {
+    pub fn compile(self) -> Result<CompiledModel, CompileError> {
         let order = match (self.options.band, self.options.segments) {
             (Some(band), None) => model_order::choose(&self.structure, &self.options, band)?,
             _ => {
                 let segments = order::a_priori(&self.structure, &self.options)?;
-                ModelOrder { segments, estimated_error: None, modes_in_band: 0, passes: 0 }
+                Mesh { segments, estimated_error: None, modes_in_band: 0, passes: 0 }
             }
         };
         Ok(self.on(order)?)
@@ -164,10 +169,10 @@ impl Drawn {
     ///
     /// # Errors
     /// See [`DiscretizeError`].
-    pub fn on(mut self, order: ModelOrder) -> Result<Compiled, DiscretizeError> {
+    pub fn on(mut self, order: Mesh) -> Result<CompiledModel, DiscretizeError> {
         let parts = laid_out(&self.structure, &self.options, &order.segments, None)?;
         self.warnings.items.extend(beyond_table(&self.structure, &self.options, &parts));
-        Ok(Compiled {
+        Ok(CompiledModel {
             joints: in_joints_of(&parts, &self.options),
             structure: self.structure,
             parameters: self.parameters,
@@ -182,7 +187,7 @@ impl Drawn {
 }
 
 /// What to say of junctions that the calibration does not know.
-fn beyond_table(structure: &Structure, options: &CompileOptions, parts: &Discretized) -> Option<Diagnostic> {
+fn beyond_table(structure: &Structure, options: &CompileOptions, parts: &Assembly) -> Option<Diagnostic> {
     if options.junctions != Junctions::Calibrated {
         return None;
     }
@@ -199,8 +204,8 @@ fn laid_out(
     structure: &Structure,
     options: &CompileOptions,
     segments: &[usize],
-    other: Option<&Discretized>,
-) -> Result<Discretized, DiscretizeError> {
+    other: Option<&Assembly>,
+) -> Result<Assembly, DiscretizeError> {
     let mut parts = discretize_like(structure, options, segments, other)?;
     for (arm, strain) in yielded::arms(&parts, &structure.yields).iter().zip(structure.yields.iter().map(|y| y.strain))
     {
@@ -213,7 +218,7 @@ fn laid_out(
 }
 
 /// The system in joint coordinates, where the formulation has them.
-fn in_joints_of(parts: &Discretized, options: &CompileOptions) -> Option<Result<Arc<Joints>, Unfit>> {
+fn in_joints_of(parts: &Assembly, options: &CompileOptions) -> Option<Result<Arc<Joints>, UnsupportedModel>> {
     match options.formulation {
         Formulation::Rcr | Formulation::RcrElastic => Some(Joints::elastic(&parts.system).map(Arc::new)),
         _ => None,

@@ -3,14 +3,14 @@
 //! A netlist is its own bundle. A layout is converted, and the bundle holds the netlist that came out, under the layout's name.
 
 use crate::layout::convert::{ConvertError, Converted, convert};
-use crate::layout::{self, Drawing, Format, LayoutError, Process, ProcessError};
+use crate::layout::{self, FlatLayout, LayoutError, LayoutFormat, Process, ProcessError};
 use crate::netlist::{Bundle, DroppedInclude};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// How a layout is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Asked {
+pub struct LayoutChoice {
     /// A process inside the program, or the path of a process file; none: the one that the drawing names.
     pub process: Option<String>,
     /// The cell; none: the one that no other calls.
@@ -19,7 +19,7 @@ pub struct Asked {
 
 /// A bundle with what a conversion had to say.
 #[derive(Debug, Clone)]
-pub struct Source {
+pub struct InputBundle {
     /// The netlist.
     pub bundle: Bundle,
     /// What became of a layout; none for netlists.
@@ -51,7 +51,7 @@ pub enum FrontError {
     },
 }
 
-impl Asked {
+impl LayoutChoice {
     /// The process that was asked for.
     ///
     /// # Errors
@@ -77,12 +77,12 @@ impl Asked {
 pub fn read(
     path: &Path,
     include: &[PathBuf],
-    asked: &Asked,
+    asked: &LayoutChoice,
     dropped: &mut dyn FnMut(DroppedInclude),
     watch: &mut dyn FnMut(f64) -> bool,
-) -> Result<Source, FrontError> {
+) -> Result<InputBundle, FrontError> {
     let file = path.display().to_string();
-    if Format::of(&file).is_none() {
+    if LayoutFormat::of(&file).is_none() {
         for (option, value) in [("process", &asked.process), ("cell", &asked.cell)] {
             if value.is_some() {
                 return Err(FrontError::Netlist { option, file });
@@ -90,7 +90,7 @@ pub fn read(
         }
         let read = Bundle::read_telling(path, include, dropped);
         let bundle = read.map_err(|source| FrontError::Read { path: path.to_owned(), source })?;
-        return Ok(Source { bundle, converted: None });
+        return Ok(InputBundle { bundle, converted: None });
     }
     Ok(drawing_and_source(path, asked, watch)?.1)
 }
@@ -101,9 +101,9 @@ pub fn read(
 /// See [`FrontError`].
 pub fn drawing_and_source(
     path: &Path,
-    asked: &Asked,
+    asked: &LayoutChoice,
     watch: &mut dyn FnMut(f64) -> bool,
-) -> Result<(Drawing, Source), FrontError> {
+) -> Result<(FlatLayout, InputBundle), FrontError> {
     let process = asked.process()?;
     let drawing = layout::from_file(path, asked.cell.as_deref(), watch)?;
     let converted = convert(&drawing, process.as_ref())?;
@@ -115,7 +115,12 @@ pub fn drawing_and_source(
 ///
 /// # Errors
 /// See [`ConvertError`].
-pub fn from_bytes(bytes: &[u8], name: &str, process: Option<&str>, cell: Option<&str>) -> Result<Source, ConvertError> {
+pub fn from_bytes(
+    bytes: &[u8],
+    name: &str,
+    process: Option<&str>,
+    cell: Option<&str>,
+) -> Result<InputBundle, ConvertError> {
     let process = match process {
         None => None,
         Some(text) if text.contains('\n') => Some(Process::parse(text, "the process")?),
@@ -127,9 +132,9 @@ pub fn from_bytes(bytes: &[u8], name: &str, process: Option<&str>, cell: Option<
 }
 
 /// A layout's netlist under its name, with places in the drawing.
-fn source(name: &str, converted: Converted) -> Source {
+fn source(name: &str, converted: Converted) -> InputBundle {
     let bundle = Bundle { places: converted.places.clone(), ..Bundle::from_text(name, &converted.netlist) };
-    Source { bundle, converted: Some(converted) }
+    InputBundle { bundle, converted: Some(converted) }
 }
 
 impl From<LayoutError> for FrontError {

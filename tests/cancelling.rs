@@ -4,7 +4,7 @@ use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::analysis::{modes, pull_in, statics};
 use bimorph::budget::{Allowance, Budget, Stopped, within};
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::netlist::Bundle;
 use std::fmt::Write as _;
 use std::sync::mpsc::channel;
@@ -55,7 +55,7 @@ fn median(name: &str, mut job: impl FnMut() + Send) -> Duration {
 #[test]
 fn computations_stop_soon() {
     let (bundle, options) = chain(10_000);
-    let compiled: Compiled = compile(&bundle, &options).expect("compiles");
+    let compiled: CompiledModel = compile(&bundle, &options).expect("compiles");
     let volts = vec![("drive".to_owned(), 1.0)];
     let longest = Duration::from_secs(1);
     let soon = |name: &str, job: &mut (dyn FnMut() + Send)| {

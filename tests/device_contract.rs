@@ -1,6 +1,6 @@
 //! The electrical contract of [`bimorph::device::Device`] on a mechanism with heaters, a comb and a plate gap.
 
-use bimorph::compile::{CompileOptions, Compiled, Formulation, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Junctions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
 use bimorph::netlist::Bundle;
@@ -12,12 +12,12 @@ const SHUTTLE: &str = include_str!("netlists/shuttle.net");
 /// The formulations that a device steps in; the contract is the same in each.
 const FORMULATIONS: [Formulation; 2] = [Formulation::Compliant, Formulation::Rcr];
 
-fn compiled(formulation: Formulation) -> Arc<Compiled> {
+fn compiled(formulation: Formulation) -> Arc<CompiledModel> {
     let options = CompileOptions { formulation, junctions: Junctions::Centreline, ..CompileOptions::default() };
     Arc::new(compile(&Bundle::from_text("shuttle.net", SHUTTLE), &options).unwrap_or_else(|e| panic!("{e}")))
 }
 
-fn opened(compiled: &Arc<Compiled>) -> LocalDevice {
+fn opened(compiled: &Arc<CompiledModel>) -> LocalDevice {
     let mut device = LocalDevice::new(Arc::clone(compiled));
     let signals =
         ["s.y", "s.x", "s.vy", "left.T", "right.T", "drive.q", "squeeze.gap", "squeeze.C", "squeeze.F", "drive.F"];

@@ -1,24 +1,24 @@
 //! The reduced model of [`bimorph::export`] against the device that it stands for, at frequencies of the test's own.
 
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
-use bimorph::device::scale::Scale;
+use bimorph::device::scale::PortScale;
 use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Trial, TrialReply};
-use bimorph::export::compare::{Fitted, fit};
-use bimorph::export::{ExportError, Request};
+use bimorph::export::compare::{ModelFit, fit};
+use bimorph::export::{ExportError, ExportRequest};
 use bimorph::netlist::Bundle;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 use std::path::Path;
 use std::sync::Arc;
 
-fn compiled(file: &str, options: CompileOptions) -> Arc<Compiled> {
+fn compiled(file: &str, options: CompileOptions) -> Arc<CompiledModel> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     Arc::new(compile(&Bundle::read(&path, &[]).unwrap(), &options).unwrap_or_else(|e| panic!("{file}: {e}")))
 }
 
-fn request(ports: &[&str], signals: &[&str], bias: &[(&str, f64)]) -> Request {
-    Request {
+fn request(ports: &[&str], signals: &[&str], bias: &[(&str, f64)]) -> ExportRequest {
+    ExportRequest {
         ports: ports.iter().map(|p| ((*p).to_owned(), None)).collect(),
         signals: signals.iter().map(|s| ((*s).to_owned(), 1.0)).collect(),
         bias: bias.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect(),
@@ -29,7 +29,7 @@ fn request(ports: &[&str], signals: &[&str], bias: &[(&str, f64)]) -> Request {
 }
 
 /// Largest deviation of the model from [`Device::linearize`] over the largest value of its curve, at 41 frequencies of the band.
-fn deviation(compiled: &Arc<Compiled>, request: &Request, fitted: &Fitted) -> f64 {
+fn deviation(compiled: &Arc<CompiledModel>, request: &ExportRequest, fitted: &ModelFit) -> f64 {
     let mut device = LocalDevice::new(Arc::clone(compiled));
     let ports: Vec<String> = request.ports.iter().map(|(n, _)| n.clone()).collect();
     let signals = request.signals.iter().map(|(n, _)| n.clone()).collect();
@@ -40,7 +40,7 @@ fn deviation(compiled: &Arc<Compiled>, request: &Request, fitted: &Fitted) -> f6
     device
         .trial(&Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &voltages }, &mut reply)
         .unwrap();
-    let scales: Vec<Scale> = opened.ports.iter().map(|p| Scale::new(p.kind, None)).collect();
+    let scales: Vec<PortScale> = opened.ports.iter().map(|p| PortScale::new(p.kind, None)).collect();
     let (p, mut small) = (scales.len(), SmallSignal::default());
     let [low, high] = fitted.band;
     let rows = fitted.model.rows();
@@ -153,7 +153,7 @@ fn a_linear_model() {
 fn a_count_is_kept() {
     let compiled = compiled("examples/bank/bank.net", CompileOptions::default());
     let request =
-        Request { count: Some(1), to: Some(1e6), ..request(&["heat", "sense"], &["yoke.y"], &[("heat", 1.0)]) };
+        ExportRequest { count: Some(1), to: Some(1e6), ..request(&["heat", "sense"], &["yoke.y"], &[("heat", 1.0)]) };
     let fitted = fit(&compiled, &request).unwrap();
     assert_eq!(fitted.model.modes.iter().filter(|m| m.number.is_some()).count(), 1);
     assert!(fitted.error > 1e-2);

@@ -5,7 +5,7 @@
 
 use bimorph::front::from_bytes;
 use bimorph::layout::mask::mask;
-use bimorph::layout::{Format, Process};
+use bimorph::layout::{LayoutFormat, Process};
 use bimorph::netlist::{Bundle, load};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -39,14 +39,14 @@ const WORDS: [&str; 14] = [
 const FOREIGN: &str = "DS 1 1 1;\n9 T;\nL POLY1;\nB 10000 200 5000 0;\nB 20000 200 19848 1736 984808 173648;\nB 5000 5000 31500 3500;\n\
     W 150 31500 3500 31500 9000 36000 9000;\nL ANCHOR1;\nB 600 600 0 0;\nDF;\nC 1;\nE\n";
 
-fn corpus(format: Format) -> Vec<Vec<u8>> {
+fn corpus(format: LayoutFormat) -> Vec<Vec<u8>> {
     let process = Process::builtin("polymumps").unwrap();
     let mut all = Vec::new();
     for name in ["bank/bank", "comb_resonator/comb_resonator", "switch/switch", "pivots/pivots", "arch/arch"] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/{name}.net"));
         let structure = load(&Bundle::read(&path, &[]).unwrap(), &[]).unwrap().structure;
         let drawn = mask(&structure, &process, format, "x").unwrap().bytes;
-        if format == Format::Cif {
+        if format == LayoutFormat::Cif {
             let bare: Vec<u8> = drawn
                 .split_inclusive(|b| *b == b'\n')
                 .filter(|line| !line.starts_with(b"94"))
@@ -57,7 +57,7 @@ fn corpus(format: Format) -> Vec<Vec<u8>> {
         }
         all.push(drawn);
     }
-    if format == Format::Cif {
+    if format == LayoutFormat::Cif {
         all.push(FOREIGN.into());
     }
     all
@@ -129,7 +129,7 @@ fn kept(name: &str) -> PathBuf {
 }
 
 /// Runs a format until `done`; with `keep` each drawing is written down before it is read, so that one that ends the process is known.
-fn run(format: Format, name: &str, (seed, keep): (u64, bool), mut done: impl FnMut(usize) -> bool) {
+fn run(format: LayoutFormat, name: &str, (seed, keep): (u64, bool), mut done: impl FnMut(usize) -> bool) {
     let mut maker = Maker { random: ChaCha8Rng::seed_from_u64(seed), corpus: corpus(format) };
     let (mut count, mut converted) = (0, 0);
     while !done(count) {
@@ -159,16 +159,16 @@ fn run(format: Format, name: &str, (seed, keep): (u64, bool), mut done: impl FnM
 
 #[test]
 fn a_few_cif() {
-    run(Format::Cif, "fuzz.cif", (1, false), |count| count >= QUICK);
+    run(LayoutFormat::Cif, "fuzz.cif", (1, false), |count| count >= QUICK);
 }
 
 #[test]
 fn a_few_gds() {
-    run(Format::Gds, "fuzz.gds", (1, false), |count| count >= QUICK);
+    run(LayoutFormat::Gds, "fuzz.gds", (1, false), |count| count >= QUICK);
 }
 
 /// For `FUZZ_MINUTES` [min], each time with other drawings: the seed is the time, and is told with what fails.
-fn for_minutes(format: Format, name: &str) {
+fn for_minutes(format: LayoutFormat, name: &str) {
     let minutes: f64 = std::env::var("FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0);
     let end = Instant::now() + Duration::from_secs_f64(60.0 * minutes);
     let seed = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_secs());
@@ -178,11 +178,11 @@ fn for_minutes(format: Format, name: &str) {
 #[test]
 #[ignore = "minutes: make fuzz"]
 fn fuzz_cif() {
-    for_minutes(Format::Cif, "fuzz.cif");
+    for_minutes(LayoutFormat::Cif, "fuzz.cif");
 }
 
 #[test]
 #[ignore = "minutes: make fuzz"]
 fn fuzz_gds() {
-    for_minutes(Format::Gds, "fuzz.gds");
+    for_minutes(LayoutFormat::Gds, "fuzz.gds");
 }

@@ -6,7 +6,7 @@ use bimorph::analysis::harmonic::grid::Spacing;
 use bimorph::analysis::harmonic::{HarmonicOptions, HarmonicResult, harmonic};
 use bimorph::analysis::mesh::harmonic_fitted;
 use bimorph::analysis::statics::static_equilibrium;
-use bimorph::compile::{CompileOptions, Compiled, Formulation, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Formulation, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Trial, TrialReply};
 use bimorph::netlist::{Bundle, Setting};
@@ -24,11 +24,11 @@ const TWO: &str = "anchor * [f] [l=1u w=1u h=1u]\nmass2d * [a] [m=1e-10]\nmass2d
 const ELBOW: &str = "process p = [Youngsmodulus=165e9 Poisson=0.3 density=2300 h=2u fluid=2u viscosity=1.78e-5]\nanchor p [f] [l=10u w=10u]\n\
                      first beam2d p [f a] [l=100u w=2u]\nsecond beam2d p [a b] [l=80u w=2u oz=pi/2]\nplate2d p [b] [l=30u w=20u]\n";
 
-fn model(text: &str, options: CompileOptions) -> Compiled {
+fn model(text: &str, options: CompileOptions) -> CompiledModel {
     compile(&Bundle::from_text("harmonic.net", text), &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn plain(text: &str) -> Compiled {
+fn plain(text: &str) -> CompiledModel {
     model(text, CompileOptions::default())
 }
 
@@ -43,7 +43,7 @@ fn asked(drive: &str, signals: &[&str], from: f64, to: f64) -> HarmonicOptions {
     }
 }
 
-fn run(compiled: &Compiled, options: &HarmonicOptions) -> HarmonicResult {
+fn run(compiled: &CompiledModel, options: &HarmonicOptions) -> HarmonicResult {
     harmonic(compiled, options, &mut |_| true).unwrap_or_else(|e| panic!("{e}"))
 }
 

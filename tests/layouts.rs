@@ -6,7 +6,7 @@ use bimorph::compile::{CompileOptions, compile};
 use bimorph::front::from_bytes;
 use bimorph::layout::drawing::Polygon;
 use bimorph::layout::mask::{MaskError, mask};
-use bimorph::layout::{self, Format, Process, convert};
+use bimorph::layout::{self, LayoutFormat, Process, convert};
 use bimorph::netlist::{Bundle, Setting, load};
 use std::path::Path;
 
@@ -42,7 +42,7 @@ fn every_planar_example_comes_back_with_its_modes() {
         let drawn = Bundle::read(&path, &[]).unwrap();
         let before = frequencies(&drawn);
         let structure = load(&drawn, &[]).unwrap().structure;
-        for (format, file) in [(Format::Gds, "x.gds"), (Format::Cif, "x.cif")] {
+        for (format, file) in [(LayoutFormat::Gds, "x.gds"), (LayoutFormat::Cif, "x.cif")] {
             let mask = mask(&structure, &polymumps(), format, file).unwrap();
             let source = from_bytes(&mask.bytes, file, None, None).unwrap();
             let report = source.converted.unwrap().report;
@@ -66,9 +66,9 @@ fn every_planar_example_comes_back_with_its_modes() {
 const BEAM: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [root] [l=10u w=10u oz=pi]\n\
                     arm beam2d p [root tip] [l=100u w=2u oz=0.3]\n";
 
-fn drawn_beam() -> layout::Drawing {
+fn drawn_beam() -> layout::FlatLayout {
     let structure = load(&Bundle::from_text("beam.net", BEAM), &[]).unwrap().structure;
-    let mask = mask(&structure, &polymumps(), Format::Gds, "beam.gds").unwrap();
+    let mask = mask(&structure, &polymumps(), LayoutFormat::Gds, "beam.gds").unwrap();
     layout::from_bytes(&mask.bytes, "beam.gds", None).unwrap()
 }
 
@@ -149,10 +149,10 @@ fn a_netlist_without_outlines_is_told_as_such() {
     let text = "anchor * [f] []\nspring2d * [f m] [kx=1 l=5u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\n";
     let structure = load(&Bundle::from_text("x.net", text), &[]).unwrap().structure;
     // An anchor alone has a pad, and that is all that is drawn.
-    let drawn = mask(&structure, &polymumps(), Format::Gds, "x.gds").unwrap();
+    let drawn = mask(&structure, &polymumps(), LayoutFormat::Gds, "x.gds").unwrap();
     assert!(drawn.notes.iter().any(|n| n == "1 spring2d has no outline"), "{:?}", drawn.notes);
     let loose = load(&Bundle::from_text("x.net", &text.replace("anchor", "hinge")), &[]).unwrap().structure;
-    assert_eq!(mask(&loose, &polymumps(), Format::Gds, "x.gds"), Err(MaskError::Empty));
+    assert_eq!(mask(&loose, &polymumps(), LayoutFormat::Gds, "x.gds"), Err(MaskError::Empty));
 }
 
 /// Outlines alone, without a label, give the bank of the paper back: six anchors, seventeen beams, its frequencies.
@@ -161,7 +161,7 @@ fn outlines_alone_give_the_bank_back() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
     let (drawn, bare) = (Bundle::read(&path, &[]).unwrap(), vec![("comb".to_owned(), Setting::Number(0.0))]);
     let structure = load(&drawn, &bare).unwrap().structure;
-    let bytes = mask(&structure, &polymumps(), Format::Cif, "bank.cif").unwrap().bytes;
+    let bytes = mask(&structure, &polymumps(), LayoutFormat::Cif, "bank.cif").unwrap().bytes;
     let outlines: Vec<u8> =
         bytes.split_inclusive(|b| *b == b'\n').filter(|line| !line.starts_with(b"94")).flatten().copied().collect();
     let source = from_bytes(&outlines, "bank.cif", None, None).unwrap();
@@ -207,7 +207,7 @@ fn a_body_keeps_its_mass_and_its_drag() {
     let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u viscosity=1.78e-5 fluid=2u]\nanchor p [root] []\n\
                 beam2d p [root c] [l=100u w=2u]\nbody2d p [c] [A=1e-8 Ip=2e-17]\n";
     let structure = load(&Bundle::from_text("body.net", text), &[]).unwrap().structure;
-    let drawn = mask(&structure, &polymumps(), Format::Gds, "body.gds").unwrap();
+    let drawn = mask(&structure, &polymumps(), LayoutFormat::Gds, "body.gds").unwrap();
     assert!(!drawn.notes.iter().any(|note| note.contains("drag")), "{:?}", drawn.notes);
     let source = from_bytes(&drawn.bytes, "body.gds", None, None).unwrap();
     let back = load(&source.bundle, &[]).unwrap().structure.masses.remove(0);
@@ -220,7 +220,7 @@ fn a_body_keeps_its_mass_and_its_drag() {
 /// The netlist drawn as masks in GDSII, and read again by its labels.
 fn there_and_back(text: &str) -> (bimorph::structure::Structure, String) {
     let structure = load(&Bundle::from_text("t.net", text), &[]).unwrap_or_else(|e| panic!("{e}")).structure;
-    let mask = mask(&structure, &polymumps(), Format::Gds, "t.gds").unwrap();
+    let mask = mask(&structure, &polymumps(), LayoutFormat::Gds, "t.gds").unwrap();
     assert!(mask.notes.iter().all(|note| !note.contains("mirrored")), "{:?}", mask.notes);
     let again = from_bytes(&mask.bytes, "t.gds", None, None).unwrap_or_else(|e| panic!("{e}"));
     let text = again.converted.unwrap().netlist;

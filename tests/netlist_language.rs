@@ -1,16 +1,16 @@
 //! The rules of the SUGAR 2 language, one test a rule: numbers, operators, scopes, layers, subnets, names, settings.
 //! The expected values follow from the grammar (sugar.y, sugar.lex of SUGAR 2) and were seen in runs of it.
 
-use bimorph::netlist::{Bundle, Diagnostics, Loaded, Setting, load};
+use bimorph::netlist::{Bundle, Diagnostics, LoadedNetlist, Setting, load};
 
 /// The process most tests use.
 const PROCESS: &str = "process p1 = [Youngsmodulus=165e9 Poisson=0.3 density=2300 h=2u viscosity=1.78e-5 fluid=2u]\n";
 
-fn loaded(text: &str) -> Loaded {
+fn loaded(text: &str) -> LoadedNetlist {
     with(text, &[])
 }
 
-fn with(text: &str, set: &[(&str, f64)]) -> Loaded {
+fn with(text: &str, set: &[(&str, f64)]) -> LoadedNetlist {
     let set: Vec<_> = set.iter().map(|(n, v)| ((*n).to_owned(), Setting::Number(*v))).collect();
     load(&Bundle::from_text("t.net", text), &set).unwrap_or_else(|d| panic!("{d}"))
 }

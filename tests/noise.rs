@@ -1,7 +1,7 @@
 //! Noise of a device: what is warm and takes energy gives it back. Checked against the fluctuation–dissipation theorem, which
 //! holds for any linear system in equilibrium (Callen and Welton 1951), and against closed forms.
 
-use bimorph::compile::{CompileOptions, Compiled, Formulation, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Junctions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Agitation, Device, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial, TrialReply};
 use bimorph::multibody::agitation::BOLTZMANN;
@@ -41,12 +41,12 @@ eground * [b] []
 heat port * [a] []
 ";
 
-fn compiled(text: &str) -> Arc<Compiled> {
+fn compiled(text: &str) -> Arc<CompiledModel> {
     let options = CompileOptions { junctions: Junctions::Centreline, ..CompileOptions::default() };
     Arc::new(compile(&Bundle::from_text("noise.net", text), &options).unwrap_or_else(|e| panic!("{e}")))
 }
 
-fn opened(compiled: &Arc<Compiled>, ports: &[&str], signals: &[&str]) -> LocalDevice {
+fn opened(compiled: &Arc<CompiledModel>, ports: &[&str], signals: &[&str]) -> LocalDevice {
     let mut device = LocalDevice::new(Arc::clone(compiled));
     let names = |list: &[&str]| list.iter().map(|name| (*name).to_owned()).collect();
     let request = OpenRequest { ports: names(ports), signals: names(signals), noise: None };
@@ -150,7 +150,7 @@ fn a_heater_is_a_warm_resistor() {
     }
 }
 
-fn shaken(compiled: &Arc<Compiled>, signal: &str, seed: u64, band: Option<f64>) -> LocalDevice {
+fn shaken(compiled: &Arc<CompiledModel>, signal: &str, seed: u64, band: Option<f64>) -> LocalDevice {
     let mut device = LocalDevice::new(Arc::clone(compiled));
     let noise = Some(Agitation { seed, band });
     device.open(&OpenRequest { ports: vec![], signals: vec![signal.into()], noise }).unwrap_or_else(|e| panic!("{e}"));
@@ -172,7 +172,7 @@ fn run(device: &mut LocalDevice, given: &[f64], dt: f64, steps: usize) -> (Vec<f
 }
 
 /// A mass of 1 ng at 5 kHz.
-fn mass(c: f64) -> Arc<Compiled> {
+fn mass(c: f64) -> Arc<CompiledModel> {
     compiled(&format!(
         "anchor * [g] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-9 J=1e-20]\nguide2d * [m] []\nspring2d * [g m] [kx=1]\ndamper2d * [g m] [bx={c}]\n"
     ))

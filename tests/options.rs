@@ -6,7 +6,7 @@
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::TransientOptions;
 use bimorph::options::analysis::{ANALYSES, MODES_COUNT, TRAN_POINTS, TRAN_RHO};
-use bimorph::options::{CompileOptions, Described, MODEL, ModelOption, Range, Value};
+use bimorph::options::{CompileOptions, MODEL, ModelOption, OptionDescription, OptionValue, Range};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -36,7 +36,7 @@ fn wrapped(text: &str, head: &str, width: usize) -> String {
 }
 
 /// What an option means, with its range and default, in one sentence each.
-fn sentences(about: &Described) -> String {
+fn sentences(about: &OptionDescription) -> String {
     let unit = if matches!(about.unit, "" | "1") { String::new() } else { format!(" [{}]", about.unit) };
     match about.range {
         Range::Flag => format!("{}.", about.about()),
@@ -80,7 +80,7 @@ fn fields() -> String {
     for ModelOption { about, number, .. } in MODEL.iter() {
         let kind = match about.range {
             // presence tells a default that is true from a false that was sent
-            Range::Flag if about.default == Value::Flag(true) => "optional bool",
+            Range::Flag if about.default == OptionValue::Flag(true) => "optional bool",
             Range::Flag => "bool",
             Range::Count(..) => "optional uint32",
             Range::Above(..) | Range::Within(..) => "optional double",
@@ -161,20 +161,22 @@ fn bimorph(words: &[String]) -> (Option<i32>, String, String) {
 }
 
 /// A value of an option just inside its range and one beyond it, as text; none where every value is inside.
-fn inside_and_beyond(about: &Described) -> (Value, Option<Value>) {
+fn inside_and_beyond(about: &OptionDescription) -> (OptionValue, Option<OptionValue>) {
     match about.range {
-        Range::Flag => (Value::Flag(true), None),
-        Range::Count(low, high) => (Value::Count(low), Some(Value::Count(high + 1))),
-        Range::Above(low, high) => (Value::Number(low + 0.01 * (high - low)), Some(Value::Number(2.0 * high))),
-        Range::Within(low, high) => (Value::Number(low), Some(Value::Number(2.0 * high))),
-        Range::Names(names) => (Value::Name(names[0].to_owned()), Some(Value::Name("nosuch".to_owned()))),
+        Range::Flag => (OptionValue::Flag(true), None),
+        Range::Count(low, high) => (OptionValue::Count(low), Some(OptionValue::Count(high + 1))),
+        Range::Above(low, high) => {
+            (OptionValue::Number(low + 0.01 * (high - low)), Some(OptionValue::Number(2.0 * high)))
+        }
+        Range::Within(low, high) => (OptionValue::Number(low), Some(OptionValue::Number(2.0 * high))),
+        Range::Names(names) => (OptionValue::Name(names[0].to_owned()), Some(OptionValue::Name("nosuch".to_owned()))),
     }
 }
 
-fn written(value: &Value) -> Option<String> {
+fn written(value: &OptionValue) -> Option<String> {
     match value {
-        Value::Unset | Value::Flag(_) => None,
-        Value::Name(name) => Some(name.clone()),
+        OptionValue::Unset | OptionValue::Flag(_) => None,
+        OptionValue::Name(name) => Some(name.clone()),
         other => Some(other.to_string()),
     }
 }
@@ -203,7 +205,7 @@ fn every_front_takes_the_same_options() {
         let of = of.split(" --").next().unwrap_or(of);
         assert!(of.contains(&unit), "{flag}: {of}");
         assert!(about.range == Range::Flag || of.contains(&format!("[default: {default}]")), "{flag}: {of}");
-        let command = |value: &Value| {
+        let command = |value: &OptionValue| {
             let words = ["check".to_owned(), "c.net".into(), "--json".into(), flag.clone()];
             bimorph(&words.into_iter().chain(written(value)).collect::<Vec<_>>())
         };
@@ -212,9 +214,9 @@ fn every_front_takes_the_same_options() {
         if name != "segments" {
             let document: serde_json::Value = serde_json::from_str(&out).expect("a document");
             let told = match &inside {
-                Value::Number(x) => document[about.wire].as_f64() == Some(*x),
-                Value::Flag(flag) => document[about.wire].as_bool() == Some(*flag),
-                Value::Name(name) => document[about.wire].as_str() == Some(name),
+                OptionValue::Number(x) => document[about.wire].as_f64() == Some(*x),
+                OptionValue::Flag(flag) => document[about.wire].as_bool() == Some(*flag),
+                OptionValue::Name(name) => document[about.wire].as_str() == Some(name),
                 _ => false,
             };
             assert!(told, "{flag}: {out}");
@@ -268,7 +270,7 @@ fn analyses_take_the_same_options() {
         assert!(of.contains(&about.about()), "{command} {flag}: {of}");
         let default = about.by_default();
         assert!(
-            about.default == Value::Unset || of.contains(&format!("[default: {default}]")),
+            about.default == OptionValue::Unset || of.contains(&format!("[default: {default}]")),
             "{command} {flag}: {of}"
         );
         let Some(beyond) = inside_and_beyond(about).1.and_then(|value| written(&value)) else { continue };

@@ -6,7 +6,7 @@ mod topologies;
 use bimorph::domains::System;
 use bimorph::equations::constrained::Constrained;
 use bimorph::equations::{Control, Equations};
-use bimorph::multibody::rcr::{Linkage, Reduction, Task};
+use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
 use bimorph::solve::dirk::Dirk;
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
@@ -119,7 +119,7 @@ fn the_recursion_allocates_nothing() {
                 let blocks = blocks(
                     || way(&[&linkage]),
                     |r| {
-                        for task in [Task::Accelerations, Task::Rates, Task::Positions] {
+                        for task in [ReductionTask::Accelerations, ReductionTask::Rates, ReductionTask::Positions] {
                             r.place(&q, &v);
                             singular += usize::from(r.solve(task, &mut out).is_some());
                             r.reduce_singular(task, &mut out);

@@ -22,7 +22,7 @@ const WINDOWS: usize = 5;
 const STUDENT: f64 = 2.776;
 
 /// A run and its companion at the same output times.
-pub(super) struct Pair<'a> {
+pub(super) struct CompanionRuns<'a> {
     /// Distance of the output times, from 0 on [s].
     pub(super) spacing: f64,
     /// Samples of the run, signal by signal.
@@ -39,7 +39,7 @@ pub(super) fn first_contact(result: &TransientResult) -> Option<f64> {
 /// Compares a run that touches with its companion, and sets what `result` reports of the time after the contact. `least` is the
 /// amplitude below which a signal of a unit stands still.
 pub(super) fn judge(
-    pair: &Pair<'_>,
+    pair: &CompanionRuns<'_>,
     options: &TransientOptions<'_>,
     least: &dyn Fn(&str) -> f64,
     result: &mut TransientResult,
@@ -63,7 +63,7 @@ pub(super) fn judge(
 
 /// The first sample from `first` on at which a run and its companion are apart; none: they never are.
 fn parted(
-    pair: &Pair<'_>,
+    pair: &CompanionRuns<'_>,
     options: &TransientOptions<'_>,
     least: &dyn Fn(&str) -> f64,
     (first, count): (usize, usize),
@@ -101,7 +101,7 @@ fn allowed(
 }
 
 /// Statistics of each signal from sample `first` on; none of fewer samples than windows.
-fn statistics(pair: &Pair<'_>, first: usize, result: &TransientResult) -> Vec<Statistics> {
+fn statistics(pair: &CompanionRuns<'_>, first: usize, result: &TransientResult) -> Vec<Statistics> {
     let count = pair.run.first().map_or(0, Vec::len);
     let each = count.saturating_sub(first) / WINDOWS;
     if each == 0 {
@@ -139,7 +139,7 @@ mod tests {
         let t: Vec<f64> = (0..1000).map(|k| f64::from(k) / 1000.0).collect();
         let sine = t.iter().map(|t| 2.0 + (100.0 * std::f64::consts::PI * t).sin()).collect();
         let run = [sine, t];
-        let pair = Pair { spacing: 1e-3, run: &run, companion: None };
+        let pair = CompanionRuns { spacing: 1e-3, run: &run, companion: None };
         let named = |name: &str| (name.to_owned(), "m".to_owned(), Vec::new());
         let result = TransientResult { signals: vec![named("a"), named("b")], ..TransientResult::default() };
         let found = statistics(&pair, 0, &result);

@@ -1,7 +1,7 @@
 //! What a mechanism is after it was heated too far once: its hot arms shortened, see [`crate::domains::backbending`].
 use super::statics::operating_point;
 use super::{AnalysisError, PortVoltages};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::discretize::yielded;
 use crate::domains::backbending::Strength;
 use crate::multibody::BlockMatrix;
@@ -23,9 +23,9 @@ pub type Strains = Vec<(String, f64)>;
 
 /// A backbent mechanism.
 #[derive(Debug, Clone)]
-pub struct Backbent {
+pub struct BackbentMechanism {
     /// The mechanism with its hot arms shortened.
-    pub compiled: Compiled,
+    pub compiled: CompiledModel,
     /// Permanent strain of each beam that can yield [1], by name; negative: shorter.
     pub strains: Strains,
     /// Yield stress over Young's modulus of each [1]: what their strains are small against.
@@ -33,14 +33,14 @@ pub struct Backbent {
 }
 
 /// A beam that can yield.
-struct Arm {
+struct YieldingBeam {
     /// Index in the structure's yields.
     index: usize,
     beam: usize,
     heater: usize,
     strength: Strength,
     area: f64,
-    joints: yielded::Arm,
+    joints: yielded::YieldingJoints,
     /// Shortening so far [1].
     strain: f64,
 }
@@ -52,7 +52,7 @@ struct Arm {
 ///
 /// # Errors
 /// [`AnalysisError::BadRequest`] when no beam can yield; see [`AnalysisError`].
-pub fn backbend(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backbent, AnalysisError> {
+pub fn backbend(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<BackbentMechanism, AnalysisError> {
     let mut arms = arms(compiled);
     if arms.is_empty() {
         return Err(AnalysisError::BadRequest {
@@ -69,10 +69,10 @@ pub fn backbend(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backbent
     let beams = &compiled.structure.beams;
     let strains = arms.iter().map(|a| (beams[a.beam].name.clone(), -a.strain)).collect();
     let bearable = arms.iter().map(|a| a.strength.cold / beams[a.beam].material.youngs_modulus).collect();
-    Ok(Backbent { compiled: bent, strains, bearable })
+    Ok(BackbentMechanism { compiled: bent, strains, bearable })
 }
 
-fn arms(compiled: &Compiled) -> Vec<Arm> {
+fn arms(compiled: &CompiledModel) -> Vec<YieldingBeam> {
     let yields = &compiled.structure.yields;
     let joints = yielded::arms(&compiled.parts, yields);
     (yields.iter().zip(joints).enumerate())
@@ -80,7 +80,7 @@ fn arms(compiled: &Compiled) -> Vec<Arm> {
             let heater = compiled.parts.heaters.iter().position(|&beam| beam == y.beam)?;
             let beam = &compiled.structure.beams[y.beam];
             let ambient = beam.material.ambient_temperature;
-            Some(Arm {
+            Some(YieldingBeam {
                 index,
                 beam: y.beam,
                 heater,
@@ -95,7 +95,7 @@ fn arms(compiled: &Compiled) -> Vec<Arm> {
 }
 
 /// Finds the plastic strains at these voltages.
-fn settle(bent: &mut Compiled, arms: &mut [Arm], voltages: &PortVoltages) -> Result<(), AnalysisError> {
+fn settle(bent: &mut CompiledModel, arms: &mut [YieldingBeam], voltages: &PortVoltages) -> Result<(), AnalysisError> {
     let floor: Vec<f64> = arms.iter().map(|a| a.strain).collect();
     for _ in 0..CORRECTIONS {
         let (excess, relief) = pressures(bent, arms, voltages)?;
@@ -119,8 +119,8 @@ fn settle(bent: &mut Compiled, arms: &mut [Arm], voltages: &PortVoltages) -> Res
 /// By how much each arm's pressure exceeds its strength [Pa], and the pressure that a unit of shortening of each arm (column)
 /// takes from each arm (row) [Pa].
 fn pressures(
-    bent: &Compiled,
-    arms: &[Arm],
+    bent: &CompiledModel,
+    arms: &[YieldingBeam],
     voltages: &PortVoltages,
 ) -> Result<(Vec<f64>, DMatrix<f64>), AnalysisError> {
     let point = operating_point(bent, voltages)?;
@@ -129,7 +129,7 @@ fn pressures(
     let mut drive = system.electrics.drive();
     system.electrics.apply(&point.sources, &point.rise, &mut drive);
     let rest = RestStrain { expansion: &drive.expansion, built_in: 1.0 };
-    let mean = |arm: &Arm, force: &dyn Fn(usize) -> f64| {
+    let mean = |arm: &YieldingBeam, force: &dyn Fn(usize) -> f64| {
         arm.joints.iter().map(|(k, _)| force(*k)).sum::<f64>() / (arm.joints.len() as f64 * arm.area)
     };
     let excess = (arms.iter())
@@ -167,7 +167,7 @@ fn pressures(
     Ok((excess, relief))
 }
 
-fn apply(bent: &mut Compiled, arms: &[Arm]) {
+fn apply(bent: &mut CompiledModel, arms: &[YieldingBeam]) {
     for arm in arms {
         let before = std::mem::replace(&mut Arc::make_mut(&mut bent.structure).yields[arm.index].strain, -arm.strain);
         yielded::strain(&mut bent.parts, &arm.joints, -arm.strain - before);

@@ -22,15 +22,15 @@ mod spec;
 pub mod steps;
 mod variant;
 
-pub use spec::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
+pub use spec::{Chart, ChartError, ChartPart, ChartPoint, ChartSpec, Formulation, RunMeasurement};
 pub use variant::released;
 
 use super::modes::modes;
 use super::{AnalysisError, PortVoltages, Watch};
 use crate::compile::CompileOptions;
 use crate::netlist::Bundle;
-use runs::{Progress, Request, order, precision};
-use variant::{Models, Variant};
+use runs::{ChartProgress, RunSeries, order, precision};
+use variant::{ChartVariant, FormulationModels};
 
 /// Periods of the lowest mode that a run lasts when no end is given.
 const PERIODS: f64 = 5.0;
@@ -49,7 +49,7 @@ pub fn chart(
 ) -> Result<Chart, ChartError> {
     check(spec)?;
     let release = spec.release.as_deref();
-    let models = |band| Models::new(bundle, options, band, release, &spec.formulations);
+    let models = |band| FormulationModels::new(bundle, options, band, release, &spec.formulations);
     let base = models(options.band)?;
     let lowest = if spec.stop.is_none() || spec.bands.is_empty() {
         Some(lowest_mode(&base.bodies, &spec.voltages)?)
@@ -66,23 +66,23 @@ pub fn chart(
         0 => 0,
         runs => 2 + runs,
     };
-    let count = |part: Part, runs: usize| if spec.parts.contains(&part) { runs } else { 0 };
-    let runs = count(Part::Precision, spec.formulations.iter().map(precise).sum())
-        + count(Part::Order, spec.formulations.len() * bands.len() * spec.repeat)
-        + count(Part::Solvers, spec.solvers.len() * bands.len())
-        + count(Part::Defaults, defaults::ANALYSES.len() * (spec.tols.len() + 1));
-    let mut progress = Progress { watch, done: 0.0, total: runs.max(1) as f64 };
+    let count = |part: ChartPart, runs: usize| if spec.parts.contains(&part) { runs } else { 0 };
+    let runs = count(ChartPart::Precision, spec.formulations.iter().map(precise).sum())
+        + count(ChartPart::Order, spec.formulations.len() * bands.len() * spec.repeat)
+        + count(ChartPart::Solvers, spec.solvers.len() * bands.len())
+        + count(ChartPart::Defaults, defaults::ANALYSES.len() * (spec.tols.len() + 1));
+    let mut progress = ChartProgress { watch, done: 0.0, total: runs.max(1) as f64 };
     let mut chart = Chart { stop, signals: spec.signals.clone(), reference_error: None, points: Vec::new() };
-    let request = Request { spec, stop };
-    if spec.parts.contains(&Part::Precision) {
+    let request = RunSeries { spec, stop };
+    if spec.parts.contains(&ChartPart::Precision) {
         precision(&base, &request, &mut chart, &mut progress)?;
     }
-    if spec.parts.contains(&Part::Order) || spec.parts.contains(&Part::Solvers) {
-        let models: Vec<Models> = bands.iter().map(|&b| models(Some(b))).collect::<Result<_, _>>()?;
-        if spec.parts.contains(&Part::Order) {
+    if spec.parts.contains(&ChartPart::Order) || spec.parts.contains(&ChartPart::Solvers) {
+        let models: Vec<FormulationModels> = bands.iter().map(|&b| models(Some(b))).collect::<Result<_, _>>()?;
+        if spec.parts.contains(&ChartPart::Order) {
             order(&models, &request, &mut chart, &mut progress)?;
         }
-        if spec.parts.contains(&Part::Solvers) {
+        if spec.parts.contains(&ChartPart::Solvers) {
             for model in &models {
                 for &solver in &spec.solvers {
                     chart.points.push(steps::measure(&model.bodies, &request, solver)?);
@@ -94,14 +94,14 @@ pub fn chart(
             }
         }
     }
-    if spec.parts.contains(&Part::Defaults) {
+    if spec.parts.contains(&ChartPart::Defaults) {
         defaults::defaults((bundle, options), (spec, stop), &mut chart, &mut progress)?;
     }
     Ok(chart)
 }
 
 /// The lowest natural frequency that is not a rigid motion [Hz].
-fn lowest_mode(model: &Variant, voltages: &PortVoltages) -> Result<f64, AnalysisError> {
+fn lowest_mode(model: &ChartVariant, voltages: &PortVoltages) -> Result<f64, AnalysisError> {
     let found = modes(model.moving(), 4, voltages)?.frequencies_hz;
     let highest = found.last().copied().unwrap_or(0.0);
     found.into_iter().find(|f| *f > 1e-6 * highest && *f > 0.0).ok_or_else(|| AnalysisError::BadRequest {

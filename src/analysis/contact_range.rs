@@ -2,7 +2,7 @@
 //! no contact at the ends of their fingers: what goes through is told.
 
 use super::AnalysisError;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::Domain;
 use crate::multibody::planar::Pose;
 
@@ -10,7 +10,7 @@ use crate::multibody::planar::Pose;
 ///
 /// # Errors
 /// [`AnalysisError::ContactRange`] with the gap.
-pub(crate) fn within_contact_range(compiled: &Compiled, q: &[Pose]) -> Result<(), AnalysisError> {
+pub(crate) fn within_contact_range(compiled: &CompiledModel, q: &[Pose]) -> Result<(), AnalysisError> {
     let system = &compiled.parts.system;
     match system.overrun(q) {
         None => Ok(()),
@@ -23,7 +23,7 @@ pub(crate) fn within_contact_range(compiled: &Compiled, q: &[Pose]) -> Result<()
 }
 
 /// What to say of that comb.
-pub(crate) fn comb_beyond_told(compiled: &Compiled, q: &[Pose]) -> Option<String> {
+pub(crate) fn comb_beyond_told(compiled: &CompiledModel, q: &[Pose]) -> Option<String> {
     let (name, [way, room]) = comb_beyond(compiled, q)?;
     Some(format!(
         "the comb `{name}` closes by {:.3} µm, and its fingers have {:.3} µm to the other side: nothing stops them there",
@@ -34,7 +34,7 @@ pub(crate) fn comb_beyond_told(compiled: &Compiled, q: &[Pose]) -> Option<String
 
 /// The comb whose fingers go furthest through the other side at `q`: its name, and how far its sides have come together of how
 /// much they can [m].
-pub(crate) fn comb_beyond<'a>(compiled: &'a Compiled, q: &[Pose]) -> Option<(&'a str, [f64; 2])> {
+pub(crate) fn comb_beyond<'a>(compiled: &'a CompiledModel, q: &[Pose]) -> Option<(&'a str, [f64; 2])> {
     let system = &compiled.parts.system;
     // combs are the first gaps, in their order
     let beyond = compiled.structure.combs.iter().zip(&system.members).filter_map(|(comb, gap)| {

@@ -1,22 +1,22 @@
 //! Equilibrium paths: how a mechanism's equilibria go on while one load, voltage, temperature or stress grows, past folds
 //! and through bifurcations.
 use super::contact_range::{comb_beyond_told, within_contact_range};
-use super::statics::{OperatingPoint, beam_motions, node_motions, operating_point, source_vector, told_at, too_hot};
+use super::statics::{OperatingPoint, beam_motions, node_motions, notes_at, operating_point, source_vector, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, Watch};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
-use crate::readout::signal::{Signal, View};
-use crate::solve::continuation::{Branch, Continuation, ContinuationOptions, Event, PathEnd, Traced};
-use crate::solve::family::Blend;
+use crate::readout::signal::{Signal, SignalView};
+use crate::solve::continuation::{Branch, Continuation, ContinuationOptions, PathEnd, PathEvent, TracedPath};
+use crate::solve::family::LoadFamily;
 use serde::Serialize;
 
 /// What grows along the path.
 #[derive(Debug, Clone)]
-pub enum Growing<'a> {
+pub enum PathInput<'a> {
     /// Voltage of a port, by name.
     Port(&'a str),
     /// A netlist parameter; the netlist compiled with its last value.
-    Parameter(&'a Compiled),
+    Parameter(&'a CompiledModel),
     /// The factor on all dead loads.
     Loads,
 }
@@ -25,7 +25,7 @@ pub enum Growing<'a> {
 #[derive(Debug, Clone)]
 pub struct ContinuationRequest<'a> {
     /// What grows.
-    pub growing: Growing<'a>,
+    pub growing: PathInput<'a>,
     /// Its first value [V, the parameter's unit, or 1]. The path starts at the equilibrium there.
     pub from: f64,
     /// Its last value.
@@ -84,7 +84,7 @@ pub struct ContinuationResult {
 /// # Errors
 /// See [`AnalysisError`].
 pub fn trace(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     request: &ContinuationRequest<'_>,
     watch: Watch<'_>,
 ) -> Result<ContinuationResult, AnalysisError> {
@@ -100,20 +100,20 @@ pub fn trace(
     let mut volts = [request.voltages.clone(), request.voltages.clone()];
     let mut last = compiled;
     match request.growing {
-        Growing::Port(name) => {
+        PathInput::Port(name) => {
             for (volts, value) in volts.iter_mut().zip([request.from, request.to]) {
                 volts.retain(|(port, _)| port != name);
                 volts.push((name.to_owned(), value));
             }
         }
-        Growing::Parameter(to) => last = to,
-        Growing::Loads => {}
+        PathInput::Parameter(to) => last = to,
+        PathInput::Loads => {}
     }
     let system = &compiled.parts.system;
     let sources = [source_vector(compiled, &volts[0])?, source_vector(last, &volts[1])?];
-    let mut family =
-        Blend::new(system, &sources[0], &last.parts.system, &sources[1]).map_err(|e| bad("along", e.to_string()))?;
-    let start = if matches!(request.growing, Growing::Loads) {
+    let mut family = LoadFamily::new(system, &sources[0], &last.parts.system, &sources[1])
+        .map_err(|e| bad("along", e.to_string()))?;
+    let start = if matches!(request.growing, PathInput::Loads) {
         family.scale_loads([request.from, request.to]);
         let mut first = compiled.clone();
         first.parts.system = family.system().clone();
@@ -141,25 +141,25 @@ pub fn trace(
             *u = a + point.s * (b - a);
         }
         system.electrics.steady(&u, &mut rise, &mut drive);
-        let view = View { q: &point.q, v: &zeros, rise: &rise, volts: &drive.volts };
+        let view = SignalView { q: &point.q, v: &zeros, rise: &rise, volts: &drive.volts };
         for (column, signal) in columns.iter_mut().zip(&signals) {
             column.push(signal.value(compiled, &view));
         }
     }
-    let critical = |kind: Event| -> Vec<CriticalPoint> {
+    let critical = |kind: PathEvent| -> Vec<CriticalPoint> {
         let of_kind = traced.events.iter().filter(|(event, _)| *event == kind);
         of_kind.map(|&(_, point)| CriticalPoint { value: value(traced.points[point].s), point }).collect()
     };
-    let mut warnings = told_on_the_way(compiled, &start, &sources, &traced);
-    warnings.extend(told(&traced, value));
+    let mut warnings = path_notes(compiled, &start, &sources, &traced);
+    warnings.extend(event_notes(&traced, value));
     Ok(ContinuationResult {
         values: traced.points.iter().map(|p| value(p.s)).collect(),
         signals: (request.signals.iter().zip(&signals).zip(columns))
             .map(|((name, signal), column)| (name.clone(), signal.unit().to_owned(), column))
             .collect(),
         negative: traced.points.iter().map(|p| p.negative).collect(),
-        folds: critical(Event::Fold),
-        bifurcations: critical(Event::Bifurcation),
+        folds: critical(PathEvent::Fold),
+        bifurcations: critical(PathEvent::Bifurcation),
         end: match traced.end {
             PathEnd::Arrived => "arrived",
             PathEnd::TurnedBack => "turned back",
@@ -177,11 +177,11 @@ pub fn trace(
 }
 
 /// What is to be known of the equilibrium where a path starts, the first point at which a comb is beyond its range, and the hottest.
-fn told_on_the_way(
-    compiled: &Compiled,
+fn path_notes(
+    compiled: &CompiledModel,
     start: &OperatingPoint,
     [from, to]: &[Vec<f64>; 2],
-    traced: &Traced,
+    traced: &TracedPath,
 ) -> Vec<String> {
     let electrics = &compiled.parts.system.electrics;
     let mut drive = electrics.drive();
@@ -193,7 +193,7 @@ fn told_on_the_way(
     };
     let begins = |way: String| format!("the equilibrium that it starts from: {way}");
     let farthest = traced.points.iter().map(|p| p.s).fold(0.0, f64::max);
-    told_at(compiled, start)
+    notes_at(compiled, start)
         .into_iter()
         .map(begins)
         .chain(traced.points.iter().find_map(|point| comb_beyond_told(compiled, &point.q)))
@@ -202,7 +202,7 @@ fn told_on_the_way(
 }
 
 /// What is to be known of a path whose points have these values.
-fn told(traced: &Traced, value: impl Fn(f64) -> f64) -> Vec<String> {
+fn event_notes(traced: &TracedPath, value: impl Fn(f64) -> f64) -> Vec<String> {
     let at = |point: &usize| value(traced.points[*point].s);
     let rough = traced.rough.iter().map(|point| {
         format!("the path was lost next to the fold or bifurcation at {:.4e}, which is not located closely", at(point))

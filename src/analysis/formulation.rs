@@ -10,9 +10,9 @@
 use super::AnalysisError;
 use super::integrator::Integrator;
 use super::transient::options::TransientOptions;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::System;
-use crate::multibody::rcr::{Linkage, Parent};
+use crate::multibody::rcr::{Linkage, LinkageParent};
 use crate::multibody::{BodyId, Model};
 use crate::solve::baseline::SolverKind;
 use crate::solve::fastest::fastest;
@@ -26,7 +26,7 @@ const FEW: f64 = 3e3;
 
 /// What `auto` takes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Suited {
+pub struct ChosenFormulation {
     /// Compliant or rcr.
     pub formulation: Formulation,
     /// Why, in words.
@@ -35,10 +35,10 @@ pub struct Suited {
 
 impl Formulation {
     /// What `auto` takes for a run of `stop` [s], or where steps are the caller's (none).
-    pub fn suited(compiled: &Compiled, stop: Option<f64>) -> Suited {
+    pub fn suited(compiled: &CompiledModel, stop: Option<f64>) -> ChosenFormulation {
         let system = &compiled.parts.system;
         let model = &system.model;
-        let compliant = |why: &str| Suited { formulation: Self::Compliant, why: why.to_owned() };
+        let compliant = |why: &str| ChosenFormulation { formulation: Self::Compliant, why: why.to_owned() };
         let mut beams = model.sections.iter().filter(|s| s.is_segment());
         if model.linear {
             return compliant("small displacements");
@@ -59,7 +59,7 @@ impl Formulation {
             return compliant("joints only turn, but the fastest is too fast for explicit steps");
         }
         let (n, unknowns) = (linkage.coordinates, model.unknowns());
-        Suited {
+        ChosenFormulation {
             formulation: Self::Rcr,
             why: format!(
                 "joints only turn and close no loop: {n} coordinates for {unknowns}, explicit steps with rk45, stable from some {:.0} on",
@@ -71,11 +71,11 @@ impl Formulation {
     /// The formulation and the method of a run: `auto` decided, with the reason, everything else as it was asked for. A method
     /// other than the default, equal steps and a baseline's solver are those of the bodies; so is the equilibrium that a
     /// release starts from.
-    pub fn of_run(compiled: &Compiled, options: &TransientOptions<'_>) -> (Suited, Integrator) {
+    pub fn of_run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> (ChosenFormulation, Integrator) {
         let method = options.method;
         let asked = compiled.options.formulation;
         if asked != Self::Auto {
-            return (Suited { formulation: asked, why: "as asked".into() }, method);
+            return (ChosenFormulation { formulation: asked, why: "as asked".into() }, method);
         }
         let plain = method == Integrator::Rodas4
             && options.step.is_none()
@@ -83,7 +83,7 @@ impl Formulation {
             && options.release.is_none();
         if !plain {
             let why = "a release, a method, equal steps or a solver was asked for".into();
-            return (Suited { formulation: Self::Compliant, why }, method);
+            return (ChosenFormulation { formulation: Self::Compliant, why }, method);
         }
         let suited = Self::suited(compiled, Some(options.stop));
         let method = if suited.formulation == Self::Rcr { Integrator::Rk45 } else { method };
@@ -138,7 +138,7 @@ impl Formulation {
 pub fn coordinate_scales(linkage: &Linkage, length: f64) -> Vec<f64> {
     let mut scale = vec![length; linkage.coordinates];
     for link in &linkage.links {
-        let moving = (0..3).filter(|&i| link.parent == Parent::Free || link.moving[i]);
+        let moving = (0..3).filter(|&i| link.parent == LinkageParent::Free || link.moving[i]);
         for (next, i) in moving.enumerate() {
             if i == 2 {
                 scale[link.first + next] = length / link.lever;

@@ -9,9 +9,9 @@ mod motion;
 use super::modes::{ModesResult, normalized};
 use super::statics::{NodeMotion, StaticResult, electrical, source_vector};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
-use crate::compile::Compiled;
-use crate::discretize::frame::{Elements, Frame, FrameGaps, FrameOptions, assemble};
-use crate::domains::{At, Domain, Drive, Member, Point};
+use crate::compile::CompiledModel;
+use crate::discretize::frame::{ElementCount, FrameGaps, FrameOptions, LinearFrame, assemble};
+use crate::domains::{Configuration, Domain, Drive, MaterialPoint, Member};
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
@@ -23,7 +23,7 @@ use crate::solve::linear::LinearSolver;
 pub use motion::frame_transient;
 
 /// Newton iterations of an equilibrium, at most.
-const MOST_ITERATIONS: usize = 100;
+const MAX_ITERATIONS: usize = 100;
 /// Iterations after which a correction that does not shrink is rounding, where gaps pull.
 const FEW: usize = 20;
 /// A change below this share of the displacements is none.
@@ -33,10 +33,10 @@ const SETTLED: f64 = 1e-12;
 ///
 /// # Errors
 /// [`AnalysisError::BadRequest`] for drawings that make no frame.
-pub fn frame(compiled: &Compiled) -> Result<Frame, AnalysisError> {
+pub fn frame(compiled: &CompiledModel) -> Result<LinearFrame, AnalysisError> {
     let options = &compiled.options;
-    let elements = options.band.map_or(Elements::Each(1), |band| Elements::Band(band, options.tol));
-    let elements = options.segments.map_or(elements, Elements::Each);
+    let elements = options.band.map_or(ElementCount::Each(1), |band| ElementCount::Band(band, options.tol));
+    let elements = options.segments.map_or(elements, ElementCount::Each);
     let gaps = FrameGaps::Laid { chord: options.as_sugar };
     frame_with(compiled, &FrameOptions { elements, shear: options.shear, undamped: options.undamped, gaps })
 }
@@ -45,7 +45,7 @@ pub fn frame(compiled: &Compiled) -> Result<Frame, AnalysisError> {
 ///
 /// # Errors
 /// [`AnalysisError::BadRequest`] for drawings that make no frame.
-pub fn frame_with(compiled: &Compiled, options: &FrameOptions) -> Result<Frame, AnalysisError> {
+pub fn frame_with(compiled: &CompiledModel, options: &FrameOptions) -> Result<LinearFrame, AnalysisError> {
     assemble(&compiled.structure, options)
         .map_err(|e| AnalysisError::BadRequest { what: "frame".into(), detail: e.to_string() })
 }
@@ -55,8 +55,8 @@ pub fn frame_with(compiled: &Compiled, options: &FrameOptions) -> Result<Frame, 
 /// # Errors
 /// See [`AnalysisError`].
 pub fn frame_statics(
-    compiled: &Compiled,
-    frame: &Frame,
+    compiled: &CompiledModel,
+    frame: &LinearFrame,
     voltages: &PortVoltages,
 ) -> Result<(StaticResult, BeamMotions), AnalysisError> {
     let (sources, rise, drive) = sources(compiled, voltages)?;
@@ -90,8 +90,8 @@ pub fn frame_statics(
 /// # Errors
 /// See [`AnalysisError`].
 pub fn frame_modes(
-    compiled: &Compiled,
-    frame: &Frame,
+    compiled: &CompiledModel,
+    frame: &LinearFrame,
     count: usize,
     voltages: &PortVoltages,
 ) -> Result<(ModesResult, Vec<BeamMotions>), AnalysisError> {
@@ -119,7 +119,7 @@ pub fn frame_modes(
 }
 
 /// Source voltages, steady rises, and what they drive.
-fn sources(compiled: &Compiled, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec<f64>, Drive), AnalysisError> {
+fn sources(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec<f64>, Drive), AnalysisError> {
     let electrics = &compiled.parts.system.electrics;
     let sources = source_vector(compiled, voltages)?;
     let mut rise = vec![0.0; electrics.heating.heaters.len()];
@@ -129,7 +129,7 @@ fn sources(compiled: &Compiled, voltages: &PortVoltages) -> Result<(Vec<f64>, Ve
 }
 
 /// Source voltages and steady rises; refuses voltages that would act across gaps.
-fn steady(compiled: &Compiled, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec<f64>), AnalysisError> {
+fn steady(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec<f64>), AnalysisError> {
     let (sources, rise, drive) = sources(compiled, voltages)?;
     if let Some(gap) = drive.volts.iter().position(|v| *v != 0.0) {
         return Err(AnalysisError::BadRequest {
@@ -144,7 +144,7 @@ fn steady(compiled: &Compiled, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec
 }
 
 /// Forces of loads, built-in strains and heat.
-fn force(compiled: &Compiled, frame: &Frame, rise: &[f64], out: &mut [Pose]) {
+fn force(compiled: &CompiledModel, frame: &LinearFrame, rise: &[f64], out: &mut [Pose]) {
     out.copy_from_slice(&frame.load);
     let heaters = &compiled.parts.system.electrics.heating.heaters;
     for ((heater, rise), unit) in heaters.iter().zip(rise).zip(&frame.expansion) {
@@ -156,8 +156,8 @@ fn force(compiled: &Compiled, frame: &Frame, rise: &[f64], out: &mut [Pose]) {
 
 /// The equilibrium with these voltages across the gaps, from the drawing by Newton's method, and its iterations.
 fn balance(
-    compiled: &Compiled,
-    frame: &Frame,
+    compiled: &CompiledModel,
+    frame: &LinearFrame,
     rise: &[f64],
     volts: &[f64],
 ) -> Result<(Vec<Pose>, usize), AnalysisError> {
@@ -168,7 +168,7 @@ fn balance(
     let mut q = vec![Pose::zeros(); system.bodies()];
     let (mut tangent, mut before) = (system.clone(), f64::INFINITY);
     let size = compiled.structure.extent();
-    for iteration in 1..=MOST_ITERATIONS {
+    for iteration in 1..=MAX_ITERATIONS {
         tangent.stiffness.clone_from(&system.stiffness);
         let mut change = load.clone();
         let mut borne = vec![Pose::zeros(); system.bodies()];
@@ -218,38 +218,38 @@ fn amount(q: &[Pose], size: f64) -> f64 {
 }
 
 /// The gaps with a voltage across them.
-fn acting<'a>(frame: &'a Frame, volts: &'a [f64]) -> impl Iterator<Item = (&'a Member, f64)> {
+fn acting<'a>(frame: &'a LinearFrame, volts: &'a [f64]) -> impl Iterator<Item = (&'a Member, f64)> {
     frame.gaps.iter().zip(volts.iter().copied()).filter(|(_, volts)| *volts != 0.0)
 }
 
 /// Small displacements about the drawing.
-fn drawn(q: &[Pose]) -> At<'_> {
-    At { q, linear: true }
+fn drawn(q: &[Pose]) -> Configuration<'_> {
+    Configuration { q, linear: true }
 }
 
 /// Adds what the field in the gaps does to the stiffness at `q`, contact with it.
-fn add_gap_stiffness(frame: &Frame, q: &[Pose], volts: &[f64], stiffness: &mut BlockMatrix<f64, 3>) {
+fn add_gap_stiffness(frame: &LinearFrame, q: &[Pose], volts: &[f64], stiffness: &mut BlockMatrix<f64, 3>) {
     for (gap, volts) in acting(frame, volts) {
         gap.add_tangent(drawn(q), volts, &frame.system.pattern, stiffness);
     }
 }
 
-fn singular(frame: &Frame, pivot: ZeroPivot) -> AnalysisError {
+fn singular(frame: &LinearFrame, pivot: ZeroPivot) -> AnalysisError {
     let (body, direction) = (frame.system.names[pivot.body].clone(), crate::solve::DIRECTIONS[pivot.direction]);
     SolveError::Singular { body, direction }.into()
 }
 
-fn node_motions(compiled: &Compiled, frame: &Frame, q: &[Pose]) -> NodeMotions {
+fn node_motions(compiled: &CompiledModel, frame: &LinearFrame, q: &[Pose]) -> NodeMotions {
     (compiled.structure.nodes.iter().zip(&frame.nodes))
         .filter_map(|(node, point)| Some((node.name.clone(), motion(&(*point)?, q))))
         .collect()
 }
 
-fn beam_motions(frame: &Frame, q: &[Pose]) -> BeamMotions {
+fn beam_motions(frame: &LinearFrame, q: &[Pose]) -> BeamMotions {
     frame.beams.iter().map(|points| points.iter().map(|p| motion(p, q)).collect()).collect()
 }
 
-fn motion(point: &Point, q: &[Pose]) -> NodeMotion {
+fn motion(point: &MaterialPoint, q: &[Pose]) -> NodeMotion {
     let moved = point.displacement(q, true);
     NodeMotion { x: moved.x, y: moved.y, rz: point.rotation(q) }
 }

@@ -5,13 +5,13 @@
 //! equilibrium by K⁻¹·δr, which is its error of order h⁴.
 
 use super::statics::OperatingPoint;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 
 /// The gap with the largest part in that error of an equilibrium, and the error of the largest displacement of a node [1]: infinite
 /// where the tangent is singular, none without gaps along beams.
-pub(super) fn left_out(compiled: &Compiled, point: &OperatingPoint) -> Option<(String, f64)> {
+pub(super) fn left_out(compiled: &CompiledModel, point: &OperatingPoint) -> Option<(String, f64)> {
     if compiled.structure.beam_gaps.is_empty() {
         return None;
     }

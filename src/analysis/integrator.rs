@@ -11,7 +11,7 @@ use crate::solve::time::average_field::AverageField;
 use crate::solve::time::dirk::Dirk;
 use crate::solve::time::doubling::Doubling;
 use crate::solve::time::explicit::{self, Rk45};
-use crate::solve::time::method::{Method, Motion, Work};
+use crate::solve::time::method::{Method, Motion, SolverCounters};
 use crate::solve::time::radau5::Radau5;
 use crate::solve::time::rodas4::Rodas4;
 use crate::solve::time::tableau::{MIDPOINT, SDIRK4, TR_BDF2};
@@ -115,12 +115,12 @@ impl Integrator {
         h: f64,
         control: Control,
         observe: Observer<'_>,
-    ) -> (Result<Advance, SolveError>, Work) {
+    ) -> (Result<Advance, SolveError>, SolverCounters) {
         let mut bodies = Bodies::new(system, ramp);
-        let run = Run { motion, h, control, observe };
+        let run = IntegrationRun { motion, h, control, observe };
         match self.rule() {
-            Some(rule) => match explicit::suits(system).err().filter(|_| rule == Rule::Rk45) {
-                Some(error) => (Err(error), Work::default()),
+            Some(rule) => match explicit::suits(system).err().filter(|_| rule == IntegrationRule::Rk45) {
+                Some(error) => (Err(error), SolverCounters::default()),
                 None => rule.advance(&mut Newton::new(bodies, solver), run),
             },
             None => match self {
@@ -133,22 +133,22 @@ impl Integrator {
 
     /// The rule that it is over the equations of any formulation; none for methods that need what bodies alone have: Rodas4 has the
     /// Jacobian in its formula, Radau5 couples its stages, and average vector field needs constant inertia.
-    pub fn rule(self) -> Option<Rule> {
+    pub fn rule(self) -> Option<IntegrationRule> {
         match self {
             Self::Rodas4 | Self::AverageField | Self::Radau5 => None,
-            Self::Midpoint => Some(Rule::Midpoint),
-            Self::TrBdf2 => Some(Rule::TrBdf2),
-            Self::GeneralizedAlpha { rho } => Some(Rule::GeneralizedAlpha { rho }),
-            Self::Newmark => Some(Rule::Newmark),
-            Self::Rk45 => Some(Rule::Rk45),
-            Self::Sdirk4 => Some(Rule::Sdirk4),
+            Self::Midpoint => Some(IntegrationRule::Midpoint),
+            Self::TrBdf2 => Some(IntegrationRule::TrBdf2),
+            Self::GeneralizedAlpha { rho } => Some(IntegrationRule::GeneralizedAlpha { rho }),
+            Self::Newmark => Some(IntegrationRule::Newmark),
+            Self::Rk45 => Some(IntegrationRule::Rk45),
+            Self::Sdirk4 => Some(IntegrationRule::Sdirk4),
         }
     }
 }
 
 /// A method that any equations can have.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Rule {
+pub enum IntegrationRule {
     /// See [`Integrator::Midpoint`].
     Midpoint,
     /// See [`Integrator::TrBdf2`].
@@ -166,13 +166,13 @@ pub enum Rule {
     Sdirk4,
 }
 
-impl Rule {
+impl IntegrationRule {
     /// Goes through a run.
     pub fn advance<E: Staged>(
         self,
         equations: &mut E,
-        run: Run<'_, '_, E::Unknown>,
-    ) -> (Result<Advance, SolveError>, Work) {
+        run: IntegrationRun<'_, '_, E::Unknown>,
+    ) -> (Result<Advance, SolveError>, SolverCounters) {
         let n = equations.unknowns();
         match self {
             Self::TrBdf2 => run.with(equations, Dirk::new(n, &TR_BDF2)),
@@ -186,7 +186,7 @@ impl Rule {
 }
 
 /// What is the same for every method.
-pub struct Run<'a, 'b, X> {
+pub struct IntegrationRun<'a, 'b, X> {
     /// Where it begins; becomes where it ends.
     pub motion: &'a mut Motion<X>,
     /// First step to try [s].
@@ -197,12 +197,12 @@ pub struct Run<'a, 'b, X> {
     pub observe: Observer<'b, X>,
 }
 
-impl<X: Unknown> Run<'_, '_, X> {
+impl<X: Unknown> IntegrationRun<'_, '_, X> {
     fn with<E: Equations<Unknown = X>, M: Method<E>>(
         mut self,
         equations: &mut E,
         method: M,
-    ) -> (Result<Advance, SolveError>, Work) {
+    ) -> (Result<Advance, SolveError>, SolverCounters) {
         let mut stepper = Adaptive::new(equations.unknowns(), method);
         let end = stepper.advance(equations, self.motion, &mut self.h, self.control, usize::MAX, self.observe);
         (end, stepper.work())
@@ -212,7 +212,7 @@ impl<X: Unknown> Run<'_, '_, X> {
         self,
         equations: &mut E,
         method: M,
-    ) -> (Result<Advance, SolveError>, Work) {
+    ) -> (Result<Advance, SolveError>, SolverCounters) {
         match self.control {
             Control::Tolerance(_) => {
                 let doubled = Doubling::new(equations.unknowns(), method);

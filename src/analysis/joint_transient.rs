@@ -4,7 +4,7 @@
 //! implicit method does, whose stages the same recursion solves ([`crate::equations::constrained`]). An explicit step is about
 //! 1/ω long, ω the highest natural frequency of the model, whatever the tolerance: joints that only turn have a moderate
 //! one, elastic axial directions a very high one. The number of explicit steps is foretold, and refused when it is beyond
-//! [`MOST_STEPS`]: implicit steps follow the motion that is asked for.
+//! [`MAX_STEPS`]: implicit steps follow the motion that is asked for.
 //!
 //! A release starts from the equilibrium of the same mechanism: the compliant model with its locked directions [`RIGID`]
 //! times as stiff, mapped to joint coordinates and projected onto the loops.
@@ -15,12 +15,12 @@ mod report;
 mod rotary;
 
 use super::formulation::{Formulation, coordinate_scales};
-use super::integrator::{Integrator, Rule};
+use super::integrator::{IntegrationRule, Integrator};
 use super::transient::options::TransientOptions;
 use super::transient::record::record;
 use super::transient::result::TransientResult;
 use super::{AnalysisError, Watch};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::equations::Motion;
 use crate::multibody::rcr::Linkage;
 use crate::solve::fastest::{Fastest, fastest};
@@ -31,7 +31,7 @@ pub use rotary::RIGID;
 use std::f64::consts::TAU;
 
 /// Steps beyond which a run is refused before it begins.
-pub const MOST_STEPS: f64 = 2e7;
+pub const MAX_STEPS: f64 = 2e7;
 
 /// Integrates the motion in joint coordinates, with one of [`Integrator::IN_JOINTS`]. As [`super::transient::transient`]
 /// otherwise, with a report on the formulation.
@@ -39,7 +39,7 @@ pub const MOST_STEPS: f64 = 2e7;
 /// # Errors
 /// See [`AnalysisError`]; [`AnalysisError::BadRequest`] where joint coordinates, the method or explicit steps will not do.
 pub fn joint_transient(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     formulation: Formulation,
     options: &TransientOptions<'_>,
     sample: &mut dyn FnMut(f64, &[f64]),
@@ -54,7 +54,7 @@ pub fn joint_transient(
     let counts = formulation.lock(&system.model).counts();
     let scale = coordinate_scales(&linkage, system.length_scale);
     let top = fastest(&linkage, &scale, system.electrics.heating.heaters.len());
-    if let (Some(top), Rule::Rk45, None) = (&top, rule, options.step) {
+    if let (Some(top), IntegrationRule::Rk45, None) = (&top, rule, options.step) {
         affordable(formulation, &linkage, top, options.stop)?;
     }
     let start = options.release.map(|start| rotary::locked(start, formulation));
@@ -77,7 +77,7 @@ pub fn joint_transient(
         linkage,
         scale,
     };
-    let rotary = rotary::told(compiled, formulation, options);
+    let rotary = rotary::rotary_inertia_warning(compiled, formulation, options);
     let options = TransientOptions { release: start.as_ref(), ..options.clone() };
     let mut result = record(compiled, &options, &mut carrier, sample, watch)?;
     result.warnings.extend(rotary);
@@ -97,7 +97,7 @@ fn open(gap: f64, most: f64) -> Option<String> {
 }
 
 /// The method asked for, which has to be one for any equations.
-fn rule(formulation: Formulation, options: &TransientOptions<'_>) -> Result<Rule, AnalysisError> {
+fn rule(formulation: Formulation, options: &TransientOptions<'_>) -> Result<IntegrationRule, AnalysisError> {
     let method = options.method;
     method.rule().ok_or_else(|| AnalysisError::BadRequest {
         what: format!("method {}", method.name()),
@@ -112,7 +112,7 @@ fn rule(formulation: Formulation, options: &TransientOptions<'_>) -> Result<Rule
 
 fn affordable(formulation: Formulation, linkage: &Linkage, top: &Fastest, stop: f64) -> Result<(), AnalysisError> {
     let steps = stop * top.omega;
-    if steps <= MOST_STEPS {
+    if steps <= MAX_STEPS {
         return Ok(());
     }
     Err(AnalysisError::BadRequest {

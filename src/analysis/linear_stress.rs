@@ -5,13 +5,13 @@
 //! (K + K_σ)·x' = K·x for the deflection x: with K_σ the same forces would bring x' (second-order theory; Timoshenko and Gere 1961, §1.11).
 
 use super::statics::OperatingPoint;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 
 /// How far the deflection `x` of a linear model is off for want of the stiffness that the stress at `point` brings, as a share of the
 /// largest that is told; infinite beyond the buckling load. None where the model is not linear.
-pub(super) fn left_out(compiled: &Compiled, point: &OperatingPoint, x: &[Pose]) -> Option<f64> {
+pub(super) fn left_out(compiled: &CompiledModel, point: &OperatingPoint, x: &[Pose]) -> Option<f64> {
     let system = &compiled.parts.system;
     let model = &system.model;
     if !model.linear {

@@ -2,15 +2,15 @@
 use super::contact_range::comb_beyond_told;
 use super::loose_parts;
 use super::rotary_left_out;
-use super::sensitivity::About;
-use super::statics::{NodeMotion, operating_point, told_at, too_hot};
+use super::sensitivity::LinearizationPoint;
+use super::statics::{NodeMotion, notes_at, operating_point, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
-use crate::compile::{Compiled, HigherMode, LowestMode};
-use crate::domains::{Domain, Drive, Point};
+use crate::compile::{CompiledModel, HigherMode, LowestMode};
+use crate::domains::{Domain, Drive, MaterialPoint};
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::{add_damping, add_inertia};
 use crate::multibody::planar::Pose;
-use crate::readout::signal::{Signal, View};
+use crate::readout::signal::{Signal, SignalView};
 use crate::refine::axial::axial_forces;
 use crate::refine::doubling;
 use crate::refine::order_error::{own_stiffness, relative_of_loaded_modes};
@@ -62,7 +62,7 @@ const ROUNDED: f64 = 1e-4;
 ///
 /// # Errors
 /// See [`AnalysisError`]; `NotConverged` rather than a frequency that cannot be trusted.
-pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<ModesResult, AnalysisError> {
+pub fn modes(compiled: &CompiledModel, count: usize, voltages: &PortVoltages) -> Result<ModesResult, AnalysisError> {
     let (mut result, q, shapes) = shapeless(compiled, count, voltages)?;
     result.shapes = shapes.iter().map(|x| shape(compiled, &q, x, false).0).collect();
     Ok(result)
@@ -70,7 +70,7 @@ pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
 
 /// The lowest mode about the equilibrium without voltages; none where its error is not known. A scheme that has no estimate of its own is
 /// compared with `twice` the segments.
-pub(super) fn lowest(compiled: &Compiled, twice: impl FnOnce() -> Option<Compiled>) -> Option<LowestMode> {
+pub(super) fn lowest(compiled: &CompiledModel, twice: impl FnOnce() -> Option<CompiledModel>) -> Option<LowestMode> {
     let (found, _, shapes) = shapeless(compiled, 1, &[]).ok()?;
     let frequency_hz = *found.frequencies_hz.first()?;
     let quality = quality(compiled, shapes.first()?, frequency_hz);
@@ -85,7 +85,7 @@ pub(super) fn lowest(compiled: &Compiled, twice: impl FnOnce() -> Option<Compile
 }
 
 /// The modes above the lowest, of the `count` lowest about the equilibrium without voltages, whose errors are known; none where they cannot be found.
-pub(super) fn higher(compiled: &Compiled, count: usize) -> Vec<HigherMode> {
+pub(super) fn higher(compiled: &CompiledModel, count: usize) -> Vec<HigherMode> {
     let Ok((found, _, shapes)) = shapeless(compiled, count, &[]) else { return Vec::new() };
     let modes = found.frequencies_hz.iter().zip(&found.errors).zip(shapes).skip(1);
     let known = modes.filter_map(|((frequency, error), shape)| {
@@ -99,7 +99,7 @@ pub(super) fn higher(compiled: &Compiled, count: usize) -> Vec<HigherMode> {
 }
 
 /// Quality of a mode by drag and dampers [1].
-fn quality(compiled: &Compiled, shape: &[Pose], frequency_hz: f64) -> f64 {
+fn quality(compiled: &CompiledModel, shape: &[Pose], frequency_hz: f64) -> f64 {
     let model = &compiled.parts.system.model;
     let mut drag = vec![Pose::zeros(); shape.len()];
     add_damping(model, shape, &mut drag);
@@ -109,7 +109,7 @@ fn quality(compiled: &Compiled, shape: &[Pose], frequency_hz: f64) -> f64 {
 
 /// True where modes are about an equilibrium that is not the drawing. As SUGAR has it, that is where voltages pull across gaps: its beams
 /// are as stiff as drawn, whatever they bear.
-pub(super) fn about_equilibrium(compiled: &Compiled, voltages: &PortVoltages) -> bool {
+pub(super) fn about_equilibrium(compiled: &CompiledModel, voltages: &PortVoltages) -> bool {
     let system = &compiled.parts.system;
     let driven = !voltages.is_empty() || system.electrics.fixed.iter().any(|v| *v != 0.0);
     if compiled.options.as_sugar {
@@ -125,7 +125,7 @@ pub(super) fn about_equilibrium(compiled: &Compiled, voltages: &PortVoltages) ->
 /// # Errors
 /// See [`modes`].
 pub fn modes_with_curves(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     count: usize,
     voltages: &PortVoltages,
 ) -> Result<(ModesResult, Vec<BeamMotions>), AnalysisError> {
@@ -138,7 +138,7 @@ pub fn modes_with_curves(
 /// Modes without the motion of nodes; the equilibrium that they are about, and shapes of the bodies.
 type Shapeless = (ModesResult, Vec<Pose>, Vec<Vec<Pose>>);
 
-fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<Shapeless, AnalysisError> {
+fn shapeless(compiled: &CompiledModel, count: usize, voltages: &PortVoltages) -> Result<Shapeless, AnalysisError> {
     let system = &compiled.parts.system;
     let mut drive = system.electrics.drive();
     let (as_sugar, loaded) = (compiled.options.as_sugar, about_equilibrium(compiled, voltages));
@@ -149,7 +149,7 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     let mut way = Vec::new();
     let q = if loaded {
         let point = operating_point(compiled, voltages)?;
-        way = told_at(compiled, &point);
+        way = notes_at(compiled, &point);
         way.extend(comb_beyond_told(compiled, &point.q));
         way.extend(too_hot(compiled, &point));
         let driven = point.drive(compiled);
@@ -193,31 +193,31 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     let mut errors = estimated(compiled, &tangent, &forces, &found);
     errors.iter_mut().zip(&rigid).filter(|(_, rigid)| **rigid).for_each(|(error, _)| *error = Some(0.0));
     let modes = (&found.lambda[..count.min(found.lambda.len())], found.shapes.as_slice());
-    let about = About { compiled, q: &q, drive: &drive, stressed: !as_sugar, modes };
+    let about = LinearizationPoint { compiled, q: &q, drive: &drive, stressed: !as_sugar, modes };
     let per_deflection = if loaded { about.to_deflection() } else { Vec::new() };
     let way = way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}"));
     let rigid = rigid.iter().take(count).filter(|rigid| **rigid).count();
     let warnings = way.chain(loose_parts::warning(system, rigid)).collect();
-    let result = judged(compiled, count, &q, (errors, warnings), &mut found);
+    let result = assess(compiled, count, &q, (errors, warnings), &mut found);
     Ok((ModesResult { per_deflection, ..result }, q, found.shapes))
 }
 
 /// What there is to tell of `count` modes about `q`, of which some more may have been found; those are taken away. With the estimated errors
 /// of them all, and what is to be warned of besides.
-fn judged(
-    compiled: &Compiled,
+fn assess(
+    compiled: &CompiledModel,
     count: usize,
     q: &[Pose],
     (mut errors, more): (Vec<Option<f64>>, Vec<String>),
     found: &mut Modes,
 ) -> ModesResult {
-    let mut warnings = told(compiled, count, q, (&found.lambda, found.rounding));
+    let mut warnings = notes(compiled, count, q, (&found.lambda, found.rounding));
     warnings.extend(more);
     errors.truncate(count);
     found.lambda.truncate(count);
     found.shapes.truncate(count);
     found.residuals.truncate(count);
-    warnings.extend(rotary_left_out::told(compiled, &found.shapes));
+    warnings.extend(rotary_left_out::rotary_inertia_note(compiled, &found.shapes));
     ModesResult {
         estimated_error: None,
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
@@ -233,9 +233,14 @@ fn judged(
 
 /// The result of modes that have been found about the drawn geometry, on which nothing acts, with their errors and likeness; without the
 /// motion of nodes.
-pub(super) fn unloaded(compiled: &Compiled, count: usize, mut found: Modes, errors: Vec<(f64, f64)>) -> ModesResult {
+pub(super) fn unloaded(
+    compiled: &CompiledModel,
+    count: usize,
+    mut found: Modes,
+    errors: Vec<(f64, f64)>,
+) -> ModesResult {
     let q = vec![Pose::zeros(); compiled.parts.system.bodies()];
-    judged(compiled, count, &q, (errors.into_iter().map(sure).collect(), Vec::new()), &mut found)
+    assess(compiled, count, &q, (errors.into_iter().map(sure).collect(), Vec::new()), &mut found)
 }
 
 /// The estimate of a mode that is in its reference; none where it says nothing.
@@ -244,7 +249,12 @@ fn sure((error, like): (f64, f64)) -> Option<f64> {
 }
 
 /// Estimated errors of modes about an equilibrium with this tangent, where the beams carry these axial forces.
-fn estimated(compiled: &Compiled, tangent: &BlockMatrix<f64, 3>, forces: &[f64], found: &Modes) -> Vec<Option<f64>> {
+fn estimated(
+    compiled: &CompiledModel,
+    tangent: &BlockMatrix<f64, 3>,
+    forces: &[f64],
+    found: &Modes,
+) -> Vec<Option<f64>> {
     let options = &compiled.options;
     let model = &compiled.parts.system.model;
     let (lambda, none) = (&found.lambda, vec![None; found.lambda.len()]);
@@ -271,14 +281,14 @@ fn estimated(compiled: &Compiled, tangent: &BlockMatrix<f64, 3>, forces: &[f64],
 }
 
 /// Largest displacement of a node [m].
-fn deflection(compiled: &Compiled, q: &[Pose]) -> f64 {
+fn deflection(compiled: &CompiledModel, q: &[Pose]) -> f64 {
     let linear = compiled.parts.system.model.linear;
-    let moved = |point: &Option<Point>| point.map_or(0.0, |p| p.displacement(q, linear).norm());
+    let moved = |point: &Option<MaterialPoint>| point.map_or(0.0, |p| p.displacement(q, linear).norm());
     compiled.parts.nodes.iter().map(moved).fold(0.0, f64::max)
 }
 
 /// What modes do not say by themselves: that there are fewer, that the equilibrium is far from the drawing or unstable.
-fn told(compiled: &Compiled, count: usize, q: &[Pose], (lambda, rounding): (&[f64], f64)) -> Vec<String> {
+fn notes(compiled: &CompiledModel, count: usize, q: &[Pose], (lambda, rounding): (&[f64], f64)) -> Vec<String> {
     let mut warnings = Vec::new();
     if lambda.len() < count {
         let found = lambda.len();
@@ -308,11 +318,11 @@ fn told(compiled: &Compiled, count: usize, q: &[Pose], (lambda, rounding): (&[f6
 }
 
 /// Displacements of the nodes and, where they are asked for, along the beams in a mode, the largest translation of a node scaled to 1.
-fn shape(compiled: &Compiled, q: &[Pose], x: &[Pose], along: bool) -> (NodeMotions, BeamMotions) {
+fn shape(compiled: &CompiledModel, q: &[Pose], x: &[Pose], along: bool) -> (NodeMotions, BeamMotions) {
     let zeros = vec![Pose::zeros(); q.len()];
     let (state, change) =
-        (View { q, v: &zeros, rise: &[], volts: &[] }, View { q: x, v: &zeros, rise: &[], volts: &[] });
-    let at = |point: Point| {
+        (SignalView { q, v: &zeros, rise: &[], volts: &[] }, SignalView { q: x, v: &zeros, rise: &[], volts: &[] });
+    let at = |point: MaterialPoint| {
         let at = |d: usize| Signal::Displacement(point, d).slope(compiled, &state, &change);
         NodeMotion { x: at(0), y: at(1), rz: at(2) }
     };

@@ -5,25 +5,25 @@
 
 use super::PortVoltages;
 use super::modes::{GUARDS, ModesResult, about_equilibrium, unloaded};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::BlockMatrix;
 use crate::multibody::lanes::LANES;
 use crate::multibody::planar::Pose;
-use crate::refine::side_by_side::{LaneReference, Variant};
+use crate::refine::side_by_side::{BatchVariant, LaneReference};
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
 use crate::solve::frequency::side_by_side::LaneModes;
 
 /// Lanes for variants like one of them.
 #[derive(Debug, Clone)]
-pub(crate) struct ModesSideBySide {
+pub(crate) struct BatchModes {
     lanes: LaneModes,
     reference: LaneReference,
     count: usize,
 }
 
-impl ModesSideBySide {
+impl BatchModes {
     /// For the `count` lowest modes of variants like `first`; none where it has no lanes.
-    pub(crate) fn new(first: &Compiled, count: usize, voltages: &PortVoltages) -> Option<Self> {
+    pub(crate) fn new(first: &CompiledModel, count: usize, voltages: &PortVoltages) -> Option<Self> {
         if !at_rest(first, voltages) {
             return None;
         }
@@ -40,7 +40,7 @@ impl ModesSideBySide {
     }
 
     /// The modes of each variant; none for one whose modes have to be found alone. Shapes of nodes are left out.
-    pub(crate) fn results(&self, variants: &[&Compiled], voltages: &PortVoltages) -> Vec<Option<ModesResult>> {
+    pub(crate) fn results(&self, variants: &[&CompiledModel], voltages: &PortVoltages) -> Vec<Option<ModesResult>> {
         let mut results: Vec<Option<ModesResult>> = vec![None; variants.len()];
         let fits = |&k: &usize| at_rest(variants[k], voltages) && self.lanes.fits(&variants[k].parts.system);
         let able: Vec<usize> = (0..variants.len()).filter(fits).collect();
@@ -61,12 +61,12 @@ impl ModesSideBySide {
     }
 }
 
-fn drawn(compiled: &Compiled) -> Variant<'_> {
+fn drawn(compiled: &CompiledModel) -> BatchVariant<'_> {
     (&compiled.structure, &compiled.options, &compiled.parts)
 }
 
 /// True where nothing acts on the drawn geometry.
-fn at_rest(compiled: &Compiled, voltages: &PortVoltages) -> bool {
+fn at_rest(compiled: &CompiledModel, voltages: &PortVoltages) -> bool {
     let system = &compiled.parts.system;
     !about_equilibrium(compiled, voltages)
         && system.model.loose().next().is_none()

@@ -14,23 +14,23 @@ mod sweep;
 
 use super::AnalysisError;
 use super::statics::source_vector;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::Domain;
 pub use result::PullInResult;
-use sweep::{Closed, Sweep};
+use sweep::{PostPullIn, VoltageSweep};
 
 /// Follows the equilibrium up to `max` volts on `port` (none: the first port, else the first source of the netlist), then
 /// down again. The other ports stay at 0 V, the netlist's other sources at their voltage.
 ///
 /// # Errors
 /// See [`AnalysisError`]; `NoEquilibrium` when nothing pulls in below `max`.
-pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<PullInResult, AnalysisError> {
+pub fn pull_in(compiled: &CompiledModel, port: Option<&str>, max: f64) -> Result<PullInResult, AnalysisError> {
     pull_in_with(compiled, port, max, true)
 }
 
 /// The same; further snaps of the closed part are sought where `snaps`.
 pub(super) fn pull_in_with(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     port: Option<&str>,
     max: f64,
     snaps: bool,
@@ -61,9 +61,9 @@ pub(super) fn pull_in_with(
     off[source] = 0.0;
     let name = system.electrics.names[source].clone();
     let estimated_error = compiled.order.estimated_error;
-    let mut sweep = Sweep::new(compiled, off, source);
+    let mut sweep = VoltageSweep::new(compiled, off, source);
     let q = sweep.at_rest()?;
-    let result = |pull_in_v: f64, held: bool, sweep: &Sweep<'_>| PullInResult {
+    let result = |pull_in_v: f64, held: bool, sweep: &VoltageSweep<'_>| PullInResult {
         port: name,
         pull_in_v,
         release_v: None,
@@ -74,8 +74,8 @@ pub(super) fn pull_in_with(
         warnings: sweep.warnings(),
     };
     match sweep.close(q, max)? {
-        Closed::Falls { volts } => Ok(result(volts, false, &sweep)),
-        Closed::Rests { fold, volts, q } => {
+        PostPullIn::Falls { volts } => Ok(result(volts, false, &sweep)),
+        PostPullIn::Rests { fold, volts, q } => {
             let found = sweep.held_down(q, volts, if snaps { max } else { volts })?;
             Ok(PullInResult {
                 release_v: found.release_v,
@@ -88,7 +88,7 @@ pub(super) fn pull_in_with(
 }
 
 /// Index of the source to sweep.
-fn source(compiled: &Compiled, port: Option<&str>) -> Result<usize, AnalysisError> {
+fn source(compiled: &CompiledModel, port: Option<&str>) -> Result<usize, AnalysisError> {
     let names = &compiled.parts.system.electrics.names;
     let found = match port {
         Some(name) => names.iter().position(|n| n == name),

@@ -4,8 +4,8 @@
 //! J = Σ ∫ ρ·t·w³/12·θ² dx of a mode of mass 1, θ its rotation along the beams, Rayleigh's quotient of the mode is ω²/(1 + J) with it
 //! (Lord Rayleigh, *The Theory of Sound*, 1877, § 186), so that the frequency told is too high by about √(1 + J) − 1.
 
-use crate::compile::Compiled;
-use crate::domains::Point;
+use crate::compile::CompiledModel;
+use crate::domains::MaterialPoint;
 use crate::multibody::planar::Pose;
 use crate::structure::Beam;
 
@@ -13,7 +13,7 @@ use crate::structure::Beam;
 pub(super) const WORTH: f64 = 7e-3;
 
 /// What to say of `modes` (xᵀMx = 1) where rotary inertia would take more off a frequency than the tolerance and than what models are worth.
-pub(super) fn told(compiled: &Compiled, modes: &[Vec<Pose>]) -> Option<String> {
+pub(super) fn rotary_inertia_note(compiled: &CompiledModel, modes: &[Vec<Pose>]) -> Option<String> {
     let options = &compiled.options;
     let all = modes.iter().map(|x| too_high(compiled, x));
     let (mode, over) = all.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -27,16 +27,16 @@ pub(super) fn told(compiled: &Compiled, modes: &[Vec<Pose>]) -> Option<String> {
 }
 
 /// By how much the frequency of a mode (xᵀMx = 1) comes out too high [1].
-pub(super) fn too_high(compiled: &Compiled, x: &[Pose]) -> f64 {
+pub(super) fn too_high(compiled: &CompiledModel, x: &[Pose]) -> f64 {
     let options = &compiled.options;
     // a user of --as-sugar asks for SUGAR's mass matrix, which has none either
     if options.rotary_inertia || options.as_sugar { 0.0 } else { (1.0 + share(compiled, x)).sqrt() - 1.0 }
 }
 
 /// J of a mode: the rotary inertia of beams that bend. Rigid ones (of no segment) have theirs.
-fn share(compiled: &Compiled, x: &[Pose]) -> f64 {
+fn share(compiled: &CompiledModel, x: &[Pose]) -> f64 {
     let parts = &compiled.parts;
-    let of = |(beam, offsets): (&Beam, &[f64; 2]), points: &[Point]| {
+    let of = |(beam, offsets): (&Beam, &[f64; 2]), points: &[MaterialPoint]| {
         let per_length = beam.material.density * beam.thickness * beam.width.powi(3) / 12.0;
         let step = (beam.length - offsets[0] - offsets[1]) / (points.len() - 1) as f64;
         let turn = |k: usize| points[k].rotation(x).powi(2);

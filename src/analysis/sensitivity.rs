@@ -7,7 +7,7 @@
 //! ```
 //! The shape stays as it is, by which the quotient changes in the second order only (Rayleigh).
 
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::Drive;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
@@ -19,15 +19,15 @@ const FREE: f64 = 1e-9;
 
 /// Modes about an equilibrium: `q` under `drive`, with the stiffness that stress adds where `stressed`, their λ and shapes.
 #[derive(Clone, Copy)]
-pub(super) struct About<'a> {
-    pub(super) compiled: &'a Compiled,
+pub(super) struct LinearizationPoint<'a> {
+    pub(super) compiled: &'a CompiledModel,
     pub(super) q: &'a [Pose],
     pub(super) drive: &'a Drive,
     pub(super) stressed: bool,
     pub(super) modes: (&'a [f64], &'a [Vec<Pose>]),
 }
 
-impl About<'_> {
+impl LinearizationPoint<'_> {
     /// |d ln f / d ln q| of each mode [1].
     pub(super) fn to_deflection(self) -> Vec<f64> {
         if self.q.iter().all(|q| *q == Pose::zeros()) {

@@ -7,18 +7,18 @@
 use super::AnalysisError;
 use super::contact_range::within_contact_range;
 use super::formulation::Formulation;
-use super::stability::Stability;
+use super::stability::StabilityMonitor;
 use super::statics::source_vector;
 use super::transient::first_step::first_step;
 use super::transient::options::{STEP_SHARE, TransientOptions, check};
-use super::transient::record::LOOKS;
-use crate::compile::Compiled;
+use super::transient::record::STABILITY_CHECKS;
+use crate::compile::CompiledModel;
 use crate::domains::{Drive, Ramp};
-use crate::readout::signal::{Signal, View};
+use crate::readout::signal::{Signal, SignalView};
 use crate::solve::baseline::SolverKind;
 use crate::solve::dense::interpolate;
 use crate::solve::time::method::Motion;
-use crate::solve::time::side_by_side::{self, Ended, LaneWork, Variant, Watcher};
+use crate::solve::time::side_by_side::{self, BatchRun, Ended, LaneWork, Watcher};
 
 use super::integrator::Integrator;
 
@@ -39,7 +39,7 @@ pub struct RunEnd {
 /// # Errors
 /// [`AnalysisError::BadRequest`] for options that mean nothing.
 pub fn ends(
-    variants: &[&Compiled],
+    variants: &[&CompiledModel],
     options: &TransientOptions<'_>,
     finished: &mut dyn FnMut() -> bool,
 ) -> Result<(Vec<Option<RunEnd>>, LaneWork), AnalysisError> {
@@ -55,13 +55,13 @@ pub fn ends(
     let mut goes_on = true;
     // each round has the variants that differ from its first one in numbers alone
     while left.len() > 1 && goes_on {
-        let mut watchers: Vec<Option<End<'_>>> =
-            (0..variants.len()).map(|k| Some(End::new(variants[k], set[k].as_ref()?, options))).collect();
+        let mut watchers: Vec<Option<RunFinisher<'_>>> =
+            (0..variants.len()).map(|k| Some(RunFinisher::new(variants[k], set[k].as_ref()?, options))).collect();
         let mut others = Vec::new();
         let mut steps: Vec<Option<u64>> = vec![None; variants.len()];
         {
             let mut queue = left.iter().copied();
-            let mut slots: Vec<Option<&mut End<'_>>> = watchers.iter_mut().map(Option::as_mut).collect();
+            let mut slots: Vec<Option<&mut RunFinisher<'_>>> = watchers.iter_mut().map(Option::as_mut).collect();
             let stop = std::cell::Cell::new(false);
             let mut next = || {
                 loop {
@@ -71,7 +71,7 @@ pub fn ends(
                     let motion = Motion::zeros(system.bodies());
                     let (h, tol) = (first_step(system, options.stop), STEP_SHARE * options.tol);
                     let ramp = setup.ramp(variants[number], options.stop);
-                    return Some((number, Variant { system, ramp, motion, h, tol, watcher }));
+                    return Some((number, BatchRun { system, ramp, motion, h, tol, watcher }));
                 }
             };
             let mut done = |number: usize, ended: Ended| match ended {
@@ -93,7 +93,7 @@ pub fn ends(
         }
         for (k, (watcher, steps)) in watchers.into_iter().zip(steps).enumerate() {
             if let (Some(watcher), Some(steps)) = (watcher, steps) {
-                let warnings = watcher.stability.told().into_iter().collect();
+                let warnings = watcher.stability.warning().into_iter().collect();
                 ends[k] = Some(RunEnd { values: watcher.values, steps, warnings });
             }
         }
@@ -111,7 +111,7 @@ struct Setup {
 
 impl Setup {
     /// None where a run alone has to say what is wrong, or where there are no lanes.
-    fn new(compiled: &Compiled, options: &TransientOptions<'_>) -> Option<Self> {
+    fn new(compiled: &CompiledModel, options: &TransientOptions<'_>) -> Option<Self> {
         // lanes are of the bodies' own coordinates
         if compiled.joints.is_some() || Formulation::of_run(compiled, options).0.formulation != Formulation::Compliant {
             return None;
@@ -122,27 +122,27 @@ impl Setup {
         Some(Self { signals, sources, rise })
     }
 
-    fn ramp<'a>(&'a self, compiled: &'a Compiled, stop: f64) -> Ramp<'a> {
+    fn ramp<'a>(&'a self, compiled: &'a CompiledModel, stop: f64) -> Ramp<'a> {
         let electrics = &compiled.parts.system.electrics;
         Ramp::new(electrics, &self.sources, &self.sources, &self.rise, stop)
     }
 }
 
 /// Sees to the end of a run, its stability on the way, and the range of the law of contact.
-struct End<'a> {
-    compiled: &'a Compiled,
+struct RunFinisher<'a> {
+    compiled: &'a CompiledModel,
     setup: &'a Setup,
     ramp: Ramp<'a>,
     stop: f64,
     contacts: bool,
     looks: usize,
-    stability: Stability,
+    stability: StabilityMonitor,
     drive: Drive,
     values: Vec<f64>,
 }
 
-impl<'a> End<'a> {
-    fn new(compiled: &'a Compiled, setup: &'a Setup, options: &TransientOptions<'_>) -> Self {
+impl<'a> RunFinisher<'a> {
+    fn new(compiled: &'a CompiledModel, setup: &'a Setup, options: &TransientOptions<'_>) -> Self {
         let system = &compiled.parts.system;
         let ramp = setup.ramp(compiled, options.stop);
         let mut drive = system.electrics.drive();
@@ -154,7 +154,7 @@ impl<'a> End<'a> {
             stop: options.stop,
             contacts: (0..system.members.len()).any(|g| system.touching(g).is_some()),
             looks: 0,
-            stability: Stability::new(system),
+            stability: StabilityMonitor::new(system),
             drive,
             values: Vec::new(),
         }
@@ -162,7 +162,7 @@ impl<'a> End<'a> {
 
     /// Looks at the stability that are due at the end of a step.
     fn due(&self, s: f64, h: f64) -> usize {
-        ((s + h) / self.stop * LOOKS as f64 * (1.0 + 1e-12)) as usize
+        ((s + h) / self.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize
     }
 
     fn ends(&self, s: f64, h: f64) -> bool {
@@ -170,12 +170,12 @@ impl<'a> End<'a> {
     }
 }
 
-impl Watcher for End<'_> {
+impl Watcher for RunFinisher<'_> {
     fn wants(&self, s: f64, h: f64) -> bool {
         self.contacts || self.due(s, h) > self.looks || self.ends(s, h)
     }
 
-    fn see(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> bool {
+    fn observe(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> bool {
         if self.contacts && within_contact_range(self.compiled, &after.q).is_err() {
             return false;
         }
@@ -184,14 +184,14 @@ impl Watcher for End<'_> {
             interpolate(before, after, h, ((self.stop - s) / h).min(1.0), &mut now);
             let rise: Vec<f64> = (0..self.setup.rise.len()).map(|k| self.ramp.rise_at(k, self.stop)).collect();
             let volts = self.drive.volts.clone();
-            let view = View { q: &now.q, v: &now.v, rise: &rise, volts: &volts };
+            let view = SignalView { q: &now.q, v: &now.v, rise: &rise, volts: &volts };
             self.values = self.setup.signals.iter().map(|signal| signal.value(self.compiled, &view)).collect();
         }
         let due = self.due(s, h);
         if due > self.looks {
             self.looks = due;
             self.ramp.at(s + h, &mut self.drive);
-            self.stability.look(&self.compiled.parts.system, &self.drive, s + h, (&after.q, &after.v));
+            self.stability.check(&self.compiled.parts.system, &self.drive, s + h, (&after.q, &after.v));
         }
         true
     }

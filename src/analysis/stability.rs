@@ -17,7 +17,7 @@ const ROUNDS: usize = 4;
 
 /// An unstable place that a motion balances on.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Balanced {
+pub(crate) struct UnstableEquilibrium {
     /// When it was first seen [s].
     pub(crate) since: f64,
     /// Directions that run away.
@@ -28,22 +28,22 @@ pub(crate) struct Balanced {
 
 /// Looks at some states of a run.
 #[derive(Debug)]
-pub(crate) struct Stability {
+pub(crate) struct StabilityMonitor {
     tangent: BlockMatrix<f64, 3>,
     rest: Vec<Pose>,
-    found: Option<Balanced>,
+    found: Option<UnstableEquilibrium>,
     /// Still so at the last look.
     lasts: bool,
 }
 
-impl Stability {
+impl StabilityMonitor {
     pub(crate) fn new(system: &System) -> Self {
         let rest = vec![Pose::zeros(); system.bodies()];
         Self { tangent: BlockMatrix::new(&system.model.pattern), rest, found: None, lasts: false }
     }
 
     /// Looks at a state at time `t` [s].
-    pub(crate) fn look(&mut self, system: &System, drive: &Drive, t: f64, (q, v): (&[Pose], &[Pose])) {
+    pub(crate) fn check(&mut self, system: &System, drive: &Drive, t: f64, (q, v): (&[Pose], &[Pose])) {
         let model = &system.model;
         self.stiffness(system, drive, q, 0.0);
         let directions = self.tangent.factor(&model.pattern).map_or(0, |inertia| inertia.negative);
@@ -62,13 +62,13 @@ impl Stability {
         self.lasts = true;
         if self.found.is_none() {
             let body = most(&shape).map_or_else(String::new, |k| model.bodies[k].name.to_string());
-            self.found = Some(Balanced { since: t, directions, body });
+            self.found = Some(UnstableEquilibrium { since: t, directions, body });
         }
     }
 
     /// What to tell of the run.
-    pub(crate) fn told(&self) -> Option<String> {
-        let Balanced { since, directions, body } = self.found.as_ref()?;
+    pub(crate) fn warning(&self) -> Option<String> {
+        let UnstableEquilibrium { since, directions, body } = self.found.as_ref()?;
         let many = if *directions == 1 {
             "a direction of the stiffness runs".to_owned()
         } else {

@@ -4,12 +4,12 @@ use super::contact_range::within_contact_range;
 use super::loose_parts;
 use super::weak_parts;
 use super::{AnalysisError, BeamMotions, PortVoltages};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::Drive;
 use crate::multibody::planar::Pose;
-use crate::readout::signal::{Signal, View};
+use crate::readout::signal::{Signal, SignalView};
 use crate::solve::SolveError;
-use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, LossKind, Passed, Path};
+use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, LossKind, Path, StabilityLoss};
 use crate::solve::path::{LoadPath, SourcePath};
 use crate::structure::MOLTEN;
 use serde::Serialize;
@@ -30,7 +30,7 @@ pub struct StaticResult {
     /// True when it jumped: it pulled in, snapped through or buckled.
     pub jumped: bool,
     /// Losses of stability on the way from rest, in their order; `jumped` where there are any.
-    pub passed: Vec<Passed>,
+    pub passed: Vec<StabilityLoss>,
     /// Motions that nothing resists noticeably and no load excites; they are held where they are.
     pub free_motions: Vec<String>,
     /// Mechanical unknowns.
@@ -45,16 +45,16 @@ pub struct StaticResult {
 
 impl StaticResult {
     /// How it came about, as sentences, where that is not by the shortest way.
-    pub fn told(&self) -> Vec<String> {
-        told(self.pulled_in, &self.passed, &self.free_motions)
+    pub fn notes(&self) -> Vec<String> {
+        notes(self.pulled_in, &self.passed, &self.free_motions)
     }
 }
 
 /// Losses of stability that a sentence names at most.
 const MAX_NAMED: usize = 3;
 
-fn told(pulled_in: bool, passed: &[Passed], free_motions: &[String]) -> Vec<String> {
-    let one = |Passed { kind, share, direction }: &Passed| {
+fn notes(pulled_in: bool, passed: &[StabilityLoss], free_motions: &[String]) -> Vec<String> {
+    let one = |StabilityLoss { kind, share, direction }: &StabilityLoss| {
         let kind = match kind {
             LossKind::LimitPoint => "limit point",
             LossKind::Bifurcation => "bifurcation",
@@ -78,14 +78,14 @@ fn told(pulled_in: bool, passed: &[Passed], free_motions: &[String]) -> Vec<Stri
     way.into_iter().chain(held).collect()
 }
 
-/// [`StaticResult::told`] of an equilibrium that something else starts from.
-pub(crate) fn told_at(compiled: &Compiled, point: &OperatingPoint) -> Vec<String> {
+/// [`StaticResult::notes`] of an equilibrium that something else starts from.
+pub(crate) fn notes_at(compiled: &CompiledModel, point: &OperatingPoint) -> Vec<String> {
     let (pulled_in, _) = jump(compiled, point);
-    told(pulled_in, &point.path.passed, &point.free_motions)
+    notes(pulled_in, &point.path.passed, &point.free_motions)
 }
 
 /// Whether it pulled in, and whether it jumped at all.
-fn jump(compiled: &Compiled, point: &OperatingPoint) -> (bool, bool) {
+fn jump(compiled: &CompiledModel, point: &OperatingPoint) -> (bool, bool) {
     let system = &compiled.parts.system;
     let jumped = !point.path.passed.is_empty();
     let touching = (0..system.members.len()).any(|g| system.touches(g, &point.q));
@@ -96,7 +96,7 @@ fn jump(compiled: &Compiled, point: &OperatingPoint) -> (bool, bool) {
 ///
 /// # Errors
 /// See [`AnalysisError`].
-pub fn static_equilibrium(compiled: &Compiled, voltages: &PortVoltages) -> Result<StaticResult, AnalysisError> {
+pub fn static_equilibrium(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<StaticResult, AnalysisError> {
     Ok(static_with_curves(compiled, voltages)?.0)
 }
 
@@ -105,7 +105,7 @@ pub fn static_equilibrium(compiled: &Compiled, voltages: &PortVoltages) -> Resul
 /// # Errors
 /// See [`AnalysisError`].
 pub fn static_with_curves(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     voltages: &PortVoltages,
 ) -> Result<(StaticResult, BeamMotions), AnalysisError> {
     let point = operating_point(compiled, voltages)?;
@@ -113,7 +113,7 @@ pub fn static_with_curves(
 }
 
 /// What there is to tell of an equilibrium.
-pub(crate) fn result_at(compiled: &Compiled, point: &OperatingPoint) -> StaticResult {
+pub(crate) fn result_at(compiled: &CompiledModel, point: &OperatingPoint) -> StaticResult {
     let system = &compiled.parts.system;
     let electrics = &system.electrics;
     let port = |p: usize| electrics.names[p].clone();
@@ -141,16 +141,16 @@ pub(crate) fn result_at(compiled: &Compiled, point: &OperatingPoint) -> StaticRe
 }
 
 /// What source voltages and temperature rises say without any mechanics.
-pub(crate) struct Electrical {
+pub(crate) struct ElectricalSolution {
     pub(crate) temperatures_k: Vec<(String, f64)>,
     pub(crate) currents_a: Vec<(String, f64)>,
 }
 
 /// Temperatures of heated or prescribed beams and currents into ports.
-pub(crate) fn electrical(compiled: &Compiled, sources: &[f64], rise: &[f64]) -> Electrical {
+pub(crate) fn electrical(compiled: &CompiledModel, sources: &[f64], rise: &[f64]) -> ElectricalSolution {
     let structure = &compiled.structure;
     let electrics = &compiled.parts.system.electrics;
-    let view = View { q: &[], v: &[], rise, volts: &[] };
+    let view = SignalView { q: &[], v: &[], rise, volts: &[] };
     let temperatures_k = (structure.beams.iter().enumerate())
         .filter(|(_, b)| b.heater.is_some() || b.temperature.is_some())
         .map(|(index, b)| {
@@ -161,7 +161,7 @@ pub(crate) fn electrical(compiled: &Compiled, sources: &[f64], rise: &[f64]) -> 
         .collect();
     let current = |p: usize| (0..sources.len()).map(|s| electrics.conductance[(p, s)] * sources[s]).sum::<f64>();
     let currents_a = (0..electrics.ports).map(|p| (electrics.names[p].clone(), current(p))).collect();
-    Electrical { temperatures_k, currents_a }
+    ElectricalSolution { temperatures_k, currents_a }
 }
 
 /// An equilibrium with what it was found at.
@@ -179,7 +179,7 @@ pub(crate) struct OperatingPoint {
 
 impl OperatingPoint {
     /// What drives it.
-    pub(crate) fn drive(&self, compiled: &Compiled) -> Drive {
+    pub(crate) fn drive(&self, compiled: &CompiledModel) -> Drive {
         let electrics = &compiled.parts.system.electrics;
         let (mut rise, mut drive) = (self.rise.clone(), electrics.drive());
         electrics.steady(&self.sources, &mut rise, &mut drive);
@@ -187,7 +187,7 @@ impl OperatingPoint {
     }
 
     /// At rest as drawn and cold, with the voltages on: where a run begins.
-    pub(crate) fn rest(compiled: &Compiled, voltages: &PortVoltages) -> Result<Self, AnalysisError> {
+    pub(crate) fn rest(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<Self, AnalysisError> {
         let system = &compiled.parts.system;
         let electrics = &system.electrics;
         let sources = source_vector(compiled, voltages)?;
@@ -200,7 +200,10 @@ impl OperatingPoint {
 }
 
 /// The equilibrium reached from rest.
-pub(crate) fn operating_point(compiled: &Compiled, voltages: &PortVoltages) -> Result<OperatingPoint, AnalysisError> {
+pub(crate) fn operating_point(
+    compiled: &CompiledModel,
+    voltages: &PortVoltages,
+) -> Result<OperatingPoint, AnalysisError> {
     let sources = source_vector(compiled, voltages)?;
     let rest = vec![0.0; sources.len()];
     let q = vec![Pose::zeros(); compiled.parts.system.bodies()];
@@ -210,7 +213,7 @@ pub(crate) fn operating_point(compiled: &Compiled, voltages: &PortVoltages) -> R
 
 /// The equilibrium next to `q`; that reached from rest where there is none, and then true.
 pub(crate) fn operating_point_near(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     voltages: &PortVoltages,
     q: Vec<Pose>,
 ) -> Result<(OperatingPoint, bool), AnalysisError> {
@@ -225,7 +228,7 @@ pub(crate) fn operating_point_near(
 
 /// Follows the path of sources from `from` to `sources` and of the loads' share, beginning at `q`.
 fn settle(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     mut q: Vec<Pose>,
     sources: Vec<f64>,
     (from, loads): (&[f64], [f64; 2]),
@@ -259,7 +262,7 @@ fn settle(
 
 /// The equilibrium `q` with what it was found at, sources steady.
 pub(super) fn settled(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     q: Vec<Pose>,
     sources: Vec<f64>,
     path: Path,
@@ -273,10 +276,10 @@ pub(super) fn settled(
 }
 
 /// Largest voltage of a port [V], as of those that are searched.
-const MOST_VOLTS: f64 = 1e9;
+const MAX_VOLTS: f64 = 1e9;
 
 /// What to say of beams that the current makes hotter than any solid bears.
-pub(crate) fn too_hot(compiled: &Compiled, point: &OperatingPoint) -> Option<String> {
+pub(crate) fn too_hot(compiled: &CompiledModel, point: &OperatingPoint) -> Option<String> {
     let (heaters, beams) = (&compiled.parts.heaters, &compiled.structure.beams);
     let (beam, rise) = (heaters.iter().zip(&point.rise)).max_by(|a, b| a.1.total_cmp(b.1))?;
     let beam = &beams[*beam];
@@ -287,7 +290,7 @@ pub(crate) fn too_hot(compiled: &Compiled, point: &OperatingPoint) -> Option<Str
 }
 
 /// The source vector for voltages by port name.
-pub(crate) fn source_vector(compiled: &Compiled, voltages: &PortVoltages) -> Result<Vec<f64>, AnalysisError> {
+pub(crate) fn source_vector(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<Vec<f64>, AnalysisError> {
     let electrics = &compiled.parts.system.electrics;
     let mut ports = vec![None; electrics.ports];
     for (name, volts) in voltages {
@@ -303,8 +306,8 @@ pub(crate) fn source_vector(compiled: &Compiled, voltages: &PortVoltages) -> Res
         if !volts.is_finite() {
             return Err(refused(format!("{volts} is not a finite number of volts")));
         }
-        if volts.abs() > MOST_VOLTS {
-            return Err(refused(format!("expected at most {MOST_VOLTS:e} V, got {volts:e}")));
+        if volts.abs() > MAX_VOLTS {
+            return Err(refused(format!("expected at most {MAX_VOLTS:e} V, got {volts:e}")));
         }
         if let Some(before) = ports[port].replace(*volts) {
             return Err(refused(format!("given twice, {before} V and {volts} V")));
@@ -317,7 +320,7 @@ pub(crate) fn source_vector(compiled: &Compiled, voltages: &PortVoltages) -> Res
 }
 
 /// Displacement of every mechanical node, by name.
-pub(crate) fn node_motions(compiled: &Compiled, q: &[Pose]) -> Vec<(String, NodeMotion)> {
+pub(crate) fn node_motions(compiled: &CompiledModel, q: &[Pose]) -> Vec<(String, NodeMotion)> {
     let linear = compiled.parts.system.model.linear;
     (compiled.structure.nodes.iter().zip(&compiled.parts.nodes))
         .filter_map(|(node, point)| {
@@ -329,9 +332,9 @@ pub(crate) fn node_motions(compiled: &Compiled, q: &[Pose]) -> Vec<(String, Node
 }
 
 /// Displacement of points along every beam, ends included.
-pub(crate) fn beam_motions(compiled: &Compiled, q: &[Pose]) -> BeamMotions {
+pub(crate) fn beam_motions(compiled: &CompiledModel, q: &[Pose]) -> BeamMotions {
     let linear = compiled.parts.system.model.linear;
-    let at = |point: &crate::domains::Point| {
+    let at = |point: &crate::domains::MaterialPoint| {
         let moved = point.displacement(q, linear);
         NodeMotion { x: moved.x, y: moved.y, rz: point.rotation(q) }
     };

@@ -6,53 +6,53 @@
 use super::PortVoltages;
 use super::contact_range::within_contact_range;
 use super::statics::{OperatingPoint, settled, source_vector};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::lanes::LANES;
 use crate::multibody::planar::Pose;
 use crate::solve::equilibrium::Path;
-use crate::solve::equilibrium::side_by_side::{LaneEquilibrium, Way};
+use crate::solve::equilibrium::side_by_side::{BatchPath, LaneEquilibrium};
 use crate::solve::path::SourcePath;
 
 /// Lanes for variants like one of them.
 #[derive(Debug, Clone)]
-pub(crate) struct StaticsSideBySide(LaneEquilibrium);
+pub(crate) struct BatchStatics(LaneEquilibrium);
 
 /// A variant to be settled: where from, if not from rest.
-pub(crate) type Begins<'a> = (&'a Compiled, Option<Vec<Pose>>);
+pub(crate) type BatchStart<'a> = (&'a CompiledModel, Option<Vec<Pose>>);
 
 /// A variant's sources at the end and at the beginning, and where it begins.
-struct Laid {
+struct BatchEquilibrium {
     number: usize,
     sources: Vec<f64>,
     from: Vec<f64>,
     q: Vec<Pose>,
 }
 
-impl StaticsSideBySide {
+impl BatchStatics {
     /// For variants like `first`; none where it has no lanes.
-    pub(crate) fn new(first: &Compiled) -> Option<Self> {
+    pub(crate) fn new(first: &CompiledModel) -> Option<Self> {
         LaneEquilibrium::new(&first.parts.system).map(Self)
     }
 
     /// The equilibrium of each variant, from rest or, for all of them, next to where they begin. None for one whose equilibrium has to be
     /// found alone.
-    pub(crate) fn points(&self, variants: &[Begins<'_>], voltages: &PortVoltages) -> Vec<Option<OperatingPoint>> {
+    pub(crate) fn points(&self, variants: &[BatchStart<'_>], voltages: &PortVoltages) -> Vec<Option<OperatingPoint>> {
         let mut points: Vec<Option<OperatingPoint>> = vec![None; variants.len()];
-        let lay = |(number, (compiled, start)): (usize, &Begins<'_>)| {
+        let lay = |(number, (compiled, start)): (usize, &BatchStart<'_>)| {
             let system = &compiled.parts.system;
             let sources = source_vector(compiled, voltages).ok().filter(|_| self.0.fits(system))?;
             let rest = vec![0.0; sources.len()];
             let from = if start.is_some() { sources.clone() } else { rest };
             let q = start.clone().unwrap_or_else(|| vec![Pose::zeros(); system.bodies()]);
-            Some(Laid { number, sources, from, q })
+            Some(BatchEquilibrium { number, sources, from, q })
         };
-        let laid: Vec<Laid> = variants.iter().enumerate().filter_map(lay).collect();
+        let laid: Vec<BatchEquilibrium> = variants.iter().enumerate().filter_map(lay).collect();
         if laid.is_empty() {
             return points;
         }
         let mut lanes = self.0.clone();
         for some in laid.chunks(LANES) {
-            let path = |laid: &Laid| {
+            let path = |laid: &BatchEquilibrium| {
                 let (compiled, start) = &variants[laid.number];
                 let share = if start.is_some() { 1.0 } else { 0.0 };
                 (compiled, share)
@@ -63,8 +63,8 @@ impl StaticsSideBySide {
                     SourcePath::new(&compiled.parts.system.electrics, &laid.from, &laid.sources, [share, 1.0])
                 })
                 .collect();
-            let ways: Vec<Way<'_>> = (some.iter().zip(&paths))
-                .map(|(laid, along)| Way { system: &path(laid).0.parts.system, path: along, q: &laid.q })
+            let ways: Vec<BatchPath<'_>> = (some.iter().zip(&paths))
+                .map(|(laid, along)| BatchPath { system: &path(laid).0.parts.system, path: along, q: &laid.q })
                 .collect();
             for (laid, arrived) in some.iter().zip(lanes.follow(&ways)) {
                 let (compiled, _) = path(laid);

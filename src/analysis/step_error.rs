@@ -21,12 +21,12 @@ use super::integrator::Integrator;
 pub(super) use super::transient::error_log::least;
 use super::transient::{TransientOptions, TransientResult, transient};
 use super::{AnalysisError, Watch};
-use crate::compile::{Compiled, Formulation};
+use crate::compile::{CompiledModel, Formulation};
 use companion::{companion, compared};
-pub use run::Run;
-use run::{AT_THE_END, LOOSER, MOST_AGAIN, MOST_KEPT, room};
+pub use run::RunFunction;
+use run::{AT_THE_END, LOOSER, MAX_AGAIN, MAX_KEPT, room};
 pub(crate) use run::{beyond, unknown};
-use samples::{Kept, Picked, resolved};
+use samples::{BufferedSamples, SelectedSamples, resolved};
 use std::cell::Cell;
 
 /// Fraction of the room that the next run aims at.
@@ -48,8 +48,8 @@ const HOPELESS: f64 = 0.3;
 /// Those of the run; another run that fails is none, and leaves the run without what it would have brought.
 pub fn with_step_error<T>(
     options: &TransientOptions<'_>,
-    model: &Compiled,
-    run: Run<'_, T>,
+    model: &CompiledModel,
+    run: RunFunction<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<(TransientResult, T), AnalysisError> {
@@ -59,8 +59,8 @@ pub fn with_step_error<T>(
 /// As above, with the tolerance that the steps of the run followed.
 fn held<T>(
     options: &TransientOptions<'_>,
-    model: &Compiled,
-    run: Run<'_, T>,
+    model: &CompiledModel,
+    run: RunFunction<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<(TransientResult, T, f64), AnalysisError> {
@@ -72,7 +72,7 @@ fn held<T>(
     let made = first(&estimated, model, run, sample, watch)?;
     let made = sharper(made, &estimated, model, run, watch)?;
     made.kept.send(sample);
-    let Made { mut result, more, tol, .. } = made;
+    let SampledRun { mut result, more, tol, .. } = made;
     result.warnings.extend(match result.step_error {
         Some(error) => beyond(options, error, AT_THE_END),
         None => (!options.signals.is_empty()).then(|| unknown(options)),
@@ -81,7 +81,7 @@ fn held<T>(
 }
 
 /// Whether a run of this model propagates its error.
-fn propagates(options: &TransientOptions<'_>, model: &Compiled) -> bool {
+fn propagates(options: &TransientOptions<'_>, model: &CompiledModel) -> bool {
     let system = &model.parts.system;
     Formulation::of_run(model, options).1 == Integrator::Rodas4
         && options.step.is_none()
@@ -92,10 +92,10 @@ fn propagates(options: &TransientOptions<'_>, model: &Compiled) -> bool {
 }
 
 /// A run with its samples and the tolerance of its steps.
-struct Made<T> {
+struct SampledRun<T> {
     result: TransientResult,
     more: T,
-    kept: Kept,
+    kept: BufferedSamples,
     tol: f64,
     /// Its samples have been sent.
     long: bool,
@@ -107,14 +107,14 @@ struct Made<T> {
 /// Those of the run.
 fn first<T>(
     options: &TransientOptions<'_>,
-    model: &Compiled,
-    run: Run<'_, T>,
+    model: &CompiledModel,
+    run: RunFunction<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
-) -> Result<Made<T>, AnalysisError> {
+) -> Result<SampledRun<T>, AnalysisError> {
     let unknowns = model.unknowns() as f64;
-    let long = Cell::new(options.points * options.signals.len() > MOST_KEPT);
-    let (mut kept, mut picked) = (Kept::default(), Picked::new(options));
+    let long = Cell::new(options.points * options.signals.len() > MAX_KEPT);
+    let (mut kept, mut picked) = (BufferedSamples::default(), SelectedSamples::new(options));
     let mut keep = |t: f64, values: &[f64]| {
         picked.add(values);
         if long.get() {
@@ -127,12 +127,12 @@ fn first<T>(
     let mut steps = 0.0;
     let mut count = |fraction: f64| {
         steps += 1.0;
-        long.set(long.get() || steps * unknowns > MOST_AGAIN);
+        long.set(long.get() || steps * unknowns > MAX_AGAIN);
         watch(fraction)
     };
     let (mut result, more) = run(options, &mut keep, &mut count)?;
     result.step_error = result.step_error.filter(|_| resolved(&picked, &result, options, model));
-    Ok(Made { result, more, kept, tol: options.tol, long: long.get() })
+    Ok(SampledRun { result, more, kept, tol: options.tol, long: long.get() })
 }
 
 /// Runs at sharper tolerances until one is within what its mesh leaves of the tolerance of `options`.
@@ -140,12 +140,12 @@ fn first<T>(
 /// # Errors
 /// [`AnalysisError::Cancelled`].
 fn sharper<T>(
-    mut made: Made<T>,
+    mut made: SampledRun<T>,
     options: &TransientOptions<'_>,
-    model: &Compiled,
-    run: Run<'_, T>,
+    model: &CompiledModel,
+    run: RunFunction<'_, T>,
     watch: Watch<'_>,
-) -> Result<Made<T>, AnalysisError> {
+) -> Result<SampledRun<T>, AnalysisError> {
     let room = room(options.tol, made.result.estimated_error);
     let unknowns = model.unknowns() as f64;
     let mut exponent = EXPONENT;
@@ -156,11 +156,11 @@ fn sharper<T>(
         };
         let ratio = ratio.clamp(RATIOS.0, RATIOS.1);
         // the length of a step goes with the fourth root of its tolerance
-        if made.result.counters.steps as f64 * ratio.powf(-0.25) * unknowns > MOST_AGAIN {
+        if made.result.counters.steps as f64 * ratio.powf(-0.25) * unknowns > MAX_AGAIN {
             break;
         }
         let options = TransientOptions { tol: ratio * made.tol, ..options.clone() };
-        let (mut kept, mut picked) = (Kept::default(), Picked::new(&options));
+        let (mut kept, mut picked) = (BufferedSamples::default(), SelectedSamples::new(&options));
         let mut keep = |t: f64, values: &[f64]| {
             picked.add(values);
             kept.keep(t, values);
@@ -172,7 +172,7 @@ fn sharper<T>(
         };
         result.step_error = result.step_error.filter(|_| resolved(&picked, &result, &options, model));
         let errors = made.result.step_error.zip(result.step_error);
-        made = Made { result, more, kept, tol: options.tol, long: false };
+        made = SampledRun { result, more, kept, tol: options.tol, long: false };
         if let Some((before, after)) = errors {
             exponent = ((before / after).ln() / -ratio.ln()).clamp(EXPONENTS.0, EXPONENTS.1);
             if before.min(after) > HOPELESS {
@@ -185,7 +185,11 @@ fn sharper<T>(
 
 /// The estimate alone, for one of several runs that are alike, at `points` output times; and the tolerance that their steps have to follow
 /// for it. None where nothing was compared.
-pub(crate) fn step_error(options: &TransientOptions<'_>, model: &Compiled, watch: Watch<'_>) -> (Option<f64>, f64) {
+pub(crate) fn step_error(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    watch: Watch<'_>,
+) -> (Option<f64>, f64) {
     let mut run = |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
         Ok((transient(model, options, sample, watch)?, ()))
     };

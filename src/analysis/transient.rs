@@ -14,18 +14,18 @@ use super::formulation::Formulation;
 use super::integrator::Integrator;
 use super::joint_transient::joint_transient;
 use super::{AnalysisError, Watch};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::{Ramp, System};
 use crate::equations::Bodies;
 use crate::solve::baseline::{Solver, SolverKind};
 use crate::solve::time::adaptive::{Adaptive, Advance, Observer};
 use crate::solve::time::defect::{Estimated, SeeError};
-use crate::solve::time::method::{Motion, Work};
+use crate::solve::time::method::{Motion, SolverCounters};
 use crate::solve::time::rodas4::Rodas4;
 pub use first_step::first_step;
 pub use options::{TransientOptions, Until};
-use record::{Carrier, record};
-pub use result::{Counters, Event, Statistics, TransientResult};
+use record::{Propagator, record};
+pub use result::{Counters, CrossingEvent, Statistics, TransientResult};
 
 /// The bodies' own coordinates, joints as springs.
 struct Compliant<'a> {
@@ -33,14 +33,14 @@ struct Compliant<'a> {
     options: &'a TransientOptions<'a>,
 }
 
-impl Carrier for Compliant<'_> {
+impl Propagator for Compliant<'_> {
     fn advance(
         &mut self,
         ramp: &Ramp<'_>,
         motion: &mut Motion,
         observe: Observer<'_>,
         errors: Option<SeeError<'_>>,
-    ) -> Result<(Advance, Work), AnalysisError> {
+    ) -> Result<(Advance, SolverCounters), AnalysisError> {
         let options = self.options;
         if options.solver != SolverKind::Recursion && !options.method.takes_solvers() {
             return Err(AnalysisError::BadRequest {
@@ -71,7 +71,7 @@ impl Carrier for Compliant<'_> {
 /// # Errors
 /// See [`AnalysisError`].
 pub fn transient(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     options: &TransientOptions<'_>,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,

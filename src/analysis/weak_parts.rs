@@ -62,7 +62,7 @@ pub(super) fn held(system: &System) -> Option<(System, Vec<usize>)> {
 /// Sentences about parts that are held, with the force on each at `q` of the system that holds them.
 pub(super) fn sentences(system: &System, held: &System, parts: &[usize], q: &[Pose]) -> Vec<String> {
     let springs = &held.model.joints[system.model.joints.len()..];
-    let one = |(&body, joint): (&usize, &crate::multibody::section::LaidJoint)| {
+    let one = |(&body, joint): (&usize, &crate::multibody::section::PackedJoint)| {
         let force = held.model.section(joint).stiffness.0[0] * q[body].x.hypot(q[body].y);
         format!(
             "the part with body \"{}\" is held by beams so slender that rounding hides their stiffness; the net load on it is {force:.1e} N",

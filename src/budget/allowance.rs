@@ -1,6 +1,6 @@
 //! What a computation may use.
 
-use super::{Purse, Stopped};
+use super::{OwnerQuota, Stopped};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -18,7 +18,7 @@ pub struct Allowance {
     /// When it must have ended; none: any time.
     pub deadline: Option<Instant>,
     /// What it draws on together with others; none: nothing.
-    pub purse: Option<Arc<Purse>>,
+    pub purse: Option<Arc<OwnerQuota>>,
 }
 
 impl Default for Allowance {

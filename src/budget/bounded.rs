@@ -1,13 +1,13 @@
 //! A part of a computation that is given up where it takes too much.
 
-use super::{Allowance, Budget, LATE, Shared, Stopped, current, unwind, within};
+use super::{Allowance, Budget, BudgetState, LATE, Stopped, current, unwind, within};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 impl Budget {
     /// The same allowance unused, for a part of the computation: stopped together with it.
     #[must_use]
-    pub fn part(&self) -> Self {
+    pub fn child(&self) -> Self {
         self.part_with(Allowance::clone)
     }
 
@@ -17,8 +17,8 @@ impl Budget {
     }
 
     fn part_with(&self, of: impl FnOnce(&Allowance) -> Allowance) -> Self {
-        let Shared { allowance, order, .. } = &*self.0;
-        Self(Arc::new(Shared { allowance: of(allowance), used: AtomicUsize::new(0), order: Arc::clone(order) }))
+        let BudgetState { allowance, order, .. } = &*self.0;
+        Self(Arc::new(BudgetState { allowance: of(allowance), used: AtomicUsize::new(0), order: Arc::clone(order) }))
     }
 }
 
@@ -41,7 +41,7 @@ pub fn bounded<T>(unknowns: usize, job: impl FnOnce() -> T) -> Option<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Purse, lay_out, thread_cpu, unknowns};
+    use super::super::{OwnerQuota, lay_out, thread_cpu, unknowns};
     use super::*;
     use std::time::Duration;
 
@@ -65,7 +65,7 @@ mod tests {
     #[test]
     #[cfg(target_os = "linux")]
     fn time_is_taken_once() {
-        let purse = Arc::new(Purse::new(None, Some(Duration::from_millis(75))));
+        let purse = Arc::new(OwnerQuota::new(None, Some(Duration::from_millis(75))));
         let whole = Budget::new(Allowance { purse: Some(Arc::clone(&purse)), ..Allowance::default() });
         let used = || thread_cpu().expect("a clock of the thread");
         let spun = within(&whole, || {
@@ -73,7 +73,7 @@ mod tests {
             bounded(10, || while used() - start < Duration::from_millis(50) {})
         });
         assert_eq!(spun, Ok(Some(())));
-        assert_eq!(purse.solvent(), Ok(()));
+        assert_eq!(purse.check_cpu(), Ok(()));
     }
 
     /// A computation that is cancelled stops as a whole.

@@ -13,26 +13,26 @@ pub const WINDOW: Duration = Duration::from_secs(3600);
 
 /// What several computations draw on.
 #[derive(Debug)]
-pub struct Purse {
+pub struct OwnerQuota {
     /// Most bytes that they lay out at once; none: any.
     bytes: Option<usize>,
     /// Most processor time within [`WINDOW`]; none: any.
     cpu: Option<Duration>,
     laid_out: AtomicUsize,
-    spent: Mutex<Spent>,
+    spent: Mutex<UsageBucket>,
 }
 
 /// Processor time that has not flowed out yet.
 #[derive(Debug)]
-struct Spent {
+struct UsageBucket {
     seconds: f64,
     at: Instant,
 }
 
-impl Purse {
+impl OwnerQuota {
     /// With so much in it; none: any.
     pub fn new(bytes: Option<usize>, cpu: Option<Duration>) -> Self {
-        let spent = Mutex::new(Spent { seconds: 0.0, at: Instant::now() });
+        let spent = Mutex::new(UsageBucket { seconds: 0.0, at: Instant::now() });
         Self { bytes, cpu, laid_out: AtomicUsize::new(0), spent }
     }
 
@@ -58,7 +58,7 @@ impl Purse {
     }
 
     /// Takes processor time that was used.
-    pub fn spend(&self, time: Duration) {
+    pub fn charge_cpu(&self, time: Duration) {
         self.spend_at(Instant::now(), time);
     }
 
@@ -74,7 +74,7 @@ impl Purse {
     ///
     /// # Errors
     /// [`Stopped::OwnerCpu`].
-    pub fn solvent(&self) -> Result<(), Stopped> {
+    pub fn check_cpu(&self) -> Result<(), Stopped> {
         self.solvent_at(Instant::now())
     }
 
@@ -96,19 +96,19 @@ mod tests {
 
     #[test]
     fn bytes_are_those_of_all() {
-        let purse = Purse::new(Some(100), None);
+        let purse = OwnerQuota::new(Some(100), None);
         assert_eq!(purse.take(60), Ok(()));
         assert_eq!(purse.take(41), Err(Stopped::OwnerBytes { most: 100, used: 60, more: 41 }));
         assert_eq!(purse.take(40), Ok(()));
         purse.give_back(60);
         assert_eq!(purse.take(60), Ok(()));
-        assert_eq!(Purse::new(None, None).take(usize::MAX), Ok(()));
+        assert_eq!(OwnerQuota::new(None, None).take(usize::MAX), Ok(()));
     }
 
     #[test]
     fn time_comes_back_within_the_window() {
         let most = Duration::from_secs(360);
-        let purse = Purse::new(None, Some(most));
+        let purse = OwnerQuota::new(None, Some(most));
         let start = Instant::now();
         let after = |seconds| start + Duration::from_secs(seconds);
         purse.spend_at(start, Duration::from_secs(350));

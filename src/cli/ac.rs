@@ -2,14 +2,14 @@
 
 use super::ac_report::{picture, table, text};
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named, warn_of, warn_of_mesh};
+use super::model::{Context, JsonMap, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::{progress, report, value};
 use bimorph::analysis::harmonic::grid::Spacing;
 use bimorph::analysis::harmonic::{HarmonicOptions, Root};
 use bimorph::analysis::mesh::harmonic_fitted;
 use bimorph::options::analysis::{AC_FROM, AC_MODES, AC_POINTS, AC_TO};
-use bimorph::options::{Described, Value};
+use bimorph::options::{OptionDescription, OptionValue};
 use clap::Args;
 use serde::Serialize;
 
@@ -27,7 +27,7 @@ use serde::Serialize;
     the current that 1 V of a sinusoid drives into the port on top of 10 V, and the motion\n  \
     bimorph ac comb.net --drive frame.ax --signals shuttle.x --from 1 --to 100k --points 20 --per-decade\n  \
     bimorph ac stage.net --drive c.fx --signals c.x --from 80k --to 90k --points 1001 --linear-scale --even --json")]
-pub(crate) struct Ac {
+pub(crate) struct AcCommand {
     #[command(flatten)]
     model: ModelArgs,
 
@@ -81,7 +81,7 @@ pub(crate) struct Ac {
 
 /// Samples of one signal.
 #[derive(Debug, Serialize)]
-struct Parts {
+struct ComplexSamples {
     re: Vec<f64>,
     im: Vec<f64>,
 }
@@ -108,25 +108,25 @@ impl From<&Root> for RootShown {
 }
 
 #[derive(Debug, Serialize)]
-struct Document<'a> {
+struct HarmonicDocument<'a> {
     drive: &'a str,
     drive_unit: &'a str,
     frequencies_hz: &'a [f64],
-    signals: Named<'a, Parts>,
-    units: Named<'a, String>,
-    at_rest: Named<'a, Option<f64>>,
+    signals: JsonMap<'a, ComplexSamples>,
+    units: JsonMap<'a, String>,
+    at_rest: JsonMap<'a, Option<f64>>,
     poles: Option<Vec<RootShown>>,
-    zeros: Named<'a, Option<Vec<RootShown>>>,
+    zeros: JsonMap<'a, Option<Vec<RootShown>>>,
     points_added: usize,
     modes: Option<usize>,
     modal_error: Option<f64>,
     unknowns: usize,
-    port_voltages_v: Named<'a, f64>,
+    port_voltages_v: JsonMap<'a, f64>,
     #[serde(flatten)]
     context: Context<'a>,
 }
 
-impl Ac {
+impl AcCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
         let options = self.request()?;
@@ -142,27 +142,29 @@ impl Ac {
         let (mut signals, mut units, mut at_rest, mut zeros) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for signal in &result.signals {
             let name = signal.name.clone();
-            signals
-                .push((name.clone(), Parts { re: of(&|v| v[0], &signal.values), im: of(&|v| v[1], &signal.values) }));
+            signals.push((
+                name.clone(),
+                ComplexSamples { re: of(&|v| v[0], &signal.values), im: of(&|v| v[1], &signal.values) },
+            ));
             units.push((name.clone(), signal.unit.clone()));
             at_rest.push((name.clone(), signal.at_rest));
             zeros
                 .push((name, signal.zeros.as_ref().map(|zeros| zeros.iter().map(RootShown::from).collect::<Vec<_>>())));
         }
-        let document = Document {
+        let document = HarmonicDocument {
             drive: &result.drive,
             drive_unit: &result.drive_unit,
             frequencies_hz: &result.frequencies_hz,
-            signals: Named(&signals),
-            units: Named(&units),
-            at_rest: Named(&at_rest),
+            signals: JsonMap(&signals),
+            units: JsonMap(&units),
+            at_rest: JsonMap(&at_rest),
             poles: result.poles.as_ref().map(|poles| poles.iter().map(RootShown::from).collect()),
-            zeros: Named(&zeros),
+            zeros: JsonMap(&zeros),
             points_added: result.added,
             modes: result.modes,
             modal_error: result.modal_error,
             unknowns: result.unknowns,
-            port_voltages_v: Named(&self.ports),
+            port_voltages_v: JsonMap(&self.ports),
             context: self.model.context(&compiled).with(&result.warnings),
         };
         let title = format!("{}: {} [{}]", self.model.title(), result.drive, result.drive_unit);
@@ -177,11 +179,11 @@ impl Ac {
 
     /// The request, each option within its range.
     fn request(&self) -> Result<HarmonicOptions, Failure> {
-        let given: [(&Described, Value); 4] = [
-            (&AC_FROM, Value::Number(self.from)),
-            (&AC_TO, Value::Number(self.to)),
-            (&AC_POINTS, Value::Count(self.points)),
-            (&AC_MODES, self.modes.map_or(Value::Unset, Value::Count)),
+        let given: [(&OptionDescription, OptionValue); 4] = [
+            (&AC_FROM, OptionValue::Number(self.from)),
+            (&AC_TO, OptionValue::Number(self.to)),
+            (&AC_POINTS, OptionValue::Count(self.points)),
+            (&AC_MODES, self.modes.map_or(OptionValue::Unset, OptionValue::Count)),
         ];
         for (option, value) in given {
             option.check(&value)?;

@@ -5,31 +5,31 @@ use super::report;
 use bimorph::analysis::harmonic::{HarmonicResult, Root};
 use bimorph::results::plot::Picture;
 use bimorph::results::plot::axis::{prefix, quantity};
-use bimorph::results::plot::bode::{self, Curve};
-use bimorph::results::table::{Column, Samples, Table};
+use bimorph::results::plot::bode::{self, BodeCurve};
+use bimorph::results::table::{Column, ColumnSamples, Table};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
 /// Resonances and zeros of a signal that a report names at most.
-const MOST_NAMED: usize = 12;
+const MAX_NAMED: usize = 12;
 
 pub(super) fn table(title: &str, result: &HarmonicResult) -> Result<Table, Failure> {
     let mut table = Table::new(title, "AC Analysis");
     table.push_real("frequency", "Hz", result.frequencies_hz.clone())?;
     for signal in &result.signals {
         let (name, unit) = (signal.name.clone(), signal.unit.clone());
-        table.push(Column { name, unit, samples: Samples::Complex(signal.values.clone()) })?;
+        table.push(Column { name, unit, samples: ColumnSamples::Complex(signal.values.clone()) })?;
     }
     Ok(table)
 }
 
 pub(super) fn picture(title: &str, result: &HarmonicResult, linear: bool) -> Picture {
-    let curve = |s: &bimorph::analysis::harmonic::SignalResponse| Curve {
+    let curve = |s: &bimorph::analysis::harmonic::SignalResponse| BodeCurve {
         name: s.name.clone(),
         unit: s.unit.clone(),
         values: s.values.clone(),
     };
-    let curves: Vec<Curve> = result.signals.iter().map(curve).collect();
+    let curves: Vec<BodeCurve> = result.signals.iter().map(curve).collect();
     bode::draw(title, &result.frequencies_hz, linear, &curves)
 }
 
@@ -59,8 +59,8 @@ pub(super) fn text(result: &HarmonicResult) -> String {
     }
     for signal in &result.signals {
         let Some(zeros) = signal.zeros.as_ref().filter(|zeros| !zeros.is_empty()) else { continue };
-        let named: Vec<String> = zeros.iter().take(MOST_NAMED).map(zero).collect();
-        let more = zeros.len().saturating_sub(MOST_NAMED);
+        let named: Vec<String> = zeros.iter().take(MAX_NAMED).map(zero).collect();
+        let more = zeros.len().saturating_sub(MAX_NAMED);
         let more = if more > 0 { format!(", {more} more") } else { String::new() };
         let _ = writeln!(text, "zeros of {}: {}{more}", signal.name, named.join(", "));
     }
@@ -141,7 +141,7 @@ fn resonances(result: &HarmonicResult, poles: &[Root]) -> String {
         text += "no resonance within the band\n";
     } else {
         let first = &result.signals[0];
-        let rows: Vec<Vec<String>> = (ringing.iter().take(MOST_NAMED))
+        let rows: Vec<Vec<String>> = (ringing.iter().take(MAX_NAMED))
             .map(|pole| {
                 let own = pole.im / TAU;
                 let q = pole.quality().map_or("undamped".into(), four);
@@ -155,12 +155,12 @@ fn resonances(result: &HarmonicResult, poles: &[Root]) -> String {
             })
             .collect();
         text += &report::columns(&["resonance", "Q", "half-power width", &first.name, "phase"], &rows);
-        if ringing.len() > MOST_NAMED {
-            let _ = writeln!(text, "… {} more; --json has all", ringing.len() - MOST_NAMED);
+        if ringing.len() > MAX_NAMED {
+            let _ = writeln!(text, "… {} more; --json has all", ringing.len() - MAX_NAMED);
         }
     }
     if !corners.is_empty() {
-        let shown: Vec<String> = corners.iter().take(MOST_NAMED).cloned().collect();
+        let shown: Vec<String> = corners.iter().take(MAX_NAMED).cloned().collect();
         let _ = writeln!(text, "corners of what lags without ringing: {}", shown.join(", "));
     }
     text

@@ -1,15 +1,15 @@
 //! The node that moves most on a path: what is shown where nobody says.
 
-use bimorph::compile::Compiled;
+use bimorph::compile::CompiledModel;
 
 /// Nodes among which it is sought.
-const MOST_NODES: usize = 1000;
+const MAX_NODES: usize = 1000;
 
 /// x and y of every node; of very many, of some evenly among them.
-pub(super) fn every(compiled: &Compiled) -> Vec<String> {
+pub(super) fn every(compiled: &CompiledModel) -> Vec<String> {
     let nodes = || compiled.structure.nodes.iter().filter(|node| node.mechanical);
     // of many neighbours one tells what the others do
-    let nodes = nodes().step_by(nodes().count().div_ceil(MOST_NODES).max(1));
+    let nodes = nodes().step_by(nodes().count().div_ceil(MAX_NODES).max(1));
     nodes.flat_map(|node| [format!("{}.x", node.name), format!("{}.y", node.name)]).collect()
 }
 

@@ -1,12 +1,12 @@
 //! Options of parameters that vary by chance.
 
 use super::failure::Failure;
-use bimorph::jobs::sweep::{Design, Samples, Sampling, Vary};
+use bimorph::jobs::sweep::{Design, SampleGenerator, Sampling, Vary};
 use clap::Args;
 
 /// Samples of parameters that vary.
 #[derive(Debug, Args)]
-pub(crate) struct Chance {
+pub(crate) struct SamplingArgs {
     /// A parameter that varies by chance: NAME=normal:MEAN:DEVIATION, NAME=uniform:LOW:HIGH or NAME=lognormal:MEDIAN:DEVIATION_OF_LN.
     /// Repeatable; beside --param the samples are drawn at every point of the grid (process corners)
     #[arg(long, value_name = "NAME=DISTRIBUTION", requires = "samples")]
@@ -29,9 +29,9 @@ pub(crate) struct Chance {
     correlate: Vec<(String, String, f64)>,
 }
 
-impl Chance {
+impl SamplingArgs {
     /// What was asked for, drawn up; none where nothing varies.
-    pub(crate) fn samples(&self) -> Result<Option<Samples>, Failure> {
+    pub(crate) fn samples(&self) -> Result<Option<SampleGenerator>, Failure> {
         let Some(count) = self.samples else { return Ok(None) };
         let asked = Sampling {
             vary: self.vary.clone(),
@@ -40,7 +40,7 @@ impl Chance {
             design: self.design,
             correlations: self.correlate.clone(),
         };
-        Ok(Some(Samples::new(asked)?))
+        Ok(Some(SampleGenerator::new(asked)?))
     }
 }
 

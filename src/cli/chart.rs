@@ -5,18 +5,18 @@ mod picture;
 mod table;
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named};
+use super::model::{Context, JsonMap, ModelArgs};
 use super::output::{check_folder, print, write_picture};
 use super::{interrupt, progress, value};
-use bimorph::analysis::chart::{Chart as Measured, ChartSpec, Formulation, Part, chart};
+use bimorph::analysis::chart::{Chart as Measured, ChartPart, ChartSpec, Formulation, chart};
 use bimorph::analysis::integrator::Integrator;
-use bimorph::options::Value;
+use bimorph::options::OptionValue;
 use bimorph::options::analysis::CHART_POINTS;
 use bimorph::results::atomic;
-use bimorph::results::format::Format;
+use bimorph::results::format::ResultFormat;
 use bimorph::solve::baseline::SolverKind;
 use clap::Args;
-use picture::Work;
+use picture::CostMeasure;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -34,7 +34,7 @@ use std::path::{Path, PathBuf};
     bimorph chart stage.net --set F=20u --release F --signals c.x --parts defaults --tols 1e-2,1e-3,1e-4 --out asked.png\n      \
     whether default commands keep their tolerance on a scene, and what that costs\n  \
     bimorph chart bank.net --signals yoke.y --work counts --out bank.svg     the same picture on every machine")]
-pub(crate) struct Chart {
+pub(crate) struct ChartCommand {
     #[command(flatten)]
     model: ModelArgs,
 
@@ -89,7 +89,7 @@ pub(crate) struct Chart {
 
     /// What stands for work in pictures: time, or counts, which are the same on every machine
     #[arg(long, value_enum, default_value_t)]
-    work: Work,
+    work: CostMeasure,
 
     /// Print one JSON document: SI, full precision
     #[arg(long)]
@@ -101,12 +101,12 @@ pub(crate) struct Chart {
 }
 
 #[derive(Debug, Serialize)]
-struct Document<'a> {
+struct ChartDocument<'a> {
     #[serde(flatten)]
     chart: &'a Measured,
     release: Option<&'a str>,
     repeat: usize,
-    port_voltages_v: Named<'a, f64>,
+    port_voltages_v: JsonMap<'a, f64>,
     #[serde(flatten)]
     context: Context<'a>,
 }
@@ -117,10 +117,10 @@ const CHEAPER: &str = "fewer --tols or --methods, or a shorter --stop, cost less
 /// Methods that are charted when none are named: all but the explicit one, which needs millions of steps on stiff parts.
 const METHODS: [&str; 6] = ["rodas4", "avf", "midpoint", "tr-bdf2", "generalized-alpha", "radau5"];
 
-impl Chart {
+impl ChartCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         for path in &self.out {
-            if Format::from_path(path)? == Format::Raw {
+            if ResultFormat::from_path(path)? == ResultFormat::Raw {
                 return Err(Failure::bad(
                     "--out",
                     "a .csv, .svg, .png or .html file",
@@ -129,7 +129,7 @@ impl Chart {
             }
             check_folder(path)?;
         }
-        CHART_POINTS.check(&Value::Count(self.points))?;
+        CHART_POINTS.check(&OptionValue::Count(self.points))?;
         let spec = self.spec()?;
         let compiled = self.model.compile()?;
         let (bundle, options) = (self.model.bundle()?, self.model.options()?);
@@ -147,11 +147,11 @@ impl Chart {
             self.write(path, &title, &result)?;
         }
         if self.json {
-            let document = Document {
+            let document = ChartDocument {
                 chart: &result,
                 release: self.release.as_deref(),
                 repeat: self.repeat,
-                port_voltages_v: Named(&self.ports),
+                port_voltages_v: JsonMap(&self.ports),
                 context: self.model.context(&compiled),
             };
             let mut text = serde_json::to_string(&document).map_err(|e| Failure::Stdout(e.into()))?;
@@ -164,12 +164,12 @@ impl Chart {
 
     fn write(&self, path: &Path, title: &str, result: &Measured) -> Result<(), Failure> {
         let failed = |source| Failure::Write { path: path.to_owned(), source };
-        match Format::from_path(path)? {
-            Format::Csv => {
+        match ResultFormat::from_path(path)? {
+            ResultFormat::Csv => {
                 let text = table::csv(result);
                 atomic::write(path, |out| out.write_all(text.as_bytes())).map_err(failed)
             }
-            Format::Html => {
+            ResultFormat::Html => {
                 let text = page::html(title, result, &picture::draw(title, result, self.work));
                 atomic::write(path, |out| out.write_all(text.as_bytes())).map_err(failed)
             }
@@ -182,11 +182,16 @@ impl Chart {
             let named = value::names(lists);
             if named.is_empty() { all.iter().map(|n| (*n).to_owned()).collect() } else { named }
         };
-        let part_names = Part::ALL.map(Part::name);
+        let part_names = ChartPart::ALL.map(ChartPart::name);
         let formulation_names = Formulation::ALL.map(Formulation::name);
         let solver_names = SolverKind::ALL.map(SolverKind::name);
         Ok(ChartSpec {
-            parts: choose("--parts", &all(&self.parts, &Part::DEFAULT.map(Part::name)), &part_names, &Part::ALL)?,
+            parts: choose(
+                "--parts",
+                &all(&self.parts, &ChartPart::DEFAULT.map(ChartPart::name)),
+                &part_names,
+                &ChartPart::ALL,
+            )?,
             signals: value::names(&self.signals),
             stop: self.stop,
             points: self.points,

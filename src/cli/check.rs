@@ -1,9 +1,9 @@
 //! `bimorph check`: is the netlist right, and what is in it?
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named};
+use super::model::{Context, JsonMap, ModelArgs};
 use super::output;
-use bimorph::compile::{Compiled, Formulation};
+use bimorph::compile::{CompiledModel, Formulation};
 use bimorph::domains::elements;
 use bimorph::netlist::Setting;
 use bimorph::structure::Structure;
@@ -17,7 +17,7 @@ use std::fmt::Write;
 /// beam (0: rigid).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph check bank.net\n  bimorph check bank.net --set w=2.1u --json")]
-pub(crate) struct Check {
+pub(crate) struct CheckCommand {
     #[command(flatten)]
     model: ModelArgs,
 
@@ -27,7 +27,7 @@ pub(crate) struct Check {
 }
 
 #[derive(Debug, Serialize)]
-struct Found<'a> {
+struct CheckDocument<'a> {
     #[serde(flatten)]
     context: Context<'a>,
     nodes: usize,
@@ -40,11 +40,11 @@ struct Found<'a> {
     stops: usize,
     ports: Vec<&'a str>,
     unknowns: usize,
-    segments: Named<'a, usize>,
+    segments: JsonMap<'a, usize>,
     modes_in_band: usize,
 }
 
-impl Check {
+impl CheckCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         let compiled = self.model.compile()?;
         let s = &compiled.structure;
@@ -53,7 +53,7 @@ impl Check {
         let segments: Vec<(String, usize)> =
             s.beams.iter().zip(&order.segments).map(|(beam, n)| (beam.name.clone(), *n)).collect();
         if self.json {
-            let found = Found {
+            let found = CheckDocument {
                 context: self.model.context(&compiled),
                 nodes: s.nodes.len(),
                 beams: s.beams.len(),
@@ -65,7 +65,7 @@ impl Check {
                 stops: s.stops.len(),
                 ports: s.ports.iter().map(|p| p.name.as_str()).collect(),
                 unknowns,
-                segments: Named(&segments),
+                segments: JsonMap(&segments),
                 modes_in_band: order.modes_in_band,
             };
             let text = serde_json::to_string(&found).map_err(|e| Failure::Stdout(e.into()))?;
@@ -98,7 +98,7 @@ impl Check {
 }
 
 /// What the formulation makes of the model, in a line; nothing for the bodies' own coordinates.
-fn formulation(compiled: &Compiled) -> String {
+fn formulation(compiled: &CompiledModel) -> String {
     let name = compiled.options.formulation.name();
     match &compiled.joints {
         Some(Ok(joints)) => format!(

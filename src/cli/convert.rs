@@ -3,10 +3,10 @@
 use super::failure::Failure;
 use super::model::{LayoutArgs, front_telling};
 use super::output;
-use bimorph::layout::report::{Report, region};
+use bimorph::layout::report::{ConversionReport, region};
 use bimorph::netlist;
 use bimorph::results::atomic;
-use bimorph::results::format::Format;
+use bimorph::results::format::ResultFormat;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
@@ -20,7 +20,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph convert resonator.gds -o resonator.net --picture resonator.png\n  \
     bimorph convert chip.gds --cell tuning_fork --process soi -o fork.net\n  bimorph modes resonator.gds --count 3")]
-pub(crate) struct Convert {
+pub(crate) struct ConvertCommand {
     /// Layout: .cif or .gds
     file: PathBuf,
 
@@ -41,19 +41,19 @@ pub(crate) struct Convert {
 }
 
 #[derive(Debug, Serialize)]
-struct Document<'a> {
+struct ConversionDocument<'a> {
     file: String,
     cell: &'a str,
     process: &'a str,
     #[serde(flatten)]
-    report: &'a Report,
+    report: &'a ConversionReport,
     netlist: &'a str,
 }
 
-impl Convert {
+impl ConvertCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         if let Some(path) = &self.picture {
-            if !matches!(Format::from_path(path)?, Format::Svg | Format::Png | Format::Html) {
+            if !matches!(ResultFormat::from_path(path)?, ResultFormat::Svg | ResultFormat::Png | ResultFormat::Html) {
                 let got = format!("\"{}\"", path.display());
                 return Err(Failure::bad("--picture", "a file that ends in .svg, .png or .html", got));
             }
@@ -63,7 +63,7 @@ impl Convert {
             output::check_folder(path)?;
         }
         let name = self.file.display().to_string();
-        if bimorph::layout::Format::of(&name).is_none() {
+        if bimorph::layout::LayoutFormat::of(&name).is_none() {
             return Err(bimorph::layout::LayoutError::Format { file: name }.into());
         }
         let (drawing, source) = front_telling(&self.file, &self.layout.asked())?;
@@ -73,14 +73,14 @@ impl Convert {
         let report = self.report(&drawing.top, &converted.process, &converted.report);
         if let Some(path) = &self.picture {
             let picture = super::convert_picture::draw(&self.file, &drawing, &loaded.structure, converted);
-            output::write_picture(path, Format::from_path(path)?, &picture)?;
+            output::write_picture(path, ResultFormat::from_path(path)?, &picture)?;
         }
         if let Some(path) = &self.out {
             let failed = |source| Failure::Write { path: path.clone(), source };
             atomic::write(path, |out| out.write_all(converted.netlist.as_bytes())).map_err(failed)?;
         }
         if self.json {
-            let document = Document {
+            let document = ConversionDocument {
                 file: name,
                 cell: &drawing.top,
                 process: &converted.process,
@@ -97,7 +97,7 @@ impl Convert {
         output::print(&converted.netlist)
     }
 
-    fn report(&self, cell: &str, process: &str, report: &Report) -> String {
+    fn report(&self, cell: &str, process: &str, report: &ConversionReport) -> String {
         const MOST: usize = 20;
         let um2 = |m2: f64| (m2 * 1e14).round() / 1e2;
         let mut text = format!("{}: cell {cell}, process {process}, by {}\n", self.file.display(), report.by);

@@ -8,7 +8,7 @@ use super::plot::{chart_of, longest};
 use super::{cosim_check, interrupt, progress};
 use bimorph::cosim::check::check;
 use bimorph::cosim::{CosimError, CosimOptions, run};
-use bimorph::results::format::Format;
+use bimorph::results::format::ResultFormat;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -27,7 +27,7 @@ use std::time::Instant;
     A device in a deck:\n  \
     .model bank bimorph(file=\"bank.net\" ports=[\"heat\" \"sense\"] monitors=[\"yoke.y:1e6\"])\n  \
     A1 %gd [heat 0 sense 0] %v [y] bank")]
-pub(crate) struct Cosim {
+pub(crate) struct CosimCommand {
     /// ngspice deck; or a netlist (.net), which becomes a deck around its device with the circuit that it draws
     deck: PathBuf,
 
@@ -66,9 +66,9 @@ pub(crate) struct Cosim {
     netlist: NetlistArgs,
 }
 
-impl Cosim {
+impl CosimCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
-        let format = self.out.as_deref().map(Format::from_path).transpose()?;
+        let format = self.out.as_deref().map(ResultFormat::from_path).transpose()?;
         if let Some(out) = &self.out {
             check_folder(out)?;
         }
@@ -84,7 +84,7 @@ impl Cosim {
             None
         };
         let raw = match (&self.out, format) {
-            (Some(out), Some(Format::Raw)) => Some(out.clone()),
+            (Some(out), Some(ResultFormat::Raw)) => Some(out.clone()),
             (Some(out), Some(_)) => Some(out.with_extension(format!("{}.raw", std::process::id()))),
             _ => None,
         };
@@ -122,7 +122,7 @@ impl Cosim {
             cosim_check::print_check(&self.deck, checked, self.json, self.quiet)?;
         }
         let (Some(out), Some(format), Some(raw)) = (&self.out, format, report.raw) else { return Ok(()) };
-        if format == Format::Raw {
+        if format == ResultFormat::Raw {
             return Ok(());
         }
         let drawn = longest(&raw, None).and_then(|(table, count)| {

@@ -3,29 +3,29 @@
 use super::failure::Failure;
 use super::output::print;
 use super::report::columns;
-use bimorph::cosim::check::Checked;
-use bimorph::cosim::compare::{Oscillation, Plot, Printed, Vector};
+use bimorph::cosim::check::CosimCheck;
+use bimorph::cosim::compare::{Oscillation, PlotComparison, PrintedNumber, VectorComparison};
 use bimorph::results::plot::axis::quantity;
 use serde::Serialize;
 use std::path::Path;
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct CosimDocument<'a> {
     file: String,
-    plots: &'a [Plot],
-    printed: &'a [Printed],
+    plots: &'a [PlotComparison],
+    printed: &'a [PrintedNumber],
     warnings: Vec<&'a str>,
 }
 
 /// Prints ngspice's output of the run as it is, unless `quiet`, then a table for each plot; or one document.
-pub(crate) fn print_check(deck: &Path, checked: &Checked, json: bool, quiet: bool) -> Result<(), Failure> {
+pub(crate) fn print_check(deck: &Path, checked: &CosimCheck, json: bool, quiet: bool) -> Result<(), Failure> {
     for note in &checked.notes {
         eprintln!("warning: {note}");
     }
     if json {
         let file = deck.display().to_string();
         let warnings = checked.notes.iter().map(String::as_str).chain(checked.report.warnings()).collect();
-        let document = Document { file, plots: &checked.plots, printed: &checked.printed, warnings };
+        let document = CosimDocument { file, plots: &checked.plots, printed: &checked.printed, warnings };
         let text = serde_json::to_string(&document).map_err(|e| Failure::Stdout(e.into()))?;
         return print(&format!("{text}\n"));
     }
@@ -35,7 +35,7 @@ pub(crate) fn print_check(deck: &Path, checked: &Checked, json: bool, quiet: boo
         text += &table(plot);
     }
     if !checked.printed.is_empty() {
-        let row = |p: &Printed| {
+        let row = |p: &PrintedNumber| {
             vec![p.name.clone(), format!("{:.6e}", p.values[0]), format!("{:.6e}", p.values[1]), share(p.difference)]
         };
         let rows: Vec<Vec<String>> = checked.printed.iter().map(row).collect();
@@ -49,7 +49,7 @@ pub(crate) fn print_check(deck: &Path, checked: &Checked, json: bool, quiet: boo
     print(&text)
 }
 
-fn table(plot: &Plot) -> String {
+fn table(plot: &PlotComparison) -> String {
     let place = |x: f64| match plot.axis.as_str() {
         "" => String::new(),
         "time" => quantity(x, "s"),
@@ -66,8 +66,8 @@ fn table(plot: &Plot) -> String {
 }
 
 /// What oscillates, whose phase counts for nothing.
-fn oscillators(plot: &Plot) -> String {
-    let row = |v: &Vector| {
+fn oscillators(plot: &PlotComparison) -> String {
+    let row = |v: &VectorComparison| {
         let Oscillation { frequency: [f, _], amplitude: [a, _], difference } = v.oscillation?;
         let of = |value: f64, unit: &str, off: f64| [quantity(value, unit), share(off)];
         Some(

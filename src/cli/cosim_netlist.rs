@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::options::Chosen;
 use super::output::{check_folder, write_page};
 use super::value;
-use bimorph::cosim::around::{Around, around};
+use bimorph::cosim::around::{DeckSpec, around};
 use bimorph::cosim::finer;
 use bimorph::netlist::{self, Bundle, DroppedInclude, Setting};
 use clap::Args;
@@ -120,7 +120,7 @@ impl NetlistArgs {
         Ok(name.unwrap_or(whole).display().to_string())
     }
 
-    fn wanted(&self, file: String) -> Around {
+    fn wanted(&self, file: String) -> DeckSpec {
         let mut model: Vec<String> = self.chosen.written().map(|(_, word)| word).collect();
         if !self.set.is_empty() {
             let word = |(name, value): &(String, Setting)| match value {
@@ -138,7 +138,7 @@ impl NetlistArgs {
         if self.op || analyses.is_empty() {
             analyses.insert(0, ".op".into());
         }
-        Around {
+        DeckSpec {
             file,
             model,
             ports: self.port.clone(),

@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::output::print;
-use super::serve::Told;
+use super::serve::SettingSources;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::{CompileOptions, Junctions, compile};
 use bimorph::cosim::{self, CosimOptions, find_ngspice, find_plugin};
@@ -25,7 +25,7 @@ use std::time::Duration;
 /// by a file or the environment (BIMORPH_SERVE_NAME), certificate, key, tokens and folder of states must be good, too.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph doctor\n  bimorph doctor --config /etc/bimorph/serve.toml")]
-pub(crate) struct Doctor {
+pub(crate) struct DoctorCommand {
     /// File of settings of a server, TOML
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -50,7 +50,7 @@ const DECK: &str = "* doctor\n.model plate bimorph(file=\"plate.net\" ports=[\"d
 /// Longest wait for a server on this machine.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-impl Doctor {
+impl DoctorCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         print(&format!("bimorph {}\n", env!("CARGO_PKG_VERSION")))?;
         let core = core();
@@ -65,7 +65,7 @@ impl Doctor {
 
     /// What a server with these settings would find.
     fn settings(&self) -> Result<(), Failure> {
-        let settings = Told::of(self.config.clone()).settings()?;
+        let settings = SettingSources::of(self.config.clone()).settings()?;
         if settings == Settings::default() {
             return Ok(());
         }

@@ -1,14 +1,14 @@
 //! `bimorph export`: the model as a file for other simulators.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named, warn_of};
+use super::model::{Context, JsonMap, ModelArgs, warn_of};
 use super::output::{check_folder, print, write_page};
 use super::{progress, report, value};
 use bimorph::analysis::mesh::{beyond, in_circuit};
-use bimorph::compile::Compiled;
-use bimorph::export::compare::{Fitted, fit};
+use bimorph::compile::CompiledModel;
+use bimorph::export::compare::{ModelFit, fit};
 use bimorph::export::names::{self, Pins};
-use bimorph::export::{ExportError, Request, lumped, lumped_spice, lumped_verilog_a, spice, verilog_a};
+use bimorph::export::{ExportError, ExportRequest, lumped, lumped_spice, lumped_verilog_a, spice, verilog_a};
 use bimorph::results::plot::axis::quantity;
 use clap::Args;
 use serde::Serialize;
@@ -28,7 +28,7 @@ use std::sync::Arc;
                         bimorph export bank.net --verilog-a --name bank --out bank.va\n  \
                         bimorph export stage.net --spice --ports drive,m.x --to 200k"
 )]
-pub(crate) struct Export {
+pub(crate) struct ExportCommand {
     #[command(flatten)]
     model: ModelArgs,
 
@@ -83,7 +83,7 @@ pub(crate) struct Export {
 }
 
 #[derive(Debug, Serialize)]
-struct Document<'a> {
+struct ExportDocument<'a> {
     name: &'a str,
     pins: Vec<&'a str>,
     frequencies_hz: Vec<f64>,
@@ -91,12 +91,12 @@ struct Document<'a> {
     error: f64,
     band_hz: [f64; 2],
     unknowns: usize,
-    port_voltages_v: Named<'a, f64>,
+    port_voltages_v: JsonMap<'a, f64>,
     #[serde(flatten)]
     context: Context<'a>,
 }
 
-impl Export {
+impl ExportCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         if let Some(path) = &self.out {
             check_folder(path)?;
@@ -128,7 +128,7 @@ impl Export {
         if !self.json {
             return print(&(summary(&fitted, &pins, &name) + &mesh(&compiled) + "\n"));
         }
-        let document = Document {
+        let document = ExportDocument {
             name: &name,
             pins: pins.all().collect(),
             frequencies_hz: fitted.model.modes.iter().map(|m| m.omega / TAU).collect(),
@@ -136,7 +136,7 @@ impl Export {
             error: fitted.error,
             band_hz: fitted.band,
             unknowns: fitted.unknowns,
-            port_voltages_v: Named(&self.bias),
+            port_voltages_v: JsonMap(&self.bias),
             context: self.model.context(&compiled).with(&warnings),
         };
         let json = serde_json::to_string(&document).map_err(|e| Failure::Stdout(e.into()))?;
@@ -144,7 +144,7 @@ impl Export {
     }
 
     /// What the file does not say by its numbers.
-    fn warnings(&self, compiled: &Compiled, fitted: &Fitted) -> Vec<String> {
+    fn warnings(&self, compiled: &CompiledModel, fitted: &ModelFit) -> Vec<String> {
         let mut warnings: Vec<String> = beyond(compiled.options.tol, mesh_error(compiled)).into_iter().collect();
         if fitted.error > self.within {
             let (modes, error, within) = (fitted.model.modes.len(), fitted.error, self.within);
@@ -168,7 +168,7 @@ impl Export {
     }
 
     /// Writes the nonlinear model.
-    fn whole(&self, compiled: &Compiled, request: &Request, name: &str) -> Result<(), Failure> {
+    fn whole(&self, compiled: &CompiledModel, request: &ExportRequest, name: &str) -> Result<(), Failure> {
         let model = lumped::lump(compiled, request)?;
         let pins = Pins::of(&model.ports, &model.signals)?;
         let version = env!("CARGO_PKG_VERSION");
@@ -189,7 +189,7 @@ impl Export {
     }
 
     /// The request, each option within its range.
-    fn request(&self) -> Result<Request, Failure> {
+    fn request(&self) -> Result<ExportRequest, Failure> {
         if let Some(to) = self.to.filter(|to| to.is_nan() || *to <= 0.0) {
             return Err(Failure::bad("--to", "a frequency above 0 Hz", to.to_string()));
         }
@@ -204,7 +204,7 @@ impl Export {
         {
             return Err(Failure::bad("--ports, --signals", "a scale other than 0", format!("\"{name}:0\"")));
         }
-        Ok(Request {
+        Ok(ExportRequest {
             ports: scaled(&self.ports),
             signals: scaled(&self.signals).into_iter().map(|(name, scale)| (name, scale.unwrap_or(1.0))).collect(),
             bias: self.bias.clone(),
@@ -215,7 +215,7 @@ impl Export {
     }
 
     /// The lines at the head of the file.
-    fn about(&self, compiled: &Compiled, fitted: &Fitted) -> Vec<String> {
+    fn about(&self, compiled: &CompiledModel, fitted: &ModelFit) -> Vec<String> {
         let version = env!("CARGO_PKG_VERSION");
         let model = &fitted.model;
         let bias: Vec<String> = self.bias.iter().map(|(n, v)| format!("{n}={v:e} V")).collect();
@@ -245,18 +245,18 @@ impl Export {
     }
 }
 
-fn quality(fitted: &Fitted, mode: usize) -> f64 {
+fn quality(fitted: &ModelFit, mode: usize) -> f64 {
     fitted.model.modes[mode].omega / fitted.model.damping[(mode, mode)]
 }
 
 /// The estimate of the mesh, or of its lowest mode where that is all that is known; what has no beams has no mesh.
-fn mesh_error(compiled: &Compiled) -> Option<f64> {
+fn mesh_error(compiled: &CompiledModel) -> Option<f64> {
     let lowest = || compiled.lowest.map(|lowest| lowest.error.abs());
     if compiled.structure.beams.is_empty() { Some(0.0) } else { compiled.order.estimated_error.or_else(lowest) }
 }
 
 /// How far the full model itself may be off by its mesh.
-fn mesh(compiled: &Compiled) -> String {
+fn mesh(compiled: &CompiledModel) -> String {
     match mesh_error(compiled) {
         Some(error) if compiled.options.band.is_none() && compiled.options.segments.is_none() => format!(
             "the equilibrium and the lowest frequencies of the full model: off by {error:.1e} at most, by its mesh; --band HZ holds all below it"
@@ -267,9 +267,9 @@ fn mesh(compiled: &Compiled) -> String {
 }
 
 /// What was written, for a person.
-fn summary(fitted: &Fitted, pins: &Pins, name: &str) -> String {
+fn summary(fitted: &ModelFit, pins: &Pins, name: &str) -> String {
     let model = &fitted.model;
-    let row = |(j, mode): (usize, &bimorph::export::linear::Mode)| {
+    let row = |(j, mode): (usize, &bimorph::export::linear::ReducedMode)| {
         let number = mode.number.map_or_else(|| "static".into(), |n| n.to_string());
         vec![
             number,

@@ -5,7 +5,7 @@ use bimorph::analysis::AnalysisError;
 use bimorph::analysis::chart::ChartError;
 use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
-use bimorph::cosim::around::AroundError;
+use bimorph::cosim::around::DeckError;
 use bimorph::export::ExportError;
 use bimorph::front::FrontError;
 use bimorph::jobs::sweep::SweepError;
@@ -14,7 +14,7 @@ use bimorph::layout::LayoutError;
 use bimorph::layout::convert::ConvertError;
 use bimorph::layout::gds::{GdsError, GdsFault};
 use bimorph::layout::mask::MaskError;
-use bimorph::options::Refused;
+use bimorph::options::OptionError;
 use bimorph::results::format::UnknownFormat;
 use bimorph::results::plot::render::RenderError;
 use bimorph::results::raw::RawError;
@@ -53,7 +53,7 @@ pub(crate) enum Failure {
     #[error("a server with these settings does not start; see the lines marked missing")]
     Settings,
     #[error("--{}: expected {}, got {}", .0.option.replace('_', "-"), .0.expected, .0.got)]
-    Option(#[from] Refused),
+    Option(#[from] OptionError),
     #[error(transparent)]
     Format(#[from] UnknownFormat),
     #[error(transparent)]
@@ -79,7 +79,7 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Cosim(#[from] CosimError),
     #[error(transparent)]
-    Around(#[from] AroundError),
+    Around(#[from] DeckError),
     #[error(transparent)]
     Serve(#[from] ServeError),
     #[error(transparent)]

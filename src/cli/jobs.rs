@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::output::print;
-use super::remote::{Reach, failure, follow};
+use super::remote::{ConnectionArgs, failure, follow};
 use super::{delivery, progress};
 use bimorph::service::client::JobStatus;
 use clap::{Args, Subcommand};
@@ -17,7 +17,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
     bimorph sweep bank.net --param w=1.8u:2.2u:2001 --to unix:///tmp/bimorph.sock --detach\n  \
     bimorph jobs list --to unix:///tmp/bimorph.sock\n  \
     bimorph jobs attach jobs/0123456789abcdef0123456789abcdef --to unix:///tmp/bimorph.sock --out w.csv")]
-pub(crate) struct Jobs {
+pub(crate) struct JobsCommand {
     #[command(subcommand)]
     action: Action,
 }
@@ -25,51 +25,51 @@ pub(crate) struct Jobs {
 #[derive(Debug, Subcommand)]
 enum Action {
     /// Your jobs, the last one first
-    List(At),
+    List(ServerArgs),
     /// Wait for the rows of a job and write its table; of one that ended early, the rows that it has
     Attach(Attach),
     /// Stop a job; its rows stay
-    Cancel(Named),
+    Cancel(JobArgs),
     /// Stop a job, if it goes on, and let the server forget it
-    Delete(Named),
+    Delete(JobArgs),
 }
 
 #[derive(Debug, Args)]
-struct At {
+struct ServerArgs {
     /// The server: unix:///path, host:port or https://host:port
     #[arg(long, value_name = "URI")]
     to: String,
 
     #[command(flatten)]
-    reach: Reach,
+    reach: ConnectionArgs,
 }
 
 #[derive(Debug, Args)]
-struct Named {
+struct JobArgs {
     /// The job: jobs/ and 32 digits
     name: String,
 
     #[command(flatten)]
-    at: At,
+    at: ServerArgs,
 }
 
 #[derive(Debug, Args)]
 struct Attach {
     #[command(flatten)]
-    job: Named,
+    job: JobArgs,
 
     /// Write the table to a .csv file [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-impl Jobs {
+impl JobsCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         match &self.action {
             Action::List(at) => list(at),
             Action::Attach(attach) => attach.run(),
-            Action::Cancel(Named { name, at }) => Ok(at.reach.client(&at.to)?.cancel_job(name)?),
-            Action::Delete(Named { name, at }) => Ok(at.reach.client(&at.to)?.delete_job(name)?),
+            Action::Cancel(JobArgs { name, at }) => Ok(at.reach.client(&at.to)?.cancel_job(name)?),
+            Action::Delete(JobArgs { name, at }) => Ok(at.reach.client(&at.to)?.delete_job(name)?),
         }
     }
 }
@@ -77,7 +77,7 @@ impl Jobs {
 impl Attach {
     fn run(&self) -> Result<(), Failure> {
         delivery::check(self.out.as_ref())?;
-        let Named { name, at } = &self.job;
+        let JobArgs { name, at } = &self.job;
         let bar = progress::bar("sweep");
         let followed = follow(&mut at.reach.client(&at.to)?, &at.to, name, &bar);
         bar.finish_and_clear();
@@ -92,7 +92,7 @@ impl Attach {
     }
 }
 
-fn list(at: &At) -> Result<(), Failure> {
+fn list(at: &ServerArgs) -> Result<(), Failure> {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
     let now = i64::try_from(now).unwrap_or(i64::MAX);
     let mut text = format!("{:37}  {:9}  {:>17}  {:>9}  netlist\n", "job", "state", "rows", "age");

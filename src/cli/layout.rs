@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::model::ModelArgs;
 use super::output;
-use bimorph::layout::Format;
+use bimorph::layout::LayoutFormat;
 use bimorph::layout::convert::DEFAULT_PROCESS;
 use bimorph::layout::mask::mask;
 use bimorph::layout::process::Process;
@@ -20,7 +20,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph layout bank.net --out bank.gds\n  \
     bimorph layout bank.net --set wh=2.2u --out bank.cif --process polymumps")]
-pub(crate) struct Layout {
+pub(crate) struct LayoutCommand {
     #[command(flatten)]
     model: ModelArgs,
 
@@ -33,10 +33,10 @@ pub(crate) struct Layout {
     json: bool,
 }
 
-impl Layout {
+impl LayoutCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         let name = self.out.display().to_string();
-        let Some(format) = Format::of(&name) else {
+        let Some(format) = LayoutFormat::of(&name) else {
             return Err(Failure::bad("--out", "a file that ends in .gds or .cif", format!("\"{name}\"")));
         };
         output::check_folder(&self.out)?;

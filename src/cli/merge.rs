@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::merge_error::{LAST, MergeError};
 use super::output::{check_folder, print};
-use bimorph::jobs::sweep::part::{COLUMN, NoPart, Part};
+use bimorph::jobs::sweep::part::{COLUMN, SweepPart, SweepPartError};
 use bimorph::results::{atomic, csv::field};
 use clap::Args;
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ use std::path::PathBuf;
     bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/2 --out part0.csv\n  \
     bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 1/2 --out part1.csv\n  \
     bimorph merge part0.csv part1.csv --out whole.csv")]
-pub(crate) struct Merge {
+pub(crate) struct MergeCommand {
     /// Tables of `bimorph sweep --shard I/N`, in any order
     #[arg(value_name = "FILE", required = true)]
     parts: Vec<PathBuf>,
@@ -30,20 +30,20 @@ pub(crate) struct Merge {
 }
 
 /// A row: the table it is of, and its fields.
-struct Row {
+struct ShardRow {
     table: usize,
     fields: csv::StringRecord,
 }
 
 /// What tables have in common, as far as it is known.
 #[derive(Default)]
-struct Whole {
+struct CommonColumns {
     parameters: Vec<String>,
     /// Of the first row, and the table it is in.
-    part: Option<(Part, usize)>,
+    part: Option<(SweepPart, usize)>,
 }
 
-impl Merge {
+impl MergeCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         if let Some(out) = &self.out {
             if out.extension().is_none_or(|e| !e.eq_ignore_ascii_case("csv")) {
@@ -62,8 +62,8 @@ impl Merge {
 
 fn merged(parts: &[PathBuf]) -> Result<String, MergeError> {
     let mut heads: Vec<csv::StringRecord> = Vec::new();
-    let mut whole = Whole::default();
-    let mut rows: BTreeMap<usize, Row> = BTreeMap::new();
+    let mut whole = CommonColumns::default();
+    let mut rows: BTreeMap<usize, ShardRow> = BTreeMap::new();
     for (table, path) in parts.iter().enumerate() {
         let failed = |source| MergeError::Csv { path: path.clone(), source };
         let mut reader = csv::Reader::from_path(path).map_err(failed)?;
@@ -84,13 +84,13 @@ fn merged(parts: &[PathBuf]) -> Result<String, MergeError> {
             let mut fields = record.map_err(failed)?;
             if of_part {
                 let part = fields.iter().next_back().unwrap_or_default().parse();
-                whole.take(part.map_err(|NoPart| MergeError::NoPart { path: path.clone() })?, table, parts)?;
+                whole.take(part.map_err(|SweepPartError| MergeError::NoPart { path: path.clone() })?, table, parts)?;
                 fields.truncate(head.len());
             }
             let number = fields.get(0).unwrap_or_default();
             let point =
                 number.parse().map_err(|_| MergeError::NoNumber { path: path.clone(), got: number.to_owned() })?;
-            if let Some(first) = rows.insert(point, Row { table, fields }) {
+            if let Some(first) = rows.insert(point, ShardRow { table, fields }) {
                 return Err(MergeError::Twice { point, first: parts[first.table].clone(), second: path.clone() });
             }
         }
@@ -105,9 +105,9 @@ fn merged(parts: &[PathBuf]) -> Result<String, MergeError> {
     Ok(written(&heads, whole.parameters.len(), &rows))
 }
 
-impl Whole {
+impl CommonColumns {
     /// A row of a table says of what it is a part.
-    fn take(&mut self, part: Part, table: usize, paths: &[PathBuf]) -> Result<(), MergeError> {
+    fn take(&mut self, part: SweepPart, table: usize, paths: &[PathBuf]) -> Result<(), MergeError> {
         let (known, first) = self.part.get_or_insert_with(|| (part.clone(), table));
         if part.is_with(known) {
             return Ok(());
@@ -127,7 +127,7 @@ fn parameters_of(head: &csv::StringRecord) -> Option<Vec<String>> {
 }
 
 /// The table. Results stand in the order in which rows have them first, as in a sweep in one run.
-fn written(heads: &[csv::StringRecord], parameters: usize, rows: &BTreeMap<usize, Row>) -> String {
+fn written(heads: &[csv::StringRecord], parameters: usize, rows: &BTreeMap<usize, ShardRow>) -> String {
     let first = 1 + parameters;
     let results = |table: usize| first..heads[table].len() - LAST.len();
     let (mut names, mut places) = (Vec::new(), BTreeMap::new());

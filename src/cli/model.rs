@@ -3,12 +3,12 @@
 use super::failure::Failure;
 use super::options::Chosen;
 use super::{interrupt, progress, value};
-use bimorph::compile::{CompileOptions, Compiled, Drawn, Junctions, compile, draw};
-use bimorph::front::{self, Asked, Source};
-use bimorph::layout::Format;
-use bimorph::layout::drawing::Drawing;
+use bimorph::compile::{CompileOptions, CompiledModel, Junctions, ParsedStructure, compile, draw};
+use bimorph::front::{self, InputBundle, LayoutChoice};
+use bimorph::layout::LayoutFormat;
+use bimorph::layout::drawing::FlatLayout;
 use bimorph::netlist::{Bundle, Diagnostic, DroppedInclude, Setting};
-use bimorph::options::{MODEL, Value};
+use bimorph::options::{MODEL, OptionValue};
 use clap::Args;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
@@ -49,13 +49,13 @@ pub(crate) struct LayoutArgs {
 }
 
 impl LayoutArgs {
-    pub(crate) fn asked(&self) -> Asked {
-        Asked { process: self.process.clone(), cell: self.cell.clone() }
+    pub(crate) fn asked(&self) -> LayoutChoice {
+        LayoutChoice { process: self.process.clone(), cell: self.cell.clone() }
     }
 }
 
 /// Reads and converts a file with a bar; gives the drawing too.
-pub(crate) fn front_telling(path: &Path, asked: &Asked) -> Result<(Drawing, Source), Failure> {
+pub(crate) fn front_telling(path: &Path, asked: &LayoutChoice) -> Result<(FlatLayout, InputBundle), Failure> {
     interrupt::listen();
     let bar = progress::bar("reading");
     let read = front::drawing_and_source(path, asked, &mut progress::watch(&bar, ""));
@@ -69,7 +69,7 @@ impl ModelArgs {
         self.bundle_asked(&self.asked())
     }
 
-    fn bundle_asked(&self, asked: &Asked) -> Result<Bundle, Failure> {
+    fn bundle_asked(&self, asked: &LayoutChoice) -> Result<Bundle, Failure> {
         interrupt::listen();
         let warn = &mut |dropped: DroppedInclude| eprintln!("warning: {dropped}");
         let bar = progress::bar("reading");
@@ -91,15 +91,18 @@ impl ModelArgs {
     }
 
     /// How a layout is to be read.
-    pub(crate) fn asked(&self) -> Asked {
+    pub(crate) fn asked(&self) -> LayoutChoice {
         self.layout.asked()
     }
 
     /// What was drawn, with warnings on standard error. A process is then that of what is to be drawn, for netlists too.
-    pub(crate) fn draw(&self) -> Result<Drawn, Failure> {
-        let asked =
-            if Format::of(&self.file.display().to_string()).is_some() { self.asked() } else { Asked::default() };
-        let drawn = draw(&bimorph::netlist::Source::new(&self.bundle_asked(&asked)?), &self.options()?)?;
+    pub(crate) fn draw(&self) -> Result<ParsedStructure, Failure> {
+        let asked = if LayoutFormat::of(&self.file.display().to_string()).is_some() {
+            self.asked()
+        } else {
+            LayoutChoice::default()
+        };
+        let drawn = draw(&bimorph::netlist::NetlistSource::new(&self.bundle_asked(&asked)?), &self.options()?)?;
         if !drawn.warnings.items.is_empty() {
             eprint!("{}", drawn.warnings.render(io::stderr().is_terminal()));
         }
@@ -112,12 +115,12 @@ impl ModelArgs {
     }
 
     /// Compiles the netlist and shows its warnings on standard error.
-    pub(crate) fn compile(&self) -> Result<Compiled, Failure> {
+    pub(crate) fn compile(&self) -> Result<CompiledModel, Failure> {
         self.compiled(&self.options()?)
     }
 
     /// The same for a frame of cubic beams, whose centrelines meet in points.
-    pub(crate) fn compile_frame(&self) -> Result<Compiled, Failure> {
+    pub(crate) fn compile_frame(&self) -> Result<CompiledModel, Failure> {
         let mut options = self.options()?;
         if self.chosen.given("junctions") && options.junctions != Junctions::Centreline {
             let got = format!("\"{}\" with --solver frame, which has no other", options.junctions.name());
@@ -132,24 +135,24 @@ impl ModelArgs {
         Ok(compiled)
     }
 
-    fn compiled(&self, options: &CompileOptions) -> Result<Compiled, Failure> {
+    fn compiled(&self, options: &CompileOptions) -> Result<CompiledModel, Failure> {
         let compiled = compile(&self.bundle()?, options)?;
         warn(&compiled);
         Ok(compiled)
     }
 
     /// What the model was made from, for JSON.
-    pub(crate) fn context<'a>(&'a self, compiled: &'a Compiled) -> Context<'a> {
+    pub(crate) fn context<'a>(&'a self, compiled: &'a CompiledModel) -> Context<'a> {
         self.context_of(compiled, compiled)
     }
 
     /// The same of a run in which `compiled` moves and `drawn` is what the netlist says.
-    pub(crate) fn context_of<'a>(&'a self, drawn: &'a Compiled, compiled: &'a Compiled) -> Context<'a> {
+    pub(crate) fn context_of<'a>(&'a self, drawn: &'a CompiledModel, compiled: &'a CompiledModel) -> Context<'a> {
         let mut told: Vec<&Diagnostic> = compiled.warnings.items.iter().collect();
         told.extend(drawn.warnings.items.iter().filter(|d| !compiled.warnings.items.contains(d)));
         Context {
             file: self.file.display().to_string(),
-            parameters: Map(&drawn.parameters),
+            parameters: OrderedMap(&drawn.parameters),
             options: Keys(&drawn.options),
             estimated_error: compiled.order.estimated_error,
             warnings: told.into_iter().map(|d| d.message.as_str()).collect(),
@@ -171,7 +174,7 @@ fn baseline() -> Diagnostic {
 }
 
 /// Shows what the mesh has added to the warnings of a model on standard error.
-pub(crate) fn warn_of_mesh(before: &Compiled, fitted: &Compiled) {
+pub(crate) fn warn_of_mesh(before: &CompiledModel, fitted: &CompiledModel) {
     let mut added = fitted.warnings.clone();
     added.items.drain(..before.warnings.items.len().min(added.items.len()));
     if !added.items.is_empty() {
@@ -180,7 +183,7 @@ pub(crate) fn warn_of_mesh(before: &Compiled, fitted: &Compiled) {
 }
 
 /// Shows the warnings of a netlist on standard error.
-pub(crate) fn warn(compiled: &Compiled) {
+pub(crate) fn warn(compiled: &CompiledModel) {
     if !compiled.warnings.items.is_empty() {
         eprint!("{}", compiled.warnings.render(io::stderr().is_terminal()));
     }
@@ -192,7 +195,7 @@ pub(crate) struct Context<'a> {
     /// Netlist as named on the command line.
     file: String,
     /// Netlist parameters with the values they took, SI.
-    parameters: Map<'a, Setting>,
+    parameters: OrderedMap<'a, Setting>,
     /// Every option, under its name on the wire.
     #[serde(flatten)]
     options: Keys<'a>,
@@ -227,11 +230,11 @@ impl Serialize for Keys<'_> {
         for option in MODEL.iter().filter(|option| option.about.name != "segments") {
             let key = option.about.wire;
             match self.0.value(option) {
-                Value::Unset => map.serialize_entry(key, &())?,
-                Value::Flag(flag) => map.serialize_entry(key, &flag)?,
-                Value::Count(count) => map.serialize_entry(key, &count)?,
-                Value::Number(x) => map.serialize_entry(key, &x)?,
-                Value::Name(name) => map.serialize_entry(key, &name)?,
+                OptionValue::Unset => map.serialize_entry(key, &())?,
+                OptionValue::Flag(flag) => map.serialize_entry(key, &flag)?,
+                OptionValue::Count(count) => map.serialize_entry(key, &count)?,
+                OptionValue::Number(x) => map.serialize_entry(key, &x)?,
+                OptionValue::Name(name) => map.serialize_entry(key, &name)?,
             }
         }
         map.end()
@@ -240,9 +243,9 @@ impl Serialize for Keys<'_> {
 
 /// Named values as a JSON object in their own order.
 #[derive(Debug)]
-pub(crate) struct Map<'a, T>(pub(crate) &'a [(String, T)]);
+pub(crate) struct OrderedMap<'a, T>(pub(crate) &'a [(String, T)]);
 
-impl Serialize for Map<'_, Setting> {
+impl Serialize for OrderedMap<'_, Setting> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len()))?;
         for (name, value) in self.0 {
@@ -257,9 +260,9 @@ impl Serialize for Map<'_, Setting> {
 
 /// The same for values that JSON knows.
 #[derive(Debug)]
-pub(crate) struct Named<'a, T>(pub(crate) &'a [(String, T)]);
+pub(crate) struct JsonMap<'a, T>(pub(crate) &'a [(String, T)]);
 
-impl<T: Serialize> Serialize for Named<'_, T> {
+impl<T: Serialize> Serialize for JsonMap<'_, T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
     }

@@ -1,7 +1,7 @@
 //! `bimorph modes`: how it rings.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named, warn_of, warn_of_mesh};
+use super::model::{Context, JsonMap, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::ModelChoice;
 use super::{progress, report, statics, value};
@@ -10,20 +10,20 @@ use bimorph::analysis::frame::{frame, frame_modes};
 use bimorph::analysis::mesh::modes_fitted;
 use bimorph::analysis::modes::ModesResult;
 use bimorph::analysis::statics::NodeMotion;
-use bimorph::compile::Compiled;
-use bimorph::options::Value;
+use bimorph::compile::CompiledModel;
+use bimorph::options::OptionValue;
 use bimorph::options::analysis::MODES_COUNT;
-use bimorph::results::format::Format;
-use bimorph::results::plot::animation::{self, Frame, Play};
+use bimorph::results::format::ResultFormat;
+use bimorph::results::plot::animation::{self, AnimationFrame, Play};
 use bimorph::results::plot::axis::quantity;
-use bimorph::results::plot::mechanism::{self, Drawing, Scale};
+use bimorph::results::plot::mechanism::{self, DisplacementScale, MechanismFigure};
 use bimorph::results::plot::svg::Picture;
 use bimorph::results::table::Table;
 use clap::Args;
 use serde::Serialize;
 
 /// Shapes drawn in one picture.
-const MOST_SHAPES: usize = 12;
+const MAX_SHAPES: usize = 12;
 
 /// Natural frequencies and mode shapes about the operating point, without damping.
 ///
@@ -34,7 +34,7 @@ const MOST_SHAPES: usize = 12;
 #[command(after_help = "Examples:\n  bimorph modes bank.net --count 10 --band 1.3M\n  \
                         bimorph modes bank.net --port sense=40 --json      about the equilibrium at 40 V\n  \
                         bimorph modes bank.net --count 4 --out shapes.png")]
-pub(crate) struct Modes {
+pub(crate) struct ModesCommand {
     #[command(flatten)]
     model: ModelArgs,
 
@@ -55,24 +55,24 @@ pub(crate) struct Modes {
 }
 
 #[derive(Debug, Serialize)]
-struct Document<'a> {
+struct ModesDocument<'a> {
     frequencies_hz: &'a [f64],
-    shapes: Vec<Named<'a, NodeMotion>>,
+    shapes: Vec<JsonMap<'a, NodeMotion>>,
     residuals: &'a [f64],
     estimated_errors: &'a [Option<f64>],
     unknowns: usize,
     /// Largest displacement of a node at the equilibrium that the modes are about [m].
     deflection_m: f64,
     solver: ModelChoice,
-    port_voltages_v: Named<'a, f64>,
+    port_voltages_v: JsonMap<'a, f64>,
     #[serde(flatten)]
     context: Context<'a>,
 }
 
-impl Modes {
+impl ModesCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
-        MODES_COUNT.check(&Value::Count(self.count))?;
+        MODES_COUNT.check(&OptionValue::Count(self.count))?;
         // SUGAR's modes are those of one cubic element for each beam
         let usual = if self.model.options()?.as_sugar { ModelChoice::Frame } else { ModelChoice::Recursion };
         let solver = self.solver.unwrap_or(usual);
@@ -91,15 +91,15 @@ impl Modes {
         let (compiled, result, curves) = result?;
         warn_of_mesh(&drawn, &compiled);
         warn_of(&result.warnings);
-        let document = Document {
+        let document = ModesDocument {
             frequencies_hz: &result.frequencies_hz,
-            shapes: result.shapes.iter().map(|shape| Named(shape)).collect(),
+            shapes: result.shapes.iter().map(|shape| JsonMap(shape)).collect(),
             residuals: &result.residuals,
             estimated_errors: &result.errors,
             unknowns: result.unknowns,
             deflection_m: result.deflection_m,
             solver,
-            port_voltages_v: Named(&self.ports),
+            port_voltages_v: JsonMap(&self.ports),
             context: self.model.context(&compiled).with(&result.warnings),
         };
         let title = self.model.title();
@@ -117,7 +117,7 @@ impl Modes {
             + "\n"
             + &about(result.deflection_m)
             + &report::footing(&compiled, result.unknowns);
-        if self.output.format() == Some(Format::Html) {
+        if self.output.format() == Some(ResultFormat::Html) {
             return self.output.finish_page(|| page(&compiled, &title, &result, &curves), &document, &text);
         }
         self.output.finish(
@@ -153,33 +153,33 @@ fn name(index: usize, frequency: f64) -> String {
     format!("{}: {}", index + 1, quantity(frequency, "Hz"))
 }
 
-fn picture(compiled: &Compiled, title: &str, result: &ModesResult, curves: &[BeamMotions]) -> Picture {
+fn picture(compiled: &CompiledModel, title: &str, result: &ModesResult, curves: &[BeamMotions]) -> Picture {
     let names: Vec<String> = result.frequencies_hz.iter().enumerate().map(|(i, f)| name(i, *f)).collect();
     let motions: Vec<_> = result.shapes.iter().map(|shape| statics::motion(compiled, shape)).collect();
     let curves: Vec<_> = curves.iter().map(statics::beams).collect();
-    let drawings: Vec<Drawing<'_>> = (names.iter().zip(&motions).zip(&curves).take(MOST_SHAPES))
-        .map(|((title, motion), curves)| Drawing {
+    let drawings: Vec<MechanismFigure<'_>> = (names.iter().zip(&motions).zip(&curves).take(MAX_SHAPES))
+        .map(|((title, motion), curves)| MechanismFigure {
             structure: &compiled.structure,
             title,
             motion,
             curves,
             temperatures: &[],
-            scale: Scale::Shape,
+            scale: DisplacementScale::Shape,
         })
         .collect();
     mechanism::grid(title, &drawings)
 }
 
 /// The modes swinging. Their displacements stand for no length: the largest of each becomes a micrometre.
-fn page(compiled: &Compiled, title: &str, result: &ModesResult, curves: &[BeamMotions]) -> String {
+fn page(compiled: &CompiledModel, title: &str, result: &ModesResult, curves: &[BeamMotions]) -> String {
     let frames = result.shapes.iter().zip(&result.frequencies_hz).zip(curves).enumerate();
-    let frames: Vec<Frame> = frames
+    let frames: Vec<AnimationFrame> = frames
         .map(|(k, ((shape, frequency), curves))| {
             let (mut nodes, mut curves) = (statics::motion(compiled, shape), statics::beams(curves));
             let all = || nodes.iter().chain(curves.iter().flatten());
             let largest = all().map(|[x, y, _]| x.hypot(*y)).fold(f64::MIN_POSITIVE, f64::max);
             nodes.iter_mut().chain(curves.iter_mut().flatten()).for_each(|m| *m = m.map(|x| 1e-6 * x / largest));
-            Frame { label: name(k, *frequency), nodes, curves }
+            AnimationFrame { label: name(k, *frequency), nodes, curves }
         })
         .collect();
     animation::page(&compiled.structure, title, Play::Modes, &frames)

@@ -2,13 +2,13 @@
 
 use super::failure::Failure;
 use super::value;
-use bimorph::options::{CompileOptions, Described, MODEL, Range, Value};
+use bimorph::options::{CompileOptions, MODEL, OptionDescription, OptionValue, Range};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use std::sync::LazyLock;
 
 /// The options that were given, as they were written.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Chosen(Vec<(usize, Value)>);
+pub(crate) struct Chosen(Vec<(usize, OptionValue)>);
 
 impl Chosen {
     /// The options of a compilation, each within its range.
@@ -25,11 +25,11 @@ impl Chosen {
         self.0.iter().map(|(k, value)| {
             let name = MODEL[*k].about.name;
             let value = match value {
-                Value::Flag(flag) => flag.to_string(),
-                Value::Count(count) => count.to_string(),
-                Value::Number(x) => format!("{x:e}"),
-                Value::Name(name) => format!("\"{name}\""),
-                Value::Unset => "0".to_owned(),
+                OptionValue::Flag(flag) => flag.to_string(),
+                OptionValue::Count(count) => count.to_string(),
+                OptionValue::Number(x) => format!("{x:e}"),
+                OptionValue::Name(name) => format!("\"{name}\""),
+                OptionValue::Unset => "0".to_owned(),
             };
             (FLAGS[*k].as_str(), format!("{name}={value}"))
         })
@@ -45,7 +45,7 @@ impl Chosen {
 static FLAGS: LazyLock<Vec<String>> = LazyLock::new(|| MODEL.iter().map(|option| option.about.flag()).collect());
 
 /// What the command shows of an option: other options named as the command writes them.
-fn help(about: &Described) -> String {
+fn help(about: &OptionDescription) -> String {
     let mut text = about.about();
     if let Range::Names(names) = about.range
         && names.iter().any(|name| !text.contains(name))
@@ -61,7 +61,7 @@ fn help(about: &Described) -> String {
     text
 }
 
-fn arg(about: &Described, flag: &'static str) -> Arg {
+fn arg(about: &OptionDescription, flag: &'static str) -> Arg {
     let arg = Arg::new(about.name).long(flag).help(help(about));
     match about.range {
         Range::Flag => arg.action(ArgAction::SetTrue),
@@ -74,12 +74,12 @@ fn arg(about: &Described, flag: &'static str) -> Arg {
     }
 }
 
-fn found(matches: &ArgMatches, about: &Described) -> Option<Value> {
+fn found(matches: &ArgMatches, about: &OptionDescription) -> Option<OptionValue> {
     match about.range {
-        Range::Flag => matches.get_flag(about.name).then_some(Value::Flag(true)),
-        Range::Count(..) => matches.get_one(about.name).copied().map(Value::Count),
-        Range::Above(..) | Range::Within(..) => matches.get_one(about.name).copied().map(Value::Number),
-        Range::Names(_) => matches.get_one(about.name).cloned().map(Value::Name),
+        Range::Flag => matches.get_flag(about.name).then_some(OptionValue::Flag(true)),
+        Range::Count(..) => matches.get_one(about.name).copied().map(OptionValue::Count),
+        Range::Above(..) | Range::Within(..) => matches.get_one(about.name).copied().map(OptionValue::Number),
+        Range::Names(_) => matches.get_one(about.name).cloned().map(OptionValue::Name),
     }
 }
 

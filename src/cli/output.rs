@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::interrupt;
-use bimorph::results::format::Format;
+use bimorph::results::format::ResultFormat;
 use bimorph::results::plot::{Picture, render};
 use bimorph::results::table::Table;
 use bimorph::results::{atomic, csv, raw};
@@ -27,13 +27,13 @@ impl OutputArgs {
     /// Refuses a file that could not be written, before any work is done.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         let Some(path) = &self.out else { return Ok(()) };
-        Format::from_path(path)?;
+        ResultFormat::from_path(path)?;
         check_folder(path)
     }
 
     /// The format of `--out`.
-    pub(crate) fn format(&self) -> Option<Format> {
-        self.out.as_deref().and_then(|path| Format::from_path(path).ok())
+    pub(crate) fn format(&self) -> Option<ResultFormat> {
+        self.out.as_deref().and_then(|path| ResultFormat::from_path(path).ok())
     }
 
     /// Writes a finished page to `--out`, then prints.
@@ -87,30 +87,30 @@ pub(crate) fn check_folder(path: &Path) -> Result<(), Failure> {
 /// Writes one result file.
 pub(crate) fn write(
     path: &Path,
-    format: Format,
+    format: ResultFormat,
     table: impl FnOnce() -> Result<Table, Failure>,
     picture: impl FnOnce() -> Result<Picture, Failure>,
 ) -> Result<(), Failure> {
     interrupt::no_longer_polled();
     let failed = |source| Failure::Write { path: path.to_owned(), source };
     match format {
-        Format::Raw => {
+        ResultFormat::Raw => {
             let table = table()?;
             atomic::write(path, |out| raw::write(&table, raw::Encoding::Binary, out)).map_err(failed)
         }
-        Format::Csv => {
+        ResultFormat::Csv => {
             let table = table()?;
             atomic::write(path, |out| csv::write(&table, out)).map_err(failed)
         }
-        Format::Svg | Format::Png | Format::Html => write_picture(path, format, &picture()?),
+        ResultFormat::Svg | ResultFormat::Png | ResultFormat::Html => write_picture(path, format, &picture()?),
     }
 }
 
 /// Writes a picture as SVG, as a web page, or (any other format) as PNG.
-pub(crate) fn write_picture(path: &Path, format: Format, picture: &Picture) -> Result<(), Failure> {
+pub(crate) fn write_picture(path: &Path, format: ResultFormat, picture: &Picture) -> Result<(), Failure> {
     let bytes = match format {
-        Format::Svg => picture.to_svg().into_bytes(),
-        Format::Html => {
+        ResultFormat::Svg => picture.to_svg().into_bytes(),
+        ResultFormat::Html => {
             let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
             render::html(&name, picture).into_bytes()
         }

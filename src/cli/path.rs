@@ -1,19 +1,19 @@
 //! `bimorph path`: how equilibria go on while one thing grows.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named, warn_of, warn_of_mesh};
+use super::model::{Context, JsonMap, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::{busiest, progress, report, statics, value};
-use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace};
+use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, PathInput, trace};
 use bimorph::analysis::mesh::path_fitted;
 use bimorph::analysis::statics::NodeMotion;
-use bimorph::compile::{Compiled, compile};
+use bimorph::compile::{CompiledModel, compile};
 use bimorph::netlist::Setting;
-use bimorph::options::Value;
+use bimorph::options::OptionValue;
 use bimorph::options::analysis::PATH_POINTS;
 use bimorph::results::plot::axis::quantity;
-use bimorph::results::plot::mechanism::{self, Drawing, Scale};
-use bimorph::results::plot::plane::{self, Curve, Mark, Plane, Sign};
+use bimorph::results::plot::mechanism::{self, DisplacementScale, MechanismFigure};
+use bimorph::results::plot::plane::{self, PlaneChart, PlaneCurve, PlaneMark, Sign};
 use bimorph::results::plot::{chart, stack, svg::Picture};
 use bimorph::results::table::Table;
 use bimorph::solve::continuation::Branch;
@@ -38,7 +38,7 @@ pub(crate) struct PathCommand {
 
     /// What grows: a port [V], a netlist parameter that sets loads, temperatures or stresses, or `loads`, a factor on all
     #[arg(long, value_name = "NAME=FROM:TO", value_parser = way)]
-    along: Way,
+    along: PathRange,
 
     /// Signals wanted: a,b or repeated [default: x and y of the node that moves most]
     #[arg(long, value_name = "NAMES")]
@@ -62,20 +62,20 @@ pub(crate) struct PathCommand {
 
 /// `NAME=FROM:TO`.
 #[derive(Debug, Clone, PartialEq)]
-struct Way {
+struct PathRange {
     name: String,
     from: f64,
     to: f64,
 }
 
-fn way(text: &str) -> Result<Way, String> {
+fn way(text: &str) -> Result<PathRange, String> {
     let wrong = || format!("expected NAME=FROM:TO such as F=0:260u, got \"{text}\"");
     let (name, range) = text.split_once('=').ok_or_else(wrong)?;
     let (from, to) = range.split_once(':').ok_or_else(wrong)?;
-    let way = Way { name: name.trim().to_owned(), from: value::number(from)?, to: value::number(to)? };
+    let way = PathRange { name: name.trim().to_owned(), from: value::number(from)?, to: value::number(to)? };
     match way {
-        Way { name, .. } if name.is_empty() => Err(wrong()),
-        Way { name, from, to } if from == to => {
+        PathRange { name, .. } if name.is_empty() => Err(wrong()),
+        PathRange { name, from, to } if from == to => {
             Err(format!("{name} goes nowhere from {from} to {to}: FROM and TO have to differ"))
         }
         way => Ok(way),
@@ -93,19 +93,19 @@ enum BranchArg {
 }
 
 #[derive(Debug, Serialize)]
-struct Document<'a> {
+struct PathDocument<'a> {
     along: &'a str,
     values: &'a [f64],
-    signals: Named<'a, Vec<f64>>,
-    units: Named<'a, String>,
+    signals: JsonMap<'a, Vec<f64>>,
+    units: JsonMap<'a, String>,
     negative: &'a [usize],
     folds: &'a [CriticalPoint],
     bifurcations: &'a [CriticalPoint],
     end: &'a str,
-    last: Named<'a, NodeMotion>,
+    last: JsonMap<'a, NodeMotion>,
     unknowns: usize,
     iterations: usize,
-    port_voltages_v: Named<'a, f64>,
+    port_voltages_v: JsonMap<'a, f64>,
     #[serde(flatten)]
     context: Context<'a>,
 }
@@ -116,14 +116,14 @@ const CHEAPER: &str = "a shorter --along, a larger --tol or fewer --points cost 
 impl PathCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
-        PATH_POINTS.check(&Value::Count(self.points))?;
+        PATH_POINTS.check(&OptionValue::Count(self.points))?;
         let drawn = self.model.compile()?;
         let ends = self.ends(&drawn)?;
         let first = ends.as_ref().map_or(&drawn, |[first, _]| first);
         let growing = match &ends {
-            Some([_, last]) => Growing::Parameter(last),
-            None if drawn.structure.port(&self.along.name).is_some() => Growing::Port(&self.along.name),
-            None => Growing::Loads,
+            Some([_, last]) => PathInput::Parameter(last),
+            None if drawn.structure.port(&self.along.name).is_some() => PathInput::Port(&self.along.name),
+            None => PathInput::Loads,
         };
         let mut request = ContinuationRequest {
             growing,
@@ -155,19 +155,19 @@ impl PathCommand {
         };
         let units = split(|s| s.1.clone());
         let signals: Vec<(String, Vec<f64>)> = result.signals.iter().map(|s| (s.0.clone(), s.2.clone())).collect();
-        let document = Document {
+        let document = PathDocument {
             along: &self.along.name,
             values: &result.values,
-            signals: Named(&signals),
-            units: Named(&units),
+            signals: JsonMap(&signals),
+            units: JsonMap(&units),
             negative: &result.negative,
             folds: &result.folds,
             bifurcations: &result.bifurcations,
             end: result.end,
-            last: Named(&result.last),
+            last: JsonMap(&result.last),
             unknowns: result.unknowns,
             iterations: result.iterations,
-            port_voltages_v: Named(&self.ports),
+            port_voltages_v: JsonMap(&self.ports),
             context: self.model.context(&fitted).with(&result.warnings),
         };
         let unit = self.unit(&drawn, ends.as_ref());
@@ -180,7 +180,7 @@ impl PathCommand {
     }
 
     /// The netlist at both ends, where a parameter grows; none for ports and `loads`.
-    fn ends(&self, drawn: &Compiled) -> Result<Option<[Compiled; 2]>, Failure> {
+    fn ends(&self, drawn: &CompiledModel) -> Result<Option<[CompiledModel; 2]>, Failure> {
         let name = &self.along.name;
         if drawn.structure.port(name).is_some() {
             return Ok(None);
@@ -195,7 +195,7 @@ impl PathCommand {
             return Err(Failure::bad("--along", "a port, a numeric parameter, or loads", got));
         }
         let bundle = self.model.bundle()?;
-        let at = |value: f64| -> Result<Compiled, Failure> {
+        let at = |value: f64| -> Result<CompiledModel, Failure> {
             let mut options = drawn.options.clone();
             options.set.retain(|(parameter, _)| parameter != name);
             options.set.push((name.clone(), Setting::Number(value)));
@@ -205,7 +205,7 @@ impl PathCommand {
     }
 
     /// The unit of what grows, where what it changes tells.
-    fn unit(&self, drawn: &Compiled, ends: Option<&[Compiled; 2]>) -> &'static str {
+    fn unit(&self, drawn: &CompiledModel, ends: Option<&[CompiledModel; 2]>) -> &'static str {
         let Some([first, last]) = ends else {
             return if drawn.structure.port(&self.along.name).is_some() { "V" } else { "" };
         };
@@ -235,7 +235,7 @@ impl PathCommand {
         Ok(table)
     }
 
-    fn picture(&self, compiled: &Compiled, result: &ContinuationResult, unit: &str) -> Picture {
+    fn picture(&self, compiled: &CompiledModel, result: &ContinuationResult, unit: &str) -> Picture {
         let mut units: Vec<&str> = Vec::new();
         for (_, unit, _) in &result.signals {
             if !units.contains(&unit.as_str()) {
@@ -247,7 +247,7 @@ impl PathCommand {
             .iter()
             .map(|x_unit| {
                 let of_unit: Vec<_> = result.signals.iter().filter(|s| s.1 == **x_unit).collect();
-                let curves = of_unit.iter().map(|(name, _, values)| Curve {
+                let curves = of_unit.iter().map(|(name, _, values)| PlaneCurve {
                     name: name.clone(),
                     points: values.iter().zip(&result.values).map(|(x, y)| [*x, *y]).collect(),
                     dashed: result.negative.iter().map(|n| *n > 0).collect(),
@@ -256,7 +256,7 @@ impl PathCommand {
                 let marks = marks.iter().flat_map(|(list, word, sign)| {
                     let of_unit = &of_unit;
                     list.iter().flat_map(move |c| {
-                        of_unit.iter().enumerate().map(move |(k, s)| Mark {
+                        of_unit.iter().enumerate().map(move |(k, s)| PlaneMark {
                             at: [s.2[c.point], c.value],
                             sign: *sign,
                             word: if k == 0 { plane::word(word, c.value, unit) } else { String::new() },
@@ -268,7 +268,7 @@ impl PathCommand {
                     [one] => one.0.clone(),
                     _ => chart::word(x_unit).to_owned(),
                 };
-                plane::draw(&Plane {
+                plane::draw(&PlaneChart {
                     title: title.clone(),
                     x: [x_name, (*x_unit).to_owned()],
                     y: [self.along.name.clone(), unit.to_owned()],
@@ -280,18 +280,18 @@ impl PathCommand {
             })
             .collect();
         let end = result.values.last().copied().unwrap_or_default();
-        pictures.push(mechanism::draw(&Drawing {
+        pictures.push(mechanism::draw(&MechanismFigure {
             structure: &compiled.structure,
             title: &format!("at the end of the path, {} = {}", self.along.name, quantity(end, unit)),
             motion: &statics::motion(compiled, &result.last),
             curves: &statics::beams(&result.last_curves),
             temperatures: &[],
-            scale: Scale::Visible,
+            scale: DisplacementScale::Visible,
         }));
         stack(&pictures)
     }
 
-    fn text(&self, compiled: &Compiled, result: &ContinuationResult, unit: &str) -> String {
+    fn text(&self, compiled: &CompiledModel, result: &ContinuationResult, unit: &str) -> String {
         let mut rows: Vec<(usize, Vec<String>)> = Vec::new();
         let mut row = |what: &str, point: usize| {
             let mut cells = vec![what.to_owned(), quantity(result.values[point], unit)];
@@ -336,7 +336,7 @@ mod tests {
     /// Ranges take suffixes; a range without a way is refused.
     #[test]
     fn ways() {
-        assert_eq!(way("F=0:260u"), Ok(Way { name: "F".into(), from: 0.0, to: 2.6e-4 }));
+        assert_eq!(way("F=0:260u"), Ok(PathRange { name: "F".into(), from: 0.0, to: 2.6e-4 }));
         assert!(way("F=1").is_err() && way("F=1:1").is_err() && way("=0:1").is_err());
     }
 }

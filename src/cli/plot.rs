@@ -5,11 +5,11 @@ use super::output::{check_folder, write};
 use super::{interrupt, statics, value};
 use bimorph::analysis::mesh::static_fitted;
 use bimorph::compile::{CompileOptions, compile};
-use bimorph::front::{self, Asked};
+use bimorph::front::{self, LayoutChoice};
 use bimorph::netlist::Setting;
-use bimorph::results::format::Format;
-use bimorph::results::plot::chart::{self, Chart, Panel, Series};
-use bimorph::results::plot::plane::{self, Curve, Mark, Plane, Sign};
+use bimorph::results::format::ResultFormat;
+use bimorph::results::plot::chart::{self, Panel, PanelChart, Series};
+use bimorph::results::plot::plane::{self, PlaneChart, PlaneCurve, PlaneMark, Sign};
 use bimorph::results::plot::{stack, svg::Picture};
 use bimorph::results::raw;
 use bimorph::results::table::{Column, Table};
@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
     bimorph plot bank.raw --panel 'drive=v(heat)' --panel 'yoke [µm]=v(y)' --out bank.svg\n  \
     bimorph plot bank.raw --mechanism bank.net --port heat=2.2 --out bank.png\n  \
     bimorph plot stage.raw --track c.x,c.y --out track.png          one signal against another, to one scale")]
-pub(crate) struct Plot {
+pub(crate) struct PlotCommand {
     /// ngspice raw file, binary or ASCII
     file: PathBuf,
 
@@ -66,10 +66,10 @@ pub(crate) struct Plot {
     out: PathBuf,
 }
 
-impl Plot {
+impl PlotCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         interrupt::listen();
-        let format = Format::from_path(&self.out)?;
+        let format = ResultFormat::from_path(&self.out)?;
         check_folder(&self.out)?;
         let (mut table, _) = longest(&self.file, self.plot)?;
         for other in &self.others {
@@ -95,7 +95,7 @@ impl Plot {
     }
 
     fn mechanism(&self, netlist: &Path) -> Result<Picture, Failure> {
-        let bundle = front::read(netlist, &[], &Asked::default(), &mut |_| (), &mut |_| true)?.bundle;
+        let bundle = front::read(netlist, &[], &LayoutChoice::default(), &mut |_| (), &mut |_| true)?.bundle;
         let compiled = compile(&bundle, &CompileOptions { set: self.set.clone(), ..CompileOptions::default() })?;
         let (compiled, result, curves) = static_fitted(&compiled, &self.ports)?;
         let volts: Vec<String> = self.ports.iter().map(|(name, v)| format!("{name} = {v} V")).collect();
@@ -131,7 +131,7 @@ pub(crate) fn chart_of(table: &Table, title: Option<&str>, panels: &[String]) ->
         panels.iter().map(|text| panel(text, table)).collect::<Result<_, _>>()?
     };
     let first = columns.first();
-    Ok(chart::draw(&Chart {
+    Ok(chart::draw(&PanelChart {
         title: title.unwrap_or(&table.title).to_owned(),
         x_name: first.map(|c| c.name.clone()).unwrap_or_default(),
         x_unit: first.map(|c| c.unit.clone()).unwrap_or_default(),
@@ -178,16 +178,16 @@ fn tracks(table: &Table, title: Option<&str>, tracks: &[String]) -> Result<Pictu
         let points = x.samples.magnitudes().into_iter().zip(y.samples.magnitudes()).map(|(x, y)| [x, y]).collect();
         names.get_or_insert_with(|| [x, y].map(|c| [c.name.clone(), unit(c)]));
         let name = if name.is_empty() { format!("{}, {}", x.name, y.name) } else { name.trim().to_owned() };
-        curves.push(Curve { name, points, dashed: Vec::new() });
+        curves.push(PlaneCurve { name, points, dashed: Vec::new() });
     }
     let [x, y] = names.unwrap_or_default();
     let start = curves.first().and_then(|c| c.points.first().copied()).unwrap_or_default();
-    Ok(plane::draw(&Plane {
+    Ok(plane::draw(&PlaneChart {
         title: title.unwrap_or(&table.title).to_owned(),
         x,
         y,
         curves,
-        marks: vec![Mark { at: start, sign: Sign::Dot, word: "start".to_owned(), below: false }],
+        marks: vec![PlaneMark { at: start, sign: Sign::Dot, word: "start".to_owned(), below: false }],
         equal: true,
         note: String::new(),
     }))

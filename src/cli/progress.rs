@@ -27,7 +27,7 @@ pub(crate) fn spinner(what: &str) -> ProgressBar {
 /// A pass of an analysis has a forecast once it has taken so long [s]; the forecast is checked each time that the pass has taken twice as long.
 const FIRST_FORECAST: f64 = 3.0;
 /// Completed fraction of a pass before which it has no forecast: its steps have yet to find their length.
-const LEAST_DONE: f64 = 0.01;
+const MIN_DONE: f64 = 0.01;
 /// A pass that goes this many times as fast as before has not settled: it has no forecast.
 const SETTLING: f64 = 4.0;
 /// Shortest forecast that is printed [s].
@@ -86,7 +86,7 @@ impl Forecast {
         self.checked = (passed, fraction, rate);
         let all = spent + (1.0 - fraction) / rate;
         let known = self.printed.is_some_and(|printed| (0.5 * printed..2.0 * printed).contains(&all));
-        let settled = before > 0.0 && fraction >= LEAST_DONE && rate <= SETTLING * rate_before;
+        let settled = before > 0.0 && fraction >= MIN_DONE && rate <= SETTLING * rate_before;
         if !settled || all <= LONG || known {
             return None;
         }

@@ -6,7 +6,7 @@ use super::output::OutputArgs;
 use super::{progress, report, value};
 use bimorph::analysis::mesh::pull_in_fitted;
 use bimorph::analysis::pull_in::PullInResult;
-use bimorph::options::Value;
+use bimorph::options::OptionValue;
 use bimorph::options::analysis::PULL_IN_MAX;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::table::Table;
@@ -22,7 +22,7 @@ use serde::Serialize;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph pullin switch.net --max 50\n  \
                         bimorph pullin switch.net --source drive --set gap=1.5u --json")]
-pub(crate) struct Pullin {
+pub(crate) struct PullInCommand {
     #[command(flatten)]
     model: ModelArgs,
 
@@ -39,7 +39,7 @@ pub(crate) struct Pullin {
 }
 
 #[derive(Debug, Serialize)]
-struct Document<'a> {
+struct PullInDocument<'a> {
     #[serde(flatten)]
     result: &'a PullInResult,
     max_v: f64,
@@ -47,14 +47,14 @@ struct Document<'a> {
     context: Context<'a>,
 }
 
-impl Pullin {
+impl PullInCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
         if self.output.format().is_some_and(|f| !f.is_table()) {
             let hint = "write .csv or .raw";
             return Err(Failure::NoSuchOutput { what: "pullin", kind: "picture", hint });
         }
-        PULL_IN_MAX.check(&Value::Number(self.max))?;
+        PULL_IN_MAX.check(&OptionValue::Number(self.max))?;
         let compiled = self.model.compile()?;
         let busy = progress::spinner("pull-in");
         let drawn = compiled;
@@ -71,7 +71,7 @@ impl Pullin {
             quantity(result.pull_in_v, "V"),
             report::options(&compiled)
         );
-        let document = Document {
+        let document = PullInDocument {
             result: &result,
             max_v: self.max,
             context: self.model.context(&compiled).with(&result.warnings),

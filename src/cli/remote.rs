@@ -12,7 +12,7 @@ use std::time::Duration;
 
 /// How a server is reached.
 #[derive(Debug, Args)]
-pub(crate) struct Reach {
+pub(crate) struct ConnectionArgs {
     #[command(flatten)]
     access: AccessArgs,
 
@@ -23,7 +23,7 @@ pub(crate) struct Reach {
 
 /// How a sweep is computed on a server.
 #[derive(Debug, Args)]
-pub(crate) struct Remote {
+pub(crate) struct RemoteSweepArgs {
     /// Run on a server: unix:///path, host:port or https://host:port. Ctrl-C lets go of it, and it goes on (`bimorph jobs`)
     #[arg(long, value_name = "URI")]
     pub(super) to: Option<String>,
@@ -41,10 +41,10 @@ pub(crate) struct Remote {
     release_after: Option<f64>,
 
     #[command(flatten)]
-    pub(super) reach: Reach,
+    pub(super) reach: ConnectionArgs,
 }
 
-impl Reach {
+impl ConnectionArgs {
     /// A connection.
     pub(super) fn client(&self, uri: &str) -> Result<Client, Failure> {
         if !(self.deadline > 0.0 && self.deadline < 1e6) {
@@ -54,7 +54,7 @@ impl Reach {
     }
 }
 
-impl Remote {
+impl RemoteSweepArgs {
     /// Starts a job; the connection and its name.
     pub(super) fn submit(
         &self,

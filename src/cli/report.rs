@@ -1,17 +1,17 @@
 //! Reports for people: aligned columns in engineering units.
 
-use bimorph::compile::Compiled;
+use bimorph::compile::CompiledModel;
 use bimorph::discretize::Scheme;
 use bimorph::results::plot::axis::quantity;
 use std::fmt::Write;
 
 /// Rows shown of a long list.
-const MOST_ROWS: usize = 40;
+const MAX_ROWS: usize = 40;
 
 /// Lines up cells in columns, the first to the left and the others to the right, two blanks apart.
 pub(crate) fn columns(header: &[&str], rows: &[Vec<String>]) -> String {
     let mut widths: Vec<usize> = header.iter().map(|h| h.chars().count()).collect();
-    for row in rows.iter().take(MOST_ROWS) {
+    for row in rows.iter().take(MAX_ROWS) {
         for (width, cell) in widths.iter_mut().zip(row) {
             *width = (*width).max(cell.chars().count());
         }
@@ -26,17 +26,17 @@ pub(crate) fn columns(header: &[&str], rows: &[Vec<String>]) -> String {
         text.push('\n');
     };
     line(&mut header.iter().copied());
-    for row in rows.iter().take(MOST_ROWS) {
+    for row in rows.iter().take(MAX_ROWS) {
         line(&mut row.iter().map(String::as_str));
     }
-    if rows.len() > MOST_ROWS {
-        let _ = writeln!(text, "… {} more; --json and --out have all", rows.len() - MOST_ROWS);
+    if rows.len() > MAX_ROWS {
+        let _ = writeln!(text, "… {} more; --json and --out have all", rows.len() - MAX_ROWS);
     }
     text
 }
 
 /// The last line of a report: what the numbers rest on.
-pub(crate) fn footing(compiled: &Compiled, unknowns: usize) -> String {
+pub(crate) fn footing(compiled: &CompiledModel, unknowns: usize) -> String {
     format!("{unknowns} unknowns, {}", options(compiled))
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn footing(compiled: &Compiled, unknowns: usize) -> String {
 const ROUNDED: f64 = 5e-4;
 
 /// The options of a model in one line.
-pub(crate) fn options(compiled: &Compiled) -> String {
+pub(crate) fn options(compiled: &CompiledModel) -> String {
     let options = &compiled.options;
     let mut text = format!("tolerance {:e}", options.tol);
     if options.tol < ROUNDED {

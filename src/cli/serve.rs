@@ -4,7 +4,7 @@ use super::failure::Failure;
 use bimorph::service::address::Address;
 use bimorph::service::log;
 use bimorph::service::server::ServeOptions;
-use bimorph::service::settings::{ENVIRONMENT, SETTINGS, Setting, Settings, Source};
+use bimorph::service::settings::{ENVIRONMENT, SETTINGS, ServerOption, SettingSource, Settings};
 use bimorph::service::until_signal::run_until_signal;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use std::path::{Path, PathBuf};
@@ -20,16 +20,16 @@ use std::sync::LazyLock;
                         bimorph serve --listen 127.0.0.1:50051 --listen unix:///run/bimorph.sock\n  \
                         bimorph serve --listen 127.0.0.1:0         any free port; the line says which\n  \
                         bimorph serve --config /etc/bimorph/serve.toml")]
-pub(crate) struct Serve {
+pub(crate) struct ServeCommand {
     #[command(flatten)]
-    told: Told,
+    told: SettingSources,
 
     /// Stop when standard input ends, as it does when the program that started this server ends
     #[arg(long)]
     while_stdin: bool,
 }
 
-impl Serve {
+impl ServeCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         let options = self.told.settings()?.options();
         let calls = options.listen.len();
@@ -47,14 +47,14 @@ impl Serve {
 
 /// What the options of a server say, in the order in which files, the environment and options are asked.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Told {
+pub(crate) struct SettingSources {
     config: Option<PathBuf>,
     /// Name of the setting, its value, and the option that says so.
     given: Vec<(String, String, String)>,
 }
 
 /// The arguments' names, which live as long as the program.
-static FLAGS: LazyLock<Vec<String>> = LazyLock::new(|| SETTINGS.iter().map(Setting::flag).collect());
+static FLAGS: LazyLock<Vec<String>> = LazyLock::new(|| SETTINGS.iter().map(ServerOption::flag).collect());
 
 /// Options for limits that are often changed.
 const SHORT: [(&str, &str, &str); 2] = [
@@ -62,7 +62,7 @@ const SHORT: [(&str, &str, &str); 2] = [
     ("max-connections", "connections", "Most connections at once; as --limit connections=N"),
 ];
 
-impl Told {
+impl SettingSources {
     /// What a file and the environment say, without options.
     pub(crate) fn of(config: Option<PathBuf>) -> Self {
         Self { config, given: Vec::new() }
@@ -72,7 +72,7 @@ impl Told {
     pub(crate) fn settings(&self) -> Result<Settings, Failure> {
         let mut settings = Settings::default();
         for (name, text, place) in &self.given {
-            settings.set(name, text, Source::Option, place.clone())?;
+            settings.set(name, text, SettingSource::Option, place.clone())?;
         }
         settings.read_environment(
             std::env::vars_os()
@@ -118,7 +118,7 @@ impl Told {
     }
 }
 
-impl FromArgMatches for Told {
+impl FromArgMatches for SettingSources {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
         let mut told = Self::default();
         told.take(matches)?;
@@ -130,7 +130,7 @@ impl FromArgMatches for Told {
     }
 }
 
-impl Args for Told {
+impl Args for SettingSources {
     fn augment_args(command: Command) -> Command {
         let value = |name: &'static str, place: &'static str| Arg::new(name).long(name).value_name(place);
         let settings = SETTINGS.iter().zip(FLAGS.iter()).map(|(setting, flag)| {

@@ -1,7 +1,7 @@
 //! `bimorph static`: where it rests.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named, warn_of_mesh};
+use super::model::{Context, JsonMap, ModelArgs, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::ModelChoice;
 use super::{progress, report, value};
@@ -10,13 +10,13 @@ use bimorph::analysis::frame::{frame, frame_statics};
 use bimorph::analysis::mesh::static_backbent;
 use bimorph::analysis::mesh::static_fitted;
 use bimorph::analysis::statics::{NodeMotion, StaticResult};
-use bimorph::compile::Compiled;
+use bimorph::compile::CompiledModel;
 use bimorph::results::plot::axis::quantity;
-use bimorph::results::plot::mechanism::{self, Drawing, Scale};
-use bimorph::results::plot::shapes::Motion;
+use bimorph::results::plot::mechanism::{self, DisplacementScale, MechanismFigure};
+use bimorph::results::plot::shapes::NodeDisplacement;
 use bimorph::results::plot::svg::Picture;
 use bimorph::results::table::Table;
-use bimorph::solve::equilibrium::Passed;
+use bimorph::solve::equilibrium::StabilityLoss;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
@@ -33,7 +33,7 @@ use std::fmt::Write;
                         bimorph static stage.net --set F=100u --json\n  \
                         bimorph static bank.net --port heat=2.2 --out bank.svg     the mechanism, at rest and deflected\n  \
                         bimorph static bank.net --backbend heat=2.6          at rest after it was heated too far once")]
-pub(crate) struct Static {
+pub(crate) struct StaticCommand {
     #[command(flatten)]
     model: ModelArgs,
 
@@ -58,25 +58,25 @@ pub(crate) struct Static {
 }
 
 #[derive(Debug, Serialize)]
-struct Document<'a> {
-    nodes: Named<'a, NodeMotion>,
-    temperatures_k: Named<'a, f64>,
-    currents_a: Named<'a, f64>,
-    charges_c: Named<'a, f64>,
-    permanent_strains: Named<'a, f64>,
+struct StaticDocument<'a> {
+    nodes: JsonMap<'a, NodeMotion>,
+    temperatures_k: JsonMap<'a, f64>,
+    currents_a: JsonMap<'a, f64>,
+    charges_c: JsonMap<'a, f64>,
+    permanent_strains: JsonMap<'a, f64>,
     pulled_in: bool,
     jumped: bool,
-    passed: &'a [Passed],
+    passed: &'a [StabilityLoss],
     free_motions: &'a [String],
     unknowns: usize,
     solver: ModelChoice,
     iterations: usize,
-    port_voltages_v: Named<'a, f64>,
+    port_voltages_v: JsonMap<'a, f64>,
     #[serde(flatten)]
     context: Context<'a>,
 }
 
-impl Static {
+impl StaticCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
         let drawn = match self.solver {
@@ -98,12 +98,12 @@ impl Static {
         busy.finish_and_clear();
         let (compiled, result, curves, permanent_strains) = result?;
         warn_of_mesh(&drawn, &compiled);
-        let document = Document {
-            nodes: Named(&result.nodes),
-            temperatures_k: Named(&result.temperatures_k),
-            currents_a: Named(&result.currents_a),
-            charges_c: Named(&result.charges_c),
-            permanent_strains: Named(&permanent_strains),
+        let document = StaticDocument {
+            nodes: JsonMap(&result.nodes),
+            temperatures_k: JsonMap(&result.temperatures_k),
+            currents_a: JsonMap(&result.currents_a),
+            charges_c: JsonMap(&result.charges_c),
+            permanent_strains: JsonMap(&permanent_strains),
             pulled_in: result.pulled_in,
             jumped: result.jumped,
             passed: &result.passed,
@@ -111,7 +111,7 @@ impl Static {
             unknowns: result.unknowns,
             solver: self.solver,
             iterations: result.iterations,
-            port_voltages_v: Named(&self.ports),
+            port_voltages_v: JsonMap(&self.ports),
             context: self.model.context(&compiled),
         };
         let title = self.model.title();
@@ -119,7 +119,7 @@ impl Static {
             [] => text(&compiled, &result, &permanent_strains),
             names => {
                 chosen(&result, &value::names(names))?
-                    + &told(&result)
+                    + &history(&result)
                     + "\n"
                     + &report::footing(&compiled, result.unknowns)
             }
@@ -158,19 +158,19 @@ fn table(title: &str, result: &StaticResult, names: &[String]) -> Result<Table, 
 }
 
 /// The mechanism at rest and in this equilibrium.
-pub(crate) fn picture(compiled: &Compiled, title: &str, result: &StaticResult, curves: &BeamMotions) -> Picture {
-    mechanism::draw(&Drawing {
+pub(crate) fn picture(compiled: &CompiledModel, title: &str, result: &StaticResult, curves: &BeamMotions) -> Picture {
+    mechanism::draw(&MechanismFigure {
         structure: &compiled.structure,
         title,
         motion: &motion(compiled, &result.nodes),
         curves: &beams(curves),
         temperatures: &result.temperatures_k,
-        scale: Scale::Visible,
+        scale: DisplacementScale::Visible,
     })
 }
 
 /// Displacements by node index, from displacements by name.
-pub(crate) fn motion(compiled: &Compiled, nodes: &[(String, NodeMotion)]) -> Vec<Motion> {
+pub(crate) fn motion(compiled: &CompiledModel, nodes: &[(String, NodeMotion)]) -> Vec<NodeDisplacement> {
     let mut motion = vec![[0.0; 3]; compiled.structure.nodes.len()];
     for (name, moved) in nodes {
         if let Some(id) = compiled.structure.node(name) {
@@ -181,7 +181,7 @@ pub(crate) fn motion(compiled: &Compiled, nodes: &[(String, NodeMotion)]) -> Vec
 }
 
 /// Displacements along beams as pictures take them.
-pub(crate) fn beams(curves: &BeamMotions) -> Vec<Vec<Motion>> {
+pub(crate) fn beams(curves: &BeamMotions) -> Vec<Vec<NodeDisplacement>> {
     curves.iter().map(|curve| curve.iter().map(|m| [m.x, m.y, m.rz]).collect()).collect()
 }
 
@@ -211,14 +211,14 @@ fn chosen(result: &StaticResult, names: &[String]) -> Result<String, Failure> {
 }
 
 /// How the equilibrium came about.
-fn told(result: &StaticResult) -> String {
-    result.told().iter().map(|sentence| format!("\n{sentence}\n")).collect()
+fn history(result: &StaticResult) -> String {
+    result.notes().iter().map(|sentence| format!("\n{sentence}\n")).collect()
 }
 
 /// A displacement below this share of the largest one is rounding.
 const NOISE: f64 = 1e-12;
 
-fn text(compiled: &Compiled, result: &StaticResult, strains: &[(String, f64)]) -> String {
+fn text(compiled: &CompiledModel, result: &StaticResult, strains: &[(String, f64)]) -> String {
     let largest = |of: fn(&NodeMotion) -> f64| result.nodes.iter().map(|(_, m)| of(m)).fold(0.0, f64::max);
     let (far, turned) = (largest(|m| m.x.abs().max(m.y.abs())), largest(|m| m.rz.abs()));
     let cell = |v: f64, most: f64, unit: &str| quantity(if v.abs() < NOISE * most { 0.0 } else { v }, unit);
@@ -241,7 +241,7 @@ fn text(compiled: &Compiled, result: &StaticResult, strains: &[(String, f64)]) -
         let rows: Vec<Vec<String>> = strains.iter().map(|(n, e)| vec![n.clone(), format!("{e:.3e}")]).collect();
         let _ = write!(text, "\n{}", report::columns(&["beam", "permanent strain"], &rows));
     }
-    text.push_str(&told(result));
+    text.push_str(&history(result));
     let _ = write!(text, "\n{} Newton iterations, {}", result.iterations, report::footing(compiled, result.unknowns));
     text
 }

@@ -1,20 +1,20 @@
 //! `bimorph sweep`: many variants.
 
-use super::chance::Chance;
+use super::chance::SamplingArgs;
 use super::failure::Failure;
 use super::model::ModelArgs;
 use super::output::print;
-use super::remote::{Remote, failure, follow};
+use super::remote::{RemoteSweepArgs, failure, follow};
 use super::{delivery, interrupt, progress, sweep_files, value};
 use bimorph::compile::CompileOptions;
-use bimorph::jobs::sweep::journal::{self, Journal, Kept};
-use bimorph::jobs::sweep::part::Part;
-use bimorph::jobs::sweep::statistics::{Limit, SweepStatistics};
+use bimorph::jobs::sweep::journal::{self, Journal, JournalRow};
+use bimorph::jobs::sweep::part::SweepPart;
+use bimorph::jobs::sweep::statistics::{SweepStatistics, YieldLimit};
 use bimorph::jobs::sweep::{
     self, Shard, SweepAnalysis, SweepError, SweepParameter, SweepProgress, SweepSpec, SweepTable,
 };
 use bimorph::netlist::Bundle;
-use bimorph::options::Value;
+use bimorph::options::OptionValue;
 use bimorph::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_STOP};
 use clap::{Args, ValueEnum};
 use std::io::{self, IsTerminal};
@@ -46,7 +46,7 @@ use std::sync::OnceLock;
     bimorph sweep bank.net --param option.tol=1e-2,1e-3,1e-4 --analysis modes\n  \
     bimorph sweep bank.net --param wh=1.8u:2.2u:201 --out w.csv --resume\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --to unix:///tmp/bimorph.sock")]
-pub(crate) struct Sweep {
+pub(crate) struct SweepCommand {
     #[command(flatten)]
     model: ModelArgs,
 
@@ -61,11 +61,11 @@ pub(crate) struct Sweep {
     points: Option<PathBuf>,
 
     #[command(flatten)]
-    chance: Chance,
+    chance: SamplingArgs,
 
     /// What to compute at each point
-    #[arg(long, value_enum, default_value_t = Analysis::Static)]
-    analysis: Analysis,
+    #[arg(long, value_enum, default_value_t = SweepAnalysisChoice::Static)]
+    analysis: SweepAnalysisChoice,
 
     /// Modes: how many [default: 6]
     #[arg(long, short = 'n')]
@@ -100,7 +100,7 @@ pub(crate) struct Sweep {
     threads: Option<usize>,
 
     #[command(flatten)]
-    remote: Remote,
+    remote: RemoteSweepArgs,
 
     /// Write the table to a .csv or .parquet file, or a picture of every result to an .svg, .png or .html file: histograms of samples, else
     /// curves over the last parameter. Repeatable [default: the table to standard output]
@@ -110,7 +110,7 @@ pub(crate) struct Sweep {
     /// Print statistics of every result, and the fraction of points that keep to this limit: NAME>NUMBER, with <, <=, > or >=. A point without
     /// a result is beyond it. Repeatable: the yield is of all of them
     #[arg(long, value_name = "LIMIT")]
-    limits: Vec<Limit>,
+    limits: Vec<YieldLimit>,
 
     /// Go on with the points in FILE.csv.journal, if there are any
     #[arg(long, requires = "out", conflicts_with = "to")]
@@ -118,14 +118,14 @@ pub(crate) struct Sweep {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Analysis {
+enum SweepAnalysisChoice {
     Static,
     Modes,
     Pullin,
     Tran,
 }
 
-impl Sweep {
+impl SweepCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         sweep_files::check(&self.out)?;
         let spec = self.spec()?;
@@ -139,7 +139,7 @@ impl Sweep {
         let table = self.here(&spec, &bundle, &options, &bar);
         bar.finish_and_clear();
         let (table, journal) = table?;
-        let part = (spec.shard.count > 1).then(|| Part::of(&spec, &bundle, &options)).transpose()?;
+        let part = (spec.shard.count > 1).then(|| SweepPart::of(&spec, &bundle, &options)).transpose()?;
         let written = self.deliver(&table, &spec, part.map(|part| part.to_string()).as_deref())?;
         // points that are in no table stay where they are
         if let Some(journal) = journal.filter(|_| written) {
@@ -209,7 +209,7 @@ impl Sweep {
             bar.suspend(|| eprintln!("{} points are there from before", known.len()));
         }
         let refused = OnceLock::new();
-        let keep = |kept: &Kept| journal.keep(kept).map_err(|error| refused.set(error)).is_ok();
+        let keep = |kept: &JournalRow| journal.keep(kept).map_err(|error| refused.set(error)).is_ok();
         let table = sweep::run_on(spec, bundle, options, known, Some(&keep), &|p| report(bar, p));
         if let Some(error) = refused.into_inner() {
             return Err(error.into());
@@ -237,17 +237,17 @@ impl Sweep {
         self.check_use()?;
         let count = self.count.unwrap_or(MODES_COUNT.count());
         let max = self.max.unwrap_or(PULL_IN_MAX.number());
-        MODES_COUNT.check(&Value::Count(count))?;
-        PULL_IN_MAX.check(&Value::Number(max))?;
+        MODES_COUNT.check(&OptionValue::Count(count))?;
+        PULL_IN_MAX.check(&OptionValue::Number(max))?;
         let analysis = match self.analysis {
-            Analysis::Static => {
+            SweepAnalysisChoice::Static => {
                 SweepAnalysis::Static { outputs: value::names(&self.signals), voltages: self.ports.clone() }
             }
-            Analysis::Modes => SweepAnalysis::Modes { count, voltages: self.ports.clone() },
-            Analysis::Pullin => SweepAnalysis::PullIn { port: self.source.clone(), max },
-            Analysis::Tran => {
+            SweepAnalysisChoice::Modes => SweepAnalysis::Modes { count, voltages: self.ports.clone() },
+            SweepAnalysisChoice::Pullin => SweepAnalysis::PullIn { port: self.source.clone(), max },
+            SweepAnalysisChoice::Tran => {
                 let stop = self.stop.unwrap_or_default();
-                TRAN_STOP.check(&Value::Number(stop))?;
+                TRAN_STOP.check(&OptionValue::Number(stop))?;
                 let outputs = value::names(&self.signals);
                 if outputs.is_empty() {
                     return Err(Failure::bad("--signals", "at least one signal, such as yoke.y", "none".to_owned()));
@@ -270,8 +270,8 @@ impl Sweep {
 
     /// Refuses what the analysis would ignore.
     fn check_use(&self) -> Result<(), Failure> {
-        use Analysis::{Modes, Pullin, Static, Tran};
-        let given: [(&str, bool, &[Analysis]); 6] = [
+        use SweepAnalysisChoice::{Modes, Pullin, Static, Tran};
+        let given: [(&str, bool, &[SweepAnalysisChoice]); 6] = [
             ("--count", self.count.is_some(), &[Modes]),
             ("--signals", !self.signals.is_empty(), &[Static, Tran]),
             ("--stop", self.stop.is_some(), &[Tran]),
@@ -279,7 +279,7 @@ impl Sweep {
             ("--source", self.source.is_some(), &[Pullin]),
             ("--max", self.max.is_some(), &[Pullin]),
         ];
-        let name = |analysis: &Analysis| {
+        let name = |analysis: &SweepAnalysisChoice| {
             analysis.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
         };
         if let Some((option, _, of)) = given.iter().find(|(_, given, of)| *given && !of.contains(&self.analysis)) {

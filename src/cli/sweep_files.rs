@@ -3,13 +3,13 @@
 use super::delivery;
 use super::failure::Failure;
 use super::output::{check_folder, write_picture};
-use bimorph::jobs::sweep::statistics::{self, ColumnStatistics, Fraction, Limit, SweepStatistics};
+use bimorph::jobs::sweep::statistics::{self, ColumnStatistics, Fraction, SweepStatistics, YieldLimit};
 use bimorph::jobs::sweep::{SweepAnalysis, SweepSpec, SweepTable};
 use bimorph::netlist::Setting;
 use bimorph::results::atomic;
-use bimorph::results::format::Format;
-use bimorph::results::parquet::{self, Column, Values};
-use bimorph::results::plot::plane::{Curve, Plane};
+use bimorph::results::format::ResultFormat;
+use bimorph::results::parquet::{self, ParquetColumn, ParquetValues};
+use bimorph::results::plot::plane::{PlaneChart, PlaneCurve};
 use bimorph::results::plot::{Picture, histogram, plane, stack};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,8 @@ fn is_table(path: &Path) -> bool {
 /// Rejects files that a sweep is not written to, before anything is computed.
 pub(super) fn check(files: &[PathBuf]) -> Result<(), Failure> {
     for file in files {
-        let is_picture = matches!(Format::from_path(file), Ok(Format::Svg | Format::Png | Format::Html));
+        let is_picture =
+            matches!(ResultFormat::from_path(file), Ok(ResultFormat::Svg | ResultFormat::Png | ResultFormat::Html));
         if !is_table(file) && !is_picture {
             let expected = "a .csv, .parquet, .svg, .png or .html file";
             return Err(Failure::bad("--out", expected, format!("\"{}\"", file.display())));
@@ -46,7 +47,7 @@ pub(super) fn table_file(files: &[PathBuf]) -> Option<&PathBuf> {
 }
 
 /// Rejects limits on what this sweep has no column of, as far as its columns are known before it runs.
-pub(super) fn check_limits(spec: &SweepSpec, limits: &[Limit]) -> Result<(), Failure> {
+pub(super) fn check_limits(spec: &SweepSpec, limits: &[YieldLimit]) -> Result<(), Failure> {
     let results: Vec<String> = match &spec.analysis {
         SweepAnalysis::Modes { count, .. } => (1..=*count).map(|k| format!("f{k}")).collect(),
         SweepAnalysis::PullIn { .. } => vec!["pull_in".to_owned(), "release".to_owned()],
@@ -74,7 +75,7 @@ pub(super) fn deliver(
     title: &str,
     table: &SweepTable,
     part: Option<&str>,
-    (is_random, limits): (bool, &[Limit]),
+    (is_random, limits): (bool, &[YieldLimit]),
 ) -> Result<bool, Failure> {
     if files.is_empty() {
         return delivery::deliver(None, table, part);
@@ -91,7 +92,7 @@ pub(super) fn deliver(
                 return Ok(false);
             }
         } else if delivery::is_result(table, part) {
-            write_picture(file, Format::from_path(file)?, &picture(title, table, is_random, limits))?;
+            write_picture(file, ResultFormat::from_path(file)?, &picture(title, table, is_random, limits))?;
         } else {
             return Ok(false);
         }
@@ -100,10 +101,10 @@ pub(super) fn deliver(
 }
 
 /// The columns of the CSV table.
-fn columns(table: &SweepTable, part: Option<&str>) -> Vec<Column> {
-    let mut found = vec![Column {
+fn columns(table: &SweepTable, part: Option<&str>) -> Vec<ParquetColumn> {
+    let mut found = vec![ParquetColumn {
         name: "point".to_owned(),
-        values: Values::Integers(table.rows.iter().map(|row| row.point as i64).collect()),
+        values: ParquetValues::Integers(table.rows.iter().map(|row| row.point as i64).collect()),
     }];
     for (k, name) in table.parameters.iter().enumerate() {
         let number = |setting: &Setting| match setting {
@@ -117,31 +118,34 @@ fn columns(table: &SweepTable, part: Option<&str>) -> Vec<Column> {
         let settings = || table.rows.iter().map(|row| &row.parameters[k]);
         let are_numbers = settings().all(|setting| number(setting).is_some());
         let values = if are_numbers {
-            Values::Numbers(settings().map(number).collect())
+            ParquetValues::Numbers(settings().map(number).collect())
         } else {
-            Values::Texts(settings().map(text).collect())
+            ParquetValues::Texts(settings().map(text).collect())
         };
-        found.push(Column { name: name.clone(), values });
+        found.push(ParquetColumn { name: name.clone(), values });
     }
     for (k, (name, unit)) in table.results.iter().zip(&table.units).enumerate() {
         let values = table.rows.iter().map(|row| row.values.as_ref().ok().and_then(|values| values[k])).collect();
-        found.push(Column { name: format!("{name} [{unit}]"), values: Values::Numbers(values) });
+        found.push(ParquetColumn { name: format!("{name} [{unit}]"), values: ParquetValues::Numbers(values) });
     }
     let estimates = table.rows.iter().map(|row| row.estimated_error).collect();
-    found.push(Column { name: "estimated_error [1]".to_owned(), values: Values::Numbers(estimates) });
+    found.push(ParquetColumn { name: "estimated_error [1]".to_owned(), values: ParquetValues::Numbers(estimates) });
     let warnings = table.rows.iter().map(|row| row.warning.clone()).collect();
-    found.push(Column { name: "warning".to_owned(), values: Values::Texts(warnings) });
+    found.push(ParquetColumn { name: "warning".to_owned(), values: ParquetValues::Texts(warnings) });
     let error = |error: &String| error.trim_end().to_owned();
     let errors = table.rows.iter().map(|row| row.values.as_ref().err().map(error).unwrap_or_default()).collect();
-    found.push(Column { name: "error".to_owned(), values: Values::Texts(errors) });
+    found.push(ParquetColumn { name: "error".to_owned(), values: ParquetValues::Texts(errors) });
     if let Some(part) = part {
-        found.push(Column { name: "part".to_owned(), values: Values::Texts(vec![part.to_owned(); table.rows.len()]) });
+        found.push(ParquetColumn {
+            name: "part".to_owned(),
+            values: ParquetValues::Texts(vec![part.to_owned(); table.rows.len()]),
+        });
     }
     found
 }
 
 /// A panel for each result: its histogram where samples were drawn, else its curve over the last parameter of numbers.
-fn picture(title: &str, table: &SweepTable, is_random: bool, limits: &[Limit]) -> Picture {
+fn picture(title: &str, table: &SweepTable, is_random: bool, limits: &[YieldLimit]) -> Picture {
     let over = (0..table.parameters.len()).rev().find(|k| {
         let mut settings = table.rows.iter().map(|row| &row.parameters[*k]);
         settings.all(|setting| matches!(setting, Setting::Number(_)))
@@ -155,7 +159,7 @@ fn picture(title: &str, table: &SweepTable, is_random: bool, limits: &[Limit]) -
     stack(&panels)
 }
 
-fn bars(title: &str, table: &SweepTable, result: usize, limits: &[Limit]) -> histogram::Histogram {
+fn bars(title: &str, table: &SweepTable, result: usize, limits: &[YieldLimit]) -> histogram::Histogram {
     let (edges, counts) = statistics::histogram(&statistics::values(table, result));
     let (name, unit) = (&table.results[result], &table.units[result]);
     let of_it = limits.iter().filter(|limit| limit.name == *name).map(|limit| limit.value).collect();
@@ -168,7 +172,7 @@ fn bars(title: &str, table: &SweepTable, result: usize, limits: &[Limit]) -> his
     }
 }
 
-fn curves(title: &str, table: &SweepTable, result: usize, over: usize) -> Plane {
+fn curves(title: &str, table: &SweepTable, result: usize, over: usize) -> PlaneChart {
     let mut curves: BTreeMap<Vec<String>, (usize, Vec<[f64; 2]>)> = BTreeMap::new();
     for (at, row) in table.rows.iter().enumerate() {
         let others = row.parameters.iter().enumerate().filter(|(k, _)| *k != over);
@@ -184,14 +188,14 @@ fn curves(title: &str, table: &SweepTable, result: usize, over: usize) -> Plane 
     let mut ordered: Vec<_> = curves.into_iter().collect();
     ordered.sort_by_key(|(_, (first, _))| *first);
     let is_named = ordered.len() <= MAX_NAMED;
-    let curve = |(named, (_, points)): (Vec<String>, (usize, Vec<[f64; 2]>))| Curve {
+    let curve = |(named, (_, points)): (Vec<String>, (usize, Vec<[f64; 2]>))| PlaneCurve {
         name: if is_named { named.join(", ") } else { String::new() },
         points,
         dashed: Vec::new(),
     };
     let (parameter, name) = (&table.parameters[over], &table.results[result]);
     let unit = if parameter.ends_with(".v") { "V" } else { "" };
-    Plane {
+    PlaneChart {
         title: format!("{title}: {name}"),
         x: [parameter.clone(), unit.to_owned()],
         y: [name.clone(), table.units[result].clone()],

@@ -1,10 +1,10 @@
 //! `bimorph tran`: motion in time.
 
 use super::failure::Failure;
-use super::model::{ModelArgs, Named, warn_of, warn_of_mesh};
+use super::model::{JsonMap, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::SolverChoice;
-use super::tran_report::{Document, picture, table, text};
+use super::tran_report::{TransientDocument, picture, table, text};
 use super::{draw_motion, progress, value};
 use bimorph::analysis::Watch;
 use bimorph::analysis::chart::released;
@@ -14,9 +14,9 @@ use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
-use bimorph::compile::{Compiled, Formulation};
-use bimorph::multibody::relative::Unfit;
-use bimorph::options::Value;
+use bimorph::compile::{CompiledModel, Formulation};
+use bimorph::multibody::relative::UnsupportedModel;
+use bimorph::options::OptionValue;
 use bimorph::options::analysis::{TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use clap::Args;
 use std::path::PathBuf;
@@ -55,7 +55,7 @@ Examples:\n  \
     the model of the paper: joints that only turn, in joint coordinates; \"joint_coordinates\" tells n, m and the gaps\n  \
     bimorph tran stage.net --set F=100u --release F --stop 10u --formulation rcr-elastic --rotary-inertia --method tr-bdf2\n      \
     every elastic direction a coordinate, in implicit steps by the same recursion")]
-pub(crate) struct Tran {
+pub(crate) struct TransientCommand {
     #[command(flatten)]
     model: ModelArgs,
 
@@ -111,7 +111,7 @@ pub(crate) struct Tran {
     output: OutputArgs,
 }
 
-impl Tran {
+impl TransientCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.check()?;
         let formulation = self.model.options()?.formulation;
@@ -154,7 +154,7 @@ impl Tran {
             Some((suited, method)) => (suited.formulation, *method),
             None => (formulation, method),
         };
-        let (mut result, joints) = self.moved(compiled, formulation, &TransientOptions { method, ..options })?;
+        let (mut result, joints) = self.run_motion(compiled, formulation, &TransientOptions { method, ..options })?;
         warn_of(&result.warnings);
         let drawn = result.signals.split_off(wanted);
         if let Some(path) = &self.draw {
@@ -167,10 +167,10 @@ impl Tran {
             units.push((name.clone(), unit.clone()));
         }
         let taken = suited.map(|(suited, _)| format!("{}: {}", suited.formulation.name(), suited.why));
-        let document = Document {
+        let document = TransientDocument {
             t: &result.t,
-            signals: Named(&signals),
-            units: Named(&units),
+            signals: JsonMap(&signals),
+            units: JsonMap(&units),
             method: if self.solver == SolverChoice::Frame { "newmark" } else { method.name() },
             counters: result.counters,
             events: &result.events,
@@ -183,7 +183,7 @@ impl Tran {
             after_contact: &result.after_contact,
             solver: self.solver,
             release: self.release.as_deref(),
-            port_voltages_v: Named(&self.ports),
+            port_voltages_v: JsonMap(&self.ports),
             context: self.model.context_of(start.unwrap_or(compiled), compiled).with(&result.warnings),
         };
         let title = self.model.title();
@@ -216,21 +216,21 @@ impl Tran {
                 return Err(Failure::bad(option, "--solver recursion", got));
             }
         }
-        TRAN_STOP.check(&Value::Number(self.stop))?;
-        TRAN_POINTS.check(&Value::Count(self.points))?;
-        TRAN_STEP.check(&self.step.map_or(Value::Unset, Value::Number))?;
-        TRAN_RHO.check(&Value::Number(self.rho.unwrap_or(TRAN_RHO.number())))?;
+        TRAN_STOP.check(&OptionValue::Number(self.stop))?;
+        TRAN_POINTS.check(&OptionValue::Count(self.points))?;
+        TRAN_STEP.check(&self.step.map_or(OptionValue::Unset, OptionValue::Number))?;
+        TRAN_RHO.check(&OptionValue::Number(self.rho.unwrap_or(TRAN_RHO.number())))?;
         Ok(())
     }
 
     /// What moves, and what it is released from, on the mesh for the run.
     fn fitted(
         &self,
-        drawn: &Compiled,
-        release: Option<&Compiled>,
+        drawn: &CompiledModel,
+        release: Option<&CompiledModel>,
         method: Integrator,
         signals: &[String],
-    ) -> Result<(Compiled, Option<Compiled>), Failure> {
+    ) -> Result<(CompiledModel, Option<CompiledModel>), Failure> {
         let run = TransientOptions {
             stop: self.stop,
             signals: signals.to_vec(),
@@ -252,9 +252,9 @@ impl Tran {
     }
 
     /// The motion, by the equations that were chosen.
-    fn moved(
+    fn run_motion(
         &self,
-        compiled: &Compiled,
+        compiled: &CompiledModel,
         formulation: Formulation,
         options: &TransientOptions<'_>,
     ) -> Result<(TransientResult, Option<JointReport>), Failure> {
@@ -291,11 +291,11 @@ impl Tran {
         }
     }
 
-    fn integrator(&self, compiled: &Compiled) -> Result<Integrator, Failure> {
+    fn integrator(&self, compiled: &CompiledModel) -> Result<Integrator, Failure> {
         let implicit = compiled.joints.is_none();
         // mechanisms of rigid loops have explicit steps
         let name = self.method.as_deref().unwrap_or(match &compiled.joints {
-            Some(Err(Unfit::RigidLoop { .. })) => "rk45",
+            Some(Err(UnsupportedModel::RigidLoop { .. })) => "rk45",
             _ => "rodas4",
         });
         let unknown = || Failure::bad("--method", "the name of an integrator", name.to_owned());
@@ -323,7 +323,7 @@ impl Tran {
 }
 
 /// x and y of every mechanical node that nothing holds.
-fn free_nodes(compiled: &Compiled) -> Vec<String> {
+fn free_nodes(compiled: &CompiledModel) -> Vec<String> {
     let structure = &compiled.structure;
     let held = |id: usize| structure.supports.iter().any(|s| s.node.0 == id && s.held == [true; 3]);
     let free = structure.nodes.iter().enumerate().filter(|(id, node)| node.mechanical && !held(*id));

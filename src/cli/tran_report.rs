@@ -1,27 +1,27 @@
 //! What `bimorph tran` says of a motion: document, table, picture and text.
 
 use super::failure::Failure;
-use super::model::{Context, Named};
+use super::model::{Context, JsonMap};
 use super::report;
 use super::solver::SolverChoice;
 use bimorph::analysis::joint_transient::JointReport;
-use bimorph::analysis::transient::{Counters, Event, Statistics, TransientResult};
-use bimorph::compile::Compiled;
+use bimorph::analysis::transient::{Counters, CrossingEvent, Statistics, TransientResult};
+use bimorph::compile::CompiledModel;
 use bimorph::results::plot::axis::quantity;
-use bimorph::results::plot::chart::{self, Chart, Panel, Series};
+use bimorph::results::plot::chart::{self, Panel, PanelChart, Series};
 use bimorph::results::plot::svg::Picture;
 use bimorph::results::table::Table;
 use bimorph::solve::time::event::Direction;
 use serde::Serialize;
 
 #[derive(Debug, Serialize)]
-pub(super) struct Document<'a> {
+pub(super) struct TransientDocument<'a> {
     pub(super) t: &'a [f64],
-    pub(super) signals: Named<'a, Vec<f64>>,
-    pub(super) units: Named<'a, String>,
+    pub(super) signals: JsonMap<'a, Vec<f64>>,
+    pub(super) units: JsonMap<'a, String>,
     pub(super) method: &'a str,
     pub(super) counters: Counters,
-    pub(super) events: &'a [Event],
+    pub(super) events: &'a [CrossingEvent],
     pub(super) joint_coordinates: Option<JointReport>,
     /// What formulation auto took, and why.
     pub(super) formulation_taken: Option<String>,
@@ -32,7 +32,7 @@ pub(super) struct Document<'a> {
     pub(super) after_contact: &'a [Statistics],
     pub(super) solver: SolverChoice,
     pub(super) release: Option<&'a str>,
-    pub(super) port_voltages_v: Named<'a, f64>,
+    pub(super) port_voltages_v: JsonMap<'a, f64>,
     #[serde(flatten)]
     pub(super) context: Context<'a>,
 }
@@ -58,7 +58,7 @@ pub(super) fn picture(title: &str, result: &TransientResult) -> Picture {
             }
         }
     }
-    chart::draw(&Chart {
+    chart::draw(&PanelChart {
         title: title.to_owned(),
         x_name: "time".to_owned(),
         x_unit: "s".to_owned(),
@@ -68,10 +68,10 @@ pub(super) fn picture(title: &str, result: &TransientResult) -> Picture {
 }
 
 /// Crossings that are listed: a part that bounces has many.
-const MOST_EVENTS: usize = 20;
+const MAX_EVENTS: usize = 20;
 
 pub(super) fn text(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     result: &TransientResult,
     joints: Option<&JointReport>,
     asked: &[(String, f64)],
@@ -93,14 +93,14 @@ pub(super) fn text(
     let mut events: String = result
         .events
         .iter()
-        .take(MOST_EVENTS)
+        .take(MAX_EVENTS)
         .map(|e| {
             let what = if e.contact { " (contact)" } else { "" };
             let way = if e.direction == Direction::Up { "up" } else { "down" };
             format!("{} crosses {:e} {way} at {}{what}\n", e.signal, e.level, quantity(e.t, "s"))
         })
         .collect();
-    if let Some(more) = result.events.len().checked_sub(MOST_EVENTS).filter(|more| *more > 0) {
+    if let Some(more) = result.events.len().checked_sub(MAX_EVENTS).filter(|more| *more > 0) {
         events.push_str(&format!("and {more} crossings more: --json has all\n"));
     }
     let crossed = |name: &str, level: f64| result.events.iter().any(|e| e.signal == name && e.level == level);

@@ -5,7 +5,7 @@
 //! each, as they are in every analysis, unless the netlist's circuit touches them and no voltage is given.
 
 use super::printed::{prints, scale};
-use super::spice_names::{Names, swept};
+use super::spice_names::{SpiceNames, swept};
 use crate::structure::{CircuitElement, CircuitKind, NodeId, Structure};
 use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
@@ -16,7 +16,7 @@ const IDEAL_GAIN: f64 = 1e6;
 
 /// What the deck shall hold beside the netlist.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Around {
+pub struct DeckSpec {
     /// The netlist as the `.model` line names it.
     pub file: String,
     /// Netlist parameters and options of the model, as words of the `.model` line.
@@ -36,7 +36,7 @@ pub struct Around {
 /// Why there is no deck.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
-pub enum AroundError {
+pub enum DeckError {
     /// The mechanism has no electrical side.
     #[error("no potential acts on the mechanism: it has no gap, comb or heated beam between electrical nodes")]
     NothingElectrical,
@@ -83,22 +83,22 @@ pub enum AroundError {
 /// The deck around a netlist's device.
 ///
 /// # Errors
-/// [`AroundError`]
-pub fn around(structure: &Structure, wanted: &Around) -> Result<String, AroundError> {
+/// [`DeckError`]
+pub fn around(structure: &Structure, wanted: &DeckSpec) -> Result<String, DeckError> {
     if wanted.file.contains(char::is_whitespace) {
-        return Err(AroundError::Blank { file: wanted.file.clone() });
+        return Err(DeckError::Blank { file: wanted.file.clone() });
     }
     if structure.circuit.is_empty() && structure.ports.is_empty() {
-        return Err(AroundError::NothingDrives);
+        return Err(DeckError::NothingDrives);
     }
     if structure.electrical_grounds.is_empty() {
-        return Err(AroundError::NoGround);
+        return Err(DeckError::NoGround);
     }
     let alone = structure.clone().without_circuit();
     if alone.ports.is_empty() {
-        return Err(AroundError::NothingElectrical);
+        return Err(DeckError::NothingElectrical);
     }
-    let mut names = Names::new();
+    let mut names = SpiceNames::new();
     // nodes on a wire are one node of SPICE
     let nets = structure.nets();
     let net = |id: NodeId| nets[id.0];
@@ -113,7 +113,7 @@ pub fn around(structure: &Structure, wanted: &Around) -> Result<String, AroundEr
 
     let mut text = format!("* {}: the device, and the circuit that its netlist draws\n", wanted.file);
     let wave = |name: &str| wanted.drives.iter().find(|(driven, _)| driven == name).map(|(_, wave)| wave.as_str());
-    let mut elements = Names::new();
+    let mut elements = SpiceNames::new();
     let sources = sources(structure, wanted)?;
     // what the netlist's sources and ports are called in the deck
     let mut called: BTreeMap<String, String> = BTreeMap::new();
@@ -175,19 +175,19 @@ pub fn around(structure: &Structure, wanted: &Around) -> Result<String, AroundEr
 }
 
 /// The source that small signals come from; checks the names that were given.
-fn sources(structure: &Structure, wanted: &Around) -> Result<Option<String>, AroundError> {
+fn sources(structure: &Structure, wanted: &DeckSpec) -> Result<Option<String>, DeckError> {
     for (what, names) in [
         ("port", wanted.ports.iter().map(|(name, _)| name).collect::<Vec<_>>()),
         ("drive", wanted.drives.iter().map(|(name, _)| name).collect()),
     ] {
         if let Some((_, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
-            return Err(AroundError::Twice { what, name: (*name).clone() });
+            return Err(DeckError::Twice { what, name: (*name).clone() });
         }
     }
     let listed = |names: &[&str]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
     let ports: Vec<&str> = structure.ports.iter().map(|p| p.name.as_str()).collect();
     if let Some((name, _)) = wanted.ports.iter().find(|(name, _)| !ports.contains(&name.as_str())) {
-        return Err(AroundError::Unknown { what: "port", name: name.clone(), available: listed(&ports) });
+        return Err(DeckError::Unknown { what: "port", name: name.clone(), available: listed(&ports) });
     }
     let is_source = |e: &&CircuitElement| matches!(e.kind, CircuitKind::VoltageSource | CircuitKind::CurrentSource);
     let mut all: Vec<&str> = structure.circuit.iter().filter(is_source).map(|e| e.name.as_str()).collect();
@@ -199,11 +199,11 @@ fn sources(structure: &Structure, wanted: &Around) -> Result<Option<String>, Aro
     let known =
         |name: &str| ports.contains(&name) || structure.circuit.iter().filter(is_source).any(|e| e.name == name);
     if let Some((name, _)) = wanted.drives.iter().find(|(name, _)| !known(name)) {
-        return Err(AroundError::Unknown { what: "source or port", name: name.clone(), available: listed(&all) });
+        return Err(DeckError::Unknown { what: "source or port", name: name.clone(), available: listed(&all) });
     }
     match &wanted.source {
         Some(name) if all.contains(&name.as_str()) => Ok(Some(name.clone())),
-        Some(name) => Err(AroundError::Unknown { what: "source", name: name.clone(), available: listed(&all) }),
+        Some(name) => Err(DeckError::Unknown { what: "source", name: name.clone(), available: listed(&all) }),
         // what the netlist itself says of small signals holds
         None if structure.circuit.iter().any(|e| e.small_signal.is_some()) => Ok(None),
         None => Ok(all.first().map(|name| (*name).to_owned())),
@@ -214,9 +214,9 @@ fn sources(structure: &Structure, wanted: &Around) -> Result<Option<String>, Aro
 fn line(
     element: &CircuitElement,
     node: &impl Fn(NodeId) -> String,
-    names: &mut Names,
+    names: &mut SpiceNames,
     ac: bool,
-) -> Result<String, AroundError> {
+) -> Result<String, DeckError> {
     let (letter, parameter) = match element.kind {
         CircuitKind::Resistor => ("R", "R"),
         CircuitKind::Capacitor => ("C", "C"),
@@ -228,7 +228,7 @@ fn line(
     let value = match (element.kind, element.value) {
         (CircuitKind::OpAmp, _) => IDEAL_GAIN,
         (_, Some(value)) => value,
-        (_, None) => return Err(AroundError::NoValue { name: element.name.clone(), parameter }),
+        (_, None) => return Err(DeckError::NoValue { name: element.name.clone(), parameter }),
     };
     let at = |n: usize| node(element.nodes[n]);
     let name = names.take(&format!("{letter}_{}", element.name));
@@ -257,22 +257,23 @@ mod tests {
     const PLATE: &str = "anchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\n\
         anchor * [e] [l=1u w=1u h=1u]\nplategap2d * [m e] [A=1e-8 gap=2u]\neground * [e] []\n";
 
-    fn deck(more: &str, wanted: &Around) -> Result<String, AroundError> {
+    fn deck(more: &str, wanted: &DeckSpec) -> Result<String, DeckError> {
         let loaded =
             load(&Bundle::from_text("n.net", &format!("{PLATE}{more}")), &[]).unwrap_or_else(|d| panic!("{d}"));
-        around(&loaded.structure, &Around { file: "n.net".into(), ..wanted.clone() })
+        around(&loaded.structure, &DeckSpec { file: "n.net".into(), ..wanted.clone() })
     }
 
     /// What a source gives over time stands behind its voltage; a name that is no source is told.
     #[test]
     fn sources_give_what_they_are_told() {
-        let drive = |name: &str| Around { drives: vec![(name.into(), "PULSE(0 4 1u)".into())], ..Around::default() };
+        let drive =
+            |name: &str| DeckSpec { drives: vec![(name.into(), "PULSE(0 4 1u)".into())], ..DeckSpec::default() };
         let more = "bias Vsrc * [s e] [V=4]\nr R * [s m] [R=1k]\ndrive port * [m e] []\n";
         let text = deck(more, &drive("bias")).unwrap();
         assert!(text.contains("v_bias s 0 dc 4e0 ac 1 PULSE(0 4 1u)\nr_r s m 1e3\nA1"), "{text}");
         let text = deck("drive port * [m e] []\n", &drive("drive")).unwrap();
         assert!(text.contains("v_drive m 0 dc 0e0 ac 1 PULSE(0 4 1u)\nA1"), "{text}");
-        assert!(matches!(deck(more, &drive("r")), Err(AroundError::Unknown { .. })));
+        assert!(matches!(deck(more, &drive("r")), Err(DeckError::Unknown { .. })));
     }
 
     /// Every element of the circuit becomes a line, nodes have legal names of their own, the device has the node that acts on it, and
@@ -281,11 +282,11 @@ mod tests {
     fn the_circuit_becomes_lines() {
         let more = "bias Vsrc * [s(1) e] [V=4]\nR * [s(1) m] [R=1k]\nc C * [m e] [C=1p]\nL * [s(1) GND] [L=1m]\n\
             i Isrc * [GND e] [I=1u]\namp opamp * [q m o e] []\nx vcvs * [m e q e] [A=2]\nR * [o q] [G=1m]\n";
-        let wanted = Around {
+        let wanted = DeckSpec {
             signals: vec!["m.x".into()],
             analyses: vec![".op".into()],
             model: vec!["tol=1e-4".into()],
-            ..Around::default()
+            ..DeckSpec::default()
         };
         let text = deck(more, &wanted).unwrap();
         let lines: Vec<&str> = text.lines().skip(1).collect();
@@ -317,7 +318,7 @@ mod tests {
     #[test]
     fn wires_are_one_node() {
         let more = "bias Vsrc * [s g] [V=4]\nR * [s x] [R=1k]\nC * [y e] [C=1p]\nwire * [m x y] []\nwire * [e g] []\n";
-        let text = deck(more, &Around::default()).unwrap();
+        let text = deck(more, &DeckSpec::default()).unwrap();
         let lines: Vec<&str> = text.lines().skip(1).take(4).collect();
         assert_eq!(
             lines,
@@ -330,15 +331,15 @@ mod tests {
     #[test]
     fn what_is_missing_is_told() {
         let port = "drive port * [m e] []\n";
-        let wanted = Around { ports: vec![("drive".into(), 2.0)], ..Around::default() };
+        let wanted = DeckSpec { ports: vec![("drive".into(), 2.0)], ..DeckSpec::default() };
         let text = deck(port, &wanted).unwrap();
         assert!(text.contains("v_drive m 0 dc 2e0 ac 1\nA1 %gd [m 0] null device\n"), "{text}");
-        assert_eq!(deck("", &Around::default()), Err(AroundError::NothingDrives));
-        let value = deck("c C * [m e] []\n", &Around::default());
-        assert_eq!(value, Err(AroundError::NoValue { name: "c".into(), parameter: "C" }));
-        let unknown = deck(port, &Around { source: Some("x".into()), ..wanted });
-        assert!(matches!(&unknown, Err(AroundError::Unknown { available, .. }) if available == "drive"), "{unknown:?}");
-        let nothing = deck("R * [p e] [R=1]\n", &Around::default());
-        assert_eq!(nothing, Err(AroundError::NothingElectrical));
+        assert_eq!(deck("", &DeckSpec::default()), Err(DeckError::NothingDrives));
+        let value = deck("c C * [m e] []\n", &DeckSpec::default());
+        assert_eq!(value, Err(DeckError::NoValue { name: "c".into(), parameter: "C" }));
+        let unknown = deck(port, &DeckSpec { source: Some("x".into()), ..wanted });
+        assert!(matches!(&unknown, Err(DeckError::Unknown { available, .. }) if available == "drive"), "{unknown:?}");
+        let nothing = deck("R * [p e] [R=1]\n", &DeckSpec::default());
+        assert_eq!(nothing, Err(DeckError::NothingElectrical));
     }
 }

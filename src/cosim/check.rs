@@ -1,23 +1,23 @@
 //! A run repeated with half the steps, a tenth of the tolerances and twice the segments: how far off it may be.
 
-use super::compare::{self, Plot, Printed};
+use super::compare::{self, PlotComparison, PrintedNumber};
 use super::error::{CosimError, io};
 use super::finer::{TIGHTER, finer, keeping_plots, measuring};
 use super::run::{CosimOptions, CosimReport, run_whatever};
-use super::scratch::Scratch;
+use super::scratch::ScratchFolder;
 use crate::results::raw;
 use crate::results::table::Table;
 use std::path::Path;
 
 /// How far a run and its finer repetition lie apart.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Checked {
+pub struct CosimCheck {
     /// The run as the deck has it.
     pub report: CosimReport,
     /// Every plot.
-    pub plots: Vec<Plot>,
+    pub plots: Vec<PlotComparison>,
     /// Every number that was printed by name.
-    pub printed: Vec<Printed>,
+    pub printed: Vec<PrintedNumber>,
     /// What could not be made finer or compared, one sentence each.
     pub notes: Vec<String>,
 }
@@ -27,11 +27,11 @@ pub struct Checked {
 ///
 /// # Errors
 /// [`CosimError`]: of either run.
-pub fn check(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Checked, CosimError> {
+pub fn check(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<CosimCheck, CosimError> {
     let deck = &options.deck;
     let bytes = std::fs::read(deck).map_err(|source| CosimError::Deck { path: deck.clone(), source })?;
     let text = options.text.clone().unwrap_or_else(|| String::from_utf8_lossy(&bytes).into_owned());
-    let scratch = Scratch::new()?;
+    let scratch = ScratchFolder::new()?;
     let changed = finer(&text, deck.parent().unwrap_or(Path::new(".")));
     let mut notes = changed.notes;
     let one = |text: &str, name: &str, share: f64| {
@@ -65,7 +65,7 @@ pub fn check(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Ch
     }
     let (plots, more) = compare::plots(&plots, &fine_plots);
     notes.extend(more);
-    Ok(Checked { plots, printed: compare::printed(&report.output, &fine.output), notes, report })
+    Ok(CosimCheck { plots, printed: compare::printed(&report.output, &fine.output), notes, report })
 }
 
 /// Plots of a raw file; none where there is none.

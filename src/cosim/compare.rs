@@ -6,17 +6,17 @@
 
 pub use super::oscillation::Oscillation;
 use super::oscillation::common;
-use crate::results::table::{Samples, Table};
+use crate::results::table::{ColumnSamples, Table};
 use serde::Serialize;
 
 /// Smallest range that a voltage [V] or a current [A] is measured against: ngspice solves no finer (`vntol`, `abstol`).
-const LEAST_RANGE: [(&str, f64); 2] = [("V", 1e-6), ("A", 1e-12)];
+const MIN_RANGE: [(&str, f64); 2] = [("V", 1e-6), ("A", 1e-12)];
 /// Smallest range, as a share of the largest magnitude [1]: of a constant, the difference is relative to a thousandth of it.
-const LEAST_SHARE: f64 = 1e-3;
+const MIN_SHARE: f64 = 1e-3;
 
 /// How far apart a vector is.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Vector {
+pub struct VectorComparison {
     /// Its name.
     pub name: String,
     /// Its unit, where ngspice tells it.
@@ -34,7 +34,7 @@ pub struct Vector {
     pub oscillation: Option<Oscillation>,
 }
 
-impl Vector {
+impl VectorComparison {
     /// The largest difference that counts [1]: of an oscillator that of its frequency or amplitude, not that of its phase.
     pub fn counts(&self) -> f64 {
         self.oscillation.map_or(self.largest, |o| o.difference[0].max(o.difference[1]))
@@ -43,7 +43,7 @@ impl Vector {
 
 /// How far apart the vectors of a plot are.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Plot {
+pub struct PlotComparison {
     /// Its name ("Transient Analysis").
     pub name: String,
     /// Name of the axis.
@@ -51,12 +51,12 @@ pub struct Plot {
     /// Points of both runs.
     pub points: [usize; 2],
     /// Its vectors.
-    pub vectors: Vec<Vector>,
+    pub vectors: Vec<VectorComparison>,
 }
 
 /// A number that both runs printed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Printed {
+pub struct PrintedNumber {
     /// Its name.
     pub name: String,
     /// What the first run and the second said.
@@ -66,7 +66,7 @@ pub struct Printed {
 }
 
 /// Compares plot by plot; a sentence for each plot that cannot be compared.
-pub fn plots(first: &[Table], second: &[Table]) -> (Vec<Plot>, Vec<String>) {
+pub fn plots(first: &[Table], second: &[Table]) -> (Vec<PlotComparison>, Vec<String>) {
     let mut notes = Vec::new();
     if first.len() != second.len() {
         notes.push(format!("{} plots, and {} in the finer run", first.len(), second.len()));
@@ -83,7 +83,7 @@ pub fn plots(first: &[Table], second: &[Table]) -> (Vec<Plot>, Vec<String>) {
     (plots, notes)
 }
 
-fn plot(a: &Table, b: &Table) -> Result<Plot, String> {
+fn plot(a: &Table, b: &Table) -> Result<PlotComparison, String> {
     let points = [a.rows(), b.rows()];
     let refused = |why: &str| Err(format!("{}: {why}", a.plot_name));
     if a.plot_name != b.plot_name {
@@ -116,12 +116,12 @@ fn plot(a: &Table, b: &Table) -> Result<Plot, String> {
         let squares: f64 = differences.iter().map(|d| d * d).sum();
         let relative = |d: f64| if range > 0.0 { d / range } else { d };
         let oscillation = match (&column.samples, &other.samples) {
-            (Samples::Real(v), Samples::Real(w)) if a.plot_name.starts_with("Transient") => {
+            (ColumnSamples::Real(v), ColumnSamples::Real(w)) if a.plot_name.starts_with("Transient") => {
                 common((&x, v), (&y, w), relative(differences[worst]))
             }
             _ => None,
         };
-        vectors.push(Vector {
+        vectors.push(VectorComparison {
             oscillation,
             name: column.name.clone(),
             unit: column.unit.clone(),
@@ -132,32 +132,32 @@ fn plot(a: &Table, b: &Table) -> Result<Plot, String> {
         });
     }
     let axis = if single { String::new() } else { a.columns()[0].name.clone() };
-    Ok(Plot { name: a.plot_name.clone(), axis, points, vectors })
+    Ok(PlotComparison { name: a.plot_name.clone(), axis, points, vectors })
 }
 
-fn real(samples: &Samples) -> Vec<f64> {
+fn real(samples: &ColumnSamples) -> Vec<f64> {
     complex(samples).iter().map(|z| z[0]).collect()
 }
 
-fn complex(samples: &Samples) -> Vec<[f64; 2]> {
+fn complex(samples: &ColumnSamples) -> Vec<[f64; 2]> {
     match samples {
-        Samples::Real(v) => v.iter().map(|x| [*x, 0.0]).collect(),
-        Samples::Complex(v) => v.clone(),
+        ColumnSamples::Real(v) => v.iter().map(|x| [*x, 0.0]).collect(),
+        ColumnSamples::Complex(v) => v.clone(),
     }
 }
 
 /// What differences of a vector are relative to.
-fn range(samples: &Samples, name: &str, unit: &str) -> f64 {
+fn range(samples: &ColumnSamples, name: &str, unit: &str) -> f64 {
     let largest = samples.magnitudes().into_iter().fold(0.0, |m: f64, y| m.max(y.abs()));
     let span = match samples {
-        Samples::Real(v) if v.len() > 1 => {
+        ColumnSamples::Real(v) if v.len() > 1 => {
             let (low, high) = v.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, y| (r.0.min(*y), r.1.max(*y)));
-            (high - low).max(LEAST_SHARE * largest)
+            (high - low).max(MIN_SHARE * largest)
         }
         _ => largest,
     };
     // ngspice calls whatever is looked at by `@` a voltage
-    let least = LEAST_RANGE.iter().find(|(u, _)| *u == unit && !name.contains('@')).map_or(0.0, |(_, least)| *least);
+    let least = MIN_RANGE.iter().find(|(u, _)| *u == unit && !name.contains('@')).map_or(0.0, |(_, least)| *least);
     span.max(least)
 }
 
@@ -196,7 +196,7 @@ fn between(t: &[f64], y: &[[f64; 2]], at: f64) -> ([f64; 2], [f64; 2]) {
 }
 
 /// Numbers that ngspice printed by name, as `print` and `.measure` do, in both outputs, in their order.
-pub fn printed(first: &str, second: &str) -> Vec<Printed> {
+pub fn printed(first: &str, second: &str) -> Vec<PrintedNumber> {
     let (first, second) = (numbers(first), numbers(second));
     let mut used = vec![false; second.len()];
     let mut found = Vec::new();
@@ -206,7 +206,7 @@ pub fn printed(first: &str, second: &str) -> Vec<Printed> {
         let other = second[n].1;
         let most = value.abs().max(other.abs());
         let difference = if most > 0.0 { (value - other).abs() / most } else { 0.0 };
-        found.push(Printed { name, values: [value, other], difference });
+        found.push(PrintedNumber { name, values: [value, other], difference });
     }
     found
 }

@@ -14,11 +14,11 @@ const STEP_SHARE: f64 = 0.5;
 /// ngspice's `reltol` where a deck says nothing [1].
 const DEFAULT_RELTOL: f64 = 1e-3;
 /// Steps that ngspice takes at least, where `.tran` gives no longest one.
-const LEAST_STEPS: f64 = 50.0;
+const MIN_STEPS: f64 = 50.0;
 
 /// A deck changed.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Rewritten {
+pub struct RefinedDeck {
     /// Its text.
     pub text: String,
     /// What could not be made finer, one sentence each.
@@ -26,7 +26,7 @@ pub struct Rewritten {
 }
 
 /// The deck with shorter steps and tighter tolerances. `folder`: where it stands.
-pub fn finer(deck: &str, folder: &Path) -> Rewritten {
+pub fn finer(deck: &str, folder: &Path) -> RefinedDeck {
     let mut notes = Vec::new();
     let (mut lines, mut control, mut tightened) = (Vec::new(), false, false);
     for (n, line) in logical_lines(deck).into_iter().enumerate() {
@@ -67,7 +67,7 @@ pub fn finer(deck: &str, folder: &Path) -> Rewritten {
     if !tightened && !lines.is_empty() {
         lines.insert(1, format!(".options reltol={}", written(DEFAULT_RELTOL / TIGHTER)));
     }
-    Rewritten { text: lines.join("\n") + "\n", notes }
+    RefinedDeck { text: lines.join("\n") + "\n", notes }
 }
 
 /// The deck with every plot of its `.control` sections appended to `raw` at their end, and before each `quit`. A deck without such a
@@ -241,13 +241,13 @@ fn halved(line: &str, control: bool) -> Option<String> {
         (Some(numbers), Some(_)) => written(STEP_SHARE * numbers[3]),
         (Some(numbers), None) => {
             let span = numbers[1] - numbers.get(2).copied().unwrap_or(0.0);
-            written(STEP_SHARE * numbers[0].min(span / LEAST_STEPS))
+            written(STEP_SHARE * numbers[0].min(span / MIN_STEPS))
         }
         (None, _) if control => return None,
         (None, Some(longest)) => format!("{{{STEP_SHARE}*{}}}", expression(longest)?),
         (None, None) => {
             let (step, stop, start) = (expression(step)?, expression(stop)?, expression(start)?);
-            format!("{{{STEP_SHARE}*min({step},({stop}-{start})/{LEAST_STEPS})}}")
+            format!("{{{STEP_SHARE}*min({step},({stop}-{start})/{MIN_STEPS})}}")
         }
     };
     let tail = if uic.is_some() { " uic" } else { "" };

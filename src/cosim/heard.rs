@@ -7,7 +7,7 @@ use std::process::Child;
 use std::time::Duration;
 
 /// What ngspice said and how it ended.
-pub(super) struct Heard {
+pub(super) struct RunOutput {
     status: std::process::ExitStatus,
     aborted: Option<String>,
     nothing_run: bool,
@@ -16,10 +16,10 @@ pub(super) struct Heard {
 }
 
 /// How often a run looks whether it is still wanted.
-const LOOK: Duration = Duration::from_millis(10);
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Passes ngspice's messages on, or keeps them, and hears the ones that tell a failure. Ends ngspice when it shall not go on.
-pub(super) fn listen(mut child: Child, capture: bool, keep_going: &dyn Fn() -> bool) -> std::io::Result<Heard> {
+pub(super) fn listen(mut child: Child, capture: bool, keep_going: &dyn Fn() -> bool) -> std::io::Result<RunOutput> {
     let stdout = child.stdout.take().map(|mut out| {
         std::thread::spawn(move || {
             let mut bytes = Vec::new();
@@ -36,7 +36,7 @@ pub(super) fn listen(mut child: Child, capture: bool, keep_going: &dyn Fn() -> b
             cancelled = true;
             child.kill()?;
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     };
     let mut output = match stdout.map(std::thread::JoinHandle::join) {
         Some(Ok(bytes)) => bytes?,
@@ -47,10 +47,10 @@ pub(super) fn listen(mut child: Child, capture: bool, keep_going: &dyn Fn() -> b
         _ => (None, false, Vec::new()),
     };
     output.append(&mut messages);
-    Ok(Heard { status, aborted, nothing_run, cancelled, output: String::from_utf8_lossy(&output).into_owned() })
+    Ok(RunOutput { status, aborted, nothing_run, cancelled, output: String::from_utf8_lossy(&output).into_owned() })
 }
 
-pub(super) fn judge(heard: &Heard, failure: &Path, deck: &Path, has_control: bool) -> Result<(), CosimError> {
+pub(super) fn judge(heard: &RunOutput, failure: &Path, deck: &Path, has_control: bool) -> Result<(), CosimError> {
     let output = || heard.output.clone();
     if let Ok(reason) = std::fs::read_to_string(failure) {
         return Err(CosimError::Stopped { reason, output: output() });

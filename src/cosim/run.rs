@@ -12,7 +12,7 @@ use super::error::{CosimError, io};
 use super::find::{find_ngspice, find_plugin};
 use super::heard::{judge, listen};
 use super::includes::Included;
-use super::scratch::{Initial, Scratch, initialise, user_settings};
+use super::scratch::{InitializationFile, ScratchFolder, initialise, user_settings};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -85,13 +85,13 @@ pub(super) fn run_whatever(options: &CosimOptions, keep_going: &dyn Fn() -> bool
         Some(path) => path.canonicalize().map_err(io(|| format!("cannot read the plug-in {}", path.display())))?,
         None => find_plugin()?,
     };
-    let scratch = Scratch::new()?;
+    let scratch = ScratchFolder::new()?;
     let folder = deck.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = folder.canonicalize().map_err(|source| CosimError::Deck { path: deck.clone(), source })?;
     let user = user_settings();
     let settings = user.as_ref().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
     let included = Included::of(&String::from_utf8_lossy(&text), &folder, &settings);
-    let start = Initial {
+    let start = InitializationFile {
         user: user.as_deref(),
         limited: included.mentions(&["convstep", "convabsstep"]),
         includes: options.text.as_ref().map(|_| folder.as_path()),

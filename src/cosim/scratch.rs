@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A folder of this run, gone afterwards.
-pub(super) struct Scratch(pub(super) PathBuf);
+pub(super) struct ScratchFolder(pub(super) PathBuf);
 
-impl Scratch {
+impl ScratchFolder {
     pub(super) fn new() -> Result<Self, CosimError> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -18,7 +18,7 @@ impl Scratch {
 }
 
 /// What the initialisation file of a run says beside loading the plug-in.
-pub(super) struct Initial<'a> {
+pub(super) struct InitializationFile<'a> {
     /// The user's own initialisation file.
     pub(super) user: Option<&'a Path>,
     /// Whether the deck sets ngspice's limit on the change of a code model's inputs itself. Otherwise it is lifted: derivatives of parts are exact,
@@ -36,7 +36,7 @@ pub(super) fn user_settings() -> Option<PathBuf> {
 }
 
 /// Writes the initialisation file. The plug-in is linked under a plain name: ngspice splits paths at blanks; so is the folder of the includes.
-pub(super) fn initialise(folder: &Path, plugin: &Path, start: &Initial<'_>) -> Result<(), CosimError> {
+pub(super) fn initialise(folder: &Path, plugin: &Path, start: &InitializationFile<'_>) -> Result<(), CosimError> {
     let link = folder.join("bimorph.cm");
     #[cfg(unix)]
     let linked = std::os::unix::fs::symlink(plugin, &link);
@@ -58,7 +58,7 @@ pub(super) fn initialise(folder: &Path, plugin: &Path, start: &Initial<'_>) -> R
     std::fs::write(&path, lines).map_err(io(|| format!("cannot write {}", path.display())))
 }
 
-impl Drop for Scratch {
+impl Drop for ScratchFolder {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.0);
     }

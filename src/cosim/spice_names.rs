@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::collections::HashMap;
 
 /// Legal, distinct names of SPICE, with the number that the last of a kind got.
-pub(super) struct Names {
+pub(super) struct SpiceNames {
     taken: HashMap<String, usize>,
 }
 
-impl Names {
+impl SpiceNames {
     pub(super) fn new() -> Self {
         // ngspice takes all of these for ground
         Self { taken: ["0", "gnd"].map(|name| (name.to_owned(), 1)).into() }
@@ -52,7 +52,7 @@ mod tests {
     /// than the first.
     #[test]
     fn names_are_distinct() {
-        let mut names = Names::new();
+        let mut names = SpiceNames::new();
         let taken: Vec<String> = ["a(1)", "A(1)", "a_1_2", "a 1", "gnd", "0"].map(|n| names.take(n)).into();
         assert_eq!(taken, ["a_1", "a_1_2", "a_1_2_2", "a_1_3", "gnd_2", "0_2"]);
         let many: HashSet<String> = (0..100_000).map(|_| names.take("r_anon9")).collect();

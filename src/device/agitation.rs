@@ -12,7 +12,7 @@
 pub use super::contract::Agitation;
 use super::contract::DeviceError;
 use crate::analysis::modes::modes;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::agitation::{self, BOLTZMANN};
 use crate::multibody::planar::Pose;
 use rand_chacha::ChaCha8Rng;
@@ -23,11 +23,11 @@ const BAND: f64 = 20.0;
 /// Highest band [Hz]: beyond what any mechanism feels.
 const HIGHEST: f64 = 1e12;
 /// Cells that one step may cross: beyond, the mean of the force says too little.
-const MOST_CELLS: f64 = 2.0;
+const MAX_CELLS: f64 = 2.0;
 
 /// An agitation of a model.
 #[derive(Debug, Clone)]
-pub(super) struct Shaken {
+pub(super) struct ThermalForce {
     seed: u64,
     /// Length of a cell [s].
     pub(super) cell: f64,
@@ -47,12 +47,12 @@ fn normal(numbers: &mut ChaCha8Rng) -> f64 {
     radius * turn.cos()
 }
 
-impl Shaken {
+impl ThermalForce {
     /// Of a model whose surroundings are at `temperature` [K].
     ///
     /// # Errors
     /// [`DeviceError::BadRequest`] for a band that is none, or that has to be given.
-    pub(super) fn new(asked: &Agitation, compiled: &Compiled, temperature: f64) -> Result<Self, DeviceError> {
+    pub(super) fn new(asked: &Agitation, compiled: &CompiledModel, temperature: f64) -> Result<Self, DeviceError> {
         let refused = |expected: &str, got: String| DeviceError::BadRequest {
             what: "noise band",
             expected: expected.into(),
@@ -76,7 +76,7 @@ impl Shaken {
         Ok(Self { seed: asked.seed, cell, size, force: still.clone(), mean: still, over: None })
     }
 
-    /// The mean force over the last step that [`Shaken::over`] was told.
+    /// The mean force over the last step that [`ThermalForce::over`] was told.
     pub(super) fn mean(&self) -> &[Pose] {
         &self.mean
     }
@@ -85,14 +85,14 @@ impl Shaken {
     ///
     /// # Errors
     /// That step [s].
-    pub(super) fn over(&mut self, compiled: &Compiled, start: f64, dt: f64) -> Result<(), f64> {
+    pub(super) fn over(&mut self, compiled: &CompiledModel, start: f64, dt: f64) -> Result<(), f64> {
         if self.over == Some((start, dt)) {
             return Ok(());
         }
         // times are sums of steps: what a rounding is over the end of a cell is none of the next
         let rounding = 1e-9;
         let (from, to) = (start / self.cell, (start + dt) / self.cell);
-        if to - from > MOST_CELLS * (1.0 + rounding) {
+        if to - from > MAX_CELLS * (1.0 + rounding) {
             return Err(self.cell);
         }
         self.over = None;

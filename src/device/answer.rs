@@ -1,14 +1,14 @@
 //! What a trial answers: currents, charges, outputs and their partials from the state that it came to, and how long a step the
 //! circuit may take next.
 
-use super::session::Session;
-use super::shown::{Follow, Shown};
+use super::session::DeviceSession;
+use super::shown::{StepHistory, SteppingRule};
 use super::states::Snapshot;
 use super::{Trial, TrialReply};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::System;
-use crate::readout::ports::Answer;
-use crate::readout::signal::{Signal, View};
+use crate::readout::ports::PortResponse;
+use crate::readout::signal::{Signal, SignalView};
 
 /// Share of the compilation's tolerance that one internal step may use.
 pub(super) const STEP_SHARE: f64 = 1e-2;
@@ -19,12 +19,12 @@ const SAME_TEMPERATURE: f64 = 1e-6;
 /// A voltage that no circuit tells from another, and its share of the voltage at the port: what ngspice iterates to [V, 1].
 const SAME_VOLTAGE: [f64; 2] = [1e-6, 1e-6];
 
-impl Session {
+impl DeviceSession {
     /// Fills in the reply from `motion`, `rise`, `sources` and `sensitivity`, and stores the state. `from` holds the
     /// sources at the start of a transient step, and what was seen up to there; `dt_next` becomes what is seen now.
     pub(super) fn answer(
         &mut self,
-        compiled: &Compiled,
+        compiled: &CompiledModel,
         request: &Trial<'_>,
         from: Option<(&[f64], &Snapshot)>,
         next_step: f64,
@@ -49,12 +49,12 @@ impl Session {
         reply.token = Some(self.states.insert(request, snapshot));
     }
 
-    fn view(&self) -> View<'_> {
-        View { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts }
+    fn view(&self) -> SignalView<'_> {
+        SignalView { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts }
     }
 
     /// Currents, charges and outputs; of the partials of currents those that the circuit alone makes.
-    fn values(&self, compiled: &Compiled, system: &System, reply: &mut TrialReply) {
+    fn values(&self, compiled: &CompiledModel, system: &System, reply: &mut TrialReply) {
         let electrics = &system.electrics;
         let (ports, gaps) = (self.ports.len(), self.drive.volts.len());
         let view = self.view();
@@ -65,16 +65,16 @@ impl Session {
         for (&port, answer) in self.ports.sources.iter().zip(&self.ports.answers) {
             let (mut current, mut charge) = (0.0, 0.0);
             match answer {
-                Answer::Current => {
+                PortResponse::Current => {
                     let row = electrics.conductance.row(port);
                     current = row.iter().zip(&self.sources).map(|(g, u)| g * u).sum();
                     reply.di_dv.extend(self.ports.sources.iter().map(|&other| row[other]));
                     let of = |g: usize| electrics.gap_rows[(g, port)] * system.capacitance(g, view.q) * view.volts[g];
                     charge = (0..gaps).map(of).sum();
                 }
-                Answer::Motion(signal) => current = signal.value(compiled, &view),
-                Answer::Rise(heater) => current = view.rise[*heater],
-                Answer::Nothing => {}
+                PortResponse::Motion(signal) => current = signal.value(compiled, &view),
+                PortResponse::Rise(heater) => current = view.rise[*heater],
+                PortResponse::Nothing => {}
             }
             reply.currents.push(current);
             reply.charges.push(charge);
@@ -86,10 +86,16 @@ impl Session {
 
     /// Partials of charges, outputs and what is not electrical, from the sensitivities. `step` holds the sources at the start of
     /// a transient step and its length [s].
-    fn partials(&mut self, compiled: &Compiled, system: &System, step: Option<(&[f64], f64)>, reply: &mut TrialReply) {
+    fn partials(
+        &mut self,
+        compiled: &CompiledModel,
+        system: &System,
+        step: Option<(&[f64], f64)>,
+        reply: &mut TrialReply,
+    ) {
         let electrics = &system.electrics;
         let (ports, gaps) = (self.ports.len(), self.drive.volts.len());
-        let view = View { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts };
+        let view = SignalView { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts };
         reply.dq_dv.clear();
         reply.dq_dv.resize(ports * ports, 0.0);
         reply.doutputs_dv.clear();
@@ -114,20 +120,22 @@ impl Session {
                 let dq =
                     system.capacitance(g, view.q) * volts + system.capacitance_slope(g, view.q, &s.q) * view.volts[g];
                 for (row, &other) in self.ports.sources.iter().enumerate() {
-                    if self.ports.answers[row] == Answer::Current {
+                    if self.ports.answers[row] == PortResponse::Current {
                         reply.dq_dv[row * ports + p] += electrics.gap_rows[(g, other)] * dq;
                     }
                 }
             }
-            let change = View { q: &s.q, v: &s.v, rise: &self.rise_slope, volts: &gap_row };
+            let change = SignalView { q: &s.q, v: &s.v, rise: &self.rise_slope, volts: &gap_row };
             for (row, signal) in self.signals.iter().enumerate() {
                 reply.doutputs_dv[row * ports + p] = signal.slope(compiled, &view, &change);
             }
             for (row, answer) in self.ports.answers.iter().enumerate() {
                 match answer {
-                    Answer::Motion(signal) => reply.di_dv[row * ports + p] = signal.slope(compiled, &view, &change),
-                    Answer::Rise(heater) => reply.di_dv[row * ports + p] = change.rise[*heater],
-                    Answer::Current | Answer::Nothing => {}
+                    PortResponse::Motion(signal) => {
+                        reply.di_dv[row * ports + p] = signal.slope(compiled, &view, &change)
+                    }
+                    PortResponse::Rise(heater) => reply.di_dv[row * ports + p] = change.rise[*heater],
+                    PortResponse::Current | PortResponse::Nothing => {}
                 }
             }
         }
@@ -136,18 +144,18 @@ impl Session {
     /// What the circuit sees of a state, and how long a step it may take from there [s].
     fn seen(
         &self,
-        compiled: &Compiled,
+        compiled: &CompiledModel,
         system: &System,
         request: &Trial<'_>,
         before: Option<&Snapshot>,
         reply: &TrialReply,
-    ) -> (Shown, f64) {
+    ) -> (StepHistory, f64) {
         let (ports, view) = (self.ports.len(), self.view());
-        let electrical = |row: usize| self.ports.answers[row] == Answer::Current;
+        let electrical = |row: usize| self.ports.answers[row] == PortResponse::Current;
         let shown = (0..ports).map(|row| if electrical(row) { reply.charges[row] } else { reply.currents[row] });
         let seen = reply.outputs.iter().copied().chain(shown).collect();
         match before {
-            None => (Shown::start(seen), f64::INFINITY),
+            None => (StepHistory::start(seen), f64::INFINITY),
             Some(before) => {
                 let (tol, signals) = (compiled.options.tol, self.signals.len());
                 let nothing = STEP_SHARE * tol * FLOOR;
@@ -165,16 +173,16 @@ impl Session {
                     Signal::Charge(g) => charge(system.capacitance(*g, view.q), view.volts[*g]),
                 };
                 let follow = |n: usize| match n.checked_sub(signals).map(|port| &self.ports.answers[port]) {
-                    Some(Answer::Motion(_)) => Follow::Even,
-                    Some(Answer::Current) => Follow::Differentiated,
-                    _ => Follow::Line,
+                    Some(PortResponse::Motion(_)) => SteppingRule::Even,
+                    Some(PortResponse::Current) => SteppingRule::Differentiated,
+                    _ => SteppingRule::Line,
                 };
                 let floor = |n: usize| match n.checked_sub(signals) {
                     None => of_signal(&self.signals[n]),
                     Some(port) => match &self.ports.answers[port] {
-                        Answer::Current => charge(reply.dq_dv[port * (ports + 1)], request.voltages[port]),
-                        Answer::Motion(signal) => of_signal(signal),
-                        Answer::Rise(_) | Answer::Nothing => SAME_TEMPERATURE,
+                        PortResponse::Current => charge(reply.dq_dv[port * (ports + 1)], request.voltages[port]),
+                        PortResponse::Motion(signal) => of_signal(signal),
+                        PortResponse::Rise(_) | PortResponse::Nothing => SAME_TEMPERATURE,
                     },
                 };
                 before.shown.step(request.dt, seen, tol, floor, follow)

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 const ALIKE: f64 = 0.25;
 
 /// The same where the points are so far apart that a turning point is known to no better [1].
-const LEAST_ALIKE: f64 = 0.4;
+const MIN_ALIKE: f64 = 0.4;
 
 /// What brings a motion out of phase.
 #[derive(Debug, Clone, Copy)]
@@ -27,7 +27,7 @@ impl Phase {
 
 /// One quantity over time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Course {
+pub(super) struct Waveform {
     now: f64,
     low: f64,
     high: f64,
@@ -39,7 +39,7 @@ pub(super) struct Course {
     halves: u32,
 }
 
-impl Course {
+impl Waveform {
     /// From this value on.
     pub(super) fn at(y: f64) -> Self {
         Self { now: y, low: y, high: y, rises: None, turned: None, halves: 0 }
@@ -60,7 +60,7 @@ impl Course {
         }
         // it turned at the last point, or up to a step beside it
         let (since, from) = self.turned.replace((before, last))?;
-        let alike = ALIKE.max((t - before) / half).min(LEAST_ALIKE);
+        let alike = ALIKE.max((t - before) / half).min(MIN_ALIKE);
         if ((before - since) / half - 1.0).abs() > alike {
             return None;
         }

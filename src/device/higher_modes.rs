@@ -8,7 +8,7 @@
 //! Half cycles of η̇ are counted as those of signals are ([`super::half_cycles`]). The frequency of a mode is off by the mesh and by the steps of the
 //! integrator, and the phase that adds up until the mode has died away makes an error of at most twice its amplitude.
 
-use super::half_cycles::{Course, Phase};
+use super::half_cycles::{Phase, Waveform};
 use crate::compile::HigherMode;
 use crate::solve::time::defect::step_error;
 use std::f64::consts::TAU;
@@ -47,7 +47,7 @@ pub(super) struct HigherModes(Vec<Followed>);
 
 #[derive(Debug, Clone)]
 struct Followed {
-    course: Course,
+    course: Waveform,
     /// Sum of the errors of steps [1], and of their angles [rad].
     steps: [f64; 2],
     /// Error of each current [A] at the last half cycle, and when that was [s].
@@ -64,11 +64,11 @@ impl Followed {
 
 impl HigherModes {
     /// After an accepted point at `times[1]` that follows one at `times[0]` [s]; `charges` says which values are charges. True where a mode has turned.
-    pub(super) fn see(&mut self, times: [f64; 2], charges: &[bool], split: &Split<'_>) -> bool {
+    pub(super) fn observe(&mut self, times: [f64; 2], charges: &[bool], split: &Split<'_>) -> bool {
         let [before, t] = times;
         if self.0.len() != split.modes.len() {
             let begun = |rate: &f64| Followed {
-                course: Course::at(*rate),
+                course: Waveform::at(*rate),
                 steps: [0.0; 2],
                 errors: vec![0.0; charges.len()],
                 at: t,

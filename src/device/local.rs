@@ -7,27 +7,27 @@
 use super::contract::refused;
 use super::look;
 use super::saved;
-use super::session::Session;
+use super::session::DeviceSession;
 use super::{Description, Device, DeviceError, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
 use std::sync::Arc;
 
 /// A [`Device`] over a compiled model.
 #[derive(Debug)]
 pub struct LocalDevice {
-    compiled: Arc<Compiled>,
-    session: Option<Session>,
+    compiled: Arc<CompiledModel>,
+    session: Option<DeviceSession>,
 }
 
 impl LocalDevice {
     /// A device over a compiled model, not yet open.
-    pub fn new(compiled: Arc<Compiled>) -> Self {
+    pub fn new(compiled: Arc<CompiledModel>) -> Self {
         Self { compiled, session: None }
     }
 
     /// The model.
-    pub fn compiled(&self) -> &Arc<Compiled> {
+    pub fn compiled(&self) -> &Arc<CompiledModel> {
         &self.compiled
     }
 
@@ -39,7 +39,7 @@ impl LocalDevice {
 
 impl Device for LocalDevice {
     fn open(&mut self, request: &OpenRequest) -> Result<Description, DeviceError> {
-        let (session, description) = Session::open(&self.compiled, request)?;
+        let (session, description) = DeviceSession::open(&self.compiled, request)?;
         self.session = Some(session);
         Ok(description)
     }
@@ -87,7 +87,7 @@ impl Device for LocalDevice {
     fn look(&mut self, token: Token, name: &str) -> Result<f64, DeviceError> {
         let session = self.session.as_mut().ok_or(DeviceError::NotOpen)?;
         let state = session.states.get(token).ok_or(DeviceError::UnknownToken(token))?;
-        session.look(&self.compiled, &state, name)
+        session.read_quantity(&self.compiled, &state, name)
     }
 
     fn noise(&mut self, token: Token, omega: f64, reply: &mut Vec<[f64; 2]>) -> Result<(), DeviceError> {
@@ -113,7 +113,7 @@ impl Device for LocalDevice {
 
     fn load(&mut self, bytes: &[u8]) -> Result<Description, DeviceError> {
         let (opened, states) = saved::read(bytes)?;
-        let (mut session, description) = Session::open(&self.compiled, &opened)?;
+        let (mut session, description) = DeviceSession::open(&self.compiled, &opened)?;
         if !states.in_order().all(|(_, _, state)| session.fits(state)) {
             return Err(refused("states of this model", "states of another one"));
         }
@@ -125,8 +125,8 @@ impl Device for LocalDevice {
     fn recover(&mut self) {
         // a state is stored whole or not at all; all else is storage that every trial fills again
         let Some(mut session) = self.session.take() else { return };
-        self.session = Session::open(&self.compiled, &session.opened)
+        self.session = DeviceSession::open(&self.compiled, &session.opened)
             .ok()
-            .map(|(fresh, _)| Session { states: std::mem::take(&mut session.states), ..fresh });
+            .map(|(fresh, _)| DeviceSession { states: std::mem::take(&mut session.states), ..fresh });
     }
 }

@@ -2,11 +2,11 @@
 //! like as a whole. Without derivatives, and without a trace.
 
 use super::DeviceError;
-use super::session::Session;
+use super::session::DeviceSession;
 use super::states::Snapshot;
-use crate::compile::Compiled;
-use crate::domains::{Domain, Point};
-use crate::readout::signal::{self, Signal, View};
+use crate::compile::CompiledModel;
+use crate::domains::{Domain, MaterialPoint};
+use crate::readout::signal::{self, Signal, SignalView};
 
 /// Quantities of a state as a whole, with what they are, by the names under which [`super::Device::look`] knows them beside signals.
 pub const WHOLE: [(&str, &str); 3] = [
@@ -16,23 +16,28 @@ pub const WHOLE: [(&str, &str); 3] = [
 ];
 
 /// Every name that has a value in a state of this model.
-pub(super) fn names(compiled: &Compiled) -> Vec<String> {
+pub(super) fn names(compiled: &CompiledModel) -> Vec<String> {
     let there = [true, closing(compiled).next().is_some(), !compiled.parts.heaters.is_empty()];
     let whole = WHOLE.iter().zip(there).filter(|(_, there)| *there).map(|((name, _), _)| (*name).to_owned());
     whole.chain(signal::names(compiled)).collect()
 }
 
 /// Gaps that close, of those there are: plates and facing beams.
-fn closing(compiled: &Compiled) -> impl Iterator<Item = usize> {
-    compiled.parts.system.members.iter().enumerate().filter(|(_, gap)| gap.closes()).map(|(g, _)| g)
+fn closing(compiled: &CompiledModel) -> impl Iterator<Item = usize> {
+    compiled.parts.system.members.iter().enumerate().filter(|(_, gap)| gap.is_electrostatic()).map(|(g, _)| g)
 }
 
-impl Session {
+impl DeviceSession {
     /// Value of a quantity in a state, in its own unit.
     ///
     /// # Errors
     /// [`DeviceError::UnknownSignal`]
-    pub(super) fn look(&self, compiled: &Compiled, state: &Snapshot, name: &str) -> Result<f64, DeviceError> {
+    pub(super) fn read_quantity(
+        &self,
+        compiled: &CompiledModel,
+        state: &Snapshot,
+        name: &str,
+    ) -> Result<f64, DeviceError> {
         let system = Self::system(&self.ports.system, compiled);
         let rows = &system.electrics.gap_rows;
         let volts: Vec<f64> = (0..system.members.len())
@@ -47,7 +52,7 @@ impl Session {
                     .iter()
                     .flatten()
                     .chain(compiled.parts.beams.iter().flat_map(|points| points.iter()));
-                let far = |p: &Point| p.displacement(&state.q, system.model.linear).norm();
+                let far = |p: &MaterialPoint| p.displacement(&state.q, system.model.linear).norm();
                 Ok(points.map(far).fold(0.0, f64::max))
             }
             "closest" => closing(compiled)
@@ -60,7 +65,7 @@ impl Session {
                 .ok_or_else(|| none("the netlist has no heated beam")),
             _ => {
                 let signal = Signal::find(compiled, name).map_err(|e| none(&e.to_string()))?;
-                Ok(signal.value(compiled, &View { q: &state.q, v: &state.v, rise: &state.rise, volts: &volts }))
+                Ok(signal.value(compiled, &SignalView { q: &state.q, v: &state.v, rise: &state.rise, volts: &volts }))
             }
         }
     }

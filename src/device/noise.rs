@@ -13,26 +13,26 @@
 //! An answer is that with nothing else changed: the current of a port whose voltage is held, the motion of one whose force
 //! is. Left out: fluctuations of temperature, and what Johnson's noise heats.
 
-use super::seen::{Seen, surroundings};
-use super::session::Session;
+use super::seen::{OutputGradient, surroundings};
+use super::session::DeviceSession;
 use super::states::Snapshot;
 use super::{DeviceError, Token};
 use crate::budget;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::System;
 use crate::multibody::agitation::{BOLTZMANN, damped};
 use crate::multibody::planar::Pose;
-use crate::readout::ports::Answer;
-use crate::readout::signal::{Signal, View};
+use crate::readout::ports::PortResponse;
+use crate::readout::signal::{Signal, SignalView};
 use crate::solve::frequency::gyroscopic;
 use crate::solve::harmonic::ComplexPose;
 use nalgebra::Complex;
 
-impl Session {
+impl DeviceSession {
     /// Spectral densities of ports, then signals, about a state: row-major, complex.
     pub(super) fn noise(
         &mut self,
-        compiled: &Compiled,
+        compiled: &CompiledModel,
         (token, state): (Token, &Snapshot),
         omega: f64,
         out: &mut Vec<[f64; 2]>,
@@ -85,32 +85,32 @@ impl Session {
     }
 
     /// What answer `i` sees.
-    fn seen_by(&self, compiled: &Compiled, system: &System, state: &Snapshot, i: usize) -> Seen {
-        let mut seen = Seen::nothing(system.bodies());
+    fn seen_by(&self, compiled: &CompiledModel, system: &System, state: &Snapshot, i: usize) -> OutputGradient {
+        let mut seen = OutputGradient::nothing(system.bodies());
         let signal = match i.checked_sub(self.ports.len()) {
             Some(signal) => self.signals[signal],
             None => match self.ports.answers[i] {
-                Answer::Current => {
+                PortResponse::Current => {
                     seen.change = self.charge_seen(system, state, self.ports.sources[i]);
                     return seen;
                 }
-                Answer::Motion(signal) => signal,
-                Answer::Rise(_) | Answer::Nothing => return seen,
+                PortResponse::Motion(signal) => signal,
+                PortResponse::Rise(_) | PortResponse::Nothing => return seen,
             },
         };
         if matches!(signal, Signal::Temperature(_) | Signal::Prescribed(_)) {
             return seen;
         }
         let (heaters, gaps) = (state.rise.len(), self.drive.volts.len());
-        let view = View { q: &state.q, v: &state.v, rise: &state.rise, volts: &self.drive.volts };
+        let view = SignalView { q: &state.q, v: &state.v, rise: &state.rise, volts: &self.drive.volts };
         let (cold, off) = (vec![0.0; heaters], vec![0.0; gaps]);
         let mut unit = vec![Pose::zeros(); system.bodies()];
         let still = unit.clone();
         for k in 0..unit.len() {
             for d in 0..3 {
                 unit[k][d] = 1.0;
-                let place = View { q: &unit, v: &still, rise: &cold, volts: &off };
-                let motion = View { q: &still, v: &unit, rise: &cold, volts: &off };
+                let place = SignalView { q: &unit, v: &still, rise: &cold, volts: &off };
+                let motion = SignalView { q: &still, v: &unit, rise: &cold, volts: &off };
                 seen.place[k][d] = signal.slope(compiled, &view, &place);
                 seen.change[k][d] = signal.slope(compiled, &view, &motion);
                 unit[k][d] = 0.0;
@@ -150,7 +150,7 @@ impl Session {
     /// The sources of two answers, if both are currents.
     fn both_electrical(&self, i: usize, j: usize) -> Option<(usize, usize)> {
         let source = |i: usize| {
-            let current = self.ports.answers.get(i) == Some(&Answer::Current);
+            let current = self.ports.answers.get(i) == Some(&PortResponse::Current);
             current.then(|| self.ports.sources[i])
         };
         Some((source(i)?, source(j)?))

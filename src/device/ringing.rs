@@ -8,19 +8,19 @@
 //! A current is a result as its charge is, over a range of its own: a slow stroke may make nearly all of a charge and nearly nothing of its current.
 //! So the rates of charges from point to point are followed, too, and what higher modes bring to them ([`super::higher_modes`]).
 
-use super::half_cycles::{Course, Phase};
+use super::half_cycles::{Phase, Waveform};
 use super::higher_modes::{HigherModes, OfMode, Split};
 use crate::compile::LowestMode;
 
 /// Part of half a cycle below which two points tell no rate of a charge [1]: at corners of a source they are roundings apart.
-const LEAST_STEP: f64 = 1e-4;
+const MIN_STEP: f64 = 1e-4;
 
 /// By how much an error is larger than the last one that was told, to be told again [1].
 const GROWS: f64 = 3.0;
 
 /// An accepted state as the circuit sees it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Accepted<'a> {
+pub(super) struct AcceptedState<'a> {
     /// Time since the equilibrium [s].
     pub(super) t: f64,
     /// Signals, then charges or answers of ports.
@@ -29,11 +29,11 @@ pub(super) struct Accepted<'a> {
 
 /// The motion of one transient, as far as its accepted points tell.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Ringing {
+pub(super) struct PhaseErrorMonitor {
     /// Time of the last point [s].
     at: f64,
     /// Those of the values, then those of the rates of charges.
-    courses: Vec<Course>,
+    courses: Vec<Waveform>,
     /// Rates of the charges among the values, in their places [1/s]; the others stay 0.
     rates: Vec<f64>,
     /// Values and time [s] at the last point that told rates.
@@ -58,19 +58,19 @@ pub(super) struct Worst {
     pub(super) higher: Option<OfMode>,
 }
 
-impl Ringing {
+impl PhaseErrorMonitor {
     /// After a point since the equilibrium, with `charges` among its values: what is furthest off of the values and currents that turn there.
-    pub(super) fn see(
+    pub(super) fn observe(
         &mut self,
         mode: &LowestMode,
-        at: Accepted<'_>,
+        at: AcceptedState<'_>,
         charges: &[bool],
         split: Option<&Split<'_>>,
     ) -> Worst {
-        let (Accepted { t, values }, count) = (at, at.values.len());
+        let (AcceptedState { t, values }, count) = (at, at.values.len());
         let mut worst = Worst { error: 0.0, cycles: 0.0, n: 0, higher: None };
         if t <= self.at || self.courses.len() != 2 * count {
-            let courses = values.iter().chain(std::iter::repeat_n(&0.0, count)).map(|y| Course::at(*y)).collect();
+            let courses = values.iter().chain(std::iter::repeat_n(&0.0, count)).map(|y| Waveform::at(*y)).collect();
             let none = vec![0.0; count];
             let (rates, rated, told) = (none.clone(), (values.to_vec(), t), self.told);
             *self = Self { at: t, courses, rates, rated, errors: none, higher: HigherModes::default(), told };
@@ -79,7 +79,7 @@ impl Ringing {
         let (before, half) = (self.at, 0.5 / mode.frequency_hz);
         self.at = t;
         let (last, since) = &mut self.rated;
-        let rated = t - *since > LEAST_STEP * half;
+        let rated = t - *since > MIN_STEP * half;
         if rated {
             for (n, rate) in self.rates.iter_mut().enumerate().filter(|(n, _)| charges[*n]) {
                 *rate = (values[n] - last[n]) / (t - *since);
@@ -100,7 +100,7 @@ impl Ringing {
                 worst = Worst { error, cycles: 0.5 * f64::from(halves), n, higher: None };
             }
         }
-        if split.is_some_and(|split| self.higher.see([before, t], charges, split)) {
+        if split.is_some_and(|split| self.higher.observe([before, t], charges, split)) {
             for n in (0..count).filter(|n| charges[*n]) {
                 let (sum, largest) = self.higher.of(n);
                 let range = self.courses[count + n].range();
@@ -119,11 +119,11 @@ impl Ringing {
         &mut self,
         mode: &LowestMode,
         tol: f64,
-        at: Accepted<'_>,
+        at: AcceptedState<'_>,
         charges: &[bool],
         split: &Split<'_>,
     ) -> Option<(String, usize)> {
-        let Worst { error, cycles, n, higher } = self.see(mode, at, charges, Some(split));
+        let Worst { error, cycles, n, higher } = self.observe(mode, at, charges, Some(split));
         if error <= tol * self.told.max(1.0) {
             return None;
         }
@@ -158,13 +158,13 @@ mod tests {
 
     const MODE: LowestMode = LowestMode { frequency_hz: 1e3, quality: f64::INFINITY, error: 1e-4 };
 
-    /// What [`Ringing`] says of a course up to `end` [s], and how far off a motion with another frequency really is.
+    /// What [`PhaseErrorMonitor`] says of a course up to `end` [s], and how far off a motion with another frequency really is.
     fn worst(mode: &LowestMode, end: f64, course: impl Fn(f64) -> f64) -> f64 {
-        let mut ringing = Ringing::default();
+        let mut ringing = PhaseErrorMonitor::default();
         (0..)
             .map(|k| f64::from(k) * 3e-5)
             .take_while(|t| *t < end)
-            .map(|t| ringing.see(mode, Accepted { t, values: &[course(t)] }, &[false], None).error)
+            .map(|t| ringing.observe(mode, AcceptedState { t, values: &[course(t)] }, &[false], None).error)
             .fold(0.0, f64::max)
     }
 
@@ -197,9 +197,10 @@ mod tests {
     fn currents_have_a_range_of_their_own() {
         let charge = |t: f64| 50.0 * t + 0.01 * (TAU * 1e3 * t).sin();
         let rings = |charges: bool| {
-            let mut ringing = Ringing::default();
+            let mut ringing = PhaseErrorMonitor::default();
             let seen = (0..3300).map(|k| f64::from(k) * 3e-5);
-            let seen = seen.map(|t| ringing.see(&MODE, Accepted { t, values: &[charge(t)] }, &[charges], None));
+            let seen =
+                seen.map(|t| ringing.observe(&MODE, AcceptedState { t, values: &[charge(t)] }, &[charges], None));
             seen.fold((0.0, 0), |worst, now| if now.error > worst.0 { (now.error, now.n) } else { worst })
         };
         let ((error, n), (alone, _)) = (rings(true), rings(false));
@@ -228,11 +229,11 @@ mod tests {
         let (slow, fast) = (|t: f64| 3.0 * (TAU * 1e3 * t).cos(), |t: f64| (TAU * 1e4 * t).cos());
         let charge = |t: f64| 3.0 * (TAU * 1e3 * t).sin() / (TAU * 1e3) + (TAU * 1e4 * t).sin() / (TAU * 1e4);
         let reported = |step: f64| {
-            let (mut ringing, dt) = (Ringing::default(), 5e-6);
+            let (mut ringing, dt) = (PhaseErrorMonitor::default(), 5e-6);
             let points = (1..).map(|k| f64::from(k) * dt).take_while(|t| *t < end);
             let seen = points.map(|t| {
                 let split = Split { modes: &modes, rates: &[fast(t)], step, coupling: &|_, _| 1.0 };
-                let worst = ringing.see(&lowest, Accepted { t, values: &[charge(t)] }, &[true], Some(&split));
+                let worst = ringing.observe(&lowest, AcceptedState { t, values: &[charge(t)] }, &[true], Some(&split));
                 assert!(worst.error == 0.0 || worst.n == 1 && worst.higher.is_some());
                 worst.error
             });

@@ -127,7 +127,7 @@ pub struct Start<'a> {
 
 /// What a device is led along, and what is wanted of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Course<'a> {
+pub struct DriveSchedule<'a> {
     /// Times at the ends of the steps [s], ascending (n).
     pub times: &'a [f64],
     /// Port values at each time, row by row (n×p), or one row for all (p).
@@ -165,7 +165,7 @@ pub fn steps(
     device: &mut dyn Device,
     opened: &Description,
     start: &Start<'_>,
-    course: &Course<'_>,
+    course: &DriveSchedule<'_>,
 ) -> Result<Ran, DeviceError> {
     let ports = opened.ports.len();
     let stride = match course.values.len() {

@@ -5,7 +5,7 @@
 //! model's.
 
 use super::contract::{Agitation, DeviceError, OpenRequest, Token, refused};
-use super::shown::Shown;
+use super::shown::StepHistory;
 use super::states::{Snapshot, States};
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;
@@ -15,7 +15,7 @@ const HEAD: [u8; 8] = *b"bimorph\x02";
 
 /// Writes what is open and its states.
 pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
-    let mut out = Writer(HEAD.to_vec());
+    let mut out = SnapshotWriter(HEAD.to_vec());
     for names in [&opened.ports, &opened.signals] {
         out.count(names.len());
         for name in names {
@@ -55,7 +55,7 @@ pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
 /// # Errors
 /// [`DeviceError::BadRequest`] for bytes that [`write`] has not made.
 pub(super) fn read(bytes: &[u8]) -> Result<(OpenRequest, States), DeviceError> {
-    let mut from = Reader(bytes);
+    let mut from = SnapshotReader(bytes);
     let read = from.all();
     match read {
         Some(read) if from.0.is_empty() => Ok(read),
@@ -63,9 +63,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<(OpenRequest, States), DeviceError> {
     }
 }
 
-struct Writer(Vec<u8>);
+struct SnapshotWriter(Vec<u8>);
 
-impl Writer {
+impl SnapshotWriter {
     fn word(&mut self, word: u64) {
         self.0.extend(word.to_le_bytes());
     }
@@ -86,9 +86,9 @@ impl Writer {
 }
 
 /// What is left to read; none at any place where the bytes are not what they should be.
-struct Reader<'a>(&'a [u8]);
+struct SnapshotReader<'a>(&'a [u8]);
 
-impl Reader<'_> {
+impl SnapshotReader<'_> {
     fn all(&mut self) -> Option<(OpenRequest, States)> {
         self.0 = self.0.strip_prefix(&HEAD)?;
         let opened = OpenRequest { ports: self.names()?, signals: self.names()?, noise: self.noise()? };
@@ -103,11 +103,11 @@ impl Reader<'_> {
                 next_step: f64::from_bits(self.word()?),
                 elapsed: f64::from_bits(self.word()?),
                 shown: {
-                    let mut parts = [const { Vec::new() }; Shown::PARTS];
+                    let mut parts = [const { Vec::new() }; StepHistory::PARTS];
                     for part in &mut parts {
                         *part = self.numbers()?;
                     }
-                    Shown::from_numbers(parts)?
+                    StepHistory::from_numbers(parts)?
                 },
                 carried: {
                     let mut carried = Vec::new();
@@ -200,8 +200,8 @@ mod tests {
                 sources: vec![1.0, -2.0],
                 elapsed: 3e-6,
                 next_step: f64::INFINITY,
-                shown: Shown::start(vec![1.0, 2.0])
-                    .step(1e-6, vec![1.5, 2.5], 1e-3, |_| 1e-9, |_| crate::device::shown::Follow::Line)
+                shown: StepHistory::start(vec![1.0, 2.0])
+                    .step(1e-6, vec![1.5, 2.5], 1e-3, |_| 1e-9, |_| crate::device::shown::SteppingRule::Line)
                     .0,
                 carried,
             };

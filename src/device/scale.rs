@@ -11,14 +11,14 @@ use super::PortKind;
 
 /// Factors of a port.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scale {
+pub struct PortScale {
     /// What one volt or ampere of the circuit gives, in the port's own unit.
     pub given: f64,
     /// Volts or amperes of the circuit for one unit of what the port answers.
     pub answered: f64,
 }
 
-impl Scale {
+impl PortScale {
     /// Of a port of this kind. `across`: volts per unit of what lies across it, in place of the default.
     pub fn new(kind: PortKind, across: Option<f64>) -> Self {
         let (given, default) = match kind {
@@ -47,7 +47,7 @@ mod tests {
             [([PortKind::Force, PortKind::Moment], 1e-6), ([PortKind::ForceRate, PortKind::MomentRate], 1.0)]
         {
             for kind in kinds {
-                let scale = Scale::new(kind, None);
+                let scale = PortScale::new(kind, None);
                 assert!((scale.given / scale.answered / work - 1.0).abs() < 1e-12, "{kind:?}");
             }
         }
@@ -56,7 +56,7 @@ mod tests {
     /// A scale of the line is volts per unit across, on either side.
     #[test]
     fn a_given_scale_is_across() {
-        assert_eq!(Scale::new(PortKind::Force, Some(1e7)), Scale { given: 1.0, answered: 1e7 });
-        assert_eq!(Scale::new(PortKind::Acceleration, Some(0.1)).given, 10.0);
+        assert_eq!(PortScale::new(PortKind::Force, Some(1e7)), PortScale { given: 1.0, answered: 1e7 });
+        assert_eq!(PortScale::new(PortKind::Acceleration, Some(0.1)).given, 10.0);
     }
 }

@@ -1,6 +1,6 @@
 //! What an answer sees of displacements, and what surrounds a mechanism.
 
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
 use crate::solve::harmonic::ComplexPose;
 use nalgebra::Complex;
@@ -9,19 +9,19 @@ use nalgebra::Complex;
 const ROOM: f64 = 300.15;
 
 /// Temperature of what surrounds the mechanism [K].
-pub(super) fn surroundings(compiled: &Compiled) -> f64 {
+pub(super) fn surroundings(compiled: &CompiledModel) -> f64 {
     let ambient = compiled.structure.beams.iter().map(|beam| beam.material.ambient_temperature);
     ambient.into_iter().find(|t| *t > 0.0).unwrap_or(ROOM)
 }
 
 /// What an answer sees of a displacement of each body, and of its rate of change: the same at every frequency.
 #[derive(Debug, Clone)]
-pub(super) struct Seen {
+pub(super) struct OutputGradient {
     pub(super) place: Vec<Pose>,
     pub(super) change: Vec<Pose>,
 }
 
-impl Seen {
+impl OutputGradient {
     pub(super) fn nothing(bodies: usize) -> Self {
         Self { place: vec![Pose::zeros(); bodies], change: vec![Pose::zeros(); bodies] }
     }

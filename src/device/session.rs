@@ -1,21 +1,21 @@
 //! What is open of a device: its ports, its signals, its states, and the storage that every trial reuses.
 
-use super::agitation::Shaken;
+use super::agitation::ThermalForce;
 use super::contact_steps::ContactSteps;
 use super::growth::{Difference, Growth};
-use super::ringing::Ringing;
-use super::seen::{Seen, surroundings};
+use super::ringing::PhaseErrorMonitor;
+use super::seen::{OutputGradient, surroundings};
 use super::states::{Snapshot, States};
 use super::{Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, Token, Trial};
 use crate::analysis::transient::first_step;
 use crate::budget;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::drive::Electrics;
 use crate::domains::{Drive, System};
-use crate::equations::bodies::Weights;
+use crate::equations::bodies::NormWeights;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
-use crate::readout::ports::Ports;
+use crate::readout::ports::OpenedPorts;
 use crate::readout::signal::Signal;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use crate::solve::harmonic::{ComplexPose, Harmonic};
@@ -26,20 +26,20 @@ use std::sync::Arc;
 
 /// What is open: the choice of ports and signals, the states, and the storage that every trial reuses.
 #[derive(Debug)]
-pub(super) struct Session {
+pub(super) struct DeviceSession {
     /// What it was opened with.
     pub(super) opened: OpenRequest,
-    pub(super) ports: Ports,
+    pub(super) ports: OpenedPorts,
     pub(super) signals: Vec<Signal>,
     pub(super) states: States,
     pub(super) first_step: f64,
     pub(super) equilibrium: Equilibrium,
     /// Thermal agitation, if it was asked for.
-    pub(super) shaken: Option<Shaken>,
+    pub(super) shaken: Option<ThermalForce>,
     /// Carries ∂motion/∂(final voltage), one for each opened port.
     pub(super) stepper: Adaptive<Formulated>,
     /// What weighs the errors of its steps.
-    pub(super) weights: Weights,
+    pub(super) weights: NormWeights,
     pub(super) motion: Motion,
     pub(super) rise: Vec<f64>,
     pub(super) rise_slope: Vec<f64>,
@@ -51,12 +51,12 @@ pub(super) struct Session {
     pub(super) linear: Option<(Token, BlockMatrix<f64, 3>)>,
     pub(super) harmonic: Harmonic,
     /// What each answer sees of a displacement, about the state that was asked for its noise last.
-    pub(super) seen: Option<(Token, Vec<Seen>)>,
+    pub(super) seen: Option<(Token, Vec<OutputGradient>)>,
     pub(super) response: Vec<ComplexPose>,
     /// Codes of the warnings that were given, and how much each told of.
     pub(super) warned: Vec<(String, f64)>,
     /// How what was accepted rings.
-    pub(super) ringing: Ringing,
+    pub(super) ringing: PhaseErrorMonitor,
     /// How fast the last trial's motion grows at fixed voltages.
     pub(super) growth: Growth,
     pub(super) difference: Difference,
@@ -67,9 +67,9 @@ pub(super) struct Session {
 /// Doubles for each port and body: stages, displacements, velocities, and those of states that are kept.
 const DOUBLES: usize = 64;
 
-impl Session {
-    pub(super) fn open(compiled: &Compiled, request: &OpenRequest) -> Result<(Self, Description), DeviceError> {
-        let ports = Ports::find(compiled, &request.ports)?;
+impl DeviceSession {
+    pub(super) fn open(compiled: &CompiledModel, request: &OpenRequest) -> Result<(Self, Description), DeviceError> {
+        let ports = OpenedPorts::find(compiled, &request.ports)?;
         let own = ports.system.clone();
         let system = own.as_deref().unwrap_or(&compiled.parts.system);
         let electrics = &system.electrics;
@@ -109,14 +109,14 @@ impl Session {
             None => None,
         };
         let shaken = match &request.noise {
-            Some(noise) => Some(Shaken::new(noise, compiled, surroundings(compiled))?),
+            Some(noise) => Some(ThermalForce::new(noise, compiled, surroundings(compiled))?),
             None => None,
         };
         let session = Self {
             opened: request.clone(),
             shaken,
             stepper: Adaptive::new(n, Formulated::new(system, joints.as_ref(), first_step, &ports.sources)),
-            weights: Weights::new(&system.model),
+            weights: NormWeights::new(&system.model),
             ports,
             signals,
             states: States::default(),
@@ -135,7 +135,7 @@ impl Session {
             seen: None,
             response: vec![ComplexPose::zeros(); n],
             warned: Vec::new(),
-            ringing: Ringing::default(),
+            ringing: PhaseErrorMonitor::default(),
             growth: Growth::default(),
             difference: Difference::new(n),
             contact_steps: ContactSteps::default(),
@@ -204,7 +204,7 @@ impl Session {
     }
 
     /// The model as it was opened, with the inputs among its ports.
-    pub(super) fn system<'a>(own: &'a Option<Arc<System>>, compiled: &'a Compiled) -> &'a System {
+    pub(super) fn system<'a>(own: &'a Option<Arc<System>>, compiled: &'a CompiledModel) -> &'a System {
         own.as_deref().unwrap_or(&compiled.parts.system)
     }
 

@@ -24,7 +24,7 @@ const SHARE_DIFFERENTIATED: f64 = 3.6;
 
 /// How the circuit's steps follow a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Follow {
+pub enum SteppingRule {
     /// On straight lines between its points.
     Line,
     /// The same, with steps that are even over a swing.
@@ -35,7 +35,7 @@ pub enum Follow {
 
 /// What was seen up to a state, part of that state.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Shown {
+pub struct StepHistory {
     /// Values at this state.
     now: Vec<f64>,
     /// Slopes over the step that led here, per second; empty at the start.
@@ -50,7 +50,7 @@ pub struct Shown {
     high: Vec<f64>,
 }
 
-impl Shown {
+impl StepHistory {
     /// At the start of a transient.
     pub fn start(values: Vec<f64>) -> Self {
         let (low, high) = (values.clone(), values.clone());
@@ -65,7 +65,7 @@ impl Shown {
         values: Vec<f64>,
         tol: f64,
         floor: impl Fn(usize) -> f64,
-        follow: impl Fn(usize) -> Follow,
+        follow: impl Fn(usize) -> SteppingRule,
     ) -> (Self, f64) {
         if self.now.len() != values.len() {
             return (Self::start(values), f64::INFINITY);
@@ -81,7 +81,7 @@ impl Shown {
             next.slopes.push(slope);
             let Some(slope_before) = self.slopes.get(n) else { continue };
             let follow = follow(n);
-            let share = if follow == Follow::Differentiated { SHARE_DIFFERENTIATED } else { SHARE };
+            let share = if follow == SteppingRule::Differentiated { SHARE_DIFFERENTIATED } else { SHARE };
             let allowed = share * tol * (next.high[n] - next.low[n]) + floor(n);
             let bend = (slope - slope_before) / (self.steps[0] + dt);
             next.bends.push(bend);
@@ -90,22 +90,22 @@ impl Shown {
                 // A divided difference stands for the middle of its three points.
                 let change = 3.0 * (bend - bend_before) / (self.steps[1] + self.steps[0] + dt);
                 // of a sine even steps are as long where it turns as where it bends most
-                let turns = if follow == Follow::Line { 1.0 } else { (16.0 * share * tol).sqrt().min(1.0) };
+                let turns = if follow == SteppingRule::Line { 1.0 } else { (16.0 * share * tol).sqrt().min(1.0) };
                 bound = bound.min((turns * 4.0 * allowed / change.abs()).cbrt());
             }
         }
         (next, bound)
     }
 
-    /// Lists of numbers that [`Shown::numbers`] gives.
+    /// Lists of numbers that [`StepHistory::numbers`] gives.
     pub const PARTS: usize = 6;
 
-    /// Everything it holds, to be put away; [`Shown::from_numbers`] takes it back.
+    /// Everything it holds, to be put away; [`StepHistory::from_numbers`] takes it back.
     pub fn numbers(&self) -> [&[f64]; Self::PARTS] {
         [&self.now, &self.slopes, &self.bends, &self.steps, &self.low, &self.high]
     }
 
-    /// What [`Shown::numbers`] gave; none for lists that do not fit together.
+    /// What [`StepHistory::numbers`] gave; none for lists that do not fit together.
     pub fn from_numbers(parts: [Vec<f64>; Self::PARTS]) -> Option<Self> {
         let [now, slopes, bends, steps, low, high] = parts;
         let fits = |list: &[f64]| list.is_empty() || list.len() == now.len();
@@ -145,10 +145,10 @@ mod tests {
     #[test]
     fn a_sine_is_followed_within_its_share() {
         let tol = 1e-3;
-        let (mut shown, mut t, mut dt) = (Shown::start(vec![1.0]), 0.0, 1e-3);
+        let (mut shown, mut t, mut dt) = (StepHistory::start(vec![1.0]), 0.0, 1e-3);
         let (mut worst, mut points) = (0.0f64, 0);
         while t < 40.0 {
-            let (after, bound) = shown.step(dt, vec![f64::cos(t + dt)], tol, |_| 0.0, |_| Follow::Line);
+            let (after, bound) = shown.step(dt, vec![f64::cos(t + dt)], tol, |_| 0.0, |_| SteppingRule::Line);
             if t > 20.0 {
                 let line = 0.5 * (f64::cos(t) + f64::cos(t + dt));
                 worst = worst.max((f64::cos(t + 0.5 * dt) - line).abs() / 2.0);
@@ -165,10 +165,10 @@ mod tests {
     /// What stands still, and what bends by less than its floor, bounds nothing that matters.
     #[test]
     fn noise_below_the_floor_does_not_hold_the_circuit() {
-        let mut shown = Shown::start(vec![293.0, 0.0]);
+        let mut shown = StepHistory::start(vec![293.0, 0.0]);
         for k in 1..100 {
             let noise = if k % 2 == 0 { 1e-9 } else { -1e-9 };
-            let (after, bound) = shown.step(1e-6, vec![293.0, noise], 1e-3, |_| 1e-6, |_| Follow::Line);
+            let (after, bound) = shown.step(1e-6, vec![293.0, noise], 1e-3, |_| 1e-6, |_| SteppingRule::Line);
             assert!(bound > 1e-5, "{bound:e}");
             shown = after;
         }

@@ -1,19 +1,19 @@
 //! The small-signal answer: how ports and signals of a state respond to a small change at one port that goes as e^(st).
 //!
-//! [`Perturbed`] is the physics at any complex s [rad/s]; [`Session::respond`] asks at s = iω.
+//! [`PerturbedState`] is the physics at any complex s [rad/s]; [`DeviceSession::respond`] asks at s = iω.
 
-use super::session::Session;
+use super::session::DeviceSession;
 use super::states::Snapshot;
 use super::{DeviceError, SmallSignal, Token};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::System;
 use crate::multibody::BlockMatrix;
-use crate::readout::ports::Answer;
-use crate::readout::small_signal::{Moved, Perturbed};
+use crate::readout::ports::PortResponse;
+use crate::readout::small_signal::{ForcedMotion, PerturbedState};
 use crate::solve::frequency::gyroscopic;
 use nalgebra::Complex;
 
-impl Session {
+impl DeviceSession {
     /// Sets the drive of a state and factors the dynamic stiffness about it.
     pub(super) fn factor_about(
         &mut self,
@@ -40,7 +40,7 @@ impl Session {
     /// Small-signal response about a state.
     pub(super) fn respond(
         &mut self,
-        compiled: &Compiled,
+        compiled: &CompiledModel,
         token: Token,
         state: &Snapshot,
         omega: f64,
@@ -56,25 +56,25 @@ impl Session {
         reply.outputs.clear();
         reply.outputs.resize(self.signals.len() * ports, [0.0; 2]);
         let (q, v, rise, sources) = (&state.q, &state.v, &state.rise, &state.sources);
-        let about = Perturbed { compiled, system, q, v, rise, sources, drive: &self.drive };
+        let about = PerturbedState { compiled, system, q, v, rise, sources, drive: &self.drive };
         let s = Complex::new(0.0, omega);
         let pair = |c: Complex<f64>| [c.re, c.im];
         for (p, &port) in self.ports.sources.iter().enumerate() {
             let push = about.push(port, s);
             self.response.copy_from_slice(&push.force);
             gyroscopic::solve(&mut self.harmonic, system, (omega, rate), &mut self.response);
-            let moved = Moved::new(&push, &self.response, s);
+            let moved = ForcedMotion::new(&push, &self.response, s);
             for (row, signal) in self.signals.iter().enumerate() {
-                reply.outputs[row * ports + p] = pair(about.seen(*signal, &moved));
+                reply.outputs[row * ports + p] = pair(about.signal_change(*signal, &moved));
             }
             let charges = about.charges(&self.ports.sources, &moved);
             for (row, (answer, &other)) in self.ports.answers.iter().zip(&self.ports.sources).enumerate() {
                 reply.admittance[row * ports + p] = match answer {
                     // i = G + s·dq
-                    Answer::Current => pair(s * charges[row] + system.electrics.conductance[(other, port)]),
-                    Answer::Motion(signal) => pair(about.seen(*signal, &moved)),
-                    Answer::Rise(heater) => pair(Perturbed::warmed(&push, *heater)),
-                    Answer::Nothing => [0.0; 2],
+                    PortResponse::Current => pair(s * charges[row] + system.electrics.conductance[(other, port)]),
+                    PortResponse::Motion(signal) => pair(about.signal_change(*signal, &moved)),
+                    PortResponse::Rise(heater) => pair(PerturbedState::warmed(&push, *heater)),
+                    PortResponse::Nothing => [0.0; 2],
                 };
             }
         }

@@ -1,6 +1,6 @@
 //! The states behind tokens: immutable, few, found by a hash of the request that made them.
 
-use super::shown::Shown;
+use super::shown::StepHistory;
 use super::{Mode, Token, Trial};
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;
@@ -9,9 +9,9 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 
 /// States held at most; the least recently used goes first. A circuit needs its last accepted state and its trials.
-const MOST: usize = 64;
+const MAX_STATES: usize = 64;
 /// Bytes of states held beyond [`KEPT`] of them.
-const MOST_BYTES: usize = 32 << 20;
+const MAX_BYTES: usize = 32 << 20;
 /// States kept when the circuit says which one it accepted.
 const KEPT: usize = 8;
 
@@ -31,7 +31,7 @@ pub struct Snapshot {
     /// Time since the equilibrium that the motion began from [s].
     pub elapsed: f64,
     /// What the circuit has seen.
-    pub shown: Shown,
+    pub shown: StepHistory,
     /// What a formulation carries from step to step beside the bodies' motion.
     pub carried: Vec<Motion>,
 }
@@ -70,7 +70,7 @@ impl States {
         self.bytes += size(&snapshot);
         self.held.insert(token, (parent, Arc::new(snapshot)));
         self.touch(token);
-        while self.used.len() > MOST || (self.used.len() > KEPT && self.bytes > MOST_BYTES) {
+        while self.used.len() > MAX_STATES || (self.used.len() > KEPT && self.bytes > MAX_BYTES) {
             if let Some(old) = self.used.pop_front() {
                 self.forget(old);
             }

@@ -1,15 +1,15 @@
 //! How a trial is made: a static one by following the parent's equilibrium, a transient one by integrating from the parent's
 //! state.
 
-use super::agitation::Shaken;
+use super::agitation::ThermalForce;
 use super::answer::STEP_SHARE;
 use super::contact_steps::{ContactSteps, MAX_ERROR, near};
 use super::growth::{Bound, rate_along};
-use super::session::Session;
+use super::session::DeviceSession;
 use super::states::Snapshot;
 use super::{Status, Trial, TrialReply};
 use crate::analysis::contact_range::within_contact_range;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::{Ramp, System};
 use crate::equations::Bodies;
 use crate::multibody::planar::Pose;
@@ -26,11 +26,11 @@ const PROPOSED_STEPS: f64 = 32.0;
 /// growing motion adds 18 % or more.
 const RESPONDS: f64 = 0.1;
 
-impl Session {
+impl DeviceSession {
     /// A static trial: from the parent's equilibrium along straight lines in voltage, or from rest.
     pub(super) fn balance(
         &mut self,
-        compiled: &Compiled,
+        compiled: &CompiledModel,
         request: &Trial<'_>,
         parent: Option<&Snapshot>,
         reply: &mut TrialReply,
@@ -77,7 +77,7 @@ impl Session {
     /// A transient trial: the motion over dt, sensitivities along.
     pub(super) fn advance(
         &mut self,
-        compiled: &Compiled,
+        compiled: &CompiledModel,
         request: &Trial<'_>,
         parent: Option<&Snapshot>,
         reply: &mut TrialReply,
@@ -97,7 +97,7 @@ impl Session {
         let tol = STEP_SHARE * compiled.options.tol;
         let kept = parent.is_some_and(|parent| self.keep_steps(system, (request, parent), &from, tol));
         self.begin(parent);
-        let push = self.shaken.as_ref().map_or(&[][..], Shaken::mean);
+        let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
         let mut ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
         let mut h = self.contact_steps.next;
         let ends = &self.contact_steps.ends;
@@ -105,7 +105,7 @@ impl Session {
         if !(kept && self.stepper.along(bodies, &mut self.motion, ends, (tol, MAX_ERROR))) {
             self.begin(parent);
             h = parent.map_or(self.first_step, |p| p.next_step);
-            let push = self.shaken.as_ref().map_or(&[][..], Shaken::mean);
+            let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
             ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
             let advanced = self.stepper.advance(
                 &mut Bodies::weighed(system, &ramp, &self.weights),
@@ -180,7 +180,7 @@ impl Session {
             return !self.contact_steps.ends.is_empty();
         }
         self.begin(Some(parent));
-        let push = self.shaken.as_ref().map_or(&[][..], Shaken::mean);
+        let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
         let ramp = Ramp::new(&system.electrics, from, from, &self.rise, request.dt).pushed(push);
         let (mut h, mut touches) = (parent.next_step, system.contact_energy(&parent.q) > 0.0);
         let ContactSteps { ends, next, .. } = &mut self.contact_steps;

@@ -3,23 +3,23 @@
 
 use super::growth::held_by_charge;
 use super::higher_modes::Split;
-use super::ringing::Accepted;
-use super::session::Session;
+use super::ringing::AcceptedState;
+use super::session::DeviceSession;
 use super::states::Snapshot;
-use crate::analysis::mesh::{WARNING, told_moving, told_still};
+use crate::analysis::mesh::{WARNING, operating_point_warnings, transient_warnings};
 use crate::analysis::statics::OperatingPoint;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
-use crate::readout::ports::Answer;
+use crate::readout::ports::PortResponse;
 
 /// Code of the warning that a charge alone holds a mechanism.
 const HELD: &str = "W048";
 
-impl Session {
+impl DeviceSession {
     /// What this state warns of and none before it did, or not a tenth as much: fingers of combs that go through their other side, beams hotter than
     /// any solid bears, a motion that rings out of step and, in equilibria, gaps along beams in too few segments and what a linear
     /// model leaves out.
-    pub(super) fn warns(&mut self, compiled: &Compiled, state: &Snapshot) -> Vec<Diagnostic> {
+    pub(super) fn warns(&mut self, compiled: &CompiledModel, state: &Snapshot) -> Vec<Diagnostic> {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
         let electrics = &system.electrics;
@@ -35,13 +35,13 @@ impl Session {
             ..OperatingPoint::default()
         };
         let found = match state.elapsed == 0.0 {
-            true => told_still(compiled, &point),
-            false => told_moving(compiled, &point).into_iter().map(|warning| (warning, 1.0)).collect(),
+            true => operating_point_warnings(compiled, &point),
+            false => transient_warnings(compiled, &point).into_iter().map(|warning| (warning, 1.0)).collect(),
         };
         let mut told: Vec<Diagnostic> =
             found.into_iter().filter_map(|(warning, size)| self.grown(warning, size)).collect();
         if let Some(mode) = &compiled.lowest {
-            let (charges, seen) = (self.charges(), Accepted { t: state.elapsed, values: state.shown.values() });
+            let (charges, seen) = (self.charges(), AcceptedState { t: state.elapsed, values: state.shown.values() });
             let model = &compiled.parts.system.model;
             let rates: Vec<f64> =
                 compiled.higher.iter().map(|mode| model.mass_product(&mode.shape, &state.v)).collect();
@@ -77,11 +77,11 @@ impl Session {
     /// Which of the values that the circuit sees are charges: their change is a current.
     fn charges(&self) -> Vec<bool> {
         let signals = self.signals.iter().map(|_| false);
-        signals.chain(self.ports.answers.iter().map(|answer| *answer == Answer::Current)).collect()
+        signals.chain(self.ports.answers.iter().map(|answer| *answer == PortResponse::Current)).collect()
     }
 
     /// What a value, or the current of a charge behind all values, is called.
-    fn seen_name(&self, n: usize, compiled: &Compiled) -> String {
+    fn seen_name(&self, n: usize, compiled: &CompiledModel) -> String {
         let (signals, ports) = (self.signals.len(), self.ports.len());
         let port = |n: usize| match self.opened.ports.get(n) {
             Some(name) => name.clone(),

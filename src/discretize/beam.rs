@@ -1,15 +1,15 @@
 //! A beam of the drawing as bodies and joints of a model, cut by a [`Scheme`].
 //!
-//! At junctions the ends are [`End`]s: the beam proper, which is cut, runs from one offset to the other, the rods in between
+//! At junctions the ends are [`JunctionEnd`]s: the beam proper, which is cut, runs from one offset to the other, the rods in between
 //! belong to the bodies of the nodes, and the springs' compliance is added to that of the first and the last joint.
 
 use super::bar::shear_flexibility;
 pub use super::bar::{SHEAR_COEFFICIENT, bar};
-use super::junction_springs::End;
-use super::rigid::{Assembly, Lump};
-use super::scheme::{Bar, Cut, Pin};
+use super::junction_springs::JunctionEnd;
+use super::rigid::{Lump, RigidGroups};
+use super::scheme::{Bar, SegmentJoint, SegmentedBeam};
 use super::sprung::second_strain;
-use crate::domains::Point;
+use crate::domains::MaterialPoint;
 use crate::multibody::{BodyName, Coupling, Joint};
 use crate::options::{CompileOptions, Junctions, Scheme};
 use crate::structure::Beam;
@@ -18,19 +18,19 @@ use std::sync::Arc;
 
 /// Joints of the model in the making.
 #[derive(Debug, Clone, Default)]
-pub struct Joints {
+pub struct JointBuilder {
     /// Joints, `Free(k)` being body k of the assembly.
     pub joints: Vec<Joint>,
     /// Pairs of joints whose rotations are coupled.
     pub couplings: Vec<Coupling>,
     /// The bodies of the beam at hand.
-    bodies: Vec<Point>,
+    bodies: Vec<MaterialPoint>,
     /// Beams that were cut before: those of a drawing are mostly alike.
-    known: Vec<Sprung>,
+    known: Vec<StiffenedBeam>,
 }
 
 /// Beams that are remembered.
-const MOST_KNOWN: usize = 16;
+const MAX_KNOWN: usize = 16;
 
 /// Lays a beam: adds its inner bodies, masses and joints. Returns the equally spaced points along it, the drawn ends
 /// included.
@@ -39,10 +39,10 @@ pub fn lay(
     segments: usize,
     heater: Option<usize>,
     options: &CompileOptions,
-    ends: &[End; 2],
-    rigid: &mut Assembly,
-    out: &mut Joints,
-) -> Vec<Point> {
+    ends: &[JunctionEnd; 2],
+    rigid: &mut RigidGroups,
+    out: &mut JointBuilder,
+) -> Vec<MaterialPoint> {
     let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
     let drawn = [rigid.point(beam.a.0), rigid.point(beam.b.0)];
     let shift = [along * ends[0].offset, along * -ends[1].offset];
@@ -50,9 +50,9 @@ pub fn lay(
     let mut bar = bar(beam, options.shear, options.rotary_inertia);
     bar.length -= ends[0].offset + ends[1].offset;
     let give = shear_flexibility(beam);
-    let drawn_as = Drawn { bar, give, segments, wall: rigid.grounded(beam.b.0), ends: *ends };
-    let Joints { joints, couplings, bodies, known } = out;
-    let Sprung { cut, strained, .. } = sprung(known, drawn_as, options);
+    let drawn_as = JointProperties { bar, give, segments, wall: rigid.grounded(beam.b.0), ends: *ends };
+    let JointBuilder { joints, couplings, bodies, known } = out;
+    let StiffenedBeam { cut, strained, .. } = sprung(known, drawn_as, options);
     let segments = segments.max(1);
     let last = cut.parts.len() - 1;
     let name = if last > 1 { Arc::from(beam.name.as_str()) } else { Arc::default() };
@@ -98,7 +98,7 @@ pub fn lay(
     for &(i, j, stiffness) in &cut.couplings {
         couplings.push(Coupling { first: pair(i), second: pair(j), stiffness });
     }
-    let mut points: Vec<Point> = (cut.nodes.iter().enumerate())
+    let mut points: Vec<MaterialPoint> = (cut.nodes.iter().enumerate())
         .map(|(k, &part)| {
             let at = k as f64 * bar.length / segments as f64;
             bodies[part].beyond(place(at) - place(cut.parts[part].at))
@@ -110,7 +110,7 @@ pub fn lay(
 
 /// What the joints of a beam depend on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Drawn {
+struct JointProperties {
     /// Between the junctions.
     bar: Bar,
     /// Shear flexibility of the section [1/N].
@@ -118,26 +118,30 @@ struct Drawn {
     segments: usize,
     /// Its far end is part of the ground.
     wall: bool,
-    ends: [End; 2],
+    ends: [JunctionEnd; 2],
 }
 
 /// Stress per strain of a joint, and its second-order axial strain.
-type Strained = (Matrix3<f64>, Matrix2<f64>);
+type JointStress = (Matrix3<f64>, Matrix2<f64>);
 
 /// A beam that was cut, with the stiffness of its joints and their second-order strain, junctions included.
 #[derive(Debug, Clone)]
-struct Sprung {
-    drawn: Drawn,
-    cut: Cut,
-    strained: Vec<Strained>,
+struct StiffenedBeam {
+    drawn: JointProperties,
+    cut: SegmentedBeam,
+    strained: Vec<JointStress>,
 }
 
 /// The beam cut, or found among those that were.
-fn sprung<'a>(known: &'a mut Vec<Sprung>, drawn: Drawn, options: &CompileOptions) -> &'a Sprung {
+fn sprung<'a>(
+    known: &'a mut Vec<StiffenedBeam>,
+    drawn: JointProperties,
+    options: &CompileOptions,
+) -> &'a StiffenedBeam {
     if let Some(k) = known.iter().position(|other| other.drawn == drawn) {
         return &known[k];
     }
-    if known.len() == MOST_KNOWN {
+    if known.len() == MAX_KNOWN {
         known.clear();
     }
     // a rigid beam is the rods of a single segment, which its one body holds together
@@ -149,7 +153,7 @@ fn sprung<'a>(known: &'a mut Vec<Sprung>, drawn: Drawn, options: &CompileOptions
     } else {
         cut.pins.iter().map(|pin| (pin.stiffness, pin.second)).collect()
     };
-    known.push(Sprung { drawn, cut, strained });
+    known.push(StiffenedBeam { drawn, cut, strained });
     &known[known.len() - 1]
 }
 
@@ -157,19 +161,20 @@ fn sprung<'a>(known: &'a mut Vec<Sprung>, drawn: Drawn, options: &CompileOptions
 #[derive(Default)]
 struct Springs {
     /// The last joint away from the ends, and what it is.
-    inner: Option<(Pin, Strained)>,
+    inner: Option<(SegmentJoint, JointStress)>,
     /// The last stiffness, and its inverse.
     own: Option<(Matrix3<f64>, Option<Matrix3<f64>>)>,
 }
 
 impl Springs {
     /// [`Springs::with_ends`] of joint `k`.
-    fn with(&mut self, drawn: &Drawn, cut: &Cut, k: usize) -> Strained {
+    fn with(&mut self, drawn: &JointProperties, cut: &SegmentedBeam, k: usize) -> JointStress {
         let pin = &cut.pins[k];
         if k == 0 || k == cut.pins.len() - 1 {
             return self.with_ends(drawn, cut, k);
         }
-        let alike = |last: &Pin| (last.stiffness, last.length, last.locked) == (pin.stiffness, pin.length, pin.locked);
+        let alike =
+            |last: &SegmentJoint| (last.stiffness, last.length, last.locked) == (pin.stiffness, pin.length, pin.locked);
         match &self.inner {
             Some((last, (stiffness, _))) if alike(last) => (*stiffness, pin.second),
             _ => {
@@ -183,8 +188,8 @@ impl Springs {
     /// Joint `k` of a cut beam with the shear compliance of its segment and the springs of the ends next to it.
     ///
     /// A joint with rigid directions takes the bending part of the springs alone.
-    fn with_ends(&mut self, drawn: &Drawn, cut: &Cut, k: usize) -> Strained {
-        let Drawn { bar, give, ends, .. } = drawn;
+    fn with_ends(&mut self, drawn: &JointProperties, cut: &SegmentedBeam, k: usize) -> JointStress {
+        let JointProperties { bar, give, ends, .. } = drawn;
         let pin = &cut.pins[k];
         // an end without a spring is none: the joint is then one of the others to the last bit
         let next = [(k == 0).then_some(&ends[0]), (k == cut.pins.len() - 1).then_some(&ends[1])];
@@ -237,7 +242,14 @@ pub fn drag_per_mass(beam: &Beam, undamped: bool) -> f64 {
 }
 
 /// The rod of that length that a junction makes part of its node's body.
-fn add_rod(beam: &Beam, length: f64, along: Vector2<f64>, drag_per_mass: f64, node: Point, rigid: &mut Assembly) {
+fn add_rod(
+    beam: &Beam,
+    length: f64,
+    along: Vector2<f64>,
+    drag_per_mass: f64,
+    node: MaterialPoint,
+    rigid: &mut RigidGroups,
+) {
     if length > 0.0 {
         let mass = beam.material.density * beam.width * beam.thickness * length;
         let second = mass * (length * length / 3.0 + beam.width * beam.width / 12.0);

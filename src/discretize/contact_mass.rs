@@ -5,7 +5,7 @@
 //! a millionth of the mass of all bodies.
 
 use crate::domains::domain::Domain;
-use crate::domains::drawn::Laid;
+use crate::domains::drawn::PlacedMember;
 use crate::domains::member::Member;
 use crate::multibody::{Body, BodyId};
 use crate::options::CompileOptions;
@@ -14,7 +14,11 @@ use crate::options::CompileOptions;
 const LIGHT: f64 = 1e-6;
 
 /// The bodies, with some mass where they have none and a contact of `members` acts on them.
-pub(super) fn weighed(mut bodies: Vec<Body>, members: &[Laid<'_, Member>], options: &CompileOptions) -> Vec<Body> {
+pub(super) fn weighed(
+    mut bodies: Vec<Body>,
+    members: &[PlacedMember<'_, Member>],
+    options: &CompileOptions,
+) -> Vec<Body> {
     if !options.rotary_inertia {
         return bodies;
     }

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 /// Most segments of all beams together: with bodies, joints and their factors each takes about a kilobyte.
-pub const MOST_SEGMENTS: usize = 2_000_000;
+pub const MAX_SEGMENTS: usize = 2_000_000;
 
 /// Why a drawing cannot become a model.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -40,7 +40,7 @@ pub enum DiscretizeError {
         beam: String,
     },
     /// More segments than can be laid out.
-    #[error("{segments} segments in all, at most {MOST_SEGMENTS}; take a lower band, a larger tol, or fewer segments")]
+    #[error("{segments} segments in all, at most {MAX_SEGMENTS}; take a lower band, a larger tol, or fewer segments")]
     TooFine {
         /// Segments of all beams together.
         segments: usize,

@@ -5,16 +5,16 @@
 //! drawn twice further out stays, as fine meshes would else have bodies of less than no mass.
 
 use super::beam::drag_per_mass;
-use super::junction_springs::End;
+use super::junction_springs::JunctionEnd;
 use super::overlap::{Strip, overlap, turn};
-use super::rigid::{Assembly, Lump};
+use super::rigid::{Lump, RigidGroups};
 use crate::structure::{Beam, Structure};
 use nalgebra::Vector2;
 
 /// Sharpest turn up to which beams lie above each other within their rigid ends only [rad].
 const SHARPEST: f64 = 0.75 * std::f64::consts::PI;
 /// Share of the mass that beams bring to a junction which it may have twice.
-const MOST_MASS: f64 = 0.5;
+const MAX_MASS: f64 = 0.5;
 
 /// Junctions with two beams or more.
 #[derive(Debug, Clone, Default)]
@@ -57,7 +57,7 @@ pub(super) struct Excess {
 
 impl Excess {
     /// Adds it to the body of its node.
-    pub(super) fn add_to(&self, rigid: &mut Assembly) {
+    pub(super) fn add_to(&self, rigid: &mut RigidGroups) {
         let point = rigid.point(self.node);
         rigid.add_mass(point, &self.mass, self.drag_per_mass);
         if let Some(drag) = &self.drag {
@@ -67,7 +67,12 @@ impl Excess {
 }
 
 /// Of each junction of a drawing whose beams end so.
-pub(super) fn find(structure: &Structure, ends: &[[End; 2]], meetings: &Meetings, undamped: bool) -> Vec<Excess> {
+pub(super) fn find(
+    structure: &Structure,
+    ends: &[[JunctionEnd; 2]],
+    meetings: &Meetings,
+    undamped: bool,
+) -> Vec<Excess> {
     let mut shortest = vec![f64::INFINITY; structure.nodes.len()];
     let mut brought = vec![0.0; structure.nodes.len()];
     for beam in &structure.beams {
@@ -92,7 +97,7 @@ pub(super) fn find(structure: &Structure, ends: &[[End; 2]], meetings: &Meetings
         let room = (shortest[node] / widest).min(1.0);
         let whole = mass * room;
         // where junctions of stout beams overlap in turn, no more goes than leaves half of what the beams bring
-        let left = MOST_MASS * brought[node] / (whole * excess.amount).max(f64::MIN_POSITIVE);
+        let left = MAX_MASS * brought[node] / (whole * excess.amount).max(f64::MIN_POSITIVE);
         let mut left = left.min(1.0);
         if folded(&strips) {
             let end = |beam: usize| &ends[beam][usize::from(structure.beams[beam].a.0 != node)];

@@ -14,10 +14,10 @@
 //! Clark et al., "Addressing the needs of complex MEMS design", MEMS 2002, for SUGAR.
 
 use super::bar::bar;
-use super::free_rotation::{self, Acting};
-use super::rigid::Assembly;
+use super::free_rotation::{self, BodyActions};
+use super::rigid::RigidGroups;
 use super::{DiscretizeError, cubic, lay_spring, order};
-use crate::domains::{Domain, Member, Point};
+use crate::domains::{Domain, MaterialPoint, Member};
 use crate::multibody::linear_system::{LinearSystem, add_pair};
 use crate::multibody::planar::{JointFrame, Pose};
 use crate::multibody::{BodyId, BodyName, Joint};
@@ -27,7 +27,7 @@ use std::sync::Arc;
 
 /// How many elements a beam gets.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Elements {
+pub enum ElementCount {
     /// The same number for every beam; 1 is what SUGAR does.
     Each(usize),
     /// By the highest frequency to be resolved [Hz] and the relative error: the rule of [`order`], since a cubic element
@@ -53,7 +53,7 @@ pub enum FrameGaps {
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameOptions {
     /// How many elements a beam gets.
-    pub elements: Elements,
+    pub elements: ElementCount,
     /// With shear flexibility and rotary inertia.
     pub shear: bool,
     /// Leave out gas damping.
@@ -64,7 +64,7 @@ pub struct FrameOptions {
 
 /// A linear frame, and where the drawing's parts went.
 #[derive(Debug, Clone)]
-pub struct Frame {
+pub struct LinearFrame {
     /// K, M, C.
     pub system: LinearSystem,
     /// Forces of the dead loads and of strains that are built in or prescribed.
@@ -72,9 +72,9 @@ pub struct Frame {
     /// For each heated beam, the forces per free strain [N, N·m].
     pub expansion: Vec<Vec<Pose>>,
     /// For each node of the structure, its material point; none for purely electrical nodes.
-    pub nodes: Vec<Option<Point>>,
+    pub nodes: Vec<Option<MaterialPoint>>,
     /// For each beam, the points along its centreline, ends included.
-    pub beams: Vec<Vec<Point>>,
+    pub beams: Vec<Vec<MaterialPoint>>,
     /// Gaps in the order of the product's own; none where they are left out.
     pub gaps: Vec<Member>,
 }
@@ -83,9 +83,9 @@ pub struct Frame {
 ///
 /// # Errors
 /// See [`DiscretizeError`].
-pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, DiscretizeError> {
+pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<LinearFrame, DiscretizeError> {
     let undamped = options.undamped;
-    let mut rigid = Assembly::new(structure, &[]);
+    let mut rigid = RigidGroups::new(structure, &[]);
     let (pieces, beams) = cut(structure, &options.elements, &mut rigid)?;
     if rigid.bodies.is_empty() {
         return Err(DiscretizeError::NothingMoves);
@@ -100,7 +100,7 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
     }
     super::lay_dampers(&gaps, undamped, &mut dampers);
     let ends: Vec<BodyId> = pieces.iter().flat_map(|piece| [piece.from.body, piece.to.body]).collect();
-    let acting = Acting { structure, joints: &joints, dampers: &dampers, members: &gaps, elements: &ends };
+    let acting = BodyActions { structure, joints: &joints, dampers: &dampers, members: &gaps, elements: &ends };
     free_rotation::hold(&acting, &mut rigid);
     rigid.hold_hinges(structure, &mut joints);
     let couplings: Vec<(BodyId, BodyId)> = (pieces.iter().map(|p| (p.from.body, p.to.body)))
@@ -168,28 +168,28 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
             load[k] += carry(point.arm).transpose() * Vector3::new(force.force[0], force.force[1], force.moment);
         }
     }
-    let placed = |point: Point| Point { body: moved(point.body), ..point };
+    let placed = |point: MaterialPoint| MaterialPoint { body: moved(point.body), ..point };
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| placed(rigid.point(n)))).collect();
     let beams = beams.into_iter().map(|points| points.into_iter().map(placed).collect()).collect();
     let gaps = gaps.into_iter().map(|laid| laid.member.moved(&placed)).collect();
-    Ok(Frame { system, load, expansion, nodes, beams, gaps })
+    Ok(LinearFrame { system, load, expansion, nodes, beams, gaps })
 }
 
 /// The elements of every beam, and the points between them along its centreline, ends included.
 fn cut<'a>(
     structure: &'a Structure,
-    elements: &Elements,
-    rigid: &mut Assembly,
-) -> Result<(Vec<Piece<'a>>, Vec<Vec<Point>>), DiscretizeError> {
-    let mut pieces: Vec<Piece<'_>> = Vec::new();
-    let mut beams: Vec<Vec<Point>> = Vec::with_capacity(structure.beams.len());
+    elements: &ElementCount,
+    rigid: &mut RigidGroups,
+) -> Result<(Vec<FrameElement<'a>>, Vec<Vec<MaterialPoint>>), DiscretizeError> {
+    let mut pieces: Vec<FrameElement<'_>> = Vec::new();
+    let mut beams: Vec<Vec<MaterialPoint>> = Vec::with_capacity(structure.beams.len());
     for (index, beam) in structure.beams.iter().enumerate() {
         order::check(beam)?;
         let count = match elements {
-            Elements::Each(n) => (*n).max(1),
-            Elements::Band(band, tol) => order::segments(beam, Some(*band), *tol),
-            Elements::Beams(counts) => counts[index],
+            ElementCount::Each(n) => (*n).max(1),
+            ElementCount::Band(band, tol) => order::segments(beam, Some(*band), *tol),
+            ElementCount::Beams(counts) => counts[index],
         };
         let (start, end) = (rigid.position(beam.a.0), rigid.position(beam.b.0));
         let mut from = rigid.point(beam.a.0);
@@ -199,7 +199,7 @@ fn cut<'a>(
             let at = start + (end - start) * (k as f64 / count as f64);
             let to =
                 if k == count { rigid.point(beam.b.0) } else { rigid.add_segment(BodyName::segment(&name, k), at) };
-            pieces.push(Piece { index, beam, from, to, length: beam.length / count as f64 });
+            pieces.push(FrameElement { index, beam, from, to, length: beam.length / count as f64 });
             points.push(to);
             from = to;
         }
@@ -209,16 +209,16 @@ fn cut<'a>(
 }
 
 /// One element.
-struct Piece<'a> {
+struct FrameElement<'a> {
     /// Of its beam in the structure.
     index: usize,
     beam: &'a Beam,
-    from: Point,
-    to: Point,
+    from: MaterialPoint,
+    to: MaterialPoint,
     length: f64,
 }
 
-impl Piece<'_> {
+impl FrameElement<'_> {
     fn drag_per_mass(&self) -> f64 {
         let m = &self.beam.material;
         if m.viscosity == 0.0 { 0.0 } else { m.viscosity / (m.fluid * m.density * self.beam.thickness) }

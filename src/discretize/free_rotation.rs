@@ -6,8 +6,8 @@
 //! that acts away from the point keeps the rotation as an unknown. Springs of different stiffness along x and y have a frame that turns with the
 //! mean of both ends; a held end counts as not turned.
 
-use super::rigid::Assembly;
-use crate::domains::{Domain, Laid, Member};
+use super::rigid::RigidGroups;
+use crate::domains::{Domain, Member, PlacedMember};
 use crate::multibody::planar::JointFrame;
 use crate::multibody::{BodyId, Damper, Joint};
 use crate::structure::Structure;
@@ -18,7 +18,7 @@ const SAME: f64 = 1e-9;
 
 /// What is known of the rotation of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Rotation {
+enum RotationUse {
     /// Nothing acts on the body yet.
     Unknown,
     /// Everything so far acts on this point, given from the reference point [m].
@@ -28,25 +28,25 @@ enum Rotation {
 }
 
 /// What acts on the bodies of a model in the making.
-pub(super) struct Acting<'a> {
+pub(super) struct BodyActions<'a> {
     pub(super) structure: &'a Structure,
     pub(super) joints: &'a [Joint],
     pub(super) dampers: &'a [Damper],
-    pub(super) members: &'a [Laid<'a, Member>],
+    pub(super) members: &'a [PlacedMember<'a, Member>],
     /// Ends of beam elements that are no joints.
     pub(super) elements: &'a [BodyId],
 }
 
 /// Holds the rotations that nothing uses.
-pub(super) fn hold(acting: &Acting<'_>, rigid: &mut Assembly) {
+pub(super) fn hold(acting: &BodyActions<'_>, rigid: &mut RigidGroups) {
     let same = SAME * acting.structure.extent();
-    let mut rotations = vec![Rotation::Unknown; rigid.bodies.len()];
+    let mut rotations = vec![RotationUse::Unknown; rigid.bodies.len()];
     let mut see = |id: BodyId, at: Option<Vector2<f64>>| {
         let BodyId::Free(k) = id else { return };
         rotations[k] = match (rotations[k], at) {
-            (Rotation::Unknown, Some(point)) => Rotation::About(point),
-            (Rotation::About(one), Some(other)) if (one - other).norm() <= same => Rotation::About(one),
-            _ => Rotation::Used,
+            (RotationUse::Unknown, Some(point)) => RotationUse::About(point),
+            (RotationUse::About(one), Some(other)) if (one - other).norm() <= same => RotationUse::About(one),
+            _ => RotationUse::Used,
         };
     };
     acting.elements.iter().for_each(|body| see(*body, None));
@@ -80,7 +80,7 @@ pub(super) fn hold(acting: &Acting<'_>, rigid: &mut Assembly) {
         body.lumps_act(same, |at| see(BodyId::Free(k), at));
     }
     for (body, rotation) in rigid.bodies.iter_mut().zip(rotations) {
-        if matches!(rotation, Rotation::About(_)) {
+        if matches!(rotation, RotationUse::About(_)) {
             body.hold_rotation();
         }
     }

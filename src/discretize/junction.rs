@@ -18,10 +18,10 @@
 
 use super::bar::bar;
 use super::excess::{self, Excess, Meetings};
-use super::junction_springs::{End, corner, interpolate};
+use super::junction_springs::{JunctionEnd, corner, interpolate};
 use super::junction_table as table;
 use super::overlap::{IN_LINE, Strip, turn};
-use super::rigid::Assembly;
+use super::rigid::RigidGroups;
 use super::scheme::Bar;
 use crate::budget;
 use crate::multibody::BodyId;
@@ -30,13 +30,13 @@ use crate::structure::{Beam, Structure};
 use std::f64::consts::PI;
 
 /// Share of a beam that its two offsets may take together.
-const MOST: f64 = 0.9;
+const MAX_OFFSET_FRACTION: f64 = 0.9;
 /// Kinds of beams whose settled ends are remembered.
-const MOST_KNOWN: usize = 16;
+const MAX_KNOWN: usize = 16;
 
 /// One beam as its junction sees it.
 #[derive(Debug, Clone, Copy)]
-struct Branch {
+struct JunctionBeam {
     beam: usize,
     /// 0 where the beam starts, 1 where it ends.
     end: usize,
@@ -46,12 +46,12 @@ struct Branch {
 }
 
 /// Those of each node, one node after the other.
-struct Branches {
+struct JunctionBeams {
     start: Vec<usize>,
-    all: Vec<Branch>,
+    all: Vec<JunctionBeam>,
 }
 
-impl Branches {
+impl JunctionBeams {
     fn new(structure: &Structure) -> Self {
         let ends = |beam: &Beam| [beam.a.0, beam.b.0];
         let mut start = vec![0; structure.nodes.len() + 1];
@@ -62,26 +62,26 @@ impl Branches {
             start[k + 1] += start[k];
         }
         let mut at = start.clone();
-        let mut all = vec![Branch { beam: 0, end: 0, angle: 0.0, width: 0.0 }; 2 * structure.beams.len()];
+        let mut all = vec![JunctionBeam { beam: 0, end: 0, angle: 0.0, width: 0.0 }; 2 * structure.beams.len()];
         for (k, beam) in structure.beams.iter().enumerate() {
             for (end, node) in ends(beam).into_iter().enumerate() {
-                all[at[node]] = Branch { beam: k, end, angle: beam.angle + PI * end as f64, width: beam.width };
+                all[at[node]] = JunctionBeam { beam: k, end, angle: beam.angle + PI * end as f64, width: beam.width };
                 at[node] += 1;
             }
         }
         Self { start, all }
     }
 
-    fn of(&self, node: usize) -> &[Branch] {
+    fn of(&self, node: usize) -> &[JunctionBeam] {
         &self.all[self.start[node]..self.start[node + 1]]
     }
 }
 
 /// What junctions do to a drawing.
 #[derive(Debug, Clone)]
-pub struct Ends {
+pub struct JunctionEnds {
     /// For each beam, its start and its end.
-    pub beams: Vec<[End; 2]>,
+    pub beams: Vec<[JunctionEnd; 2]>,
     /// Junctions with two beams or more.
     pub(super) meetings: Meetings,
     /// What is drawn twice there.
@@ -91,14 +91,14 @@ pub struct Ends {
 }
 
 /// Finds the junctions of a drawing.
-pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions, undamped: bool) -> Ends {
-    let beams = vec![[End::default(); 2]; structure.beams.len()];
-    let mut ends = Ends { beams, meetings: Meetings::default(), excess: Vec::new(), cut: Vec::new() };
+pub fn find(structure: &Structure, rigid: &RigidGroups, kind: Junctions, undamped: bool) -> JunctionEnds {
+    let beams = vec![[JunctionEnd::default(); 2]; structure.beams.len()];
+    let mut ends = JunctionEnds { beams, meetings: Meetings::default(), excess: Vec::new(), cut: Vec::new() };
     if kind == Junctions::Centreline {
         return ends;
     }
     let held = rigid_nodes(structure, rigid);
-    let at = Branches::new(structure);
+    let at = JunctionBeams::new(structure);
     let mut guided = vec![false; structure.nodes.len()];
     for support in structure.supports.iter().filter(|s| s.held[2]) {
         guided[support.node.0] = true;
@@ -111,16 +111,16 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions, undamped: 
             }
         } else if branches.len() > 1 {
             meet(branches, &structure.beams, &mut ends.beams);
-            let strip = |b: &Branch| (Strip { angle: b.angle, width: b.width, weight: 1.0 }, b.beam);
+            let strip = |b: &JunctionBeam| (Strip { angle: b.angle, width: b.width, weight: 1.0 }, b.beam);
             ends.meetings.add(node, branches.iter().map(strip));
         } else if let [b] = branches {
             ends.beams[b.beam][b.end].free = true;
         }
     }
     // beams of a drawing are mostly alike
-    let mut known: Vec<(Bar, [End; 2], [End; 2])> = Vec::new();
+    let mut known: Vec<(Bar, [JunctionEnd; 2], [JunctionEnd; 2])> = Vec::new();
     for (k, (beam, both)) in structure.beams.iter().zip(&mut ends.beams).enumerate() {
-        let share = (both[0].offset + both[1].offset) / (MOST * beam.length);
+        let share = (both[0].offset + both[1].offset) / (MAX_OFFSET_FRACTION * beam.length);
         if share > 1.0 {
             ends.cut.push(k);
         }
@@ -131,7 +131,7 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions, undamped: 
         }
         let raw = *both;
         let taken = (raw[0].offset + raw[1].offset) / share.max(1.0);
-        let room = 0.5 * (MOST * beam.length - taken).max(0.0);
+        let room = 0.5 * (MAX_OFFSET_FRACTION * beam.length - taken).max(0.0);
         for end in &mut *both {
             if share > 1.0 {
                 end.offset /= share;
@@ -141,7 +141,7 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions, undamped: 
                 _ => end.spring.fill(0.0),
             }
         }
-        if known.len() < MOST_KNOWN {
+        if known.len() < MAX_KNOWN {
             known.push((bar, raw, *both));
         }
     }
@@ -150,7 +150,7 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions, undamped: 
 }
 
 /// Nodes on anchors, plates and rigid links: beams end there where they are drawn.
-fn rigid_nodes(structure: &Structure, rigid: &Assembly) -> Vec<bool> {
+fn rigid_nodes(structure: &Structure, rigid: &RigidGroups) -> Vec<bool> {
     let mut held: Vec<bool> = (0..structure.nodes.len()).map(|n| rigid.point(n).body == BodyId::Ground).collect();
     for link in &structure.links {
         held[link.a.0] = true;
@@ -163,8 +163,8 @@ fn rigid_nodes(structure: &Structure, rigid: &Assembly) -> Vec<bool> {
 }
 
 /// Adds what a junction does to the ends of its branches.
-fn meet(branches: &[Branch], beams: &[Beam], ends: &mut [[End; 2]]) {
-    let mut add = |b: &Branch, row: &table::Row, other: f64, mirrored: bool| {
+fn meet(branches: &[JunctionBeam], beams: &[Beam], ends: &mut [[JunctionEnd; 2]]) {
+    let mut add = |b: &JunctionBeam, row: &table::ComplianceRow, other: f64, mirrored: bool| {
         ends[b.beam][b.end].add(row, &beams[b.beam], other, mirrored);
     };
     let pairs = if branches.len() > 2 { in_line(branches) } else { Vec::new() };
@@ -223,7 +223,12 @@ fn meet(branches: &[Branch], beams: &[Beam], ends: &mut [[End; 2]]) {
 }
 
 /// The step in the width of a bar, as far as what crosses it does not cover it.
-fn step(a: &Branch, b: &Branch, covered: f64, add: &mut impl FnMut(&Branch, &table::Row, f64, bool)) {
+fn step(
+    a: &JunctionBeam,
+    b: &JunctionBeam,
+    covered: f64,
+    add: &mut impl FnMut(&JunctionBeam, &table::ComplianceRow, f64, bool),
+) {
     let open = 1.0 - covered / a.width.max(b.width);
     if open <= 0.0 || a.width == b.width {
         return;
@@ -236,7 +241,7 @@ fn step(a: &Branch, b: &Branch, covered: f64, add: &mut impl FnMut(&Branch, &tab
 }
 
 /// Pairs of branches that go on in line, the straightest first; a branch is in one pair at most.
-fn in_line(branches: &[Branch]) -> Vec<(usize, usize)> {
+fn in_line(branches: &[JunctionBeam]) -> Vec<(usize, usize)> {
     let mut found: Vec<(f64, usize, usize)> = Vec::new();
     for i in 0..branches.len() {
         budget::check();
@@ -261,11 +266,11 @@ fn in_line(branches: &[Branch]) -> Vec<(usize, usize)> {
 }
 
 /// Angle from one branch to another, counterclockwise, −π…π [rad].
-fn angle_to(from: &Branch, to: &Branch) -> f64 {
+fn angle_to(from: &JunctionBeam, to: &JunctionBeam) -> f64 {
     (to.angle - from.angle + PI).rem_euclid(2.0 * PI) - PI
 }
 
 /// Positive where the other branch lies on the left of the first.
-fn left_of(from: &Branch, to: &Branch) -> f64 {
+fn left_of(from: &JunctionBeam, to: &JunctionBeam) -> f64 {
     (to.angle - from.angle).sin()
 }

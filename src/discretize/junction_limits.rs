@@ -1,6 +1,6 @@
 //! Where a drawing goes beyond what the table of junctions was made from, so that its figures say nothing.
 
-use super::junction::Ends;
+use super::junction::JunctionEnds;
 use super::overlap::{Strip, turn};
 use crate::structure::Structure;
 
@@ -26,7 +26,7 @@ pub struct Beyond {
 }
 
 /// The beams of a drawing whose junctions are beyond the table, if there are any.
-pub fn beyond(structure: &Structure, ends: &Ends) -> Option<Beyond> {
+pub fn beyond(structure: &Structure, ends: &JunctionEnds) -> Option<Beyond> {
     let mut why: Vec<Option<&'static str>> = vec![None; structure.beams.len()];
     let mut goes_on = vec![false; structure.beams.len()];
     for (_, meeting) in ends.meetings.iter() {

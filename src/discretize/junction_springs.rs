@@ -6,20 +6,20 @@
 //!
 //! A junction that is stiffer than what its offset leaves out has a spring of negative compliance. In series with a segment of
 //! a long mesh that does no harm; with a segment shorter than the spring stands for, nothing would be left. So the edge
-//! is moved outwards, rod by rod ([`End::settle`]), until rod and spring together give way under every load: the compliance of
+//! is moved outwards, rod by rod ([`JunctionEnd::settle`]), until rod and spring together give way under every load: the compliance of
 //! the whole stays what it was, and no segment beside it matters.
 //!
 //! Source of the numbers: [`super::junction_table`].
 
 use super::bar::bar;
-use super::junction_table::{self as table, Row};
+use super::junction_table::{self as table, ComplianceRow};
 use super::scheme::Bar;
 use crate::structure::Beam;
 use nalgebra::Matrix3;
 
 /// What the junction at one end does to a beam.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct End {
+pub struct JunctionEnd {
     /// Length that belongs to the rigid body of the node [m].
     pub offset: f64,
     /// Compliance of the spring at the edge over (N, V, M) [m/N, rad/N, rad/(N·m)], of the branch seen from the node.
@@ -28,10 +28,10 @@ pub struct End {
     pub free: bool,
 }
 
-impl End {
+impl JunctionEnd {
     /// Adds what a row of the table says of a branch of `beam` that meets another of width `other`; `mirrored` when the
     /// junction is the row's seen in a mirror along the branch. The larger offset holds.
-    pub fn add(&mut self, row: &Row, beam: &Beam, other: f64, mirrored: bool) {
+    pub fn add(&mut self, row: &ComplianceRow, beam: &Beam, other: f64, mirrored: bool) {
         let unit = 1.0 / (beam.material.youngs_modulus * beam.thickness);
         let w = beam.width;
         let odd = if mirrored { -1.0 } else { 1.0 };
@@ -49,7 +49,7 @@ impl End {
     /// out: a beam so short has no room for its junctions.
     pub fn settle(&mut self, beam: &Beam, most: f64) {
         let old = self.spring;
-        let most = f64::min(most, MOST_WIDTHS * beam.width);
+        let most = f64::min(most, MAX_WIDTHS * beam.width);
         let mut rod = 0.0;
         while rod < most && !gives(&self.spring, beam) {
             rod = f64::min(rod + ROD * beam.width, most);
@@ -74,7 +74,7 @@ impl End {
 /// Step by which an edge is moved outwards, in widths.
 const ROD: f64 = 1.0 / 64.0;
 /// No junction reaches so far [widths].
-const MOST_WIDTHS: f64 = 64.0;
+const MAX_WIDTHS: f64 = 64.0;
 
 /// A spring's compliance under loads at a distance `d` [m] outwards from its edge.
 fn moved(spring: &Matrix3<f64>, d: f64) -> Matrix3<f64> {
@@ -119,7 +119,7 @@ fn positive_part(spring: &Matrix3<f64>, beam: &Beam) -> Matrix3<f64> {
 /// Row of [`table::CORNER`] at a ratio of widths (other over own, by its logarithm) and a turn [°], linear in between and
 /// constant outside. Next to equal widths a step of the width in a straight beam counts by the square of its logarithm: to first
 /// order it is what the two beams make of it, so that a taper of many pieces becomes the beam that it is drawn from.
-pub fn corner(ratio: f64, turn: f64) -> Row {
+pub fn corner(ratio: f64, turn: f64) -> ComplianceRow {
     let (r, share) = place(&table::RATIOS, ratio.log2());
     let equal = table::RATIOS.len() / 2;
     let power = 1.0 + (1.0 - turn / 45.0).max(0.0);
@@ -133,11 +133,20 @@ pub fn corner(ratio: f64, turn: f64) -> Row {
 
 /// Row of a two-way table at a ratio of widths (other over own, by its logarithm) and an angle [°], linear in between and
 /// constant outside.
-pub fn interpolate<const N: usize>(rows: &[[Row; N]; 9], ratio: f64, angles: &[f64; N], angle: f64) -> Row {
+pub fn interpolate<const N: usize>(
+    rows: &[[ComplianceRow; N]; 9],
+    ratio: f64,
+    angles: &[f64; N],
+    angle: f64,
+) -> ComplianceRow {
     blend(rows, place(&table::RATIOS, ratio.log2()), place(angles, angle))
 }
 
-fn blend<const N: usize>(rows: &[[Row; N]; 9], (r, share): (usize, f64), (a, part): (usize, f64)) -> Row {
+fn blend<const N: usize>(
+    rows: &[[ComplianceRow; N]; 9],
+    (r, share): (usize, f64),
+    (a, part): (usize, f64),
+) -> ComplianceRow {
     let mut row = [0.0; 7];
     for (k, value) in row.iter_mut().enumerate() {
         let along = |r: usize| rows[r][a][k] * (1.0 - part) + rows[r][a + 1][k] * part;
@@ -195,7 +204,7 @@ mod tests {
         };
         let rows = table::CORNER.iter().flatten().chain(table::BAR.iter().flatten());
         for row in rows.chain(table::STEM.iter().flatten()).chain(table::CROSS.iter().flatten()) {
-            let mut end = End::default();
+            let mut end = JunctionEnd::default();
             end.add(row, &beam, 4e-6, false);
             let (edge, raw) = (end.offset, end.spring);
             end.settle(&beam, 40e-6);

@@ -14,7 +14,7 @@
 #![allow(clippy::approx_constant)]
 
 /// Distance of the edge and six compliances.
-pub type Row = [f64; 7];
+pub type ComplianceRow = [f64; 7];
 
 /// log₂ of the other's width over the branch's own, of every table.
 pub const RATIOS: [f64; 9] = [-3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0];
@@ -26,10 +26,10 @@ pub const TILTS: [f64; 4] = [0.0, 15.0, 30.0, 45.0];
 pub const LEANS: [f64; 7] = [-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0];
 
 /// A clamped end: the edge cannot contract across. Distance 0.
-pub const CLAMP: Row = [0.0000, -0.0123, 0.0000, 0.0000, -0.0437, -0.0249, -0.0659];
+pub const CLAMP: ComplianceRow = [0.0000, -0.0123, 0.0000, 0.0000, -0.0437, -0.0249, -0.0659];
 
 /// Two branches, the other on the left: by ratio and turn.
-pub const CORNER: [[Row; 9]; 9] = [
+pub const CORNER: [[ComplianceRow; 9]; 9] = [
     [
         [0.0000, 0.5244, 0.0000, 0.0000, 0.1746, -0.0388, 0.0752],
         [0.0000, 0.5660, -0.0809, 0.0133, 0.2815, -0.1361, 0.0978],
@@ -132,7 +132,7 @@ pub const CORNER: [[Row; 9]; 9] = [
 ];
 
 /// The stem of a T, leaning to the right: by ratio of bar over stem and tilt.
-pub const STEM: [[Row; 4]; 9] = [
+pub const STEM: [[ComplianceRow; 4]; 9] = [
     [
         [0.5000, 0.4161, 0.0000, 0.0000, -0.2448, -0.1576, -2.1224],
         [1.5894, 0.4801, 0.0504, -0.3198, -0.0550, -0.4048, -0.3536],
@@ -190,7 +190,7 @@ pub const STEM: [[Row; 4]; 9] = [
 ];
 
 /// Half of the bar of a T, the stem on the left: by ratio of stem over bar and lean.
-pub const BAR: [[Row; 7]; 9] = [
+pub const BAR: [[ComplianceRow; 7]; 9] = [
     [
         [0.0000, 0.5632, 0.2280, 0.0062, 0.9998, 1.2153, 5.6974],
         [2.8868, 0.6751, 0.1929, 0.0301, 1.4548, 2.0408, 7.2406],
@@ -275,7 +275,7 @@ pub const BAR: [[Row; 7]; 9] = [
 ];
 
 /// A branch of a cross whose other bar leans towards it on its left: by ratio of the other bar and tilt.
-pub const CROSS: [[Row; 4]; 9] = [
+pub const CROSS: [[ComplianceRow; 4]; 9] = [
     [
         [0.5000, 0.0592, 0.0000, 0.0000, -0.1645, -0.4648, 0.7237],
         [1.5894, 0.1960, 0.1000, 0.5122, -0.2384, -0.2370, 2.3475],

@@ -48,11 +48,11 @@ mod stations;
 pub mod yielded;
 
 pub use crate::options::{Junctions, Scheme};
-pub use error::{DiscretizeError, MOST_SEGMENTS};
-use free_rotation::Acting;
+pub use error::{DiscretizeError, MAX_SEGMENTS};
+use free_rotation::BodyActions;
 
 use crate::budget;
-use crate::domains::{BeamLine, Domain, Laid, Load, Member, Point, System};
+use crate::domains::{BeamLine, DeadLoad, Domain, MaterialPoint, Member, PlacedMember, System};
 use crate::multibody::{BodyId, Coupling, Damper, Joint, Model};
 use crate::options::CompileOptions;
 use crate::structure::Structure;
@@ -66,17 +66,17 @@ const BODY_BYTES: usize = 1000;
 
 /// A system, and where the drawing's parts went.
 #[derive(Debug, Clone)]
-pub struct Discretized {
+pub struct Assembly {
     /// Bodies, joints, gaps, electrics.
     pub system: System,
     /// For each node of the structure, its material point; none for purely electrical nodes.
-    pub nodes: Vec<Option<Point>>,
+    pub nodes: Vec<Option<MaterialPoint>>,
     /// For each beam, the equally spaced points along its centreline, ends included: one more than its segments.
-    pub beams: Vec<Arc<[Point]>>,
+    pub beams: Vec<Arc<[MaterialPoint]>>,
     /// For each beam, what the junctions at its start and its end take of its length [m].
     pub offsets: Vec<[f64; 2]>,
     /// What junctions do to the drawing.
-    ends: Arc<junction::Ends>,
+    ends: Arc<junction::JunctionEnds>,
     /// For each heater of the electrics, its beam in the structure.
     pub heaters: Vec<usize>,
     /// Name of each gap of the system, which come before what acts without two sides.
@@ -87,7 +87,7 @@ pub struct Discretized {
 ///
 /// # Errors
 /// See [`DiscretizeError`].
-pub fn discretize(structure: &Structure, options: &CompileOptions) -> Result<Discretized, DiscretizeError> {
+pub fn discretize(structure: &Structure, options: &CompileOptions) -> Result<Assembly, DiscretizeError> {
     discretize_with(structure, options, &order::a_priori(structure, options)?)
 }
 
@@ -99,7 +99,7 @@ pub fn discretize_with(
     structure: &Structure,
     options: &CompileOptions,
     segments: &[usize],
-) -> Result<Discretized, DiscretizeError> {
+) -> Result<Assembly, DiscretizeError> {
     discretize_like(structure, options, segments, None)
 }
 
@@ -111,10 +111,10 @@ pub fn discretize_like(
     structure: &Structure,
     options: &CompileOptions,
     segments: &[usize],
-    other: Option<&Discretized>,
-) -> Result<Discretized, DiscretizeError> {
+    other: Option<&Assembly>,
+) -> Result<Assembly, DiscretizeError> {
     let total = segments.iter().fold(0, |sum: usize, n| sum.saturating_add(*n));
-    if total > MOST_SEGMENTS {
+    if total > MAX_SEGMENTS {
         return Err(DiscretizeError::TooFine { segments: total });
     }
     // inner bodies of beams alone: what they come to at least is refused before anything is laid out
@@ -124,8 +124,8 @@ pub fn discretize_like(
         return Err(DiscretizeError::NothingDrawn);
     }
     let stiff: Vec<bool> = segments.iter().map(|n| *n == 0).collect();
-    let mut rigid = rigid::Assembly::new(structure, &stiff);
-    let mut laid = beam::Joints::default();
+    let mut rigid = rigid::RigidGroups::new(structure, &stiff);
+    let mut laid = beam::JointBuilder::default();
     // a joint for each segment and a body between any two; a wall has a joint more
     laid.joints.reserve(total + segments.len() + structure.springs.len() + structure.supports.len());
     rigid.bodies.reserve(total);
@@ -147,7 +147,7 @@ pub fn discretize_like(
     for excess in &ends.excess {
         excess.add_to(&mut rigid);
     }
-    let beam::Joints { mut joints, couplings: mut coupled, .. } = laid;
+    let beam::JointBuilder { mut joints, couplings: mut coupled, .. } = laid;
     for mass in &structure.masses {
         rigid.add_plate(mass, options.undamped);
     }
@@ -157,15 +157,15 @@ pub fn discretize_like(
     let stations = stations::of_beams(structure, &beams, &ends, &rigid);
     let gaps = rigid.gaps(structure, options.as_sugar, &stations);
     lay_dampers(&gaps, options.undamped, &mut dampers);
-    let acting = Acting { structure, joints: &joints, dampers: &dampers, members: &gaps, elements: &[] };
+    let acting = BodyActions { structure, joints: &joints, dampers: &dampers, members: &gaps, elements: &[] };
     free_rotation::hold(&acting, &mut rigid);
     rigid.hold_hinges(structure, &mut joints);
     let mut couplings = couplings(&gaps);
     let load = |l: &crate::structure::Load| {
         let force = Vector2::new(l.force[0], l.force[1]);
-        Load { point: rigid.point(l.node.0), force, moment: l.moment }
+        DeadLoad { point: rigid.point(l.node.0), force, moment: l.moment }
     };
-    let loads: Vec<Load> = structure.loads.iter().map(load).collect();
+    let loads: Vec<DeadLoad> = structure.loads.iter().map(load).collect();
     let electrics = match other {
         Some(other) => Arc::clone(&other.system.electrics),
         None => Arc::new(ports::lay(structure, &heaters, &gaps, &rigid)?),
@@ -188,14 +188,15 @@ pub fn discretize_like(
         (*first, *second) = ((placed(first.0), placed(first.1)), (placed(second.0), placed(second.1)));
     }
     let model = model.couple(coupled);
-    let moved = |p: Point| rigid.centered(p, &place);
+    let moved = |p: MaterialPoint| rigid.centered(p, &place);
     let gap_names = gaps.iter().filter(|laid| laid.member.is_gap()).map(|laid| laid.name.to_owned()).collect();
-    let beams: Vec<Arc<[Point]>> = beams.into_iter().map(|points| points.into_iter().map(moved).collect()).collect();
+    let beams: Vec<Arc<[MaterialPoint]>> =
+        beams.into_iter().map(|points| points.into_iter().map(moved).collect()).collect();
     let mut system = System {
         beams: Arc::new(structure.beams.iter().zip(&beams).map(|(drawn, points)| line(drawn, points)).collect()),
         model,
         members: gaps.into_iter().map(|laid| laid.member.moved(&moved)).collect(),
-        loads: loads.into_iter().map(|l| Load { point: moved(l.point), ..l }).collect(),
+        loads: loads.into_iter().map(|l| DeadLoad { point: moved(l.point), ..l }).collect(),
         electrics,
         length_scale: length_scale(structure),
     };
@@ -203,10 +204,10 @@ pub fn discretize_like(
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n)))).collect();
     let offsets = ends.beams.iter().map(|[a, b]| [a.offset, b.offset]).collect();
-    Ok(Discretized { system, nodes, beams, offsets, ends, heaters, gap_names })
+    Ok(Assembly { system, nodes, beams, offsets, ends, heaters, gap_names })
 }
 
-impl Discretized {
+impl Assembly {
     /// The beams whose junctions are beyond what the table was made from.
     pub fn beyond_table(&self, structure: &Structure) -> Option<junction_limits::Beyond> {
         junction_limits::beyond(structure, &self.ends)
@@ -222,7 +223,7 @@ fn length_scale(structure: &Structure) -> f64 {
 }
 
 /// The centreline of a beam.
-fn line(drawn: &crate::structure::Beam, points: &Arc<[Point]>) -> BeamLine {
+fn line(drawn: &crate::structure::Beam, points: &Arc<[MaterialPoint]>) -> BeamLine {
     BeamLine {
         name: drawn.name.as_str().into(),
         points: Arc::clone(points),
@@ -234,14 +235,14 @@ fn line(drawn: &crate::structure::Beam, points: &Arc<[Point]>) -> BeamLine {
 }
 
 /// The pairs of bodies that gaps couple.
-fn couplings(gaps: &[Laid<'_, Member>]) -> Vec<(BodyId, BodyId)> {
+fn couplings(gaps: &[PlacedMember<'_, Member>]) -> Vec<(BodyId, BodyId)> {
     let mut pairs = Vec::new();
     gaps.iter().for_each(|laid| laid.member.pairs(|a, b| pairs.push((a, b))));
     pairs
 }
 
 /// The dampers that laws have, none of an undamped model.
-fn lay_dampers(gaps: &[Laid<'_, Member>], undamped: bool, dampers: &mut Vec<Damper>) {
+fn lay_dampers(gaps: &[PlacedMember<'_, Member>], undamped: bool, dampers: &mut Vec<Damper>) {
     if !undamped {
         gaps.iter().for_each(|laid| laid.member.dampers(|damper| dampers.push(damper)));
     }
@@ -251,7 +252,7 @@ fn lay_dampers(gaps: &[Laid<'_, Member>], undamped: bool, dampers: &mut Vec<Damp
 fn lay_spring(
     spring: &crate::structure::SpringDamper,
     undamped: bool,
-    rigid: &rigid::Assembly,
+    rigid: &rigid::RigidGroups,
     joints: &mut Vec<Joint>,
     dampers: &mut Vec<Damper>,
 ) {

@@ -9,7 +9,7 @@
 //!
 //! With a band this is where [`model_order`](crate::refine::model_order) starts from.
 
-use super::error::{DiscretizeError, MOST_SEGMENTS};
+use super::error::{DiscretizeError, MAX_SEGMENTS};
 use crate::domains::BeamRows;
 use crate::options::CompileOptions;
 use crate::structure::{Beam, Structure};
@@ -81,6 +81,6 @@ pub fn segments(beam: &Beam, band: Option<f64>, tol: f64) -> usize {
     };
     let kl = waves(beam, band);
     // one beam beyond the limit of all is enough to be refused
-    let count = (kl / (1440.0 * tol).powf(0.25)).ceil().clamp(1.0, MOST_SEGMENTS as f64 + 1.0) as usize;
+    let count = (kl / (1440.0 * tol).powf(0.25)).ceil().clamp(1.0, MAX_SEGMENTS as f64 + 1.0) as usize;
     if kl > 3.0 { count.max(2) } else { count }
 }

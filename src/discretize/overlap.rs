@@ -41,7 +41,7 @@ pub fn turn(a: f64, b: f64) -> f64 {
 }
 
 /// Junctions that a thread remembers.
-const MOST_KNOWN: usize = 512;
+const MAX_KNOWN: usize = 512;
 /// Strips that are looked up without memory of their own.
 const FEW: usize = 8;
 
@@ -74,7 +74,7 @@ pub fn overlap(strips: &[Strip]) -> Lump {
         integrated(&sorted)
     };
     KNOWN.with_borrow_mut(|known| {
-        if known.len() >= MOST_KNOWN {
+        if known.len() >= MAX_KNOWN {
             known.clear();
         }
         known.insert(key.to_vec(), found);
@@ -193,18 +193,18 @@ impl Quad {
     /// The two sides that the line at height `y` crosses.
     fn sides(&self, y: f64) -> Option<Sides> {
         let mut crossed = (0..4).map(|k| (self.0[k], self.0[(k + 1) % 4])).filter(|(a, b)| (a.y - y) * (b.y - y) < 0.0);
-        let side = |(a, b): (Vector2<f64>, Vector2<f64>)| Side { from: a, along: b - a };
+        let side = |(a, b): (Vector2<f64>, Vector2<f64>)| QuadSide { from: a, along: b - a };
         Some(Sides(side(crossed.next()?), side(crossed.next()?)))
     }
 }
 
 /// A side of a quadrilateral: where it begins, and how it goes on.
-struct Side {
+struct QuadSide {
     from: Vector2<f64>,
     along: Vector2<f64>,
 }
 
-impl Side {
+impl QuadSide {
     /// Where it is at height `y`.
     fn at(&self, y: f64) -> f64 {
         self.from.x + self.along.x * (y - self.from.y) / self.along.y
@@ -212,7 +212,7 @@ impl Side {
 }
 
 /// Two sides of one quadrilateral.
-struct Sides(Side, Side);
+struct Sides(QuadSide, QuadSide);
 
 impl Sides {
     /// Where the line at height `y` runs between them.

@@ -4,11 +4,11 @@
 //! touches no node).
 
 use super::error::DiscretizeError;
-use super::rigid::Assembly;
+use super::rigid::RigidGroups;
 use crate::domains::drive::Electrics;
-use crate::domains::network::{Circuit, CircuitError};
-use crate::domains::thermal::{Heater, Heating};
-use crate::domains::{Laid, Member};
+use crate::domains::network::{CircuitError, ElectricalNetwork};
+use crate::domains::thermal::{HeatConductor, Heating};
+use crate::domains::{Member, PlacedMember};
 use crate::structure::{GapVoltage, Structure};
 use nalgebra::{DMatrix, RowDVector};
 
@@ -20,8 +20,8 @@ use nalgebra::{DMatrix, RowDVector};
 pub fn lay(
     structure: &Structure,
     heated: &[usize],
-    gaps: &[Laid<'_, Member>],
-    rigid: &Assembly,
+    gaps: &[PlacedMember<'_, Member>],
+    rigid: &RigidGroups,
 ) -> Result<Electrics, DiscretizeError> {
     let ports = structure.ports.len();
     let mut names: Vec<String> = structure.ports.iter().map(|p| p.name.clone()).collect();
@@ -33,7 +33,7 @@ pub fn lay(
     for &index in heated {
         let beam = &structure.beams[index];
         if let Some(h) = &beam.heater {
-            heaters.push(Heater {
+            heaters.push(HeatConductor {
                 a: net[beam.a.0],
                 b: net[beam.b.0],
                 resistance: h.resistance,
@@ -46,7 +46,7 @@ pub fn lay(
             });
         }
     }
-    let circuit = Circuit {
+    let circuit = ElectricalNetwork {
         nodes: structure.nodes.len(),
         resistors: (structure.resistors.iter().map(|r| (net[r.a.0], net[r.b.0], r.resistance)))
             .chain(heaters.iter().map(|h| (h.a, h.b, h.resistance)))

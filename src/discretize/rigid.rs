@@ -1,10 +1,10 @@
 //! Nodes → rigid bodies. Links and rigid beams join nodes to one body; anchors make it ground; other supports hold
 //! directions.
 //!
-//! Until [`Assembly::finish_bodies`] every point is given from its group's reference point (the position of the group's
+//! Until [`RigidGroups::finish_bodies`] every point is given from its group's reference point (the position of the group's
 //! first node); after it, from the centre of mass, in which the mass matrix is diagonal and constant.
 
-use crate::domains::{Drawing, Laid, Member, Point, Station};
+use crate::domains::{MaterialPoint, Member, PlacedMember, Station, StructureView};
 use crate::multibody::planar::JointFrame;
 use crate::multibody::{Body, BodyId, BodyName, Drag, Joint};
 use crate::sets::Sets;
@@ -41,7 +41,7 @@ impl Lump {
 
 /// A body in the making.
 #[derive(Debug, Clone)]
-pub struct Rough {
+pub struct UnfinishedBody {
     name: BodyName,
     reference: Vector2<f64>,
     mass: Lump,
@@ -52,14 +52,14 @@ pub struct Rough {
 
 /// Groups of nodes and the bodies they become.
 #[derive(Debug, Clone)]
-pub struct Assembly {
+pub struct RigidGroups {
     /// Bodies so far: node groups, then beam segments.
-    pub bodies: Vec<Rough>,
+    pub bodies: Vec<UnfinishedBody>,
     group: Vec<BodyId>,
     position: Vec<Vector2<f64>>,
 }
 
-impl Assembly {
+impl RigidGroups {
     /// Groups the nodes of a drawing, of which the beams marked in `rigid` are links too.
     pub fn new(structure: &Structure, rigid: &[bool]) -> Self {
         let count = structure.nodes.len();
@@ -86,7 +86,7 @@ impl Assembly {
                 continue;
             }
             group[node] = if first == node || group[first] == BodyId::Ground {
-                bodies.push(Rough::new((&structure.nodes[node].name).into(), position[node]));
+                bodies.push(UnfinishedBody::new((&structure.nodes[node].name).into(), position[node]));
                 BodyId::Free(bodies.len() - 1)
             } else {
                 group[first]
@@ -103,10 +103,12 @@ impl Assembly {
     }
 
     /// The material point of a node.
-    pub fn point(&self, node: usize) -> Point {
+    pub fn point(&self, node: usize) -> MaterialPoint {
         match self.group[node] {
-            BodyId::Ground => Point { body: BodyId::Ground, arm: Vector2::zeros() },
-            BodyId::Free(k) => Point { body: self.group[node], arm: self.position[node] - self.bodies[k].reference },
+            BodyId::Ground => MaterialPoint { body: BodyId::Ground, arm: Vector2::zeros() },
+            BodyId::Free(k) => {
+                MaterialPoint { body: self.group[node], arm: self.position[node] - self.bodies[k].reference }
+            }
         }
     }
 
@@ -121,13 +123,13 @@ impl Assembly {
     }
 
     /// A new body for an inner node of a beam.
-    pub fn add_segment(&mut self, name: BodyName, position: Vector2<f64>) -> Point {
-        self.bodies.push(Rough::new(name, position));
-        Point { body: BodyId::Free(self.bodies.len() - 1), arm: Vector2::zeros() }
+    pub fn add_segment(&mut self, name: BodyName, position: Vector2<f64>) -> MaterialPoint {
+        self.bodies.push(UnfinishedBody::new(name, position));
+        MaterialPoint { body: BodyId::Free(self.bodies.len() - 1), arm: Vector2::zeros() }
     }
 
     /// Adds a mass and its drag to the body of a point; `lump` is about that point.
-    pub fn add_mass(&mut self, point: Point, lump: &Lump, drag_per_mass: f64) {
+    pub fn add_mass(&mut self, point: MaterialPoint, lump: &Lump, drag_per_mass: f64) {
         if let BodyId::Free(k) = point.body {
             self.bodies[k].mass.add(lump, point.arm, 1.0);
             self.bodies[k].drag.add(lump, point.arm, drag_per_mass);
@@ -135,7 +137,7 @@ impl Assembly {
     }
 
     /// Adds drag to the body of a point; `lump` is about that point.
-    pub fn add_drag(&mut self, point: Point, lump: &Lump) {
+    pub fn add_drag(&mut self, point: MaterialPoint, lump: &Lump) {
         if let BodyId::Free(k) = point.body {
             self.bodies[k].drag.add(lump, point.arm, 1.0);
         }
@@ -161,13 +163,24 @@ impl Assembly {
     }
 
     /// What acts across gaps; `chord`: facing beams as SUGAR has them; `stations`: where the segments of each beam are joined.
-    pub fn gaps<'a>(&self, structure: &'a Structure, chord: bool, stations: &[Vec<Station>]) -> Vec<Laid<'a, Member>> {
-        Member::lay(&Drawing { structure, point: &|node: NodeId| self.point(node.0), chord, stations })
+    pub fn gaps<'a>(
+        &self,
+        structure: &'a Structure,
+        chord: bool,
+        stations: &[Vec<Station>],
+    ) -> Vec<PlacedMember<'a, Member>> {
+        Member::lay(&StructureView { structure, point: &|node: NodeId| self.point(node.0), chord, stations })
     }
 
     /// The frame of a joint at a drawn position, whose x axis lies along `axis`.
-    pub fn frame_at(&self, a: Point, b: Point, position: Vector2<f64>, axis: Vector2<f64>) -> JointFrame {
-        let arm = |p: Point| match p.body {
+    pub fn frame_at(
+        &self,
+        a: MaterialPoint,
+        b: MaterialPoint,
+        position: Vector2<f64>,
+        axis: Vector2<f64>,
+    ) -> JointFrame {
+        let arm = |p: MaterialPoint| match p.body {
             BodyId::Ground => Vector2::zeros(),
             BodyId::Free(k) => position - self.bodies[k].reference,
         };
@@ -200,7 +213,7 @@ impl Assembly {
                 a: BodyId::Ground,
                 b: point.body,
                 frame: self.frame_at(
-                    Point { body: BodyId::Ground, arm: Vector2::zeros() },
+                    MaterialPoint { body: BodyId::Ground, arm: Vector2::zeros() },
                     point,
                     self.position[support.node.0],
                     Vector2::new(support.angle.cos(), support.angle.sin()),
@@ -216,7 +229,7 @@ impl Assembly {
 
     /// The finished bodies, about their centres of mass.
     pub fn finish_bodies(&self) -> Vec<Body> {
-        self.bodies.iter().map(Rough::finish).collect()
+        self.bodies.iter().map(UnfinishedBody::finish).collect()
     }
 
     /// Moves a frame's arms from reference points to centres of mass.
@@ -229,10 +242,12 @@ impl Assembly {
     }
 
     /// A point about its body's centre of mass, the body renumbered by `place`.
-    pub fn centered(&self, point: Point, place: &[usize]) -> Point {
+    pub fn centered(&self, point: MaterialPoint, place: &[usize]) -> MaterialPoint {
         match point.body {
             BodyId::Ground => point,
-            BodyId::Free(k) => Point { body: BodyId::Free(place[k]), arm: point.arm - self.bodies[k].mass.center() },
+            BodyId::Free(k) => {
+                MaterialPoint { body: BodyId::Free(place[k]), arm: point.arm - self.bodies[k].mass.center() }
+            }
         }
     }
 }
@@ -243,7 +258,7 @@ fn holds_all_of(one: &Support, other: &Support) -> bool {
     translations(one) == [true; 2] || (one.angle == other.angle && translations(one) == translations(other))
 }
 
-impl Rough {
+impl UnfinishedBody {
     fn new(name: BodyName, reference: Vector2<f64>) -> Self {
         let (mass, drag) = (Lump::default(), Lump::default());
         Self { name, reference, mass, drag, held: Vec::new(), fixed_angle: false }

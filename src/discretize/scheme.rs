@@ -46,7 +46,7 @@ pub struct Bar {
 
 /// A body of a cut beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Part {
+pub struct BeamSegment {
     /// Its reference point [m from the start]; the first and the last part belong to the end nodes.
     pub at: f64,
     /// Mass [kg].
@@ -59,7 +59,7 @@ pub struct Part {
 
 /// A joint of a cut beam, between parts k and k + 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pin {
+pub struct SegmentJoint {
     /// Place [m from the start].
     pub at: f64,
     /// Length whose free strain it carries [m].
@@ -74,11 +74,11 @@ pub struct Pin {
 
 /// A beam cut into parts and joints.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Cut {
+pub struct SegmentedBeam {
     /// Bodies from start to end, end nodes included.
-    pub parts: Vec<Part>,
+    pub parts: Vec<BeamSegment>,
     /// Joints from start to end, one fewer.
-    pub pins: Vec<Pin>,
+    pub pins: Vec<SegmentJoint>,
     /// Pairs of joints whose rotations are coupled, with the stiffness [N·m/rad]: energy k·p₁·p₂.
     pub couplings: Vec<(usize, usize, f64)>,
     /// For each of the N + 1 equally spaced nodes, its part.
@@ -102,26 +102,26 @@ impl Scheme {
     }
 
     /// Cuts a beam into `n` segments. `wall`: the far end is clamped to ground, where A0 has one joint more.
-    pub fn cut(self, bar: &Bar, n: usize, wall: bool) -> Cut {
+    pub fn cut(self, bar: &Bar, n: usize, wall: bool) -> SegmentedBeam {
         let h = bar.length / n as f64;
         match self {
             Self::A0 => {
                 let count = n + usize::from(wall);
                 let places: Vec<f64> = (0..count).map(|k| k as f64 * h).collect();
                 let share = bar.length / count as f64;
-                let pins = places.iter().map(|&at| Pin { length: share, ..turning(bar, at, h) }).collect();
+                let pins = places.iter().map(|&at| SegmentJoint { length: share, ..turning(bar, at, h) }).collect();
                 // node k is the end of rod k; with a wall the last node is a part of its own, next to its rod
                 let nodes = (0..=n).map(|k| if wall && k == n { n + 1 } else { k }).collect();
-                Cut { parts: rods(bar, &places), pins, couplings: Vec::new(), nodes }
+                SegmentedBeam { parts: rods(bar, &places), pins, couplings: Vec::new(), nodes }
             }
             Self::A2 | Self::C1 => {
                 let places = middles(n, h);
-                let mut pins: Vec<Pin> = places.iter().map(|&at| turning(bar, at, h)).collect();
+                let mut pins: Vec<SegmentJoint> = places.iter().map(|&at| turning(bar, at, h)).collect();
                 let mut couplings = Vec::new();
                 if self == Self::C1 && n > 1 {
                     couplings = couple_ends(&mut pins, bar.ei / h);
                 }
-                Cut { parts: rods(bar, &places), pins, couplings, nodes: (0..=n).collect() }
+                SegmentedBeam { parts: rods(bar, &places), pins, couplings, nodes: (0..=n).collect() }
             }
             Self::D1 => {
                 let pair = 2.0 * h;
@@ -131,20 +131,20 @@ impl Scheme {
                 let off = |k: usize| if k.is_multiple_of(2) { -from_middle } else { from_middle };
                 let places: Vec<f64> = (0..n).map(|k| ((k / 2) as f64 + 0.5 + off(k)) * pair).collect();
                 let pins = places.iter().map(|&at| turning(bar, at, h)).collect();
-                Cut { parts: rods(bar, &places), pins, couplings: Vec::new(), nodes: (0..=n).collect() }
+                SegmentedBeam { parts: rods(bar, &places), pins, couplings: Vec::new(), nodes: (0..=n).collect() }
             }
             // where nothing has been decided, what bodies take
             Self::B | Self::E4 | Self::Auto | Self::Es => {
                 let pins = (0..n).map(|k| self.elastic(bar, n, k)).collect();
                 let mut parts = Vec::new();
                 self.parts_into(bar, n, &mut parts);
-                Cut { parts, pins, couplings: Vec::new(), nodes: (0..=n).collect() }
+                SegmentedBeam { parts, pins, couplings: Vec::new(), nodes: (0..=n).collect() }
             }
         }
     }
 
-    /// [`Cut::parts`] of B, E4 or Es alone.
-    pub fn parts_into(self, bar: &Bar, n: usize, parts: &mut Vec<Part>) {
+    /// [`SegmentedBeam::parts`] of B, E4 or Es alone.
+    pub fn parts_into(self, bar: &Bar, n: usize, parts: &mut Vec<BeamSegment>) {
         parts.clear();
         match self {
             Self::B => parts.extend(rods(bar, &middles(n, bar.length / n as f64))),
@@ -158,7 +158,7 @@ impl Scheme {
     /// e_u = u − h·p²/8 + g²/2h + h·p_t²/24 + 0.6·g_t²/h + (e_a + e_b)·p_t/2 − (g_t + e_b − e_a)²/2h
     /// p_t = M·h/EI,  g_t = V·h³/12EI,  e = (1 − 12σ)·h²/24·κ at inner nodes, 0 at the ends
     /// ```
-    fn elastic(self, bar: &Bar, n: usize, k: usize) -> Pin {
+    fn elastic(self, bar: &Bar, n: usize, k: usize) -> SegmentJoint {
         let h = bar.length / n as f64;
         let at = (k as f64 + 0.5) * h;
         let unit = h * h * h / bar.ei;
@@ -181,7 +181,7 @@ impl Scheme {
                 + outer(&shear, &shear) * (0.6 / h)
                 + (outer(&(a + b), &turn) + outer(&turn, &(a + b))) * 0.25
                 - outer(&across, &across) * (0.5 / h);
-            Pin { at, length: h, stiffness, second, locked: [false; 3] }
+            SegmentJoint { at, length: h, stiffness, second, locked: [false; 3] }
         };
         if self == Self::Es {
             let left_out = 1.0 - 12.0 * SIGMA;
@@ -194,7 +194,7 @@ impl Scheme {
         if bar.shear > 0.0 {
             return joint(Matrix2::new(unit / 12.0 + h * bar.shear, 0.0, 0.0, h / bar.ei), 0.0);
         }
-        Pin {
+        SegmentJoint {
             at,
             length: h,
             stiffness: Matrix3::from_diagonal(&[axial, 12.0 * bar.ei / (h * h * h), bar.ei / h].into()),
@@ -204,13 +204,18 @@ impl Scheme {
     }
 
     /// Masses at the nodes: E4 or Es.
-    fn points(self, bar: &Bar, n: usize) -> impl Iterator<Item = Part> {
+    fn points(self, bar: &Bar, n: usize) -> impl Iterator<Item = BeamSegment> {
         let h = bar.length / n as f64;
         let (unit, rotary) = (bar.line_mass * h, bar.rotary);
         (0..=n).map(move |k| {
             let (mass, first, second) = if self == Self::Es { tuned(n, k) } else { shares(n, k) };
             let mass = mass * unit;
-            Part { at: k as f64 * h, mass, first: first * h * unit, second: second * h * h * unit + rotary * mass }
+            BeamSegment {
+                at: k as f64 * h,
+                mass,
+                first: first * h * unit,
+                second: second * h * h * unit + rotary * mass,
+            }
         })
     }
 }
@@ -249,7 +254,7 @@ fn middles(n: usize, h: f64) -> Vec<f64> {
 }
 
 /// Rods between the joints; the outer ones belong to the end nodes.
-fn rods(bar: &Bar, places: &[f64]) -> Vec<Part> {
+fn rods(bar: &Bar, places: &[f64]) -> Vec<BeamSegment> {
     let count = places.len();
     (0..=count)
         .map(|k| {
@@ -260,15 +265,15 @@ fn rods(bar: &Bar, places: &[f64]) -> Vec<Part> {
             let at = if k == count { bar.length } else { middle * f64::from(u8::from(k > 0)) };
             let (mass, off) = (length * bar.line_mass, middle - at);
             let second = mass * (length * length / 12.0 + off * off + bar.rotary);
-            Part { at, mass, first: mass * off, second }
+            BeamSegment { at, mass, first: mass * off, second }
         })
         .collect()
 }
 
 /// A joint that only turns.
-fn turning(bar: &Bar, at: f64, h: f64) -> Pin {
+fn turning(bar: &Bar, at: f64, h: f64) -> SegmentJoint {
     let stiff = PENALTY * bar.ea / h;
-    Pin {
+    SegmentJoint {
         at,
         length: h,
         stiffness: Matrix3::from_diagonal(&[stiff, stiff, bar.ei / h].into()),
@@ -278,7 +283,7 @@ fn turning(bar: &Bar, at: f64, h: f64) -> Pin {
 }
 
 /// The end correction of C1: the flexibilities of the two joints next to each end grow by h/24EI·[[3, −2], [−2, 1]].
-fn couple_ends(pins: &mut [Pin], unit: f64) -> Vec<(usize, usize, f64)> {
+fn couple_ends(pins: &mut [SegmentJoint], unit: f64) -> Vec<(usize, usize, f64)> {
     let n = pins.len();
     // ends that share a joint are one block
     let ends = if n < 4 { vec![(0, n)] } else { vec![(0, 2), (n - 2, n)] };

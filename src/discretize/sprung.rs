@@ -10,7 +10,7 @@
 //! to second order, q_o = (g_o, p_o). The parts follow from the whole by the compliances, which all bear one shear force and moment. As the
 //! segment becomes short all of it vanishes with h; with the straight segment's Q over the whole, a spring's g²/h would not.
 
-use super::junction_springs::End;
+use super::junction_springs::JunctionEnd;
 use nalgebra::{Matrix2, RowVector2};
 
 /// Q of a joint in the middle of a segment of length `h` [m], over (g, p) as a whole: `own` is the segment's alone, `compliance` its
@@ -19,7 +19,7 @@ pub(super) fn second_strain(
     own: &Matrix2<f64>,
     h: f64,
     compliance: &Matrix2<f64>,
-    ends: [Option<&End>; 2],
+    ends: [Option<&JunctionEnd>; 2],
 ) -> Matrix2<f64> {
     let d = 0.5 * h;
     let springs = [(ends[0], 1.0), (ends[1], -1.0)];

@@ -1,8 +1,8 @@
 //! Where along each beam the bodies of its segments measure: what gaps along beams are cut by.
 
-use super::junction::Ends;
-use super::rigid::Assembly;
-use crate::domains::{Point, Station};
+use super::junction::JunctionEnds;
+use super::rigid::RigidGroups;
+use crate::domains::{MaterialPoint, Station};
 use crate::structure::Structure;
 use nalgebra::Vector2;
 
@@ -10,9 +10,9 @@ use nalgebra::Vector2;
 /// segments. Empty where the drawing has no gap along beams.
 pub(super) fn of_beams(
     structure: &Structure,
-    beams: &[Vec<Point>],
-    ends: &Ends,
-    rigid: &Assembly,
+    beams: &[Vec<MaterialPoint>],
+    ends: &JunctionEnds,
+    rigid: &RigidGroups,
 ) -> Vec<Vec<Station>> {
     if structure.beam_gaps.is_empty() {
         return Vec::new();
@@ -29,7 +29,11 @@ pub(super) fn of_beams(
 }
 
 /// The stations of a beam of a length [m], of which each end has so much [m] up to the edge of its junction.
-fn between(points: &[Point], length: f64, [(before, first), (after, end)]: [(f64, Point); 2]) -> Vec<Station> {
+fn between(
+    points: &[MaterialPoint],
+    length: f64,
+    [(before, first), (after, end)]: [(f64, MaterialPoint); 2],
+) -> Vec<Station> {
     let last = points.len() - 1;
     let mut stations = Vec::with_capacity(points.len() + 2);
     stations.push(Station { at: 0.0, point: points[0] });

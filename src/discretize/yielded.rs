@@ -1,13 +1,13 @@
 //! Permanent strain of heated beams that have yielded: a rest offset, like thermal expansion.
 
-use super::Discretized;
+use super::Assembly;
 use crate::structure::Yield;
 
 /// The joints of a beam that can yield, each with the length that it stands for [m]; none where nothing heats it.
-pub type Arm = Vec<(usize, f64)>;
+pub type YieldingJoints = Vec<(usize, f64)>;
 
 /// The arms in the order of `yields`.
-pub fn arms(parts: &Discretized, yields: &[Yield]) -> Vec<Arm> {
+pub fn arms(parts: &Assembly, yields: &[Yield]) -> Vec<YieldingJoints> {
     let model = &parts.system.model;
     let of = |y: &Yield| {
         let heater = parts.heaters.iter().position(|&beam| beam == y.beam)?;
@@ -21,7 +21,7 @@ pub fn arms(parts: &Discretized, yields: &[Yield]) -> Vec<Arm> {
 }
 
 /// Strains an arm by so much more, for good [1]; negative: shorter.
-pub fn strain(parts: &mut Discretized, arm: &Arm, change: f64) {
+pub fn strain(parts: &mut Assembly, arm: &YieldingJoints, change: f64) {
     if change != 0.0 {
         for &(k, length) in arm {
             parts.system.model.joints[k].rest += length * change;

@@ -7,14 +7,14 @@ use nalgebra::{Matrix6, Vector2, Vector6};
 
 /// A material point of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
+pub struct MaterialPoint {
     /// The body.
     pub body: BodyId,
     /// From its centre of mass to the point, as drawn [m].
     pub arm: Vector2<f64>,
 }
 
-impl Point {
+impl MaterialPoint {
     /// The point of the same body that lies `shift` further as drawn [m]; ground has no places.
     pub fn beyond(&self, shift: Vector2<f64>) -> Self {
         match self.body {
@@ -40,16 +40,16 @@ impl Point {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Approach {
     /// Moving point.
-    pub a: Point,
+    pub a: MaterialPoint,
     /// Point it approaches.
-    pub b: Point,
+    pub b: MaterialPoint,
     /// Fixed unit vector.
     pub axis: Vector2<f64>,
 }
 
 /// An approach with its derivatives over the pair's six coordinates.
 #[derive(Debug, Clone, Copy)]
-pub struct Measured {
+pub struct ApproachDerivatives {
     /// u [m].
     pub value: f64,
     /// ∂u/∂(q_a, q_b).
@@ -67,12 +67,12 @@ impl Approach {
 
     /// u with its derivatives.
     #[inline]
-    pub fn measure(&self, q: &[Pose], linear: bool) -> Measured {
+    pub fn measure(&self, q: &[Pose], linear: bool) -> ApproachDerivatives {
         let (pa, pb) = (Model::pose(q, self.a.body), Model::pose(q, self.b.body));
         let (ta, sa) = planar::point_turn(&pa, self.a.arm, linear);
         let (tb, sb) = planar::point_turn(&pb, self.b.arm, linear);
         let n = self.axis;
-        Measured {
+        ApproachDerivatives {
             value: self.value(q, linear),
             gradient: Vector6::new(n.x, n.y, n.dot(&ta), -n.x, -n.y, -n.dot(&tb)),
             bend: [n.dot(&sa), -n.dot(&sb)],
@@ -86,13 +86,13 @@ impl Approach {
 
     /// The same with its points where `to` takes them.
     #[must_use]
-    pub(super) fn moved(self, to: &dyn Fn(Point) -> Point) -> Self {
+    pub(super) fn moved(self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self {
         Self { a: to(self.a), b: to(self.b), ..self }
     }
 
     /// `r +=` the forces of a potential φ(u) with the derivative φ′ = `first`.
     #[inline]
-    pub(super) fn add_force(&self, m: &Measured, first: f64, r: &mut [Pose]) {
+    pub(super) fn add_force(&self, m: &ApproachDerivatives, first: f64, r: &mut [Pose]) {
         let f = m.gradient * first;
         for (id, part) in [(self.a.body, f.fixed_rows::<3>(0)), (self.b.body, f.fixed_rows::<3>(3))] {
             if let BodyId::Free(k) = id {
@@ -102,14 +102,14 @@ impl Approach {
     }
 
     /// Change of u with a change `dq` of the configuration where it was measured [m].
-    pub(super) fn change(&self, m: &Measured, dq: &[Pose]) -> f64 {
+    pub(super) fn change(&self, m: &ApproachDerivatives, dq: &[Pose]) -> f64 {
         let (da, db) = (Model::pose(dq, self.a.body), Model::pose(dq, self.b.body));
         m.gradient.fixed_rows::<3>(0).dot(&da) + m.gradient.fixed_rows::<3>(3).dot(&db)
     }
 
     /// Rate of u where it was measured, with the rate of each body [m/s].
     #[inline]
-    pub(super) fn rate(&self, m: &Measured, rate: &impl Fn(usize) -> Pose) -> f64 {
+    pub(super) fn rate(&self, m: &ApproachDerivatives, rate: &impl Fn(usize) -> Pose) -> f64 {
         let of = |id: BodyId| if let BodyId::Free(k) = id { rate(k) } else { Pose::zeros() };
         m.gradient.fixed_rows::<3>(0).dot(&of(self.a.body)) + m.gradient.fixed_rows::<3>(3).dot(&of(self.b.body))
     }
@@ -142,13 +142,13 @@ impl Approach {
     }
 
     /// The forces of that potential on its points: −φ′·n on a, φ′·n on b.
-    pub(super) fn levers(&self, first: f64, mut lever: impl FnMut(Point, Vector2<f64>)) {
+    pub(super) fn load_points(&self, first: f64, mut lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
         lever(self.a, self.axis * -first);
         lever(self.b, self.axis * first);
     }
 }
 
-impl Measured {
+impl ApproachDerivatives {
     /// Hessian of a potential φ(u) over the pair: φ″·∇u∇uᵀ + φ′·∇²u.
     #[inline]
     pub fn hessian(&self, first: f64, second: f64) -> Matrix6<f64> {

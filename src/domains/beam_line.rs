@@ -3,7 +3,7 @@
 //! Each segment is the cubic through its ends. All is measured along the beam as it lies at present, from its start to its end,
 //! so that nothing depends on the directions of the global axes.
 
-use super::approach::Point;
+use super::approach::MaterialPoint;
 use crate::multibody::Model;
 use crate::multibody::planar::{self, Pose};
 use nalgebra::Vector2;
@@ -20,7 +20,7 @@ pub struct BeamLine {
     /// Full element name.
     pub name: Arc<str>,
     /// Equally spaced points, ends included.
-    pub points: Arc<[Point]>,
+    pub points: Arc<[MaterialPoint]>,
     /// Direction as drawn [rad].
     pub angle: f64,
     /// Length [m].
@@ -33,7 +33,7 @@ pub struct BeamLine {
 
 /// A side of a beam, seen along its drawn direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub enum BeamSide {
     /// Left.
     Left,
     /// Right.
@@ -79,12 +79,12 @@ impl BeamLine {
 
     /// Energy [J] with which a motion `dq` from the configuration `q` bends the beam, and the side to which it carries the beam: that of the
     /// first place that moves across the beam by half of the largest such displacement.
-    pub fn bending(&self, q: &[Pose], dq: &[Pose], linear: bool) -> (f64, Side) {
+    pub fn bending(&self, q: &[Pose], dq: &[Pose], linear: bool) -> (f64, BeamSide) {
         let (mut energy, mut shape) = (0.0, Vec::with_capacity(PLACES * self.segments()));
         for k in 0..self.segments() {
             let chord = self.chord(k, q, linear);
             let h = chord.norm().max(f64::MIN_POSITIVE);
-            let across = planar::turn(chord) / h;
+            let across = planar::perpendicular(chord) / h;
             let [a, b] = [k, k + 1].map(|k| moved(&self.points[k], q, dq, linear));
             let ends = [a.0.dot(&across), b.0.dot(&across)];
             let turn = (ends[1] - ends[0]) / h;
@@ -101,17 +101,17 @@ impl BeamLine {
 }
 
 /// Displacement and rotation of a point with a motion `dq`.
-fn moved(point: &Point, q: &[Pose], dq: &[Pose], linear: bool) -> (Vector2<f64>, f64) {
+fn moved(point: &MaterialPoint, q: &[Pose], dq: &[Pose], linear: bool) -> (Vector2<f64>, f64) {
     let change = Model::pose(dq, point.body);
     let (lever, _) = planar::point_turn(&Model::pose(q, point.body), point.arm, linear);
     (Vector2::new(change.x, change.y) + lever * change.z, change.z)
 }
 
 /// The side of the first place with half of the largest displacement.
-fn first_side(shape: &[f64]) -> Side {
+fn first_side(shape: &[f64]) -> BeamSide {
     let most = shape.iter().map(|v| v.abs()).fold(0.0, f64::max);
     match shape.iter().find(|v| v.abs() >= HALF * most) {
-        Some(v) if *v < 0.0 => Side::Right,
-        _ => Side::Left,
+        Some(v) if *v < 0.0 => BeamSide::Right,
+        _ => BeamSide::Left,
     }
 }

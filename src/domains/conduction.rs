@@ -16,7 +16,7 @@ use thiserror::Error;
 
 /// A conductor of heat and current between two nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Heater {
+pub struct HeatConductor {
     /// First node.
     pub a: usize,
     /// Second node.
@@ -56,7 +56,7 @@ pub(super) struct Conduction {
 impl Conduction {
     /// # Errors
     /// [`NoHeatSink`].
-    pub(super) fn new(heaters: &[Heater], sink: &[bool]) -> Result<Self, NoHeatSink> {
+    pub(super) fn new(heaters: &[HeatConductor], sink: &[bool]) -> Result<Self, NoHeatSink> {
         let mut row = vec![None; sink.len()];
         let mut free = 0;
         for h in heaters {
@@ -76,13 +76,13 @@ impl Conduction {
     }
 
     /// Mean rise of each heater for the heat into each [K, W].
-    pub(super) fn rises(&self, heaters: &[Heater], watts: &[f64]) -> Vec<f64> {
+    pub(super) fn rises(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
         let ends = self.ends(heaters, watts.iter().map(|watts| [0.5 * watts; 2]));
         heaters.iter().zip(watts).zip(ends).map(|((h, watts), ends)| mean(h, *watts, ends)).collect()
     }
 
     /// Rise at both ends of each heater for the heat from it into both [K, W].
-    fn ends(&self, heaters: &[Heater], into: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+    fn ends(&self, heaters: &[HeatConductor], into: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
         let mut rise = vec![0.0; self.free];
         for (h, watts) in heaters.iter().zip(into) {
             for (row, watts) in [self.row[h.a], self.row[h.b]].into_iter().zip(watts) {
@@ -98,7 +98,7 @@ impl Conduction {
 
     /// The heat into each heater, and where none comes into a part that conducts together, heat in proportion to capacity [W]. The nodes
     /// of a heater that are not at ambient join it to a part.
-    fn evenly(&self, heaters: &[Heater], watts: &[f64]) -> Vec<f64> {
+    fn evenly(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
         let count = self.row.len();
         let mut parts = Sets::new(count + heaters.len());
         for (k, h) in heaters.iter().enumerate() {
@@ -112,22 +112,22 @@ impl Conduction {
         for (k, watts) in watts.iter().enumerate() {
             heated[parts.first(count + k)] |= *watts > 0.0;
         }
-        let one = |(k, (h, watts)): (usize, (&Heater, &f64))| {
+        let one = |(k, (h, watts)): (usize, (&HeatConductor, &f64))| {
             if heated[parts.first(count + k)] { *watts } else { h.capacity }
         };
         heaters.iter().zip(watts).enumerate().map(one).collect()
     }
 
     /// Mean delay of the rise of each heater behind the heat into all of them [s, W]. A part that none comes into is heated evenly.
-    pub(super) fn delays(&self, heaters: &[Heater], watts: &[f64]) -> Vec<f64> {
+    pub(super) fn delays(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
         let watts = &self.evenly(heaters, watts);
         let warm = self.ends(heaters, watts.iter().map(|watts| [0.5 * watts; 2]));
-        let stored = |((h, watts), [a, b]): ((&Heater, &f64), &[f64; 2])| {
+        let stored = |((h, watts), [a, b]): ((&HeatConductor, &f64), &[f64; 2])| {
             let own = watts / (24.0 * h.conductance);
             [h.capacity * (a / 3.0 + b / 6.0 + own), h.capacity * (a / 6.0 + b / 3.0 + own)]
         };
         let late = self.ends(heaters, heaters.iter().zip(watts).zip(&warm).map(stored));
-        let one = |(h, watts): (&Heater, &f64), warm: [f64; 2], late: [f64; 2]| {
+        let one = |(h, watts): (&HeatConductor, &f64), warm: [f64; 2], late: [f64; 2]| {
             let own = h.capacity / h.conductance;
             let rise = mean(h, *watts, warm);
             let delayed =
@@ -140,12 +140,12 @@ impl Conduction {
 }
 
 /// Mean rise of a heater between its ends [K].
-fn mean(h: &Heater, watts: f64, ends: [f64; 2]) -> f64 {
+fn mean(h: &HeatConductor, watts: f64, ends: [f64; 2]) -> f64 {
     0.5 * (ends[0] + ends[1]) + watts / (12.0 * h.conductance)
 }
 
 /// A heater of a part that holds no sink.
-fn without_sink(heaters: &[Heater], sink: &[bool]) -> Option<usize> {
+fn without_sink(heaters: &[HeatConductor], sink: &[bool]) -> Option<usize> {
     let mut parts = Sets::new(sink.len());
     for h in heaters {
         parts.join(h.a, h.b);

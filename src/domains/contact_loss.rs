@@ -44,7 +44,7 @@ impl Loss {
 
     /// True where contact takes energy out of a motion.
     #[inline]
-    pub fn acts(&self) -> bool {
+    pub fn is_dissipative(&self) -> bool {
         self.chi > 0.0
     }
 

@@ -9,7 +9,7 @@
 //! fall together. Neither stress nor voltage enters, so that the speed is a constant of the element.
 
 use super::contact_loss::Loss;
-use super::domain::{At, Domain};
+use super::domain::{Configuration, Domain};
 use super::system::System;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
@@ -20,12 +20,12 @@ pub const WITHOUT_STATICS: f64 = 1.0;
 /// Loads that cancel to less than this share of their sum act one by one.
 const CANCELLED: f64 = 1e-3;
 /// Contacts that get a shape of their own; the others share that of the last one.
-const MOST_SHAPES: usize = 256;
+const MAX_SHAPES: usize = 256;
 
 impl System {
     /// True where the contact of a member takes energy out of a motion.
     pub fn loses(&self) -> bool {
-        self.members.iter().any(|member| member.loss().is_some_and(|loss| loss.acts()))
+        self.members.iter().any(|member| member.loss().is_some_and(|loss| loss.is_dissipative()))
     }
 
     /// Finds the reference speeds that the netlist does not give.
@@ -41,7 +41,7 @@ impl System {
             let mut own = None;
             for &g in &group {
                 let frequency = together.or_else(|| {
-                    if bent.shapes < MOST_SHAPES || own.is_none() {
+                    if bent.shapes < MAX_SHAPES || own.is_none() {
                         own = Some(bent.frequency(self, &[g]));
                     }
                     own.flatten()
@@ -101,7 +101,7 @@ impl Bent {
     /// ω₀ [rad/s] of the shape that contacts bend the mechanism into together; none where they cancel or there is none.
     fn frequency(&mut self, system: &System, contacts: &[usize]) -> Option<f64> {
         let stiffness = self.stiffness.as_ref()?;
-        let at = At { q: &self.rest, linear: system.model.linear };
+        let at = Configuration { q: &self.rest, linear: system.model.linear };
         self.shapes += 1;
         let (mut load, mut all) = (self.rest.clone(), 0.0);
         for &g in contacts {

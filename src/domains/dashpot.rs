@@ -1,9 +1,9 @@
 //! A dashpot: a linear damper between a node and the ground.
 
-use super::approach::Point;
-use super::domain::{At, Domain};
-use super::drawn::{Drawing, Drawn};
-use super::element::Element;
+use super::approach::MaterialPoint;
+use super::domain::{Configuration, Domain};
+use super::drawn::{FromStructure, StructureView};
+use super::element::DomainElement;
 use crate::multibody::planar::{JointFrame, Pose};
 use crate::multibody::{BlockMatrix, BodyId, Damper, Pattern};
 use crate::structure::GapVoltage;
@@ -13,18 +13,18 @@ use nalgebra::{Vector2, Vector3};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dashpot {
     /// Where it holds its body.
-    pub point: Point,
+    pub point: MaterialPoint,
     /// Its local x axis, a unit vector.
     pub axis: Vector2<f64>,
     /// Force per rate along local x and y, moment per rate about z [N·s/m, N·s/m, N·m·s].
     pub coefficients: Vector3<f64>,
 }
 
-impl Drawn for Dashpot {
-    const ELEMENT: Option<Element> =
-        Some(Element { name: "dashpot2d", nodes: &[1], node_names: "[n]", parameters: &["bx", "by", "brz"] });
+impl FromStructure for Dashpot {
+    const ELEMENT: Option<DomainElement> =
+        Some(DomainElement { name: "dashpot2d", nodes: &[1], node_names: "[n]", parameters: &["bx", "by", "brz"] });
 
-    fn lay<'a>(drawing: &Drawing<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
+    fn lay<'a>(drawing: &StructureView<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
         for placed in drawing.placed::<Self>() {
             let point = (drawing.point)(placed.nodes[0]);
             let axis = Vector2::new(placed.angle.cos(), placed.angle.sin());
@@ -32,7 +32,7 @@ impl Drawn for Dashpot {
         }
     }
 
-    fn moved(self, to: &dyn Fn(Point) -> Point) -> Self {
+    fn moved(self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self {
         Self { point: to(self.point), ..self }
     }
 
@@ -49,15 +49,15 @@ impl Domain for Dashpot {
         false
     }
 
-    fn acts(&self, _: f64) -> bool {
+    fn is_active(&self, _: f64) -> bool {
         false
     }
 
     fn bodies(&self, _: impl FnMut(BodyId)) {}
 
-    fn add_force(&self, _: At<'_>, _: f64, _: &mut [Pose]) {}
+    fn add_force(&self, _: Configuration<'_>, _: f64, _: &mut [Pose]) {}
 
-    fn add_force_change(&self, _: At<'_>, _: f64, _: f64, _: &mut [Pose]) {}
+    fn add_force_change(&self, _: Configuration<'_>, _: f64, _: f64, _: &mut [Pose]) {}
 
-    fn add_tangent(&self, _: At<'_>, _: f64, _: &Pattern, _: &mut BlockMatrix<f64, 3>) {}
+    fn add_tangent(&self, _: Configuration<'_>, _: f64, _: &Pattern, _: &mut BlockMatrix<f64, 3>) {}
 }

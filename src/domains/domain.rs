@@ -5,24 +5,24 @@
 //! ```text
 //! forces ∂Π/∂q      tangent ∂²Π/∂q²      change of the forces with what drives it ∂²Π/∂q∂u      charge −∂Π/∂u
 //! ```
-//! Constant damping belongs to the mechanism: a domain hands its dampers over when it is laid ([`super::drawn::Drawn::dampers`]), and
+//! Constant damping belongs to the mechanism: a domain hands its dampers over when it is laid ([`super::drawn::FromStructure::dampers`]), and
 //! every integrator, frequency response and noise has them. Other forces that depend on rates are added by [`Domain::add_loss`]. Only heat has states of its own
 //! ([`super::lag`]): temperatures follow voltages alone, so that they come before the mechanism and not with it.
 //!
 //! Nothing here is called through a pointer: [`super::member::Member`] is one of the registered domains, chosen by a `match`.
 
-use super::approach::{Approach, Point};
+use super::approach::{Approach, MaterialPoint};
 use super::capacitor::Capacitor;
 use super::contact::Contact;
 use super::contact_loss::Loss;
-use super::stop::Stop;
+use super::stop::StopKind;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
 use nalgebra::Vector2;
 
 /// Where the bodies are.
 #[derive(Debug, Clone, Copy)]
-pub struct At<'a> {
+pub struct Configuration<'a> {
     /// Displacements.
     pub q: &'a [Pose],
     /// Small displacements about the drawing.
@@ -33,7 +33,7 @@ pub struct At<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct Chord<'a> {
     /// Configurations at the start, the middle and the end.
-    pub at: [At<'a>; 3],
+    pub at: [Configuration<'a>; 3],
     /// Length [s].
     pub h: f64,
 }
@@ -44,7 +44,7 @@ pub enum Law {
     /// A field, and what bears where its conductors touch.
     Field(Capacitor, Option<Contact>),
     /// A stop with the ways to its two sides [m].
-    Stop([Option<f64>; 2], Stop),
+    Stop([Option<f64>; 2], StopKind),
 }
 
 /// One thing that acts on bodies. Forces are those of the residual: minus the wrench on each body.
@@ -65,18 +65,24 @@ pub trait Domain {
     }
 
     /// `r += ∂Π/∂q`, held directions not removed.
-    fn add_force(&self, at: At<'_>, given: Self::Given, r: &mut [Pose]);
+    fn add_force(&self, at: Configuration<'_>, given: Self::Given, r: &mut [Pose]);
 
     /// `r += (∂²Π/∂q∂u)·change`: how the forces at `given` change with it.
-    fn add_force_change(&self, at: At<'_>, given: Self::Given, change: Self::Given, r: &mut [Pose]);
+    fn add_force_change(&self, at: Configuration<'_>, given: Self::Given, change: Self::Given, r: &mut [Pose]);
 
     /// `tangent += ∂²Π/∂q²`, on a pattern that couples its bodies.
-    fn add_tangent(&self, at: At<'_>, given: Self::Given, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>);
+    fn add_tangent(
+        &self,
+        at: Configuration<'_>,
+        given: Self::Given,
+        pattern: &Pattern,
+        tangent: &mut BlockMatrix<f64, 3>,
+    );
 
     /// Both: [`Domain::add_force`] and [`Domain::add_tangent`].
     fn add_force_and_tangent(
         &self,
-        at: At<'_>,
+        at: Configuration<'_>,
         given: Self::Given,
         pattern: &Pattern,
         (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
@@ -91,66 +97,66 @@ pub trait Domain {
     }
 
     /// False where it adds no force, wherever the bodies are.
-    fn acts(&self, given: Self::Given) -> bool {
+    fn is_active(&self, given: Self::Given) -> bool {
         let _ = given;
         true
     }
 
     /// `lever` is told each point that a force of fixed direction acts on, and the force [N]: what a linear model's tangent leaves out.
-    fn levers(&self, at: At<'_>, given: Self::Given, lever: impl FnMut(Point, Vector2<f64>)) {
+    fn load_points(&self, at: Configuration<'_>, given: Self::Given, lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
         let _ = (at, given, lever);
     }
 
     /// Π [J] but for the shares of a field, −½·C·V², and of contact, which are told apart below.
-    fn energy(&self, at: At<'_>, given: Self::Given) -> f64 {
+    fn energy(&self, at: Configuration<'_>, given: Self::Given) -> f64 {
         let _ = (at, given);
         0.0
     }
 
     /// Capacitance [F].
-    fn capacitance(&self, at: At<'_>) -> f64 {
+    fn capacitance(&self, at: Configuration<'_>) -> f64 {
         let _ = at;
         0.0
     }
 
     /// Change of the capacitance with a change `dq` of the configuration [F].
-    fn capacitance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn capacitance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let _ = (at, dq);
         0.0
     }
 
     /// Force per ½V² that pulls its two sides together, ∂C/∂u with u the approach of all of it [N/V²].
-    fn pull(&self, at: At<'_>) -> f64 {
+    fn pull(&self, at: Configuration<'_>) -> f64 {
         let _ = at;
         0.0
     }
 
     /// The same, and its change with a change `dq` of the configuration.
-    fn pull_and_change(&self, at: At<'_>, dq: &[Pose]) -> (f64, f64) {
+    fn pull_and_change(&self, at: Configuration<'_>, dq: &[Pose]) -> (f64, f64) {
         let _ = (at, dq);
         (0.0, 0.0)
     }
 
     /// True for electrodes that voltage draws upon each other.
-    fn closes(&self) -> bool {
+    fn is_electrostatic(&self) -> bool {
         false
     }
 
     /// `r +=` the change of the forces by the shape that beams take within segments under the load along them, which forces on the
     /// bodies leave out; the sum of the changes' sizes [N].
-    fn add_shape_force(&self, at: At<'_>, given: Self::Given, r: &mut [Pose]) -> f64 {
+    fn add_shape_force(&self, at: Configuration<'_>, given: Self::Given, r: &mut [Pose]) -> f64 {
         let _ = (at, given, r);
         0.0
     }
 
     /// Distance left between its two sides [m]; infinite where it has none.
-    fn distance(&self, at: At<'_>) -> f64 {
+    fn distance(&self, at: Configuration<'_>) -> f64 {
         let _ = at;
         f64::INFINITY
     }
 
     /// Change of the distance with a change `dq` of the configuration [m].
-    fn distance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn distance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let _ = (at, dq);
         0.0
     }
@@ -161,24 +167,24 @@ pub trait Domain {
     }
 
     /// What is left until it could not be closed further [m].
-    fn room(&self, at: At<'_>) -> f64 {
+    fn clearance(&self, at: Configuration<'_>) -> f64 {
         self.distance(at)
     }
 
     /// Force with which its sides bear on each other [N].
-    fn bearing(&self, at: At<'_>) -> f64 {
+    fn bearing(&self, at: Configuration<'_>) -> f64 {
         let _ = at;
         0.0
     }
 
     /// Energy stored where its sides touch [J].
-    fn contact_energy(&self, at: At<'_>) -> f64 {
+    fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         let _ = at;
         0.0
     }
 
     /// Work of the contact force over a small change `dq` of the configuration [J], of either sign.
-    fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn contact_work(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let _ = (at, dq);
         0.0
     }
@@ -194,20 +200,20 @@ pub trait Domain {
     }
 
     /// `r +=` a load that closes its contact as drawn, of any size. Returns how far its parts fall, as [`super::contact_speed`] takes it [m].
-    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+    fn add_closing(&self, at: Configuration<'_>, r: &mut [Pose]) -> f64 {
         let _ = (at, r);
         0.0
     }
 
     /// `r +=` the force that rates add to ∂Π/∂q where contact loses energy, `rate` the rate of each body.
-    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+    fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
         let _ = (at, rate, r);
     }
 
     /// Adds the derivatives of that force with displacements to `stiffness` and with rates to `damping`. True where there are any.
     fn add_loss_tangent(
         &self,
-        at: At<'_>,
+        at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
         stiffness: &mut BlockMatrix<f64, 3>,

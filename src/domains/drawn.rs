@@ -1,10 +1,10 @@
 //! From a drawing to the members of a domain.
 
-use super::approach::{Approach, Point};
+use super::approach::{Approach, MaterialPoint};
 use super::domain::Domain;
-use super::element::Element;
+use super::element::DomainElement;
 use crate::multibody::Damper;
-use crate::structure::{GapVoltage, NodeId, Placed, Structure};
+use crate::structure::{GapVoltage, NodeId, PlacedElement, Structure};
 use nalgebra::Vector2;
 
 /// A point along a beam that one body carries.
@@ -13,25 +13,25 @@ pub struct Station {
     /// Distance from where the beam, or what lies along it, begins [m].
     pub at: f64,
     /// The material point.
-    pub point: Point,
+    pub point: MaterialPoint,
 }
 
 /// A drawing, as domains read it.
 #[derive(Clone, Copy)]
-pub struct Drawing<'a, 'p> {
+pub struct StructureView<'a, 'p> {
     /// What is drawn.
     pub structure: &'a Structure,
     /// The material point of a node.
-    pub point: &'p dyn Fn(NodeId) -> Point,
+    pub point: &'p dyn Fn(NodeId) -> MaterialPoint,
     /// Facing beams as SUGAR has them.
     pub chord: bool,
     /// For each beam, the points along it that its segments are joined at; empty where only nodes are known.
     pub stations: &'p [Vec<Station>],
 }
 
-impl<'a> Drawing<'a, '_> {
+impl<'a> StructureView<'a, '_> {
     /// What a netlist placed of a domain's own element.
-    pub fn placed<D: Drawn>(&self) -> impl Iterator<Item = &'a Placed> + use<'a, D> {
+    pub fn placed<D: FromStructure>(&self) -> impl Iterator<Item = &'a PlacedElement> + use<'a, D> {
         self.structure.placed.iter().filter(|placed| D::ELEMENT.is_some_and(|element| placed.element == element.name))
     }
 
@@ -42,26 +42,26 @@ impl<'a> Drawing<'a, '_> {
 }
 
 /// A domain whose members are drawn.
-pub trait Drawn: Domain<Given = f64> + Sized {
+pub trait FromStructure: Domain<Given = f64> + Sized {
     /// `put` is told each member of the drawing: its name, the voltage across it if it has a field, and itself.
-    fn lay<'a>(drawing: &Drawing<'a, '_>, put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self));
+    fn lay<'a>(drawing: &StructureView<'a, '_>, put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self));
 
     /// The element that netlists place it with, where that is its own and no other part of a drawing.
-    const ELEMENT: Option<Element> = None;
+    const ELEMENT: Option<DomainElement> = None;
 
-    /// `put` is told its dampers, before [`Drawn::moved`]: damping is constant, and the mechanism's own.
+    /// `put` is told its dampers, before [`FromStructure::moved`]: damping is constant, and the mechanism's own.
     fn dampers(&self, put: impl FnMut(Damper)) {
         let _ = put;
     }
 
     /// The same with its points where `to` takes them.
     #[must_use]
-    fn moved(self, to: &dyn Fn(Point) -> Point) -> Self;
+    fn moved(self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self;
 }
 
 /// A member that was laid.
 #[derive(Debug, Clone)]
-pub struct Laid<'a, M> {
+pub struct PlacedMember<'a, M> {
     /// Full element name.
     pub name: &'a str,
     /// The voltage across it; none: it has no field.

@@ -1,11 +1,11 @@
 //! A comb, or two lumped plates: a field that depends on one approach, and what bears where plates touch.
 
-use super::approach::{Approach, Point};
+use super::approach::{Approach, MaterialPoint};
 use super::capacitor::{Capacitance, Capacitor};
 use super::contact::{Contact, touching_distance};
 use super::contact_loss::{Loss, fall_at_pull_in};
-use super::domain::{At, Chord, Domain, Law};
-use super::drawn::{Drawing, Drawn};
+use super::domain::{Chord, Configuration, Domain, Law};
+use super::drawn::{FromStructure, StructureView};
 use super::quotient::{self, quotient};
 use crate::multibody::model::locate;
 use crate::multibody::planar::Pose;
@@ -42,14 +42,14 @@ impl Electrodes {
     }
 
     /// True where its contact loses energy.
-    fn loses(&self, at: At<'_>) -> bool {
-        self.loss.acts() && self.contact.is_some_and(|contact| self.distance(at) < contact.touch)
+    fn loses(&self, at: Configuration<'_>) -> bool {
+        self.loss.is_dissipative() && self.contact.is_some_and(|contact| self.distance(at) < contact.touch)
     }
 }
 
-impl Drawn for Electrodes {
+impl FromStructure for Electrodes {
     /// Combs, then plates.
-    fn lay<'a>(drawing: &Drawing<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
+    fn lay<'a>(drawing: &StructureView<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
         for comb in &drawing.structure.combs {
             let approach = drawing.approach(comb.a, comb.b, comb.axis);
             let slope = comb.gaps * comb.permittivity * comb.height / comb.gap;
@@ -68,7 +68,7 @@ impl Drawn for Electrodes {
         }
     }
 
-    fn moved(self, to: &dyn Fn(Point) -> Point) -> Self {
+    fn moved(self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self {
         Self { approach: self.approach.moved(to), ..self }
     }
 }
@@ -80,11 +80,11 @@ impl Domain for Electrodes {
         self.approach.bodies().into_iter().for_each(see);
     }
 
-    fn acts(&self, volts: f64) -> bool {
+    fn is_active(&self, volts: f64) -> bool {
         volts != 0.0 || self.contact.is_some()
     }
 
-    fn add_force(&self, at: At<'_>, volts: f64, r: &mut [Pose]) {
+    fn add_force(&self, at: Configuration<'_>, volts: f64, r: &mut [Pose]) {
         let m = self.approach.measure(at.q, at.linear);
         let mut first = -0.5 * volts * volts * self.capacitor.at(m.value).slope;
         if let Some(contact) = self.contact {
@@ -93,12 +93,12 @@ impl Domain for Electrodes {
         self.approach.add_force(&m, first, r);
     }
 
-    fn add_force_change(&self, at: At<'_>, volts: f64, change: f64, r: &mut [Pose]) {
+    fn add_force_change(&self, at: Configuration<'_>, volts: f64, change: f64, r: &mut [Pose]) {
         let m = self.approach.measure(at.q, at.linear);
         self.approach.add_force(&m, -volts * change * self.capacitor.at(m.value).slope, r);
     }
 
-    fn add_tangent(&self, at: At<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
         let m = self.approach.measure(at.q, at.linear);
         let Capacitance { slope, curvature, .. } = self.capacitor.at(m.value);
         let factor = -0.5 * volts * volts;
@@ -112,40 +112,40 @@ impl Domain for Electrodes {
         locate(pattern, self.approach.a.body, self.approach.b.body).add(tangent, &h);
     }
 
-    fn levers(&self, at: At<'_>, volts: f64, lever: impl FnMut(Point, Vector2<f64>)) {
+    fn load_points(&self, at: Configuration<'_>, volts: f64, lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
         let u = self.approach.value(at.q, true);
-        self.approach.levers(-0.5 * volts * volts * self.capacitor.at(u).slope + self.pressed(u).0, lever);
+        self.approach.load_points(-0.5 * volts * volts * self.capacitor.at(u).slope + self.pressed(u).0, lever);
     }
 
-    fn capacitance(&self, at: At<'_>) -> f64 {
+    fn capacitance(&self, at: Configuration<'_>) -> f64 {
         self.capacitor.at(self.approach.value(at.q, at.linear)).value
     }
 
-    fn capacitance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn capacitance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let m = self.approach.measure(at.q, at.linear);
         self.capacitor.at(m.value).slope * self.approach.change(&m, dq)
     }
 
-    fn pull(&self, at: At<'_>) -> f64 {
+    fn pull(&self, at: Configuration<'_>) -> f64 {
         self.capacitor.at(self.approach.value(at.q, at.linear)).slope
     }
 
-    fn pull_and_change(&self, at: At<'_>, dq: &[Pose]) -> (f64, f64) {
+    fn pull_and_change(&self, at: Configuration<'_>, dq: &[Pose]) -> (f64, f64) {
         let m = self.approach.measure(at.q, at.linear);
         let Capacitance { slope, curvature, .. } = self.capacitor.at(m.value);
         (slope, curvature * self.approach.change(&m, dq))
     }
 
-    fn closes(&self) -> bool {
+    fn is_electrostatic(&self) -> bool {
         matches!(self.capacitor, Capacitor::Plates { .. })
     }
 
     /// Overlap of a comb, gap of plates.
-    fn distance(&self, at: At<'_>) -> f64 {
+    fn distance(&self, at: Configuration<'_>) -> f64 {
         self.capacitor.distance(self.approach.value(at.q, at.linear))
     }
 
-    fn distance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn distance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let along = self.approach.change(&self.approach.measure(at.q, at.linear), dq);
         match self.capacitor {
             Capacitor::Comb { .. } => along,
@@ -157,15 +157,15 @@ impl Domain for Electrodes {
         self.contact.map(|c| [c.touch, c.least()])
     }
 
-    fn bearing(&self, at: At<'_>) -> f64 {
+    fn bearing(&self, at: Configuration<'_>) -> f64 {
         self.pressed(self.approach.value(at.q, at.linear)).0
     }
 
-    fn contact_energy(&self, at: At<'_>) -> f64 {
+    fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         self.contact.map_or(0.0, |contact| contact.energy(self.distance(at)))
     }
 
-    fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn contact_work(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let force = self.contact.map_or(0.0, |contact| contact.force(self.distance(at)).0);
         if force == 0.0 { 0.0 } else { force * self.distance_change(at, dq) }
     }
@@ -178,12 +178,12 @@ impl Domain for Electrodes {
         self.loss = loss;
     }
 
-    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+    fn add_closing(&self, at: Configuration<'_>, r: &mut [Pose]) -> f64 {
         self.add_force_change(at, 1.0, -1.0, r);
         self.contact.map_or(0.0, |contact| fall_at_pull_in(self.distance(at), contact.touch))
     }
 
-    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+    fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
         if self.loses(at) {
             let m = self.approach.measure(at.q, at.linear);
             self.approach.add_force(&m, self.lost((m.value, self.approach.rate(&m, rate))).0, r);
@@ -192,7 +192,7 @@ impl Domain for Electrodes {
 
     fn add_loss_tangent(
         &self,
-        at: At<'_>,
+        at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
         stiffness: &mut BlockMatrix<f64, 3>,

@@ -2,7 +2,7 @@
 
 /// An element of a domain: what a netlist and a layout need to know of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Element {
+pub struct DomainElement {
     /// As netlists call it.
     pub name: &'static str,
     /// Numbers of nodes that it can have.

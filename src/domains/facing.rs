@@ -3,7 +3,7 @@
 //! The gap is g(s) = g₀ + w(s), with w the cubic (Hermite) interpolation of the relative displacement and rotation of the
 //! two pairs of ends: z = (w₁, φ₁, w₂, φ₂). Parallel beams get exactly SUGAR's nodal forces and moments, pl/2 and pl²/12
 //! (its `gap2d`); tilted ones differ in second order, because here forces, stiffness and charge come from one potential.
-//! With [`Facing::chord`] they do not: as SUGAR has it, the gap is then measured along the straight lines between the ends, while
+//! With [`FacingStretch::chord`] they do not: as SUGAR has it, the gap is then measured along the straight lines between the ends, while
 //! its pressure acts through the cubics, so that the forces are the derivatives of no energy.
 //! α is SUGAR's fringe factor 1 + 1.12·g₀/h. Quadrature of the field is Gauss–Legendre, of the contact pressure Gauss–Lobatto,
 //! whose points include the ends, where tilted beams touch first ([`super::quadrature`]): six and nine points on a gap of one
@@ -15,7 +15,7 @@ use nalgebra::{Matrix4, Vector4};
 
 /// Constants of a stretch of facing beams.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Facing {
+pub struct FacingStretch {
     /// Length [m].
     pub length: f64,
     /// Gap as drawn [m].
@@ -43,7 +43,7 @@ pub struct FacingCapacitance {
     pub hessian: Matrix4<f64>,
 }
 
-impl Facing {
+impl FacingStretch {
     /// Capacitance at the relative end displacements z = (w₁, φ₁, w₂, φ₂); positive w opens the gap.
     pub fn at(&self, z: &Vector4<f64>) -> FacingCapacitance {
         let (mut value, mut gradient, mut hessian) = (0.0, Vector4::zeros(), Matrix4::zeros());
@@ -224,8 +224,8 @@ mod tests {
     use super::super::quadrature::hermite;
     use super::*;
 
-    fn facing() -> Facing {
-        Facing {
+    fn facing() -> FacingStretch {
+        FacingStretch {
             length: 100e-6,
             gap: 2e-6,
             strength: 8.854e-12 * 2e-6,
@@ -255,7 +255,7 @@ mod tests {
     /// the weights of a cubic (sums over 4000 intervals, by Simpson's rule).
     #[test]
     fn tilted_beams_along_chords_match_sugar() {
-        let f = Facing { chord: true, ..facing() };
+        let f = FacingStretch { chord: true, ..facing() };
         let z = Vector4::new(-0.3e-6, 4e-3, -0.35e-6, -6e-3);
         let (n, mut sum) = (4000, Vector4::zeros());
         for k in 0..=n {
@@ -306,8 +306,8 @@ mod tests {
             assert!((column - second.column(i)).norm() < 1e-5 * column.norm(), "{i}");
         }
         let flat = Vector4::new(-1.92e-6, 0.0, -1.92e-6, 0.0);
-        let half = Facing { length: 50e-6, ..f };
-        let sum = |f: &Facing| f.contact(&flat).0[0] + f.contact(&flat).0[2];
+        let half = FacingStretch { length: 50e-6, ..f };
+        let sum = |f: &FacingStretch| f.contact(&flat).0[0] + f.contact(&flat).0[2];
         let pressure = Contact { touch: 0.1e-6, area: 1.0 }.force(0.08e-6).0;
         assert!((sum(&f) / (-pressure * 2e-6 * 100e-6) - 1.0).abs() < 1e-9);
         assert!((2.0 * sum(&half) / sum(&f) - 1.0).abs() < 1e-9);

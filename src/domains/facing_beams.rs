@@ -1,24 +1,24 @@
 //! Two rows of beams that face each other: the field and the contact of [`super::facing`], stretch by stretch, over the bodies
 //! of the segments that both are cut into.
 
-use super::approach::Point;
+use super::approach::MaterialPoint;
 use super::contact::touching_distance;
 use super::contact_loss::{Loss, fall_at_pull_in};
-use super::domain::{At, Chord, Domain};
-use super::drawn::{Drawing, Drawn};
-use super::facing::Facing;
+use super::domain::{Chord, Configuration, Domain};
+use super::drawn::{FromStructure, StructureView};
+use super::facing::FacingStretch;
 pub use super::facing_local::FacingBeams;
 use super::facing_local::SIGNS;
 use super::facing_loss;
 use super::facing_side::{Opening, back};
-use super::facing_stretches::{BeamRows, Stretch, stretches};
+use super::facing_stretches::{BeamRows, CubicStretch, stretches};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model, Pattern};
 use crate::structure::GapVoltage;
 use nalgebra::{Vector2, Vector4};
 
-impl Drawn for FacingBeams {
-    fn lay<'a>(drawing: &Drawing<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
+impl FromStructure for FacingBeams {
+    fn lay<'a>(drawing: &StructureView<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
         let drawn = &drawing.structure.beam_gaps;
         if drawn.is_empty() {
             return;
@@ -30,7 +30,7 @@ impl Drawn for FacingBeams {
             let [a, b, c, d] = gap.nodes;
             let sides = [[a, b], [c, d]].map(|nodes| beams.side(drawing, gap, nodes));
             let cut = stretches(&sides);
-            let facing = Facing {
+            let facing = FacingStretch {
                 length: gap.length,
                 gap: gap.gap,
                 strength: gap.permittivity * gap.height * gap.fringe,
@@ -39,8 +39,8 @@ impl Drawn for FacingBeams {
                 chord: drawing.chord,
                 alone: cut.len() == 1,
             };
-            let stretches = cut.into_iter().map(|cut| Stretch {
-                facing: Facing { length: cut.length, ..facing },
+            let stretches = cut.into_iter().map(|cut| CubicStretch {
+                facing: FacingStretch { length: cut.length, ..facing },
                 segments: cut.segments,
                 weights: cut.weights,
             });
@@ -49,7 +49,7 @@ impl Drawn for FacingBeams {
         }
     }
 
-    fn moved(mut self, to: &dyn Fn(Point) -> Point) -> Self {
+    fn moved(mut self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self {
         for station in self.sides.iter_mut().flat_map(|side| &mut side.stations) {
             station.point = to(station.point);
         }
@@ -74,7 +74,7 @@ impl Domain for FacingBeams {
         }
     }
 
-    fn add_force(&self, at: At<'_>, volts: f64, r: &mut [Pose]) {
+    fn add_force(&self, at: Configuration<'_>, volts: f64, r: &mut [Pose]) {
         self.along(at, |local| {
             if volts != 0.0 || !local.stretch.facing.apart(&local.z) {
                 self.add(local, local.stretch.facing.load(&local.z, volts), r);
@@ -82,14 +82,14 @@ impl Domain for FacingBeams {
         });
     }
 
-    fn add_force_change(&self, at: At<'_>, volts: f64, change: f64, r: &mut [Pose]) {
+    fn add_force_change(&self, at: Configuration<'_>, volts: f64, change: f64, r: &mut [Pose]) {
         self.along(at, |local| {
             let first = local.stretch.facing.gradient(&local.z) * (-volts * change);
             self.add(local, first, r);
         });
     }
 
-    fn add_tangent(&self, at: At<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
         self.along(at, |local| {
             if let Some(both) = local.stretch.facing.load_and_stiffness(&local.z, volts) {
                 self.add_stiffness(local, both, pattern, tangent);
@@ -99,7 +99,7 @@ impl Domain for FacingBeams {
 
     fn add_force_and_tangent(
         &self,
-        at: At<'_>,
+        at: Configuration<'_>,
         volts: f64,
         pattern: &Pattern,
         (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
@@ -112,7 +112,7 @@ impl Domain for FacingBeams {
         });
     }
 
-    fn levers(&self, at: At<'_>, volts: f64, mut lever: impl FnMut(Point, Vector2<f64>)) {
+    fn load_points(&self, at: Configuration<'_>, volts: f64, mut lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
         self.along(at, |local| {
             let first = local.stretch.facing.load(&local.z, volts);
             for side in self.moving() {
@@ -124,21 +124,21 @@ impl Domain for FacingBeams {
         });
     }
 
-    fn capacitance(&self, at: At<'_>) -> f64 {
+    fn capacitance(&self, at: Configuration<'_>) -> f64 {
         self.sum(at, |local| local.stretch.facing.capacitance(&local.z))
     }
 
-    fn capacitance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn capacitance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         self.sum(at, |local| local.stretch.facing.gradient(&local.z).dot(&self.change(local, |id| Model::pose(dq, id))))
     }
 
-    fn pull(&self, at: At<'_>) -> f64 {
+    fn pull(&self, at: Configuration<'_>) -> f64 {
         let mut sum = Vector4::zeros();
         self.along(at, |local| sum += local.stretch.facing.gradient(&local.z));
         -(sum[0] + sum[2])
     }
 
-    fn pull_and_change(&self, at: At<'_>, dq: &[Pose]) -> (f64, f64) {
+    fn pull_and_change(&self, at: Configuration<'_>, dq: &[Pose]) -> (f64, f64) {
         let (mut sum, mut change) = (Vector4::zeros(), Vector4::zeros());
         self.along(at, |local| {
             let c = local.stretch.facing.at(&local.z);
@@ -148,10 +148,10 @@ impl Domain for FacingBeams {
         (-(sum[0] + sum[2]), -(change[0] + change[2]))
     }
 
-    fn add_shape_force(&self, at: At<'_>, volts: f64, r: &mut [Pose]) -> f64 {
+    fn add_shape_force(&self, at: Configuration<'_>, volts: f64, r: &mut [Pose]) -> f64 {
         let (mut begin, mut size) = (0.0, 0.0);
         self.along(at, |local| {
-            let Stretch { facing, segments, .. } = local.stretch;
+            let CubicStretch { facing, segments, .. } = local.stretch;
             let first = local.stretch.facing.load(&local.z, volts);
             let load = (first[0] + first[2]) / facing.length;
             let bent = |s: f64| -> f64 {
@@ -165,18 +165,18 @@ impl Domain for FacingBeams {
         size
     }
 
-    fn closes(&self) -> bool {
+    fn is_electrostatic(&self) -> bool {
         true
     }
 
     /// The smallest along the beams.
-    fn distance(&self, at: At<'_>) -> f64 {
+    fn distance(&self, at: Configuration<'_>) -> f64 {
         let mut least = f64::INFINITY;
         self.closest(at, |_, distance, _| least = distance);
         least
     }
 
-    fn distance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn distance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let mut change = 0.0;
         self.closest(at, |local, _, weights| change = weights.dot(&self.change(local, |id| Model::pose(dq, id))));
         change
@@ -187,18 +187,18 @@ impl Domain for FacingBeams {
         Some([facing.touch, facing.least()])
     }
 
-    fn bearing(&self, at: At<'_>) -> f64 {
+    fn bearing(&self, at: Configuration<'_>) -> f64 {
         self.sum(at, |local| {
             let force = local.stretch.facing.contact(&local.z).0;
             force[0].abs() + force[2].abs()
         })
     }
 
-    fn contact_energy(&self, at: At<'_>) -> f64 {
+    fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         self.sum(at, |local| local.stretch.facing.contact_energy(&local.z))
     }
 
-    fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn contact_work(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         self.sum(at, |local| match local.stretch.facing.apart(&local.z) {
             true => 0.0,
             false => local.stretch.facing.contact(&local.z).0.dot(&self.change(local, |id| Model::pose(dq, id))),
@@ -213,18 +213,18 @@ impl Domain for FacingBeams {
         self.loss = loss;
     }
 
-    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+    fn add_closing(&self, at: Configuration<'_>, r: &mut [Pose]) -> f64 {
         self.add_force_change(at, 1.0, -1.0, r);
         self.stretches.first().map_or(0.0, |first| fall_at_pull_in(first.facing.gap, first.facing.touch))
     }
 
-    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+    fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
         facing_loss::add(self, at, rate, r);
     }
 
     fn add_loss_tangent(
         &self,
-        at: At<'_>,
+        at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
         stiffness: &mut BlockMatrix<f64, 3>,

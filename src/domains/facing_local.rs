@@ -1,10 +1,10 @@
 //! Facing beams stretch by stretch: relative displacements of their ends, and what is a function of them over the poses of the bodies.
 
-use super::approach::Point;
+use super::approach::MaterialPoint;
 use super::contact_loss::Loss;
-use super::domain::At;
+use super::domain::Configuration;
 use super::facing_side::{Deflection, Flank, Opening, Walk, back, onto, values};
-use super::facing_stretches::Stretch;
+use super::facing_stretches::CubicStretch;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
 use nalgebra::{Matrix4, Vector4};
@@ -17,14 +17,14 @@ pub struct FacingBeams {
     /// The upper side, then the lower one.
     pub sides: [Flank; 2],
     /// From a to b.
-    pub(super) stretches: Vec<Stretch>,
+    pub(super) stretches: Vec<CubicStretch>,
     /// Energy loss of an impact.
     pub loss: Loss,
 }
 
 /// A stretch at a configuration.
 pub(super) struct Local<'a> {
-    pub(super) stretch: &'a Stretch,
+    pub(super) stretch: &'a CubicStretch,
     /// Its relative end displacements and slopes.
     pub(super) z: Vector4<f64>,
     /// The ends of its segments, upper then lower.
@@ -37,14 +37,14 @@ pub(super) const SIGNS: [f64; 2] = [1.0, -1.0];
 impl FacingBeams {
     /// Both sides at a configuration, to be followed from start to end.
     #[inline]
-    pub(super) fn walks<'a>(&'a self, at: At<'a>) -> [Walk<'a>; 2] {
+    pub(super) fn walks<'a>(&'a self, at: Configuration<'a>) -> [Walk<'a>; 2] {
         let walk = |side| Walk::new(self.frame, side, at.q, at.linear);
         [walk(&self.sides[0]), walk(&self.sides[1])]
     }
 
     /// The next stretch along them.
     #[inline(always)]
-    pub(super) fn local<'a>(&self, stretch: &'a Stretch, [upper, lower]: &'a mut [Walk<'_>; 2]) -> Local<'a> {
+    pub(super) fn local<'a>(&self, stretch: &'a CubicStretch, [upper, lower]: &'a mut [Walk<'_>; 2]) -> Local<'a> {
         let ends = [upper.to(stretch.segments[0]), lower.to(stretch.segments[1])];
         let part = |side: usize| match self.sides[side].fixed {
             true => Vector4::zeros(),
@@ -55,7 +55,7 @@ impl FacingBeams {
 
     /// Calls `each` for the stretches in turn.
     #[inline(always)]
-    pub(super) fn along(&self, at: At<'_>, mut each: impl FnMut(&Local<'_>)) {
+    pub(super) fn along(&self, at: Configuration<'_>, mut each: impl FnMut(&Local<'_>)) {
         let mut walks = self.walks(at);
         for stretch in &self.stretches {
             each(&self.local(stretch, &mut walks));
@@ -64,7 +64,7 @@ impl FacingBeams {
 
     /// The sum of `of` over the stretches.
     #[inline]
-    pub(super) fn sum(&self, at: At<'_>, mut of: impl FnMut(&Local<'_>) -> f64) -> f64 {
+    pub(super) fn sum(&self, at: Configuration<'_>, mut of: impl FnMut(&Local<'_>) -> f64) -> f64 {
         let mut sum = 0.0;
         self.along(at, |local| sum += of(local));
         sum
@@ -79,7 +79,7 @@ impl FacingBeams {
 
     /// The points at the ends of a stretch's segments.
     #[inline]
-    pub(super) fn points(&self, stretch: &Stretch, side: usize) -> [&Point; 2] {
+    pub(super) fn points(&self, stretch: &CubicStretch, side: usize) -> [&MaterialPoint; 2] {
         let segment = stretch.segments[side];
         [&self.sides[side].stations[segment].point, &self.sides[side].stations[segment + 1].point]
     }
@@ -108,7 +108,7 @@ impl FacingBeams {
     }
 
     /// The stretch with the smallest distance, that distance [m], and its derivative with z.
-    pub(super) fn closest(&self, at: At<'_>, mut each: impl FnMut(&Local<'_>, f64, Vector4<f64>)) {
+    pub(super) fn closest(&self, at: Configuration<'_>, mut each: impl FnMut(&Local<'_>, f64, Vector4<f64>)) {
         let mut least = f64::INFINITY;
         self.along(at, |local| {
             let (distance, weights) = local.stretch.facing.closest(&local.z);

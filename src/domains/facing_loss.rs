@@ -2,8 +2,8 @@
 //! discrete forces of field and contact over a step ([`super::quotient`]).
 
 use super::contact_loss::Loss;
-use super::domain::{At, Chord};
-use super::facing::Facing;
+use super::domain::{Chord, Configuration};
+use super::facing::FacingStretch;
 use super::facing_local::{FacingBeams, Local};
 use super::facing_side::Deflection;
 use super::quotient::quotient;
@@ -14,7 +14,7 @@ use nalgebra::{Matrix4, Vector4};
 /// Forces of z and their derivatives.
 type Derivatives = (Vector4<f64>, Matrix4<f64>);
 
-impl Facing {
+impl FacingStretch {
     /// Points of the contact's rule that are pressed: ∂g/∂z, the force [N] and its derivative with the distance [N/m].
     fn pressed(&self, z: &Vector4<f64>) -> impl Iterator<Item = (Vector4<f64>, f64, f64)> {
         let points = if self.apart(z) { &[] } else { self.lobatto() };
@@ -92,8 +92,8 @@ fn lost(beams: &FacingBeams, local: &Local<'_>, rate: &impl Fn(usize) -> Pose) -
 }
 
 /// See [`super::domain::Domain::add_loss`].
-pub(super) fn add(beams: &FacingBeams, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
-    if !beams.loss.acts() {
+pub(super) fn add(beams: &FacingBeams, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+    if !beams.loss.is_dissipative() {
         return;
     }
     beams.along(at, |local| {
@@ -107,13 +107,13 @@ pub(super) fn add(beams: &FacingBeams, at: At<'_>, rate: &impl Fn(usize) -> Pose
 /// as small as the rotation over a step.
 pub(super) fn add_tangent(
     beams: &FacingBeams,
-    at: At<'_>,
+    at: Configuration<'_>,
     rate: &impl Fn(usize) -> Pose,
     pattern: &Pattern,
     [stiffness, damping]: [&mut BlockMatrix<f64, 3>; 2],
 ) -> bool {
     let mut acts = false;
-    if beams.loss.acts() {
+    if beams.loss.is_dissipative() {
         beams.along(at, |local| {
             if let Some((force, by_rate)) = lost(beams, local, rate) {
                 beams.add_stiffness(local, force, pattern, stiffness);

@@ -1,6 +1,6 @@
 //! One side of a gap along beams: the points that bear it, and the distances and slopes that they measure.
 
-use super::approach::Point;
+use super::approach::MaterialPoint;
 use super::drawn::Station;
 use crate::multibody::BodyId;
 use crate::multibody::planar::{self, Pose};
@@ -30,13 +30,13 @@ pub(super) struct Deflection {
 impl Opening {
     /// What a point measures at a configuration.
     #[inline]
-    pub(super) fn seen(&self, point: &Point, q: &[Pose], linear: bool) -> Deflection {
+    pub(super) fn deflection(&self, point: &MaterialPoint, q: &[Pose], linear: bool) -> Deflection {
         let BodyId::Free(k) = point.body else { return Deflection::default() };
         let (pose, axis) = (&q[k], self.axis);
         let moved = planar::point(pose, point.arm, linear);
         // the arm where its body has turned it
         let arm = if linear { point.arm } else { point.arm + moved - Vector2::new(pose.x, pose.y) };
-        let gradient = Vector3::new(axis.x, axis.y, axis.dot(&planar::turn(arm)));
+        let gradient = Vector3::new(axis.x, axis.y, axis.dot(&planar::perpendicular(arm)));
         let bend = if linear { 0.0 } else { -axis.dot(&arm) };
         Deflection { w: moved.dot(&axis), gradient, bend, slope: self.side * pose.z }
     }
@@ -93,17 +93,17 @@ impl Flank {
 }
 
 /// How the two ends of a stretch follow from the ends of the segment that it lies on; none: they are those ends.
-pub(super) type Weights = Option<Box<Matrix4<f64>>>;
+pub(super) type EndWeights = Option<Box<Matrix4<f64>>>;
 
 /// (w₁, φ₁, w₂, φ₂) of a stretch from those of its segment.
 #[inline]
-pub(super) fn onto(weights: &Weights, ends: Vector4<f64>) -> Vector4<f64> {
+pub(super) fn onto(weights: &EndWeights, ends: Vector4<f64>) -> Vector4<f64> {
     weights.as_ref().map_or(ends, |weights| **weights * ends)
 }
 
 /// What changes with the ends of a segment where something changes by `first` with those of a stretch on it.
 #[inline]
-pub(super) fn back(weights: &Weights, first: Vector4<f64>) -> Vector4<f64> {
+pub(super) fn back(weights: &EndWeights, first: Vector4<f64>) -> Vector4<f64> {
     weights.as_ref().map_or(first, |weights| weights.tr_mul(&first))
 }
 
@@ -130,7 +130,7 @@ impl<'a> Walk<'a> {
 
     #[inline]
     fn at(&self, station: usize) -> Deflection {
-        self.frame.seen(&self.side.stations[station].point, self.q, self.linear)
+        self.frame.deflection(&self.side.stations[station].point, self.q, self.linear)
     }
 
     /// The two ends of a segment; segments come in ascending order.

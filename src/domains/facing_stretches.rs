@@ -5,9 +5,9 @@
 //! work-equivalent to a pressure along that cubic put the bodies exactly where a linear beam under the pressure has them. What is
 //! left is the shape within a segment, p·s²·(h − s)²/(24·EI), whose share in the deflection falls with the fourth power of h.
 
-use super::drawn::{Drawing, Station};
-use super::facing::Facing;
-use super::facing_side::{Flank, Weights};
+use super::drawn::{Station, StructureView};
+use super::facing::FacingStretch;
+use super::facing_side::{EndWeights, Flank};
 use super::quadrature::{hermite, hermite_slope};
 use crate::multibody::BodyId;
 use crate::structure::{BeamGap, NodeId, Structure};
@@ -69,7 +69,7 @@ impl<'d> BeamRows<'d> {
 
     /// The stations of a side of a gap, from one node to another: those of the beams along it, or its two ends where no beam
     /// lies there or none bends.
-    pub(super) fn side(&self, drawing: &Drawing<'_, '_>, gap: &BeamGap, nodes: [NodeId; 2]) -> Flank {
+    pub(super) fn side(&self, drawing: &StructureView<'_, '_>, gap: &BeamGap, nodes: [NodeId; 2]) -> Flank {
         let [start, end] = nodes.map(|node| (drawing.point)(node));
         let ends = || vec![Station { at: 0.0, point: start }, Station { at: gap.length, point: end }];
         let cut = !drawing.chord && !drawing.stations.is_empty();
@@ -104,12 +104,12 @@ impl<'d> BeamRows<'d> {
 
 /// A part of the gap over which both sides are single cubics.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Stretch {
-    pub(super) facing: Facing,
+pub(super) struct CubicStretch {
+    pub(super) facing: FacingStretch,
     /// The segments of both sides.
     pub(super) segments: [usize; 2],
     /// From the ends of the segments to those of the stretch.
-    pub(super) weights: [Weights; 2],
+    pub(super) weights: [EndWeights; 2],
 }
 
 /// A part of a gap over which both sides are single cubics.
@@ -119,7 +119,7 @@ pub(super) struct Interval {
     /// The segment of each side that it lies on.
     pub(super) segments: [usize; 2],
     /// How its ends follow from those of the segments.
-    pub(super) weights: [Weights; 2],
+    pub(super) weights: [EndWeights; 2],
 }
 
 /// The stretches of a gap between two sides, from its start to its end.
@@ -145,7 +145,7 @@ pub(super) fn stretches(sides: &[Flank; 2]) -> Vec<Interval> {
 }
 
 /// How the ends of a stretch follow from those of its segment.
-fn on(segment: [f64; 2], stretch: [f64; 2], close: f64) -> Weights {
+fn on(segment: [f64; 2], stretch: [f64; 2], close: f64) -> EndWeights {
     if (0..2).all(|i| (segment[i] - stretch[i]).abs() <= close) {
         return None;
     }

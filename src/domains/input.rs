@@ -1,6 +1,6 @@
 //! What a source gives that is no voltage: forces at points, heat into beams, the motion of the frame.
 
-use super::approach::Point;
+use super::approach::MaterialPoint;
 
 /// A quantity that is given to a mechanism beside its voltages.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -8,7 +8,7 @@ pub enum Input {
     /// A force along global x (0) or y (1) [N], or a moment about z (2) [N·m], on a point.
     Force {
         /// Where it acts.
-        point: Point,
+        point: MaterialPoint,
         /// Which it is.
         direction: usize,
     },

@@ -1,11 +1,11 @@
 //! What acts on a mechanism beside voltages: forces and moments at points, heat into beams, and the motion of the frame that
 //! it is mounted on ([`super::moving_frame`]).
 
-use super::domain::{At, Domain};
+use super::domain::{Configuration, Domain};
 use super::drive::Drive;
 pub use super::input::Input;
-use super::load::Load;
-pub use super::moving_frame::Frame;
+use super::load::DeadLoad;
+pub use super::moving_frame::FrameMotion;
 use super::moving_frame::InFrame;
 use super::system::System;
 use crate::multibody::BlockMatrix;
@@ -14,12 +14,12 @@ use nalgebra::Vector2;
 
 impl System {
     /// Motion of the frame in a drive; none where no input moves it.
-    pub fn frame(&self, drive: &Drive) -> Option<Frame> {
+    pub fn frame(&self, drive: &Drive) -> Option<FrameMotion> {
         let inputs = &self.electrics.inputs;
         if !inputs.iter().any(Input::moves_frame) {
             return None;
         }
-        let mut frame = Frame { turning: drive.turning, ..Frame::default() };
+        let mut frame = FrameMotion { turning: drive.turning, ..FrameMotion::default() };
         for (input, value) in inputs.iter().zip(&drive.inputs) {
             match input {
                 Input::Acceleration { axis } => frame.acceleration[*axis] += value,
@@ -42,7 +42,7 @@ impl System {
     }
 
     /// `r +=` the share of inputs in the residual.
-    pub(super) fn add_input_forces(&self, at: At<'_>, drive: &Drive, r: &mut [Pose]) {
+    pub(super) fn add_input_forces(&self, at: Configuration<'_>, drive: &Drive, r: &mut [Pose]) {
         for (load, size) in self.given_loads(&drive.inputs) {
             load.add_force(at, size, r);
         }
@@ -53,7 +53,7 @@ impl System {
     }
 
     /// `r +=` the change of that share with a change of the drive.
-    pub(super) fn add_input_change(&self, at: At<'_>, drive: &Drive, change: &Drive, r: &mut [Pose]) {
+    pub(super) fn add_input_change(&self, at: Configuration<'_>, drive: &Drive, change: &Drive, r: &mut [Pose]) {
         for ((load, change), (_, size)) in self.given_loads(&change.inputs).zip(self.given_loads(&drive.inputs)) {
             load.add_force_change(at, size, change, r);
         }
@@ -63,7 +63,7 @@ impl System {
     }
 
     /// `tangent +=` the share of inputs in ∂r/∂q but for the skew one of Euler's force.
-    pub(super) fn add_input_tangent(&self, at: At<'_>, drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+    pub(super) fn add_input_tangent(&self, at: Configuration<'_>, drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
         for (load, size) in self.given_loads(&drive.inputs) {
             load.add_tangent(at, size, &self.model.pattern, tangent);
         }
@@ -73,18 +73,18 @@ impl System {
     }
 
     /// Their share in the potential [J] but for Euler's force, which has none.
-    pub(super) fn input_energy(&self, at: At<'_>, drive: &Drive) -> f64 {
+    pub(super) fn input_energy(&self, at: Configuration<'_>, drive: &Drive) -> f64 {
         let given: f64 = self.given_loads(&drive.inputs).map(|(load, size)| load.energy(at, size)).sum();
         let pushed: f64 = at.q.iter().zip(&drive.push).map(|(q, push)| q.dot(push)).sum();
         given - pushed + self.frame(drive).map_or(0.0, |frame| self.in_frame().energy(at, frame))
     }
 
     /// The forces and moments among the inputs: loads of one unit, with their sizes [N, N·m].
-    pub(super) fn given_loads<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = (Load, f64)> + 'a {
+    pub(super) fn given_loads<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = (DeadLoad, f64)> + 'a {
         let unit = |point, direction| match direction {
-            0 => Load { point, force: Vector2::x(), moment: 0.0 },
-            1 => Load { point, force: Vector2::y(), moment: 0.0 },
-            _ => Load { point, force: Vector2::zeros(), moment: 1.0 },
+            0 => DeadLoad { point, force: Vector2::x(), moment: 0.0 },
+            1 => DeadLoad { point, force: Vector2::y(), moment: 0.0 },
+            _ => DeadLoad { point, force: Vector2::zeros(), moment: 1.0 },
         };
         self.electrics.inputs.iter().zip(values).filter_map(move |(input, value)| match *input {
             Input::Force { point, direction } => Some((unit(point, direction), *value)),

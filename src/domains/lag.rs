@@ -66,21 +66,21 @@ impl Lag {
 }
 
 /// Time constants whose exponentials are kept.
-const KEPT: usize = 4;
+const CACHED_LAGS: usize = 4;
 
 /// The lags of heaters at one time: those of the last few time constants are not computed again.
 #[derive(Debug, Clone)]
 pub struct Lags {
     /// Time after the start [s].
     pub t: f64,
-    kept: [Option<Lag>; KEPT],
+    kept: [Option<Lag>; CACHED_LAGS],
     next: usize,
 }
 
 impl Lags {
     /// At time `t` after the start [s].
     pub fn new(t: f64) -> Self {
-        Self { t, kept: [None; KEPT], next: 0 }
+        Self { t, kept: [None; CACHED_LAGS], next: 0 }
     }
 
     /// Of a time constant [s], which is not zero.
@@ -93,7 +93,7 @@ impl Lags {
         }
         let lag = Lag::new(time_constant, self.t);
         self.kept[self.next] = Some(lag);
-        self.next = (self.next + 1) % KEPT;
+        self.next = (self.next + 1) % CACHED_LAGS;
         lag
     }
 }

@@ -9,7 +9,7 @@
 //! analysis and steady state distributions for Markov chains", Operations Research 33 (1985), for what it does to rounding.
 
 use crate::multibody::Pattern;
-use crate::multibody::layout::Layout;
+use crate::multibody::layout::EliminationLayout;
 use std::sync::Arc;
 
 /// Nodes between two looks at the budget.
@@ -46,8 +46,8 @@ impl Laplacian {
             }
         }
         let grounded: Vec<usize> = (0..size).filter(|k| to_ground[*k] > 0.0).collect();
-        let layout = Layout::of_elimination(size, edges.clone(), grounded);
-        let Layout { order, place: turn, pattern, .. } = &*layout;
+        let layout = EliminationLayout::of_elimination(size, edges.clone(), grounded);
+        let EliminationLayout { order, place: turn, pattern, .. } = &*layout;
         let mut between = vec![0.0; pattern.off_blocks()];
         for ((a, b), g) in edges.into_iter().map(|(a, b)| (turn[a], turn[b])).zip(conductances) {
             between[pattern.block(a.max(b), a.min(b))?] += g;

@@ -35,7 +35,7 @@ impl LossDerivatives {
     }
 
     /// True where they are not zero.
-    pub fn acts(&self) -> bool {
+    pub fn is_nonzero(&self) -> bool {
         self.acts
     }
 

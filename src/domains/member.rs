@@ -1,10 +1,10 @@
 //! The register of domains: a mechanism's members of them stand in one list, and each call goes to the member's own law.
 
-use super::approach::{Approach, Point};
+use super::approach::{Approach, MaterialPoint};
 use super::contact_loss::Loss;
-use super::domain::{At, Chord, Domain, Law};
-use super::drawn::{Drawing, Drawn, Laid};
-use super::element::Element;
+use super::domain::{Chord, Configuration, Domain, Law};
+use super::drawn::{FromStructure, PlacedMember, StructureView};
+use super::element::DomainElement;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Damper, Pattern};
 use nalgebra::Vector2;
@@ -32,12 +32,12 @@ macro_rules! domains {
         }
 
         impl Member {
-            const ELEMENTS: &'static [Option<Element>] = &[$(<$law as Drawn>::ELEMENT),+];
+            const ELEMENTS: &'static [Option<DomainElement>] = &[$(<$law as FromStructure>::ELEMENT),+];
 
             /// The members of a drawing, domain by domain: those that are gaps first.
-            pub fn lay<'a>(drawing: &Drawing<'a, '_>) -> Vec<Laid<'a, Self>> {
-                let mut all: Vec<Laid<'a, Self>> = Vec::new();
-                $(<$law>::lay(drawing, |name, voltage, law| all.push(Laid { name, voltage, member: law.into() }));)+
+            pub fn lay<'a>(drawing: &StructureView<'a, '_>) -> Vec<PlacedMember<'a, Self>> {
+                let mut all: Vec<PlacedMember<'a, Self>> = Vec::new();
+                $(<$law>::lay(drawing, |name, voltage, law| all.push(PlacedMember { name, voltage, member: law.into() }));)+
                 all.sort_by_key(|laid| !laid.member.is_gap());
                 all
             }
@@ -49,7 +49,7 @@ macro_rules! domains {
 
             /// The same with its points where `to` takes them.
             #[must_use]
-            pub fn moved(self, to: &dyn Fn(Point) -> Point) -> Self {
+            pub fn moved(self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self {
                 match self { $(Self::$kind(law) => law.moved(to).into(),)+ }
             }
         }
@@ -64,7 +64,7 @@ domains! {
 }
 
 /// The elements that domains have of their own, in the order of the register.
-pub fn elements() -> impl Iterator<Item = &'static Element> {
+pub fn elements() -> impl Iterator<Item = &'static DomainElement> {
     Member::ELEMENTS.iter().flatten()
 }
 
@@ -84,24 +84,24 @@ impl Domain for Member {
     }
 
     #[inline]
-    fn add_force(&self, at: At<'_>, given: f64, r: &mut [Pose]) {
+    fn add_force(&self, at: Configuration<'_>, given: f64, r: &mut [Pose]) {
         each!(self, m => m.add_force(at, given, r));
     }
 
     #[inline]
-    fn add_force_change(&self, at: At<'_>, given: f64, change: f64, r: &mut [Pose]) {
+    fn add_force_change(&self, at: Configuration<'_>, given: f64, change: f64, r: &mut [Pose]) {
         each!(self, m => m.add_force_change(at, given, change, r));
     }
 
     #[inline]
-    fn add_tangent(&self, at: At<'_>, given: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, given: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
         each!(self, m => m.add_tangent(at, given, pattern, tangent));
     }
 
     #[inline]
     fn add_force_and_tangent(
         &self,
-        at: At<'_>,
+        at: Configuration<'_>,
         given: f64,
         pattern: &Pattern,
         sums: (&mut [Pose], &mut BlockMatrix<f64, 3>),
@@ -110,47 +110,47 @@ impl Domain for Member {
     }
 
     #[inline]
-    fn acts(&self, given: f64) -> bool {
-        each!(self, m => m.acts(given))
+    fn is_active(&self, given: f64) -> bool {
+        each!(self, m => m.is_active(given))
     }
 
-    fn levers(&self, at: At<'_>, given: f64, lever: impl FnMut(Point, Vector2<f64>)) {
-        each!(self, m => m.levers(at, given, lever));
+    fn load_points(&self, at: Configuration<'_>, given: f64, lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
+        each!(self, m => m.load_points(at, given, lever));
     }
 
-    fn energy(&self, at: At<'_>, given: f64) -> f64 {
+    fn energy(&self, at: Configuration<'_>, given: f64) -> f64 {
         each!(self, m => m.energy(at, given))
     }
 
-    fn capacitance(&self, at: At<'_>) -> f64 {
+    fn capacitance(&self, at: Configuration<'_>) -> f64 {
         each!(self, m => m.capacitance(at))
     }
 
-    fn capacitance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn capacitance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         each!(self, m => m.capacitance_change(at, dq))
     }
 
-    fn pull(&self, at: At<'_>) -> f64 {
+    fn pull(&self, at: Configuration<'_>) -> f64 {
         each!(self, m => m.pull(at))
     }
 
-    fn pull_and_change(&self, at: At<'_>, dq: &[Pose]) -> (f64, f64) {
+    fn pull_and_change(&self, at: Configuration<'_>, dq: &[Pose]) -> (f64, f64) {
         each!(self, m => m.pull_and_change(at, dq))
     }
 
-    fn closes(&self) -> bool {
-        each!(self, m => m.closes())
+    fn is_electrostatic(&self) -> bool {
+        each!(self, m => m.is_electrostatic())
     }
 
-    fn add_shape_force(&self, at: At<'_>, given: f64, r: &mut [Pose]) -> f64 {
+    fn add_shape_force(&self, at: Configuration<'_>, given: f64, r: &mut [Pose]) -> f64 {
         each!(self, m => m.add_shape_force(at, given, r))
     }
 
-    fn distance(&self, at: At<'_>) -> f64 {
+    fn distance(&self, at: Configuration<'_>) -> f64 {
         each!(self, m => m.distance(at))
     }
 
-    fn distance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn distance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         each!(self, m => m.distance_change(at, dq))
     }
 
@@ -158,19 +158,19 @@ impl Domain for Member {
         each!(self, m => m.touching())
     }
 
-    fn room(&self, at: At<'_>) -> f64 {
-        each!(self, m => m.room(at))
+    fn clearance(&self, at: Configuration<'_>) -> f64 {
+        each!(self, m => m.clearance(at))
     }
 
-    fn bearing(&self, at: At<'_>) -> f64 {
+    fn bearing(&self, at: Configuration<'_>) -> f64 {
         each!(self, m => m.bearing(at))
     }
 
-    fn contact_energy(&self, at: At<'_>) -> f64 {
+    fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         each!(self, m => m.contact_energy(at))
     }
 
-    fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn contact_work(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         each!(self, m => m.contact_work(at, dq))
     }
 
@@ -182,19 +182,19 @@ impl Domain for Member {
         each!(self, m => m.set_loss(loss));
     }
 
-    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+    fn add_closing(&self, at: Configuration<'_>, r: &mut [Pose]) -> f64 {
         each!(self, m => m.add_closing(at, r))
     }
 
     #[inline]
-    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+    fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
         each!(self, m => m.add_loss(at, rate, r));
     }
 
     #[inline]
     fn add_loss_tangent(
         &self,
-        at: At<'_>,
+        at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
         stiffness: &mut BlockMatrix<f64, 3>,

@@ -8,14 +8,14 @@
 //! (Goldstein, "Classical Mechanics" 1980, §4.10): Euler's, the centrifugal and Coriolis' force. All but the last depend on
 //! the place alone and belong to the residual here; Coriolis' force is that of [`crate::solve::time::gyration`].
 
-use super::domain::{At, Domain};
+use super::domain::{Configuration, Domain};
 use crate::multibody::planar::{self, Pose};
 use crate::multibody::{BlockMatrix, Body, BodyId, Pattern};
 use nalgebra::Vector2;
 
 /// Motion of the frame, or a change of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Frame {
+pub struct FrameMotion {
     /// Acceleration of the origin [m/s²].
     pub acceleration: Vector2<f64>,
     /// Rate about z [rad/s].
@@ -30,10 +30,10 @@ pub struct InFrame<'a>(pub &'a [Body]);
 
 impl InFrame<'_> {
     /// `r += m·(a + Ω̇ e×r − outward·r)` and the moment J·Ω̇.
-    fn add(&self, q: &[Pose], frame: &Frame, outward: f64, r: &mut [Pose]) {
+    fn add(&self, q: &[Pose], frame: &FrameMotion, outward: f64, r: &mut [Pose]) {
         for ((r, q), body) in r.iter_mut().zip(q).zip(self.0) {
             let place = body.center + q.xy();
-            let push = frame.acceleration + planar::turn(place) * frame.turning - place * outward;
+            let push = frame.acceleration + planar::perpendicular(place) * frame.turning - place * outward;
             r.x += body.mass * push.x;
             r.y += body.mass * push.y;
             r.z += body.inertia * frame.turning;
@@ -42,21 +42,21 @@ impl InFrame<'_> {
 }
 
 impl Domain for InFrame<'_> {
-    type Given = Frame;
+    type Given = FrameMotion;
 
     fn bodies(&self, see: impl FnMut(BodyId)) {
         (0..self.0.len()).map(BodyId::Free).for_each(see);
     }
 
-    fn add_force(&self, at: At<'_>, frame: Frame, r: &mut [Pose]) {
+    fn add_force(&self, at: Configuration<'_>, frame: FrameMotion, r: &mut [Pose]) {
         self.add(at.q, &frame, frame.rate * frame.rate, r);
     }
 
-    fn add_force_change(&self, at: At<'_>, frame: Frame, change: Frame, r: &mut [Pose]) {
+    fn add_force_change(&self, at: Configuration<'_>, frame: FrameMotion, change: FrameMotion, r: &mut [Pose]) {
         self.add(at.q, &change, 2.0 * frame.rate * change.rate, r);
     }
 
-    fn energy(&self, at: At<'_>, frame: Frame) -> f64 {
+    fn energy(&self, at: Configuration<'_>, frame: FrameMotion) -> f64 {
         let of = |(q, body): (&Pose, &Body)| {
             let outward = 0.5 * (q.xy().norm_squared() + 2.0 * body.center.dot(&q.xy()));
             body.mass * (frame.acceleration.dot(&q.xy()) - frame.rate * frame.rate * outward)
@@ -65,7 +65,7 @@ impl Domain for InFrame<'_> {
     }
 
     /// But for the skew share of Euler's force.
-    fn add_tangent(&self, _: At<'_>, frame: Frame, _: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, _: Configuration<'_>, frame: FrameMotion, _: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
         if frame.rate == 0.0 {
             return;
         }

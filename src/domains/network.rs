@@ -12,13 +12,13 @@ mod known;
 
 use super::laplacian::Laplacian;
 use crate::sets::Sets;
-use known::Known;
+use known::KnownPotentials;
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
 /// A network by node indices. Sources come in the order of the source vector.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Circuit {
+pub struct ElectricalNetwork {
     /// Number of nodes.
     pub nodes: usize,
     /// Resistors (a, b, R [Ω]).
@@ -45,18 +45,18 @@ pub enum CircuitError {
     /// Sources that contradict each other: a loop of ideal sources, or one across ground.
     #[error("voltage source or port {source_index} closes a loop of ideal sources")]
     SourceLoop {
-        /// Index in [`Circuit::sources`].
+        /// Index in [`ElectricalNetwork::sources`].
         source_index: usize,
     },
     /// Conductances whose sums or quotients are beyond what doubles hold.
     #[error("conductances are too large or too small to be computed with; the largest is that of resistor {resistor}")]
     Range {
-        /// Index of the smallest resistance in [`Circuit::resistors`].
+        /// Index of the smallest resistance in [`ElectricalNetwork::resistors`].
         resistor: usize,
     },
 }
 
-impl Circuit {
+impl ElectricalNetwork {
     /// Solves the network. A part that nothing ties to ground has its first node at 0 V.
     ///
     /// # Errors
@@ -77,7 +77,7 @@ impl Circuit {
             crate::budget::check();
             part.join(a, b);
         }
-        let known = Known::new((self.nodes, &self.grounds), &self.sources, &mut part, ground);
+        let known = KnownPotentials::new((self.nodes, &self.grounds), &self.sources, &mut part, ground);
         let count = self.sources.len();
         let free = known.free;
         // right-hand sides with their solutions, potentials with what sources fix of them, and conductances
@@ -119,7 +119,7 @@ impl Circuit {
     }
 
     /// Current into the network at the plus of each source: what leaves the nodes that hang on it.
-    fn conductance(&self, known: &Known, potential: &DMatrix<f64>) -> DMatrix<f64> {
+    fn conductance(&self, known: &KnownPotentials, potential: &DMatrix<f64>) -> DMatrix<f64> {
         let count = self.sources.len();
         // what leaves each node that a source touches
         let mut place = vec![usize::MAX; self.nodes];
@@ -166,7 +166,7 @@ mod tests {
     /// A divider of 1 kΩ and 3 kΩ: a quarter of the drop, 0.25 mS into the port; a floating electrode is at 0 V.
     #[test]
     fn divider() {
-        let circuit = Circuit {
+        let circuit = ElectricalNetwork {
             nodes: 4,
             resistors: vec![(0, 1, 1e3), (1, 2, 3e3)],
             sources: vec![(0, Some(2))],
@@ -182,7 +182,7 @@ mod tests {
     /// by modified nodal analysis (Ho, Ruehli, Brennan 1975) with a dense matrix.
     #[test]
     fn like_modified_nodal_analysis() {
-        let circuit = Circuit {
+        let circuit = ElectricalNetwork {
             nodes: 9,
             resistors: vec![
                 (1, 2, 1e3),
@@ -231,7 +231,7 @@ mod tests {
         let n = 100_000;
         let mut resistors: Vec<(usize, usize, f64)> = (0..n - 1).map(|k| (k, k + 1, 1e3)).collect();
         resistors.extend((1..n).map(|k| (k, n, 1e6)));
-        let circuit = Circuit { nodes: n + 1, resistors, sources: vec![(0, Some(n))], grounds: vec![n] };
+        let circuit = ElectricalNetwork { nodes: n + 1, resistors, sources: vec![(0, Some(n))], grounds: vec![n] };
         let found = circuit.solve().unwrap();
         let characteristic = 500.0 + (500.0f64.powi(2) + 1e9).sqrt();
         assert!((found.conductance[(0, 0)] * characteristic - 1.0).abs() < 1e-12);
@@ -248,7 +248,7 @@ mod tests {
         let along = (0..side).flat_map(|y| (0..side - 1).map(move |x| (at(x, y), at(x + 1, y), 1.0)));
         let across = (0..side - 1).flat_map(|y| (0..side).map(move |x| (at(x, y), at(x, y + 1), 1.0)));
         let corner = at(side - 1, side - 1);
-        let circuit = Circuit {
+        let circuit = ElectricalNetwork {
             nodes: side * side,
             resistors: along.chain(across).collect(),
             sources: vec![(0, Some(corner))],
@@ -266,8 +266,12 @@ mod tests {
     /// Two ideal sources in parallel contradict each other and are refused by index.
     #[test]
     fn parallel_sources_are_refused() {
-        let circuit =
-            Circuit { nodes: 2, resistors: vec![], sources: vec![(0, Some(1)), (1, Some(0))], grounds: vec![1] };
+        let circuit = ElectricalNetwork {
+            nodes: 2,
+            resistors: vec![],
+            sources: vec![(0, Some(1)), (1, Some(0))],
+            grounds: vec![1],
+        };
         assert_eq!(circuit.solve(), Err(CircuitError::SourceLoop { source_index: 1 }));
     }
 
@@ -275,7 +279,7 @@ mod tests {
     #[test]
     fn conductances_out_of_range_are_told() {
         for resistors in [vec![(0, 1, 1.0), (0, 1, 1e-310)], vec![(0, 1, 1.01e-308), (0, 1, 1e-308)]] {
-            let circuit = Circuit { nodes: 3, resistors, sources: vec![], grounds: vec![1] };
+            let circuit = ElectricalNetwork { nodes: 3, resistors, sources: vec![], grounds: vec![1] };
             assert_eq!(circuit.solve(), Err(CircuitError::Range { resistor: 1 }));
         }
     }

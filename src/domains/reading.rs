@@ -56,8 +56,8 @@ impl System {
 
     /// What is left of a gap until it could not be closed further [m]: its distance; of a stop the way and, beyond it, what a touch
     /// takes.
-    pub fn room(&self, gap: usize, q: &[Pose]) -> f64 {
-        self.members[gap].room(self.at(q))
+    pub fn clearance(&self, gap: usize, q: &[Pose]) -> f64 {
+        self.members[gap].clearance(self.at(q))
     }
 
     /// True when a gap is so far closed that its contact force acts.

@@ -4,7 +4,7 @@
 //! direction. Without beams the first gap that changes at least half as much as any closes, and without gaps the first joint with half of the
 //! largest strain lengthens or turns to the left.
 
-use super::beam_line::Side;
+use super::beam_line::BeamSide;
 use super::domain::Domain;
 use super::system::System;
 use crate::multibody::planar::Pose;
@@ -30,12 +30,13 @@ impl System {
 
     /// The sign with which a `motion` from `q` goes to the side of the rule, and where `sign`·`motion` goes, in words.
     pub fn side(&self, q: &[Pose], motion: &[Pose], sign: f64) -> (f64, String) {
-        let bent: Vec<(f64, Side)> = self.beams.iter().map(|beam| beam.bending(q, motion, self.model.linear)).collect();
+        let bent: Vec<(f64, BeamSide)> =
+            self.beams.iter().map(|beam| beam.bending(q, motion, self.model.linear)).collect();
         let most = bent.iter().map(|(energy, _)| *energy).fold(0.0, f64::max);
         if most > 0.0
             && let Some(k) = bent.iter().position(|(energy, _)| *energy >= DECIDES * most)
         {
-            let left = if bent[k].1 == Side::Left { 1.0 } else { -1.0 };
+            let left = if bent[k].1 == BeamSide::Left { 1.0 } else { -1.0 };
             let side = if left * sign > 0.0 { "left" } else { "right" };
             return (left, format!("{} to the {side}", self.beams[k].name));
         }

@@ -15,14 +15,14 @@ pub const SOFT: f64 = 1e-9;
 
 /// How a stop bears.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Stop {
+pub enum StopKind {
     /// On an area [m²], by the law of contact.
     Rigid(f64),
     /// As a spring [N/m].
     Elastic(f64),
 }
 
-impl Stop {
+impl StopKind {
     /// Way that is left where the law ends [m], negative: how far a rigid stop may be pressed.
     pub fn least(&self) -> f64 {
         match self {
@@ -77,7 +77,7 @@ impl Stop {
 }
 
 /// What rates add to the force against the approach `u` [m] that changes at `rate` [m/s], and its derivatives with both.
-pub(super) fn lost(stop: &Stop, loss: &Loss, ways: &[Option<f64>; 2], (u, rate): (f64, f64)) -> (f64, f64, f64) {
+pub(super) fn lost(stop: &StopKind, loss: &Loss, ways: &[Option<f64>; 2], (u, rate): (f64, f64)) -> (f64, f64, f64) {
     let side = |way: Option<f64>, u: f64, closing: f64| {
         let (force, slope) = way.map_or((0.0, 0.0), |w| stop.force(w - u));
         let (added, by_rate) = loss.fraction(closing);
@@ -100,17 +100,17 @@ mod tests {
     /// An elastic stop gives k·(p − w) far beyond w, a rigid one p = 1 TPa·s⁴ with s = p/50 nm; nothing before.
     #[test]
     fn follows_its_law() {
-        let (f, slope) = Stop::Elastic(1e3).force(-1e-6);
+        let (f, slope) = StopKind::Elastic(1e3).force(-1e-6);
         assert!((f / (1e3 * (1e-6 - 1e-9)) - 1.0).abs() < 2e-6 && (slope / -1e3 - 1.0).abs() < 2e-6);
-        assert!((Stop::Rigid(1e-10).force(-5e-9).0 / (1e-10 * 1e12 * 1e-4) - 1.0).abs() < 1e-9);
-        assert_eq!(Stop::Elastic(1e3).force(0.0), (0.0, 0.0));
-        assert!((Stop::Rigid(1e-10).least() + 25e-9).abs() < 1e-15);
+        assert!((StopKind::Rigid(1e-10).force(-5e-9).0 / (1e-10 * 1e12 * 1e-4) - 1.0).abs() < 1e-9);
+        assert_eq!(StopKind::Elastic(1e3).force(0.0), (0.0, 0.0));
+        assert!((StopKind::Rigid(1e-10).least() + 25e-9).abs() < 1e-15);
     }
 
     /// Energy's slope is the force and the force's slope the stiffness: central differences.
     #[test]
     fn one_potential() {
-        for stop in [Stop::Elastic(2e3), Stop::Rigid(1e-10)] {
+        for stop in [StopKind::Elastic(2e3), StopKind::Rigid(1e-10)] {
             for p in [2e-11, 4e-10, 3e-9, 20e-9] {
                 let e = 1e-4 * p;
                 let slope = (stop.energy(-p - e) - stop.energy(-p + e)) / (2.0 * e);

@@ -1,12 +1,12 @@
 //! A stop between two bodies, or a body and the ground, without a field: the law of [`super::stop`] along one approach.
 
-use super::approach::{Approach, Point};
+use super::approach::{Approach, MaterialPoint};
 use super::contact::TOUCH;
 use super::contact_loss::Loss;
-use super::domain::{At, Chord, Domain, Law};
-use super::drawn::{Drawing, Drawn};
+use super::domain::{Chord, Configuration, Domain, Law};
+use super::drawn::{FromStructure, StructureView};
 use super::quotient::{self, quotient};
-use super::stop::{Stop, lost, nearer};
+use super::stop::{StopKind, lost, nearer};
 use crate::multibody::model::locate;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
@@ -21,25 +21,25 @@ pub struct StopPair {
     /// Way along the approach and against it until they touch [m].
     pub ways: [Option<f64>; 2],
     /// How it bears.
-    pub stop: Stop,
+    pub stop: StopKind,
     /// What an impact loses.
     pub loss: Loss,
 }
 
-impl Drawn for StopPair {
-    fn lay<'a>(drawing: &Drawing<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
-        let ground = Point { body: BodyId::Ground, arm: Vector2::zeros() };
+impl FromStructure for StopPair {
+    fn lay<'a>(drawing: &StructureView<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
+        let ground = MaterialPoint { body: BodyId::Ground, arm: Vector2::zeros() };
         for stop in &drawing.structure.stops {
             let b = stop.b.map_or(ground, drawing.point);
             let axis = Vector2::new(stop.axis[0], stop.axis[1]);
             let approach = Approach { a: (drawing.point)(stop.a), b, axis };
-            let law = stop.stiffness.map_or(Stop::Rigid(stop.area), Stop::Elastic);
+            let law = stop.stiffness.map_or(StopKind::Rigid(stop.area), StopKind::Elastic);
             let loss = Loss::new(&stop.impact);
             put(&stop.name, None, Self { approach, ways: stop.ways, stop: law, loss });
         }
     }
 
-    fn moved(self, to: &dyn Fn(Point) -> Point) -> Self {
+    fn moved(self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self {
         Self { approach: self.approach.moved(to), ..self }
     }
 }
@@ -51,7 +51,7 @@ impl Domain for StopPair {
         self.approach.bodies().into_iter().for_each(see);
     }
 
-    fn add_force(&self, at: At<'_>, _: f64, r: &mut [Pose]) {
+    fn add_force(&self, at: Configuration<'_>, _: f64, r: &mut [Pose]) {
         let m = self.approach.measure(at.q, at.linear);
         let first = self.stop.bearing(&self.ways, m.value).0;
         if first != 0.0 {
@@ -59,9 +59,9 @@ impl Domain for StopPair {
         }
     }
 
-    fn add_force_change(&self, _: At<'_>, _: f64, _: f64, _: &mut [Pose]) {}
+    fn add_force_change(&self, _: Configuration<'_>, _: f64, _: f64, _: &mut [Pose]) {}
 
-    fn add_tangent(&self, at: At<'_>, _: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, _: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
         let m = self.approach.measure(at.q, at.linear);
         let (first, second) = self.stop.bearing(&self.ways, m.value);
         if first != 0.0 {
@@ -70,16 +70,16 @@ impl Domain for StopPair {
         }
     }
 
-    fn levers(&self, at: At<'_>, _: f64, lever: impl FnMut(Point, Vector2<f64>)) {
-        self.approach.levers(self.stop.bearing(&self.ways, self.approach.value(at.q, true)).0, lever);
+    fn load_points(&self, at: Configuration<'_>, _: f64, lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
+        self.approach.load_points(self.stop.bearing(&self.ways, self.approach.value(at.q, true)).0, lever);
     }
 
     /// The way left to the nearer side.
-    fn distance(&self, at: At<'_>) -> f64 {
+    fn distance(&self, at: Configuration<'_>) -> f64 {
         nearer(&self.ways, self.approach.value(at.q, at.linear)).0
     }
 
-    fn distance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn distance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let slope = nearer(&self.ways, self.approach.value(at.q, at.linear)).1;
         slope * self.approach.change(&self.approach.measure(at.q, at.linear), dq)
     }
@@ -89,21 +89,21 @@ impl Domain for StopPair {
     }
 
     /// The way and, beyond it, what a touch takes.
-    fn room(&self, at: At<'_>) -> f64 {
+    fn clearance(&self, at: Configuration<'_>) -> f64 {
         self.distance(at).max(0.0) + TOUCH
     }
 
-    fn bearing(&self, at: At<'_>) -> f64 {
+    fn bearing(&self, at: Configuration<'_>) -> f64 {
         self.stop.bearing(&self.ways, self.approach.value(at.q, at.linear)).0.abs()
     }
 
-    fn contact_energy(&self, at: At<'_>) -> f64 {
+    fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         let u = self.approach.value(at.q, at.linear);
         let side = |way: Option<f64>, u: f64| way.map_or(0.0, |w| self.stop.energy(w - u));
         side(self.ways[0], u) + side(self.ways[1], -u)
     }
 
-    fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+    fn contact_work(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let force = self.stop.force(self.distance(at)).0;
         if force == 0.0 { 0.0 } else { force * self.distance_change(at, dq) }
     }
@@ -116,14 +116,14 @@ impl Domain for StopPair {
         self.loss = loss;
     }
 
-    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+    fn add_closing(&self, at: Configuration<'_>, r: &mut [Pose]) -> f64 {
         let m = self.approach.measure(at.q, at.linear);
         self.approach.add_force(&m, 1.0, r);
         nearer(&self.ways, m.value).0
     }
 
-    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
-        if self.loss.acts() && self.distance(at) < 0.0 {
+    fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        if self.loss.is_dissipative() && self.distance(at) < 0.0 {
             let m = self.approach.measure(at.q, at.linear);
             let now = (m.value, self.approach.rate(&m, rate));
             self.approach.add_force(&m, lost(&self.stop, &self.loss, &self.ways, now).0, r);
@@ -132,13 +132,13 @@ impl Domain for StopPair {
 
     fn add_loss_tangent(
         &self,
-        at: At<'_>,
+        at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
         stiffness: &mut BlockMatrix<f64, 3>,
         damping: &mut BlockMatrix<f64, 3>,
     ) -> bool {
-        if !self.loss.acts() || self.distance(at) >= 0.0 {
+        if !self.loss.is_dissipative() || self.distance(at) >= 0.0 {
             return false;
         }
         self.approach.add_rate_tangent(

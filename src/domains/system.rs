@@ -2,11 +2,11 @@
 //!
 //! The residual is r(q, drive) = ∂Π/∂q − load, so that statics is r = 0 and dynamics M·q̈ + C·q̇ + r = 0.
 
-use super::approach::Point;
+use super::approach::MaterialPoint;
 use super::beam_line::BeamLine;
-use super::domain::{At, Chord, Domain};
+use super::domain::{Chord, Configuration, Domain};
 use super::drive::{Drive, Electrics};
-use super::load::Load;
+use super::load::DeadLoad;
 use super::member::Member;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model, forces};
@@ -21,7 +21,7 @@ pub struct System {
     /// What acts across gaps and on bodies, in the order of [`Drive::volts`]: gaps first.
     pub members: Vec<Member>,
     /// Dead loads.
-    pub loads: Vec<Load>,
+    pub loads: Vec<DeadLoad>,
     /// Ports, sources, heaters.
     pub electrics: Arc<Electrics>,
     /// What displacements are measured against [m]: the narrowest beam or the smallest gap, whichever is smaller; 1 µm where
@@ -69,7 +69,7 @@ impl System {
     /// has its own way with joints needs only this of a system.
     pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
         let at = self.at(q);
-        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
             gap.add_force(at, volts, r);
         }
         for load in &self.loads {
@@ -81,13 +81,13 @@ impl System {
     /// True where [`System::add_body_forces`] adds anything.
     pub(crate) fn is_acted_on(&self, drive: &Drive) -> bool {
         !(self.loads.is_empty() && drive.inputs.is_empty() && drive.push.is_empty())
-            || self.members.iter().zip(&drive.volts).any(|(gap, volts)| gap.acts(*volts))
+            || self.members.iter().zip(&drive.volts).any(|(gap, volts)| gap.is_active(*volts))
     }
 
     /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
     pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
         let (at, pattern) = (self.at(q), &self.model.pattern);
-        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
             gap.add_tangent(at, volts, pattern, tangent);
         }
         for load in &self.loads {
@@ -119,7 +119,7 @@ impl System {
         tangent.clear();
         forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
         let (at, pattern) = (self.at(q), &self.model.pattern);
-        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
             gap.add_force_and_tangent(at, volts, pattern, (r, tangent));
         }
         for load in &self.loads {
@@ -195,20 +195,20 @@ impl System {
         if !self.model.linear {
             return;
         }
-        let mut lever = |point: Point, force: Vector2<f64>| {
+        let mut lever = |point: MaterialPoint, force: Vector2<f64>| {
             if let BodyId::Free(k) = point.body {
                 tangent.diagonal[k][(2, 2)] += point.arm.dot(&force);
             }
         };
         let at = self.at(q);
         for load in &self.loads {
-            load.levers(at, drive.load, &mut lever);
+            load.load_points(at, drive.load, &mut lever);
         }
         for (load, size) in self.given_loads(&drive.inputs) {
-            load.levers(at, size, &mut lever);
+            load.load_points(at, size, &mut lever);
         }
         for (gap, &volts) in self.members.iter().zip(&drive.volts) {
-            gap.levers(at, volts, &mut lever);
+            gap.load_points(at, volts, &mut lever);
         }
     }
 
@@ -244,7 +244,7 @@ impl System {
         tangent: &mut BlockMatrix<f64, 3>,
     ) {
         let chord = Chord { at: q.map(|q| self.at(q)), h };
-        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
             gap.add_quotient(&chord, volts, &self.model.pattern, r, tangent);
         }
     }
@@ -290,7 +290,7 @@ impl System {
 
     /// A configuration, as domains take it.
     #[inline]
-    pub(super) fn at<'a>(&self, q: &'a [Pose]) -> At<'a> {
-        At { q, linear: self.model.linear }
+    pub(super) fn at<'a>(&self, q: &'a [Pose]) -> Configuration<'a> {
+        Configuration { q, linear: self.model.linear }
     }
 }

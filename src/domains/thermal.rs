@@ -15,7 +15,7 @@
 //! `conduction.rs`.
 
 use super::conduction::Conduction;
-pub use super::conduction::{Heater, NoHeatSink};
+pub use super::conduction::{HeatConductor, NoHeatSink};
 use super::input::Input;
 use super::network::Potentials;
 use nalgebra::DVector;
@@ -24,7 +24,7 @@ use nalgebra::DVector;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Heating {
     /// The heaters.
-    pub heaters: Vec<Heater>,
+    pub heaters: Vec<HeatConductor>,
     sources: usize,
     /// Heater by heater, its symmetric form Q over the sources, row-major [K/V²].
     form: Vec<f64>,
@@ -43,7 +43,7 @@ impl Heating {
     /// # Errors
     /// [`NoHeatSink`].
     pub fn new(
-        mut heaters: Vec<Heater>,
+        mut heaters: Vec<HeatConductor>,
         potentials: &Potentials,
         sources: usize,
         sink: &[bool],
@@ -159,14 +159,14 @@ impl Heating {
 
 #[cfg(test)]
 mod tests {
-    use super::super::network::Circuit;
+    use super::super::network::ElectricalNetwork;
     use super::*;
 
     fn bar(pieces: usize) -> Heating {
         // 200 µm × 2 µm × 2 µm, ρ = 2e-5 Ω·m, k = 41 W/(m·K), cut into equal pieces
         let (rho, k, length, area) = (2e-5, 41.0, 200e-6, 4e-12);
         let l = length / pieces as f64;
-        let heater = |i: usize| Heater {
+        let heater = |i: usize| HeatConductor {
             a: i,
             b: i + 1,
             resistance: rho * l / area,
@@ -178,7 +178,7 @@ mod tests {
             capacity: 1600e3 * l * area,
         };
         let heaters: Vec<_> = (0..pieces).map(heater).collect();
-        let circuit = Circuit {
+        let circuit = ElectricalNetwork {
             nodes: pieces + 1,
             resistors: heaters.iter().map(|h| (h.a, h.b, h.resistance)).collect(),
             sources: vec![(0, Some(pieces))],
@@ -221,12 +221,16 @@ mod tests {
     #[test]
     fn delays_need_no_current() {
         let driven = bar(4);
-        let heaters: Vec<Heater> = driven.heaters.iter().map(|h| Heater { time_constant: 0.0, ..*h }).collect();
+        let heaters: Vec<HeatConductor> =
+            driven.heaters.iter().map(|h| HeatConductor { time_constant: 0.0, ..*h }).collect();
         let sink = [true, false, false, false, true];
-        let none = Circuit { nodes: 5, resistors: Vec::new(), sources: Vec::new(), grounds: Vec::new() };
+        let none = ElectricalNetwork { nodes: 5, resistors: Vec::new(), sources: Vec::new(), grounds: Vec::new() };
         let alone = Heating::new(heaters.clone(), &none.solve().unwrap(), 0, &sink).unwrap();
-        let given: Vec<Heater> =
-            heaters.iter().enumerate().map(|(k, h)| Heater { delayed: k != 0, time_constant: 1e-6, ..*h }).collect();
+        let given: Vec<HeatConductor> = heaters
+            .iter()
+            .enumerate()
+            .map(|(k, h)| HeatConductor { delayed: k != 0, time_constant: 1e-6, ..*h })
+            .collect();
         let beside = Heating::new(given, &none.solve().unwrap(), 0, &sink).unwrap();
         for k in 1..4 {
             let want = driven.heaters[k].time_constant;
@@ -240,7 +244,7 @@ mod tests {
     /// A heater without a path for its heat is refused.
     #[test]
     fn no_sink() {
-        let h = Heater {
+        let h = HeatConductor {
             a: 0,
             b: 1,
             resistance: 1.0,
@@ -251,7 +255,8 @@ mod tests {
             delayed: false,
             capacity: 0.0,
         };
-        let circuit = Circuit { nodes: 2, resistors: vec![(0, 1, 1.0)], sources: vec![(0, Some(1))], grounds: vec![1] };
+        let circuit =
+            ElectricalNetwork { nodes: 2, resistors: vec![(0, 1, 1.0)], sources: vec![(0, Some(1))], grounds: vec![1] };
         let refused = Heating::new(vec![h], &circuit.solve().unwrap(), 1, &[false, false]);
         assert_eq!(refused, Err(NoHeatSink { heater: 0 }));
     }

@@ -7,7 +7,7 @@
 //! energy, and the error of a penetration below a tenth of it. A step that leaps beyond the law of contact is rejected, whatever its error is relative
 //! to where it ends.
 
-use super::{Equations, Motion, Place};
+use super::{DegreeOfFreedom, Equations, Motion};
 use crate::domains::{Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BodyId, Model};
@@ -22,14 +22,14 @@ pub const DIRECTIONS: [&str; 3] = ["along x", "along y", "about z"];
 
 /// What weighs displacements and rates of a system.
 #[derive(Debug, Clone)]
-pub struct Weights {
+pub struct NormWeights {
     /// Of all bodies [kg].
     pub(crate) mass: f64,
     /// Directions that have drag and no mass: body, direction and drag [N·s/m, N·m·s].
     pub(crate) dragged: Vec<(usize, usize, f64)>,
 }
 
-impl Weights {
+impl NormWeights {
     /// Of a model.
     pub fn new(model: &Model) -> Self {
         Self { mass: model.bodies.iter().map(|b| b.mass).sum(), dragged: dragged(model) }
@@ -43,17 +43,17 @@ pub struct Bodies<'a> {
     pub system: &'a System,
     /// Its sources, inputs and heat over time.
     pub ramp: &'a Ramp<'a>,
-    weights: Cow<'a, Weights>,
+    weights: Cow<'a, NormWeights>,
 }
 
 impl<'a> Bodies<'a> {
     /// A system under a ramp.
     pub fn new(system: &'a System, ramp: &'a Ramp<'a>) -> Self {
-        Self { system, ramp, weights: Cow::Owned(Weights::new(&system.model)) }
+        Self { system, ramp, weights: Cow::Owned(NormWeights::new(&system.model)) }
     }
 
     /// The same with weights that have been found before.
-    pub fn weighed(system: &'a System, ramp: &'a Ramp<'a>, weights: &'a Weights) -> Self {
+    pub fn weighed(system: &'a System, ramp: &'a Ramp<'a>, weights: &'a NormWeights) -> Self {
         Self { system, ramp, weights: Cow::Borrowed(weights) }
     }
 }
@@ -70,7 +70,7 @@ impl Equations for Bodies<'_> {
     }
 
     fn share(&self, [before, after]: [&Motion; 2], error: &Motion, h: f64, tol: f64) -> f64 {
-        let (system, Weights { mass, dragged }) = (self.system, &*self.weights);
+        let (system, NormWeights { mass, dragged }) = (self.system, &*self.weights);
         if *mass == 0.0 && dragged.is_empty() {
             return 0.0; // nothing moves in time with neither mass nor drag
         }
@@ -90,7 +90,7 @@ impl Equations for Bodies<'_> {
         if share.is_nan() { f64::INFINITY } else { share }
     }
 
-    fn worst(&self, error: &[Pose]) -> Place {
+    fn worst(&self, error: &[Pose]) -> DegreeOfFreedom {
         let (mut place, mut worst) = ((0, 0), -1.0);
         for (j, e) in error.iter().enumerate() {
             let m = self.system.model.mass(j);
@@ -104,7 +104,7 @@ impl Equations for Bodies<'_> {
         place
     }
 
-    fn named(&self, (body, direction): Place) -> (String, &'static str) {
+    fn named(&self, (body, direction): DegreeOfFreedom) -> (String, &'static str) {
         (self.system.model.bodies[body].name.to_string(), DIRECTIONS[direction])
     }
 }

@@ -17,8 +17,8 @@
 
 use super::anderson::Anderson;
 use super::loads::Loads;
-use super::{Control, Equations, Motion, Place, Stage, Staged, StepFailure, Work};
-use crate::multibody::rcr::{AddedInertia, Linkage, Reduction, Singularity, Task};
+use super::{Control, DegreeOfFreedom, Equations, Motion, SolverCounters, Stage, Staged, StepFailure};
+use crate::multibody::rcr::{AddedInertia, Linkage, Reduction, ReductionTask, Singularity};
 
 /// Most iterations of a stage.
 const MAX_ITERATIONS: usize = 60;
@@ -57,7 +57,7 @@ pub struct Constrained<'a, L> {
     hurried: bool,
     /// Relative error that a stage may have [1].
     exact: f64,
-    work: Work,
+    work: SolverCounters,
     /// Reductions that took the path for singular configurations.
     pub singular: u64,
     /// Largest gap of a loop after a projection [m].
@@ -82,7 +82,7 @@ impl<'a, L: Loads> Constrained<'a, L> {
             zeros,
             hurried: true,
             exact: EQUAL,
-            work: Work::default(),
+            work: SolverCounters::default(),
             singular: 0,
             gap: 0.0,
         }
@@ -191,17 +191,17 @@ impl<L: Loads> Equations for Constrained<'_, L> {
     }
 
     /// The body whose joint has the largest of the coordinates against its size.
-    fn worst(&self, error: &[f64]) -> Place {
+    fn worst(&self, error: &[f64]) -> DegreeOfFreedom {
         let size = |k: usize| (error[k] / self.scale[k]).abs();
         let worst = (0..error.len()).fold(0, |best, k| if size(k) > size(best) { k } else { best });
         (if error.is_empty() { 0 } else { self.linkage.body_of(worst) }, 0)
     }
 
-    fn named(&self, (body, _): Place) -> (String, &'static str) {
+    fn named(&self, (body, _): DegreeOfFreedom) -> (String, &'static str) {
         (self.linkage.names.get(body).cloned().unwrap_or_default(), "in its joint")
     }
 
-    fn work(&mut self) -> Work {
+    fn work(&mut self) -> SolverCounters {
         std::mem::take(&mut self.work)
     }
 }
@@ -211,7 +211,7 @@ impl<L: Loads> Staged for Constrained<'_, L> {
         self.at.q.copy_from_slice(q);
         self.at.v.copy_from_slice(v);
         self.act(t);
-        let met = self.reduction.solve(Task::Accelerations, a);
+        let met = self.reduction.solve(ReductionTask::Accelerations, a);
         self.singular += u64::from(met.is_some());
         self.finite(a)
     }

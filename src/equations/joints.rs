@@ -5,7 +5,7 @@ use crate::domains::System;
 use crate::multibody::Drag;
 use crate::multibody::planar::Pose;
 use crate::multibody::relative::loops::Loops;
-use crate::multibody::relative::{Tree, Unfit};
+use crate::multibody::relative::{Tree, UnsupportedModel};
 
 /// A system on a tree. Immutable; shared by sessions.
 #[derive(Debug, Clone)]
@@ -42,8 +42,8 @@ impl Joints {
     /// The system with everything elastic that is drawn so.
     ///
     /// # Errors
-    /// [`Unfit`].
-    pub fn elastic(system: &System) -> Result<Self, Unfit> {
+    /// [`UnsupportedModel`].
+    pub fn elastic(system: &System) -> Result<Self, UnsupportedModel> {
         Tree::elastic(&system.model).map(|tree| Self::new(system, tree))
     }
 

@@ -36,7 +36,7 @@ use crate::multibody::factor::ZeroPivot;
 
 /// Work done.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Work {
+pub struct SolverCounters {
     /// Accepted steps.
     pub steps: u64,
     /// Rejected steps.
@@ -51,7 +51,7 @@ pub struct Work {
     pub iterations: u64,
 }
 
-impl Work {
+impl SolverCounters {
     /// Both together.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
@@ -67,7 +67,7 @@ impl Work {
 }
 
 /// A body, by its number in elimination order, and one of its directions.
-pub type Place = (usize, usize);
+pub type DegreeOfFreedom = (usize, usize);
 
 /// Why a step of this length could not be taken; a shorter one may.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -159,14 +159,14 @@ pub trait Equations {
     }
 
     /// Where an error is largest.
-    fn worst(&self, error: &[Self::Unknown]) -> Place;
+    fn worst(&self, error: &[Self::Unknown]) -> DegreeOfFreedom;
 
     /// Name of a body, and words for a direction.
-    fn named(&self, place: Place) -> (String, &'static str);
+    fn named(&self, place: DegreeOfFreedom) -> (String, &'static str);
 
     /// Work since this was last asked.
-    fn work(&mut self) -> Work {
-        Work::default()
+    fn work(&mut self) -> SolverCounters {
+        SolverCounters::default()
     }
 }
 

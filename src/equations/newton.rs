@@ -10,7 +10,7 @@
 //! no further.
 
 use super::linear::LinearSolver;
-use super::{Bodies, Equations, Motion, Place, Stage, Staged, StepFailure, Work};
+use super::{Bodies, DegreeOfFreedom, Equations, Motion, SolverCounters, Stage, Staged, StepFailure};
 use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, System};
 use crate::multibody::planar::Pose;
@@ -27,7 +27,7 @@ const LOST: f64 = 1e3;
 
 /// One evaluation of the forces in [`Equation`].
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sample {
+pub(crate) struct ForceEvaluation {
     /// Weight w.
     pub(crate) weight: f64,
     /// Share ξ of the displacement.
@@ -50,7 +50,7 @@ pub(crate) struct Equation<'a> {
     /// The part that does not depend on x.
     pub(crate) constant: &'a [Pose],
     /// Where the forces are taken.
-    pub(crate) samples: &'a [Sample],
+    pub(crate) samples: &'a [ForceEvaluation],
     /// Length of a step over which members have their discrete forces instead [s].
     pub(crate) quotient: Option<f64>,
 }
@@ -72,7 +72,7 @@ pub struct Newton<'a, S> {
     force: Vec<Pose>,
     residual: Vec<Pose>,
     drive: Drive,
-    work: Work,
+    work: SolverCounters,
 }
 
 impl<'a, S: LinearSolver> Newton<'a, S> {
@@ -94,7 +94,7 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
             constant: zeros.clone(),
             force: zeros.clone(),
             residual: zeros,
-            work: Work::default(),
+            work: SolverCounters::default(),
         }
     }
 
@@ -222,15 +222,15 @@ impl<S: LinearSolver> Equations for Newton<'_, S> {
         self.bodies.share(ends, error, h, tol)
     }
 
-    fn worst(&self, error: &[Pose]) -> Place {
+    fn worst(&self, error: &[Pose]) -> DegreeOfFreedom {
         self.bodies.worst(error)
     }
 
-    fn named(&self, place: Place) -> (String, &'static str) {
+    fn named(&self, place: DegreeOfFreedom) -> (String, &'static str) {
         self.bodies.named(place)
     }
 
-    fn work(&mut self) -> Work {
+    fn work(&mut self) -> SolverCounters {
         std::mem::take(&mut self.work)
     }
 }
@@ -261,7 +261,7 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
         for (x, (near, q)) in x.iter_mut().zip(stage.near.iter().zip(stage.q)) {
             *x = near - q;
         }
-        let samples = [Sample { weight: 1.0, share: 1.0, time: stage.t }];
+        let samples = [ForceEvaluation { weight: 1.0, share: 1.0, time: stage.t }];
         let (m, c) = (1.0 / stage.beta, stage.gamma / stage.beta);
         let (rates, base) = (stage.v, stage.q);
         let equation = Equation { m, c, rates, base, constant: &constant, samples: &samples, quotient: None };
@@ -317,7 +317,7 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
 }
 
 /// Largest translation, or rotation times the length scale [m], with its body and direction; a NaN counts as infinite.
-pub(crate) fn largest(system: &System, x: &[Pose]) -> (f64, Place) {
+pub(crate) fn largest(system: &System, x: &[Pose]) -> (f64, DegreeOfFreedom) {
     let mut found = (0.0, (0, 0));
     for (j, p) in x.iter().enumerate() {
         for i in 0..3 {

@@ -5,7 +5,7 @@
 //! Yuan, Dickens, Earthquake Eng. Struct. Dyn. 10 (1982)).
 
 use super::ExportError;
-use super::mechanism::{Mechanism, Push, dot};
+use super::mechanism::{InputExcitation, LinearizedMechanism, dot};
 use crate::analysis::AnalysisError;
 use crate::analysis::harmonic::modal;
 use crate::multibody::planar::Pose;
@@ -51,7 +51,7 @@ impl Basis {
     }
 }
 
-impl Mechanism<'_> {
+impl LinearizedMechanism<'_> {
     /// The `count` lowest modes, or all there are.
     ///
     /// # Errors
@@ -66,7 +66,7 @@ impl Mechanism<'_> {
     }
 
     /// What a push yields at rest in all directions but those of a basis.
-    pub(super) fn left(&self, push: &Push, basis: &Basis) -> Vec<Pose> {
+    pub(super) fn left(&self, push: &InputExcitation, basis: &Basis) -> Vec<Pose> {
         let mut rest = push.yielded.clone();
         for (x, lambda) in basis.shapes.iter().zip(&basis.lambda) {
             let share = dot(x, &push.force) / lambda;

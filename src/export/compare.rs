@@ -8,20 +8,20 @@
 //! swings, one direction after the other; then modes above the band are added, and last the others in the band.
 
 use super::basis::Basis;
-use super::linear::Reduced;
-use super::mechanism::{Mechanism, port_names};
-use super::{ExportError, Request};
-use crate::compile::Compiled;
+use super::linear::ReducedModel;
+use super::mechanism::{LinearizedMechanism, port_names};
+use super::{ExportError, ExportRequest};
+use crate::compile::CompiledModel;
 use crate::device::local::LocalDevice;
-use crate::device::scale::Scale;
+use crate::device::scale::PortScale;
 use crate::device::{Device, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Modes looked at first, and at most.
-const FIRST: usize = 8;
-const MOST: usize = 128;
+const FIRST_MODES: usize = 8;
+const MAX_MODES: usize = 128;
 /// Frequencies in a decade.
 const PER_DECADE: f64 = 30.0;
 /// How far below the lowest corner the comparison begins.
@@ -44,10 +44,10 @@ const MANY: usize = 12;
 const BEYOND_ONE: f64 = 10.0;
 
 /// The exact device at the operating point.
-struct Exact {
+struct ExactDevice {
     device: LocalDevice,
     token: Token,
-    scales: Vec<Scale>,
+    scales: Vec<PortScale>,
     signals: Vec<f64>,
     /// Ports of the device: those of the model, then those that only have a bias.
     opened: usize,
@@ -57,9 +57,9 @@ struct Exact {
 
 /// The model, and how good it is.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fitted {
+pub struct ModelFit {
     /// The model.
-    pub model: Reduced,
+    pub model: ReducedModel,
     /// Largest relative deviation from the exact small-signal answer [1].
     pub error: f64,
     /// Where: row, port and frequency [Hz].
@@ -78,13 +78,13 @@ pub struct Fitted {
 ///
 /// # Errors
 /// See [`ExportError`].
-pub fn fit(compiled: &Arc<Compiled>, request: &Request) -> Result<Fitted, ExportError> {
-    let mechanism = Mechanism::new(compiled, request)?;
-    let (mut exact, at_rest) = Exact::new(compiled, request)?;
-    let mut count = request.count.unwrap_or(FIRST);
+pub fn fit(compiled: &Arc<CompiledModel>, request: &ExportRequest) -> Result<ModelFit, ExportError> {
+    let mechanism = LinearizedMechanism::new(compiled, request)?;
+    let (mut exact, at_rest) = ExactDevice::new(compiled, request)?;
+    let mut count = request.count.unwrap_or(FIRST_MODES);
     loop {
         let found = mechanism.modes(count)?;
-        let exhausted = found.lambda.len() < count || count >= MOST;
+        let exhausted = found.lambda.len() < count || count >= MAX_MODES;
         let every: Vec<usize> = (0..found.lambda.len()).collect();
         let all = mechanism.reduced(&Basis::of(&found, &every));
         let shares = exact.shares(&all)?;
@@ -109,13 +109,13 @@ pub fn fit(compiled: &Arc<Compiled>, request: &Request) -> Result<Fitted, Export
             let (error, worst) = deviation(&model, &all, &grid, &answers);
             let band = [grid[0] / TAU, to];
             let unknowns = compiled.parts.system.model.unknowns();
-            Fitted { model, error, worst, band, compared: grid.len(), unknowns, jumped: exact.jumped }
+            ModelFit { model, error, worst, band, compared: grid.len(), unknowns, jumped: exact.jumped }
         };
         let choices = match request.count {
             Some(_) => vec![every.clone()],
             None => choices(&every, &showing, |j| hertz(j) <= 1.01 * to),
         };
-        let mut best: Option<Fitted> = None;
+        let mut best: Option<ModelFit> = None;
         for kept in &choices {
             let basis = Basis::of(&found, kept);
             for depth in 1..=DEEPEST {
@@ -163,7 +163,7 @@ fn choices(every: &[usize], showing: &[usize], in_band: impl Fn(usize) -> bool) 
 }
 
 /// Angular frequencies of the comparison, ascending.
-fn grid(model: &Reduced, to: f64) -> Vec<f64> {
+fn grid(model: &ReducedModel, to: f64) -> Vec<f64> {
     let end = TAU * to;
     let lags = model.lags.iter().map(|l| 1.0 / l.tau);
     let lowest = model.modes.iter().map(|m| m.omega).chain(lags).fold(end, f64::min);
@@ -186,8 +186,8 @@ fn grid(model: &Reduced, to: f64) -> Vec<f64> {
 
 /// Largest relative deviation, and where: row, port, frequency [Hz]. `all` is the model with every mode that is known.
 fn deviation(
-    model: &Reduced,
-    all: &Reduced,
+    model: &ReducedModel,
+    all: &ReducedModel,
     grid: &[f64],
     answers: &[DMatrix<Complex<f64>>],
 ) -> (f64, (String, String, f64)) {
@@ -213,8 +213,8 @@ fn deviation(
     worst
 }
 
-impl Exact {
-    fn new(compiled: &Arc<Compiled>, request: &Request) -> Result<(Self, DVector<f64>), ExportError> {
+impl ExactDevice {
+    fn new(compiled: &Arc<CompiledModel>, request: &ExportRequest) -> Result<(Self, DVector<f64>), ExportError> {
         let mut device = LocalDevice::new(Arc::clone(compiled));
         let named = port_names(compiled, request)?;
         let mut ports: Vec<String> = named.iter().map(|(name, _)| name.clone()).collect();
@@ -225,8 +225,8 @@ impl Exact {
         ports.append(&mut more);
         let signals = request.signals.iter().map(|(name, _)| name.clone()).collect();
         let opened = device.open(&OpenRequest { ports: ports.clone(), signals, noise: None })?;
-        let scales: Vec<Scale> =
-            opened.ports.iter().zip(&named).map(|(port, (_, across))| Scale::new(port.kind, *across)).collect();
+        let scales: Vec<PortScale> =
+            opened.ports.iter().zip(&named).map(|(port, (_, across))| PortScale::new(port.kind, *across)).collect();
         let volts = |name: &String| request.bias.iter().rev().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
         let voltages: Vec<f64> = ports.iter().map(volts).collect();
         let mut reply = TrialReply::default();
@@ -263,8 +263,8 @@ impl Exact {
     }
 
     /// How much of what is there at its resonance each mode is, at the port or signal that sees it best [1].
-    fn shares(&mut self, model: &Reduced) -> Result<Vec<f64>, ExportError> {
-        let share = |(j, mode): (usize, &super::linear::Mode)| {
+    fn shares(&mut self, model: &ReducedModel) -> Result<Vec<f64>, ExportError> {
+        let share = |(j, mode): (usize, &super::linear::ReducedMode)| {
             // beside an undamped resonance, which has no answer itself
             let omega =
                 if model.damping[(j, j)] > UNDAMPED * mode.omega { mode.omega } else { mode.omega * (1.0 + NARROW) };

@@ -6,7 +6,7 @@
 use super::lumped::Law;
 use crate::domains::capacitor::Capacitor;
 use crate::domains::contact::{Contact, PRESSURE, TOUCH};
-use crate::domains::stop::{SOFT, Stop};
+use crate::domains::stop::{SOFT, StopKind};
 
 /// C(u) [F].
 pub(super) fn capacitance(capacitor: &Capacitor, u: &str) -> String {
@@ -60,10 +60,10 @@ pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<Strin
             let side = |way: Option<f64>, [sign, closing]: [&str; 2]| {
                 let left = format!("({:e} {sign} 1e-6 * {u})", way?);
                 let elastic = match stop {
-                    Stop::Rigid(area) => {
+                    StopKind::Rigid(area) => {
                         pressed(&Contact { touch: TOUCH, area: *area }, &format!("({TOUCH:e} + {left})"))
                     }
-                    Stop::Elastic(k) => {
+                    StopKind::Elastic(k) => {
                         let p = format!("max(-{left}, 0)");
                         format!("({k:e} * {p} * {p} / ({p} + {SOFT:e}))")
                     }

@@ -20,7 +20,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 /// A port of the model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Port {
+pub struct ReducedPort {
     /// Its name in the netlist, or of the quantity.
     pub name: String,
     /// What is given and answered.
@@ -31,7 +31,7 @@ pub struct Port {
     pub bias: Option<f64>,
 }
 
-impl Port {
+impl ReducedPort {
     /// What a volt and an ampere are at it, in plain letters.
     pub fn meaning(&self) -> String {
         let plain = |unit: &str| unit.replace('·', " ").replace('²', "^2");
@@ -60,7 +60,7 @@ pub struct SignalShown {
 
 /// A mode that is kept, or a direction of the static correction that swings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mode {
+pub struct ReducedMode {
     /// Its number among the undamped modes at the operating point, from 1; none for a direction of the static correction.
     pub number: Option<usize>,
     /// Angular frequency [rad/s].
@@ -69,7 +69,7 @@ pub struct Mode {
 
 /// The lag of heat behind one port.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lag {
+pub struct HeatLag {
     /// Index of the port.
     pub port: usize,
     /// Time constant [s].
@@ -78,15 +78,15 @@ pub struct Lag {
 
 /// The model. p ports, n modes, l lags; r rows of y: the p ports, then the signals.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reduced {
+pub struct ReducedModel {
     /// Ports.
-    pub ports: Vec<Port>,
+    pub ports: Vec<ReducedPort>,
     /// Signals.
     pub signals: Vec<SignalShown>,
     /// Modes, ascending.
-    pub modes: Vec<Mode>,
+    pub modes: Vec<ReducedMode>,
     /// Lags.
-    pub lags: Vec<Lag>,
+    pub lags: Vec<HeatLag>,
     /// D, n × n [1/s].
     pub damping: DMatrix<f64>,
     /// B, n × p [V/V, V/A].
@@ -107,7 +107,7 @@ pub struct Reduced {
     pub change: DMatrix<f64>,
 }
 
-impl Reduced {
+impl ReducedModel {
     /// Number of rows of y.
     pub fn rows(&self) -> usize {
         self.ports.len() + self.signals.len()
@@ -164,7 +164,7 @@ impl Reduced {
         Complex::new(self.place[(row, mode)], omega / self.modes[mode].omega * self.rate[(row, mode)])
     }
 
-    /// Magnitudes of the parts that [`Reduced::response`] adds up, mode by mode and the rest: what a value is small against
+    /// Magnitudes of the parts that [`ReducedModel::response`] adds up, mode by mode and the rest: what a value is small against
     /// where they cancel, r × p.
     pub fn parts(&self, omega: f64) -> DMatrix<f64> {
         let mut parts = DMatrix::from_fn(self.rows(), self.ports.len(), |r, q| {

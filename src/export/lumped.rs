@@ -13,18 +13,18 @@ mod model;
 mod sliding;
 
 use super::ExportError;
-use super::Request;
-use super::linear::{Port, SignalShown};
+use super::ExportRequest;
+use super::linear::{ReducedPort, SignalShown};
 use super::mechanism::port_names;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::device::PortKind;
-use crate::device::scale::Scale;
+use crate::device::scale::PortScale;
 use crate::domains::capacitor::Capacitor;
 use crate::domains::drive::Electrics;
 use crate::domains::{Domain, Input, Member, System};
-use crate::readout::ports::{Answer, Ports};
+use crate::readout::ports::{OpenedPorts, PortResponse};
 use crate::readout::signal::Signal;
-pub use model::{Coordinate, Law, Lumped, LumpedGap, Reading};
+pub use model::{Coordinate, Law, LumpedGap, LumpedModel, LumpedOutput};
 use nalgebra::{DMatrix, DVector};
 use sliding::{UNHELD, along, axis, coordinates, dampers, springs};
 
@@ -32,9 +32,9 @@ use sliding::{UNHELD, along, axis, coordinates, dampers, springs};
 ///
 /// # Errors
 /// [`ExportError::NotLumped`] where a part can turn, a spring is not linear, or something heats.
-pub fn lump(compiled: &Compiled, request: &Request) -> Result<Lumped, ExportError> {
+pub fn lump(compiled: &CompiledModel, request: &ExportRequest) -> Result<LumpedModel, ExportError> {
     let (names, across): (Vec<_>, Vec<_>) = port_names(compiled, request)?.into_iter().unzip();
-    let ports = Ports::find(compiled, &names)?;
+    let ports = OpenedPorts::find(compiled, &names)?;
     let system = ports.system.as_deref().unwrap_or(&compiled.parts.system);
     let electrics = &system.electrics;
     if let Some(k) = ports.kinds.iter().position(|kind| *kind == PortKind::Rate) {
@@ -60,12 +60,12 @@ pub fn lump(compiled: &Compiled, request: &Request) -> Result<Lumped, ExportErro
     let (mut rows, mut signals) = (Vec::new(), Vec::new());
     for (answer, &source) in ports.answers.iter().zip(&ports.sources) {
         rows.push(match answer {
-            Answer::Current => {
+            PortResponse::Current => {
                 let (row, constant) = by_port(electrics, &ports, &|s| electrics.conductance[(source, s)]);
-                Reading::Current(row, constant)
+                LumpedOutput::Current(row, constant)
             }
-            Answer::Motion(signal) => reading(signal, &coordinates, &gaps)?,
-            Answer::Rise(_) | Answer::Nothing => Reading::Nothing,
+            PortResponse::Motion(signal) => reading(signal, &coordinates, &gaps)?,
+            PortResponse::Rise(_) | PortResponse::Nothing => LumpedOutput::Nothing,
         });
     }
     for (name, scale) in &request.signals {
@@ -73,13 +73,14 @@ pub fn lump(compiled: &Compiled, request: &Request) -> Result<Lumped, ExportErro
         rows.push(reading(&signal, &coordinates, &gaps)?);
         signals.push(SignalShown { name: name.clone(), unit: signal.unit(), scale: *scale });
     }
-    let scaled: Vec<Scale> = ports.kinds.iter().zip(&across).map(|(kind, across)| Scale::new(*kind, *across)).collect();
+    let scaled: Vec<PortScale> =
+        ports.kinds.iter().zip(&across).map(|(kind, across)| PortScale::new(*kind, *across)).collect();
     let port = |k: usize| {
         let (kind, scale) = (ports.kinds[k], scaled[k]);
         let across = if kind.given_flow() { scale.answered } else { 1.0 / scale.given };
-        Port { name: names[k].clone(), kind, across, bias: None }
+        ReducedPort { name: names[k].clone(), kind, across, bias: None }
     };
-    Ok(Lumped {
+    Ok(LumpedModel {
         ports: (0..names.len()).map(port).collect(),
         scales: scaled.iter().map(|s| s.answered).chain(signals.iter().map(|s| s.scale)).collect(),
         given: scaled.iter().map(|s| s.given).collect(),
@@ -95,7 +96,7 @@ pub fn lump(compiled: &Compiled, request: &Request) -> Result<Lumped, ExportErro
 }
 
 /// Force per unit of what is given to each port, coordinates × ports [N per N, kg].
-fn pushes(electrics: &Electrics, ports: &Ports, coordinates: &[Coordinate]) -> DMatrix<f64> {
+fn pushes(electrics: &Electrics, ports: &OpenedPorts, coordinates: &[Coordinate]) -> DMatrix<f64> {
     let n = coordinates.len();
     let mut push = DMatrix::zeros(n, ports.sources.len());
     for (q, &source) in ports.sources.iter().enumerate() {
@@ -112,21 +113,21 @@ fn pushes(electrics: &Electrics, ports: &Ports, coordinates: &[Coordinate]) -> D
 }
 
 /// A linear function of the sources, over the ports; and what the netlist's own sources make of it.
-fn by_port(electrics: &Electrics, ports: &Ports, row: &dyn Fn(usize) -> f64) -> (DVector<f64>, f64) {
+fn by_port(electrics: &Electrics, ports: &OpenedPorts, row: &dyn Fn(usize) -> f64) -> (DVector<f64>, f64) {
     let fixed: f64 = electrics.fixed.iter().enumerate().map(|(k, v)| row(electrics.ports + k) * v).sum();
     (DVector::from_iterator(ports.sources.len(), ports.sources.iter().map(|&s| row(s))), fixed)
 }
 
 /// Every gap of the mechanism.
 fn gaps(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     system: &System,
-    ports: &Ports,
+    ports: &OpenedPorts,
     coordinates: &[Coordinate],
 ) -> Result<Vec<LumpedGap>, ExportError> {
     let electrics = &system.electrics;
     // what acts without sides comes after all gaps; where it adds no force, its damping is among that of the parts
-    let acts = |(_, gap): &(usize, &Member)| gap.is_gap() || gap.acts(1.0);
+    let acts = |(_, gap): &(usize, &Member)| gap.is_gap() || gap.is_active(1.0);
     let gap = |(g, gap): (usize, &Member)| {
         let Some((approach, law)) = gap.law() else {
             let why = match compiled.parts.gap_names.get(g) {
@@ -145,23 +146,25 @@ fn gaps(
 }
 
 /// What a signal reads.
-fn reading(signal: &Signal, coordinates: &[Coordinate], gaps: &[LumpedGap]) -> Result<Reading, ExportError> {
+fn reading(signal: &Signal, coordinates: &[Coordinate], gaps: &[LumpedGap]) -> Result<LumpedOutput, ExportError> {
     match *signal {
-        Signal::Displacement(_, 2) | Signal::Rate(_, 2) => Ok(Reading::Constant(0.0)),
-        Signal::Displacement(point, d) => Ok(Reading::Place(along(coordinates, &point, axis(d)))),
-        Signal::Rate(point, d) => Ok(Reading::Rate(along(coordinates, &point, axis(d)))),
-        Signal::Prescribed(t) => Ok(Reading::Constant(t)),
-        Signal::Charge(g) => Ok(Reading::Charge(g)),
-        Signal::Capacitance(g) => Ok(Reading::Capacitance(g)),
-        Signal::Pull(g) => Ok(Reading::Pull(g)),
+        Signal::Displacement(_, 2) | Signal::Rate(_, 2) => Ok(LumpedOutput::Constant(0.0)),
+        Signal::Displacement(point, d) => Ok(LumpedOutput::Place(along(coordinates, &point, axis(d)))),
+        Signal::Rate(point, d) => Ok(LumpedOutput::Rate(along(coordinates, &point, axis(d)))),
+        Signal::Prescribed(t) => Ok(LumpedOutput::Constant(t)),
+        Signal::Charge(g) => Ok(LumpedOutput::Charge(g)),
+        Signal::Capacitance(g) => Ok(LumpedOutput::Capacitance(g)),
+        Signal::Pull(g) => Ok(LumpedOutput::Pull(g)),
         Signal::Distance(g) => match gaps[g].law {
-            Law::Field(capacitor @ Capacitor::Comb { .. }, _) => Ok(Reading::Distance(g, capacitor.distance(0.0), 1.0)),
-            Law::Field(capacitor, _) => Ok(Reading::Distance(g, capacitor.distance(0.0), -1.0)),
+            Law::Field(capacitor @ Capacitor::Comb { .. }, _) => {
+                Ok(LumpedOutput::Distance(g, capacitor.distance(0.0), 1.0))
+            }
+            Law::Field(capacitor, _) => Ok(LumpedOutput::Distance(g, capacitor.distance(0.0), -1.0)),
             Law::Stop(..) => Err(ExportError::NotLumped {
                 why: format!("\"{}\" is a stop, whose distance has a corner", gaps[g].name),
             }),
         },
         // of beams that heat, which have been refused
-        Signal::Temperature(_) => Ok(Reading::Nothing),
+        Signal::Temperature(_) => Ok(LumpedOutput::Nothing),
     }
 }

@@ -11,21 +11,21 @@
 //! | `q1` … | its charge in femtocoulombs, through a capacitor of a femtofarad: that current is dQ/dt |
 
 use super::laws::{bearing, capacitance, loses, slope};
-use super::lumped::{Law, Lumped, Reading};
+use super::lumped::{Law, LumpedModel, LumpedOutput};
 use super::names::Pins;
-use super::parts::Parts;
+use super::parts::SubcircuitText;
 use crate::device::PortKind;
 use nalgebra::DVector;
 use std::fmt::Write;
 
 /// The file: a header that tells what it is, and the subcircuit `name`.
-pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> String {
+pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> String {
     let mut text = String::new();
     for line in about {
         let _ = writeln!(text, "* {line}");
     }
     let _ = writeln!(text, ".subckt {name} {}", pins.all().collect::<Vec<_>>().join(" "));
-    let mut deck = Deck { model, pins, parts: Parts::after(text) };
+    let mut deck = LumpedSubcircuit { model, pins, parts: SubcircuitText::after(text) };
     deck.ports();
     deck.coordinates();
     for g in 0..model.gaps.len() {
@@ -39,13 +39,13 @@ pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> Strin
     text
 }
 
-struct Deck<'a> {
-    model: &'a Lumped,
+struct LumpedSubcircuit<'a> {
+    model: &'a LumpedModel,
     pins: &'a Pins,
-    parts: Parts,
+    parts: SubcircuitText,
 }
 
-impl Deck<'_> {
+impl LumpedSubcircuit<'_> {
     /// Forces of part `j` are in units of this [N].
     fn unit(&self, j: usize) -> f64 {
         let c = &self.model.coordinates[j];
@@ -145,7 +145,7 @@ impl Deck<'_> {
     fn row(&mut self, row: usize) {
         let model = self.model;
         let (ports, scale, n) = (model.ports.len(), model.scales[row], row + 1);
-        if let Reading::Current(conductance, constant) = &model.rows[row] {
+        if let LumpedOutput::Current(conductance, constant) = &model.rows[row] {
             let [plus, minus] = &self.pins.ports[row];
             self.parts.line(&format!("* current into port {}", model.ports[row].name));
             for (q, share) in conductance.iter().enumerate() {
@@ -161,31 +161,31 @@ impl Deck<'_> {
         let sum = format!("y{n}");
         let places = ("0", sum.as_str());
         match &model.rows[row] {
-            Reading::Current(..) | Reading::Nothing => return,
-            Reading::Place(shares) => self.sum(places, "x", shares, 1e-6 * scale),
-            Reading::Rate(shares) => {
+            LumpedOutput::Current(..) | LumpedOutput::Nothing => return,
+            LumpedOutput::Place(shares) => self.sum(places, "x", shares, 1e-6 * scale),
+            LumpedOutput::Rate(shares) => {
                 let rates = shares.zip_map(
                     &DVector::from_iterator(shares.len(), model.coordinates.iter().map(|c| c.omega)),
                     |s, w| s * w,
                 );
                 self.sum(places, "v", &rates, 1e-6 * scale);
             }
-            Reading::Charge(g) => self.parts.by_voltage(places, &format!("q{}", g + 1), 1e-15 * scale),
-            Reading::Capacitance(g) | Reading::Pull(g) => {
+            LumpedOutput::Charge(g) => self.parts.by_voltage(places, &format!("q{}", g + 1), 1e-15 * scale),
+            LumpedOutput::Capacitance(g) | LumpedOutput::Pull(g) => {
                 if let Law::Field(capacitor, _) = &model.gaps[*g].law {
                     let (u, e) = (format!("V(g{})", g + 1), format!("V(e{})", g + 1));
                     let value = match model.rows[row] {
-                        Reading::Pull(_) => format!("0.5 * {e} * {e} * {}", slope(capacitor, &u)),
+                        LumpedOutput::Pull(_) => format!("0.5 * {e} * {e} * {}", slope(capacitor, &u)),
                         _ => capacitance(capacitor, &u),
                     };
                     self.parts.line(&format!("By{n} 0 {sum} I={scale:e} * {value}"));
                 }
             }
-            Reading::Distance(g, rest, sign) => {
+            LumpedOutput::Distance(g, rest, sign) => {
                 self.parts.by_voltage(places, &format!("g{}", g + 1), 1e-6 * sign * scale);
                 self.parts.constant(places, rest * scale);
             }
-            Reading::Constant(value) => self.parts.constant(places, value * scale),
+            LumpedOutput::Constant(value) => self.parts.constant(places, value * scale),
         }
         self.parts.sum(&sum);
         if let Some(k) = row.checked_sub(ports) {

@@ -2,13 +2,13 @@
 //! `ddt` acts in time.
 
 use super::laws::{bearing, capacitance, loses, slope};
-use super::lumped::{Law, Lumped, Reading};
+use super::lumped::{Law, LumpedModel, LumpedOutput};
 use super::names::Pins;
-use super::verilog_a::{Sum, head};
+use super::verilog_a::{ContributionSum, head};
 use nalgebra::DVector;
 
 /// The file: a header that tells what it is, and the module `name`.
-pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> String {
+pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> String {
     let coordinates = (1..=model.coordinates.len()).flat_map(|k| [format!("x{k}"), format!("v{k}")]);
     let gaps = model.gaps.iter().enumerate().flat_map(|(g, gap)| {
         let of = |name: &str| format!("{name}{}", g + 1);
@@ -18,18 +18,18 @@ pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> Strin
     let inner: Vec<String> = coordinates.chain(gaps).collect();
     let mut text = head(name, pins, &inner, &model.ports, about);
     for (g, gap) in model.gaps.iter().enumerate() {
-        let mut sum = Sum::begin(&format!("I(g{0}) <+ V(g{0})", g + 1));
+        let mut sum = ContributionSum::begin(&format!("I(g{0}) <+ V(g{0})", g + 1));
         add(&mut sum, "x", &gap.along, -1.0);
         sum.end(&mut text);
         if loses(&gap.law, gap.loss) {
-            let mut sum = Sum::begin(&format!("I(s{0}) <+ V(s{0})", g + 1));
+            let mut sum = ContributionSum::begin(&format!("I(s{0}) <+ V(s{0})", g + 1));
             for (j, (share, c)) in gap.along.iter().zip(&model.coordinates).enumerate() {
                 sum.add(-1e-6 * share * c.omega, &format!("V(v{})", j + 1));
             }
             sum.end(&mut text);
         }
         if matches!(gap.law, Law::Field(..)) {
-            let mut sum = Sum::begin(&format!("I(e{0}) <+ V(e{0})", g + 1));
+            let mut sum = ContributionSum::begin(&format!("I(e{0}) <+ V(e{0})", g + 1));
             add(&mut sum, "b", &gap.by_port, -1.0);
             sum.add(-gap.constant, "1");
             sum.end(&mut text);
@@ -37,8 +37,8 @@ pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> Strin
     }
     for (j, c) in model.coordinates.iter().enumerate() {
         let (x, v, unit) = (format!("x{}", j + 1), format!("v{}", j + 1), c.mass * c.omega * c.omega * 1e-6);
-        Sum::begin(&format!("I({x}) <+ ddt({:e} * V({x})) - V({v})", 1.0 / c.omega)).end(&mut text);
-        let mut sum = Sum::begin(&format!("I({v}) <+ ddt({:e} * V({v}))", 1.0 / c.omega));
+        ContributionSum::begin(&format!("I({x}) <+ ddt({:e} * V({x})) - V({v})", 1.0 / c.omega)).end(&mut text);
+        let mut sum = ContributionSum::begin(&format!("I({v}) <+ ddt({:e} * V({v}))", 1.0 / c.omega));
         for (i, other) in model.coordinates.iter().enumerate() {
             sum.add(1e-6 * model.stiffness[(j, i)] / unit, &format!("V(x{})", i + 1));
             sum.add(1e-6 * other.omega * model.damping[(j, i)] / unit, &format!("V(v{})", i + 1));
@@ -63,13 +63,13 @@ pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> Strin
         let scale = model.scales[row];
         let left = match row.checked_sub(model.ports.len()) {
             Some(k) => format!("V({})", pins.signals[k]),
-            None if matches!(reading, Reading::Current(..)) => format!("I(b{})", row + 1),
+            None if matches!(reading, LumpedOutput::Current(..)) => format!("I(b{})", row + 1),
             None => format!("V(b{})", row + 1),
         };
-        let mut sum = Sum::begin(&format!("{left} <+ 0"));
+        let mut sum = ContributionSum::begin(&format!("{left} <+ 0"));
         match reading {
-            Reading::Nothing => continue,
-            Reading::Current(conductance, constant) => {
+            LumpedOutput::Nothing => continue,
+            LumpedOutput::Current(conductance, constant) => {
                 add(&mut sum, "b", conductance, 1.0);
                 sum.add(*constant, "1");
                 for (g, gap) in model.gaps.iter().enumerate() {
@@ -79,28 +79,28 @@ pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> Strin
                     }
                 }
             }
-            Reading::Place(shares) => add(&mut sum, "x", shares, 1e-6 * scale),
-            Reading::Rate(shares) => {
+            LumpedOutput::Place(shares) => add(&mut sum, "x", shares, 1e-6 * scale),
+            LumpedOutput::Rate(shares) => {
                 for (j, (share, c)) in shares.iter().zip(&model.coordinates).enumerate() {
                     sum.add(1e-6 * scale * share * c.omega, &format!("V(v{})", j + 1));
                 }
             }
-            Reading::Charge(g) | Reading::Capacitance(g) | Reading::Pull(g) => {
+            LumpedOutput::Charge(g) | LumpedOutput::Capacitance(g) | LumpedOutput::Pull(g) => {
                 if let Law::Field(capacitor, _) = &model.gaps[*g].law {
                     let (u, e) = (format!("V(g{})", g + 1), format!("V(e{})", g + 1));
                     let value = match reading {
-                        Reading::Pull(_) => format!("0.5 * {e} * {e} * {}", slope(capacitor, &u)),
-                        Reading::Charge(_) => format!("{} * {e}", capacitance(capacitor, &u)),
+                        LumpedOutput::Pull(_) => format!("0.5 * {e} * {e} * {}", slope(capacitor, &u)),
+                        LumpedOutput::Charge(_) => format!("{} * {e}", capacitance(capacitor, &u)),
                         _ => capacitance(capacitor, &u),
                     };
                     sum.add(scale, &value);
                 }
             }
-            Reading::Distance(g, rest, sign) => {
+            LumpedOutput::Distance(g, rest, sign) => {
                 sum.add(1e-6 * sign * scale, &format!("V(g{})", g + 1));
                 sum.add(rest * scale, "1");
             }
-            Reading::Constant(value) => sum.add(value * scale, "1"),
+            LumpedOutput::Constant(value) => sum.add(value * scale, "1"),
         }
         sum.end(&mut text);
     }
@@ -109,7 +109,7 @@ pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> Strin
 }
 
 /// Adds `scale` times the shares of nodes or branches `name1` ….
-fn add(sum: &mut Sum, name: &str, shares: &DVector<f64>, scale: f64) {
+fn add(sum: &mut ContributionSum, name: &str, shares: &DVector<f64>, scale: f64) {
     for (j, share) in shares.iter().enumerate() {
         sum.add(scale * share, &format!("V({name}{})", j + 1));
     }

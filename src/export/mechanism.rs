@@ -1,22 +1,22 @@
 //! A mechanism at an operating point, and what a unit of each input does to it there.
 
 use super::linear::SignalShown;
-use super::{ExportError, Request};
+use super::{ExportError, ExportRequest};
 use crate::analysis::AnalysisError;
 use crate::analysis::statics::operating_point;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::device::PortKind;
 use crate::domains::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
-use crate::readout::ports::Ports;
+use crate::readout::ports::OpenedPorts;
 use crate::readout::signal::Signal;
 use crate::solve::SolveError;
 use crate::solve::frequency::refined::{ROUNDING, Refined};
 
 /// A unit of one input, at once or behind a lag: what it does to a mechanism that does not swing.
 #[derive(Debug)]
-pub(super) struct Push {
+pub(super) struct InputExcitation {
     pub(super) port: usize,
     /// Time constant that it comes with [s]; none: at once.
     pub(super) tau: Option<f64>,
@@ -29,9 +29,9 @@ pub(super) struct Push {
 
 /// A mechanism at its operating point, with the inputs and outputs that a model is made for.
 #[derive(Debug)]
-pub struct Mechanism<'a> {
-    pub(super) compiled: &'a Compiled,
-    pub(super) ports: Ports,
+pub struct LinearizedMechanism<'a> {
+    pub(super) compiled: &'a CompiledModel,
+    pub(super) ports: OpenedPorts,
     pub(super) names: Vec<String>,
     pub(super) across: Vec<Option<f64>>,
     pub(super) shown: Vec<(Signal, SignalShown)>,
@@ -41,14 +41,17 @@ pub struct Mechanism<'a> {
     pub(super) drive: Drive,
     pub(super) tangent: BlockMatrix<f64, 3>,
     pub(super) factor: BlockMatrix<f64, 3>,
-    pub(super) pushes: Vec<Push>,
+    pub(super) pushes: Vec<InputExcitation>,
 }
 
 /// The ports of a request by name: those asked for, or every electrical one.
 ///
 /// # Errors
 /// [`ExportError::NoPorts`].
-pub fn port_names(compiled: &Compiled, request: &Request) -> Result<Vec<(String, Option<f64>)>, ExportError> {
+pub fn port_names(
+    compiled: &CompiledModel,
+    request: &ExportRequest,
+) -> Result<Vec<(String, Option<f64>)>, ExportError> {
     let electrics = &compiled.parts.system.electrics;
     let names = match request.ports.as_slice() {
         [] => electrics.names[..electrics.ports].iter().map(|n| (n.clone(), None)).collect(),
@@ -61,14 +64,14 @@ pub(super) fn dot(a: &[Pose], b: &[Pose]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
-impl<'a> Mechanism<'a> {
+impl<'a> LinearizedMechanism<'a> {
     /// Finds the operating point and what each input does there.
     ///
     /// # Errors
     /// See [`ExportError`].
-    pub fn new(compiled: &'a Compiled, request: &Request) -> Result<Self, ExportError> {
+    pub fn new(compiled: &'a CompiledModel, request: &ExportRequest) -> Result<Self, ExportError> {
         let (names, across): (Vec<_>, Vec<_>) = port_names(compiled, request)?.into_iter().unzip();
-        let ports = Ports::find(compiled, &names)?;
+        let ports = OpenedPorts::find(compiled, &names)?;
         if let Some(k) = ports.kinds.iter().position(|kind| *kind == PortKind::Rate) {
             return Err(ExportError::Turning { port: names[k].clone() });
         }
@@ -118,7 +121,7 @@ impl<'a> Mechanism<'a> {
     }
 
     /// Every push of every port.
-    fn pushes(&self) -> Vec<Push> {
+    fn pushes(&self) -> Vec<InputExcitation> {
         let system = self.system();
         let electrics = &system.electrics;
         let heaters = &electrics.heating.heaters;
@@ -138,7 +141,7 @@ impl<'a> Mechanism<'a> {
                 }
             }
             for tau in taus {
-                let of = |(h, slope): (&crate::domains::thermal::Heater, &f64)| {
+                let of = |(h, slope): (&crate::domains::thermal::HeatConductor, &f64)| {
                     let own = Some(h.time_constant).filter(|tau| *tau > 0.0);
                     if own == tau { *slope } else { 0.0 }
                 };
@@ -159,7 +162,7 @@ impl<'a> Mechanism<'a> {
                 force.iter_mut().for_each(|f| *f = -*f);
                 let mut yielded = force.clone();
                 self.yielded(&mut refined, &mut yielded);
-                pushes.push(Push { port, tau, force, yielded, volts: change.volts, rise });
+                pushes.push(InputExcitation { port, tau, force, yielded, volts: change.volts, rise });
             }
         }
         pushes

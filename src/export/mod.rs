@@ -30,7 +30,7 @@ pub mod reduce;
 pub mod spice;
 pub mod verilog_a;
 
-pub use linear::Reduced;
+pub use linear::ReducedModel;
 
 use crate::analysis::AnalysisError;
 use crate::device::DeviceError;
@@ -39,7 +39,7 @@ use thiserror::Error;
 
 /// What is to be written.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Request {
+pub struct ExportRequest {
     /// Ports with volts per unit of what lies across them, where that is not the default; none: every electrical one.
     pub ports: Vec<(String, Option<f64>)>,
     /// Signals shown as voltages, with volts per unit.

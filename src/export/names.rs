@@ -1,7 +1,7 @@
 //! Names of pins: those of ports and signals with the characters that simulators take.
 
 use super::ExportError;
-use super::linear::{Port, SignalShown};
+use super::linear::{ReducedPort, SignalShown};
 
 /// Pins of a written model, in order.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,7 +17,7 @@ impl Pins {
     ///
     /// # Errors
     /// [`ExportError::SameName`] where two become one.
-    pub fn of(ports: &[Port], signals: &[SignalShown]) -> Result<Self, ExportError> {
+    pub fn of(ports: &[ReducedPort], signals: &[SignalShown]) -> Result<Self, ExportError> {
         let (all_ports, all_signals) = (ports, signals);
         let ports: Vec<String> = ports.iter().map(|p| plain(&p.name)).collect();
         let signals: Vec<String> = signals.iter().map(|s| plain(&s.name)).collect();

@@ -4,14 +4,14 @@ use std::fmt::Write;
 
 /// Text of a subcircuit, with the numbers of its sources.
 #[derive(Debug, Default)]
-pub(super) struct Parts {
+pub(super) struct SubcircuitText {
     /// What is written so far.
     pub(super) text: String,
     /// Sources named so far: G, F, I.
     counts: [usize; 3],
 }
 
-impl Parts {
+impl SubcircuitText {
     /// Parts that go on after `text`.
     pub(super) fn after(text: String) -> Self {
         Self { text, counts: [0; 3] }

@@ -9,16 +9,16 @@
 //! heaters with the same time constant that one port heats share one lag: their rises are in proportion to it.
 
 use super::basis::Basis;
-use super::linear::{Lag, Mode, Port, Reduced};
-pub use super::mechanism::{Mechanism, port_names};
-use super::mechanism::{Push, dot};
+use super::linear::{HeatLag, ReducedMode, ReducedModel, ReducedPort};
+use super::mechanism::{InputExcitation, dot};
+pub use super::mechanism::{LinearizedMechanism, port_names};
 use crate::device::PortKind;
-use crate::device::scale::Scale;
+use crate::device::scale::PortScale;
 use crate::domains::loss_derivatives::LossDerivatives;
 use crate::multibody::forces::add_damping;
 use crate::multibody::planar::Pose;
-use crate::readout::ports::Answer;
-use crate::readout::signal::{Signal, View};
+use crate::readout::ports::PortResponse;
+use crate::readout::signal::{Signal, SignalView};
 use nalgebra::{DMatrix, DVector};
 
 /// Displacement that a volt of a mode's share stands for where the mode moves most [m].
@@ -28,7 +28,7 @@ const NONE: f64 = 1e-10;
 
 /// What is read in a row of y.
 #[derive(Debug, Clone, Copy)]
-enum Row {
+enum OutputRow {
     /// A quantity of the state.
     Level(Signal),
     /// Its rate of change.
@@ -41,24 +41,24 @@ enum Row {
     Nothing,
 }
 
-impl Mechanism<'_> {
+impl LinearizedMechanism<'_> {
     /// The model with these directions. Values at rest are left at 0.
-    pub fn reduced(&self, basis: &Basis) -> Reduced {
+    pub fn reduced(&self, basis: &Basis) -> ReducedModel {
         let system = self.system();
-        let scales: Vec<Scale> =
-            self.ports.kinds.iter().zip(&self.across).map(|(kind, across)| Scale::new(*kind, *across)).collect();
+        let scales: Vec<PortScale> =
+            self.ports.kinds.iter().zip(&self.across).map(|(kind, across)| PortScale::new(*kind, *across)).collect();
         let rows = self.rows();
         let (n, r, p) = (basis.lambda.len(), rows.len(), scales.len());
         let answered = |row: usize| if row < p { scales[row].answered } else { self.shown[row - p].1.scale };
         let (shapes, lambda) = (&basis.shapes, &basis.lambda);
         let omega: Vec<f64> = lambda.iter().map(|l| l.sqrt()).collect();
         let length: Vec<f64> = shapes.iter().map(|x| MICROMETRE / self.largest(x)).collect();
-        let lags: Vec<&Push> = self.pushes.iter().filter(|push| push.tau.is_some()).collect();
-        let mut model = Reduced {
+        let lags: Vec<&InputExcitation> = self.pushes.iter().filter(|push| push.tau.is_some()).collect();
+        let mut model = ReducedModel {
             ports: (0..p).map(|k| self.port(k)).collect(),
             signals: self.shown.iter().map(|(_, shown)| shown.clone()).collect(),
-            modes: basis.numbers.iter().zip(&omega).map(|(&number, &omega)| Mode { number, omega }).collect(),
-            lags: lags.iter().map(|l| Lag { port: l.port, tau: l.tau.unwrap_or(0.0) }).collect(),
+            modes: basis.numbers.iter().zip(&omega).map(|(&number, &omega)| ReducedMode { number, omega }).collect(),
+            lags: lags.iter().map(|l| HeatLag { port: l.port, tau: l.tau.unwrap_or(0.0) }).collect(),
             damping: DMatrix::zeros(n, n),
             push: DMatrix::zeros(n, p),
             push_lagged: DMatrix::zeros(n, lags.len()),
@@ -87,7 +87,7 @@ impl Mechanism<'_> {
             for (row, read) in rows.iter().enumerate() {
                 let value = answered(row) * length[k] * self.read(*read, &shapes[k], &still.0, &still.1);
                 match read {
-                    Row::Change(_) | Row::Current(_) => model.rate[(row, k)] = value * omega[k],
+                    OutputRow::Change(_) | OutputRow::Current(_) => model.rate[(row, k)] = value * omega[k],
                     _ => model.place[(row, k)] = value,
                 }
             }
@@ -111,9 +111,9 @@ impl Mechanism<'_> {
                     continue; // all of it is in the directions
                 }
                 match (read, push.tau) {
-                    (Row::Change(_) | Row::Current(_), None) => model.change[(row, q)] += value,
+                    (OutputRow::Change(_) | OutputRow::Current(_), None) => model.change[(row, q)] += value,
                     // of what lags the rate is (u − h)/τ
-                    (Row::Change(_) | Row::Current(_), Some(tau)) => {
+                    (OutputRow::Change(_) | OutputRow::Current(_), Some(tau)) => {
                         model.direct[(row, q)] += value / tau;
                         model.lagged[(row, l)] -= value / tau;
                     }
@@ -124,7 +124,7 @@ impl Mechanism<'_> {
             l += usize::from(push.tau.is_some());
         }
         for (row, read) in rows.iter().enumerate() {
-            if let Row::Current(source) = read {
+            if let OutputRow::Current(source) = read {
                 for (q, &other) in self.ports.sources.iter().enumerate() {
                     model.direct[(row, q)] += system.electrics.conductance[(*source, other)];
                 }
@@ -134,48 +134,48 @@ impl Mechanism<'_> {
         model
     }
 
-    fn port(&self, k: usize) -> Port {
+    fn port(&self, k: usize) -> ReducedPort {
         let kind = self.ports.kinds[k];
-        let scale = Scale::new(kind, self.across[k]);
+        let scale = PortScale::new(kind, self.across[k]);
         let across = if kind.given_flow() { scale.answered } else { 1.0 / scale.given };
         let bias = (kind == PortKind::Electrical).then(|| self.sources[self.ports.sources[k]]);
-        Port { name: self.names[k].clone(), kind, across, bias }
+        ReducedPort { name: self.names[k].clone(), kind, across, bias }
     }
 
     /// What is read in each row: ports, then signals.
-    fn rows(&self) -> Vec<Row> {
+    fn rows(&self) -> Vec<OutputRow> {
         let of_signal = |signal: Signal| match signal {
-            Signal::Rate(point, direction) => Row::Change(Signal::Displacement(point, direction)),
-            level => Row::Level(level),
+            Signal::Rate(point, direction) => OutputRow::Change(Signal::Displacement(point, direction)),
+            level => OutputRow::Level(level),
         };
-        let of_port = |(answer, source): (&Answer, &usize)| match answer {
-            Answer::Current => Row::Current(*source),
-            Answer::Motion(signal) => of_signal(*signal),
-            Answer::Rise(heater) => Row::Rise(*heater),
-            Answer::Nothing => Row::Nothing,
+        let of_port = |(answer, source): (&PortResponse, &usize)| match answer {
+            PortResponse::Current => OutputRow::Current(*source),
+            PortResponse::Motion(signal) => of_signal(*signal),
+            PortResponse::Rise(heater) => OutputRow::Rise(*heater),
+            PortResponse::Nothing => OutputRow::Nothing,
         };
         let ports = self.ports.answers.iter().zip(&self.ports.sources).map(of_port);
         ports.chain(self.shown.iter().map(|(signal, _)| of_signal(*signal))).collect()
     }
 
     /// Change of a row's quantity (of its charge, of what it is the rate of) with a change of state.
-    fn read(&self, row: Row, q: &[Pose], volts: &[f64], rise: &[f64]) -> f64 {
+    fn read(&self, row: OutputRow, q: &[Pose], volts: &[f64], rise: &[f64]) -> f64 {
         let system = self.system();
         let still = vec![Pose::zeros(); self.q.len()];
         match row {
-            Row::Level(signal) | Row::Change(signal) => {
-                let state = View { q: &self.q, v: &still, rise: &self.rise, volts: &self.drive.volts };
-                signal.slope(self.compiled, &state, &View { q, v: &still, rise, volts })
+            OutputRow::Level(signal) | OutputRow::Change(signal) => {
+                let state = SignalView { q: &self.q, v: &still, rise: &self.rise, volts: &self.drive.volts };
+                signal.slope(self.compiled, &state, &SignalView { q, v: &still, rise, volts })
             }
-            Row::Current(source) => (0..volts.len())
+            OutputRow::Current(source) => (0..volts.len())
                 .map(|g| {
                     let charge = system.capacitance(g, &self.q) * volts[g]
                         + system.capacitance_slope(g, &self.q, q) * self.drive.volts[g];
                     system.electrics.gap_rows[(g, source)] * charge
                 })
                 .sum(),
-            Row::Rise(heater) => rise[heater],
-            Row::Nothing => 0.0,
+            OutputRow::Rise(heater) => rise[heater],
+            OutputRow::Nothing => 0.0,
         }
     }
 
@@ -189,7 +189,7 @@ impl Mechanism<'_> {
 }
 
 /// Takes away couplings that are none but for rounding.
-fn without_rounding(model: &mut Reduced) {
+fn without_rounding(model: &mut ReducedModel) {
     let diagonal = model.damping.diagonal();
     for j in 0..diagonal.len() {
         for k in 0..diagonal.len() {

@@ -12,10 +12,10 @@
 //!
 //! Conductances that stand for no resistance of the part are controlled sources, which make no noise.
 
-use super::compare::Fitted;
-use super::linear::Reduced;
+use super::compare::ModelFit;
+use super::linear::ReducedModel;
 use super::names::Pins;
-use super::parts::Parts;
+use super::parts::SubcircuitText;
 use crate::device::PortKind;
 use std::fmt::Write;
 
@@ -24,13 +24,13 @@ const CAPACITOR: f64 = 1e-9;
 const INDUCTOR: f64 = 1.0;
 
 /// The file: a header that tells what it is, and the subcircuit `name`. `about` holds the lines that say what was exported.
-pub fn write(fitted: &Fitted, pins: &Pins, name: &str, about: &[String]) -> String {
+pub fn write(fitted: &ModelFit, pins: &Pins, name: &str, about: &[String]) -> String {
     let mut text = String::new();
     for line in about {
         let _ = writeln!(text, "* {line}");
     }
     let _ = writeln!(text, ".subckt {name} {}", pins.all().collect::<Vec<_>>().join(" "));
-    let mut deck = Deck { model: &fitted.model, pins, parts: Parts::after(text) };
+    let mut deck = LinearSubcircuit { model: &fitted.model, pins, parts: SubcircuitText::after(text) };
     deck.inputs();
     deck.lags();
     deck.modes();
@@ -43,13 +43,13 @@ pub fn write(fitted: &Fitted, pins: &Pins, name: &str, about: &[String]) -> Stri
 }
 
 /// A subcircuit being written.
-struct Deck<'a> {
-    model: &'a Reduced,
+struct LinearSubcircuit<'a> {
+    model: &'a ReducedModel,
     pins: &'a Pins,
-    parts: Parts,
+    parts: SubcircuitText,
 }
 
-impl Deck<'_> {
+impl LinearSubcircuit<'_> {
     /// A current of `gain` times input `port`.
     fn by_input(&mut self, places: (&str, &str), port: usize, gain: f64) {
         if self.model.ports[port].kind.given_flow() {

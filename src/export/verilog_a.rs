@@ -4,14 +4,14 @@
 //! the next, no event is watched and no step is bounded. `ddt` acts on voltages and branch currents alone. One contribution for
 //! each node and each row of the model's equations ([`super::linear`]).
 
-use super::compare::Fitted;
-use super::linear::{Port, Reduced};
+use super::compare::ModelFit;
+use super::linear::{ReducedModel, ReducedPort};
 use super::names::Pins;
 use crate::device::PortKind;
 use std::fmt::Write;
 
 /// The file: a header that tells what it is, and the module `name`.
-pub fn write(fitted: &Fitted, pins: &Pins, name: &str, about: &[String]) -> String {
+pub fn write(fitted: &ModelFit, pins: &Pins, name: &str, about: &[String]) -> String {
     let model = &fitted.model;
     let inner: Vec<String> = (1..=model.modes.len())
         .flat_map(|k| [format!("x{k}"), format!("w{k}")])
@@ -26,7 +26,7 @@ pub fn write(fitted: &Fitted, pins: &Pins, name: &str, about: &[String]) -> Stri
         let omega = model.modes[j].omega;
         let (x, w) = (format!("x{}", j + 1), format!("w{}", j + 1));
         let _ = writeln!(text, "    I({x}) <+ ddt({:e} * V({x})) - V({w});", 1.0 / omega);
-        let mut sum = Sum::begin(&format!("I({w}) <+ ddt({:e} * V({w})) + V({x})", 1.0 / omega));
+        let mut sum = ContributionSum::begin(&format!("I({w}) <+ ddt({:e} * V({w})) + V({x})", 1.0 / omega));
         for k in 0..model.modes.len() {
             sum.add(model.damping[(j, k)] / omega, &format!("V(w{})", k + 1));
         }
@@ -45,7 +45,7 @@ pub fn write(fitted: &Fitted, pins: &Pins, name: &str, about: &[String]) -> Stri
             (_, Some(k)) => format!("V({})", pins.signals[k]),
             _ => format!("V(b{})", row + 1),
         };
-        let mut sum = Sum::begin(&format!("{left} <+ {:e}", model.at_rest[row]));
+        let mut sum = ContributionSum::begin(&format!("{left} <+ {:e}", model.at_rest[row]));
         for j in 0..model.modes.len() {
             sum.add(model.place[(row, j)], &format!("V(x{})", j + 1));
             sum.add(model.rate[(row, j)], &format!("V(w{})", j + 1));
@@ -67,7 +67,7 @@ pub fn write(fitted: &Fitted, pins: &Pins, name: &str, about: &[String]) -> Stri
 }
 
 /// All up to the first contribution: what the file is, pins, inner nodes and branches.
-pub(super) fn head(name: &str, pins: &Pins, inner: &[String], ports: &[Port], about: &[String]) -> String {
+pub(super) fn head(name: &str, pins: &Pins, inner: &[String], ports: &[ReducedPort], about: &[String]) -> String {
     let mut text = String::new();
     for line in about {
         let _ = writeln!(text, "// {line}");
@@ -87,7 +87,7 @@ pub(super) fn head(name: &str, pins: &Pins, inner: &[String], ports: &[Port], ab
 }
 
 /// The deviation of an input from the operating point.
-fn input(model: &Reduced, port: usize) -> String {
+fn input(model: &ReducedModel, port: usize) -> String {
     let (branch, bias) = (format!("b{}", port + 1), model.ports[port].bias.unwrap_or(0.0));
     if model.ports[port].kind.given_flow() {
         format!("I({branch})")
@@ -99,9 +99,9 @@ fn input(model: &Reduced, port: usize) -> String {
 }
 
 /// A contribution being written, a term a line.
-pub(super) struct Sum(String);
+pub(super) struct ContributionSum(String);
 
-impl Sum {
+impl ContributionSum {
     pub(super) fn begin(start: &str) -> Self {
         Self(format!("    {start}"))
     }

@@ -30,21 +30,21 @@ mod transient;
 mod values;
 
 pub use axis::SweepParameter;
-pub use crew::{Crew, Pool};
+pub use crew::{Executor, ThreadPool};
 pub use design::{DESIGNS, Design};
 pub use distribution::{Distribution, Vary, number};
 pub use error::SweepError;
 #[cfg(feature = "server")]
 pub use points::points;
-pub use samples::{Samples, Sampling};
+pub use samples::{SampleGenerator, Sampling};
 pub use spec::{Shard, SweepAnalysis, SweepSpec};
 pub use table::{SweepRow, SweepTable};
 pub use values::Values;
 
-use crate::compile::{CompileError, CompileOptions, Drawn, draw};
-use crate::netlist::{Bundle, Setting, Source};
-use journal::Kept;
-use point::Outcome;
+use crate::compile::{CompileError, CompileOptions, ParsedStructure, draw};
+use crate::netlist::{Bundle, NetlistSource, Setting};
+use journal::JournalRow;
+use point::PointOutcome;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -67,16 +67,20 @@ pub struct SweepProgress {
 /// [`SweepError::BadSpec`] with the first such parameter or output.
 pub fn check_names(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<(), SweepError> {
     spec.point_numbers()?;
-    point::check_names(spec, &Source::new(bundle), options)
+    point::check_names(spec, &NetlistSource::new(bundle), options)
 }
 
 /// What is drawn at the first point, with what the netlist is warned of there.
 ///
 /// # Errors
 /// What the point would have for an error.
-pub fn first_drawn(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<Drawn, CompileError> {
+pub fn first_drawn(
+    spec: &SweepSpec,
+    bundle: &Bundle,
+    options: &CompileOptions,
+) -> Result<ParsedStructure, CompileError> {
     let settings = spec.settings(0);
-    draw(&Source::new(bundle), &axis::at(&axis::chosen(options, &settings), &settings))
+    draw(&NetlistSource::new(bundle), &axis::at(&axis::chosen(options, &settings), &settings))
 }
 
 /// Runs a sweep; under a budget, each point has all of its allowance, and the rows together have it once more. `progress` is told after every point, from any thread, and answers whether to go on.
@@ -101,18 +105,18 @@ pub fn run_on(
     spec: &SweepSpec,
     bundle: &Bundle,
     options: &CompileOptions,
-    known: Vec<Kept>,
-    keep: Option<&(dyn Fn(&Kept) -> bool + Sync)>,
+    known: Vec<JournalRow>,
+    keep: Option<&(dyn Fn(&JournalRow) -> bool + Sync)>,
     progress: &(dyn Fn(SweepProgress) -> bool + Sync),
 ) -> Result<SweepTable, SweepError> {
     let mut numbers = spec.point_numbers()?;
     let points = numbers.len() as u64;
-    let mut known: BTreeMap<usize, Kept> = known.into_iter().map(|kept| (kept.point, kept)).collect();
+    let mut known: BTreeMap<usize, JournalRow> = known.into_iter().map(|kept| (kept.point, kept)).collect();
     known.retain(|number, _| numbers.binary_search(number).is_ok());
     numbers.retain(|number| !known.contains_key(number));
     let before = known.values().filter(|kept| kept.error.is_some()).count();
     let (done, failed) = (AtomicU64::new(known.len() as u64), AtomicU64::new(before as u64));
-    let each = |outcome: &Outcome| {
+    let each = |outcome: &PointOutcome| {
         if outcome.values.is_err() {
             failed.fetch_add(1, Ordering::Relaxed);
         }
@@ -122,11 +126,11 @@ pub fn run_on(
     };
     let found = Mutex::new(Vec::with_capacity(numbers.len()));
     let take = |outcomes| found.lock().unwrap_or_else(PoisonError::into_inner).extend(outcomes);
-    let crew = Pool::new(spec.threads.unwrap_or(0))?;
+    let crew = ThreadPool::new(spec.threads.unwrap_or(0))?;
     if !pieces::run((spec, bundle, options), &numbers, &crew, &each, &take)? {
         return Err(SweepError::Cancelled { done: done.into_inner(), points });
     }
-    let mut all: Vec<Outcome> = known.into_values().map(|kept| kept.outcome(spec)).collect();
+    let mut all: Vec<PointOutcome> = known.into_values().map(|kept| kept.outcome(spec)).collect();
     all.extend(found.into_inner().unwrap_or_else(PoisonError::into_inner));
     all.sort_by_key(|outcome| outcome.number);
     Ok(table::assemble(spec.names().map(str::to_owned).collect(), all))
@@ -142,15 +146,15 @@ pub fn run_by(
     bundle: &Bundle,
     options: &CompileOptions,
     numbers: &[usize],
-    crew: &dyn Crew,
-    keep: &(dyn Fn(Kept) -> bool + Sync),
+    crew: &dyn Executor,
+    keep: &(dyn Fn(JournalRow) -> bool + Sync),
 ) -> Result<bool, SweepError> {
     pieces::run((spec, bundle, options), numbers, crew, &|outcome| keep(outcome.kept()), &drop)
 }
 
 /// The table of points that came one by one, each with the values of its parameters, in any order.
-pub fn table_of(parameters: Vec<String>, rows: Vec<(Vec<Setting>, Kept)>) -> SweepTable {
-    let mut all: Vec<Outcome> = rows.into_iter().map(|(settings, kept)| kept.with(settings)).collect();
+pub fn table_of(parameters: Vec<String>, rows: Vec<(Vec<Setting>, JournalRow)>) -> SweepTable {
+    let mut all: Vec<PointOutcome> = rows.into_iter().map(|(settings, kept)| kept.with(settings)).collect();
     all.sort_by_key(|outcome| outcome.number);
     table::assemble(parameters, all)
 }

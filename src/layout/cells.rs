@@ -1,6 +1,6 @@
 //! A layout with its hierarchy, as a file holds it: cells with outlines, labels and calls of other cells.
 //!
-//! Both readers make one of these; [`flatten`](super::flatten) makes a [`Drawing`](super::Drawing) of it.
+//! Both readers make one of these; [`flatten`](super::flatten) makes a [`FlatLayout`](super::FlatLayout) of it.
 
 use std::collections::BTreeMap;
 
@@ -28,16 +28,16 @@ pub(crate) struct Cell {
     /// Its name.
     pub(crate) name: String,
     /// Contours, any direction, closed without repeating the first point [units].
-    pub(crate) shapes: Vec<Shape>,
+    pub(crate) shapes: Vec<CellShape>,
     /// Texts.
-    pub(crate) texts: Vec<Text>,
+    pub(crate) texts: Vec<CellText>,
     /// Calls of other cells.
-    pub(crate) calls: Vec<Call>,
+    pub(crate) calls: Vec<CellReference>,
 }
 
 /// A contour on a layer.
 #[derive(Debug, Clone)]
-pub(crate) struct Shape {
+pub(crate) struct CellShape {
     /// Index into [`Library::layers`].
     pub(crate) layer: u32,
     /// Its points [units].
@@ -46,7 +46,7 @@ pub(crate) struct Shape {
 
 /// A text on a layer.
 #[derive(Debug, Clone)]
-pub(crate) struct Text {
+pub(crate) struct CellText {
     /// Index into [`Library::layers`]; none where the file gives none.
     pub(crate) layer: Option<u32>,
     /// The text.
@@ -57,7 +57,7 @@ pub(crate) struct Text {
 
 /// A cell called in a place, or in a grid of them.
 #[derive(Debug, Clone)]
-pub(crate) struct Call {
+pub(crate) struct CellReference {
     /// Name of the cell.
     pub(crate) cell: String,
     /// Where in the file, for messages ("line 7", "byte 1204").

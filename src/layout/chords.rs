@@ -7,7 +7,7 @@ use super::drawing::Polygon;
 /// Edges a bucket, on average.
 const SHARE: f64 = 2.0;
 /// Most buckets along one side.
-const MOST: f64 = 4096.0;
+const MAX_BUCKETS: f64 = 4096.0;
 
 /// Edges of disjoint polygons, findable by place.
 #[derive(Debug)]
@@ -35,7 +35,7 @@ impl Chords {
         let [width, height] =
             [high[0] - low[0], high[1] - low[1]].map(|s| if s.is_finite() { s.max(1.0) } else { 1.0 });
         let wanted = (edges.len() as f64 / SHARE).max(1.0);
-        let size = (width * height / wanted).sqrt().max(width.max(height) / MOST);
+        let size = (width * height / wanted).sqrt().max(width.max(height) / MAX_BUCKETS);
         let (columns, rows) = ((width / size) as usize + 1, (height / size) as usize + 1);
         let mut chords =
             Self { low, size, columns, rows, buckets: vec![Vec::new(); columns * rows], edges: Vec::new() };

@@ -9,11 +9,11 @@ mod error;
 mod shapes;
 mod text;
 
-use super::cells::{Call, Cell, Library, Shape, Text, Transform};
-use super::flatten::MOST_POINTS;
+use super::cells::{Cell, CellReference, CellShape, CellText, Library, Transform};
+use super::flatten::MAX_POINTS;
 use crate::budget;
 use std::collections::HashMap;
-use text::Reader;
+use text::CifReader;
 
 pub use error::{CifError, CifFault};
 
@@ -22,7 +22,7 @@ const CENTIMICRON: f64 = 1e-8;
 /// Most points of one polygon or wire.
 const LONGEST: usize = 1 << 20;
 /// Most shapes, labels and calls of a file, before hierarchy is taken out.
-const MOST_PARTS: usize = 4_000_000;
+const MAX_PARTS: usize = 4_000_000;
 /// The cell of what stands outside symbols.
 pub(super) const OUTSIDE: &str = "(top)";
 
@@ -31,8 +31,8 @@ pub(super) const OUTSIDE: &str = "(top)";
 /// # Errors
 /// See [`CifError`]: the first thing that is wrong, with line and column.
 pub(crate) fn read(text: &[u8], file: &str) -> Result<Library, CifError> {
-    let mut reading = Reading {
-        reader: Reader::new(text, file),
+    let mut reading = CifParser {
+        reader: CifReader::new(text, file),
         library: Library { source: file.to_owned(), unit_m: CENTIMICRON, ..Library::default() },
         outside: Cell { name: OUTSIDE.to_owned(), ..Cell::default() },
         symbol: None,
@@ -55,8 +55,8 @@ struct Symbol {
     outer_layer: Option<u32>,
 }
 
-struct Reading<'a> {
-    reader: Reader<'a>,
+struct CifParser<'a> {
+    reader: CifReader<'a>,
     library: Library,
     outside: Cell,
     symbol: Option<Symbol>,
@@ -69,21 +69,21 @@ struct Reading<'a> {
     first_skipped: String,
 }
 
-type Read<T> = Result<T, CifError>;
+type CifResult<T> = Result<T, CifError>;
 
-impl Reading<'_> {
-    fn file(&mut self) -> Read<()> {
+impl CifParser<'_> {
+    fn file(&mut self) -> CifResult<()> {
         loop {
             budget::check();
             self.reader.blanks()?;
             let Some(byte) = self.reader.peek() else {
                 return Err(self.reader.error(CifFault::End("without `E`: is it whole?")));
             };
-            if self.parts > MOST_PARTS {
-                return Err(self.reader.error(CifFault::Many { what: "shapes, labels and calls", most: MOST_PARTS }));
+            if self.parts > MAX_PARTS {
+                return Err(self.reader.error(CifFault::Many { what: "shapes, labels and calls", most: MAX_PARTS }));
             }
-            if self.points as u64 > MOST_POINTS {
-                return Err(self.reader.error(CifFault::Many { what: "points", most: MOST_POINTS as usize }));
+            if self.points as u64 > MAX_POINTS {
+                return Err(self.reader.error(CifFault::Many { what: "points", most: MAX_POINTS as usize }));
             }
             match byte {
                 b';' => self.reader.advance(),
@@ -117,26 +117,26 @@ impl Reading<'_> {
         self.symbol.as_mut().map_or(&mut self.outside, |s| &mut s.cell)
     }
 
-    fn add(&mut self, points: Vec<[f64; 2]>) -> Read<()> {
+    fn add(&mut self, points: Vec<[f64; 2]>) -> CifResult<()> {
         let Some(layer) = self.layer else { return Err(self.reader.error(CifFault::NoLayer)) };
         self.parts += 1;
         self.points += points.len();
-        self.cell().shapes.push(Shape { layer, points });
+        self.cell().shapes.push(CellShape { layer, points });
         Ok(())
     }
 
     /// A point, in the unit of the file.
-    fn point(&mut self) -> Read<[f64; 2]> {
+    fn point(&mut self) -> CifResult<[f64; 2]> {
         let (x, y) = (self.reader.integer()?, self.reader.integer()?);
         Ok([x as f64, y as f64].map(|v| v * self.scale()))
     }
 
-    fn size(&mut self, what: &'static str) -> Read<f64> {
+    fn size(&mut self, what: &'static str) -> CifResult<f64> {
         let value = self.reader.integer()?;
         if value > 0 { Ok(value as f64 * self.scale()) } else { Err(self.reader.error(CifFault::Size { what, value })) }
     }
 
-    fn layer(&mut self) -> Read<()> {
+    fn layer(&mut self) -> CifResult<()> {
         self.reader.advance();
         let name = self.reader.name("the name of a layer")?;
         self.reader.end()?;
@@ -144,7 +144,7 @@ impl Reading<'_> {
         Ok(())
     }
 
-    fn definition(&mut self) -> Read<()> {
+    fn definition(&mut self) -> CifResult<()> {
         self.reader.advance();
         self.reader.blanks()?;
         match self.reader.peek() {
@@ -198,13 +198,13 @@ impl Reading<'_> {
         Ok(())
     }
 
-    fn number(&mut self, what: &'static str) -> Read<i64> {
+    fn number(&mut self, what: &'static str) -> CifResult<i64> {
         let value = self.reader.integer()?;
         if value >= 0 { Ok(value) } else { Err(self.reader.error(CifFault::Size { what, value })) }
     }
 
     /// C number, then T x y, MX, MY and R a b in the order in which they act.
-    fn call(&mut self) -> Read<()> {
+    fn call(&mut self) -> CifResult<()> {
         let place = self.reader.place();
         self.reader.advance();
         let number = self.number("the number of a symbol")?;
@@ -240,13 +240,13 @@ impl Reading<'_> {
         self.parts += 1;
         // A symbol that comes later is found at the end.
         let cell = self.defined.get(&number).map_or_else(|| format!("#{number}"), |k| format!("@{k}"));
-        let call = Call { cell, place, transform, count: [1, 1], pitch: [[0.0; 2]; 2] };
+        let call = CellReference { cell, place, transform, count: [1, 1], pitch: [[0.0; 2]; 2] };
         self.cell().calls.push(call);
         Ok(())
     }
 
     /// 9 names a symbol, 94 and 95 are labels.
-    fn extension(&mut self) -> Read<()> {
+    fn extension(&mut self) -> CifResult<()> {
         let place = self.reader.place();
         let statement = self.reader.statement()?;
         let words = text::words(&statement);
@@ -270,7 +270,7 @@ impl Reading<'_> {
             let layer = layer.map(|name| self.library.layer(&name)).or(self.layer);
             let at = at.map(|v| v * self.scale());
             self.parts += 1;
-            self.cell().texts.push(Text { layer, text, at });
+            self.cell().texts.push(CellText { layer, text, at });
         } else {
             self.skipped += 1;
             if self.skipped == 1 {
@@ -304,7 +304,7 @@ impl Reading<'_> {
         }
         let outside = &self.outside;
         // A file whose top level is one call as it stands means that symbol.
-        let plain = |call: &Call| call.transform == Transform::IDENTITY && names.contains(&call.cell);
+        let plain = |call: &CellReference| call.transform == Transform::IDENTITY && names.contains(&call.cell);
         let alone = outside.shapes.is_empty() && outside.texts.is_empty();
         if alone && outside.calls.len() == 1 && plain(&outside.calls[0]) {
             let called = outside.calls[0].cell.clone();

@@ -1,13 +1,13 @@
 //! A drawing to a netlist: by its labels where it carries its mechanism, else by its geometry.
 
-use super::drawing::Drawing;
+use super::drawing::FlatLayout;
 use super::extract::{self, ExtractError, ExtractOptions, Extraction};
 use super::labelled::{self, LabelledError};
-use super::lines::Line;
+use super::lines::ElementLine;
 use super::mask;
 use super::process::{Process, ProcessError};
 use super::read::LayoutError;
-use super::report::{Areas, Report, Unrecognised};
+use super::report::{ConversionReport, LayerAreas, Unrecognised};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use thiserror::Error;
@@ -39,7 +39,7 @@ pub struct Converted {
     /// The netlist.
     pub netlist: String,
     /// What became of the drawing.
-    pub report: Report,
+    pub report: ConversionReport,
     /// Name of the process.
     pub process: String,
     /// For lines of the netlist, from 1, the layer and place in the drawing that they stand for.
@@ -52,7 +52,7 @@ pub struct Converted {
 ///
 /// # Errors
 /// See [`ConvertError`].
-pub fn convert(drawing: &Drawing, process: Option<&Process>) -> Result<Converted, ConvertError> {
+pub fn convert(drawing: &FlatLayout, process: Option<&Process>) -> Result<Converted, ConvertError> {
     let named = mask::drawn_on(drawing);
     let builtin;
     let process = match process {
@@ -70,9 +70,9 @@ pub fn convert(drawing: &Drawing, process: Option<&Process>) -> Result<Converted
 }
 
 /// Limbs, bodies and anchors as they are drawn, with what labels on the layer of notes add.
-fn by_geometry(drawing: &Drawing, process: &Process) -> Result<Converted, ConvertError> {
+fn by_geometry(drawing: &FlatLayout, process: &Process) -> Result<Converted, ConvertError> {
     let extraction = extract::extract(drawing, process, &ExtractOptions::default())?;
-    let extract::Written { text: mut netlist, names, places } = extract::written(&extraction);
+    let extract::WrittenNetlist { text: mut netlist, names, places } = extract::written(&extraction);
     let in_words = |(line, (layer, at)): (usize, (String, [f64; 2]))| {
         let at = drawing.place(at.map(|x| x / drawing.unit_m));
         (line, if layer == "*" { format!("at {at}") } else { format!("layer {layer} at {at}") })
@@ -81,7 +81,7 @@ fn by_geometry(drawing: &Drawing, process: &Process) -> Result<Converted, Conver
     let mut report = report(&extraction, drawing.unit_m);
     let mut lines = netlist.lines().count();
     for label in drawing.labels.iter().filter(|l| mask::on_notes(&l.layer)) {
-        match Line::parse(&label.text) {
+        match ElementLine::parse(&label.text) {
             Ok(line) => {
                 let _ = writeln!(netlist, "{line}");
                 let at = drawing.place(label.at.map(f64::from));
@@ -98,8 +98,8 @@ fn by_geometry(drawing: &Drawing, process: &Process) -> Result<Converted, Conver
     Ok(Converted { netlist, report, process: process.name.clone(), places, landmark })
 }
 
-fn report(extraction: &Extraction, unit_m: f64) -> Report {
-    let mut areas = Areas::default();
+fn report(extraction: &Extraction, unit_m: f64) -> ConversionReport {
+    let mut areas = LayerAreas::default();
     for layer in &extraction.layers {
         areas.drawn_m2 += layer.drawn;
         areas.extracted_m2 += layer.extracted;
@@ -137,7 +137,7 @@ fn report(extraction: &Extraction, unit_m: f64) -> Report {
             contours: contours.collect(),
         }
     });
-    Report {
+    ConversionReport {
         by: "geometry".to_owned(),
         counts: counts.map(|(what, n)| (what.to_owned(), n)).collect(),
         areas,

@@ -6,64 +6,64 @@
 //!
 //! Reference: F. P. Preparata, M. I. Shamos, "Computational Geometry" (1985), 8.8 (rectangles that meet, by interval trees).
 
-use super::drawing::{Point, Polygon};
+use super::drawing::{GridPoint, Polygon};
 use thiserror::Error;
 
 /// Cuts that set operations take on: some 200 bytes each.
-pub const MOST_CUTS: usize = 4_000_000;
+pub const MAX_CUTS: usize = 4_000_000;
 const BYTES_PER_CUT: usize = 200;
 /// What counting holds for each edge.
 const BYTES_PER_EDGE: usize = 200;
 /// Sum over slanted edges of the squares of how many cuts each has. Crossings of slanted edges are rounded to the grid, which moves the pieces
 /// between them, so that set operations go over them again and again: a star of n edges that all cut one another takes n³ (0.1 s at 250).
-const MOST_DENSE: u64 = 20_000_000;
+const MAX_DENSE: u64 = 20_000_000;
 /// Up to so many edges cannot come to that.
 const FEW: usize = 250;
 /// Pairs of runs that are tried: long lines side by side on a slope, none of which cut another, come to that.
-const MOST_TRIED: usize = 50_000_000;
+const MAX_TRIED: usize = 50_000_000;
 
 /// Polygons whose union could be too large to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error(
-    "its polygons cut one another in more than {MOST_CUTS} places, or slanted ones each in hundreds, or many long slanted ones lie side by \
+    "its polygons cut one another in more than {MAX_CUTS} places, or slanted ones each in hundreds, or many long slanted ones lie side by \
      side, about point {} {} of its grid", .at[0], .at[1]
 )]
-pub struct Tangled {
+pub struct CrossingContours {
     /// Where the counting ended [database units].
-    pub at: Point,
+    pub at: GridPoint,
 }
 
 /// Looks at polygons before a set operation on all of them.
 ///
 /// # Errors
-/// [`Tangled`] beyond [`MOST_CUTS`], or where slanted edges cut one another too often each.
-pub(super) fn bounded<'a>(polygons: impl Iterator<Item = &'a Polygon>) -> Result<(), Tangled> {
-    let edges: Vec<Vec<Edge>> = polygons.flat_map(|p| &p.contours).map(|c| edges_of(c).collect()).collect();
+/// [`CrossingContours`] beyond [`MAX_CUTS`], or where slanted edges cut one another too often each.
+pub(super) fn bounded<'a>(polygons: impl Iterator<Item = &'a Polygon>) -> Result<(), CrossingContours> {
+    let edges: Vec<Vec<ContourEdge>> = polygons.flat_map(|p| &p.contours).map(|c| edges_of(c).collect()).collect();
     let all = edges.iter().map(Vec::len).sum::<usize>();
     // fewer pairs than cuts that are taken on
     let slanted = edges.iter().flatten().filter(|e| e.slanted()).count();
-    if all.saturating_mul(all) / 2 <= MOST_CUTS && slanted <= FEW {
+    if all.saturating_mul(all) / 2 <= MAX_CUTS && slanted <= FEW {
         return Ok(());
     }
     crate::budget::lay_out(all.saturating_mul(BYTES_PER_EDGE));
-    let cuts = Sweep::new(runs(&edges)).count(MOST_CUTS)?;
+    let cuts = SweepLine::new(runs(&edges)).count(MAX_CUTS)?;
     crate::budget::lay_out(cuts.saturating_mul(BYTES_PER_CUT));
     Ok(())
 }
 
 /// From the lesser end to the greater, by x, then y.
 #[derive(Debug, Clone, Copy)]
-struct Edge {
-    a: Point,
-    b: Point,
+struct ContourEdge {
+    a: GridPoint,
+    b: GridPoint,
 }
 
-fn edges_of(contour: &[Point]) -> impl Iterator<Item = Edge> {
+fn edges_of(contour: &[GridPoint]) -> impl Iterator<Item = ContourEdge> {
     let next = contour.iter().cycle().skip(1);
-    contour.iter().zip(next).filter(|(a, b)| a != b).map(|(a, b)| Edge { a: *a.min(b), b: *a.max(b) })
+    contour.iter().zip(next).filter(|(a, b)| a != b).map(|(a, b)| ContourEdge { a: *a.min(b), b: *a.max(b) })
 }
 
-impl Edge {
+impl ContourEdge {
     fn low(&self) -> i32 {
         self.a[1].min(self.b[1])
     }
@@ -81,7 +81,7 @@ impl Edge {
     }
 
     /// On which side of the edge's line a point lies.
-    fn side(&self, p: Point) -> i128 {
+    fn side(&self, p: GridPoint) -> i128 {
         let [ux, uy, vx, vy] =
             [self.b[0] - self.a[0], self.b[1] - self.a[1], p[0] - self.a[0], p[1] - self.a[1]].map(i128::from);
         (ux * vy - uy * vx).signum()
@@ -105,26 +105,26 @@ impl Edge {
 
 /// Edges of a contour one after the other, and the box around them.
 #[derive(Debug, Clone, Copy)]
-struct Run<'a> {
-    edges: &'a [Edge],
-    low: Point,
-    high: Point,
+struct EdgeRun<'a> {
+    edges: &'a [ContourEdge],
+    low: GridPoint,
+    high: GridPoint,
 }
 
 /// Most edges of a run.
 const RUN: usize = 8;
 
 /// The runs of contours from left to right.
-fn runs(contours: &[Vec<Edge>]) -> Vec<Run<'_>> {
+fn runs(contours: &[Vec<ContourEdge>]) -> Vec<EdgeRun<'_>> {
     let run = |edges| {
-        let run = Run { edges, low: [i32::MAX; 2], high: [i32::MIN; 2] };
-        edges.iter().fold(run, |run: Run, e| Run {
+        let run = EdgeRun { edges, low: [i32::MAX; 2], high: [i32::MIN; 2] };
+        edges.iter().fold(run, |run: EdgeRun, e| EdgeRun {
             low: [run.low[0].min(e.a[0]), run.low[1].min(e.low())],
             high: [run.high[0].max(e.b[0]), run.high[1].max(e.high())],
             ..run
         })
     };
-    let mut runs: Vec<Run> = contours.iter().flat_map(|c| c.chunks(RUN)).map(run).collect();
+    let mut runs: Vec<EdgeRun> = contours.iter().flat_map(|c| c.chunks(RUN)).map(run).collect();
     runs.sort_by_key(|r| r.low);
     runs
 }
@@ -132,8 +132,8 @@ fn runs(contours: &[Vec<Edge>]) -> Vec<Run<'_>> {
 /// Cuts of each edge of a run with slanted ones, or of a slanted edge with any.
 type Each = [u32; RUN];
 
-impl Run<'_> {
-    /// Cuts among its own edges, and by how much they add to [`MOST_DENSE`].
+impl EdgeRun<'_> {
+    /// Cuts among its own edges, and by how much they add to [`MAX_DENSE`].
     fn own(&self, each: &mut Each) -> (usize, u64) {
         let (mut cuts, mut dense) = (0, 0);
         for (k, e) in self.edges.iter().enumerate() {
@@ -169,8 +169,8 @@ fn one_more(count: &mut u32) -> u64 {
 }
 
 /// Runs in the tree, by the nodes that cover their range of y.
-struct Sweep<'a> {
-    runs: Vec<Run<'a>>,
+struct SweepLine<'a> {
+    runs: Vec<EdgeRun<'a>>,
     /// Ends of ranges, in order.
     places: Vec<i32>,
     /// Leaves, a power of two.
@@ -187,8 +187,8 @@ struct Sweep<'a> {
     dense: u64,
 }
 
-impl<'a> Sweep<'a> {
-    fn new(runs: Vec<Run<'a>>) -> Self {
+impl<'a> SweepLine<'a> {
+    fn new(runs: Vec<EdgeRun<'a>>) -> Self {
         let mut places: Vec<i32> = runs.iter().flat_map(|r| [r.low[1], r.high[1]]).collect();
         places.sort_unstable();
         places.dedup();
@@ -198,7 +198,7 @@ impl<'a> Sweep<'a> {
         Self { runs, places, leaves, at, below, last, tried: 0, each, dense: 0 }
     }
 
-    fn count(&mut self, most: usize) -> Result<usize, Tangled> {
+    fn count(&mut self, most: usize) -> Result<usize, CrossingContours> {
         let mut cuts = 0;
         for k in 0..self.runs.len() {
             crate::budget::check();
@@ -207,8 +207,8 @@ impl<'a> Sweep<'a> {
             let (own, dense) = run.own(&mut self.each[k]);
             self.dense += dense;
             cuts += own + self.meet(k, range, 1, [0, self.leaves - 1]);
-            if cuts > most || self.tried > MOST_TRIED || self.dense > MOST_DENSE {
-                return Err(Tangled { at: run.low });
+            if cuts > most || self.tried > MAX_TRIED || self.dense > MAX_DENSE {
+                return Err(CrossingContours { at: run.low });
             }
             self.enter(k, range, 1, [0, self.leaves - 1]);
         }
@@ -278,8 +278,9 @@ mod tests {
     use proptest::prelude::*;
 
     fn count(polygons: &[Polygon]) -> usize {
-        let edges: Vec<Vec<Edge>> = polygons.iter().flat_map(|p| &p.contours).map(|c| edges_of(c).collect()).collect();
-        Sweep::new(runs(&edges)).count(usize::MAX).unwrap()
+        let edges: Vec<Vec<ContourEdge>> =
+            polygons.iter().flat_map(|p| &p.contours).map(|c| edges_of(c).collect()).collect();
+        SweepLine::new(runs(&edges)).count(usize::MAX).unwrap()
     }
 
     fn bars(n: i32) -> Vec<Polygon> {
@@ -296,7 +297,7 @@ mod tests {
         assert!(bounded(bars(10_000).iter()).is_err());
     }
 
-    /// A star whose edges all cut one another is refused from 273 edges on (the cube root of [`MOST_DENSE`], each cut counts for two edges), one that
+    /// A star whose edges all cut one another is refused from 273 edges on (the cube root of [`MAX_DENSE`], each cut counts for two edges), one that
     /// each edge crosses a few times is not, however many edges it has.
     #[test]
     fn stars() {
@@ -327,7 +328,7 @@ mod tests {
         /// Any edges on a small grid: as many cuts as all pairs have.
         #[test]
         fn any_edges(points in prop::collection::vec(prop::array::uniform2(-6i32..6), 3..60)) {
-            let edges: Vec<Edge> = edges_of(&points).collect();
+            let edges: Vec<ContourEdge> = edges_of(&points).collect();
             let pairs = (0..edges.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
             let all = pairs.filter(|(i, j)| edges[*i].cuts(&edges[*j])).count();
             prop_assert_eq!(count(&[Polygon { contours: vec![points] }]), all);

@@ -5,7 +5,7 @@
 //! spine on either side; a field between facing beams the electrode that no beam draws. Lumped parts, links, loads and circuits
 //! have no outline.
 
-use super::lines::{Line, Lines};
+use super::lines::{ElementLine, ElementLines};
 use super::process::Process;
 use crate::domains::elements;
 use std::collections::HashMap;
@@ -19,7 +19,7 @@ const LONGEST_CORNER: f64 = 2.0;
 /// Spines of combs, in widths of a finger [1].
 const SPINE: f64 = 2.0;
 /// Most fingers that are drawn of one comb.
-const MOST_FINGERS: f64 = 10_000.0;
+const MAX_FINGERS: f64 = 10_000.0;
 
 /// What a shape is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -42,7 +42,7 @@ pub(crate) struct Figure {
 }
 
 /// A beam's end: where it is and where the beam goes from there.
-struct End {
+struct BeamEnd {
     half: f64,
     /// Away from the node, along the beam.
     direction: [f64; 2],
@@ -54,7 +54,7 @@ pub(crate) fn is_beam(model: &str) -> bool {
 }
 
 /// Draws lines whose nodes lie at these places [m].
-pub(crate) fn draw(lines: &Lines, at: &HashMap<String, [f64; 2]>, process: &Process) -> Figure {
+pub(crate) fn draw(lines: &ElementLines, at: &HashMap<String, [f64; 2]>, process: &Process) -> Figure {
     let mut drawing =
         Draw { lines, at, process, figure: Figure::default(), layers: HashMap::new(), ends: HashMap::new() };
     drawing.choose_layers();
@@ -66,13 +66,13 @@ pub(crate) fn draw(lines: &Lines, at: &HashMap<String, [f64; 2]>, process: &Proc
 }
 
 struct Draw<'a> {
-    lines: &'a Lines,
+    lines: &'a ElementLines,
     at: &'a HashMap<String, [f64; 2]>,
     process: &'a Process,
     figure: Figure,
     /// Layer of each process of the lines.
     layers: HashMap<&'a str, usize>,
-    ends: HashMap<&'a str, Vec<End>>,
+    ends: HashMap<&'a str, Vec<BeamEnd>>,
 }
 
 fn unit(a: [f64; 2], b: [f64; 2]) -> ([f64; 2], f64) {
@@ -131,7 +131,7 @@ impl<'a> Draw<'a> {
         }
     }
 
-    fn layer(&mut self, line: &'a Line) -> usize {
+    fn layer(&mut self, line: &'a ElementLine) -> usize {
         let own = self.layers.get(line.process.as_str()).copied();
         let layer =
             own.or_else(|| line.nodes.iter().find_map(|n| self.figure.layer_of.get(n.as_str()).copied())).unwrap_or(0);
@@ -147,8 +147,8 @@ impl<'a> Draw<'a> {
             let (a, b) = (self.place(&line.nodes[0]), self.place(&line.nodes[1]));
             let (d, _) = unit(a, b);
             let half = line.get("w").unwrap_or(0.0) / 2.0;
-            self.ends.entry(&line.nodes[0]).or_default().push(End { half, direction: d });
-            self.ends.entry(&line.nodes[1]).or_default().push(End { half, direction: [-d[0], -d[1]] });
+            self.ends.entry(&line.nodes[0]).or_default().push(BeamEnd { half, direction: d });
+            self.ends.entry(&line.nodes[1]).or_default().push(BeamEnd { half, direction: [-d[0], -d[1]] });
         }
         for line in &lines.elements {
             if is_beam(&line.model) && line.nodes.len() == 2 {
@@ -235,12 +235,12 @@ impl<'a> Draw<'a> {
     }
 
     /// Fingers side by side, those of the two sides in turn.
-    fn comb(&mut self, line: &Line, layer: usize) {
+    fn comb(&mut self, line: &ElementLine, layer: usize) {
         let get = |name: &str| line.get(name).unwrap_or(0.0);
         let (gap, length, gaps) = (get("gap"), get("L"), get("N"));
         let width = line.get("w").unwrap_or(gap);
-        let fingers = (gaps.round().clamp(1.0, MOST_FINGERS) as usize) + 1;
-        if gaps.fract() != 0.0 || gaps > MOST_FINGERS {
+        let fingers = (gaps.round().clamp(1.0, MAX_FINGERS) as usize) + 1;
+        if gaps.fract() != 0.0 || gaps > MAX_FINGERS {
             self.figure.notes.push(format!("the comb `{}` has {gaps} gaps: {} were drawn", line.name, fingers - 1));
         }
         let d = turned(get("oz"));

@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 pub const LARGEST_COORDINATE: i32 = (1 << 30) - 1;
 
 /// A point of the grid: x, y [database units].
-pub type Point = [i32; 2];
+pub type GridPoint = [i32; 2];
 
 /// A flat drawing.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Drawing {
+pub struct FlatLayout {
     /// Size of a database unit [m].
     pub unit_m: f64,
     /// Polygons as drawn (they may overlap), by layer: CIF's name, or GDSII's "layer/datatype".
@@ -31,7 +31,7 @@ pub struct Drawing {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Polygon {
     /// Outer contour counter-clockwise, then holes clockwise; closed without repeating the first point.
-    pub contours: Vec<Vec<Point>>,
+    pub contours: Vec<Vec<GridPoint>>,
 }
 
 /// A text with a place.
@@ -42,7 +42,7 @@ pub struct Label {
     /// Its text.
     pub text: String,
     /// Its place [database units].
-    pub at: Point,
+    pub at: GridPoint,
 }
 
 /// A cell in its place: p ↦ origin + magnification·R(angle)·(mirrored ? (x, −y) : (x, y)).
@@ -50,7 +50,7 @@ pub struct Label {
 pub struct Placement {
     /// Name of the cell.
     pub cell: String,
-    /// Index of the placement that holds it in [`Drawing::cells`]; none: the top cell.
+    /// Index of the placement that holds it in [`FlatLayout::cells`]; none: the top cell.
     pub parent: Option<usize>,
     /// Place of the cell's origin in the drawing [database units].
     pub origin: [f64; 2],
@@ -61,12 +61,12 @@ pub struct Placement {
     /// Magnification [1].
     pub magnification: f64,
     /// Lower left and upper right corner of the box around all polygons in it [database units].
-    pub extent: [Point; 2],
+    pub extent: [GridPoint; 2],
 }
 
 impl Polygon {
     /// A polygon without holes, turned counter-clockwise and beginning with its leftmost, then lowest point.
-    pub fn from_contour(mut contour: Vec<Point>) -> Self {
+    pub fn from_contour(mut contour: Vec<GridPoint>) -> Self {
         if twice_area(&contour) < 0 {
             contour.reverse();
         }
@@ -76,7 +76,7 @@ impl Polygon {
     }
 
     /// A box between two opposite corners.
-    pub fn rectangle([x0, y0]: Point, [x1, y1]: Point) -> Self {
+    pub fn rectangle([x0, y0]: GridPoint, [x1, y1]: GridPoint) -> Self {
         let ([x0, x1], [y0, y1]) = ([x0.min(x1), x0.max(x1)], [y0.min(y1), y0.max(y1)]);
         Self { contours: vec![vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]] }
     }
@@ -87,7 +87,7 @@ impl Polygon {
     }
 
     /// Lower left and upper right corner of the box around it; none without points.
-    pub fn extent(&self) -> Option<[Point; 2]> {
+    pub fn extent(&self) -> Option<[GridPoint; 2]> {
         let mut points = self.contours.iter().flatten();
         let first = *points.next()?;
         Some(points.fold([first, first], |[low, high], p| {
@@ -97,22 +97,22 @@ impl Polygon {
 }
 
 /// Twice the signed area of a closed contour [square database units], positive counter-clockwise: exact.
-pub fn twice_area(contour: &[Point]) -> i128 {
+pub fn twice_area(contour: &[GridPoint]) -> i128 {
     let next = contour.iter().cycle().skip(1);
-    let cross = |([x0, y0], [x1, y1]): (&Point, &Point)| {
+    let cross = |([x0, y0], [x1, y1]): (&GridPoint, &GridPoint)| {
         i128::from(i64::from(*x0) * i64::from(*y1)) - i128::from(i64::from(*x1) * i64::from(*y0))
     };
     contour.iter().zip(next).map(cross).sum()
 }
 
-impl Drawing {
+impl FlatLayout {
     /// Number of polygons on all layers.
     pub fn polygons(&self) -> usize {
         self.layers.values().map(Vec::len).sum()
     }
 
     /// Lower left and upper right corner of the box around all polygons; none without any.
-    pub fn extent(&self) -> Option<[Point; 2]> {
+    pub fn extent(&self) -> Option<[GridPoint; 2]> {
         let boxes = self.layers.values().flatten().filter_map(Polygon::extent);
         boxes.reduce(|[a, b], [c, d]| [[a[0].min(c[0]), a[1].min(c[1])], [b[0].max(d[0]), b[1].max(d[1])]])
     }

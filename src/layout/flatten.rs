@@ -11,10 +11,10 @@ mod error;
 mod grid;
 
 use super::cells::{Library, Transform};
-use super::drawing::Drawing;
+use super::drawing::FlatLayout;
 use crate::budget;
-use bounds::MOST_PLACEMENTS;
-pub use bounds::{DEEPEST, MOST_LABELS, MOST_POINTS, MOST_POLYGONS};
+use bounds::MAX_PLACEMENTS;
+pub use bounds::{DEEPEST, MAX_LABELS, MAX_POINTS, MAX_POLYGONS};
 use copy::Flat;
 pub use error::FlattenError;
 use std::collections::{BTreeMap, HashMap};
@@ -24,7 +24,7 @@ impl Library {
     ///
     /// # Errors
     /// See [`FlattenError`].
-    pub(crate) fn flatten(mut self, cell: Option<&str>) -> Result<Drawing, FlattenError> {
+    pub(crate) fn flatten(mut self, cell: Option<&str>) -> Result<FlatLayout, FlattenError> {
         let mut by_name = HashMap::with_capacity(self.cells.len());
         for (k, cell) in self.cells.iter().enumerate() {
             if by_name.insert(cell.name.clone(), k).is_some() {
@@ -39,7 +39,7 @@ impl Library {
         budget::lay_out(usize::try_from(bytes).unwrap_or(usize::MAX));
         let grid = self.grid(&total, &order, &counts);
         let mut flat = Flat {
-            drawing: Drawing {
+            drawing: FlatLayout {
                 unit_m: self.unit_m / grid,
                 layers: BTreeMap::new(),
                 labels: Vec::with_capacity(total.labels as usize),
@@ -53,7 +53,7 @@ impl Library {
             by_name: &by_name,
             counts: &counts,
             grid,
-            places: total.placements <= MOST_PLACEMENTS,
+            places: total.placements <= MAX_PLACEMENTS,
             crossing: 0,
             tangled: None,
             vanished: 0,
@@ -70,10 +70,10 @@ impl Library {
 
     /// The cell to draw.
     fn top(&self, cell: Option<&str>, by_name: &HashMap<String, usize>) -> Result<usize, FlattenError> {
-        const MOST_LISTED: usize = 20;
+        const MAX_LISTED: usize = 20;
         let list = |names: &[&str]| {
-            let more = names.len().saturating_sub(MOST_LISTED);
-            let listed = names[..names.len().min(MOST_LISTED)].join(", ");
+            let more = names.len().saturating_sub(MAX_LISTED);
+            let listed = names[..names.len().min(MAX_LISTED)].join(", ");
             if more > 0 { format!("{listed} and {more} more") } else { listed }
         };
         if let Some(name) = cell.or(self.top.as_deref()) {

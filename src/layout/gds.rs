@@ -8,19 +8,19 @@ mod element;
 mod error;
 pub(crate) mod record;
 
-use super::cells::{Call, Cell, Library, Shape, Text};
-use super::flatten::MOST_POINTS;
+use super::cells::{Cell, CellReference, CellShape, CellText, Library};
+use super::flatten::MAX_POINTS;
 use crate::budget;
 use record::{Record, Records, kind};
 use std::io::Read;
 
-use element::{Element, Noted, data};
+use element::{GdsElement, IgnoredContent, data};
 pub use error::{GdsError, GdsFault};
 
 /// Most shapes, labels and calls of a file, before hierarchy is taken out.
-const MOST_PARTS: usize = 4_000_000;
+const MAX_PARTS: usize = 4_000_000;
 /// Most cells of a file.
-const MOST_CELLS: usize = 1_000_000;
+const MAX_CELLS: usize = 1_000_000;
 /// Sizes of a database unit that can be meant [m].
 const UNITS: std::ops::RangeInclusive<f64> = 1e-15..=1e-3;
 /// Records between two reports of progress.
@@ -32,7 +32,8 @@ const REPORT: u32 = 1 << 14;
 /// See [`GdsError`]: the first thing that is wrong, with its byte and record.
 pub(crate) fn read(from: impl Read, file: &str, watch: &mut dyn FnMut(u64) -> bool) -> Result<Library, GdsError> {
     let library = Library { source: file.to_owned(), unit_m: 0.0, ..Library::default() };
-    let mut reading = Reading { library, cell: None, element: None, parts: 0, points: 0, noted: Noted::default() };
+    let mut reading =
+        GdsParser { library, cell: None, element: None, parts: 0, points: 0, noted: IgnoredContent::default() };
     let mut records = Records::new(from, file);
     let first = records.next().map(|r| (r.kind, r.data.to_vec()));
     match first {
@@ -68,16 +69,16 @@ pub(crate) fn read(from: impl Read, file: &str, watch: &mut dyn FnMut(u64) -> bo
     Ok(reading.finish())
 }
 
-struct Reading {
+struct GdsParser {
     library: Library,
     cell: Option<Cell>,
-    element: Option<Element>,
+    element: Option<GdsElement>,
     parts: usize,
     points: u64,
-    noted: Noted,
+    noted: IgnoredContent,
 }
 
-impl Reading {
+impl GdsParser {
     /// Takes a record; true after the last one.
     fn take(&mut self, record: &Record<'_>) -> Result<bool, GdsFault> {
         if let Some(element) = &mut self.element {
@@ -105,8 +106,8 @@ impl Reading {
                 self.library.unit_m = snapped(unit);
             }
             kind::BGNSTR if self.cell.is_none() => {
-                if self.library.cells.len() >= MOST_CELLS {
-                    return Err(GdsFault::Many { what: "cells", most: MOST_CELLS as u64 });
+                if self.library.cells.len() >= MAX_CELLS {
+                    return Err(GdsFault::Many { what: "cells", most: MAX_CELLS as u64 });
                 }
                 self.cell = Some(Cell::default());
             }
@@ -133,7 +134,7 @@ impl Reading {
                 }
                 let name = kind::name(record.kind).unwrap_or("element");
                 let (kind, offset) = (record.kind, record.offset);
-                self.element = Some(Element { name, kind, offset, magnification: 1.0, ..Element::default() });
+                self.element = Some(GdsElement { name, kind, offset, magnification: 1.0, ..GdsElement::default() });
             }
             kind::ENDLIB => return Err(GdsFault::Order { expected: "ENDSTR before the end of the library" }),
             kind::ENDEL | kind::XY | kind::LAYER => return Err(GdsFault::Order { expected: "an element around it" }),
@@ -142,10 +143,10 @@ impl Reading {
         Ok(false)
     }
 
-    fn close(&mut self, element: Element) -> Result<(), GdsFault> {
+    fn close(&mut self, element: GdsElement) -> Result<(), GdsFault> {
         self.parts += 1;
-        if self.parts > MOST_PARTS {
-            return Err(GdsFault::Many { what: "elements", most: MOST_PARTS as u64 });
+        if self.parts > MAX_PARTS {
+            return Err(GdsFault::Many { what: "elements", most: MAX_PARTS as u64 });
         }
         let name = element.name;
         let lacks = |lacks: &'static str| GdsFault::Incomplete { element: name, lacks };
@@ -159,14 +160,20 @@ impl Reading {
             let (count, pitch) = element.array(first)?;
             let called = element.called.clone().ok_or_else(|| lacks("SNAME"))?;
             let transform = element.transform(first);
-            cell.calls.push(Call { cell: called, place: format!("byte {}", element.offset), transform, count, pitch });
+            cell.calls.push(CellReference {
+                cell: called,
+                place: format!("byte {}", element.offset),
+                transform,
+                count,
+                pitch,
+            });
             return Ok(());
         }
         let layer = element.layer.ok_or_else(|| lacks("LAYER"))?;
         let layer = self.library.layer(&format!("{layer}/{}", element.datatype.unwrap_or(0)));
         if element.kind == kind::TEXT {
             let text = element.text.ok_or_else(|| lacks("STRING"))?;
-            cell.texts.push(Text { layer: Some(layer), text, at: first });
+            cell.texts.push(CellText { layer: Some(layer), text, at: first });
             return Ok(());
         }
         let contours = if element.kind == kind::PATH {
@@ -182,16 +189,16 @@ impl Reading {
                 points.pop();
             }
             self.points += points.len() as u64;
-            if self.points > MOST_POINTS {
-                return Err(GdsFault::Many { what: "points", most: MOST_POINTS });
+            if self.points > MAX_POINTS {
+                return Err(GdsFault::Many { what: "points", most: MAX_POINTS });
             }
-            cell.shapes.push(Shape { layer, points });
+            cell.shapes.push(CellShape { layer, points });
         }
         Ok(())
     }
 
     fn finish(mut self) -> Library {
-        let Noted { nodes, lines, absolute, unknown } = self.noted;
+        let IgnoredContent { nodes, lines, absolute, unknown } = self.noted;
         let notes = [
             (nodes, "NODE elements hold no polygon and were passed over"),
             (lines, "paths have no width and were left out"),

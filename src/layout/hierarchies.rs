@@ -1,19 +1,20 @@
 //! A hierarchy written in either format reads back to the same drawing, whatever is in it; and a large one reads whole.
 //! Sources: the hierarchies are random; areas by hand.
 
-use super::cells::{Call, Cell, Library, Shape, Text, Transform};
-use super::drawing::Drawing;
+use super::cells::{Cell, CellReference, CellShape, CellText, Library, Transform};
+use super::drawing::FlatLayout;
 use super::{from_bytes, regions, write_cif, write_gds};
 use proptest::prelude::*;
 
 /// A library in whole units: each cell calls earlier ones only.
 fn library() -> impl Strategy<Value = Library> {
     let point = || [(-500..500i32).prop_map(f64::from), (-500..500i32).prop_map(f64::from)];
-    let shape = (0..3u32, proptest::collection::vec(point(), 3..9)).prop_map(|(layer, points)| Shape { layer, points });
+    let shape =
+        (0..3u32, proptest::collection::vec(point(), 3..9)).prop_map(|(layer, points)| CellShape { layer, points });
     let turn = (0..4u8, any::<bool>(), point());
     let call = (any::<proptest::sample::Index>(), turn, 1..3u32, 1..3u32, [point(), point()]);
     let text = (0..3u32, "[a-z][a-z0-9_]{0,6}( [a-z=\\[\\]0-9.]{1,9})?", point());
-    let text = text.prop_map(|(layer, text, at)| Text { layer: Some(layer), text, at });
+    let text = text.prop_map(|(layer, text, at)| CellText { layer: Some(layer), text, at });
     let cell = (
         proptest::collection::vec(shape, 0..4),
         proptest::collection::vec(text, 0..3),
@@ -25,11 +26,11 @@ fn library() -> impl Strategy<Value = Library> {
             library.layer(layer);
         }
         for (k, (shapes, texts, calls)) in cells.into_iter().enumerate() {
-            let call = |(which, (quarter, mirrored, origin), columns, rows, pitch): Placed| {
+            let call = |(which, (quarter, mirrored, origin), columns, rows, pitch): RandomCall| {
                 let turn = Transform::turn_degrees(90.0 * f64::from(quarter));
                 let transform = Transform::shift(origin).after(&turn).after(&Transform::mirror([false, mirrored]));
                 let cell = format!("c{}", which.index(k));
-                Call { cell, place: String::new(), transform, count: [columns, rows], pitch }
+                CellReference { cell, place: String::new(), transform, count: [columns, rows], pitch }
             };
             let calls = if k == 0 { Vec::new() } else { calls.into_iter().map(call).collect() };
             library.cells.push(Cell { name: format!("c{k}"), shapes, texts, calls });
@@ -39,12 +40,12 @@ fn library() -> impl Strategy<Value = Library> {
 }
 
 /// A call: which cell, turned how, where, how often and how far apart.
-type Placed = (proptest::sample::Index, (u8, bool, [f64; 2]), u32, u32, [[f64; 2]; 2]);
+type RandomCall = (proptest::sample::Index, (u8, bool, [f64; 2]), u32, u32, [[f64; 2]; 2]);
 
 /// What a drawing shows, in nanometres: merged polygons by layer, labels.
-type Shown = (Vec<(String, Vec<Vec<Vec<[i64; 2]>>>)>, Vec<(String, [i64; 2])>);
+type VisibleContent = (Vec<(String, Vec<Vec<Vec<[i64; 2]>>>)>, Vec<(String, [i64; 2])>);
 
-fn shown(d: &Drawing) -> Shown {
+fn shown(d: &FlatLayout) -> VisibleContent {
     let nm = |p: &[i32; 2]| p.map(|x| i64::from(x) * (d.unit_m / 1e-9).round() as i64);
     let merged = |all: &Vec<super::Polygon>| {
         let contours = |p: super::Polygon| p.contours.iter().map(|c| c.iter().map(nm).collect()).collect();
@@ -80,18 +81,18 @@ fn a_device_in_both_formats_is_one_drawing() {
         vec![[x - w / 2.0, y - 275.0], [x + w / 2.0, y - 275.0], [x + w / 2.0, y + 275.0], [x - w / 2.0, y + 275.0]]
     };
     let shapes = vec![
-        Shape {
+        CellShape {
             layer: plate,
             points: vec![[-2190.0, -2190.0], [-2190.0, -1590.0], [1190.0, -1590.0], [1190.0, -2190.0]],
         },
-        Shape { layer: cap, points: boxed(-1062.0, -19.0, 550.0) },
+        CellShape { layer: cap, points: boxed(-1062.0, -19.0, 550.0) },
         // An odd width: half units.
-        Shape { layer: cap, points: boxed(758.0, -117.0, 552.0) },
+        CellShape { layer: cap, points: boxed(758.0, -117.0, 552.0) },
     ];
     library.cells.push(Cell { name: "TOP".into(), shapes, ..Cell::default() });
     let gds = from_bytes(&write_gds::write(&library).unwrap(), "x.gds", None).unwrap();
     let cif = from_bytes(cif.as_bytes(), "x.cif", None).unwrap();
-    let area = |d: &Drawing, layer: &str| {
+    let area = |d: &FlatLayout, layer: &str| {
         let all: Vec<_> = d
             .layers
             .iter()
@@ -115,10 +116,10 @@ fn a_device_in_both_formats_is_one_drawing() {
 fn a_hundred_thousand_polygons_read_whole() {
     let mut library = Library { source: "x".into(), unit_m: 1e-9, ..Library::default() };
     let layer = library.layer("45/0");
-    let boxed = |w: f64| Shape { layer, points: vec![[0.0, 0.0], [w, 0.0], [w, 1000.0], [0.0, 1000.0]] };
+    let boxed = |w: f64| CellShape { layer, points: vec![[0.0, 0.0], [w, 0.0], [w, 1000.0], [0.0, 1000.0]] };
     library.cells.push(Cell { name: "bar".into(), shapes: vec![boxed(400.0)], ..Cell::default() });
     library.cells.push(Cell { name: "rail".into(), shapes: vec![boxed(1000.0)], ..Cell::default() });
-    let call = |cell: &str, y: f64, count: [u32; 2]| Call {
+    let call = |cell: &str, y: f64, count: [u32; 2]| CellReference {
         cell: cell.into(),
         place: String::new(),
         transform: Transform::shift([0.0, y]),

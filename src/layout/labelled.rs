@@ -6,19 +6,19 @@
 //! drawings is told with its area and place.
 
 use super::chords::Chords;
-use super::crossings::{Tangled, bounded};
+use super::crossings::{CrossingContours, bounded};
 use super::draw::{self, Role, is_beam};
-use super::drawing::{Drawing, LARGEST_COORDINATE, Point, Polygon};
-use super::lines::{Line, LineError, Lines, ProcessLine, is_full_name, text};
+use super::drawing::{FlatLayout, GridPoint, LARGEST_COORDINATE, Polygon};
+use super::lines::{ElementLine, ElementLines, LineError, ProcessLine, is_full_name, text};
 use super::mask::{ROUNDING, Width, Widths, on_notes};
 use super::process::{Process, names};
 use super::regions;
-use super::report::{Areas, Report, Unrecognised, region};
+use super::report::{ConversionReport, LayerAreas, Unrecognised, region};
 use std::collections::{BTreeMap, HashMap};
 use thiserror::Error;
 
 /// Differences told one by one.
-const TOLD: usize = 20;
+const MAX_REPORTED: usize = 20;
 
 /// Why the labels of a drawing make no netlist.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -60,7 +60,7 @@ pub enum LabelledError {
         /// A layer of the drawing or of the mechanism that its labels tell of.
         what: String,
         /// How often, and where.
-        tangled: Tangled,
+        tangled: CrossingContours,
     },
     /// Two nodes of a beam in one place.
     #[error("{place}: `{line}` has both its nodes in one place")]
@@ -84,7 +84,10 @@ type Landmark = Option<(String, [f64; 2])>;
 ///
 /// # Errors
 /// See [`LabelledError`].
-pub(crate) fn read(drawing: &Drawing, process: &Process) -> Result<(String, Report, Landmark), LabelledError> {
+pub(crate) fn read(
+    drawing: &FlatLayout,
+    process: &Process,
+) -> Result<(String, ConversionReport, Landmark), LabelledError> {
     let mut notes = drawing.notes.clone();
     let (mut lines, places) = lines_of(drawing)?;
     let at = nodes_of(drawing, &lines, &mut notes);
@@ -106,15 +109,15 @@ pub(crate) fn read(drawing: &Drawing, process: &Process) -> Result<(String, Repo
 }
 
 /// Lines in the order of their numbers, with where they stand.
-fn lines_of(drawing: &Drawing) -> Result<(Lines, Vec<String>), LabelledError> {
-    let mut numbered: Vec<(u64, Line, String)> = Vec::new();
+fn lines_of(drawing: &FlatLayout) -> Result<(ElementLines, Vec<String>), LabelledError> {
+    let mut numbered: Vec<(u64, ElementLine, String)> = Vec::new();
     let mut processes = BTreeMap::new();
     for label in drawing.labels.iter().filter(|l| on_notes(&l.layer)) {
         let place = || format!("{}, label at {}", drawing.source, drawing.place(label.at.map(f64::from)));
         if let Some(process) = ProcessLine::parse(&label.text) {
             processes.insert(process.name.clone(), process);
         } else if let Some((number, text)) = label.text.split_once(": ").and_then(|(n, t)| Some((n.parse().ok()?, t))) {
-            let line = Line::parse(text).map_err(|error| LabelledError::Line { place: place(), error })?;
+            let line = ElementLine::parse(text).map_err(|error| LabelledError::Line { place: place(), error })?;
             numbered.push((number, line, place()));
         }
     }
@@ -126,11 +129,11 @@ fn lines_of(drawing: &Drawing) -> Result<(Lines, Vec<String>), LabelledError> {
         }
     }
     let (elements, places) = numbered.into_iter().map(|(_, line, place)| (line, place)).unzip();
-    Ok((Lines { processes: processes.into_values().collect(), elements }, places))
+    Ok((ElementLines { processes: processes.into_values().collect(), elements }, places))
 }
 
 /// Where nodes lie [m]: labels of their names.
-fn nodes_of(drawing: &Drawing, lines: &Lines, notes: &mut Vec<String>) -> HashMap<String, [f64; 2]> {
+fn nodes_of(drawing: &FlatLayout, lines: &ElementLines, notes: &mut Vec<String>) -> HashMap<String, [f64; 2]> {
     let wanted: std::collections::HashSet<&String> = lines.elements.iter().flat_map(|l| &l.nodes).collect();
     let mut at: HashMap<String, [i32; 2]> = HashMap::new();
     for label in drawing.labels.iter().filter(|l| is_full_name(&l.text) && wanted.contains(&l.text)) {
@@ -144,7 +147,7 @@ fn nodes_of(drawing: &Drawing, lines: &Lines, notes: &mut Vec<String>) -> HashMa
 }
 
 /// Polygons of each layer of the process, merged, and of its anchors.
-fn layers_of(drawing: &Drawing, process: &Process) -> Result<BTreeMap<Role, Vec<Polygon>>, LabelledError> {
+fn layers_of(drawing: &FlatLayout, process: &Process) -> Result<BTreeMap<Role, Vec<Polygon>>, LabelledError> {
     let mut all: BTreeMap<Role, Vec<Polygon>> = BTreeMap::new();
     for (name, polygons) in &drawing.layers {
         for (k, layer) in process.layers.iter().enumerate() {
@@ -175,10 +178,10 @@ fn merge(what: &str, polygons: &[Polygon], with: &[Polygon]) -> Result<Vec<Polyg
 
 /// Lengths, directions and widths: the label's where the drawing agrees, else the drawing's.
 fn measure(
-    lines: &mut Lines,
+    lines: &mut ElementLines,
     places: &[String],
     at: &HashMap<String, [f64; 2]>,
-    drawing: &Drawing,
+    drawing: &FlatLayout,
     process: &Process,
     layers: &BTreeMap<Role, Vec<Polygon>>,
 ) -> Result<Vec<String>, LabelledError> {
@@ -193,7 +196,7 @@ fn measure(
     let mut changed = 0;
     let mut tell = |text: String| {
         changed += 1;
-        if changed <= TOLD {
+        if changed <= MAX_REPORTED {
             notes.push(text);
         }
     };
@@ -235,14 +238,14 @@ fn measure(
             }
         }
     }
-    if changed > TOLD {
-        notes.push(format!("{} more such differences", changed - TOLD));
+    if changed > MAX_REPORTED {
+        notes.push(format!("{} more such differences", changed - MAX_REPORTED));
     }
     Ok(notes)
 }
 
 /// A contour on the grid of a unit [m]; none where it reaches beyond.
-fn on_grid(shape: &[[f64; 2]], unit: f64) -> Option<Vec<Point>> {
+fn on_grid(shape: &[[f64; 2]], unit: f64) -> Option<Vec<GridPoint>> {
     let largest = f64::from(LARGEST_COORDINATE);
     let on = |p: &[f64; 2]| {
         let p = p.map(|x| (x / unit).round());
@@ -253,13 +256,13 @@ fn on_grid(shape: &[[f64; 2]], unit: f64) -> Option<Vec<Point>> {
 
 /// Draws the mechanism again and tells what only one of the two drawings has.
 fn compare(
-    drawing: &Drawing,
+    drawing: &FlatLayout,
     process: &Process,
-    lines: &Lines,
+    lines: &ElementLines,
     at: &HashMap<String, [f64; 2]>,
     layers: &BTreeMap<Role, Vec<Polygon>>,
     mut notes: Vec<String>,
-) -> Result<Report, LabelledError> {
+) -> Result<ConversionReport, LabelledError> {
     let figure = draw::draw(lines, at, process);
     let unit = drawing.unit_m;
     let mut again: BTreeMap<Role, Vec<Polygon>> = BTreeMap::new();
@@ -276,7 +279,7 @@ fn compare(
         ));
     }
     let square = unit * unit;
-    let mut areas = Areas::default();
+    let mut areas = LayerAreas::default();
     let mut unrecognised = Vec::new();
     let none = Vec::new();
     let roles: std::collections::BTreeSet<Role> = layers.keys().chain(again.keys()).copied().collect();
@@ -311,5 +314,5 @@ fn compare(
     for line in &lines.elements {
         *counts.entry(line.model.clone()).or_insert(0) += 1;
     }
-    Ok(Report { by: "labels".to_owned(), counts, areas, unrecognised, notes })
+    Ok(ConversionReport { by: "labels".to_owned(), counts, areas, unrecognised, notes })
 }

@@ -2,7 +2,7 @@
 //!
 //! A line is one element with its full name ("b1.hot") and all numbers in SI; a process is a material with its thickness.
 //! [`of_structure`] makes lines of a [`Structure`](crate::structure::Structure), [`text`] a netlist of lines, in which
-//! names with dots become subnets again; a line's own text is what stands in a label, and [`Line::parse`] reads it back.
+//! names with dots become subnets again; a line's own text is what stands in a label, and [`ElementLine::parse`] reads it back.
 
 pub(crate) mod of_structure;
 pub(crate) mod text;
@@ -15,7 +15,7 @@ pub(crate) const LONGEST_LABEL: usize = 4096;
 
 /// One element.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Line {
+pub(crate) struct ElementLine {
     /// Full name, with those of the subnet instances around it.
     pub(crate) name: String,
     /// Element model ("beam2d").
@@ -39,11 +39,11 @@ pub(crate) struct ProcessLine {
 
 /// A mechanism.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Lines {
+pub(crate) struct ElementLines {
     /// Materials.
     pub(crate) processes: Vec<ProcessLine>,
     /// Elements, in the order in which they place each other.
-    pub(crate) elements: Vec<Line>,
+    pub(crate) elements: Vec<ElementLine>,
 }
 
 /// Why a label is no line.
@@ -56,7 +56,7 @@ pub struct LineError {
     pub expected: &'static str,
 }
 
-impl Line {
+impl ElementLine {
     /// A parameter's value.
     pub(crate) fn get(&self, name: &str) -> Option<f64> {
         self.parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v)
@@ -147,15 +147,15 @@ fn write_pairs(f: &mut fmt::Formatter<'_>, pairs: &[(String, f64)]) -> fmt::Resu
     f.write_str("[")?;
     for (k, (name, value)) in pairs.iter().enumerate() {
         let blank = if k > 0 { " " } else { "" };
-        write!(f, "{blank}{name}={}", Number(*value))?;
+        write!(f, "{blank}{name}={}", ExactNumber(*value))?;
     }
     f.write_str("]")
 }
 
 /// A number that reads back to the same bits in netlists: 2e-6, 0.5, 400.
-pub(crate) struct Number(pub(crate) f64);
+pub(crate) struct ExactNumber(pub(crate) f64);
 
-impl fmt::Display for Number {
+impl fmt::Display for ExactNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let size = self.0.abs();
         if self.0 == 0.0 {
@@ -168,7 +168,7 @@ impl fmt::Display for Number {
     }
 }
 
-impl fmt::Display for Line {
+impl fmt::Display for ElementLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, model, process, nodes, parameters } = self;
         write!(f, "{name} {model} {process} [{}] ", nodes.join(" "))?;
@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn lines_read_back() {
         let text = "q.b(1).hot beam2det p1 [a(1) q.t] [l=2.06e-4 w=2e-6 oz=-1.5707963267948966 R=0 n=400]";
-        assert_eq!(Line::parse(text).unwrap().to_string(), text);
+        assert_eq!(ElementLine::parse(text).unwrap().to_string(), text);
         let process = "process p1 = [Youngsmodulus=1.65e11 density=2300]";
         assert_eq!(ProcessLine::parse(process).unwrap().to_string(), process);
         for wrong in [
@@ -204,21 +204,21 @@ mod tests {
             "a b p [c(x)] []",
             "a b p [c] [l=inf]",
         ] {
-            assert!(Line::parse(wrong).is_err(), "{wrong}");
+            assert!(ElementLine::parse(wrong).is_err(), "{wrong}");
         }
     }
 
     proptest! {
         #[test]
         fn any_text_parses_or_is_refused(text in ".{0,80}") {
-            let _ = (Line::parse(&text), ProcessLine::parse(&text));
+            let _ = (ElementLine::parse(&text), ProcessLine::parse(&text));
         }
 
         #[test]
         fn numbers_keep_their_bits(bits in any::<u64>()) {
             let value = f64::from_bits(bits);
             if value.is_finite() {
-                prop_assert_eq!(Number(value).to_string().parse::<f64>().unwrap(), value);
+                prop_assert_eq!(ExactNumber(value).to_string().parse::<f64>().unwrap(), value);
             }
         }
     }

@@ -3,14 +3,14 @@
 //! docs/layout.md describes the labels. Nodes are texts on the layer that they belong to. On the layer of notes (`BIMORPH` in CIF,
 //! 255/0 in GDSII) stand a text `bimorph layout 1 PROCESS`, one for each process and one for each element, numbered and at its place.
 
-use super::cells::{Cell, Library, Shape, Text};
+use super::cells::{Cell, CellShape, CellText, Library};
 use super::chords::Chords;
 use super::crossings::bounded;
 use super::draw::{self, Figure, Role, is_beam};
-use super::drawing::{Drawing, LARGEST_COORDINATE};
-use super::lines::{Lines, of_structure};
+use super::drawing::{FlatLayout, LARGEST_COORDINATE};
+use super::lines::{ElementLines, of_structure};
 use super::process::{Process, canonical};
-use super::read::Format;
+use super::read::LayoutFormat;
 use super::regions;
 use super::write_gds::WriteError;
 use super::{write_cif, write_gds};
@@ -23,7 +23,7 @@ pub(crate) const NOTES: [&str; 2] = ["BIMORPH", "255/0"];
 /// The text that marks a drawing of ours.
 pub(crate) const MARK: &str = "bimorph layout 1";
 /// Most parts of a drawing.
-const MOST: usize = 200_000;
+const MAX_PARTS: usize = 200_000;
 /// The finest unit [m].
 const FINEST: f64 = 1e-12;
 /// Rounding of a grid, in units: of two corners each.
@@ -52,7 +52,7 @@ pub enum MaskError {
     #[error("nothing of this netlist has an outline: beams, plates, anchors, combs and facing beams have one")]
     Empty,
     /// Too many parts.
-    #[error("{count} elements: at most {MOST} are drawn")]
+    #[error("{count} elements: at most {MAX_PARTS} are drawn")]
     Large {
         /// How many.
         count: usize,
@@ -88,10 +88,10 @@ pub enum MaskError {
 ///
 /// # Errors
 /// See [`MaskError`].
-pub fn mask(structure: &Structure, process: &Process, format: Format, name: &str) -> Result<Mask, MaskError> {
+pub fn mask(structure: &Structure, process: &Process, format: LayoutFormat, name: &str) -> Result<Mask, MaskError> {
     let structure = &in_words(structure);
     let (lines, left) = of_structure::lines(structure);
-    if lines.elements.len() > MOST {
+    if lines.elements.len() > MAX_PARTS {
         return Err(MaskError::Large { count: lines.elements.len() });
     }
     let at: HashMap<String, [f64; 2]> =
@@ -106,15 +106,15 @@ pub fn mask(structure: &Structure, process: &Process, format: Format, name: &str
     let mut lines = lines;
     mark_hidden(&mut lines, &figure, &at, library.unit_m);
     let cell = Cell { name: cell_name(name), ..Cell::default() };
-    let mut drawn = Drawn { process, format, library: &mut library, cell };
+    let mut drawn = MaskDrawing { process, format, library: &mut library, cell };
     drawn.shapes(&figure)?;
     drawn.labels(&lines, &figure, structure)?;
     let cell = drawn.cell;
     let (polygons, labels) = (cell.shapes.len(), cell.texts.len());
     library.cells.push(cell);
     let bytes = match format {
-        Format::Cif => write_cif::write(&library)?.into_bytes(),
-        Format::Gds => write_gds::write(&library)?,
+        LayoutFormat::Cif => write_cif::write(&library)?.into_bytes(),
+        LayoutFormat::Gds => write_gds::write(&library)?,
     };
     Ok(Mask { bytes, notes, polygons, labels, unit_m: library.unit_m })
 }
@@ -152,7 +152,7 @@ fn unit(figure: &Figure, at: &HashMap<String, [f64; 2]>) -> Result<f64, MaskErro
 }
 
 /// Beams whose width nobody can measure in the drawing are marked so: what covers them is wider than they are.
-fn mark_hidden(lines: &mut Lines, figure: &Figure, at: &HashMap<String, [f64; 2]>, unit_m: f64) {
+fn mark_hidden(lines: &mut ElementLines, figure: &Figure, at: &HashMap<String, [f64; 2]>, unit_m: f64) {
     let widths = Widths::of_figure(figure, unit_m);
     for line in lines.elements.iter_mut().filter(|l| is_beam(&l.model)) {
         let ends = [at.get(&line.nodes[0]), at.get(&line.nodes[1])];
@@ -223,14 +223,14 @@ impl Widths {
     }
 }
 
-struct Drawn<'a> {
+struct MaskDrawing<'a> {
     process: &'a Process,
-    format: Format,
+    format: LayoutFormat,
     library: &'a mut Library,
     cell: Cell,
 }
 
-impl Drawn<'_> {
+impl MaskDrawing<'_> {
     /// The name of a mask in this format: the first one that can be one.
     fn mask_name(&self, role: Role) -> Result<String, MaskError> {
         let numbered = |n: &&String| {
@@ -241,8 +241,10 @@ impl Drawn<'_> {
             Role::Anchor(k) => (&self.process.layers[k].name, "anchors", &self.process.layers[k].anchoring.drawn),
         };
         let (found, format, expected) = match self.format {
-            Format::Gds => (names.iter().find(numbered), "GDSII", "a number like \"45/0\""),
-            Format::Cif => (names.iter().find(|n| !numbered(n)).or(names.first()), "CIF", "a name like \"POLY1\""),
+            LayoutFormat::Gds => (names.iter().find(numbered), "GDSII", "a number like \"45/0\""),
+            LayoutFormat::Cif => {
+                (names.iter().find(|n| !numbered(n)).or(names.first()), "CIF", "a name like \"POLY1\"")
+            }
         };
         found.cloned().ok_or_else(|| MaskError::Unnamed {
             layer: layer.clone(),
@@ -262,7 +264,7 @@ impl Drawn<'_> {
             let name = self.mask_name(*role)?;
             let layer = self.library.layer(&name);
             let points = shape.iter().map(|p| self.grid(*p)).collect();
-            self.cell.shapes.push(Shape { layer, points });
+            self.cell.shapes.push(CellShape { layer, points });
         }
         Ok(())
     }
@@ -270,11 +272,11 @@ impl Drawn<'_> {
     fn text(&mut self, layer: &str, text: String, at: [f64; 2]) {
         let layer = Some(self.library.layer(layer));
         let at = self.grid(at);
-        self.cell.texts.push(Text { layer, text, at });
+        self.cell.texts.push(CellText { layer, text, at });
     }
 
-    fn labels(&mut self, lines: &Lines, figure: &Figure, structure: &Structure) -> Result<(), MaskError> {
-        let notes = NOTES[usize::from(self.format == Format::Gds)];
+    fn labels(&mut self, lines: &ElementLines, figure: &Figure, structure: &Structure) -> Result<(), MaskError> {
+        let notes = NOTES[usize::from(self.format == LayoutFormat::Gds)];
         for node in structure.nodes.iter().filter(|n| n.mechanical) {
             let layer = match figure.layer_of.get(&node.name) {
                 Some(k) => self.mask_name(Role::Layer(*k))?,
@@ -297,7 +299,7 @@ impl Drawn<'_> {
 }
 
 /// The process on whose masks a drawing of ours was drawn, by name; none: the drawing does not carry its mechanism as labels.
-pub fn drawn_on(drawing: &Drawing) -> Option<&str> {
+pub fn drawn_on(drawing: &FlatLayout) -> Option<&str> {
     let marks = drawing.labels.iter().filter(|l| on_notes(&l.layer));
     marks.filter_map(|l| l.text.strip_prefix(MARK)?.strip_prefix(' ')).next()
 }

@@ -1,6 +1,6 @@
 //! Drawings of masks: CIF and GDSII to polygons without hierarchy, and back.
 //!
-//! A [`Drawing`] is what a layout file holds, flattened: polygons for each layer on an integer grid, and labels. [`regions`] has the
+//! A [`FlatLayout`] is what a layout file holds, flattened: polygons for each layer on an integer grid, and labels. [`regions`] has the
 //! set operations on such polygons. A [`Process`] says what the layers are: which ones move, how thick they are and of
 //! what, and what holds them.
 
@@ -28,6 +28,6 @@ mod simple;
 mod write_cif;
 pub mod write_gds;
 
-pub use drawing::{Drawing, Label, Placement, Polygon};
-pub use process::{Anchoring, Layer, Process, ProcessError};
-pub use read::{Format, LayoutError, from_bytes, from_file};
+pub use drawing::{FlatLayout, Label, Placement, Polygon};
+pub use process::{Anchoring, Process, ProcessError, StructuralLayer};
+pub use read::{LayoutError, LayoutFormat, from_bytes, from_file};

@@ -7,9 +7,9 @@ mod file;
 mod stack;
 
 pub use error::ProcessError;
-use file::File;
+use file::ProcessFile;
 use stack::is_name;
-pub use stack::{Anchoring, Fixed, Layer, Metal, Process};
+pub use stack::{Anchoring, FixedLayer, MetalLayer, Process, StructuralLayer};
 use std::collections::BTreeMap;
 
 /// Processes inside the program, by name.
@@ -19,7 +19,7 @@ const BUILTIN: [(&str, &str); 2] =
 /// Longest process file [bytes].
 const LONGEST: usize = 1 << 20;
 /// Most layers of one process.
-const MOST_LAYERS: usize = 256;
+const MAX_LAYERS: usize = 256;
 
 impl Process {
     /// Names of the processes inside the program.
@@ -49,9 +49,9 @@ impl Process {
         if text.len() > LONGEST {
             return Err(malformed(format!("a process file has at most {LONGEST} bytes, this one {}", text.len())));
         }
-        let read: File = toml::from_str(text).map_err(|e| malformed(e.to_string().trim_end().to_owned()))?;
-        if read.layer.is_empty() || read.layer.len() > MOST_LAYERS {
-            return Err(malformed(format!("expected 1 to {MOST_LAYERS} [[layer]], found {}", read.layer.len())));
+        let read: ProcessFile = toml::from_str(text).map_err(|e| malformed(e.to_string().trim_end().to_owned()))?;
+        if read.layer.is_empty() || read.layer.len() > MAX_LAYERS {
+            return Err(malformed(format!("expected 1 to {MAX_LAYERS} [[layer]], found {}", read.layer.len())));
         }
         let materials = read.material;
         let layers = read.layer.into_iter().map(|layer| layer.complete(&materials, file));
@@ -95,7 +95,7 @@ impl Process {
     }
 
     /// The layer that moves and consists of the drawn layer of that name.
-    pub fn layer_of(&self, drawn: &str) -> Option<&Layer> {
+    pub fn layer_of(&self, drawn: &str) -> Option<&StructuralLayer> {
         self.layers.iter().find(|layer| names(&layer.drawn, drawn))
     }
 

@@ -1,7 +1,7 @@
 //! A layout file of either format to a flat drawing.
 
 use super::cif::{self, CifError};
-use super::drawing::Drawing;
+use super::drawing::FlatLayout;
 use super::flatten::FlattenError;
 use super::gds::{self, GdsError};
 use std::io::{BufReader, Read};
@@ -13,14 +13,14 @@ pub const LONGEST_CIF: u64 = 1 << 30;
 
 /// Formats of layouts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
+pub enum LayoutFormat {
     /// Caltech Intermediate Form, text.
     Cif,
     /// GDSII stream.
     Gds,
 }
 
-impl Format {
+impl LayoutFormat {
     /// The format that a file's name says it has: `.cif`, `.gds`, `.gdsii`, `.gds2`, `.sf`; none: it is no layout.
     pub fn of(name: &str) -> Option<Self> {
         let extension = Path::new(name).extension()?.to_str()?.to_ascii_lowercase();
@@ -73,11 +73,11 @@ pub enum LayoutError {
 ///
 /// # Errors
 /// See [`LayoutError`].
-pub fn from_bytes(bytes: &[u8], name: &str, cell: Option<&str>) -> Result<Drawing, LayoutError> {
-    let format = Format::of(name).ok_or_else(|| LayoutError::Format { file: name.to_owned() })?;
+pub fn from_bytes(bytes: &[u8], name: &str, cell: Option<&str>) -> Result<FlatLayout, LayoutError> {
+    let format = LayoutFormat::of(name).ok_or_else(|| LayoutError::Format { file: name.to_owned() })?;
     let library = match format {
-        Format::Cif => cif::read(bytes, name)?,
-        Format::Gds => gds::read(bytes, name, &mut |_| true)?,
+        LayoutFormat::Cif => cif::read(bytes, name)?,
+        LayoutFormat::Gds => gds::read(bytes, name, &mut |_| true)?,
     };
     Ok(library.flatten(cell)?)
 }
@@ -86,14 +86,18 @@ pub fn from_bytes(bytes: &[u8], name: &str, cell: Option<&str>) -> Result<Drawin
 ///
 /// # Errors
 /// See [`LayoutError`].
-pub fn from_file(path: &Path, cell: Option<&str>, watch: &mut dyn FnMut(f64) -> bool) -> Result<Drawing, LayoutError> {
+pub fn from_file(
+    path: &Path,
+    cell: Option<&str>,
+    watch: &mut dyn FnMut(f64) -> bool,
+) -> Result<FlatLayout, LayoutError> {
     let name = path.display().to_string();
-    let format = Format::of(&name).ok_or_else(|| LayoutError::Format { file: name.clone() })?;
+    let format = LayoutFormat::of(&name).ok_or_else(|| LayoutError::Format { file: name.clone() })?;
     let failed = |e: std::io::Error| LayoutError::Read { file: name.clone(), reason: e.to_string() };
     let mut file = std::fs::File::open(path).map_err(failed)?;
     let size = file.metadata().map_err(failed)?.len();
     let library = match format {
-        Format::Cif => {
+        LayoutFormat::Cif => {
             if size > LONGEST_CIF {
                 return Err(LayoutError::Long { file: name, bytes: size });
             }
@@ -101,7 +105,7 @@ pub fn from_file(path: &Path, cell: Option<&str>, watch: &mut dyn FnMut(f64) -> 
             file.by_ref().take(LONGEST_CIF).read_to_end(&mut text).map_err(failed)?;
             cif::read(&text, &name)?
         }
-        Format::Gds => {
+        LayoutFormat::Gds => {
             let mut told = |at: u64| watch(at as f64 / size.max(1) as f64);
             gds::read(BufReader::with_capacity(1 << 16, file), &name, &mut told)?
         }

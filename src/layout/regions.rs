@@ -4,7 +4,7 @@
 //! counter-clockwise and holes clockwise. Where edges cross between grid points the crossing is rounded to the grid, which moves an
 //! edge by at most one unit. Coordinates must stay within [`LARGEST_COORDINATE`](super::drawing::LARGEST_COORDINATE).
 
-use super::drawing::{Point, Polygon, twice_area};
+use super::drawing::{GridPoint, Polygon, twice_area};
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay::{Overlay, ShapeType};
 use i_overlay::core::overlay_rule::OverlayRule;
@@ -37,7 +37,7 @@ pub fn area(polygons: &[Polygon]) -> f64 {
 }
 
 /// What one contour encloses, whatever its direction and crossings.
-pub(super) fn enclosed(contour: &[Point], rule: FillRule) -> Vec<Polygon> {
+pub(super) fn enclosed(contour: &[GridPoint], rule: FillRule) -> Vec<Polygon> {
     let mut overlay = Overlay::<i32>::new(contour.len());
     overlay.add_path_iter(contour.iter().map(|[x, y]| IntPoint::new(*x, *y)), ShapeType::Subject);
     in_order(overlay.overlay(OverlayRule::Subject, rule))
@@ -53,7 +53,7 @@ fn combine(a: &[Polygon], b: &[Polygon], rule: OverlayRule) -> Vec<Polygon> {
 
 /// Directions, first points and the order of shapes are made one whatever the order of input.
 fn in_order(shapes: IntShapes<i32>) -> Vec<Polygon> {
-    let point = |p: &IntPoint<i32>| -> Point { [p.x, p.y] };
+    let point = |p: &IntPoint<i32>| -> GridPoint { [p.x, p.y] };
     let mut shapes: Vec<Polygon> = shapes
         .into_iter()
         .map(|shape| Polygon { contours: shape.iter().map(|contour| contour.iter().map(point).collect()).collect() })

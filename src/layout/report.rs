@@ -7,18 +7,18 @@ use std::collections::BTreeMap;
 /// Pieces smaller than this share of a square of the grid's rounding are no pieces: what two roundings of the same edge leave.
 const SLIVER: f64 = 3.0;
 /// Pieces told one by one; the rest are added up.
-const TOLD: usize = 200;
+const MAX_REPORTED: usize = 200;
 
 /// What a conversion has to say.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Report {
+pub struct ConversionReport {
     /// How the drawing was read: `labels` or `geometry`.
     pub by: String,
     /// How many there are of each element of the netlist.
     pub counts: BTreeMap<String, usize>,
     /// Areas.
     #[serde(flatten)]
-    pub areas: Areas,
+    pub areas: LayerAreas,
     /// What was not understood.
     pub unrecognised: Vec<Unrecognised>,
     /// What was approximated or left out, in words.
@@ -27,7 +27,7 @@ pub struct Report {
 
 /// Areas of the layers that move [m²].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Areas {
+pub struct LayerAreas {
     /// As drawn, merged.
     pub drawn_m2: f64,
     /// In the mechanism.
@@ -67,7 +67,7 @@ impl Unrecognised {
                 continue;
             }
             let area_m2 = area * unit_m * unit_m;
-            if all.len() >= TOLD {
+            if all.len() >= MAX_REPORTED {
                 rest = (rest.0 + 1, rest.1 + area_m2);
                 continue;
             }

@@ -6,7 +6,7 @@ use super::process::canonical;
 use thiserror::Error;
 
 /// Most points of a boundary, the repeated first one included: what one record holds.
-const MOST_POINTS: usize = 8191;
+const MAX_POINTS: usize = 8191;
 /// Longest text of a record [bytes].
 const LONGEST_TEXT: usize = 65_000;
 
@@ -21,7 +21,7 @@ pub enum WriteError {
         layer: String,
     },
     /// More points than a record holds.
-    #[error("a polygon of `{cell}` on `{layer}` has {points} points: at most {MOST_POINTS}")]
+    #[error("a polygon of `{cell}` on `{layer}` has {points} points: at most {MAX_POINTS}")]
     Points {
         /// Its cell.
         cell: String,
@@ -54,7 +54,7 @@ pub enum WriteError {
 /// See [`WriteError`].
 pub(crate) fn write(library: &Library) -> Result<Vec<u8>, WriteError> {
     let numbers: Vec<[u16; 2]> = library.layers.iter().map(|name| number(name)).collect::<Result<_, _>>()?;
-    let mut out = Stream { bytes: Vec::new() };
+    let mut out = GdsWriter { bytes: Vec::new() };
     out.shorts(kind::HEADER, &[600]);
     out.shorts(kind::BGNLIB, &[1970, 1, 1, 0, 0, 0, 1970, 1, 1, 0, 0, 0]);
     out.text(kind::LIBNAME, "BIMORPH")?;
@@ -73,11 +73,11 @@ fn number(name: &str) -> Result<[u16; 2], WriteError> {
     parsed.ok_or_else(|| WriteError::Layer { layer: name.to_owned() })
 }
 
-struct Stream {
+struct GdsWriter {
     bytes: Vec<u8>,
 }
 
-impl Stream {
+impl GdsWriter {
     fn record(&mut self, kind: u8, data_type: u8, data: &[u8]) {
         // Callers keep data below 64 KiB.
         self.bytes.extend((data.len() as u16 + 4).to_be_bytes());
@@ -124,7 +124,7 @@ impl Stream {
         self.text(kind::STRNAME, &cell.name)?;
         for shape in &cell.shapes {
             let [layer, datatype] = numbers[shape.layer as usize];
-            if shape.points.len() + 1 > MOST_POINTS {
+            if shape.points.len() + 1 > MAX_POINTS {
                 let layer = library.layers[shape.layer as usize].clone();
                 return Err(WriteError::Points { cell: cell.name.clone(), layer, points: shape.points.len() });
             }

@@ -16,9 +16,9 @@
 mod block;
 
 use super::Pattern;
-use block::Decomposed;
+use block::BlockFactor;
 pub(super) use block::LOST;
-pub use block::{Inertia, Scalar, ZeroPivot};
+pub use block::{PivotSigns, Scalar, ZeroPivot};
 use nalgebra::{SMatrix, SVector};
 
 /// A symmetric matrix of N×N blocks on a [`Pattern`]; after [`BlockMatrix::factor`], its factors in the same storage.
@@ -62,7 +62,7 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
     ///
     /// # Errors
     /// [`ZeroPivot`] where a pivot vanishes against the entries it came from, or is not finite.
-    pub fn factor(&mut self, pattern: &Pattern) -> Result<Inertia, ZeroPivot> {
+    pub fn factor(&mut self, pattern: &Pattern) -> Result<PivotSigns, ZeroPivot> {
         self.eliminate(pattern, Err)
     }
 
@@ -72,7 +72,7 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
     ///
     /// # Errors
     /// [`ZeroPivot`] where there is nothing to hold on to: no body resists that direction, or a pivot is not finite.
-    pub fn factor_holding(&mut self, pattern: &Pattern, held: &mut Vec<ZeroPivot>) -> Result<Inertia, ZeroPivot> {
+    pub fn factor_holding(&mut self, pattern: &Pattern, held: &mut Vec<ZeroPivot>) -> Result<PivotSigns, ZeroPivot> {
         held.clear();
         let empty = self.diagonal.iter().enumerate().flat_map(|(body, block)| {
             let zero = move |direction: &usize| block[(*direction, *direction)] == T::zero();
@@ -111,8 +111,8 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
         &mut self,
         pattern: &Pattern,
         mut vanished: impl FnMut(ZeroPivot) -> Result<(), ZeroPivot>,
-    ) -> Result<Inertia, ZeroPivot> {
-        let mut inertia = Inertia::default();
+    ) -> Result<PivotSigns, ZeroPivot> {
+        let mut inertia = PivotSigns::default();
         for (scale, block) in self.scale.iter_mut().zip(&self.diagonal) {
             *scale = SVector::from_fn(|i, _| block[(i, i)].modulus());
         }
@@ -120,7 +120,7 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
             if j.is_multiple_of(BODIES_PER_CHECK) {
                 crate::budget::check();
             }
-            let own = Decomposed::new(&self.diagonal[j], &self.scale[j], &mut inertia, &mut |direction| {
+            let own = BlockFactor::new(&self.diagonal[j], &self.scale[j], &mut inertia, &mut |direction| {
                 vanished(ZeroPivot { body: j, direction })
             })?;
             self.diagonal[j] = own.inverse();

@@ -4,18 +4,18 @@ use super::joint::Coupling;
 use super::model::Model;
 use super::planar::factored::FactoredTangent;
 use super::planar::{HalfTurn, JointKinematics, PairTangent, Pose, Symmetric};
-use super::section::{LaidJoint, NONE, Place, Section};
+use super::section::{JointSection, NONE, PackedJoint, PairSlot};
 use super::{BlockMatrix, BodyId};
 use nalgebra::{Matrix6, Vector3};
 
 /// Half turns of the two bodies that were met last. Along a beam each body is met twice in a row, and a sine and cosine
 /// is dearer than everything else that a body costs.
-pub(super) struct Turns {
+pub(super) struct HalfTurnCache {
     a: (u32, HalfTurn),
     b: (u32, HalfTurn),
 }
 
-impl Turns {
+impl HalfTurnCache {
     pub(super) fn new() -> Self {
         Self { a: (NONE, HalfTurn::REST), b: (NONE, HalfTurn::REST) }
     }
@@ -38,11 +38,11 @@ impl Turns {
     pub(super) fn kinematics(
         &mut self,
         linear: bool,
-        joint: &LaidJoint,
-        section: &Section,
+        joint: &PackedJoint,
+        section: &JointSection,
         q: &[Pose],
     ) -> JointKinematics {
-        let Place { a, b, .. } = joint.place;
+        let PairSlot { a, b, .. } = joint.place;
         let (qa, qb) = (pose(q, a), pose(q, b));
         let frame = joint.frame(section);
         if linear {
@@ -59,15 +59,15 @@ fn pose(q: &[Pose], body: u32) -> Pose {
     if body == NONE { Pose::zeros() } else { q[body as usize] }
 }
 
-impl LaidJoint {
+impl PackedJoint {
     /// Axial rest offset [m].
     #[inline]
-    fn offset(&self, section: &Section, rest: &RestStrain<'_>) -> f64 {
+    fn offset(&self, section: &JointSection, rest: &RestStrain<'_>) -> f64 {
         self.rest * rest.built_in + section.expansion.map_or(0.0, |(group, length)| length * rest.expansion[group])
     }
 
     #[inline(always)]
-    fn stress(&self, section: &Section, k: &JointKinematics, rest: &RestStrain<'_>) -> Vector3<f64> {
+    fn stress(&self, section: &JointSection, k: &JointKinematics, rest: &RestStrain<'_>) -> Vector3<f64> {
         section.stiffness * Vector3::new(k.strain.x - self.offset(section, rest), k.strain.y, k.strain.z)
     }
 }
@@ -82,23 +82,23 @@ pub struct RestStrain<'a> {
 }
 
 /// Force along the axis of a joint [N], tension positive.
-pub fn axial_force(model: &Model, joint: &LaidJoint, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
+pub fn axial_force(model: &Model, joint: &PackedJoint, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
     let section = model.section(joint);
-    joint.stress(section, &Turns::new().kinematics(model.linear, joint, section, q), rest).x
+    joint.stress(section, &HalfTurnCache::new().kinematics(model.linear, joint, section, q), rest).x
 }
 
 /// Change of [`axial_force`] with a change `dq` of the configuration [N].
-pub fn axial_change(model: &Model, joint: &LaidJoint, q: &[Pose], dq: &[Pose]) -> f64 {
+pub fn axial_change(model: &Model, joint: &PackedJoint, q: &[Pose], dq: &[Pose]) -> f64 {
     let section = model.section(joint);
-    let k = Turns::new().kinematics(model.linear, joint, section, q);
+    let k = HalfTurnCache::new().kinematics(model.linear, joint, section, q);
     let (da, db) = (pose(dq, joint.place.a), pose(dq, joint.place.b));
     (section.stiffness * (k.rows() * nalgebra::Vector6::new(da.x, da.y, da.z, db.x, db.y, db.z))).x
 }
 
 /// `r +=` the forces that a change `offset` [m] of one joint's rest offset brings.
-pub fn add_offset_change(model: &Model, joint: &LaidJoint, q: &[Pose], offset: f64, r: &mut [Pose]) {
+pub fn add_offset_change(model: &Model, joint: &PackedJoint, q: &[Pose], offset: f64, r: &mut [Pose]) {
     let section = model.section(joint);
-    let k = Turns::new().kinematics(model.linear, joint, section, q);
+    let k = HalfTurnCache::new().kinematics(model.linear, joint, section, q);
     scatter(joint.place, k.forces(&(section.stiffness * Vector3::new(-offset, 0.0, 0.0))), r);
 }
 
@@ -115,12 +115,12 @@ pub fn add_elastic_backwards(model: &Model, q: &[Pose], rest: &RestStrain<'_>, r
 #[inline(always)]
 fn add_joints<'a>(
     model: &Model,
-    joints: impl Iterator<Item = &'a LaidJoint>,
+    joints: impl Iterator<Item = &'a PackedJoint>,
     q: &[Pose],
     rest: &RestStrain<'_>,
     r: &mut [Pose],
 ) {
-    let mut turns = Turns::new();
+    let mut turns = HalfTurnCache::new();
     for joint in joints {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q);
@@ -172,7 +172,7 @@ pub fn add_tangent(
     tangent: &mut BlockMatrix<f64, 3>,
     r: &mut [Pose],
 ) {
-    let mut turns = Turns::new();
+    let mut turns = HalfTurnCache::new();
     for joint in &model.joints {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q);
@@ -192,7 +192,7 @@ pub fn add_tangent(
 /// `tangent +=` the stiffness that the stress of the joints brings to a linear model about the drawn geometry, as stress and
 /// heat do. Equilibria of a linear model do not have it; vibrations about them do.
 pub fn add_stress_stiffness(model: &Model, q: &[Pose], rest: &RestStrain<'_>, tangent: &mut BlockMatrix<f64, 3>) {
-    let mut turns = Turns::new();
+    let mut turns = HalfTurnCache::new();
     for joint in model.joints.iter().filter(|_| model.linear) {
         let section = model.section(joint);
         let k = turns.kinematics(true, joint, section, q);
@@ -203,9 +203,9 @@ pub fn add_stress_stiffness(model: &Model, q: &[Pose], rest: &RestStrain<'_>, ta
 
 /// The tangents of the joints with their stress, unsummed; their sum is that of [`add_tangent`], and for a linear model of
 /// [`add_stress_stiffness`], without couplings.
-pub(crate) fn factored(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> Vec<(Place, FactoredTangent)> {
-    let mut turns = Turns::new();
-    let one = |joint: &LaidJoint| {
+pub(crate) fn factored(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> Vec<(PairSlot, FactoredTangent)> {
+    let mut turns = HalfTurnCache::new();
+    let one = |joint: &PackedJoint| {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q);
         let stress = joint.stress(section, &k, rest);
@@ -216,8 +216,8 @@ pub(crate) fn factored(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> Vec<
 
 /// Strain energy U(q) [J].
 pub fn strain_energy(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
-    let mut turns = Turns::new();
-    let energy = |joint: &LaidJoint| {
+    let mut turns = HalfTurnCache::new();
+    let energy = |joint: &PackedJoint| {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q);
         let strain = k.strain - Vector3::new(joint.offset(section, rest), 0.0, 0.0);
@@ -237,7 +237,7 @@ pub fn add_rest_change(model: &Model, q: &[Pose], change: &RestStrain<'_>, r: &m
     if change.built_in == 0.0 && change.expansion.iter().all(|&e| e == 0.0) {
         return;
     }
-    let mut turns = Turns::new();
+    let mut turns = HalfTurnCache::new();
     for joint in &model.joints {
         let section = model.section(joint);
         let offset = joint.offset(section, change);
@@ -293,7 +293,7 @@ pub fn add_inertia(model: &Model, m: f64, c: f64, matrix: &mut BlockMatrix<f64, 
 }
 
 #[inline(always)]
-pub(super) fn scatter(place: Place, (a, b): (Pose, Pose), r: &mut [Pose]) {
+pub(super) fn scatter(place: PairSlot, (a, b): (Pose, Pose), r: &mut [Pose]) {
     if place.a != NONE {
         r[place.a as usize] += a;
     }
@@ -302,7 +302,7 @@ pub(super) fn scatter(place: Place, (a, b): (Pose, Pose), r: &mut [Pose]) {
     }
 }
 
-impl Place {
+impl PairSlot {
     /// Adds the tangent of a pair to `matrix`, in the parts that belong to free bodies.
     #[inline(always)]
     pub(crate) fn add_pair(self, matrix: &mut BlockMatrix<f64, 3>, h: &PairTangent) {

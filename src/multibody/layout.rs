@@ -9,13 +9,13 @@ use std::cell::RefCell;
 use std::sync::Arc;
 
 /// Graphs that a thread keeps.
-const KEPT: usize = 8;
+const CACHED_LAYOUTS: usize = 8;
 /// Vertices of a graph that is kept, at most: of larger ones the numbers take longer anyway, and the memory counts.
-const MOST: usize = 2000;
+const MAX_VERTICES: usize = 2000;
 
 /// Order and pattern of a graph.
 #[derive(Debug)]
-pub struct Layout {
+pub struct EliminationLayout {
     count: usize,
     edges: Vec<(usize, usize)>,
     grounded: Vec<usize>,
@@ -28,13 +28,13 @@ pub struct Layout {
 }
 
 thread_local! {
-    static LAST: RefCell<Vec<Arc<Layout>>> = const { RefCell::new(Vec::new()) };
+    static LAST: RefCell<Vec<Arc<EliminationLayout>>> = const { RefCell::new(Vec::new()) };
 }
 
-impl Layout {
+impl EliminationLayout {
     /// Of a graph on `count` vertices, of which ground holds those that are `grounded`.
     pub fn of(count: usize, edges: Vec<(usize, usize)>, grounded: Vec<usize>) -> Arc<Self> {
-        if count > MOST {
+        if count > MAX_VERTICES {
             let Self { order, place, pattern, .. } = Self::new(count, edges, grounded, Pattern::new);
             return Arc::new(Self { count, edges: Vec::new(), grounded: Vec::new(), order, place, pattern });
         }
@@ -50,7 +50,7 @@ impl Layout {
         }
         let new = Arc::new(Self::new(count, edges, grounded, Pattern::new));
         LAST.with_borrow_mut(|last| {
-            last.truncate(KEPT - 1);
+            last.truncate(CACHED_LAYOUTS - 1);
             last.insert(0, Arc::clone(&new));
         });
         new
@@ -59,7 +59,7 @@ impl Layout {
     /// The same for one elimination that finds the targets of its updates on its way: the pattern of a large graph has none.
     pub(crate) fn of_elimination(count: usize, edges: Vec<(usize, usize)>, grounded: Vec<usize>) -> Arc<Self> {
         match count {
-            ..=MOST => Self::of(count, edges, grounded),
+            ..=MAX_VERTICES => Self::of(count, edges, grounded),
             _ => Arc::new(Self::new(count, edges, grounded, Pattern::without_targets)),
         }
     }
@@ -91,12 +91,14 @@ mod tests {
         let chain = |n: usize| (1..n).map(|k| (k - 1, k)).collect::<Vec<_>>();
         for n in [3, 4, 3, 5, 6, 7, 8, 9, 10, 11, 12, 3, 4] {
             for grounded in [vec![0], vec![n - 1], vec![0]] {
-                let (found, anew) =
-                    (Layout::of(n, chain(n), grounded.clone()), Layout::new(n, chain(n), grounded, Pattern::new));
+                let (found, anew) = (
+                    EliminationLayout::of(n, chain(n), grounded.clone()),
+                    EliminationLayout::new(n, chain(n), grounded, Pattern::new),
+                );
                 assert_eq!((&found.order, &found.place, &found.pattern), (&anew.order, &anew.place, &anew.pattern));
             }
         }
-        let again = || Layout::of(4, chain(4), vec![0]);
+        let again = || EliminationLayout::of(4, chain(4), vec![0]);
         assert!(Arc::ptr_eq(&again(), &again()));
     }
 }

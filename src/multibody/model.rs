@@ -2,12 +2,12 @@
 
 use super::BlockMatrix;
 use super::body::Body;
-use super::factor::{HELD, Inertia, ZeroPivot};
+use super::factor::{HELD, PivotSigns, ZeroPivot};
 use super::joint::{BodyId, Coupling, Damper, Joint};
-use super::layout::Layout;
+use super::layout::EliminationLayout;
 use super::pattern::Pattern;
 use super::planar::{Block, Pose, Symmetric};
-use super::section::{LaidJoint, NONE, Place, Section, Sections};
+use super::section::{JointSection, NONE, PackedJoint, PairSlot, Sections};
 use crate::sets::Sets;
 use nalgebra::{Matrix3, Matrix6, Vector2};
 use serde::{Deserialize, Serialize};
@@ -20,9 +20,9 @@ pub struct Model {
     /// Bodies in elimination order.
     pub bodies: Vec<Body>,
     /// Joints, along the elimination order of their earlier body.
-    pub joints: Vec<LaidJoint>,
+    pub joints: Vec<PackedJoint>,
     /// What joints share.
-    pub sections: Vec<Section>,
+    pub sections: Vec<JointSection>,
     /// Couplings of joints, see [`Model::couple`].
     pub couplings: Vec<Coupling>,
     /// Dampers.
@@ -35,7 +35,7 @@ pub struct Model {
     held: Vec<u32>,
     /// The bodies of each part that no joint connects to ground and no support holds.
     loose: Vec<Vec<u32>>,
-    pub(crate) damper_place: Vec<Place>,
+    pub(crate) damper_place: Vec<PairSlot>,
     pub(crate) damper_matrix: Vec<Matrix6<f64>>,
 }
 
@@ -77,8 +77,8 @@ impl Model {
                 _ => None,
             })
             .collect();
-        let layout = Layout::of(bodies.len(), edges, grounded);
-        let Layout { order, place, pattern, .. } = &*layout;
+        let layout = EliminationLayout::of(bodies.len(), edges, grounded);
+        let EliminationLayout { order, place, pattern, .. } = &*layout;
         let moved = |id: BodyId| match id {
             BodyId::Ground => BodyId::Ground,
             BodyId::Free(k) => BodyId::Free(place[k]),
@@ -87,12 +87,12 @@ impl Model {
             (d.a, d.b) = (moved(d.a), moved(d.b));
         }
         let mut sections = Sections::new(joints.len());
-        let given: Vec<LaidJoint> =
+        let given: Vec<PackedJoint> =
             joints.iter().map(|j| sections.lay(j, locate(pattern, moved(j.a), moved(j.b)))).collect();
         drop(joints);
         let mut sorted: Vec<((u32, u32), u32)> = given.iter().map(|j| j.place.order()).zip(0..).collect();
         sorted.sort_unstable();
-        let laid: Vec<LaidJoint> = sorted.iter().map(|(_, k)| given[*k as usize]).collect();
+        let laid: Vec<PackedJoint> = sorted.iter().map(|(_, k)| given[*k as usize]).collect();
         let mut slots: Vec<Option<Body>> = bodies.into_iter().map(Some).collect();
         let mut bodies = Vec::with_capacity(order.len());
         bodies.extend(order.iter().filter_map(|&k| slots[k].take()));
@@ -159,7 +159,7 @@ impl Model {
     pub fn with_springs_to_ground(&self, bodies: &[usize], [moves, turns]: [f64; 2]) -> Self {
         let mut model = self.clone();
         let section = model.sections.len() as u32;
-        model.sections.push(Section {
+        model.sections.push(JointSection {
             axis: Vector2::x(),
             stiffness: Symmetric([moves, 0.0, 0.0, moves, 0.0, turns]),
             second: [0.0; 3],
@@ -167,8 +167,8 @@ impl Model {
             locked: [false; 3],
         });
         let spring = |&body: &usize| {
-            let place = Place { a: NONE, b: body as u32, block: NONE };
-            LaidJoint::at_center(place, section)
+            let place = PairSlot { a: NONE, b: body as u32, block: NONE };
+            PackedJoint::at_center(place, section)
         };
         model.joints.extend(bodies.iter().map(spring));
         model
@@ -182,7 +182,7 @@ impl Model {
         &self,
         stiffness: &mut BlockMatrix<f64, 3>,
         held: &mut Vec<ZeroPivot>,
-    ) -> Result<Inertia, ZeroPivot> {
+    ) -> Result<PivotSigns, ZeroPivot> {
         for body in self.loose() {
             let block = &mut stiffness.diagonal[body];
             let own = block.diagonal();
@@ -195,7 +195,7 @@ impl Model {
 
     /// What a joint shares with others.
     #[inline]
-    pub fn section(&self, joint: &LaidJoint) -> &Section {
+    pub fn section(&self, joint: &PackedJoint) -> &JointSection {
         &self.sections[joint.section()]
     }
 
@@ -259,21 +259,21 @@ impl Model {
 }
 
 /// Least pivot of a translation that is held [N/m]: where the body's own stiffness passes through 0, as at a fold, its pivot does not.
-pub(super) const LEAST_HELD: f64 = 1.0;
+pub(super) const MIN_HELD: f64 = 1.0;
 
 /// P·A·P with pivots in what the projector P takes away: 1 for a rotation. A translation that is held at an angle mixes with the one that is free, so its
 /// pivot is of the size of both: beside a contact of 10¹³ N/m a pivot of 1 would be rounding.
 pub(super) fn projected<T: super::Scalar>(p: &Matrix3<f64>, a: &Matrix3<T>) -> Matrix3<T> {
     let lifted: Matrix3<T> = p.map(T::from_real);
     let block = lifted * a * lifted;
-    let size = a[(0, 0)].modulus() + a[(1, 1)].modulus() + LEAST_HELD;
+    let size = a[(0, 0)].modulus() + a[(1, 1)].modulus() + MIN_HELD;
     let mut held = Matrix3::identity() - p;
     held.fixed_view_mut::<2, 2>(0, 0).apply(|x| *x *= size);
     block + held.map(T::from_real)
 }
 
 /// See [`Model::loose_parts`].
-fn loose_parts(bodies: &[Body], joints: &[LaidJoint]) -> Vec<Vec<u32>> {
+fn loose_parts(bodies: &[Body], joints: &[PackedJoint]) -> Vec<Vec<u32>> {
     let ground = bodies.len();
     let mut joined = Sets::new(ground + 1);
     let index = |id: u32| if id == NONE { ground } else { id as usize };
@@ -297,7 +297,7 @@ fn loose_parts(bodies: &[Body], joints: &[LaidJoint]) -> Vec<Vec<u32>> {
 }
 
 /// Where a pair's blocks lie on a pattern.
-pub(crate) fn locate(pattern: &Pattern, a: BodyId, b: BodyId) -> Place {
+pub(crate) fn locate(pattern: &Pattern, a: BodyId, b: BodyId) -> PairSlot {
     let index = |id| match id {
         BodyId::Ground => NONE,
         BodyId::Free(k) => k as u32,
@@ -306,5 +306,5 @@ pub(crate) fn locate(pattern: &Pattern, a: BodyId, b: BodyId) -> Place {
         (BodyId::Free(a), BodyId::Free(b)) if a != b => pattern.block(a.max(b), a.min(b)).map_or(NONE, |k| k as u32),
         _ => NONE,
     };
-    Place { a: index(a), b: index(b), block }
+    PairSlot { a: index(a), b: index(b), block }
 }

@@ -24,7 +24,7 @@ pub type PairRow = SMatrix<f64, 3, 6>;
 
 /// Rotation of `v` by a right angle: the derivative of a rotating vector with respect to its angle.
 #[inline]
-pub fn turn(v: Vector2<f64>) -> Vector2<f64> {
+pub fn perpendicular(v: Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-v.y, v.x)
 }
 
@@ -37,8 +37,8 @@ pub fn rotate(theta: f64, v: Vector2<f64>) -> Vector2<f64> {
 
 /// (R(θ) − 1)·v without cancellation at small angles.
 #[inline]
-pub fn swing(theta: f64, v: Vector2<f64>) -> Vector2<f64> {
-    HalfTurn::new(theta).swing(v)
+pub fn rotation_minus_identity(theta: f64, v: Vector2<f64>) -> Vector2<f64> {
+    HalfTurn::new(theta).rotation_minus_identity(v)
 }
 
 /// Sine and cosine of half of a body's rotation θ, with R(θ) − 1.
@@ -64,7 +64,7 @@ impl HalfTurn {
 
     /// (R(θ) − 1)·v without cancellation at small angles.
     #[inline]
-    fn swing(&self, v: Vector2<f64>) -> Vector2<f64> {
+    fn rotation_minus_identity(&self, v: Vector2<f64>) -> Vector2<f64> {
         Vector2::new(self.less * v.x - self.whole * v.y, self.whole * v.x + self.less * v.y)
     }
 
@@ -80,7 +80,7 @@ impl HalfTurn {
 /// Displacement of the point at `arm` on a body at pose `q` [m].
 #[inline]
 pub fn point(q: &Pose, arm: Vector2<f64>, linear: bool) -> Vector2<f64> {
-    let moved = if linear { turn(arm) * q.z } else { swing(q.z, arm) };
+    let moved = if linear { perpendicular(arm) * q.z } else { rotation_minus_identity(q.z, arm) };
     Vector2::new(q.x, q.y) + moved
 }
 
@@ -88,10 +88,10 @@ pub fn point(q: &Pose, arm: Vector2<f64>, linear: bool) -> Vector2<f64> {
 #[inline]
 pub fn point_turn(q: &Pose, arm: Vector2<f64>, linear: bool) -> (Vector2<f64>, Vector2<f64>) {
     if linear {
-        (turn(arm), Vector2::zeros())
+        (perpendicular(arm), Vector2::zeros())
     } else {
         let r = rotate(q.z, arm);
-        (turn(r), -r)
+        (perpendicular(r), -r)
     }
 }
 

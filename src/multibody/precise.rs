@@ -10,12 +10,12 @@ use super::joint::{BodyId, Coupling};
 use super::model::Model;
 use super::planar::Pose;
 use super::planar::factored::FactoredTangent;
-use super::section::{NONE, Place};
+use super::section::{NONE, PairSlot};
 
 /// ∂²U/∂q² of the joints of a model at one configuration.
 #[derive(Debug, Clone)]
 pub struct PreciseTangent {
-    joints: Vec<(Place, FactoredTangent)>,
+    joints: Vec<(PairSlot, FactoredTangent)>,
     couplings: Vec<Coupling>,
 }
 

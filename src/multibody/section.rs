@@ -9,7 +9,7 @@ use rustc_hash::{FxBuildHasher, FxHashMap};
 
 /// What the joints that are cut from one beam share.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Section {
+pub struct JointSection {
     /// Cosine and sine of the drawn angle of the joints' x axis.
     pub axis: Vector2<f64>,
     /// Stress per strain, see [`Joint::stiffness`].
@@ -24,7 +24,7 @@ pub struct Section {
 
 /// A joint of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LaidJoint {
+pub struct PackedJoint {
     /// From the centre of mass of body a to the joint, as drawn [m].
     pub arm_a: Vector2<f64>,
     /// From the centre of mass of body b to the joint, as drawn [m].
@@ -32,13 +32,13 @@ pub struct LaidJoint {
     /// Axial rest offset that does not change [m].
     pub rest: f64,
     /// Where its bodies and their coupling lie.
-    pub(crate) place: Place,
+    pub(crate) place: PairSlot,
     section: u32,
 }
 
-impl LaidJoint {
+impl PackedJoint {
     /// A joint between the centres of mass of two bodies, or of one and the ground.
-    pub(super) fn at_center(place: Place, section: u32) -> Self {
+    pub(super) fn at_center(place: PairSlot, section: u32) -> Self {
         Self { arm_a: Vector2::zeros(), arm_b: Vector2::zeros(), rest: 0.0, place, section }
     }
 
@@ -54,7 +54,7 @@ impl LaidJoint {
     }
 
     /// The joint as it was given.
-    pub(crate) fn whole(&self, section: &Section) -> Joint {
+    pub(crate) fn whole(&self, section: &JointSection) -> Joint {
         let ([uu, ug, up, gg, gp, pp], [q_gg, q_gp, q_pp]) = (section.stiffness.0, section.second);
         let (a, b) = self.bodies();
         Joint {
@@ -70,7 +70,7 @@ impl LaidJoint {
     }
 
     #[inline]
-    pub(crate) fn frame(&self, section: &Section) -> JointFrame {
+    pub(crate) fn frame(&self, section: &JointSection) -> JointFrame {
         JointFrame { arm_a: self.arm_a, arm_b: self.arm_b, axis: section.axis }
     }
 }
@@ -78,7 +78,7 @@ impl LaidJoint {
 /// Where a pair of bodies and their coupling lie in the tangent. Indices are 32 bits wide: a model with more bodies or
 /// blocks would fill terabytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct PairSlot {
     /// Body a, or [`NONE`] for ground.
     pub(crate) a: u32,
     /// Body b, or [`NONE`] for ground.
@@ -90,7 +90,7 @@ pub(crate) struct Place {
 /// Ground, or no block.
 pub(crate) const NONE: u32 = u32::MAX;
 
-impl Place {
+impl PairSlot {
     fn id(index: u32) -> BodyId {
         if index == NONE { BodyId::Ground } else { BodyId::Free(index as usize) }
     }
@@ -115,7 +115,7 @@ const ROOM: usize = 64;
 
 /// Lays joints down with one section for all that are alike in everything but place and rest offset.
 pub(crate) struct Sections {
-    pub(crate) all: Vec<Section>,
+    pub(crate) all: Vec<JointSection>,
     /// The last section of each hash.
     known: FxHashMap<u64, u32>,
     /// For each section, the one before it with the same hash.
@@ -134,9 +134,9 @@ impl Sections {
     }
 
     /// The joint as it is stored, between the bodies of `place`.
-    pub(crate) fn lay(&mut self, joint: &Joint, place: Place) -> LaidJoint {
+    pub(crate) fn lay(&mut self, joint: &Joint, place: PairSlot) -> PackedJoint {
         let (k, q) = (&joint.stiffness, &joint.second);
-        let section = Section {
+        let section = JointSection {
             axis: joint.frame.axis,
             stiffness: Symmetric([k[(0, 0)], k[(0, 1)], k[(0, 2)], k[(1, 1)], k[(1, 2)], k[(2, 2)]]),
             second: [q[(0, 0)], q[(0, 1)], q[(1, 1)]],
@@ -148,10 +148,10 @@ impl Sections {
             Some(last) if *last == section => (self.all.len() - 1) as u32,
             _ => self.find(section),
         };
-        LaidJoint { arm_a: joint.frame.arm_a, arm_b: joint.frame.arm_b, rest: joint.rest, place, section }
+        PackedJoint { arm_a: joint.frame.arm_a, arm_b: joint.frame.arm_b, rest: joint.rest, place, section }
     }
 
-    fn find(&mut self, section: Section) -> u32 {
+    fn find(&mut self, section: JointSection) -> u32 {
         let last = self.known.entry(section.hash()).or_insert(NONE);
         let mut at = *last;
         while at != NONE {
@@ -166,7 +166,7 @@ impl Sections {
     }
 }
 
-impl Section {
+impl JointSection {
     /// True for one that has the same bits.
     fn is(&self, other: &Self) -> bool {
         let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
@@ -194,7 +194,7 @@ mod tests {
     /// A stored joint takes 56 bytes; joints of one beam share a section, and each can be had back as it was given.
     #[test]
     fn small_and_whole() {
-        assert_eq!(size_of::<LaidJoint>(), 56);
+        assert_eq!(size_of::<PackedJoint>(), 56);
         let axis = Vector2::new(0.6, 0.8);
         let joint = |rest: f64, gp: f64| Joint {
             a: BodyId::Ground,
@@ -208,9 +208,9 @@ mod tests {
         };
         let given = [joint(1.0, 0.5), joint(2.0, 0.5), joint(3.0, 0.7), joint(4.0, 0.5)];
         let mut sections = Sections::new(4);
-        let place = Place { a: NONE, b: 3, block: NONE };
-        let laid: Vec<LaidJoint> = given.iter().map(|joint| sections.lay(joint, place)).collect();
-        assert_eq!(laid.iter().map(LaidJoint::section).collect::<Vec<_>>(), [0, 0, 1, 0]);
+        let place = PairSlot { a: NONE, b: 3, block: NONE };
+        let laid: Vec<PackedJoint> = given.iter().map(|joint| sections.lay(joint, place)).collect();
+        assert_eq!(laid.iter().map(PackedJoint::section).collect::<Vec<_>>(), [0, 0, 1, 0]);
         for (joint, laid) in given.iter().zip(&laid) {
             assert_eq!(laid.whole(&sections.all[laid.section()]), *joint);
         }

@@ -5,14 +5,14 @@
 //! the same stiffness as at rest.
 
 use super::BlockMatrix;
-use super::forces::{Turns, add_coupling_tangent, scatter};
+use super::forces::{HalfTurnCache, add_coupling_tangent, scatter};
 use super::model::Model;
 use super::planar::Pose;
 use nalgebra::Vector3;
 
 /// `tangent += factor·K₀`: the stiffness in the geometry `q` with all strains and section forces set to zero.
 pub fn add_unstressed_tangent(model: &Model, q: &[Pose], factor: f64, tangent: &mut BlockMatrix<f64, 3>) {
-    let mut turns = Turns::new();
+    let mut turns = HalfTurnCache::new();
     for joint in &model.joints {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q).unstrained();
@@ -23,7 +23,7 @@ pub fn add_unstressed_tangent(model: &Model, q: &[Pose], factor: f64, tangent: &
 
 /// `r +=` the forces on the bodies of the stress (N [N], V [N], M [N·m]) that `stress` gives for each joint.
 pub fn add_stresses(model: &Model, q: &[Pose], mut stress: impl FnMut(usize) -> Vector3<f64>, r: &mut [Pose]) {
-    let mut turns = Turns::new();
+    let mut turns = HalfTurnCache::new();
     for (number, joint) in model.joints.iter().enumerate() {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q).unstrained();
@@ -33,6 +33,6 @@ pub fn add_stresses(model: &Model, q: &[Pose], mut stress: impl FnMut(usize) -> 
 
 /// Strains (u [m], g [m], p [rad]) of the joints of a model.
 pub fn strains(model: &Model, q: &[Pose]) -> impl Iterator<Item = Vector3<f64>> {
-    let mut turns = Turns::new();
+    let mut turns = HalfTurnCache::new();
     model.joints.iter().map(move |joint| turns.kinematics(model.linear, joint, model.section(joint), q).strain)
 }

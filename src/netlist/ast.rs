@@ -1,14 +1,14 @@
 //! The syntax tree of a netlist with all its includes in place.
 
-use super::elements::Model;
-use super::source::Span;
+use super::elements::ElementModel;
+use super::source::TextSpan;
 use std::sync::Arc;
 
 /// A name with its place.
 #[derive(Debug, Clone)]
 pub(crate) struct Ident {
     pub(crate) name: Arc<str>,
-    pub(crate) span: Span,
+    pub(crate) span: TextSpan,
 }
 
 /// Where a variable lives: in the netlist itself or in the subnet instance at hand.
@@ -43,7 +43,7 @@ pub(crate) enum Binary {
 #[derive(Debug, Clone)]
 pub(crate) struct Expr {
     pub(crate) kind: ExprKind,
-    pub(crate) span: Span,
+    pub(crate) span: TextSpan,
 }
 
 #[derive(Debug, Clone)]
@@ -85,7 +85,7 @@ pub(crate) struct Def {
 pub(crate) struct Name {
     pub(crate) base: Ident,
     pub(crate) indices: Vec<Expr>,
-    pub(crate) span: Span,
+    pub(crate) span: TextSpan,
 }
 
 /// The layer word of an element.
@@ -100,7 +100,7 @@ pub(crate) enum LayerRef {
 }
 
 #[derive(Debug, Clone)]
-pub(crate) struct Element {
+pub(crate) struct ElementStatement {
     /// The name given.
     pub(crate) name: Option<Name>,
     /// Count of this anonymous line, from 1, in reading order over all files; 0 for one that has a name.
@@ -111,13 +111,13 @@ pub(crate) struct Element {
     /// The subnet of that name, once resolved; none: a built-in element.
     pub(crate) subnet: Option<usize>,
     /// The built-in element of that name, and whether it takes every parameter that is given.
-    pub(crate) built_in: Option<(&'static Model, bool)>,
+    pub(crate) built_in: Option<(&'static ElementModel, bool)>,
     /// The layer's name; `*` for none.
     pub(crate) layer_name: Ident,
     pub(crate) layer: LayerRef,
     pub(crate) nodes: Vec<Name>,
     /// The place of the whole node list.
-    pub(crate) nodes_span: Span,
+    pub(crate) nodes_span: TextSpan,
     pub(crate) parameters: Vec<Def>,
 }
 
@@ -128,15 +128,15 @@ pub(crate) enum Statement {
     Subnet(usize),
     Def(Def),
     Block(Vec<Statement>),
-    Element(Box<Element>),
+    Element(Box<ElementStatement>),
     For { index: Ident, slot: Slot, from: Expr, to: Expr, body: Vec<Statement> },
     If { condition: Expr, then: Box<Statement>, otherwise: Option<Box<Statement>> },
     Call(Expr),
 }
 
-/// `process ID [: ID] = [ … ]`. Entries are the layer's own; its parent's follow by [`Layer::parent`].
+/// `process ID [: ID] = [ … ]`. Entries are the layer's own; its parent's follow by [`LayerDefinition::parent`].
 #[derive(Debug, Clone)]
-pub(crate) struct Layer {
+pub(crate) struct LayerDefinition {
     pub(crate) name: Ident,
     pub(crate) parent_name: Option<Ident>,
     pub(crate) parent: Option<usize>,
@@ -155,7 +155,7 @@ pub(crate) struct Formal {
 }
 
 #[derive(Debug, Clone)]
-pub(crate) struct Subnet {
+pub(crate) struct SubnetDefinition {
     pub(crate) name: Ident,
     pub(crate) nodes: Vec<Name>,
     pub(crate) formals: Vec<Formal>,
@@ -168,8 +168,8 @@ pub(crate) struct Subnet {
 #[derive(Debug, Default)]
 pub(crate) struct Program {
     pub(crate) statements: Vec<Statement>,
-    pub(crate) layers: Vec<Layer>,
-    pub(crate) subnets: Vec<Subnet>,
+    pub(crate) layers: Vec<LayerDefinition>,
+    pub(crate) subnets: Vec<SubnetDefinition>,
     /// Number of variables of the netlist itself, once resolved.
     pub(crate) variables: usize,
     /// Files whose `ox oy oz` are in degrees, by their numbers.

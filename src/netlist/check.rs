@@ -1,8 +1,8 @@
 //! What can be said about a finished drawing before any physics: loose nodes, loose parts, floating potentials, and
 //! one message for each thing that the planar model leaves out.
 
-use super::drawing::{Drawing, Fact};
-use super::sink::Sink;
+use super::drawing::{Fact, StructureBuilder};
+use super::sink::DiagnosticSink;
 use super::suggest::did_you_mean;
 use super::value::short;
 use crate::domains::BeamRows;
@@ -12,20 +12,20 @@ use std::collections::HashSet;
 use std::ops::RangeInclusive;
 
 /// So many loose parts or floating nodes are told one by one.
-const TOLD: usize = 3;
+const MAX_REPORTED: usize = 3;
 
 /// So many loose nodes are told.
-const MOST_LOOSE: usize = 20;
+const MAX_LOOSE: usize = 20;
 
 /// Resistances that can be computed with [Ω], and conductances of heat [W/K]: sums and quotients of them stay numbers.
 const RESISTANCES: RangeInclusive<f64> = 1e-300..=1e300;
 
 /// Reports what has become infinite or vanished: sizes may be in range one by one and not in their products.
-pub(crate) fn finite(drawing: &Drawing, sink: &mut Sink) {
+pub(crate) fn finite(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     let s = &drawing.structure;
     let mut told = HashSet::new();
     let mut look = |name: &str, node: NodeId, good: bool| {
-        if !good && told.len() < TOLD && told.insert(name.to_owned()) {
+        if !good && told.len() < MAX_REPORTED && told.insert(name.to_owned()) {
             let message = format!("what `{name}` has in the model is not finite: its sizes are out of any range");
             let help = "check its numbers, their suffixes and exponents";
             sink.error("E060", drawing.first_named[node.0], message, help);
@@ -68,7 +68,7 @@ pub(crate) fn finite(drawing: &Drawing, sink: &mut Sink) {
 }
 
 /// Checks a drawing whose nodes are placed.
-pub(crate) fn check(drawing: &Drawing, sink: &mut Sink) {
+pub(crate) fn check(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     facts(drawing, sink);
     let structure = &drawing.structure;
     let mut connected = vec![false; structure.nodes.len()];
@@ -86,7 +86,7 @@ pub(crate) fn check(drawing: &Drawing, sink: &mut Sink) {
 }
 
 /// A gap whose nodes are all anchored bends nothing, unless beams lie between them.
-fn gaps_between_anchors(drawing: &Drawing, sink: &mut Sink) {
+fn gaps_between_anchors(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     let structure = &drawing.structure;
     let mut anchored = vec![false; structure.nodes.len()];
     for support in structure.supports.iter().filter(|support| support.held == [true; 3]) {
@@ -107,7 +107,7 @@ fn gaps_between_anchors(drawing: &Drawing, sink: &mut Sink) {
     }
 }
 
-fn facts(drawing: &Drawing, sink: &mut Sink) {
+fn facts(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     for noted in &drawing.facts {
         let number = short(noted.number);
         let elements = if noted.count == 1 { "1 element".to_owned() } else { format!("{} elements", noted.count) };
@@ -238,7 +238,7 @@ fn mechanical_connections(structure: &Structure) -> impl Iterator<Item = (NodeId
 }
 
 /// A mechanical node that no member touches and nothing holds completely.
-fn loose_nodes(drawing: &Drawing, connected: &[bool], sink: &mut Sink) {
+fn loose_nodes(drawing: &StructureBuilder, connected: &[bool], sink: &mut DiagnosticSink) {
     let structure = &drawing.structure;
     let mut held = vec![[false; 3]; structure.nodes.len()];
     for support in &structure.supports {
@@ -247,7 +247,7 @@ fn loose_nodes(drawing: &Drawing, connected: &[bool], sink: &mut Sink) {
         }
     }
     let loose = |i: &usize| structure.nodes[*i].mechanical && !connected[*i] && held[*i] != [true; 3];
-    for index in (0..structure.nodes.len()).filter(loose).take(MOST_LOOSE) {
+    for index in (0..structure.nodes.len()).filter(loose).take(MAX_LOOSE) {
         let name = &structure.nodes[index].name;
         let message = format!("node `{name}` is connected to nothing: no beam, link or spring holds it");
         let others = (0..structure.nodes.len()).filter(|&i| connected[i]).map(|i| structure.nodes[i].name.as_str());
@@ -257,7 +257,7 @@ fn loose_nodes(drawing: &Drawing, connected: &[bool], sink: &mut Sink) {
 }
 
 /// A part that no support holds in any direction.
-fn unheld_parts(drawing: &Drawing, connected: &[bool], parts: &mut Sets, sink: &mut Sink) {
+fn unheld_parts(drawing: &StructureBuilder, connected: &[bool], parts: &mut Sets, sink: &mut DiagnosticSink) {
     let structure = &drawing.structure;
     let mut held = vec![false; structure.nodes.len()];
     for support in &structure.supports {
@@ -271,9 +271,10 @@ fn unheld_parts(drawing: &Drawing, connected: &[bool], parts: &mut Sets, sink: &
             loose.push(index);
         }
     }
-    for &index in loose.iter().take(TOLD) {
+    for &index in loose.iter().take(MAX_REPORTED) {
         let name = &structure.nodes[index].name;
-        let more = if loose.len() > TOLD { format!(" ({} such parts in all)", loose.len()) } else { String::new() };
+        let more =
+            if loose.len() > MAX_REPORTED { format!(" ({} such parts in all)", loose.len()) } else { String::new() };
         let message = format!("nothing holds the part with node `{name}`: it has no anchor{more}");
         sink.warning(
             "W012",
@@ -285,7 +286,7 @@ fn unheld_parts(drawing: &Drawing, connected: &[bool], parts: &mut Sets, sink: &
 }
 
 /// Potentials that no port, source or ground fixes.
-fn floating_potentials(drawing: &Drawing, sink: &mut Sink) {
+fn floating_potentials(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     let structure = &drawing.structure;
     let mut nets = Sets::new(structure.nodes.len() + 1);
     let ground = structure.nodes.len();
@@ -320,10 +321,13 @@ fn floating_potentials(drawing: &Drawing, sink: &mut Sink) {
             floating.push(index);
         }
     }
-    for &index in floating.iter().take(TOLD) {
+    for &index in floating.iter().take(MAX_REPORTED) {
         let name = &structure.nodes[index].name;
-        let more =
-            if floating.len() > TOLD { format!(" ({} such nets in all)", floating.len()) } else { String::new() };
+        let more = if floating.len() > MAX_REPORTED {
+            format!(" ({} such nets in all)", floating.len())
+        } else {
+            String::new()
+        };
         let message = format!("the potential of node `{name}` floats: no port, source or ground fixes it{more}");
         let help = "connect it with `R`, or add `eground * [node] []`";
         sink.warning("W013", drawing.first_named[index], message, help);

@@ -1,6 +1,6 @@
 //! The structure under construction, with what is needed to place its nodes.
 
-use super::source::Span;
+use super::source::TextSpan;
 use crate::budget;
 use crate::structure::{Beam, Node, NodeId, Structure};
 use rustc_hash::FxHashSet;
@@ -16,21 +16,21 @@ pub(crate) const NAME_COPIES: usize = 4;
 
 /// How one element fixes the positions of its nodes relative to each other.
 #[derive(Debug, Clone)]
-pub(crate) struct Placement {
+pub(crate) struct ElementPlacement {
     /// The element's place in the text, for messages.
-    pub(crate) span: Span,
-    /// Its first node in [`Drawing::placed`], and how many there are.
+    pub(crate) span: TextSpan,
+    /// Its first node in [`StructureBuilder::placed`], and how many there are.
     first: usize,
     count: usize,
 }
 
 /// A node, and its position relative to the first of the element [m], global axes.
-pub(crate) type Placed = (NodeId, [f64; 2]);
+pub(crate) type NodeOffset = (NodeId, [f64; 2]);
 
 /// A beam that takes its length and direction from the positions of its nodes.
 #[derive(Debug, Clone)]
 pub(crate) struct Unmeasured {
-    pub(crate) span: Span,
+    pub(crate) span: TextSpan,
     /// Index into [`Structure::beams`].
     pub(crate) beam: usize,
 }
@@ -84,9 +84,9 @@ pub(crate) enum Fact {
 
 /// A fact with where it was first met, how often, and its number there (a temperature, a conductivity).
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Noted {
+pub(crate) struct NotedFact {
     pub(crate) fact: Fact,
-    pub(crate) span: Span,
+    pub(crate) span: TextSpan,
     pub(crate) count: usize,
     pub(crate) number: f64,
 }
@@ -94,7 +94,7 @@ pub(crate) struct Noted {
 /// A member that leaves the drawing plane.
 #[derive(Debug, Clone)]
 pub(crate) struct Upright {
-    pub(crate) span: Span,
+    pub(crate) span: TextSpan,
     pub(crate) name: String,
     pub(crate) nodes: [NodeId; 2],
     /// Normal to the plane and stouter than long.
@@ -107,24 +107,24 @@ pub(crate) struct Upright {
 
 /// Structure, placements and facts gathered while elements are built.
 #[derive(Debug, Default)]
-pub(crate) struct Drawing {
+pub(crate) struct StructureBuilder {
     pub(crate) structure: Structure,
-    pub(crate) placements: Vec<Placement>,
+    pub(crate) placements: Vec<ElementPlacement>,
     /// The nodes of all of them.
-    placed: Vec<Placed>,
+    placed: Vec<NodeOffset>,
     pub(crate) unmeasured: Vec<Unmeasured>,
     /// Members that leave the plane, until the anchors are known.
     pub(crate) upright: Vec<Upright>,
     /// In order of appearance.
-    pub(crate) facts: Vec<Noted>,
+    pub(crate) facts: Vec<NotedFact>,
     /// Nodes at electrical ground, and names of ports, so far.
     pub(crate) grounded: FxHashSet<NodeId>,
     pub(crate) port_names: FxHashSet<String>,
     /// Where each node was first named.
-    pub(crate) first_named: Vec<Span>,
+    pub(crate) first_named: Vec<TextSpan>,
 }
 
-impl Drawing {
+impl StructureBuilder {
     /// Nothing drawn yet, with room for a small part.
     pub(crate) fn new() -> Self {
         let mut drawing = Self::default();
@@ -137,7 +137,7 @@ impl Drawing {
     }
 
     /// A new node.
-    pub(crate) fn add_node(&mut self, name: String, span: Span) -> NodeId {
+    pub(crate) fn add_node(&mut self, name: String, span: TextSpan) -> NodeId {
         budget::lay_out(NODE_BYTES + NAME_COPIES * name.len());
         self.structure.nodes.push(Node { name, position: [0.0; 2], mechanical: false, electrical: false });
         self.first_named.push(span);
@@ -145,19 +145,19 @@ impl Drawing {
     }
 
     /// Marks nodes as mechanical and records how they lie.
-    pub(crate) fn place(&mut self, span: Span, nodes: &[NodeId], offsets: &[[f64; 2]]) {
+    pub(crate) fn place(&mut self, span: TextSpan, nodes: &[NodeId], offsets: &[[f64; 2]]) {
         self.mechanical(nodes);
         self.lay(span, nodes, offsets);
     }
 
     /// Records how nodes lie; they may be mere points of the drawing.
-    pub(crate) fn lay(&mut self, span: Span, nodes: &[NodeId], offsets: &[[f64; 2]]) {
-        self.placements.push(Placement { span, first: self.placed.len(), count: nodes.len() });
+    pub(crate) fn lay(&mut self, span: TextSpan, nodes: &[NodeId], offsets: &[[f64; 2]]) {
+        self.placements.push(ElementPlacement { span, first: self.placed.len(), count: nodes.len() });
         self.placed.extend(nodes.iter().copied().zip(offsets.iter().copied()));
     }
 
     /// The nodes that an element places.
-    pub(crate) fn placed_by(&self, placement: &Placement) -> &[Placed] {
+    pub(crate) fn placed_by(&self, placement: &ElementPlacement) -> &[NodeOffset] {
         &self.placed[placement.first..placement.first + placement.count]
     }
 
@@ -174,7 +174,7 @@ impl Drawing {
     }
 
     /// Adds a beam and its placement; without a length it is measured once the nodes are placed.
-    pub(crate) fn add_beam(&mut self, span: Span, beam: Beam, measured: bool) {
+    pub(crate) fn add_beam(&mut self, span: TextSpan, beam: Beam, measured: bool) {
         let (a, b) = (beam.a, beam.b);
         if measured {
             let (s, c) = beam.angle.sin_cos();
@@ -191,14 +191,14 @@ impl Drawing {
         self.facts.iter().map(|noted| noted.count).sum()
     }
 
-    pub(crate) fn note(&mut self, fact: Fact, span: Span) {
+    pub(crate) fn note(&mut self, fact: Fact, span: TextSpan) {
         self.note_number(fact, span, 0.0);
     }
 
-    pub(crate) fn note_number(&mut self, fact: Fact, span: Span, number: f64) {
+    pub(crate) fn note_number(&mut self, fact: Fact, span: TextSpan, number: f64) {
         match self.facts.iter_mut().find(|noted| noted.fact == fact) {
             Some(noted) => noted.count += 1,
-            None => self.facts.push(Noted { fact, span, count: 1, number }),
+            None => self.facts.push(NotedFact { fact, span, count: 1, number }),
         }
     }
 }

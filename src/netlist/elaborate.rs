@@ -1,12 +1,12 @@
 //! Runs a resolved program: definitions, loops and subnets become elements of a drawing.
 
 use super::ast::{Def, Expr, Name, PI_SLOT, Program, Slot, Statement};
-use super::drawing::Drawing;
+use super::drawing::StructureBuilder;
 use super::elements::Argument;
 use super::rotation::Rotation;
 use super::setting::Setting;
-use super::sink::{Reported, Sink};
-use super::source::Span;
+use super::sink::{DiagnosticSink, Reported};
+use super::source::TextSpan;
 use super::value::{LayerValues, Value, short};
 use crate::structure::NodeId;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -17,12 +17,12 @@ use std::sync::Arc;
 /// Blocks, conditions, loops and instances together may nest this deep while running: bounds the stack.
 const DEEPEST_RUN: usize = 400;
 /// Statements, operators and values that one netlist may run: loops and recursion end here instead of never.
-const MOST_STEPS: usize = 30_000_000;
+const MAX_STEPS: usize = 30_000_000;
 /// Elements and subnet instances that one netlist may build; nodes it may name.
-const MOST_ELEMENTS: usize = 300_000;
+const MAX_ELEMENTS: usize = 300_000;
 
 /// Variables and nodes of the netlist or of one subnet instance.
-pub(super) struct Frame {
+pub(super) struct EvaluationScope {
     pub(super) values: Vec<Value>,
     /// Nodes by the name they have here.
     pub(super) nodes: FxHashMap<Arc<str>, NodeId>,
@@ -39,10 +39,10 @@ pub(super) struct Frame {
 pub(crate) struct Elaborator<'p> {
     pub(super) program: &'p Program,
     settings: BTreeMap<&'p str, &'p Setting>,
-    pub(super) sink: &'p mut Sink,
-    pub(super) frames: Vec<Frame>,
+    pub(super) sink: &'p mut DiagnosticSink,
+    pub(super) frames: Vec<EvaluationScope>,
     pub(super) layers: Vec<Option<LayerValues<'p>>>,
-    pub(super) drawing: Drawing,
+    pub(super) drawing: StructureBuilder,
     parameters: Vec<(String, Setting)>,
     /// Variables that were set from outside.
     from_outside: FxHashSet<usize>,
@@ -61,16 +61,16 @@ pub(crate) struct Elaborator<'p> {
 
 /// What an elaboration yields.
 pub(crate) struct Elaborated {
-    pub(crate) drawing: Drawing,
+    pub(crate) drawing: StructureBuilder,
     pub(crate) parameters: Vec<(String, Setting)>,
 }
 
 impl<'p> Elaborator<'p> {
     /// Runs `program` with parameters set from outside; errors go to the sink.
-    pub(crate) fn run(program: &'p Program, set: &'p [(String, Setting)], sink: &'p mut Sink) -> Elaborated {
+    pub(crate) fn run(program: &'p Program, set: &'p [(String, Setting)], sink: &'p mut DiagnosticSink) -> Elaborated {
         let mut values = vec![Value::Undefined; program.variables];
         values[PI_SLOT.index] = Value::Number(std::f64::consts::PI);
-        let frame = Frame {
+        let frame = EvaluationScope {
             values,
             nodes: FxHashMap::default(),
             prefix: Arc::default(),
@@ -84,7 +84,7 @@ impl<'p> Elaborator<'p> {
             sink,
             frames: vec![frame],
             layers: vec![None; program.layers.len()],
-            drawing: Drawing::new(),
+            drawing: StructureBuilder::new(),
             parameters: Vec::new(),
             from_outside: FxHashSet::default(),
             parameter_at: FxHashMap::default(),
@@ -101,7 +101,7 @@ impl<'p> Elaborator<'p> {
 
     // ---- variables ----
 
-    fn frame(&mut self, slot: Slot) -> &mut Frame {
+    fn frame(&mut self, slot: Slot) -> &mut EvaluationScope {
         let at = if slot.global { 0 } else { self.frames.len() - 1 };
         &mut self.frames[at]
     }
@@ -117,7 +117,7 @@ impl<'p> Elaborator<'p> {
         }
     }
 
-    pub(super) fn here(&self) -> &Frame {
+    pub(super) fn here(&self) -> &EvaluationScope {
         &self.frames[self.frames.len() - 1]
     }
 
@@ -145,7 +145,7 @@ impl<'p> Elaborator<'p> {
         if self.depth >= DEEPEST_RUN {
             if !std::mem::replace(&mut self.stopped, true) {
                 let message = format!("blocks and subnet instances nest more than {DEEPEST_RUN} deep");
-                self.sink.error("E052", Span::NOWHERE, message, "look for a subnet that calls itself without end");
+                self.sink.error("E052", TextSpan::NOWHERE, message, "look for a subnet that calls itself without end");
             }
             return;
         }
@@ -201,19 +201,19 @@ impl<'p> Elaborator<'p> {
         crate::budget::check();
         self.steps += 1;
         let built = self.elements.max(self.drawing.structure.nodes.len());
-        if !self.stopped && (self.steps > MOST_STEPS || built > MOST_ELEMENTS) {
+        if !self.stopped && (self.steps > MAX_STEPS || built > MAX_ELEMENTS) {
             self.stopped = true;
-            let message = if built > MOST_ELEMENTS {
-                format!("the netlist builds more than {MOST_ELEMENTS} elements or nodes")
+            let message = if built > MAX_ELEMENTS {
+                format!("the netlist builds more than {MAX_ELEMENTS} elements or nodes")
             } else {
-                format!("the netlist runs more than {MOST_STEPS} steps")
+                format!("the netlist runs more than {MAX_STEPS} steps")
             };
-            self.sink.error("E046", Span::NOWHERE, message, "look for a loop or a subnet without end");
+            self.sink.error("E046", TextSpan::NOWHERE, message, "look for a loop or a subnet without end");
         }
         !self.stopped
     }
 
-    fn parameter(&mut self, name: &'p str, span: Span, default: Option<&'p Expr>) -> Value {
+    fn parameter(&mut self, name: &'p str, span: TextSpan, default: Option<&'p Expr>) -> Value {
         let value = match (self.settings.get(name), default) {
             (Some(Setting::Number(x)), _) => Value::Number(*x),
             (Some(Setting::Text(text)), _) => Value::Text(Arc::from(text.as_str())),

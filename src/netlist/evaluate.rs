@@ -4,7 +4,7 @@ use super::ast::{Binary, Expr, ExprKind};
 use super::elaborate::Elaborator;
 use super::functions;
 use super::sink::Reported;
-use super::source::Span;
+use super::source::TextSpan;
 use super::value::Value;
 
 impl<'p> Elaborator<'p> {
@@ -44,7 +44,7 @@ impl<'p> Elaborator<'p> {
         self.sink.error("E040", expr.span, message, help)
     }
 
-    fn binary(&mut self, operator: Binary, left: &'p Expr, right: &'p Expr, span: Span) -> Result<Value, Reported> {
+    fn binary(&mut self, operator: Binary, left: &'p Expr, right: &'p Expr, span: TextSpan) -> Result<Value, Reported> {
         let sign = match operator {
             Binary::Add => "+",
             Binary::Subtract => "-",
@@ -95,7 +95,7 @@ impl<'p> Elaborator<'p> {
         Ok(Value::Number(number))
     }
 
-    fn call(&mut self, name: &str, arguments: &'p [Expr], span: Span) -> Result<Value, Reported> {
+    fn call(&mut self, name: &str, arguments: &'p [Expr], span: TextSpan) -> Result<Value, Reported> {
         match (name, arguments) {
             ("cond", [condition, yes, no]) => {
                 let branch = if self.number(condition, "cond")? == 0.0 { no } else { yes };

@@ -2,8 +2,8 @@
 
 use super::ast::{Binary, Expr, ExprKind, Ident};
 use super::parser::{Parsed, Parser};
-use super::source::Span;
-use super::token::{Kind, Token};
+use super::source::TextSpan;
+use super::token::{Lexeme, TokenKind};
 
 /// Operators, calls and brackets that one expression may hold: bounds the depth of its tree.
 const LARGEST_EXPRESSION: usize = 500;
@@ -11,21 +11,21 @@ const LARGEST_EXPRESSION: usize = 500;
 /// How strongly unary `-` and `!` bind: below `^`, above `* /`.
 const UNARY: u8 = 6;
 
-fn binary(kind: Kind) -> Option<(Binary, u8)> {
+fn binary(kind: TokenKind) -> Option<(Binary, u8)> {
     Some(match kind {
-        Kind::Or => (Binary::Or, 1),
-        Kind::And => (Binary::And, 2),
-        Kind::Equal => (Binary::Equal, 3),
-        Kind::NotEqual => (Binary::NotEqual, 3),
-        Kind::Less => (Binary::Less, 3),
-        Kind::LessEqual => (Binary::LessEqual, 3),
-        Kind::Greater => (Binary::Greater, 3),
-        Kind::GreaterEqual => (Binary::GreaterEqual, 3),
-        Kind::Plus => (Binary::Add, 4),
-        Kind::Minus => (Binary::Subtract, 4),
-        Kind::Star => (Binary::Multiply, 5),
-        Kind::Slash => (Binary::Divide, 5),
-        Kind::Caret => (Binary::Power, 7),
+        TokenKind::Or => (Binary::Or, 1),
+        TokenKind::And => (Binary::And, 2),
+        TokenKind::Equal => (Binary::Equal, 3),
+        TokenKind::NotEqual => (Binary::NotEqual, 3),
+        TokenKind::Less => (Binary::Less, 3),
+        TokenKind::LessEqual => (Binary::LessEqual, 3),
+        TokenKind::Greater => (Binary::Greater, 3),
+        TokenKind::GreaterEqual => (Binary::GreaterEqual, 3),
+        TokenKind::Plus => (Binary::Add, 4),
+        TokenKind::Minus => (Binary::Subtract, 4),
+        TokenKind::Star => (Binary::Multiply, 5),
+        TokenKind::Slash => (Binary::Divide, 5),
+        TokenKind::Caret => (Binary::Power, 7),
         _ => return None,
     })
 }
@@ -72,30 +72,30 @@ impl Parser<'_> {
     fn prefix(&mut self) -> Parsed<Expr> {
         let token = self.peek();
         let kind = match token.kind {
-            Kind::Number(value) => ExprKind::Number(value),
-            Kind::Text => {
+            TokenKind::Number(value) => ExprKind::Number(value),
+            TokenKind::Text => {
                 let quoted = self.text_of(token.span);
                 let text = quoted.trim_end_matches(['"', '\'']).get(1..).unwrap_or("");
                 ExprKind::Text(self.word(text))
             }
-            Kind::Identifier => return self.variable_or_call(),
-            Kind::Minus | Kind::Not => {
+            TokenKind::Identifier => return self.variable_or_call(),
+            TokenKind::Minus | TokenKind::Not => {
                 self.count()?;
                 self.next();
                 let operand = Box::new(self.climb(UNARY)?);
                 let span = token.span.to(operand.span);
-                let negate = token.kind == Kind::Minus;
+                let negate = token.kind == TokenKind::Minus;
                 let kind = if negate { ExprKind::Negate(operand) } else { ExprKind::Not(operand) };
                 return Ok(Expr { kind, span });
             }
-            Kind::Open => {
+            TokenKind::Open => {
                 self.count()?;
                 self.next();
                 let inner = self.climb(0)?;
-                let close = self.expect(Kind::Close, "`)`")?;
+                let close = self.expect(TokenKind::Close, "`)`")?;
                 return Ok(Expr { span: token.span.to(close.span), ..inner });
             }
-            Kind::Plus => {
+            TokenKind::Plus => {
                 let help = "a number has no leading `+`";
                 return Err(self.sink.error("E010", token.span, "expected a value, found `+`".into(), help));
             }
@@ -107,31 +107,31 @@ impl Parser<'_> {
 
     fn variable_or_call(&mut self) -> Parsed<Expr> {
         let name = self.ident("a value")?;
-        match self.eat(Kind::Open) {
+        match self.eat(TokenKind::Open) {
             Some(open) => self.call(name, open),
             None => Ok(Expr { span: name.span, kind: ExprKind::Variable(name.name, super::ast::Slot::NONE) }),
         }
     }
 
     /// A call whose opening bracket was read.
-    pub(super) fn call(&mut self, function: Ident, open: Token) -> Parsed<Expr> {
+    pub(super) fn call(&mut self, function: Ident, open: Lexeme) -> Parsed<Expr> {
         self.count()?;
         let (arguments, close) = self.arguments(open)?;
         Ok(Expr { span: function.span.to(close), kind: ExprKind::Call(function.name, arguments) })
     }
 
     /// Values up to the closing bracket, and the place of that bracket.
-    pub(super) fn arguments(&mut self, _open: Token) -> Parsed<(Vec<Expr>, Span)> {
+    pub(super) fn arguments(&mut self, _open: Lexeme) -> Parsed<(Vec<Expr>, TextSpan)> {
         let mut arguments = Vec::new();
-        if let Some(close) = self.eat(Kind::Close) {
+        if let Some(close) = self.eat(TokenKind::Close) {
             return Ok((arguments, close.span));
         }
         loop {
             arguments.push(self.climb(0)?);
-            if let Some(close) = self.eat(Kind::Close) {
+            if let Some(close) = self.eat(TokenKind::Close) {
                 return Ok((arguments, close.span));
             }
-            self.expect(Kind::Comma, "`,` or `)`")?;
+            self.expect(TokenKind::Comma, "`,` or `)`")?;
         }
     }
 }

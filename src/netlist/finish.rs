@@ -2,20 +2,20 @@
 
 use super::bundle::Bundle;
 use super::diagnostic::Diagnostics;
-use super::drawing::Drawing;
-use super::front::Loaded;
+use super::drawing::StructureBuilder;
+use super::front::LoadedNetlist;
 use super::setting::Setting;
-use super::sink::Sink;
+use super::sink::DiagnosticSink;
 use super::{check, elements, place};
 use std::sync::Arc;
 
 /// What every front end of netlists does with the elements that it has built: members out of the plane, positions, loose ends.
 pub(super) fn finish(
-    mut drawing: Drawing,
+    mut drawing: StructureBuilder,
     parameters: Vec<(String, Setting)>,
-    mut sink: Sink,
+    mut sink: DiagnosticSink,
     bundle: &Arc<Bundle>,
-) -> Result<Loaded, Diagnostics> {
+) -> Result<LoadedNetlist, Diagnostics> {
     elements::upright::settle(&mut drawing, &mut sink);
     if !sink.failed() {
         place::place(&mut drawing, &mut sink);
@@ -30,5 +30,5 @@ pub(super) fn finish(
         return Err(sink.finish(bundle));
     }
     let warnings = sink.finish(bundle);
-    Ok(Loaded { structure: drawing.structure, parameters, warnings })
+    Ok(LoadedNetlist { structure: drawing.structure, parameters, warnings })
 }

@@ -3,15 +3,15 @@
 //! Both are told by whole statements that the language does not have. A SUGAR 3 netlist says `use("…")`, holds a Lua comment or
 //! braces at the end of a word; a MATLAB file defines a function or loads a netlist.
 
-use super::source::Span;
+use super::source::TextSpan;
 
 /// What a file is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum FileKind {
     /// A SUGAR 3 netlist, told by the line.
-    Lua(Span),
+    Lua(TextSpan),
     /// A MATLAB function or script, told by the line.
-    Matlab(Span),
+    Matlab(TextSpan),
     /// Anything else: a SUGAR 2 netlist, right or wrong.
     Netlist,
 }
@@ -23,24 +23,24 @@ const MATLAB: [&str; 9] =
     ["clear all", "clear;", "close all", "clc", "figure(", "figure;", "addpath(", "cho_load(", "hold on"];
 
 /// What the text of file number `file` is, by its first line that decides.
-pub(crate) fn kind(text: &str, file: u16) -> Kind {
+pub(crate) fn kind(text: &str, file: u16) -> FileKind {
     let mut start = 0;
     // statements that end with a semicolon, and the first of them; lines with a list of nodes
     let (mut ended, mut first, mut lists) = (0, None, 0);
     for line in text.split_inclusive('\n') {
         crate::budget::check();
         let at = |offset: usize| u32::try_from(offset).unwrap_or(u32::MAX);
-        let span = Span { file, start: at(start), end: at(start + line.trim_end().len()) };
+        let span = TextSpan { file, start: at(start), end: at(start + line.trim_end().len()) };
         start += line.len();
         let body = line.trim_start_matches(['\u{feff}', ' ', '\t', '\r']);
         if body.starts_with('%') {
             continue;
         }
         if lua(body) {
-            return Kind::Lua(span);
+            return FileKind::Lua(span);
         }
         if matlab(body) {
-            return Kind::Matlab(span);
+            return FileKind::Matlab(span);
         }
         let code = body.split('%').next().unwrap_or("").trim_end();
         if code.ends_with(';') && !code.contains('[') {
@@ -50,8 +50,8 @@ pub(crate) fn kind(text: &str, file: u16) -> Kind {
         lists += usize::from(code.contains('['));
     }
     match first {
-        Some(span) if ended >= ENDED && lists == 0 => Kind::Matlab(span),
-        _ => Kind::Netlist,
+        Some(span) if ended >= ENDED && lists == 0 => FileKind::Matlab(span),
+        _ => FileKind::Netlist,
     }
 }
 
@@ -99,9 +99,9 @@ mod tests {
 
     fn told(text: &str) -> (char, u32) {
         match kind(text, 0) {
-            Kind::Lua(span) => ('l', span.start),
-            Kind::Matlab(span) => ('m', span.start),
-            Kind::Netlist => ('n', 0),
+            FileKind::Lua(span) => ('l', span.start),
+            FileKind::Matlab(span) => ('m', span.start),
+            FileKind::Netlist => ('n', 0),
         }
     }
 

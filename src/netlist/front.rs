@@ -9,7 +9,7 @@ use std::fmt::Debug;
 
 /// What a netlist elaborates to.
 #[derive(Debug, Clone)]
-pub struct Loaded {
+pub struct LoadedNetlist {
     /// The drawing.
     pub structure: Structure,
     /// Parameters of the netlist with the values they took, in order of appearance.
@@ -24,8 +24,8 @@ pub trait FrontEnd: Debug + Send + Sync {
     ///
     /// # Errors
     /// Every error found in one run, those of reading too; warnings are among them.
-    fn load(&self, set: &[(String, Setting)]) -> Result<Loaded, Diagnostics>;
+    fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics>;
 }
 
 /// Reads a bundle in one language.
-pub(crate) type Read = fn(&Bundle) -> Box<dyn FrontEnd>;
+pub(crate) type ReadFunction = fn(&Bundle) -> Box<dyn FrontEnd>;

@@ -1,6 +1,6 @@
 //! Reading a netlist from the disk, with the files that it uses.
 
-use super::bundle::{Bundle, DEEPEST_INCLUDE, MOST_INCLUDES};
+use super::bundle::{Bundle, DEEPEST_INCLUDE, MAX_INCLUDES};
 use super::{foreign, lexer, sugar3};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,8 @@ impl Bundle {
     ) -> Result<Self, std::io::Error> {
         let root = path.display().to_string();
         let files = BTreeMap::from([(root.clone(), text_of(path)?)]);
-        let mut reader = Reader { files, found: BTreeMap::new(), own: path.canonicalize().ok(), include, dropped };
+        let mut reader =
+            IncludeReader { files, found: BTreeMap::new(), own: path.canonicalize().ok(), include, dropped };
         reader.includes_of(&root, &folder_of(path), 0);
         Ok(Self { root, files: reader.files, places: BTreeMap::new() })
     }
@@ -57,7 +58,7 @@ impl std::fmt::Display for DroppedInclude {
 }
 
 /// Reads includes depth first, in the order in which the parser meets them.
-struct Reader<'a> {
+struct IncludeReader<'a> {
     files: BTreeMap<String, String>,
     /// Where each spelled name was found.
     found: BTreeMap<String, PathBuf>,
@@ -67,7 +68,7 @@ struct Reader<'a> {
     dropped: &'a mut dyn FnMut(DroppedInclude),
 }
 
-impl Reader<'_> {
+impl IncludeReader<'_> {
     fn includes_of(&mut self, name: &str, folder: &Path, depth: usize) {
         for spelled in uses_of(&self.files[name]) {
             let places = [folder, Path::new("")].into_iter().chain(self.include.iter().map(PathBuf::as_path));
@@ -80,7 +81,7 @@ impl Reader<'_> {
                 continue;
             }
             // One more than allowed on each count, so that `load` sees that there are too many.
-            if self.files.len() > MOST_INCLUDES + 1 || depth > DEEPEST_INCLUDE {
+            if self.files.len() > MAX_INCLUDES + 1 || depth > DEEPEST_INCLUDE {
                 continue;
             }
             // The root under another spelling stays out: `load` says that the netlist includes itself.
@@ -99,7 +100,7 @@ impl Reader<'_> {
 /// The files that a text uses, in the order in which its language meets them.
 fn uses_of(text: &str) -> Vec<String> {
     match foreign::kind(text, 0) {
-        foreign::Kind::Lua(_) => sugar3::uses_of(text),
+        foreign::FileKind::Lua(_) => sugar3::uses_of(text),
         _ => lexer::uses_of(text),
     }
 }

@@ -1,12 +1,12 @@
 //! Elements and subnet instances: parameters evaluated, layers looked up, frames opened.
 
-use super::ast::{Element, Layer, LayerRef};
+use super::ast::{ElementStatement, LayerDefinition, LayerRef};
 use super::drawing::{ELEMENT_BYTES, Fact, NAME_COPIES};
-use super::elaborate::{Elaborator, Frame};
-use super::elements::{self, Argument, Arguments, Instance};
+use super::elaborate::{Elaborator, EvaluationScope};
+use super::elements::{self, Argument, Arguments, ElementInstance};
 use super::rotation::Rotation;
 use super::sink::Reported;
-use super::source::Span;
+use super::source::TextSpan;
 use super::value::{LayerValues, Value};
 use crate::budget;
 use crate::structure::NodeId;
@@ -14,14 +14,14 @@ use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::sync::Arc;
 
 /// Nodes of an instance that room is made for at first, at most.
-const MOST_ROOM: usize = 32;
+const MAX_ROOM: usize = 32;
 /// Subnet instances may nest this deep.
 const DEEPEST_INSTANCE: usize = 100;
 
 /// A subnet instance to be built.
 #[derive(Clone, Copy)]
-struct Call<'a, 'p> {
-    element: &'p Element,
+struct SubnetCall<'a, 'p> {
+    element: &'p ElementStatement,
     /// Index of the subnet.
     subnet: usize,
     /// The instance's name where it is called.
@@ -33,7 +33,7 @@ struct Call<'a, 'p> {
 }
 
 impl<'p> Elaborator<'p> {
-    pub(super) fn element(&mut self, element: &'p Element) -> Result<(), Reported> {
+    pub(super) fn element(&mut self, element: &'p ElementStatement) -> Result<(), Reported> {
         self.elements += 1;
         let local: Arc<str> = match &element.name {
             Some(name) => {
@@ -119,14 +119,14 @@ impl<'p> Elaborator<'p> {
         };
         match element.subnet {
             Some(subnet) => {
-                let call = Call { element, subnet, local: &local, nodes: &nodes, given: &given, rotation, layer };
+                let call = SubnetCall { element, subnet, local: &local, nodes: &nodes, given: &given, rotation, layer };
                 let result = self.subnet(&call);
                 self.spare.push((nodes, given));
                 result
             }
             None => {
                 let values = layer.map_or_else(|| Ok(Arc::default()), |layer| self.layer(layer))?;
-                let instance = Instance {
+                let instance = ElementInstance {
                     name: self.full(&local),
                     anonymous: element.name.is_none(),
                     model: &element.model.name,
@@ -172,7 +172,7 @@ impl<'p> Elaborator<'p> {
         self.program.degrees.contains(&file)
     }
 
-    fn check_angle(&mut self, angle: f64, span: Span) {
+    fn check_angle(&mut self, angle: f64, span: TextSpan) {
         let divides = 360.0 % angle.abs() == 0.0;
         if angle.abs() > std::f64::consts::TAU && (divides || angle.fract() == 0.0) {
             self.drawing.note_number(Fact::Degrees, span, angle);
@@ -186,7 +186,7 @@ impl<'p> Elaborator<'p> {
         }
         let program = self.program;
         let mut values = Vec::new();
-        let mut next: Option<&'p Layer> = Some(&program.layers[index]);
+        let mut next: Option<&'p LayerDefinition> = Some(&program.layers[index]);
         while let Some(layer) = next {
             budget::check();
             budget::lay_out(layer.entries.len() * size_of::<(&str, Value)>());
@@ -204,8 +204,8 @@ impl<'p> Elaborator<'p> {
 
     // ---- subnets ----
 
-    fn subnet(&mut self, call: &Call<'_, 'p>) -> Result<(), Reported> {
-        let Call { element, nodes, given, layer, .. } = *call;
+    fn subnet(&mut self, call: &SubnetCall<'_, 'p>) -> Result<(), Reported> {
+        let SubnetCall { element, nodes, given, layer, .. } = *call;
         let subnet = &self.program.subnets[call.subnet];
         let model = &*element.model.name;
         if nodes.len() != subnet.nodes.len() {
@@ -230,9 +230,9 @@ impl<'p> Elaborator<'p> {
         let layer_values = layer.map_or_else(|| Ok(Arc::default()), |layer| self.layer(layer))?;
         let mut prefix = self.full(call.local);
         prefix.push('.');
-        let frame = Frame {
+        let frame = EvaluationScope {
             values: vec![Value::Undefined; subnet.variables],
-            nodes: FxHashMap::with_capacity_and_hasher((nodes.len() + subnet.body.len()).min(MOST_ROOM), FxBuildHasher),
+            nodes: FxHashMap::with_capacity_and_hasher((nodes.len() + subnet.body.len()).min(MAX_ROOM), FxBuildHasher),
             prefix: Arc::from(prefix),
             rotation: call.rotation,
             layer,
@@ -251,8 +251,8 @@ impl<'p> Elaborator<'p> {
     }
 
     /// Gives the formal nodes and parameters of a new frame their values: actual, then default, then layer.
-    fn bind(&mut self, call: &Call<'_, 'p>, layer: &LayerValues<'p>) -> Result<(), Reported> {
-        let Call { element, nodes, given, .. } = *call;
+    fn bind(&mut self, call: &SubnetCall<'_, 'p>, layer: &LayerValues<'p>) -> Result<(), Reported> {
+        let SubnetCall { element, nodes, given, .. } = *call;
         let subnet = &self.program.subnets[call.subnet];
         for (formal, id) in subnet.nodes.iter().zip(nodes) {
             let name = self.name(formal)?;

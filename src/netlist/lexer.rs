@@ -1,8 +1,8 @@
 //! Text → tokens. The lexical rules are SUGAR 2's: free form, `%` comments, numbers with one glued suffix letter.
 
-use super::sink::Sink;
-use super::source::Span;
-use super::token::{Kind, Token};
+use super::sink::DiagnosticSink;
+use super::source::TextSpan;
+use super::token::{Lexeme, TokenKind};
 use crate::budget;
 
 /// Tokens between two looks at the budget.
@@ -11,7 +11,7 @@ const CHUNK: usize = 1024;
 const TOKEN_BYTES: usize = 96;
 
 /// Turns the text of file number `file` into tokens. Errors go to the sink; a token stands in for what was wrong.
-pub(crate) fn tokens(file: u16, text: &str, sink: &mut Sink) -> Vec<Token> {
+pub(crate) fn tokens(file: u16, text: &str, sink: &mut DiagnosticSink) -> Vec<Lexeme> {
     let mut lexer =
         Lexer { file, text, bytes: text.as_bytes(), at: 0, fresh_line: true, out: Vec::new(), sink: Some(sink) };
     lexer.run();
@@ -23,13 +23,13 @@ pub(crate) fn uses_of(text: &str) -> Vec<String> {
     let mut lexer =
         Lexer { file: 0, text, bytes: text.as_bytes(), at: 0, fresh_line: true, out: Vec::new(), sink: None };
     lexer.run();
-    let uses = lexer.out.iter().filter(|t| t.kind == Kind::Uses);
+    let uses = lexer.out.iter().filter(|t| t.kind == TokenKind::Uses);
     uses.map(|t| used_name(&text[t.span.start as usize..t.span.end as usize]).to_owned())
         .filter(|n| !n.is_empty())
         .collect()
 }
 
-/// The file named by the text of a [`Kind::Uses`] token; empty when the line names none.
+/// The file named by the text of a [`TokenKind::Uses`] token; empty when the line names none.
 pub(crate) fn used_name(text: &str) -> &str {
     let name = text.strip_prefix("uses").unwrap_or("").trim();
     let quoted = |quote: char| name.strip_prefix(quote)?.strip_suffix(quote);
@@ -73,8 +73,8 @@ struct Lexer<'a> {
     bytes: &'a [u8],
     at: usize,
     fresh_line: bool,
-    out: Vec<Token>,
-    sink: Option<&'a mut Sink>,
+    out: Vec<Lexeme>,
+    sink: Option<&'a mut DiagnosticSink>,
 }
 
 impl Lexer<'_> {
@@ -82,18 +82,18 @@ impl Lexer<'_> {
         self.bytes.get(self.at + ahead).copied().unwrap_or(0)
     }
 
-    fn push(&mut self, kind: Kind, start: usize) {
+    fn push(&mut self, kind: TokenKind, start: usize) {
         let span = self.span(start);
         if self.out.len().is_multiple_of(CHUNK) {
             budget::check();
             budget::lay_out(CHUNK * TOKEN_BYTES);
         }
-        self.out.push(Token { kind, span, starts_line: std::mem::take(&mut self.fresh_line) });
+        self.out.push(Lexeme { kind, span, starts_line: std::mem::take(&mut self.fresh_line) });
     }
 
-    fn span(&self, start: usize) -> Span {
+    fn span(&self, start: usize) -> TextSpan {
         let clamp = |at: usize| u32::try_from(at).unwrap_or(u32::MAX);
-        Span { file: self.file, start: clamp(start), end: clamp(self.at) }
+        TextSpan { file: self.file, start: clamp(start), end: clamp(self.at) }
     }
 
     fn error(&mut self, code: &'static str, start: usize, message: String, help: String) {
@@ -131,19 +131,19 @@ impl Lexer<'_> {
             }
         }
         self.fresh_line = true;
-        self.push(Kind::End, self.bytes.len());
+        self.push(TokenKind::End, self.bytes.len());
     }
 
     fn word(&mut self, start: usize) {
         self.skip(|b| b.is_ascii_alphanumeric() || b == b'_');
         let kind = match &self.text[start..self.at] {
-            "subnet" => Kind::Subnet,
-            "param" => Kind::Param,
-            "process" => Kind::Process,
-            "for" => Kind::For,
-            "if" => Kind::If,
-            "else" => Kind::Else,
-            "call" => Kind::Call,
+            "subnet" => TokenKind::Subnet,
+            "param" => TokenKind::Param,
+            "process" => TokenKind::Process,
+            "for" => TokenKind::For,
+            "if" => TokenKind::If,
+            "else" => TokenKind::Else,
+            "call" => TokenKind::Call,
             "uses" => {
                 self.skip(|b| b.is_ascii_whitespace());
                 match self.peek(0) {
@@ -155,9 +155,9 @@ impl Lexer<'_> {
                     }
                     _ => self.skip(|b| !b.is_ascii_whitespace()),
                 }
-                Kind::Uses
+                TokenKind::Uses
             }
-            _ => Kind::Identifier,
+            _ => TokenKind::Identifier,
         };
         self.push(kind, start);
     }
@@ -194,7 +194,7 @@ impl Lexer<'_> {
                 sink.warning("W001", span, "the suffix `m` is milli, and multiplies this number by 0.001".into(), help);
             }
         }
-        self.push(Kind::Number(value), start);
+        self.push(TokenKind::Number(value), start);
     }
 
     /// A number that runs on into letters: no unit, no second suffix.
@@ -226,7 +226,7 @@ impl Lexer<'_> {
         let spelled = self.text[start..self.at].to_owned();
         let message = format!("a number must begin with a digit, found `{spelled}`");
         self.error("E001", start, message, format!("write `0{spelled}`"));
-        self.push(Kind::Number(0.5), start);
+        self.push(TokenKind::Number(0.5), start);
     }
 
     fn string(&mut self, start: usize, quote: u8) {
@@ -239,34 +239,34 @@ impl Lexer<'_> {
             let help = format!("close it with `{quote}` on the same line");
             self.error("E003", start, "this string is never closed".into(), help);
         }
-        self.push(Kind::Text, start);
+        self.push(TokenKind::Text, start);
     }
 
     fn symbol(&mut self, start: usize, byte: u8) {
         let equals = self.peek(1) == b'=';
         let (kind, width) = match byte {
-            b'+' => (Kind::Plus, 1),
-            b'-' => (Kind::Minus, 1),
-            b'*' => (Kind::Star, 1),
-            b'/' => (Kind::Slash, 1),
-            b'^' => (Kind::Caret, 1),
-            b'(' => (Kind::Open, 1),
-            b')' => (Kind::Close, 1),
-            b'[' => (Kind::OpenList, 1),
-            b']' => (Kind::CloseList, 1),
-            b'=' if equals => (Kind::Equal, 2),
-            b'=' => (Kind::Equals, 1),
-            b'!' | b'~' if equals => (Kind::NotEqual, 2),
-            b'!' | b'~' => (Kind::Not, 1),
-            b'<' if equals => (Kind::LessEqual, 2),
-            b'<' => (Kind::Less, 1),
-            b'>' if equals => (Kind::GreaterEqual, 2),
-            b'>' => (Kind::Greater, 1),
-            b'&' => (Kind::And, 1),
-            b'|' => (Kind::Or, 1),
-            b':' => (Kind::Colon, 1),
-            b',' => (Kind::Comma, 1),
-            b'?' => (Kind::Question, 1),
+            b'+' => (TokenKind::Plus, 1),
+            b'-' => (TokenKind::Minus, 1),
+            b'*' => (TokenKind::Star, 1),
+            b'/' => (TokenKind::Slash, 1),
+            b'^' => (TokenKind::Caret, 1),
+            b'(' => (TokenKind::Open, 1),
+            b')' => (TokenKind::Close, 1),
+            b'[' => (TokenKind::OpenList, 1),
+            b']' => (TokenKind::CloseList, 1),
+            b'=' if equals => (TokenKind::Equal, 2),
+            b'=' => (TokenKind::Equals, 1),
+            b'!' | b'~' if equals => (TokenKind::NotEqual, 2),
+            b'!' | b'~' => (TokenKind::Not, 1),
+            b'<' if equals => (TokenKind::LessEqual, 2),
+            b'<' => (TokenKind::Less, 1),
+            b'>' if equals => (TokenKind::GreaterEqual, 2),
+            b'>' => (TokenKind::Greater, 1),
+            b'&' => (TokenKind::And, 1),
+            b'|' => (TokenKind::Or, 1),
+            b':' => (TokenKind::Colon, 1),
+            b',' => (TokenKind::Comma, 1),
+            b'?' => (TokenKind::Question, 1),
             _ => return self.stray(start),
         };
         self.at += width;

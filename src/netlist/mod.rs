@@ -42,9 +42,9 @@ mod value;
 
 pub use bundle::Bundle;
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
-pub use front::{FrontEnd, Loaded};
+pub use front::{FrontEnd, LoadedNetlist};
 pub use includes::DroppedInclude;
-pub use read::{Source, load};
+pub use read::{NetlistSource, load};
 pub use setting::Setting;
 
 /// The names of all built-in elements, in the order of docs/netlist.md.

@@ -1,12 +1,12 @@
 //! Tokens → syntax tree, by recursive descent. Included files are read where they are named.
 
 use super::ast::{Ident, Program, Statement};
-use super::bundle::{Bundle, DEEPEST_INCLUDE, MOST_INCLUDES};
+use super::bundle::{Bundle, DEEPEST_INCLUDE, MAX_INCLUDES};
 use super::foreign;
 use super::lexer;
-use super::sink::{Reported, Sink};
-use super::source::Span;
-use super::token::{Kind, Token};
+use super::sink::{DiagnosticSink, Reported};
+use super::source::TextSpan;
+use super::token::{Lexeme, TokenKind};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ const DEEPEST_NESTING: usize = 100;
 const DEGREES: &str = "degrees.net";
 
 /// Parses a bundle. Every syntax error goes to the sink.
-pub(crate) fn parse(bundle: &Bundle, sink: &mut Sink) -> Program {
+pub(crate) fn parse(bundle: &Bundle, sink: &mut DiagnosticSink) -> Program {
     let mut parser = Parser {
         bundle,
         sink,
@@ -40,12 +40,12 @@ pub(crate) fn parse(bundle: &Bundle, sink: &mut Sink) -> Program {
 
 pub(super) struct Parser<'a> {
     pub(super) bundle: &'a Bundle,
-    pub(super) sink: &'a mut Sink,
+    pub(super) sink: &'a mut DiagnosticSink,
     pub(super) text: &'a str,
-    pub(super) tokens: Vec<Token>,
+    pub(super) tokens: Vec<Lexeme>,
     pub(super) at: usize,
     /// Opening brackets of the blocks being read, outermost first.
-    pub(super) blocks: Vec<Token>,
+    pub(super) blocks: Vec<Lexeme>,
     pub(super) depth: usize,
     includes: usize,
     /// True while an unclosed block is being left for the top level of its file.
@@ -63,39 +63,39 @@ pub(super) type Parsed<T> = Result<T, Reported>;
 impl<'a> Parser<'a> {
     // ---- tokens ----
 
-    pub(super) fn peek(&self) -> Token {
+    pub(super) fn peek(&self) -> Lexeme {
         self.ahead(0)
     }
 
-    pub(super) fn ahead(&self, n: usize) -> Token {
+    pub(super) fn ahead(&self, n: usize) -> Lexeme {
         let last = self.tokens.len() - 1;
         self.tokens[(self.at + n).min(last)]
     }
 
-    pub(super) fn next(&mut self) -> Token {
+    pub(super) fn next(&mut self) -> Lexeme {
         let token = self.peek();
         self.at = (self.at + 1).min(self.tokens.len() - 1);
         token
     }
 
-    pub(super) fn eat(&mut self, kind: Kind) -> Option<Token> {
+    pub(super) fn eat(&mut self, kind: TokenKind) -> Option<Lexeme> {
         (self.peek().kind == kind).then(|| self.next())
     }
 
-    pub(super) fn expect(&mut self, kind: Kind, wanted: &str) -> Parsed<Token> {
+    pub(super) fn expect(&mut self, kind: TokenKind, wanted: &str) -> Parsed<Lexeme> {
         if self.peek().kind == kind { Ok(self.next()) } else { Err(self.unexpected(wanted)) }
     }
 
     pub(super) fn unexpected(&mut self, wanted: &str) -> Reported {
         let token = self.peek();
         let found = match token.kind {
-            Kind::Identifier | Kind::Number(_) | Kind::Text => format!("`{}`", self.text_of(token.span)),
+            TokenKind::Identifier | TokenKind::Number(_) | TokenKind::Text => format!("`{}`", self.text_of(token.span)),
             kind => kind.called().to_owned(),
         };
         self.sink.error("E010", token.span, format!("expected {wanted}, found {found}"), "")
     }
 
-    pub(super) fn text_of(&self, span: Span) -> &'a str {
+    pub(super) fn text_of(&self, span: TextSpan) -> &'a str {
         self.text.get(span.start as usize..span.end as usize).unwrap_or("")
     }
 
@@ -104,7 +104,7 @@ impl<'a> Parser<'a> {
     }
 
     pub(super) fn ident(&mut self, wanted: &str) -> Parsed<Ident> {
-        let token = self.expect(Kind::Identifier, wanted)?;
+        let token = self.expect(TokenKind::Identifier, wanted)?;
         Ok(Ident { name: self.word(self.text_of(token.span)), span: token.span })
     }
 
@@ -114,7 +114,7 @@ impl<'a> Parser<'a> {
         let Some(text) = self.bundle.files.get(name) else { return };
         let number = u16::try_from(self.includes).unwrap_or(u16::MAX);
         match foreign::kind(text, number) {
-            foreign::Kind::Lua(span) => {
+            foreign::FileKind::Lua(span) => {
                 let message = format!("`{name}` is a SUGAR 3 (Lua) netlist");
                 let help = if cfg!(feature = "lua") {
                     "a SUGAR 2 netlist can use SUGAR 2 files only"
@@ -124,13 +124,13 @@ impl<'a> Parser<'a> {
                 self.sink.error("E005", span, message, help);
                 return;
             }
-            foreign::Kind::Matlab(span) => {
+            foreign::FileKind::Matlab(span) => {
                 let message = format!("`{name}` is a MATLAB file, not a netlist");
                 let help = "a netlist is what such a file loads with `cho_load`: name that one";
                 self.sink.error("E006", span, message, help);
                 return;
             }
-            foreign::Kind::Netlist => {}
+            foreign::FileKind::Netlist => {}
         }
         let tokens = lexer::tokens(number, text, self.sink);
         let outer = (
@@ -140,10 +140,10 @@ impl<'a> Parser<'a> {
             std::mem::replace(&mut self.depth, 0),
             std::mem::take(&mut self.blocks),
         );
-        while self.peek().kind != Kind::End {
+        while self.peek().kind != TokenKind::End {
             crate::budget::check();
             self.leaving = false;
-            if let Some(close) = self.eat(Kind::CloseList) {
+            if let Some(close) = self.eat(TokenKind::CloseList) {
                 self.sink.error("E011", close.span, "this `]` closes nothing".into(), "");
                 continue;
             }
@@ -186,8 +186,8 @@ impl<'a> Parser<'a> {
                 format!("files include each other more than {DEEPEST_INCLUDE} deep"),
                 "",
             );
-        } else if self.includes >= MOST_INCLUDES {
-            self.sink.error("E024", token.span, format!("more than {MOST_INCLUDES} included files"), "");
+        } else if self.includes >= MAX_INCLUDES {
+            self.sink.error("E024", token.span, format!("more than {MAX_INCLUDES} included files"), "");
         } else {
             self.includes += 1;
             self.sink.files.push(name.to_owned());
@@ -198,12 +198,12 @@ impl<'a> Parser<'a> {
     // ---- statements ----
 
     pub(super) fn statement_or_skip(&mut self, top: bool, depth: usize, out: &mut Vec<Statement>) {
-        if self.peek().kind == Kind::Uses {
+        if self.peek().kind == TokenKind::Uses {
             return self.uses(depth, out);
         }
         let before = self.at;
         let result = match self.peek().kind {
-            Kind::Param | Kind::Process | Kind::Subnet if !top => {
+            TokenKind::Param | TokenKind::Process | TokenKind::Subnet if !top => {
                 let token = self.peek();
                 let opened = self.blocks.last().map_or(0, |open| self.line_of(open.span));
                 let message = format!("{} stands inside a block", token.kind.called());
@@ -212,9 +212,9 @@ impl<'a> Parser<'a> {
                 self.leaving = true;
                 return;
             }
-            Kind::Param => self.param(out),
-            Kind::Process => self.process().map(|p| out.push(p)),
-            Kind::Subnet => self.subnet().map(|s| out.push(s)),
+            TokenKind::Param => self.param(out),
+            TokenKind::Process => self.process().map(|p| out.push(p)),
+            TokenKind::Subnet => self.subnet().map(|s| out.push(s)),
             _ => self.line().map(|s| out.push(s)),
         };
         if result.is_err() && !self.leaving {
@@ -222,14 +222,14 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn line_of(&self, span: Span) -> usize {
+    fn line_of(&self, span: TextSpan) -> usize {
         self.text.get(..span.start as usize).map_or(0, |before| before.matches('\n').count() + 1)
     }
 
     /// Skips what is left of a statement with an error: to a word that can only begin a statement, or to the first
     /// word of a line that looks like one, or to the end of the enclosing block.
     fn recover(&mut self, before: usize) {
-        let opened = |kind: Kind| i64::from(kind == Kind::OpenList) - i64::from(kind == Kind::CloseList);
+        let opened = |kind: TokenKind| i64::from(kind == TokenKind::OpenList) - i64::from(kind == TokenKind::CloseList);
         let mut open: i64 = self.tokens[before..self.at].iter().map(|t| opened(t.kind)).sum();
         if self.at == before {
             open += opened(self.next().kind).max(0);
@@ -237,11 +237,11 @@ impl<'a> Parser<'a> {
         loop {
             let token = self.peek();
             let done = match token.kind {
-                Kind::End => true,
-                Kind::CloseList => open <= 0,
+                TokenKind::End => true,
+                TokenKind::CloseList => open <= 0,
                 kind if kind.begins_statement() => token.starts_line || open <= 0,
-                Kind::Identifier => token.starts_line && (open <= 0 || self.element_ahead()),
-                Kind::OpenList => token.starts_line && open <= 0,
+                TokenKind::Identifier => token.starts_line && (open <= 0 || self.element_ahead()),
+                TokenKind::OpenList => token.starts_line && open <= 0,
                 _ => false,
             };
             if done {
@@ -253,8 +253,8 @@ impl<'a> Parser<'a> {
 
     /// True when the tokens ahead look like the head of an element: two or three words, then a list.
     fn element_ahead(&self) -> bool {
-        let word = |n: usize| matches!(self.ahead(n).kind, Kind::Identifier | Kind::Star);
-        word(1) && (self.ahead(2).kind == Kind::OpenList || (word(2) && self.ahead(3).kind == Kind::OpenList))
+        let word = |n: usize| matches!(self.ahead(n).kind, TokenKind::Identifier | TokenKind::Star);
+        word(1) && (self.ahead(2).kind == TokenKind::OpenList || (word(2) && self.ahead(3).kind == TokenKind::OpenList))
     }
 
     /// True when a new statement begins here, on a line of its own: inside a list, its `]` is missing.

@@ -4,8 +4,8 @@
 //! other nodes along. A part that is not reached starts at the origin again. Nothing forces a loop of elements to
 //! close: stiffness comes from lengths and angles, not from positions, so a loop that stays open is worth a warning.
 
-use super::drawing::Drawing;
-use super::sink::Sink;
+use super::drawing::StructureBuilder;
+use super::sink::DiagnosticSink;
 use super::value::short;
 
 /// A loop is open when it misses by more than this part of its largest element [1].
@@ -13,10 +13,10 @@ const OPEN_LOOP: f64 = 1e-6;
 /// Nodes nearer to each other than this part of the drawing's size are in one place [1].
 const ROUNDING: f64 = 1e-9;
 /// So many open loops, and so many unplaced parts, are told one by one.
-const TOLD: usize = 3;
+const MAX_REPORTED: usize = 3;
 
 #[derive(Clone, Copy, PartialEq)]
-enum Mark {
+enum PlacingState {
     /// Touched by no element that places.
     None,
     Unplaced,
@@ -25,7 +25,7 @@ enum Mark {
 }
 
 /// Fills in the positions of all nodes, the lengths of beams that were left to be measured, and the warnings.
-pub(crate) fn place(drawing: &mut Drawing, sink: &mut Sink) {
+pub(crate) fn place(drawing: &mut StructureBuilder, sink: &mut DiagnosticSink) {
     let starts = walk(drawing);
     if unplaced_nodes(drawing, sink) {
         return;
@@ -36,15 +36,15 @@ pub(crate) fn place(drawing: &mut Drawing, sink: &mut Sink) {
 }
 
 /// Places every node; answers the nodes that started at the origin.
-fn walk(drawing: &mut Drawing) -> Vec<usize> {
+fn walk(drawing: &mut StructureBuilder) -> Vec<usize> {
     let mut nodes = std::mem::take(&mut drawing.structure.nodes);
-    let mut marks = vec![Mark::None; nodes.len()];
+    let mut marks = vec![PlacingState::None; nodes.len()];
     // the elements of each node, one node after the other
     let mut start = vec![0; nodes.len() + 1];
     let of = |placement| drawing.placed_by(placement);
     for (node, _) in drawing.placements.iter().flat_map(of) {
         start[node.0 + 1] += 1;
-        marks[node.0] = Mark::Unplaced;
+        marks[node.0] = PlacingState::Unplaced;
     }
     for k in 0..nodes.len() {
         start[k + 1] += start[k];
@@ -58,23 +58,25 @@ fn walk(drawing: &mut Drawing) -> Vec<usize> {
     }
     let mut starts = Vec::new();
     for first in 0..nodes.len() {
-        if marks[first] != Mark::Unplaced {
+        if marks[first] != PlacingState::Unplaced {
             continue;
         }
         starts.push(first);
-        marks[first] = Mark::Waiting;
+        marks[first] = PlacingState::Waiting;
         let mut stack = vec![first];
         while let Some(node) = stack.pop() {
-            marks[node] = Mark::Done;
+            marks[node] = PlacingState::Done;
             for &element in &elements[start[node]..start[node + 1]] {
                 let placed = of(&drawing.placements[element]);
                 // SUGAR takes the last node of the element that is done.
-                let Some((known, from)) = placed.iter().rfind(|(n, _)| marks[n.0] == Mark::Done) else { continue };
+                let Some((known, from)) = placed.iter().rfind(|(n, _)| marks[n.0] == PlacingState::Done) else {
+                    continue;
+                };
                 let at = nodes[known.0].position;
                 for (other, offset) in placed {
-                    if marks[other.0] == Mark::Unplaced {
+                    if marks[other.0] == PlacingState::Unplaced {
                         nodes[other.0].position = [at[0] + offset[0] - from[0], at[1] + offset[1] - from[1]];
-                        marks[other.0] = Mark::Waiting;
+                        marks[other.0] = PlacingState::Waiting;
                         stack.push(other.0);
                     }
                 }
@@ -86,7 +88,7 @@ fn walk(drawing: &mut Drawing) -> Vec<usize> {
 }
 
 /// Reports nodes that only beams and links without a length touch: nothing says where they lie.
-fn unplaced_nodes(drawing: &Drawing, sink: &mut Sink) -> bool {
+fn unplaced_nodes(drawing: &StructureBuilder, sink: &mut DiagnosticSink) -> bool {
     let mut placed = vec![false; drawing.structure.nodes.len()];
     for (node, _) in drawing.placements.iter().flat_map(|p| drawing.placed_by(p)) {
         placed[node.0] = true;
@@ -103,12 +105,13 @@ fn unplaced_nodes(drawing: &Drawing, sink: &mut Sink) -> bool {
     found
 }
 
-fn unconnected_parts(drawing: &Drawing, starts: &[usize], sink: &mut Sink) {
+fn unconnected_parts(drawing: &StructureBuilder, starts: &[usize], sink: &mut DiagnosticSink) {
     let later = starts.get(1..).unwrap_or(&[]);
-    for &start in later.iter().take(TOLD) {
+    for &start in later.iter().take(MAX_REPORTED) {
         let name = &drawing.structure.nodes[start].name;
         let first = &drawing.structure.nodes[starts[0]].name;
-        let more = if later.len() > TOLD { format!(" ({} such parts in all)", later.len()) } else { String::new() };
+        let more =
+            if later.len() > MAX_REPORTED { format!(" ({} such parts in all)", later.len()) } else { String::new() };
         let message = format!("the part with node `{name}` is not connected to node `{first}`{more}");
         let help =
             format!("it is drawn from the origin again; connect it, or place it with `pos * [{first} {name}] [x= y=]`");
@@ -116,7 +119,7 @@ fn unconnected_parts(drawing: &Drawing, starts: &[usize], sink: &mut Sink) {
     }
 }
 
-fn open_loops(drawing: &Drawing, sink: &mut Sink) {
+fn open_loops(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     let mut open = Vec::new();
     for placement in &drawing.placements {
         let placed = drawing.placed_by(placement);
@@ -136,8 +139,9 @@ fn open_loops(drawing: &Drawing, sink: &mut Sink) {
             open.push((placement.span, worst));
         }
     }
-    for (span, miss) in open.iter().take(TOLD) {
-        let more = if open.len() > TOLD { format!(" ({} such elements in all)", open.len()) } else { String::new() };
+    for (span, miss) in open.iter().take(MAX_REPORTED) {
+        let more =
+            if open.len() > MAX_REPORTED { format!(" ({} such elements in all)", open.len()) } else { String::new() };
         let message = format!(
             "this element does not reach the drawn place of its node: it misses by x = {} m, y = {} m{more}",
             short(miss[0]),
@@ -149,7 +153,7 @@ fn open_loops(drawing: &Drawing, sink: &mut Sink) {
 }
 
 /// Length and direction of beams without `l=`, from the positions of their nodes.
-fn measure(drawing: &mut Drawing, sink: &mut Sink) {
+fn measure(drawing: &mut StructureBuilder, sink: &mut DiagnosticSink) {
     // what sums of offsets leave between two nodes in one place
     let rounding = if drawing.unmeasured.is_empty() { 0.0 } else { ROUNDING * drawing.structure.extent() };
     for unmeasured in &drawing.unmeasured {

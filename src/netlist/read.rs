@@ -3,7 +3,7 @@
 use super::bundle::Bundle;
 use super::diagnostic::Diagnostics;
 use super::foreign;
-use super::front::{FrontEnd, Loaded};
+use super::front::{FrontEnd, LoadedNetlist};
 use super::setting::Setting;
 use super::sugar2::Sugar2;
 
@@ -11,18 +11,18 @@ use super::sugar2::Sugar2;
 ///
 /// # Errors
 /// Every error found in one run; warnings are among them.
-pub fn load(bundle: &Bundle, set: &[(String, Setting)]) -> Result<Loaded, Diagnostics> {
-    Source::new(bundle).load(set)
+pub fn load(bundle: &Bundle, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics> {
+    NetlistSource::new(bundle).load(set)
 }
 
 /// A drawing that has been read, in whichever language it is.
 #[derive(Debug)]
-pub struct Source {
+pub struct NetlistSource {
     front: Box<dyn FrontEnd>,
 }
 
-impl Source {
-    /// Reads a bundle. Errors come out with [`Source::load`].
+impl NetlistSource {
+    /// Reads a bundle. Errors come out with [`NetlistSource::load`].
     pub fn new(bundle: &Bundle) -> Self {
         Self { front: read(bundle) }
     }
@@ -36,7 +36,7 @@ impl Source {
     ///
     /// # Errors
     /// Every error found in one run, those of reading too; warnings are among them.
-    pub fn load(&self, set: &[(String, Setting)]) -> Result<Loaded, Diagnostics> {
+    pub fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics> {
         self.front.load(set)
     }
 }
@@ -54,6 +54,6 @@ impl Bundle {
     /// True when the root is a SUGAR 3 netlist: a program, in Lua.
     pub fn is_program(&self) -> bool {
         let root = self.files.get(&self.root).map_or("", String::as_str);
-        matches!(foreign::kind(root, 0), foreign::Kind::Lua(_))
+        matches!(foreign::kind(root, 0), foreign::FileKind::Lua(_))
     }
 }

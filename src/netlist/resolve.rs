@@ -3,16 +3,18 @@
 //! A block opens a scope: names first defined inside it end with it, assignments to outer names stay. A definition
 //! inside a subnet never touches a variable of the netlist; those can be read there.
 
-use super::ast::{Def, Element, Expr, ExprKind, Ident, Layer, LayerRef, Name, Program, Slot, Statement};
+use super::ast::{
+    Def, ElementStatement, Expr, ExprKind, Ident, LayerDefinition, LayerRef, Name, Program, Slot, Statement,
+};
 use super::elements;
 use super::functions;
-use super::sink::Sink;
-use super::suggest::{MOST_LISTED, did_you_mean};
+use super::sink::DiagnosticSink;
+use super::suggest::{MAX_LISTED, did_you_mean};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Resolves every name of a program; errors go to the sink.
-pub(crate) fn resolve(program: &mut Program, sink: &mut Sink) {
+pub(crate) fn resolve(program: &mut Program, sink: &mut DiagnosticSink) {
     let incomplete = program.incomplete;
     let mut resolver = Resolver {
         sink,
@@ -42,7 +44,7 @@ pub(crate) fn resolve(program: &mut Program, sink: &mut Sink) {
 }
 
 struct Resolver<'a> {
-    sink: &'a mut Sink,
+    sink: &'a mut DiagnosticSink,
     scopes: Vec<BTreeMap<Arc<str>, Slot>>,
     globals: usize,
     /// Number of variables of the subnet at hand; none outside subnets.
@@ -157,7 +159,7 @@ impl Resolver<'_> {
     }
 
     /// Warns of entries that nothing reads and that look like a slip of one that is read.
-    fn misspelt_entries(&mut self, layer: &Layer, program: &Program) {
+    fn misspelt_entries(&mut self, layer: &LayerDefinition, program: &Program) {
         for entry in &layer.entries {
             let name = &*entry.name.name;
             let formal = || program.subnets.iter().flat_map(|s| &s.formals).any(|f| *f.name.name == *name);
@@ -191,7 +193,7 @@ impl Resolver<'_> {
         program.subnets[index] = subnet;
     }
 
-    fn element(&mut self, element: &mut Element) {
+    fn element(&mut self, element: &mut ElementStatement) {
         element.subnet = self.subnets.get(&element.model.name).copied();
         if element.subnet.is_none() && self.locals.is_none() {
             // Inside subnets this waits until an instance is built: libraries hold bodies that nobody calls.
@@ -297,5 +299,5 @@ impl Resolver<'_> {
 }
 
 fn listed<'a>(names: impl Iterator<Item = &'a Arc<str>>) -> String {
-    names.take(MOST_LISTED).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
+    names.take(MAX_LISTED).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
 }

@@ -6,8 +6,8 @@ use super::diagnostic::Diagnostics;
 use super::parser;
 use super::read::load;
 use super::setting::Setting;
-use super::sink::Sink;
-use super::source::Span;
+use super::sink::DiagnosticSink;
+use super::source::TextSpan;
 use std::sync::Arc;
 
 impl Setting {
@@ -26,14 +26,14 @@ impl Setting {
         let line = text.replace(['\n', '\r'], " ");
         let percent = line.split(['\'', '"']).step_by(2).any(|part| part.contains('%'));
         let bundle = Bundle::from_text("setting", &format!("param value = {line}"));
-        let mut sink = Sink::new(&bundle.root);
+        let mut sink = DiagnosticSink::new(&bundle.root);
         if percent {
             // it would begin a comment, and a share in percent become one in full
-            sink.error("E049", Span::NOWHERE, format!("`{line}` has a `%`"), "write 0.01 for 1 %");
+            sink.error("E049", TextSpan::NOWHERE, format!("`{line}` has a `%`"), "write 0.01 for 1 %");
         }
         let program = parser::parse(&bundle, &mut sink);
         if !sink.failed() && !matches!(program.statements.as_slice(), [Statement::Param { .. }]) {
-            sink.error("E049", Span::NOWHERE, format!("`{line}` is more than one value"), "give one value");
+            sink.error("E049", TextSpan::NOWHERE, format!("`{line}` is more than one value"), "give one value");
         }
         if sink.failed() {
             return Err(sink.finish(&Arc::new(bundle)));

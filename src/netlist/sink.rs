@@ -2,20 +2,20 @@
 
 use super::bundle::Bundle;
 use super::diagnostic::{Diagnostic, Diagnostics, Severity};
-use super::source::Span;
+use super::source::TextSpan;
 use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Marks that an error was already put into the [`Sink`]: nothing more needs to be said about it.
+/// Marks that an error was already put into the [`DiagnosticSink`]: nothing more needs to be said about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Reported;
 
 /// Errors, and lines that the netlist prints, beyond this many are left out: nobody reads them, and a loop could make millions.
-const MOST_MESSAGES: usize = 100;
+const MAX_MESSAGES: usize = 100;
 
 /// Warnings of one code beyond this many are left out, so that none hides another.
-const MOST_WARNINGS: usize = 20;
+const MAX_WARNINGS: usize = 20;
 
 /// Code of the last line, which tells how many messages were left out.
 const LEFT_OUT: &str = "W016";
@@ -23,7 +23,7 @@ const LEFT_OUT: &str = "W016";
 const PRINT: &str = "W002";
 
 /// Messages that look for a near name.
-const MOST_SUGGESTIONS: usize = 20;
+const MAX_SUGGESTIONS: usize = 20;
 
 /// Longer messages are cut [byte].
 const LONGEST_MESSAGE: usize = 4000;
@@ -33,11 +33,11 @@ const LONGEST_NAME: usize = 60;
 
 /// The messages of one load.
 #[derive(Debug, Clone)]
-pub(crate) struct Sink {
-    /// Names of the files in reading order; [`Span::file`] is an index here.
+pub(crate) struct DiagnosticSink {
+    /// Names of the files in reading order; [`TextSpan::file`] is an index here.
     pub(crate) files: Vec<String>,
-    items: Vec<(Span, Severity, &'static str, String, String)>,
-    seen: FxHashSet<(Span, &'static str)>,
+    items: Vec<(TextSpan, Severity, &'static str, String, String)>,
+    seen: FxHashSet<(TextSpan, &'static str)>,
     errors: usize,
     /// Errors kept, and by code how many warnings came and how many messages were left out.
     kept_errors: usize,
@@ -47,7 +47,7 @@ pub(crate) struct Sink {
     pub(crate) instances: Vec<String>,
 }
 
-impl Sink {
+impl DiagnosticSink {
     pub(crate) fn new(root: &str) -> Self {
         Self {
             files: vec![root.to_owned()],
@@ -65,7 +65,7 @@ impl Sink {
     pub(crate) fn error(
         &mut self,
         code: &'static str,
-        span: Span,
+        span: TextSpan,
         message: String,
         help: impl Into<String>,
     ) -> Reported {
@@ -75,12 +75,12 @@ impl Sink {
     }
 
     /// Reports a warning. The same code at the same place is reported once.
-    pub(crate) fn warning(&mut self, code: &'static str, span: Span, message: String, help: impl Into<String>) {
+    pub(crate) fn warning(&mut self, code: &'static str, span: TextSpan, message: String, help: impl Into<String>) {
         self.push(Severity::Warning, code, span, message, help.into());
     }
 
     /// Records output of the netlist itself (`call print`): never merged with other messages.
-    pub(crate) fn output(&mut self, code: &'static str, span: Span, message: String) {
+    pub(crate) fn output(&mut self, code: &'static str, span: TextSpan, message: String) {
         if self.room(Severity::Warning, code) {
             self.items.push((span, Severity::Warning, code, cut(message), String::new()));
         }
@@ -88,7 +88,7 @@ impl Sink {
 
     /// Whether messages still look for what was meant, which takes a look at every known name.
     pub(crate) fn suggests(&self) -> bool {
-        self.items.len() - self.warnings.get(PRINT).map_or(0, |n| MOST_MESSAGES.min(*n)) < MOST_SUGGESTIONS
+        self.items.len() - self.warnings.get(PRINT).map_or(0, |n| MAX_MESSAGES.min(*n)) < MAX_SUGGESTIONS
     }
 
     /// True once an error was reported.
@@ -96,8 +96,8 @@ impl Sink {
         self.errors > 0
     }
 
-    fn push(&mut self, severity: Severity, code: &'static str, span: Span, message: String, mut help: String) {
-        let repeated = span != Span::NOWHERE && !self.seen.insert((span, code));
+    fn push(&mut self, severity: Severity, code: &'static str, span: TextSpan, message: String, mut help: String) {
+        let repeated = span != TextSpan::NOWHERE && !self.seen.insert((span, code));
         if repeated || !self.room(severity, code) {
             return;
         }
@@ -115,9 +115,9 @@ impl Sink {
     /// Counts a message; false where it is one too many of its kind.
     fn room(&mut self, severity: Severity, code: &'static str) -> bool {
         let (count, most) = match severity {
-            Severity::Error => (&mut self.kept_errors, 2 * MOST_MESSAGES),
-            Severity::Warning if code == PRINT => (self.warnings.entry(code).or_default(), MOST_MESSAGES),
-            Severity::Warning => (self.warnings.entry(code).or_default(), MOST_WARNINGS),
+            Severity::Error => (&mut self.kept_errors, 2 * MAX_MESSAGES),
+            Severity::Warning if code == PRINT => (self.warnings.entry(code).or_default(), MAX_MESSAGES),
+            Severity::Warning => (self.warnings.entry(code).or_default(), MAX_WARNINGS),
         };
         *count += 1;
         let room = *count <= most;
@@ -165,7 +165,7 @@ fn in_drawing(bundle: &Bundle, at: (String, usize, usize, usize)) -> (String, us
 }
 
 /// File, line, column and width of a span; the width stops at the end of the first line.
-fn place(files: &[String], bundle: &Bundle, span: Span) -> (String, usize, usize, usize) {
+fn place(files: &[String], bundle: &Bundle, span: TextSpan) -> (String, usize, usize, usize) {
     let Some(name) = files.get(usize::from(span.file)) else {
         return (bundle.root.clone(), 0, 0, 0);
     };

@@ -2,8 +2,8 @@
 
 /// A stretch of text in one file of a bundle: byte offsets, end exclusive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) struct Span {
-    /// Index of the file in reading order; 0 is the root. [`Span::NOWHERE`] has none.
+pub(crate) struct TextSpan {
+    /// Index of the file in reading order; 0 is the root. [`TextSpan::NOWHERE`] has none.
     pub(crate) file: u16,
     /// First byte.
     pub(crate) start: u32,
@@ -11,7 +11,7 @@ pub(crate) struct Span {
     pub(crate) end: u32,
 }
 
-impl Span {
+impl TextSpan {
     /// The place of a message that is about no text at all (a setting from outside).
     pub(crate) const NOWHERE: Self = Self { file: u16::MAX, start: 0, end: 0 };
 

@@ -1,31 +1,34 @@
 //! The grammar of statements: definitions, blocks, loops, conditions, layers, subnets, elements and their lists.
 
-use super::ast::{Def, Element, Expr, ExprKind, Formal, Ident, Layer, LayerRef, Name, Slot, Statement, Subnet};
+use super::ast::{
+    Def, ElementStatement, Expr, ExprKind, Formal, Ident, LayerDefinition, LayerRef, Name, Slot, Statement,
+    SubnetDefinition,
+};
 use super::elements;
 use super::parser::{Parsed, Parser};
 use super::sink::Reported;
-use super::source::Span;
-use super::token::{Kind, Token};
+use super::source::TextSpan;
+use super::token::{Lexeme, TokenKind};
 use std::collections::HashSet;
 use std::sync::Arc;
 
 /// Parameters of one element, layer or subnet.
-const MOST_PARAMETERS: usize = 1000;
+const MAX_PARAMETERS: usize = 1000;
 
 impl Parser<'_> {
     pub(super) fn line(&mut self) -> Parsed<Statement> {
         match self.peek().kind {
-            Kind::OpenList => Ok(Statement::Block(self.block()?)),
-            Kind::For => self.nested(Self::for_loop),
-            Kind::If => self.nested(Self::condition),
-            Kind::Call => {
+            TokenKind::OpenList => Ok(Statement::Block(self.block()?)),
+            TokenKind::For => self.nested(Self::for_loop),
+            TokenKind::If => self.nested(Self::condition),
+            TokenKind::Call => {
                 self.next();
                 let function = self.ident("the function to call")?;
-                let open = self.expect(Kind::Open, "`(`")?;
+                let open = self.expect(TokenKind::Open, "`(`")?;
                 Ok(Statement::Call(self.outermost(|p| p.call(function, open))?))
             }
-            Kind::Identifier if self.ahead(1).kind == Kind::Equals => Ok(Statement::Def(self.def()?)),
-            Kind::Identifier => {
+            TokenKind::Identifier if self.ahead(1).kind == TokenKind::Equals => Ok(Statement::Def(self.def()?)),
+            TokenKind::Identifier => {
                 let element = self.element()?;
                 self.stray_list();
                 Ok(Statement::Element(Box::new(element)))
@@ -37,13 +40,15 @@ impl Parser<'_> {
     /// Warns of a list on an element's line that looks like more parameters and is a block of definitions.
     fn stray_list(&mut self) {
         let open = self.peek();
-        let entry = (self.ahead(1).kind, self.ahead(2).kind) == (Kind::Identifier, Kind::Equals);
-        if open.kind != Kind::OpenList || open.starts_line || !entry {
+        let entry = (self.ahead(1).kind, self.ahead(2).kind) == (TokenKind::Identifier, TokenKind::Equals);
+        if open.kind != TokenKind::OpenList || open.starts_line || !entry {
             return;
         }
         let inside = (1..).map(|n| self.ahead(n).kind);
-        let ends = inside.take_while(|kind| *kind != Kind::End).find(|k| matches!(k, Kind::OpenList | Kind::CloseList));
-        if ends == Some(Kind::CloseList) {
+        let ends = inside
+            .take_while(|kind| *kind != TokenKind::End)
+            .find(|k| matches!(k, TokenKind::OpenList | TokenKind::CloseList));
+        if ends == Some(TokenKind::CloseList) {
             let message = "a second list of definitions on an element's line is a block of its own".to_owned();
             self.sink.warning("W019", open.span, message, "an element has one list of parameters: put them into it");
         }
@@ -62,7 +67,7 @@ impl Parser<'_> {
 
     fn block(&mut self) -> Parsed<Vec<Statement>> {
         self.nested(|p| {
-            let open = p.expect(Kind::OpenList, "a block `[ … ]`")?;
+            let open = p.expect(TokenKind::OpenList, "a block `[ … ]`")?;
             p.blocks.push(open);
             let mut out = Vec::new();
             let result = loop {
@@ -70,11 +75,11 @@ impl Parser<'_> {
                     break Err(Reported);
                 }
                 match p.peek().kind {
-                    Kind::CloseList => {
+                    TokenKind::CloseList => {
                         p.next();
                         break Ok(out);
                     }
-                    Kind::End => {
+                    TokenKind::End => {
                         p.leaving = true;
                         break Err(p.unclosed(open));
                     }
@@ -86,16 +91,16 @@ impl Parser<'_> {
         })
     }
 
-    fn unclosed(&mut self, open: Token) -> Reported {
+    fn unclosed(&mut self, open: Lexeme) -> Reported {
         self.sink.error("E014", open.span, "this `[` is never closed".into(), "every `[` needs its `]`")
     }
 
     fn for_loop(&mut self) -> Parsed<Statement> {
         self.next();
         let index = self.ident("the loop's variable")?;
-        self.expect(Kind::Equals, "`=`")?;
+        self.expect(TokenKind::Equals, "`=`")?;
         let from = self.expression()?;
-        self.expect(Kind::Colon, "`:` between the first and the last value")?;
+        self.expect(TokenKind::Colon, "`:` between the first and the last value")?;
         let to = self.expression()?;
         let body = self.block()?;
         Ok(Statement::For { index, slot: Slot::NONE, from, to, body })
@@ -105,7 +110,7 @@ impl Parser<'_> {
         self.next();
         let condition = self.expression()?;
         let then = Box::new(self.line()?);
-        let otherwise = match self.eat(Kind::Else) {
+        let otherwise = match self.eat(TokenKind::Else) {
             Some(_) => Some(Box::new(self.line()?)),
             None => None,
         };
@@ -114,7 +119,7 @@ impl Parser<'_> {
 
     fn def(&mut self) -> Parsed<Def> {
         let name = self.ident("a name")?;
-        self.expect(Kind::Equals, "`=`")?;
+        self.expect(TokenKind::Equals, "`=`")?;
         Ok(Def { name, slot: Slot::NONE, value: self.expression()? })
     }
 
@@ -122,12 +127,12 @@ impl Parser<'_> {
         self.next();
         loop {
             let name = self.ident("the parameter's name")?;
-            let default = match self.eat(Kind::Equals) {
+            let default = match self.eat(TokenKind::Equals) {
                 Some(_) => Some(self.expression()?),
                 None => None,
             };
             out.push(Statement::Param { name, slot: Slot::NONE, default });
-            if self.eat(Kind::Comma).is_none() {
+            if self.eat(TokenKind::Comma).is_none() {
                 return Ok(());
             }
         }
@@ -136,13 +141,13 @@ impl Parser<'_> {
     pub(super) fn process(&mut self) -> Parsed<Statement> {
         self.next();
         let name = self.ident("the layer's name")?;
-        let parent_name = match self.eat(Kind::Colon) {
+        let parent_name = match self.eat(TokenKind::Colon) {
             Some(_) => Some(self.ident("the parent layer's name")?),
             None => None,
         };
-        self.expect(Kind::Equals, "`=`")?;
+        self.expect(TokenKind::Equals, "`=`")?;
         let (entries, _) = self.def_list()?;
-        self.program.layers.push(Layer { name, parent_name, parent: None, entries, constant: false });
+        self.program.layers.push(LayerDefinition { name, parent_name, parent: None, entries, constant: false });
         Ok(Statement::Process(self.program.layers.len() - 1))
     }
 
@@ -150,18 +155,18 @@ impl Parser<'_> {
         self.next();
         let name = self.ident("the subnet's name")?;
         let (nodes, _) = self.name_list()?;
-        let open = self.expect(Kind::OpenList, "`[` of the parameter list")?;
+        let open = self.expect(TokenKind::OpenList, "`[` of the parameter list")?;
         let mut formals = Vec::new();
-        while self.eat(Kind::CloseList).is_none() {
+        while self.eat(TokenKind::CloseList).is_none() {
             let name = self.list_name(open)?;
-            self.expect(Kind::Equals, "`=` and a default, `*` (must be given) or `?` (may stay open)")?;
+            self.expect(TokenKind::Equals, "`=` and a default, `*` (must be given) or `?` (may stay open)")?;
             let mark = self.peek();
             let default = match mark.kind {
-                Kind::Star => None,
-                Kind::Question => Some(Expr { kind: ExprKind::Undefined, span: mark.span }),
+                TokenKind::Star => None,
+                TokenKind::Question => Some(Expr { kind: ExprKind::Undefined, span: mark.span }),
                 _ => Some(self.expression()?),
             };
-            if matches!(mark.kind, Kind::Star | Kind::Question) {
+            if matches!(mark.kind, TokenKind::Star | TokenKind::Question) {
                 self.next();
             }
             formals.push(Formal { name, slot: Slot::NONE, default });
@@ -171,22 +176,22 @@ impl Parser<'_> {
         // nodes with indices may be told apart by these
         self.twice(nodes.iter().filter(|n| n.indices.is_empty()).map(|n| &n.base), "node", "last");
         let body = self.block()?;
-        self.program.subnets.push(Subnet { name, nodes, formals, body, variables: 0 });
+        self.program.subnets.push(SubnetDefinition { name, nodes, formals, body, variables: 0 });
         Ok(Statement::Subnet(self.program.subnets.len() - 1))
     }
 
-    fn element(&mut self) -> Parsed<Element> {
+    fn element(&mut self) -> Parsed<ElementStatement> {
         let first = self.ident("a statement")?;
         let mut name = None;
         let mut words = vec![first.clone()];
-        if self.peek().kind == Kind::Open {
+        if self.peek().kind == TokenKind::Open {
             name = Some(self.indices(first)?);
             words.clear();
         }
         while words.len() < 3 {
             match self.peek().kind {
-                Kind::Identifier => words.push(self.ident("a name")?),
-                Kind::Star => {
+                TokenKind::Identifier => words.push(self.ident("a name")?),
+                TokenKind::Star => {
                     let span = self.next().span;
                     words.push(Ident { name: self.word("*"), span });
                     break;
@@ -198,7 +203,7 @@ impl Parser<'_> {
             let base = words.remove(0);
             name = Some(Name { span: base.span, base, indices: Vec::new() });
         }
-        let (Ok([model, layer_name]), Kind::OpenList) = (<[Ident; 2]>::try_from(words), self.peek().kind) else {
+        let (Ok([model, layer_name]), TokenKind::OpenList) = (<[Ident; 2]>::try_from(words), self.peek().kind) else {
             let help = "an element is `[NAME] MODEL LAYER [nodes] [parameters]`, with `*` for no layer";
             let span = self.peek().span;
             let found = self.peek().kind.called();
@@ -221,13 +226,25 @@ impl Parser<'_> {
         let turns = |name: &str| matches!(name, "ox" | "oy" | "oz");
         let given = || parameters.iter().map(|def| &*def.name.name).filter(|name| !turns(name));
         let built_in = elements::model(&model.name).map(|model| (model, given().all(|name| model.takes(name))));
-        Ok(Element { name, number, unnamed, model, subnet, built_in, layer_name, layer, nodes, nodes_span, parameters })
+        Ok(ElementStatement {
+            name,
+            number,
+            unnamed,
+            model,
+            subnet,
+            built_in,
+            layer_name,
+            layer,
+            nodes,
+            nodes_span,
+            parameters,
+        })
     }
 
     // ---- lists ----
 
     fn indices(&mut self, base: Ident) -> Parsed<Name> {
-        if self.peek().kind != Kind::Open {
+        if self.peek().kind != TokenKind::Open {
             return Ok(Name { span: base.span, base, indices: Vec::new() });
         }
         let open = self.next();
@@ -238,16 +255,16 @@ impl Parser<'_> {
         Ok(Name { span: base.span.to(close), base, indices })
     }
 
-    fn name_list(&mut self) -> Parsed<(Vec<Name>, Span)> {
-        let open = self.expect(Kind::OpenList, "`[` of the node list")?;
+    fn name_list(&mut self) -> Parsed<(Vec<Name>, TextSpan)> {
+        let open = self.expect(TokenKind::OpenList, "`[` of the node list")?;
         let mut names = Vec::new();
         loop {
             match self.peek().kind {
-                Kind::CloseList => {
+                TokenKind::CloseList => {
                     let close = self.next();
                     return Ok((names, open.span.to(close.span)));
                 }
-                Kind::Comma => {
+                TokenKind::Comma => {
                     let comma = self.next();
                     self.sink.error(
                         "E017",
@@ -256,7 +273,7 @@ impl Parser<'_> {
                         "remove the comma",
                     );
                 }
-                Kind::End => return Err(self.unclosed(open)),
+                TokenKind::End => return Err(self.unclosed(open)),
                 _ if self.statement_ahead() => return Err(self.unclosed(open)),
                 _ => {
                     let base = self.ident("a node name or `]`")?;
@@ -266,17 +283,17 @@ impl Parser<'_> {
         }
     }
 
-    fn def_list(&mut self) -> Parsed<(Vec<Def>, Span)> {
-        let open = self.expect(Kind::OpenList, "`[` of the parameter list")?;
+    fn def_list(&mut self) -> Parsed<(Vec<Def>, TextSpan)> {
+        let open = self.expect(TokenKind::OpenList, "`[` of the parameter list")?;
         let mut defs = Vec::new();
         loop {
             match self.peek().kind {
-                Kind::CloseList => {
+                TokenKind::CloseList => {
                     let close = self.next();
                     self.twice(defs.iter().map(|def: &Def| &def.name), "parameter", "first");
                     return Ok((defs, open.span.to(close.span)));
                 }
-                Kind::Comma => {
+                TokenKind::Comma => {
                     let comma = self.next();
                     self.sink.error(
                         "E017",
@@ -287,7 +304,7 @@ impl Parser<'_> {
                 }
                 _ => {
                     let name = self.list_name(open)?;
-                    self.expect(Kind::Equals, &format!("`=` after the parameter `{}`", name.name))?;
+                    self.expect(TokenKind::Equals, &format!("`=` after the parameter `{}`", name.name))?;
                     defs.push(Def { name, slot: Slot::NONE, value: self.expression()? });
                     self.short(defs.len(), open)?;
                 }
@@ -296,17 +313,17 @@ impl Parser<'_> {
     }
 
     /// Refuses a list of parameters that nobody wrote: elements look through it for each name they take.
-    fn short(&mut self, length: usize, open: Token) -> Parsed<()> {
-        if length <= MOST_PARAMETERS {
+    fn short(&mut self, length: usize, open: Lexeme) -> Parsed<()> {
+        if length <= MAX_PARAMETERS {
             return Ok(());
         }
-        let message = format!("a list of more than {MOST_PARAMETERS} parameters");
+        let message = format!("a list of more than {MAX_PARAMETERS} parameters");
         Err(self.sink.error("E018", open.span, message, "split the element, or name what it takes"))
     }
 
     /// The next name of a parameter list, or the error that the list was left open.
-    fn list_name(&mut self, open: Token) -> Parsed<Ident> {
-        if self.peek().kind == Kind::End || self.statement_ahead() {
+    fn list_name(&mut self, open: Lexeme) -> Parsed<Ident> {
+        if self.peek().kind == TokenKind::End || self.statement_ahead() {
             return Err(self.unclosed(open));
         }
         self.ident("a parameter name or `]`")

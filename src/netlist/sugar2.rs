@@ -5,11 +5,11 @@ use super::bundle::Bundle;
 use super::diagnostic::Diagnostics;
 use super::elaborate::Elaborator;
 use super::finish::finish;
-use super::front::{FrontEnd, Loaded};
+use super::front::{FrontEnd, LoadedNetlist};
 use super::setting::Setting;
-use super::sink::Sink;
-use super::source::Span;
-use super::suggest::MOST_LISTED;
+use super::sink::DiagnosticSink;
+use super::source::TextSpan;
+use super::suggest::MAX_LISTED;
 use super::{parser, resolve, suggest};
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
@@ -20,12 +20,12 @@ pub(crate) struct Sugar2 {
     bundle: Arc<Bundle>,
     program: Program,
     /// What reading had to say.
-    sink: Sink,
+    sink: DiagnosticSink,
 }
 
 impl Sugar2 {
     pub(crate) fn new(bundle: &Bundle) -> Self {
-        let mut sink = Sink::new(&bundle.root);
+        let mut sink = DiagnosticSink::new(&bundle.root);
         let mut program = parser::parse(bundle, &mut sink);
         let parsed = (!sink.failed()).then(|| sink.clone());
         if !sink.failed() || program.incomplete {
@@ -60,7 +60,7 @@ fn draws(statements: &[Statement]) -> bool {
 }
 
 impl FrontEnd for Sugar2 {
-    fn load(&self, set: &[(String, Setting)]) -> Result<Loaded, Diagnostics> {
+    fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics> {
         let (bundle, program) = (&self.bundle, &self.program);
         let mut sink = self.sink.clone();
         if !sink.failed() || program.incomplete {
@@ -75,7 +75,7 @@ impl FrontEnd for Sugar2 {
 }
 
 /// Every name set from outside must be a parameter of the netlist.
-fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut Sink) {
+fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut DiagnosticSink) {
     let names = program
         .statements
         .iter()
@@ -87,18 +87,18 @@ fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut Sink)
             continue;
         }
         if !sink.suggests() {
-            sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), "");
+            sink.error("E048", TextSpan::NOWHERE, format!("the netlist has no parameter `{name}` to set"), "");
             continue;
         }
         let mut help = match known.as_slice() {
             [] => "the netlist has no `param`".to_owned(),
-            names if names.len() <= MOST_LISTED => format!("its parameters are {}", names.join(" ")),
-            names => format!("it has {} parameters, {} …", names.len(), names[..MOST_LISTED].join(" ")),
+            names if names.len() <= MAX_LISTED => format!("its parameters are {}", names.join(" ")),
+            names => format!("it has {} parameters, {} …", names.len(), names[..MAX_LISTED].join(" ")),
         };
         if let Some(meant) = suggest::nearest(name, known.iter().copied()) {
             help = format!("did you mean `{meant}`? {help}");
         }
-        sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), help);
+        sink.error("E048", TextSpan::NOWHERE, format!("the netlist has no parameter `{name}` to set"), help);
     }
 }
 

@@ -1,7 +1,7 @@
 //! "Did you mean": the nearest known name.
 
 /// Longer lists of names are cut in messages.
-pub(crate) const MOST_LISTED: usize = 40;
+pub(crate) const MAX_LISTED: usize = 40;
 
 /// No name longer than this [characters] is compared.
 const LONGEST: usize = 64;

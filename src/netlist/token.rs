@@ -1,10 +1,10 @@
 //! The words of a netlist.
 
-use super::source::Span;
+use super::source::TextSpan;
 
 /// What a token is. Identifiers and strings keep only their span: their text is in the source.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Kind {
+pub(crate) enum TokenKind {
     Identifier,
     Number(f64),
     Text,
@@ -44,14 +44,14 @@ pub(crate) enum Kind {
 
 /// A word with its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Token {
-    pub(crate) kind: Kind,
-    pub(crate) span: Span,
+pub(crate) struct Lexeme {
+    pub(crate) kind: TokenKind,
+    pub(crate) span: TextSpan,
     /// True for the first token of a line: where reading can go on after an error.
     pub(crate) starts_line: bool,
 }
 
-impl Kind {
+impl TokenKind {
     /// How messages call it.
     pub(crate) fn called(self) -> &'static str {
         match self {

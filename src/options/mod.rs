@@ -14,4 +14,4 @@ pub mod table;
 
 pub use choices::{Formulation, Junctions, Scheme};
 pub use model::{CompileOptions, MODEL, ModelOption};
-pub use table::{Described, Range, Refused, Value};
+pub use table::{OptionDescription, OptionError, OptionValue, Range};

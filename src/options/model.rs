@@ -5,18 +5,18 @@
 //! After a change, `BIMORPH_WRITE=1 cargo test --test options` writes what is generated from it.
 
 use super::choices::{Formulation, Junctions, Scheme};
-use super::table::{Described, Field, Range, Refused, Value};
+use super::table::{Field, OptionDescription, OptionError, OptionValue, Range};
 use crate::netlist::Setting;
 use std::sync::LazyLock;
 
 /// An option of a model: what it is, and its field.
 pub struct ModelOption {
     /// Name, unit, default, range, meaning.
-    pub about: Described,
+    pub about: OptionDescription,
     /// Number of its field on the wire.
     pub number: u32,
-    get: fn(&CompileOptions) -> Value,
-    set: fn(&mut CompileOptions, Value),
+    get: fn(&CompileOptions) -> OptionValue,
+    set: fn(&mut CompileOptions, OptionValue),
 }
 
 macro_rules! options {
@@ -39,7 +39,7 @@ macro_rules! options {
 
         /// Every option of a model, in the order of the documentation.
         pub static MODEL: LazyLock<Vec<ModelOption>> = LazyLock::new(|| vec![$(ModelOption {
-            about: Described {
+            about: OptionDescription {
                 name: stringify!($field),
                 wire: $wire,
                 unit: $unit,
@@ -115,18 +115,20 @@ options! {
 
 impl CompileOptions {
     /// The value of an option.
-    pub fn value(&self, option: &ModelOption) -> Value {
+    pub fn value(&self, option: &ModelOption) -> OptionValue {
         (option.get)(self)
     }
 
     /// Gives an option a value, if it can have it.
     ///
     /// # Errors
-    /// [`Refused`]: the option is as before.
-    pub fn choose(&mut self, option: &ModelOption, value: Value) -> Result<(), Refused> {
+    /// [`OptionError`]: the option is as before.
+    pub fn choose(&mut self, option: &ModelOption, value: OptionValue) -> Result<(), OptionError> {
         let value = match value {
             // the American spelling means the same, wherever it is written
-            Value::Name(name) if name == "centerline" => Value::Name(Junctions::Centreline.name().to_owned()),
+            OptionValue::Name(name) if name == "centerline" => {
+                OptionValue::Name(Junctions::Centreline.name().to_owned())
+            }
             other => other,
         };
         option.about.check(&value)?;
@@ -137,11 +139,11 @@ impl CompileOptions {
     /// Whether every option is within its range: asked before anything is laid out.
     ///
     /// # Errors
-    /// [`Refused`]: the first that is not.
-    pub fn check(&self) -> Result<(), Refused> {
+    /// [`OptionError`]: the first that is not.
+    pub fn check(&self) -> Result<(), OptionError> {
         MODEL.iter().try_for_each(|option| option.about.check(&self.value(option)))?;
         match (self.scheme, self.formulation) {
-            (Scheme::E4, Formulation::Rcr | Formulation::RcrElastic) => Err(Refused {
+            (Scheme::E4, Formulation::Rcr | Formulation::RcrElastic) => Err(OptionError {
                 option: "scheme",
                 expected: format!(
                     "es, which is taken where none is given, beside formulation {}, or formulation compliant (bodies inside an \
@@ -166,7 +168,12 @@ mod tests {
         assert_eq!(defaults.check(), Ok(()));
         for option in MODEL.iter() {
             assert_eq!(defaults.value(option), option.about.default, "{}", option.about.name);
-            assert_eq!(option.about.default == Value::Unset, !option.about.unset.is_empty(), "{}", option.about.name);
+            assert_eq!(
+                option.about.default == OptionValue::Unset,
+                !option.about.unset.is_empty(),
+                "{}",
+                option.about.name
+            );
         }
     }
 
@@ -174,16 +181,18 @@ mod tests {
     fn a_value_beyond_its_range_is_refused_and_changes_nothing() {
         for option in MODEL.iter() {
             let (good, bad) = match option.about.range {
-                Range::Flag => (Value::Flag(true), Value::Number(1.0)),
-                Range::Count(low, high) => (Value::Count(high), Value::Count(if low > 0 { low - 1 } else { high + 1 })),
-                Range::Above(low, high) => (Value::Number(0.5 * high), Value::Number(low)),
-                Range::Within(low, high) => (Value::Number(high), Value::Number(low - high)),
-                Range::Names(names) => (Value::Name(names[0].to_owned()), Value::Name("nosuch".to_owned())),
+                Range::Flag => (OptionValue::Flag(true), OptionValue::Number(1.0)),
+                Range::Count(low, high) => {
+                    (OptionValue::Count(high), OptionValue::Count(if low > 0 { low - 1 } else { high + 1 }))
+                }
+                Range::Above(low, high) => (OptionValue::Number(0.5 * high), OptionValue::Number(low)),
+                Range::Within(low, high) => (OptionValue::Number(high), OptionValue::Number(low - high)),
+                Range::Names(names) => (OptionValue::Name(names[0].to_owned()), OptionValue::Name("nosuch".to_owned())),
             };
             let mut options = CompileOptions::default();
             let refused = options.choose(option, bad).expect_err(option.about.name);
             assert_eq!((refused.option, &options), (option.about.name, &CompileOptions::default()));
-            assert!(options.choose(option, Value::Number(f64::NAN)).is_err(), "{}", option.about.name);
+            assert!(options.choose(option, OptionValue::Number(f64::NAN)).is_err(), "{}", option.about.name);
             options.choose(option, good.clone()).unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(options.value(option), good);
         }

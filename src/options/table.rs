@@ -1,6 +1,6 @@
 //! What an option is: its name, unit, default, range and meaning, said once for every front.
 //!
-//! A front reads what its user wrote as a [`Value`] and hands it to [`Described::check`]; what it shows of an option (help,
+//! A front reads what its user wrote as an [`OptionValue`] and hands it to [`OptionDescription::check`]; what it shows of an option (help,
 //! declarations, tables) it takes from here.
 
 use super::choices::{Formulation, Junctions, Scheme};
@@ -9,8 +9,8 @@ use thiserror::Error;
 
 /// What an option holds, whatever its type.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Value {
-    /// Nothing: a rule decides, see [`Described::unset`].
+pub enum OptionValue {
+    /// Nothing: a rule decides, see [`OptionDescription::unset`].
     Unset,
     /// Yes or no.
     Flag(bool),
@@ -22,7 +22,7 @@ pub enum Value {
     Name(String),
 }
 
-impl fmt::Display for Value {
+impl fmt::Display for OptionValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unset => f.write_str("nothing"),
@@ -52,7 +52,7 @@ pub enum Range {
 
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let number = |x: &f64| Value::Number(*x);
+        let number = |x: &f64| OptionValue::Number(*x);
         match self {
             Self::Flag => f.write_str("true or false"),
             Self::Count(low, high) => write!(f, "{low} to {high}"),
@@ -67,7 +67,7 @@ impl fmt::Display for Range {
 
 /// An option as every front shows it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Described {
+pub struct OptionDescription {
     /// Its name in decks, in Python and in the library; on the command line with `-` for `_`.
     pub name: &'static str,
     /// Its field on the wire and its key in JSON documents, which say the unit where it is not 1.
@@ -77,7 +77,7 @@ pub struct Described {
     /// What it may be.
     pub range: Range,
     /// What it is unless a front says otherwise.
-    pub default: Value,
+    pub default: OptionValue,
     /// Where the default is nothing: what decides then.
     pub unset: &'static str,
     /// What it means, in one sentence or two.
@@ -87,8 +87,8 @@ pub struct Described {
 /// A value that an option cannot have.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{option}: expected {expected}, got {got}")]
-pub struct Refused {
-    /// [`Described::name`].
+pub struct OptionError {
+    /// [`OptionDescription::name`].
     pub option: &'static str,
     /// What it takes, with its unit.
     pub expected: String,
@@ -96,7 +96,7 @@ pub struct Refused {
     pub got: String,
 }
 
-impl Described {
+impl OptionDescription {
     /// The name as the command writes it.
     pub fn flag(&self) -> String {
         self.name.replace('_', "-")
@@ -110,8 +110,8 @@ impl Described {
     /// The default in words.
     pub fn by_default(&self) -> String {
         match &self.default {
-            Value::Unset => self.unset.to_owned(),
-            Value::Name(name) => name.clone(),
+            OptionValue::Unset => self.unset.to_owned(),
+            OptionValue::Name(name) => name.clone(),
             other => other.to_string(),
         }
     }
@@ -132,81 +132,81 @@ impl Described {
     /// bounds.
     ///
     /// # Errors
-    /// [`Refused`].
-    pub fn check(&self, value: &Value) -> Result<(), Refused> {
+    /// [`OptionError`].
+    pub fn check(&self, value: &OptionValue) -> Result<(), OptionError> {
         let fits = match (&self.range, value) {
-            (_, Value::Unset) => self.default == Value::Unset,
-            (Range::Flag, Value::Flag(_)) => true,
-            (Range::Count(low, high), Value::Count(count)) => (low..=high).contains(&count),
-            (Range::Above(low, high), Value::Number(x)) => x > low && (x < high || *x == *high && *high != 1.0),
-            (Range::Within(low, high), Value::Number(x)) => (low..=high).contains(&x),
-            (Range::Names(names), Value::Name(name)) => names.contains(&name.as_str()),
+            (_, OptionValue::Unset) => self.default == OptionValue::Unset,
+            (Range::Flag, OptionValue::Flag(_)) => true,
+            (Range::Count(low, high), OptionValue::Count(count)) => (low..=high).contains(&count),
+            (Range::Above(low, high), OptionValue::Number(x)) => x > low && (x < high || *x == *high && *high != 1.0),
+            (Range::Within(low, high), OptionValue::Number(x)) => (low..=high).contains(&x),
+            (Range::Names(names), OptionValue::Name(name)) => names.contains(&name.as_str()),
             _ => false,
         };
         if fits {
             return Ok(());
         }
-        Err(Refused { option: self.name, expected: self.expected(), got: value.to_string() })
+        Err(OptionError { option: self.name, expected: self.expected(), got: value.to_string() })
     }
 }
 
 /// A type that a field of the options may have.
 pub(super) trait Field: Sized {
     /// As a value.
-    fn value(&self) -> Value;
+    fn value(&self) -> OptionValue;
     /// From a value that the table has found to fit.
-    fn from_value(value: Value) -> Option<Self>;
+    fn from_value(value: OptionValue) -> Option<Self>;
 }
 
 impl Field for bool {
-    fn value(&self) -> Value {
-        Value::Flag(*self)
+    fn value(&self) -> OptionValue {
+        OptionValue::Flag(*self)
     }
 
-    fn from_value(value: Value) -> Option<Self> {
-        if let Value::Flag(flag) = value { Some(flag) } else { None }
+    fn from_value(value: OptionValue) -> Option<Self> {
+        if let OptionValue::Flag(flag) = value { Some(flag) } else { None }
     }
 }
 
 impl Field for f64 {
-    fn value(&self) -> Value {
-        Value::Number(*self)
+    fn value(&self) -> OptionValue {
+        OptionValue::Number(*self)
     }
 
-    fn from_value(value: Value) -> Option<Self> {
-        if let Value::Number(x) = value { Some(x) } else { None }
+    fn from_value(value: OptionValue) -> Option<Self> {
+        if let OptionValue::Number(x) = value { Some(x) } else { None }
     }
 }
 
 impl Field for usize {
-    fn value(&self) -> Value {
-        Value::Count(*self)
+    fn value(&self) -> OptionValue {
+        OptionValue::Count(*self)
     }
 
-    fn from_value(value: Value) -> Option<Self> {
-        if let Value::Count(count) = value { Some(count) } else { None }
+    fn from_value(value: OptionValue) -> Option<Self> {
+        if let OptionValue::Count(count) = value { Some(count) } else { None }
     }
 }
 
 impl<T: Field> Field for Option<T> {
-    fn value(&self) -> Value {
-        self.as_ref().map_or(Value::Unset, T::value)
+    fn value(&self) -> OptionValue {
+        self.as_ref().map_or(OptionValue::Unset, T::value)
     }
 
-    fn from_value(value: Value) -> Option<Self> {
-        if value == Value::Unset { Some(None) } else { T::from_value(value).map(Some) }
+    fn from_value(value: OptionValue) -> Option<Self> {
+        if value == OptionValue::Unset { Some(None) } else { T::from_value(value).map(Some) }
     }
 }
 
 macro_rules! named_field {
     ($($kind:ty),+) => {$(
         impl Field for $kind {
-            fn value(&self) -> Value {
-                Value::Name(self.name().to_owned())
+            fn value(&self) -> OptionValue {
+                OptionValue::Name(self.name().to_owned())
             }
 
-            fn from_value(value: Value) -> Option<Self> {
-                if let Value::Name(name) = value { Self::named(&name) } else { None }
+            fn from_value(value: OptionValue) -> Option<Self> {
+                if let OptionValue::Name(name) = value { Self::named(&name) } else { None }
             }
         }
     )+};

@@ -16,9 +16,9 @@
 use super::ReadoutError;
 use super::port_kind::PortKind;
 use super::signal::Signal;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::inputs::Input;
-use crate::domains::{Point, System};
+use crate::domains::{MaterialPoint, System};
 use crate::equations::Joints;
 use crate::multibody::BodyId;
 use std::collections::{HashMap, HashSet};
@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 /// How a port answers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Answer {
+pub(crate) enum PortResponse {
     /// With the current and charge of this source.
     Current,
     /// With a motion.
@@ -39,21 +39,21 @@ pub(crate) enum Answer {
 
 /// The ports that a session was opened with.
 #[derive(Debug)]
-pub(crate) struct Ports {
+pub(crate) struct OpenedPorts {
     /// Index of each in the source vector.
     pub(crate) sources: Vec<usize>,
     pub(crate) kinds: Vec<PortKind>,
-    pub(crate) answers: Vec<Answer>,
+    pub(crate) answers: Vec<PortResponse>,
     /// The model with the inputs among them; none where there are none.
     pub(crate) system: Option<Arc<System>>,
 }
 
-impl Ports {
+impl OpenedPorts {
     /// Finds ports by name; no names: every electrical one.
     ///
     /// # Errors
     /// [`ReadoutError::UnknownPort`], [`ReadoutError::BadPort`] for a port that cannot be.
-    pub(crate) fn find(compiled: &Compiled, names: &[String]) -> Result<Self, ReadoutError> {
+    pub(crate) fn find(compiled: &CompiledModel, names: &[String]) -> Result<Self, ReadoutError> {
         let system = &compiled.parts.system;
         let electrics = &system.electrics;
         let known: HashMap<&str, usize> =
@@ -62,7 +62,7 @@ impl Ports {
         if names.is_empty() {
             found.sources = (0..electrics.ports).collect();
             found.kinds = vec![PortKind::Electrical; electrics.ports];
-            found.answers = vec![Answer::Current; electrics.ports];
+            found.answers = vec![PortResponse::Current; electrics.ports];
             return Ok(found);
         }
         let (mut inputs, mut given) = (Vec::new(), HashSet::new());
@@ -75,7 +75,7 @@ impl Ports {
                 });
             }
             let (source, kind, answer) = match known.get(name.as_str()) {
-                Some(&source) => (source, PortKind::Electrical, Answer::Current),
+                Some(&source) => (source, PortKind::Electrical, PortResponse::Current),
                 None => {
                     let (input, kind, answer) = offered(compiled, name)?;
                     inputs.push(input);
@@ -111,8 +111,8 @@ impl Ports {
 }
 
 /// The port that a node, a beam or the frame offers under this name.
-fn offered(compiled: &Compiled, name: &str) -> Result<(Input, PortKind, Answer), ReadoutError> {
-    let inertial = |input, kind| Ok((input, kind, Answer::Nothing));
+fn offered(compiled: &CompiledModel, name: &str) -> Result<(Input, PortKind, PortResponse), ReadoutError> {
+    let inertial = |input, kind| Ok((input, kind, PortResponse::Nothing));
     match name {
         "frame.ax" => return inertial(Input::Acceleration { axis: 0 }, PortKind::Acceleration),
         "frame.ay" => return inertial(Input::Acceleration { axis: 1 }, PortKind::Acceleration),
@@ -139,9 +139,9 @@ fn offered(compiled: &Compiled, name: &str) -> Result<(Input, PortKind, Answer),
                 (_, 2) => PortKind::MomentRate,
                 _ => PortKind::ForceRate,
             };
-            Ok((Input::Force { point, direction }, kind, Answer::Motion(signal)))
+            Ok((Input::Force { point, direction }, kind, PortResponse::Motion(signal)))
         }
-        Ok(Signal::Temperature(heater)) => Ok((Input::Heat { heater }, PortKind::Thermal, Answer::Rise(heater))),
+        Ok(Signal::Temperature(heater)) => Ok((Input::Heat { heater }, PortKind::Thermal, PortResponse::Rise(heater))),
         Ok(Signal::Prescribed(_)) => refused(
             "a beam that knows heat",
             "whose temperature is prescribed; draw it as beam2det to give it a thermal port",
@@ -158,7 +158,7 @@ fn offered(compiled: &Compiled, name: &str) -> Result<(Input, PortKind, Answer),
 }
 
 /// Whether a force in that direction does anything.
-fn movable(system: &System, point: Point, direction: usize) -> bool {
+fn movable(system: &System, point: MaterialPoint, direction: usize) -> bool {
     let BodyId::Free(k) = point.body else { return false };
     let Some(free) = &system.model.bodies[k].free else { return true };
     let mut wrench = nalgebra::Vector3::zeros();

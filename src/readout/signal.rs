@@ -1,8 +1,8 @@
 //! Quantities that can be read from a state by name.
 
 use super::ReadoutError;
-use crate::compile::Compiled;
-use crate::domains::Point;
+use crate::compile::CompiledModel;
+use crate::domains::MaterialPoint;
 use crate::multibody::planar::{self, Pose};
 use crate::multibody::{BodyId, Model};
 
@@ -10,9 +10,9 @@ use crate::multibody::{BodyId, Model};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Signal {
     /// Displacement of a node: direction 0 x, 1 y, 2 rotation.
-    Displacement(Point, usize),
+    Displacement(MaterialPoint, usize),
     /// Rate of a node's displacement.
-    Rate(Point, usize),
+    Rate(MaterialPoint, usize),
     /// Mean temperature of heater k [K].
     Temperature(usize),
     /// A temperature that the netlist prescribes [K].
@@ -29,7 +29,7 @@ pub enum Signal {
 
 /// What signals are read from: a state, or a change of one.
 #[derive(Debug, Clone, Copy)]
-pub struct View<'a> {
+pub struct SignalView<'a> {
     /// Displacements.
     pub q: &'a [Pose],
     /// Rates.
@@ -46,12 +46,12 @@ impl Signal {
     ///
     /// # Errors
     /// [`ReadoutError::UnknownSignal`] with what would be understood.
-    pub fn find(compiled: &Compiled, name: &str) -> Result<Self, ReadoutError> {
+    pub fn find(compiled: &CompiledModel, name: &str) -> Result<Self, ReadoutError> {
         Self::lookup(compiled, name)
             .ok_or_else(|| ReadoutError::UnknownSignal { name: name.to_owned(), hint: hint(compiled, name) })
     }
 
-    fn lookup(compiled: &Compiled, name: &str) -> Option<Self> {
+    fn lookup(compiled: &CompiledModel, name: &str) -> Option<Self> {
         let (part, quantity) = name.rsplit_once('.')?;
         if let Some((direction, rate)) = direction(quantity) {
             let point = match compiled.structure.node(part) {
@@ -95,7 +95,7 @@ impl Signal {
     }
 
     /// Its value in a state.
-    pub fn value(&self, compiled: &Compiled, state: &View<'_>) -> f64 {
+    pub fn value(&self, compiled: &CompiledModel, state: &SignalView<'_>) -> f64 {
         let system = &compiled.parts.system;
         let linear = system.model.linear;
         match *self {
@@ -113,7 +113,7 @@ impl Signal {
     }
 
     /// Its change with a change of the state.
-    pub fn slope(&self, compiled: &Compiled, state: &View<'_>, change: &View<'_>) -> f64 {
+    pub fn slope(&self, compiled: &CompiledModel, state: &SignalView<'_>, change: &SignalView<'_>) -> f64 {
         let system = &compiled.parts.system;
         let linear = system.model.linear;
         match *self {
@@ -140,7 +140,7 @@ impl Signal {
 }
 
 /// Every signal of a model by name, in the order of the drawing: of nodes that can move, beams and gaps.
-pub fn names(compiled: &Compiled) -> Vec<String> {
+pub fn names(compiled: &CompiledModel) -> Vec<String> {
     let moves = |i: usize| compiled.parts.nodes[i].is_some_and(|p| matches!(p.body, BodyId::Free(_)));
     let nodes = compiled.structure.nodes.iter().enumerate().filter(|(i, _)| moves(*i));
     let motions = nodes.flat_map(|(_, n)| DIRECTIONS.map(|quantity| format!("{}.{quantity}", n.name)));
@@ -159,28 +159,28 @@ fn direction(quantity: &str) -> Option<(usize, bool)> {
 }
 
 /// Node, direction and kind (true: rate) of a signal of a node.
-pub(crate) fn node_signal(compiled: &Compiled, name: &str) -> Option<(usize, usize, bool)> {
+pub(crate) fn node_signal(compiled: &CompiledModel, name: &str) -> Option<(usize, usize, bool)> {
     let (part, quantity) = name.rsplit_once('.')?;
     let (direction, rate) = direction(quantity)?;
     Some((compiled.structure.node(part)?.0, direction, rate))
 }
 
 /// Rate of a material point when its body moves at `v` (or its first-order change when the body's pose changes by `v`).
-fn point_rate(p: Point, q: &[Pose], v: &[Pose], linear: bool) -> nalgebra::Vector2<f64> {
+fn point_rate(p: MaterialPoint, q: &[Pose], v: &[Pose], linear: bool) -> nalgebra::Vector2<f64> {
     let (q, v) = (Model::pose(q, p.body), Model::pose(v, p.body));
     let (turn, _) = planar::point_turn(&q, p.arm, linear);
     nalgebra::Vector2::new(v.x, v.y) + turn * v.z
 }
 
 /// The point `BEAM[k]`.
-fn along_beam(compiled: &Compiled, name: &str) -> Option<Point> {
+fn along_beam(compiled: &CompiledModel, name: &str) -> Option<MaterialPoint> {
     let (beam, number) = name.strip_suffix(']')?.rsplit_once('[')?;
     let beam = compiled.structure.beams.iter().position(|b| b.name == beam)?;
     compiled.parts.beams[beam].get(number.parse::<usize>().ok()?).copied()
 }
 
 /// What a wrong name could have meant.
-fn hint(compiled: &Compiled, name: &str) -> String {
+fn hint(compiled: &CompiledModel, name: &str) -> String {
     let part = name.rsplit_once('.').map_or(name, |(part, _)| part);
     let nodes: Vec<&str> = compiled.structure.nodes.iter().filter(|n| n.mechanical).map(|n| n.name.as_str()).collect();
     if nodes.contains(&part) {

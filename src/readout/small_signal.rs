@@ -1,10 +1,10 @@
 //! How a small change at one source that goes as e^(st) moves a state, and what is seen of it.
 //!
-//! [`Perturbed`] is the physics at any complex s [rad/s]: what a unit at a port does to the forces, and what is seen of the motion
+//! [`PerturbedState`] is the physics at any complex s [rad/s]: what a unit at a port does to the forces, and what is seen of the motion
 //! that follows. A device asks at s = iω, an analysis of responses at poles and zeros, too.
 
-use super::signal::{Signal, View};
-use crate::compile::Compiled;
+use super::signal::{Signal, SignalView};
+use crate::compile::CompiledModel;
 use crate::domains::{Drive, System};
 use crate::multibody::planar::Pose;
 use crate::solve::harmonic::ComplexPose;
@@ -13,8 +13,8 @@ use nalgebra::Complex;
 
 /// A state and what holds it there.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Perturbed<'a> {
-    pub(crate) compiled: &'a Compiled,
+pub(crate) struct PerturbedState<'a> {
+    pub(crate) compiled: &'a CompiledModel,
     /// The model with the inputs among its sources.
     pub(crate) system: &'a System,
     pub(crate) q: &'a [Pose],
@@ -26,7 +26,7 @@ pub(crate) struct Perturbed<'a> {
 
 /// What a unit at one source does before anything moves.
 #[derive(Debug, Clone)]
-pub(crate) struct Push {
+pub(crate) struct SourceExcitation {
     /// Force on each body [N, N·m].
     pub(crate) force: Vec<ComplexPose>,
     /// Change of the voltage of each gap [V].
@@ -37,7 +37,7 @@ pub(crate) struct Push {
 
 /// How a part of a push depends on s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Law {
+pub(crate) enum FrequencyDependence {
     /// Not at all.
     AtOnce,
     /// As 1/(1 + sτ), τ in seconds.
@@ -46,7 +46,7 @@ pub(crate) enum Law {
     Rate,
 }
 
-impl Law {
+impl FrequencyDependence {
     /// What it is at s [rad/s].
     pub(crate) fn factor(self, s: Complex<f64>) -> Complex<f64> {
         match self {
@@ -61,7 +61,7 @@ impl Law {
 #[derive(Debug, Clone)]
 pub(crate) struct Constituent {
     /// How it depends on s.
-    pub(crate) law: Law,
+    pub(crate) law: FrequencyDependence,
     /// Force on each body for a factor of 1 [N, N·m].
     pub(crate) force: Vec<Pose>,
     /// Change of the voltage of each gap [V].
@@ -72,28 +72,28 @@ pub(crate) struct Constituent {
 
 /// A motion of the bodies with what pushed them, in its real and imaginary parts.
 #[derive(Debug, Clone)]
-pub(crate) struct Moved {
-    parts: [Part; 2],
+pub(crate) struct ForcedMotion {
+    parts: [MotionComponent; 2],
 }
 
 #[derive(Debug, Clone)]
-struct Part {
+struct MotionComponent {
     q: Vec<Pose>,
     v: Vec<Pose>,
     rise: Vec<f64>,
     volts: Vec<f64>,
 }
 
-impl Moved {
+impl ForcedMotion {
     /// The motion `q` that goes as e^(st), with the push that it follows.
-    pub(crate) fn new(push: &Push, q: &[ComplexPose], s: Complex<f64>) -> Self {
+    pub(crate) fn new(push: &SourceExcitation, q: &[ComplexPose], s: Complex<f64>) -> Self {
         let part = |imaginary: bool| {
             let of = |c: Complex<f64>| if imaginary { c.im } else { c.re };
             // rates are s times displacements
             let rate = |c: Complex<f64>| {
                 if imaginary { s.im * c.re + s.re * c.im } else { s.re * c.re - s.im * c.im }
             };
-            Part {
+            MotionComponent {
                 q: q.iter().map(|x| x.map(of)).collect(),
                 v: q.iter().map(|x| x.map(rate)).collect(),
                 rise: push.rise.iter().map(|r| of(*r)).collect(),
@@ -104,22 +104,23 @@ impl Moved {
     }
 }
 
-impl Moved {
+impl ForcedMotion {
     /// A real motion `q` that does not change, with these voltages and rises.
     pub(crate) fn held(q: Vec<Pose>, volts: Vec<f64>, rise: Vec<f64>) -> Self {
         let v = vec![Pose::zeros(); q.len()];
-        let none = Part { q: v.clone(), v: v.clone(), rise: vec![0.0; rise.len()], volts: vec![0.0; volts.len()] };
-        Self { parts: [Part { q, v, rise, volts }, none] }
+        let none =
+            MotionComponent { q: v.clone(), v: v.clone(), rise: vec![0.0; rise.len()], volts: vec![0.0; volts.len()] };
+        Self { parts: [MotionComponent { q, v, rise, volts }, none] }
     }
 }
 
-impl Perturbed<'_> {
-    fn view(&self) -> View<'_> {
-        View { q: self.q, v: self.v, rise: self.rise, volts: &self.drive.volts }
+impl PerturbedState<'_> {
+    fn view(&self) -> SignalView<'_> {
+        SignalView { q: self.q, v: self.v, rise: self.rise, volts: &self.drive.volts }
     }
 
     /// What a unit e^(st) at source `source` does.
-    pub(crate) fn push(&self, source: usize, s: Complex<f64>) -> Push {
+    pub(crate) fn push(&self, source: usize, s: Complex<f64>) -> SourceExcitation {
         let system = self.system;
         let electrics = &system.electrics;
         let heaters = &electrics.heating.heaters;
@@ -159,10 +160,10 @@ impl Perturbed<'_> {
             force
         });
         let force = re.iter().zip(&im).map(|(re, im)| re.zip_map(im, |re, im| Complex::new(-re, -im))).collect();
-        Push { force, volts, rise }
+        SourceExcitation { force, volts, rise }
     }
 
-    /// [`Perturbed::push`] in parts that do not depend on s: its sum over them, each times [`Law::factor`].
+    /// [`PerturbedState::push`] in parts that do not depend on s: its sum over them, each times [`FrequencyDependence::factor`].
     pub(crate) fn constituents(&self, source: usize) -> Vec<Constituent> {
         let system = self.system;
         let electrics = &system.electrics;
@@ -171,38 +172,38 @@ impl Perturbed<'_> {
         unit[source] = 1.0;
         let slopes: Vec<f64> = (0..heaters.len()).map(|k| electrics.heating.slope(k, self.sources, &unit)).collect();
         let law = |k: usize| match heaters[k].time_constant {
-            tau if tau > 0.0 => Law::Lagged(tau),
-            _ => Law::AtOnce,
+            tau if tau > 0.0 => FrequencyDependence::Lagged(tau),
+            _ => FrequencyDependence::AtOnce,
         };
-        let mut laws = vec![Law::AtOnce];
+        let mut laws = vec![FrequencyDependence::AtOnce];
         for (k, slope) in slopes.iter().enumerate() {
             if *slope != 0.0 && !laws.contains(&law(k)) {
                 laws.push(law(k));
             }
         }
         if system.is_rate(source) {
-            laws.push(Law::Rate);
+            laws.push(FrequencyDependence::Rate);
         }
-        let one = |own: Law| {
+        let one = |own: FrequencyDependence| {
             let rise: Vec<f64> = (0..heaters.len()).map(|k| if law(k) == own { slopes[k] } else { 0.0 }).collect();
             let mut change = electrics.drive();
             change.load = 0.0;
             for ((strain, heater), rise) in change.expansion.iter_mut().zip(heaters).zip(&rise) {
                 *strain = heater.expansion * rise;
             }
-            if own == Law::AtOnce {
+            if own == FrequencyDependence::AtOnce {
                 for (g, volts) in change.volts.iter_mut().enumerate() {
                     *volts = electrics.gap_rows[(g, source)];
                 }
                 change.inputs.copy_from_slice(&unit[electrics.voltages()..]);
             }
-            if own == Law::Rate {
+            if own == FrequencyDependence::Rate {
                 change.turning = 1.0;
             }
             let volts = change.volts.clone();
             let mut force = vec![Pose::zeros(); system.bodies()];
             system.drive_force(self.q, self.drive, &change, &mut force);
-            if own == Law::AtOnce && system.is_rate(source) {
+            if own == FrequencyDependence::AtOnce && system.is_rate(source) {
                 for ((force, body), v) in force.iter_mut().zip(&system.model.bodies).zip(self.v) {
                     *force += held_out(body, skew(body, 2.0, v));
                 }
@@ -214,16 +215,16 @@ impl Perturbed<'_> {
     }
 
     /// Change of a signal.
-    pub(crate) fn seen(&self, signal: Signal, moved: &Moved) -> Complex<f64> {
+    pub(crate) fn signal_change(&self, signal: Signal, moved: &ForcedMotion) -> Complex<f64> {
         let [re, im] = moved.parts.each_ref().map(|part| {
-            let change = View { q: &part.q, v: &part.v, rise: &part.rise, volts: &part.volts };
+            let change = SignalView { q: &part.q, v: &part.v, rise: &part.rise, volts: &part.volts };
             signal.slope(self.compiled, &self.view(), &change)
         });
         Complex::new(re, im)
     }
 
     /// Change of the charge that each source has brought [C].
-    pub(crate) fn charges(&self, sources: &[usize], moved: &Moved) -> Vec<Complex<f64>> {
+    pub(crate) fn charges(&self, sources: &[usize], moved: &ForcedMotion) -> Vec<Complex<f64>> {
         let mut charges = vec![Complex::from(0.0); sources.len()];
         for g in 0..self.drive.volts.len() {
             let [re, im] = moved.parts.each_ref().map(|part| {
@@ -239,7 +240,7 @@ impl Perturbed<'_> {
     }
 
     /// Change of the rise of a heater [K].
-    pub(crate) fn warmed(push: &Push, heater: usize) -> Complex<f64> {
+    pub(crate) fn warmed(push: &SourceExcitation, heater: usize) -> Complex<f64> {
         push.rise[heater]
     }
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 /// The chosen order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ModelOrder {
+pub struct Mesh {
     /// Segments of each beam, in the order of the structure; 0: a rigid beam.
     pub segments: Vec<usize>,
     /// Largest estimated relative error of a frequency within the band [1]; none where no mode lies in it or no estimate
@@ -17,7 +17,7 @@ pub struct ModelOrder {
     pub passes: usize,
 }
 
-impl ModelOrder {
+impl Mesh {
     /// The same mesh with so many times its estimate.
     #[must_use]
     pub fn with_estimate_times(self, factor: f64) -> Self {
@@ -27,7 +27,7 @@ impl ModelOrder {
 
 /// What a mesh is for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Aim {
+pub struct MeshTarget {
     /// Highest frequency whose mode matters [Hz].
     pub band: f64,
     /// Relative error that the frequency of each mode may have [1], from the lowest; beyond the list: the option `tol`.
@@ -36,7 +36,7 @@ pub struct Aim {
     pub rigid: bool,
 }
 
-impl Aim {
+impl MeshTarget {
     pub(super) fn tolerance(&self, options: &CompileOptions, mode: usize) -> f64 {
         self.tolerances.get(mode).copied().unwrap_or(options.tol)
     }

@@ -1,7 +1,7 @@
 //! The axial force that each beam carries at an operating point.
 
-use crate::discretize::Discretized;
-use crate::domains::{Drive, Point};
+use crate::discretize::Assembly;
+use crate::domains::{Drive, MaterialPoint};
 use crate::multibody::BodyId;
 use crate::multibody::forces::axial_force;
 use crate::multibody::planar::Pose;
@@ -15,7 +15,7 @@ type Along = (f64, f64, f64);
 const ALONG: f64 = 0.99;
 
 /// Mean over the segments of each beam, tension positive [N]; 0 for a rigid beam.
-pub fn axial_forces(structure: &Structure, parts: &Discretized, q: &[Pose], drive: &Drive) -> Vec<f64> {
+pub fn axial_forces(structure: &Structure, parts: &Assembly, q: &[Pose], drive: &Drive) -> Vec<f64> {
     let model = &parts.system.model;
     let key = |a: BodyId, b: BodyId| (a.min(b), a.max(b));
     let mut between: HashMap<(BodyId, BodyId), Vec<Along>> = HashMap::new();
@@ -24,9 +24,9 @@ pub fn axial_forces(structure: &Structure, parts: &Discretized, q: &[Pose], driv
         let axis = model.section(joint).axis;
         between.entry(key(a, b)).or_default().push((axis.x, axis.y, axial_force(model, joint, q, &drive.rest())));
     }
-    let of = |(beam, points): (&crate::structure::Beam, &std::sync::Arc<[Point]>)| {
+    let of = |(beam, points): (&crate::structure::Beam, &std::sync::Arc<[MaterialPoint]>)| {
         let along = |&&(x, y, _): &&Along| (x * beam.angle.cos() + y * beam.angle.sin()).abs() > ALONG;
-        let one = |pair: &[Point]| {
+        let one = |pair: &[MaterialPoint]| {
             let joints = between.get(&key(pair[0].body, pair[1].body))?;
             Some(joints.iter().find(along)?.2)
         };

@@ -4,8 +4,8 @@
 //! small: at the distance s of a segment of length h, u' = h·((cos(β + θ), sin(β + θ)) − (cos β, sin β)), β the beam's direction as drawn.
 //! Bent beams keep their length to O(h⁴), so that Newton's method settles from there within a few iterations.
 
-use crate::discretize::Discretized;
-use crate::domains::Point;
+use crate::discretize::Assembly;
+use crate::domains::MaterialPoint;
 use crate::multibody::BodyId;
 use crate::multibody::planar::{self, Pose};
 use crate::structure::Structure;
@@ -13,16 +13,16 @@ use nalgebra::Vector2;
 
 /// Displacement and rotation of a point.
 #[derive(Clone, Copy)]
-struct Moved {
+struct PointDisplacement {
     u: Vector2<f64>,
     turn: f64,
 }
 
 /// Displacements `x` of the bodies of one mesh as those of another; `linear`: about the drawn geometry, as of a mode.
-pub fn carried(structure: &Structure, from: &Discretized, to: &Discretized, x: &[Pose], linear: bool) -> Vec<Pose> {
+pub fn carried(structure: &Structure, from: &Assembly, to: &Assembly, x: &[Pose], linear: bool) -> Vec<Pose> {
     let mut y = vec![Pose::zeros(); to.system.bodies()];
-    let at = |p: &Point| Moved { u: p.displacement(x, linear), turn: p.rotation(x) };
-    let mut put = |p: &Point, moved: Moved| {
+    let at = |p: &MaterialPoint| PointDisplacement { u: p.displacement(x, linear), turn: p.rotation(x) };
+    let mut put = |p: &MaterialPoint, moved: PointDisplacement| {
         if let BodyId::Free(k) = p.body {
             let swung = planar::point(&Pose::new(0.0, 0.0, moved.turn), p.arm, linear);
             let u = moved.u - swung;
@@ -37,7 +37,7 @@ pub fn carried(structure: &Structure, from: &Discretized, to: &Discretized, x: &
         moved.clear();
         moved.extend(from.iter().map(at));
         slopes.clear();
-        slopes.extend(moved.iter().map(|moved: &Moved| slope(along, h, moved.turn, linear)));
+        slopes.extend(moved.iter().map(|moved: &PointDisplacement| slope(along, h, moved.turn, linear)));
         for (k, point) in to.iter().enumerate() {
             // a node that both meshes have
             if (k * last).is_multiple_of(new) {
@@ -67,11 +67,11 @@ fn slope(along: Vector2<f64>, h: f64, turn: f64, linear: bool) -> Vector2<f64> {
 /// The cubic between the ends of a segment with these slopes, at its share `s`.
 fn between(
     (along, h): (Vector2<f64>, f64),
-    [a, b]: [Moved; 2],
+    [a, b]: [PointDisplacement; 2],
     [ta, tb]: [Vector2<f64>; 2],
     s: f64,
     linear: bool,
-) -> Moved {
+) -> PointDisplacement {
     let step = b.u - a.u;
     let u = a.u + step * (s * s * (3.0 - 2.0 * s)) + ta * (s * (1.0 - s) * (1.0 - s)) - tb * (s * s * (1.0 - s));
     let rate = step * (6.0 * s * (1.0 - s)) + ta * ((1.0 - s) * (1.0 - 3.0 * s)) - tb * (s * (2.0 - 3.0 * s));
@@ -85,5 +85,5 @@ fn between(
         let mean = a.turn + s * (b.turn - a.turn);
         mean + (local - mean).sin().atan2((local - mean).cos())
     };
-    Moved { u, turn }
+    PointDisplacement { u, turn }
 }

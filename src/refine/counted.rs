@@ -4,10 +4,10 @@
 //! pivots of K − ω²M (Sylvester), reaches the number asked for. Found by bisection on a first mesh, then [`model_order`] chooses the mesh for that
 //! band, and the band is looked up again on it until the modes asked for lie within.
 
-use super::aim::{Aim, ModelOrder};
+use super::aim::{Mesh, MeshTarget};
 use super::look::mechanics;
 use super::model_order;
-use crate::discretize::{DiscretizeError, Discretized, discretize_with, order};
+use crate::discretize::{Assembly, DiscretizeError, discretize_with, order};
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
@@ -16,7 +16,7 @@ use crate::structure::Structure;
 use std::f64::consts::TAU;
 
 /// Meshes of which the band is looked up, at most.
-const MOST_PASSES: usize = 12;
+const MAX_PASSES: usize = 12;
 /// Share by which the band lies above the highest mode that is asked for.
 const ABOVE: f64 = 0.01;
 /// Share of the tolerance that the estimate may use: it has been found smaller than the error, by up to a factor of 2.9 where short wide beams
@@ -30,23 +30,23 @@ const HIGHEST: f64 = 1e13;
 ///
 /// # Errors
 /// See [`DiscretizeError`].
-pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> Result<ModelOrder, DiscretizeError> {
+pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> Result<Mesh, DiscretizeError> {
     let bare = mechanics(structure);
     let options = &CompileOptions { band: None, ..options.clone() };
     let mut segments = order::a_priori(&bare, options)?;
     let mut chosen = None;
-    for _ in 0..MOST_PASSES {
+    for _ in 0..MAX_PASSES {
         let parts = discretize_with(&bare, options, &segments)?;
         let Some(frequency) = highest_of(&parts, count) else {
             let finer: Vec<usize> = segments.iter().map(|&n| options.scheme.segments(2 * n)).collect();
-            if finer == segments || finer.iter().sum::<usize>() > model_order::MOST_SEGMENTS {
+            if finer == segments || finer.iter().sum::<usize>() > model_order::MAX_SEGMENTS {
                 break;
             }
             segments = finer;
             continue;
         };
         let tolerances = vec![SAFETY * options.tol; count];
-        let aim = Aim { band: frequency * (1.0 + ABOVE), tolerances, rigid: false };
+        let aim = MeshTarget { band: frequency * (1.0 + ABOVE), tolerances, rigid: false };
         let order = model_order::choose_for(structure, options, &aim)?.with_estimate_times(SAFETY);
         let done = order.estimated_error.is_none() || order.modes_in_band >= count;
         segments.clone_from(&order.segments);
@@ -55,11 +55,11 @@ pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> 
             break;
         }
     }
-    Ok(chosen.unwrap_or(ModelOrder { segments, estimated_error: None, modes_in_band: 0, passes: 0 }))
+    Ok(chosen.unwrap_or(Mesh { segments, estimated_error: None, modes_in_band: 0, passes: 0 }))
 }
 
 /// Frequency of the `count`-th mode as drawn [Hz], to half of [`ABOVE`]; none where the mesh has no such mode.
-fn highest_of(parts: &Discretized, count: usize) -> Option<f64> {
+fn highest_of(parts: &Assembly, count: usize) -> Option<f64> {
     let (system, model) = (&parts.system, &parts.system.model);
     let rest = vec![Pose::zeros(); system.bodies()];
     let mut stiffness = BlockMatrix::new(&model.pattern);

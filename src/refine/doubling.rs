@@ -7,21 +7,21 @@
 //!
 //! Reference: L. F. Richardson, "The deferred approach to the limit", Phil. Trans. R. Soc. A 226 (1927).
 
-use super::aim::ModelOrder;
+use super::aim::Mesh;
 use super::groups::{Groups, MARGIN};
 use crate::options::CompileOptions;
 use crate::structure::Structure;
 
 /// Meshes that are compared with their double at most.
-const MOST_PASSES: usize = 10;
+const MAX_PASSES: usize = 10;
 /// Segments of all beams together, doubled, beyond which nothing is compared.
-const MOST_SEGMENTS: usize = 60_000;
+const MAX_SEGMENTS: usize = 60_000;
 /// Groups that are doubled alone at most.
-const MOST_GROUPS: usize = 8;
+const MAX_GROUPS: usize = 8;
 /// Share of the tolerance that the estimate may use: it has been found up to a quarter smaller than the error (docs/accuracy.md).
 pub const SAFETY: f64 = 0.75;
 /// Results that decide, at most: the worst.
-const MOST_RESULTS: usize = 24;
+const MAX_RESULTS: usize = 24;
 
 /// A number that an analysis gives, and the size to which its error is relative, in one unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ pub type Analyse<'a, E> = &'a mut dyn FnMut(&[usize]) -> Result<Vec<Output>, E>;
 
 /// Refines from `segments` until the results hold `options.tol`.
 ///
-/// [`ModelOrder::estimated_error`] is that of the worst result: none where the mesh twice as fine as the first has no results or would be
+/// [`Mesh::estimated_error`] is that of the worst result: none where the mesh twice as fine as the first has no results or would be
 /// too fine. Where refinement does not help, or makes worse, it is beyond the tolerance, and the mesh is the best of those compared.
 ///
 /// # Errors
@@ -47,9 +47,9 @@ pub fn fit<E>(
     options: &CompileOptions,
     mut segments: Vec<usize>,
     analyse: Analyse<'_, E>,
-) -> Result<ModelOrder, E> {
-    let groups = Groups::new(&structure.beams).merged(&structure.beams, MOST_GROUPS);
-    let order = |segments: &[usize], estimated_error, passes| ModelOrder {
+) -> Result<Mesh, E> {
+    let groups = Groups::new(&structure.beams).merged(&structure.beams, MAX_GROUPS);
+    let order = |segments: &[usize], estimated_error, passes| Mesh {
         segments: segments.to_vec(),
         estimated_error,
         modes_in_band: 0,
@@ -58,10 +58,10 @@ pub fn fit<E>(
     let mut coarse = analyse(&segments)?;
     let (mut before, mut slow) = ((f64::INFINITY, usize::MAX), 0);
     // of all that were compared: where rounding begins, finer meshes are worse
-    let mut best: Option<ModelOrder> = None;
-    for passes in 1..=MOST_PASSES {
+    let mut best: Option<Mesh> = None;
+    for passes in 1..=MAX_PASSES {
         let twice = doubled(options, &segments, |_| true);
-        if twice == segments || twice.iter().sum::<usize>() > MOST_SEGMENTS {
+        if twice == segments || twice.iter().sum::<usize>() > MAX_SEGMENTS {
             // without beams there is no mesh to be wrong
             let none = (twice == segments).then_some(0.0);
             return Ok(best.unwrap_or_else(|| order(&segments, none, passes)));
@@ -79,7 +79,7 @@ pub fn fit<E>(
         let all = segments.iter().sum::<usize>();
         let fewer = (before.1 as f64 / all as f64).clamp(0.5, 1.0);
         slow = if worst > fewer * before.0 { slow + 1 } else { 0 };
-        if passes == MOST_PASSES || slow > 1 {
+        if passes == MAX_PASSES || slow > 1 {
             break;
         }
         before = (worst, all);
@@ -89,7 +89,7 @@ pub fn fit<E>(
         }
         let mut decide: Vec<usize> = (0..errors.len()).filter(|&j| errors[j].abs() > 0.1 * options.tol).collect();
         decide.sort_by(|&i, &j| errors[j].abs().total_cmp(&errors[i].abs()).then(i.cmp(&j)));
-        decide.truncate(MOST_RESULTS);
+        decide.truncate(MAX_RESULTS);
         let shares = shares(options, &groups, &segments, &coarse, (&errors, &decide), analyse);
         let next = match shares {
             Some(shares) => {
@@ -110,17 +110,17 @@ pub fn fit<E>(
             _ => (twice, fine),
         };
     }
-    Ok(best.unwrap_or_else(|| order(&segments, None, MOST_PASSES)))
+    Ok(best.unwrap_or_else(|| order(&segments, None, MAX_PASSES)))
 }
 
 /// The estimate of a mesh as it is: what twice the segments change.
 ///
 /// # Errors
 /// What the analysis has against the mesh.
-pub fn estimate<E>(options: &CompileOptions, segments: Vec<usize>, analyse: Analyse<'_, E>) -> Result<ModelOrder, E> {
+pub fn estimate<E>(options: &CompileOptions, segments: Vec<usize>, analyse: Analyse<'_, E>) -> Result<Mesh, E> {
     let worst = |errors: Vec<f64>| errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
     let estimated_error = errors(options, &segments, analyse)?.map(worst);
-    Ok(ModelOrder { segments, estimated_error, modes_in_band: 0, passes: 1 })
+    Ok(Mesh { segments, estimated_error, modes_in_band: 0, passes: 1 })
 }
 
 /// The relative error of each result of a mesh; none where the finer mesh has no results or would be too fine.
@@ -130,15 +130,15 @@ pub fn estimate<E>(options: &CompileOptions, segments: Vec<usize>, analyse: Anal
 pub fn errors<E>(options: &CompileOptions, segments: &[usize], analyse: Analyse<'_, E>) -> Result<Option<Vec<f64>>, E> {
     let coarse = analyse(segments)?;
     let twice = doubled(options, segments, |_| true);
-    let comparable = twice.iter().sum::<usize>() <= MOST_SEGMENTS;
+    let comparable = twice.iter().sum::<usize>() <= MAX_SEGMENTS;
     let fine = if comparable { analyse(&twice).ok() } else { None };
     Ok(fine.map(|fine| differences(&coarse, &fine)))
 }
 
 /// The mesh of twice the segments; none where it would be too fine to compare with.
-pub fn twice(options: &CompileOptions, order: &ModelOrder) -> Option<ModelOrder> {
+pub fn twice(options: &CompileOptions, order: &Mesh) -> Option<Mesh> {
     let segments = doubled(options, &order.segments, |_| true);
-    (segments.iter().sum::<usize>() <= MOST_SEGMENTS).then(|| ModelOrder { segments, ..order.clone() })
+    (segments.iter().sum::<usize>() <= MAX_SEGMENTS).then(|| Mesh { segments, ..order.clone() })
 }
 
 /// For each result that decides, what each group contributes to its error; none where a mesh has no results.

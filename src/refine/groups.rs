@@ -8,7 +8,7 @@ use std::collections::HashMap;
 pub(super) const MARGIN: f64 = 0.9;
 
 /// Segments of a beam for each of those it has, at most, by one prediction: further it is a guess.
-const MOST_GROWTH: usize = 8;
+const MAX_GROWTH: usize = 8;
 
 /// Beams that are alike, as indices.
 pub(super) struct Groups(pub(super) Vec<Vec<usize>>);
@@ -64,7 +64,7 @@ impl Groups {
         let step = |n: usize| options.scheme.segments(n + 1 + n / 50);
         for _ in 0..100_000 {
             let gain = |g: usize| {
-                if now[g] == 0 || next[g] > MOST_GROWTH * (now[g] + 1) {
+                if now[g] == 0 || next[g] > MAX_GROWTH * (now[g] + 1) {
                     return 0.0;
                 }
                 let less = scaled(g, next[g]) - scaled(g, step(next[g]));

@@ -7,8 +7,8 @@
 //! Reference: W. T. Koiter, "On the stability of elastic equilibrium" (1945), for imperfections; S. P. Timoshenko, J. M. Gere,
 //! "Theory of Elastic Stability" (1961), §1.12.
 
-use crate::discretize::Discretized;
-use crate::domains::{Load, Point};
+use crate::discretize::Assembly;
+use crate::domains::{DeadLoad, MaterialPoint};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId};
 use crate::solve::frequency::eigen::lowest_modes;
@@ -16,7 +16,7 @@ use nalgebra::Vector2;
 
 /// Adds the forces of an imperfection whose largest displacement is `size` [m], of either sign; nothing where no mode comes
 /// out or the lowest one is a rigid motion.
-pub fn apply(parts: &mut Discretized, size: f64) {
+pub fn apply(parts: &mut Assembly, size: f64) {
     let system = &parts.system;
     let zeros = vec![Pose::zeros(); system.bodies()];
     let mut drive = system.electrics.drive();
@@ -36,11 +36,11 @@ pub fn apply(parts: &mut Discretized, size: f64) {
     // the body that moves most goes up, or to the right
     let up = if most.y.abs() > 1e-6 * most.x.abs() { most.y } else { most.x };
     let scale = lambda * size.copysign(size * up) / largest;
-    let loads: Vec<Load> = (shape.iter().enumerate())
+    let loads: Vec<DeadLoad> = (shape.iter().enumerate())
         .map(|(k, x)| {
             let force = system.model.mass(k).component_mul(x) * scale;
-            let point = Point { body: BodyId::Free(k), arm: Vector2::zeros() };
-            Load { point, force: Vector2::new(force.x, force.y), moment: force.z }
+            let point = MaterialPoint { body: BodyId::Free(k), arm: Vector2::zeros() };
+            DeadLoad { point, force: Vector2::new(force.x, force.y), moment: force.z }
         })
         .collect();
     parts.system.loads.extend(loads);

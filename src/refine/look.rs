@@ -2,10 +2,10 @@
 //!
 //! Each look starts the iteration of the modes from the shapes of the mesh looked at before, carried over.
 
-use super::aim::Aim;
+use super::aim::MeshTarget;
 use super::carry::carried;
-use super::order_error::{OrderError, of_modes};
-use crate::discretize::{DiscretizeError, Discretized, discretize_with};
+use super::order_error::{ModeErrors, of_modes};
+use crate::discretize::{Assembly, DiscretizeError, discretize_with};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::options::CompileOptions;
@@ -13,15 +13,15 @@ use crate::solve::subspace;
 use crate::structure::Structure;
 
 /// Modes within the band beyond which the rule of [`order`] stands as it is.
-const MOST_MODES: usize = 64;
+const MAX_MODES: usize = 64;
 
 /// A model that was computed.
-pub(super) struct Seen {
-    pub(super) parts: Discretized,
+pub(super) struct MeshModes {
+    pub(super) parts: Assembly,
     pub(super) lambda: Vec<f64>,
     pub(super) shapes: Vec<Vec<Pose>>,
     pub(super) modes: usize,
-    pub(super) error: Option<OrderError>,
+    pub(super) error: Option<ModeErrors>,
 }
 
 /// The drawing without what has no share in the modes of the drawn geometry.
@@ -44,27 +44,27 @@ pub(super) fn mechanics(structure: &Structure) -> Structure {
 }
 
 /// Modes within the band and their errors; starts from the shapes of a model with other segments.
-pub(super) fn look(
+pub(super) fn solve_modes(
     structure: &Structure,
     options: &CompileOptions,
-    aim: &Aim,
+    aim: &MeshTarget,
     segments: &[usize],
-    before: Option<&Seen>,
-) -> Result<Seen, DiscretizeError> {
+    before: Option<&MeshModes>,
+) -> Result<MeshModes, DiscretizeError> {
     let parts = discretize_with(structure, options, segments)?;
     let (modes, lambda, shapes, error) = modes_in_band(structure, options, aim, &parts, before).unwrap_or_default();
-    Ok(Seen { parts, lambda, shapes, modes, error })
+    Ok(MeshModes { parts, lambda, shapes, modes, error })
 }
 
-type Found = (usize, Vec<f64>, Vec<Vec<Pose>>, Option<OrderError>);
+type ModesInBand = (usize, Vec<f64>, Vec<Vec<Pose>>, Option<ModeErrors>);
 
 fn modes_in_band(
     structure: &Structure,
     options: &CompileOptions,
-    aim: &Aim,
-    parts: &Discretized,
-    before: Option<&Seen>,
-) -> Option<Found> {
+    aim: &MeshTarget,
+    parts: &Assembly,
+    before: Option<&MeshModes>,
+) -> Option<ModesInBand> {
     let (system, model) = (&parts.system, &parts.system.model);
     let n = system.bodies();
     let mut k = BlockMatrix::new(&model.pattern);
@@ -82,7 +82,7 @@ fn modes_in_band(
     };
     let edge = (std::f64::consts::TAU * aim.band).powi(2);
     let modes = shifted(edge).factor(&model.pattern).ok()?.negative;
-    if modes == 0 || modes > MOST_MODES {
+    if modes == 0 || modes > MAX_MODES {
         return None;
     }
     let mut shift = 0.0;

@@ -16,10 +16,10 @@
 //! Reference: J. O. Dow, "A Unified Approach to the Finite Element Method and Error Analysis Procedures" (1999), for
 //! refinement led by an estimate.
 
-pub use super::aim::{Aim, ModelOrder};
+pub use super::aim::{Mesh, MeshTarget};
 use super::groups::{Groups, MARGIN};
-use super::look::{Seen, look, mechanics};
-use super::order_error::OrderError;
+use super::look::{MeshModes, mechanics, solve_modes};
+use super::order_error::ModeErrors;
 use super::rigid_beams::stiffen;
 use crate::discretize::{DiscretizeError, order};
 use crate::options::{CompileOptions, Scheme};
@@ -28,25 +28,25 @@ use crate::structure::Structure;
 /// Largest kh of a segment at the edge of the band.
 const LONGEST: f64 = 3.0;
 /// Segments beyond which it does.
-pub(super) const MOST_SEGMENTS: usize = 10_000;
+pub(super) const MAX_SEGMENTS: usize = 10_000;
 /// Models tried.
-const MOST_PASSES: usize = 24;
+const MAX_PASSES: usize = 24;
 /// Models without an estimate that are refined as a whole.
-const MOST_BLIND: usize = 3;
+const MAX_BLIND: usize = 3;
 
 /// Chooses the numbers of segments for a band.
 ///
 /// # Errors
 /// See [`DiscretizeError`].
-pub fn choose(structure: &Structure, options: &CompileOptions, band: f64) -> Result<ModelOrder, DiscretizeError> {
-    choose_for(structure, options, &Aim { band, tolerances: Vec::new(), rigid: true })
+pub fn choose(structure: &Structure, options: &CompileOptions, band: f64) -> Result<Mesh, DiscretizeError> {
+    choose_for(structure, options, &MeshTarget { band, tolerances: Vec::new(), rigid: true })
 }
 
 /// Chooses the numbers of segments for an aim.
 ///
 /// # Errors
 /// See [`DiscretizeError`].
-pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &Aim) -> Result<ModelOrder, DiscretizeError> {
+pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &MeshTarget) -> Result<Mesh, DiscretizeError> {
     let (bare, band) = (mechanics(structure), aim.band);
     let options = &CompileOptions { band: Some(band), ..options.clone() };
     let groups = Groups::new(&bare.beams);
@@ -57,14 +57,14 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &Aim) ->
     for (n, floor) in segments.iter_mut().zip(&floor) {
         *n = (*n).max(*floor);
     }
-    if segments.iter().sum::<usize>() > MOST_SEGMENTS {
-        return Ok(ModelOrder { segments, estimated_error: None, modes_in_band: 0, passes: 0 });
+    if segments.iter().sum::<usize>() > MAX_SEGMENTS {
+        return Ok(Mesh { segments, estimated_error: None, modes_in_band: 0, passes: 0 });
     }
-    let mut holds: Option<(ModelOrder, Seen)> = None;
-    let mut seen: Option<Seen> = None;
-    for passes in 1..=MOST_PASSES {
+    let mut holds: Option<(Mesh, MeshModes)> = None;
+    let mut seen: Option<MeshModes> = None;
+    for passes in 1..=MAX_PASSES {
         let before = seen.as_ref().or(holds.as_ref().map(|(_, seen)| seen));
-        let now = look(&bare, options, aim, &segments, before)?;
+        let now = solve_modes(&bare, options, aim, &segments, before)?;
         let Some(error) = &now.error else {
             if holds.is_some() {
                 break;
@@ -74,19 +74,15 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &Aim) ->
             }
             // modes of so few segments may not be told apart: with more they are
             let finer: Vec<usize> = segments.iter().map(|&n| options.scheme.segments(2 * n)).collect();
-            if now.modes > 0
-                && passes <= MOST_BLIND
-                && finer != segments
-                && finer.iter().sum::<usize>() <= MOST_SEGMENTS
+            if now.modes > 0 && passes <= MAX_BLIND && finer != segments && finer.iter().sum::<usize>() <= MAX_SEGMENTS
             {
                 segments = finer;
                 continue;
             }
-            return Ok(ModelOrder { segments, estimated_error: None, modes_in_band: now.modes, passes });
+            return Ok(Mesh { segments, estimated_error: None, modes_in_band: now.modes, passes });
         };
         let worst = aim.worst(options, &error.relative[..now.modes]);
-        let order =
-            ModelOrder { segments: segments.clone(), estimated_error: Some(worst), modes_in_band: now.modes, passes };
+        let order = Mesh { segments: segments.clone(), estimated_error: Some(worst), modes_in_band: now.modes, passes };
         let mut next = predicted(options, aim, &groups, error, now.modes, (&segments, &floor));
         let total = |n: &[usize]| n.iter().sum::<usize>();
         if worst <= options.tol {
@@ -103,7 +99,7 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &Aim) ->
             if holds.as_ref().is_some_and(|(h, _)| total(&next) >= total(&h.segments)) {
                 break;
             }
-            if next == segments || passes == MOST_PASSES || total(&next) > MOST_SEGMENTS {
+            if next == segments || passes == MAX_PASSES || total(&next) > MAX_SEGMENTS {
                 if holds.is_some() {
                     break;
                 }
@@ -125,20 +121,20 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &Aim) ->
 fn by_another_scheme(
     structure: &Structure,
     options: &CompileOptions,
-    aim: &Aim,
-) -> Result<ModelOrder, DiscretizeError> {
+    aim: &MeshTarget,
+) -> Result<Mesh, DiscretizeError> {
     let finer = CompileOptions { scheme: Scheme::E4, tol: 0.5 * options.tol, ..options.clone() };
     let tolerances = aim.tolerances.iter().map(|tol| 0.5 * tol).collect();
-    let order = choose_for(structure, &finer, &Aim { tolerances, ..aim.clone() })?;
-    Ok(ModelOrder { estimated_error: None, ..order })
+    let order = choose_for(structure, &finer, &MeshTarget { tolerances, ..aim.clone() })?;
+    Ok(Mesh { estimated_error: None, ..order })
 }
 
 /// The fewest segments for which every mode is predicted to hold.
 fn predicted(
     options: &CompileOptions,
-    aim: &Aim,
+    aim: &MeshTarget,
     groups: &Groups,
-    error: &OrderError,
+    error: &ModeErrors,
     modes: usize,
     (segments, floor): (&[usize], &[usize]),
 ) -> Vec<usize> {

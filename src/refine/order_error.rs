@@ -31,11 +31,11 @@
 //!
 //! Valid for modes that the nodes can show: kh < 4.73, which [`model_order`](super::model_order) sees to.
 
-use super::reference::{Compared, Pencil, compare};
-use super::span::{Span, spans};
+use super::reference::{Pencil, ReferenceModes, compare};
+use super::span::{BeamSpan, spans};
 use crate::discretize::bar::bar;
-use crate::discretize::frame::{Elements, Frame, FrameGaps, FrameOptions, assemble};
-use crate::discretize::{Discretized, cubic, order};
+use crate::discretize::frame::{ElementCount, FrameGaps, FrameOptions, LinearFrame, assemble};
+use crate::discretize::{Assembly, cubic, order};
 use crate::multibody::linear_system::LinearSystem;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model};
@@ -45,7 +45,7 @@ use nalgebra::Vector3;
 
 /// Estimated errors of modes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OrderError {
+pub struct ModeErrors {
     /// For each mode, (f − f_beam)/f_beam [1]; 0 for a rigid motion.
     pub relative: Vec<f64>,
     /// For each mode, λ = ω² of the beams [rad²/s²].
@@ -61,13 +61,13 @@ pub struct OrderError {
 pub fn strain_shares(
     structure: &Structure,
     options: &CompileOptions,
-    parts: &Discretized,
+    parts: &Assembly,
     lambda: &[f64],
     shapes: &[Vec<Pose>],
 ) -> Vec<Vec<f64>> {
     let spans = spans(structure, options, (&parts.beams, &parts.offsets), false);
     let share = |(shape, lambda): (&Vec<Pose>, &f64)| {
-        let one = |(span, beam): (&Span, &crate::structure::Beam)| {
+        let one = |(span, beam): (&BeamSpan, &crate::structure::Beam)| {
             let n = span.points.len() - 1;
             let bar = bar(beam, options.shear, options.rotary_inertia);
             let stiffness = cubic::stiffness(&bar, span.length / n as f64);
@@ -81,7 +81,7 @@ pub fn strain_shares(
 
 /// True where the model's tangent is that of the cubic frame: schemes E4 and B without rigid beams. Only then is the
 /// estimate that of a loaded equilibrium too.
-pub fn own_stiffness(options: &CompileOptions, parts: &Discretized) -> bool {
+pub fn own_stiffness(options: &CompileOptions, parts: &Assembly) -> bool {
     let exact = matches!(options.scheme, Scheme::Auto | Scheme::E4 | Scheme::B);
     exact && parts.beams.iter().all(|points| points.len() > 2 || points[0].body != points[1].body)
 }
@@ -90,11 +90,11 @@ pub fn own_stiffness(options: &CompileOptions, parts: &Discretized) -> bool {
 pub fn of_modes(
     structure: &Structure,
     options: &CompileOptions,
-    parts: &Discretized,
+    parts: &Assembly,
     factor: (&BlockMatrix<f64, 3>, f64),
     lambda: &[f64],
     shapes: &[Vec<Pose>],
-) -> Option<OrderError> {
+) -> Option<ModeErrors> {
     of_loaded_modes(structure, options, parts, factor, &[], (lambda, shapes))
 }
 
@@ -102,19 +102,19 @@ pub fn of_modes(
 pub fn of_loaded_modes(
     structure: &Structure,
     options: &CompileOptions,
-    parts: &Discretized,
+    parts: &Assembly,
     factor: (&BlockMatrix<f64, 3>, f64),
     axial: &[f64],
     (lambda, shapes): (&[f64], &[Vec<Pose>]),
-) -> Option<OrderError> {
+) -> Option<ModeErrors> {
     if !own_stiffness(options, parts) {
         return by_frame(structure, options, parts, lambda, shapes);
     }
-    let (Compared { reference, likeness, x, norms }, spans) =
+    let (ReferenceModes { reference, likeness, x, norms }, spans) =
         compared(structure, options, parts, factor, axial, (lambda, shapes))?;
     let shares = (shapes.iter().zip(&x).zip(lambda.iter().zip(&norms)))
         .map(|((y, x), (&lambda, norm))| {
-            let share = |span: &Span| {
+            let share = |span: &BeamSpan| {
                 let (y, x) = (span.local(y), span.local(x));
                 let of = |f: Vec<Vector3<f64>>| f.iter().zip(&x).map(|(f, x)| f.dot(x)).sum::<f64>();
                 let softer = if lambda > 0.0 { of(span.segments(&y, &span.softer)) / lambda } else { 0.0 };
@@ -123,14 +123,14 @@ pub fn of_loaded_modes(
             spans.iter().map(share).collect()
         })
         .collect();
-    Some(OrderError { relative: relative(lambda, &reference), reference, likeness, shares })
+    Some(ModeErrors { relative: relative(lambda, &reference), reference, likeness, shares })
 }
 
-/// [`OrderError::relative`] and [`OrderError::likeness`] of each mode alone.
+/// [`ModeErrors::relative`] and [`ModeErrors::likeness`] of each mode alone.
 pub fn relative_of_loaded_modes(
     structure: &Structure,
     options: &CompileOptions,
-    parts: &Discretized,
+    parts: &Assembly,
     factor: (&BlockMatrix<f64, 3>, f64),
     axial: &[f64],
     (lambda, shapes): (&[f64], &[Vec<Pose>]),
@@ -149,11 +149,11 @@ pub fn relative_of_loaded_modes(
 fn compared(
     structure: &Structure,
     options: &CompileOptions,
-    parts: &Discretized,
+    parts: &Assembly,
     (factor, shift): (&BlockMatrix<f64, 3>, f64),
     axial: &[f64],
     (lambda, shapes): (&[f64], &[Vec<Pose>]),
-) -> Option<(Compared, Vec<Span>)> {
+) -> Option<(ReferenceModes, Vec<BeamSpan>)> {
     let model = &parts.system.model;
     let mut spans = spans(structure, options, (&parts.beams, &parts.offsets), true);
     for ((span, beam), force) in spans.iter_mut().zip(&structure.beams).zip(axial) {
@@ -178,15 +178,15 @@ pub fn relative(lambda: &[f64], reference: &[f64]) -> Vec<f64> {
 fn by_frame(
     structure: &Structure,
     options: &CompileOptions,
-    parts: &Discretized,
+    parts: &Assembly,
     lambda: &[f64],
     shapes: &[Vec<Pose>],
-) -> Option<OrderError> {
+) -> Option<ModeErrors> {
     // a frame of centrelines says nothing about other junctions
     if parts.offsets.iter().flatten().any(|o| *o != 0.0) {
         return None;
     }
-    let elements = Elements::Beams(parts.beams.iter().map(|b| b.len() - 1).collect());
+    let elements = ElementCount::Beams(parts.beams.iter().map(|b| b.len() - 1).collect());
     let gaps = FrameGaps::LeftOut;
     let frame = assemble(structure, &FrameOptions { elements, shear: options.shear, undamped: true, gaps }).ok()?;
     let system = &frame.system;
@@ -202,7 +202,7 @@ fn by_frame(
     let mass = |x: &[Pose]| multiply(system, x);
     let project = |x: &mut [Pose]| system.project(x);
     let pencil = Pencil { factor: &factor, pattern: &system.pattern, shift, mass: &mass, project: &project };
-    let Compared { reference, likeness, .. } = compare(&pencil, &spans, lambda, &shapes)?;
+    let ReferenceModes { reference, likeness, .. } = compare(&pencil, &spans, lambda, &shapes)?;
     let relative = relative(lambda, &reference);
     let shares = (shapes.iter().zip(lambda).zip(&relative))
         .map(|((y, &lambda), error)| {
@@ -218,7 +218,7 @@ fn by_frame(
             weights.iter().map(|w| if sum > 0.0 { error * w / sum } else { 0.0 }).collect()
         })
         .collect();
-    Some(OrderError { relative, reference, likeness, shares })
+    Some(ModeErrors { relative, reference, likeness, shares })
 }
 
 fn multiply(system: &LinearSystem, x: &[Pose]) -> Vec<Pose> {
@@ -228,7 +228,7 @@ fn multiply(system: &LinearSystem, x: &[Pose]) -> Vec<Pose> {
 }
 
 /// A shape of the model over the bodies of the frame.
-fn to_frame(model: &Model, parts: &Discretized, frame: &Frame, x: &[Pose]) -> Vec<Pose> {
+fn to_frame(model: &Model, parts: &Assembly, frame: &LinearFrame, x: &[Pose]) -> Vec<Pose> {
     let mut y = vec![Pose::zeros(); frame.system.bodies()];
     let pairs = (frame.nodes.iter().zip(&parts.nodes))
         .filter_map(|(to, from)| Some((*to.as_ref()?, *from.as_ref()?)))

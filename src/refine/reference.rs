@@ -5,7 +5,7 @@
 //! ```
 //! for each mode (λ, y) of the model, then Rayleigh–Ritz with K and M_r over the block of all x.
 
-use super::span::{Scratch, Span};
+use super::span::{BeamSpan, SpanScratch};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Pattern};
 use crate::solve::frequency::mac;
@@ -25,7 +25,7 @@ pub(super) struct Pencil<'a> {
 }
 
 /// What the reference says of each mode.
-pub(super) struct Compared {
+pub(super) struct ReferenceModes {
     /// λ_r.
     pub(super) reference: Vec<f64>,
     pub(super) likeness: Vec<f64>,
@@ -36,17 +36,22 @@ pub(super) struct Compared {
 }
 
 /// Modes by inverse iteration and Rayleigh–Ritz with the reference.
-pub(super) fn compare(pencil: &Pencil<'_>, spans: &[Span], lambda: &[f64], shapes: &[Vec<Pose>]) -> Option<Compared> {
+pub(super) fn compare(
+    pencil: &Pencil<'_>,
+    spans: &[BeamSpan],
+    lambda: &[f64],
+    shapes: &[Vec<Pose>],
+) -> Option<ReferenceModes> {
     let count = lambda.len();
-    let tight: Vec<&Span> = spans.iter().filter(|span| span.softer != Matrix6::zeros()).collect();
-    let softer = |x: &[Pose], scratch: &mut Scratch| {
+    let tight: Vec<&BeamSpan> = spans.iter().filter(|span| span.softer != Matrix6::zeros()).collect();
+    let softer = |x: &[Pose], scratch: &mut SpanScratch| {
         let mut f = vec![Pose::zeros(); x.len()];
         for span in &tight {
             span.add_segments(x, &span.softer, scratch, &mut f);
         }
         f
     };
-    let weigh = |x: &[Pose], lambda: f64, scratch: &mut Scratch| {
+    let weigh = |x: &[Pose], lambda: f64, scratch: &mut SpanScratch| {
         let mut z = (pencil.mass)(x);
         let base = z.clone();
         for span in spans {
@@ -54,7 +59,7 @@ pub(super) fn compare(pencil: &Pencil<'_>, spans: &[Span], lambda: &[f64], shape
         }
         (z, base)
     };
-    let scratch = &mut Scratch::default();
+    let scratch = &mut SpanScratch::default();
     let (mut x, mut kx, mut norms) = (Vec::new(), Vec::new(), Vec::new());
     let (mut mx, mut second, mut plain) = (Vec::new(), Vec::new(), Vec::new());
     for (y, &lambda) in shapes.iter().zip(lambda) {
@@ -102,7 +107,7 @@ pub(super) fn compare(pencil: &Pencil<'_>, spans: &[Span], lambda: &[f64], shape
     let near = |k: usize, r: f64| (found[k] - r).abs() <= NEAR * r.abs();
     let sum = |(i, r): (usize, &f64)| (0..count).filter(|&k| near(k, *r)).map(|k| alike[(i, k)]).sum::<f64>().min(1.0);
     let likeness = reference.iter().enumerate().map(sum).collect();
-    Some(Compared { reference, likeness, x, norms })
+    Some(ReferenceModes { reference, likeness, x, norms })
 }
 
 fn dot(a: &[Pose], b: &[Pose]) -> f64 {

@@ -5,12 +5,12 @@
 //! that touch ground, that are heated or under stress, and electrodes of facing beams stay elastic, as they may matter where
 //! nothing rings.
 
-use super::aim::{Aim, ModelOrder};
+use super::aim::{Mesh, MeshTarget};
 use super::groups::{Groups, MARGIN};
-use super::look::{Seen, look};
+use super::look::{MeshModes, solve_modes};
 use super::order_error::{relative, strain_shares};
-use crate::discretize::{DiscretizeError, Discretized, discretize_with};
-use crate::domains::{BeamRows, Point};
+use crate::discretize::{Assembly, DiscretizeError, discretize_with};
+use crate::domains::{BeamRows, MaterialPoint};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId};
 use crate::options::CompileOptions;
@@ -21,10 +21,10 @@ pub(super) fn stiffen(
     structure: &Structure,
     bare: &Structure,
     options: &CompileOptions,
-    aim: &Aim,
+    aim: &MeshTarget,
     groups: &Groups,
-    elastic: &Seen,
-    order: &mut ModelOrder,
+    elastic: &MeshModes,
+    order: &mut Mesh,
 ) -> Result<(), DiscretizeError> {
     let Some(error) = &elastic.error else { return Ok(()) };
     let modes = elastic.modes;
@@ -69,7 +69,7 @@ pub(super) fn stiffen(
         let firm = still.len() == yields.len()
             && still.iter().zip(&yields).all(|(rigid, elastic)| (rigid - elastic).abs() <= options.tol * elastic);
         if firm {
-            let now = look(bare, options, aim, &segments, Some(elastic))?;
+            let now = solve_modes(bare, options, aim, &segments, Some(elastic))?;
             order.passes += 1;
             let apart = relative(&now.lambda, &error.reference);
             let worst = apart.iter().take(modes).fold(0.0, |m: f64, e| m.max(e.abs()));
@@ -103,11 +103,11 @@ fn acted_on(structure: &Structure) -> Vec<NodeId> {
 /// How far the drawn structure gives way where it is acted on: fᵀK⁻¹f for a unit force or moment in each direction at each
 /// of these nodes, and for a unit tension in each beam that heat or stress lengthens. Empty where nothing acts; none where
 /// something does on a structure that floats.
-fn compliances(structure: &Structure, acted: &[NodeId], parts: &Discretized) -> Option<Vec<f64>> {
+fn compliances(structure: &Structure, acted: &[NodeId], parts: &Assembly) -> Option<Vec<f64>> {
     let (system, model) = (&parts.system, &parts.system.model);
     let n = system.bodies();
     let mut forces: Vec<Vec<Pose>> = Vec::new();
-    let push = |f: &mut [Pose], p: &Point, x: f64, y: f64, moment: f64| {
+    let push = |f: &mut [Pose], p: &MaterialPoint, x: f64, y: f64, moment: f64| {
         if let BodyId::Free(k) = p.body {
             f[k] += Pose::new(x, y, moment + p.arm.x * y - p.arm.y * x);
         }

@@ -6,13 +6,13 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::order_error::{own_stiffness, relative};
-use super::span::{Span, spans};
-use crate::discretize::Discretized;
+use super::span::{BeamSpan, spans};
+use crate::discretize::Assembly;
 use crate::multibody::BodyId;
-use crate::multibody::lanes::{Eight, Kernel, LANES, LanePose, Real, STILL, Wide, across, forces, load, store};
+use crate::multibody::lanes::{Kernel, LANES, Lane8, LanePose, Real, STILL, SimdReal, across, forces, load, store};
 use crate::options::CompileOptions;
 use crate::solve::frequency::mac;
-use crate::solve::frequency::side_by_side::{LaneModes, Small, dot, weigh};
+use crate::solve::frequency::side_by_side::{LaneModes, RitzMatrices, dot, weigh};
 use crate::structure::Structure;
 use nalgebra::{DMatrix, Matrix6};
 
@@ -23,23 +23,23 @@ const LONG: [usize; 2] = [0, 3];
 const ACROSS: [usize; 4] = [1, 2, 4, 5];
 
 /// A matrix of a segment: what is along, then what is across, row by row.
-type Segment<T = Eight> = [T; 20];
+type Segment<T = Lane8> = [T; 20];
 
 /// A point of a beam.
 #[derive(Debug, Clone, Copy)]
 struct LanePoint {
     /// Its body; none: ground.
     body: Option<u32>,
-    arm: [Eight; 2],
+    arm: [Lane8; 2],
     /// Mass, first and second moment of the model's lump there.
-    lump: [Eight; 3],
+    lump: [Lane8; 3],
 }
 
-/// A beam in each variant, see [`Span`].
+/// A beam in each variant, see [`BeamSpan`].
 #[derive(Debug, Clone)]
 struct LaneSpan {
     points: Vec<LanePoint>,
-    along: [Eight; 2],
+    along: [Lane8; 2],
     mass: Segment,
     second: Segment,
 }
@@ -56,19 +56,19 @@ pub(crate) struct LaneReference {
     mx: Vec<Vec<LanePose>>,
     bent: Vec<Vec<LanePose>>,
     /// λ of the reference.
-    lambda: Vec<Eight>,
+    lambda: Vec<Lane8>,
     /// xᵀM_r·x and yᵀM·x, row by row, and yᵀMy.
-    own: Vec<Eight>,
-    common: Vec<Eight>,
-    lengths: Vec<Eight>,
-    small: Small,
+    own: Vec<Lane8>,
+    common: Vec<Lane8>,
+    lengths: Vec<Lane8>,
+    small: RitzMatrices,
 }
 
 /// What is drawn, with its options, and the model of it.
-pub(crate) type Variant<'a> = (&'a Structure, &'a CompileOptions, &'a Discretized);
+pub(crate) type BatchVariant<'a> = (&'a Structure, &'a CompileOptions, &'a Assembly);
 
 /// The beams of a variant.
-fn beams((structure, options, parts): Variant<'_>) -> Vec<Span> {
+fn beams((structure, options, parts): BatchVariant<'_>) -> Vec<BeamSpan> {
     spans(structure, options, (&parts.beams, &parts.offsets), true)
 }
 
@@ -78,13 +78,14 @@ fn body(id: BodyId) -> Option<u32> {
 
 impl LaneReference {
     /// For variants like `first` and so many modes; none where the model's stiffness is not that of its beams.
-    pub(crate) fn new(first: Variant<'_>, modes: usize) -> Option<Self> {
+    pub(crate) fn new(first: BatchVariant<'_>, modes: usize) -> Option<Self> {
         if !own_stiffness(first.1, first.2) {
             return None;
         }
-        let none = Eight::NONE;
-        let point = |p: &crate::domains::Point| LanePoint { body: body(p.body), arm: [none; 2], lump: [none; 3] };
-        let span = |span: &Span| LaneSpan {
+        let none = Lane8::NONE;
+        let point =
+            |p: &crate::domains::MaterialPoint| LanePoint { body: body(p.body), arm: [none; 2], lump: [none; 3] };
+        let span = |span: &BeamSpan| LaneSpan {
             points: span.points.iter().map(point).collect(),
             along: [none; 2],
             mass: [none; 20],
@@ -106,29 +107,30 @@ impl LaneReference {
             own: vec![none; modes * modes],
             common: vec![none; modes * modes],
             lengths: vec![none; modes],
-            small: Small::default(),
+            small: RitzMatrices::default(),
         })
     }
 
     /// Signed relative error of each mode's frequency and how much of it is in the reference, for each variant whose modes `modes` has
     /// found last; none for one that has other points.
-    pub(crate) fn compare(&mut self, modes: &LaneModes, variants: &[Variant<'_>]) -> Vec<Option<Vec<(f64, f64)>>> {
-        let fits: Vec<bool> = variants.iter().enumerate().map(|(lane, variant)| self.put(lane, *variant)).collect();
+    pub(crate) fn compare(&mut self, modes: &LaneModes, variants: &[BatchVariant<'_>]) -> Vec<Option<Vec<(f64, f64)>>> {
+        let fits: Vec<bool> =
+            variants.iter().enumerate().map(|(lane, variant)| self.set_lane(lane, *variant)).collect();
         for lane in variants.len()..LANES {
             if let Some(last) = variants.last() {
-                self.put(lane, *last);
+                self.set_lane(lane, *last);
             }
         }
-        across(Work { reference: self, modes });
+        across(ReferenceKernel { reference: self, modes });
         self.small.sort(&mut self.lambda);
-        let found = |(lane, fits): (usize, bool)| fits.then(|| self.judged(modes, lane));
+        let found = |(lane, fits): (usize, bool)| fits.then(|| self.mode_errors(modes, lane));
         fits.into_iter().enumerate().map(found).collect()
     }
 
     /// Puts the beams of a variant into one lane; false where they have other points.
-    fn put(&mut self, lane: usize, variant: Variant<'_>) -> bool {
+    fn set_lane(&mut self, lane: usize, variant: BatchVariant<'_>) -> bool {
         let spans = beams(variant);
-        let alike = |(own, other): (&LaneSpan, &Span)| {
+        let alike = |(own, other): (&LaneSpan, &BeamSpan)| {
             own.points.len() == other.points.len()
                 && own.points.iter().zip(&other.points).all(|(own, other)| own.body == body(other.body))
         };
@@ -148,9 +150,9 @@ impl LaneReference {
     }
 
     /// Errors of the modes in one lane: [`super::reference::compare`] from where the small matrices are known.
-    fn judged(&self, modes: &LaneModes, lane: usize) -> Vec<(f64, f64)> {
+    fn mode_errors(&self, modes: &LaneModes, lane: usize) -> Vec<(f64, f64)> {
         let count = self.lambda.len();
-        let of = |numbers: &[Eight]| numbers.iter().map(|x| x.lane(lane)).collect::<Vec<f64>>();
+        let of = |numbers: &[Lane8]| numbers.iter().map(|x| x.lane(lane)).collect::<Vec<f64>>();
         let (found, lambda, lengths) = (of(&self.lambda), of(modes.lambda()), of(&self.lengths));
         let (own, common) = (of(&self.own), of(&self.common));
         let v = |i: usize, k: usize| self.small.vector(i, k).lane(lane);
@@ -173,7 +175,7 @@ impl LaneReference {
     }
 }
 
-fn set(lane: usize, to: &mut [Eight], from: &[f64]) {
+fn set(lane: usize, to: &mut [Lane8], from: &[f64]) {
     for (to, from) in to.iter_mut().zip(from) {
         to.set_lane(lane, *from);
     }
@@ -195,14 +197,14 @@ fn segment(matrix: &Matrix6<f64>) -> [f64; 20] {
     segment
 }
 
-struct Work<'a> {
+struct ReferenceKernel<'a> {
     reference: &'a mut LaneReference,
     modes: &'a LaneModes,
 }
 
-impl Kernel for Work<'_> {
+impl Kernel for ReferenceKernel<'_> {
     #[inline(always)]
-    fn run<W: Wide>(self, simd: W::Simd) {
+    fn run<W: SimdReal>(self, simd: W::Simd) {
         let LaneReference { spans, local, force, plain, x, kx, mx, bent, lambda, own, common, lengths, small } =
             self.reference;
         let (model, factor, shapes, values) = self.modes.found();
@@ -253,7 +255,7 @@ impl Kernel for Work<'_> {
 
 /// `out +=` (a·(consistent mass) + b·M₂ − c·(the model's lumps))·x of all beams.
 #[inline(always)]
-fn add_beams<W: Wide>(
+fn add_beams<W: SimdReal>(
     simd: W::Simd,
     spans: &[LaneSpan],
     x: &[LanePose],

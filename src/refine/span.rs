@@ -5,8 +5,8 @@
 
 use crate::discretize::bar::bar;
 use crate::discretize::cubic;
-use crate::discretize::scheme::{Bar, Part};
-use crate::domains::Point;
+use crate::discretize::scheme::{Bar, BeamSegment};
+use crate::domains::MaterialPoint;
 use crate::multibody::BodyId;
 use crate::multibody::planar::Pose;
 use crate::options::CompileOptions;
@@ -14,8 +14,8 @@ use crate::structure::Structure;
 use nalgebra::{Matrix6, Vector2, Vector3, Vector6};
 
 /// A beam over the points of what is cut of it: between the edges of junctions, where there are any.
-pub(super) struct Span {
-    pub(super) points: Vec<Point>,
+pub(super) struct BeamSpan {
+    pub(super) points: Vec<MaterialPoint>,
     pub(super) length: f64,
     pub(super) along: Vector2<f64>,
     /// Consistent mass of a segment, or zero where another matrix has it.
@@ -25,19 +25,19 @@ pub(super) struct Span {
     /// N²·B of a segment.
     pub(super) softer: Matrix6<f64>,
     /// Lumps of the model at the points.
-    pub(super) lumps: Vec<Part>,
+    pub(super) lumps: Vec<BeamSegment>,
 }
 
 /// Motions and forces at the points of a span.
 #[derive(Default)]
-pub(super) struct Scratch {
+pub(super) struct SpanScratch {
     x: Vec<Vector3<f64>>,
     f: Vec<Vector3<f64>>,
 }
 
-impl Span {
+impl BeamSpan {
     /// `out +=` (M_r − M)·x of this beam, N·A included.
-    pub(super) fn add_defect(&self, x: &[Pose], lambda: f64, scratch: &mut Scratch, out: &mut [Pose]) {
+    pub(super) fn add_defect(&self, x: &[Pose], lambda: f64, scratch: &mut SpanScratch, out: &mut [Pose]) {
         self.fill(x, &(self.mass + self.second * lambda), scratch);
         for ((f, x), lump) in scratch.f.iter_mut().zip(&scratch.x).zip(&self.lumps) {
             lighten(f, x, lump);
@@ -46,13 +46,13 @@ impl Span {
     }
 
     /// `out +=` the same matrix for every segment, times x.
-    pub(super) fn add_segments(&self, x: &[Pose], segment: &Matrix6<f64>, scratch: &mut Scratch, out: &mut [Pose]) {
+    pub(super) fn add_segments(&self, x: &[Pose], segment: &Matrix6<f64>, scratch: &mut SpanScratch, out: &mut [Pose]) {
         self.fill(x, segment, scratch);
         self.scatter(&scratch.f, out);
     }
 
     /// Motion of the points, and what the matrix of every segment makes of it.
-    fn fill(&self, x: &[Pose], segment: &Matrix6<f64>, scratch: &mut Scratch) {
+    fn fill(&self, x: &[Pose], segment: &Matrix6<f64>, scratch: &mut SpanScratch) {
         scratch.x.clear();
         scratch.x.extend(self.points_of(x));
         scratch.f.clear();
@@ -66,7 +66,7 @@ impl Span {
     }
 
     fn points_of<'a>(&'a self, x: &'a [Pose]) -> impl Iterator<Item = Vector3<f64>> + 'a {
-        let at = move |p: &Point| match p.body {
+        let at = move |p: &MaterialPoint| match p.body {
             BodyId::Ground => Vector3::zeros(),
             BodyId::Free(k) => {
                 let (dx, dy) = (x[k].x - x[k].z * p.arm.y, x[k].y + x[k].z * p.arm.x);
@@ -121,19 +121,19 @@ fn multiply(segment: &Matrix6<f64>, x: &[Vector3<f64>], f: &mut [Vector3<f64>]) 
 }
 
 /// Takes away what a lump of the model has for itself.
-fn lighten(f: &mut Vector3<f64>, x: &Vector3<f64>, lump: &Part) {
+fn lighten(f: &mut Vector3<f64>, x: &Vector3<f64>, lump: &BeamSegment) {
     f.x -= lump.mass * x.x;
     f.y -= lump.mass * x.y + lump.first * x.z;
     f.z -= lump.first * x.y + lump.second * x.z;
 }
 
 /// Every beam over its `points`, less the offsets at both ends.
-pub(super) fn spans<P: AsRef<[Point]>>(
+pub(super) fn spans<P: AsRef<[MaterialPoint]>>(
     structure: &Structure,
     options: &CompileOptions,
     (beams, offsets): (&[P], &[[f64; 2]]),
     lumped: bool,
-) -> Vec<Span> {
+) -> Vec<BeamSpan> {
     let span = |((beam, points), [first, last]): ((&crate::structure::Beam, &P), &[f64; 2])| {
         let points = points.as_ref();
         let n = points.len() - 1;
@@ -147,7 +147,7 @@ pub(super) fn spans<P: AsRef<[Point]>>(
         if lumped {
             options.scheme.parts_into(&bar, n, &mut lumps);
         }
-        Span {
+        BeamSpan {
             points,
             length: bar.length,
             along,

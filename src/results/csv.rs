@@ -1,6 +1,6 @@
 //! Tables as comma-separated text (RFC 4180): one header line `name [unit]`, then full-precision numbers.
 
-use super::table::{Samples, Table};
+use super::table::{ColumnSamples, Table};
 use std::io::{self, Write};
 
 /// Writes `table`. A complex column becomes two, `re(name)` and `im(name)`. Numbers read back to the same bits.
@@ -12,8 +12,8 @@ pub fn write(table: &Table, out: &mut dyn Write) -> io::Result<()> {
     for column in table.columns() {
         let unit = if column.unit.is_empty() { String::new() } else { format!(" [{}]", column.unit) };
         match column.samples {
-            Samples::Real(_) => header.push(field(&format!("{}{unit}", column.name))),
-            Samples::Complex(_) => {
+            ColumnSamples::Real(_) => header.push(field(&format!("{}{unit}", column.name))),
+            ColumnSamples::Complex(_) => {
                 header.push(field(&format!("re({}){unit}", column.name)));
                 header.push(field(&format!("im({}){unit}", column.name)));
             }
@@ -26,8 +26,8 @@ pub fn write(table: &Table, out: &mut dyn Write) -> io::Result<()> {
                 out.write_all(b",")?;
             }
             match &column.samples {
-                Samples::Real(v) => write!(out, "{:e}", v[row])?,
-                Samples::Complex(v) => write!(out, "{:e},{:e}", v[row][0], v[row][1])?,
+                ColumnSamples::Real(v) => write!(out, "{:e}", v[row])?,
+                ColumnSamples::Complex(v) => write!(out, "{:e},{:e}", v[row][0], v[row][1])?,
             }
         }
         out.write_all(b"\n")?;
@@ -52,7 +52,11 @@ mod tests {
         let values = vec![0.1 + 0.2, -1e-300, f64::MAX];
         table.push_real("time", "s", values.clone()).unwrap();
         table
-            .push(Column { name: "i,1".into(), unit: "A".into(), samples: Samples::Complex(vec![[1.0, -2.5e-9]; 3]) })
+            .push(Column {
+                name: "i,1".into(),
+                unit: "A".into(),
+                samples: ColumnSamples::Complex(vec![[1.0, -2.5e-9]; 3]),
+            })
             .unwrap();
         let mut text = Vec::new();
         write(&table, &mut text).unwrap();

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 /// Kinds of result files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
+pub enum ResultFormat {
     /// ngspice raw file, binary.
     Raw,
     /// Comma-separated values.
@@ -18,7 +18,7 @@ pub enum Format {
     Html,
 }
 
-/// Extensions that [`Format::from_path`] knows, as they are listed in messages.
+/// Extensions that [`ResultFormat::from_path`] knows, as they are listed in messages.
 pub const KNOWN: &str = ".raw, .csv, .svg, .png, .html";
 
 /// A file name that says no known format.
@@ -29,7 +29,7 @@ pub struct UnknownFormat {
     pub name: String,
 }
 
-impl Format {
+impl ResultFormat {
     /// The format that the extension of `path` asks for.
     ///
     /// # Errors

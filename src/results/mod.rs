@@ -1,6 +1,6 @@
 //! What comes out: tables, ngspice `.raw` files, CSV, and pictures.
 //!
-//! A [`table::Table`] holds named columns with units. [`csv`] and [`raw`] write it, [`plot`] draws it. Every file is
+//! A [`table::DeviceTable`] holds named columns with units. [`csv`] and [`raw`] write it, [`plot`] draws it. Every file is
 //! written through [`atomic`]: a reader sees the whole file or none.
 
 pub mod atomic;

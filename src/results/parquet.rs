@@ -5,16 +5,16 @@ use std::io::{self, Write};
 
 /// A column and its values, as many as rows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
+pub struct ParquetColumn {
     /// Name, with the unit in brackets where it has one.
     pub name: String,
     /// Values.
-    pub values: Values,
+    pub values: ParquetValues,
 }
 
 /// Values of one kind.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Values {
+pub enum ParquetValues {
     /// Whole numbers.
     Integers(Vec<i64>),
     /// Numbers; none: null.
@@ -34,7 +34,7 @@ const RUNS: i64 = 3;
 ///
 /// # Errors
 /// Those of `out`, and columns of different lengths.
-pub fn write(columns: &[Column], out: &mut dyn Write) -> io::Result<()> {
+pub fn write(columns: &[ParquetColumn], out: &mut dyn Write) -> io::Result<()> {
     let rows = columns.first().map_or(0, |column| column.values.len());
     if columns.iter().any(|column| column.values.len() != rows) {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "columns of different lengths"));
@@ -64,7 +64,7 @@ pub fn write(columns: &[Column], out: &mut dyn Write) -> io::Result<()> {
     out.write_all(MAGIC)
 }
 
-impl Values {
+impl ParquetValues {
     fn len(&self) -> usize {
         match self {
             Self::Integers(values) => values.len(),
@@ -131,7 +131,7 @@ fn page_header(count: usize, bytes: usize) -> Vec<u8> {
 
 type Group = (usize, Vec<(usize, usize)>);
 
-fn file_metadata(columns: &[Column], rows: usize, groups: &[Group]) -> Vec<u8> {
+fn file_metadata(columns: &[ParquetColumn], rows: usize, groups: &[Group]) -> Vec<u8> {
     let mut file = Struct::default();
     file.int(1, 5, 1);
     let mut root = Struct::default();
@@ -146,20 +146,20 @@ fn file_metadata(columns: &[Column], rows: usize, groups: &[Group]) -> Vec<u8> {
 }
 
 /// A column of the schema.
-fn element(column: &Column) -> Vec<u8> {
+fn element(column: &ParquetColumn) -> Vec<u8> {
     let mut element = Struct::default();
     element.int(1, 5, column.values.kind());
-    element.int(3, 5, i64::from(matches!(column.values, Values::Numbers(_))));
+    element.int(3, 5, i64::from(matches!(column.values, ParquetValues::Numbers(_))));
     element.text(4, &column.name);
-    if matches!(column.values, Values::Texts(_)) {
+    if matches!(column.values, ParquetValues::Texts(_)) {
         // UTF-8
         element.int(6, 5, 0);
     }
     element.end()
 }
 
-fn row_group(columns: &[Column], (count, chunks): &Group) -> Vec<u8> {
-    let chunk = |(column, (offset, bytes)): (&Column, &(usize, usize))| {
+fn row_group(columns: &[ParquetColumn], (count, chunks): &Group) -> Vec<u8> {
+    let chunk = |(column, (offset, bytes)): (&ParquetColumn, &(usize, usize))| {
         let mut about = Struct::default();
         about.int(1, 5, column.values.kind());
         about.list(2, 5, [PLAIN, RUNS].iter().map(|encoding| zigzag(*encoding)).collect());
@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn a_file() {
         let mut bytes = Vec::new();
-        let column = Column { name: "a".into(), values: Values::Texts(vec!["x".into(); 3]) };
+        let column = ParquetColumn { name: "a".into(), values: ParquetValues::Texts(vec!["x".into(); 3]) };
         write(&[column], &mut bytes).expect("written");
         assert!(bytes.starts_with(MAGIC) && bytes.ends_with(MAGIC));
         let length =

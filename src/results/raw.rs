@@ -8,7 +8,7 @@ mod read;
 
 pub use read::{RawError, read};
 
-use super::table::{Samples, Table};
+use super::table::{ColumnSamples, Table};
 use std::io::{self, Write};
 
 /// How the numbers are stored.
@@ -90,10 +90,10 @@ pub fn write(table: &Table, encoding: Encoding, out: &mut dyn Write) -> io::Resu
     Ok(())
 }
 
-fn sample(samples: &Samples, row: usize) -> [f64; 2] {
+fn sample(samples: &ColumnSamples, row: usize) -> [f64; 2] {
     match samples {
-        Samples::Real(v) => [v[row], 0.0],
-        Samples::Complex(v) => v[row],
+        ColumnSamples::Real(v) => [v[row], 0.0],
+        ColumnSamples::Complex(v) => v[row],
     }
 }
 
@@ -120,9 +120,9 @@ mod tests {
                 let mut table = Table::new("made up", "Transient Analysis");
                 for (name, kind, values) in list {
                     let samples = if complex {
-                        Samples::Complex(values)
+                        ColumnSamples::Complex(values)
                     } else {
-                        Samples::Real(values.into_iter().map(|[re, _]| re).collect())
+                        ColumnSamples::Real(values.into_iter().map(|[re, _]| re).collect())
                     };
                     table.push(Column { name, unit: KINDS[kind].0.to_owned(), samples }).unwrap();
                 }
@@ -172,7 +172,7 @@ mod tests {
             Values:\n 0\t1.0e+00,0.0e+00\n\t5.0e-01,-5.0e-01\n\n 1\t1.0e+01,0.0e+00\n\t1.0e-02,-1.0e-01\n";
         let plots = read(text.as_bytes()).unwrap();
         assert_eq!(plots.len(), 1);
-        assert_eq!(plots[0].column("V(OUT)").unwrap().samples, Samples::Complex(vec![[0.5, -0.5], [0.01, -0.1]]));
+        assert_eq!(plots[0].column("V(OUT)").unwrap().samples, ColumnSamples::Complex(vec![[0.5, -0.5], [0.01, -0.1]]));
         assert_eq!(plots[0].columns()[0].unit, "Hz");
     }
 }

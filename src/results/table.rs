@@ -4,14 +4,14 @@ use thiserror::Error;
 
 /// Samples of one quantity.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Samples {
+pub enum ColumnSamples {
     /// Real numbers.
     Real(Vec<f64>),
     /// Complex numbers as [re, im].
     Complex(Vec<[f64; 2]>),
 }
 
-impl Samples {
+impl ColumnSamples {
     /// Number of samples.
     pub fn len(&self) -> usize {
         match self {
@@ -42,7 +42,7 @@ pub struct Column {
     /// Unit in SI, such as "m"; empty for a pure number.
     pub unit: String,
     /// Its samples.
-    pub samples: Samples,
+    pub samples: ColumnSamples,
 }
 
 /// Columns of equal length. The first is the independent one (time, voltage, frequency).
@@ -94,7 +94,7 @@ impl Table {
     /// # Errors
     /// [`LengthMismatch`].
     pub fn push_real(&mut self, name: &str, unit: &str, samples: Vec<f64>) -> Result<(), LengthMismatch> {
-        self.push(Column { name: name.to_owned(), unit: unit.to_owned(), samples: Samples::Real(samples) })
+        self.push(Column { name: name.to_owned(), unit: unit.to_owned(), samples: ColumnSamples::Real(samples) })
     }
 
     /// The columns, the independent one first.
@@ -114,6 +114,6 @@ impl Table {
 
     /// True when any column is complex.
     pub fn is_complex(&self) -> bool {
-        self.columns.iter().any(|c| matches!(c.samples, Samples::Complex(_)))
+        self.columns.iter().any(|c| matches!(c.samples, ColumnSamples::Complex(_)))
     }
 }

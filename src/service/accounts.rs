@@ -3,7 +3,7 @@
 
 use super::limits::Limits;
 use super::status;
-use crate::budget::Purse;
+use crate::budget::OwnerQuota;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,7 +14,7 @@ use tonic::Status;
 pub(super) struct Accounts {
     bounds: Bounds,
     /// Bytes of all open sessions.
-    sessions: Arc<Sessions>,
+    sessions: Arc<SessionByteQuota>,
     open: Mutex<BTreeMap<String, Arc<Account>>>,
 }
 
@@ -37,8 +37,8 @@ struct Bounds {
 pub(super) struct Account {
     name: String,
     bounds: Bounds,
-    held: Mutex<Held>,
-    sessions: Arc<Sessions>,
+    held: Mutex<AccountUsage>,
+    sessions: Arc<SessionByteQuota>,
     /// Calls under way.
     calls: AtomicUsize,
     /// Transients and tables that are being sent.
@@ -48,12 +48,12 @@ pub(super) struct Account {
     /// Bytes of its requests, by the lengths that they announce.
     requests: AtomicUsize,
     /// What its computations draw on, where that is bounded.
-    pub(super) purse: Option<Arc<Purse>>,
+    pub(super) purse: Option<Arc<OwnerQuota>>,
 }
 
 /// Bytes of the sessions of all clients, as they are counted.
 #[derive(Debug)]
-struct Sessions {
+struct SessionByteQuota {
     most: usize,
     used: Mutex<usize>,
 }
@@ -65,7 +65,7 @@ const SESSION_BYTES: usize = 4 << 10;
 const PORT_BYTES: usize = 176;
 
 #[derive(Debug, Default, Clone, Copy)]
-struct Held {
+struct AccountUsage {
     sessions: usize,
     unknowns: usize,
     /// Bytes of its sessions, as they are counted.
@@ -74,7 +74,7 @@ struct Held {
 
 /// A session in an account; dropped, it is not there any more.
 #[derive(Debug)]
-pub(super) struct Seat {
+pub(super) struct SessionLease {
     account: Arc<Account>,
     unknowns: usize,
     bytes: usize,
@@ -94,7 +94,7 @@ impl Accounts {
             streams: limits.client_result_streams,
             connections: limits.client_connections,
         };
-        let sessions = Arc::new(Sessions { most: limits.session_memory, used: Mutex::default() });
+        let sessions = Arc::new(SessionByteQuota { most: limits.session_memory, used: Mutex::default() });
         Self { bounds, sessions, open: Mutex::default() }
     }
 
@@ -107,7 +107,7 @@ impl Accounts {
         let bounds = self.bounds;
         let any = |most: usize| (most > 0).then_some(most);
         let (bytes, cpu) = (any(bounds.bytes), (!bounds.cpu.is_zero()).then_some(bounds.cpu));
-        let purse = (bytes.is_some() || cpu.is_some()).then(|| Arc::new(Purse::new(bytes, cpu)));
+        let purse = (bytes.is_some() || cpu.is_some()).then(|| Arc::new(OwnerQuota::new(bytes, cpu)));
         let account = Arc::new(Account {
             name: name.to_owned(),
             bounds,
@@ -134,7 +134,7 @@ impl Account {
     ///
     /// # Errors
     /// RESOURCE_EXHAUSTED with what is used and what is allowed.
-    pub(super) fn seat(self: &Arc<Self>, unknowns: usize) -> Result<Seat, Status> {
+    pub(super) fn seat(self: &Arc<Self>, unknowns: usize) -> Result<SessionLease, Status> {
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         for (limit, most, used, more) in [
             ("client_sessions", self.bounds.sessions, held.sessions, 1),
@@ -147,7 +147,7 @@ impl Account {
         held.sessions += 1;
         held.unknowns += unknowns;
         drop(held);
-        let mut seat = Seat { account: Arc::clone(self), unknowns, bytes: 0 };
+        let mut seat = SessionLease { account: Arc::clone(self), unknowns, bytes: 0 };
         seat.open(0)?;
         Ok(seat)
     }
@@ -164,7 +164,7 @@ impl Account {
     ///
     /// # Errors
     /// RESOURCE_EXHAUSTED; then it is not counted.
-    pub(super) fn call(self: &Arc<Self>) -> Result<Counted, Status> {
+    pub(super) fn call(self: &Arc<Self>) -> Result<CountLease, Status> {
         self.count(|account| &account.calls, "client_calls", self.bounds.calls, "wait for others")
     }
 
@@ -172,7 +172,7 @@ impl Account {
     ///
     /// # Errors
     /// RESOURCE_EXHAUSTED; then it is not counted.
-    pub(super) fn stream(self: &Arc<Self>) -> Result<Counted, Status> {
+    pub(super) fn stream(self: &Arc<Self>) -> Result<CountLease, Status> {
         let way_out = "read or end those that are open";
         self.count(|account| &account.streams, "client_result_streams", self.bounds.streams, way_out)
     }
@@ -181,7 +181,7 @@ impl Account {
     ///
     /// # Errors
     /// RESOURCE_EXHAUSTED; then it is not counted.
-    pub(super) fn connection(self: &Arc<Self>) -> Result<Counted, Status> {
+    pub(super) fn connection(self: &Arc<Self>) -> Result<CountLease, Status> {
         self.count(
             |account| &account.connections,
             "client_connections",
@@ -196,9 +196,9 @@ impl Account {
         limit: &str,
         most: usize,
         way_out: &str,
-    ) -> Result<Counted, Status> {
+    ) -> Result<CountLease, Status> {
         let used = of(self).fetch_add(1, Ordering::Relaxed);
-        let counted = Counted { account: Arc::clone(self), of };
+        let counted = CountLease { account: Arc::clone(self), of };
         if most > 0 && used >= most { Err(self.refused(limit, most, (used, 1), way_out)) } else { Ok(counted) }
     }
 
@@ -223,18 +223,18 @@ impl Account {
 
 /// A call or a connection of a client; dropped, it is not there any more.
 #[derive(Debug)]
-pub(super) struct Counted {
+pub(super) struct CountLease {
     account: Arc<Account>,
     of: fn(&Account) -> &AtomicUsize,
 }
 
-impl Drop for Counted {
+impl Drop for CountLease {
     fn drop(&mut self) {
         (self.of)(&self.account).fetch_sub(1, Ordering::Relaxed);
     }
 }
 
-impl Seat {
+impl SessionLease {
     /// Takes the bytes of a device with so many ports.
     ///
     /// # Errors
@@ -262,12 +262,12 @@ impl Seat {
     }
 
     /// What the client's computations draw on, where that is bounded.
-    pub(super) fn purse(&self) -> Option<Arc<Purse>> {
+    pub(super) fn purse(&self) -> Option<Arc<OwnerQuota>> {
         self.account.purse.clone()
     }
 }
 
-impl Drop for Seat {
+impl Drop for SessionLease {
     fn drop(&mut self) {
         let mut held = self.account.held.lock().unwrap_or_else(PoisonError::into_inner);
         held.sessions -= 1;

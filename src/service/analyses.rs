@@ -1,31 +1,31 @@
 //! The calls that analyse a model, each bounded before anything is computed.
 
-use super::chunks::{Outlet, send_transient};
+use super::chunks::{MessageSink, send_transient};
 use super::convert::{self, Violation, analysis as results};
 use super::limits::Limits;
-use super::models::Model;
-use super::shared::{Calls, Reply};
-use super::work::{Results, guarded};
+use super::models::NamedModel;
+use super::shared::{BimorphService, Reply};
+use super::work::{CancellingStream, guarded};
 use super::{proto, status};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::mesh;
 use crate::analysis::transient::TransientOptions;
-use crate::compile::Compiled;
-use crate::options::Value;
+use crate::compile::CompiledModel;
+use crate::options::OptionValue;
 use crate::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use std::sync::Arc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Response, Status};
 
 /// A transient as it is computed.
-pub(super) type TransientStream = Results<ReceiverStream<Result<proto::TransientEvent, Status>>>;
+pub(super) type TransientStream = CancellingStream<ReceiverStream<Result<proto::TransientEvent, Status>>>;
 
-impl Calls {
+impl BimorphService {
     /// Looks up a model, then computes on it.
     async fn analyse<T: Send + 'static>(
         &self,
         id: &str,
-        job: impl Fn(&Model) -> Result<T, Status> + Send + Sync + 'static,
+        job: impl Fn(&NamedModel) -> Result<T, Status> + Send + Sync + 'static,
     ) -> Reply<T> {
         let model = self.0.models.get(id)?;
         self.0.work.run(move || job(&model)).await.map(Response::new)
@@ -34,7 +34,7 @@ impl Calls {
     /// Static equilibrium.
     pub(super) async fn statics(&self, request: proto::StaticRequest) -> Reply<proto::StaticResponse> {
         let voltages = voltages(request.voltages)?;
-        let job = move |model: &Model| {
+        let job = move |model: &NamedModel| {
             let (fitted, mut result, _) = mesh::static_fitted(&model.compiled, &voltages).map_err(status::analysis)?;
             result.warnings.extend(mesh::warnings(&fitted));
             Ok(results::static_to_wire(&result))
@@ -50,7 +50,7 @@ impl Calls {
             return Err(status::limit("modes", self.0.limits.modes, count));
         }
         let most = self.0.limits.mode_work;
-        let job = move |model: &Model| {
+        let job = move |model: &NamedModel| {
             let work = model.unknowns().saturating_mul(count.saturating_mul(count));
             if work > most {
                 return Err(status::limit("mode_work", most, work));
@@ -77,7 +77,7 @@ impl Calls {
         if bytes > most {
             return Err(status::limit("message_bytes", most, bytes));
         }
-        let job = move |model: &Model| {
+        let job = move |model: &NamedModel| {
             let (fitted, mut result) =
                 mesh::harmonic_fitted(&model.compiled, &options, &mut |_| true).map_err(status::analysis)?;
             result.warnings.extend(mesh::warnings(&fitted));
@@ -89,9 +89,9 @@ impl Calls {
     /// Pull-in and release.
     pub(super) async fn pulled_in(&self, request: proto::PullInRequest) -> Reply<proto::PullInResponse> {
         let max = request.max_v;
-        convert::options::analysis(&PULL_IN_MAX, Value::Number(max)).map_err(status::violation)?;
+        convert::options::analysis(&PULL_IN_MAX, OptionValue::Number(max)).map_err(status::violation)?;
         let port = (!request.port.is_empty()).then_some(request.port);
-        let job = move |model: &Model| {
+        let job = move |model: &NamedModel| {
             let (fitted, mut result) =
                 mesh::pull_in_fitted(&model.compiled, port.as_deref(), max).map_err(status::analysis)?;
             result.warnings.extend(mesh::warnings(&fitted));
@@ -109,13 +109,13 @@ impl Calls {
         };
         let given = |about, value| convert::options::analysis(about, value).map_err(status::violation);
         let stop = request.stop_s;
-        given(&TRAN_STOP, Value::Number(stop))?;
+        given(&TRAN_STOP, OptionValue::Number(stop))?;
         let tol = match request.tol {
             0.0 => model.compiled.options.tol,
             tol => convert::number("tol", tol, true).map_err(status::violation)?,
         };
         let points = if request.points == 0 { TRAN_POINTS.count() } else { request.points as usize };
-        given(&TRAN_POINTS, Value::Count(points))?;
+        given(&TRAN_POINTS, OptionValue::Count(points))?;
         count("signals", request.signals.len(), &self.0.limits)?;
         count("events", request.events.len(), &self.0.limits)?;
         let values = points.saturating_mul(request.signals.len() + 1);
@@ -131,7 +131,7 @@ impl Calls {
         };
         let method = match (method, request.rho) {
             (Integrator::GeneralizedAlpha { .. }, Some(rho)) => {
-                given(&TRAN_RHO, Value::Number(rho))?;
+                given(&TRAN_RHO, OptionValue::Number(rho))?;
                 Integrator::GeneralizedAlpha { rho }
             }
             (_, Some(_)) => {
@@ -142,7 +142,7 @@ impl Calls {
         let step = match request.step_s {
             0.0 => None,
             step => {
-                given(&TRAN_STEP, Value::Number(step))?;
+                given(&TRAN_STEP, OptionValue::Number(step))?;
                 Some(step)
             }
         };
@@ -152,9 +152,9 @@ impl Calls {
         let sending = self.sending()?;
         let place = self.0.work.place().await?;
         let budget = self.0.work.budget();
-        let (outlet, receiver) = Outlet::new(Arc::clone(&self.0));
+        let (outlet, receiver) = MessageSink::new(Arc::clone(&self.0));
         let outlet = outlet.with_place(place);
-        let results = Results::new(ReceiverStream::new(receiver), budget.clone());
+        let results = CancellingStream::new(ReceiverStream::new(receiver), budget.clone());
         let mut failed = outlet.also();
         tokio::task::spawn_blocking(move || {
             let _sending = sending;
@@ -162,7 +162,7 @@ impl Calls {
                 let release = release.as_ref().map(|model| &*model.compiled);
                 // the mesh, too, holds the tolerance that the run asks for
                 let sharper = (tol < model.compiled.options.tol).then(|| {
-                    let mut sharper = Compiled::clone(&model.compiled);
+                    let mut sharper = CompiledModel::clone(&model.compiled);
                     sharper.options.tol = tol;
                     sharper
                 });

@@ -2,7 +2,7 @@
 
 use super::accounts::Account;
 use super::framing::Framing;
-use super::gate::Call;
+use super::gate::AdmittedCall;
 use http_body::{Frame, SizeHint};
 use std::future::Future;
 use std::pin::Pin;
@@ -15,9 +15,9 @@ use tonic::{Code, Status};
 use tracing::Span;
 
 /// The body of a request: counted, and passed on by whole messages.
-pub(super) struct Received {
+pub(super) struct RequestBody {
     body: Body,
-    call: Arc<Call>,
+    call: Arc<AdmittedCall>,
     account: Arc<Account>,
     framing: Framing,
     /// Silence between two messages is no pause.
@@ -25,9 +25,9 @@ pub(super) struct Received {
     pause: Option<Pin<Box<Sleep>>>,
 }
 
-impl Received {
+impl RequestBody {
     /// Of no body yet.
-    pub(super) fn new(call: Arc<Call>, account: Arc<Account>, stream: bool) -> Self {
+    pub(super) fn new(call: Arc<AdmittedCall>, account: Arc<Account>, stream: bool) -> Self {
         Self { body: Body::empty(), call, account, framing: Framing::default(), stream, pause: None }
     }
 
@@ -48,7 +48,7 @@ impl Received {
     }
 }
 
-impl http_body::Body for Received {
+impl http_body::Body for RequestBody {
     type Data = Bytes;
     type Error = Status;
 
@@ -95,13 +95,13 @@ impl http_body::Body for Received {
 }
 
 /// The body of an answer; the call is over when it is dropped.
-pub(super) struct Answering {
+pub(super) struct ResponseBody {
     pub(super) body: Body,
-    pub(super) call: Arc<Call>,
+    pub(super) call: Arc<AdmittedCall>,
     pub(super) span: Span,
 }
 
-impl Drop for Answering {
+impl Drop for ResponseBody {
     fn drop(&mut self) {
         let code = self.call.code();
         let ms = self.call.time().as_secs_f64() * 1e3;
@@ -109,7 +109,7 @@ impl Drop for Answering {
     }
 }
 
-impl http_body::Body for Answering {
+impl http_body::Body for ResponseBody {
     type Data = Bytes;
     type Error = Status;
 

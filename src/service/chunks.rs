@@ -2,14 +2,14 @@
 
 use super::convert::analysis::summary_to_wire;
 use super::pace::{CHUNK_BYTES, HEARTBEAT};
-use super::shared::Shared;
-use super::turns::{Party, Place};
+use super::shared::ServerState;
+use super::turns::{Permit, Waiter};
 use super::{proto, status};
 use crate::analysis::AnalysisError;
 use crate::analysis::mesh::{self, fitted_in_time};
 use crate::analysis::step_error::{self, with_step_error};
 use crate::analysis::transient::{TransientOptions, TransientResult, transient};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use proto::transient_event::Kind;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -21,24 +21,24 @@ use tonic::Status;
 const LIVELINESS: Duration = Duration::from_millis(200);
 
 /// Where the messages of a stream go: one at a time, never waiting for a silent client longer than the idle limit.
-pub(super) struct Outlet<T> {
+pub(super) struct MessageSink<T> {
     sender: mpsc::Sender<Result<T, Status>>,
-    shared: Arc<Shared>,
+    shared: Arc<ServerState>,
     runtime: Handle,
     /// Where the computation runs; given back while a reader is slow, so that others go on.
-    place: Option<Place>,
+    place: Option<Permit>,
     pub(super) open: bool,
 }
 
-impl<T> Outlet<T> {
+impl<T> MessageSink<T> {
     /// An outlet, used from a blocking thread, and what the client reads.
-    pub(super) fn new(shared: Arc<Shared>) -> (Self, mpsc::Receiver<Result<T, Status>>) {
+    pub(super) fn new(shared: Arc<ServerState>) -> (Self, mpsc::Receiver<Result<T, Status>>) {
         let (sender, receiver) = mpsc::channel(2);
         (Self { sender, shared, runtime: Handle::current(), place: None, open: true }, receiver)
     }
 
     /// The same for a computation that takes a place.
-    pub(super) fn with_place(self, place: Place) -> Self {
+    pub(super) fn with_place(self, place: Permit) -> Self {
         Self { place: Some(place), ..self }
     }
 
@@ -70,7 +70,7 @@ impl<T> Outlet<T> {
         }
     }
 
-    fn place_again(&mut self, party: Party) {
+    fn place_again(&mut self, party: Waiter) {
         let (sender, shared) = (&self.sender, &self.shared);
         self.place = self.runtime.block_on(async {
             tokio::select! {
@@ -110,9 +110,9 @@ impl<T> Outlet<T> {
 
 /// Runs a transient and sends its samples as they come.
 pub(super) fn send_transient(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     options: &TransientOptions<'_>,
-    outlet: Outlet<proto::TransientEvent>,
+    outlet: MessageSink<proto::TransientEvent>,
 ) {
     let width = options.signals.len();
     let rows = (CHUNK_BYTES / 2 / (8 * (width + 1))).max(1);
@@ -137,7 +137,7 @@ pub(super) fn send_transient(
     };
     let result = fitted_in_time(compiled, options).and_then(|(moving, start)| {
         let options = TransientOptions { release: start.as_ref(), ..options.clone() };
-        let run: step_error::Run<'_, ()> =
+        let run: step_error::RunFunction<'_, ()> =
             &mut |options, sample, watch| transient(&moving, options, sample, watch).map(|r| (r, ()));
         let (mut result, ()) = with_step_error(&options, &moving, run, &mut sample, &mut watch)?;
         result.warnings.extend(mesh::warnings(&moving));
@@ -152,7 +152,7 @@ pub(super) fn send_transient(
 
 fn finish(
     result: Result<TransientResult, AnalysisError>,
-    outlet: &Outlet<proto::TransientEvent>,
+    outlet: &MessageSink<proto::TransientEvent>,
 ) -> Result<proto::TransientEvent, Status> {
     match result {
         Ok(result) => Ok(proto::TransientEvent { kind: Some(Kind::Finished(summary_to_wire(&result))), progress: 1.0 }),

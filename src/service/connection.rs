@@ -6,9 +6,9 @@
 //! The HTTP layer waits for its clients when it shuts down; one that never answers would hold the server for as long as
 //! it likes. So the socket itself listens for the order to cut: reads and writes then fail, and the layer above gives up.
 
-use super::guard::{Guard, Voice};
+use super::guard::{Guard, NegotiatedSocket};
 use super::limits::Limits;
-use super::presence::{Presence, Who};
+use super::presence::{Peer, PeerIdentity};
 use socket2::{SockRef, TcpKeepalive};
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -30,7 +30,7 @@ use tonic::transport::server::Connected;
 /// Bytes that a client has sent when it has said that it speaks HTTP/2: the preface and the head of its settings.
 const GREETING: usize = 24 + 9;
 
-enum Socket {
+enum ClientSocket {
     Tcp(TcpStream),
     Tls(Box<TlsStream<TcpStream>>),
     Unix(UnixStream),
@@ -40,7 +40,7 @@ enum Socket {
 #[derive(Debug)]
 pub(super) struct Connections {
     places: Arc<Semaphore>,
-    open: Mutex<Vec<Weak<Presence>>>,
+    open: Mutex<Vec<Weak<Peer>>>,
     handshake: Duration,
     keepalive: Duration,
     cutting: CancellationToken,
@@ -73,7 +73,7 @@ impl Connections {
         tokio::time::timeout(LETTING_GO, Arc::clone(&self.places).acquire_owned()).await.ok()?.ok()
     }
 
-    fn longest_idle(&self) -> Option<Arc<Presence>> {
+    fn longest_idle(&self) -> Option<Arc<Peer>> {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         open.retain(|presence| presence.strong_count() > 0);
         let idle = open.iter().filter_map(Weak::upgrade).filter(|presence| !presence.cut.is_cancelled());
@@ -83,8 +83,8 @@ impl Connections {
             .map(|(_, p)| p)
     }
 
-    fn welcome(&self) -> Arc<Presence> {
-        let presence = Presence::new(&self.cutting);
+    fn welcome(&self) -> Arc<Peer> {
+        let presence = Peer::new(&self.cutting);
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         if open.len() >= 2 * self.places.available_permits().max(64) {
             open.retain(|presence| presence.strong_count() > 0);
@@ -127,18 +127,24 @@ impl Connections {
             Err(_) => return None,
         };
         let socket = match voice {
-            Voice::Plain(socket) => Socket::Tcp(socket),
-            Voice::Secure(stream) => Socket::Tls(stream),
+            NegotiatedSocket::Plain(socket) => ClientSocket::Tcp(socket),
+            NegotiatedSocket::Secure(stream) => ClientSocket::Tls(stream),
         };
         Some(self.connection(socket, presence, who, place))
     }
 
     /// A connection over a Unix socket in a place.
     pub(super) fn unix(&self, socket: UnixStream, place: OwnedSemaphorePermit) -> Connection {
-        self.connection(Socket::Unix(socket), self.welcome(), Who::Local, place)
+        self.connection(ClientSocket::Unix(socket), self.welcome(), PeerIdentity::Local, place)
     }
 
-    fn connection(&self, socket: Socket, presence: Arc<Presence>, who: Who, place: OwnedSemaphorePermit) -> Connection {
+    fn connection(
+        &self,
+        socket: ClientSocket,
+        presence: Arc<Peer>,
+        who: PeerIdentity,
+        place: OwnedSemaphorePermit,
+    ) -> Connection {
         let _ = presence.who.set(who);
         let cut = Box::pin(presence.cut.clone().cancelled_owned());
         let greeting = Some(Box::pin(tokio::time::sleep(self.handshake)));
@@ -154,9 +160,9 @@ const LETTING_GO: Duration = Duration::from_secs(1);
 
 /// One accepted connection.
 pub(super) struct Connection {
-    socket: Socket,
+    socket: ClientSocket,
     cut: Pin<Box<WaitForCancellationFutureOwned>>,
-    presence: Arc<Presence>,
+    presence: Arc<Peer>,
     /// Runs until the client has greeted.
     greeting: Option<Pin<Box<Sleep>>>,
     /// Bytes read until then.
@@ -188,8 +194,8 @@ impl Connection {
 }
 
 impl Connected for Connection {
-    type ConnectInfo = Arc<Presence>;
-    fn connect_info(&self) -> Arc<Presence> {
+    type ConnectInfo = Arc<Peer>;
+    fn connect_info(&self) -> Arc<Peer> {
         Arc::clone(&self.presence)
     }
 }
@@ -199,9 +205,9 @@ impl AsyncRead for Connection {
         self.check(cx)?;
         let before = buf.filled().len();
         let read = match &mut self.socket {
-            Socket::Tcp(socket) => Pin::new(socket).poll_read(cx, buf),
-            Socket::Tls(socket) => Pin::new(socket).poll_read(cx, buf),
-            Socket::Unix(socket) => Pin::new(socket).poll_read(cx, buf),
+            ClientSocket::Tcp(socket) => Pin::new(socket).poll_read(cx, buf),
+            ClientSocket::Tls(socket) => Pin::new(socket).poll_read(cx, buf),
+            ClientSocket::Unix(socket) => Pin::new(socket).poll_read(cx, buf),
         };
         self.greet(buf.filled().len() - before, cx)?;
         read
@@ -212,9 +218,9 @@ impl AsyncWrite for Connection {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &[u8]) -> Poll<io::Result<usize>> {
         self.check(cx)?;
         match &mut self.socket {
-            Socket::Tcp(socket) => Pin::new(socket).poll_write(cx, buf),
-            Socket::Tls(socket) => Pin::new(socket).poll_write(cx, buf),
-            Socket::Unix(socket) => Pin::new(socket).poll_write(cx, buf),
+            ClientSocket::Tcp(socket) => Pin::new(socket).poll_write(cx, buf),
+            ClientSocket::Tls(socket) => Pin::new(socket).poll_write(cx, buf),
+            ClientSocket::Unix(socket) => Pin::new(socket).poll_write(cx, buf),
         }
     }
 
@@ -225,32 +231,32 @@ impl AsyncWrite for Connection {
     ) -> Poll<io::Result<usize>> {
         self.check(cx)?;
         match &mut self.socket {
-            Socket::Tcp(socket) => Pin::new(socket).poll_write_vectored(cx, bufs),
-            Socket::Tls(socket) => Pin::new(socket).poll_write_vectored(cx, bufs),
-            Socket::Unix(socket) => Pin::new(socket).poll_write_vectored(cx, bufs),
+            ClientSocket::Tcp(socket) => Pin::new(socket).poll_write_vectored(cx, bufs),
+            ClientSocket::Tls(socket) => Pin::new(socket).poll_write_vectored(cx, bufs),
+            ClientSocket::Unix(socket) => Pin::new(socket).poll_write_vectored(cx, bufs),
         }
     }
 
     fn is_write_vectored(&self) -> bool {
         match &self.socket {
-            Socket::Tls(socket) => socket.is_write_vectored(),
-            Socket::Tcp(_) | Socket::Unix(_) => true,
+            ClientSocket::Tls(socket) => socket.is_write_vectored(),
+            ClientSocket::Tcp(_) | ClientSocket::Unix(_) => true,
         }
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match &mut self.socket {
-            Socket::Tcp(socket) => Pin::new(socket).poll_flush(cx),
-            Socket::Tls(socket) => Pin::new(socket).poll_flush(cx),
-            Socket::Unix(socket) => Pin::new(socket).poll_flush(cx),
+            ClientSocket::Tcp(socket) => Pin::new(socket).poll_flush(cx),
+            ClientSocket::Tls(socket) => Pin::new(socket).poll_flush(cx),
+            ClientSocket::Unix(socket) => Pin::new(socket).poll_flush(cx),
         }
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match &mut self.socket {
-            Socket::Tcp(socket) => Pin::new(socket).poll_shutdown(cx),
-            Socket::Tls(socket) => Pin::new(socket).poll_shutdown(cx),
-            Socket::Unix(socket) => Pin::new(socket).poll_shutdown(cx),
+            ClientSocket::Tcp(socket) => Pin::new(socket).poll_shutdown(cx),
+            ClientSocket::Tls(socket) => Pin::new(socket).poll_shutdown(cx),
+            ClientSocket::Unix(socket) => Pin::new(socket).poll_shutdown(cx),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What is done to files so that they outlive the machine: bytes are written and waited for before anything names them or is said of
 //! them. All of it goes through here, in whose tests the order can be looked at.
 
-use crate::jobs::sweep::journal::{Journal, JournalError, Kept};
+use crate::jobs::sweep::journal::{Journal, JournalError, JournalRow};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
@@ -13,13 +13,13 @@ pub(super) struct Disk {
     /// Whether to wait for it.
     sync: bool,
     #[cfg(test)]
-    pub(super) done: std::sync::Mutex<Vec<Done>>,
+    pub(super) done: std::sync::Mutex<Vec<DiskOperation>>,
 }
 
 /// What was done.
 #[cfg(test)]
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Done {
+pub(super) enum DiskOperation {
     Written(std::path::PathBuf, Vec<u8>),
     Added(std::path::PathBuf, Vec<u8>),
     Synced(std::path::PathBuf),
@@ -46,11 +46,11 @@ impl Disk {
         file.write_all(bytes)?;
         file.set_len(bytes.len() as u64)?;
         #[cfg(test)]
-        self.note(Done::Written(path.to_owned(), bytes.to_vec()));
+        self.note(DiskOperation::Written(path.to_owned(), bytes.to_vec()));
         if self.sync {
             file.sync_data()?;
             #[cfg(test)]
-            self.note(Done::Synced(path.to_owned()));
+            self.note(DiskOperation::Synced(path.to_owned()));
         }
         Ok(())
     }
@@ -60,14 +60,14 @@ impl Disk {
     ///
     /// # Errors
     /// What the system said.
-    pub(super) fn journal(&self, path: &Path, sweep: &str) -> Result<(Journal, Vec<Kept>), JournalError> {
+    pub(super) fn journal(&self, path: &Path, sweep: &str) -> Result<(Journal, Vec<JournalRow>), JournalError> {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
         drop(private().open(path).map_err(failed)?);
         let (journal, points) = Journal::open(path, sweep, true)?;
         #[cfg(test)]
-        self.note(Done::Written(path.to_owned(), fs::read(path).map_err(failed)?));
+        self.note(DiskOperation::Written(path.to_owned(), fs::read(path).map_err(failed)?));
         #[cfg(test)]
-        self.note(Done::Synced(path.to_owned()));
+        self.note(DiskOperation::Synced(path.to_owned()));
         Ok((journal, points))
     }
 
@@ -79,9 +79,9 @@ impl Disk {
         journal.keep_all(lines, self.sync)?;
         #[cfg(test)]
         {
-            self.note(Done::Added(journal.path().to_owned(), lines.to_vec()));
+            self.note(DiskOperation::Added(journal.path().to_owned(), lines.to_vec()));
             if self.sync {
-                self.note(Done::Synced(journal.path().to_owned()));
+                self.note(DiskOperation::Synced(journal.path().to_owned()));
             }
         }
         Ok(())
@@ -94,7 +94,7 @@ impl Disk {
     pub(super) fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         fs::rename(from, to)?;
         #[cfg(test)]
-        self.note(Done::Renamed(from.to_owned(), to.to_owned()));
+        self.note(DiskOperation::Renamed(from.to_owned(), to.to_owned()));
         Ok(())
     }
 
@@ -106,13 +106,13 @@ impl Disk {
         if self.sync {
             File::open(folder)?.sync_all()?;
             #[cfg(test)]
-            self.note(Done::FolderSynced(folder.to_owned()));
+            self.note(DiskOperation::FolderSynced(folder.to_owned()));
         }
         Ok(())
     }
 
     #[cfg(test)]
-    fn note(&self, done: Done) {
+    fn note(&self, done: DiskOperation) {
         self.done.lock().expect("nobody panicked").push(done);
     }
 }

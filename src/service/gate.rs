@@ -1,11 +1,11 @@
 //! The gate through which calls come in: counts of them and of what their requests hold, and who may ask.
 
-use super::accounts::{Account, Accounts, Counted};
+use super::accounts::{Account, Accounts, CountLease};
 use super::guard::Guard;
 use super::ids::Ids;
 use super::limits::Limits;
 use super::metrics::{self, Metrics};
-use super::presence::Presence;
+use super::presence::Peer;
 use super::status;
 use std::sync::atomic::{AtomicI32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -15,7 +15,7 @@ use tonic::codegen::http;
 use tonic::{Code, Status};
 
 /// Counts for all services of a server.
-pub(super) struct Gate {
+pub(super) struct AdmissionCounters {
     pub(super) calls: AtomicUsize,
     /// Calls of health: those that are answered at once, and those that go on.
     pub(super) health: [AtomicUsize; 2],
@@ -47,7 +47,7 @@ const HEALTH_CALLS: usize = 64;
 /// Bytes of a request of it.
 const HEALTH_BYTES: usize = 1 << 10;
 
-impl Gate {
+impl AdmissionCounters {
     pub(super) fn new(
         limits: &Limits,
         guard: Arc<Guard>,
@@ -94,9 +94,9 @@ impl Gate {
         })
     }
 
-    pub(super) fn enter(self: &Arc<Self>, request: &http::Request<Body>, is_health: bool) -> Call {
+    pub(super) fn enter(self: &Arc<Self>, request: &http::Request<Body>, is_health: bool) -> AdmittedCall {
         let path = request.uri().path();
-        let call = Call {
+        let call = AdmittedCall {
             gate: Arc::clone(self),
             presence: request.extensions().get().cloned(),
             health: is_health.then(|| usize::from(path.ends_with("/Watch"))),
@@ -118,7 +118,7 @@ impl Gate {
     }
 
     /// Whether a call may go on, and whose it is.
-    pub(super) fn admit(&self, call: &Call, headers: &http::HeaderMap) -> Result<Arc<Account>, Status> {
+    pub(super) fn admit(&self, call: &AdmittedCall, headers: &http::HeaderMap) -> Result<Arc<Account>, Status> {
         let presence = call.presence.as_ref().ok_or_else(|| Status::unauthenticated("nobody is known to ask"))?;
         let (most, name) = if call.is_health() { (HEALTH_CALLS, "health") } else { (self.most_calls, "calls") };
         if call.count().load(Ordering::Relaxed) > most {
@@ -137,16 +137,16 @@ impl Gate {
 }
 
 /// One call, from its first byte until its answer is sent.
-pub(super) struct Call {
-    pub(super) gate: Arc<Gate>,
-    pub(super) presence: Option<Arc<Presence>>,
+pub(super) struct AdmittedCall {
+    pub(super) gate: Arc<AdmissionCounters>,
+    pub(super) presence: Option<Arc<Peer>>,
     /// Its kind among those of health; none: any other.
     pub(super) health: Option<usize>,
     pub(super) held: AtomicUsize,
     /// Bytes that its request announces, and whose account has them.
     announced: Mutex<(usize, Option<Arc<Account>>)>,
     /// Its place in the account of its client.
-    counted: OnceLock<Counted>,
+    counted: OnceLock<CountLease>,
     /// Its place among the calls that are counted.
     pub(super) place: usize,
     pub(super) started: Instant,
@@ -154,7 +154,7 @@ pub(super) struct Call {
     pub(super) code: AtomicI32,
 }
 
-impl Call {
+impl AdmittedCall {
     /// The count that it is in.
     pub(super) fn count(&self) -> &AtomicUsize {
         self.health.map_or(&self.gate.calls, |kind| &self.gate.health[kind])
@@ -244,7 +244,7 @@ fn long_health() -> Status {
     Status::resource_exhausted(format!("a request of health has at most {HEALTH_BYTES} bytes"))
 }
 
-impl Drop for Call {
+impl Drop for AdmittedCall {
     fn drop(&mut self) {
         self.release();
         self.count().fetch_sub(1, Ordering::Relaxed);

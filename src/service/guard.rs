@@ -2,8 +2,8 @@
 //!
 //! A Unix socket asks for nothing: its mode lets in its owner alone.
 
-use super::presence::{Presence, Who};
-use super::tls::{ALPN, Pair, PemError, authorities, certificates, provider, validity};
+use super::presence::{Peer, PeerIdentity};
+use super::tls::{ALPN, CertificateFiles, PemError, authorities, certificates, provider, validity};
 use super::tokens::{TokenError, Tokens, is_open, sha256};
 use std::io;
 use std::path::PathBuf;
@@ -63,7 +63,7 @@ pub enum GuardError {
 /// # Errors
 /// [`GuardError`].
 pub fn look_at(files: &GuardFiles) -> Result<Vec<String>, GuardError> {
-    let guard = Read::of(files)?;
+    let guard = LoadedFiles::of(files)?;
     let mut found = Vec::new();
     if let Some(path) = &files.certificate {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
@@ -97,22 +97,22 @@ pub fn look_at(files: &GuardFiles) -> Result<Vec<String>, GuardError> {
 #[derive(Default)]
 pub(super) struct Guard {
     files: GuardFiles,
-    read: RwLock<Arc<Read>>,
+    read: RwLock<Arc<LoadedFiles>>,
 }
 
 /// What the files held when they were read last.
 #[derive(Default)]
-struct Read {
+struct LoadedFiles {
     tls: Option<Arc<ServerConfig>>,
     certified: bool,
     tokens: Option<Tokens>,
 }
 
-impl Read {
+impl LoadedFiles {
     fn of(files: &GuardFiles) -> Result<Self, GuardError> {
         let tls = match (&files.certificate, &files.key) {
             (Some(certificate), Some(key)) => {
-                let pair = Pair::read(certificate, key)?;
+                let pair = CertificateFiles::read(certificate, key)?;
                 let refused = |reason: String| GuardError::Refused { path: certificate.clone(), reason };
                 Some(Arc::new(config(pair, files, refused)?))
             }
@@ -139,7 +139,7 @@ impl Guard {
     /// # Errors
     /// [`GuardError`].
     pub(super) fn read(files: &GuardFiles) -> Result<Self, GuardError> {
-        Ok(Self { files: files.clone(), read: RwLock::new(Arc::new(Read::of(files)?)) })
+        Ok(Self { files: files.clone(), read: RwLock::new(Arc::new(LoadedFiles::of(files)?)) })
     }
 
     /// Reads the files again: calls show the new tokens from here on, and new connections have the new certificates. Where a file is wrong,
@@ -148,12 +148,12 @@ impl Guard {
     /// # Errors
     /// [`GuardError`].
     pub(super) fn reload(&self) -> Result<(), GuardError> {
-        let read = Arc::new(Read::of(&self.files)?);
+        let read = Arc::new(LoadedFiles::of(&self.files)?);
         *self.read.write().unwrap_or_else(PoisonError::into_inner) = read;
         Ok(())
     }
 
-    fn now(&self) -> Arc<Read> {
+    fn now(&self) -> Arc<LoadedFiles> {
         Arc::clone(&self.read.read().unwrap_or_else(PoisonError::into_inner))
     }
 
@@ -169,19 +169,19 @@ impl Guard {
     }
 
     /// Who is there, if it speaks as this address does.
-    pub(super) fn hear(&self, presence: &Presence) -> Result<Who, Status> {
+    pub(super) fn hear(&self, presence: &Peer) -> Result<PeerIdentity, Status> {
         match presence.who() {
-            Who::Plain => Err(Status::unauthenticated("this address speaks TLS: connect with https://")),
+            PeerIdentity::Plain => Err(Status::unauthenticated("this address speaks TLS: connect with https://")),
             known => Ok(known),
         }
     }
 
     /// Who asks, if that is known to the server.
-    pub(super) fn admit(&self, presence: &Presence, headers: &HeaderMap) -> Result<Who, Status> {
+    pub(super) fn admit(&self, presence: &Peer, headers: &HeaderMap) -> Result<PeerIdentity, Status> {
         match self.hear(presence)? {
-            Who::Local => Ok(Who::Local),
+            PeerIdentity::Local => Ok(PeerIdentity::Local),
             known => match &self.now().tokens {
-                Some(tokens) => tokens.who(headers).map(Who::Named),
+                Some(tokens) => tokens.who(headers).map(PeerIdentity::Named),
                 None => Ok(known),
             },
         }
@@ -190,20 +190,23 @@ impl Guard {
     /// Finds out how a client speaks. Without TLS here, as it likes.
     ///
     /// A client that speaks plain HTTP/2 to TLS is let in, to be told so by every call.
-    pub(super) async fn greet(&self, socket: TcpStream) -> io::Result<(Voice, Who)> {
-        let Some(tls) = self.now().tls.clone() else { return Ok((Voice::Plain(socket), Who::Unknown)) };
+    pub(super) async fn greet(&self, socket: TcpStream) -> io::Result<(NegotiatedSocket, PeerIdentity)> {
+        let Some(tls) = self.now().tls.clone() else {
+            return Ok((NegotiatedSocket::Plain(socket), PeerIdentity::Unknown));
+        };
         let mut first = [0];
         if socket.peek(&mut first).await? == 0 {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
         if first == *b"P" {
-            return Ok((Voice::Plain(socket), Who::Plain));
+            return Ok((NegotiatedSocket::Plain(socket), PeerIdentity::Plain));
         }
         match TlsAcceptor::from(tls).accept(socket).into_fallible().await {
             Ok(stream) => {
                 let shown = stream.get_ref().1.peer_certificates().and_then(<[_]>::first);
-                let who = shown.map_or(Who::Unknown, |certificate| Who::Certified(sha256(certificate)));
-                Ok((Voice::Secure(Box::new(stream)), who))
+                let who =
+                    shown.map_or(PeerIdentity::Unknown, |certificate| PeerIdentity::Certified(sha256(certificate)));
+                Ok((NegotiatedSocket::Secure(Box::new(stream)), who))
             }
             Err((error, socket)) => {
                 say_goodbye(socket).await;
@@ -214,7 +217,7 @@ impl Guard {
 }
 
 /// A socket whose client has been understood.
-pub(super) enum Voice {
+pub(super) enum NegotiatedSocket {
     Plain(TcpStream),
     Secure(Box<TlsStream<TcpStream>>),
 }
@@ -231,7 +234,11 @@ async fn say_goodbye(mut socket: TcpStream) {
     }
 }
 
-fn config(pair: Pair, files: &GuardFiles, refused: impl Fn(String) -> GuardError) -> Result<ServerConfig, GuardError> {
+fn config(
+    pair: CertificateFiles,
+    files: &GuardFiles,
+    refused: impl Fn(String) -> GuardError,
+) -> Result<ServerConfig, GuardError> {
     let error = |error: rustls::Error| refused(error.to_string());
     let builder = ServerConfig::builder_with_provider(provider())
         .with_protocol_versions(&[&rustls::version::TLS13])

@@ -2,14 +2,14 @@
 //! protocol as bytes, so that whoever speaks it to a server speaks it here, and gets the same bits and the same errors.
 
 use super::connection::Connections;
-use super::joined::{Joined, Next};
+use super::joined::{AttachedSession, RequestAction};
 use super::limits::Limits;
 use super::server::share;
-use super::shared::{Calls, Shared};
+use super::shared::{BimorphService, ServerState};
 use super::shutdown::Shutdown;
 use super::{proto, status};
 use crate::budget::{Allowance, Budget};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::device::Device;
 use crate::device::local::LocalDevice;
 use prost::Message;
@@ -30,22 +30,22 @@ const LOOK: Duration = Duration::from_millis(50);
 const NONE: usize = 1_000_000_000_000_000;
 
 /// A service in this process. Its sweeps run and its sessions are there as long as it is.
-pub struct Inside {
+pub struct InProcessServer {
     /// None once it is over.
     runtime: Option<Runtime>,
-    calls: Calls,
+    calls: BimorphService,
 }
 
 /// Answers of a call that has many.
-pub struct Answers {
+pub struct ReplyMessages {
     runtime: Handle,
     stream: Pin<Box<dyn Stream<Item = Result<Vec<u8>, Status>> + Send>>,
 }
 
 /// The questions of one device: what the Trial stream is to a server.
-pub struct Questions {
-    joined: Joined,
-    shared: Arc<Shared>,
+pub struct DeviceChannel {
+    joined: AttachedSession,
+    shared: Arc<ServerState>,
 }
 
 /// What a process allows itself: memory and patience are its own, programs run in their sandbox.
@@ -90,7 +90,7 @@ macro_rules! one_answer {
     };
 }
 
-impl Inside {
+impl InProcessServer {
     /// A service without models yet.
     ///
     /// # Errors
@@ -98,14 +98,14 @@ impl Inside {
     pub fn new() -> io::Result<Self> {
         let runtime = Builder::new_multi_thread().worker_threads(1).thread_name("bimorph").enable_all().build()?;
         let signals = Shutdown::default();
-        let make: fn(Arc<Compiled>) -> Box<dyn Device> = |compiled| Box::new(LocalDevice::new(compiled));
+        let make: fn(Arc<CompiledModel>) -> Box<dyn Device> = |compiled| Box::new(LocalDevice::new(compiled));
         let limits = limits();
         let connections = Arc::new(Connections::new(&limits, &signals.cutting));
         let shared = {
             let _within = runtime.enter();
             share(limits, Vec::new(), (make, None, connections), &signals)
         };
-        Ok(Self { runtime: Some(runtime), calls: Calls(shared) })
+        Ok(Self { runtime: Some(runtime), calls: BimorphService(shared) })
     }
 
     fn runtime(&self) -> Result<&Runtime, Status> {
@@ -136,7 +136,7 @@ impl Inside {
     ///
     /// # Errors
     /// Those of the call.
-    pub fn stream(&self, name: &str, request: &[u8]) -> Result<Answers, Status> {
+    pub fn stream(&self, name: &str, request: &[u8]) -> Result<ReplyMessages, Status> {
         let runtime = self.runtime()?.handle().clone();
         let calls = &self.calls;
         let stream = runtime.block_on(async {
@@ -150,16 +150,16 @@ impl Inside {
                 other => Err(Status::unimplemented(format!("no call \"{other}\" with many answers"))),
             }
         })?;
-        Ok(Answers { runtime, stream })
+        Ok(ReplyMessages { runtime, stream })
     }
 
     /// The questions of one device, whose session ends with them unless they join one.
-    pub fn questions(&self) -> Questions {
-        Questions { joined: Joined::none(&self.calls.0), shared: Arc::clone(&self.calls.0) }
+    pub fn questions(&self) -> DeviceChannel {
+        DeviceChannel { joined: AttachedSession::none(&self.calls.0), shared: Arc::clone(&self.calls.0) }
     }
 }
 
-impl Drop for Inside {
+impl Drop for InProcessServer {
     fn drop(&mut self) {
         self.calls.0.jobs.suspend();
         if let Some(runtime) = self.runtime.take() {
@@ -206,7 +206,7 @@ pub(super) async fn wanted<T>(
     }
 }
 
-impl Answers {
+impl ReplyMessages {
     /// The next answer; none after the last.
     ///
     /// # Errors
@@ -218,7 +218,7 @@ impl Answers {
     }
 }
 
-impl Questions {
+impl DeviceChannel {
     /// The reply to one question; none to an accept that asks for none.
     ///
     /// # Errors
@@ -231,9 +231,9 @@ impl Questions {
 
     fn reply(&mut self, request: proto::DeviceRequest) -> Option<ReplyKind> {
         match self.joined.next(request) {
-            Next::Ask(session, question) => session.answer(&question, &Budget::new(Allowance::default())),
-            Next::Attach(id) => Some(self.joined.join(self.shared.sessions.get(&id))),
-            Next::Answered(reply) => reply,
+            RequestAction::Ask(session, question) => session.answer(&question, &Budget::new(Allowance::default())),
+            RequestAction::Attach(id) => Some(self.joined.join(self.shared.sessions.get(&id))),
+            RequestAction::Answered(reply) => reply,
         }
     }
 }

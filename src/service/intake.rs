@@ -6,11 +6,11 @@
 //! answered), and a message that was begun must go on. Who may not ask is refused here; whether the server is well may be
 //! asked by everybody, in a few small places of its own, so that nobody is in the way of others by asking that.
 
-use super::bodies::{Answering, Received};
-use super::gate::{Gate, OPEN, REQUEST_ID};
+use super::bodies::{RequestBody, ResponseBody};
+use super::gate::{AdmissionCounters, OPEN, REQUEST_ID};
 use super::metrics::{self};
 use super::status;
-use super::turns::{CLIENT, Client};
+use super::turns::{CLIENT, TaskOwner};
 use std::convert::Infallible;
 use std::future::Future;
 use std::pin::Pin;
@@ -25,20 +25,20 @@ use tracing::Instrument;
 /// Calls whose requests are streams: silence between two messages is no pause.
 const STREAMS: [&str; 2] = ["/Trial", "/ServerReflectionInfo"];
 
-/// A service whose calls enter through a [`Gate`].
+/// A service whose calls enter through an [`AdmissionCounters`].
 #[derive(Clone)]
-pub(super) struct Intake<S> {
+pub(super) struct AdmissionService<S> {
     service: S,
-    gate: Arc<Gate>,
+    gate: Arc<AdmissionCounters>,
 }
 
-impl<S> Intake<S> {
-    pub(super) fn new(service: S, gate: &Arc<Gate>) -> Self {
+impl<S> AdmissionService<S> {
+    pub(super) fn new(service: S, gate: &Arc<AdmissionCounters>) -> Self {
         Self { service, gate: Arc::clone(gate) }
     }
 }
 
-impl<S: NamedService> NamedService for Intake<S> {
+impl<S: NamedService> NamedService for AdmissionService<S> {
     const NAME: &'static str = S::NAME;
 }
 
@@ -60,22 +60,22 @@ fn not_grpc() -> http::Response<Body> {
     response
 }
 
-type Answer = Pin<Box<dyn Future<Output = Result<http::Response<Body>, Infallible>> + Send>>;
+type ResponseFuture = Pin<Box<dyn Future<Output = Result<http::Response<Body>, Infallible>> + Send>>;
 
-impl<S> Service<http::Request<Body>> for Intake<S>
+impl<S> Service<http::Request<Body>> for AdmissionService<S>
 where
     S: Service<http::Request<Body>, Response = http::Response<Body>, Error = Infallible> + NamedService,
     S::Future: Send + 'static,
 {
     type Response = http::Response<Body>;
     type Error = Infallible;
-    type Future = Answer;
+    type Future = ResponseFuture;
 
     fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
         self.service.poll_ready(cx)
     }
 
-    fn call(&mut self, request: http::Request<Body>) -> Answer {
+    fn call(&mut self, request: http::Request<Body>) -> ResponseFuture {
         if !is_grpc(request.headers()) {
             return Box::pin(std::future::ready(Ok(not_grpc())));
         }
@@ -102,8 +102,8 @@ where
         let stream = STREAMS.iter().any(|name| request.uri().path().ends_with(name));
         let number = call.presence.as_ref().map_or(0, |presence| presence.number());
         let name = account.name().into();
-        let received = Received::new(Arc::clone(&call), Arc::clone(&account), stream);
-        let client = Client { number, account: Some(account), name };
+        let received = RequestBody::new(Arc::clone(&call), Arc::clone(&account), stream);
+        let client = TaskOwner { number, account: Some(account), name };
         let request = request.map(|body| Body::new(received.of(body)));
         let answer = CLIENT.scope(client, self.service.call(request)).instrument(span.clone());
         Box::pin(async move {
@@ -111,7 +111,7 @@ where
             status::say_undecodable(response.headers_mut());
             response.headers_mut().insert(REQUEST_ID, id);
             call.hear(response.headers());
-            Ok(response.map(|body| Body::new(Answering { body, call, span })))
+            Ok(response.map(|body| Body::new(ResponseBody { body, call, span })))
         })
     }
 }

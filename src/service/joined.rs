@@ -2,9 +2,9 @@
 
 use super::answerable::answerable;
 use super::proto;
-use super::question::Question;
+use super::question::StreamRequest;
 use super::session::{Session, refused};
-use super::shared::Shared;
+use super::shared::ServerState;
 use proto::device_reply::Kind as ReplyKind;
 use proto::device_request::Kind as RequestKind;
 use std::sync::Arc;
@@ -12,8 +12,8 @@ use std::sync::atomic::Ordering;
 use tonic::Status;
 
 /// The session of a stream; left when this goes away.
-pub(super) struct Joined {
-    shared: Arc<Shared>,
+pub(super) struct AttachedSession {
+    shared: Arc<ServerState>,
     session: Option<Arc<Session>>,
     /// The stream's number among those of the session.
     number: u64,
@@ -22,43 +22,43 @@ pub(super) struct Joined {
 }
 
 /// What a request comes down to.
-pub(super) enum Next {
+pub(super) enum RequestAction {
     /// To be asked of this session.
-    Ask(Arc<Session>, Question),
+    Ask(Arc<Session>, StreamRequest),
     /// To join the session of that id.
     Attach(String),
     /// A refusal; none of what has no answer.
     Answered(Option<ReplyKind>),
 }
 
-impl Joined {
+impl AttachedSession {
     /// None yet.
-    pub(super) fn none(shared: &Arc<Shared>) -> Self {
+    pub(super) fn none(shared: &Arc<ServerState>) -> Self {
         Self { shared: Arc::clone(shared), session: None, number: 0, owned: false }
     }
 
     /// What a request comes down to. One that opens has a session when this returns.
-    pub(super) fn next(&mut self, request: proto::DeviceRequest) -> Next {
+    pub(super) fn next(&mut self, request: proto::DeviceRequest) -> RequestAction {
         self.shared.metrics.trials.fetch_add(1, Ordering::Relaxed);
         let question = match request.kind {
-            Some(RequestKind::Open(open)) => self.enter(&open).map(|()| Question::Open(open)),
-            Some(RequestKind::Attach(attach)) => return Next::Attach(attach.session),
-            Some(RequestKind::Trial(trial)) => Ok(Question::Trial(trial)),
-            Some(RequestKind::Accept(accept)) => Ok(Question::Accept(accept, self.number)),
+            Some(RequestKind::Open(open)) => self.enter(&open).map(|()| StreamRequest::Open(open)),
+            Some(RequestKind::Attach(attach)) => return RequestAction::Attach(attach.session),
+            Some(RequestKind::Trial(trial)) => Ok(StreamRequest::Trial(trial)),
+            Some(RequestKind::Accept(accept)) => Ok(StreamRequest::Accept(accept, self.number)),
             Some(RequestKind::Linearize(request)) => {
                 let limits = &self.shared.limits;
                 let bound = self.session.as_ref().map(|session| session.bound_small_signals(1, request.noise, limits));
-                bound.unwrap_or(Ok(())).map(|()| Question::Linearize(request))
+                bound.unwrap_or(Ok(())).map(|()| StreamRequest::Linearize(request))
             }
             None => Err(Status::invalid_argument("a request without a kind")),
         };
         match (question, &self.session) {
-            (Ok(question), Some(session)) => Next::Ask(Arc::clone(session), question),
+            (Ok(question), Some(session)) => RequestAction::Ask(Arc::clone(session), question),
             (Ok(question), None) => {
                 let fault = super::convert::device::fault_to_wire(&crate::device::DeviceError::NotOpen);
-                Next::Answered((!question.is_silent()).then_some(ReplyKind::Fault(fault)))
+                RequestAction::Answered((!question.is_silent()).then_some(ReplyKind::Fault(fault)))
             }
-            (Err(status), _) => Next::Answered(Some(refused(&status))),
+            (Err(status), _) => RequestAction::Answered(Some(refused(&status))),
         }
     }
 
@@ -108,7 +108,7 @@ impl Joined {
     }
 }
 
-impl Drop for Joined {
+impl Drop for AttachedSession {
     fn drop(&mut self) {
         self.leave();
     }

@@ -1,16 +1,16 @@
 //! What is kept of one session: two files in turn, each with a checksum, of which one is whole at any moment.
 
-use super::kept::Kept;
+use super::kept::SessionRecord;
 use super::proto;
-use super::store::Store;
+use super::store::SessionStore;
 use crate::device::{Device, DeviceError, Token};
 use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Keeps the states of one session.
 #[derive(Debug)]
-pub(super) struct Keeper {
-    store: Arc<Store>,
+pub(super) struct SessionWriter {
+    store: Arc<SessionStore>,
     id: String,
     model: String,
     sequence: u64,
@@ -20,22 +20,27 @@ pub(super) struct Keeper {
     pub(super) lease_ms: u64,
 }
 
-impl Keeper {
+impl SessionWriter {
     /// Of a new session of a model.
     ///
     /// # Errors
     /// What the system said, or the bound.
-    pub(super) fn new(store: &Arc<Store>, id: &str, model: &str, source: &proto::CompileRequest) -> io::Result<Self> {
+    pub(super) fn new(
+        store: &Arc<SessionStore>,
+        id: &str,
+        model: &str,
+        source: &proto::CompileRequest,
+    ) -> io::Result<Self> {
         store.begin(id, model, source)?;
         Ok(Self::of(store, id, model, 0, 0, 0))
     }
 
-    /// Of one that goes on; it sleeps until [`Store::wake`].
-    pub(super) fn after(store: &Arc<Store>, id: &str, model: &str, kept: &Kept) -> Self {
+    /// Of one that goes on; it sleeps until [`SessionStore::wake`].
+    pub(super) fn after(store: &Arc<SessionStore>, id: &str, model: &str, kept: &SessionRecord) -> Self {
         Self::of(store, id, model, kept.sequence, kept.accepted, kept.lease_ms)
     }
 
-    fn of(store: &Arc<Store>, id: &str, model: &str, sequence: u64, accepted: u64, lease_ms: u64) -> Self {
+    fn of(store: &Arc<SessionStore>, id: &str, model: &str, sequence: u64, accepted: u64, lease_ms: u64) -> Self {
         Self { store: Arc::clone(store), id: id.to_owned(), model: model.to_owned(), sequence, accepted, lease_ms }
     }
 
@@ -47,7 +52,7 @@ impl Keeper {
     pub(super) fn keep(&mut self, accepted: u64, sealed: &[u8]) -> io::Result<()> {
         let sequence = self.sequence + 1;
         let path = self.store.session(&self.id, &self.model, sequence % 2);
-        let bytes = Kept::write(sequence, accepted, self.lease_ms, sealed);
+        let bytes = SessionRecord::write(sequence, accepted, self.lease_ms, sealed);
         self.store.counted(&path, bytes.len(), || {
             self.store.disk().write(&path, &bytes)?;
             // the name of a new file is kept by its folder
@@ -80,7 +85,7 @@ impl Keeper {
 }
 
 /// Removes what is kept of a session that is closed: whoever keeps at this moment is waited for, and then finds it closed.
-pub(super) fn forget(keeper: &Mutex<Keeper>) {
+pub(super) fn forget(keeper: &Mutex<SessionWriter>) {
     keeper.lock().unwrap_or_else(PoisonError::into_inner).forget();
 }
 

@@ -9,7 +9,7 @@ const BEFORE: usize = 16 + 16 + 4 * 8;
 
 /// What is kept of a session.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Kept {
+pub(super) struct SessionRecord {
     pub(super) sequence: u64,
     /// The last accepted state; 0: none yet.
     pub(super) accepted: u64,
@@ -19,7 +19,7 @@ pub(super) struct Kept {
     pub(super) sealed: Vec<u8>,
 }
 
-impl Kept {
+impl SessionRecord {
     pub(super) fn write(sequence: u64, accepted: u64, lease_ms: u64, sealed: &[u8]) -> Vec<u8> {
         let mut out = Vec::with_capacity(BEFORE + sealed.len());
         out.extend(HEAD);

@@ -1,7 +1,7 @@
 //! What one server allows: a table, from which come the fields, their defaults, and what everybody is told of them.
 
 use super::proto;
-use super::written::{Bytes, BytesOrNone, Count, CountOrNone, Time, TimeOrNone, Written};
+use super::written::{ByteSize, BytesOrNone, CountOrNone, PositiveCount, PositiveSeconds, TimeOrNone, ValueSyntax};
 use std::sync::LazyLock;
 use std::time::Duration;
 
@@ -23,7 +23,7 @@ macro_rules! limits {
         /// `Default` is the only place where the numbers stand; bytes are in [byte], times in [s].
         #[derive(Debug, Clone, PartialEq)]
         pub struct Limits {
-            $($(#[doc = $help])+ pub $field: <$kind as Written>::Held,)+
+            $($(#[doc = $help])+ pub $field: <$kind as ValueSyntax>::Held,)+
         }
 
         impl Default for Limits {
@@ -35,7 +35,7 @@ macro_rules! limits {
         /// Every limit, in the order of the documentation.
         pub static LIMITS: LazyLock<Vec<Limit>> = LazyLock::new(|| vec![$(Limit {
             name: stringify!($field),
-            place: $kind::PLACE,
+            place: $kind::METAVAR,
             help: concat!($($help, "\n"),+),
             read: |limits, text| $kind::read(text).map(|value| limits.$field = value),
             write: |limits| $kind::write(&limits.$field),
@@ -47,40 +47,40 @@ limits! {
     /// Largest message in either direction. Streams send chunks of at most 1 MiB whatever this is. A session whose
     /// answers would be larger (derivatives are as many as the square of the ports) does not open, and a `Linearize` of
     /// too many frequencies or cross-spectra is refused.
-    message_bytes: Bytes = 64 << 20;
+    message_bytes: ByteSize = 64 << 20;
 
     /// Largest netlist, all files together, and largest layout.
-    netlist_bytes: Bytes = 16 << 20;
+    netlist_bytes: ByteSize = 16 << 20;
 
     /// Largest SUGAR 3 netlist, all files together: such a netlist is a Lua program, and 0 runs none. With 1M they run
     /// in the sandbox of docs/netlist.md.
     program_bytes: BytesOrNone = 0;
 
     /// Most mechanical unknowns of one model.
-    unknowns: Count = 200_000;
+    unknowns: PositiveCount = 200_000;
 
     /// Models with at most this many unknowns are stepped where their requests arrive; larger ones on a thread of their
     /// own for each trial, which costs some ten microseconds but lets other streams run meanwhile.
-    inline_unknowns: Count = 2_000;
+    inline_unknowns: PositiveCount = 2_000;
 
     /// Most compiled models kept; the one unused for longest is forgotten first, and none that an open session or a computation
     /// of another client has.
-    models: Count = 64;
+    models: PositiveCount = 64;
 
     /// Most models of one client kept, whose own are forgotten first; 0: any.
     client_models: CountOrNone = 0;
 
     /// Most bytes of all models kept, counted by what their compilation laid out.
-    model_memory: Bytes = 512 << 20;
+    model_memory: ByteSize = 512 << 20;
 
     /// The same of the models of one client; 0: any. A single model may be larger.
     client_model_memory: BytesOrNone = 0;
 
     /// Most sessions open at once. Each holds a bounded number of states.
-    sessions: Count = 256;
+    sessions: PositiveCount = 256;
 
     /// Most bytes of all open sessions, counted as 4 kB for each unknown of their models and 176 bytes more for each of their ports.
-    session_memory: Bytes = 2 << 30;
+    session_memory: ByteSize = 2 << 30;
 
     /// The same of all sessions of one client; 0: any.
     client_session_memory: BytesOrNone = 0;
@@ -100,50 +100,50 @@ limits! {
 
     /// Most bytes of states, netlists and jobs in the folder `state_dir`; a session whose states would be beyond does not open, an
     /// accepted state that would be is refused, and a job whose rows would be ends.
-    state_bytes: Bytes = 1 << 30;
+    state_bytes: ByteSize = 1 << 30;
 
     /// Most points of one sweep.
-    sweep_points: Count = 1_000_000;
+    sweep_points: PositiveCount = 1_000_000;
 
     /// Most jobs kept, running or finished; with a folder `state_dir` most that run or wait, and 64 times as many in all. All that run
     /// share the processors, in turns of their clients.
-    sweeps: Count = 16;
+    sweeps: PositiveCount = 16;
 
     /// Most jobs of one client kept, running or finished; with a folder `state_dir` most that run or wait, and 64 times as many in all. 0: any.
     client_sweeps: CountOrNone = 0;
 
     /// A finished job in the folder `state_dir` that nobody asks for is forgotten after so long; without such a folder, after `idle`.
-    sweeps_idle: Time = Duration::from_secs(7 * 24 * 3600);
+    sweeps_idle: PositiveSeconds = Duration::from_secs(7 * 24 * 3600);
 
     /// Most samples times signals of one transient.
-    transient_values: Count = 100_000_000;
+    transient_values: PositiveCount = 100_000_000;
 
     /// Most modes of one request.
-    modes: Count = 1_000;
+    modes: PositiveCount = 1_000;
 
     /// Most unknowns times the square of the modes of one request, which is what one restart of the iteration takes: 1
     /// 000 modes of 2 000 unknowns, 100 of 200 000.
-    mode_work: Count = 2_000_000_000;
+    mode_work: PositiveCount = 2_000_000_000;
 
     /// Analyses computed at once, others wait their turn: as many as there are cores. As many compilations and openings
     /// have places of their own, and twice as many long trials.
-    analyses: Count = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    analyses: PositiveCount = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
 
     /// Bytes that one computation may lay out, all together, counted before they are laid out.
-    memory: Bytes = 512 << 20;
+    memory: ByteSize = 512 << 20;
 
     /// Processor time of one computation. Unary calls end earlier, at `request_timeout`.
-    cpu: Time = Duration::from_secs(3600);
+    cpu: PositiveSeconds = Duration::from_secs(3600);
 
     /// Most signals, outputs, events or ports of one request.
-    signals: Count = 10_000;
+    signals: PositiveCount = 10_000;
 
     /// Most transients and tables being sent at once; one whose reader is slow gives its place among analyses to
     /// others.
-    result_streams: Count = 64;
+    result_streams: PositiveCount = 64;
 
     /// Most calls at once of all connections, streams among them.
-    calls: Count = 4096;
+    calls: PositiveCount = 4096;
 
     /// Most calls of one client at once, of all its connections; 0: any.
     client_calls: CountOrNone = 0;
@@ -155,46 +155,46 @@ limits! {
     client_connections: CountOrNone = 0;
 
     /// Most bytes of requests held at once: those being received, and those of unary calls until they are answered.
-    held_bytes: Bytes = 256 << 20;
+    held_bytes: ByteSize = 256 << 20;
 
     /// Most bytes of requests of one connection held at once, by the lengths that they announce: from the head of a message until it is
     /// answered. At least `message_bytes`.
-    connection_bytes: Bytes = 128 << 20;
+    connection_bytes: ByteSize = 128 << 20;
 
     /// The same of all connections of one client; 0: any.
     client_held_bytes: BytesOrNone = 0;
 
     /// Longest pause inside a request: a message that was begun must go on, or the call ends with `DEADLINE_EXCEEDED`.
-    request_pause: Time = Duration::from_secs(20);
+    request_pause: PositiveSeconds = Duration::from_secs(20);
 
     /// A connection that has not said by then what it speaks is closed.
-    handshake: Time = Duration::from_secs(10);
+    handshake: PositiveSeconds = Duration::from_secs(10);
 
     /// After so long without a word on a TCP connection the system asks the other end whether it is there, and closes the connection after
     /// five questions a sixth of this apart without an answer: a machine that lost its power or its network gives its place back. A
     /// program that is paused is there.
-    keepalive: Time = Duration::from_secs(60);
+    keepalive: PositiveSeconds = Duration::from_secs(60);
 
     /// Most connections at once. A further one takes the place of the one without calls that was idle for longest; with
     /// none such it is closed as it comes.
-    connections: Count = 512;
+    connections: PositiveCount = 512;
 
     /// Most HTTP/2 streams of one connection.
-    streams_per_connection: Count = 128;
+    streams_per_connection: PositiveCount = 128;
 
     /// Longest unary call; then `DEADLINE_EXCEEDED`.
-    request_timeout: Time = Duration::from_secs(120);
+    request_timeout: PositiveSeconds = Duration::from_secs(120);
 
     /// A session without a stream and without a lease, or a finished job that is not kept on a disk, untouched for this long is forgotten.
-    idle: Time = Duration::from_secs(600);
+    idle: PositiveSeconds = Duration::from_secs(600);
 
     /// A session on an open stream untouched for this long is forgotten: a circuit may be paused for lunch, but a
     /// client that vanished without a word must not stay for ever. Also the longest lease.
-    stream_idle: Time = Duration::from_secs(12 * 3600);
+    stream_idle: PositiveSeconds = Duration::from_secs(12 * 3600);
 
     /// After the signal to stop, open streams may go on for this long; then they end with `UNAVAILABLE`, and
     /// connections that do not close are cut.
-    drain: Time = Duration::from_secs(5);
+    drain: PositiveSeconds = Duration::from_secs(5);
 }
 
 impl Limits {

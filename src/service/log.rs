@@ -12,13 +12,13 @@ use std::time::Duration;
 /// Lines that wait at most.
 const QUEUE: usize = 1024;
 
-static LINES: OnceLock<SyncSender<Item>> = OnceLock::new();
+static LINES: OnceLock<SyncSender<LogItem>> = OnceLock::new();
 /// Lines dropped since the last that was written.
 static DROPPED: AtomicUsize = AtomicUsize::new(0);
 /// Lines dropped in all.
 static LOST: AtomicU64 = AtomicU64::new(0);
 
-enum Item {
+enum LogItem {
     Text(Vec<u8>),
     /// Everything before this is written.
     Mark(SyncSender<()>),
@@ -26,7 +26,7 @@ enum Item {
 
 /// Says one line, without waiting.
 pub fn line(text: &str) {
-    Lines.put(format!("{text}\n").into_bytes());
+    LogLines.put(format!("{text}\n").into_bytes());
 }
 
 /// Lines that nobody read in time.
@@ -37,25 +37,25 @@ pub(super) fn dropped() -> u64 {
 /// Waits until the lines so far are written, but no longer than `most`.
 pub(super) fn flush(most: Duration) {
     let (done, written) = sync_channel(1);
-    if LINES.get().is_some_and(|lines| lines.try_send(Item::Mark(done)).is_ok()) {
+    if LINES.get().is_some_and(|lines| lines.try_send(LogItem::Mark(done)).is_ok()) {
         let _ = written.recv_timeout(most);
     }
 }
 
 /// A writer for the subscriber: each write is one line.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Lines;
+pub(super) struct LogLines;
 
-impl Lines {
+impl LogLines {
     fn put(self, text: Vec<u8>) {
-        if queue().try_send(Item::Text(text)).is_err() {
+        if queue().try_send(LogItem::Text(text)).is_err() {
             DROPPED.fetch_add(1, Ordering::Relaxed);
             LOST.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
 
-impl Write for Lines {
+impl Write for LogLines {
     fn write(&mut self, text: &[u8]) -> io::Result<usize> {
         self.put(text.to_vec());
         Ok(text.len())
@@ -66,7 +66,7 @@ impl Write for Lines {
     }
 }
 
-fn queue() -> &'static SyncSender<Item> {
+fn queue() -> &'static SyncSender<LogItem> {
     LINES.get_or_init(|| {
         let (sender, lines) = sync_channel(QUEUE);
         // without a thread the queue fills, and lines are dropped
@@ -75,11 +75,11 @@ fn queue() -> &'static SyncSender<Item> {
     })
 }
 
-fn write(lines: &Receiver<Item>) {
+fn write(lines: &Receiver<LogItem>) {
     for item in lines {
         let text = match item {
-            Item::Text(text) => text,
-            Item::Mark(done) => {
+            LogItem::Text(text) => text,
+            LogItem::Mark(done) => {
                 let _ = done.send(());
                 continue;
             }

@@ -8,7 +8,7 @@ use super::turns::client;
 use super::{proto, status};
 use crate::analysis::mesh;
 use crate::budget;
-use crate::compile::{CompileOptions, Compiled, compile};
+use crate::compile::{CompileOptions, CompiledModel, compile};
 use crate::content::Fnv;
 use crate::device::OpenRequest;
 use crate::netlist::Bundle;
@@ -17,10 +17,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tonic::Status;
 
 /// A model that clients can name.
-pub(super) struct Model {
-    pub(super) compiled: Arc<Compiled>,
+pub(super) struct NamedModel {
+    pub(super) compiled: Arc<CompiledModel>,
     /// The same on the mesh that it has in a circuit.
-    pub(super) in_circuit: Arc<Compiled>,
+    pub(super) in_circuit: Arc<CompiledModel>,
     pub(super) description: proto::ModelDescription,
     bundle: Bundle,
     options: CompileOptions,
@@ -28,7 +28,7 @@ pub(super) struct Model {
     bytes: usize,
 }
 
-impl Model {
+impl NamedModel {
     pub(super) fn id(&self) -> &str {
         &self.description.id
     }
@@ -48,39 +48,39 @@ impl Model {
 
 /// The models kept, at most [`Limits::models`].
 #[derive(Default)]
-pub(super) struct Models {
-    kept: Mutex<Kept>,
+pub(super) struct ModelCache {
+    kept: Mutex<ModelTable>,
 }
 
 #[derive(Default)]
-struct Kept {
-    models: BTreeMap<String, Entry>,
+struct ModelTable {
+    models: BTreeMap<String, CachedModel>,
     requests: u64,
 }
 
 /// A model that is kept.
-struct Entry {
-    model: Arc<Model>,
+struct CachedModel {
+    model: Arc<NamedModel>,
     /// When it was last asked for, as a count of requests.
     used: u64,
     /// Clients that asked for it.
     clients: BTreeSet<Arc<str>>,
 }
 
-impl Entry {
+impl CachedModel {
     /// Whether an open session or a computation has it.
     fn is_in_use(&self) -> bool {
         Arc::strong_count(&self.model) > 1
     }
 }
 
-impl Kept {
+impl ModelTable {
     fn bytes(&self) -> usize {
         self.models.values().map(|entry| entry.model.bytes).sum()
     }
 
     /// The model unused for longest of those that may be forgotten.
-    fn oldest(&self, may: impl Fn(&Entry) -> bool) -> Option<String> {
+    fn oldest(&self, may: impl Fn(&CachedModel) -> bool) -> Option<String> {
         let found = self.models.iter().filter(|(_, entry)| may(entry));
         found.min_by_key(|(_, entry)| entry.used).map(|(id, _)| id.clone())
     }
@@ -98,7 +98,7 @@ impl Kept {
             if count == 0 || !(many || large) {
                 break;
             }
-            let own = |entry: &Entry| entry.clients.contains(client);
+            let own = |entry: &CachedModel| entry.clients.contains(client);
             let free = self.oldest(|entry| own(entry) && !entry.is_in_use());
             let Some(id) = free.or_else(|| self.oldest(own)) else { break };
             // it stays for others that asked for it
@@ -114,7 +114,7 @@ impl Kept {
             && (self.models.len() >= limits.models || self.bytes().saturating_add(bytes) > limits.model_memory)
         {
             // a session goes on without the name of its model, but only its own client may take that away
-            let own = |entry: &Entry| entry.clients.iter().all(|other| **other == *client);
+            let own = |entry: &CachedModel| entry.clients.iter().all(|other| **other == *client);
             let free = self.oldest(|entry| !entry.is_in_use());
             let Some(id) = free.or_else(|| self.oldest(own)) else {
                 let many = self.models.len() >= limits.models;
@@ -128,9 +128,9 @@ impl Kept {
     }
 }
 
-impl Models {
+impl ModelCache {
     /// The model of that id.
-    pub(super) fn get(&self, id: &str) -> Result<Arc<Model>, Status> {
+    pub(super) fn get(&self, id: &str) -> Result<Arc<NamedModel>, Status> {
         self.find(id).ok_or_else(|| status::not_found("model", id))
     }
 
@@ -139,7 +139,7 @@ impl Models {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner).models.len()
     }
 
-    fn find(&self, id: &str) -> Option<Arc<Model>> {
+    fn find(&self, id: &str) -> Option<Arc<NamedModel>> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.requests += 1;
         let now = kept.requests;
@@ -159,7 +159,7 @@ impl Models {
         options: CompileOptions,
         limits: &Limits,
         make: MakeDevice,
-    ) -> Result<Arc<Model>, Status> {
+    ) -> Result<Arc<NamedModel>, Status> {
         let mut key = hash(&bundle, &options);
         // The hash is not cryptographic, so a hit is compared in full, and a collision takes the next free id.
         while let Some(model) = self.find(&format!("{key:032x}")) {
@@ -183,19 +183,19 @@ impl Models {
         // the meshes that were looked at are gone
         let larger = in_circuit.unknowns().div_ceil(compiled.unknowns().max(1));
         let bytes = bytes.saturating_mul(1 + larger);
-        let model = Arc::new(Model { compiled, in_circuit, description, bundle, options, bytes });
+        let model = Arc::new(NamedModel { compiled, in_circuit, description, bundle, options, bytes });
         self.keep(Arc::clone(&model), limits)?;
         Ok(model)
     }
 
-    fn keep(&self, model: Arc<Model>, limits: &Limits) -> Result<(), Status> {
+    fn keep(&self, model: Arc<NamedModel>, limits: &Limits) -> Result<(), Status> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.requests += 1;
         let (used, client) = (kept.requests, client().name);
         kept.models.remove(model.id());
         kept.make_room(&client, model.bytes, limits)?;
         let id = model.id().to_owned();
-        kept.models.insert(id, Entry { model, used, clients: BTreeSet::from([client]) });
+        kept.models.insert(id, CachedModel { model, used, clients: BTreeSet::from([client]) });
         Ok(())
     }
 }
@@ -214,7 +214,7 @@ pub(super) fn check_size(bundle: &Bundle, limits: &Limits) -> Result<(), Status>
     Ok(())
 }
 
-fn describe(id: String, compiled: &Arc<Compiled>, make: MakeDevice) -> Result<proto::ModelDescription, Status> {
+fn describe(id: String, compiled: &Arc<CompiledModel>, make: MakeDevice) -> Result<proto::ModelDescription, Status> {
     let opened = make(Arc::clone(compiled)).open(&OpenRequest::default()).map_err(|error| status::device(&error))?;
     let nodes = compiled.structure.nodes.iter().filter(|node| node.mechanical);
     Ok(proto::ModelDescription {

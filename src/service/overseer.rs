@@ -3,7 +3,7 @@
 //! Nothing secret is told, so nobody is asked for a token. A connection answers once and closes; few are open at once.
 
 use super::address::Address;
-use super::overseen::{Overseen, busy, text};
+use super::overseen::{MonitoringState, busy, text};
 use super::server::ServeError;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use std::collections::VecDeque;
@@ -14,7 +14,7 @@ use tokio::task::{AbortHandle, JoinSet};
 use tonic::codegen::http::{Method, Request, Response, StatusCode};
 
 /// Connections open at once.
-const MOST: usize = 16;
+const MAX_CONNECTIONS: usize = 16;
 /// Longest time for one.
 const PATIENCE: Duration = Duration::from_secs(5);
 
@@ -29,7 +29,7 @@ pub(super) async fn bind(address: &Address) -> Result<(TcpListener, Address), Se
 
 /// Answers until it is dropped. A request is answered as it comes, so those that are open have not asked, or do not read: where all
 /// places are taken, the oldest one makes room.
-pub(super) async fn answer(listener: TcpListener, overseen: Overseen) {
+pub(super) async fn answer(listener: TcpListener, overseen: MonitoringState) {
     // ends all that are open when this is dropped
     let mut tasks = JoinSet::new();
     let mut open: VecDeque<AbortHandle> = VecDeque::new();
@@ -40,7 +40,7 @@ pub(super) async fn answer(listener: TcpListener, overseen: Overseen) {
         };
         while tasks.try_join_next().is_some() {}
         open.retain(|task| !task.is_finished());
-        if open.len() >= MOST
+        if open.len() >= MAX_CONNECTIONS
             && let Some(oldest) = open.pop_front()
         {
             oldest.abort();
@@ -58,7 +58,7 @@ pub(super) async fn answer(listener: TcpListener, overseen: Overseen) {
     }
 }
 
-fn reply<B>(request: &Request<B>, overseen: &Overseen) -> Response<String> {
+fn reply<B>(request: &Request<B>, overseen: &MonitoringState) -> Response<String> {
     let (status, body) = match (request.method(), request.uri().path()) {
         (&Method::GET, "/metrics") => (StatusCode::OK, text(&overseen.shared, &overseen.gate)),
         (&Method::GET, "/live") => (StatusCode::OK, "alive\n".to_owned()),

@@ -1,10 +1,10 @@
 //! A machine may lose its power at any moment: whatever of the files was not waited for may then be there, be gone, or be torn. In
 //! each such case a state whose keeping was answered is found again, with its model.
 
-use super::disk::Done;
-use super::keeper::Keeper;
+use super::disk::DiskOperation;
+use super::keeper::SessionWriter;
 use super::proto;
-use super::store::Store;
+use super::store::SessionStore;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ const MODEL: &str = "00000000000000000000000000000001";
 
 /// What becomes of bytes that were not waited for.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Bytes {
+pub(super) enum UnsyncedBytes {
     Gone,
     /// The first half is there.
     Torn,
@@ -26,7 +26,7 @@ pub(super) enum Bytes {
     Whole,
 }
 
-impl Bytes {
+impl UnsyncedBytes {
     pub(super) const ALL: [Self; 5] = [Self::Gone, Self::Torn, Self::Blank, Self::Holed, Self::Whole];
 }
 
@@ -38,20 +38,20 @@ struct Inode {
 }
 
 impl Inode {
-    fn after(&self, bytes: Bytes) -> Vec<u8> {
+    fn after(&self, bytes: UnsyncedBytes) -> Vec<u8> {
         let Some(written) = &self.written else { return self.sure.clone() };
         let same = self.sure.iter().zip(written).take_while(|(a, b)| a == b).count();
         let half = same + (written.len() - same) / 2;
         let rest = |from: usize| self.sure.get(from..).unwrap_or_default();
         match bytes {
-            Bytes::Gone => self.sure.clone(),
-            Bytes::Torn => [&written[..half], rest(half)].concat(),
-            Bytes::Blank => [&self.sure[..same], &vec![0; written.len() - same], rest(written.len())].concat(),
-            Bytes::Holed => {
+            UnsyncedBytes::Gone => self.sure.clone(),
+            UnsyncedBytes::Torn => [&written[..half], rest(half)].concat(),
+            UnsyncedBytes::Blank => [&self.sure[..same], &vec![0; written.len() - same], rest(written.len())].concat(),
+            UnsyncedBytes::Holed => {
                 let hole = half.min(self.sure.len()).max(same);
                 [&self.sure[..hole], &vec![0; half - hole], &written[half..]].concat()
             }
-            Bytes::Whole => written.clone(),
+            UnsyncedBytes::Whole => written.clone(),
         }
     }
 }
@@ -66,15 +66,15 @@ pub(super) struct Machine {
 
 impl Machine {
     /// What was done until the power went.
-    pub(super) fn after(done: &[Done]) -> Self {
+    pub(super) fn after(done: &[DiskOperation]) -> Self {
         let mut machine = Self::default();
         done.iter().for_each(|one| machine.run(one));
         machine
     }
 
-    fn run(&mut self, done: &Done) {
+    fn run(&mut self, done: &DiskOperation) {
         match done {
-            Done::Written(path, bytes) => {
+            DiskOperation::Written(path, bytes) => {
                 let next = self.files.len();
                 let file = *self.names.entry(path.clone()).or_insert(next);
                 if file == next {
@@ -82,19 +82,19 @@ impl Machine {
                 }
                 self.files[file].written = Some(bytes.clone());
             }
-            Done::Added(path, bytes) => {
+            DiskOperation::Added(path, bytes) => {
                 let file = &mut self.files[self.names[path]];
                 file.written.get_or_insert_with(|| file.sure.clone()).extend(bytes);
             }
-            Done::Synced(path) => {
+            DiskOperation::Synced(path) => {
                 let file = &mut self.files[self.names[path]];
                 file.sure = file.written.take().expect("written before");
             }
-            Done::Renamed(from, to) => {
+            DiskOperation::Renamed(from, to) => {
                 let file = self.names.remove(from).expect("there");
                 self.names.insert(to.clone(), file);
             }
-            Done::FolderSynced(folder) => {
+            DiskOperation::FolderSynced(folder) => {
                 let inside = |path: &PathBuf| path.parent() == Some(folder);
                 self.sure.retain(|path, _| !inside(path));
                 self.sure.extend(self.names.iter().filter(|(path, _)| inside(path)).map(|(p, f)| (p.clone(), *f)));
@@ -103,7 +103,7 @@ impl Machine {
     }
 
     /// What is found when the power is back, in a folder of its own.
-    pub(super) fn found(&self, from: &Path, bytes: Bytes, new_names: bool) -> tempfile::TempDir {
+    pub(super) fn found(&self, from: &Path, bytes: UnsyncedBytes, new_names: bool) -> tempfile::TempDir {
         let folder = tempfile::tempdir().expect("a folder");
         for (path, file) in if new_names { &self.names } else { &self.sure } {
             let path = folder.path().join(path.strip_prefix(from).expect("inside"));
@@ -119,7 +119,7 @@ impl Machine {
 #[test]
 fn no_answered_state_is_lost_with_the_power() {
     let folder = tempfile::tempdir().expect("a folder");
-    let store = Arc::new(Store::open(folder.path(), true, 1 << 20).expect("opens"));
+    let store = Arc::new(SessionStore::open(folder.path(), true, 1 << 20).expect("opens"));
     let source = proto::CompileRequest {
         bundle: Some(proto::Bundle {
             root: "a.net".into(),
@@ -127,7 +127,7 @@ fn no_answered_state_is_lost_with_the_power() {
         }),
         options: None,
     };
-    let mut keeper = Keeper::new(&store, ID, MODEL, &source).expect("there is room");
+    let mut keeper = SessionWriter::new(&store, ID, MODEL, &source).expect("there is room");
     let done = || store.disk().done.lock().expect("nobody panicked").clone();
     let mut answered = vec![(0, done().len())];
     for state in 1..=5_u64 {
@@ -139,10 +139,10 @@ fn no_answered_state_is_lost_with_the_power() {
     for power in 0..=done.len() {
         let machine = Machine::after(&done[..power]);
         let kept = answered.iter().filter(|(_, when)| *when <= power).map(|(state, _)| *state).max().unwrap_or(0);
-        for bytes in Bytes::ALL {
+        for bytes in UnsyncedBytes::ALL {
             for new_names in [false, true] {
                 let found = machine.found(folder.path(), bytes, new_names);
-                let store = Store::open(found.path(), false, 1 << 20).expect("opens");
+                let store = SessionStore::open(found.path(), false, 1 << 20).expect("opens");
                 let state = store.load(ID, MODEL).map_or(0, |kept| kept.accepted);
                 let case = format!("{bytes:?}, {new_names}, after {power} of {}", done.len());
                 assert!(state == kept || state == kept + 1, "{state} where {kept} was answered: {case}");
@@ -151,5 +151,5 @@ fn no_answered_state_is_lost_with_the_power() {
         }
     }
     // 2 files of states, each new once; and every state is waited for
-    assert!(done.iter().filter(|one| matches!(one, Done::Synced(_))).count() >= 5);
+    assert!(done.iter().filter(|one| matches!(one, DiskOperation::Synced(_))).count() >= 5);
 }

@@ -1,6 +1,6 @@
 //! What is known of a connection from outside, and who is there.
 
-use super::accounts::Counted;
+use super::accounts::CountLease;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -11,7 +11,7 @@ static NUMBERS: AtomicU64 = AtomicU64::new(1);
 
 /// What is known of a connection from outside.
 #[derive(Debug)]
-pub(super) struct Presence {
+pub(super) struct Peer {
     pub(super) number: u64,
     pub(super) opened: Instant,
     /// Calls under way.
@@ -22,13 +22,13 @@ pub(super) struct Presence {
     pub(super) used_ms: AtomicU64,
     pub(super) greeted: AtomicBool,
     /// Once its client has been understood.
-    pub(super) who: OnceLock<Who>,
+    pub(super) who: OnceLock<PeerIdentity>,
     /// Its place in the account of its client, once it had a call.
-    pub(super) counted: OnceLock<Counted>,
+    pub(super) counted: OnceLock<CountLease>,
     pub(super) cut: CancellationToken,
 }
 
-impl Presence {
+impl Peer {
     pub(super) fn new(cut: &CancellationToken) -> Arc<Self> {
         Arc::new(Self {
             number: NUMBERS.fetch_add(1, Ordering::Relaxed),
@@ -49,8 +49,8 @@ impl Presence {
     }
 
     /// Who is there, as far as the connection itself says.
-    pub(super) fn who(&self) -> Who {
-        self.who.get().cloned().unwrap_or(Who::Unknown)
+    pub(super) fn who(&self) -> PeerIdentity {
+        self.who.get().cloned().unwrap_or(PeerIdentity::Unknown)
     }
 
     /// A call begins.
@@ -79,7 +79,7 @@ impl Presence {
 
 /// Who is at the other end.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Who {
+pub(super) enum PeerIdentity {
     /// The owner of this server, over a Unix socket.
     Local,
     /// Anybody.
@@ -92,7 +92,7 @@ pub(super) enum Who {
     Named(Arc<str>),
 }
 
-impl fmt::Display for Who {
+impl fmt::Display for PeerIdentity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Local => f.write_str("local"),

@@ -3,7 +3,7 @@
 use super::proto;
 
 /// What a stream asks of its session.
-pub(super) enum Question {
+pub(super) enum StreamRequest {
     Open(proto::OpenRequest),
     Trial(proto::TrialRequest),
     /// By the stream of that number.
@@ -11,7 +11,7 @@ pub(super) enum Question {
     Linearize(proto::SmallSignalRequest),
 }
 
-impl Question {
+impl StreamRequest {
     /// Whether it accepts a state.
     pub(super) fn is_accept(&self) -> bool {
         matches!(self, Self::Accept(..))

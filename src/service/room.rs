@@ -5,12 +5,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A bound on bytes, and those in use.
 #[derive(Debug)]
-pub(super) struct Room {
+pub(super) struct ByteQuota {
     most: usize,
     used: AtomicUsize,
 }
 
-impl Room {
+impl ByteQuota {
     /// At most so many, of which some are in use.
     pub(super) fn new(most: usize, used: usize) -> Self {
         Self { most, used: AtomicUsize::new(used) }

@@ -5,9 +5,9 @@ use super::answerable::answerable;
 use super::convert::{self, model as text, options as options_wire};
 use super::jobs::{JobStream, RowStream, SweepStream, TableStream};
 use super::models::check_size;
-use super::question::Question;
+use super::question::StreamRequest;
 use super::runs::RunStream;
-use super::shared::{Calls, Reply};
+use super::shared::{BimorphService, Reply};
 use super::stream::TrialStream;
 use super::{proto, status};
 use crate::budget::Budget;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tonic::{Request, Response, Status, Streaming};
 
-impl Calls {
+impl BimorphService {
     /// Bundle and options of a request, within limits.
     fn netlist(
         &self,
@@ -33,7 +33,7 @@ impl Calls {
 }
 
 #[tonic::async_trait]
-impl proto::bimorph_server::Bimorph for Calls {
+impl proto::bimorph_server::Bimorph for BimorphService {
     async fn info(&self, _: Request<proto::InfoRequest>) -> Reply<proto::InfoResponse> {
         let limits = &self.0.limits;
         Ok(Response::new(proto::InfoResponse {
@@ -80,7 +80,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         let (shared, request) = (Arc::clone(&self.0), request.into_inner());
         let model = shared.models.get(&request.model)?;
         answerable(&request, model.compiled.parts.system.electrics.ports, &shared.limits)?;
-        let question = Question::Open(request);
+        let question = StreamRequest::Open(request);
         let job = move |budget: &Budget| {
             shared.created(&model, |session| match session.answer(&question, budget) {
                 Some(ReplyKind::Opened(opened)) => Ok(opened),
@@ -107,7 +107,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         let request = request.into_inner();
         let session = self.0.session(&request.session).await?;
         session.bound_small_signals(request.omega.len(), request.noise, &self.0.limits)?;
-        let turn = session.turn().await?;
+        let turn = session.acquire().await?;
         let job = move || {
             let _turn = &turn;
             session.linearize(Token(request.token), &request.omega, request.noise)
@@ -119,7 +119,7 @@ impl proto::bimorph_server::Bimorph for Calls {
     async fn snapshot(&self, request: Request<proto::SnapshotRequest>) -> Reply<proto::SnapshotResponse> {
         let request = request.into_inner();
         let session = self.0.session(&request.session).await?;
-        let turn = session.turn().await?;
+        let turn = session.acquire().await?;
         let only = (request.token != 0).then_some(Token(request.token));
         let job = move || {
             let _turn = &turn;
@@ -139,7 +139,7 @@ impl proto::bimorph_server::Bimorph for Calls {
     async fn fork(&self, request: Request<proto::ForkRequest>) -> Reply<proto::OpenResponse> {
         let shared = Arc::clone(&self.0);
         let session = shared.session(&request.get_ref().session).await?;
-        let turn = session.turn().await?;
+        let turn = session.acquire().await?;
         let job = move || {
             let _turn = &turn;
             shared.restored(session.model(), &session.snapshot(None)?)

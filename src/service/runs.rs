@@ -1,12 +1,12 @@
 //! Many steps of sessions in one call, computed in bursts between which others have their turn, and streamed.
 
-use super::chunks::Outlet;
+use super::chunks::MessageSink;
 use super::convert::run::{self, Rows};
 use super::convert::{Violation, device as wire, number};
 use super::pace::CHUNK_BYTES;
 use super::session::Session;
-use super::shared::{Calls, Reply};
-use super::work::{Results, caught};
+use super::shared::{BimorphService, Reply};
+use super::work::{CancellingStream, caught};
 use super::{proto, status};
 use crate::budget::Budget;
 use crate::device::run::{Run, Stepped};
@@ -18,7 +18,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Response, Status};
 
 /// A run as it is computed.
-pub(super) type RunStream = Results<ReceiverStream<Result<proto::RunEvent, Status>>>;
+pub(super) type RunStream = CancellingStream<ReceiverStream<Result<proto::RunEvent, Status>>>;
 
 /// Others of the session wait for so long at most, but for a step.
 const BURST: Duration = Duration::from_millis(10);
@@ -28,7 +28,7 @@ const UNWATCHED: usize = 8;
 const LIVELINESS: Duration = Duration::from_millis(200);
 
 /// What all lanes share.
-struct Course {
+struct RunContext {
     times: Vec<f64>,
     values: Option<Rows>,
     /// Whether currents and charges are wanted.
@@ -36,7 +36,7 @@ struct Course {
 }
 
 /// A session of a run.
-struct Lane {
+struct RunLane {
     number: u32,
     session: Arc<Session>,
     run: Run,
@@ -48,12 +48,12 @@ struct Lane {
     given: Vec<f64>,
 }
 
-impl Calls {
+impl BimorphService {
     /// Many steps of sessions.
     pub(super) async fn ran(&self, request: proto::RunRequest) -> Reply<RunStream> {
         let limits = &self.0.limits;
         let times = run::times(&request.times).map_err(status::violation)?;
-        let mut course = Course { times, values: None, ports: request.ports };
+        let mut course = RunContext { times, values: None, ports: request.ports };
         for (what, most, got) in
             [("sessions", limits.sessions, request.lanes.len()), ("signals", limits.signals, request.signals.len())]
         {
@@ -72,7 +72,7 @@ impl Calls {
                 let rows = Rows::read("values", bytes, ports, course.times.len()).map_err(status::violation)?;
                 course.values = Some(rows);
             }
-            let lane = Lane::new((number, lane), session, &opened, &request.signals, &course);
+            let lane = RunLane::new((number, lane), session, &opened, &request.signals, &course);
             lanes.push(lane.map_err(status::violation)?);
             let width = request.signals.len() + if course.ports { 2 * ports } else { 0 };
             values = values.saturating_add(course.times.len().saturating_mul(width));
@@ -83,9 +83,9 @@ impl Calls {
         let sending = self.sending()?;
         let place = self.0.work.place().await?;
         let budget = self.0.work.budget();
-        let (outlet, receiver) = Outlet::new(Arc::clone(&self.0));
+        let (outlet, receiver) = MessageSink::new(Arc::clone(&self.0));
         let mut outlet = outlet.with_place(place);
-        let results = Results::new(ReceiverStream::new(receiver), budget.clone());
+        let results = CancellingStream::new(ReceiverStream::new(receiver), budget.clone());
         tokio::task::spawn_blocking(move || {
             let _sending = sending;
             let mut sender = Sender::new(course.times.len().saturating_mul(lanes.len()));
@@ -104,13 +104,13 @@ impl Calls {
     }
 }
 
-impl Lane {
+impl RunLane {
     fn new(
         (lane_number, lane): (u32, proto::RunLane),
         session: Arc<Session>,
         opened: &proto::DeviceDescription,
         signals: &[String],
-        course: &Course,
+        course: &RunContext,
     ) -> Result<Self, Violation> {
         let place = |field: &str| format!("lanes[{lane_number}].{field}");
         let ports = opened.ports.len();
@@ -148,10 +148,10 @@ impl Lane {
     /// Runs it to its end.
     fn run(
         mut self,
-        course: &Course,
+        course: &RunContext,
         budget: &Budget,
         sender: &mut Sender,
-        outlet: &mut Outlet<proto::RunEvent>,
+        outlet: &mut MessageSink<proto::RunEvent>,
     ) -> Result<(), Status> {
         let session = Arc::clone(&self.session);
         loop {
@@ -175,7 +175,7 @@ impl Lane {
     fn burst(
         &mut self,
         device: &mut dyn Device,
-        course: &Course,
+        course: &RunContext,
         sender: &mut Sender,
     ) -> Result<Option<String>, DeviceError> {
         let began = Instant::now();
@@ -275,7 +275,7 @@ impl Sender {
         self.is_full() || self.since.elapsed() >= LIVELINESS
     }
 
-    fn flush(&mut self, outlet: &mut Outlet<proto::RunEvent>) {
+    fn flush(&mut self, outlet: &mut MessageSink<proto::RunEvent>) {
         let progress = self.done as f64 / self.steps.max(1) as f64;
         let event = proto::RunEvent { progress, ..std::mem::take(&mut self.event) };
         outlet.send(Ok(event));

@@ -4,23 +4,23 @@ use super::accounts::Accounts;
 use super::address::Address;
 use super::connection::Connections;
 use super::descriptors;
-use super::gate::Gate;
+use super::gate::AdmissionCounters;
 use super::guard::Guard;
-use super::intake::Intake;
-use super::jobs::registry::Jobs;
+use super::intake::AdmissionService;
+use super::jobs::registry::JobRegistry;
 use super::limits::Limits;
-use super::models::Models;
-use super::overseen::{Overseen, busy};
+use super::models::ModelCache;
+use super::overseen::{MonitoringState, busy};
 use super::overseer;
 use super::proto::{DESCRIPTORS, ServerSetting, bimorph_server::BimorphServer};
 pub use super::serving::{MakeDevice, Ready, ServeError, ServeOptions};
-use super::sessions::Sessions;
-use super::shared::{Calls, Shared};
-use super::shutdown::{GRACE, Shutdown, Waiting};
+use super::sessions::SessionRegistry;
+use super::shared::{BimorphService, ServerState};
+use super::shutdown::{BoxedWait, GRACE, Shutdown};
 use super::sockets::Listener;
-use super::store::Store;
+use super::store::SessionStore;
 use super::survey::StoreError;
-use super::work::Work;
+use super::work::ComputePermits;
 use crate::device::local::LocalDevice;
 use std::future::Future;
 use std::path::PathBuf;
@@ -61,11 +61,15 @@ pub async fn run_with(
 }
 
 /// [`run_with`], compiled once, here: the service of every program that runs one.
-fn serve(options: ServeOptions, make: MakeDevice, shutdown: Waiting<'_, ()>) -> Waiting<'_, Result<(), ServeError>> {
+fn serve(
+    options: ServeOptions,
+    make: MakeDevice,
+    shutdown: BoxedWait<'_, ()>,
+) -> BoxedWait<'_, Result<(), ServeError>> {
     Box::pin(serve_until(options, make, shutdown))
 }
 
-async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: Waiting<'_, ()>) -> Result<(), ServeError> {
+async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: BoxedWait<'_, ()>) -> Result<(), ServeError> {
     let ServeOptions {
         listen,
         guard,
@@ -85,7 +89,7 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: Waiting<
         return Err(ServeError::NoAddress);
     }
     let guard = Arc::new(Guard::read(&guard)?);
-    let open = |folder| Store::open(folder, !state_unsynced, limits.state_bytes);
+    let open = |folder| SessionStore::open(folder, !state_unsynced, limits.state_bytes);
     let store = state_dir.as_deref().map(open).transpose()?.map(Arc::new);
     let (listeners, overseer, bound) = open_all(&listen, metrics.as_ref(), insecure, &guard).await?;
     let signals = Shutdown::default();
@@ -98,24 +102,24 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: Waiting<
     drop(sender);
     let rereading = tokio::spawn(reread(Arc::clone(&guard), reload));
 
-    let told = settings.map(|settings| settings.told()).unwrap_or_default();
+    let told = settings.map(|settings| settings.reported()).unwrap_or_default();
     let shared = share(limits, told, (make, store, connections), &signals);
     wake(&shared, state_dir)?;
-    let calls = BimorphServer::new(Calls(Arc::clone(&shared)))
+    let calls = BimorphServer::new(BimorphService(Arc::clone(&shared)))
         .max_decoding_message_size(shared.limits.message_bytes)
         .max_encoding_message_size(shared.limits.message_bytes);
     let (health, health_service) = tonic_health::server::health_reporter();
-    health.set_serving::<BimorphServer<Calls>>().await;
+    health.set_serving::<BimorphServer<BimorphService>>().await;
     let reflection = || {
         tonic_reflection::server::Builder::configure()
             .register_encoded_file_descriptor_set(DESCRIPTORS)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
-    let gate = Gate::new(&shared.limits, guard, Arc::clone(&shared.metrics), &shared.accounts);
+    let gate = AdmissionCounters::new(&shared.limits, guard, Arc::clone(&shared.metrics), &shared.accounts);
     let reflection = |error: &dyn Fn(&dyn std::error::Error) -> ServeError| {
         let v1 = reflection().build_v1().map_err(|e| error(&e))?;
         let v1alpha = reflection().build_v1alpha().map_err(|e| error(&e))?;
-        Ok::<_, ServeError>((Intake::new(v1, &gate), Intake::new(v1alpha, &gate)))
+        Ok::<_, ServeError>((AdmissionService::new(v1, &gate), AdmissionService::new(v1alpha, &gate)))
     };
     let transport = |error: &dyn std::error::Error| ServeError::Transport(with_sources(error));
     let (v1, v1alpha) = reflection(&transport)?;
@@ -123,14 +127,14 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: Waiting<
         Server::builder()
             .max_concurrent_streams(u32::try_from(shared.limits.streams_per_connection).unwrap_or(u32::MAX))
             .initial_connection_window_size(CONNECTION_WINDOW)
-            .add_service(Intake::new(calls, &gate))
-            .add_service(Intake::new(health_service, &gate))
+            .add_service(AdmissionService::new(calls, &gate))
+            .add_service(AdmissionService::new(health_service, &gate))
             .add_service(v1)
             .add_service(v1alpha)
             .serve_with_incoming_shutdown(ReceiverStream::new(incoming), signals.draining.clone().cancelled_owned())
     );
     let housekeeping = tokio::spawn(keep_house(Arc::clone(&shared)));
-    let overseen = Overseen { shared: Arc::clone(&shared), gate };
+    let overseen = MonitoringState { shared: Arc::clone(&shared), gate };
     let watching = tokio::spawn(watch_over(health.clone(), overseen.clone()));
     let overseer = overseer.map(|listener| tokio::spawn(overseer::answer(listener, overseen)));
     ready(&bound);
@@ -140,7 +144,7 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: Waiting<
         () = shutdown => None,
     };
     watching.abort();
-    health.set_not_serving::<BimorphServer<Calls>>().await;
+    health.set_not_serving::<BimorphServer<BimorphService>>().await;
     for name in ["", READY] {
         health.set_service_status(name, ServingStatus::NotServing).await;
     }
@@ -180,7 +184,7 @@ async fn reread(guard: Arc<Guard>, reload: Arc<Notify>) {
 }
 
 /// Goes on with the jobs in the folder, where there is one.
-fn wake(shared: &Shared, folder: Option<PathBuf>) -> Result<(), StoreError> {
+fn wake(shared: &ServerState, folder: Option<PathBuf>) -> Result<(), StoreError> {
     let woken = shared.jobs.wake(&shared.accounts, &shared.limits);
     woken.map_err(|reason| StoreError::Folder { path: folder.unwrap_or_default(), reason })
 }
@@ -207,19 +211,19 @@ async fn open_all(
 pub(super) fn share(
     limits: Limits,
     told: Vec<ServerSetting>,
-    (make, store, connections): (MakeDevice, Option<Arc<Store>>, Arc<Connections>),
+    (make, store, connections): (MakeDevice, Option<Arc<SessionStore>>, Arc<Connections>),
     signals: &Shutdown,
-) -> Arc<Shared> {
-    Arc::new(Shared {
-        work: Work::sliced(limits.analyses, &limits, signals.clone()),
-        desk: Work::sliced(limits.analyses, &limits, signals.clone()),
-        trials: Work::new(limits.analyses.saturating_mul(2), &limits, signals.clone()),
+) -> Arc<ServerState> {
+    Arc::new(ServerState {
+        work: ComputePermits::sliced(limits.analyses, &limits, signals.clone()),
+        desk: ComputePermits::sliced(limits.analyses, &limits, signals.clone()),
+        trials: ComputePermits::new(limits.analyses.saturating_mul(2), &limits, signals.clone()),
         results: Arc::new(Semaphore::new(limits.result_streams.min(Semaphore::MAX_PERMITS))),
         told,
         make,
-        models: Models::default(),
-        sessions: Sessions::default(),
-        jobs: Jobs::new(&limits, store.clone()),
+        models: ModelCache::default(),
+        sessions: SessionRegistry::default(),
+        jobs: JobRegistry::new(&limits, store.clone()),
         accounts: Arc::new(Accounts::new(&limits)),
         store,
         connections,
@@ -230,7 +234,7 @@ pub(super) fn share(
 }
 
 /// Tells by the health service whether this server is ready for more.
-async fn watch_over(health: HealthReporter, overseen: Overseen) {
+async fn watch_over(health: HealthReporter, overseen: MonitoringState) {
     let mut ticks = tokio::time::interval(LOOK);
     let mut told = None;
     loop {
@@ -249,12 +253,12 @@ async fn watch_over(health: HealthReporter, overseen: Overseen) {
 }
 
 /// What is done beside the calls, for as long as the server runs.
-async fn keep_house(shared: Arc<Shared>) {
+async fn keep_house(shared: Arc<ServerState>) {
     tokio::join!(expire(Arc::clone(&shared)), look_for_clients(shared));
 }
 
 /// Cancels jobs whose clients are gone, for as long as the server runs.
-async fn look_for_clients(shared: Arc<Shared>) {
+async fn look_for_clients(shared: Arc<ServerState>) {
     let mut ticks = tokio::time::interval(LOOK);
     loop {
         ticks.tick().await;
@@ -263,7 +267,7 @@ async fn look_for_clients(shared: Arc<Shared>) {
 }
 
 /// Forgets what was not used for [`Limits::idle`], for as long as the server runs.
-async fn expire(shared: Arc<Shared>) {
+async fn expire(shared: Arc<ServerState>) {
     let idle = shared.limits.idle;
     let mut ticks = tokio::time::interval(
         (idle.min(shared.limits.stream_idle) / 4).clamp(Duration::from_millis(10), Duration::from_secs(30)),

@@ -5,7 +5,7 @@ use super::guard::{GuardError, GuardFiles};
 use super::limits::Limits;
 use super::settings::Settings;
 use super::survey::StoreError;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::device::Device;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ pub struct ServeOptions {
 pub type Ready = Box<dyn FnOnce(&[Address]) + Send>;
 
 /// Makes the device of a session.
-pub type MakeDevice = fn(Arc<Compiled>) -> Box<dyn Device>;
+pub type MakeDevice = fn(Arc<CompiledModel>) -> Box<dyn Device>;
 
 impl Default for ServeOptions {
     fn default() -> Self {

@@ -1,11 +1,11 @@
 //! One open device with its states: who may ask it, and what of it is kept.
 
-use super::accounts::Seat;
+use super::accounts::SessionLease;
 use super::convert::device as wire;
-use super::keeper::{Keeper, forget, with_those_before};
+use super::keeper::{SessionWriter, forget, with_those_before};
 use super::limits::Limits;
-use super::models::Model;
-use super::question::Question;
+use super::models::NamedModel;
+use super::question::StreamRequest;
 use super::server::MakeDevice;
 use super::small_signal::small_signal;
 use super::snapshots;
@@ -13,7 +13,7 @@ use super::turns::client;
 use super::usage::Usage;
 use super::work::caught;
 use super::{proto, status};
-use crate::budget::{Allowance, Budget, Purse, Stopped};
+use crate::budget::{Allowance, Budget, OwnerQuota, Stopped};
 use crate::device::{Device, Token, TrialReply};
 use proto::device_reply::Kind as ReplyKind;
 use std::panic::catch_unwind;
@@ -27,7 +27,7 @@ use tonic::{Code, Status};
 pub(super) struct Session {
     pub(super) id: String,
     /// Held, so that it is here as long as the session is.
-    model: Arc<Model>,
+    model: Arc<NamedModel>,
     pub(super) device: Mutex<Box<dyn Device>>,
     pub(super) description: Mutex<proto::DeviceDescription>,
     /// Whether a trial is likely to be short enough to run where its request arrives.
@@ -39,11 +39,11 @@ pub(super) struct Session {
     pub(super) usage: Usage,
     closed: AtomicBool,
     /// Its place in the account of who opened it, where that is bounded.
-    pub(super) seat: Mutex<Option<Seat>>,
+    pub(super) seat: Mutex<Option<SessionLease>>,
     /// What its trials draw on.
-    purse: Option<Arc<Purse>>,
+    purse: Option<Arc<OwnerQuota>>,
     /// Where its accepted states are kept, if they are to outlive the server.
-    keeper: Option<Arc<Mutex<Keeper>>>,
+    keeper: Option<Arc<Mutex<SessionWriter>>>,
     /// The last accepted state that is kept; 0: none yet.
     accepted: AtomicU64,
     /// An accepted state that could not be kept, of which nobody has heard; 0: none.
@@ -51,7 +51,7 @@ pub(super) struct Session {
 }
 
 /// A question that needs a thread.
-pub(super) struct Later;
+pub(super) struct NeedsThread;
 
 /// Longest computation where requests arrive.
 const SLICE: Duration = Duration::from_millis(5);
@@ -60,11 +60,11 @@ const AFTER_SLOW: u32 = 64;
 
 impl Session {
     /// A session with a device that is not open yet; with a keeper its accepted states are kept. Nobody finds it before it is
-    /// among [`super::sessions::Sessions`].
+    /// among [`super::sessions::SessionRegistry`].
     pub(super) fn new(
         id: String,
-        keeper: Option<Keeper>,
-        model: &Arc<Model>,
+        keeper: Option<SessionWriter>,
+        model: &Arc<NamedModel>,
         make: MakeDevice,
         limits: &Limits,
     ) -> Result<Arc<Self>, Status> {
@@ -72,7 +72,7 @@ impl Session {
         let seat = client().account.map(|account| account.seat(model.unknowns())).transpose()?;
         Ok(Arc::new(Self {
             id,
-            purse: seat.as_ref().and_then(Seat::purse),
+            purse: seat.as_ref().and_then(SessionLease::purse),
             seat: Mutex::new(seat),
             accepted: AtomicU64::new(keeper.as_ref().map_or(0, |keeper| keeper.accepted)),
             keeper: keeper.map(|keeper| Arc::new(Mutex::new(keeper))),
@@ -92,13 +92,13 @@ impl Session {
         &self.id
     }
 
-    pub(super) fn model(&self) -> &Arc<Model> {
+    pub(super) fn model(&self) -> &Arc<NamedModel> {
         &self.model
     }
 
     /// Answers one question; none for an accept. Waits for the device. A fault inside closes this session and no other;
     /// what the budget stops is refused, and the session goes on.
-    pub(super) fn answer(&self, question: &Question, budget: &Budget) -> Option<ReplyKind> {
+    pub(super) fn answer(&self, question: &StreamRequest, budget: &Budget) -> Option<ReplyKind> {
         let device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
         self.answer_with(device, question, budget).unwrap_or_else(|why| self.refuse(question, &status::stopped(why)))
     }
@@ -107,43 +107,43 @@ impl Session {
     /// less than `SLICE`.
     ///
     /// # Errors
-    /// [`Later`]: to be asked again with [`Session::answer`], on a thread. Trials are pure, so nothing has happened.
-    pub(super) fn answer_at_once(&self, question: &Question) -> Result<Option<ReplyKind>, Later> {
+    /// [`NeedsThread`]: to be asked again with [`Session::answer`], on a thread. Trials are pure, so nothing has happened.
+    pub(super) fn answer_at_once(&self, question: &StreamRequest) -> Result<Option<ReplyKind>, NeedsThread> {
         // what waits for the disk waits elsewhere
-        let keeps =
-            matches!(question, Question::Open(_) | Question::Accept(..)) || self.due.load(Ordering::Relaxed) != 0;
+        let keeps = matches!(question, StreamRequest::Open(_) | StreamRequest::Accept(..))
+            || self.due.load(Ordering::Relaxed) != 0;
         if keeps && self.keeper.is_some()
             || !self.inline
             || self.slow.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_ok()
         {
-            return Err(Later);
+            return Err(NeedsThread);
         }
         let device = match self.device.try_lock() {
             Ok(device) => device,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            Err(TryLockError::WouldBlock) => return Err(Later),
+            Err(TryLockError::WouldBlock) => return Err(NeedsThread),
         };
         let deadline = Some(Instant::now() + SLICE);
         let slice = Budget::new(Allowance { deadline, ..Allowance::default() });
         // a state that was computed is accepted whatever is left
         let purse = self.purse.as_ref().filter(|_| !question.is_accept());
-        if let Some(Err(why)) = purse.map(|purse| purse.solvent()) {
+        if let Some(Err(why)) = purse.map(|purse| purse.check_cpu()) {
             return Ok(self.refuse(question, &status::stopped(why)));
         }
         let started = purse.map(|purse| (purse, Instant::now()));
         let answer = self.answer_with(device, question, &slice);
         // nothing waits here, so that time is processor time
-        started.into_iter().for_each(|(purse, at)| purse.spend(at.elapsed()));
+        started.into_iter().for_each(|(purse, at)| purse.charge_cpu(at.elapsed()));
         answer.map_err(|_| {
             self.slow.store(AFTER_SLOW, Ordering::Relaxed);
-            Later
+            NeedsThread
         })
     }
 
     fn answer_with(
         &self,
         mut device: MutexGuard<'_, Box<dyn Device>>,
-        question: &Question,
+        question: &StreamRequest,
         budget: &Budget,
     ) -> Result<Option<ReplyKind>, Stopped> {
         if self.is_closed() {
@@ -163,16 +163,16 @@ impl Session {
         }
     }
 
-    fn refuse(&self, question: &Question, status: &Status) -> Option<ReplyKind> {
+    fn refuse(&self, question: &StreamRequest, status: &Status) -> Option<ReplyKind> {
         (!question.is_silent()).then(|| refused(status))
     }
 
-    fn ask(&self, device: &mut dyn Device, question: &Question) -> Option<ReplyKind> {
+    fn ask(&self, device: &mut dyn Device, question: &StreamRequest) -> Option<ReplyKind> {
         if let Err(status) = self.make_up(device, question) {
             return self.refuse(question, &status);
         }
         let answer = match question {
-            Question::Open(request) => {
+            StreamRequest::Open(request) => {
                 let own = self.model.compiled.parts.system.electrics.ports;
                 let ports = if request.ports.is_empty() { own } else { request.ports.len() };
                 if let Err(status) = self.take_memory(ports) {
@@ -185,14 +185,14 @@ impl Session {
                     self.keep(device, None).map_or_else(|s| refused(&s), |_| ReplyKind::Opened(self.opened()))
                 })
             }
-            Question::Trial(request) => {
+            StreamRequest::Trial(request) => {
                 let mut reply = TrialReply::default();
                 wire::trial_from_wire(request)
                     .and_then(|trial| device.trial(&trial, &mut reply))
                     .map(|()| ReplyKind::Trial(wire::reply_to_wire(&mut reply)))
             }
-            Question::Accept(accept, stream) => return self.accept(device, accept, *stream),
-            Question::Linearize(request) => {
+            StreamRequest::Accept(accept, stream) => return self.accept(device, accept, *stream),
+            StreamRequest::Linearize(request) => {
                 small_signal(device, Token(request.token), request.omega, request.noise).map(ReplyKind::Linearized)
             }
         };
@@ -217,9 +217,9 @@ impl Session {
     }
 
     /// Keeps now what an accept without an answer could not: until that is done its stream has no later reply but the refusal.
-    fn make_up(&self, device: &dyn Device, question: &Question) -> Result<(), Status> {
+    fn make_up(&self, device: &dyn Device, question: &StreamRequest) -> Result<(), Status> {
         let due = self.due.load(Ordering::Relaxed);
-        if due == 0 || matches!(question, Question::Open(_) | Question::Accept(..)) {
+        if due == 0 || matches!(question, StreamRequest::Open(_) | StreamRequest::Accept(..)) {
             return Ok(());
         }
         let kept = self.keep(device, Some(Token(due)));
@@ -277,7 +277,7 @@ impl Session {
     }
 
     /// Waits for this session's turn, without a thread: who works on its device for long holds it.
-    pub(super) async fn turn(&self) -> Result<OwnedSemaphorePermit, Status> {
+    pub(super) async fn acquire(&self) -> Result<OwnedSemaphorePermit, Status> {
         Arc::clone(&self.turn).acquire_owned().await.map_err(|_| status::fault())
     }
 

@@ -10,12 +10,12 @@ use tonic::Status;
 
 /// The sessions of a server.
 #[derive(Default)]
-pub(super) struct Sessions {
+pub(super) struct SessionRegistry {
     open: Mutex<BTreeMap<String, Arc<Session>>>,
     ids: Ids,
 }
 
-impl Sessions {
+impl SessionRegistry {
     fn open(&self) -> MutexGuard<'_, BTreeMap<String, Arc<Session>>> {
         self.open.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -5,7 +5,7 @@ use super::access::read;
 use super::address::Address;
 use super::limits::{LIMITS, Limits};
 use super::proto;
-use super::written::{File, Flag, Place, Places, Written};
+use super::written::{AddressList, AddressOrNone, PathOrNone, ValueSyntax, YesOrNo};
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use thiserror::Error;
 pub const ENVIRONMENT: &str = "BIMORPH_SERVE_";
 
 /// A setting beside the limits: what it is, and its field.
-pub struct Setting {
+pub struct ServerOption {
     /// Name in files; with `-` for `_` an option of the command; in capitals after [`ENVIRONMENT`] a variable.
     pub name: &'static str,
     /// What is written for its value: `FILE`, `ADDRESS`; empty: yes or no.
@@ -32,11 +32,11 @@ macro_rules! settings {
         /// Everything that a server is told. `Default` is the only place where the values stand.
         #[derive(Debug, Clone, PartialEq)]
         pub struct Settings {
-            $($(#[doc = $help])+ pub $field: <$kind as Written>::Held,)+
+            $($(#[doc = $help])+ pub $field: <$kind as ValueSyntax>::Held,)+
             /// The limits.
             pub limits: Limits,
             /// Who said what is not as nobody says.
-            sources: BTreeMap<&'static str, Source>,
+            sources: BTreeMap<&'static str, SettingSource>,
         }
 
         impl Default for Settings {
@@ -46,9 +46,9 @@ macro_rules! settings {
         }
 
         /// Every setting beside the limits, in the order of the documentation.
-        pub static SETTINGS: LazyLock<Vec<Setting>> = LazyLock::new(|| vec![$(Setting {
+        pub static SETTINGS: LazyLock<Vec<ServerOption>> = LazyLock::new(|| vec![$(ServerOption {
             name: stringify!($field),
-            place: $kind::PLACE,
+            place: $kind::METAVAR,
             help: concat!($($help, "\n"),+),
             read: |settings, text| $kind::read(text).map(|value| settings.$field = value),
             write: |settings| $kind::write(&settings.$field),
@@ -58,39 +58,39 @@ macro_rules! settings {
 
 settings! {
     /// Where to listen: unix:///path or host:port. Repeated, or with commas between.
-    listen: Places = vec![Address::Tcp(SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)))];
+    listen: AddressList = vec![Address::Tcp(SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)))];
 
     /// Certificate of this server and those up to its authority, PEM: every TCP address speaks TLS 1.3.
-    tls_cert: File = None;
+    tls_cert: PathOrNone = None;
 
     /// Key of the certificate, PEM.
-    tls_key: File = None;
+    tls_key: PathOrNone = None;
 
     /// Authorities of clients, PEM: each client must have a certificate of one of them.
-    tls_client_ca: File = None;
+    tls_client_ca: PathOrNone = None;
 
     /// Tokens, a line for each client, TOKEN or NAME TOKEN: every call over TCP must show one.
-    token_file: File = None;
+    token_file: PathOrNone = None;
 
     /// Where metrics and readiness are told by plain HTTP: /metrics (Prometheus), /ready, /live. Nobody is asked for a token there.
-    metrics: Place = None;
+    metrics: AddressOrNone = None;
 
     /// Log as JSON, an object a line, with the id, the name and the client of each request.
-    log_json: Flag = false;
+    log_json: YesOrNo = false;
 
     /// Folder for accepted states of sessions and for jobs, which then outlive the server: a client goes on where it was.
-    state_dir: File = None;
+    state_dir: PathOrNone = None;
 
     /// Do not wait for the disk when a state is kept: it outlives the end of the server, not that of the machine.
-    state_unsynced: Flag = false;
+    state_unsynced: YesOrNo = false;
 
     /// Allow addresses that other machines can reach, whoever may come and whoever may listen.
-    insecure: Flag = false;
+    insecure: YesOrNo = false;
 }
 
 /// Who said how a setting is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Source {
+pub enum SettingSource {
     /// A file.
     File,
     /// A variable of the environment.
@@ -131,7 +131,7 @@ pub enum SettingError {
     },
 }
 
-impl Setting {
+impl ServerOption {
     /// The name as an option of the command.
     pub fn flag(&self) -> String {
         self.name.replace('_', "-")
@@ -148,7 +148,7 @@ impl Settings {
     ///
     /// # Errors
     /// [`SettingError`], which names `place`.
-    pub fn set(&mut self, name: &str, text: &str, source: Source, place: String) -> Result<(), SettingError> {
+    pub fn set(&mut self, name: &str, text: &str, source: SettingSource, place: String) -> Result<(), SettingError> {
         let value =
             |place, expected: &str| SettingError::Value { place, expected: expected.to_owned(), got: text.to_owned() };
         let mut unheard = Self::default();
@@ -165,7 +165,7 @@ impl Settings {
     }
 
     /// Whether a setting takes what `source` says; then it is remembered.
-    fn yields(&mut self, name: &'static str, source: Source) -> bool {
+    fn yields(&mut self, name: &'static str, source: SettingSource) -> bool {
         let strongest = self.sources.entry(name).or_insert(source);
         if source < *strongest {
             return false;
@@ -188,7 +188,7 @@ impl Settings {
         for (variable, text) in variables {
             let Some(name) = variable.strip_prefix(ENVIRONMENT).map(str::to_lowercase) else { continue };
             if !text.is_empty() && name != "config" && !is_of_a_service(&name, &text) {
-                self.set(&name, &text, Source::Environment, variable)?;
+                self.set(&name, &text, SettingSource::Environment, variable)?;
             }
         }
         Ok(())
@@ -242,34 +242,34 @@ impl Settings {
             let expected = "a text, a number, true, false, or a list of texts".to_owned();
             return Err(SettingError::Value { place, expected, got: value.type_str().to_owned() });
         };
-        let is_path = SETTINGS.iter().any(|setting| setting.name == name && setting.place == File::PLACE);
+        let is_path = SETTINGS.iter().any(|setting| setting.name == name && setting.place == PathOrNone::METAVAR);
         let text = match path.parent() {
             // nothing is no path, and not the folder of the file
             Some(folder) if is_path && !text.is_empty() => folder.join(text).display().to_string(),
             _ => text,
         };
-        self.set(name, &text, Source::File, place)
+        self.set(name, &text, SettingSource::File, place)
     }
 
     /// The value of a setting as it is written; empty: none.
-    pub fn get(&self, setting: &Setting) -> String {
+    pub fn get(&self, setting: &ServerOption) -> String {
         (setting.write)(self)
     }
 
     /// Every setting as it is written, and who said so. Paths are told as given or not.
-    pub(super) fn told(&self) -> Vec<proto::ServerSetting> {
+    pub(super) fn reported(&self) -> Vec<proto::ServerSetting> {
         let settings = SETTINGS.iter().map(|setting| {
             let value = (setting.write)(self);
-            let hidden = setting.place == File::PLACE && !value.is_empty();
+            let hidden = setting.place == PathOrNone::METAVAR && !value.is_empty();
             (setting.name, if hidden { "given".to_owned() } else { value })
         });
         let own = self.limits_of_clients();
         let limits = LIMITS.iter().map(|limit| (limit.name, own.get(limit)));
         let source = |name| match self.sources.get(name) {
             None => "default",
-            Some(Source::File) => "file",
-            Some(Source::Environment) => "environment",
-            Some(Source::Option) => "option",
+            Some(SettingSource::File) => "file",
+            Some(SettingSource::Environment) => "environment",
+            Some(SettingSource::Option) => "option",
         };
         let told = settings.chain(limits).map(|(name, value)| proto::ServerSetting {
             name: name.to_owned(),

@@ -1,43 +1,43 @@
 //! What all calls of a server share.
 
-use super::accounts::{Accounts, Counted};
+use super::accounts::{Accounts, CountLease};
 use super::connection::Connections;
-use super::jobs::registry::Jobs;
+use super::jobs::registry::JobRegistry;
 use super::limits::Limits;
 use super::metrics::Metrics;
-use super::models::Models;
+use super::models::ModelCache;
 use super::server::MakeDevice;
-use super::sessions::Sessions;
+use super::sessions::SessionRegistry;
 use super::shutdown::Shutdown;
-use super::store::Store;
+use super::store::SessionStore;
 use super::turns::client;
-use super::work::Work;
+use super::work::ComputePermits;
 use super::{proto, status};
 use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::{Response, Status};
 
 /// What all calls of a server share.
-pub(super) struct Shared {
+pub(super) struct ServerState {
     pub(super) limits: Limits,
     /// Everything that this server was told, for Info.
     pub(super) told: Vec<proto::ServerSetting>,
     pub(super) make: MakeDevice,
-    pub(super) models: Models,
-    pub(super) sessions: Sessions,
-    pub(super) jobs: Jobs,
+    pub(super) models: ModelCache,
+    pub(super) sessions: SessionRegistry,
+    pub(super) jobs: JobRegistry,
     /// What each client has.
     pub(super) accounts: Arc<Accounts>,
     pub(super) connections: Arc<Connections>,
     pub(super) metrics: Arc<Metrics>,
     /// States that outlive the server.
-    pub(super) store: Option<Arc<Store>>,
+    pub(super) store: Option<Arc<SessionStore>>,
     /// Places for analyses, which may take long.
-    pub(super) work: Work,
+    pub(super) work: ComputePermits,
     /// Places for what a circuit waits for before it can start.
-    pub(super) desk: Work,
+    pub(super) desk: ComputePermits,
     /// Places for trials that take longer than may pass where requests arrive.
-    pub(super) trials: Work,
+    pub(super) trials: ComputePermits,
     /// Places for results that are being sent.
     pub(super) results: Arc<Semaphore>,
     pub(super) shutdown: Shutdown,
@@ -45,25 +45,25 @@ pub(super) struct Shared {
 
 /// The service.
 #[derive(Clone)]
-pub(super) struct Calls(pub(super) Arc<Shared>);
+pub(super) struct BimorphService(pub(super) Arc<ServerState>);
 
 /// A place for results that are being sent, until it is dropped.
-pub(super) struct Sending {
+pub(super) struct SendingPermit {
     _place: OwnedSemaphorePermit,
-    _counted: Option<Counted>,
+    _counted: Option<CountLease>,
 }
 
 /// The answer of a call.
 pub(super) type Reply<T> = Result<Response<T>, Status>;
 
-impl Calls {
+impl BimorphService {
     /// A place for results that are being sent.
-    pub(super) fn sending(&self) -> Result<Sending, Status> {
+    pub(super) fn sending(&self) -> Result<SendingPermit, Status> {
         let counted = client().account.map(|account| account.stream()).transpose()?;
         let most = self.0.limits.result_streams;
         let place = Arc::clone(&self.0.results).try_acquire_owned();
         let place =
             place.map_err(|_| status::limit("result_streams", most, "one more; read or end those that are open"))?;
-        Ok(Sending { _place: place, _counted: counted })
+        Ok(SendingPermit { _place: place, _counted: counted })
     }
 }

@@ -56,7 +56,7 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     //! Clients that are known have fractions, unless something else is said; others have what they had.
-    use super::super::settings::Source;
+    use super::super::settings::SettingSource;
     use super::*;
 
     #[test]
@@ -64,7 +64,7 @@ mod tests {
         assert_eq!(Settings::default().limits_of_clients(), Limits::default());
         let mut settings = Settings::default();
         for (name, text) in [("token_file", "tokens"), ("sessions", "10"), ("client_sweeps", "0")] {
-            settings.set(name, text, Source::Option, name.to_owned()).expect("a setting");
+            settings.set(name, text, SettingSource::Option, name.to_owned()).expect("a setting");
         }
         let limits = settings.limits_of_clients();
         assert_eq!((limits.client_sessions, limits.client_sweeps, limits.client_models), (3, 0, 16));

@@ -12,7 +12,7 @@ use tokio_util::sync::CancellationToken;
 pub(super) const GRACE: Duration = Duration::from_millis(300);
 
 /// Something to wait for, whatever it is.
-pub(super) type Waiting<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
+pub(super) type BoxedWait<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
 
 /// The three signals, shared by everything that lives as long as the server.
 #[derive(Debug, Clone, Default)]

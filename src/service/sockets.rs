@@ -18,7 +18,7 @@ use tokio::sync::{OwnedSemaphorePermit, mpsc};
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 
 /// A socket that was just accepted.
-enum Socket {
+enum AcceptedSocket {
     Tcp(TcpStream),
     Unix(UnixStream),
 }
@@ -81,12 +81,12 @@ impl Listener {
                 () = shutdown.draining.cancelled() => return,
             };
             match next {
-                Ok(Some((Socket::Unix(socket), place))) => {
+                Ok(Some((AcceptedSocket::Unix(socket), place))) => {
                     if accepted.send(Ok(connections.unix(socket, place))).await.is_err() {
                         return;
                     }
                 }
-                Ok(Some((Socket::Tcp(socket), place))) => {
+                Ok(Some((AcceptedSocket::Tcp(socket), place))) => {
                     // a handshake waits for its client, and nobody else does
                     let (connections, guard, accepted) =
                         (Arc::clone(&connections), Arc::clone(&guard), accepted.clone());
@@ -106,16 +106,16 @@ impl Listener {
     }
 
     /// One connection; none when there is no place for it.
-    async fn next(&self, connections: &Connections) -> io::Result<Option<(Socket, OwnedSemaphorePermit)>> {
+    async fn next(&self, connections: &Connections) -> io::Result<Option<(AcceptedSocket, OwnedSemaphorePermit)>> {
         match self {
             Self::Tcp(listener, _) => {
                 let (socket, _) = listener.accept().await?;
                 connections.prepare(&socket)?;
-                Ok(connections.place().await.map(|place| (Socket::Tcp(socket), place)))
+                Ok(connections.place().await.map(|place| (AcceptedSocket::Tcp(socket), place)))
             }
             Self::Unix(listener, _) => {
                 let (socket, _) = listener.accept().await?;
-                Ok(connections.place().await.map(|place| (Socket::Unix(socket), place)))
+                Ok(connections.place().await.map(|place| (AcceptedSocket::Unix(socket), place)))
             }
         }
     }

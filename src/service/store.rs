@@ -8,10 +8,10 @@
 //! What is here is bounded: two files a session, and `state_bytes` in all, jobs among them.
 
 use super::disk::{Disk, private};
-use super::kept::Kept;
+use super::kept::SessionRecord;
 use super::proto;
-use super::room::Room;
-use super::survey::{StoreError, Survey};
+use super::room::ByteQuota;
+use super::survey::{StoreError, StoreScan};
 use prost::Message;
 use std::collections::BTreeMap;
 use std::fs::{self, DirBuilder, File};
@@ -26,21 +26,21 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The folder of a server.
 #[derive(Debug)]
-pub(super) struct Store {
+pub(super) struct SessionStore {
     pub(super) folder: PathBuf,
     /// Held as long as the server runs.
     _lock: File,
     disk: Disk,
-    room: Room,
+    room: ByteQuota,
     /// Every session that is kept.
-    sessions: Mutex<BTreeMap<String, Entry>>,
+    sessions: Mutex<BTreeMap<String, StoredSession>>,
     /// Held while models are written or removed.
     files: Mutex<()>,
 }
 
 /// A session that is kept.
 #[derive(Debug)]
-struct Entry {
+struct StoredSession {
     model: String,
     /// Since when it waits for somebody to ask for it; none: it is in use.
     asleep: Option<Instant>,
@@ -48,13 +48,13 @@ struct Entry {
 
 /// A session that waits for somebody to ask for it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Asleep {
+pub(super) struct WaitingSession {
     /// The id of its model.
     pub(super) model: String,
     since: Instant,
 }
 
-impl Store {
+impl SessionStore {
     /// Opens or makes the folder, and finds what an earlier server left there. It stays, however old it is: the time without use
     /// counts from here.
     ///
@@ -80,23 +80,23 @@ impl Store {
                 Err(fs::TryLockError::Error(reason)) => return Err(wrong(reason)),
             }
         }
-        let found = Survey::of(folder).map_err(wrong)?;
+        let found = StoreScan::of(folder).map_err(wrong)?;
         for path in found.left {
             let _ = fs::remove_file(path);
         }
         let asleep = Some(Instant::now());
-        let sessions = found.sessions.into_iter().map(|(id, model)| (id, Entry { model, asleep })).collect();
+        let sessions = found.sessions.into_iter().map(|(id, model)| (id, StoredSession { model, asleep })).collect();
         Ok(Self {
             folder: folder.to_owned(),
             _lock: lock,
             disk,
-            room: Room::new(most, found.bytes),
+            room: ByteQuota::new(most, found.bytes),
             sessions: Mutex::new(sessions),
             files: Mutex::default(),
         })
     }
 
-    fn entries(&self) -> MutexGuard<'_, BTreeMap<String, Entry>> {
+    fn entries(&self) -> MutexGuard<'_, BTreeMap<String, StoredSession>> {
         self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -106,17 +106,17 @@ impl Store {
     }
 
     /// Whether a session waits for somebody to ask for it.
-    pub(super) fn asleep(&self, id: &str) -> Option<Asleep> {
+    pub(super) fn asleep(&self, id: &str) -> Option<WaitingSession> {
         let entries = self.entries();
-        let Entry { model, asleep } = entries.get(id)?;
-        asleep.map(|since| Asleep { model: model.clone(), since })
+        let StoredSession { model, asleep } = entries.get(id)?;
+        asleep.map(|since| WaitingSession { model: model.clone(), since })
     }
 
     /// Ends the sleep of a session that still sleeps as it did, where `admit` has room for it; none: it woke or ended meanwhile.
     pub(super) fn wake<T, E>(
         &self,
         id: &str,
-        as_it_did: &Asleep,
+        as_it_did: &WaitingSession,
         admit: impl FnOnce() -> Result<T, E>,
     ) -> Option<Result<T, E>> {
         let mut entries = self.entries();
@@ -147,23 +147,23 @@ impl Store {
     }
 
     /// Room for what others keep here.
-    pub(super) fn room(&self) -> &Room {
+    pub(super) fn room(&self) -> &ByteQuota {
         &self.room
     }
 
     /// Forgets sessions that nobody asked for in `time`; how many.
     pub(super) fn expire(&self, time: Duration) -> usize {
-        let is_old = |entry: &Entry| entry.asleep.is_some_and(|since| since.elapsed() >= time);
+        let is_old = |entry: &StoredSession| entry.asleep.is_some_and(|since| since.elapsed() >= time);
         let old: Vec<String> = self.entries().iter().filter(|(_, e)| is_old(e)).map(|(id, _)| id.clone()).collect();
         // somebody may ask for one of them just now
         old.iter().filter(|id| self.forget_where(id, is_old)).count()
     }
 
     /// What is kept of a session: the newer of its files that is whole.
-    pub(super) fn load(&self, id: &str, model: &str) -> Option<Kept> {
+    pub(super) fn load(&self, id: &str, model: &str) -> Option<SessionRecord> {
         let read = |slot| {
             let bytes = fs::read(self.session(id, model, slot)).ok()?;
-            let kept = Kept::read(&bytes);
+            let kept = SessionRecord::read(&bytes);
             if kept.is_none() {
                 let text =
                     "a file of its states is not whole: a write was cut off, or it is damaged; the one before it holds";
@@ -184,13 +184,13 @@ impl Store {
         self.forget_where(id, |entry| entry.asleep.is_some())
     }
 
-    fn forget_where(&self, id: &str, wanted: impl FnOnce(&Entry) -> bool) -> bool {
+    fn forget_where(&self, id: &str, wanted: impl FnOnce(&StoredSession) -> bool) -> bool {
         let _hold = self.hold();
         let mut entries = self.entries();
         if !entries.get(id).is_some_and(wanted) {
             return false;
         }
-        let Some(Entry { model, .. }) = entries.remove(id) else { return false };
+        let Some(StoredSession { model, .. }) = entries.remove(id) else { return false };
         let is_last = !entries.values().any(|entry| entry.model == model);
         drop(entries);
         for slot in [0, 1] {
@@ -217,7 +217,7 @@ impl Store {
     pub(super) fn begin(&self, id: &str, model: &str, source: &proto::CompileRequest) -> io::Result<()> {
         let _hold = self.hold();
         self.keep_model(model, source)?;
-        self.entries().insert(id.to_owned(), Entry { model: model.to_owned(), asleep: None });
+        self.entries().insert(id.to_owned(), StoredSession { model: model.to_owned(), asleep: None });
         Ok(())
     }
 
@@ -265,19 +265,19 @@ fn size(path: &Path) -> usize {
 #[cfg(test)]
 mod tests {
     //! What was kept is found again, and a file that is not whole gives way to the one before it.
-    use super::super::keeper::Keeper;
+    use super::super::keeper::SessionWriter;
     use super::*;
     use std::sync::Arc;
 
     const ID: &str = "0123456789abcdef0123456789abcdef";
     const MODEL: &str = "00000000000000000000000000000000";
 
-    fn keeper(store: &Arc<Store>) -> Keeper {
-        Keeper::new(store, ID, MODEL, &proto::CompileRequest::default()).expect("there is room")
+    fn keeper(store: &Arc<SessionStore>) -> SessionWriter {
+        SessionWriter::new(store, ID, MODEL, &proto::CompileRequest::default()).expect("there is room")
     }
 
-    fn store(folder: &Path, most: usize) -> Result<Store, StoreError> {
-        Store::open(folder, false, most)
+    fn store(folder: &Path, most: usize) -> Result<SessionStore, StoreError> {
+        SessionStore::open(folder, false, most)
     }
 
     #[test]
@@ -319,7 +319,7 @@ mod tests {
         assert_eq!(kept(), Some((5000, 7, b"seven".to_vec())));
         keeper.keep(8, b"eight").expect("kept");
         assert_eq!(kept(), Some((5000, 8, b"eight".to_vec())));
-        let mut later = Keeper::after(&store, ID, MODEL, &store.load(ID, MODEL).expect("kept"));
+        let mut later = SessionWriter::after(&store, ID, MODEL, &store.load(ID, MODEL).expect("kept"));
         later.keep(9, b"nine").expect("kept");
         later.lease(0).expect("kept");
         assert_eq!(kept(), Some((0, 9, b"nine".to_vec())));

@@ -5,11 +5,11 @@
 //! is stopped there and asked again on a blocking thread, as are models above
 //! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns), one at a time, which keeps replies in order.
 
-use super::joined::{Joined, Next};
-use super::question::Question;
+use super::joined::{AttachedSession, RequestAction};
+use super::question::StreamRequest;
 use super::session::{Session, refused};
-use super::shared::Shared;
-use super::turns::{CLIENT, Client, client};
+use super::shared::ServerState;
+use super::turns::{CLIENT, TaskOwner, client};
 use super::{proto, status};
 use crate::budget::{Allowance, Budget};
 use proto::device_reply::Kind as ReplyKind;
@@ -25,26 +25,26 @@ use tonic::{Status, Streaming};
 const BURST: usize = 64;
 
 /// What is awaited.
-type Running<T> = Pin<Box<dyn Future<Output = T> + Send>>;
+type PendingReply<T> = Pin<Box<dyn Future<Output = T> + Send>>;
 
 /// The replies of one stream.
 pub(super) struct TrialStream {
-    shared: Arc<Shared>,
+    shared: Arc<ServerState>,
     requests: Streaming<proto::DeviceRequest>,
     ending: Pin<Box<WaitForCancellationFutureOwned>>,
-    joined: Joined,
+    joined: AttachedSession,
     /// A session that is being woken, to be joined.
-    waking: Option<Running<Result<Arc<Session>, Status>>>,
-    running: Option<Running<Option<ReplyKind>>>,
+    waking: Option<PendingReply<Result<Arc<Session>, Status>>>,
+    running: Option<PendingReply<Option<ReplyKind>>>,
     finished: bool,
-    client: Client,
+    client: TaskOwner,
 }
 
 impl TrialStream {
-    pub(super) fn new(shared: Arc<Shared>, requests: Streaming<proto::DeviceRequest>) -> Self {
+    pub(super) fn new(shared: Arc<ServerState>, requests: Streaming<proto::DeviceRequest>) -> Self {
         let ending = Box::pin(shared.shutdown.ending.clone().cancelled_owned());
         Self {
-            joined: Joined::none(&shared),
+            joined: AttachedSession::none(&shared),
             shared,
             requests,
             ending,
@@ -58,13 +58,13 @@ impl TrialStream {
     /// Starts on a request: a reply at once, none (an accept), or a thread in `running`.
     fn take(&mut self, request: proto::DeviceRequest) -> Option<ReplyKind> {
         match CLIENT.sync_scope(self.client.clone(), || self.joined.next(request)) {
-            Next::Ask(session, question) => self.ask(session, question),
-            Next::Attach(id) => self.attach(id),
-            Next::Answered(reply) => reply,
+            RequestAction::Ask(session, question) => self.ask(session, question),
+            RequestAction::Attach(id) => self.attach(id),
+            RequestAction::Answered(reply) => reply,
         }
     }
 
-    fn ask(&mut self, session: Arc<Session>, question: Question) -> Option<ReplyKind> {
+    fn ask(&mut self, session: Arc<Session>, question: StreamRequest) -> Option<ReplyKind> {
         if let Ok(reply) = session.answer_at_once(&question) {
             return reply;
         }
@@ -87,8 +87,8 @@ impl TrialStream {
 }
 
 /// Answers on a thread, in the session's turn. Dropped, it stops the computation.
-async fn later(shared: Arc<Shared>, session: Arc<Session>, question: Question) -> Option<ReplyKind> {
-    let turn = match session.turn().await {
+async fn later(shared: Arc<ServerState>, session: Arc<Session>, question: StreamRequest) -> Option<ReplyKind> {
+    let turn = match session.acquire().await {
         Ok(turn) => turn,
         Err(status) => return Some(refused(&status)),
     };

@@ -46,9 +46,9 @@ pub fn look_at(folder: &Path) -> Result<String, StoreError> {
         return Ok("in use by a running server".to_owned());
     }
     probe(folder).map_err(wrong)?;
-    let found = match Survey::of(folder) {
+    let found = match StoreScan::of(folder) {
         // a server makes what is not there yet
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Survey::default(),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => StoreScan::default(),
         found => found.map_err(wrong)?,
     };
     let (sessions, jobs) = (found.sessions.len(), found.jobs);
@@ -69,7 +69,7 @@ fn probe(folder: &Path) -> io::Result<()> {
 
 /// What is in a folder.
 #[derive(Default)]
-pub(super) struct Survey {
+pub(super) struct StoreScan {
     /// Sessions with their models.
     pub(super) sessions: BTreeMap<String, String>,
     /// How many jobs there are.
@@ -80,7 +80,7 @@ pub(super) struct Survey {
     pub(super) left: Vec<PathBuf>,
 }
 
-impl Survey {
+impl StoreScan {
     /// Looks around.
     pub(super) fn of(folder: &Path) -> io::Result<Self> {
         let mut found = Self::default();

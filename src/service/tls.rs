@@ -31,12 +31,12 @@ pub struct PemError {
 }
 
 /// A certificate file and its key.
-pub(super) struct Pair {
+pub(super) struct CertificateFiles {
     pub(super) chain: Vec<CertificateDer<'static>>,
     pub(super) key: PrivateKeyDer<'static>,
 }
 
-impl Pair {
+impl CertificateFiles {
     /// Reads both; whether they belong together is found out by who uses them.
     pub(super) fn read(certificate: &Path, key: &Path) -> Result<Self, PemError> {
         let chain = certificates("certificate", certificate)?;

@@ -15,7 +15,7 @@ use tonic::codegen::http::header::AUTHORIZATION;
 /// Fewest characters of a token.
 const SHORTEST: usize = 16;
 /// Most tokens of a file.
-const MOST: usize = 10_000;
+const MAX_TOKENS: usize = 10_000;
 
 /// A token file that cannot be used.
 #[derive(Debug, Error)]
@@ -67,8 +67,8 @@ impl Tokens {
                 ));
             }
             known.push((name.into(), hash));
-            if known.len() > MOST {
-                return Err(wrong(Some(number), format!("expected at most {MOST} tokens")));
+            if known.len() > MAX_TOKENS {
+                return Err(wrong(Some(number), format!("expected at most {MAX_TOKENS} tokens")));
             }
         }
         if known.is_empty() {

@@ -11,12 +11,12 @@ use tokio::sync::oneshot;
 
 tokio::task_local! {
     /// Whom the task at hand works for.
-    pub(super) static CLIENT: Client;
+    pub(super) static CLIENT: TaskOwner;
 }
 
 /// Whom a task works for.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Client {
+pub(super) struct TaskOwner {
     /// The connection; 0 for the server's own.
     pub(super) number: u64,
     /// What it is called; all of one name are one.
@@ -25,63 +25,63 @@ pub(super) struct Client {
     pub(super) account: Option<Arc<Account>>,
 }
 
-impl Client {
+impl TaskOwner {
     /// Whose turn it is when a computation of this task waits.
-    pub(super) fn party(&self) -> Party {
-        Party { client: Arc::clone(&self.name), number: self.number }
+    pub(super) fn party(&self) -> Waiter {
+        Waiter { client: Arc::clone(&self.name), number: self.number }
     }
 }
 
 /// Whom this task works for; the server itself where nobody is known.
-pub(super) fn client() -> Client {
-    CLIENT.try_with(Client::clone).unwrap_or_default()
+pub(super) fn client() -> TaskOwner {
+    CLIENT.try_with(TaskOwner::clone).unwrap_or_default()
 }
 
 /// Who waits for a place: a client, and which of its connections (or jobs).
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Party {
+pub(super) struct Waiter {
     pub(super) client: Arc<str>,
     pub(super) number: u64,
 }
 
 /// So many places.
 #[derive(Debug)]
-pub(super) struct Turns {
-    state: Mutex<State>,
+pub(super) struct FairSemaphore {
+    state: Mutex<SemaphoreState>,
     /// Whether a client that has no place gets one beside those that are shared.
     own: bool,
 }
 
-type Waits = oneshot::Sender<Place>;
+type PermitSender = oneshot::Sender<Permit>;
 /// Those that wait, by whom; the one whose turn is next in front.
-type Queue<K, T> = VecDeque<(K, T)>;
+type FairQueue<K, T> = VecDeque<(K, T)>;
 
 #[derive(Debug)]
-struct State {
+struct SemaphoreState {
     /// Shared places that are free.
     free: usize,
-    waiting: Queue<Arc<str>, Queue<u64, VecDeque<Waits>>>,
+    waiting: FairQueue<Arc<str>, FairQueue<u64, VecDeque<PermitSender>>>,
     /// Places that each client has, its own among them.
     taken: BTreeMap<Arc<str>, usize>,
 }
 
 /// A place; dropped, it goes to the next in turn.
 #[derive(Debug)]
-pub(super) struct Place {
-    turns: Option<Arc<Turns>>,
-    party: Party,
+pub(super) struct Permit {
+    turns: Option<Arc<FairSemaphore>>,
+    party: Waiter,
     /// Whether it is one that is shared.
     shared: bool,
 }
 
-impl Place {
+impl Permit {
     /// Whose it is.
-    pub(super) fn party(&self) -> Party {
+    pub(super) fn party(&self) -> Waiter {
         self.party.clone()
     }
 }
 
-impl Drop for Place {
+impl Drop for Permit {
     fn drop(&mut self) {
         let Some(turns) = self.turns.take() else { return };
         let mut state = turns.state();
@@ -91,7 +91,7 @@ impl Drop for Place {
     }
 }
 
-impl State {
+impl SemaphoreState {
     fn leave(&mut self, client: &Arc<str>) {
         if let Some(count) = self.taken.get_mut(client) {
             *count -= 1;
@@ -101,13 +101,13 @@ impl State {
         }
     }
 
-    fn wait(&mut self, party: &Party, sender: Waits) {
+    fn wait(&mut self, party: &Waiter, sender: PermitSender) {
         let own = of(&mut self.waiting, &party.client);
         of(own, &party.number).push_back(sender);
     }
 
     /// The next in turn, and who: of any client, or of that one.
-    fn next(&mut self, only: Option<&str>) -> Option<(Party, Waits)> {
+    fn next(&mut self, only: Option<&str>) -> Option<(Waiter, PermitSender)> {
         loop {
             let at = only.map_or(Some(0), |only| self.waiting.iter().position(|(client, _)| **client == *only))?;
             let (client, mut own) = self.waiting.remove(at)?;
@@ -116,7 +116,7 @@ impl State {
                 if !senders.is_empty() {
                     own.push_back((number, senders));
                 }
-                sender.map(|sender| (Party { client: Arc::clone(&client), number }, sender))
+                sender.map(|sender| (Waiter { client: Arc::clone(&client), number }, sender))
             });
             if !own.is_empty() {
                 self.waiting.push_back((client, own));
@@ -132,7 +132,7 @@ impl State {
 }
 
 /// The entry of a key, made where there is none.
-fn of<'a, K: PartialEq + Clone, T: Default>(queue: &'a mut Queue<K, T>, key: &K) -> &'a mut T {
+fn of<'a, K: PartialEq + Clone, T: Default>(queue: &'a mut FairQueue<K, T>, key: &K) -> &'a mut T {
     let at = queue.iter().position(|(other, _)| other == key).unwrap_or_else(|| {
         queue.push_back((key.clone(), T::default()));
         queue.len() - 1
@@ -140,7 +140,7 @@ fn of<'a, K: PartialEq + Clone, T: Default>(queue: &'a mut Queue<K, T>, key: &K)
     &mut queue[at].1
 }
 
-impl Turns {
+impl FairSemaphore {
     /// So many places, all shared.
     pub(super) fn new(places: usize) -> Arc<Self> {
         Self::with(places, false)
@@ -152,16 +152,16 @@ impl Turns {
     }
 
     fn with(places: usize, own: bool) -> Arc<Self> {
-        let state = State { free: places.max(1), waiting: VecDeque::new(), taken: BTreeMap::new() };
+        let state = SemaphoreState { free: places.max(1), waiting: VecDeque::new(), taken: BTreeMap::new() };
         Arc::new(Self { state: Mutex::new(state), own })
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, SemaphoreState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Waits for a place for a client. Dropped, it waits no more.
-    pub(super) async fn place(self: &Arc<Self>, party: Party) -> Place {
+    pub(super) async fn place(self: &Arc<Self>, party: Waiter) -> Permit {
         let (sender, waits) = oneshot::channel();
         {
             let mut state = self.state();
@@ -169,7 +169,7 @@ impl Turns {
             self.serve(&mut state);
         }
         // a sender goes away with its place alone
-        waits.await.unwrap_or(Place { turns: None, party, shared: false })
+        waits.await.unwrap_or(Permit { turns: None, party, shared: false })
     }
 
     /// How many wait for a place.
@@ -180,7 +180,7 @@ impl Turns {
     }
 
     /// Gives out what is free.
-    fn serve(self: &Arc<Self>, state: &mut State) {
+    fn serve(self: &Arc<Self>, state: &mut SemaphoreState) {
         while state.free > 0 {
             let Some(next) = state.next(None) else { return };
             state.free -= usize::from(self.give(state, next, true));
@@ -188,7 +188,7 @@ impl Turns {
         if !self.own {
             return;
         }
-        let without = |state: &State, client: &Arc<str>| !state.taken.contains_key(client);
+        let without = |state: &SemaphoreState, client: &Arc<str>| !state.taken.contains_key(client);
         let poor: Vec<Arc<str>> =
             state.waiting.iter().filter(|(client, _)| without(state, client)).map(|(c, _)| Arc::clone(c)).collect();
         for client in poor {
@@ -200,9 +200,14 @@ impl Turns {
     }
 
     /// Gives a place; whether it was taken.
-    fn give(self: &Arc<Self>, state: &mut State, (party, sender): (Party, Waits), shared: bool) -> bool {
+    fn give(
+        self: &Arc<Self>,
+        state: &mut SemaphoreState,
+        (party, sender): (Waiter, PermitSender),
+        shared: bool,
+    ) -> bool {
         *state.taken.entry(Arc::clone(&party.client)).or_default() += 1;
-        match sender.send(Place { turns: Some(Arc::clone(self)), party, shared }) {
+        match sender.send(Permit { turns: Some(Arc::clone(self)), party, shared }) {
             Ok(()) => true,
             Err(mut place) => {
                 // the client went away, and the state is locked here
@@ -222,14 +227,14 @@ mod tests {
     use std::pin::{Pin, pin};
     use std::task::{Context, Poll, Waker};
 
-    fn party(client: &str, number: u64) -> Party {
-        Party { client: client.into(), number }
+    fn party(client: &str, number: u64) -> Waiter {
+        Waiter { client: client.into(), number }
     }
 
-    type Waiting<'a> = Vec<Pin<Box<dyn Future<Output = Place> + 'a>>>;
+    type Waiting<'a> = Vec<Pin<Box<dyn Future<Output = Permit> + 'a>>>;
 
     /// The places that are given now.
-    fn given(waiting: &mut Waiting<'_>) -> Vec<Place> {
+    fn given(waiting: &mut Waiting<'_>) -> Vec<Permit> {
         let mut cx = Context::from_waker(Waker::noop());
         let mut given = Vec::new();
         waiting.retain_mut(|waits| match waits.as_mut().poll(&mut cx) {
@@ -245,8 +250,8 @@ mod tests {
     /// One place; of clients a, b and c the connections 1 and 2 wait.
     #[test]
     fn clients_and_their_connections_take_turns() {
-        let turns = Turns::new(1);
-        let ask = |client: &str, number| -> Pin<Box<dyn Future<Output = Place>>> {
+        let turns = FairSemaphore::new(1);
+        let ask = |client: &str, number| -> Pin<Box<dyn Future<Output = Permit>>> {
             let (turns, party) = (Arc::clone(&turns), party(client, number));
             Box::pin(async move { turns.place(party).await })
         };
@@ -274,8 +279,8 @@ mod tests {
     /// A client that has no place gets one of its own at once, and no second one before its turn.
     #[test]
     fn a_client_without_a_place_gets_its_own() {
-        let turns = Turns::and_own(2);
-        let ask = |client: &str| -> Pin<Box<dyn Future<Output = Place>>> {
+        let turns = FairSemaphore::and_own(2);
+        let ask = |client: &str| -> Pin<Box<dyn Future<Output = Permit>>> {
             let (turns, party) = (Arc::clone(&turns), party(client, 1));
             Box::pin(async move { turns.place(party).await })
         };

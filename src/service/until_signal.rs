@@ -1,6 +1,6 @@
 //! A server on threads of its own, until it is told to stop by a signal or the end of its standard input.
 
-use super::log::{self, Lines};
+use super::log::{self, LogLines};
 use super::server::run;
 use super::serving::{ServeError, ServeOptions};
 use std::io::IsTerminal;
@@ -30,7 +30,7 @@ pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
     let filter = wanted.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
     // A host program that logs already goes on as it does.
     let ansi = std::io::stderr().is_terminal();
-    let log = tracing_subscriber::fmt().with_max_level(LevelFilter::TRACE).with_writer(|| Lines);
+    let log = tracing_subscriber::fmt().with_max_level(LevelFilter::TRACE).with_writer(|| LogLines);
     let _ = match options.log_json {
         true => log.json().flatten_event(true).with_span_list(false).finish().with(filter).try_init(),
         false => log.with_ansi(ansi).finish().with(filter).try_init(),

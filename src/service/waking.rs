@@ -4,22 +4,22 @@
 //! behind, and one that was asleep sleeps on.
 
 use super::convert::{model as text, options as options_wire};
-use super::keeper::Keeper;
-use super::models::{Model, check_size};
+use super::keeper::SessionWriter;
+use super::models::{NamedModel, check_size};
 use super::session::Session;
-use super::shared::Shared;
+use super::shared::ServerState;
 use super::status;
-use super::store::Store;
+use super::store::SessionStore;
 use std::sync::Arc;
 use tonic::Status;
 
 /// What is kept of a session that is being made: removed unless that is done.
-struct Unfinished<'a> {
-    store: Option<&'a Store>,
+struct RestoreGuard<'a> {
+    store: Option<&'a SessionStore>,
     id: &'a str,
 }
 
-impl Drop for Unfinished<'_> {
+impl Drop for RestoreGuard<'_> {
     fn drop(&mut self) {
         if let Some(store) = self.store {
             store.forget(self.id);
@@ -27,16 +27,17 @@ impl Drop for Unfinished<'_> {
     }
 }
 
-impl Shared {
+impl ServerState {
     /// A new session, kept where states are kept, and what `start` says of it. Waits for the disk.
     pub(super) fn created<T>(
         &self,
-        model: &Arc<Model>,
+        model: &Arc<NamedModel>,
         start: impl FnOnce(&Session) -> Result<T, Status>,
     ) -> Result<T, Status> {
         let id = self.sessions.id(&self.limits)?;
-        let mut unfinished = Unfinished { store: self.store.as_deref(), id: &id };
-        let keeper = self.store.as_ref().map(|store| Keeper::new(store, &id, model.id(), &model.source())).transpose();
+        let mut unfinished = RestoreGuard { store: self.store.as_deref(), id: &id };
+        let keeper =
+            self.store.as_ref().map(|store| SessionWriter::new(store, &id, model.id(), &model.source())).transpose();
         let keeper = keeper.map_err(|error| status::not_kept("the state is", &error))?;
         let session = Session::new(id.clone(), keeper, model, self.make, &self.limits)?;
         let said = start(&session)?;
@@ -46,7 +47,11 @@ impl Shared {
     }
 
     /// A session with the states of a snapshot.
-    pub(super) fn restored(&self, model: &Arc<Model>, snapshot: &[u8]) -> Result<super::proto::OpenResponse, Status> {
+    pub(super) fn restored(
+        &self,
+        model: &Arc<NamedModel>,
+        snapshot: &[u8],
+    ) -> Result<super::proto::OpenResponse, Status> {
         self.created(model, |session| {
             let opened = session.restore(snapshot, &self.limits)?;
             session.keep_all().map(|()| opened)
@@ -68,7 +73,7 @@ impl Shared {
 
     /// Goes on with what is kept of a session that sleeps. Nobody waits for this: whoever is first with the same states wakes it,
     /// and a session that was closed or has gone on meanwhile is looked for again.
-    fn wake(&self, store: &Arc<Store>, id: &str) -> Result<Arc<Session>, Status> {
+    fn wake(&self, store: &Arc<SessionStore>, id: &str) -> Result<Arc<Session>, Status> {
         loop {
             let Some(asleep) = store.asleep(id) else { return self.sessions.get(id) };
             self.sessions.room(&self.limits)?;
@@ -79,7 +84,7 @@ impl Shared {
                 }
             })?;
             let model = self.model_of(store, &asleep.model)?;
-            let keeper = Keeper::after(store, id, model.id(), &kept);
+            let keeper = SessionWriter::after(store, id, model.id(), &kept);
             let session = Session::new(id.to_owned(), Some(keeper), &model, self.make, &self.limits)?;
             session.restore(&kept.sealed, &self.limits)?;
             let longest = u64::try_from(self.limits.stream_idle.as_millis()).unwrap_or(u64::MAX);
@@ -91,7 +96,7 @@ impl Shared {
     }
 
     /// The model of a session that sleeps, compiled again where it is not here.
-    fn model_of(&self, store: &Store, id: &str) -> Result<Arc<Model>, Status> {
+    fn model_of(&self, store: &SessionStore, id: &str) -> Result<Arc<NamedModel>, Status> {
         self.models.get(id).or_else(|_| {
             let source = store.model(id).ok_or_else(|| status::not_found("model", id))?;
             let bundle = text::bundle_from_wire(source.bundle).map_err(status::violation)?;

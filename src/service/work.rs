@@ -7,7 +7,7 @@
 use super::limits::Limits;
 use super::shutdown::Shutdown;
 use super::status;
-use super::turns::{CLIENT, Party, Place, Turns, client};
+use super::turns::{CLIENT, FairSemaphore, Permit, Waiter, client};
 use crate::budget::{self, Allowance, Budget, Stopped};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,11 +24,11 @@ const SLICE: Duration = Duration::from_millis(30);
 const STARVED: Duration = Duration::from_millis(8);
 
 /// Places for computations.
-pub(super) struct Work {
-    places: Arc<Turns>,
+pub(super) struct ComputePermits {
+    places: Arc<FairSemaphore>,
     /// Places for short ones; none: there are no slices.
-    short: Option<Arc<Turns>>,
-    long: Arc<Long>,
+    short: Option<Arc<FairSemaphore>>,
+    long: Arc<LongComputations>,
     timeout: Duration,
     allowance: Allowance,
     shutdown: Shutdown,
@@ -36,16 +36,16 @@ pub(super) struct Work {
 
 /// Connections whose computations are known to be long, and how many each has.
 #[derive(Default)]
-struct Long(Mutex<BTreeMap<u64, usize>>);
+struct LongComputations(Mutex<BTreeMap<u64, usize>>);
 
 /// A computation that is known to be long, until it ends.
-struct Known {
-    long: Arc<Long>,
+struct LongComputation {
+    long: Arc<LongComputations>,
     number: u64,
 }
 
 /// What came of a computation.
-struct Done<T> {
+struct ComputationOutcome<T> {
     answer: Result<T, Status>,
     /// Whether it was stopped for want of time.
     is_late: bool,
@@ -53,18 +53,18 @@ struct Done<T> {
     cpu: Option<Duration>,
 }
 
-impl Long {
+impl LongComputations {
     fn has(&self, number: u64) -> bool {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).contains_key(&number)
     }
 
-    fn enter(self: &Arc<Self>, number: u64) -> Known {
+    fn enter(self: &Arc<Self>, number: u64) -> LongComputation {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner).entry(number).or_default() += 1;
-        Known { long: Arc::clone(self), number }
+        LongComputation { long: Arc::clone(self), number }
     }
 }
 
-impl Drop for Known {
+impl Drop for LongComputation {
     fn drop(&mut self) {
         let mut long = self.long.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(count) = long.get_mut(&self.number) {
@@ -76,16 +76,16 @@ impl Drop for Known {
     }
 }
 
-impl Work {
+impl ComputePermits {
     /// At most `places` long ones at once and one more of each client that has none, each answered within the limit of a unary call.
     pub(super) fn new(places: usize, limits: &Limits, shutdown: Shutdown) -> Self {
-        let (places, long) = (Turns::and_own(places), Arc::default());
+        let (places, long) = (FairSemaphore::and_own(places), Arc::default());
         Self { places, short: None, long, timeout: limits.request_timeout, allowance: allowance(limits), shutdown }
     }
 
     /// The same with as many places for short ones.
     pub(super) fn sliced(places: usize, limits: &Limits, shutdown: Shutdown) -> Self {
-        Self { short: Some(Turns::new(places)), ..Self::new(places, limits, shutdown) }
+        Self { short: Some(FairSemaphore::new(places)), ..Self::new(places, limits, shutdown) }
     }
 
     /// How many computations wait for a place.
@@ -94,11 +94,11 @@ impl Work {
     }
 
     /// Waits for a place, in the turn of the client at hand.
-    pub(super) async fn place(&self) -> Result<Place, Status> {
+    pub(super) async fn place(&self) -> Result<Permit, Status> {
         self.place_of(&self.places, client().party(), Instant::now() + self.timeout).await
     }
 
-    async fn place_of(&self, places: &Arc<Turns>, party: Party, deadline: Instant) -> Result<Place, Status> {
+    async fn place_of(&self, places: &Arc<FairSemaphore>, party: Waiter, deadline: Instant) -> Result<Permit, Status> {
         tokio::select! {
             place = places.place(party) => Ok(place),
             () = tokio::time::sleep_until(deadline.into()) => Err(self.late("waiting for its turn")),
@@ -107,7 +107,7 @@ impl Work {
     }
 
     /// Waits for a place as long as it takes, for a computation that gave its own back; none when the server stops.
-    pub(super) async fn again(&self, party: Party) -> Option<Place> {
+    pub(super) async fn again(&self, party: Waiter) -> Option<Permit> {
         tokio::select! {
             place = self.places.place(party) => Some(place),
             () = self.shutdown.ending.cancelled() => None,
@@ -142,7 +142,8 @@ impl Work {
                 break;
             }
             let end = deadline.min(Instant::now() + SLICE);
-            let Done { answer, is_late, cpu } = self.compute(Arc::clone(&job), place, end, deadline).await?;
+            let ComputationOutcome { answer, is_late, cpu } =
+                self.compute(Arc::clone(&job), place, end, deadline).await?;
             if !is_late || end == deadline {
                 return answer.map_err(|status| self.told(status));
             }
@@ -152,7 +153,7 @@ impl Work {
         }
         let _known = self.short.as_ref().map(|_| self.long.enter(party.number));
         let place = self.place_of(&self.places, party, deadline).await?;
-        let Done { answer, .. } = self.compute(job, place, deadline, deadline).await?;
+        let ComputationOutcome { answer, .. } = self.compute(job, place, deadline, deadline).await?;
         answer.map_err(|status| self.told(status))
     }
 
@@ -160,10 +161,10 @@ impl Work {
     async fn compute<T: Send + 'static>(
         &self,
         job: Arc<impl Fn(&Budget) -> Result<T, Status> + Send + Sync + 'static>,
-        place: Place,
+        place: Permit,
         end: Instant,
         deadline: Instant,
-    ) -> Result<Done<T>, Status> {
+    ) -> Result<ComputationOutcome<T>, Status> {
         let budget = Budget::new(Allowance { deadline: Some(end), ..of_client(self.allowance.clone()) });
         let guard = CancelOnDrop(budget.clone());
         let (span, client) = (tracing::Span::current(), client());
@@ -173,12 +174,12 @@ impl Work {
             let answer = CLIENT.sync_scope(client, || span.in_scope(|| job(&budget)));
             let is_late = budget.is_late();
             let cpu = before.filter(|_| is_late).and_then(|before| Some(budget::thread_cpu()?.saturating_sub(before)));
-            Done { answer, is_late, cpu }
+            ComputationOutcome { answer, is_late, cpu }
         });
         tokio::select! {
             answer = running => answer.map_err(|_| status::fault()),
             () = tokio::time::sleep_until(deadline.into()) => {
-                guard.0.late();
+                guard.0.expire();
                 Err(self.late("computing"))
             }
             () = self.shutdown.ending.cancelled() => Err(status::stopping()),
@@ -222,19 +223,19 @@ impl Drop for CancelOnDrop {
 }
 
 /// A stream of results that stops its computation when its reader is gone.
-pub(super) struct Results<S> {
+pub(super) struct CancellingStream<S> {
     stream: S,
     _guard: CancelOnDrop,
 }
 
-impl<S> Results<S> {
+impl<S> CancellingStream<S> {
     /// The results of what runs under `budget`.
     pub(super) fn new(stream: S, budget: Budget) -> Self {
         Self { stream, _guard: CancelOnDrop(budget) }
     }
 }
 
-impl<S: Stream + Unpin> Stream for Results<S> {
+impl<S: Stream + Unpin> Stream for CancellingStream<S> {
     type Item = S::Item;
 
     fn poll_next(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Self::Item>> {

@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 /// A way of writing a value.
-pub trait Written {
+pub trait ValueSyntax {
     /// What is held.
     type Held;
     /// What is written in place of the value in help: `N`, `BYTES`.
-    const PLACE: &'static str;
+    const METAVAR: &'static str;
 
     /// Reads it.
     ///
@@ -27,18 +27,18 @@ fn whole(text: &str) -> Option<usize> {
 }
 
 /// Largest number of anything: sums and small multiples of such still are numbers.
-const MOST: usize = 1_000_000_000_000_000;
+const MAX_NUMBER: usize = 1_000_000_000_000_000;
 
 /// A whole number above 0.
 #[derive(Debug)]
-pub struct Count;
+pub struct PositiveCount;
 
-impl Written for Count {
+impl ValueSyntax for PositiveCount {
     type Held = usize;
-    const PLACE: &'static str = "N";
+    const METAVAR: &'static str = "N";
 
     fn read(text: &str) -> Result<usize, &'static str> {
-        whole(text).filter(|n| *n <= MOST).ok_or("a whole number above 0, at most 1e15")
+        whole(text).filter(|n| *n <= MAX_NUMBER).ok_or("a whole number above 0, at most 1e15")
     }
 
     fn write(held: &usize) -> String {
@@ -47,20 +47,20 @@ impl Written for Count {
 }
 
 /// What may also be none, written as 0.
-pub trait MayBeNone: Written {
+pub trait OptionalSyntax: ValueSyntax {
     /// What is expected where it may.
     const OR_NONE: &'static str;
 }
 
-impl MayBeNone for Count {
+impl OptionalSyntax for PositiveCount {
     const OR_NONE: &'static str = "a whole number, at most 1e15; 0: any";
 }
 
-impl MayBeNone for Bytes {
+impl OptionalSyntax for ByteSize {
     const OR_NONE: &'static str = "bytes, as 0, 1000000, 64M or 2G";
 }
 
-impl MayBeNone for Time {
+impl OptionalSyntax for PositiveSeconds {
     const OR_NONE: &'static str = "seconds, at most 1e9; 0: any";
 }
 
@@ -68,9 +68,9 @@ impl MayBeNone for Time {
 #[derive(Debug)]
 pub struct OrNone<W>(PhantomData<W>);
 
-impl<W: MayBeNone<Held: Default>> Written for OrNone<W> {
+impl<W: OptionalSyntax<Held: Default>> ValueSyntax for OrNone<W> {
     type Held = W::Held;
-    const PLACE: &'static str = W::PLACE;
+    const METAVAR: &'static str = W::METAVAR;
 
     fn read(text: &str) -> Result<W::Held, &'static str> {
         if text == "0" { Ok(W::Held::default()) } else { W::read(text).map_err(|_| W::OR_NONE) }
@@ -82,19 +82,19 @@ impl<W: MayBeNone<Held: Default>> Written for OrNone<W> {
 }
 
 /// A whole number, or none.
-pub type CountOrNone = OrNone<Count>;
+pub type CountOrNone = OrNone<PositiveCount>;
 /// Bytes, or none.
-pub type BytesOrNone = OrNone<Bytes>;
+pub type BytesOrNone = OrNone<ByteSize>;
 /// A time in seconds, or none.
-pub type TimeOrNone = OrNone<Time>;
+pub type TimeOrNone = OrNone<PositiveSeconds>;
 
 /// Bytes: a whole number above 0, with an optional k, M or G (times 1024).
 #[derive(Debug)]
-pub struct Bytes;
+pub struct ByteSize;
 
-impl Written for Bytes {
+impl ValueSyntax for ByteSize {
     type Held = usize;
-    const PLACE: &'static str = "BYTES";
+    const METAVAR: &'static str = "BYTES";
 
     fn read(text: &str) -> Result<usize, &'static str> {
         let (digits, shift) = match text.char_indices().last() {
@@ -116,11 +116,11 @@ impl Written for Bytes {
 
 /// A time in seconds, above 0.
 #[derive(Debug)]
-pub struct Time;
+pub struct PositiveSeconds;
 
-impl Written for Time {
+impl ValueSyntax for PositiveSeconds {
     type Held = Duration;
-    const PLACE: &'static str = "SECONDS";
+    const METAVAR: &'static str = "SECONDS";
 
     fn read(text: &str) -> Result<Duration, &'static str> {
         let seconds = text.parse::<f64>().ok().filter(|s| *s > 0.0 && *s <= 1e9);
@@ -134,11 +134,11 @@ impl Written for Time {
 
 /// A path, or nothing.
 #[derive(Debug)]
-pub struct File;
+pub struct PathOrNone;
 
-impl Written for File {
+impl ValueSyntax for PathOrNone {
     type Held = Option<PathBuf>;
-    const PLACE: &'static str = "FILE";
+    const METAVAR: &'static str = "FILE";
 
     fn read(text: &str) -> Result<Option<PathBuf>, &'static str> {
         if text.is_empty() { Err("a path") } else { Ok(Some(text.into())) }
@@ -151,11 +151,11 @@ impl Written for File {
 
 /// An address, or nothing.
 #[derive(Debug)]
-pub struct Place;
+pub struct AddressOrNone;
 
-impl Written for Place {
+impl ValueSyntax for AddressOrNone {
     type Held = Option<Address>;
-    const PLACE: &'static str = "ADDRESS";
+    const METAVAR: &'static str = "ADDRESS";
 
     fn read(text: &str) -> Result<Option<Address>, &'static str> {
         text.parse().map(Some).map_err(|_| "host:port or unix:///path")
@@ -168,11 +168,11 @@ impl Written for Place {
 
 /// Addresses, separated by commas.
 #[derive(Debug)]
-pub struct Places;
+pub struct AddressList;
 
-impl Written for Places {
+impl ValueSyntax for AddressList {
     type Held = Vec<Address>;
-    const PLACE: &'static str = "ADDRESS";
+    const METAVAR: &'static str = "ADDRESS";
 
     fn read(text: &str) -> Result<Vec<Address>, &'static str> {
         let read: Result<Vec<_>, _> = text.split(',').map(|place| place.trim().parse()).collect();
@@ -188,11 +188,11 @@ impl Written for Places {
 
 /// Yes or no.
 #[derive(Debug)]
-pub struct Flag;
+pub struct YesOrNo;
 
-impl Written for Flag {
+impl ValueSyntax for YesOrNo {
     type Held = bool;
-    const PLACE: &'static str = "";
+    const METAVAR: &'static str = "";
 
     fn read(text: &str) -> Result<bool, &'static str> {
         text.parse().map_err(|_| "true or false")

@@ -21,13 +21,13 @@ use crate::equations::linear::{LinearSolver, Recursion};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};
-use dense::Dense;
+use dense::DensePivoted;
 use dense_unpivoted::DenseUnpivoted;
 pub use kind::{SolverKind, TooLarge};
 use sparse::Sparse;
 
 /// Dense baselines refuse more unknowns than this: their square would be larger than 1.2 GB.
-const MOST_DENSE: usize = 12_000;
+const MAX_DENSE: usize = 12_000;
 
 /// A linear solver chosen at run time: one comparison for each factorization or solve.
 #[derive(Debug)]
@@ -37,7 +37,7 @@ pub enum Solver {
     /// See [`SolverKind::DenseUnpivoted`].
     DenseUnpivoted(DenseUnpivoted),
     /// See [`SolverKind::Dense`].
-    Dense(Dense),
+    Dense(DensePivoted),
     /// See [`SolverKind::Sparse`].
     Sparse(Box<Sparse>),
 }
@@ -50,13 +50,13 @@ impl Solver {
     pub fn new(kind: SolverKind, pattern: &Pattern) -> Result<Self, TooLarge> {
         let unknowns = DOF * pattern.bodies();
         let dense = matches!(kind, SolverKind::Dense | SolverKind::DenseUnpivoted);
-        if dense && unknowns > MOST_DENSE {
+        if dense && unknowns > MAX_DENSE {
             return Err(TooLarge { solver: kind.name(), unknowns });
         }
         Ok(match kind {
             SolverKind::Recursion => Self::Recursion(Recursion),
             SolverKind::DenseUnpivoted => Self::DenseUnpivoted(DenseUnpivoted::new(pattern)),
-            SolverKind::Dense => Self::Dense(Dense::new(pattern)),
+            SolverKind::Dense => Self::Dense(DensePivoted::new(pattern)),
             SolverKind::Sparse => Self::Sparse(Box::new(Sparse::new(pattern)?)),
         })
     }

@@ -23,15 +23,15 @@ mod traced;
 
 pub use corrector::Continuation;
 pub use options::{Branch, ContinuationOptions};
-pub use traced::{Event, PathEnd, PathPoint, Traced};
+pub use traced::{PathEnd, PathEvent, PathPoint, TracedPath};
 
-use corrector::{Place, Plane};
+use corrector::{CorrectorPlane, PathState};
 
 use super::SolveError;
 use crate::domains::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
-use family::Blend;
+use family::LoadFamily;
 
 /// Step below which the path goes on although its point at a given s was not found [1].
 const NEAREST: f64 = 1e-10;
@@ -55,13 +55,13 @@ impl Continuation {
     /// [`SolveError::Singular`] where a body moves freely at the start; [`SolveError::Lost`] where `q` is no equilibrium.
     pub fn trace(
         &mut self,
-        family: &mut Blend,
+        family: &mut LoadFamily,
         q: &[Pose],
         watch: &mut dyn FnMut(f64) -> bool,
-    ) -> Result<Traced, SolveError> {
+    ) -> Result<TracedPath, SolveError> {
         self.iterations = 0;
         let mut here = self.start(family, q)?;
-        let mut traced = Traced::default();
+        let mut traced = TracedPath::default();
         traced.points.push(point(&here));
         let mut step = 0.5 * self.options.longest;
         traced.end = loop {
@@ -89,7 +89,7 @@ impl Continuation {
                 }
             }
             // the same contact is an equilibrium at the opposite voltage: only one that is still there without any goes on to that
-            if let Some(still) = family.still()
+            if let Some(still) = family.field_free_point()
                 && (here.s - still) * (next.s - still) < 0.0
                 && step > NEAREST
                 && self.land(family, &here, &next, still).is_none()
@@ -105,8 +105,9 @@ impl Continuation {
             let arrived = next.s >= self.options.target && branched.is_none();
             here = branched.unwrap_or(next);
             if arrived {
-                let before = Place { q: traced.points.last().map_or_else(Vec::new, |p| p.q.clone()), ..here.clone() };
-                let before = Place { s: traced.points.last().map_or(0.0, |p| p.s), ..before };
+                let before =
+                    PathState { q: traced.points.last().map_or_else(Vec::new, |p| p.q.clone()), ..here.clone() };
+                let before = PathState { s: traced.points.last().map_or(0.0, |p| p.s), ..before };
                 let last = self.land(family, &before, &here, self.options.target);
                 traced.points.push(last.unwrap_or_else(|| point(&here)));
                 break PathEnd::Arrived;
@@ -122,13 +123,13 @@ impl Continuation {
     }
 
     /// The first point with its tangent, towards growing s.
-    fn start(&mut self, family: &mut Blend, q: &[Pose]) -> Result<Place, SolveError> {
+    fn start(&mut self, family: &mut LoadFamily, q: &[Pose]) -> Result<PathState, SolveError> {
         let zeros = vec![Pose::zeros(); q.len()];
-        let guess = Place { q: q.to_vec(), s: 0.0, dq: zeros, ds: 1.0, negative: 0 };
-        let plane = Plane { from: &guess, dq: &guess.dq, ds: 1.0, distance: 0.0 };
+        let guess = PathState { q: q.to_vec(), s: 0.0, dq: zeros, ds: 1.0, negative: 0 };
+        let plane = CorrectorPlane { from: &guess, dq: &guess.dq, ds: 1.0, distance: 0.0 };
         match self.correct(family, &plane, guess.clone()) {
             Ok((mut place, _)) => {
-                self.turn(family, &mut place, &guess);
+                self.update_tangent(family, &mut place, &guess);
                 Ok(place)
             }
             Err(Some(pivot)) => Err(SolveError::singular(family.system(), pivot)),
@@ -142,17 +143,17 @@ impl Continuation {
     /// Records what happened between two points; at a bifurcation that is to be left, the first point of the new branch.
     fn note(
         &mut self,
-        family: &mut Blend,
-        here: &Place,
-        next: &Place,
+        family: &mut LoadFamily,
+        here: &PathState,
+        next: &PathState,
         step: f64,
-        traced: &mut Traced,
-    ) -> Option<Place> {
+        traced: &mut TracedPath,
+    ) -> Option<PathState> {
         if here.ds * next.ds < 0.0 {
             let (fold, located) = self.find_fold(family, here, next, step);
             // a fold changes the inertia; where s turns back without, this is a branch that comes back to its path
             let crossing = here.negative == next.negative;
-            traced.events.push((if crossing { Event::Bifurcation } else { Event::Fold }, traced.points.len()));
+            traced.events.push((if crossing { PathEvent::Bifurcation } else { PathEvent::Fold }, traced.points.len()));
             traced.rough.extend((!located).then_some(traced.points.len()));
             traced.points.push(point(&fold));
             return if crossing { self.rejoin(family, &fold) } else { None };
@@ -161,7 +162,7 @@ impl Continuation {
             return None;
         }
         let (at, located) = self.find_bifurcation(family, here, next.negative, step);
-        traced.events.push((Event::Bifurcation, traced.points.len()));
+        traced.events.push((PathEvent::Bifurcation, traced.points.len()));
         traced.rough.extend((!located).then_some(traced.points.len()));
         traced.points.push(point(&at));
         if self.options.branch == Branch::Stay || next.negative < here.negative {
@@ -173,7 +174,7 @@ impl Continuation {
     }
 
     /// The point at `s` exactly, from the two points around it; none where none is found, or only one of another branch.
-    fn land(&mut self, family: &mut Blend, before: &Place, past: &Place, s: f64) -> Option<PathPoint> {
+    fn land(&mut self, family: &mut LoadFamily, before: &PathState, past: &PathState, s: f64) -> Option<PathPoint> {
         let share = if past.s == before.s { 1.0 } else { (s - before.s) / (past.s - before.s) };
         let mut guess = past.clone();
         for (q, before) in guess.q.iter_mut().zip(&before.q) {
@@ -181,13 +182,13 @@ impl Continuation {
         }
         guess.s = s;
         let zeros = vec![Pose::zeros(); guess.q.len()];
-        let plane = Plane { from: &guess, dq: &zeros, ds: 1.0, distance: 0.0 };
+        let plane = CorrectorPlane { from: &guess, dq: &zeros, ds: 1.0, distance: 0.0 };
         let (place, _) = self.correct(family, &plane, guess.clone()).ok()?;
         let near = self.is_between(family, (before, past), (&guess, &place));
         near.then(|| PathPoint { s, ..point(&place) })
     }
 }
 
-fn point(place: &Place) -> PathPoint {
+fn point(place: &PathState) -> PathPoint {
     PathPoint { s: place.s, q: place.q.clone(), negative: place.negative }
 }

@@ -17,7 +17,7 @@ pub mod path;
 mod refusal;
 pub mod side_by_side;
 
-pub use loss::{LossKind, Passed};
+pub use loss::{LossKind, StabilityLoss};
 
 use super::SolveError;
 use crate::domains::{Domain, Drive, System};
@@ -33,7 +33,7 @@ const STALLED: f64 = 1e-5;
 const UNBALANCED: f64 = 1e-6;
 
 /// Smallest load step where the present load is next to nothing, as a fraction of the path.
-const LEAST_STEP: f64 = 1e-10;
+const MIN_STEP: f64 = 1e-10;
 
 /// Share of the distance of electrodes that one step may change. A plate on a spring folds at a third.
 const LEAP: f64 = 0.5;
@@ -81,7 +81,7 @@ pub struct Path {
     /// Newton iterations.
     pub iterations: usize,
     /// Losses of stability that it passed, in this order.
-    pub passed: Vec<Passed>,
+    pub passed: Vec<StabilityLoss>,
     /// Fraction of the path that was reached: 1 unless it stopped at a loss of stability.
     pub reached: f64,
 }
@@ -175,7 +175,7 @@ impl Equilibrium {
             self.free_from_start = from_the_first;
             let smallest = match path.is_still() {
                 true => f64::INFINITY,
-                false => (self.options.smallest_step * to).max(LEAST_STEP),
+                false => (self.options.smallest_step * to).max(MIN_STEP),
             };
             match self.correct(system, path, to, q, &mut done) {
                 Corrected::Stable => {
@@ -275,7 +275,7 @@ impl Equilibrium {
     /// upon the closed branch by chance.
     fn leaps(&self, system: &System, from: &[Pose]) -> bool {
         let far = |(gap, volts): (usize, &f64)| {
-            if *volts == 0.0 || !system.members[gap].closes() {
+            if *volts == 0.0 || !system.members[gap].is_electrostatic() {
                 return false;
             }
             let (before, after) = (system.distance(gap, from), system.distance(gap, &self.trial));

@@ -13,7 +13,7 @@ pub enum GapVoltage {
 }
 
 /// Least restitution of an impact [1].
-pub const LEAST_RESTITUTION: f64 = 0.01;
+pub const MIN_RESTITUTION: f64 = 0.01;
 
 /// Reference speeds of impacts that a netlist may give [m/s].
 pub const IMPACT_SPEEDS: [f64; 2] = [1e-9, 1e6];

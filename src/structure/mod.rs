@@ -16,12 +16,12 @@ mod placed;
 mod without_circuit;
 
 pub use circuit::{CircuitElement, CircuitKind};
-pub use gap::{BeamGap, Comb, GapVoltage, IMPACT_SPEEDS, Impact, LEAST_RESTITUTION, PlateGap, Stop};
+pub use gap::{BeamGap, Comb, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, PlateGap, Stop};
 pub use index::NodeIndex;
 pub use mechanical::{Beam, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};
 pub use network::{Port, Resistor, VoltageSource, Wire};
 pub use node::{Node, NodeId};
-pub use placed::Placed;
+pub use placed::PlacedElement;
 
 use serde::{Deserialize, Serialize};
 
@@ -56,7 +56,7 @@ pub struct Structure {
     pub stops: Vec<Stop>,
     /// Elements of domains that have their own.
     #[serde(default)]
-    pub placed: Vec<Placed>,
+    pub placed: Vec<PlacedElement>,
     /// Resistors.
     pub resistors: Vec<Resistor>,
     /// Conductors without resistance.

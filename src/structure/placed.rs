@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// An element of a domain's own: where it is, and the numbers that it was given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Placed {
+pub struct PlacedElement {
     /// Which element it is, as netlists call it.
     pub element: String,
     /// Full element name.

@@ -1,7 +1,8 @@
-//! What the source itself holds to: floors, no circles of files, sizes.
+//! What the source itself holds to: floors, no circles of files, sizes, unique names of types.
 
 mod circles;
 mod layering;
+mod names;
 mod sizes;
 
 use std::fs;

@@ -1,6 +1,6 @@
 //! Draws mechanisms: boxes with corners closed by half a width, turned by any angle, rounded to the grid.
 
-use bimorph::layout::drawing::{Drawing, Label, Point, Polygon};
+use bimorph::layout::drawing::{FlatLayout, GridPoint, Label, Polygon};
 
 /// Database units in a micrometre.
 const GRID: f64 = 1000.0;
@@ -8,7 +8,7 @@ const GRID: f64 = 1000.0;
 /// A drawing in the making; lengths in micrometres.
 #[derive(Debug, Clone)]
 pub(crate) struct Sheet {
-    drawing: Drawing,
+    drawing: FlatLayout,
     /// Everything is turned by this [rad] and then moved.
     angle: f64,
     shift: [f64; 2],
@@ -16,11 +16,12 @@ pub(crate) struct Sheet {
 
 impl Sheet {
     pub(crate) fn new(degrees: f64, shift: [f64; 2]) -> Self {
-        let drawing = Drawing { unit_m: 1e-6 / GRID, source: "sheet".into(), top: "TOP".into(), ..Drawing::default() };
+        let drawing =
+            FlatLayout { unit_m: 1e-6 / GRID, source: "sheet".into(), top: "TOP".into(), ..FlatLayout::default() };
         Self { drawing, angle: degrees.to_radians(), shift }
     }
 
-    fn point(&self, [x, y]: [f64; 2]) -> Point {
+    fn point(&self, [x, y]: [f64; 2]) -> GridPoint {
         let (s, c) = self.angle.sin_cos();
         [c * x - s * y + self.shift[0], s * x + c * y + self.shift[1]].map(|v| (v * GRID).round() as i32)
     }
@@ -56,7 +57,7 @@ impl Sheet {
         self.drawing.labels.push(Label { layer: "POLY1".into(), text: text.into(), at });
     }
 
-    pub(crate) fn drawing(&self) -> &Drawing {
+    pub(crate) fn drawing(&self) -> &FlatLayout {
         &self.drawing
     }
 }

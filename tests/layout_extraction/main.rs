@@ -9,7 +9,7 @@ mod repeats;
 
 use bimorph::analysis::modes::modes;
 use bimorph::compile::{CompileOptions, Junctions, compile};
-use bimorph::layout::drawing::{Drawing, Polygon};
+use bimorph::layout::drawing::{FlatLayout, Polygon};
 use bimorph::layout::extract::{ExtractOptions, Extraction, extract, netlist};
 use bimorph::layout::process::Process;
 use bimorph::layout::regions::union;
@@ -19,7 +19,7 @@ use draw::Sheet;
 /// PolyMUMPs as the program has it, for netlists of references.
 const POLY: &str = "process p1 = [ Poisson=0.3 Youngsmodulus=165e9 density=2300 h=2u viscosity=1.78e-5 fluid=2u ]\n";
 
-fn extracted(drawing: &Drawing) -> Extraction {
+fn extracted(drawing: &FlatLayout) -> Extraction {
     let process = Process::builtin("polymumps").unwrap();
     let found = extract(drawing, &process, &ExtractOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     for layer in &found.layers {
@@ -36,7 +36,7 @@ fn frequencies(text: &str, count: usize) -> Vec<f64> {
 }
 
 /// The extracted netlist has the frequencies of another, each within a relative error.
-fn agree(drawing: &Drawing, reference: &str, count: usize, relative: f64) -> String {
+fn agree(drawing: &FlatLayout, reference: &str, count: usize, relative: f64) -> String {
     let found = extracted(drawing);
     assert!(found.unrecognised.is_empty() && found.notes.is_empty(), "{:?} {:?}", found.unrecognised, found.notes);
     let text = netlist(&found);
@@ -283,7 +283,7 @@ proptest::proptest! {
         corners in proptest::collection::vec(proptest::collection::vec((0u32..1000, 0u32..1000), 3..8), 0..6),
     ) {
         let scale = |x: u32| i32::try_from(i64::from(x) * i64::from(size) / 1000).unwrap();
-        let mut drawing = Drawing { unit_m: 1e-9, ..Drawing::default() };
+        let mut drawing = FlatLayout { unit_m: 1e-9, ..FlatLayout::default() };
         for (x, y, w, h, layer, degrees) in boxes {
             let layer = ["POLY1", "POLY1", "POLY1", "ANCHOR1", "HOLE1", "POLY1"][layer];
             let (s, c) = f64::from(if degrees < 180 { 0 } else { degrees }).to_radians().sin_cos();

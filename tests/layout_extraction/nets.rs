@@ -3,14 +3,14 @@
 use super::draw::Sheet;
 use super::{POLY, extracted};
 use bimorph::analysis::statics::static_equilibrium;
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::layout::extract::netlist;
 use bimorph::netlist::Bundle;
 
 /// PolyMUMPs' sheet resistance [Ω/square].
 const SHEET: f64 = 20.0;
 
-fn model(text: &str) -> Compiled {
+fn model(text: &str) -> CompiledModel {
     let options = CompileOptions { junctions: Junctions::Centreline, ..CompileOptions::default() };
     compile(&Bundle::from_text("nets.net", text), &options).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }

@@ -3,23 +3,23 @@
 use super::{extracted, frequencies};
 use bimorph::budget::{Allowance, Budget, within};
 use bimorph::layout::convert::convert;
-use bimorph::layout::drawing::Drawing;
+use bimorph::layout::drawing::FlatLayout;
 use bimorph::layout::extract::netlist;
-use bimorph::layout::{Format, Process, from_bytes};
+use bimorph::layout::{LayoutFormat, Process, from_bytes};
 use bimorph::netlist::{Bundle, load};
 
 /// An L of two beams on a pad, twice in a pair with a bar between their ends; units of 10 nm.
 const CELLS: &str = "DS 1 1 1; 9 arm; L POLY1; B 2000 1000 -1000 0; B 10000 200 5000 0; B 300 6100 9950 2950; L ANCHOR1; B 1600 600 -1000 0; DF;
 DS 2 1 1; 9 pair; C 1 T 0 0; C 1 MY T 0 20000; L POLY1; B 300 8200 9950 10000; DF;\n";
 
-fn drawing(top: &str) -> Drawing {
+fn drawing(top: &str) -> FlatLayout {
     let text = format!("{CELLS}DS 3 1 1; 9 top; {top} DF;\nC 3;\nE\n");
     from_bytes(text.as_bytes(), "cells.cif", None).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
 /// The netlist with subnets has the modes of the flat one within 1e-9; answers it.
-fn as_flat(drawing: &Drawing) -> String {
-    let flat = Drawing { cells: Vec::new(), ..drawing.clone() };
+fn as_flat(drawing: &FlatLayout) -> String {
+    let flat = FlatLayout { cells: Vec::new(), ..drawing.clone() };
     let (text, flat) = (netlist(&extracted(drawing)), netlist(&extracted(&flat)));
     assert!(!flat.contains("subnet"), "{flat}");
     let (got, want) = (frequencies(&text, 6), frequencies(&flat, 6));
@@ -65,7 +65,7 @@ fn subnets_are_drawn_and_read_again() {
     let text = as_flat(&drawing("C 2 T 0 0; C 2 R 0 1 T 60000 0;"));
     let structure = load(&Bundle::from_text("cells.net", &text), &[]).unwrap().structure;
     let process = Process::builtin("polymumps").unwrap();
-    let mask = bimorph::layout::mask::mask(&structure, &process, Format::Gds, "cells.gds").unwrap();
+    let mask = bimorph::layout::mask::mask(&structure, &process, LayoutFormat::Gds, "cells.gds").unwrap();
     let again = convert(&from_bytes(&mask.bytes, "cells.gds", None).unwrap(), None).unwrap();
     assert!(again.netlist.contains("subnet"), "{}", again.netlist);
     for (f, g) in frequencies(&again.netlist, 6).iter().zip(frequencies(&text, 6)) {
@@ -93,8 +93,8 @@ fn cells_that_lie_over_each_other_stay_flat() {
          L METAL; B 100 100 900000 900000; DF;\nDS 2 1 1; {placed} DF;\nC 2;\nE\n"
     );
     let drawing = from_bytes(text.as_bytes(), "marked.cif", None).unwrap();
-    let flat = Drawing { cells: Vec::new(), ..drawing.clone() };
-    let used = |drawing: &Drawing| {
+    let flat = FlatLayout { cells: Vec::new(), ..drawing.clone() };
+    let used = |drawing: &FlatLayout| {
         let budget = Budget::new(Allowance::default());
         let text = within(&budget, || netlist(&extracted(drawing))).unwrap();
         assert!(!text.contains("subnet"), "{text}");

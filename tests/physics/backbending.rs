@@ -4,7 +4,7 @@ use crate::{close, model, node};
 use bimorph::analysis::backbending::backbend;
 use bimorph::analysis::mesh::static_backbent;
 use bimorph::analysis::statics::static_equilibrium;
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::netlist::{Bundle, Setting};
 use std::path::Path;
 
@@ -40,11 +40,11 @@ fn a_clamped_bar_yields_to_its_strength() {
     close(strain(400.0), -(free - 100e6 * 0.6 / 165e9), 1e-5);
 }
 
-fn bank() -> Compiled {
+fn bank() -> CompiledModel {
     bank_with(CompileOptions::default())
 }
 
-fn bank_with(options: CompileOptions) -> Compiled {
+fn bank_with(options: CompileOptions) -> CompiledModel {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
     let set = vec![("comb".to_owned(), Setting::Number(0.0))];
     compile(&Bundle::read(&path, &[]).unwrap(), &CompileOptions { set, junctions: Junctions::Centreline, ..options })
@@ -57,7 +57,7 @@ fn bank_with(options: CompileOptions) -> Compiled {
 #[test]
 fn a_bank_rests_bent_the_other_way() {
     let bank = bank();
-    let rest = |bent: &Compiled| node(&static_equilibrium(bent, &[]).unwrap(), "yoke").y;
+    let rest = |bent: &CompiledModel| node(&static_equilibrium(bent, &[]).unwrap(), "yoke").y;
     let hot = static_equilibrium(&bank, &volts("heat", 3.2)).unwrap();
     assert!(node(&hot, "yoke").y < -1e-6);
     let bent = backbend(&bank, &volts("heat", 3.2)).unwrap();

@@ -4,13 +4,13 @@ use crate::{balance, close, linear, model, node};
 use bimorph::analysis::frame::{frame, frame_modes, frame_statics, frame_transient, frame_with};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::transient::{TransientOptions, transient};
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
-use bimorph::discretize::frame::{Elements, FrameGaps, FrameOptions};
+use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
+use bimorph::discretize::frame::{ElementCount, FrameGaps, FrameOptions};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::baseline::SolverKind;
 use std::path::Path;
 
-fn bank(band: Option<f64>) -> Compiled {
+fn bank(band: Option<f64>) -> CompiledModel {
     let bundle = Bundle::read(Path::new("examples/bank/bank.net"), &[]).unwrap();
     compile(&bundle, &CompileOptions { band, junctions: Junctions::Centreline, ..CompileOptions::default() }).unwrap()
 }
@@ -45,7 +45,7 @@ fn every_solver_gives_the_same_motion() {
 }
 
 /// A bank of three bimorphs, as an independent program has it: 169 GPa, 2330 kg/m3, Poisson's ratio 0.22.
-fn fine_bank() -> Compiled {
+fn fine_bank() -> CompiledModel {
     let bimorph = |k: usize| {
         format!(
             "anchor p2 [c{k}] [l=10u w=10u oz=pi]\nanchor p2 [h{k}] [l=10u w=10u oz=pi]\n\
@@ -63,7 +63,8 @@ fn fine_bank() -> Compiled {
 
 fn fine_modes(elements: usize, shear: bool) -> Vec<f64> {
     let compiled = fine_bank();
-    let options = FrameOptions { elements: Elements::Each(elements), shear, undamped: false, gaps: FrameGaps::LeftOut };
+    let options =
+        FrameOptions { elements: ElementCount::Each(elements), shear, undamped: false, gaps: FrameGaps::LeftOut };
     let frame = frame_with(&compiled, &options).unwrap();
     frame_modes(&compiled, &frame, 10, &[]).unwrap().0.frequencies_hz
 }

@@ -2,9 +2,9 @@
 
 use crate::contact::EPS;
 use crate::{close, model};
-use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, Growing, trace};
+use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, PathInput, trace};
 use bimorph::analysis::pull_in::pull_in;
-use bimorph::compile::{CompileOptions, Compiled};
+use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Status, Token, Trial, TrialReply};
 use bimorph::solve::continuation::Branch;
@@ -20,7 +20,7 @@ struct Plate {
 }
 
 impl Plate {
-    fn model(&self) -> Compiled {
+    fn model(&self) -> CompiledModel {
         let Self { k, area, gap, touch } = self;
         let text = format!(
             "anchor * [f] []
@@ -98,7 +98,7 @@ struct Sweep {
 }
 
 impl Sweep {
-    fn new(compiled: Compiled) -> Self {
+    fn new(compiled: CompiledModel) -> Self {
         let mut device = LocalDevice::new(Arc::new(compiled));
         let request = OpenRequest { ports: Vec::new(), signals: vec!["gap.gap".to_owned()], noise: None };
         device.open(&request).unwrap();
@@ -205,7 +205,7 @@ fn snaps_are_limit_points_of_the_path() {
     let compiled = model(text, &CompileOptions::default());
     let found = pull_in(&compiled, None, 20.0).unwrap();
     let request = ContinuationRequest {
-        growing: Growing::Port("drive"),
+        growing: PathInput::Port("drive"),
         from: 0.0,
         to: 20.0,
         voltages: vec![],

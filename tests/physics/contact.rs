@@ -4,7 +4,7 @@ use crate::{balance, close, model, node};
 use bimorph::analysis::pull_in::pull_in;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::transient::{TransientOptions, transient};
-use bimorph::compile::{CompileOptions, Compiled};
+use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::domains::contact::{DEEPEST, TOUCH};
 use bimorph::solve::time::event::Direction;
 
@@ -13,7 +13,7 @@ pub(crate) const EPS: f64 = 8.854e-12;
 pub(crate) const LEAST: f64 = TOUCH * (1.0 - 0.5 * DEEPEST);
 
 /// A plate of area A on a spring k in front of an electrode at a distance g.
-fn plate(k: f64, area: f64, gap: f64, impact: &str) -> Compiled {
+fn plate(k: f64, area: f64, gap: f64, impact: &str) -> CompiledModel {
     let text = format!(
         "anchor * [f] []
         mass2d * [m] [m=1e-10]
@@ -28,7 +28,7 @@ fn plate(k: f64, area: f64, gap: f64, impact: &str) -> Compiled {
 }
 
 /// A plate of 1e-8 m² on 1 N/m, 2 µm in front of an electrode, with what stops it.
-fn stopped_plate(stop: &str) -> Compiled {
+fn stopped_plate(stop: &str) -> CompiledModel {
     let text = format!(
         "anchor * [f] []
         mass2d * [m] [m=1e-10]
@@ -111,7 +111,7 @@ fn beyond_the_law_there_is_no_number() {
 
 /// One gap of random size, in one of four layouts: a lumped plate, a cantilever that is the electrode, a wide electrode on a thin
 /// cantilever (SUGAR's demo beamgap2e), a clamped-clamped beam over four pieces of an electrode.
-pub(crate) fn random_part(case: usize, random: &mut Numbers) -> Compiled {
+pub(crate) fn random_part(case: usize, random: &mut Numbers) -> CompiledModel {
     let gap = random.between(1e-6, 4e-6);
     if case.is_multiple_of(4) {
         return plate(random.between(0.1, 10.0), random.between(1e-9, 1e-7), gap, "");

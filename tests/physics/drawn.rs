@@ -5,12 +5,12 @@ use super::{balance, close, linear, node};
 use bimorph::analysis::frame::{frame, frame_statics};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::statics::static_equilibrium;
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::netlist::Bundle;
 
 const P1: &str = "process p1 = [Youngsmodulus=165e9 density=2300 h=2u]\n";
 
-fn drawn(text: &str, options: &CompileOptions) -> Compiled {
+fn drawn(text: &str, options: &CompileOptions) -> CompiledModel {
     compile(&Bundle::from_text("drawn.net", &format!("{P1}{text}")), options).unwrap_or_else(|e| panic!("{e}"))
 }
 

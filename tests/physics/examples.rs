@@ -3,11 +3,11 @@
 use crate::{balance, close, node};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::transient::{TransientOptions, transient};
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::netlist::{Bundle, Setting};
 use std::path::Path;
 
-fn scene(name: &str, set: &[(&str, f64)], options: &CompileOptions) -> Compiled {
+fn scene(name: &str, set: &[(&str, f64)], options: &CompileOptions) -> CompiledModel {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name);
     let bundle = Bundle::read(&path, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
     let set = set.iter().map(|(n, v)| ((*n).to_owned(), Setting::Number(*v))).collect();
@@ -21,7 +21,7 @@ fn band(band: f64) -> CompileOptions {
     CompileOptions { band: Some(band), ..CompileOptions::default() }
 }
 
-fn frequencies(compiled: &Compiled, want: &[f64], relative: f64) {
+fn frequencies(compiled: &CompiledModel, want: &[f64], relative: f64) {
     let found = modes(compiled, want.len(), &[]).unwrap().frequencies_hz;
     assert_eq!(found.len(), want.len());
     for (found, want) in found.iter().zip(want) {

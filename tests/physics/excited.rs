@@ -3,7 +3,7 @@
 use bimorph::analysis::chart::error::relative_error;
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::netlist::{Bundle, Setting};
 use std::path::Path;
 
@@ -35,7 +35,7 @@ fn run(
     stop: f64,
     signals: &[&str],
     options: &CompileOptions,
-) -> (TransientResult, Compiled) {
+) -> (TransientResult, CompiledModel) {
     let model = compile(bundle, options).unwrap();
     let loaded = force.map(|force| {
         let set = vec![("F".to_owned(), Setting::Number(force))];
@@ -53,7 +53,7 @@ fn run(
     (transient(&model, &asked, &mut |_, _| {}, &mut |_| true).unwrap(), model)
 }
 
-fn warned(model: &Compiled) -> bool {
+fn warned(model: &CompiledModel) -> bool {
     model.warnings.items.iter().any(|d| d.code == "W040")
 }
 

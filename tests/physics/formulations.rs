@@ -6,7 +6,7 @@ use bimorph::analysis::formulation::Formulation;
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
-use bimorph::compile::{CompileOptions, Compiled};
+use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::domains::Ramp;
 use bimorph::equations::loads::JointLoads;
 use bimorph::multibody::rcr::Reduction;
@@ -56,7 +56,7 @@ A row p1 [tip] [n=3]
 f2d * [tip] [F=F oz=pi/2]
 ";
 
-fn undamped(text: &str, force: f64) -> Compiled {
+fn undamped(text: &str, force: f64) -> CompiledModel {
     let set = vec![("F".to_owned(), Setting::Number(force))];
     model(text, &CompileOptions { set, undamped: true, ..CompileOptions::default() })
 }
@@ -65,11 +65,15 @@ fn asked(stop: f64, signal: &str, tol: f64) -> TransientOptions<'static> {
     TransientOptions { stop, signals: vec![signal.into()], points: 101, tol, ..TransientOptions::default() }
 }
 
-fn spring(compiled: &Compiled, options: &TransientOptions<'_>) -> TransientResult {
+fn spring(compiled: &CompiledModel, options: &TransientOptions<'_>) -> TransientResult {
     transient(compiled, options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn joints(compiled: &Compiled, kind: Formulation, options: &TransientOptions<'_>) -> (TransientResult, JointReport) {
+fn joints(
+    compiled: &CompiledModel,
+    kind: Formulation,
+    options: &TransientOptions<'_>,
+) -> (TransientResult, JointReport) {
     let options = &TransientOptions { method: Integrator::Rk45, ..options.clone() };
     joint_transient(compiled, kind, options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{e}"))
 }

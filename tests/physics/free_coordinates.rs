@@ -9,7 +9,7 @@ use bimorph::analysis::mesh::{modes_fitted, static_fitted};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::statics::{StaticResult, static_equilibrium};
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
-use bimorph::compile::{CompileOptions, Compiled};
+use bimorph::compile::{CompileOptions, CompiledModel};
 use std::f64::consts::{PI, TAU};
 
 /// Displacement of a node.
@@ -22,7 +22,7 @@ fn close(found: f64, expected: f64, relative: f64) {
     assert!((found - expected).abs() <= relative * expected.abs(), "{found:e}, expected {expected:e}");
 }
 
-fn run(compiled: &Compiled, formulation: Formulation, options: &TransientOptions<'_>) -> TransientResult {
+fn run(compiled: &CompiledModel, formulation: Formulation, options: &TransientOptions<'_>) -> TransientResult {
     let mut sample = |_: f64, _: &[f64]| {};
     let mut watch = |_: f64| true;
     match formulation {

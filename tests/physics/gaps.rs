@@ -6,7 +6,7 @@ use bimorph::analysis::modes::modes;
 use bimorph::analysis::pull_in::pull_in;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::CompileOptions;
-use bimorph::domains::{At, Domain, Point};
+use bimorph::domains::{Configuration, Domain, MaterialPoint};
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, BodyId};
 use nalgebra::{DMatrix, DVector};
@@ -184,7 +184,7 @@ fn differences_of_a_nanometre() {
     let mut q = vec![Pose::zeros(); 2];
     assert_eq!(system.bodies(), q.len());
     for (drawn, point) in compiled.structure.nodes.iter().zip(&frame.nodes) {
-        if let Some(Point { body: BodyId::Free(k), .. }) = point {
+        if let Some(MaterialPoint { body: BodyId::Free(k), .. }) = point {
             let moved = node(&rest, &drawn.name);
             q[*k] = Pose::new(moved.x, moved.y, moved.rz);
         }
@@ -198,7 +198,7 @@ fn differences_of_a_nanometre() {
     let force = |q: &[Pose]| {
         let mut force = vec![Pose::zeros(); 2];
         for gap in &frame.gaps {
-            gap.add_force(At { q, linear: true }, 10.0, &mut force);
+            gap.add_force(Configuration { q, linear: true }, 10.0, &mut force);
         }
         flat(&force)
     };

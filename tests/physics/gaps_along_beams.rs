@@ -3,13 +3,13 @@
 
 use crate::{close, model, node};
 use bimorph::analysis::mesh::{pull_in_fitted, static_fitted};
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::multibody::BlockMatrix;
 use bimorph::multibody::planar::Pose;
 use bimorph::netlist::Bundle;
-use bimorph::refine::model_order::ModelOrder;
+use bimorph::refine::model_order::Mesh;
 use nalgebra::Vector2;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -35,7 +35,7 @@ fn over_electrode(beams: usize, gaps: usize, clamped: bool) -> String {
     text
 }
 
-fn compiled(text: &str, options: &CompileOptions) -> Compiled {
+fn compiled(text: &str, options: &CompileOptions) -> CompiledModel {
     let options = CompileOptions { junctions: Junctions::Centreline, ..options.clone() };
     compile(&Bundle::from_text("gap.net", text), &options).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -92,7 +92,7 @@ const TWO: &str = "
 #[test]
 fn one_potential_on_unequal_segments() {
     let drawn = model(TWO, &CompileOptions::default());
-    let order = ModelOrder { segments: vec![3, 4], ..drawn.order.clone() };
+    let order = Mesh { segments: vec![3, 4], ..drawn.order.clone() };
     let compiled = drawn.with_order(order).unwrap();
     // the upper beam bends towards the lower one as x², to an end that is open or touches
     for (volts, end, touches) in [(20.0, -0.3e-6, false), (60.0, -1.91e-6, true)] {

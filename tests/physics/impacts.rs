@@ -9,11 +9,11 @@ use bimorph::analysis::modes::modes;
 use bimorph::analysis::pull_in::pull_in;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
-use bimorph::compile::{CompileOptions, Compiled, Formulation};
+use bimorph::compile::{CompileOptions, CompiledModel, Formulation};
 use bimorph::solve::time::event::Direction;
 
 /// A mass of 1e-10 kg that 1 µN throws at a stop 10 µm away: it arrives with √(2·F·w/m) = 0.44721 m/s.
-fn thrown(stop: &str, options: &CompileOptions) -> Compiled {
+fn thrown(stop: &str, options: &CompileOptions) -> CompiledModel {
     let text = format!(
         "anchor * [f] []
         mass2d * [m] [m=1e-10]
@@ -25,12 +25,12 @@ fn thrown(stop: &str, options: &CompileOptions) -> Compiled {
     model(&text, options)
 }
 
-fn run(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<TransientResult, AnalysisError> {
+fn run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> Result<TransientResult, AnalysisError> {
     transient(compiled, options, &mut |_, _| {}, &mut |_| true)
 }
 
 /// How far the mass comes back from the stop, of the way that it fell.
-fn rebound(compiled: &Compiled, method: Integrator, step: Option<f64>) -> f64 {
+fn rebound(compiled: &CompiledModel, method: Integrator, step: Option<f64>) -> f64 {
     let options = TransientOptions {
         stop: 100e-6,
         points: 20_001,
@@ -77,7 +77,7 @@ fn rebounds_have_the_restitution() {
 }
 
 /// A plate on k = 1 N/m, m = 1e-10 kg, in front of an electrode 2 µm away that it pulls in on.
-fn plate(impact: &str) -> Compiled {
+fn plate(impact: &str) -> CompiledModel {
     let text = format!(
         "anchor * [f] []
         mass2d * [m] [m=1e-10]

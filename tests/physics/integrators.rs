@@ -3,7 +3,7 @@
 use crate::{ARM, model};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::{TransientOptions, transient};
-use bimorph::compile::{CompileOptions, Compiled};
+use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::domains::{Ramp, System};
 use bimorph::netlist::Setting;
 use bimorph::solve::SolveError;
@@ -12,7 +12,7 @@ use bimorph::solve::baseline::Solver;
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::event::Direction;
 use bimorph::solve::linear::Recursion;
-use bimorph::solve::method::{Motion, Work};
+use bimorph::solve::method::{Motion, SolverCounters};
 use bimorph::solve::path::SourcePath;
 
 /// A plate on a spring and a damper that a ramp of 2 V to 4 V pulls at (k = 1 N/m, m = 1e-10 kg, A = 1e-8 m², g = 2 µm).
@@ -55,7 +55,7 @@ fn run(
     volts: (&[f64], &[f64]),
     motion: &mut Motion,
     (method, stop, control): (Integrator, f64, Control),
-) -> (Result<(), SolveError>, Work) {
+) -> (Result<(), SolveError>, SolverCounters) {
     let rise = vec![0.0; system.electrics.heating.heaters.len()];
     let ramp = Ramp::new(&system.electrics, volts.0, volts.1, &rise, stop);
     let solver = Solver::Recursion(Recursion);
@@ -64,7 +64,7 @@ fn run(
 }
 
 /// The bank free to move, and its static displacement under 25 µN.
-fn released_bank() -> (Compiled, Motion) {
+fn released_bank() -> (CompiledModel, Motion) {
     let at = |force: f64| {
         let set = vec![("F".to_owned(), Setting::Number(force))];
         model(&format!("{ARM}{BANK}"), &CompileOptions { set, undamped: true, ..CompileOptions::default() })
@@ -82,7 +82,12 @@ fn energy(system: &System, motion: &Motion) -> f64 {
 }
 
 /// Energy gained, relative to the strain energy released, after `stop` in equal steps.
-fn drift(bank: &(Compiled, Motion), method: Integrator, step: f64, stop: f64) -> Result<(f64, Work), SolveError> {
+fn drift(
+    bank: &(CompiledModel, Motion),
+    method: Integrator,
+    step: f64,
+    stop: f64,
+) -> Result<(f64, SolverCounters), SolveError> {
     let (system, mut motion) = (&bank.0.parts.system, bank.1.clone());
     let before = energy(system, &motion);
     let (end, work) = run(system, (&[], &[]), &mut motion, (method, stop, Control::Fixed(step)));

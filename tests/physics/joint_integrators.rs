@@ -4,10 +4,10 @@
 use crate::{ARM, model};
 use bimorph::analysis::AnalysisError;
 use bimorph::analysis::formulation::{Formulation, coordinate_scales};
-use bimorph::analysis::integrator::{Integrator, Run};
+use bimorph::analysis::integrator::{IntegrationRun, Integrator};
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
-use bimorph::compile::{CompileOptions, Compiled};
+use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::domains::Ramp;
 use bimorph::equations::constrained::Constrained;
 use bimorph::equations::loads::JointLoads;
@@ -31,7 +31,7 @@ const ALL: [Integrator; 5] = [
     Integrator::GeneralizedAlpha { rho: 0.8 },
 ];
 
-fn undamped(text: &str, force: f64, rotary_inertia: bool) -> Compiled {
+fn undamped(text: &str, force: f64, rotary_inertia: bool) -> CompiledModel {
     let set = vec![("F".to_owned(), Setting::Number(force))];
     model(&format!("{ARM}{text}"), &CompileOptions { set, undamped: true, rotary_inertia, ..CompileOptions::default() })
 }
@@ -40,7 +40,11 @@ fn asked(stop: f64, signal: &str, method: Integrator, tol: f64) -> TransientOpti
     TransientOptions { stop, signals: vec![signal.into()], points: 51, tol, method, ..TransientOptions::default() }
 }
 
-fn joints(compiled: &Compiled, kind: Formulation, options: &TransientOptions<'_>) -> (TransientResult, JointReport) {
+fn joints(
+    compiled: &CompiledModel,
+    kind: Formulation,
+    options: &TransientOptions<'_>,
+) -> (TransientResult, JointReport) {
     joint_transient(compiled, kind, options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -52,7 +56,7 @@ fn apart(a: &TransientResult, b: &TransientResult) -> f64 {
 }
 
 /// The bank in joint coordinates after `stop` in equal steps of `h`, from rates that its loops allow: coordinates.
-fn struck(compiled: &Compiled, method: Integrator, stop: f64, h: f64) -> (Vec<f64>, u64) {
+fn struck(compiled: &CompiledModel, method: Integrator, stop: f64, h: f64) -> (Vec<f64>, u64) {
     let system = &compiled.parts.system;
     let linkage = Formulation::Rcr.linkage(system).unwrap();
     let n = linkage.coordinates;
@@ -62,7 +66,7 @@ fn struck(compiled: &Compiled, method: Integrator, stop: f64, h: f64) -> (Vec<f6
     let mut now = Motion::zeros(n);
     now.v.iter_mut().zip(&scale).for_each(|(v, s)| *v = 2e6 * s);
     equations.project(0.0, &mut now);
-    let run = Run { motion: &mut now, h, control: Control::Fixed(h), observe: &mut |_, _, _, _| true };
+    let run = IntegrationRun { motion: &mut now, h, control: Control::Fixed(h), observe: &mut |_, _, _, _| true };
     let (end, work) = method.rule().unwrap().advance(&mut equations, run);
     end.unwrap();
     (now.q, work.iterations)

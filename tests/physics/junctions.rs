@@ -5,12 +5,12 @@ mod plane_stress;
 use super::{POLY, close, linear, node};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::statics::static_equilibrium;
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::netlist::Bundle;
 use plane_stress::LAYOUTS;
 use std::path::Path;
 
-fn with(text: &str, junctions: Junctions) -> Compiled {
+fn with(text: &str, junctions: Junctions) -> CompiledModel {
     let bundle = Bundle::from_text("model.net", &format!("{POLY}{text}"));
     compile(&bundle, &CompileOptions { junctions, ..linear() }).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -40,7 +40,7 @@ mod told;
 mod vm236;
 
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::netlist::Bundle;
 
 /// Structural polysilicon with the constants of SUGAR's MUMPs process file, 2 µm thick.
@@ -63,7 +63,7 @@ pub(crate) const ARM: &str = "
 ";
 
 /// Compiles [`POLY`] followed by `text`, beams meeting in points: what closed forms and SUGAR describe.
-pub(crate) fn model(text: &str, options: &CompileOptions) -> Compiled {
+pub(crate) fn model(text: &str, options: &CompileOptions) -> CompiledModel {
     let bundle = Bundle::from_text("model.net", &format!("{POLY}{text}"));
     compile(&bundle, &CompileOptions { junctions: Junctions::Centreline, ..options.clone() })
         .unwrap_or_else(|e| panic!("{e}"))
@@ -75,7 +75,7 @@ pub(crate) fn linear() -> CompileOptions {
 }
 
 /// Static equilibrium with voltages on ports.
-pub(crate) fn balance(compiled: &Compiled, volts: &[(&str, f64)]) -> StaticResult {
+pub(crate) fn balance(compiled: &CompiledModel, volts: &[(&str, f64)]) -> StaticResult {
     let volts: Vec<(String, f64)> = volts.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
     static_equilibrium(compiled, &volts).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -2,18 +2,18 @@
 //! `analysis::mesh`, on default options.
 
 use super::{close, node};
-use bimorph::analysis::mesh::{Request, fitted, fitted_in_time, in_circuit};
+use bimorph::analysis::mesh::{MeshRequest, fitted, fitted_in_time, in_circuit};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
-use bimorph::compile::{CompileOptions, Compiled, Formulation, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Junctions, compile};
 use bimorph::netlist::{Bundle, Setting};
 use std::path::Path;
 
 const SILICON: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nparam F=0\nanchor p [a] []\n";
 
 /// Beams that meet in points and at ideal clamps: what closed forms describe.
-fn drawn(text: &str, options: CompileOptions) -> Compiled {
+fn drawn(text: &str, options: CompileOptions) -> CompiledModel {
     let options = CompileOptions { junctions: Junctions::Centreline, ..options };
     compile(&Bundle::from_text("mesh.net", &format!("{SILICON}{text}")), &options).unwrap()
 }
@@ -35,7 +35,7 @@ fn elastica_within_the_tolerance() {
         for tol in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
             let set = vec![("F".to_owned(), Setting::Number(force))];
             let model = drawn(text, CompileOptions { tol, set, ..CompileOptions::default() });
-            let model = fitted(&model, &Request::Static { voltages: &[] }).unwrap();
+            let model = fitted(&model, &MeshRequest::Static { voltages: &[] }).unwrap();
             let tip = node(&static_equilibrium(&model, &[]).unwrap(), "t");
             let size = across.hypot(along) * 1e-3;
             let error = (tip.y - across * 1e-3).abs().max((tip.x - along * 1e-3).abs()) / size;
@@ -54,7 +54,7 @@ fn elastica_within_the_tolerance() {
 #[test]
 fn modes_by_their_number() {
     let model = drawn("beam2d p [a b] [l=200u w=2u]\nanchor p [b] []", CompileOptions::default());
-    let model = fitted(&model, &Request::Modes { count: 3, voltages: &[] }).unwrap();
+    let model = fitted(&model, &MeshRequest::Modes { count: 3, voltages: &[] }).unwrap();
     let found = modes(&model, 3, &[]).unwrap();
     // √(EI/ρA)/2πl²
     let unit = (165e9 * 4e-12 / 12.0 / 2300.0_f64).sqrt() / (std::f64::consts::TAU * 4e-8);
@@ -71,7 +71,7 @@ fn modes_by_their_number() {
         "beam2d p [a b] [l=200u w=2u]\nanchor p [b] []",
         CompileOptions { tol: 1e-6, ..CompileOptions::default() },
     );
-    let fine = modes(&fitted(&fine, &Request::Modes { count: 3, voltages: &[] }).unwrap(), 3, &[]).unwrap();
+    let fine = modes(&fitted(&fine, &MeshRequest::Modes { count: 3, voltages: &[] }).unwrap(), 3, &[]).unwrap();
     for k in 0..3 {
         let error = found.frequencies_hz[k] / fine.frequencies_hz[k] - 1.0;
         let told = found.errors[k].unwrap();
@@ -85,7 +85,7 @@ fn modes_by_their_number() {
 fn segments_of_the_user_are_told() {
     let text = "beam2d p [a t] [l=1000u w=0.5u]\nf2d * [t] [F=1.375e-8 oz=pi/2]";
     let model = drawn(text, CompileOptions { segments: Some(1), ..CompileOptions::default() });
-    let model = fitted(&model, &Request::Static { voltages: &[] }).unwrap();
+    let model = fitted(&model, &MeshRequest::Static { voltages: &[] }).unwrap();
     assert_eq!(model.order.segments, [1]);
     let tip = node(&static_equilibrium(&model, &[]).unwrap(), "t");
     let error = (tip.y / 0.669964181278e-3 - 1.0).abs().max((tip.x / 0.328941242247e-3 + 1.0).abs());
@@ -104,7 +104,7 @@ fn modes_about_a_loaded_state() {
     ] {
         let at = |tol: f64| {
             let model = drawn(text, CompileOptions { tol, ..CompileOptions::default() });
-            let model = fitted(&model, &Request::Modes { count: 4, voltages: &[] }).unwrap();
+            let model = fitted(&model, &MeshRequest::Modes { count: 4, voltages: &[] }).unwrap();
             (modes(&model, 4, &[]).unwrap().frequencies_hz, model.order.estimated_error.unwrap())
         };
         let ((found, told), (fine, _)) = (at(1e-3), at(1e-5));
@@ -172,7 +172,7 @@ fn modes_about_stress_converge_at_junctions() {
     close(fine[0], finest[0], 3e-6);
     let model = fitted(
         &with(CompileOptions { tol: 1e-6, ..CompileOptions::default() }),
-        &Request::Modes { count: 3, voltages: &[] },
+        &MeshRequest::Modes { count: 3, voltages: &[] },
     );
     let model = model.unwrap();
     let told = model.order.estimated_error.unwrap();
@@ -180,7 +180,7 @@ fn modes_about_stress_converge_at_junctions() {
     assert!(model.warnings.items.is_empty(), "{:?}", model.warnings.items);
     let found = modes(&model, 3, &[]).unwrap().frequencies_hz;
     let finer: Vec<usize> = model.order.segments.iter().map(|n| 8 * n).collect();
-    let finer = model.with_order(bimorph::refine::model_order::ModelOrder { segments: finer, ..model.order.clone() });
+    let finer = model.with_order(bimorph::refine::model_order::Mesh { segments: finer, ..model.order.clone() });
     let finer = modes(&finer.unwrap(), 3, &[]).unwrap().frequencies_hz;
     let error = found.iter().zip(&finer).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
     assert!(error <= 1e-6 && error < 2.0 * told, "{error:e}, told {told:e}");

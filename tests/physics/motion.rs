@@ -4,14 +4,14 @@ use crate::{close, model};
 use bimorph::analysis::AnalysisError;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, transient};
-use bimorph::compile::{CompileOptions, Compiled};
+use bimorph::compile::{CompileOptions, CompiledModel};
 
-fn run(compiled: &Compiled, options: &TransientOptions<'_>) -> (Vec<f64>, Vec<f64>, u64) {
+fn run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> (Vec<f64>, Vec<f64>, u64) {
     let result = transient(compiled, options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{e}"));
     (result.t, result.signals[0].2.clone(), result.counters.factorizations)
 }
 
-fn options<'a>(stop: f64, release: Option<&'a Compiled>) -> TransientOptions<'a> {
+fn options<'a>(stop: f64, release: Option<&'a CompiledModel>) -> TransientOptions<'a> {
     TransientOptions { stop, signals: vec!["m.x".into()], points: 201, release, ..TransientOptions::default() }
 }
 

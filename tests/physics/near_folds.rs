@@ -2,10 +2,10 @@
 
 use super::{close, model, node};
 use bimorph::analysis::AnalysisError;
-use bimorph::analysis::continuation::{ContinuationRequest, Growing};
+use bimorph::analysis::continuation::{ContinuationRequest, PathInput};
 use bimorph::analysis::mesh::{modes_fitted, path_fitted, pull_in_fitted, static_fitted, warnings};
 use bimorph::analysis::modes::modes;
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::continuation::Branch;
 use std::path::Path;
@@ -14,7 +14,7 @@ use std::path::Path;
 const BEAM: &str = "param s = 0\nparam F = 0\nanchor p1 [a] []\nbeam2d p1 [a m] [l=100u w=2u stress=s]\n\
     beam2d p1 [m b] [l=100u w=2u stress=s]\nanchor p1 [b] []\n";
 
-fn stressed(more: &str, s: f64, options: &CompileOptions) -> Compiled {
+fn stressed(more: &str, s: f64, options: &CompileOptions) -> CompiledModel {
     let options = CompileOptions { set: vec![("s".into(), Setting::Number(s))], ..options.clone() };
     model(&format!("{BEAM}{more}"), &options)
 }
@@ -94,7 +94,7 @@ fn a_path_that_ends_at_rest() {
         model(&format!("{BEAM}f2d * [m] [F=F oz=pi/2]\n"), &options)
     };
     let request = ContinuationRequest {
-        growing: Growing::Loads,
+        growing: PathInput::Loads,
         from: 1.0,
         to: 0.0,
         voltages: Vec::new(),
@@ -114,7 +114,7 @@ fn pull_in_of_a_buckled_part_is_told() {
         "anchor * [e] []\nplategap2d * [m e] [A=2e-9 gap=3u oz=-pi/2]\neground * [e] []\ndrive port * [m e] []\n";
     let told = |s: f64| {
         let (_, found) = pull_in_fitted(&stressed(plate, s, &CompileOptions::default()), None, 200.0).unwrap();
-        found.told().join("; ")
+        found.notes().join("; ")
     };
     assert!(told(-80e6).contains("snapped through or buckled"), "{}", told(-80e6));
     assert!(!told(0.0).contains("buckled"), "{}", told(0.0));
@@ -199,7 +199,7 @@ fn ports_that_pull_nothing() {
 #[test]
 fn beyond_a_buckling_load_nothing_stays_straight() {
     let fine = CompileOptions { segments: Some(64), ..CompileOptions::default() };
-    let deflection = |compiled: &Compiled| {
+    let deflection = |compiled: &CompiledModel| {
         let (fitted, result, _) = static_fitted(compiled, &[]).unwrap();
         (node(&result, "m").y.abs(), fitted.order.estimated_error)
     };

@@ -1,20 +1,20 @@
 //! A drawing that is turned gives the same results: 24 angles, the axes among them.
 
 use crate::{close, model};
-use bimorph::analysis::continuation::{ContinuationRequest, Growing, trace};
+use bimorph::analysis::continuation::{ContinuationRequest, PathInput, trace};
 use bimorph::analysis::harmonic::{HarmonicOptions, harmonic};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::pull_in::pull_in;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::transient::{TransientOptions, transient};
-use bimorph::compile::{CompileOptions, Compiled};
+use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Status, Token, Trial, TrialReply};
 use bimorph::solve::continuation::Branch;
 use std::sync::Arc;
 
 /// A plate on a guide, a spring and a damper, before an electrode, along a direction [deg].
-fn guided(angle: f64) -> Compiled {
+fn guided(angle: f64) -> CompiledModel {
     let text = format!(
         "anchor * [f] []
         spring2d * [f m] [kx=1 oz=deg({angle})]
@@ -30,7 +30,7 @@ fn guided(angle: f64) -> Compiled {
 }
 
 /// A cantilever of 80 µm over an electrode, along a direction [deg].
-fn cantilever(angle: f64) -> Compiled {
+fn cantilever(angle: f64) -> CompiledModel {
     let text = format!(
         "dl = 20u
         anchor p1 [e(0)] []
@@ -53,7 +53,7 @@ fn drive(volts: f64) -> Vec<(String, f64)> {
 }
 
 /// What statics say of a node at a voltage: its motion along the direction and across it [m], and the charge [C].
-fn statics(compiled: &Compiled, angle: f64, name: &str, volts: f64) -> [f64; 3] {
+fn statics(compiled: &CompiledModel, angle: f64, name: &str, volts: f64) -> [f64; 3] {
     let result = static_equilibrium(compiled, &drive(volts)).unwrap_or_else(|e| panic!("{angle}° {volts} V: {e}"));
     let at = crate::node(&result, name);
     let (sin, cos) = angle.to_radians().sin_cos();
@@ -61,9 +61,9 @@ fn statics(compiled: &Compiled, angle: f64, name: &str, volts: f64) -> [f64; 3] 
 }
 
 /// Limit points of the path up to a voltage [V].
-fn limits(compiled: &Compiled, to: f64) -> Vec<f64> {
+fn limits(compiled: &CompiledModel, to: f64) -> Vec<f64> {
     let request = ContinuationRequest {
-        growing: Growing::Port("drive"),
+        growing: PathInput::Port("drive"),
         from: 0.0,
         to,
         voltages: vec![],
@@ -77,7 +77,7 @@ fn limits(compiled: &Compiled, to: f64) -> Vec<f64> {
 }
 
 /// Capacitance in sweeps of a device, up through pull-in and down through release, and 5 µs later [F].
-fn session(compiled: Compiled) -> Vec<f64> {
+fn session(compiled: CompiledModel) -> Vec<f64> {
     let mut device = LocalDevice::new(Arc::new(compiled));
     device.open(&OpenRequest { ports: Vec::new(), signals: vec!["gap.C".to_owned()], noise: None }).unwrap();
     let (mut at, mut seen): (Option<Token>, Vec<f64>) = (None, Vec::new());
@@ -111,7 +111,7 @@ fn a_guided_plate_along_any_direction() {
         signals: vec!["gap.gap".to_owned()],
         ..TransientOptions::default()
     };
-    let response = |compiled: &Compiled| {
+    let response = |compiled: &CompiledModel| {
         let options = HarmonicOptions {
             drive: "drive".to_owned(),
             signals: vec!["gap.gap".to_owned()],
@@ -123,7 +123,7 @@ fn a_guided_plate_along_any_direction() {
         };
         harmonic(compiled, &options, &mut |_| true).unwrap_or_else(|e| panic!("{e}"))
     };
-    let run = |compiled: &Compiled, angle: f64| {
+    let run = |compiled: &CompiledModel, angle: f64| {
         transient(compiled, &options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{angle}°: {e}"))
     };
     let wanted = (

@@ -1,9 +1,9 @@
 //! Equilibrium paths by arc length: buckling, post-buckling, snap-through, pull-in and what lies behind it.
 
 use crate::{close, model};
-use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, Growing, trace};
+use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, PathInput, trace};
 use bimorph::analysis::mesh::path_fitted;
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::continuation::Branch;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -17,7 +17,7 @@ const EI: f64 = E * W * W * W * W / 12.0;
 /// Euler's load of a clamped column.
 const EULER: f64 = 4.0 * PI * PI * EI / (L * L);
 
-fn scene(name: &str, set: &[(&str, f64)], options: &CompileOptions) -> Compiled {
+fn scene(name: &str, set: &[(&str, f64)], options: &CompileOptions) -> CompiledModel {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name);
     let bundle = Bundle::read(&path, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
     let set = set.iter().map(|(n, v)| ((*n).to_owned(), Setting::Number(*v))).collect();
@@ -29,10 +29,10 @@ fn fine() -> CompileOptions {
     CompileOptions { band: Some(2e7), ..CompileOptions::default() }
 }
 
-fn follow(first: &Compiled, growing: Growing<'_>, to: f64, signals: &[&str], branch: Branch) -> ContinuationResult {
+fn follow(model: &CompiledModel, by: PathInput<'_>, to: f64, signals: &[&str], branch: Branch) -> ContinuationResult {
     let signals = signals.iter().map(|s| (*s).to_owned()).collect();
-    let request = ContinuationRequest { growing, from: 0.0, to, voltages: vec![], signals, branch, points: 3000 };
-    trace(first, &request, &mut |_| true).unwrap_or_else(|e| panic!("{e}"))
+    let request = ContinuationRequest { growing: by, from: 0.0, to, voltages: vec![], signals, branch, points: 3000 };
+    trace(model, &request, &mut |_| true).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Complete elliptic integral K(k) by the arithmetic-geometric mean.
@@ -61,7 +61,7 @@ fn modulus(value: f64) -> f64 {
 fn column() {
     let file = "column/column.net";
     let (first, last) = (scene(file, &[], &fine()), scene(file, &[("F", 1.2 * EULER)], &fine()));
-    let to = |branch| follow(&first, Growing::Parameter(&last), 1.2 * EULER, &["middle.y", "end.x"], branch);
+    let to = |branch| follow(&first, PathInput::Parameter(&last), 1.2 * EULER, &["middle.y", "end.x"], branch);
     let bent = (modulus(FRAC_PI_2 * 1.2f64.sqrt()), FRAC_PI_2 * 1.2f64.sqrt());
     let want = L * bent.0 / bent.1;
     for (branch, sign) in [(Branch::Plus, 1.0), (Branch::Minus, -1.0)] {
@@ -81,10 +81,10 @@ fn column() {
 #[test]
 fn ends_before_a_bifurcation() {
     let at = |force: f64| scene("column/column.net", &[("F", force)], &fine());
-    let whole = follow(&at(0.0), Growing::Parameter(&at(1.2 * EULER)), 1.2 * EULER, &[], Branch::Plus);
+    let whole = follow(&at(0.0), PathInput::Parameter(&at(1.2 * EULER)), 1.2 * EULER, &[], Branch::Plus);
     for share in [0.99, 0.9999] {
         let to = share * whole.bifurcations[0].value;
-        let path = follow(&at(0.0), Growing::Parameter(&at(to)), to, &["middle.y"], Branch::Plus);
+        let path = follow(&at(0.0), PathInput::Parameter(&at(to)), to, &["middle.y"], Branch::Plus);
         assert_eq!((path.end, path.bifurcations.len(), path.negative.last()), ("arrived", 0, Some(&0)), "{share}");
         close(*path.values.last().unwrap(), to, 1e-12);
         assert!(path.signals[0].2.iter().all(|y| y.abs() < 1e-12));
@@ -101,7 +101,7 @@ fn the_mesh_of_a_path_holds_the_tolerance() {
         let at = |force: f64| scene("column/column.net", &[("F", force)], options);
         let (first, last) = (at(0.0), at(to));
         let request = ContinuationRequest {
-            growing: Growing::Parameter(&last),
+            growing: PathInput::Parameter(&last),
             from: 0.0,
             to,
             voltages: vec![],
@@ -122,7 +122,7 @@ fn the_mesh_of_a_path_holds_the_tolerance() {
     // a path that ends for want of points ends nowhere in particular: nothing is told of its error
     let last = scene("column/column.net", &[("F", to)], &CompileOptions::default());
     let request = ContinuationRequest {
-        growing: Growing::Parameter(&last),
+        growing: PathInput::Parameter(&last),
         from: 0.0,
         to,
         voltages: vec![],
@@ -144,8 +144,8 @@ fn the_mesh_of_a_path_holds_the_tolerance() {
 #[test]
 fn columns_of_two_segments() {
     let cut = |segments: usize| CompileOptions { segments: Some(segments), ..CompileOptions::default() };
-    let critical = |at: &dyn Fn(f64) -> Compiled, to: f64, signal: &str| {
-        let path = follow(&at(0.0), Growing::Parameter(&at(to)), to, &[signal], Branch::Stay);
+    let critical = |at: &dyn Fn(f64) -> CompiledModel, to: f64, signal: &str| {
+        let path = follow(&at(0.0), PathInput::Parameter(&at(to)), to, &[signal], Branch::Stay);
         path.bifurcations[0].value
     };
     let cantilever = |segments: usize| {
@@ -169,7 +169,7 @@ fn column_with_imperfection() {
     let file = "column/column.net";
     let (first, last) =
         (scene(file, &[("side", 1e-8)], &fine()), scene(file, &[("side", 1e-8), ("F", 1.2 * EULER)], &fine()));
-    let path = follow(&first, Growing::Parameter(&last), 1.2 * EULER, &["middle.y"], Branch::Plus);
+    let path = follow(&first, PathInput::Parameter(&last), 1.2 * EULER, &["middle.y"], Branch::Plus);
     assert!(path.bifurcations.is_empty() && path.folds.is_empty());
     let k = modulus(FRAC_PI_2 * 1.2f64.sqrt());
     close(*path.signals[0].2.last().unwrap(), L * k / (FRAC_PI_2 * 1.2f64.sqrt()), 5e-3);
@@ -190,7 +190,7 @@ fn clamped_beam_buckles_by_heat() {
     };
     let critical = EULER / (E * W * W);
     let rise = 2.0 * critical / 2.33e-6;
-    let path = follow(&text(0.0), Growing::Parameter(&text(rise)), rise, &["m.y"], Branch::Plus);
+    let path = follow(&text(0.0), PathInput::Parameter(&text(rise)), rise, &["m.y"], Branch::Plus);
     close(path.bifurcations[0].value, critical / 2.33e-6, 1e-3);
     close(*path.signals[0].2.last().unwrap(), 2.0 * L / PI * critical.sqrt(), 5e-3);
 }
@@ -203,14 +203,15 @@ fn arch_snaps_through() {
     let file = "arch/arch.net";
     let coarse = CompileOptions::default();
     let at = |force: f64, even: f64| scene(file, &[("F", force), ("even", even)], &coarse);
-    let even = follow(&at(0.0, 1.0), Growing::Parameter(&at(1e-5, 1.0)), 1e-5, &["p(20).y"], Branch::Plus);
+    let even = follow(&at(0.0, 1.0), PathInput::Parameter(&at(1e-5, 1.0)), 1e-5, &["p(20).y"], Branch::Plus);
     assert_eq!((even.end, even.folds.len(), even.bifurcations.len()), ("arrived", 2, 0));
     let y = |k: usize| even.signals[0].2[even.folds[k].point];
     close(even.folds[0].value, 5.4336e-6, 1e-2);
     close(y(0), -2.409e-6, 1e-2);
     assert!((even.folds[1].value - 0.4080e-6).abs() < 1e-2 * 5.4336e-6, "{}", even.folds[1].value);
     close(y(1), -6.575e-6, 1e-2);
-    let sways = follow(&at(0.0, 0.0), Growing::Parameter(&at(1e-5, 0.0)), 1e-5, &["p(20).y", "p(20).rz"], Branch::Plus);
+    let sways =
+        follow(&at(0.0, 0.0), PathInput::Parameter(&at(1e-5, 0.0)), 1e-5, &["p(20).y", "p(20).rz"], Branch::Plus);
     assert_eq!((sways.end, sways.bifurcations.len()), ("arrived", 2));
     assert!(sways.bifurcations[0].value < even.folds[0].value);
     assert_eq!(sways.negative.last(), Some(&0));
@@ -231,7 +232,7 @@ fn behind_pull_in() {
     eground * [e] []
     drive port * [m] []";
     let plate = model(text, &CompileOptions::default());
-    let path = follow(&plate, Growing::Port("drive"), 6.0, &["m.x"], Branch::Plus);
+    let path = follow(&plate, PathInput::Port("drive"), 6.0, &["m.x"], Branch::Plus);
     let g: f64 = 2e-6;
     let fold = &path.folds[0];
     close(fold.value, (8.0 * g.powi(3) / (27.0 * 8.854e-12 * 1e-8)).sqrt(), 1e-4);
@@ -261,7 +262,7 @@ fn roll_up_and_elastica() {
     let moment = 2.0 * PI * EI / L;
     let circle = follow(
         &at("M", 0.0),
-        Growing::Parameter(&at("M", moment)),
+        PathInput::Parameter(&at("M", moment)),
         moment,
         &["tip.x", "tip.y", "tip.rz"],
         Branch::Plus,
@@ -271,7 +272,7 @@ fn roll_up_and_elastica() {
     assert!((last(0) + L).hypot(last(1)) < 3e-3 * L, "{} {}", last(0), last(1));
     close(last(2), 2.0 * PI, 1e-6);
     let force = EI / (L * L);
-    let bent = follow(&at("F", 0.0), Growing::Parameter(&at("F", force)), force, &["tip.x", "tip.y"], Branch::Plus);
+    let bent = follow(&at("F", 0.0), PathInput::Parameter(&at("F", force)), force, &["tip.x", "tip.y"], Branch::Plus);
     close(*bent.signals[0].2.last().unwrap(), -0.056_433_236_283_376_88 * L, 1e-3);
     close(*bent.signals[1].2.last().unwrap(), 0.301_720_773_799_813_5 * L, 1e-4);
 }
@@ -286,7 +287,7 @@ fn geometry_is_no_load() {
         model(text, &CompileOptions { set: vec![("w".into(), Setting::Number(w))], ..CompileOptions::default() })
     };
     let request = ContinuationRequest {
-        growing: Growing::Parameter(&at(3e-6)),
+        growing: PathInput::Parameter(&at(3e-6)),
         from: 2e-6,
         to: 3e-6,
         voltages: vec![],

@@ -3,14 +3,14 @@
 
 use crate::model;
 use bimorph::analysis::mesh::modes_fitted;
-use bimorph::compile::{CompileError, CompileOptions, Compiled, Formulation, Scheme, compile};
+use bimorph::compile::{CompileError, CompileOptions, CompiledModel, Formulation, Scheme, compile};
 use bimorph::equations::Joints;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::relative::columns::Four;
 use bimorph::multibody::relative::dynamics::Stresses;
 use bimorph::multibody::relative::geometric::{Geometric, fill};
-use bimorph::multibody::relative::placed::{Eights, Placed};
-use bimorph::multibody::relative::{JointMatrix, Parent, Tree, Unfit};
+use bimorph::multibody::relative::placed::{LaneJointStates, TreeKinematics};
+use bimorph::multibody::relative::{JointMatrix, Tree, TreeParent, UnsupportedModel};
 use bimorph::netlist::Bundle;
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::path::SourcePath;
@@ -43,7 +43,7 @@ fn coordinates(tree: &Tree, size: f64, seed: &mut u64) -> Vec<Pose> {
     q
 }
 
-fn framed() -> Compiled {
+fn framed() -> CompiledModel {
     model(FRAME, &CompileOptions { scheme: Scheme::Es, segments: Some(3), ..CompileOptions::default() })
 }
 
@@ -53,12 +53,12 @@ fn framed() -> Compiled {
 fn poses_lead_back_to_coordinates() {
     let compiled = framed();
     let tree = Tree::elastic(&compiled.parts.system.model).unwrap();
-    assert!(tree.links.iter().any(|l| matches!(l.parent, Parent::Body(_))) && !tree.closures.is_empty());
+    assert!(tree.links.iter().any(|l| matches!(l.parent, TreeParent::Body(_))) && !tree.closures.is_empty());
     let mut seed = 5;
     let (q, v) = (coordinates(&tree, 1.0, &mut seed), coordinates(&tree, 1e6, &mut seed));
     let zeros = vec![Pose::zeros(); q.len()];
-    let mut placed = Placed::new(&tree);
-    placed.place(&tree, &Eights::tiles(&q, &v, &zeros));
+    let mut placed = TreeKinematics::new(&tree);
+    placed.place(&tree, &LaneJointStates::tiles(&q, &v, &zeros));
     let (x, rate, mut back) = (placed.at.clone(), placed.rate.clone(), zeros);
     tree.coordinates_at(&x, &mut back);
     for (back, q) in back.iter().zip(&q) {
@@ -80,16 +80,16 @@ fn motion_is_the_derivative_of_place() {
     let tree = Tree::elastic(&compiled.parts.system.model).unwrap();
     let mut seed = 11;
     let [q, v, z] = [1.0, 1.0, 1.0].map(|size| coordinates(&tree, size, &mut seed));
-    let mut placed = Placed::new(&tree);
+    let mut placed = TreeKinematics::new(&tree);
     let mut at = |t: f64| {
         let q: Vec<Pose> = (0..q.len()).map(|j| q[j] + v[j] * t + z[j] * (0.5 * t * t)).collect();
-        placed.place(&tree, &Eights::at_rest(&q));
+        placed.place(&tree, &LaneJointStates::at_rest(&q));
         placed.at.clone()
     };
     let step = 1e-4;
     let (before, now, after) = (at(-step), at(0.0), at(step));
-    let mut placed = Placed::new(&tree);
-    placed.place(&tree, &Eights::tiles(&q, &v, &z));
+    let mut placed = TreeKinematics::new(&tree);
+    placed.place(&tree, &LaneJointStates::tiles(&q, &v, &z));
     let (rate, push) = (&placed.rate, &placed.acceleration);
     let largest = |x: &[Pose]| x.iter().map(|x| x.xy().amax()).fold(0.0, f64::max);
     for j in 0..q.len() {
@@ -109,8 +109,8 @@ fn factor_agrees_with_dense_elimination() {
     let tree = Tree::new(model, |k| [k % 3 == 0, false, false]);
     let (count, mut seed) = (tree.links.len(), 3);
     let q = coordinates(&tree, 1.0, &mut seed);
-    let mut placed = Placed::new(&tree);
-    placed.place(&tree, &Eights::at_rest(&q));
+    let mut placed = TreeKinematics::new(&tree);
+    placed.place(&tree, &LaneJointStates::at_rest(&q));
     let mut form = JointMatrix::new(&tree);
     let scale = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, 1.0, 1e-6));
     for block in &mut form.bodies.diagonal {
@@ -196,15 +196,16 @@ fn newton_over_coordinates_is_quadratic() {
     let reach = expected.iter().map(|x| x.xy().amax()).fold(0.0, f64::max);
     let run = |exact: bool| {
         let (mut q, mut force, mut change) = (zeros.clone(), zeros.clone(), vec![Four::ZERO; count]);
-        let (mut placed, mut stresses, mut form) = (Placed::new(tree), Stresses::new(tree), JointMatrix::new(tree));
+        let (mut placed, mut stresses, mut form) =
+            (TreeKinematics::new(tree), Stresses::new(tree), JointMatrix::new(tree));
         let mut brought = vec![Geometric::ZERO; count];
         let mut errors = Vec::new();
         for _ in 0..9 {
-            placed.place(tree, &Eights::at_rest(&q));
+            placed.place(tree, &LaneJointStates::at_rest(&q));
             let apart = placed.at.iter().zip(&expected).map(|(a, b)| (a - b).xy().amax()).fold(0.0, f64::max);
             errors.push(apart / reach);
             closures.tangent(&placed.at, &drive, &mut form.bodies, &mut force);
-            stresses.fill(tree, &Eights::at_rest(&q), &drive.rest());
+            stresses.fill(tree, &LaneJointStates::at_rest(&q), &drive.rest());
             placed.resist(tree, &stresses, &mut force, &mut change);
             fill(tree, &placed, |j| q[j], &force, &mut brought);
             form.factor(tree, &placed, 1.0, exact.then_some(&brought)).unwrap();
@@ -226,7 +227,7 @@ fn newton_over_coordinates_is_quadratic() {
 #[test]
 fn what_does_not_fit_is_told() {
     let linear = model(FRAME, &CompileOptions { linear: true, ..CompileOptions::default() });
-    assert_eq!(Tree::elastic(&linear.parts.system.model).err(), Some(Unfit::Linear));
+    assert_eq!(Tree::elastic(&linear.parts.system.model).err(), Some(UnsupportedModel::Linear));
 }
 
 /// A scheme without rotary inertia that is asked for by name beside joint coordinates is refused with the way out; where none is

@@ -2,10 +2,10 @@
 
 use crate::model;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
-use bimorph::compile::{CompileOptions, Compiled, Formulation, Scheme, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Scheme, compile};
 use bimorph::domains::Ramp;
 use bimorph::equations::{Bodies, Joints};
-use bimorph::multibody::relative::{Tree, Unfit};
+use bimorph::multibody::relative::{Tree, UnsupportedModel};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::time::joint_rodas4::JointRodas4;
 
@@ -47,14 +47,14 @@ fn plates_on_pivots_step_explicitly() {
     assert!(apart(elastic, truth) < 2e-3 * truth[1] && counted.counters.factorizations > 0, "{elastic:?}");
 }
 
-fn scene(file: &str, formulation: Formulation, tol: f64, set: &[(&str, f64)]) -> Compiled {
+fn scene(file: &str, formulation: Formulation, tol: f64, set: &[(&str, f64)]) -> CompiledModel {
     let bundle = Bundle::read(Path::new(file), &[]).unwrap();
     let set = set.iter().map(|&(n, v)| (n.to_owned(), Setting::Number(v))).collect();
     let options = CompileOptions { formulation, tol, set, scheme: Scheme::Es, ..CompileOptions::default() };
     compile(&bundle, &options).unwrap_or_else(|e| panic!("{file}: {e}"))
 }
 
-fn run(compiled: &Compiled, volts: &[(&str, f64)], stop: f64, signal: &str) -> TransientResult {
+fn run(compiled: &CompiledModel, volts: &[(&str, f64)], stop: f64, signal: &str) -> TransientResult {
     let options = TransientOptions {
         stop,
         signals: vec![signal.to_owned()],
@@ -106,7 +106,7 @@ fn a_cantilever_swings_alike() {
         }
     }
     let bare = beam(0.0, Formulation::Compliant, Scheme::E4, 4, 1e-3);
-    assert!(matches!(Tree::elastic(&bare.parts.system.model), Err(Unfit::NoInertia { .. })));
+    assert!(matches!(Tree::elastic(&bare.parts.system.model), Err(UnsupportedModel::NoInertia { .. })));
 }
 
 /// On scenes as they are drawn, heated or loaded at once, both formulations move alike: within the tolerance of the larger

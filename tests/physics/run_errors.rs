@@ -4,11 +4,11 @@ use crate::model;
 use bimorph::analysis::chart::error::{half_range, largest_error};
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
-use bimorph::compile::{CompileOptions, Compiled, Formulation, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Formulation, compile};
 use bimorph::netlist::Bundle;
 use std::path::Path;
 
-fn reported(model: &Compiled, options: &TransientOptions<'_>) -> TransientResult {
+fn reported(model: &CompiledModel, options: &TransientOptions<'_>) -> TransientResult {
     let mut run =
         |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
             transient(model, options, sample, watch).map(|r| (r, ()))

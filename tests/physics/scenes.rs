@@ -3,7 +3,7 @@
 use crate::{balance, close, linear, model, node};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::transient::{TransientOptions, transient};
-use bimorph::compile::{CompileOptions, Compiled};
+use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::netlist::Setting;
 
 /// Two orthogonal banks of five bimorphs (206 µm hot arms) push a rigid 60 µm plate through 80 µm tethers; a force along x
@@ -38,7 +38,7 @@ plate2d p1 [c] [l=60u w=60u]
 f2d * [c] [F=F]
 ";
 
-fn stage(force: f64, options: &CompileOptions) -> Compiled {
+fn stage(force: f64, options: &CompileOptions) -> CompiledModel {
     let set = vec![("F".to_owned(), Setting::Number(force))];
     model(QUARTER_STAGE, &CompileOptions { set, ..options.clone() })
 }

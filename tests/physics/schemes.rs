@@ -5,9 +5,9 @@ use bimorph::analysis::AnalysisError;
 use bimorph::analysis::formulation::Formulation;
 use bimorph::analysis::frame::{frame_modes, frame_with};
 use bimorph::analysis::modes::{ModesResult, modes};
-use bimorph::compile::{CompileOptions, Compiled};
+use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::discretize::Scheme;
-use bimorph::discretize::frame::{Elements, FrameGaps, FrameOptions};
+use bimorph::discretize::frame::{ElementCount, FrameGaps, FrameOptions};
 use bimorph::multibody::BlockMatrix;
 use bimorph::multibody::planar::Pose;
 
@@ -52,7 +52,7 @@ pub(crate) const BANK_KHZ: [f64; 10] = [
     1123.529771541024,
 ];
 
-fn beam(scheme: Scheme, segments: usize, clamped: bool, thick: f64) -> Compiled {
+fn beam(scheme: Scheme, segments: usize, clamped: bool, thick: f64) -> CompiledModel {
     let end = if clamped { "anchor p1 [b] [l=5u w=5u]" } else { "" };
     let text = format!("anchor p1 [a] [l=5u w=5u]\nbeam2d p1 [a b] [l=200u w={thick:e}]\n{end}");
     model(&text, &CompileOptions { scheme, segments: Some(segments), ..CompileOptions::default() })
@@ -68,7 +68,7 @@ fn error(scheme: Scheme, segments: usize, clamped: bool) -> (f64, usize) {
 }
 
 /// Three frequencies, fewer where the model has fewer. A beam of a hundred widths stretches far above its third mode.
-fn bending(compiled: &Compiled) -> Vec<f64> {
+fn bending(compiled: &CompiledModel) -> Vec<f64> {
     (1..=3).rev().find_map(|count| modes(compiled, count, &[]).ok()).map_or(Vec::new(), |m| m.frequencies_hz)
 }
 
@@ -83,7 +83,7 @@ const PAIRS: [(f64, f64); 8] = [
     (1.2e6, 1e-4),
 ];
 
-fn bank(band: f64, tol: f64) -> (Compiled, ModesResult) {
+fn bank(band: f64, tol: f64) -> (CompiledModel, ModesResult) {
     let options =
         CompileOptions { band: Some(band), tol, shear: true, rotary_inertia: true, ..CompileOptions::default() };
     let compiled = model(BANK, &options);
@@ -271,7 +271,7 @@ fn thick_beams() {
         (compiled, found)
     };
     let (compiled, fine) = thick(16);
-    let (elements, gaps) = (Elements::Each(64), FrameGaps::LeftOut);
+    let (elements, gaps) = (ElementCount::Each(64), FrameGaps::LeftOut);
     let options = FrameOptions { elements, shear: true, undamped: true, gaps };
     let frame = frame_with(&compiled, &options).unwrap();
     let want = frame_modes(&compiled, &frame, 3, &[]).unwrap().0.frequencies_hz;
@@ -313,7 +313,7 @@ fn rigid_beams() {
     let index = free.structure.beams.len() - 1;
     assert_eq!(free.order.segments[index], 0);
     let fine = model(&format!("{BANK}f2d * [e] [F=1u]"), &CompileOptions { segments: Some(8), ..linear() });
-    let soft = |compiled: &Compiled| node(&balance(compiled, &[]), "e").x;
+    let soft = |compiled: &CompiledModel| node(&balance(compiled, &[]), "e").x;
     close(soft(&loaded), soft(&fine), 1e-2);
     let plain = model(BANK, &CompileOptions::default());
     assert!(plain.order.segments.iter().all(|n| *n > 0) && plain.order.estimated_error.is_none());

@@ -136,7 +136,7 @@ fn states_do_not_depend_on_the_direction_of_the_drawing() {
             let (found, its) = at(TAU * f64::from(k) / 24.0);
             let apart = found.iter().zip(&reference).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
             assert!(apart < 1e-8 * largest, "{name} at {} °: {:e} of {largest:e}", 15 * k, apart);
-            let directions = |list: &[bimorph::solve::equilibrium::Passed]| -> Vec<String> {
+            let directions = |list: &[bimorph::solve::equilibrium::StabilityLoss]| -> Vec<String> {
                 list.iter().map(|passed| passed.direction.clone()).collect()
             };
             assert_eq!(directions(&its), directions(&passed), "{name} at {} °", 15 * k);

@@ -1,7 +1,7 @@
 //! A run whose stiffness changes on the way holds the tolerance of its mesh, or is told beyond it: contracts of `analysis::mesh` for transients.
 
 use bimorph::analysis::chart::error::relative_error;
-use bimorph::analysis::mesh::{Request, fitted, fitted_in_time};
+use bimorph::analysis::mesh::{MeshRequest, fitted, fitted_in_time};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, compile};
@@ -124,7 +124,7 @@ f2d * [s] [F=60u oz=pi/2]
     };
     let fine = CompileOptions { tol: 1e-6, segments: Some(64), ..CompileOptions::default() };
     let model = compile(&bundle, &fine).unwrap();
-    let model = fitted(&model, &Request::Modes { count: 3, voltages: &Vec::new() }).unwrap();
+    let model = fitted(&model, &MeshRequest::Modes { count: 3, voltages: &Vec::new() }).unwrap();
     let reference = modes(&model, 3, &Vec::new()).unwrap();
     for tol in [1e-2, 1e-3, 1e-4] {
         let found = with(CompileOptions { tol, ..CompileOptions::default() });

@@ -9,13 +9,13 @@ use bimorph::analysis::modes::modes;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::analysis::{AnalysisError, chart};
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::netlist::{Bundle, Setting};
 use std::path::Path;
 
 const SILICON: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nparam F=0\nanchor p [a] []\n";
 
-fn drawn(text: &str, options: &CompileOptions) -> Compiled {
+fn drawn(text: &str, options: &CompileOptions) -> CompiledModel {
     let options = CompileOptions { junctions: Junctions::Centreline, ..options.clone() };
     compile(&Bundle::from_text("told.net", &format!("{SILICON}{text}")), &options).unwrap()
 }
@@ -30,7 +30,7 @@ fn example(name: &str) -> Bundle {
 }
 
 /// A run with what is told of its steps.
-fn told(model: &Compiled, start: &Compiled, options: &TransientOptions<'_>) -> TransientResult {
+fn told(model: &CompiledModel, start: &CompiledModel, options: &TransientOptions<'_>) -> TransientResult {
     let options = TransientOptions { release: Some(start), ..options.clone() };
     let mut run =
         |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {

@@ -2,12 +2,12 @@
 
 use crate::contact::{EPS, LEAST};
 use crate::{balance, close, model, node};
-use bimorph::analysis::continuation::{ContinuationRequest, Growing, trace};
+use bimorph::analysis::continuation::{ContinuationRequest, PathInput, trace};
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::pull_in::pull_in;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, transient};
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::netlist::Bundle;
 use bimorph::solve::continuation::Branch;
 use bimorph::solve::time::event::Direction;
@@ -15,7 +15,7 @@ use std::fmt::Write;
 
 /// ANSYS Verification Manual, VM236: a clamped-clamped beam of 80 × 10 × 0.5 µm over an electrode 0.7 µm away that it meets
 /// after 0.6 µm; E = 169 GPa, ν = 0.25 in plane strain. `n` gap elements over `n` beams; no fringe field.
-fn vm236(n: usize) -> Compiled {
+fn vm236(n: usize) -> CompiledModel {
     let mut text = format!(
         "process p = [Youngsmodulus=169e9/(1-0.25^2) density=2330 h=10u stress=0 Poisson=0]
         n = {n}
@@ -57,7 +57,7 @@ fn vm236_pull_in_and_release() {
 fn vm236_hysteresis_in_one_path() {
     let compiled = vm236(16);
     let request = ContinuationRequest {
-        growing: Growing::Port("drive"),
+        growing: PathInput::Port("drive"),
         from: 0.0,
         to: 18.0,
         voltages: vec![],
@@ -95,7 +95,7 @@ fn the_switch_shows_its_hysteresis() {
     let bundle = Bundle::read(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
     let compiled = compile(&bundle, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let request = ContinuationRequest {
-        growing: Growing::Port("drive"),
+        growing: PathInput::Port("drive"),
         from: 0.0,
         to: 20.0,
         voltages: vec![],

@@ -4,7 +4,7 @@
 mod frame;
 mod meaning;
 
-use bimorph::compile::{CompileOptions, Compiled, Formulation, Junctions, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Junctions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{
     Device, DeviceError, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial, TrialReply,
@@ -36,16 +36,16 @@ fn ports(formulation: Formulation) -> &'static [(&'static str, PortKind, f64)] {
 
 const FORMULATIONS: [Formulation; 2] = [Formulation::Compliant, Formulation::Rcr];
 
-fn compiled(text: &str, formulation: Formulation) -> Arc<Compiled> {
+fn compiled(text: &str, formulation: Formulation) -> Arc<CompiledModel> {
     compiled_to(1e-3, text, formulation)
 }
 
-fn compiled_to(tol: f64, text: &str, formulation: Formulation) -> Arc<Compiled> {
+fn compiled_to(tol: f64, text: &str, formulation: Formulation) -> Arc<CompiledModel> {
     let options = CompileOptions { formulation, tol, junctions: Junctions::Centreline, ..CompileOptions::default() };
     Arc::new(compile(&Bundle::from_text("ports.net", text), &options).unwrap_or_else(|e| panic!("{e}")))
 }
 
-fn opened(compiled: &Arc<Compiled>, ports: &[&str], signals: &[&str]) -> LocalDevice {
+fn opened(compiled: &Arc<CompiledModel>, ports: &[&str], signals: &[&str]) -> LocalDevice {
     let mut device = LocalDevice::new(Arc::clone(compiled));
     let names = |list: &[&str]| list.iter().map(|name| (*name).to_owned()).collect();
     device
@@ -54,7 +54,7 @@ fn opened(compiled: &Arc<Compiled>, ports: &[&str], signals: &[&str]) -> LocalDe
     device
 }
 
-fn all(compiled: &Arc<Compiled>) -> LocalDevice {
+fn all(compiled: &Arc<CompiledModel>) -> LocalDevice {
     let names: Vec<&str> = ports(compiled.options.formulation).iter().map(|(name, ..)| *name).collect();
     opened(compiled, &names, &["s.y", "s.vy", "right.T", "squeeze.gap", "s.vx"])
 }

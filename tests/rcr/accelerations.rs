@@ -3,7 +3,7 @@
 use crate::dense;
 use crate::mechanism::{Mechanism, PIN, Stream, WELD};
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, Reduction, Task};
+use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
 use nalgebra::Matrix2;
 
 /// A random tree of `count` bodies with `loops` further joints of random kinds.
@@ -49,10 +49,10 @@ fn compare(m: &Mechanism, seed: u64) -> Option<(f64, f64)> {
     }
     let force = reduction.force.clone();
     let mut a = vec![0.0; linkage.coordinates];
-    reduction.reduce(Task::Accelerations, &mut a);
+    reduction.reduce(ReductionTask::Accelerations, &mut a);
     let (fast, near) = (reduction.accelerations.clone(), reduction.nearness);
     let judge = dense::accelerations(&model, &dense::joints(&model), &reduction, &force)?;
-    reduction.reduce_singular(Task::Accelerations, &mut a);
+    reduction.reduce_singular(ReductionTask::Accelerations, &mut a);
     let general = dense::difference(&reduction.accelerations, &judge, 1.0);
     assert!(general < 1e-12, "general path: {general:e}, nearness {near:e}");
     Some((dense::difference(&fast, &judge, 1.0), near))

@@ -2,7 +2,7 @@
 
 use crate::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, Parent, Reduction};
+use bimorph::multibody::rcr::{Linkage, LinkageParent, Reduction};
 use bimorph::solve::dormand_prince::{DormandPrince, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 use std::f64::consts::FRAC_PI_2;
@@ -12,9 +12,9 @@ fn rates(linkage: &Linkage, omega: &[f64]) -> Vec<f64> {
     let mut v = vec![0.0; linkage.coordinates];
     for (body, link) in linkage.links.iter().enumerate() {
         let up = match link.parent {
-            Parent::Body(p) => omega[p],
-            Parent::Ground => 0.0,
-            Parent::Free => panic!("a free root"),
+            LinkageParent::Body(p) => omega[p],
+            LinkageParent::Ground => 0.0,
+            LinkageParent::Free => panic!("a free root"),
         };
         v[link.first] = link.sign * (omega[body] - up);
     }

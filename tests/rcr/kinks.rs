@@ -2,7 +2,7 @@
 
 use crate::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, Reduction, Singularity, Task};
+use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
 
 /// A shuttle on arms of two links; `kinks` are the angles between the links, `turn` the direction of the first arm.
 fn star(kinks: &[f64], turn: f64) -> Mechanism {
@@ -32,9 +32,9 @@ fn shuttle(kinks: &[f64]) -> ([f64; 3], [f64; 3], Singularity) {
     for (k, &p) in place.iter().enumerate() {
         r.force[p] = [0.3 + 0.1 * k as f64, 1.0 - 0.2 * k as f64, 0.5 * (k as f64 - 3.0)];
     }
-    r.reduce(Task::Accelerations, &mut out);
+    r.reduce(ReductionTask::Accelerations, &mut out);
     let local = r.accelerations[place[0]];
-    let met = r.reduce_singular(Task::Accelerations, &mut out);
+    let met = r.reduce_singular(ReductionTask::Accelerations, &mut out);
     (local, r.accelerations[place[0]], met)
 }
 
@@ -76,7 +76,7 @@ fn what_is_not_finite_stays_so() {
             let q = vec![if wrong.is_nan() { wrong } else { 0.0 }; linkage.coordinates];
             r.place(&q, &q);
             r.force[place[0]] = [wrong, 1.0, 0.0];
-            r.reduce_singular(Task::Accelerations, &mut out);
+            r.reduce_singular(ReductionTask::Accelerations, &mut out);
             assert!(!out.iter().all(|x| x.is_finite()));
         }
     }

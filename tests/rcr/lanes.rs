@@ -2,7 +2,7 @@
 
 use crate::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Lanes, Linkage, Real, Reduction, Task};
+use bimorph::multibody::rcr::{Lanes, Linkage, Real, Reduction, ReductionTask};
 
 /// A ladder of `cells` cells whose rungs are `width` wide.
 fn ladder(cells: usize, width: f64) -> Linkage {
@@ -44,7 +44,7 @@ fn a_lane_has_the_bits_of_its_variant() {
         alone.force.fill([0.1, -1.0, 0.0]);
         let mut out = vec![0.0; n];
         alone.place(&q, &q);
-        alone.reduce(Task::Accelerations, &mut out);
+        alone.reduce(ReductionTask::Accelerations, &mut out);
         for (a, b) in out.iter().zip(&together) {
             assert_eq!(a.to_bits(), b.lane(lane).to_bits());
         }

@@ -5,7 +5,7 @@
 mod topologies;
 
 use crate::mechanism::{Mechanism, PIN, Stream, WELD};
-use bimorph::multibody::rcr::{Linkage, Reduction, Task};
+use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
 use bimorph::multibody::{BodyId, Model};
 
 fn bits(of: &[f64]) -> Vec<u64> {
@@ -52,7 +52,9 @@ fn seen(
     let mut out = vec![0.0; n];
     r.force.copy_from_slice(force);
     r.torque.copy_from_slice(torque);
-    for task in [Task::Accelerations, Task::Rates, Task::Positions, Task::Accelerations] {
+    for task in
+        [ReductionTask::Accelerations, ReductionTask::Rates, ReductionTask::Positions, ReductionTask::Accelerations]
+    {
         let mut keep = |what: &str, bits: Vec<u64>| seen.push((format!("{what} {task:?}"), bits));
         r.place(q, v);
         r.reduce(task, &mut out);

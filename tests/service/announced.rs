@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use tonic::Code;
 
 /// Most memory of a server whose clients announce much and send nothing [kB].
-const MOST_KB: u64 = 300 << 10;
+const MAX_KB: u64 = 300 << 10;
 
 /// A thousand calls of five bytes announce 64 MiB each, on twenty connections, in an address space of 6 GiB, which holds 96 of them.
 /// `Info` and a `Check` of others are answered, and little memory is held.
@@ -36,7 +36,7 @@ fn a_thousand_announcements() {
         check.expect("others have room");
         drop(held);
     });
-    assert!(victim.peak_kb() < MOST_KB, "{} kB", victim.peak_kb());
+    assert!(victim.peak_kb() < MAX_KB, "{} kB", victim.peak_kb());
 }
 
 /// A message of 8 MiB that is sent whole is decoded whole, in frames of any size; one of more than a message may have is refused by

@@ -1,7 +1,7 @@
 //! A device without mechanics: every answer is a short closed form of the request, so a test knows it, and a benchmark
 //! measures the wire alone.
 
-use bimorph::compile::Compiled;
+use bimorph::compile::CompiledModel;
 use bimorph::device::{
     Description, Device, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, SmallSignal, Status, Token,
     Trial, TrialReply,
@@ -21,7 +21,7 @@ pub(crate) struct Echo {
 pub(crate) const PANIC: f64 = 666.0;
 
 /// Makes the device; has the type of `bimorph::service::server::MakeDevice`.
-pub(crate) fn echo(_: Arc<Compiled>) -> Box<dyn Device> {
+pub(crate) fn echo(_: Arc<CompiledModel>) -> Box<dyn Device> {
     Box::new(Echo { ports: 0, signals: 0, tokens: BTreeSet::new() })
 }
 

@@ -3,7 +3,7 @@
 use super::attached::{Attached, trial};
 use super::cuts::LOCAL;
 use super::running::{block_on, start_with, wire_bundle};
-use bimorph::service::inside::{Inside, Questions};
+use bimorph::service::inside::{DeviceChannel, InProcessServer};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use prost::Message;
@@ -12,17 +12,21 @@ use proto::device_request::Kind as Ask;
 use std::cell::Cell;
 use tonic::Code;
 
-fn call<T: Message + Default>(inside: &Inside, name: &str, request: &impl Message) -> Result<T, tonic::Status> {
+fn call<T: Message + Default>(
+    inside: &InProcessServer,
+    name: &str,
+    request: &impl Message,
+) -> Result<T, tonic::Status> {
     inside.call(name, &request.encode_to_vec(), &|| true).map(|bytes| T::decode(&*bytes).expect("a message"))
 }
 
-fn ask(questions: &mut Questions, kind: Ask) -> Option<ReplyKind> {
+fn ask(questions: &mut DeviceChannel, kind: Ask) -> Option<ReplyKind> {
     let request = proto::DeviceRequest { kind: Some(kind) }.encode_to_vec();
     let reply = questions.ask(&request).expect("a question")?;
     proto::DeviceReply::decode(&*reply).expect("a reply").kind
 }
 
-fn compiled(inside: &Inside) -> String {
+fn compiled(inside: &InProcessServer) -> String {
     let request = proto::CompileRequest { bundle: wire_bundle(), options: None };
     call::<proto::CompileResponse>(inside, "Compile", &request).expect("compiles").model.expect("a model").id
 }
@@ -30,7 +34,7 @@ fn compiled(inside: &Inside) -> String {
 /// Models have the same ids, analyses the same numbers, sessions the same replies, and what is refused the same words.
 #[test]
 fn it_says_what_a_server_says() {
-    let inside = Inside::new().expect("a thread");
+    let inside = InProcessServer::new().expect("a thread");
     let server = start_with("127.0.0.1:0", Limits::default(), LOCAL);
     let model = compiled(&inside);
     let voltages = vec![proto::Named { name: "drive".into(), value: 3.0 }];
@@ -81,7 +85,7 @@ fn dt(step: u32) -> f64 {
 /// What is not wanted any more stops; names and bytes that mean nothing are refused; a session ends with its questions.
 #[test]
 fn it_stops_and_refuses() {
-    let inside = Inside::new().expect("a thread");
+    let inside = InProcessServer::new().expect("a thread");
     let model = compiled(&inside);
     let voltages = vec![proto::Named { name: "drive".into(), value: 3.0 }];
     let transient =
@@ -111,7 +115,7 @@ fn it_stops_and_refuses() {
     else {
         panic!("opens")
     };
-    let alive = |inside: &Inside| {
+    let alive = |inside: &InProcessServer| {
         let request = proto::KeepAliveRequest { session: opened.session.clone(), lease_s: 0.0 };
         call::<proto::KeepAliveResponse>(inside, "KeepAlive", &request).map_err(|status| status.code())
     };

@@ -3,7 +3,7 @@
 use super::attached::{Attached, refusal, trial};
 use super::running::{Running, block_on, compiled, start_kept};
 use bimorph::budget;
-use bimorph::compile::Compiled;
+use bimorph::compile::CompiledModel;
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Description, Device, DeviceError, OpenRequest, SmallSignal, Token, Trial, TrialReply};
 use bimorph::service::limits::Limits;
@@ -100,7 +100,7 @@ impl Device for Faulty {
 /// A maker of devices with a gate of their own.
 macro_rules! gated {
     ($gate:ident) => {{
-        fn make(compiled: Arc<Compiled>) -> Box<dyn Device> {
+        fn make(compiled: Arc<CompiledModel>) -> Box<dyn Device> {
             Box::new(Faulty(LocalDevice::new(compiled), &$gate))
         }
         make as MakeDevice

@@ -2,7 +2,7 @@
 
 use super::attached::Attached;
 use super::running::{block_on, compiled, start_kept};
-use bimorph::compile::Compiled;
+use bimorph::compile::CompiledModel;
 use bimorph::device::Device;
 use bimorph::device::local::LocalDevice;
 use bimorph::service::limits::Limits;
@@ -14,7 +14,7 @@ use std::time::Duration;
 use tonic::Code;
 use tonic::transport::Channel;
 
-fn device(compiled: Arc<Compiled>) -> Box<dyn Device> {
+fn device(compiled: Arc<CompiledModel>) -> Box<dyn Device> {
     Box::new(LocalDevice::new(compiled))
 }
 

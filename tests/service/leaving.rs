@@ -12,7 +12,7 @@ use std::time::Duration;
 /// How long a client stays.
 const STAY: Duration = Duration::from_millis(400);
 /// Processor time of the server after that, with two cores: a fraction of what it would compute [s].
-const MOST_AFTER_S: f64 = 0.5;
+const MAX_AFTER_S: f64 = 0.5;
 
 /// A grid of beams with `side` by `side` meshes.
 fn grid(side: usize) -> String {
@@ -142,7 +142,7 @@ fn computations_end_with_their_clients() {
             tokio::time::sleep(Duration::from_millis(700)).await;
             let after = victim.cpu_s() - before;
             println!("{name}: {after:.2} s of processor after the clients have left");
-            assert!(after < MOST_AFTER_S, "{name}: {after} s");
+            assert!(after < MAX_AFTER_S, "{name}: {after} s");
         }
     });
 }

@@ -3,9 +3,9 @@
 use super::attached::trial;
 use super::echo::echo;
 use super::running::{DEADLINE, block_on, compiled, start_with};
-use bimorph::compile::Compiled;
+use bimorph::compile::CompiledModel;
 use bimorph::device::{Description, Device, DeviceError, OpenRequest, SmallSignal, Token, Trial, TrialReply};
-use bimorph::service::client::{Line, Lines};
+use bimorph::service::client::{TrialChannel, TrialConnections};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use prost::Message;
@@ -42,11 +42,11 @@ impl Device for Slow {
     }
 }
 
-fn slow(compiled: Arc<Compiled>) -> Box<dyn Device> {
+fn slow(compiled: Arc<CompiledModel>) -> Box<dyn Device> {
     Box::new(Slow(echo(compiled)))
 }
 
-fn ask(line: &mut Line, kind: Ask, patience: Duration) -> Result<Option<ReplyKind>, Status> {
+fn ask(line: &mut TrialChannel, kind: Ask, patience: Duration) -> Result<Option<ReplyKind>, Status> {
     let request = proto::DeviceRequest { kind: Some(kind) }.encode_to_vec();
     let reply = line.ask(&request, patience, &|| true)?;
     Ok(reply.and_then(|reply| proto::DeviceReply::decode(&*reply).expect("a reply").kind))
@@ -57,7 +57,7 @@ fn ask(line: &mut Line, kind: Ask, patience: Duration) -> Result<Option<ReplyKin
 fn each_question_has_its_own_reply() {
     let server = start_with("127.0.0.1:0", Limits::default(), slow);
     let model = block_on(async { compiled(&mut server.client().await).await });
-    let lines = Lines::new().expect("a thread");
+    let lines = TrialConnections::new().expect("a thread");
     let mut line = lines.open((&server.address.to_string(), 0), None, DEADLINE, &|| true).expect("a stream");
     let open = Ask::Open(proto::OpenRequest { model, ports: vec!["p".into()], ..Default::default() });
     let opened = ask(&mut line, open, DEADLINE).expect("a reply");
@@ -79,7 +79,7 @@ fn each_question_has_its_own_reply() {
 /// Without a server, and after it has gone, a question ends as UNAVAILABLE, and a new server at the address is found.
 #[test]
 fn a_server_that_goes() {
-    let lines = Lines::new().expect("a thread");
+    let lines = TrialConnections::new().expect("a thread");
     let folder = tempfile::tempdir().expect("a folder");
     let address = format!("unix://{}/s", folder.path().display());
     let open = || lines.open((&address, 0), None, DEADLINE, &|| true);

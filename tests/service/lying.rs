@@ -2,7 +2,7 @@
 //! and the next open begins anew. The lies are those of a device behind a server that passes them on.
 
 use super::running::{Running, start_with};
-use bimorph::compile::Compiled;
+use bimorph::compile::CompiledModel;
 use bimorph::device::{
     Description, Device, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, SmallSignal, Status, Token,
     Trial, TrialReply,
@@ -18,7 +18,7 @@ struct Liar {
     signals: usize,
 }
 
-fn liar(_: Arc<Compiled>) -> Box<dyn Device> {
+fn liar(_: Arc<CompiledModel>) -> Box<dyn Device> {
     Box::new(Liar { lie: String::new(), ports: 2, signals: 0 })
 }
 

@@ -1,6 +1,6 @@
 //! Clients of an earlier version are understood: their bytes, not only their messages.
 
-use bimorph::service::inside::Inside;
+use bimorph::service::inside::InProcessServer;
 use bimorph::service::proto;
 use tonic::Code;
 
@@ -18,7 +18,7 @@ fn bytes_of_older_clients_are_understood() {
         out.extend(bytes);
         out
     }
-    let inside = Inside::new().expect("a thread");
+    let inside = InProcessServer::new().expect("a thread");
     let text = super::running::PLATE;
     let file = [field(1, b"plate.net"), field(2, text.as_bytes())].concat();
     let bundle = [field(1, b"plate.net"), field(2, &file)].concat();

@@ -3,9 +3,9 @@
 
 use super::cuts::LOCAL;
 use super::running::{Running, block_on, bundle, compiled, start_with};
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
-use bimorph::device::run::{Course, Ran, Start, steps};
+use bimorph::device::run::{DriveSchedule, Ran, Start, steps};
 use bimorph::device::{
     Description, Device, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, SmallSignal, Status, Token,
     Trial, TrialReply,
@@ -82,7 +82,7 @@ fn a_run_has_the_bits_of_its_steps() {
     }
     assert!(before > 0, "no step was taken in pieces: the test shows less than it says");
     let signals = ["m.x".to_owned()];
-    let course = Course { times: &times, values: &volts, signals: &signals, ports: true };
+    let course = DriveSchedule { times: &times, values: &volts, signals: &signals, ports: true };
     let said = |ran: &Ran, place: &str| {
         assert_eq!((ran.steps, ran.trials, &ran.error), (times.len(), trials, &None), "{place}");
         assert_eq!(bits(&ran.outputs), bits(&outputs), "{place}");
@@ -107,7 +107,7 @@ static TRIALS: AtomicUsize = AtomicUsize::new(0);
 /// A device whose signal is its voltage, which asks for steps of at most 1 s, has no answer above 5 V, and computes 20 µs.
 struct Fussy;
 
-fn fussy(_: Arc<Compiled>) -> Box<dyn Device> {
+fn fussy(_: Arc<CompiledModel>) -> Box<dyn Device> {
     Box::new(Fussy)
 }
 

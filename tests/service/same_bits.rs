@@ -9,7 +9,7 @@ use bimorph::analysis::mesh::in_circuit;
 use bimorph::analysis::mesh::{modes_fitted, pull_in_fitted, static_fitted};
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, Until, transient};
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepSpec};
@@ -36,7 +36,7 @@ fn local_server(limits: Limits) -> Running {
     start_with("127.0.0.1:0", limits, |compiled| Box::new(LocalDevice::new(compiled)))
 }
 
-fn compiled(bundle: &Bundle) -> Arc<Compiled> {
+fn compiled(bundle: &Bundle) -> Arc<CompiledModel> {
     let drawn = compile(bundle, &CompileOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     Arc::new(in_circuit(&drawn))
 }

@@ -6,7 +6,7 @@ use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, BodyId};
 use bimorph::solve::continuation::{Branch, Continuation, ContinuationOptions};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
-use bimorph::solve::family::Blend;
+use bimorph::solve::family::LoadFamily;
 use bimorph::solve::path::SourcePath;
 
 /// Euler's load of a clamped–free column, π²EI/(4L²), E = 165 GPa, 2 µm square, L = 200 µm [N].
@@ -64,7 +64,7 @@ pub(crate) fn followed(share: f64) -> Option<f64> {
 /// pivots.
 pub(crate) fn path(branch: Branch) -> Vec<(f64, f64, usize)> {
     let ((from, tip), (to, _)) = (column(0.0), column(1.1));
-    let mut family = Blend::new(&from, &[], &to, &[]).unwrap();
+    let mut family = LoadFamily::new(&from, &[], &to, &[]).unwrap();
     let options = ContinuationOptions { branch, longest: 0.02, ..ContinuationOptions::default() };
     let q = vec![Pose::zeros(); from.bodies()];
     let traced = Continuation::new(&from, options).trace(&mut family, &q, &mut |_| true).unwrap();

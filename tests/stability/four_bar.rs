@@ -3,7 +3,7 @@
 
 use super::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, Parent, Reduction, Task};
+use bimorph::multibody::rcr::{Linkage, LinkageParent, Reduction, ReductionTask};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 
@@ -35,8 +35,8 @@ fn four_bar() -> FourBar {
     let mut v = vec![0.0; linkage.coordinates];
     for (body, link) in linkage.links.iter().enumerate() {
         let up = match link.parent {
-            Parent::Body(p) => turning(p),
-            Parent::Ground | Parent::Free => 0.0,
+            LinkageParent::Body(p) => turning(p),
+            LinkageParent::Ground | LinkageParent::Free => 0.0,
         };
         v[link.first] = link.sign * (turning(body) - up);
     }
@@ -69,9 +69,11 @@ impl SecondOrder for Feedback<'_> {
         r.place(q, v);
         r.force.fill([0.0; 3]);
         gravity(&self.of.masses, r);
-        r.reduce(Task::Accelerations, a);
+        r.reduce(ReductionTask::Accelerations, a);
         // the smallest change of the accelerations that adds the feedback to the rows
-        for (task, gain) in [(Task::Rates, 2.0 * self.alpha), (Task::Positions, self.alpha * self.alpha)] {
+        for (task, gain) in
+            [(ReductionTask::Rates, 2.0 * self.alpha), (ReductionTask::Positions, self.alpha * self.alpha)]
+        {
             if gain > 0.0 {
                 r.reduce(task, &mut self.change);
                 a.iter_mut().zip(&self.change).for_each(|(a, d)| *a += gain * d);
@@ -99,7 +101,7 @@ fn run<P: SecondOrder>(of: &FourBar, rtol: f64, problem: &mut P) -> Passage {
     let ended = method.integrate(problem, (0.0, 10.0), &mut q, &mut v, &mut h, &bounds, 20_000, &mut |dense| {
         dense.at(dense.t + dense.h, &mut at, &mut rate);
         placed.place(&at, &rate);
-        gap.push([dense.t + dense.h, placed.largest(Task::Positions)]);
+        gap.push([dense.t + dense.h, placed.largest(ReductionTask::Positions)]);
         true
     });
     placed.place(&q, &v);

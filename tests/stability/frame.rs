@@ -1,7 +1,7 @@
 //! Elastic beams as rigid bodies at nodes with joints between them: the compliant formulation, built by hand.
 
 use bimorph::domains::drive::Electrics;
-use bimorph::domains::{Load, Point, Ramp, System};
+use bimorph::domains::{DeadLoad, MaterialPoint, Ramp, System};
 use bimorph::multibody::planar::JointFrame;
 use bimorph::multibody::{Body, BodyId, Joint, Model};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
@@ -102,10 +102,10 @@ impl Frame {
     pub(crate) fn system(self, loads: &[(BodyId, [f64; 2])]) -> (System, Vec<usize>) {
         let (model, place) = Model::new(self.bodies, self.joints, Vec::new(), &[], false);
         let at = |id: BodyId| match id {
-            BodyId::Free(k) => Point { body: BodyId::Free(place[k]), arm: Vector2::zeros() },
-            BodyId::Ground => Point { body: BodyId::Ground, arm: Vector2::zeros() },
+            BodyId::Free(k) => MaterialPoint { body: BodyId::Free(place[k]), arm: Vector2::zeros() },
+            BodyId::Ground => MaterialPoint { body: BodyId::Ground, arm: Vector2::zeros() },
         };
-        let loads = loads.iter().map(|&(id, f)| Load { point: at(id), force: f.into(), moment: 0.0 }).collect();
+        let loads = loads.iter().map(|&(id, f)| DeadLoad { point: at(id), force: f.into(), moment: 0.0 }).collect();
         let electrics = Electrics { names: Vec::new(), ..Electrics::default() };
         (System { loads, electrics: Arc::new(electrics), ..System::of_model(model, 1e-6) }, place)
     }

@@ -1,7 +1,7 @@
 //! Initial states off the loops, and loops that close twice.
 
 use super::mechanism::Mechanism;
-use bimorph::multibody::rcr::{Linkage, Reduction, Singularity, Task};
+use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
 use bimorph::multibody::{BodyId, Model};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::{JointMotion, NotFinite};
@@ -29,11 +29,11 @@ pub(crate) fn projected(size: f64) -> [f64; 3] {
     let mut v: Vec<f64> = (0..n).map(|_| size * s.next()).collect();
     let mut r = Reduction::<f64>::new(&[&linkage]);
     r.place(&q, &v);
-    let before = r.largest(Task::Positions);
+    let before = r.largest(ReductionTask::Positions);
     let mut change = vec![0.0; n];
     let after = r.project_positions(&mut q, &v, &mut change);
     r.project_rates(&q, &mut v, &mut change);
-    [before, after, r.largest(Task::Rates)]
+    [before, after, r.largest(ReductionTask::Rates)]
 }
 
 struct Adrift<P>(P);
@@ -82,7 +82,7 @@ pub(crate) fn kept(end: f64) -> [f64; 2] {
         }
         let mut r = Reduction::<f64>::new(&[&linkage]);
         r.place(&q, &v);
-        *gap = r.largest(Task::Positions);
+        *gap = r.largest(ReductionTask::Positions);
     }
     gaps
 }
@@ -116,7 +116,7 @@ pub(crate) fn local(bars: usize) -> f64 {
     r.place(&zeros, &zeros);
     gravity(&model, &mut r);
     let mut out = zeros.clone();
-    r.reduce(Task::Accelerations, &mut out);
+    r.reduce(ReductionTask::Accelerations, &mut out);
     let all = r.accelerations.iter().flatten();
     all.fold(0.0, |m: f64, x| if x.is_nan() || m.is_nan() { f64::NAN } else { m.max(x.abs()) })
 }

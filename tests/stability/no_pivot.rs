@@ -5,7 +5,7 @@ use super::mechanism::Stream;
 use super::symbolic::{Chosen, Symbolic};
 use bimorph::multibody::Model;
 use bimorph::multibody::forces::RestStrain;
-use bimorph::multibody::rcr::{Linkage, Parent, Reduction, Task};
+use bimorph::multibody::rcr::{Linkage, LinkageParent, Reduction, ReductionTask};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 
@@ -34,7 +34,7 @@ impl Case {
         let n = self.linkage.coordinates;
         let mut q: Vec<f64> = (0..n).map(|_| size * s.next()).collect();
         for link in &self.linkage.links {
-            if link.parent == Parent::Free {
+            if link.parent == LinkageParent::Free {
                 q[link.first] *= LEVER;
                 q[link.first + 1] *= LEVER;
             }
@@ -69,7 +69,7 @@ pub(crate) fn errors(chosen: Chosen, count: usize, bent: f64) -> (f64, f64) {
         r.force[p] = [1e-6 * (k as f64).sin(), 1e-6 * (k as f64).cos(), 1e-11];
     }
     let symbolic = case.symbolic(chosen, &r, &r.force);
-    r.solve(Task::Accelerations, &mut vec![0.0; n]);
+    r.solve(ReductionTask::Accelerations, &mut vec![0.0; n]);
     let (judge, blind) = (symbolic.judge(), symbolic.accelerations());
     let ours = |i: usize| r.accelerations[case.place[i / 3]][i % 3];
     (apart(&|i| blind[i], &|i| judge[i], judge.len()), apart(&ours, &|i| judge[i], judge.len()))
@@ -104,12 +104,12 @@ impl SecondOrder for Blind<'_> {
         // springs of the tree as moments on the bodies
         let mut force = r.force.clone();
         for (body, link) in case.linkage.links.iter().enumerate() {
-            if link.parent == Parent::Free {
+            if link.parent == LinkageParent::Free {
                 continue;
             }
             let moment = link.sign * r.torque[link.first];
             force[body][2] += moment;
-            if let Parent::Body(p) = link.parent {
+            if let LinkageParent::Body(p) = link.parent {
                 force[p][2] -= moment;
             }
         }
@@ -120,9 +120,9 @@ impl SecondOrder for Blind<'_> {
         }
         for (body, link) in case.linkage.links.iter().enumerate() {
             match link.parent {
-                Parent::Free => a[link.first..link.first + 3].copy_from_slice(&of[body]),
-                Parent::Ground => a[link.first] = link.sign * of[body][2],
-                Parent::Body(p) => a[link.first] = link.sign * (of[body][2] - of[p][2]),
+                LinkageParent::Free => a[link.first..link.first + 3].copy_from_slice(&of[body]),
+                LinkageParent::Ground => a[link.first] = link.sign * of[body][2],
+                LinkageParent::Body(p) => a[link.first] = link.sign * (of[body][2] - of[p][2]),
             }
         }
         if a.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(()) }
@@ -145,14 +145,14 @@ pub(crate) struct Run {
 }
 
 const END: f64 = 0.5e-6;
-const MOST_STEPS: u64 = 3000;
+const MAX_STEPS: u64 = 3000;
 
 fn integrate<P: SecondOrder>(case: &Case, problem: &mut P, q: &mut [f64]) -> Run {
     let n = case.linkage.coordinates;
     let mut v = vec![0.0; n];
     let mut atol_q = vec![1e-10; n];
     for link in &case.linkage.links {
-        if link.parent == Parent::Free {
+        if link.parent == LinkageParent::Free {
             atol_q[link.first] = 1e-14;
             atol_q[link.first + 1] = 1e-14;
         }
@@ -164,7 +164,7 @@ fn integrate<P: SecondOrder>(case: &Case, problem: &mut P, q: &mut [f64]) -> Run
     let mut placed = Reduction::<f64>::new(&[&case.linkage]);
     let mut last = vec![0.0; n];
     let mut rate = vec![0.0; n];
-    let _ = method.integrate(problem, (0.0, END), q, &mut v, &mut h, &bounds, MOST_STEPS, &mut |dense| {
+    let _ = method.integrate(problem, (0.0, END), q, &mut v, &mut h, &bounds, MAX_STEPS, &mut |dense| {
         dense.at(dense.t + dense.h, &mut last, &mut rate);
         placed.place(&last, &rate);
         run.reached = dense.t + dense.h;

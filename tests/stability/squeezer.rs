@@ -2,7 +2,7 @@
 
 use super::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, Reduction, Task};
+use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::{JointMotion, NotFinite};
 
@@ -120,7 +120,7 @@ fn run<P: SecondOrder<Error = NotFinite>>(of: &Squeezer, end: f64, problem: &mut
             let t = dense.t + dense.h;
             dense.at(t, &mut at, &mut rate);
             placed.place(&at, &rate);
-            drift.gap.push([t, placed.largest(Task::Positions)]);
+            drift.gap.push([t, placed.largest(ReductionTask::Positions)]);
             drift.energy.push([t, (of.energy(&placed) - first).abs()]);
             drift.work = TORQUE * placed.pose(of.motor)[2];
             true

@@ -8,7 +8,7 @@ use bimorph::solve::adaptive::Control;
 use bimorph::solve::baseline::Solver;
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::linear::Recursion;
-use bimorph::solve::method::{Motion, Work};
+use bimorph::solve::method::{Motion, SolverCounters};
 use bimorph::solve::path::SourcePath;
 
 /// Segments of the cantilever.
@@ -37,7 +37,7 @@ fn bent(system: &System) -> Vec<Pose> {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Released {
     pub(crate) track: Vec<[f64; 2]>,
-    pub(crate) work: Work,
+    pub(crate) work: SolverCounters,
 }
 
 /// The tip after release until `end` [s]; ends early when it is beyond ten times the first displacement.
@@ -46,7 +46,7 @@ fn released(ratio: f64, method: Integrator, control: Control, end: f64) -> Relea
     let q = bent(&loaded);
     let (system, _) = stiff(ratio, 0.0);
     let first = q[tip].y;
-    let mut out = Released { track: vec![[0.0, first]], work: Work::default() };
+    let mut out = Released { track: vec![[0.0, first]], work: SolverCounters::default() };
     let mut motion = Motion { v: vec![Pose::zeros(); q.len()], q };
     let ramp = quiet(&system, end);
     let solver = Solver::Recursion(Recursion);

@@ -1,7 +1,7 @@
 //! Arms that come straight: a star of six two-link arms between a shuttle and ground, against 60-digit references.
 
 use super::mechanism::Mechanism;
-use bimorph::multibody::rcr::{Linkage, Reduction, Singularity, Task};
+use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
 use bimorph::multibody::{BodyId, Model};
 use nalgebra::{DMatrix, DVector};
 
@@ -79,9 +79,9 @@ fn loaded(kinks: &[f64]) -> (Model, Vec<usize>, Linkage, Reduction<f64>) {
 pub(crate) fn shuttle(size: f64, shape: &[f64; 6]) -> Shuttle {
     let (model, place, linkage, mut r) = loaded(&shape.map(|x| x * size));
     let mut out = vec![0.0; linkage.coordinates];
-    r.reduce(Task::Accelerations, &mut out);
+    r.reduce(ReductionTask::Accelerations, &mut out);
     let local = r.accelerations[place[0]];
-    let met = r.reduce_singular(Task::Accelerations, &mut out);
+    let met = r.reduce_singular(ReductionTask::Accelerations, &mut out);
     Shuttle { local, ours: r.accelerations[place[0]], dense: dense(&model, &r.force, place[0]), met }
 }
 
@@ -125,7 +125,7 @@ pub(crate) fn crowded(count: usize) -> (Singularity, f64) {
     let (mut met, mut best) = (Singularity::default(), f64::INFINITY);
     for _ in 0..5 {
         let started = std::time::Instant::now();
-        met = r.reduce_singular(Task::Accelerations, &mut out);
+        met = r.reduce_singular(ReductionTask::Accelerations, &mut out);
         best = best.min(started.elapsed().as_secs_f64());
     }
     (met, best)

@@ -3,7 +3,7 @@
 
 use super::mechanism::Stream;
 use bimorph::multibody::planar::{JointFrame, Pose};
-use bimorph::multibody::rcr::{Linkage, Reduction, Task};
+use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
 use bimorph::multibody::{BlockMatrix, Body, BodyId, Joint, Model, forces};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector3};
 
@@ -100,9 +100,9 @@ pub(crate) fn by_recursion(u: Units) -> [Vec<[f64; 3]>; 2] {
     r.place(&zeros, &zeros);
     r.force = push(&model, u);
     let mut out = zeros.clone();
-    r.reduce(Task::Accelerations, &mut out);
+    r.reduce(ReductionTask::Accelerations, &mut out);
     let local = in_si(&r.accelerations, u);
-    r.reduce_singular(Task::Accelerations, &mut out);
+    r.reduce_singular(ReductionTask::Accelerations, &mut out);
     [local, in_si(&r.accelerations, u)]
 }
 

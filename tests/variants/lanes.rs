@@ -1,14 +1,14 @@
 //! Variants side by side: a lane has the bits of its variant alone.
 
 use bimorph::analysis::transient::first_step;
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::domains::Ramp;
 use bimorph::equations::Bodies;
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::time::adaptive::{Adaptive, Control};
 use bimorph::solve::time::method::Motion;
 use bimorph::solve::time::rodas4::Rodas4;
-use bimorph::solve::time::side_by_side::{self, Ended, Variant, Watcher};
+use bimorph::solve::time::side_by_side::{self, BatchRun, Ended, Watcher};
 
 /// The final motion and the accepted steps of a run.
 type Ran = (Vec<(f64, f64)>, Motion);
@@ -21,14 +21,14 @@ impl Watcher for Notes {
     fn wants(&self, _: f64, _: f64) -> bool {
         true
     }
-    fn see(&mut self, s: f64, h: f64, _: &Motion, _: &Motion) -> bool {
+    fn observe(&mut self, s: f64, h: f64, _: &Motion, _: &Motion) -> bool {
         self.0.push((s, h));
         true
     }
 }
 
 /// A run alone.
-fn alone(compiled: &Compiled, volts: &[f64], stop: f64, tol: f64) -> Option<Ran> {
+fn alone(compiled: &CompiledModel, volts: &[f64], stop: f64, tol: f64) -> Option<Ran> {
     let system = &compiled.parts.system;
     let mut sources = vec![0.0; system.electrics.sources()];
     system.electrics.fill_sources(&volts[..system.electrics.ports], &mut sources);
@@ -47,7 +47,7 @@ fn alone(compiled: &Compiled, volts: &[f64], stop: f64, tol: f64) -> Option<Ran>
 }
 
 /// The same runs side by side.
-fn together(variants: &[Compiled], volts: &[f64], stop: f64, tol: f64) -> Vec<Option<Ran>> {
+fn together(variants: &[CompiledModel], volts: &[f64], stop: f64, tol: f64) -> Vec<Option<Ran>> {
     let electrics: Vec<_> = variants.iter().map(|v| &v.parts.system.electrics).collect();
     let sources: Vec<Vec<f64>> = (electrics.iter())
         .map(|e| {
@@ -67,7 +67,7 @@ fn together(variants: &[Compiled], volts: &[f64], stop: f64, tol: f64) -> Vec<Op
             let (volts, rise) = (&sources[number], &rises[number]);
             let ramp = Ramp::new(&system.electrics, volts, volts, rise, stop);
             let motion = Motion::zeros(system.bodies());
-            Some((number, Variant { system, ramp, motion, h: first_step(system, stop), tol, watcher: notes }))
+            Some((number, BatchRun { system, ramp, motion, h: first_step(system, stop), tol, watcher: notes }))
         };
         let mut done = |number: usize, ended: Ended| {
             if let Ended::Done(motion, _) = ended {
@@ -116,7 +116,7 @@ f2d * [t] [F=F oz=deg(60)]
 drive port * [m e] []
 ";
     let plate = Bundle::from_text("plate.net", plate);
-    let grid = |bundle: &Bundle, names: [&str; 2], values: &dyn Fn(usize) -> [f64; 2]| -> Vec<Compiled> {
+    let grid = |bundle: &Bundle, names: [&str; 2], values: &dyn Fn(usize) -> [f64; 2]| -> Vec<CompiledModel> {
         let options = |k: usize| {
             let pairs = names.iter().zip(values(k));
             let set = pairs.map(|(name, value)| ((*name).to_owned(), Setting::Number(value))).collect();

@@ -2,7 +2,9 @@
 
 use super::{BEAMS, statics, swept};
 use bimorph::compile::CompileOptions;
-use bimorph::jobs::sweep::{self, Samples, Sampling, Shard, SweepAnalysis, SweepParameter, SweepSpec, SweepTable};
+use bimorph::jobs::sweep::{
+    self, SampleGenerator, Sampling, Shard, SweepAnalysis, SweepParameter, SweepSpec, SweepTable,
+};
 use bimorph::netlist::{Bundle, Setting};
 
 /// Parameters that go together.
@@ -89,7 +91,7 @@ fn points_are_those_of_the_grid() {
 fn corners_have_scatter() {
     let vary = vec!["l=normal:100u:1u".parse().expect("a distribution")];
     let asked = Sampling { vary, count: 5, seed: 3, ..Sampling::default() };
-    let samples = Some(Samples::new(asked).expect("samples"));
+    let samples = Some(SampleGenerator::new(asked).expect("samples"));
     let corners = || together(&["w=1.8u,2.2u", "F=110u,90u"]);
     let table = run(&SweepSpec { samples, ..spec(corners(), statics()) });
     assert_eq!(table.parameters, ["w", "F", "l"]);

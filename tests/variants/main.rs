@@ -112,12 +112,12 @@ fn frequencies_hold_their_tolerance() {
 /// A netlist that was read once draws each set of parameters as one that is read anew, warnings and errors included.
 #[test]
 fn reading_once_is_reading_anew() {
-    let source = bimorph::netlist::Source::new(&Bundle::from_text("beams.net", BEAMS));
+    let source = bimorph::netlist::NetlistSource::new(&Bundle::from_text("beams.net", BEAMS));
     for (name, value) in [("w", 1e-6), ("w", 3e-6), ("w", -1e-6), ("nosuch", 1.0), ("l", 5e-5)] {
         let set = vec![(name.to_owned(), Setting::Number(value))];
         let options = CompileOptions { set, ..CompileOptions::default() };
         let anew = compile(&Bundle::from_text("beams.net", BEAMS), &options);
-        let once = bimorph::compile::draw(&source, &options).and_then(bimorph::compile::Drawn::compile);
+        let once = bimorph::compile::draw(&source, &options).and_then(bimorph::compile::ParsedStructure::compile);
         assert_eq!(format!("{once:?}"), format!("{anew:?}"));
     }
 }

@@ -1,21 +1,21 @@
 //! Equilibria and modes of variants side by side: bits of a variant alone, or its modes to rounding, in any company.
 
 use super::{BEAMS, swept};
-use bimorph::analysis::mesh::{self, Request};
+use bimorph::analysis::mesh::{self, MeshRequest};
 use bimorph::analysis::modes::modes;
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::domains::System;
 use bimorph::jobs::sweep::{Shard, SweepAnalysis};
 use bimorph::multibody::BlockMatrix;
 use bimorph::multibody::planar::Pose;
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::eigen::{Modes, lowest_modes};
-use bimorph::solve::equilibrium::side_by_side::{LaneEquilibrium, Way};
+use bimorph::solve::equilibrium::side_by_side::{BatchPath, LaneEquilibrium};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::frequency::side_by_side::LaneModes;
 use bimorph::solve::path::SourcePath;
 
-fn variants(text: &str, name: &str, values: &[f64]) -> Vec<Compiled> {
+fn variants(text: &str, name: &str, values: &[f64]) -> Vec<CompiledModel> {
     let one = |value: &f64| {
         let set = vec![(name.to_owned(), Setting::Number(*value))];
         let options = CompileOptions { set, segments: Some(4), ..CompileOptions::default() };
@@ -43,7 +43,7 @@ fn sources(system: &System, volts: f64) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// The same in lanes, some at a time.
-fn together(variants: &[Compiled], volts: f64, at_once: usize) -> Vec<Option<(Vec<Pose>, usize)>> {
+fn together(variants: &[CompiledModel], volts: f64, at_once: usize) -> Vec<Option<(Vec<Pose>, usize)>> {
     let systems: Vec<&System> = variants.iter().map(|v| &v.parts.system).collect();
     let mut lanes = LaneEquilibrium::new(systems[0]).expect("lanes");
     let ends: Vec<_> = systems.iter().map(|system| sources(system, volts)).collect();
@@ -51,7 +51,8 @@ fn together(variants: &[Compiled], volts: f64, at_once: usize) -> Vec<Option<(Ve
         .map(|(system, (from, to))| SourcePath::new(&system.electrics, from, to, [0.0, 1.0]))
         .collect();
     let q = vec![Pose::zeros(); systems[0].bodies()];
-    let ways: Vec<Way<'_>> = systems.iter().zip(&paths).map(|(system, path)| Way { system, path, q: &q }).collect();
+    let ways: Vec<BatchPath<'_>> =
+        systems.iter().zip(&paths).map(|(system, path)| BatchPath { system, path, q: &q }).collect();
     assert!(systems.iter().all(|system| lanes.fits(system)));
     ways.chunks(at_once)
         .flat_map(|ways| lanes.follow(ways))
@@ -172,7 +173,7 @@ fn rows_of_modes_are_modes_on_one_mesh() {
         let options = CompileOptions { set, tol, ..options.clone() };
         compile(&Bundle::from_text("beams.net", &text), &options).expect("a variant")
     };
-    let request = Request::Modes { count: 3, voltages: &[] };
+    let request = MeshRequest::Modes { count: 3, voltages: &[] };
     let order = mesh::order(&variant(2e-6, 0.6 * options.tol), &request).expect("a mesh");
     for row in &table.rows {
         let Setting::Number(w) = row.parameters[0] else { panic!("a width") };

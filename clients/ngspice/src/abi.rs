@@ -102,7 +102,7 @@ pub(crate) struct Complex {
 /// A parameter or port value.
 #[repr(C)]
 #[derive(Clone, Copy)]
-pub(crate) union Value {
+pub(crate) union ParameterValue {
     pub(crate) flag: c_int,
     pub(crate) real: f64,
     pub(crate) complex: Complex,
@@ -111,7 +111,7 @@ pub(crate) union Value {
 
 /// What a call says about the circuit. From 47 on two more doubles follow.
 #[repr(C)]
-pub(crate) struct Circuit {
+pub(crate) struct CircuitArguments {
     pub(crate) init: c_int,
     pub(crate) anal_type: c_int,
     pub(crate) anal_init: c_int,
@@ -122,18 +122,18 @@ pub(crate) struct Circuit {
     pub(crate) t: [f64; 8],
 }
 
-/// What follows [`Circuit`] in a call.
+/// What follows [`CircuitArguments`] in a call.
 #[repr(C)]
 pub(crate) struct Tail {
     pub(crate) num_conn: c_int,
-    pub(crate) conn: *mut *mut Connection,
+    pub(crate) conn: *mut *mut ConnectionData,
     pub(crate) num_param: c_int,
     pub(crate) param: *mut *mut Parameter,
 }
 
 /// A connection of an instance.
 #[repr(C)]
-pub(crate) struct Connection {
+pub(crate) struct ConnectionData {
     pub(crate) name: *const c_char,
     pub(crate) description: *const c_char,
     pub(crate) is_null: c_int,
@@ -149,7 +149,7 @@ pub(crate) struct Connection {
 pub(crate) struct Parameter {
     pub(crate) is_null: c_int,
     pub(crate) size: c_int,
-    pub(crate) element: *mut Value,
+    pub(crate) element: *mut ParameterValue,
     pub(crate) element_type: c_int,
 }
 
@@ -174,10 +174,10 @@ pub(crate) mod port_data {
 
 /// Head of a model (`GENmodel`, then what code models add).
 #[repr(C)]
-pub(crate) struct Model {
+pub(crate) struct ModelHead {
     pub(crate) kind: c_int,
-    pub(crate) next: *mut Model,
-    pub(crate) instances: *mut Instance,
+    pub(crate) next: *mut ModelHead,
+    pub(crate) instances: *mut InstanceHead,
     pub(crate) name: *const c_char,
     pub(crate) defaults: *mut c_void,
     pub(crate) num_param: c_int,
@@ -186,15 +186,15 @@ pub(crate) struct Model {
 
 /// Head of an instance (`GENinstance`, then what code models add).
 #[repr(C)]
-pub(crate) struct Instance {
-    pub(crate) model: *mut Model,
-    pub(crate) next: *mut Instance,
+pub(crate) struct InstanceHead {
+    pub(crate) model: *mut ModelHead,
+    pub(crate) next: *mut InstanceHead,
     pub(crate) name: *const c_char,
     pub(crate) state: c_int,
     /// `GENinstance` ends here, padded to a whole word.
     pub(crate) padding: c_int,
     pub(crate) num_conn: c_int,
-    pub(crate) conn: *mut *mut Connection,
+    pub(crate) conn: *mut *mut ConnectionData,
 }
 
 /// Declares a connection.
@@ -258,11 +258,11 @@ pub(crate) struct ParameterInfo43 {
     pub(crate) description: *const c_char,
     pub(crate) kind: c_int,
     pub(crate) default_count: c_int,
-    pub(crate) defaults: *const Value,
+    pub(crate) defaults: *const ParameterValue,
     pub(crate) has_lower: c_int,
-    pub(crate) lower: Value,
+    pub(crate) lower: ParameterValue,
     pub(crate) has_upper: c_int,
-    pub(crate) upper: Value,
+    pub(crate) upper: ParameterValue,
     pub(crate) rest: ParameterInfoTail,
 }
 
@@ -281,12 +281,12 @@ pub(crate) struct ParameterInfoTail {
 }
 
 const _: () = {
-    assert!(size_of::<Value>() == 16);
-    assert!(size_of::<Circuit>() == 104);
+    assert!(size_of::<ParameterValue>() == 16);
+    assert!(size_of::<CircuitArguments>() == 104);
     assert!(size_of::<ConnectionInfo>() == 80);
     assert!(size_of::<ParameterInfo42>() == 192);
     assert!(size_of::<ParameterInfo43>() == 112);
     assert!(std::mem::offset_of!(Tail, conn) == 8 && std::mem::offset_of!(Tail, param) == 24);
-    assert!(std::mem::offset_of!(Instance, conn) == 40);
-    assert!(std::mem::offset_of!(Model, param) == 48);
+    assert!(std::mem::offset_of!(InstanceHead, conn) == 40);
+    assert!(std::mem::offset_of!(ModelHead, param) == 48);
 };

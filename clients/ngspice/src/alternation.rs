@@ -20,18 +20,18 @@ const NOISE: f64 = 1e-7;
 /// By how much an alternation is larger than the one that was reported last, to be reported again [1].
 const GROWS: f64 = 3.0;
 /// Ratio of a step to the one before it below which a point has no derivative [1].
-const LEAST_RATIO: f64 = 1e-3;
+const MIN_RATIO: f64 = 1e-3;
 
 /// What the accepted points of an instance show of its currents.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Alternation {
     /// Length of the last step [s]; 0 where there is none since an equilibrium.
     step: f64,
-    ports: Vec<Port>,
+    ports: Vec<PortAlternation>,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Port {
+struct PortAlternation {
     /// Charges at the last two points, the last first [C].
     charges: [f64; 2],
     /// Current of the charge at the last point [A].
@@ -46,7 +46,7 @@ struct Port {
     reported: f64,
 }
 
-impl Port {
+impl PortAlternation {
     /// Alternation [A] at the point before the last, where it is one.
     fn add(&mut self, [before, step]: [f64; 2], charge: f64) -> f64 {
         let [last, first] = self.charges;
@@ -78,9 +78,9 @@ impl Alternation {
     ) -> Vec<Diagnostic> {
         let known = self.step > 0.0 && self.ports.len() == charges.len();
         if step == 0.0 || self.ports.len() != charges.len() {
-            self.ports = vec![Port::default(); charges.len()];
+            self.ports = vec![PortAlternation::default(); charges.len()];
         }
-        let even = known && step > LEAST_RATIO * self.step;
+        let even = known && step > MIN_RATIO * self.step;
         let mut warnings = Vec::new();
         for ((port, name), (charge, current)) in
             self.ports.iter_mut().zip(names).zip(charges.iter().zip(&base.currents))

@@ -1,9 +1,9 @@
 //! ngspice's memory, read and written: inputs and outputs at each call.
 
-use crate::abi::{self, Complex, Connection, Instance, Model, Tail, analysis, port, port_data};
-use crate::circuit::Circuit;
-use crate::layout::Layout;
-use crate::question::Question;
+use crate::abi::{self, Complex, ConnectionData, InstanceHead, ModelHead, Tail, analysis, port, port_data};
+use crate::circuit::HostCircuit;
+use crate::layout::HostLayout;
+use crate::question::EvaluationRequest;
 use std::ffi::{CStr, c_char, c_int, c_void};
 
 /// Ports that are driven.
@@ -33,14 +33,14 @@ pub(crate) unsafe fn text(at: *const c_char) -> Option<String> {
 ///
 /// # Safety
 /// `model` heads the host's list of models, which stays as it is as long as the iterator lives.
-pub(crate) unsafe fn instances<'a>(model: *mut Model) -> impl Iterator<Item = (&'a Model, &'a Instance)> {
+pub(crate) unsafe fn instances<'a>(model: *mut ModelHead) -> impl Iterator<Item = (&'a ModelHead, &'a InstanceHead)> {
     // SAFETY: by contract; the list ends in null.
     let models = std::iter::successors(unsafe { model.as_ref() }, |m| unsafe { m.next.as_ref() });
     models.flat_map(|m| {
         // SAFETY: as above.
         let first = unsafe { m.instances.as_ref() };
         // SAFETY: as above.
-        let next = |i: &&'a Instance| unsafe { i.next.as_ref() };
+        let next = |i: &&'a InstanceHead| unsafe { i.next.as_ref() };
         std::iter::successors(first, next).map(move |i| (m, i))
     })
 }
@@ -49,7 +49,7 @@ pub(crate) unsafe fn instances<'a>(model: *mut Model) -> impl Iterator<Item = (&
 ///
 /// # Safety
 /// `conn` points to an instance's connections, at least `which + 1` of them.
-pub(crate) unsafe fn size(conn: *mut *mut Connection, which: usize) -> usize {
+pub(crate) unsafe fn size(conn: *mut *mut ConnectionData, which: usize) -> usize {
     // SAFETY: by contract.
     let connection = unsafe { &**conn.add(which) };
     if connection.is_null == 0 { connection.size.max(0) as usize } else { 0 }
@@ -59,7 +59,7 @@ pub(crate) unsafe fn size(conn: *mut *mut Connection, which: usize) -> usize {
 ///
 /// # Safety
 /// As for [`size`].
-pub(crate) unsafe fn branches(conn: *mut *mut Connection) -> Vec<bool> {
+pub(crate) unsafe fn branches(conn: *mut *mut ConnectionData) -> Vec<bool> {
     // SAFETY: by contract; a port begins with its kind.
     unsafe { (0..size(conn, PORTS)).map(|n| is_branch(*(**conn.add(PORTS)).port.add(n))).collect() }
 }
@@ -76,7 +76,7 @@ unsafe fn is_branch(port: *const u8) -> bool {
 ///
 /// # Safety
 /// As for [`size`]; the host has allocated the ports' outputs.
-pub(crate) unsafe fn partial_at_80(conn: *mut *mut Connection) -> bool {
+pub(crate) unsafe fn partial_at_80(conn: *mut *mut ConnectionData) -> bool {
     // SAFETY: the electrical ports exist (the connection may not be null); that word is a pointer or null.
     unsafe { !(*(*(**conn).port).add(port_data::PARTIAL_39).cast::<*mut c_void>()).is_null() }
 }
@@ -86,7 +86,7 @@ pub(crate) unsafe fn partial_at_80(conn: *mut *mut Connection) -> bool {
 ///
 /// # Safety
 /// As for [`partial_at_80`], in the host's layout.
-pub(crate) unsafe fn terminals(conn: *mut *mut Connection, layout: &Layout) -> Vec<[i32; 2]> {
+pub(crate) unsafe fn terminals(conn: *mut *mut ConnectionData, layout: &HostLayout) -> Vec<[i32; 2]> {
     // SAFETY: by contract; a port's matrix data hold its nodes and its branch.
     unsafe {
         let matrix = layout.port_matrix(partial_at_80(conn));
@@ -117,24 +117,24 @@ pub(crate) enum Wanted {
 }
 
 /// One call of the model by the host.
-pub(crate) struct Call<'a> {
-    told: &'a abi::Circuit,
+pub(crate) struct ModelCall<'a> {
+    told: &'a abi::CircuitArguments,
     tail: &'a Tail,
-    circuit: Circuit,
+    circuit: HostCircuit,
     wanted: Wanted,
     partial: usize,
     matrix: usize,
 }
 
-impl Call<'_> {
+impl ModelCall<'_> {
     /// Sees a call's data.
     ///
     /// # Safety
     /// `data` is what the host passed to the model in this call, `layout` is the host's, and `circuit` the one it loads.
-    pub(crate) unsafe fn new(data: *mut c_void, layout: &Layout, circuit: Circuit, wanted: Wanted) -> Self {
+    pub(crate) unsafe fn new(data: *mut c_void, layout: &HostLayout, circuit: HostCircuit, wanted: Wanted) -> Self {
         // SAFETY: by contract.
         unsafe {
-            let told = &*data.cast::<abi::Circuit>();
+            let told = &*data.cast::<abi::CircuitArguments>();
             let tail = &*data.cast::<u8>().add(layout.call_tail()).cast::<Tail>();
             let as_39 = partial_at_80(tail.conn);
             let partial = port_data::PARTIAL_39 + if as_39 { 0 } else { 8 };
@@ -166,25 +166,25 @@ impl Call<'_> {
 
     /// What is asked, or why it cannot be told. The circuit's step and the difference of the two times are the same up to
     /// the rounding of the times.
-    pub(crate) fn question(&self) -> Result<Question, &'static str> {
+    pub(crate) fn question(&self) -> Result<EvaluationRequest, &'static str> {
         let (c, delta) = (self.told, self.circuit.delta());
         if self.wanted == Wanted::Small {
             let told = (c.anal_type == analysis::AC).then_some(c.frequency);
             return match told.or_else(|| self.circuit.omega()) {
-                Some(omega) => Ok(Question::SmallSignal { omega }),
+                Some(omega) => Ok(EvaluationRequest::SmallSignal { omega }),
                 None => Err("this ngspice does not tell code models the frequency in this analysis; use .ac"),
             };
         }
         if c.anal_type != analysis::TRAN || !self.circuit.transient() {
-            return Ok(Question::Static);
+            return Ok(EvaluationRequest::Static);
         }
         let dt = c.t[0] - c.t[1];
         Ok(match dt > 0.0 {
             true => {
                 let same = (dt - delta).abs() <= 4.0 * f64::EPSILON * c.t[0];
-                Question::Transient { t: c.time, dt: if same { delta } else { dt }, rule: self.circuit.rule() }
+                EvaluationRequest::Transient { t: c.time, dt: if same { delta } else { dt }, rule: self.circuit.rule() }
             }
-            false => Question::Static,
+            false => EvaluationRequest::Static,
         })
     }
 

@@ -3,11 +3,11 @@
 //! Each passes the call on to the host's own code model support and adds what Bimorph needs around it. None lets a
 //! panic out.
 
-use crate::abi::{self, Model, code};
-use crate::call::{self, Call, Wanted};
-use crate::circuit::Circuit;
+use crate::abi::{self, ModelHead, code};
+use crate::call::{self, ModelCall, Wanted};
+use crate::circuit::HostCircuit;
 use crate::opening::open_all;
-use crate::question::Outcome;
+use crate::question::EvaluationOutcome;
 use crate::registry::{close, registry};
 use crate::respond::{moves, respond, settle};
 use crate::table::{DEVICE, LAYOUT};
@@ -29,13 +29,13 @@ fn record_failure(text: &str) {
 }
 
 /// Stores a model parameter.
-pub(crate) unsafe extern "C" fn model_param(index: c_int, value: *mut c_void, model: *mut Model) -> c_int {
+pub(crate) unsafe extern "C" fn model_param(index: c_int, value: *mut c_void, model: *mut ModelHead) -> c_int {
     // SAFETY: passed on.
     guarded(|| unsafe { host::model_param(index, value, model) })
 }
 
 /// Frees a model.
-pub(crate) unsafe extern "C" fn model_delete(model: *mut Model) -> c_int {
+pub(crate) unsafe extern "C" fn model_delete(model: *mut ModelHead) -> c_int {
     // SAFETY: passed on.
     guarded(|| unsafe { host::model_delete(model) })
 }
@@ -43,7 +43,7 @@ pub(crate) unsafe extern "C" fn model_delete(model: *mut Model) -> c_int {
 /// Reads an instance parameter: what `show` and `@a1[…]` show.
 pub(crate) unsafe extern "C" fn ask(
     _circuit: *mut c_void,
-    instance: *mut abi::Instance,
+    instance: *mut abi::InstanceHead,
     index: c_int,
     value: *mut c_void,
     _select: *mut c_void,
@@ -62,7 +62,7 @@ pub(crate) unsafe extern "C" fn ask(
 /// Reads a model parameter.
 pub(crate) unsafe extern "C" fn model_ask(
     circuit: *mut c_void,
-    model: *mut Model,
+    model: *mut ModelHead,
     index: c_int,
     value: *mut c_void,
 ) -> c_int {
@@ -74,11 +74,11 @@ pub(crate) unsafe extern "C" fn model_ask(
 /// integrals would cost one more iteration at every point. It comes where those have converged: of an equilibrium this is
 /// the last that is heard. What ngspice then writes is the solution before the last one, so that monitors of an equilibrium would
 /// carry `reltol`: they are iterated until they stand still.
-pub(crate) unsafe extern "C" fn convergence_test(model: *mut Model, circuit: *mut c_void) -> c_int {
+pub(crate) unsafe extern "C" fn convergence_test(model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     guarded(|| {
         let Some(layout) = LAYOUT.get() else { return code::PANIC };
         // SAFETY: the host's circuit, for this call.
-        let circuit = unsafe { Circuit::new(circuit, layout) };
+        let circuit = unsafe { HostCircuit::new(circuit, layout) };
         let mut registry = registry();
         // SAFETY: the host's lists.
         let mut entries = unsafe { call::instances(model) }.map(|(_, instance)| instance.conn as usize);
@@ -99,7 +99,7 @@ pub(crate) unsafe extern "C" fn convergence_test(model: *mut Model, circuit: *mu
 /// Opens every instance, after the host's own setup. An error ends the run before it starts.
 pub(crate) unsafe extern "C" fn setup(
     matrix: *mut c_void,
-    model: *mut Model,
+    model: *mut ModelHead,
     circuit: *mut c_void,
     states: *mut c_int,
 ) -> c_int {
@@ -137,7 +137,7 @@ fn offer_names() {
 }
 
 /// Closes the instances of these models: states and connections to servers end with the analysis.
-pub(crate) unsafe extern "C" fn unsetup(model: *mut Model, circuit: *mut c_void) -> c_int {
+pub(crate) unsafe extern "C" fn unsetup(model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     guarded(|| {
         // SAFETY: the host's lists; then passed on.
         unsafe {
@@ -148,7 +148,7 @@ pub(crate) unsafe extern "C" fn unsetup(model: *mut Model, circuit: *mut c_void)
 }
 
 /// Frees an instance.
-pub(crate) unsafe extern "C" fn delete(instance: *mut abi::Instance) -> c_int {
+pub(crate) unsafe extern "C" fn delete(instance: *mut abi::InstanceHead) -> c_int {
     guarded(|| {
         // SAFETY: the host passes a live instance.
         unsafe {
@@ -167,13 +167,13 @@ fn refuse(text: &str) -> c_int {
 }
 
 /// Loads the matrix for currents: the host calls [`evaluate`] for each instance.
-pub(crate) unsafe extern "C" fn load(model: *mut Model, circuit: *mut c_void) -> c_int {
+pub(crate) unsafe extern "C" fn load(model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     // SAFETY: passed on.
     guarded(|| unsafe { load_for(Wanted::Large, model, circuit) })
 }
 
 /// Loads the complex matrix of a small-signal analysis.
-pub(crate) unsafe extern "C" fn small_signal_load(model: *mut Model, circuit: *mut c_void) -> c_int {
+pub(crate) unsafe extern "C" fn small_signal_load(model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     // SAFETY: passed on.
     guarded(|| unsafe { load_for(Wanted::Small, model, circuit) })
 }
@@ -186,13 +186,13 @@ pub(crate) unsafe extern "C" fn small_signal_load(model: *mut Model, circuit: *m
 ///
 /// # Safety
 /// The arguments are those with which the host called the plug-in.
-unsafe fn load_for(wanted: Wanted, model: *mut Model, circuit: *mut c_void) -> c_int {
+unsafe fn load_for(wanted: Wanted, model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     let Some(layout) = LAYOUT.get() else { return code::PANIC };
     {
         let mut registry = registry();
         registry.good = true;
         // SAFETY: the host's circuit, for this load.
-        registry.loading = Some((unsafe { Circuit::new(circuit, layout) }, wanted));
+        registry.loading = Some((unsafe { HostCircuit::new(circuit, layout) }, wanted));
     }
     // SAFETY: passed on; the registry is not locked while the host calls back.
     let result = unsafe { host::load(model, circuit) };
@@ -202,7 +202,7 @@ unsafe fn load_for(wanted: Wanted, model: *mut Model, circuit: *mut c_void) -> c
 /// Pole-zero analysis solves at complex frequencies, where the part cannot be asked; ngspice would leave it out.
 pub(crate) unsafe extern "C" fn pole_zero_setup(
     _matrix: *mut c_void,
-    model: *mut Model,
+    model: *mut ModelHead,
     _circuit: *mut c_void,
     _states: *mut c_int,
 ) -> c_int {
@@ -215,7 +215,7 @@ pub(crate) unsafe extern "C" fn pole_zero_setup(
 }
 
 /// Distortion analysis needs third derivatives; ngspice would take the part for linear.
-pub(crate) unsafe extern "C" fn distortion(_mode: c_int, model: *mut Model, _circuit: *mut c_void) -> c_int {
+pub(crate) unsafe extern "C" fn distortion(_mode: c_int, model: *mut ModelHead, _circuit: *mut c_void) -> c_int {
     guarded(|| {
         // SAFETY: the host's lists.
         let any = unsafe { call::instances(model).next() }.is_some();
@@ -228,9 +228,9 @@ pub(crate) unsafe extern "C" fn distortion(_mode: c_int, model: *mut Model, _cir
 pub(crate) unsafe extern "C" fn noise(
     mode: c_int,
     operation: c_int,
-    model: *mut Model,
+    model: *mut ModelHead,
     circuit: *mut c_void,
-    analysis: *mut noise::Analysis,
+    analysis: *mut noise::NoiseAnalysis,
     density: *mut f64,
 ) -> c_int {
     guarded(|| {
@@ -244,26 +244,26 @@ pub(crate) unsafe extern "C" fn noise(
 }
 
 /// Binds the matrix entries for KLU.
-pub(crate) unsafe extern "C" fn bind(model: *mut Model, circuit: *mut c_void) -> c_int {
+pub(crate) unsafe extern "C" fn bind(model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     // SAFETY: passed on.
     guarded(|| unsafe { bind_by(0, model, circuit) })
 }
 
 /// Binds them to the complex matrix.
-pub(crate) unsafe extern "C" fn bind_complex(model: *mut Model, circuit: *mut c_void) -> c_int {
+pub(crate) unsafe extern "C" fn bind_complex(model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     // SAFETY: passed on.
     guarded(|| unsafe { bind_by(1, model, circuit) })
 }
 
 /// Binds them to the real matrix again.
-pub(crate) unsafe extern "C" fn bind_real(model: *mut Model, circuit: *mut c_void) -> c_int {
+pub(crate) unsafe extern "C" fn bind_real(model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     // SAFETY: passed on.
     guarded(|| unsafe { bind_by(2, model, circuit) })
 }
 
 /// # Safety
 /// The arguments are those with which the host called the plug-in.
-unsafe fn bind_by(which: usize, model: *mut Model, circuit: *mut c_void) -> c_int {
+unsafe fn bind_by(which: usize, model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     // SAFETY: passed on.
     let bound = LAYOUT.get().and_then(|layout| unsafe { host::bind(which, model, circuit, layout) });
     bound
@@ -273,7 +273,7 @@ unsafe fn bind_by(which: usize, model: *mut Model, circuit: *mut c_void) -> c_in
 /// Bounds the next step by the truncation error of the charges, as the host does for capacitors, and by what the devices
 /// can bear. An answer that was given stands, so a device rejects no step here: one that
 /// needs a shorter step says so in its answer.
-pub(crate) unsafe extern "C" fn trunc(model: *mut Model, circuit: *mut c_void, step: *mut f64) -> c_int {
+pub(crate) unsafe extern "C" fn trunc(model: *mut ModelHead, circuit: *mut c_void, step: *mut f64) -> c_int {
     /// ngspice rejects a step when the next one would be less than this share of it, with a little to spare.
     const KEEPS: f64 = 0.91;
     guarded(|| {
@@ -292,11 +292,11 @@ pub(crate) unsafe extern "C" fn trunc(model: *mut Model, circuit: *mut c_void, s
 }
 
 /// A point was accepted.
-pub(crate) unsafe extern "C" fn accept(circuit: *mut c_void, model: *mut Model) -> c_int {
+pub(crate) unsafe extern "C" fn accept(circuit: *mut c_void, model: *mut ModelHead) -> c_int {
     guarded(|| {
         let Some(layout) = LAYOUT.get() else { return code::PANIC };
         // SAFETY: the host's circuit, for this call.
-        let circuit = unsafe { Circuit::new(circuit, layout) };
+        let circuit = unsafe { HostCircuit::new(circuit, layout) };
         let mut registry = registry();
         // SAFETY: the host's lists.
         for (_, instance) in unsafe { call::instances(model) } {
@@ -317,7 +317,7 @@ pub(crate) unsafe extern "C" fn evaluate(data: *mut c_void) {
         let mut registry = registry();
         let (circuit, wanted) = registry.loading?;
         // SAFETY: the host passes the data of this call, in its layout, while it loads the circuit.
-        let call = unsafe { Call::new(data, layout, circuit, wanted) };
+        let call = unsafe { ModelCall::new(data, layout, circuit, wanted) };
         if registry.stopped {
             registry.good = false;
             return None;
@@ -326,13 +326,13 @@ pub(crate) unsafe extern "C" fn evaluate(data: *mut c_void) {
         Some(respond(&call, &mut registry))
     }));
     let outcome = match outcome {
-        Ok(None) | Ok(Some(Outcome::Solved)) => return,
+        Ok(None) | Ok(Some(EvaluationOutcome::Solved)) => return,
         Ok(Some(outcome)) => outcome,
-        Err(_) => Outcome::Stop(format!("internal error: {}; please report it", panics::last())),
+        Err(_) => EvaluationOutcome::Stop(format!("internal error: {}; please report it", panics::last())),
     };
     let mut registry = registry();
     registry.good = false;
-    if let Outcome::Stop(text) = outcome {
+    if let EvaluationOutcome::Stop(text) = outcome {
         registry.stopped = true;
         let asked = registry.asked;
         let name = registry.find(asked).map_or("?", |entry| entry.instance.name());

@@ -4,8 +4,8 @@
 //! Code models are told the kind of an analysis by whoever set it last, and `.noise`, `.pz`, `.tf` and `.sens` do not set
 //! it. The circuit's own mode is right at every call.
 
-use crate::companion::Rule;
-use crate::layout::{Generation, Layout};
+use crate::companion::DifferentiationRule;
+use crate::layout::{Generation, HostLayout};
 use std::ffi::c_void;
 
 /// Offset of the state vectors, eight pointers [byte].
@@ -53,18 +53,18 @@ mod bit {
 
 /// A circuit during one of the host's calls.
 #[derive(Clone, Copy)]
-pub(crate) struct Circuit {
+pub(crate) struct HostCircuit {
     /// Address.
     base: usize,
-    layout: Layout,
+    layout: HostLayout,
 }
 
-impl Circuit {
+impl HostCircuit {
     /// The circuit at `at`.
     ///
     /// # Safety
     /// The host passed it in the call that lasts as long as this value is used, and its layout is `layout`.
-    pub(crate) unsafe fn new(at: *mut c_void, layout: &Layout) -> Self {
+    pub(crate) unsafe fn new(at: *mut c_void, layout: &HostLayout) -> Self {
         Self { base: at as usize, layout: *layout }
     }
 
@@ -80,12 +80,12 @@ impl Circuit {
     }
 
     /// How ngspice integrates over the present step.
-    pub(crate) fn rule(self) -> Rule {
+    pub(crate) fn rule(self) -> DifferentiationRule {
         let [order, _, method] = self.read::<[i32; 3]>(ORDER);
         match (order, method) {
-            (1, _) => Rule::First,
-            (_, GEAR) => Rule::Gear,
-            _ => Rule::Trapezoidal(self.read(XMU)),
+            (1, _) => DifferentiationRule::First,
+            (_, GEAR) => DifferentiationRule::Gear,
+            _ => DifferentiationRule::Trapezoidal(self.read(XMU)),
         }
     }
 

@@ -24,7 +24,7 @@
 
 /// How a step is differentiated.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Rule {
+pub enum DifferentiationRule {
     /// Backward Euler: nothing before the last point counts.
     First,
     /// The trapezoidal rule with this share of the current at the last point [1], ½ unless the deck says otherwise.
@@ -61,14 +61,16 @@ pub struct Companion {
 
 impl Companion {
     /// For a step `h` [s] by a rule, after a step of `before` [s]; 0 where there was none since the slope changed.
-    pub fn new(rule: Rule, h: f64, before: f64) -> Self {
+    pub fn new(rule: DifferentiationRule, h: f64, before: f64) -> Self {
         match rule {
-            Rule::Trapezoidal(mu) => Self { slope: 1.0 / h / (1.0 - mu), second: 0.0, memory: mu / (1.0 - mu) },
-            Rule::Gear if before > 0.0 => {
+            DifferentiationRule::Trapezoidal(mu) => {
+                Self { slope: 1.0 / h / (1.0 - mu), second: 0.0, memory: mu / (1.0 - mu) }
+            }
+            DifferentiationRule::Gear if before > 0.0 => {
                 let bend = h / (h + before);
                 Self { slope: (1.0 + bend) / h, second: bend / before, memory: 0.0 }
             }
-            Rule::First | Rule::Gear => Self { slope: 1.0 / h, second: 0.0, memory: 0.0 },
+            DifferentiationRule::First | DifferentiationRule::Gear => Self { slope: 1.0 / h, second: 0.0, memory: 0.0 },
         }
     }
 
@@ -89,7 +91,7 @@ mod tests {
     #[test]
     fn parabolas_are_exact() {
         let (q, i) = (|t: f64| 3.0 - 2.0 * t + 5.0 * t * t, |t: f64| -2.0 + 10.0 * t);
-        for rule in [Rule::Trapezoidal(0.5), Rule::Gear] {
+        for rule in [DifferentiationRule::Trapezoidal(0.5), DifferentiationRule::Gear] {
             for (h, h1) in [(1.0, 1.0), (0.5, 1.0), (2.0, 0.5), (0.01, 1.0), (9.0, 1e-3)] {
                 let t = 0.7;
                 let got = Companion::new(rule, h, h1).current(q(t), [q(t - h), q(t - h - h1)], i(t - h));
@@ -101,9 +103,12 @@ mod tests {
     /// Where the slope begins anew nothing beyond the last point counts, neither a charge nor a current.
     #[test]
     fn nothing_reaches_back_over_a_corner() {
-        for (rule, before) in
-            [(Rule::First, 1e-9), (Rule::First, 0.0), (Rule::Gear, 0.0), (Rule::Trapezoidal(0.0), 1e-9)]
-        {
+        for (rule, before) in [
+            (DifferentiationRule::First, 1e-9),
+            (DifferentiationRule::First, 0.0),
+            (DifferentiationRule::Gear, 0.0),
+            (DifferentiationRule::Trapezoidal(0.0), 1e-9),
+        ] {
             assert_eq!(Companion::new(rule, 1e-9, before).current(2.0, [1.0, 77.0], 99.0), 1.0 / 1e-9);
         }
     }
@@ -111,11 +116,13 @@ mod tests {
     /// A constant charge drives no current. What was wrong before stays as long as the deck's `xmu` lets it.
     #[test]
     fn a_constant_charge_drives_no_current() {
-        for rule in [Rule::First, Rule::Trapezoidal(0.5), Rule::Gear] {
+        for rule in [DifferentiationRule::First, DifferentiationRule::Trapezoidal(0.5), DifferentiationRule::Gear] {
             assert_eq!(Companion::new(rule, 3e-9, 2e-9).current(1e-3, [1e-3; 2], 0.0), 0.0);
         }
         let after = |mu: f64, n: usize| {
-            (0..n).fold(1.0, |i, _| Companion::new(Rule::Trapezoidal(mu), 1e-9, 1e-9).current(1e-3, [1e-3; 2], i))
+            (0..n).fold(1.0, |i, _| {
+                Companion::new(DifferentiationRule::Trapezoidal(mu), 1e-9, 1e-9).current(1e-3, [1e-3; 2], i)
+            })
         };
         assert!(after(0.5, 10) == 1.0 && after(0.45, 12).abs() < 0.1);
     }
@@ -135,7 +142,7 @@ mod tests {
     /// Halving the step quarters the error: second order on a smooth charge.
     #[test]
     fn second_order_on_a_sine() {
-        let error = |n: usize, rule: Rule| {
+        let error = |n: usize, rule: DifferentiationRule| {
             let h = 1.0 / n as f64;
             let c = Companion::new(rule, h, h);
             let mut i = h.cos();
@@ -146,7 +153,7 @@ mod tests {
             };
             (2..=n).map(at).fold(0.0, f64::max)
         };
-        for rule in [Rule::Trapezoidal(0.5), Rule::Gear] {
+        for rule in [DifferentiationRule::Trapezoidal(0.5), DifferentiationRule::Gear] {
             let ratio = error(64, rule) / error(128, rule);
             assert!((3.8..4.2).contains(&ratio), "{rule:?}: {ratio}");
         }
@@ -156,7 +163,7 @@ mod tests {
     const EVEN: f64 = std::f64::consts::TAU / 28.0;
 
     /// A tank at these steps [rad], i = q' by a rule, L·i' = −q by the trapezoidal rule as in ngspice: its swing at the end over that at the start.
-    fn tank(rule: Rule, steps: impl Iterator<Item = f64>) -> f64 {
+    fn tank(rule: DifferentiationRule, steps: impl Iterator<Item = f64>) -> f64 {
         let (mut q, mut i, mut last, mut before) = ([1.0, EVEN.cos()], 0.0, 0.0, EVEN);
         for h in steps {
             let c = Companion::new(rule, h, before);
@@ -173,14 +180,14 @@ mod tests {
     /// corners of a source and double. Gear's method takes half of it within 76 cycles of 28 points.
     #[test]
     fn a_tank_keeps_its_swing() {
-        let bdf2 = tank(Rule::Gear, (0..28 * 76).map(|_| EVEN));
+        let bdf2 = tank(DifferentiationRule::Gear, (0..28 * 76).map(|_| EVEN));
         assert!((0.5..0.6).contains(&bdf2), "{bdf2}");
         let breathing = |n: u32| EVEN * (1.0 + 0.4 * (2.0 * EVEN * f64::from(n)).sin());
         let alternating = |n: u32| EVEN * [1.4, 0.6][n as usize % 2];
         let doubling = |n: u32| EVEN * [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.0, 1.0, 0.3][n as usize % 9];
         let steps: [&dyn Fn(u32) -> f64; 4] = [&|_| EVEN, &breathing, &alternating, &doubling];
         for (k, steps) in steps.iter().enumerate() {
-            let kept = tank(Rule::Trapezoidal(0.5), (0..10_000).map(*steps));
+            let kept = tank(DifferentiationRule::Trapezoidal(0.5), (0..10_000).map(*steps));
             assert!((kept - 1.0).abs() < 1e-9, "{k}: {kept}");
         }
     }

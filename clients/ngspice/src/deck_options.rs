@@ -2,11 +2,11 @@
 //!
 //! From version 43 on ngspice gives every number a value, so an option that is left to a rule reads 0 there: by the rule.
 
-use bimorph::options::{CompileOptions, MODEL, ModelOption, Range, Refused, Value};
+use bimorph::options::{CompileOptions, MODEL, ModelOption, OptionError, OptionValue, Range};
 
 /// A value as a deck can write it.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Written {
+pub enum DeckValue {
     /// `name=true`.
     Flag(bool),
     /// `name=1e-3`.
@@ -21,7 +21,7 @@ pub struct Declared {
     /// Its name.
     pub name: &'static str,
     /// What it reads where the line does not say it.
-    pub default: Written,
+    pub default: DeckValue,
     /// What it means, with its unit.
     pub text: String,
 }
@@ -30,11 +30,11 @@ pub struct Declared {
 pub fn declared() -> Vec<Declared> {
     let declare = |ModelOption { about, .. }: &ModelOption| {
         let unit = if matches!(about.unit, "" | "1") { String::new() } else { format!(" [{}]", about.unit) };
-        let zero = if about.default == Value::Unset { format!("; 0: {}", about.unset) } else { String::new() };
+        let zero = if about.default == OptionValue::Unset { format!("; 0: {}", about.unset) } else { String::new() };
         Declared {
             name: about.name,
             default: match (&about.default, about.range) {
-                (Value::Unset, Range::Names(_)) => Written::Text(String::new()),
+                (OptionValue::Unset, Range::Names(_)) => DeckValue::Text(String::new()),
                 (default, _) => written(default),
             },
             text: format!("{}{unit}{zero}", about.about()),
@@ -44,31 +44,31 @@ pub fn declared() -> Vec<Declared> {
 }
 
 /// A value as a deck writes it.
-pub fn written(value: &Value) -> Written {
+pub fn written(value: &OptionValue) -> DeckValue {
     match value {
-        Value::Unset => Written::Number(0.0),
-        Value::Flag(flag) => Written::Flag(*flag),
-        Value::Count(count) => Written::Number(*count as f64),
-        Value::Number(x) => Written::Number(*x),
-        Value::Name(name) => Written::Text(name.clone()),
+        OptionValue::Unset => DeckValue::Number(0.0),
+        OptionValue::Flag(flag) => DeckValue::Flag(*flag),
+        OptionValue::Count(count) => DeckValue::Number(*count as f64),
+        OptionValue::Number(x) => DeckValue::Number(*x),
+        OptionValue::Name(name) => DeckValue::Text(name.clone()),
     }
 }
 
 /// Gives an option what the deck says.
 ///
 /// # Errors
-/// [`Refused`]: a value that the option cannot have.
-pub fn choose(options: &mut CompileOptions, option: &ModelOption, written: &Written) -> Result<(), Refused> {
-    let unset = option.about.default == Value::Unset;
+/// [`OptionError`]: a value that the option cannot have.
+pub fn choose(options: &mut CompileOptions, option: &ModelOption, written: &DeckValue) -> Result<(), OptionError> {
+    let unset = option.about.default == OptionValue::Unset;
     let value = match (written, option.about.range) {
-        (Written::Number(x), _) if unset && *x == 0.0 => Value::Unset,
-        (Written::Text(text), _) if unset && text.is_empty() => Value::Unset,
+        (DeckValue::Number(x), _) if unset && *x == 0.0 => OptionValue::Unset,
+        (DeckValue::Text(text), _) if unset && text.is_empty() => OptionValue::Unset,
         // a fraction stays a number, which no count is
-        (Written::Number(x), Range::Count(..)) if *x >= 0.0 && x.fract() == 0.0 => Value::Count(*x as usize),
-        (Written::Number(x), _) => Value::Number(*x),
-        (Written::Flag(flag), _) => Value::Flag(*flag),
+        (DeckValue::Number(x), Range::Count(..)) if *x >= 0.0 && x.fract() == 0.0 => OptionValue::Count(*x as usize),
+        (DeckValue::Number(x), _) => OptionValue::Number(*x),
+        (DeckValue::Flag(flag), _) => OptionValue::Flag(*flag),
         // ngspice 39 turns the line to lower case, and no name has another
-        (Written::Text(text), _) => Value::Name(text.to_ascii_lowercase()),
+        (DeckValue::Text(text), _) => OptionValue::Name(text.to_ascii_lowercase()),
     };
     options.choose(option, value)
 }

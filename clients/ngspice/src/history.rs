@@ -7,7 +7,7 @@
 //!
 //! Doubles: check, token, step; then p charges at this point, at the last two bases, p currents at the last, and p largest currents.
 
-use crate::companion::{Companion, Rule, hidden, shortest};
+use crate::companion::{Companion, DifferentiationRule, hidden, shortest};
 use bimorph::device::Token;
 
 /// A record as it was read.
@@ -50,7 +50,13 @@ impl Base {
 
     /// At the end of a step that ends at `t` and is `dt` long [s], with these charges there [C]: adds the currents that they
     /// make [A], and answers by how much each changes with its charge [1/s].
-    pub fn advance(&mut self, rule: Rule, (t, dt): (f64, f64), charges: &[f64], currents: &mut [f64]) -> f64 {
+    pub fn advance(
+        &mut self,
+        rule: DifferentiationRule,
+        (t, dt): (f64, f64),
+        charges: &[f64],
+        currents: &mut [f64],
+    ) -> f64 {
         if self.charges[0].iter().zip(&self.peaks).any(|(q, peak)| hidden((t, dt), *q, *peak)) {
             let slope = 1.0 / shortest(t);
             for (n, current) in currents.iter_mut().enumerate() {
@@ -60,7 +66,7 @@ impl Base {
                 self.charges[0][n] = q;
             }
             // one with the step before, unless the slope changed between them
-            self.step = if rule == Rule::First || self.step == 0.0 { 0.0 } else { self.step + dt };
+            self.step = if rule == DifferentiationRule::First || self.step == 0.0 { 0.0 } else { self.step + dt };
             return slope;
         }
         let companion = Companion::new(rule, dt, self.step);
@@ -144,12 +150,17 @@ mod tests {
     #[test]
     fn steps_of_rounding_are_crossed() {
         let q = |t: f64| vec![1e-13 + 2e-15 * t / 1e-6];
-        for rule in [Rule::Trapezoidal(0.5), Rule::Gear] {
+        for rule in [DifferentiationRule::Trapezoidal(0.5), DifferentiationRule::Gear] {
             let (mut base, mut before) = (Base::default(), 0.0);
             base.start(&q(0.0));
             for t in [1e-6, 2e-6, 2e-6 + 1e-18, 2e-6 + 3e-18, 3e-6, 4e-6] {
                 let mut current = [0.0];
-                base.advance(if before == 0.0 { Rule::First } else { rule }, (t, t - before), &q(t), &mut current);
+                base.advance(
+                    if before == 0.0 { DifferentiationRule::First } else { rule },
+                    (t, t - before),
+                    &q(t),
+                    &mut current,
+                );
                 assert!((current[0] / 2e-9 - 1.0).abs() < 1e-3, "{rule:?}: {current:?} at {t:e}");
                 before = t;
             }
@@ -160,9 +171,9 @@ mod tests {
     #[test]
     fn a_corner_is_kept_over_a_step_of_rounding() {
         let mut base = Base { step: 1e-6, charges: [vec![1e-15], vec![0.0]], currents: vec![0.0], peaks: vec![0.0] };
-        base.advance(Rule::First, (1e-6 + 1e-20, 1e-20), &[1e-15], &mut [0.0]);
+        base.advance(DifferentiationRule::First, (1e-6 + 1e-20, 1e-20), &[1e-15], &mut [0.0]);
         let mut current = [0.0];
-        base.advance(Rule::Gear, (2e-6, 1e-6), &[1e-15], &mut current);
+        base.advance(DifferentiationRule::Gear, (2e-6, 1e-6), &[1e-15], &mut current);
         assert_eq!(current, [0.0]);
     }
 
@@ -171,7 +182,7 @@ mod tests {
     fn settled_charges_take_their_currents_along() {
         let run = |asked: f64, settled: f64| {
             let mut base = base(1.0);
-            let slope = base.advance(Rule::Trapezoidal(0.5), (5e-9, 1e-9), &[asked, 0.0], &mut [0.0; 2]);
+            let slope = base.advance(DifferentiationRule::Trapezoidal(0.5), (5e-9, 1e-9), &[asked, 0.0], &mut [0.0; 2]);
             base.settle(&[settled, 0.0], slope);
             base.currents[0]
         };

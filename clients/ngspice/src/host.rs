@@ -1,7 +1,7 @@
 //! The host's functions, reached through the table it gives the plug-in.
 
-use crate::abi::{Instance, Model, slot};
-use crate::layout::{Generation, Layout};
+use crate::abi::{InstanceHead, ModelHead, slot};
+use crate::layout::{Generation, HostLayout};
 use std::cell::UnsafeCell;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ impl Core {
 }
 
 /// Model and circuit, as ngspice passes them to a device's functions.
-type OverModel = unsafe extern "C" fn(*mut Model, *mut c_void) -> c_int;
+type OverModel = unsafe extern "C" fn(*mut ModelHead, *mut c_void) -> c_int;
 
 /// Declares a call that is passed on to the host as it is.
 macro_rules! pass_on {
@@ -54,23 +54,23 @@ macro_rules! pass_on {
 }
 
 pass_on!(/// Allocates matrix entries and outputs.
-    setup, SETUP, (matrix: *mut c_void, model: *mut Model, circuit: *mut c_void, states: *mut c_int));
+    setup, SETUP, (matrix: *mut c_void, model: *mut ModelHead, circuit: *mut c_void, states: *mut c_int));
 pass_on!(/// Stores a model parameter.
-    model_param, MODEL_PARAM, (index: c_int, value: *mut c_void, model: *mut Model));
+    model_param, MODEL_PARAM, (index: c_int, value: *mut c_void, model: *mut ModelHead));
 pass_on!(/// Reads a model parameter.
-    model_ask, MODEL_ASK, (circuit: *mut c_void, model: *mut Model, index: c_int, value: *mut c_void));
+    model_ask, MODEL_ASK, (circuit: *mut c_void, model: *mut ModelHead, index: c_int, value: *mut c_void));
 pass_on!(/// Bounds the next step.
-    trunc, TRUNC, (model: *mut Model, circuit: *mut c_void, step: *mut f64));
+    trunc, TRUNC, (model: *mut ModelHead, circuit: *mut c_void, step: *mut f64));
 pass_on!(/// Frees an instance.
-    delete, DELETE, (instance: *mut Instance));
+    delete, DELETE, (instance: *mut InstanceHead));
 pass_on!(/// Frees a model.
-    model_delete, MODEL_DELETE, (model: *mut Model));
+    model_delete, MODEL_DELETE, (model: *mut ModelHead));
 
 /// Undoes [`setup`].
 ///
 /// # Safety
 /// The arguments are those with which the host called the plug-in.
-pub(crate) unsafe fn unsetup(model: *mut Model, circuit: *mut c_void) -> c_int {
+pub(crate) unsafe fn unsetup(model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     // SAFETY: the slot holds the host's function of this signature.
     unsafe { CORE.function::<OverModel>(slot::UNSETUP)(model, circuit) }
 }
@@ -79,7 +79,7 @@ pub(crate) unsafe fn unsetup(model: *mut Model, circuit: *mut c_void) -> c_int {
 ///
 /// # Safety
 /// The arguments are those with which the host called the plug-in.
-pub(crate) unsafe fn load(model: *mut Model, circuit: *mut c_void) -> c_int {
+pub(crate) unsafe fn load(model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     // SAFETY: as above.
     unsafe { CORE.function::<OverModel>(slot::LOAD)(model, circuit) }
 }
@@ -113,12 +113,12 @@ pub(crate) unsafe fn message(text: &str) {
     }
 }
 
-/// Whether the host is ngspice 42 to 44: there the function in [`Layout::telling_slot`] tells a circuit, from 45 on the
+/// Whether the host is ngspice 42 to 44: there the function in [`HostLayout::telling_slot`] tells a circuit, from 45 on the
 /// folder of the deck or null. Asked once, since a host does not change.
 ///
 /// # Safety
 /// To be called from within a call of the host, with its layout and the circuit it passed.
-pub(crate) unsafe fn until_44(layout: &Layout, circuit: *mut c_void) -> bool {
+pub(crate) unsafe fn until_44(layout: &HostLayout, circuit: *mut c_void) -> bool {
     static ANSWER: OnceLock<bool> = OnceLock::new();
     let Some(slot) = layout.telling_slot() else { return layout.generation < Generation::Since43 };
     *ANSWER.get_or_init(|| {
@@ -135,7 +135,12 @@ pub(crate) unsafe fn until_44(layout: &Layout, circuit: *mut c_void) -> bool {
 ///
 /// # Safety
 /// The arguments are those with which the host called the plug-in.
-pub(crate) unsafe fn bind(which: usize, model: *mut Model, circuit: *mut c_void, layout: &Layout) -> Option<c_int> {
+pub(crate) unsafe fn bind(
+    which: usize,
+    model: *mut ModelHead,
+    circuit: *mut c_void,
+    layout: &HostLayout,
+) -> Option<c_int> {
     // SAFETY: by contract.
     let first = layout.bind_slot(unsafe { until_44(layout, circuit) })?;
     // SAFETY: hosts that bind have these three functions there, of this signature.

@@ -4,12 +4,12 @@
 //! rejected steps lives in a [`History`], which the host rolls back; what stays here is only a cache or a count.
 
 use crate::alternation::Alternation;
-use crate::companion::Rule;
+use crate::companion::DifferentiationRule;
 use crate::history::History;
-use crate::question::{Answer, Outcome, Question};
-use crate::refusals::Refusals;
+use crate::question::{Evaluation, EvaluationOutcome, EvaluationRequest};
+use crate::refusals::FailedEvaluations;
 use crate::settings::{Monitor, PortName};
-use bimorph::device::scale::Scale;
+use bimorph::device::scale::PortScale;
 use bimorph::device::{
     Agitation, Description, Device, DeviceError, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial,
     TrialReply,
@@ -23,25 +23,25 @@ pub struct Instance {
     pub(crate) monitors: Vec<Monitor>,
     description: Description,
     /// Of each port.
-    pub(crate) scales: Vec<Scale>,
+    pub(crate) scales: Vec<PortScale>,
     /// What is given to each port, in its own unit.
     pub(crate) given: Vec<f64>,
     pub(crate) reply: TrialReply,
-    answer: Answer,
+    answer: Evaluation,
     small: SmallSignal,
     small_key: Option<(Token, u64)>,
     accepted: Option<Token>,
     /// The last equilibrium whose warnings were asked for.
     looked: Option<Token>,
     step_bound: f64,
-    refusals: Refusals,
+    refusals: FailedEvaluations,
     alternation: Alternation,
-    pub(crate) counts: Counts,
+    pub(crate) counts: InstanceCounters,
 }
 
 /// What an instance has been asked since it was opened.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Counts {
+pub(crate) struct InstanceCounters {
     /// Points that the circuit accepted.
     pub(crate) points: u64,
     /// Questions for currents.
@@ -109,7 +109,7 @@ impl Instance {
                     got: across.map_or(String::new(), |scale| format!("{}:{scale}", port.name)),
                 });
             }
-            scales.push(Scale::new(port.kind, across));
+            scales.push(PortScale::new(port.kind, across));
         }
         Ok(Self {
             scales,
@@ -119,15 +119,15 @@ impl Instance {
             monitors: monitors.to_vec(),
             description,
             reply: TrialReply::default(),
-            answer: Answer::default(),
+            answer: Evaluation::default(),
             small: SmallSignal::default(),
             small_key: None,
             accepted: None,
             looked: None,
             step_bound: f64::INFINITY,
-            refusals: Refusals::default(),
+            refusals: FailedEvaluations::default(),
             alternation: Alternation::default(),
-            counts: Counts::default(),
+            counts: InstanceCounters::default(),
         })
     }
 
@@ -142,7 +142,7 @@ impl Instance {
     }
 
     /// The last answer to a static or transient question.
-    pub fn answer(&self) -> &Answer {
+    pub fn answer(&self) -> &Evaluation {
         &self.answer
     }
 
@@ -168,7 +168,7 @@ impl Instance {
     }
 
     /// Asks the device. `previous` is the last accepted point; for a small signal, the operating point.
-    pub fn ask(&mut self, question: Question, voltages: &[f64], previous: &History) -> Outcome {
+    pub fn ask(&mut self, question: EvaluationRequest, voltages: &[f64], previous: &History) -> EvaluationOutcome {
         let mut given = std::mem::take(&mut self.given);
         given.clear();
         given.extend(voltages.iter().zip(&self.scales).map(|(v, scale)| v * scale.given));
@@ -177,17 +177,17 @@ impl Instance {
         outcome
     }
 
-    fn ask_given(&mut self, question: Question, voltages: &[f64], previous: &History) -> Outcome {
+    fn ask_given(&mut self, question: EvaluationRequest, voltages: &[f64], previous: &History) -> EvaluationOutcome {
         match question {
-            Question::Static => {
+            EvaluationRequest::Static => {
                 let outcome = self.trial(Mode::Static, 0.0, 0.0, voltages, previous.token);
                 self.finish(outcome, None, voltages, previous)
             }
-            Question::Transient { t, dt, rule } => {
+            EvaluationRequest::Transient { t, dt, rule } => {
                 let outcome = self.trial(Mode::Transient, t, dt, voltages, previous.token);
                 self.finish(outcome, Some((rule, t, dt)), voltages, previous)
             }
-            Question::SmallSignal { omega } => self.linearize(omega, previous.token),
+            EvaluationRequest::SmallSignal { omega } => self.linearize(omega, previous.token),
         }
     }
 
@@ -251,12 +251,12 @@ impl Instance {
     fn finish(
         &mut self,
         result: Result<(), DeviceError>,
-        time: Option<(Rule, f64, f64)>,
+        time: Option<(DifferentiationRule, f64, f64)>,
         given: &[f64],
         previous: &History,
-    ) -> Outcome {
+    ) -> EvaluationOutcome {
         if let Err(error) = result {
-            return Outcome::Stop(error.to_string());
+            return EvaluationOutcome::Stop(error.to_string());
         }
         let step = time.map(|(.., dt)| dt);
         let why = match &self.reply.status {
@@ -264,12 +264,12 @@ impl Instance {
                 self.refusals.solved(step);
                 self.step_bound = if time.is_some() { self.reply.dt_next } else { f64::INFINITY };
                 self.fill(time, previous);
-                return Outcome::Solved;
+                return EvaluationOutcome::Solved;
             }
             // The host shortens the step and asks again, by as much as it takes.
             Status::NeedDt(_) if step.is_some_and(|step| self.refusals.may_shorten(step)) => {
                 self.counts.refused += 1;
-                return Outcome::Retry;
+                return EvaluationOutcome::Retry;
             }
             Status::NeedDt(bound) => {
                 format!("the model needs steps below {bound:e} s, and even {:e} s is too long", step.unwrap_or(0.0))
@@ -278,7 +278,7 @@ impl Instance {
             Status::Fail(why) => why.clone(),
         };
         self.counts.refused += 1;
-        if self.refusals.refused(step) { Outcome::Stop(why) } else { Outcome::Retry }
+        if self.refusals.refused(step) { EvaluationOutcome::Stop(why) } else { EvaluationOutcome::Retry }
     }
 
     /// Why there is no equilibrium at what is given to the ports. A circuit without a path for direct current drives a port that
@@ -293,7 +293,7 @@ impl Instance {
     }
 
     /// Turns the reply into what ngspice wants; charges into currents where time passes.
-    fn fill(&mut self, time: Option<(Rule, f64, f64)>, previous: &History) {
+    fn fill(&mut self, time: Option<(DifferentiationRule, f64, f64)>, previous: &History) {
         let (reply, answer) = (&self.reply, &mut self.answer);
         let ports = reply.charges.len();
         answer.take(reply, time, &previous.base);
@@ -310,20 +310,20 @@ impl Instance {
         }
     }
 
-    fn linearize(&mut self, omega: f64, token: Option<Token>) -> Outcome {
+    fn linearize(&mut self, omega: f64, token: Option<Token>) -> EvaluationOutcome {
         let Some(token) = token else {
-            return Outcome::Stop("a small-signal analysis needs an operating point first".into());
+            return EvaluationOutcome::Stop("a small-signal analysis needs an operating point first".into());
         };
         if self.small_key == Some((token, omega.to_bits())) {
-            return Outcome::Solved;
+            return EvaluationOutcome::Solved;
         }
         self.small_key = None;
         match self.device.linearize(token, omega, &mut self.small) {
             Ok(()) => {
                 self.small_key = Some((token, omega.to_bits()));
-                Outcome::Solved
+                EvaluationOutcome::Solved
             }
-            Err(error) => Outcome::Stop(error.to_string()),
+            Err(error) => EvaluationOutcome::Stop(error.to_string()),
         }
     }
 }

@@ -33,7 +33,7 @@ pub enum Generation {
 
 /// Where a host keeps what the plug-in fills in or reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Layout {
+pub struct HostLayout {
     /// Generation of the host.
     pub generation: Generation,
     /// Built with OSDI: one more pointer in the device table.
@@ -44,7 +44,7 @@ pub struct Layout {
 
 /// A host whose layout is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-pub enum LayoutError {
+pub enum HostLayoutError {
     /// The host wrote no sizes, or at no known place.
     #[error(
         "this ngspice has an unknown device table (instance size field at byte {offset:?}); known are ngspice 39 to 47"
@@ -63,17 +63,17 @@ pub enum LayoutError {
     },
 }
 
-impl Layout {
+impl HostLayout {
     /// Finds the layout from the device table after registration. `size_at` reads the number a word points to;
     /// `version` is the host's major version where the user gave one, which tells 42 from 43.
     ///
     /// # Errors
-    /// [`LayoutError`] for a host that is not known.
+    /// [`HostLayoutError`] for a host that is not known.
     pub fn detect(
         table: &[usize; TABLE_WORDS],
         size_at: impl Fn(usize) -> i32,
         version: Option<u32>,
-    ) -> Result<Self, LayoutError> {
+    ) -> Result<Self, HostLayoutError> {
         let word = (FIRST_FREE_WORD..TABLE_WORDS - 1).find(|&w| table[w] != 0 && table[w + 1] != 0);
         let offset = word.map(|w| w * 8);
         let (osdi, cider) = match offset {
@@ -81,7 +81,7 @@ impl Layout {
             Some(368) => (true, false),
             Some(376) => (false, true),
             Some(384) => (true, true),
-            _ => return Err(LayoutError::Table { offset }),
+            _ => return Err(HostLayoutError::Table { offset }),
         };
         let size = word.map_or(0, |w| size_at(table[w]));
         let generation = match (size, version) {
@@ -91,7 +91,7 @@ impl Layout {
             // 42 and 43 differ in nothing the host shows; OSDI became the default with 43.
             (160, None) => [Generation::Since42, Generation::Since43][usize::from(osdi)],
             (224, _) => Generation::Since47,
-            _ => return Err(LayoutError::Instance { size }),
+            _ => return Err(HostLayoutError::Instance { size }),
         };
         Ok(Self { generation, osdi, cider })
     }
@@ -188,7 +188,7 @@ mod tests {
         ];
         for (offset, size, generation, functions, tail) in builds {
             let (table, size_at) = host(offset, size);
-            let layout = Layout::detect(&table, size_at, None).unwrap();
+            let layout = HostLayout::detect(&table, size_at, None).unwrap();
             assert_eq!((layout.generation, layout.functions(), layout.call_tail()), (generation, functions, tail));
             assert_eq!(layout.sizes(), offset);
         }
@@ -198,17 +198,18 @@ mod tests {
     #[test]
     fn version_given_by_the_user_decides_between_42_and_43() {
         let (table, size_at) = host(360, 160);
-        let layout = Layout::detect(&table, &size_at, Some(45)).unwrap();
+        let layout = HostLayout::detect(&table, &size_at, Some(45)).unwrap();
         assert_eq!(layout.generation, Generation::Since43);
         assert!(layout.new_parameters());
-        assert_eq!(Layout::detect(&table, &size_at, Some(42)).unwrap().generation, Generation::Since42);
+        assert_eq!(HostLayout::detect(&table, &size_at, Some(42)).unwrap().generation, Generation::Since42);
     }
 
     /// The functions that bind KLU's matrix stand behind all others: read from the code models that Debian's ngspice 44.2
     /// and 47 ship, which call slots 61 to 63 and 62 to 64; 45 added a function before them.
     #[test]
     fn klu_is_bound_by_the_hosts_own_functions() {
-        let layout = |size, osdi| Layout::detect(&host(if osdi { 384 } else { 376 }, size).0, |_| size, None).unwrap();
+        let layout =
+            |size, osdi| HostLayout::detect(&host(if osdi { 384 } else { 376 }, size).0, |_| size, None).unwrap();
         assert_eq!(layout(152, false).bind_slot(false), None);
         assert_eq!([layout(160, true).bind_slot(true), layout(160, true).bind_slot(false)], [Some(61), Some(62)]);
         assert_eq!(layout(224, true).bind_slot(false), Some(62));
@@ -218,9 +219,9 @@ mod tests {
     #[test]
     fn refuses_unknown_hosts() {
         let (table, size_at) = host(400, 160);
-        assert_eq!(Layout::detect(&table, size_at, None), Err(LayoutError::Table { offset: Some(400) }));
+        assert_eq!(HostLayout::detect(&table, size_at, None), Err(HostLayoutError::Table { offset: Some(400) }));
         let (table, size_at) = host(384, 232);
-        assert_eq!(Layout::detect(&table, size_at, None), Err(LayoutError::Instance { size: 232 }));
-        assert_eq!(Layout::detect(&[0; TABLE_WORDS], |_| 0, None), Err(LayoutError::Table { offset: None }));
+        assert_eq!(HostLayout::detect(&table, size_at, None), Err(HostLayoutError::Instance { size: 232 }));
+        assert_eq!(HostLayout::detect(&[0; TABLE_WORDS], |_| 0, None), Err(HostLayoutError::Table { offset: None }));
     }
 }

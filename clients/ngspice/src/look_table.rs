@@ -11,7 +11,7 @@ use std::ffi::{CString, c_int};
 
 /// The names, in the order of their numbers, as ngspice holds them and as instances do.
 #[derive(Default)]
-pub(crate) struct Names {
+pub(crate) struct LookNames {
     own: Vec<String>,
     written: Vec<String>,
 }
@@ -27,12 +27,12 @@ pub(crate) fn written(name: &str) -> String {
 }
 
 /// A table of instance parameters, to be handed to the host for good.
-pub(crate) struct Table {
+pub(crate) struct ParameterTable {
     pub(crate) count: &'static c_int,
     pub(crate) first: *const SpiceParameter,
 }
 
-impl Names {
+impl LookNames {
     /// The name with this number.
     pub(crate) fn get(&self, index: usize) -> Option<&str> {
         self.own.get(index).map(String::as_str)
@@ -42,7 +42,7 @@ impl Names {
     ///
     /// The host keeps no copy, but it may hold an address while it looks a name up: a table that was handed out is never freed.
     /// There is a new one for another set of names alone.
-    pub(crate) fn renew(&mut self, registry: &Registry) -> Option<Table> {
+    pub(crate) fn renew(&mut self, registry: &Registry) -> Option<ParameterTable> {
         let mut seen = HashSet::new();
         let (mut own, mut spelled, mut shown) = (Vec::new(), Vec::new(), Vec::new());
         let instances = || registry.instances();
@@ -72,7 +72,7 @@ impl Names {
             .collect();
         (self.own, self.written) = (own, spelled);
         let count = Box::leak(Box::new(parameters.len() as c_int));
-        Some(Table { count, first: Box::leak(parameters.into_boxed_slice()).as_ptr() })
+        Some(ParameterTable { count, first: Box::leak(parameters.into_boxed_slice()).as_ptr() })
     }
 }
 

@@ -1,10 +1,10 @@
 //! The `.model` line of a device: what was given, checked and with its defaults.
 
-use crate::deck_options::{self, Written};
+use crate::deck_options::{self, DeckValue};
 use crate::settings::{self, Monitor, PortName};
 use bimorph::compile::CompileOptions;
 use bimorph::device::Agitation;
-use bimorph::options::{MODEL, Refused};
+use bimorph::options::{MODEL, OptionError};
 use std::path::PathBuf;
 use std::time::Duration;
 use thiserror::Error;
@@ -31,7 +31,7 @@ pub struct RawCard {
     /// `noise_band` [Hz]
     pub noise_band: Option<f64>,
     /// The options of the model, in the order of [`MODEL`]; those that were left out are none.
-    pub options: Vec<Option<Written>>,
+    pub options: Vec<Option<DeckValue>>,
 }
 
 /// A checked `.model` line.
@@ -82,7 +82,7 @@ pub enum CardError {
     Address,
     /// An option of the model that cannot be so.
     #[error(transparent)]
-    Option(#[from] Refused),
+    Option(#[from] OptionError),
     /// A number is not positive.
     #[error("{name}={value} must be positive")]
     NotPositive {
@@ -192,7 +192,7 @@ mod tests {
     use bimorph::options::{Formulation, Junctions, Scheme};
 
     /// A line with these options.
-    fn with(given: &[(&str, Written)]) -> RawCard {
+    fn with(given: &[(&str, DeckValue)]) -> RawCard {
         let find = |name: &str| given.iter().find(|(other, _)| *other == name).map(|(_, written)| written.clone());
         assert!(given.iter().all(|(name, _)| MODEL.iter().any(|option| option.about.name == *name)));
         RawCard { options: MODEL.iter().map(|option| find(option.about.name)).collect(), ..raw() }
@@ -205,7 +205,7 @@ mod tests {
     /// `band=0` is what ngspice shows of a line without it, and takes a band back.
     #[test]
     fn a_band_of_zero_is_by_the_scene() {
-        let card = ModelCard::new(&with(&[("band", Written::Number(0.0))]), None).unwrap();
+        let card = ModelCard::new(&with(&[("band", DeckValue::Number(0.0))]), None).unwrap();
         assert_eq!(card.options.band, None);
     }
 
@@ -229,15 +229,15 @@ mod tests {
             remote: Some("unix:///a".into()),
             deadline: Some(0.5),
             ..with(&[
-                ("tol", Written::Number(1e-4)),
-                ("band", Written::Number(1e6)),
-                ("linear", Written::Flag(true)),
-                ("undamped", Written::Flag(true)),
-                ("junctions", Written::Text("Offset".into())),
-                ("scheme", Written::Text("d1".into())),
-                ("segments", Written::Number(6.0)),
-                ("rotary_inertia", Written::Flag(true)),
-                ("formulation", Written::Text("rcr".into())),
+                ("tol", DeckValue::Number(1e-4)),
+                ("band", DeckValue::Number(1e6)),
+                ("linear", DeckValue::Flag(true)),
+                ("undamped", DeckValue::Flag(true)),
+                ("junctions", DeckValue::Text("Offset".into())),
+                ("scheme", DeckValue::Text("d1".into())),
+                ("segments", DeckValue::Number(6.0)),
+                ("rotary_inertia", DeckValue::Flag(true)),
+                ("formulation", DeckValue::Text("rcr".into())),
             ])
         };
         let card = ModelCard::new(&raw, None).unwrap();
@@ -267,11 +267,11 @@ mod tests {
     fn refusals() {
         assert_eq!(ModelCard::new(&RawCard::default(), None), Err(CardError::NoFile));
         for (name, bad) in [
-            ("tol", Written::Number(0.0)),
-            ("band", Written::Number(-1.0)),
-            ("segments", Written::Number(2.5)),
-            ("segments", Written::Number(1e6)),
-            ("junctions", Written::Text("welded".into())),
+            ("tol", DeckValue::Number(0.0)),
+            ("band", DeckValue::Number(-1.0)),
+            ("segments", DeckValue::Number(2.5)),
+            ("segments", DeckValue::Number(1e6)),
+            ("junctions", DeckValue::Text("welded".into())),
         ] {
             let refused = ModelCard::new(&with(&[(name, bad)]), None);
             assert!(matches!(&refused, Err(CardError::Option(r)) if r.option == name), "{refused:?}");

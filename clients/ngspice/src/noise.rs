@@ -6,12 +6,12 @@
 //! correlation. With g the adjoint at the ports and monitors and S their spectral densities
 //! ([`bimorph::device::Device::noise`]), the share is gᵀ·S·ḡ: ports that swing together are taken together.
 
-use crate::abi::Model;
+use crate::abi::ModelHead;
 use crate::call;
-use crate::circuit::Circuit;
+use crate::circuit::HostCircuit;
 use crate::instance::Instance;
-use crate::layout::Layout;
-use crate::registry::{Entry, registry};
+use crate::layout::HostLayout;
+use crate::registry::{RegisteredInstance, registry};
 use bimorph::device::{DeviceError, Token};
 use std::ffi::{c_int, c_void};
 
@@ -27,7 +27,7 @@ const FLAT: f64 = 1e-10;
 
 /// The host's data of a noise analysis, in part: the same from SPICE 3 on.
 #[repr(C)]
-pub(crate) struct Analysis {
+pub(crate) struct NoiseAnalysis {
     /// Frequency [Hz].
     frequency: f64,
     /// The one before it [Hz].
@@ -62,16 +62,16 @@ fn integral(before: [f64; 2], now: [f64; 2]) -> f64 {
 /// The arguments are those with which the host called the plug-in, in its layout.
 pub(crate) unsafe fn add(
     (mode, operation): (c_int, c_int),
-    model: *mut Model,
+    model: *mut ModelHead,
     circuit: *mut c_void,
-    layout: &Layout,
-    (analysis, density): (*mut Analysis, *mut f64),
+    layout: &HostLayout,
+    (analysis, density): (*mut NoiseAnalysis, *mut f64),
 ) -> Result<(), String> {
     if mode != DENSITY || operation != CALCULATE {
         return Ok(());
     }
     // SAFETY: by contract.
-    let (circuit, analysis) = unsafe { (Circuit::new(circuit, layout), &mut *analysis) };
+    let (circuit, analysis) = unsafe { (HostCircuit::new(circuit, layout), &mut *analysis) };
     if !circuit.noise() {
         return Err("the noise of .sp knows no electro-mechanical parts; use .noise".into());
     }
@@ -101,7 +101,7 @@ pub(crate) unsafe fn add(
 }
 
 /// The share of one instance in the density at the output.
-fn share(entry: &mut Entry, gains: &[[f64; 2]], frequency: f64) -> Result<f64, String> {
+fn share(entry: &mut RegisteredInstance, gains: &[[f64; 2]], frequency: f64) -> Result<f64, String> {
     let told = |why: &dyn std::fmt::Display, name: &str| format!("instance {name}: {why}");
     let name = entry.instance.name().to_owned();
     let Some(token) = entry.balanced else {

@@ -3,10 +3,10 @@
 use crate::model_card::ModelCard;
 use crate::{names, told};
 use bimorph::analysis::{AnalysisError, mesh};
-use bimorph::compile::{CompileError, CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileError, CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError};
-use bimorph::front::{self, Asked, FrontError};
+use bimorph::front::{self, FrontError, LayoutChoice};
 use bimorph::layout::LayoutError;
 use bimorph::layout::convert::ConvertError;
 use bimorph::netlist::{self, Bundle};
@@ -183,7 +183,7 @@ fn read(file: &str, folders: &[PathBuf], directory: Option<&Path>) -> Result<Bun
         tried: candidates.iter().map(|p| format!("\"{}\"", p.display())).collect::<Vec<_>>().join(", "),
         source,
     };
-    match front::read(&path, &[], &Asked::default(), &mut |_| (), &mut |_| true) {
+    match front::read(&path, &[], &LayoutChoice::default(), &mut |_| (), &mut |_| true) {
         Ok(source) => Ok(source.bundle),
         Err(FrontError::Read { source, .. }) => Err(unread(source)),
         Err(FrontError::Convert(ConvertError::Layout(LayoutError::Read { reason, .. }))) => {
@@ -194,18 +194,18 @@ fn read(file: &str, folders: &[PathBuf], directory: Option<&Path>) -> Result<Bun
 }
 
 /// Models kept for instances and analyses to share; the one that nobody asked for longest makes room.
-const KEPT: usize = 16;
+const MAX_MODELS: usize = 16;
 
-struct Kept {
+struct SharedModel {
     bundle: Bundle,
     options: CompileOptions,
-    model: Arc<Compiled>,
+    model: Arc<CompiledModel>,
 }
 
-static MODELS: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
+static MODELS: Mutex<Vec<SharedModel>> = Mutex::new(Vec::new());
 
 /// The model of a netlist text under these options, compiled once, with what is known of its mesh among its warnings.
-fn compiled(file: &str, bundle: Bundle, options: &CompileOptions) -> Result<Arc<Compiled>, OpenError> {
+fn compiled(file: &str, bundle: Bundle, options: &CompileOptions) -> Result<Arc<CompiledModel>, OpenError> {
     let mut models = MODELS.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(k) = models.iter().position(|k| k.bundle == bundle && k.options == *options) {
         let kept = models.remove(k);
@@ -216,10 +216,10 @@ fn compiled(file: &str, bundle: Bundle, options: &CompileOptions) -> Result<Arc<
     let drawn = compile(&bundle, options).map_err(|source| OpenError::Compile { file: file.to_owned(), source })?;
     // once for all instances of it
     let model = Arc::new(mesh::in_circuit(&drawn));
-    if models.len() == KEPT {
+    if models.len() == MAX_MODELS {
         models.remove(0);
     }
-    models.push(Kept { bundle, options: options.clone(), model: Arc::clone(&model) });
+    models.push(SharedModel { bundle, options: options.clone(), model: Arc::clone(&model) });
     Ok(model)
 }
 

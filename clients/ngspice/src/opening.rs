@@ -1,6 +1,6 @@
 //! Setup of the instances: from ngspice's lists of models and instances to open devices.
 
-use crate::abi::{Connection, Model};
+use crate::abi::{ConnectionData, ModelHead};
 use crate::call::{self, MONITORS, Reserved};
 use crate::instance::Instance;
 use crate::model_card::ModelCard;
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Safety
 /// `model` heads the host's list of models; each is set up. `circuit` is the host's, and `states` its count of states so far.
-pub(crate) unsafe fn open_all(model: *mut Model, circuit: *mut c_void, states: &mut c_int) -> Result<(), String> {
+pub(crate) unsafe fn open_all(model: *mut ModelHead, circuit: *mut c_void, states: &mut c_int) -> Result<(), String> {
     let remote = std::env::var("BIMORPH_REMOTE").ok();
     let share = match std::env::var("BIMORPH_TOL_SHARE") {
         Ok(text) => match text.parse() {
@@ -79,7 +79,7 @@ fn seed_of(seed: u64, name: &str) -> u64 {
 ///
 /// # Safety
 /// `conn` points to the connections of an instance that the host has set up in `circuit`.
-unsafe fn deck_directory(conn: *mut *mut Connection, circuit: *mut c_void) -> Option<PathBuf> {
+unsafe fn deck_directory(conn: *mut *mut ConnectionData, circuit: *mut c_void) -> Option<PathBuf> {
     if let Some(path) = std::env::var_os("BIMORPH_DECK_DIR") {
         return Some(path.into());
     }

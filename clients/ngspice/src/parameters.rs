@@ -1,8 +1,8 @@
 //! The parameters of a `.model` line as ngspice holds them.
 
-use crate::abi::{Parameter, Value};
+use crate::abi::{Parameter, ParameterValue};
 use crate::call::text;
-use crate::deck_options::{Written, declared};
+use crate::deck_options::{DeckValue, declared};
 use crate::model_card::RawCard;
 use crate::table::OWN_COUNT;
 use std::ffi::c_int;
@@ -16,7 +16,7 @@ pub(crate) unsafe fn card(param: *mut *mut Parameter, count: c_int) -> RawCard {
     let slot = |n: usize| unsafe {
         (n < count as usize).then(|| &**param.add(n)).filter(|p| p.is_null == 0 && !p.element.is_null() && p.size > 0)
     };
-    let value = |n: usize, i: usize| -> Option<&Value> {
+    let value = |n: usize, i: usize| -> Option<&ParameterValue> {
         // SAFETY: a given parameter has `size` elements.
         slot(n).filter(|p| i < p.size as usize).map(|p| unsafe { &*p.element.add(i) })
     };
@@ -39,9 +39,9 @@ pub(crate) unsafe fn card(param: *mut *mut Parameter, count: c_int) -> RawCard {
         noise_band: real(8),
         options: (declared().iter().zip(OWN_COUNT..))
             .map(|(declared, n)| match declared.default {
-                Written::Flag(_) => flag(n).map(Written::Flag),
-                Written::Number(_) => real(n).map(Written::Number),
-                Written::Text(_) => string(n, 0).map(Written::Text),
+                DeckValue::Flag(_) => flag(n).map(DeckValue::Flag),
+                DeckValue::Number(_) => real(n).map(DeckValue::Number),
+                DeckValue::Text(_) => string(n, 0).map(DeckValue::Text),
             })
             .collect(),
     }

@@ -1,12 +1,12 @@
 //! What ngspice asks of an instance, and what it is told.
 
-use crate::companion::Rule;
+use crate::companion::DifferentiationRule;
 use crate::history::Base;
 use bimorph::device::{Token, TrialReply};
 
 /// What ngspice asks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Question {
+pub enum EvaluationRequest {
     /// Operating point or sweep: equilibrium.
     Static,
     /// A step of `dt` [s] that ends at `t` [s].
@@ -16,7 +16,7 @@ pub enum Question {
         /// Length [s], positive.
         dt: f64,
         /// How charges are differentiated over it.
-        rule: Rule,
+        rule: DifferentiationRule,
     },
     /// Small-signal answer at `omega` [rad/s].
     SmallSignal {
@@ -27,7 +27,7 @@ pub enum Question {
 
 /// What becomes of a question.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
+pub enum EvaluationOutcome {
     /// The instance holds the answer.
     Solved,
     /// No answer for this step: ngspice shall try a shorter one, or another way to the operating point.
@@ -38,7 +38,7 @@ pub enum Outcome {
 
 /// Currents, conductances and monitors as ngspice wants them. p ports, s monitors; matrices row-major.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Answer {
+pub struct Evaluation {
     /// State reached.
     pub token: Option<Token>,
     /// Step that led to it [s]; 0 for equilibrium.
@@ -59,10 +59,10 @@ pub struct Answer {
     pub monitor_gains: Vec<f64>,
 }
 
-impl Answer {
+impl Evaluation {
     /// Takes a reply over, its charges as currents where time passes: by a rule, to t [s], over a step [s], from what the point before has
     /// left.
-    pub(crate) fn take(&mut self, reply: &TrialReply, time: Option<(Rule, f64, f64)>, base: &Base) {
+    pub(crate) fn take(&mut self, reply: &TrialReply, time: Option<(DifferentiationRule, f64, f64)>, base: &Base) {
         self.token = reply.token;
         (self.step, self.slope) = (time.map_or(0.0, |(.., dt)| dt), 0.0);
         self.charges.clone_from(&reply.charges);

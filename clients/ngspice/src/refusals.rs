@@ -15,14 +15,14 @@ const HOPELESS: f64 = 1e-4;
 
 /// Refused evaluations of an instance.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Refusals {
+pub(crate) struct FailedEvaluations {
     in_a_row: u32,
     at_rest: u32,
     /// Longest step so far [s].
     longest: f64,
 }
 
-impl Refusals {
+impl FailedEvaluations {
     /// After an evaluation with a result. `step`: its length [s]; none at rest.
     pub(crate) fn solved(&mut self, step: Option<f64>) {
         self.in_a_row = 0;
@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn four_in_a_row() {
         for step in [None, Some(1.0)] {
-            let mut refusals = Refusals::default();
+            let mut refusals = FailedEvaluations::default();
             refusals.solved(step);
             assert_eq!([(); 4].map(|()| refusals.refused(step)), [false, false, false, true]);
         }
@@ -75,7 +75,7 @@ mod tests {
     #[test]
     fn refusals_between_results_are_counted() {
         let count = |converges: bool| {
-            let mut refusals = Refusals::default();
+            let mut refusals = FailedEvaluations::default();
             (1..100).find(|_| {
                 refusals.solved(None);
                 if converges {
@@ -90,7 +90,7 @@ mod tests {
     /// A step of a ten-thousandth of the longest one is the last attempt.
     #[test]
     fn creeping_steps_are_hopeless() {
-        let mut refusals = Refusals::default();
+        let mut refusals = FailedEvaluations::default();
         refusals.solved(Some(1.0));
         assert!(refusals.may_shorten(2e-4) && !refusals.may_shorten(1e-4) && refusals.refused(Some(1e-4)));
     }

@@ -1,16 +1,16 @@
 //! The instances ngspice has set up, and what they share during a load.
 
 use crate::call::{Reserved, Wanted};
-use crate::circuit::Circuit;
+use crate::circuit::HostCircuit;
 use crate::history::History;
 use crate::instance::Instance;
-use crate::look_table::Names;
+use crate::look_table::LookNames;
 use crate::trace;
 use bimorph::device::Token;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// An instance with what its calls reuse.
-pub(crate) struct Entry {
+pub(crate) struct RegisteredInstance {
     key: usize,
     /// Names the run its records belong to.
     pub(crate) epoch: u64,
@@ -46,10 +46,10 @@ pub(crate) struct Entry {
 
 /// Every instance, and what concerns the load under way.
 pub(crate) struct Registry {
-    entries: Vec<Entry>,
+    entries: Vec<RegisteredInstance>,
     epochs: u64,
     /// The circuit being loaded, and by which of the host's functions.
-    pub(crate) loading: Option<(Circuit, Wanted)>,
+    pub(crate) loading: Option<(HostCircuit, Wanted)>,
     /// Whether every instance has answered in this load.
     pub(crate) good: bool,
     /// Set when the analysis must end: no device is asked any more.
@@ -57,7 +57,7 @@ pub(crate) struct Registry {
     /// Key of the instance being asked.
     pub(crate) asked: usize,
     /// What can be asked of instances by name; none before the first setup.
-    pub(crate) names: Option<Names>,
+    pub(crate) names: Option<LookNames>,
 }
 
 static REGISTRY: Mutex<Registry> = Mutex::new(Registry {
@@ -81,7 +81,7 @@ pub(crate) fn register(key: usize, instance: Instance, memory: Reserved) {
     registry.epochs += 1;
     registry.stopped = false;
     trace::line(format_args!("open {} epoch {} {:?}", instance.name(), registry.epochs, instance.description()));
-    let entry = Entry {
+    let entry = RegisteredInstance {
         key,
         epoch: registry.epochs,
         instance,
@@ -123,7 +123,7 @@ impl Registry {
     }
 
     /// The instance whose connections stand at `key`: that address stays the same as long as it lives.
-    pub(crate) fn find(&mut self, key: usize) -> Option<&mut Entry> {
+    pub(crate) fn find(&mut self, key: usize) -> Option<&mut RegisteredInstance> {
         self.entries.iter_mut().find(|e| e.key == key)
     }
 }

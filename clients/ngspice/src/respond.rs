@@ -1,32 +1,32 @@
 //! One call of the model: read what ngspice asks, ask the device, write the answer and what is to be remembered.
 
-use crate::call::{Call, MONITORS, PORTS};
-use crate::circuit::Circuit;
+use crate::call::{MONITORS, ModelCall, PORTS};
+use crate::circuit::HostCircuit;
 use crate::history;
 use crate::instance::Instance;
-use crate::question::{Outcome, Question};
-use crate::registry::{Entry, Registry};
+use crate::question::{EvaluationOutcome, EvaluationRequest};
+use crate::registry::{RegisteredInstance, Registry};
 use crate::{host, trace};
 use bimorph::device::Status;
 
 /// Answers a call.
-pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
+pub(crate) fn respond(call: &ModelCall<'_>, registry: &mut Registry) -> EvaluationOutcome {
     let Some(entry) = registry.find(call.key()) else {
-        return Outcome::Stop("an instance was not set up".into());
+        return EvaluationOutcome::Stop("an instance was not set up".into());
     };
     let question = match call.question() {
         Ok(question) => question,
-        Err(why) => return Outcome::Stop(why.into()),
+        Err(why) => return EvaluationOutcome::Stop(why.into()),
     };
     let ports = call.size(PORTS);
-    let from = usize::from(!matches!(question, Question::SmallSignal { .. }));
+    let from = usize::from(!matches!(question, EvaluationRequest::SmallSignal { .. }));
     let (Some(recalled), Some(now)) = (call.memory(from, entry.memory), call.memory(0, entry.memory)) else {
-        return Outcome::Stop("ngspice gave no state memory".into());
+        return EvaluationOutcome::Stop("ngspice gave no state memory".into());
     };
     // SAFETY: this is within a load; the memory has the size that was reserved.
     let recalled = unsafe { std::slice::from_raw_parts(recalled, entry.memory.doubles) };
     history::read(recalled, entry.epoch, &mut entry.previous);
-    if question == Question::Static && call.sweep() {
+    if question == EvaluationRequest::Static && call.sweep() {
         if !entry.sweeping || entry.job != call.job() {
             // the host's memory still holds a point of the analysis or the sweep before, which is no point of this sweep
             entry.stale = entry.previous.token;
@@ -37,27 +37,27 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
         } else {
             entry.stale = None;
         }
-    } else if question == Question::Static {
+    } else if question == EvaluationRequest::Static {
         // from rest
         entry.previous.token = None;
     }
-    entry.sweeping = question == Question::Static && call.sweep();
-    if matches!(question, Question::SmallSignal { .. }) {
+    entry.sweeping = question == EvaluationRequest::Static && call.sweep();
+    if matches!(question, EvaluationRequest::SmallSignal { .. }) {
         // A host that takes this for a transient has copied another point's record over this one's.
         entry.previous.token = entry.balanced.or(entry.previous.token);
     }
-    if matches!(question, Question::Transient { .. }) && !entry.integrals {
+    if matches!(question, EvaluationRequest::Transient { .. }) && !entry.integrals {
         // SAFETY: this is within a load of a transient, and the charges lie within this point's memory.
         entry.integrals = unsafe { (0..ports).all(|n| host::integral(now.add(history::HEAD + n))) };
     }
     call.voltages(&mut entry.voltages);
     let outcome = entry.instance.ask(question, &entry.voltages, &entry.previous);
-    if outcome == Outcome::Solved {
-        if question == Question::Static {
+    if outcome == EvaluationOutcome::Solved {
+        if question == EvaluationRequest::Static {
             entry.balanced = entry.instance.answer().token;
         }
         match question {
-            Question::SmallSignal { .. } => write_gains(call, &entry.instance),
+            EvaluationRequest::SmallSignal { .. } => write_gains(call, &entry.instance),
             _ => write_answer(call, entry, now),
         }
     }
@@ -67,7 +67,7 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
     outcome
 }
 
-fn write_answer(call: &Call<'_>, entry: &mut Entry, memory: *mut f64) {
+fn write_answer(call: &ModelCall<'_>, entry: &mut RegisteredInstance, memory: *mut f64) {
     let (answer, ports) = (entry.instance.answer(), call.size(PORTS));
     entry.nodes.clear();
     entry.nodes.extend((0..ports).map(|n| call.given(n)));
@@ -95,7 +95,7 @@ const STILL: f64 = 1e-6;
 const MAX_FURTHER: u32 = 4;
 
 /// Whether the monitors of an equilibrium still move, where ngspice's own test is met: it ends at `reltol`.
-pub(crate) fn moves(entry: &mut Entry, circuit: Circuit) -> bool {
+pub(crate) fn moves(entry: &mut RegisteredInstance, circuit: HostCircuit) -> bool {
     let moved = |nodes: &[i32; 2]| {
         // SAFETY: nodes of the circuit, as the host set them up.
         let (new, old) = unsafe { (circuit.solved(*nodes), circuit.loaded_at(*nodes)) };
@@ -113,7 +113,7 @@ pub(crate) fn moves(entry: &mut Entry, circuit: Circuit) -> bool {
 /// currents went on straight, along their derivatives, and so did the charge that the circuit delivered. The next step has
 /// to begin from that charge: what is left out at each point would be lost or gained for good, and always with the same
 /// sign where a charge curves one way.
-pub(crate) fn settle(entry: &mut Entry, circuit: Circuit) {
+pub(crate) fn settle(entry: &mut RegisteredInstance, circuit: HostCircuit) {
     // SAFETY: nodes of the circuit, as the host set them up.
     let asked_here = (entry.nodes.iter().zip(&entry.voltages))
         .all(|(nodes, volts)| unsafe { circuit.loaded_at(*nodes) }.to_bits() == volts.to_bits());
@@ -135,7 +135,7 @@ pub(crate) fn settle(entry: &mut Entry, circuit: Circuit) {
     entry.record = 0;
 }
 
-fn write_gains(call: &Call<'_>, instance: &Instance) {
+fn write_gains(call: &ModelCall<'_>, instance: &Instance) {
     let ports = call.size(PORTS);
     for n in 0..ports {
         call.set_gains(PORTS, n, instance.admittances(n));
@@ -145,7 +145,7 @@ fn write_gains(call: &Call<'_>, instance: &Instance) {
     }
 }
 
-fn trace_call(entry: &Entry, question: Question, outcome: &Outcome) {
+fn trace_call(entry: &RegisteredInstance, question: EvaluationRequest, outcome: &EvaluationOutcome) {
     let (name, answer) = (entry.instance.name(), entry.instance.answer());
     let refusal = match &entry.instance.reply.status {
         Status::Ok => String::new(),

@@ -4,12 +4,12 @@
 //! device. Only then the layout is known and the second part, the functions, can be written.
 
 use crate::abi::{
-    Bound42, Complex, ConnectionInfo, ParameterInfo42, ParameterInfo43, ParameterInfoTail, SpiceParameter, Value, kind,
-    port,
+    Bound42, Complex, ConnectionInfo, ParameterInfo42, ParameterInfo43, ParameterInfoTail, ParameterValue,
+    SpiceParameter, kind, port,
 };
 use crate::callbacks;
-use crate::deck_options::{Declared, Written, declared};
-use crate::layout::{Layout, LayoutError, TABLE_WORDS};
+use crate::deck_options::{DeckValue, Declared, declared};
+use crate::layout::{HostLayout, HostLayoutError, TABLE_WORDS};
 use crate::look_table;
 use crate::model_card::DEADLINE;
 use std::cell::UnsafeCell;
@@ -26,12 +26,12 @@ pub(crate) struct Declaration {
     /// What ngspice shows where the line leaves it out; none: no text, an empty list. From 43 on it refuses a line that
     /// leaves out a number or a boolean without one; that a parameter was left out can still be told, so the plug-in itself
     /// never reads these.
-    default: Option<Value>,
+    default: Option<ParameterValue>,
     text: CString,
 }
 
 const STRINGS: c_int = kind::IF_STRING | kind::IF_VECTOR;
-const NOTHING: Value = Value { complex: Complex { re: 0.0, im: 0.0 } };
+const NOTHING: ParameterValue = ParameterValue { complex: Complex { re: 0.0, im: 0.0 } };
 
 /// The parameters that are the plug-in's own; the options of a model follow them.
 const OWN: [(&str, c_int, c_int, Option<f64>, &str); OWN_COUNT] = [
@@ -56,7 +56,7 @@ pub(crate) const OWN_COUNT: usize = 9;
 
 /// Parameters of a `.model` line, in the order of [`crate::parameters::card`].
 fn parameters() -> Vec<Declaration> {
-    let real = |x| Value { complex: Complex { re: x, im: 0.0 } };
+    let real = |x| ParameterValue { complex: Complex { re: x, im: 0.0 } };
     let text = |text: &str| CString::new(text).unwrap_or_default();
     let own = OWN.iter().map(|(name, kind, data_type, default, about)| Declaration {
         name: text(name),
@@ -67,13 +67,13 @@ fn parameters() -> Vec<Declaration> {
     });
     let option = |declared: Declared| {
         let (kind, data_type, default) = match declared.default {
-            Written::Flag(flag) => {
+            DeckValue::Flag(flag) => {
                 let mut value = NOTHING;
                 value.flag = flag.into();
                 (kind::BOOLEAN, kind::IF_FLAG, Some(value))
             }
-            Written::Number(x) => (kind::REAL, kind::IF_REAL, Some(real(x))),
-            Written::Text(_) => (kind::STRING, kind::IF_STRING, None),
+            DeckValue::Number(x) => (kind::REAL, kind::IF_REAL, Some(real(x))),
+            DeckValue::Text(_) => (kind::STRING, kind::IF_STRING, None),
         };
         Declaration { name: text(declared.name), kind, data_type, default, text: text(&declared.text) }
     };
@@ -209,18 +209,18 @@ fn connection<const N: usize>(
 }
 
 /// The device table, with room for any host's.
-pub(crate) struct Table(UnsafeCell<[usize; TABLE_WORDS]>);
+pub(crate) struct DeviceTable(UnsafeCell<[usize; TABLE_WORDS]>);
 
 // SAFETY: the plug-in writes it only while the host loads it or sets circuits up, from the host's thread; the host reads it afterwards.
-unsafe impl Sync for Table {}
+unsafe impl Sync for DeviceTable {}
 
 /// The one device of this plug-in.
-pub(crate) static DEVICE: Table = Table(UnsafeCell::new([0; TABLE_WORDS]));
+pub(crate) static DEVICE: DeviceTable = DeviceTable(UnsafeCell::new([0; TABLE_WORDS]));
 
 /// The host's layout, once known.
-pub(crate) static LAYOUT: OnceLock<Layout> = OnceLock::new();
+pub(crate) static LAYOUT: OnceLock<HostLayout> = OnceLock::new();
 
-impl Table {
+impl DeviceTable {
     /// Address handed to the host.
     pub(crate) fn address(&self) -> *mut c_void {
         self.0.get().cast()
@@ -262,7 +262,7 @@ impl Table {
     ///
     /// # Safety
     /// The host has called the plug-in and waits for it; it reads these two words when it looks a name up.
-    pub(crate) unsafe fn set_instance_parameters(&self, parameters: &look_table::Table) {
+    pub(crate) unsafe fn set_instance_parameters(&self, parameters: &look_table::ParameterTable) {
         // SAFETY: by contract; what they point to stays for good.
         unsafe {
             self.put(40, std::ptr::from_ref(parameters.count));
@@ -273,13 +273,13 @@ impl Table {
     /// Finds the host's layout from what it wrote, then fills in the functions.
     ///
     /// # Errors
-    /// [`LayoutError`]: nothing was filled in.
+    /// [`HostLayoutError`]: nothing was filled in.
     ///
     /// # Safety
     /// The host has registered this table and is still loading the plug-in.
-    pub(crate) unsafe fn complete(&self, version: Option<u32>) -> Result<Layout, LayoutError> {
+    pub(crate) unsafe fn complete(&self, version: Option<u32>) -> Result<HostLayout, HostLayoutError> {
         // SAFETY: by contract nobody else uses the table now; what the host wrote are addresses of its own integers.
-        let layout = unsafe { Layout::detect(&*self.0.get(), |at| *(at as *const c_int), version)? };
+        let layout = unsafe { HostLayout::detect(&*self.0.get(), |at| *(at as *const c_int), version)? };
         let declarations = declarations();
         let at = layout.functions();
         // SAFETY: offsets of the host's own device functions; the types are theirs.

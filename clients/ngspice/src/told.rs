@@ -6,29 +6,29 @@ use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 
 /// Lines that a process tells, at most.
-const MOST: usize = 200;
+const MAX_LINES: usize = 200;
 /// Those about one kind of warning of one instance: analyses after one another say much the same, and what grows is told at three times as much.
-const MOST_ALIKE: usize = 6;
+const MAX_ALIKE: usize = 6;
 
 /// What was told of whom, by code.
-static TOLD: Mutex<Vec<(String, String, String)>> = Mutex::new(Vec::new());
+static REPORTED: Mutex<Vec<(String, String, String)>> = Mutex::new(Vec::new());
 
 /// Warnings of a netlist. Those that its circuit is left out are none where the deck has it.
 pub(crate) fn of_netlist(file: &str, has_circuit: bool, warnings: &[Diagnostic]) {
     let of_circuit = |code: &str| has_circuit && ["W013", "W021", "W022"].contains(&code);
-    warnings.iter().filter(|w| !of_circuit(&w.code)).for_each(|warning| tell(file, warning, MOST));
+    warnings.iter().filter(|w| !of_circuit(&w.code)).for_each(|warning| tell(file, warning, MAX_LINES));
 }
 
 /// Warnings of what an instance came to.
 pub(crate) fn of_instance(name: &str, warnings: &[Diagnostic]) {
     let name = format!("instance {name}");
-    warnings.iter().for_each(|warning| tell(&name, warning, MOST_ALIKE));
+    warnings.iter().for_each(|warning| tell(&name, warning, MAX_ALIKE));
 }
 
 fn tell(whom: &str, warning: &Diagnostic, most: usize) {
-    let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut told = REPORTED.lock().unwrap_or_else(PoisonError::into_inner);
     let mut alike = told.iter().filter(|(of, code, _)| of == whom && *code == warning.code);
-    if told.len() == MOST || alike.clone().count() == most || alike.any(|(.., text)| *text == warning.message) {
+    if told.len() == MAX_LINES || alike.clone().count() == most || alike.any(|(.., text)| *text == warning.message) {
         return;
     }
     let line = format!("bimorph: {whom}: warning[{}]: {}", warning.code, warning.message);

@@ -7,9 +7,9 @@
 
 use super::error::SMALL;
 use super::error::relative_error;
-use super::runs::Progress;
-use super::spec::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
-use super::variant::Variant;
+use super::runs::ChartProgress;
+use super::spec::{Chart, ChartError, ChartPart, ChartPoint, ChartSpec, Formulation, RunMeasurement};
+use super::variant::ChartVariant;
 use crate::analysis::NodeMotion;
 use crate::analysis::integrator::Integrator;
 use crate::analysis::mesh::fitted_in_time;
@@ -30,18 +30,18 @@ const TIGHTER: f64 = 0.1;
 pub(super) const ANALYSES: [&str; 3] = ["static", "modes", "tran"];
 
 /// What an analysis gives.
-enum Found {
+enum AnalysisOutput {
     Nodes(Vec<(String, NodeMotion)>),
     Frequencies(Vec<f64>),
     Run(Box<TransientResult>),
 }
 
 /// One analysis: what it gives, what it tells of its error, and its work.
-struct Done {
-    found: Found,
+struct CompletedAnalysis {
+    found: AnalysisOutput,
     told: Option<f64>,
     unknowns: usize,
-    measured: Measured,
+    measured: RunMeasurement,
 }
 
 /// The points of every analysis and tolerance.
@@ -52,7 +52,7 @@ pub(super) fn defaults(
     (bundle, options): (&Bundle, &CompileOptions),
     (spec, stop): (&ChartSpec, f64),
     chart: &mut Chart,
-    progress: &mut Progress<'_>,
+    progress: &mut ChartProgress<'_>,
 ) -> Result<(), ChartError> {
     let tight = TIGHTER * spec.tols.iter().copied().fold(f64::INFINITY, f64::min);
     for analysis in ANALYSES {
@@ -62,7 +62,7 @@ pub(super) fn defaults(
             if progress.run(0.0) { done } else { Err(AnalysisError::Cancelled.into()) }
         };
         let point = |tol: f64| ChartPoint {
-            part: Part::Defaults,
+            part: ChartPart::Defaults,
             formulation: Formulation::Compliant,
             method: analysis,
             solver: SolverKind::Recursion.name(),
@@ -73,7 +73,7 @@ pub(super) fn defaults(
             failed: None,
         };
         let reference = match at(tight) {
-            Ok(reference) if still(&reference.found) => {
+            Ok(reference) if is_motionless(&reference.found) => {
                 let still = |&tol| ChartPoint { failed: Some("nothing moves".to_owned()), ..point(tol) };
                 chart.points.extend(spec.tols.iter().map(still));
                 progress.done += spec.tols.len() as f64;
@@ -87,8 +87,8 @@ pub(super) fn defaults(
                 (_, Err(error @ ChartError::Analysis(AnalysisError::Cancelled))) => return Err(error),
                 (Err(error), _) => Err(format!("the reference: {error}")),
                 (_, Err(error)) => Err(error.to_string()),
-                (Ok(reference), Ok(done)) => Ok(Done {
-                    measured: Measured {
+                (Ok(reference), Ok(done)) => Ok(CompletedAnalysis {
+                    measured: RunMeasurement {
                         error: Some(apart(&reference.found, &done.found)),
                         told: done.told,
                         ..done.measured
@@ -112,19 +112,19 @@ fn analyse(
     analysis: &str,
     tol: f64,
     watch: Watch<'_>,
-) -> Result<Done, ChartError> {
+) -> Result<CompletedAnalysis, ChartError> {
     let begun = Instant::now();
     let options = CompileOptions { tol, ..options.clone() };
-    let drawn = Variant::new(bundle, &options, options.band, spec.release.as_deref())?;
-    let mut measured = Measured::default();
+    let drawn = ChartVariant::new(bundle, &options, options.band, spec.release.as_deref())?;
+    let mut measured = RunMeasurement::default();
     let (found, told, unknowns) = match analysis {
         "static" => {
             let (fitted, result, _) = static_fitted(drawn.held().unwrap_or(drawn.moving()), &spec.voltages)?;
-            (Found::Nodes(result.nodes), fitted.order.estimated_error, result.unknowns)
+            (AnalysisOutput::Nodes(result.nodes), fitted.order.estimated_error, result.unknowns)
         }
         "modes" => {
             let (fitted, result, _) = modes_fitted(drawn.moving(), COUNT, &spec.voltages)?;
-            (Found::Frequencies(result.frequencies_hz), fitted.order.estimated_error, result.unknowns)
+            (AnalysisOutput::Frequencies(result.frequencies_hz), fitted.order.estimated_error, result.unknowns)
         }
         _ => {
             let asked = TransientOptions {
@@ -144,7 +144,7 @@ fn analyse(
             };
             let (result, ()) = with_step_error(&asked, &moving, &mut run, &mut |_, _| (), watch)?;
             let c = result.counters;
-            measured = Measured {
+            measured = RunMeasurement {
                 steps: c.steps,
                 rejected: c.rejected,
                 factorizations: c.factorizations,
@@ -154,26 +154,26 @@ fn analyse(
             };
             let told = result.estimated_error.map(|mesh| mesh.max(result.step_error.unwrap_or(0.0)));
             let unknowns = result.unknowns;
-            (Found::Run(Box::new(result)), told, unknowns)
+            (AnalysisOutput::Run(Box::new(result)), told, unknowns)
         }
     };
     measured.seconds = begun.elapsed().as_secs_f64();
-    Ok(Done { found, told, unknowns, measured })
+    Ok(CompletedAnalysis { found, told, unknowns, measured })
 }
 
 /// Nothing moves: nothing to compare.
-fn still(found: &Found) -> bool {
+fn is_motionless(found: &AnalysisOutput) -> bool {
     match found {
-        Found::Nodes(nodes) => nodes.iter().all(|(_, m)| m.x == 0.0 && m.y == 0.0),
-        Found::Frequencies(frequencies) => frequencies.is_empty(),
-        Found::Run(run) => run.signals.iter().all(|(_, _, values)| values.iter().all(|v| *v == values[0])),
+        AnalysisOutput::Nodes(nodes) => nodes.iter().all(|(_, m)| m.x == 0.0 && m.y == 0.0),
+        AnalysisOutput::Frequencies(frequencies) => frequencies.is_empty(),
+        AnalysisOutput::Run(run) => run.signals.iter().all(|(_, _, values)| values.iter().all(|v| *v == values[0])),
     }
 }
 
 /// The relative error of one result against another.
-fn apart(reference: &Found, found: &Found) -> f64 {
+fn apart(reference: &AnalysisOutput, found: &AnalysisOutput) -> f64 {
     match (reference, found) {
-        (Found::Nodes(want), Found::Nodes(got)) => {
+        (AnalysisOutput::Nodes(want), AnalysisOutput::Nodes(got)) => {
             let size = |m: &NodeMotion| m.x.hypot(m.y);
             let largest = want.iter().map(|(_, m)| size(m)).fold(0.0, f64::max);
             let one = |((_, w), (_, g)): (&(String, NodeMotion), &(String, NodeMotion))| {
@@ -181,10 +181,10 @@ fn apart(reference: &Found, found: &Found) -> f64 {
             };
             want.iter().zip(got).map(one).fold(0.0, f64::max)
         }
-        (Found::Frequencies(want), Found::Frequencies(got)) if want.len() == got.len() => {
+        (AnalysisOutput::Frequencies(want), AnalysisOutput::Frequencies(got)) if want.len() == got.len() => {
             want.iter().zip(got).map(|(w, g)| (g / w - 1.0).abs()).fold(0.0, f64::max)
         }
-        (Found::Run(want), Found::Run(got)) => relative_error(want, got),
+        (AnalysisOutput::Run(want), AnalysisOutput::Run(got)) => relative_error(want, got),
         _ => f64::INFINITY,
     }
 }

@@ -10,7 +10,7 @@ use crate::analysis::transient::TransientResult;
 pub(crate) const SMALL: f64 = 1.0 / 30.0;
 
 /// A signal: name, unit, samples.
-type Named = (String, String, Vec<f64>);
+type NamedSignal = (String, String, Vec<f64>);
 
 /// The error of `found` relative to the amplitude of `reference`; infinite where a motion stands against none, or is not
 /// finite. Both have the same signals at the same times.
@@ -38,7 +38,7 @@ pub fn largest_error(reference: &TransientResult, found: &TransientResult, least
         let swings = reference.signals.iter().filter(|s| s.1 == unit).map(|s| half_range(&s.2));
         swings.fold(0.0, f64::max)
     };
-    let error = |(want, got): (&Named, &Named)| {
+    let error = |(want, got): (&NamedSignal, &NamedSignal)| {
         let amplitude = half_range(&want.2).max(SMALL * largest(&want.1)).max(least(&want.1));
         quotient((squares(&want.2, &got.2) / want.2.len().max(1) as f64).sqrt(), amplitude)
     };

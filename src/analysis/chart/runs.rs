@@ -1,8 +1,8 @@
 //! The runs of the precision and order parts, each with its reference.
 
 use super::error::relative_error;
-use super::spec::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
-use super::variant::{Models, Variant};
+use super::spec::{Chart, ChartError, ChartPart, ChartPoint, ChartSpec, Formulation, RunMeasurement};
+use super::variant::{ChartVariant, FormulationModels};
 use crate::analysis::formulation::Formulation as Joints;
 use crate::analysis::frame::{frame, frame_transient};
 use crate::analysis::integrator::Integrator;
@@ -20,13 +20,13 @@ const SECOND: Integrator = Integrator::Rodas4;
 const TIGHTER: f64 = 1e-2;
 
 /// Counts runs, and tells the watch.
-pub(super) struct Progress<'a> {
+pub(super) struct ChartProgress<'a> {
     pub(super) watch: Watch<'a>,
     pub(super) done: f64,
     pub(super) total: f64,
 }
 
-impl Progress<'_> {
+impl ChartProgress<'_> {
     /// Tells how far the present run has come; answers whether to go on.
     pub(super) fn run(&mut self, fraction: f64) -> bool {
         (self.watch)(((self.done + fraction) / self.total).min(1.0))
@@ -34,13 +34,13 @@ impl Progress<'_> {
 }
 
 /// What all runs of a chart share.
-pub(super) struct Request<'a> {
+pub(super) struct RunSeries<'a> {
     pub(super) spec: &'a ChartSpec,
     pub(super) stop: f64,
 }
 
-impl Request<'_> {
-    fn options<'a>(&self, model: &'a Variant, method: Integrator, tol: f64) -> TransientOptions<'a> {
+impl RunSeries<'_> {
+    fn options<'a>(&self, model: &'a ChartVariant, method: Integrator, tol: f64) -> TransientOptions<'a> {
         TransientOptions {
             stop: self.stop,
             signals: self.spec.signals.clone(),
@@ -57,9 +57,9 @@ impl Request<'_> {
     fn run(
         &self,
         formulation: Formulation,
-        model: &Variant,
+        model: &ChartVariant,
         (method, tol): (Integrator, f64),
-        progress: &mut Progress<'_>,
+        progress: &mut ChartProgress<'_>,
     ) -> Result<(TransientResult, f64), AnalysisError> {
         // references are asked for by a method that joint coordinates may not have: then Rodas4
         let method = formulation.methods(&[method]).last().copied().unwrap_or(method);
@@ -88,9 +88,9 @@ impl Request<'_> {
     fn point(
         &self,
         formulation: Formulation,
-        model: &Variant,
+        model: &ChartVariant,
         choice: (Integrator, f64),
-        progress: &mut Progress<'_>,
+        progress: &mut ChartProgress<'_>,
     ) -> Result<Result<(TransientResult, f64), AnalysisError>, AnalysisError> {
         let mut seconds = Vec::with_capacity(self.spec.repeat);
         let mut kept = None;
@@ -114,10 +114,10 @@ impl Request<'_> {
 
 /// Methods and tolerances on one model.
 pub(super) fn precision(
-    models: &Models,
-    request: &Request<'_>,
+    models: &FormulationModels,
+    request: &RunSeries<'_>,
     chart: &mut Chart,
-    progress: &mut Progress<'_>,
+    progress: &mut ChartProgress<'_>,
 ) -> Result<(), ChartError> {
     let spec = request.spec;
     let tight = TIGHTER * spec.tols.iter().copied().fold(f64::INFINITY, f64::min);
@@ -130,7 +130,7 @@ pub(super) fn precision(
         let bodies = models.bodies.moving();
         let mut push = |method: Integrator, tol: f64, unknowns: usize, point: ChartPoint| {
             chart.points.push(ChartPoint {
-                part: Part::Precision,
+                part: ChartPart::Precision,
                 formulation,
                 method: method.name(),
                 solver: SolverKind::Recursion.name(),
@@ -173,10 +173,10 @@ pub(super) fn precision(
 
 /// Models of growing order, against the finest.
 pub(super) fn order(
-    models: &[Models],
-    request: &Request<'_>,
+    models: &[FormulationModels],
+    request: &RunSeries<'_>,
     chart: &mut Chart,
-    progress: &mut Progress<'_>,
+    progress: &mut ChartProgress<'_>,
 ) -> Result<(), ChartError> {
     let spec = request.spec;
     let tol = spec.tols.iter().copied().fold(f64::INFINITY, f64::min);
@@ -199,7 +199,7 @@ pub(super) fn order(
                 Err(reason) => (bodies.parts.system.model.unknowns(), failed(reason.to_owned())),
             };
             chart.points.push(ChartPoint {
-                part: Part::Order,
+                part: ChartPart::Order,
                 formulation,
                 method,
                 solver: solver.name(),
@@ -215,7 +215,7 @@ pub(super) fn order(
 
 /// A point without numbers; the rest is to be filled in.
 const EMPTY: ChartPoint = ChartPoint {
-    part: Part::Precision,
+    part: ChartPart::Precision,
     formulation: Formulation::Compliant,
     method: "",
     solver: "",
@@ -240,7 +240,7 @@ fn compared(found: Result<(TransientResult, f64), AnalysisError>, reference: &Tr
                 return failed("the motion is not finite".into());
             }
             let c = result.counters;
-            let measured = Measured {
+            let measured = RunMeasurement {
                 error: Some(error),
                 told: None,
                 seconds,

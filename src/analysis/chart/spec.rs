@@ -64,7 +64,7 @@ impl Formulation {
 /// A part of a chart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Part {
+pub enum ChartPart {
     /// Methods and tolerances on one model.
     Precision,
     /// Models of growing order.
@@ -75,7 +75,7 @@ pub enum Part {
     Defaults,
 }
 
-impl Part {
+impl ChartPart {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Precision, Self::Order, Self::Solvers, Self::Defaults];
     /// What is charted unless said otherwise.
@@ -96,7 +96,7 @@ impl Part {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChartSpec {
     /// Parts wanted.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ChartPart>,
     /// Signals whose error counts, see [`crate::readout::signal::Signal::find`].
     pub signals: Vec<String>,
     /// End time [s]; none: five periods of the lowest mode.
@@ -123,7 +123,7 @@ pub struct ChartSpec {
 
 /// Numbers of a run that succeeded.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Measured {
+pub struct RunMeasurement {
     /// Relative error [1]; none where nothing is compared.
     pub error: Option<f64>,
     /// Default part: the error that the analysis itself tells [1].
@@ -144,7 +144,7 @@ pub struct Measured {
     pub multiplications: Option<u64>,
 }
 
-impl Measured {
+impl RunMeasurement {
     /// Work without a clock: passes over the model (force evaluations, factorizations and solves together), or
     /// multiplications where those were counted.
     pub fn count(&self) -> u64 {
@@ -156,7 +156,7 @@ impl Measured {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChartPoint {
     /// Which part it belongs to.
-    pub part: Part,
+    pub part: ChartPart,
     /// Formulation.
     pub formulation: Formulation,
     /// Integration method.
@@ -170,7 +170,7 @@ pub struct ChartPoint {
     /// Mechanical unknowns.
     pub unknowns: usize,
     /// The numbers; none when it failed.
-    pub measured: Option<Measured>,
+    pub measured: Option<RunMeasurement>,
     /// Why it failed.
     pub failed: Option<String>,
 }

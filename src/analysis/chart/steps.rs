@@ -3,9 +3,9 @@
 //! The step matrix is the same for every solver; what differs is what solves with it. A few steps of a fixed length are made
 //! from the beginning of the motion, and the time is the median over the repeats.
 
-use super::runs::{Request, median};
-use super::spec::{ChartPoint, Formulation, Measured, Part};
-use super::variant::Variant;
+use super::runs::{RunSeries, median};
+use super::spec::{ChartPart, ChartPoint, Formulation, RunMeasurement};
+use super::variant::ChartVariant;
 use crate::analysis::AnalysisError;
 use crate::analysis::integrator::Integrator;
 use crate::analysis::statics::{operating_point, source_vector};
@@ -16,24 +16,28 @@ use crate::solve::method::{Method, Motion};
 use crate::solve::rodas4::Rodas4;
 use std::time::Instant;
 
-/// A repeat makes as many steps as fit into this many multiplications, at least one and at most [`MOST_STEPS`].
+/// A repeat makes as many steps as fit into this many multiplications, at least one and at most [`MAX_STEPS`].
 const MULTIPLICATIONS: u64 = 20_000_000;
-const MOST_STEPS: u64 = 20;
+const MAX_STEPS: u64 = 20;
 /// Length of a step, as a share of the run.
 const SHARE: f64 = 1e-3;
 /// A step with more multiplications than this is left out: it would take seconds.
-const MOST_MULTIPLICATIONS: u64 = 5_000_000_000;
+const MAX_MULTIPLICATIONS: u64 = 5_000_000_000;
 
 /// Measures steps of a model with a solver.
 ///
 /// # Errors
 /// Those of the request; what a solver refuses becomes a point that says so.
-pub(super) fn measure(model: &Variant, request: &Request<'_>, kind: SolverKind) -> Result<ChartPoint, AnalysisError> {
+pub(super) fn measure(
+    model: &ChartVariant,
+    request: &RunSeries<'_>,
+    kind: SolverKind,
+) -> Result<ChartPoint, AnalysisError> {
     let compiled = model.moving();
     let system = &compiled.parts.system;
     let pattern = &system.model.pattern;
     let mut point = ChartPoint {
-        part: Part::Solvers,
+        part: ChartPart::Solvers,
         formulation: Formulation::Compliant,
         method: Integrator::Rodas4.name(),
         solver: kind.name(),
@@ -52,7 +56,7 @@ pub(super) fn measure(model: &Variant, request: &Request<'_>, kind: SolverKind) 
     };
     let (factor, solve) = solver.multiplications(pattern);
     let multiplications = factor + 6 * solve;
-    if multiplications > MOST_MULTIPLICATIONS {
+    if multiplications > MAX_MULTIPLICATIONS {
         point.failed = Some(format!("left out: a step takes {:.1e} multiplications", multiplications as f64));
         return Ok(point);
     }
@@ -67,7 +71,7 @@ pub(super) fn measure(model: &Variant, request: &Request<'_>, kind: SolverKind) 
     }
     let ramp = Ramp::new(electrics, &sources, &sources, &rise, request.stop);
     let h = SHARE * request.stop;
-    let steps = (MULTIPLICATIONS / multiplications.max(1)).clamp(1, MOST_STEPS) as usize;
+    let steps = (MULTIPLICATIONS / multiplications.max(1)).clamp(1, MAX_STEPS) as usize;
     let mut bodies = Bodies::new(system, &ramp);
     let mut method = Rodas4::with_solver(solver, system, &[]);
     let mut error = Motion::zeros(system.bodies());
@@ -86,7 +90,7 @@ pub(super) fn measure(model: &Variant, request: &Request<'_>, kind: SolverKind) 
             seconds.push(begun.elapsed().as_secs_f64() / steps as f64);
         }
     }
-    point.measured = Some(Measured {
+    point.measured = Some(RunMeasurement {
         error: None,
         told: None,
         seconds: median(&mut seconds),

@@ -2,17 +2,17 @@
 
 use super::spec::{ChartError, Formulation};
 use crate::analysis::AnalysisError;
-use crate::compile::{CompileOptions, Compiled, compile};
+use crate::compile::{CompileOptions, CompiledModel, compile};
 use crate::netlist::{Bundle, Setting};
 
 /// The compiled mechanism, with what a release needs.
 #[derive(Debug, Clone)]
-pub(super) struct Variant {
-    initial: Compiled,
-    released: Option<Compiled>,
+pub(super) struct ChartVariant {
+    initial: CompiledModel,
+    released: Option<CompiledModel>,
 }
 
-impl Variant {
+impl ChartVariant {
     /// Compiles `bundle` for one band.
     pub(super) fn new(
         bundle: &Bundle,
@@ -27,25 +27,25 @@ impl Variant {
     }
 
     /// The mechanism in motion.
-    pub(super) fn moving(&self) -> &Compiled {
+    pub(super) fn moving(&self) -> &CompiledModel {
         self.released.as_ref().unwrap_or(&self.initial)
     }
 
     /// The mechanism whose equilibrium is the beginning; none: rest.
-    pub(super) fn held(&self) -> Option<&Compiled> {
+    pub(super) fn held(&self) -> Option<&CompiledModel> {
         self.released.as_ref().map(|_| &self.initial)
     }
 }
 
 /// The mechanism at one model order in every formulation of a chart.
 #[derive(Debug, Clone)]
-pub(super) struct Models {
+pub(super) struct FormulationModels {
     /// In the bodies' own coordinates.
-    pub(super) bodies: Variant,
-    joints: Vec<(Formulation, Result<Variant, String>)>,
+    pub(super) bodies: ChartVariant,
+    joints: Vec<(Formulation, Result<ChartVariant, String>)>,
 }
 
-impl Models {
+impl FormulationModels {
     /// Compiles `bundle` for one band, once for each formulation that lays it out in its own way.
     pub(super) fn new(
         bundle: &Bundle,
@@ -54,17 +54,17 @@ impl Models {
         release: Option<&str>,
         formulations: &[Formulation],
     ) -> Result<Self, ChartError> {
-        let bodies = Variant::new(bundle, options, band, release)?;
+        let bodies = ChartVariant::new(bundle, options, band, release)?;
         let compiled = |&one: &Formulation| {
             let options = CompileOptions { formulation: one.compiled_as()?, ..options.clone() };
             // what bodies can be made of may not suit joints: points that say so
-            Some((one, Variant::new(bundle, &options, band, release).map_err(|e| e.to_string())))
+            Some((one, ChartVariant::new(bundle, &options, band, release).map_err(|e| e.to_string())))
         };
         Ok(Self { bodies, joints: formulations.iter().filter_map(compiled).collect() })
     }
 
     /// The model in a formulation, or why there is none.
-    pub(super) fn of(&self, formulation: Formulation) -> Result<&Variant, &str> {
+    pub(super) fn of(&self, formulation: Formulation) -> Result<&ChartVariant, &str> {
         match self.joints.iter().find(|(one, _)| *one == formulation) {
             Some((_, model)) => model.as_ref().map_err(String::as_str),
             None => Ok(&self.bodies),
@@ -76,7 +76,7 @@ impl Models {
 ///
 /// # Errors
 /// `BadRequest` for a parameter that is none, or no number; those of [`compile`].
-pub fn released(bundle: &Bundle, initial: &Compiled, name: &str) -> Result<Compiled, ChartError> {
+pub fn released(bundle: &Bundle, initial: &CompiledModel, name: &str) -> Result<CompiledModel, ChartError> {
     if !initial.parameters.iter().any(|(p, value)| p == name && matches!(value, Setting::Number(_))) {
         let known: Vec<&str> = initial.parameters.iter().map(|(p, _)| p.as_str()).collect();
         let detail = format!("no numeric parameter of that name; the netlist has {}", known.join(", "));

@@ -4,23 +4,23 @@ use super::super::transient::options::{TransientOptions, check};
 use super::super::transient::result::{Counters, TransientResult};
 use super::super::{AnalysisError, Watch};
 use super::{balance, force, singular, steady};
-use crate::compile::Compiled;
-use crate::discretize::frame::Frame;
-use crate::domains::{Point, Ramp};
+use crate::compile::CompiledModel;
+use crate::discretize::frame::LinearFrame;
+use crate::domains::{MaterialPoint, Ramp};
 use crate::multibody::planar::Pose;
-use crate::readout::signal::{Signal, View, node_signal};
+use crate::readout::signal::{Signal, SignalView, node_signal};
 use crate::solve::baseline::frame_motion::Newmark;
 use crate::solve::baseline::sparse::Sparse;
 
 /// Steps between two output times are doubled until the motion settles, up to this many.
-const MOST_STEPS: usize = 1 << 14;
+const MAX_STEPS: usize = 1 << 14;
 /// Linear motion in time by Newmark's rule. The step is halved until the signals change by less than the tolerance.
 ///
 /// # Errors
 /// See [`AnalysisError`]; `NotConverged` when even the shortest steps do not settle.
 pub fn frame_transient(
-    compiled: &Compiled,
-    frame: &Frame,
+    compiled: &CompiledModel,
+    frame: &LinearFrame,
     options: &TransientOptions<'_>,
     watch: Watch<'_>,
 ) -> Result<TransientResult, AnalysisError> {
@@ -92,7 +92,7 @@ pub fn frame_transient(
         if error <= options.tol {
             break fine;
         }
-        if between >= MOST_STEPS {
+        if between >= MAX_STEPS {
             return Err(AnalysisError::NotConverged {
                 detail: format!("steps of {:.1e} s still change the signals by {error:.1e}", spacing / between as f64),
             });
@@ -117,13 +117,13 @@ fn change(a: &[f64], b: &[f64]) -> f64 {
 /// A quantity of a frame.
 enum FrameSignal {
     /// Displacement of a node: direction 0 x, 1 y, 2 rotation; or its rate.
-    Node { point: Point, direction: usize, rate: bool },
+    Node { point: MaterialPoint, direction: usize, rate: bool },
     /// Mean temperature of a beam, as the product's own signal has it.
     Temperature(Signal),
 }
 
 impl FrameSignal {
-    fn find(compiled: &Compiled, frame: &Frame, name: &str) -> Result<Self, AnalysisError> {
+    fn find(compiled: &CompiledModel, frame: &LinearFrame, name: &str) -> Result<Self, AnalysisError> {
         if let Some((node, direction, rate)) = node_signal(compiled, name)
             && let Some(point) = frame.nodes[node]
         {
@@ -148,13 +148,13 @@ impl FrameSignal {
         }
     }
 
-    fn value(&self, compiled: &Compiled, q: &[Pose], v: &[Pose], rise: &[f64]) -> f64 {
+    fn value(&self, compiled: &CompiledModel, q: &[Pose], v: &[Pose], rise: &[f64]) -> f64 {
         match self {
             Self::Node { point, direction, rate } => {
                 let x = if *rate { v } else { q };
                 if *direction == 2 { point.rotation(x) } else { point.displacement(x, true)[*direction] }
             }
-            Self::Temperature(signal) => signal.value(compiled, &View { q: &[], v: &[], rise, volts: &[] }),
+            Self::Temperature(signal) => signal.value(compiled, &SignalView { q: &[], v: &[], rise, volts: &[] }),
         }
     }
 }

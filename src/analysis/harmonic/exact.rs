@@ -1,24 +1,24 @@
 //! The response of the whole model to one drive at a complex frequency: one factorization of K + sC + s²M, one solve.
 
-use super::named::{Row, drive_port, row, unit};
+use super::named::{ResponseRow, drive_port, row, unit};
 use super::options::HarmonicOptions;
 use crate::analysis::AnalysisError;
 use crate::analysis::statics::{OperatingPoint, operating_point};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
-use crate::readout::ports::Ports;
-use crate::readout::small_signal::{Moved, Perturbed};
+use crate::readout::ports::OpenedPorts;
+use crate::readout::small_signal::{ForcedMotion, PerturbedState};
 use crate::solve::frequency::refined::Refined;
 use crate::solve::harmonic::{ComplexPose, Harmonic};
 use nalgebra::Complex;
 
 /// A mechanism at its operating point, with what drives it and what is seen of it.
 #[derive(Debug)]
-pub(crate) struct Exact<'a> {
-    pub(super) compiled: &'a Compiled,
-    ports: Ports,
+pub(crate) struct ExactResponse<'a> {
+    pub(super) compiled: &'a CompiledModel,
+    ports: OpenedPorts,
     pub(super) point: OperatingPoint,
     still: Vec<Pose>,
     pub(super) drive: Drive,
@@ -27,7 +27,7 @@ pub(crate) struct Exact<'a> {
     /// The tangent unsummed; none for a linear model, whose tangent is another one.
     refined: Option<Refined<'a>>,
     response: Vec<ComplexPose>,
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<ResponseRow>,
     /// Name and unit of each row.
     pub(super) shown: Vec<(String, String)>,
     pub(super) drive_unit: &'static str,
@@ -35,12 +35,12 @@ pub(crate) struct Exact<'a> {
     pub(super) floats: bool,
 }
 
-impl<'a> Exact<'a> {
+impl<'a> ExactResponse<'a> {
     /// Finds the operating point and what was asked for.
     ///
     /// # Errors
     /// See [`AnalysisError`].
-    pub(crate) fn new(compiled: &'a Compiled, options: &HarmonicOptions) -> Result<Self, AnalysisError> {
+    pub(crate) fn new(compiled: &'a CompiledModel, options: &HarmonicOptions) -> Result<Self, AnalysisError> {
         let ports = drive_port(compiled, &options.drive)?;
         let signals = match options.signals.as_slice() {
             [] => vec![super::named::own_answer(compiled, &options.drive, &ports)?],
@@ -116,8 +116,8 @@ impl<'a> Exact<'a> {
     }
 
     /// The operating point for small changes.
-    pub(super) fn perturbed(&self) -> Perturbed<'_> {
-        Perturbed {
+    pub(super) fn perturbed(&self) -> PerturbedState<'_> {
+        PerturbedState {
             compiled: self.compiled,
             system: self.system(),
             q: &self.point.q,
@@ -147,12 +147,12 @@ impl<'a> Exact<'a> {
         if let Some(refined) = &mut self.refined {
             self.harmonic.refine(system, refined, s, &push.force, &mut self.response);
         }
-        let moved = Moved::new(&push, &self.response, s);
+        let moved = ForcedMotion::new(&push, &self.response, s);
         let about = self.perturbed();
         let values: Vec<Complex<f64>> = (self.rows.iter())
             .map(|row| match row {
-                Row::Signal(signal) => about.seen(*signal, &moved),
-                Row::Current(port) => {
+                ResponseRow::Signal(signal) => about.signal_change(*signal, &moved),
+                ResponseRow::Current(port) => {
                     let conducted = system.electrics.conductance[(*port, source)];
                     s * about.charges(&[*port], &moved)[0] + conducted
                 }
@@ -163,7 +163,7 @@ impl<'a> Exact<'a> {
 }
 
 /// True where nothing acts on the mechanism.
-fn unloaded(compiled: &Compiled, options: &HarmonicOptions) -> bool {
+fn unloaded(compiled: &CompiledModel, options: &HarmonicOptions) -> bool {
     let system = &compiled.parts.system;
     options.voltages.iter().all(|(_, volts)| *volts == 0.0)
         && system.electrics.fixed.iter().all(|v| *v == 0.0)

@@ -19,9 +19,9 @@ const ABOUT: [f64; 13] = [-8.0, -4.0, -2.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0
 /// The same where nothing damps it, as shares of its frequency: its height has no bound, so that it is drawn by its flanks.
 const BESIDE: [f64; 8] = [-1e-3, -1e-4, -1e-5, -1e-6, 1e-6, 1e-5, 1e-4, 1e-3];
 /// Points that are added at most.
-pub(super) const MOST_ADDED: usize = 4000;
+pub(super) const MAX_ADDED: usize = 4000;
 /// Doublings of the distance from a resonance at most, on its flanks.
-const MOST_DOUBLED: i32 = 40;
+const MAX_DOUBLED: i32 = 40;
 /// Nearer than this share of its frequency to an undamped resonance a value says nothing: rounding moves the resonance by as much.
 pub(super) const UNBOUNDED: f64 = 1e-9;
 /// A step that is shorter than this share of the others is none.
@@ -78,11 +78,11 @@ pub(super) fn with_roots(mut grid: Vec<f64>, roots: &[Root], band: [f64; 2]) -> 
         let spacing = grid[after] - grid[after - 1];
         let first =
             root.quality().map_or(BESIDE[BESIDE.len() - 1] * own, |_| 0.5 * root.width_hz() * ABOUT[ABOUT.len() - 1]);
-        let distances = (1..=MOST_DOUBLED).map(|k| first * 2f64.powi(k)).take_while(|d| *d < spacing);
+        let distances = (1..=MAX_DOUBLED).map(|k| first * 2f64.powi(k)).take_while(|d| *d < spacing);
         more.extend(distances.flat_map(|d| [own - d, own + d]));
     }
     more.retain(|f| *f > band[0] * (1.0 + SAME) && *f < band[1] * (1.0 - SAME));
-    more.truncate(MOST_ADDED);
+    more.truncate(MAX_ADDED);
     grid.append(&mut more);
     grid.sort_by(f64::total_cmp);
     grid.dedup_by(|b, a| *b - *a <= SAME * *a);

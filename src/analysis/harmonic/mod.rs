@@ -20,23 +20,23 @@ mod root;
 mod roots;
 
 use super::{AnalysisError, Watch, rotary_left_out};
-use crate::compile::Compiled;
-use exact::Exact;
-use modal::Sum;
+use crate::compile::CompiledModel;
+use exact::ExactResponse;
+use modal::ModalSum;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
-pub use options::{HarmonicOptions, MOST_VALUES};
+pub use options::{HarmonicOptions, MAX_VALUES};
 pub use root::Root;
 
 /// Modes within the band beyond which poles, zeros and points about resonances are left out.
-const MOST_MODES: usize = 100;
+const MAX_MODES: usize = 100;
 /// Modes are known to this multiple of the band, where they are not too many.
 pub(crate) const BEYOND: f64 = 2.0;
 /// Modes beyond those, so that the last is apart from what follows.
 pub(crate) const GUARDS: usize = 2;
 /// Signals whose zeros are looked for at most.
-const MOST_ZEROS: usize = 8;
+const MAX_ZEROS: usize = 8;
 /// Frequencies at which a sum over modes is compared with the exact response.
 const COMPARED: usize = 60;
 /// Share of the sum of its parts below which a value is a zero of the curve.
@@ -89,23 +89,23 @@ pub struct HarmonicResult {
 /// # Errors
 /// See [`AnalysisError`].
 pub fn harmonic(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     options: &HarmonicOptions,
     watch: Watch<'_>,
 ) -> Result<HarmonicResult, AnalysisError> {
     options.check()?;
     let band = [options.from, options.to];
-    let mut exact = Exact::new(compiled, options)?;
+    let mut exact = ExactResponse::new(compiled, options)?;
     let mut warnings = warnings(&exact);
     let (inside, wanted) = (modal::below(&exact, TAU * options.to), modal::below(&exact, TAU * BEYOND * options.to));
     let count = match options.modes {
         Some(count) => count,
-        None => (wanted + GUARDS).min(MOST_MODES),
+        None => (wanted + GUARDS).min(MAX_MODES),
     };
-    let many = inside > MOST_MODES;
+    let many = inside > MAX_MODES;
     if many {
         warnings.push(format!(
-            "{inside} modes lie below {:e} Hz, more than {MOST_MODES}: poles, zeros and points about resonances are left out",
+            "{inside} modes lie below {:e} Hz, more than {MAX_MODES}: poles, zeros and points about resonances are left out",
             options.to
         ));
     }
@@ -118,12 +118,15 @@ pub fn harmonic(
                 &exact.tangent,
                 count.max(if many { 0 } else { inside + 1 }),
             )?;
-            warnings.extend(rotary_left_out::told(compiled, &found.shapes[..inside.min(found.shapes.len())]));
+            warnings.extend(rotary_left_out::rotary_inertia_note(
+                compiled,
+                &found.shapes[..inside.min(found.shapes.len())],
+            ));
             let shown = if options.by_modes { found.lambda.len().min(count.max(1)) } else { found.lambda.len() };
             let mut kept = found;
             kept.lambda.truncate(shown);
             kept.shapes.truncate(shown);
-            Some(Sum::new(&exact, &kept)?)
+            Some(ModalSum::new(&exact, &kept)?)
         }
     };
     let poles = sum.as_ref().filter(|_| !many).map(|sum| {
@@ -136,12 +139,12 @@ pub fn harmonic(
     });
     let known = poles.clone().unwrap_or_default();
     let rows = exact.rows.len();
-    if rows > MOST_ZEROS && poles.is_some() {
-        warnings.push(format!("zeros are those of the first {MOST_ZEROS} signals"));
+    if rows > MAX_ZEROS && poles.is_some() {
+        warnings.push(format!("zeros are those of the first {MAX_ZEROS} signals"));
     }
     let zeros: Vec<Option<Vec<Root>>> = (0..rows)
         .map(|row| {
-            let sum = sum.as_ref().filter(|_| poles.is_some() && row < MOST_ZEROS)?;
+            let sum = sum.as_ref().filter(|_| poles.is_some() && row < MAX_ZEROS)?;
             Some(roots::zeros(&mut exact, sum, row, band))
         })
         .collect();
@@ -190,7 +193,7 @@ pub fn harmonic(
 }
 
 /// What the operating point does not say by itself.
-fn warnings(exact: &Exact<'_>) -> Vec<String> {
+fn warnings(exact: &ExactResponse<'_>) -> Vec<String> {
     let mut warnings = Vec::new();
     let model = &exact.system().model;
     let mut factor = exact.tangent.clone();
@@ -213,16 +216,16 @@ fn warnings(exact: &Exact<'_>) -> Vec<String> {
 }
 
 /// One column of real and imaginary parts for each row.
-type Columns = Vec<Vec<[f64; 2]>>;
+type ComplexColumns = Vec<Vec<[f64; 2]>>;
 
 /// Every row at every frequency, and at how many there is no bound.
 fn swept(
-    exact: &mut Exact<'_>,
-    sum: Option<&Sum>,
+    exact: &mut ExactResponse<'_>,
+    sum: Option<&ModalSum>,
     frequencies: &[f64],
     poles: &[Root],
     watch: Watch<'_>,
-) -> Result<(Columns, usize), AnalysisError> {
+) -> Result<(ComplexColumns, usize), AnalysisError> {
     let rows = exact.rows.len();
     let mut columns = vec![Vec::with_capacity(frequencies.len()); rows];
     let mut lost = 0;
@@ -246,7 +249,7 @@ fn swept(
 }
 
 /// Largest deviation of a sum from the exact response, relative to each value, or to a hundredth of the largest of its signal where it is a zero.
-fn deviation(exact: &mut Exact<'_>, sum: &Sum, frequencies: &[f64], poles: &[Root]) -> f64 {
+fn deviation(exact: &mut ExactResponse<'_>, sum: &ModalSum, frequencies: &[f64], poles: &[Root]) -> f64 {
     let every = frequencies.len().div_ceil(COMPARED).max(1);
     let usable = frequencies.iter().step_by(every).chain(frequencies.last());
     let mut worst = 0.0f64;

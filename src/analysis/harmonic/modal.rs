@@ -8,15 +8,15 @@
 //!
 //! Reference: R. R. Craig, A. J. Kurdila, "Fundamentals of Structural Dynamics" (2006), §11.4.
 
-use super::exact::Exact;
-use super::named::Row;
+use super::exact::ExactResponse;
+use super::named::ResponseRow;
 use crate::analysis::AnalysisError;
 use crate::domains::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::{add_damping, add_inertia};
 use crate::multibody::planar::Pose;
 use crate::readout::signal::Signal;
-use crate::readout::small_signal::{Constituent, Law, Moved};
+use crate::readout::small_signal::{Constituent, ForcedMotion, FrequencyDependence};
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
 use crate::solve::frequency::refined::{ROUNDING, Refined};
 use crate::solve::subspace;
@@ -100,7 +100,7 @@ fn unsettled(count: usize) -> AnalysisError {
 }
 
 /// How many modes lie below `omega` [rad/s]: negative pivots of K − ω²M (Sylvester).
-pub(crate) fn below(exact: &Exact<'_>, omega: f64) -> usize {
+pub(crate) fn below(exact: &ExactResponse<'_>, omega: f64) -> usize {
     let model = &exact.system().model;
     let mut shifted = exact.tangent.clone();
     add_inertia(model, -omega * omega, 0.0, &mut shifted);
@@ -110,13 +110,13 @@ pub(crate) fn below(exact: &Exact<'_>, omega: f64) -> usize {
 
 /// The sum, with what each row sees of each mode.
 #[derive(Debug, Clone)]
-pub(crate) struct Sum {
+pub(crate) struct ModalSum {
     /// λ of each mode, ascending [rad²/s²].
     pub(super) lambda: Vec<f64>,
     /// D, modes × modes [1/s].
     pub(super) damping: DMatrix<f64>,
     /// How each part of the push depends on s.
-    pub(super) laws: Vec<Law>,
+    pub(super) laws: Vec<FrequencyDependence>,
     /// φᵀb, modes × parts.
     pub(super) push: DMatrix<f64>,
     /// What rows see of a mode, rows × modes.
@@ -136,9 +136,9 @@ pub(crate) struct Sum {
 /// A rest below this share of what the modes bring is rounding: some 5e-13 were seen where all modes are there.
 const NOTHING_LEFT: f64 = 4e-12;
 
-impl Sum {
+impl ModalSum {
     /// Over these modes.
-    pub(crate) fn new(exact: &Exact<'_>, found: &Modes) -> Result<Self, AnalysisError> {
+    pub(crate) fn new(exact: &ExactResponse<'_>, found: &Modes) -> Result<Self, AnalysisError> {
         let (system, about) = (exact.system(), exact.perturbed());
         let model = &system.model;
         let constituents = about.constituents(exact.source());
@@ -156,23 +156,23 @@ impl Sum {
             }
         }
         let none = (vec![0.0; exact.drive.volts.len()], vec![0.0; exact.point.rise.len()]);
-        let read = |row: &Row, moved: &Moved| match row {
-            Row::Signal(Signal::Rate(point, direction)) => {
-                about.seen(Signal::Displacement(*point, *direction), moved).re
+        let read = |row: &ResponseRow, moved: &ForcedMotion| match row {
+            ResponseRow::Signal(Signal::Rate(point, direction)) => {
+                about.signal_change(Signal::Displacement(*point, *direction), moved).re
             }
-            Row::Signal(signal) => about.seen(*signal, moved).re,
-            Row::Current(port) => about.charges(&[*port], moved)[0].re,
+            ResponseRow::Signal(signal) => about.signal_change(*signal, moved).re,
+            ResponseRow::Current(port) => about.charges(&[*port], moved)[0].re,
         };
         let rows = &exact.rows;
         let mut seen = DMatrix::zeros(rows.len(), n);
         for (j, shape) in found.shapes.iter().enumerate() {
             crate::budget::check();
-            let moved = Moved::held(shape.clone(), none.0.clone(), none.1.clone());
+            let moved = ForcedMotion::held(shape.clone(), none.0.clone(), none.1.clone());
             rows.iter().enumerate().for_each(|(r, row)| seen[(r, j)] = read(row, &moved));
         }
         let mut rest = DMatrix::zeros(rows.len(), constituents.len());
         for (c, (part, z)) in constituents.iter().zip(rests).enumerate() {
-            let moved = Moved::held(z, part.volts.clone(), part.rise.clone());
+            let moved = ForcedMotion::held(z, part.volts.clone(), part.rise.clone());
             rows.iter().enumerate().for_each(|(r, row)| rest[(r, c)] = read(row, &moved));
         }
         let push = DMatrix::from_fn(n, constituents.len(), |j, c| dot(&found.shapes[j], &constituents[c].force));
@@ -186,9 +186,9 @@ impl Sum {
                 }
             }
         }
-        let conducted = |row: &Row| match row {
-            Row::Current(port) => system.electrics.conductance[(*port, exact.source())],
-            Row::Signal(_) => 0.0,
+        let conducted = |row: &ResponseRow| match row {
+            ResponseRow::Current(port) => system.electrics.conductance[(*port, exact.source())],
+            ResponseRow::Signal(_) => 0.0,
         };
         let mut stir = vec![Pose::zeros(); system.bodies()];
         for shape in &found.shapes {
@@ -196,6 +196,7 @@ impl Sum {
                 *s += model.mass(j).component_mul(x);
             }
         }
+        let rate = |r: &ResponseRow| matches!(r, ResponseRow::Current(_) | ResponseRow::Signal(Signal::Rate(..)));
         Ok(Self {
             lambda: found.lambda.clone(),
             damping,
@@ -204,7 +205,7 @@ impl Sum {
             seen,
             rest,
             added,
-            rates: rows.iter().map(|r| matches!(r, Row::Current(_) | Row::Signal(Signal::Rate(..)))).collect(),
+            rates: rows.iter().map(rate).collect(),
             conducted: rows.iter().map(conducted).collect(),
             stir,
         })
@@ -231,13 +232,13 @@ impl Sum {
 
     /// Magnitudes of the parts of the push on a mode, added up.
     fn pushed(&self, s: Complex<f64>, mode: usize) -> f64 {
-        let part = |(c, law): (usize, &Law)| law.factor(s).norm() * self.push[(mode, c)].abs();
+        let part = |(c, law): (usize, &FrequencyDependence)| law.factor(s).norm() * self.push[(mode, c)].abs();
         self.laws.iter().enumerate().map(part).sum()
     }
 
     /// The same of what a row sees of the rest.
     fn left(&self, s: Complex<f64>, row: usize) -> f64 {
-        let part = |(c, law): (usize, &Law)| law.factor(s).norm() * self.rest[(row, c)].abs();
+        let part = |(c, law): (usize, &FrequencyDependence)| law.factor(s).norm() * self.rest[(row, c)].abs();
         self.laws.iter().enumerate().map(part).sum()
     }
 
@@ -308,7 +309,7 @@ impl Sum {
 }
 
 /// z of each part of the push.
-fn rests(exact: &Exact<'_>, found: &Modes, parts: &[Constituent]) -> Result<Vec<Vec<Pose>>, AnalysisError> {
+fn rests(exact: &ExactResponse<'_>, found: &Modes, parts: &[Constituent]) -> Result<Vec<Vec<Pose>>, AnalysisError> {
     let system = exact.system();
     let model = &system.model;
     let highest = found.lambda.last().map_or(0.0, |l| l.abs());

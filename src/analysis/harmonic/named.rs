@@ -1,14 +1,14 @@
 //! What drives and what is seen, by name.
 
 use crate::analysis::AnalysisError;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::readout::ReadoutError;
-use crate::readout::ports::{Answer, Ports};
+use crate::readout::ports::{OpenedPorts, PortResponse};
 use crate::readout::signal::Signal;
 
 /// What is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Row {
+pub(crate) enum ResponseRow {
     /// A signal.
     Signal(Signal),
     /// Current into a port.
@@ -19,7 +19,7 @@ pub(crate) enum Row {
 const FORCES: [(&str, &str); 3] = [("fx", "x"), ("fy", "y"), ("m", "rz")];
 
 /// The name that a port has for a drive: `NODE.fx` acts on `NODE.x`.
-fn port_name(compiled: &Compiled, drive: &str) -> String {
+fn port_name(compiled: &CompiledModel, drive: &str) -> String {
     if compiled.structure.port(drive).is_some() {
         return drive.to_owned();
     }
@@ -34,9 +34,9 @@ fn port_name(compiled: &Compiled, drive: &str) -> String {
 ///
 /// # Errors
 /// [`AnalysisError::BadRequest`] with what would be understood.
-pub(crate) fn drive_port(compiled: &Compiled, drive: &str) -> Result<Ports, AnalysisError> {
+pub(crate) fn drive_port(compiled: &CompiledModel, drive: &str) -> Result<OpenedPorts, AnalysisError> {
     let refused = |detail: String| AnalysisError::BadRequest { what: format!("drive \"{drive}\""), detail };
-    Ports::find(compiled, &[port_name(compiled, drive)]).map_err(|error| match error {
+    OpenedPorts::find(compiled, &[port_name(compiled, drive)]).map_err(|error| match error {
         ReadoutError::UnknownPort { available, .. } => {
             let ports = match available.as_slice() {
                 [] => "the netlist has no ports".to_owned(),
@@ -57,11 +57,11 @@ pub(crate) fn drive_port(compiled: &Compiled, drive: &str) -> Result<Ports, Anal
 }
 
 /// The name of what the place that is driven answers: the current into a port, the motion along a force.
-pub(super) fn own_answer(compiled: &Compiled, drive: &str, ports: &Ports) -> Result<String, AnalysisError> {
+pub(super) fn own_answer(compiled: &CompiledModel, drive: &str, ports: &OpenedPorts) -> Result<String, AnalysisError> {
     match ports.answers[0] {
-        Answer::Current => Ok(format!("{drive}.i")),
-        Answer::Motion(_) | Answer::Rise(_) => Ok(port_name(compiled, drive)),
-        Answer::Nothing => Err(AnalysisError::BadRequest {
+        PortResponse::Current => Ok(format!("{drive}.i")),
+        PortResponse::Motion(_) | PortResponse::Rise(_) => Ok(port_name(compiled, drive)),
+        PortResponse::Nothing => Err(AnalysisError::BadRequest {
             what: "signals".into(),
             detail: format!(
                 "\"{drive}\" moves the frame and answers with nothing itself: name what is to be seen, as NODE.x"
@@ -74,12 +74,12 @@ pub(super) fn own_answer(compiled: &Compiled, drive: &str, ports: &Ports) -> Res
 ///
 /// # Errors
 /// [`AnalysisError::BadRequest`] with what would be understood.
-pub(crate) fn row(compiled: &Compiled, name: &str) -> Result<Row, AnalysisError> {
+pub(crate) fn row(compiled: &CompiledModel, name: &str) -> Result<ResponseRow, AnalysisError> {
     crate::budget::check();
     if let Some(port) = name.strip_suffix(".i").and_then(|port| compiled.structure.port(port)) {
-        return Ok(Row::Current(port));
+        return Ok(ResponseRow::Current(port));
     }
-    Signal::find(compiled, name).map(Row::Signal).map_err(|error| {
+    Signal::find(compiled, name).map(ResponseRow::Signal).map_err(|error| {
         let electrics = &compiled.parts.system.electrics;
         match AnalysisError::from(error) {
             AnalysisError::BadRequest { what, detail } if electrics.ports > 0 => {
@@ -92,10 +92,10 @@ pub(crate) fn row(compiled: &Compiled, name: &str) -> Result<Row, AnalysisError>
 }
 
 /// Unit of a row over that of the drive.
-pub(super) fn unit(row: Row, drive: &str) -> String {
+pub(super) fn unit(row: ResponseRow, drive: &str) -> String {
     let own = match row {
-        Row::Signal(signal) => signal.unit(),
-        Row::Current(_) => "A",
+        ResponseRow::Signal(signal) => signal.unit(),
+        ResponseRow::Current(_) => "A",
     };
     if drive.contains(['/', '·']) { format!("{own}/({drive})") } else { format!("{own}/{drive}") }
 }

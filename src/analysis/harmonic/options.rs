@@ -2,11 +2,11 @@
 
 use super::grid::{self, Spacing};
 use crate::analysis::AnalysisError;
-use crate::options::Value;
+use crate::options::OptionValue;
 use crate::options::analysis::{AC_FROM, AC_MODES, AC_POINTS, AC_TO};
 
 /// Frequencies times signals at most: each value is a complex number in doubles.
-pub const MOST_VALUES: usize = 50_000_000;
+pub const MAX_VALUES: usize = 50_000_000;
 
 /// What is asked for.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -40,14 +40,14 @@ impl HarmonicOptions {
     /// [`AnalysisError::BadRequest`].
     pub fn check(&self) -> Result<(), AnalysisError> {
         let refused = |what: &str, detail: String| Err(AnalysisError::BadRequest { what: what.into(), detail });
-        let given = [(&AC_FROM, Value::Number(self.from)), (&AC_TO, Value::Number(self.to))];
-        for (option, value) in given.into_iter().chain([(&AC_POINTS, Value::Count(self.points))]) {
+        let given = [(&AC_FROM, OptionValue::Number(self.from)), (&AC_TO, OptionValue::Number(self.to))];
+        for (option, value) in given.into_iter().chain([(&AC_POINTS, OptionValue::Count(self.points))]) {
             if let Err(e) = option.check(&value) {
                 return refused(option.name, format!("expected {}, got {}", e.expected, e.got));
             }
         }
         if let Some(count) = self.modes
-            && let Err(e) = AC_MODES.check(&Value::Count(count))
+            && let Err(e) = AC_MODES.check(&OptionValue::Count(count))
         {
             return refused("modes", format!("expected {}, got {}", e.expected, e.got));
         }
@@ -57,16 +57,16 @@ impl HarmonicOptions {
                 format!("expected a frequency above from ({:e} Hz), got {:e} Hz", self.from, self.to),
             );
         }
-        let most = crate::options::analysis::MOST_FREQUENCIES;
+        let most = crate::options::analysis::MAX_FREQUENCIES;
         let count = grid::count(self.spacing, self.points, [self.from, self.to]).filter(|count| *count <= most);
         let Some(count) = count else {
             return refused("points", format!("expected at most {most} in all; take fewer, or a narrower band"));
         };
-        if count.saturating_mul(self.signals.len().max(1)) > MOST_VALUES {
+        if count.saturating_mul(self.signals.len().max(1)) > MAX_VALUES {
             let got = self.signals.len();
             return refused(
                 "points",
-                format!("{count} for {got} signals are more than {MOST_VALUES} values; take fewer"),
+                format!("{count} for {got} signals are more than {MAX_VALUES} values; take fewer"),
             );
         }
         Ok(())
@@ -75,7 +75,7 @@ impl HarmonicOptions {
     /// Bytes that the numbers of the answer take at most, as doubles.
     pub fn bytes(&self) -> usize {
         let even = grid::count(self.spacing, self.points, [self.from, self.to]).unwrap_or(usize::MAX);
-        let more = if self.even { 0 } else { grid::MOST_ADDED };
+        let more = if self.even { 0 } else { grid::MAX_ADDED };
         even.saturating_add(more).saturating_mul(1 + 2 * self.signals.len().max(1)).saturating_mul(8)
     }
 }

@@ -6,18 +6,18 @@
 //!
 //! Reference: A. Emami-Naeini, P. Van Dooren, "Computation of zeros of linear multivariable systems", Automatica 18 (1982).
 
-use super::exact::Exact;
-use super::modal::Sum;
+use super::exact::ExactResponse;
+use super::modal::ModalSum;
 use super::root::Root;
-use crate::readout::small_signal::Law;
+use crate::readout::small_signal::FrequencyDependence;
 use crate::solve::frequency::pole::pole;
 use faer::Mat;
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 
 /// Steps of the secant rule at most, where they begin beside the guess, and a step that is rounding, as shares of |s|.
-const MOST_STEPS: usize = 40;
-const ASIDE: f64 = 1e-4;
+const MAX_STEPS: usize = 40;
+const SECANT_OFFSET: f64 = 1e-4;
 const SETTLED: f64 = 1e-13;
 const ROUNDED: f64 = 1e-7;
 /// A zero further from its guess than this share is another one.
@@ -25,7 +25,7 @@ const NEAR: f64 = 0.1;
 /// A zero within this share of the damping of a pole takes it out of the curve.
 const UNSEEN: f64 = 0.05;
 /// Frequencies of a band at which a signal is looked for.
-const LOOKS: usize = 8;
+const SEARCH_FREQUENCIES: usize = 8;
 /// Shifts about which the pencil is inverted, in units of the end of the band.
 const SHIFTS: [f64; 3] = [0.37, 0.73, -0.53];
 /// Two of them that are nearer to each other than this share are one.
@@ -37,18 +37,18 @@ fn sorted(mut roots: Vec<Root>) -> Vec<Root> {
 }
 
 /// Frequencies by which modes are scaled, and one for all [rad/s].
-fn scales(sum: &Sum, to: f64) -> (Vec<f64>, f64) {
+fn scales(sum: &ModalSum, to: f64) -> (Vec<f64>, f64) {
     let all = TAU * to;
     (sum.lambda.iter().map(|l| l.abs().sqrt().max(1e-9 * all)).collect(), all)
 }
 
 /// Poles within the band, and how many of them could not be found to rounding.
-pub(super) fn poles(exact: &mut Exact<'_>, sum: &Sum, band: [f64; 2]) -> (Vec<Root>, usize) {
+pub(super) fn poles(exact: &mut ExactResponse<'_>, sum: &ModalSum, band: [f64; 2]) -> (Vec<Root>, usize) {
     let n = sum.lambda.len();
     let wide = [0.8 * band[0], 1.25 * band[1]];
     let mut rough = 0;
     let lags = sum.laws.iter().filter_map(|law| match law {
-        Law::Lagged(tau) => Some(Root { re: -1.0 / tau, im: 0.0 }),
+        FrequencyDependence::Lagged(tau) => Some(Root { re: -1.0 / tau, im: 0.0 }),
         _ => None,
     });
     let mut roots: Vec<Root> = lags.collect();
@@ -84,15 +84,15 @@ pub(super) fn poles(exact: &mut Exact<'_>, sum: &Sum, band: [f64; 2]) -> (Vec<Ro
 }
 
 /// Zeros of a row within the band; `sum` knows its modes to beyond it.
-pub(super) fn zeros(exact: &mut Exact<'_>, sum: &Sum, row: usize, band: [f64; 2]) -> Vec<Root> {
+pub(super) fn zeros(exact: &mut ExactResponse<'_>, sum: &ModalSum, row: usize, band: [f64; 2]) -> Vec<Root> {
     let mut roots: Vec<Root> = Vec::new();
     // what the drive does not move at all has rounding for zeros
     let mut is_seen = |k: usize| {
-        let share = k as f64 / (LOOKS - 1) as f64;
+        let share = k as f64 / (SEARCH_FREQUENCIES - 1) as f64;
         let s = Complex::new(0.0, TAU * band[0] * (band[1] / band[0]).powf(share));
         exact.at(s).is_none_or(|rows| rows[row].norm() > super::modal::UNSEEN * sum.most(s, row))
     };
-    if !(0..LOOKS).any(&mut is_seen) {
+    if !(0..SEARCH_FREQUENCIES).any(&mut is_seen) {
         return roots;
     }
     let wide = [0.8 * band[0], 1.25 * band[1]];
@@ -128,12 +128,12 @@ pub(super) fn shaping(poles: &[Root], zeros: &[Option<Vec<Root>>]) -> Vec<Root> 
 }
 
 /// Eigenvalues of the pencil A − s·E over modes, their rates, lags and the drive, with the row as its last equation.
-fn guesses(sum: &Sum, row: usize, to: f64) -> Vec<Complex<f64>> {
+fn guesses(sum: &ModalSum, row: usize, to: f64) -> Vec<Complex<f64>> {
     let n = sum.lambda.len();
     let lags: Vec<(usize, f64)> = (sum.laws.iter().enumerate())
-        .filter_map(|(c, law)| if let Law::Lagged(tau) = law { Some((c, *tau)) } else { None })
+        .filter_map(|(c, law)| if let FrequencyDependence::Lagged(tau) = law { Some((c, *tau)) } else { None })
         .collect();
-    let at_once = |c: usize| sum.laws[c] == Law::AtOnce;
+    let at_once = |c: usize| sum.laws[c] == FrequencyDependence::AtOnce;
     let size = 2 * n + lags.len() + 1;
     let u = size - 1;
     let (omega, all) = scales(sum, to);
@@ -149,9 +149,9 @@ fn guesses(sum: &Sum, row: usize, to: f64) -> Vec<Complex<f64>> {
         }
         for c in 0..sum.laws.len() {
             match sum.laws[c] {
-                Law::AtOnce => a[(n + j, u)] += sum.push[(j, c)] / all,
-                Law::Rate => e[(n + j, u)] -= sum.push[(j, c)],
-                Law::Lagged(_) => {}
+                FrequencyDependence::AtOnce => a[(n + j, u)] += sum.push[(j, c)] / all,
+                FrequencyDependence::Rate => e[(n + j, u)] -= sum.push[(j, c)],
+                FrequencyDependence::Lagged(_) => {}
             }
         }
         for (l, (c, _)) in lags.iter().enumerate() {
@@ -175,7 +175,7 @@ fn guesses(sum: &Sum, row: usize, to: f64) -> Vec<Complex<f64>> {
         match (whole, at_once(c)) {
             (false, true) => a[(u, u)] += rest,
             (true, true) => e[(u, u)] -= rest * all,
-            (false, false) if sum.laws[c] == Law::Rate => e[(u, u)] -= rest * all,
+            (false, false) if sum.laws[c] == FrequencyDependence::Rate => e[(u, u)] -= rest * all,
             _ => {}
         }
     }
@@ -218,17 +218,17 @@ fn eigenvalues(a: &DMatrix<f64>, e: &DMatrix<f64>) -> Vec<Complex<f64>> {
 }
 
 /// The zero of a row of the exact response next to `guess`; on the imaginary or the real axis where nothing damps and the guess is there.
-fn secant(exact: &mut Exact<'_>, row: usize, guess: Complex<f64>, undamped: bool) -> Option<Complex<f64>> {
+fn secant(exact: &mut ExactResponse<'_>, row: usize, guess: Complex<f64>, undamped: bool) -> Option<Complex<f64>> {
     let on = |s: Complex<f64>| match undamped {
         true if guess.re.abs() < NEAR * SAME * guess.norm() => Complex::new(0.0, s.im),
         true if guess.im.abs() < NEAR * SAME * guess.norm() => Complex::new(s.re, 0.0),
         _ => s,
     };
     let mut value = |s: Complex<f64>| exact.at(s).map(|values| values[row]);
-    let (mut before, mut now) = (on(guess * (1.0 + ASIDE)), on(guess));
+    let (mut before, mut now) = (on(guess * (1.0 + SECANT_OFFSET)), on(guess));
     let mut past = value(before)?;
     let mut last = f64::INFINITY;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let here = value(now)?;
         let slope = here - past;
         if here.norm() == 0.0 {

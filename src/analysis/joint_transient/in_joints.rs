@@ -2,8 +2,8 @@
 
 use super::super::AnalysisError;
 use super::super::formulation::Formulation;
-use super::super::integrator::{Rule, Run};
-use super::super::transient::record::Carrier;
+use super::super::integrator::{IntegrationRule, IntegrationRun};
+use super::super::transient::record::Propagator;
 use super::report::JointReport;
 use crate::domains::{Ramp, System};
 use crate::equations::constrained::Constrained;
@@ -13,7 +13,7 @@ use crate::multibody::rcr::Reduction;
 use crate::solve::SolveError;
 use crate::solve::time::adaptive::{Advance, Control, Observer, failed};
 use crate::solve::time::defect::SeeError;
-use crate::solve::time::method::{Motion, Work};
+use crate::solve::time::method::{Motion, SolverCounters};
 
 /// Joint coordinates on the way.
 pub(super) struct InJoints<'a> {
@@ -21,13 +21,13 @@ pub(super) struct InJoints<'a> {
     pub(super) system: &'a System,
     pub(super) linkage: Linkage,
     pub(super) scale: Vec<f64>,
-    pub(super) rule: Rule,
+    pub(super) rule: IntegrationRule,
     pub(super) control: Control,
     pub(super) now: Motion<f64>,
     pub(super) report: JointReport,
 }
 
-impl Carrier for InJoints<'_> {
+impl Propagator for InJoints<'_> {
     fn begin(&mut self, ramp: &Ramp<'_>, motion: &mut Motion) -> Result<(), AnalysisError> {
         let Motion { q, v } = &mut self.now;
         self.linkage.coordinates_at(&motion.q, q);
@@ -46,7 +46,7 @@ impl Carrier for InJoints<'_> {
         motion: &mut Motion,
         observe: Observer<'_>,
         _: Option<SeeError<'_>>,
-    ) -> Result<(Advance, Work), AnalysisError> {
+    ) -> Result<(Advance, SolverCounters), AnalysisError> {
         let linkage = &self.linkage;
         let loads = JointLoads::new(self.system, linkage, ramp);
         let mut shown = loads.clone();
@@ -66,24 +66,24 @@ impl Carrier for InJoints<'_> {
             }
             Control::Fixed(step) => Ok(step),
         };
-        let h = h.map_err(|error| told(self.formulation, self.rule, error))?;
-        let run = Run { motion: &mut self.now, h, control: self.control, observe: &mut see };
+        let h = h.map_err(|error| failure(self.formulation, self.rule, error))?;
+        let run = IntegrationRun { motion: &mut self.now, h, control: self.control, observe: &mut see };
         let (end, work) = self.rule.advance(&mut equations, run);
         self.report.accelerations = work.forces;
         self.report.singular_evaluations = equations.singular;
         self.report.largest_gap_m = self.report.largest_gap_m.max(equations.gap);
-        Ok((end.map_err(|error| told(self.formulation, self.rule, error))?, work))
+        Ok((end.map_err(|error| failure(self.formulation, self.rule, error))?, work))
     }
 }
 
 /// An error, with another way where explicit steps may be at fault.
-fn told(formulation: Formulation, rule: Rule, error: SolveError) -> AnalysisError {
+fn failure(formulation: Formulation, rule: IntegrationRule, error: SolveError) -> AnalysisError {
     let (t, dt) = match &error {
         SolveError::StepFailed { t, dt, .. } | SolveError::StepTooSmall { t, dt, .. } => (*t, *dt),
         _ => return error.into(),
     };
     let way = match rule {
-        Rule::Rk45 => {
+        IntegrationRule::Rk45 => {
             format!("; rk45 steps explicitly in formulation {}, tr-bdf2 implicitly", formulation.name())
         }
         _ => String::new(),

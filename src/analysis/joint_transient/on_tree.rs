@@ -4,23 +4,23 @@
 use super::super::formulation::Formulation;
 use super::super::transient::first_step::first_step;
 use super::super::transient::options::TransientOptions;
-use super::super::transient::record::{Carrier, record};
+use super::super::transient::record::{Propagator, record};
 use super::super::transient::result::TransientResult;
 use super::super::{AnalysisError, Watch};
 use super::report::JointReport;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::{Ramp, System};
 use crate::equations::{Bodies, Joints};
 use crate::solve::baseline::SolverKind;
 use crate::solve::time::adaptive::{Adaptive, Advance, Observer};
 use crate::solve::time::defect::{Estimated, SeeError};
 use crate::solve::time::joint_rodas4::JointRodas4;
-use crate::solve::time::method::{Motion, Work};
+use crate::solve::time::method::{Motion, SolverCounters};
 use std::sync::Arc;
 
 /// Loops closed by springs: one factorization a step, no constraint and no singular configuration.
 pub(super) fn on_tree(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     formulation: Formulation,
     options: &TransientOptions<'_>,
     sample: &mut dyn FnMut(f64, &[f64]),
@@ -58,14 +58,14 @@ struct OnTree<'a> {
     options: &'a TransientOptions<'a>,
 }
 
-impl Carrier for OnTree<'_> {
+impl Propagator for OnTree<'_> {
     fn advance(
         &mut self,
         ramp: &Ramp<'_>,
         motion: &mut Motion,
         observe: Observer<'_>,
         errors: Option<SeeError<'_>>,
-    ) -> Result<(Advance, Work), AnalysisError> {
+    ) -> Result<(Advance, SolverCounters), AnalysisError> {
         let options = self.options;
         if options.solver != SolverKind::Recursion {
             return Err(AnalysisError::BadRequest {

@@ -3,13 +3,13 @@
 use super::super::formulation::Formulation;
 use super::super::statics::{OperatingPoint, operating_point};
 use super::super::transient::options::TransientOptions;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 
 /// Stiffness of locked directions in the equilibrium that a release starts from, over that of the drawn beam.
 pub const RIGID: f64 = 1e4;
 
 /// The compiled model with the locked directions of the formulation [`RIGID`] times as stiff.
-pub(super) fn locked(compiled: &Compiled, formulation: Formulation) -> Compiled {
+pub(super) fn locked(compiled: &CompiledModel, formulation: Formulation) -> CompiledModel {
     let mut locked = compiled.clone();
     locked.parts.system.model = formulation.lock(&compiled.parts.system.model).stiffened(RIGID);
     locked
@@ -17,7 +17,11 @@ pub(super) fn locked(compiled: &Compiled, formulation: Formulation) -> Compiled 
 
 /// A warning where the equilibrium that a run comes from, or goes to, is further than the tolerance from that of the elastic beams: the
 /// largest difference of two displacements of a node over the largest displacement. None where one of the two has no equilibrium.
-pub(super) fn told(compiled: &Compiled, formulation: Formulation, options: &TransientOptions<'_>) -> Option<String> {
+pub(super) fn rotary_inertia_warning(
+    compiled: &CompiledModel,
+    formulation: Formulation,
+    options: &TransientOptions<'_>,
+) -> Option<String> {
     let mut beams = compiled.parts.system.model.sections.iter().filter(|section| section.is_segment());
     // a scheme whose joints only turn leaves nothing out beyond itself
     if formulation != Formulation::Rcr || beams.all(|section| section.only_turns()) {
@@ -37,12 +41,13 @@ pub(super) fn told(compiled: &Compiled, formulation: Formulation, options: &Tran
 }
 
 /// How far two equilibria are apart [1].
-fn apart(compiled: &Compiled, elastic: &OperatingPoint, turning: &OperatingPoint) -> Option<f64> {
+fn apart(compiled: &CompiledModel, elastic: &OperatingPoint, turning: &OperatingPoint) -> Option<f64> {
     let linear = compiled.parts.system.model.linear;
     let nodes = || compiled.parts.nodes.iter().flatten();
     let moved = nodes().map(|p| p.displacement(&elastic.q, linear).norm()).fold(0.0, f64::max);
-    let between =
-        |p: &crate::domains::Point| (p.displacement(&elastic.q, linear) - p.displacement(&turning.q, linear)).norm();
+    let between = |p: &crate::domains::MaterialPoint| {
+        (p.displacement(&elastic.q, linear) - p.displacement(&turning.q, linear)).norm()
+    };
     let most = nodes().map(between).fold(0.0, f64::max);
     (moved > 0.0).then_some(most / moved)
 }

@@ -13,17 +13,17 @@ use super::super::statics::{
     OperatingPoint, StaticResult, beam_motions, operating_point, operating_point_near, result_at,
 };
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
-use super::finer::MOST_NEAR_LIMIT;
+use super::finer::MAX_NEAR_LIMIT;
 use super::hidden::{Hidden, hidden};
 use super::meshed::{chosen, meshed, on};
 use super::refined::Refinement;
 use super::softening;
 use super::warnings::{near_buckling, of_fingers, of_heat, of_segments, of_stress};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
 use crate::refine::carry::carried;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::ModelOrder;
+use crate::refine::model_order::Mesh;
 use crate::solve::equilibrium::Equilibrium;
 use std::borrow::Cow;
 
@@ -35,16 +35,16 @@ const NEAR_THE_END: f64 = 0.9;
 
 /// The mesh for the equilibrium at these voltages, from `segments` upwards, and the equilibrium on it.
 pub(super) fn order(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     voltages: &PortVoltages,
     segments: Vec<usize>,
-) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
+) -> Result<(Mesh, OperatingPoint), AnalysisError> {
     if chosen(compiled) {
         return estimated(compiled, voltages, segments);
     }
     let (mut segments, mut refinement, mut lost) = (segments, Refinement::default(), None);
     loop {
-        let mut search = Search::new(compiled, voltages);
+        let mut search = EquilibriumSearch::new(compiled, voltages);
         let from = segments.clone();
         let order = match doubling::fit(&compiled.structure, &compiled.options, segments, &mut |s| search.follow(s)) {
             Err(error @ AnalysisError::NoEquilibrium { .. }) => match refinement.next(compiled, &from, &error) {
@@ -59,7 +59,7 @@ pub(super) fn order(
             Ok(order) => order,
         };
         let finer = if search.is_sure(&order) { None } else { doubling::twice(&compiled.options, &order) };
-        match finer.filter(|finer| finer.segments.iter().sum::<usize>() <= MOST_NEAR_LIMIT) {
+        match finer.filter(|finer| finer.segments.iter().sum::<usize>() <= MAX_NEAR_LIMIT) {
             Some(finer) => segments = finer.segments,
             None => match search.ended(order)? {
                 (_, _, Some(buckled)) if buckled != from => segments = buckled,
@@ -85,28 +85,29 @@ pub(super) fn order(
 
 /// A mesh as it is, with the estimate of its error and its equilibrium.
 pub(super) fn estimated(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     voltages: &PortVoltages,
     segments: Vec<usize>,
-) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
-    Search::new(compiled, voltages).estimated(segments)
+) -> Result<(Mesh, OperatingPoint), AnalysisError> {
+    EquilibriumSearch::new(compiled, voltages).estimated(segments)
 }
 
 /// The estimate of a mesh whose equilibrium is known, and that on twice the segments; its equilibrium.
 pub(super) fn estimated_from(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     voltages: &PortVoltages,
     point: OperatingPoint,
-    finer: (Compiled, OperatingPoint),
+    finer: (CompiledModel, OperatingPoint),
 ) -> Result<(OperatingPoint, Option<f64>), AnalysisError> {
-    let search = Search { known: Some(point), finer: Some(finer), ..Search::new(compiled, voltages) };
+    let search =
+        EquilibriumSearch { known: Some(point), finer: Some(finer), ..EquilibriumSearch::new(compiled, voltages) };
     let (order, point) = search.estimated(compiled.order.segments.clone())?;
     Ok((point, order.estimated_error))
 }
 
 /// The equilibrium on the mesh as it is, and the estimate of its error.
-pub(super) fn judged(
-    compiled: &Compiled,
+pub(super) fn assess(
+    compiled: &CompiledModel,
     voltages: &PortVoltages,
 ) -> Result<(OperatingPoint, Option<f64>), AnalysisError> {
     if compiled.order.segments.is_empty() {
@@ -117,7 +118,7 @@ pub(super) fn judged(
 }
 
 /// An equilibrium on a mesh.
-struct Looked {
+struct MeshEquilibrium {
     segments: Vec<usize>,
     point: OperatingPoint,
     /// The stiffness that is left; none where that is much on the first mesh.
@@ -130,25 +131,25 @@ fn beyond(point: &OperatingPoint) -> Option<f64> {
 }
 
 /// Equilibria on one mesh after the other.
-struct Search<'a> {
-    compiled: &'a Compiled,
+struct EquilibriumSearch<'a> {
+    compiled: &'a CompiledModel,
     voltages: &'a PortVoltages,
     /// The last model.
-    last: Option<Cow<'a, Compiled>>,
+    last: Option<Cow<'a, CompiledModel>>,
     /// Its equilibrium, after those of all before.
-    points: Vec<Looked>,
+    points: Vec<MeshEquilibrium>,
     /// The first equilibrium, and that of another mesh next to it, where they have been found before.
     known: Option<OperatingPoint>,
-    finer: Option<(Compiled, OperatingPoint)>,
+    finer: Option<(CompiledModel, OperatingPoint)>,
 }
 
-impl<'a> Search<'a> {
-    fn new(compiled: &'a Compiled, voltages: &'a PortVoltages) -> Self {
+impl<'a> EquilibriumSearch<'a> {
+    fn new(compiled: &'a CompiledModel, voltages: &'a PortVoltages) -> Self {
         Self { compiled, voltages, last: None, points: Vec::new(), known: None, finer: None }
     }
 
     /// A mesh with the estimate of its error and its equilibrium.
-    fn estimated(mut self, segments: Vec<usize>) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
+    fn estimated(mut self, segments: Vec<usize>) -> Result<(Mesh, OperatingPoint), AnalysisError> {
         let order = doubling::estimate(&self.compiled.options, segments, &mut |segments| self.follow(segments))?;
         let (order, point, _) = self.ended(order)?;
         Ok((order, point))
@@ -162,7 +163,7 @@ impl<'a> Search<'a> {
             Some((finer, point)) => (Cow::Owned(finer), (point, false)),
             None => self.solve(segments, anew)?,
         };
-        if let (false, Some(Looked { point: before, .. })) = (from_rest, self.points.last()) {
+        if let (false, Some(MeshEquilibrium { point: before, .. })) = (from_rest, self.points.last()) {
             // the way from rest is that of the mesh before
             if point.path.passed.is_empty() {
                 point.path.passed.clone_from(&before.path.passed);
@@ -180,7 +181,7 @@ impl<'a> Search<'a> {
         let mut outputs = outputs(&model, &point);
         outputs.extend([limit(left), limit(beyond(&point))]);
         self.last = Some(model);
-        self.points.push(Looked { segments: segments.to_vec(), point, left });
+        self.points.push(MeshEquilibrium { segments: segments.to_vec(), point, left });
         Ok(outputs)
     }
 
@@ -189,12 +190,12 @@ impl<'a> Search<'a> {
         &mut self,
         segments: &[usize],
         anew: bool,
-    ) -> Result<(Cow<'a, Compiled>, (OperatingPoint, bool)), AnalysisError> {
+    ) -> Result<(Cow<'a, CompiledModel>, (OperatingPoint, bool)), AnalysisError> {
         let model = meshed(self.compiled, segments)?;
         let linear = model.parts.system.model.linear;
         let point = match (&self.last, self.points.last(), self.known.take()) {
             (_, None, Some(known)) => (known, true),
-            (Some(before), Some(Looked { point, .. }), _) if !anew => {
+            (Some(before), Some(MeshEquilibrium { point, .. }), _) if !anew => {
                 let start = carried(&model.structure, &before.parts, &model.parts, &point.q, linear);
                 operating_point_near(&model, self.voltages, start)?
             }
@@ -204,7 +205,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether this mesh and twice its segments, where that was looked at, are on one side of their limit.
-    fn is_sure(&self, order: &ModelOrder) -> bool {
+    fn is_sure(&self, order: &Mesh) -> bool {
         let of = |segments: &[usize]| {
             self.points.iter().find(|looked| looked.segments == segments).map(|looked| looked.left)
         };
@@ -214,10 +215,7 @@ impl<'a> Search<'a> {
 
     /// The mesh that came out, with its equilibrium, and a mesh on which that has buckled. Where nothing says on which side of its limit that is,
     /// nothing tells its error.
-    fn ended(
-        mut self,
-        mut order: ModelOrder,
-    ) -> Result<(ModelOrder, OperatingPoint, Option<Vec<usize>>), AnalysisError> {
+    fn ended(mut self, mut order: Mesh) -> Result<(Mesh, OperatingPoint, Option<Vec<usize>>), AnalysisError> {
         let mut found = self.points.iter().position(|looked| looked.segments == order.segments);
         if found.is_none() {
             self.follow(&order.segments)?;
@@ -245,7 +243,7 @@ impl<'a> Search<'a> {
 }
 
 /// What is compared.
-fn outputs(model: &Compiled, point: &OperatingPoint) -> Vec<Output> {
+fn outputs(model: &CompiledModel, point: &OperatingPoint) -> Vec<Output> {
     let system = &model.parts.system;
     let q = &point.q;
     let nodes = || model.parts.nodes.iter().flatten();
@@ -277,7 +275,7 @@ fn outputs(model: &Compiled, point: &OperatingPoint) -> Vec<Output> {
 }
 
 /// The longest beam, which stands for the size of the mechanism [m].
-pub(super) fn size(model: &Compiled) -> f64 {
+pub(super) fn size(model: &CompiledModel) -> f64 {
     model.structure.beams.iter().map(|b| b.length).fold(model.parts.system.length_scale, f64::max)
 }
 
@@ -286,40 +284,40 @@ pub(super) fn size(model: &Compiled) -> f64 {
 /// # Errors
 /// See [`fitted`].
 pub fn static_fitted(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     voltages: &PortVoltages,
-) -> Result<(Compiled, StaticResult, BeamMotions), AnalysisError> {
+) -> Result<(CompiledModel, StaticResult, BeamMotions), AnalysisError> {
     let (order, point) = order(compiled, voltages, compiled.order.segments.clone())?;
     let mut fitted = on(compiled, order)?;
-    let told = told_of_static(&fitted, &point);
+    let told = static_warnings(&fitted, &point);
     fitted.warnings.items.extend(told);
     let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
     Ok((fitted, result, curves))
 }
 
-/// What an equilibrium of a circuit is warned of, each with its size: an error that grows [1], or 1. Beside what [`told_of_static`] warns of,
+/// What an equilibrium of a circuit is warned of, each with its size: an error that grows [1], or 1. Beside what [`static_warnings`] warns of,
 /// the mesh along its gaps, which was chosen without any voltage.
-pub(crate) fn told_still(fitted: &Compiled, point: &OperatingPoint) -> Vec<(Diagnostic, f64)> {
+pub(crate) fn operating_point_warnings(fitted: &CompiledModel, point: &OperatingPoint) -> Vec<(Diagnostic, f64)> {
     let share = stress_left_out(fitted, point);
     let worst = gap_shape::left_out(fitted, point);
     let segments = worst.and_then(|worst| Some((of_segments(fitted, &worst)?, worst.1)));
     let stress = of_stress(fitted, share).map(|warning| (warning, share.unwrap_or(1.0)));
-    let others = told_moving(fitted, point).into_iter().map(|warning| (warning, 1.0));
+    let others = transient_warnings(fitted, point).into_iter().map(|warning| (warning, 1.0));
     stress.into_iter().chain(segments).chain(others).collect()
 }
 
 /// What a state in motion is warned of that an equilibrium is, too, where it is seen at once.
-pub(crate) fn told_moving(fitted: &Compiled, point: &OperatingPoint) -> Vec<Diagnostic> {
+pub(crate) fn transient_warnings(fitted: &CompiledModel, point: &OperatingPoint) -> Vec<Diagnostic> {
     of_fingers(fitted, point).into_iter().chain(of_heat(fitted, point)).collect()
 }
 
 /// What an equilibrium is warned of beside its mesh: what a linear model leaves out, and combs and temperatures beyond their range.
-pub(super) fn told_of_static(fitted: &Compiled, point: &OperatingPoint) -> Vec<Diagnostic> {
+pub(super) fn static_warnings(fitted: &CompiledModel, point: &OperatingPoint) -> Vec<Diagnostic> {
     let stress = of_stress(fitted, stress_left_out(fitted, point));
-    stress.into_iter().chain(told_moving(fitted, point)).chain(near_buckling(point)).collect()
+    stress.into_iter().chain(transient_warnings(fitted, point)).chain(near_buckling(point)).collect()
 }
 
 /// What a linear model leaves out of the deflection [1].
-fn stress_left_out(fitted: &Compiled, point: &OperatingPoint) -> Option<f64> {
+fn stress_left_out(fitted: &CompiledModel, point: &OperatingPoint) -> Option<f64> {
     if fitted.options.linear { left_out(fitted, point, &point.q) } else { None }
 }

@@ -19,9 +19,9 @@ use super::super::transient::TransientOptions;
 use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium;
 use super::meshed::{chosen, meshed};
-use super::seen::Seen;
+use super::seen::SignalAmplitudes;
 use super::warnings::{of_rotary, of_steps};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::discretize::DiscretizeError;
 use crate::domains::Drive;
 use crate::multibody::forces::add_damping;
@@ -31,25 +31,25 @@ use crate::netlist::Diagnostic;
 use crate::options::CompileOptions;
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::{self, Aim, ModelOrder};
+use crate::refine::model_order::{self, Mesh, MeshTarget};
 use crate::solve::eigen::lowest_modes;
 use std::f64::consts::TAU;
 
 /// Modes looked at first, and at most.
-const FIRST: usize = 6;
-const MOST: usize = 48;
+const FIRST_MODES: usize = 6;
+const MAX_MODES: usize = 48;
 /// Share of the tolerance below which an amplitude is negligible.
 const NEGLIGIBLE: f64 = 0.3;
 /// Share that each mode may be off by of what is in none of them, and of what the lack of rotary inertia makes where that is much: no
 /// mesh mends these.
-const BESIDE: f64 = 0.3;
+const UNRESOLVED_SHARE: f64 = 0.3;
 /// What a waveform is off by that is another one.
-const ANOTHER: f64 = 0.3;
+const UNRELATED_ERROR: f64 = 0.3;
 /// Smallest error that is asked of a frequency.
-const SHARPEST: f64 = 1e-8;
+const MIN_FREQUENCY_ERROR: f64 = 1e-8;
 
 /// A mode that a run excites.
-struct Excited {
+struct ExcitedMode {
     frequency: f64,
     amplitude: f64,
     decay: f64,
@@ -58,9 +58,9 @@ struct Excited {
 }
 
 /// The mesh for a run, with the estimate of what the modes are off by; and how far what is in none of them may be off at most.
-pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result<(ModelOrder, f64), AnalysisError> {
+pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> Result<(Mesh, f64), AnalysisError> {
     if moving.structure.beams.is_empty() {
-        return Ok((ModelOrder { estimated_error: Some(0.0), ..moving.order.clone() }, 0.0));
+        return Ok((Mesh { estimated_error: Some(0.0), ..moving.order.clone() }, 0.0));
     }
     let given = chosen(moving) || moving.options.band.is_some();
     let voltages = &options.voltages;
@@ -68,7 +68,7 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
     if start.order.segments.len() != moving.order.segments.len() {
         return Ok((moving.order.clone(), 0.0)); // another drawing: the run itself says so
     }
-    let at = |model: &Compiled, segments: Vec<usize>| match given {
+    let at = |model: &CompiledModel, segments: Vec<usize>| match given {
         true => equilibrium::estimated(model, voltages, segments).map(|(order, _)| order),
         false => equilibrium::order(model, voltages, segments).map(|(order, _)| order),
     };
@@ -84,7 +84,7 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         }
     }
     let tol = moving.options.tol;
-    let mut count = FIRST;
+    let mut count = FIRST_MODES;
     loop {
         let mesh = match given {
             true => still.clone(),
@@ -94,15 +94,15 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
             }
         };
         let (modes, left) = excited(moving, options, &mesh.segments, count)?;
-        if left > NEGLIGIBLE * tol && modes.len() >= count && count < MOST {
-            count = (2 * count).min(MOST);
+        if left > NEGLIGIBLE * tol && modes.len() >= count && count < MAX_MODES {
+            count = (2 * count).min(MAX_MODES);
             continue;
         }
         // what is in none of the modes may be off by all that it swings
         let left = if left > NEGLIGIBLE * tol { 2f64.sqrt() * left } else { 0.0 };
         // no mesh holds the tolerance where these do not
         let beside = left.max(turned(&modes, options.stop));
-        let looser = if given { 1.0 } else { (BESIDE * beside / tol).max(1.0) };
+        let looser = if given { 1.0 } else { (UNRESOLVED_SHARE * beside / tol).max(1.0) };
         let Some(highest) = modes.iter().rposition(|m| m.amplitude > NEGLIGIBLE * looser * tol) else {
             return Ok((still, left));
         };
@@ -111,12 +111,12 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         let mut analyse = |segments: &[usize]| frequencies(moving, voltages, segments, &tolerances);
         if given {
             let swings: Vec<f64> = modes[..=highest].iter().map(|m| 2f64.sqrt() * m.amplitude).collect();
-            let estimated_error = told(&moving.options, &still.segments, &swings, &mut analyse);
-            return Ok((merged(&still, &ModelOrder { estimated_error, ..still.clone() }), left));
+            let estimated_error = mesh_estimate(&moving.options, &still.segments, &swings, &mut analyse);
+            return Ok((merged(&still, &Mesh { estimated_error, ..still.clone() }), left));
         }
         // the estimates of frequencies have been found too small: a part of the tolerance is theirs, and what is told is the estimate
-        let sharper = tolerances.iter().map(|t| (counted::SAFETY * t).max(SHARPEST)).collect();
-        let aim = Aim { band: 1.01 * modes[highest].frequency, tolerances: sharper, rigid: false };
+        let sharper = tolerances.iter().map(|t| (counted::SAFETY * t).max(MIN_FREQUENCY_ERROR)).collect();
+        let aim = MeshTarget { band: 1.01 * modes[highest].frequency, tolerances: sharper, rigid: false };
         let order = model_order::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
         let order = order.with_estimate_times(looser * counted::SAFETY);
         let mesh = merged(&still, &order);
@@ -129,15 +129,15 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
 }
 
 /// What a run on its mesh is warned of beside it: equal steps that its motion outruns, and rotary inertia left out.
-pub(super) fn told_of_motion(moving: &Compiled, options: &TransientOptions<'_>) -> Vec<Diagnostic> {
-    let Ok((modes, _)) = excited(moving, options, &moving.order.segments, FIRST) else { return Vec::new() };
+pub(super) fn motion_warnings(moving: &CompiledModel, options: &TransientOptions<'_>) -> Vec<Diagnostic> {
+    let Ok((modes, _)) = excited(moving, options, &moving.order.segments, FIRST_MODES) else { return Vec::new() };
     let missed = options.step.and_then(|step| Some(of_steps(step, outrun(moving, step, &modes)?)));
-    missed.into_iter().chain(of_rotary(moving, late(&modes, options.stop))).collect()
+    missed.into_iter().chain(of_rotary(moving, phase_error(&modes, options.stop))).collect()
 }
 
 /// By how much of its amplitude a run is off for want of rotary inertia.
-fn late(modes: &[Excited], stop: f64) -> f64 {
-    let late = |mode: &Excited| {
+fn phase_error(modes: &[ExcitedMode], stop: f64) -> f64 {
+    let late = |mode: &ExcitedMode| {
         let lasts = stop.min(2.0 / mode.decay.max(f64::MIN_POSITIVE));
         // a wave that has lost its phase is off by what it swings
         mode.amplitude * (mode.rotary * TAU * mode.frequency * lasts / 3f64.sqrt()).min(2f64.sqrt())
@@ -146,22 +146,22 @@ fn late(modes: &[Excited], stop: f64) -> f64 {
 }
 
 /// The same where it makes another waveform of the run.
-fn turned(modes: &[Excited], stop: f64) -> f64 {
-    let late = late(modes, stop);
-    if late > ANOTHER { late } else { 0.0 }
+fn turned(modes: &[ExcitedMode], stop: f64) -> f64 {
+    let late = phase_error(modes, stop);
+    if late > UNRELATED_ERROR { late } else { 0.0 }
 }
 
 /// The mode that a run in equal steps begins with and cannot follow: its frequency [Hz] and its share of the way. A step longer than a
 /// radian of it damps it away or slows it, in a companion of twice the step as well.
-fn outrun(moving: &Compiled, step: f64, modes: &[Excited]) -> Option<(f64, f64)> {
-    let swings = |mode: &&Excited| mode.decay < 2.0 * TAU * mode.frequency && mode.amplitude > moving.options.tol;
-    let too_fast = |mode: &&Excited| TAU * mode.frequency * step > 1.0;
+fn outrun(moving: &CompiledModel, step: f64, modes: &[ExcitedMode]) -> Option<(f64, f64)> {
+    let swings = |mode: &&ExcitedMode| mode.decay < 2.0 * TAU * mode.frequency && mode.amplitude > moving.options.tol;
+    let too_fast = |mode: &&ExcitedMode| TAU * mode.frequency * step > 1.0;
     let most = modes.iter().filter(swings).filter(too_fast).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
     Some((most.frequency, most.amplitude))
 }
 
 /// The estimate of a mesh as it is: a mode that has lost its phase is wrong by what it swings, and by no more.
-fn told(
+fn mesh_estimate(
     options: &CompileOptions,
     segments: &[usize],
     swings: &[f64],
@@ -173,7 +173,7 @@ fn told(
 
 /// Frequencies about where the run goes to, with errors relative to what each may have.
 fn frequencies(
-    moving: &Compiled,
+    moving: &CompiledModel,
     voltages: &PortVoltages,
     segments: &[usize],
     tolerances: &[f64],
@@ -192,15 +192,15 @@ fn refused(error: DiscretizeError) -> AnalysisError {
 }
 
 /// Error that the frequency of a mode may have.
-fn tolerance(mode: &Excited, stop: f64, tol: f64) -> f64 {
+fn tolerance(mode: &ExcitedMode, stop: f64, tol: f64) -> f64 {
     let lasts = stop.min(2.0 / mode.decay.max(f64::MIN_POSITIVE));
     let weight = mode.amplitude * (TAU * mode.frequency * lasts / 3f64.sqrt()).max(1.0);
-    (tol / weight.max(f64::MIN_POSITIVE)).clamp(SHARPEST, 0.3)
+    (tol / weight.max(f64::MIN_POSITIVE)).clamp(MIN_FREQUENCY_ERROR, 0.3)
 }
 
 /// The finer of two meshes for every beam, and the larger of their errors.
-fn merged(a: &ModelOrder, b: &ModelOrder) -> ModelOrder {
-    ModelOrder {
+fn merged(a: &Mesh, b: &Mesh) -> Mesh {
+    Mesh {
         segments: a.segments.iter().zip(&b.segments).map(|(a, b)| *a.max(b)).collect(),
         estimated_error: a.estimated_error.zip(b.estimated_error).map(|(a, b)| a.max(b)),
         modes_in_band: b.modes_in_band,
@@ -210,11 +210,11 @@ fn merged(a: &ModelOrder, b: &ModelOrder) -> ModelOrder {
 
 /// The lowest modes about where the run goes to, with their amplitudes; and the share of the way there that is in none of them.
 fn excited(
-    moving: &Compiled,
+    moving: &CompiledModel,
     options: &TransientOptions<'_>,
     segments: &[usize],
     count: usize,
-) -> Result<(Vec<Excited>, f64), AnalysisError> {
+) -> Result<(Vec<ExcitedMode>, f64), AnalysisError> {
     let model = meshed(moving, segments)?;
     let system = &model.parts.system;
     let rest = OperatingPoint::rest(&model, &options.voltages)?;
@@ -244,11 +244,11 @@ fn excited(
     let slow = shortest_heat(&model, &from, &to);
     // the way that slow heat takes it within the run
     let size = if slow > 0.0 { size * -(-options.stop / slow).exp_m1() } else { size };
-    let seen = Seen::new(&model, options, &to);
+    let seen = SignalAmplitudes::new(&model, options, &to);
     // what each signal sees of the way, of every mode on it, and of what is in none of them
     let mut swings = vec![seen.of(&way, 0.0)];
     let lags = |omega: f64| (1.0 + (omega * slow).powi(2)).sqrt();
-    let mut modes: Vec<Excited> = (found.shapes.iter().zip(&found.lambda))
+    let mut modes: Vec<ExcitedMode> = (found.shapes.iter().zip(&found.lambda))
         .map(|(x, lambda)| {
             let omega = lambda.max(0.0).sqrt();
             let share = system.model.mass_product(x, &way);
@@ -256,7 +256,7 @@ fn excited(
                 *way -= x * share;
             }
             swings.push(seen.of(x, omega).iter().map(|swing| swing * share.abs() / lags(omega)).collect());
-            Excited {
+            ExcitedMode {
                 frequency: omega / TAU,
                 amplitude: (share.abs() * reach(&model, x) / size / lags(omega)).min(1.0),
                 decay: damping(&system.model, x),
@@ -277,7 +277,7 @@ fn excited(
 /// K⁻¹·r with the forces r that are out of balance where the run starts, under the drive that it goes on with; none for a part that
 /// floats. For small motions this is the way to where the run goes to; for large ones the shortening of what bends is no stretch in it.
 fn pushed(
-    model: &Compiled,
+    model: &CompiledModel,
     from: &OperatingPoint,
     drive: &Drive,
     stiffness: &BlockMatrix<f64, 3>,
@@ -300,7 +300,7 @@ fn pushed(
 }
 
 /// The way from one state to another, if the stiffness all along were that at its end; none for a part that floats.
-pub(super) fn linear_way(model: &Compiled, from: &OperatingPoint, to: &OperatingPoint) -> Option<Vec<Pose>> {
+pub(super) fn linear_way(model: &CompiledModel, from: &OperatingPoint, to: &OperatingPoint) -> Option<Vec<Pose>> {
     let system = &model.parts.system;
     let mut drive = system.electrics.drive();
     system.electrics.apply(&to.sources, &to.rise, &mut drive);
@@ -311,7 +311,7 @@ pub(super) fn linear_way(model: &Compiled, from: &OperatingPoint, to: &Operating
 }
 
 /// Largest displacement of a node [m], of a small motion `x`.
-pub(super) fn reach(model: &Compiled, x: &[Pose]) -> f64 {
+pub(super) fn reach(model: &CompiledModel, x: &[Pose]) -> f64 {
     model.parts.nodes.iter().flatten().map(|p| p.displacement(x, true).norm()).fold(0.0, f64::max)
 }
 
@@ -323,7 +323,7 @@ fn damping(model: &Model, x: &[Pose]) -> f64 {
 }
 
 /// The shortest time constant of the heat that the run begins with [s]; 0 where heat moves nothing.
-fn shortest_heat(model: &Compiled, from: &OperatingPoint, to: &OperatingPoint) -> f64 {
+fn shortest_heat(model: &CompiledModel, from: &OperatingPoint, to: &OperatingPoint) -> f64 {
     let heaters = &model.parts.system.electrics.heating.heaters;
     let moves = |k: &usize| from.rise[*k] != to.rise[*k];
     let loads = !model.parts.system.loads.is_empty() || to.volts.iter().any(|v| *v != 0.0);

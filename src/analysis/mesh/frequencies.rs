@@ -5,15 +5,15 @@ use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::equilibrium;
 use super::meshed::{chosen, meshed, on};
 use super::mode_pairs;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::discretize::DiscretizeError;
 use crate::options::{CompileOptions, Junctions};
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::ModelOrder;
+use crate::refine::model_order::Mesh;
 
 /// Modes beyond which none are compared with those of a finer mesh: their own estimates stand.
-const MOST_COMPARED: usize = 64;
+const MAX_COMPARED: usize = 64;
 
 /// Tolerance below which the estimate of modes with calibrated junctions is compared with twice the segments: what it does not know, the mass of
 /// half a segment on the wrong side of a junction's spring, falls with the first power of the segments and was found up to 1e-5.
@@ -26,10 +26,10 @@ const FIRST_ORDER: f64 = 1.5;
 /// # Errors
 /// See [`fitted`](super::fitted).
 pub fn modes_fitted(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     count: usize,
     voltages: &PortVoltages,
-) -> Result<(Compiled, ModesResult, Vec<BeamMotions>), AnalysisError> {
+) -> Result<(CompiledModel, ModesResult, Vec<BeamMotions>), AnalysisError> {
     let (order, (result, curves)) = for_modes(compiled, count, voltages)?;
     let fitted = on(compiled, order)?;
     let estimated_error = fitted.order.estimated_error;
@@ -38,14 +38,14 @@ pub fn modes_fitted(
 }
 
 /// Modes with the shapes of their beams.
-pub(crate) type Shaped = (ModesResult, Vec<BeamMotions>);
+pub(crate) type ModesWithShapes = (ModesResult, Vec<BeamMotions>);
 
 /// The mesh for modes, and the modes on that mesh with the estimates of their errors.
 pub(super) fn for_modes(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     count: usize,
     voltages: &PortVoltages,
-) -> Result<(ModelOrder, Shaped), AnalysisError> {
+) -> Result<(Mesh, ModesWithShapes), AnalysisError> {
     let loaded = about_equilibrium(compiled, voltages);
     let given = chosen(compiled) || compiled.options.band.is_some();
     let order = if given {
@@ -54,7 +54,7 @@ pub(super) fn for_modes(
         let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
         counted::choose(&compiled.structure, &compiled.options, count).map_err(detail)?
     };
-    let mut compared = Compared { compiled, count, voltages, meshes: Vec::new() };
+    let mut compared = ComparedMeshes { compiled, count, voltages, meshes: Vec::new() };
     if !loaded {
         return about_drawing(&mut compared, order, given);
     }
@@ -66,7 +66,7 @@ pub(super) fn for_modes(
     let (own, found) = own_estimate(compiled, still.clone(), count, voltages)?;
     let carried = is_carried(compiled, &found.0, still.estimated_error);
     let enough = carried && own.estimated_error.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
-    if (enough && !is_fine(compiled)) || count > MOST_COMPARED {
+    if (enough && !is_fine(compiled)) || count > MAX_COMPARED {
         let (result, curves) = found;
         let faster = result.per_deflection.iter().copied().fold(1.0, f64::max);
         let moved = still.estimated_error.map(|error| if carried { error } else { error * faster });
@@ -76,28 +76,28 @@ pub(super) fn for_modes(
         let errors: Vec<Option<f64>> = result.errors.iter().enumerate().map(each).collect();
         let all = [moved, own.estimated_error, worst(errors.iter().copied())];
         let estimated_error = worst(all.into_iter());
-        return Ok((ModelOrder { estimated_error, ..own }, (ModesResult { errors, ..result }, curves)));
+        return Ok((Mesh { estimated_error, ..own }, (ModesResult { errors, ..result }, curves)));
     }
     compared.keep(own.segments.clone(), found);
     let moving = compared.fit(own.segments)?;
     let estimated_error = worst([still.estimated_error, moving.estimated_error].into_iter());
     // the comparison includes the states that the modes are about
-    compared.finish(ModelOrder { estimated_error, ..moving })
+    compared.finish(Mesh { estimated_error, ..moving })
 }
 
 /// The mesh and the modes about the drawing, which know their errors where the scheme lets them.
 fn about_drawing(
-    compared: &mut Compared<'_>,
-    order: ModelOrder,
+    compared: &mut ComparedMeshes<'_>,
+    order: Mesh,
     given: bool,
-) -> Result<(ModelOrder, Shaped), AnalysisError> {
-    let Compared { compiled, count, .. } = *compared;
+) -> Result<(Mesh, ModesWithShapes), AnalysisError> {
+    let ComparedMeshes { compiled, count, .. } = *compared;
     let fine = is_fine(compiled);
     let (order, found) = own_estimate(compiled, order, count, &[])?;
     // two modes next to each other may change places from the mesh that was looked at to this one
     let holds = order.estimated_error.is_some_and(|error| error <= compiled.options.tol);
     let known = if given { order.estimated_error.is_some() } else { holds && !fine };
-    if known || count > MOST_COMPARED {
+    if known || count > MAX_COMPARED {
         return Ok((order, found));
     }
     compared.keep(order.segments.clone(), found);
@@ -109,26 +109,26 @@ fn about_drawing(
 }
 
 /// Meshes whose modes are kept while they are compared, at most: the mesh that holds and its double are the last two but for rounding.
-const MOST_KEPT: usize = 12;
+const MAX_KEPT: usize = 12;
 
 /// The modes of the meshes that are compared.
-struct Compared<'a> {
-    compiled: &'a Compiled,
+struct ComparedMeshes<'a> {
+    compiled: &'a CompiledModel,
     count: usize,
     voltages: &'a PortVoltages,
-    meshes: Vec<(Vec<usize>, Shaped)>,
+    meshes: Vec<(Vec<usize>, ModesWithShapes)>,
 }
 
-impl Compared<'_> {
-    fn keep(&mut self, segments: Vec<usize>, found: Shaped) {
-        if self.meshes.len() == MOST_KEPT {
+impl ComparedMeshes<'_> {
+    fn keep(&mut self, segments: Vec<usize>, found: ModesWithShapes) {
+        if self.meshes.len() == MAX_KEPT {
             self.meshes.remove(0);
         }
         self.meshes.push((segments, found));
     }
 
     /// The modes of a mesh.
-    fn shaped(&mut self, segments: &[usize]) -> Result<&Shaped, AnalysisError> {
+    fn shaped(&mut self, segments: &[usize]) -> Result<&ModesWithShapes, AnalysisError> {
         let at = match self.meshes.iter().position(|(known, _)| known == segments) {
             Some(at) => at,
             None => {
@@ -146,7 +146,7 @@ impl Compared<'_> {
         Ok(frequency_outputs(&self.shaped(segments)?.0, count))
     }
 
-    fn fit(&mut self, segments: Vec<usize>) -> Result<ModelOrder, AnalysisError> {
+    fn fit(&mut self, segments: Vec<usize>) -> Result<Mesh, AnalysisError> {
         let compiled = self.compiled;
         let mut analyse = |mesh: &[usize]| self.outputs(mesh);
         if !is_fine(compiled) {
@@ -158,7 +158,7 @@ impl Compared<'_> {
     }
 
     /// The modes on the mesh that was chosen, each with the difference that twice its segments make.
-    fn finish(&mut self, order: ModelOrder) -> Result<(ModelOrder, Shaped), AnalysisError> {
+    fn finish(&mut self, order: Mesh) -> Result<(Mesh, ModesWithShapes), AnalysisError> {
         let compiled = self.compiled;
         let times = if is_fine(compiled) { FIRST_ORDER } else { 1.0 };
         let (mut result, curves) = self.shaped(&order.segments)?.clone();
@@ -175,17 +175,17 @@ impl Compared<'_> {
         }
         let of_modes = worst(result.errors.iter().copied()).filter(|_| order.estimated_error.is_some());
         let estimated_error = order.estimated_error.map(|error| error.max(of_modes.unwrap_or(0.0)));
-        Ok((ModelOrder { estimated_error, ..order }, (result, curves)))
+        Ok((Mesh { estimated_error, ..order }, (result, curves)))
     }
 }
 
 /// Whether the tolerance is finer than what modes of the drawing know of their errors.
-pub(super) fn is_fine(compiled: &Compiled) -> bool {
+pub(super) fn is_fine(compiled: &CompiledModel) -> bool {
     compiled.options.junctions == Junctions::Calibrated && compiled.options.tol < FINEST_KNOWN
 }
 
 /// Whether what the mesh leaves uncertain of the equilibrium moves no frequency beyond the tolerance: next to a fold it does.
-pub(super) fn is_carried(compiled: &Compiled, found: &ModesResult, still: Option<f64>) -> bool {
+pub(super) fn is_carried(compiled: &CompiledModel, found: &ModesResult, still: Option<f64>) -> bool {
     let faster = found.per_deflection.iter().copied().fold(1.0, f64::max);
     still.is_some_and(|error| error * faster <= doubling::SAFETY * compiled.options.tol)
 }
@@ -207,13 +207,13 @@ pub(super) fn frequency_outputs(found: &ModesResult, count: usize) -> Vec<Output
 
 /// The estimate that the modes themselves make of a mesh.
 fn own_estimate(
-    compiled: &Compiled,
-    order: ModelOrder,
+    compiled: &CompiledModel,
+    order: Mesh,
     count: usize,
     voltages: &PortVoltages,
-) -> Result<(ModelOrder, Shaped), AnalysisError> {
+) -> Result<(Mesh, ModesWithShapes), AnalysisError> {
     let model = meshed(compiled, &order.segments)?;
     let found = modes_with_curves(&model, count, voltages)?;
     let estimated_error = worst(found.0.errors.iter().copied());
-    Ok((ModelOrder { estimated_error, ..order }, found))
+    Ok((Mesh { estimated_error, ..order }, found))
 }

@@ -9,33 +9,33 @@ use super::super::modes::{ModesResult, about_equilibrium, modes};
 use super::super::pull_in::{PullInResult, pull_in};
 use super::super::statics::{OperatingPoint, StaticResult, operating_point, result_at};
 use super::super::{AnalysisError, PortVoltages};
-use super::equilibrium::{self, told_of_static};
+use super::equilibrium::{self, static_warnings};
 pub(crate) use super::finer::{Finer, finer};
 use super::frequencies::{frequency_outputs, is_carried, is_fine, worst};
 use super::meshed::meshed;
-use super::pull_in::{pull_in_outputs, told_of_pull_in};
-use super::{Request, fitted};
-use crate::compile::Compiled;
+use super::pull_in::{pull_in_outputs, pull_in_warnings};
+use super::{MeshRequest, fitted};
+use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
 
 /// What an analysis found.
 #[derive(Debug, Clone)]
-pub(crate) enum Answer {
-    /// Of [`Request::Static`].
+pub(crate) enum AnalysisResult {
+    /// Of [`MeshRequest::Static`].
     Static(StaticResult),
-    /// Of [`Request::Modes`].
+    /// Of [`MeshRequest::Modes`].
     Modes(ModesResult),
-    /// Of [`Request::PullIn`].
+    /// Of [`MeshRequest::PullIn`].
     PullIn(PullInResult),
 }
 
 /// The result on a given mesh.
 #[derive(Debug, Clone)]
-pub(crate) struct Judged {
+pub(crate) struct Assessment {
     /// The result.
-    pub(crate) answer: Answer,
+    pub(crate) answer: AnalysisResult,
     /// Largest estimated relative error by the mesh [1]; none without an estimate.
     pub(crate) estimated_error: Option<f64>,
     /// What else is to be warned of, each with its code.
@@ -48,11 +48,11 @@ pub(crate) struct Judged {
 ///
 /// # Errors
 /// What the analysis has against the model.
-pub(crate) fn judged(compiled: &Compiled, request: &Request<'_>) -> Result<Judged, AnalysisError> {
+pub(crate) fn assess(compiled: &CompiledModel, request: &MeshRequest<'_>) -> Result<Assessment, AnalysisError> {
     match *request {
-        Request::Static { voltages } => still(compiled, voltages),
-        Request::Modes { count, voltages } => swinging(compiled, count, voltages),
-        Request::PullIn { port, max } => closing(compiled, port, max),
+        MeshRequest::Static { voltages } => assess_static(compiled, voltages),
+        MeshRequest::Modes { count, voltages } => assess_modes(compiled, count, voltages),
+        MeshRequest::PullIn { port, max } => assess_pull_in(compiled, port, max),
     }
 }
 
@@ -60,28 +60,31 @@ pub(crate) fn judged(compiled: &Compiled, request: &Request<'_>) -> Result<Judge
 ///
 /// # Errors
 /// What the analysis has against the model.
-pub(crate) fn searched(compiled: &Compiled, request: &Request<'_>) -> Result<Judged, AnalysisError> {
+pub(crate) fn refine_and_assess(
+    compiled: &CompiledModel,
+    request: &MeshRequest<'_>,
+) -> Result<Assessment, AnalysisError> {
     let own = fitted(compiled, request)?;
     let (answer, warnings) = match *request {
-        Request::Static { voltages } => {
+        MeshRequest::Static { voltages } => {
             let point = operating_point(&own, voltages)?;
-            let told = told_of_static(&own, &point);
+            let told = static_warnings(&own, &point);
             let result = result_at(&own, &point);
-            let warnings = coded(told).into_iter().chain(result.told()).collect();
-            (Answer::Static(result), warnings)
+            let warnings = coded(told).into_iter().chain(result.notes()).collect();
+            (AnalysisResult::Static(result), warnings)
         }
-        Request::Modes { count, voltages } => {
+        MeshRequest::Modes { count, voltages } => {
             let found = modes(&own, count, voltages)?;
             let warnings = found.warnings.clone();
-            (Answer::Modes(found), warnings)
+            (AnalysisResult::Modes(found), warnings)
         }
-        Request::PullIn { port, max } => {
+        MeshRequest::PullIn { port, max } => {
             let found = pull_in(&own, port, max)?;
-            let warnings = coded(told_of_pull_in(&own, &found)).into_iter().chain(found.told()).collect();
-            (Answer::PullIn(found), warnings)
+            let warnings = coded(pull_in_warnings(&own, &found)).into_iter().chain(found.notes()).collect();
+            (AnalysisResult::PullIn(found), warnings)
         }
     };
-    Ok(Judged { answer, estimated_error: own.order.estimated_error, warnings, holds: true })
+    Ok(Assessment { answer, estimated_error: own.order.estimated_error, warnings, holds: true })
 }
 
 /// Warnings as a table has them.
@@ -90,12 +93,12 @@ fn coded(told: impl IntoIterator<Item = Diagnostic>) -> Vec<String> {
 }
 
 /// Within the share of the tolerance that a comparison with twice the segments may use.
-fn within(compiled: &Compiled, error: Option<f64>) -> bool {
+fn within(compiled: &CompiledModel, error: Option<f64>) -> bool {
     error.is_some_and(|error| error <= doubling::SAFETY * compiled.options.tol)
 }
 
-fn still(compiled: &Compiled, voltages: &PortVoltages) -> Result<Judged, AnalysisError> {
-    let (point, estimated_error) = equilibrium::judged(compiled, voltages)?;
+fn assess_static(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<Assessment, AnalysisError> {
+    let (point, estimated_error) = equilibrium::assess(compiled, voltages)?;
     Ok(judged_at(compiled, point, estimated_error))
 }
 
@@ -104,24 +107,24 @@ fn still(compiled: &Compiled, voltages: &PortVoltages) -> Result<Judged, Analysi
 /// # Errors
 /// What the analysis has against the model.
 pub(crate) fn judged_static(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     voltages: &PortVoltages,
     point: OperatingPoint,
-    finer: (Compiled, OperatingPoint),
-) -> Result<Judged, AnalysisError> {
+    finer: (CompiledModel, OperatingPoint),
+) -> Result<Assessment, AnalysisError> {
     let (point, estimated_error) = equilibrium::estimated_from(compiled, voltages, point, finer)?;
     Ok(judged_at(compiled, point, estimated_error))
 }
 
-fn judged_at(compiled: &Compiled, point: OperatingPoint, estimated_error: Option<f64>) -> Judged {
-    let told = told_of_static(compiled, &point);
+fn judged_at(compiled: &CompiledModel, point: OperatingPoint, estimated_error: Option<f64>) -> Assessment {
+    let told = static_warnings(compiled, &point);
     let result = result_at(compiled, &point);
-    let warnings = coded(told).into_iter().chain(result.told()).collect();
-    let answer = Answer::Static(result);
-    Judged { answer, estimated_error, warnings, holds: within(compiled, estimated_error) }
+    let warnings = coded(told).into_iter().chain(result.notes()).collect();
+    let answer = AnalysisResult::Static(result);
+    Assessment { answer, estimated_error, warnings, holds: within(compiled, estimated_error) }
 }
 
-fn swinging(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<Judged, AnalysisError> {
+fn assess_modes(compiled: &CompiledModel, count: usize, voltages: &PortVoltages) -> Result<Assessment, AnalysisError> {
     judged_modes(compiled, modes(compiled, count, voltages)?, count, voltages)
 }
 
@@ -130,17 +133,17 @@ fn swinging(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resul
 /// # Errors
 /// What the analysis has against the model.
 pub(crate) fn judged_modes(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     found: ModesResult,
     count: usize,
     voltages: &PortVoltages,
-) -> Result<Judged, AnalysisError> {
+) -> Result<Assessment, AnalysisError> {
     // a mesh without so many modes says nothing about those that it lacks
     let all = found.frequencies_hz.len() == count;
     let own = worst(found.errors.iter().copied());
     let sure = own.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
     let loaded = about_equilibrium(compiled, voltages);
-    let moved = if loaded { equilibrium::judged(compiled, voltages)?.1 } else { Some(0.0) };
+    let moved = if loaded { equilibrium::assess(compiled, voltages)?.1 } else { Some(0.0) };
     let (own, sure) = match own {
         Some(_) if !is_fine(compiled) && (!loaded || (sure && is_carried(compiled, &found, moved))) => (own, sure),
         _ => doubled(compiled, &found, count, voltages)?,
@@ -148,12 +151,12 @@ pub(crate) fn judged_modes(
     let estimated_error = moved.zip(own).map(|(a, b)| a.max(b));
     let holds = all && sure && within(compiled, moved);
     let warnings = found.warnings.clone();
-    Ok(Judged { answer: Answer::Modes(found), estimated_error, warnings, holds })
+    Ok(Assessment { answer: AnalysisResult::Modes(found), estimated_error, warnings, holds })
 }
 
 /// Frequencies compared with those of twice the segments.
 fn doubled(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     found: &ModesResult,
     count: usize,
     voltages: &PortVoltages,
@@ -169,7 +172,7 @@ fn doubled(
     Ok((order.estimated_error, within(compiled, order.estimated_error)))
 }
 
-fn closing(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Judged, AnalysisError> {
+fn assess_pull_in(compiled: &CompiledModel, port: Option<&str>, max: f64) -> Result<Assessment, AnalysisError> {
     let found = pull_in(compiled, port, max)?;
     let mut first: Option<Vec<Output>> = Some(pull_in_outputs(&found));
     let order = doubling::estimate(&compiled.options, compiled.order.segments.clone(), &mut |segments| {
@@ -179,6 +182,11 @@ fn closing(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Judged, 
         Ok::<_, AnalysisError>(pull_in_outputs(&pull_in(&*meshed(compiled, segments)?, port, max)?))
     })?;
     let estimated_error = order.estimated_error;
-    let warnings = coded(told_of_pull_in(compiled, &found)).into_iter().chain(found.told()).collect();
-    Ok(Judged { answer: Answer::PullIn(found), estimated_error, warnings, holds: within(compiled, estimated_error) })
+    let warnings = coded(pull_in_warnings(compiled, &found)).into_iter().chain(found.notes()).collect();
+    Ok(Assessment {
+        answer: AnalysisResult::PullIn(found),
+        estimated_error,
+        warnings,
+        holds: within(compiled, estimated_error),
+    })
 }

@@ -11,8 +11,8 @@
 
 use super::super::PortVoltages;
 use super::super::statics::{OperatingPoint, operating_point_near};
-use super::finer::{Finer, MOST_NEAR_LIMIT, finer};
-use crate::compile::Compiled;
+use super::finer::{Finer, MAX_NEAR_LIMIT, finer};
+use crate::compile::CompiledModel;
 use crate::domains::BeamLine;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
@@ -37,7 +37,7 @@ pub(super) enum Hidden {
 }
 
 /// Whether an equilibrium is one on finer meshes, where so little of the stiffness is left that it may not be.
-pub(super) fn hidden(compiled: &Compiled, voltages: &PortVoltages, point: &OperatingPoint) -> Hidden {
+pub(super) fn hidden(compiled: &CompiledModel, voltages: &PortVoltages, point: &OperatingPoint) -> Hidden {
     let model = &compiled.parts.system.model;
     if model.linear || model.bodies.is_empty() || !point.free_motions.is_empty() {
         // displacements are small by decree, or a direction is held that is free
@@ -47,10 +47,10 @@ pub(super) fn hidden(compiled: &Compiled, voltages: &PortVoltages, point: &Opera
     if !is_softer(compiled, point, SUSPECT[usize::from(!coarse)]) {
         return Hidden::Nothing;
     }
-    let (mut here, mut there): (Option<Compiled>, OperatingPoint) = (None, point.clone());
+    let (mut here, mut there): (Option<CompiledModel>, OperatingPoint) = (None, point.clone());
     for round in 0..2 {
         let Some(Finer { model, start }) = finer(here.as_ref().unwrap_or(compiled), &there) else { break };
-        if model.order.segments.iter().sum::<usize>() > MOST_NEAR_LIMIT {
+        if model.order.segments.iter().sum::<usize>() > MAX_NEAR_LIMIT {
             break;
         }
         let Ok((next, from_rest)) = operating_point_near(&model, voltages, start) else { break };
@@ -69,7 +69,7 @@ pub(super) fn hidden(compiled: &Compiled, voltages: &PortVoltages, point: &Opera
 }
 
 /// True where μ < `fraction`: one factorization.
-fn is_softer(compiled: &Compiled, point: &OperatingPoint, fraction: f64) -> bool {
+fn is_softer(compiled: &CompiledModel, point: &OperatingPoint, fraction: f64) -> bool {
     let system = &compiled.parts.system;
     let (mut tangent, mut force) = (BlockMatrix::new(&system.model.pattern), vec![Pose::zeros(); system.bodies()]);
     system.tangent(&point.q, &point.drive(compiled), &mut tangent, &mut force);
@@ -79,7 +79,7 @@ fn is_softer(compiled: &Compiled, point: &OperatingPoint, fraction: f64) -> bool
 }
 
 /// The beam that bends most in the motion of the smallest μ, by iteration with K⁻¹·K₀.
-fn softest(compiled: &Compiled, point: &OperatingPoint) -> Option<String> {
+fn softest(compiled: &CompiledModel, point: &OperatingPoint) -> Option<String> {
     let (system, model) = (&compiled.parts.system, &compiled.parts.system.model);
     let mut x = vec![Pose::zeros(); system.bodies()];
     let mut loaded = BlockMatrix::new(&model.pattern);

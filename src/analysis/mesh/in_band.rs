@@ -16,18 +16,18 @@
 //! The responses that are compared are sums over the modes to twice the band with static correction: what such a sum leaves out is the
 //! same on both meshes. With too many modes in the band they are exact, and no modes are compared.
 
-use super::super::harmonic::exact::Exact;
-use super::super::harmonic::modal::{self, Sum};
+use super::super::harmonic::exact::ExactResponse;
+use super::super::harmonic::modal::{self, ModalSum};
 use super::super::harmonic::{BEYOND, GUARDS, HarmonicOptions, HarmonicResult, harmonic};
 use super::super::{AnalysisError, Watch};
-use super::equilibrium::told_of_static;
+use super::equilibrium::static_warnings;
 use super::meshed::{chosen, meshed, on};
 use super::refined::refining;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::discretize::DiscretizeError;
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::{self, Aim, ModelOrder};
+use crate::refine::model_order::{self, Mesh, MeshTarget};
 use nalgebra::Complex;
 use std::cell::OnceCell;
 use std::f64::consts::TAU;
@@ -40,8 +40,8 @@ const STEP: f64 = 1e-4;
 /// Frequencies this near to a resonance are left out, as a share.
 const NEAR: f64 = 0.02;
 /// Signals that are compared at most, and modes.
-const MOST_SIGNALS: usize = 32;
-const MOST_MODES: usize = 64;
+const MAX_SIGNALS: usize = 32;
+const MAX_MODES: usize = 64;
 /// Modes are alike whose frequencies differ by a smaller share.
 const ALIKE: f64 = 0.01;
 /// Modes below this share of the highest λ are rigid motions.
@@ -56,10 +56,10 @@ const SMALL: f64 = 1e-9;
 /// # Errors
 /// See [`AnalysisError`].
 pub fn harmonic_fitted(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     options: &HarmonicOptions,
     watch: Watch<'_>,
-) -> Result<(Compiled, HarmonicResult), AnalysisError> {
+) -> Result<(CompiledModel, HarmonicResult), AnalysisError> {
     options.check()?;
     let fitted = fitted(compiled, options)?;
     let mut result = harmonic(&fitted, options, watch)?;
@@ -68,27 +68,27 @@ pub fn harmonic_fitted(
 }
 
 /// The model on the mesh for a response.
-pub(super) fn fitted(compiled: &Compiled, options: &HarmonicOptions) -> Result<Compiled, AnalysisError> {
+pub(super) fn fitted(compiled: &CompiledModel, options: &HarmonicOptions) -> Result<CompiledModel, AnalysisError> {
     refining(compiled, |compiled| fitted_from(compiled, options))
 }
 
-fn fitted_from(compiled: &Compiled, options: &HarmonicOptions) -> Result<Compiled, AnalysisError> {
+fn fitted_from(compiled: &CompiledModel, options: &HarmonicOptions) -> Result<CompiledModel, AnalysisError> {
     let fewer =
-        HarmonicOptions { signals: options.signals.iter().take(MOST_SIGNALS).cloned().collect(), ..options.clone() };
+        HarmonicOptions { signals: options.signals.iter().take(MAX_SIGNALS).cloned().collect(), ..options.clone() };
     // every name is looked up once, whatever is compared
-    let exact = Exact::new(compiled, options)?;
+    let exact = ExactResponse::new(compiled, options)?;
     drop(exact);
     let order = order(compiled, &fewer)?;
     let mut fitted = on(compiled, order)?;
-    let point = Exact::new(&fitted, options)?.into_point();
-    let told = told_of_static(&fitted, &point);
+    let point = ExactResponse::new(&fitted, options)?.into_point();
+    let told = static_warnings(&fitted, &point);
     fitted.warnings.items.extend(told);
     Ok(fitted)
 }
 
-fn order(compiled: &Compiled, options: &HarmonicOptions) -> Result<ModelOrder, AnalysisError> {
+fn order(compiled: &CompiledModel, options: &HarmonicOptions) -> Result<Mesh, AnalysisError> {
     if compiled.structure.beams.is_empty() {
-        return Ok(ModelOrder { estimated_error: Some(0.0), ..compiled.order.clone() });
+        return Ok(Mesh { estimated_error: Some(0.0), ..compiled.order.clone() });
     }
     let given = chosen(compiled);
     let start = if given || compiled.options.band.is_some() {
@@ -96,12 +96,12 @@ fn order(compiled: &Compiled, options: &HarmonicOptions) -> Result<ModelOrder, A
     } else {
         for_band(compiled, options)?
     };
-    let mut sample: Option<Sample> = None;
+    let mut sample: Option<ComparisonGrid> = None;
     let mut analyse = |segments: &[usize]| {
         let model = meshed(compiled, segments)?;
         let sample = match &sample {
             Some(known) => known,
-            None => sample.insert(Sample::new(&model, options)?),
+            None => sample.insert(ComparisonGrid::new(&model, options)?),
         };
         sample.outputs(&model, options)
     };
@@ -112,16 +112,16 @@ fn order(compiled: &Compiled, options: &HarmonicOptions) -> Result<ModelOrder, A
 }
 
 /// The mesh for the modes up to the end of the band, about the drawing.
-fn for_band(compiled: &Compiled, options: &HarmonicOptions) -> Result<Vec<usize>, AnalysisError> {
+fn for_band(compiled: &CompiledModel, options: &HarmonicOptions) -> Result<Vec<usize>, AnalysisError> {
     let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
-    let tolerances = vec![counted::SAFETY * compiled.options.tol; MOST_MODES];
-    let aim = Aim { band: options.to, tolerances, rigid: false };
+    let tolerances = vec![counted::SAFETY * compiled.options.tol; MAX_MODES];
+    let aim = MeshTarget { band: options.to, tolerances, rigid: false };
     let order = model_order::choose_for(&compiled.structure, &compiled.options, &aim).map_err(detail)?;
     Ok(order.segments.iter().zip(&compiled.order.segments).map(|(a, b)| *a.max(b)).collect())
 }
 
 /// Where meshes are compared.
-struct Sample {
+struct ComparisonGrid {
     frequencies: Vec<f64>,
     /// Modes within the band; 0: too many.
     inside: usize,
@@ -131,13 +131,13 @@ struct Sample {
     groups: OnceCell<Vec<Range<usize>>>,
 }
 
-impl Sample {
-    fn new(model: &Compiled, options: &HarmonicOptions) -> Result<Self, AnalysisError> {
-        let mut exact = Exact::new(model, options)?;
+impl ComparisonGrid {
+    fn new(model: &CompiledModel, options: &HarmonicOptions) -> Result<Self, AnalysisError> {
+        let mut exact = ExactResponse::new(model, options)?;
         let count = |times: f64| modal::below(&exact, TAU * options.to * times);
         let (inside, modes) = (count(1.0), count(BEYOND) + GUARDS);
-        let inside = if inside <= MOST_MODES { inside } else { 0 };
-        let modes = if inside == 0 && count(1.0) > 0 { 0 } else { modes.min(inside + MOST_MODES) };
+        let inside = if inside <= MAX_MODES { inside } else { 0 };
+        let modes = if inside == 0 && count(1.0) > 0 { 0 } else { modes.min(inside + MAX_MODES) };
         let last = (COMPARED - 1) as f64;
         let at = |k: usize| options.from * (options.to / options.from).powf(k as f64 / last);
         let mut frequencies: Vec<f64> = (0..COMPARED).map(at).collect();
@@ -151,8 +151,8 @@ impl Sample {
         Ok(Self { frequencies, inside, modes, groups: OnceCell::new() })
     }
 
-    fn outputs(&self, model: &Compiled, options: &HarmonicOptions) -> Result<Vec<Output>, AnalysisError> {
-        let mut exact = Exact::new(model, options)?;
+    fn outputs(&self, model: &CompiledModel, options: &HarmonicOptions) -> Result<Vec<Output>, AnalysisError> {
+        let mut exact = ExactResponse::new(model, options)?;
         let mut outputs = vec![Output { value: f64::NAN, scale: 1.0 }; self.inside];
         let mut sum = None;
         if self.modes > 0 {
@@ -163,7 +163,7 @@ impl Sample {
             for (output, lambda) in outputs.iter_mut().zip(&found.lambda) {
                 *output = Output { value: frequency(lambda), scale: scale(frequency(lambda)) };
             }
-            sum = Some(Sum::new(&exact, &found)?);
+            sum = Some(ModalSum::new(&exact, &found)?);
             let inside = &found.lambda[..self.inside.min(found.lambda.len())];
             let highest = found.lambda.last().copied().unwrap_or(0.0);
             self.groups.get_or_init(|| groups(inside, highest));
@@ -204,7 +204,7 @@ impl Sample {
     }
 
     /// What the modes within the band bring to a row, those that are alike together.
-    fn shares(&self, sum: &Sum, row: usize, rounding: f64) -> Vec<Output> {
+    fn shares(&self, sum: &ModalSum, row: usize, rounding: f64) -> Vec<Output> {
         let groups = self.groups.get().map_or(&[][..], Vec::as_slice);
         let shares: Vec<Complex<f64>> =
             groups.iter().map(|group| group.clone().map(|j| sum.share(row, j)).sum()).collect();

@@ -5,17 +5,17 @@ use super::super::AnalysisError;
 use super::super::modes::{higher, lowest};
 use super::equilibrium;
 use super::frequencies::for_modes;
-use super::meshed::{chosen, laid};
+use super::meshed::{chosen, remeshed};
 use super::section_inertia::with_section_inertia;
 use super::warnings::{WARNING, beyond};
 use crate::budget::bounded;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
-use crate::refine::model_order::ModelOrder;
+use crate::refine::model_order::Mesh;
 
 /// Unknowns of the finest mesh that is taken, and of the largest drawing for which one is sought: a circuit is not to wait for it. Meshes
 /// that it is compared with may have twice as many.
-const MOST: usize = 3000;
+const MAX_UNKNOWNS: usize = 3000;
 
 /// How much looser the tolerance becomes where its mesh would be finer than that [1], and how often.
 const LOOSER: (f64, i32) = (10.0, 3);
@@ -30,7 +30,7 @@ const HELD: usize = 3;
 /// the three lowest modes about it; no coarser anywhere than it was. Where segments or a band are given the mesh stays; where that mesh would be too
 /// fine it is one that holds ten, a hundred or a thousand times the tolerance. A warning says where one of the two may be off by more than the
 /// tolerance. What voltages do is not known here.
-pub fn in_circuit(compiled: &Compiled) -> Compiled {
+pub fn in_circuit(compiled: &CompiledModel) -> CompiledModel {
     let turning = with_section_inertia(compiled);
     let compiled = turning.as_deref().unwrap_or(compiled);
     let given = chosen(compiled) || compiled.options.band.is_some();
@@ -38,15 +38,15 @@ pub fn in_circuit(compiled: &Compiled) -> Compiled {
     if compiled.order.segments.is_empty() {
         return compiled.clone();
     }
-    if drawn > MOST {
+    if drawn > MAX_UNKNOWNS {
         return warned(compiled.clone(), "a drawing of so many unknowns", None);
     }
     let finer = if given { None } else { (0..=LOOSER.1).find_map(|k| within_most(compiled, LOOSER.0.powi(k))) };
     let sought = finer.as_ref().and_then(|finer| finer.order.estimated_error);
     let mut fitted = finer.unwrap_or_else(|| compiled.clone());
-    fitted.lowest = bounded(2 * MOST, || lowest(&fitted, || twice(&fitted, fitted.options.tol).ok())).flatten();
-    fitted.higher = bounded(2 * MOST, || higher(&fitted, FOLLOWED)).unwrap_or_default().into();
-    let compared = if sought.is_some() { None } else { bounded(2 * MOST, || worse(&fitted)) };
+    fitted.lowest = bounded(2 * MAX_UNKNOWNS, || lowest(&fitted, || twice(&fitted, fitted.options.tol).ok())).flatten();
+    fitted.higher = bounded(2 * MAX_UNKNOWNS, || higher(&fitted, FOLLOWED)).unwrap_or_default().into();
+    let compared = if sought.is_some() { None } else { bounded(2 * MAX_UNKNOWNS, || worse(&fitted)) };
     match (sought, compared) {
         (Some(error), _) => warned(fitted, "the equilibrium without voltages or one of the lowest modes", Some(error)),
         (None, Some(Some((what, error)))) => warned(fitted, what, Some(error)),
@@ -58,7 +58,7 @@ pub fn in_circuit(compiled: &Compiled) -> Compiled {
 }
 
 /// With a warning of what may be off by more than the tolerance, or by nobody knows how much.
-fn warned(mut fitted: Compiled, what: &str, error: Option<f64>) -> Compiled {
+fn warned(mut fitted: CompiledModel, what: &str, error: Option<f64>) -> CompiledModel {
     let help = "give the model `segments` or a `band`; `bimorph cosim --check` compares whole runs";
     let told = beyond(fitted.options.tol, error);
     fitted.warnings.items.extend(told.map(|told| Diagnostic::warning(WARNING, format!("{what}: {told}"), help)));
@@ -69,40 +69,41 @@ fn warned(mut fitted: Compiled, what: &str, error: Option<f64>) -> Compiled {
 ///
 /// # Errors
 /// [`AnalysisError::NotConverged`] where there is no such mesh.
-pub fn twice(compiled: &Compiled, tol: f64) -> Result<Compiled, AnalysisError> {
+pub fn twice(compiled: &CompiledModel, tol: f64) -> Result<CompiledModel, AnalysisError> {
     let scheme = compiled.options.scheme;
     let twice = |&n: &usize| if n == 0 { 0 } else { scheme.segments(2 * n) };
     let segments = compiled.order.segments.iter().map(twice).collect();
-    let mut finer = laid(compiled, ModelOrder { segments, estimated_error: None, ..compiled.order.clone() })?;
+    let mut finer = remeshed(compiled, Mesh { segments, estimated_error: None, ..compiled.order.clone() })?;
     finer.options.tol = tol;
     Ok(finer)
 }
 
 /// The model on the mesh that holds `looser` times the tolerance, where that is not too fine.
-fn within_most(compiled: &Compiled, looser: f64) -> Option<Compiled> {
+fn within_most(compiled: &CompiledModel, looser: f64) -> Option<CompiledModel> {
     let tol = compiled.options.tol;
     let mut asked = compiled.clone();
     asked.options.tol = looser * tol;
-    let mut found = bounded(2 * MOST, || sought(&asked)).flatten().filter(|finer| finer.unknowns() <= MOST)?;
+    let mut found =
+        bounded(2 * MAX_UNKNOWNS, || sought(&asked)).flatten().filter(|finer| finer.unknowns() <= MAX_UNKNOWNS)?;
     found.options.tol = tol;
     Some(found)
 }
 
 /// The model on the mesh for both; none where there is no such equilibrium or mode.
-fn sought(compiled: &Compiled) -> Option<Compiled> {
+fn sought(compiled: &CompiledModel) -> Option<CompiledModel> {
     let (moving, _) = for_modes(compiled, HELD, &[]).ok()?;
     let drawn = &compiled.order.segments;
     let least = moving.segments.iter().zip(drawn).map(|(moving, drawn)| *moving.max(drawn)).collect();
     let (still, _) = equilibrium::order(compiled, &[], least).ok()?;
     let worst = |a: Option<f64>, b: Option<f64>| Some(a?.abs().max(b?.abs()));
     let estimated_error = worst(moving.estimated_error, still.estimated_error);
-    laid(compiled, ModelOrder { estimated_error, ..still }).ok()
+    remeshed(compiled, Mesh { estimated_error, ..still }).ok()
 }
 
 /// Which of the two is further off on this mesh, and by how much; none where neither is known.
-fn worse(compiled: &Compiled) -> Option<(&'static str, f64)> {
+fn worse(compiled: &CompiledModel) -> Option<(&'static str, f64)> {
     // an equilibrium whose error nothing tells may be off by anything
-    let still = equilibrium::judged(compiled, &[]).ok().map(|(_, error)| error.unwrap_or(f64::INFINITY));
+    let still = equilibrium::assess(compiled, &[]).ok().map(|(_, error)| error.unwrap_or(f64::INFINITY));
     [("the equilibrium without voltages", still), ("the lowest mode", compiled.lowest.map(|lowest| lowest.error))]
         .into_iter()
         .filter_map(|(what, error)| Some((what, error?.abs())))

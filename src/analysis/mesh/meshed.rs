@@ -2,28 +2,28 @@
 
 use super::super::AnalysisError;
 use super::warnings::{WARNING, beyond};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::discretize::DiscretizeError;
 use crate::netlist::Diagnostic;
-use crate::refine::model_order::ModelOrder;
+use crate::refine::model_order::Mesh;
 use std::borrow::Cow;
 
 /// True where the number of segments is the user's.
-pub(super) fn chosen(compiled: &Compiled) -> bool {
+pub(super) fn chosen(compiled: &CompiledModel) -> bool {
     compiled.options.segments.is_some()
 }
 
 /// The model on another mesh, with a warning where that does not hold the tolerance.
-pub(super) fn on(compiled: &Compiled, order: ModelOrder) -> Result<Compiled, AnalysisError> {
-    let mut fitted = laid(compiled, order)?;
+pub(super) fn on(compiled: &CompiledModel, order: Mesh) -> Result<CompiledModel, AnalysisError> {
+    let mut fitted = remeshed(compiled, order)?;
     warn_of_mesh(&mut fitted);
     Ok(fitted)
 }
 
 /// The model on another mesh, of which nothing is said.
-pub(super) fn laid(compiled: &Compiled, order: ModelOrder) -> Result<Compiled, AnalysisError> {
+pub(super) fn remeshed(compiled: &CompiledModel, order: Mesh) -> Result<CompiledModel, AnalysisError> {
     Ok(if order.segments == compiled.order.segments {
-        Compiled { order, ..compiled.clone() }
+        CompiledModel { order, ..compiled.clone() }
     } else {
         let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
         compiled.with_order(order).map_err(detail)?
@@ -31,7 +31,7 @@ pub(super) fn laid(compiled: &Compiled, order: ModelOrder) -> Result<Compiled, A
 }
 
 /// Says so where the estimate of a mesh is beyond the tolerance, or missing: once, with the last estimate.
-pub(super) fn warn_of_mesh(fitted: &mut Compiled) {
+pub(super) fn warn_of_mesh(fitted: &mut CompiledModel) {
     fitted.warnings.items.retain(|d| d.code != WARNING);
     let Some(message) = beyond(fitted.options.tol, fitted.order.estimated_error) else { return };
     let help =
@@ -40,11 +40,14 @@ pub(super) fn warn_of_mesh(fitted: &mut Compiled) {
 }
 
 /// The model with so many segments.
-pub(super) fn meshed<'a>(compiled: &'a Compiled, segments: &[usize]) -> Result<Cow<'a, Compiled>, AnalysisError> {
+pub(super) fn meshed<'a>(
+    compiled: &'a CompiledModel,
+    segments: &[usize],
+) -> Result<Cow<'a, CompiledModel>, AnalysisError> {
     if segments == compiled.order.segments {
         return Ok(Cow::Borrowed(compiled));
     }
-    let order = ModelOrder { segments: segments.to_vec(), ..compiled.order.clone() };
+    let order = Mesh { segments: segments.to_vec(), ..compiled.order.clone() };
     let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
     compiled.with_order(order).map(Cow::Owned).map_err(refused)
 }

@@ -14,7 +14,7 @@
 //! | transient that closes a gap | the run up to its first contact, compared with that of half the segments | `swung` |
 //!
 //! Who gives a number of segments gets them, and the estimate of their error. Who gives a band gets the mesh for that band at
-//! least. The estimate is in [`Compiled::order`]; where it is missing or beyond the tolerance, a warning is added.
+//! least. The estimate is in [`CompiledModel::order`]; where it is missing or beyond the tolerance, a warning is added.
 
 mod equilibrium;
 mod excited;
@@ -40,13 +40,13 @@ use super::linear_stress::left_out;
 use super::statics::{OperatingPoint, operating_point};
 use super::transient::TransientOptions;
 use super::{AnalysisError, PortVoltages};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
 use crate::netlist::Diagnostic;
 use crate::readout::signal::Signal;
-use crate::refine::model_order::ModelOrder;
+use crate::refine::model_order::Mesh;
 pub use equilibrium::static_fitted;
-use excited::told_of_motion;
+use excited::motion_warnings;
 use frequencies::for_modes;
 pub use frequencies::modes_fitted;
 pub use in_band::harmonic_fitted;
@@ -57,7 +57,7 @@ pub use pull_in::pull_in_fitted;
 use section_inertia::with_section_inertia;
 use warnings::{of_fingers, of_heat, of_stress};
 
-pub(crate) use equilibrium::{told_moving, told_still};
+pub(crate) use equilibrium::{operating_point_warnings, transient_warnings};
 pub use in_circuit::{in_circuit, twice};
 pub(crate) use warnings::WARNING;
 pub use warnings::{beyond, warnings};
@@ -65,7 +65,7 @@ pub use yielded::static_backbent;
 
 /// What a mesh is for.
 #[derive(Debug, Clone, Copy)]
-pub enum Request<'a> {
+pub enum MeshRequest<'a> {
     /// The static equilibrium at these voltages.
     Static {
         /// Port voltages.
@@ -91,7 +91,7 @@ pub enum Request<'a> {
 ///
 /// # Errors
 /// What the analysis itself has against the model: see [`AnalysisError`].
-pub fn fitted(compiled: &Compiled, request: &Request<'_>) -> Result<Compiled, AnalysisError> {
+pub fn fitted(compiled: &CompiledModel, request: &MeshRequest<'_>) -> Result<CompiledModel, AnalysisError> {
     on(compiled, order(compiled, request)?)
 }
 
@@ -99,11 +99,11 @@ pub fn fitted(compiled: &Compiled, request: &Request<'_>) -> Result<Compiled, An
 ///
 /// # Errors
 /// See [`fitted`].
-pub fn order(compiled: &Compiled, request: &Request<'_>) -> Result<ModelOrder, AnalysisError> {
+pub fn order(compiled: &CompiledModel, request: &MeshRequest<'_>) -> Result<Mesh, AnalysisError> {
     Ok(match *request {
-        Request::Static { voltages } => equilibrium::order(compiled, voltages, compiled.order.segments.clone())?.0,
-        Request::Modes { count, voltages } => for_modes(compiled, count, voltages)?.0,
-        Request::PullIn { port, max } => for_pull_in(compiled, port, max)?.0,
+        MeshRequest::Static { voltages } => equilibrium::order(compiled, voltages, compiled.order.segments.clone())?.0,
+        MeshRequest::Modes { count, voltages } => for_modes(compiled, count, voltages)?.0,
+        MeshRequest::PullIn { port, max } => for_pull_in(compiled, port, max)?.0,
     })
 }
 
@@ -112,9 +112,9 @@ pub fn order(compiled: &Compiled, request: &Request<'_>) -> Result<ModelOrder, A
 /// # Errors
 /// See [`fitted`].
 pub fn fitted_in_time(
-    moving: &Compiled,
+    moving: &CompiledModel,
     options: &TransientOptions<'_>,
-) -> Result<(Compiled, Option<Compiled>), AnalysisError> {
+) -> Result<(CompiledModel, Option<CompiledModel>), AnalysisError> {
     // a name that is none is told before a mesh is sought; points along beams depend on the mesh
     for name in options.signals.iter().filter(|name| !name.contains('[')) {
         Signal::find(moving, name)?;
@@ -123,16 +123,20 @@ pub fn fitted_in_time(
     let order = order_in_time(moving, options)?;
     let start = options.release.map(|start| on(&*with_section_inertia(start)?, order.clone())).transpose()?;
     let mut moving = on(moving, order)?;
-    let told = told_of_run(&moving, start.as_ref(), &options.voltages);
+    let told = run_warnings(&moving, start.as_ref(), &options.voltages);
     moving.warnings.items.extend(told);
-    let told = told_of_motion(&moving, options);
+    let told = motion_warnings(&moving, options);
     moving.warnings.items.extend(told);
     Ok((moving, start))
 }
 
 /// What a run leaves out: the stiffness of stress in a linear model, and combs and temperatures beyond their range, as far as that is
 /// seen where the run goes to.
-pub(crate) fn told_of_run(moving: &Compiled, start: Option<&Compiled>, voltages: &PortVoltages) -> Vec<Diagnostic> {
+pub(crate) fn run_warnings(
+    moving: &CompiledModel,
+    start: Option<&CompiledModel>,
+    voltages: &PortVoltages,
+) -> Vec<Diagnostic> {
     let share = if moving.options.linear { left_out_in_time(moving, start, voltages) } else { None };
     let drawn = &moving.structure;
     let some = !(drawn.combs.is_empty() && moving.parts.heaters.is_empty());
@@ -143,7 +147,7 @@ pub(crate) fn told_of_run(moving: &Compiled, start: Option<&Compiled>, voltages:
 }
 
 /// What stress would change in the way that a linear run goes: from its first state to where it would rest.
-fn left_out_in_time(moving: &Compiled, start: Option<&Compiled>, voltages: &PortVoltages) -> Option<f64> {
+fn left_out_in_time(moving: &CompiledModel, start: Option<&CompiledModel>, voltages: &PortVoltages) -> Option<f64> {
     let end = operating_point(moving, voltages).ok()?;
     let begin = match start {
         Some(start) => operating_point(start, voltages).ok()?,
@@ -158,10 +162,10 @@ fn left_out_in_time(moving: &Compiled, start: Option<&Compiled>, voltages: &Port
 ///
 /// # Errors
 /// See [`fitted`].
-pub fn order_in_time(moving: &Compiled, options: &TransientOptions<'_>) -> Result<ModelOrder, AnalysisError> {
+pub fn order_in_time(moving: &CompiledModel, options: &TransientOptions<'_>) -> Result<Mesh, AnalysisError> {
     // the modes about a closed gap are those of parts that are pressed together, and say nothing of the way there
-    let (order, left) = match swung::closes(moving, options) {
-        true => (ModelOrder { estimated_error: Some(0.0), ..moving.order.clone() }, 0.0),
+    let (order, left) = match swung::ends_in_contact(moving, options) {
+        true => (Mesh { estimated_error: Some(0.0), ..moving.order.clone() }, 0.0),
         false => excited::order(moving, options)?,
     };
     swung::order(moving, options, order, left)

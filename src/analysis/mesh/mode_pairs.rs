@@ -15,11 +15,11 @@ use nalgebra::DMatrix;
 const ALIKE: f64 = 0.5;
 
 /// Modes with the displacement of points along every beam.
-type Shapes<'a> = (&'a ModesResult, &'a [BeamMotions]);
+type ModeShapes<'a> = (&'a ModesResult, &'a [BeamMotions]);
 
 /// The relative error of each frequency of the coarser mesh, signed [1]; none where the finer one has no such mode.
-pub(super) fn errors(structure: &Structure, coarse: Shapes<'_>, fine: Shapes<'_>) -> Vec<Option<f64>> {
-    let vectors = |shapes: Shapes<'_>| -> Vec<Vec<f64>> {
+pub(super) fn errors(structure: &Structure, coarse: ModeShapes<'_>, fine: ModeShapes<'_>) -> Vec<Option<f64>> {
+    let vectors = |shapes: ModeShapes<'_>| -> Vec<Vec<f64>> {
         (0..shapes.0.frequencies_hz.len()).map(|k| sampled(structure, coarse.1, shapes, k)).collect()
     };
     let (a, b) = (vectors(coarse), vectors(fine));
@@ -41,7 +41,7 @@ pub(super) fn errors(structure: &Structure, coarse: Shapes<'_>, fine: Shapes<'_>
 }
 
 /// Mode `k` at the points of the coarser mesh, each displacement times the root of the mass there.
-fn sampled(structure: &Structure, points: &[BeamMotions], (modes, curves): Shapes<'_>, k: usize) -> Vec<f64> {
+fn sampled(structure: &Structure, points: &[BeamMotions], (modes, curves): ModeShapes<'_>, k: usize) -> Vec<f64> {
     let mut values = Vec::new();
     let Some(coarse) = points.first() else { return values };
     for ((beam, along), coarse) in structure.beams.iter().zip(&curves[k]).zip(coarse) {

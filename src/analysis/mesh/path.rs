@@ -3,7 +3,7 @@
 //! A branch and its mirror image are one as far as a mesh is concerned: where the finer mesh comes out on the other one, it is traced
 //! once more the other way.
 
-use super::super::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace};
+use super::super::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, PathInput, trace};
 use super::super::linear_stress::left_out;
 use super::super::statics::operating_point;
 use super::super::{AnalysisError, PortVoltages, Watch};
@@ -11,13 +11,13 @@ use super::equilibrium::{ROUNDING, SMALL, size};
 use super::meshed::{chosen, meshed, on};
 use super::refined::refining;
 use super::warnings::of_stress;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::ModelOrder;
+use crate::refine::model_order::Mesh;
 use crate::solve::continuation::Branch;
 
 /// Folds that are compared, and bifurcations: the first.
-const MOST_EVENTS: usize = 8;
+const MAX_EVENTS: usize = 8;
 /// Ends of a path that are compared.
 const ENDS: [&str; 2] = ["arrived", "turned back"];
 /// Results that differ by more than this share are of another branch.
@@ -28,20 +28,20 @@ const OTHER_BRANCH: f64 = 0.3;
 /// # Errors
 /// See [`trace`].
 pub fn path_fitted(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     request: &ContinuationRequest<'_>,
     watch: Watch<'_>,
-) -> Result<(Compiled, ContinuationResult), AnalysisError> {
+) -> Result<(CompiledModel, ContinuationResult), AnalysisError> {
     refining(compiled, |compiled| path_from(compiled, request, &mut *watch))
 }
 
 /// The path on the mesh of the model or on the one that it needs beyond that.
 fn path_from(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     request: &ContinuationRequest<'_>,
     watch: Watch<'_>,
-) -> Result<(Compiled, ContinuationResult), AnalysisError> {
-    let mut search = Search { compiled, request, watch, known: Vec::new(), stopped: false };
+) -> Result<(CompiledModel, ContinuationResult), AnalysisError> {
+    let mut search = PathSearch { compiled, request, watch, known: Vec::new(), stopped: false };
     let segments = compiled.order.segments.clone();
     let mut analyse = |segments: &[usize]| search.follow(segments);
     let order = match chosen(compiled) {
@@ -59,7 +59,7 @@ fn path_from(
     let (_, result) = of_mesh.ok_or_else(lost)?;
     // where it ends for want of points, or elsewhere on twice the segments, its end is not compared
     let compared = ENDS.contains(&result.end);
-    let order = ModelOrder { estimated_error: order.estimated_error.filter(|e| compared && e.is_finite()), ..order };
+    let order = Mesh { estimated_error: order.estimated_error.filter(|e| compared && e.is_finite()), ..order };
     let mut fitted = on(compiled, order)?;
     let share = if fitted.options.linear { left_out_at_end(&fitted, request) } else { None };
     let told = of_stress(&fitted, share);
@@ -71,15 +71,15 @@ fn path_from(
 const CROSSING: [f64; 2] = [1e-3, 1e-6];
 
 /// Paths on one mesh after the other.
-struct Search<'a, 'w> {
-    compiled: &'a Compiled,
+struct PathSearch<'a, 'w> {
+    compiled: &'a CompiledModel,
     request: &'a ContinuationRequest<'a>,
     watch: Watch<'w>,
     known: Vec<(Vec<usize>, ContinuationResult)>,
     stopped: bool,
 }
 
-impl Search<'_, '_> {
+impl PathSearch<'_, '_> {
     fn follow(&mut self, segments: &[usize]) -> Result<Vec<Output>, AnalysisError> {
         let mut result = self.on(segments, self.request.branch)?;
         let mut outputs = self.outputs(&result);
@@ -106,10 +106,10 @@ impl Search<'_, '_> {
     fn on(&mut self, segments: &[usize], branch: Branch) -> Result<ContinuationResult, AnalysisError> {
         let model = meshed(self.compiled, segments)?;
         let last = match self.request.growing {
-            Growing::Parameter(last) => Some(meshed(last, segments)?),
+            PathInput::Parameter(last) => Some(meshed(last, segments)?),
             _ => None,
         };
-        let growing = last.as_deref().map_or_else(|| self.request.growing.clone(), Growing::Parameter);
+        let growing = last.as_deref().map_or_else(|| self.request.growing.clone(), PathInput::Parameter);
         let request = ContinuationRequest { growing, branch, ..self.request.clone() };
         let found = trace(&model, &request, self.watch);
         self.stopped |= matches!(found, Err(AnalysisError::Cancelled));
@@ -150,7 +150,7 @@ impl Search<'_, '_> {
         let critical = || found.folds.iter().chain(&found.bifurcations);
         let least = CROSSING[0] * critical().map(|c| c.value.abs()).fold(CROSSING[1] / CROSSING[0] * way, f64::max);
         for list in [&found.folds, &found.bifurcations] {
-            (0..MOST_EVENTS).for_each(|k| at(list.get(k).map(|c: &CriticalPoint| (c.value, c.point)), least));
+            (0..MAX_EVENTS).for_each(|k| at(list.get(k).map(|c: &CriticalPoint| (c.value, c.point)), least));
         }
         // elsewhere it ends nowhere in particular
         let ends = ENDS.contains(&found.end);
@@ -173,20 +173,20 @@ fn apart(first: &[Output], other: &[Output]) -> f64 {
 }
 
 /// What stress would change at the end of the path of a linear model.
-fn left_out_at_end(fitted: &Compiled, request: &ContinuationRequest<'_>) -> Option<f64> {
+fn left_out_at_end(fitted: &CompiledModel, request: &ContinuationRequest<'_>) -> Option<f64> {
     let mut volts: Vec<(String, f64)> = request.voltages.clone();
-    let share = |model: &Compiled, volts: &PortVoltages| {
+    let share = |model: &CompiledModel, volts: &PortVoltages| {
         let point = operating_point(model, volts).ok()?;
         left_out(model, &point, &point.q)
     };
     match request.growing {
-        Growing::Port(name) => {
+        PathInput::Port(name) => {
             volts.retain(|(port, _)| port != name);
             volts.push((name.to_owned(), request.to));
             share(fitted, &volts)
         }
-        Growing::Parameter(last) => share(meshed(last, &fitted.order.segments).ok()?.as_ref(), &volts),
-        Growing::Loads => {
+        PathInput::Parameter(last) => share(meshed(last, &fitted.order.segments).ok()?.as_ref(), &volts),
+        PathInput::Loads => {
             let most = if request.to.abs() > request.from.abs() { request.to } else { request.from };
             let mut at_end = fitted.clone();
             for load in &mut at_end.parts.system.loads {

@@ -7,10 +7,10 @@ use super::super::statics::operating_point;
 use super::meshed::{chosen, meshed, on};
 use super::refined::refining;
 use super::warnings::of_stress;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::ModelOrder;
+use crate::refine::model_order::Mesh;
 
 /// Share of the pull-in voltage that stands for the fold itself, next to which nothing has an equilibrium for sure.
 const NEXT: f64 = 0.98;
@@ -26,10 +26,10 @@ pub(super) fn pull_in_outputs(found: &PullInResult) -> Vec<Output> {
 /// # Errors
 /// See [`fitted`].
 pub fn pull_in_fitted(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     port: Option<&str>,
     max: f64,
-) -> Result<(Compiled, PullInResult), AnalysisError> {
+) -> Result<(CompiledModel, PullInResult), AnalysisError> {
     let (order, found) = for_pull_in(compiled, port, max)?;
     let mut fitted = on(compiled, order)?;
     let known = found.into_iter().find(|(segments, _)| *segments == fitted.order.segments);
@@ -37,13 +37,13 @@ pub fn pull_in_fitted(
         Some((_, result)) => PullInResult { estimated_error: fitted.order.estimated_error, ..result },
         None => pull_in(&fitted, port, max)?,
     };
-    let told = told_of_pull_in(&fitted, &result);
+    let told = pull_in_warnings(&fitted, &result);
     fitted.warnings.items.extend(told);
     Ok((fitted, result))
 }
 
 /// What a pull-in is warned of beside its mesh: what a linear model leaves out at its voltage.
-pub(super) fn told_of_pull_in(fitted: &Compiled, result: &PullInResult) -> Vec<Diagnostic> {
+pub(super) fn pull_in_warnings(fitted: &CompiledModel, result: &PullInResult) -> Vec<Diagnostic> {
     let before = || operating_point(fitted, &[(result.port.clone(), NEXT * result.pull_in_v)]).ok();
     let point = if fitted.options.linear { before() } else { None };
     let share = point.and_then(|point| left_out(fitted, &point, &point.q));
@@ -52,14 +52,14 @@ pub(super) fn told_of_pull_in(fitted: &Compiled, result: &PullInResult) -> Vec<D
 
 /// The mesh for pull-in, and the results of every mesh that was looked at.
 pub(super) fn for_pull_in(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     port: Option<&str>,
     max: f64,
-) -> Result<(ModelOrder, OfMeshes), AnalysisError> {
+) -> Result<(Mesh, OfMeshes), AnalysisError> {
     refining(compiled, |compiled| pull_in_from(compiled, port, max))
 }
 
-fn pull_in_from(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<(ModelOrder, OfMeshes), AnalysisError> {
+fn pull_in_from(compiled: &CompiledModel, port: Option<&str>, max: f64) -> Result<(Mesh, OfMeshes), AnalysisError> {
     let mut known: OfMeshes = Vec::new();
     let mut analyse = |segments: &[usize]| {
         let model = meshed(compiled, segments)?;

@@ -5,9 +5,9 @@
 //! bend too far where the search ended.
 
 use super::super::AnalysisError;
-use super::finer::MOST_NEAR_LIMIT;
+use super::finer::MAX_NEAR_LIMIT;
 use super::meshed::{chosen, meshed};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::refine::doubling::doubled;
 use std::borrow::Cow;
 
@@ -26,7 +26,7 @@ impl Refinement {
     /// The mesh to try after `segments`, where there was no equilibrium; none where a finer mesh is no remedy.
     pub(super) fn next(
         &mut self,
-        compiled: &Compiled,
+        compiled: &CompiledModel,
         segments: &[usize],
         error: &AnalysisError,
     ) -> Option<Vec<usize>> {
@@ -41,14 +41,14 @@ impl Refinement {
             return None;
         };
         self.tried += 1;
-        (next != segments && next.iter().sum::<usize>() <= MOST_NEAR_LIMIT).then_some(next)
+        (next != segments && next.iter().sum::<usize>() <= MAX_NEAR_LIMIT).then_some(next)
     }
 }
 
 /// Runs an analysis on the mesh as it is, or on the first finer one where an equilibrium on its way needs no shorter segments.
 pub(super) fn refining<T>(
-    compiled: &Compiled,
-    mut run: impl FnMut(&Compiled) -> Result<T, AnalysisError>,
+    compiled: &CompiledModel,
+    mut run: impl FnMut(&CompiledModel) -> Result<T, AnalysisError>,
 ) -> Result<T, AnalysisError> {
     let mut refinement = Refinement::default();
     let mut model = Cow::Borrowed(compiled);

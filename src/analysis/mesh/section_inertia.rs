@@ -6,12 +6,12 @@
 //! that contacts act on have some (`crate::discretize`).
 
 use super::super::AnalysisError;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::discretize::DiscretizeError;
 use std::borrow::Cow;
 
 /// The model, with the inertia of its sections where parts may touch.
-pub(super) fn with_section_inertia(compiled: &Compiled) -> Result<Cow<'_, Compiled>, AnalysisError> {
+pub(super) fn with_section_inertia(compiled: &CompiledModel) -> Result<Cow<'_, CompiledModel>, AnalysisError> {
     let options = &compiled.options;
     let system = &compiled.parts.system;
     let bends = compiled.order.segments.iter().any(|n| *n > 0);
@@ -23,5 +23,5 @@ pub(super) fn with_section_inertia(compiled: &Compiled) -> Result<Cow<'_, Compil
     model.options.rotary_inertia = true;
     let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
     let model = model.with_order(compiled.order.clone()).map_err(refused)?;
-    Ok(Cow::Owned(Compiled { lowest: compiled.lowest, ..model }))
+    Ok(Cow::Owned(CompiledModel { lowest: compiled.lowest, ..model }))
 }

@@ -7,13 +7,13 @@ use super::super::chart::error::SMALL;
 use super::super::statics::OperatingPoint;
 use super::super::step_error;
 use super::super::transient::TransientOptions;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
-use crate::readout::signal::{Signal, View};
+use crate::readout::signal::{Signal, SignalView};
 
 /// The signals of a run about a state.
-pub(super) struct Seen<'a> {
-    model: &'a Compiled,
+pub(super) struct SignalAmplitudes<'a> {
+    model: &'a CompiledModel,
     about: &'a OperatingPoint,
     signals: Vec<Signal>,
     still: Vec<Pose>,
@@ -21,9 +21,9 @@ pub(super) struct Seen<'a> {
     volts: Vec<f64>,
 }
 
-impl<'a> Seen<'a> {
+impl<'a> SignalAmplitudes<'a> {
     /// Of the signals that `options` ask for; what a coarse mesh does not have, a point far along a beam, is left out.
-    pub(super) fn new(model: &'a Compiled, options: &TransientOptions<'_>, about: &'a OperatingPoint) -> Self {
+    pub(super) fn new(model: &'a CompiledModel, options: &TransientOptions<'_>, about: &'a OperatingPoint) -> Self {
         Self {
             model,
             about,
@@ -36,8 +36,8 @@ impl<'a> Seen<'a> {
 
     /// How far each signal swings with a motion of this shape at `omega` [rad/s].
     pub(super) fn of(&self, shape: &[Pose], omega: f64) -> Vec<f64> {
-        let state = View { q: &self.about.q, v: &self.still, rise: &self.about.rise, volts: &self.about.volts };
-        let moved = |q, v| View { q, v, rise: &self.rise, volts: &self.volts };
+        let state = SignalView { q: &self.about.q, v: &self.still, rise: &self.about.rise, volts: &self.about.volts };
+        let moved = |q, v| SignalView { q, v, rise: &self.rise, volts: &self.volts };
         let swing = |signal: &Signal| {
             let place = signal.slope(self.model, &state, &moved(shape, &self.still));
             let rate = signal.slope(self.model, &state, &moved(&self.still, shape));

@@ -14,7 +14,7 @@
 //! the same with K₀ where it is, without them. A part whose lowest frequency is that of something else, soft or heavy, is not seen.
 
 use super::super::statics::OperatingPoint;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::Drive;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
@@ -28,7 +28,7 @@ const KNOWN: f64 = 0.2;
 const ROUNDS: (usize, f64) = (30, 1e-3);
 
 /// [`left`] of an equilibrium that has less than half of its stiffness left; none of others.
-pub(super) fn left_of_soft(compiled: &Compiled, point: &OperatingPoint) -> Option<f64> {
+pub(super) fn left_of_soft(compiled: &CompiledModel, point: &OperatingPoint) -> Option<f64> {
     let (system, pattern) = (&compiled.parts.system, &compiled.parts.system.model.pattern);
     if system.model.linear || system.bodies() == 0 || !point.free_motions.is_empty() {
         // displacements are small by decree, or a direction is held that is free
@@ -51,13 +51,13 @@ pub(super) fn left_of_soft(compiled: &Compiled, point: &OperatingPoint) -> Optio
 }
 
 /// The stiffness that is left at an equilibrium [N/m]; none where it cannot be told.
-pub(super) fn left(compiled: &Compiled, point: &OperatingPoint) -> Option<f64> {
+pub(super) fn left(compiled: &CompiledModel, point: &OperatingPoint) -> Option<f64> {
     let [here, ..] = drives(compiled, point);
     lowest(compiled, &point.q, &here).map(|lowest| lowest.left)
 }
 
 /// What drives an equilibrium, what is there at rest, without loads and voltages, and the first without voltages.
-fn drives(compiled: &Compiled, point: &OperatingPoint) -> [Drive; 3] {
+fn drives(compiled: &CompiledModel, point: &OperatingPoint) -> [Drive; 3] {
     let electrics = &compiled.parts.system.electrics;
     let here = point.drive(compiled);
     let without = Drive { volts: vec![0.0; here.volts.len()], ..here.clone() };
@@ -76,7 +76,7 @@ pub(super) fn scale(left: f64, tol: f64) -> f64 {
 }
 
 /// The softest motion, for its masses.
-struct Lowest {
+struct SoftestMotion {
     /// xᵀ·K·x / xᵀ·M·x [rad²/s²], or [N/m] over bodies that are alike where nothing has mass.
     lambda: f64,
     /// xᵀ·K·x / max |x_j|² [N/m].
@@ -84,7 +84,7 @@ struct Lowest {
 }
 
 /// The softest motion at a configuration, by inverse iteration; none where the stiffness is not positive.
-fn lowest(compiled: &Compiled, q: &[Pose], drive: &Drive) -> Option<Lowest> {
+fn lowest(compiled: &CompiledModel, q: &[Pose], drive: &Drive) -> Option<SoftestMotion> {
     let (system, model) = (&compiled.parts.system, &compiled.parts.system.model);
     let mut x = vec![Pose::zeros(); q.len()];
     let mut stiffness = BlockMatrix::new(&model.pattern);
@@ -124,5 +124,5 @@ fn lowest(compiled: &Compiled, q: &[Pose], drive: &Drive) -> Option<Lowest> {
     }
     let most = x.iter().map(|x| x.x * x.x + x.y * x.y).fold(0.0, f64::max);
     let left = lambda * product(&x, &x) / most;
-    left.is_finite().then_some(Lowest { lambda, left })
+    left.is_finite().then_some(SoftestMotion { lambda, left })
 }

@@ -21,11 +21,11 @@ use super::super::step_error;
 use super::super::transient::{TransientOptions, TransientResult, Until, transient};
 use super::excited;
 use super::meshed::{chosen, meshed};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
 use crate::readout::signal::Signal;
 use crate::refine::doubling;
-use crate::refine::model_order::ModelOrder;
+use crate::refine::model_order::Mesh;
 
 /// Share of the way by which what a run would do with the stiffness of its end may differ from what it does, for its modes to tell its mesh.
 const STRAIGHT: f64 = 0.03;
@@ -38,13 +38,13 @@ const POINTS: (usize, usize) = (201, 1001);
 /// Times as many of a run that ends at an event.
 const SOONER: usize = 5;
 /// Unknowns times steps of one run, at most.
-const MOST_WORK: f64 = 3e6;
+const MAX_WORK: f64 = 3e6;
 /// Output times that a run must have reached to say something.
-const FEWEST: usize = 16;
+const MIN_SAMPLES: usize = 16;
 /// Meshes that are tried, at most.
-const MOST_PASSES: usize = 6;
+const MAX_PASSES: usize = 6;
 /// Segments of all beams together, at most.
-const MOST_SEGMENTS: usize = 4000;
+const MAX_SEGMENTS: usize = 4000;
 /// Share of the tolerance that the estimate may use, and of that what a mesh that was not run is laid out for.
 const SAFETY: f64 = 0.6;
 const AIM: f64 = 0.7;
@@ -54,43 +54,44 @@ const ORDERS: (f64, f64) = (1.0, 2.0);
 
 /// The mesh for a run, from that for its ends and modes; what is in none of the modes may be off by `left` of the amplitude.
 pub(super) fn order(
-    moving: &Compiled,
+    moving: &CompiledModel,
     options: &TransientOptions<'_>,
-    order: ModelOrder,
+    order: Mesh,
     left: f64,
-) -> Result<ModelOrder, AnalysisError> {
+) -> Result<Mesh, AnalysisError> {
     let at_least =
-        |error: f64| ModelOrder { estimated_error: order.estimated_error.map(|own| own.max(error)), ..order.clone() };
+        |error: f64| Mesh { estimated_error: order.estimated_error.map(|own| own.max(error)), ..order.clone() };
     let beams = !moving.structure.beams.is_empty() && order.segments.len() == moving.order.segments.len();
     let same = options.release.is_none_or(|start| start.order.segments.len() == order.segments.len());
     if !beams || !same || options.signals.is_empty() {
         return Ok(at_least(left));
     }
     let goal = SAFETY * moving.options.tol;
-    let closes = closes(moving, options);
+    let closes = ends_in_contact(moving, options);
     let until = if closes { options.until.clone().or(Some(Until::Contact)) } else { options.until.clone() };
     let options = &TransientOptions { until, ..options.clone() };
     if !closes && !bends(moving, options, &order)? {
         let found = (left > moving.options.tol).then(|| compared(moving, options, &order.segments)).flatten();
         return Ok(match found {
             // both runs have what the modes are off by, too
-            Some(error) if error <= goal => ModelOrder { estimated_error: Some(error), ..order },
+            Some(error) if error <= goal => Mesh { estimated_error: Some(error), ..order },
             error => at_least(error.map_or(left, |error| error.min(left))),
         });
     }
     let given = chosen(moving) || moving.options.band.is_some();
     let on = |segments: &[usize], error: Option<f64>| {
         let estimated_error = order.estimated_error.zip(error).map(|(own, error)| own.max(error));
-        ModelOrder { segments: segments.to_vec(), estimated_error, ..order.clone() }
+        Mesh { segments: segments.to_vec(), estimated_error, ..order.clone() }
     };
-    let first = pair(moving, &order.segments).and_then(|(from, to)| Some((swing(moving, options, &from)?, from, to)));
+    let first =
+        pair(moving, &order.segments).and_then(|(from, to)| Some((sample_run(moving, options, &from)?, from, to)));
     // what fails says so when it is run; nothing tells of what is not compared
     let Some((mut coarse, mut from, mut segments)) = first else { return Ok(on(&order.segments, None)) };
     let (mut before, mut convergence) = (None, ORDERS.0);
     let mut last = on(&order.segments, None);
-    for _ in 0..MOST_PASSES {
-        let both =
-            swing(moving, options, &segments).and_then(|fine| Some((apart(moving, options, &coarse, &fine)?, fine)));
+    for _ in 0..MAX_PASSES {
+        let both = sample_run(moving, options, &segments)
+            .and_then(|fine| Some((apart(moving, options, &coarse, &fine)?, fine)));
         let Some((difference, fine)) = both else { return Ok(last) };
         if let Some(before) = before {
             convergence = f64::log2(before / difference).clamp(ORDERS.0, ORDERS.1);
@@ -103,10 +104,10 @@ pub(super) fn order(
         if segments == order.segments && error <= goal {
             return Ok(on(&segments, Some(error)));
         }
-        let next = twice(moving, &segments).filter(|next| next.iter().sum::<usize>() <= MOST_SEGMENTS);
+        let next = twice(moving, &segments).filter(|next| next.iter().sum::<usize>() <= MAX_SEGMENTS);
         if error <= goal || next.is_none() {
             let least = between(&order.segments, &segments, (error / (AIM * goal)).powf(1.0 / convergence));
-            let of_least = (least != segments).then(|| swing(moving, options, &least)).flatten();
+            let of_least = (least != segments).then(|| sample_run(moving, options, &least)).flatten();
             let of_least = of_least.and_then(|run| apart(moving, options, &run, &fine)).map(|apart| apart + error);
             return Ok(match of_least.filter(|error| *error <= goal) {
                 Some(error) => on(&least, Some(error)),
@@ -121,7 +122,7 @@ pub(super) fn order(
 }
 
 /// True where the run goes from rest to a state in which parts touch, on a mesh that is to be found.
-pub(super) fn closes(moving: &Compiled, options: &TransientOptions<'_>) -> bool {
+pub(super) fn ends_in_contact(moving: &CompiledModel, options: &TransientOptions<'_>) -> bool {
     let system = &moving.parts.system;
     let free = !chosen(moving) && moving.options.band.is_none();
     let asked = free && options.release.is_none() && !options.signals.is_empty();
@@ -131,7 +132,7 @@ pub(super) fn closes(moving: &Compiled, options: &TransientOptions<'_>) -> bool 
 
 /// A mesh, and the one beside it that tells what a run on it is off by: half its segments; of an odd number there is no half, then twice as
 /// many. The coarser first.
-fn pair(moving: &Compiled, segments: &[usize]) -> Option<(Vec<usize>, Vec<usize>)> {
+fn pair(moving: &CompiledModel, segments: &[usize]) -> Option<(Vec<usize>, Vec<usize>)> {
     if segments.iter().all(|n| n % 2 == 0) {
         Some((segments.iter().map(|n| n / 2).collect(), segments.to_vec()))
     } else {
@@ -140,9 +141,9 @@ fn pair(moving: &Compiled, segments: &[usize]) -> Option<(Vec<usize>, Vec<usize>
 }
 
 /// What the run on this mesh is off by, of the amplitude; none where the runs fail.
-fn compared(moving: &Compiled, options: &TransientOptions<'_>, segments: &[usize]) -> Option<f64> {
+fn compared(moving: &CompiledModel, options: &TransientOptions<'_>, segments: &[usize]) -> Option<f64> {
     let (from, to) = pair(moving, segments)?;
-    let difference = apart(moving, options, &swing(moving, options, &from)?, &swing(moving, options, &to)?)?;
+    let difference = apart(moving, options, &sample_run(moving, options, &from)?, &sample_run(moving, options, &to)?)?;
     let of_finer = difference / (ORDERS.0.exp2() - 1.0);
     Some(if from == segments { difference + of_finer } else { of_finer })
 }
@@ -154,13 +155,13 @@ fn between(least: &[usize], segments: &[usize], share: f64) -> Vec<usize> {
 }
 
 /// Twice the segments; none where they are too many.
-fn twice(moving: &Compiled, segments: &[usize]) -> Option<Vec<usize>> {
-    let order = ModelOrder { segments: segments.to_vec(), ..moving.order.clone() };
+fn twice(moving: &CompiledModel, segments: &[usize]) -> Option<Vec<usize>> {
+    let order = Mesh { segments: segments.to_vec(), ..moving.order.clone() };
     doubling::twice(&moving.options, &order).map(|order| order.segments)
 }
 
 /// Whether stiffness changes on the way: what the run would do with the stiffness of its end is not what it does.
-fn bends(moving: &Compiled, options: &TransientOptions<'_>, order: &ModelOrder) -> Result<bool, AnalysisError> {
+fn bends(moving: &CompiledModel, options: &TransientOptions<'_>, order: &Mesh) -> Result<bool, AnalysisError> {
     let model = meshed(moving, &order.segments)?;
     let rest = OperatingPoint::rest(&model, &options.voltages)?;
     let from = match options.release {
@@ -176,7 +177,7 @@ fn bends(moving: &Compiled, options: &TransientOptions<'_>, order: &ModelOrder) 
 }
 
 /// The samples of a run on a mesh, as far as it came; none where it failed.
-fn swing(moving: &Compiled, options: &TransientOptions<'_>, segments: &[usize]) -> Option<Vec<Vec<f64>>> {
+fn sample_run(moving: &CompiledModel, options: &TransientOptions<'_>, segments: &[usize]) -> Option<Vec<Vec<f64>>> {
     let model = meshed(moving, segments).ok()?;
     let start = options.release.map(|start| meshed(start, segments)).transpose().ok()?;
     let loose = TransientOptions {
@@ -197,13 +198,13 @@ fn swing(moving: &Compiled, options: &TransientOptions<'_>, segments: &[usize]) 
     let (mut steps, unknowns) = (0.0, model.unknowns() as f64);
     let mut few = |_: f64| {
         steps += 1.0;
-        steps * unknowns <= MOST_WORK
+        steps * unknowns <= MAX_WORK
     };
     match transient(&model, &loose, &mut keep, &mut few) {
         Ok(_) | Err(AnalysisError::Cancelled) => {}
         Err(_) => return None,
     }
-    columns.first().is_some_and(|column| column.len() >= FEWEST).then_some(columns)
+    columns.first().is_some_and(|column| column.len() >= MIN_SAMPLES).then_some(columns)
 }
 
 fn points(options: &TransientOptions<'_>) -> usize {
@@ -215,7 +216,12 @@ fn points(options: &TransientOptions<'_>) -> usize {
 }
 
 /// How far two runs are apart, of the amplitude.
-fn apart(moving: &Compiled, options: &TransientOptions<'_>, coarse: &[Vec<f64>], fine: &[Vec<f64>]) -> Option<f64> {
+fn apart(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+    coarse: &[Vec<f64>],
+    fine: &[Vec<f64>],
+) -> Option<f64> {
     let both = coarse.first()?.len().min(fine.first()?.len());
     let named = |columns: &[Vec<f64>]| {
         let signal = |(name, column): (&String, &Vec<f64>)| {

@@ -3,7 +3,7 @@
 use super::super::contact_range::comb_beyond_told;
 use super::super::rotary_left_out;
 use super::super::statics::{OperatingPoint, too_hot};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
 
 /// Code of the warning that a mesh does not hold the tolerance.
@@ -24,7 +24,7 @@ const BUCKLING: &str = "W046";
 const ROTARY: &str = "W045";
 
 /// What fitting a model to a request warns of, as sentences for who has no other way to see them.
-pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
+pub fn warnings(fitted: &CompiledModel) -> impl Iterator<Item = String> {
     fitted
         .warnings
         .items
@@ -46,7 +46,7 @@ pub fn beyond(tol: f64, estimated_error: Option<f64>) -> Option<String> {
 }
 
 /// What a linear model leaves out, where that is more than the tolerance.
-pub(super) fn of_stress(compiled: &Compiled, share: Option<f64>) -> Option<Diagnostic> {
+pub(super) fn of_stress(compiled: &CompiledModel, share: Option<f64>) -> Option<Diagnostic> {
     let share = share.filter(|share| *share > compiled.options.tol)?;
     let message = if share.is_finite() {
         format!(
@@ -59,7 +59,7 @@ pub(super) fn of_stress(compiled: &Compiled, share: Option<f64>) -> Option<Diagn
 }
 
 /// Where the fingers of a comb go through its other side at an equilibrium.
-pub(super) fn of_fingers(compiled: &Compiled, point: &OperatingPoint) -> Option<Diagnostic> {
+pub(super) fn of_fingers(compiled: &CompiledModel, point: &OperatingPoint) -> Option<Diagnostic> {
     let message = comb_beyond_told(compiled, &point.q)?;
     Some(Diagnostic::warning(FINGERS, message, "draw the `stop2d` that holds the part, or longer fingers"))
 }
@@ -76,7 +76,7 @@ pub(super) fn of_steps(step: f64, (frequency, share): (f64, f64)) -> Diagnostic 
 }
 
 /// Where the rotary inertia that wide beams lack makes a run's waveform this far off.
-pub(super) fn of_rotary(compiled: &Compiled, error: f64) -> Option<Diagnostic> {
+pub(super) fn of_rotary(compiled: &CompiledModel, error: f64) -> Option<Diagnostic> {
     if error <= compiled.options.tol.max(rotary_left_out::WORTH) {
         return None;
     }
@@ -98,13 +98,13 @@ pub(super) fn near_buckling(point: &OperatingPoint) -> Option<Diagnostic> {
 }
 
 /// Where current makes a beam hotter than any solid bears.
-pub(super) fn of_heat(compiled: &Compiled, point: &OperatingPoint) -> Option<Diagnostic> {
+pub(super) fn of_heat(compiled: &CompiledModel, point: &OperatingPoint) -> Option<Diagnostic> {
     let message = too_hot(compiled, point)?;
     Some(Diagnostic::warning(HEAT, message, "volts, not millivolts; `thermcond` in W/m/K, `sheetresistance` in Ω"))
 }
 
 /// Where segments are too long for the field along them, with the gap that leaves out most and the error of the deflection [1].
-pub(super) fn of_segments(compiled: &Compiled, worst: &(String, f64)) -> Option<Diagnostic> {
+pub(super) fn of_segments(compiled: &CompiledModel, worst: &(String, f64)) -> Option<Diagnostic> {
     let (name, error) = worst;
     if *error <= compiled.options.tol {
         return None;

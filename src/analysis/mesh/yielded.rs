@@ -1,11 +1,11 @@
 //! The mesh for what yields: permanent strains, compared with those of twice the segments.
 
-use super::super::backbending::{Backbent, Strains, backbend};
+use super::super::backbending::{BackbentMechanism, Strains, backbend};
 use super::super::statics::StaticResult;
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::equilibrium::{SMALL, static_fitted};
-use super::meshed::{chosen, laid, meshed, warn_of_mesh};
-use crate::compile::Compiled;
+use super::meshed::{chosen, meshed, remeshed, warn_of_mesh};
+use crate::compile::CompiledModel;
 use crate::options::CompileOptions;
 use crate::refine::doubling::{self, Output};
 
@@ -20,10 +20,10 @@ const SHARE: f64 = 0.25;
 /// # Errors
 /// See [`backbend`].
 pub fn static_backbent(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     raised: &PortVoltages,
     voltages: &PortVoltages,
-) -> Result<(Compiled, StaticResult, BeamMotions, Strains), AnalysisError> {
+) -> Result<(CompiledModel, StaticResult, BeamMotions, Strains), AnalysisError> {
     let bent = backbent_fitted(compiled, raised)?;
     let of_strains = bent.compiled.order.estimated_error;
     let (mut fitted, mut result, curves) = static_fitted(&bent.compiled, voltages)?;
@@ -37,7 +37,7 @@ pub fn static_backbent(
 ///
 /// # Errors
 /// See [`backbend`].
-fn backbent_fitted(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backbent, AnalysisError> {
+fn backbent_fitted(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<BackbentMechanism, AnalysisError> {
     let mut known = Vec::new();
     let mut analyse = |segments: &[usize]| {
         let bent = backbend(meshed(compiled, segments)?.as_ref(), voltages)?;
@@ -52,13 +52,13 @@ fn backbent_fitted(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backb
         false => doubling::fit(&compiled.structure, &options, segments, &mut analyse)?,
     };
     match known.into_iter().find(|(segments, _)| *segments == order.segments) {
-        Some((_, bent)) => Ok(Backbent { compiled: laid(&bent.compiled, order)?, ..bent }),
-        None => backbend(&laid(compiled, order)?, voltages),
+        Some((_, bent)) => Ok(BackbentMechanism { compiled: remeshed(&bent.compiled, order)?, ..bent }),
+        None => backbend(&remeshed(compiled, order)?, voltages),
     }
 }
 
 /// What is compared: strains, to themselves, or to a share of the largest one or of what the arm bears.
-fn outputs(found: &Backbent) -> Vec<Output> {
+fn outputs(found: &BackbentMechanism) -> Vec<Output> {
     let largest = found.strains.iter().fold(0.0, |m: f64, (_, strain)| m.max(strain.abs()));
     let one = |((_, strain), bearable): (&(String, f64), &f64)| Output {
         value: *strain,

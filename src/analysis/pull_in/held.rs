@@ -2,7 +2,7 @@
 
 use super::super::AnalysisError;
 use super::super::contact_range::within_contact_range;
-use super::sweep::{MAX_LIMIT_POINTS, PAST, Sweep, last, named};
+use super::sweep::{MAX_LIMIT_POINTS, PAST, VoltageSweep, last, named};
 use crate::multibody::planar::Pose;
 use crate::solve::continuation::PathEnd;
 
@@ -12,7 +12,7 @@ const UPWARDS: f64 = 0.5;
 const SAME: f64 = 1e-6;
 
 /// What holds a part down.
-pub(super) struct HeldDown {
+pub(super) struct ReleaseVoltages {
     /// Voltage at which the last of the closed gaps opens [V]; none: it is closed without any.
     pub(super) release_v: Option<f64>,
     /// Voltages at which it snaps further [V].
@@ -21,13 +21,13 @@ pub(super) struct HeldDown {
     pub(super) release_before_snaps_v: Option<f64>,
 }
 
-impl Sweep<'_> {
+impl VoltageSweep<'_> {
     /// From the state `q` at `volts`, to which pull-in leads, up to `max` and down to release.
-    pub(super) fn held_down(&mut self, q: Vec<Pose>, volts: f64, max: f64) -> Result<HeldDown, AnalysisError> {
+    pub(super) fn held_down(&mut self, q: Vec<Pose>, volts: f64, max: f64) -> Result<ReleaseVoltages, AnalysisError> {
         let (snaps_v, top) = self.climb(q.clone(), volts, max)?;
         let Some((top_volts, top)) = top else {
             let release_v = self.release(q, volts)?;
-            return Ok(HeldDown { release_v, snaps_v, release_before_snaps_v: None });
+            return Ok(ReleaseVoltages { release_v, snaps_v, release_before_snaps_v: None });
         };
         let known = self.of_closed.len();
         let before = self.release(q, volts);
@@ -47,7 +47,7 @@ impl Sweep<'_> {
             }
         };
         self.of_closed.push(sentence);
-        Ok(HeldDown { release_v, snaps_v, release_before_snaps_v: before })
+        Ok(ReleaseVoltages { release_v, snaps_v, release_before_snaps_v: before })
     }
 
     /// The voltages below `max` at which the closed part snaps further, and the state beyond the last of them with its voltage.

@@ -28,7 +28,7 @@ pub struct PullInResult {
 
 impl PullInResult {
     /// Why there is no release, and what else the voltages do not say, as sentences.
-    pub fn told(&self) -> Vec<String> {
+    pub fn notes(&self) -> Vec<String> {
         let way = match (self.release_v, self.held) {
             (Some(_), _) => None,
             (None, true) => Some("no release: it stays closed".to_owned()),

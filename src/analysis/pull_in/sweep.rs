@@ -2,14 +2,14 @@
 
 use super::super::AnalysisError;
 use super::super::contact_range::within_contact_range;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
-use crate::solve::continuation::{Continuation, ContinuationOptions, PathEnd, Traced};
+use crate::solve::continuation::{Continuation, ContinuationOptions, PathEnd, TracedPath};
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
-use crate::solve::family::Blend;
+use crate::solve::family::LoadFamily;
 use crate::solve::path::SourcePath;
 
 /// How far beyond a limit point a fall begins, as a fraction of its voltage.
@@ -26,7 +26,7 @@ const MAX_NAMED: usize = 4;
 const MAX_POINTS: usize = 20_000;
 
 /// What became of a part beyond pull-in.
-pub(super) enum Closed {
+pub(super) enum PostPullIn {
     /// It rests on contact: voltage of the limit point, and an equilibrium beyond.
     Rests { fold: f64, volts: f64, q: Vec<Pose> },
     /// Nothing holds it.
@@ -34,8 +34,8 @@ pub(super) enum Closed {
 }
 
 /// One source raised and lowered.
-pub(super) struct Sweep<'a> {
-    pub(super) compiled: &'a Compiled,
+pub(super) struct VoltageSweep<'a> {
+    pub(super) compiled: &'a CompiledModel,
     pub(super) system: &'a System,
     /// Source voltages with the swept one at 0 V.
     off: Vec<f64>,
@@ -51,9 +51,9 @@ pub(super) struct Sweep<'a> {
     pub(super) of_closed: Vec<String>,
 }
 
-impl<'a> Sweep<'a> {
+impl<'a> VoltageSweep<'a> {
     /// Of a `source`, all others at the voltages `off` [V].
-    pub(super) fn new(compiled: &'a Compiled, off: Vec<f64>, source: usize) -> Self {
+    pub(super) fn new(compiled: &'a CompiledModel, off: Vec<f64>, source: usize) -> Self {
         let system = &compiled.parts.system;
         Self {
             compiled,
@@ -93,7 +93,7 @@ impl<'a> Sweep<'a> {
     }
 
     /// From 0 V up to pull-in, and to what holds the part beyond.
-    pub(super) fn close(&mut self, mut q: Vec<Pose>, max: f64) -> Result<Closed, AnalysisError> {
+    pub(super) fn close(&mut self, mut q: Vec<Pose>, max: f64) -> Result<PostPullIn, AnalysisError> {
         let unit = self.unit(&q, max)?;
         let mut from = 0.0;
         for _ in 0..MAX_LIMIT_POINTS {
@@ -109,7 +109,7 @@ impl<'a> Sweep<'a> {
             match self.fall(&mut q, beyond) {
                 // nothing here could ever hold the part
                 Err(_) if (0..self.system.members.len()).all(|g| self.system.touching(g).is_none()) => {
-                    return Ok(Closed::Falls { volts: fold });
+                    return Ok(PostPullIn::Falls { volts: fold });
                 }
                 fallen => fallen?,
             }
@@ -119,7 +119,7 @@ impl<'a> Sweep<'a> {
             if !apart(&q) {
                 let lost = traced.end != PathEnd::Unstable;
                 let fold = if lost { self.sharpen(&before, fold, beyond, apart) } else { fold };
-                return Ok(Closed::Rests { fold, volts: beyond, q });
+                return Ok(PostPullIn::Rests { fold, volts: beyond, q });
             }
             self.passed.push(fold);
             if beyond >= max {
@@ -189,7 +189,7 @@ impl<'a> Sweep<'a> {
 
     /// The branch from the equilibrium `q` at `from` volts through s·`to` + (1 − s)·`from`, until `target` or until it is
     /// no longer stable, by steps of a twentieth at least.
-    pub(super) fn trace(&mut self, q: &[Pose], from: f64, to: f64, target: f64) -> Result<Traced, AnalysisError> {
+    pub(super) fn trace(&mut self, q: &[Pose], from: f64, to: f64, target: f64) -> Result<TracedPath, AnalysisError> {
         self.trace_by(0.05, q, [from, to], target)
     }
 
@@ -200,9 +200,9 @@ impl<'a> Sweep<'a> {
         q: &[Pose],
         [from, to]: [f64; 2],
         target: f64,
-    ) -> Result<Traced, AnalysisError> {
+    ) -> Result<TracedPath, AnalysisError> {
         let system = self.system;
-        let mut family = Blend::new(system, &self.sources(from), system, &self.sources(to))
+        let mut family = LoadFamily::new(system, &self.sources(from), system, &self.sources(to))
             .map_err(|e| AnalysisError::BadRequest { what: "pull-in".into(), detail: e.to_string() })?;
         let options = ContinuationOptions {
             longest: growth,
@@ -251,7 +251,7 @@ impl<'a> Sweep<'a> {
 }
 
 /// s and configuration of the last point.
-pub(super) fn last(traced: &Traced) -> (f64, Vec<Pose>) {
+pub(super) fn last(traced: &TracedPath) -> (f64, Vec<Pose>) {
     traced.points.last().map(|p| (p.s, p.q.clone())).unwrap_or_default()
 }
 

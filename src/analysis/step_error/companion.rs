@@ -10,15 +10,15 @@
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
 //! is continued in proportion to time, as phases go.
 
-use super::super::after_contact::{Pair, first_contact, judge};
+use super::super::after_contact::{CompanionRuns, first_contact, judge};
 use super::super::chart::error::largest_error;
 use super::super::integrator::Integrator;
 use super::super::transient::error_log::least;
 use super::super::transient::{TransientOptions, TransientResult};
 use super::super::{AnalysisError, Watch};
-use super::run::{AT_THE_END, LOOSER, MOST_AGAIN, MOST_KEPT, MOST_WORK, Run, beyond, loose, room, unknown};
-use super::samples::{Kept, Picked, resolved, stride};
-use crate::compile::{Compiled, Formulation};
+use super::run::{AT_THE_END, LOOSER, MAX_AGAIN, MAX_KEPT, MAX_WORK, RunFunction, beyond, loose, room, unknown};
+use super::samples::{BufferedSamples, SelectedSamples, resolved, stride};
+use crate::compile::{CompiledModel, Formulation};
 
 /// Fraction of the difference that is reported.
 const SHARE: f64 = 0.5;
@@ -31,14 +31,14 @@ const MORE: f64 = 2.0;
 /// Largest ratio of the requested tolerance to that of the steps.
 const MAX_SHARPER: f64 = 99.0;
 /// Output times that a companion must reach, at least.
-const FEWEST: usize = 16;
+const MIN_SAMPLES: usize = 16;
 
 /// Makes a run whose first one at a looser tolerance, its companion, came as far as this; returns the tolerance of its steps, too.
 pub(super) fn compared<T>(
     options: &TransientOptions<'_>,
-    model: &Compiled,
+    model: &CompiledModel,
     (companion, whole): (Option<TransientResult>, bool),
-    run: Run<'_, T>,
+    run: RunFunction<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<(TransientResult, T, f64), AnalysisError> {
@@ -48,23 +48,23 @@ pub(super) fn compared<T>(
     let again = whole
         && options.step.is_none()
         && is_high(Formulation::of_run(model, options).1)
-        && MORE * MORE * steps * unknowns <= MOST_AGAIN
-        && options.points * options.signals.len() <= MOST_KEPT;
+        && MORE * MORE * steps * unknowns <= MAX_AGAIN
+        && options.points * options.signals.len() <= MAX_KEPT;
     if !again {
         let mut made = once(options, model, (companion, whole), run, sample, watch)?;
         made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
         return Ok((made.result, made.more, options.tol));
     }
     let mut now = options.clone();
-    let mut kept = Kept::default();
+    let mut kept = BufferedSamples::default();
     let mut made = once(&now, model, (companion, whole), run, &mut |t, values| kept.keep(t, values), watch)?;
     let room = room(options.tol, made.result.estimated_error);
     while made.result.step_error.is_some_and(|error| error > room)
-        && MORE * made.result.counters.steps as f64 * unknowns <= MOST_AGAIN
+        && MORE * made.result.counters.steps as f64 * unknowns <= MAX_AGAIN
         && now.tol > options.tol / MAX_SHARPER
     {
         let sharper = TransientOptions { tol: now.tol / LOOSER, ..options.clone() };
-        let mut others = Kept::default();
+        let mut others = BufferedSamples::default();
         let companion = (Some(made.picked.clone()), true);
         match once(&sharper, model, companion, run, &mut |t, values| others.keep(t, values), watch) {
             Ok(found) if found.result.step_error.is_some() => (made, kept, now) = (found, others, sharper),
@@ -78,7 +78,7 @@ pub(super) fn compared<T>(
 }
 
 /// A run with its estimate, and what a sharper one is compared with.
-struct Made<T> {
+struct EstimatedRun<T> {
     result: TransientResult,
     more: T,
     picked: TransientResult,
@@ -87,14 +87,14 @@ struct Made<T> {
 /// One run, compared with its companion, which may have come to its end.
 fn once<T>(
     options: &TransientOptions<'_>,
-    model: &Compiled,
+    model: &CompiledModel,
     (companion, whole): (Option<TransientResult>, bool),
-    run: Run<'_, T>,
+    run: RunFunction<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
-) -> Result<Made<T>, AnalysisError> {
+) -> Result<EstimatedRun<T>, AnalysisError> {
     let reached = companion.as_ref().map_or(0, sampled);
-    let mut picked = Picked::new(options);
+    let mut picked = SelectedSamples::new(options);
     let mut both = |t: f64, values: &[f64]| {
         picked.add(values);
         sample(t, values);
@@ -108,7 +108,7 @@ fn once<T>(
     let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
     let least = |unit: &str| least(unit, options, model);
     let contact = first_contact(&result);
-    match companion.as_ref().filter(|c| (whole || reached >= FEWEST) && other(c) && resolved) {
+    match companion.as_ref().filter(|c| (whole || reached >= MIN_SAMPLES) && other(c) && resolved) {
         Some(companion) => {
             // single values after a contact are judged on their own
             let last = contact.map_or(usize::MAX, |t| (t / spacing(options)) as usize + 1);
@@ -126,10 +126,10 @@ fn once<T>(
     if contact.is_some() {
         let columns = |run: &TransientResult| run.signals.iter().map(|(_, _, c)| c.clone()).collect::<Vec<_>>();
         let (run, companion) = (columns(&picked), companion.as_ref().map(columns));
-        let pair = Pair { spacing: spacing(options), run: &run, companion: companion.as_deref() };
+        let pair = CompanionRuns { spacing: spacing(options), run: &run, companion: companion.as_deref() };
         judge(&pair, options, &least, &mut result);
     }
-    Ok(Made { result, more, picked })
+    Ok(EstimatedRun { result, more, picked })
 }
 
 /// Fraction of the difference that is reported. Of a companion that is hardly looser it is more than all, since the error is at best
@@ -171,7 +171,7 @@ fn is_high(method: Integrator) -> bool {
 pub(super) fn companion<T>(
     options: &TransientOptions<'_>,
     unknowns: usize,
-    run: Run<'_, T>,
+    run: RunFunction<'_, T>,
     watch: Watch<'_>,
 ) -> Result<(Option<TransientResult>, bool), AnalysisError> {
     let tol = loose(options);
@@ -186,13 +186,13 @@ pub(super) fn companion<T>(
         keep: false,
         ..options.clone()
     };
-    let mut picked = Picked::new(options);
+    let mut picked = SelectedSamples::new(options);
     let mut keep = |_: f64, values: &[f64]| picked.add(values);
     let (mut steps, mut stopped) = (0.0, false);
     let mut few = |_: f64| {
         steps += 1.0;
         stopped = !watch(0.0);
-        !stopped && steps * unknowns as f64 <= MOST_WORK
+        !stopped && steps * unknowns as f64 <= MAX_WORK
     };
     let ended = run(&looser, &mut keep, &mut few);
     let counters = ended.as_ref().map_or_else(|_| Default::default(), |(result, _)| result.counters);

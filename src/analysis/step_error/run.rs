@@ -8,18 +8,18 @@ pub(super) const LOOSER: f64 = 10.0;
 /// Loosest tolerance of a companion.
 const LOOSEST: f64 = 0.3;
 /// Unknowns times steps of a companion, at most.
-pub(super) const MOST_WORK: f64 = 3e6;
+pub(super) const MAX_WORK: f64 = 3e6;
 /// Unknowns times steps of a run that is repeated, at most: some seconds.
-pub(super) const MOST_AGAIN: f64 = 1e7;
+pub(super) const MAX_AGAIN: f64 = 1e7;
 /// Fraction of the tolerance that steps have in any case.
-const LEAST_ROOM: f64 = 0.3;
+const MIN_ROOM: f64 = 0.3;
 /// Samples of a run that is run again, at most.
-pub(super) const MOST_KEPT: usize = 1 << 20;
+pub(super) const MAX_KEPT: usize = 1 << 20;
 /// Where the estimate of a single run is made.
 pub(super) const AT_THE_END: &str = "over the run";
 
 /// Makes a run with its options; calls back with each sample and with progress.
-pub type Run<'r, T> = &'r mut dyn FnMut(
+pub type RunFunction<'r, T> = &'r mut dyn FnMut(
     &TransientOptions<'_>,
     &mut dyn FnMut(f64, &[f64]),
     Watch<'_>,
@@ -28,7 +28,7 @@ pub type Run<'r, T> = &'r mut dyn FnMut(
 /// Part of the tolerance that the error of the mesh leaves to the steps.
 pub(super) fn room(tol: f64, mesh: Option<f64>) -> f64 {
     match mesh {
-        Some(mesh) if mesh <= tol => (tol - mesh).max(LEAST_ROOM * tol),
+        Some(mesh) if mesh <= tol => (tol - mesh).max(MIN_ROOM * tol),
         _ => tol,
     }
 }

@@ -3,7 +3,7 @@
 use super::super::chart::error::half_range;
 use super::super::transient::options::STEP_SHARE;
 use super::super::transient::{TransientOptions, TransientResult};
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::equations::bodies::FLOOR;
 
 /// Output times that are compared, at most about twice as many: evenly spaced ones of a run that has more.
@@ -15,12 +15,12 @@ const ROUNDING: f64 = 1e-12;
 
 /// Samples that are not sent yet.
 #[derive(Default)]
-pub(super) struct Kept {
+pub(super) struct BufferedSamples {
     t: Vec<f64>,
     values: Vec<f64>,
 }
 
-impl Kept {
+impl BufferedSamples {
     pub(super) fn keep(&mut self, t: f64, values: &[f64]) {
         crate::budget::lay_out(size_of_val(values) + size_of::<f64>());
         self.t.push(t);
@@ -35,10 +35,10 @@ impl Kept {
 
 /// True where the displacements of a run exceed the floor of a step's error, or are rounding.
 pub(super) fn resolved(
-    picked: &Picked,
+    picked: &SelectedSamples,
     result: &TransientResult,
     options: &TransientOptions<'_>,
-    model: &Compiled,
+    model: &CompiledModel,
 ) -> bool {
     let length = model.parts.system.length_scale;
     let lengths = result.signals.iter().zip(&picked.columns).filter(|((_, unit, _), _)| unit == "m");
@@ -52,13 +52,13 @@ pub(super) fn stride(options: &TransientOptions<'_>) -> usize {
 }
 
 /// Samples of some output times.
-pub(super) struct Picked {
+pub(super) struct SelectedSamples {
     stride: usize,
     count: usize,
     pub(super) columns: Vec<Vec<f64>>,
 }
 
-impl Picked {
+impl SelectedSamples {
     /// None yet.
     pub(super) fn new(options: &TransientOptions<'_>) -> Self {
         Self { stride: stride(options), count: 0, columns: vec![Vec::new(); options.signals.len()] }

@@ -6,7 +6,7 @@
 
 use super::super::AnalysisError;
 use super::options::TransientOptions;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::{Drive, System};
 use crate::multibody::forces::kinetic_energy;
 use crate::solve::time::method::Motion;
@@ -26,7 +26,7 @@ pub(super) struct ContactEnergy<'a> {
 
 impl<'a> ContactEnergy<'a> {
     /// From the start of a run; none where nothing can touch, heat does work, or forces are the derivatives of no energy.
-    pub(super) fn start(compiled: &'a Compiled, motion: &Motion, drive: &Drive) -> Option<Self> {
+    pub(super) fn start(compiled: &'a CompiledModel, motion: &Motion, drive: &Drive) -> Option<Self> {
         let system = &compiled.parts.system;
         let conserved = compiled.parts.heaters.is_empty() && !compiled.options.as_sugar && !system.turns();
         (conserved && system.can_touch()).then(|| Self {

@@ -2,17 +2,17 @@
 
 use super::super::AnalysisError;
 use super::options::{TransientOptions, Until};
-use super::result::Event;
-use crate::compile::Compiled;
+use super::result::CrossingEvent;
+use crate::compile::CompiledModel;
 use crate::domains::Ramp;
 use crate::readout::ReadoutError;
-use crate::readout::signal::{Signal, View};
+use crate::readout::signal::{Signal, SignalView};
 use crate::solve::dense::interpolate;
 use crate::solve::time::event::{Detector, Direction};
 use crate::solve::time::method::Motion;
 
 /// A signal whose crossings of a level are found.
-struct Watched {
+struct WatchedSignal {
     name: String,
     signal: Signal,
     level: f64,
@@ -21,9 +21,14 @@ struct Watched {
 }
 
 /// The crossings asked for, and the contact of every gap that has one.
-fn watched(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<Vec<Watched>, AnalysisError> {
-    let watch =
-        |name: String, signal, level, contact| Watched { name, signal, level, contact, detector: Detector::default() };
+fn watched(compiled: &CompiledModel, options: &TransientOptions<'_>) -> Result<Vec<WatchedSignal>, AnalysisError> {
+    let watch = |name: String, signal, level, contact| WatchedSignal {
+        name,
+        signal,
+        level,
+        contact,
+        detector: Detector::default(),
+    };
     let asked = options
         .events
         .iter()
@@ -44,7 +49,7 @@ fn watched(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<Vec<Wa
 }
 
 /// True for the event that a run goes on until.
-fn ends(until: &Until, event: &Event) -> bool {
+fn ends(until: &Until, event: &CrossingEvent) -> bool {
     match until {
         Until::Contact => event.contact && event.direction == Direction::Down,
         Until::Release => event.contact && event.direction == Direction::Up,
@@ -54,15 +59,15 @@ fn ends(until: &Until, event: &Event) -> bool {
 
 /// Finds the crossings of a run.
 pub(super) struct Crossings<'a> {
-    compiled: &'a Compiled,
+    compiled: &'a CompiledModel,
     ramp: &'a Ramp<'a>,
     volts: &'a [f64],
-    watched: Vec<Watched>,
+    watched: Vec<WatchedSignal>,
     within: Motion,
     rise: Vec<f64>,
     until: Option<Until>,
     /// What was found, in order of time.
-    pub(super) events: Vec<Event>,
+    pub(super) events: Vec<CrossingEvent>,
 }
 
 impl<'a> Crossings<'a> {
@@ -71,13 +76,13 @@ impl<'a> Crossings<'a> {
     /// # Errors
     /// See [`AnalysisError`].
     pub(super) fn start(
-        (compiled, options): (&'a Compiled, &'a TransientOptions<'a>),
+        (compiled, options): (&'a CompiledModel, &'a TransientOptions<'a>),
         (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
         (motion, rise): (&Motion, &[f64]),
     ) -> Result<Self, AnalysisError> {
         let mut watched = watched(compiled, options)?;
         for w in &mut watched {
-            let view = View { q: &motion.q, v: &motion.v, rise, volts };
+            let view = SignalView { q: &motion.q, v: &motion.v, rise, volts };
             w.detector = Detector::new(w.signal.value(compiled, &view) - w.level);
         }
         let within = Motion::zeros(compiled.parts.system.bodies());
@@ -95,12 +100,12 @@ impl<'a> Crossings<'a> {
                 for (k, r) in self.rise.iter_mut().enumerate() {
                     *r = ramp.rise_at(k, s + x * h);
                 }
-                let view = View { q: &self.within.q, v: &self.within.v, rise: &self.rise, volts };
+                let view = SignalView { q: &self.within.q, v: &self.within.v, rise: &self.rise, volts };
                 w.signal.value(compiled, &view) - w.level
             };
             w.detector.step(value, |x, direction| {
-                crate::budget::lay_out(size_of::<Event>() + w.name.len());
-                self.events.push(Event {
+                crate::budget::lay_out(size_of::<CrossingEvent>() + w.name.len());
+                self.events.push(CrossingEvent {
                     signal: w.name.clone(),
                     level: w.level,
                     t: s + x * h,

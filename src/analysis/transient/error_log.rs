@@ -2,10 +2,10 @@
 
 use super::super::chart::error::{SMALL, half_range};
 use super::options::TransientOptions;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::Ramp;
 use crate::multibody::planar::Pose;
-use crate::readout::signal::{Signal, View};
+use crate::readout::signal::{Signal, SignalView};
 use crate::solve::time::method::Motion;
 
 /// Ends of steps at which signals are compared, at most.
@@ -20,7 +20,7 @@ const CHAOTIC: f64 = 30.0;
 
 /// When a signal is lost.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::analysis) struct Lost {
+pub(in crate::analysis) struct SignalLoss {
     pub(in crate::analysis) signal: String,
     /// From when on [s].
     pub(in crate::analysis) t: f64,
@@ -30,16 +30,16 @@ pub(in crate::analysis) struct Lost {
 
 /// What a run reports of its steps.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::analysis) struct Estimate {
+pub(in crate::analysis) struct StepErrorEstimate {
     /// Root mean square error of the worst signal, of its amplitude [1].
     pub(in crate::analysis) error: f64,
     /// The first signal that is lost, if any is.
-    pub(in crate::analysis) lost: Option<Lost>,
+    pub(in crate::analysis) lost: Option<SignalLoss>,
 }
 
 /// Signals and their errors at some ends of steps.
 pub(super) struct ErrorLog<'a> {
-    compiled: &'a Compiled,
+    compiled: &'a CompiledModel,
     ramp: &'a Ramp<'a>,
     volts: &'a [f64],
     signals: &'a [Signal],
@@ -57,7 +57,7 @@ pub(super) struct ErrorLog<'a> {
 impl<'a> ErrorLog<'a> {
     /// From the start of the motion, which has no error.
     pub(super) fn start(
-        (compiled, stop): (&'a Compiled, f64),
+        (compiled, stop): (&'a CompiledModel, f64),
         (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
         signals: &'a [Signal],
         motion: &Motion,
@@ -77,12 +77,12 @@ impl<'a> ErrorLog<'a> {
             errors: vec![Vec::new(); signals.len()],
             touched: false,
         };
-        log.see(0.0, motion, &Motion::zeros(system.bodies()));
+        log.observe(0.0, motion, &Motion::zeros(system.bodies()));
         log
     }
 
     /// The end of a step at time `t` [s], the motion there and its error; returns whether the next one is of use.
-    pub(super) fn see(&mut self, t: f64, motion: &Motion, error: &Motion) -> bool {
+    pub(super) fn observe(&mut self, t: f64, motion: &Motion, error: &Motion) -> bool {
         self.touched = self.touched || self.compiled.parts.system.contact_energy(&motion.q) > 0.0;
         if self.touched {
             return false;
@@ -102,7 +102,7 @@ impl<'a> ErrorLog<'a> {
         crate::budget::lay_out(2 * size_of::<f64>() * self.signals.len());
         for (signal, (values, errors)) in self.signals.iter().zip(self.values.iter_mut().zip(&mut self.errors)) {
             let of = |m: &Motion| {
-                signal.value(self.compiled, &View { q: &m.q, v: &m.v, rise: &self.rise, volts: self.volts })
+                signal.value(self.compiled, &SignalView { q: &m.q, v: &m.v, rise: &self.rise, volts: self.volts })
             };
             let value = of(motion);
             values.push(value);
@@ -113,7 +113,7 @@ impl<'a> ErrorLog<'a> {
     }
 
     /// The estimate; none where something touched, or nothing was compared.
-    pub(super) fn estimate(&self, options: &TransientOptions<'_>) -> Option<Estimate> {
+    pub(super) fn estimate(&self, options: &TransientOptions<'_>) -> Option<StepErrorEstimate> {
         if self.touched || self.t.len() < 2 || self.signals.is_empty() {
             return None;
         }
@@ -122,7 +122,7 @@ impl<'a> ErrorLog<'a> {
             let own = self.signals.iter().zip(&swings).filter(|(s, _)| s.unit() == unit);
             own.map(|(_, swing)| *swing).fold(0.0, f64::max)
         };
-        let mut found = Estimate { error: 0.0, lost: None };
+        let mut found = StepErrorEstimate { error: 0.0, lost: None };
         for (k, signal) in self.signals.iter().enumerate() {
             let amplitude =
                 swings[k].max(SMALL * largest(signal.unit())).max(least(signal.unit(), options, self.compiled));
@@ -132,7 +132,7 @@ impl<'a> ErrorLog<'a> {
             let lost = relative.iter().position(|e| *e > 2.0 * LOST);
             if let Some(at) = lost.filter(|at| found.lost.as_ref().is_none_or(|lost| self.t[*at] < lost.t)) {
                 let signal = options.signals[k].clone();
-                found.lost = Some(Lost { signal, t: self.t[at], chaotic: grows_fast(&relative[..=at]) });
+                found.lost = Some(SignalLoss { signal, t: self.t[at], chaotic: grows_fast(&relative[..=at]) });
             }
         }
         Some(found)
@@ -159,7 +159,7 @@ fn grows_fast(errors: &[f64]) -> bool {
 }
 
 /// The amplitude below which a signal of this unit stands still.
-pub(in crate::analysis) fn least(unit: &str, options: &TransientOptions<'_>, model: &Compiled) -> f64 {
+pub(in crate::analysis) fn least(unit: &str, options: &TransientOptions<'_>, model: &CompiledModel) -> f64 {
     let length = model.parts.system.length_scale;
     match unit {
         "m" => STILL * length,

@@ -3,7 +3,7 @@
 //! A compression wave beyond the buckling load of a single segment, 24·E·I/h², turns neighbouring segments against each other in a zigzag that no mesh of that
 //! length resolves. The axial and bending strains of a segment hold up to about half a radian between its ends.
 
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BodyId, Model};
 
@@ -11,7 +11,7 @@ use crate::multibody::{BodyId, Model};
 const FOLDED: f64 = 0.5;
 
 /// Addition to the message of a step that failed at `q`; empty without a folded segment.
-pub(super) fn addition(compiled: &Compiled, q: &[Pose]) -> String {
+pub(super) fn addition(compiled: &CompiledModel, q: &[Pose]) -> String {
     let model = &compiled.parts.system.model;
     let angle = |id: BodyId| Model::pose(q, id).z;
     let name = |id: BodyId| match id {

@@ -2,7 +2,7 @@
 
 use super::super::AnalysisError;
 use super::super::integrator::Integrator;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::options::analysis::TRAN_POINTS;
 use crate::solve::baseline::SolverKind;
 use crate::solve::time::adaptive::Control;
@@ -42,7 +42,7 @@ pub struct TransientOptions<'a> {
     /// Voltages held during the run, by port name [V].
     pub voltages: Vec<(String, f64)>,
     /// A variant of the same netlist whose static equilibrium is the initial state; none: at rest as drawn.
-    pub release: Option<&'a Compiled>,
+    pub release: Option<&'a CompiledModel>,
     /// What integrates.
     pub method: Integrator,
     /// Length of equal steps [s]; none: steps follow `tol`.

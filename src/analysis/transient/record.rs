@@ -1,29 +1,29 @@
 //! A run from its start to its end, and what is taken of it on the way: samples, crossings, and looks at its stability.
 
 use super::super::contact_range::within_contact_range;
-use super::super::stability::Stability;
-use super::super::statics::{operating_point, source_vector, told_at};
+use super::super::stability::StabilityMonitor;
+use super::super::statics::{notes_at, operating_point, source_vector};
 use super::super::{AnalysisError, Watch};
 use super::contact_energy::ContactEnergy;
 use super::crossings::Crossings;
-use super::error_log::{ErrorLog, Lost};
+use super::error_log::{ErrorLog, SignalLoss};
 use super::folded;
 use super::options::{TransientOptions, check};
 use super::result::{Counters, TransientResult};
-use super::samples::Samples;
-use crate::compile::Compiled;
+use super::samples::SampleRecorder;
+use crate::compile::CompiledModel;
 use crate::domains::Ramp;
 use crate::multibody::Body;
 use crate::readout::signal::Signal;
 use crate::solve::time::adaptive::{Advance, Observer};
 use crate::solve::time::defect::SeeError;
-use crate::solve::time::method::{Motion, Work};
+use crate::solve::time::method::{Motion, SolverCounters};
 
 /// Times of a run at which its stability is looked at, the end included.
-pub(in crate::analysis) const LOOKS: usize = 16;
+pub(in crate::analysis) const STABILITY_CHECKS: usize = 16;
 
 /// What carries a motion from the start of a ramp to its end.
-pub(in crate::analysis) trait Carrier {
+pub(in crate::analysis) trait Propagator {
     /// Takes the start to where the formulation can go on from.
     ///
     /// # Errors
@@ -43,14 +43,14 @@ pub(in crate::analysis) trait Carrier {
         motion: &mut Motion,
         observe: Observer<'_>,
         errors: Option<SeeError<'_>>,
-    ) -> Result<(Advance, Work), AnalysisError>;
+    ) -> Result<(Advance, SolverCounters), AnalysisError>;
 }
 
 /// Lets `carrier` go from the start to the end of a run, and takes samples and events on the way.
 pub(in crate::analysis) fn record(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     options: &TransientOptions<'_>,
-    carrier: &mut impl Carrier,
+    carrier: &mut impl Propagator,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<TransientResult, AnalysisError> {
@@ -68,9 +68,9 @@ pub(in crate::analysis) fn record(
 
     let (asked, held) = ((compiled, options), (&ramp, &volts[..]));
     let mut crossings = Crossings::start(asked, held, (&motion, &rise))?;
-    let mut samples = Samples::start(asked, held, &signals, sample, &motion);
+    let mut samples = SampleRecorder::start(asked, held, &signals, sample, &motion);
     let mut log = options.estimate.then(|| ErrorLog::start((compiled, options.stop), held, &signals, &motion));
-    let mut stability = Stability::new(system);
+    let mut stability = StabilityMonitor::new(system);
     let mut energy = ContactEnergy::start(compiled, &motion, &drive);
     let mut looks = 0;
     let (mut beyond, mut stopped_at) = (None, None);
@@ -79,7 +79,7 @@ pub(in crate::analysis) fn record(
         stopped_at = crossings.step(s, h, before, after);
         let suits = refuse_in_contact(compiled, options, s + h, after);
         let within = |()| within_contact_range(compiled, &after.q);
-        let done = ((s + h) / options.stop * LOOKS as f64 * (1.0 + 1e-12)) as usize;
+        let done = ((s + h) / options.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize;
         let look = options.step.is_some() || done > looks;
         let kept = |()| energy.as_mut().map_or(Ok(()), |energy| energy.step(options, s + h, after, look));
         if let Err(error) = suits.and_then(within).and_then(kept).or_else(|error| stopped_at.map(|_| ()).ok_or(error)) {
@@ -93,11 +93,11 @@ pub(in crate::analysis) fn record(
         if done > looks {
             looks = done;
             ramp.at(s + h, &mut drive);
-            stability.look(system, &drive, s + h, (&after.q, &after.v));
+            stability.check(system, &drive, s + h, (&after.q, &after.v));
         }
         watch(((s + h) / options.stop).min(1.0))
     };
-    let mut errors = log.as_mut().map(|log| |t: f64, motion: &Motion, error: &Motion| log.see(t, motion, error));
+    let mut errors = log.as_mut().map(|log| |t: f64, motion: &Motion, error: &Motion| log.observe(t, motion, error));
     let see = errors.as_mut().map(|see| see as SeeError<'_>);
     let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe, see).map_err(|error| match error {
         AnalysisError::StepFailed { t, dt, detail } => {
@@ -133,7 +133,7 @@ pub(in crate::analysis) fn record(
         events: crossings.events,
         warnings: begun
             .into_iter()
-            .chain(stability.told())
+            .chain(stability.warning())
             .chain(estimate.and_then(|e| e.lost).map(lost))
             .chain(unreached)
             .collect(),
@@ -142,7 +142,7 @@ pub(in crate::analysis) fn record(
 
 /// Refuses the motion at time `t` [s] where parts touch and the method gains energy in contact.
 fn refuse_in_contact(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     options: &TransientOptions<'_>,
     t: f64,
     motion: &Motion,
@@ -164,7 +164,7 @@ fn refuse_in_contact(
 }
 
 /// The warning of a signal that is lost.
-fn lost(Lost { signal, t, chaotic }: Lost) -> String {
+fn lost(SignalLoss { signal, t, chaotic }: SignalLoss) -> String {
     match chaotic {
         true => format!(
             "{signal} is not predictable after {t:.2e} s: neighbouring motions part exponentially there, at any tolerance; only its statistics hold"
@@ -178,7 +178,7 @@ fn lost(Lost { signal, t, chaotic }: Lost) -> String {
 /// Where a run begins, how much warmer its heaters are there [K], and what there is to tell of that: at rest as drawn, or in the
 /// equilibrium of what is released.
 fn start(
-    compiled: &Compiled,
+    compiled: &CompiledModel,
     options: &TransientOptions<'_>,
 ) -> Result<(Motion, Vec<f64>, Vec<String>), AnalysisError> {
     let system = &compiled.parts.system;
@@ -194,7 +194,7 @@ fn start(
     let mut told = Vec::new();
     if let Some(start) = options.release {
         let point = operating_point(start, &options.voltages)?;
-        let places = |model: &Compiled| model.structure.nodes.iter().map(|node| node.position).collect::<Vec<_>>();
+        let places = |model: &CompiledModel| model.structure.nodes.iter().map(|node| node.position).collect::<Vec<_>>();
         if point.q.len() != motion.q.len() || places(start) != places(compiled) {
             return Err(AnalysisError::BadRequest {
                 what: "release".into(),
@@ -203,7 +203,7 @@ fn start(
         }
         motion.q.copy_from_slice(&point.q);
         rise.copy_from_slice(&point.rise);
-        told = told_at(start, &point);
+        told = notes_at(start, &point);
     }
     Ok((motion, rise, told.into_iter().map(|way| format!("the equilibrium that it is released from: {way}")).collect()))
 }

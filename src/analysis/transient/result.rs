@@ -22,7 +22,7 @@ pub struct Counters {
 
 /// A signal that crossed a level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Event {
+pub struct CrossingEvent {
     /// Name of the signal; of a gap that closes or opens, its `GAP.gap`.
     pub signal: String,
     /// The level, in the signal's unit.
@@ -79,7 +79,7 @@ pub struct TransientResult {
     /// Statistics of each signal after that.
     pub after_contact: Vec<Statistics>,
     /// Crossings asked for and contacts of gaps, in order of time.
-    pub events: Vec<Event>,
+    pub events: Vec<CrossingEvent>,
     /// What the numbers do not say by themselves.
     pub warnings: Vec<String>,
 }

@@ -1,15 +1,15 @@
 //! Signals at equally spaced times, between the steps of a run.
 
 use super::options::TransientOptions;
-use crate::compile::Compiled;
+use crate::compile::CompiledModel;
 use crate::domains::Ramp;
-use crate::readout::signal::{Signal, View};
+use crate::readout::signal::{Signal, SignalView};
 use crate::solve::dense::interpolate;
 use crate::solve::time::method::Motion;
 
 /// Takes the samples of a run, keeps them if asked to, and tells each as it comes.
-pub(super) struct Samples<'a> {
-    compiled: &'a Compiled,
+pub(super) struct SampleRecorder<'a> {
+    compiled: &'a CompiledModel,
     options: &'a TransientOptions<'a>,
     ramp: &'a Ramp<'a>,
     volts: &'a [f64],
@@ -27,10 +27,10 @@ pub(super) struct Samples<'a> {
     pub(super) columns: Vec<Vec<f64>>,
 }
 
-impl<'a> Samples<'a> {
+impl<'a> SampleRecorder<'a> {
     /// Takes the first sample, of the motion at the start.
     pub(super) fn start(
-        (compiled, options): (&'a Compiled, &'a TransientOptions<'a>),
+        (compiled, options): (&'a CompiledModel, &'a TransientOptions<'a>),
         (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
         signals: &'a [Signal],
         tell: &'a mut dyn FnMut(f64, &[f64]),
@@ -78,7 +78,7 @@ impl<'a> Samples<'a> {
         for (k, r) in self.rise.iter_mut().enumerate() {
             *r = self.ramp.rise_at(k, t);
         }
-        let view = View { q: &motion.q, v: &motion.v, rise: &self.rise, volts: self.volts };
+        let view = SignalView { q: &motion.q, v: &motion.v, rise: &self.rise, volts: self.volts };
         for (value, signal) in self.row.iter_mut().zip(self.signals) {
             *value = signal.value(self.compiled, &view);
         }

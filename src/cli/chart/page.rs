@@ -1,7 +1,7 @@
 //! A chart as a web page that needs nothing else: the picture, the definitions, and every point in a table.
 
 use super::table::{HEADS, caption, cells};
-use bimorph::analysis::chart::{Chart, Part};
+use bimorph::analysis::chart::{Chart, ChartPart};
 use bimorph::results::plot::Picture;
 use bimorph::results::plot::svg::escape;
 use std::fmt::Write;
@@ -28,7 +28,7 @@ pub(super) fn html(title: &str, chart: &Chart, picture: &Picture) -> String {
         escape(&chart.signals.join(", ")),
         chart.reference_error.map(|e| format!(" (good to {e:.1e})")).unwrap_or_default()
     );
-    for part in Part::ALL {
+    for part in ChartPart::ALL {
         let points: Vec<_> = chart.points.iter().filter(|p| p.part == part).collect();
         if points.is_empty() {
             continue;

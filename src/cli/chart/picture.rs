@@ -1,14 +1,14 @@
 //! A chart as a picture: one panel for each part.
 
-use bimorph::analysis::chart::{Chart, ChartPoint, Measured, Part};
+use bimorph::analysis::chart::{Chart, ChartPart, ChartPoint, RunMeasurement};
 use bimorph::results::plot::Picture;
 use bimorph::results::plot::axis::quantity;
-use bimorph::results::plot::loglog::{self, Curve, LogChart, Panel, Slope};
+use bimorph::results::plot::loglog::{self, LogChart, LogCurve, LogPanel, Slope};
 use clap::ValueEnum;
 
 /// What stands for work.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Work {
+pub(crate) enum CostMeasure {
     /// Wall-clock time
     #[default]
     Time,
@@ -17,28 +17,28 @@ pub(crate) enum Work {
 }
 
 /// Draws a chart.
-pub(super) fn draw(title: &str, chart: &Chart, work: Work) -> Picture {
-    let mut panels: Vec<Panel> = Part::ALL.into_iter().filter_map(|part| panel(chart, part, work)).collect();
-    panels.extend((work == Work::Time).then(|| cost(chart)).flatten());
+pub(super) fn draw(title: &str, chart: &Chart, work: CostMeasure) -> Picture {
+    let mut panels: Vec<LogPanel> = ChartPart::ALL.into_iter().filter_map(|part| panel(chart, part, work)).collect();
+    panels.extend((work == CostMeasure::Time).then(|| cost(chart)).flatten());
     let mut notes = vec![format!(
         "Error of {}: root mean square over {}, relative to amplitude.",
         chart.signals.join(", "),
         quantity(chart.stop, "s")
     )];
-    let shown = |part: Part| chart.points.iter().any(|p| p.part == part);
-    if let (Some(error), true) = (chart.reference_error, shown(Part::Precision)) {
+    let shown = |part: ChartPart| chart.points.iter().any(|p| p.part == part);
+    if let (Some(error), true) = (chart.reference_error, shown(ChartPart::Precision)) {
         notes.push(format!("Methods: one model, against Radau5 a hundred times tighter (good to {error:.0e})."));
     }
-    if shown(Part::Order) {
+    if shown(ChartPart::Order) {
         notes.push("Model order: against the finest compliant model; figures are unknowns.".into());
     }
-    if shown(Part::Defaults) {
+    if shown(ChartPart::Defaults) {
         notes.push("Defaults: commands with a tolerance and nothing else, against a tenth of the tightest; figures are unknowns.".into());
     }
-    if shown(Part::Solvers) {
+    if shown(ChartPart::Solvers) {
         notes.push("Solvers: one step of Rodas4, a tangent, a factorization and six solves.".into());
     }
-    if work == Work::Time {
+    if work == CostMeasure::Time {
         notes.push("Times are wall-clock times on one machine, medians.".into());
     }
     let failed = chart.points.iter().filter(|p| p.failed.is_some()).count();
@@ -51,33 +51,33 @@ pub(super) fn draw(title: &str, chart: &Chart, work: Work) -> Picture {
     loglog::draw(&LogChart { title: title.to_owned(), panels, notes })
 }
 
-fn panel(chart: &Chart, part: Part, work: Work) -> Option<Panel> {
+fn panel(chart: &Chart, part: ChartPart, work: CostMeasure) -> Option<LogPanel> {
     let points: Vec<&ChartPoint> = chart.points.iter().filter(|p| p.part == part).collect();
     let formulations = points.iter().any(|p| p.formulation != points[0].formulation);
-    let mut curves: Vec<Curve> = Vec::new();
+    let mut curves: Vec<LogCurve> = Vec::new();
     for p in &points {
         let name = match part {
-            Part::Precision if formulations => format!("{} {}", p.formulation.name(), p.method),
-            Part::Precision => p.method.to_owned(),
-            Part::Order => match p.formulation.name() {
+            ChartPart::Precision if formulations => format!("{} {}", p.formulation.name(), p.method),
+            ChartPart::Precision => p.method.to_owned(),
+            ChartPart::Order => match p.formulation.name() {
                 "frame" => "linear frame".to_owned(),
                 name => name.to_owned(),
             },
-            Part::Solvers => p.solver.to_owned(),
-            Part::Defaults => p.method.to_owned(),
+            ChartPart::Solvers => p.solver.to_owned(),
+            ChartPart::Defaults => p.method.to_owned(),
         };
         let k = curves.iter().position(|c| c.name == name).unwrap_or_else(|| {
-            curves.push(Curve { name, points: Vec::new(), labels: Vec::new() });
+            curves.push(LogCurve { name, points: Vec::new(), labels: Vec::new() });
             curves.len() - 1
         });
         if let Some(m) = &p.measured {
             let work = effort(m, work);
             match part {
-                Part::Solvers => curves[k].points.push([p.unknowns as f64, work]),
-                Part::Defaults => curves[k].points.push([p.tol, m.error.unwrap_or(f64::NAN)]),
+                ChartPart::Solvers => curves[k].points.push([p.unknowns as f64, work]),
+                ChartPart::Defaults => curves[k].points.push([p.tol, m.error.unwrap_or(f64::NAN)]),
                 _ => curves[k].points.push([work, m.error.unwrap_or(f64::NAN)]),
             }
-            if matches!(part, Part::Order | Part::Defaults) {
+            if matches!(part, ChartPart::Order | ChartPart::Defaults) {
                 curves[k].labels.push(p.unknowns.to_string());
             }
         }
@@ -86,11 +86,11 @@ fn panel(chart: &Chart, part: Part, work: Work) -> Option<Panel> {
         return None;
     }
     let run = match work {
-        Work::Time => "time of a run [s]",
-        Work::Counts => "factorizations + solves + force evaluations",
+        CostMeasure::Time => "time of a run [s]",
+        CostMeasure::Counts => "factorizations + solves + force evaluations",
     };
     Some(match part {
-        Part::Precision => Panel {
+        ChartPart::Precision => LogPanel {
             title: "Methods, by tolerance".into(),
             x_name: run.into(),
             y_name: "relative error".into(),
@@ -98,7 +98,7 @@ fn panel(chart: &Chart, part: Part, work: Work) -> Option<Panel> {
             floor: chart.reference_error.map(|e| ("reference".into(), e)),
             slopes: Vec::new(),
         },
-        Part::Order => Panel {
+        ChartPart::Order => LogPanel {
             title: "Model order, by unknowns".into(),
             x_name: run.into(),
             y_name: "relative error".into(),
@@ -106,20 +106,20 @@ fn panel(chart: &Chart, part: Part, work: Work) -> Option<Panel> {
             floor: None,
             slopes: Vec::new(),
         },
-        Part::Solvers => Panel {
+        ChartPart::Solvers => LogPanel {
             title: "Solvers, one step".into(),
             x_name: "unknowns".into(),
             y_name: match work {
-                Work::Time => "time of a step [s]".into(),
-                Work::Counts => "multiplications of a step".into(),
+                CostMeasure::Time => "time of a step [s]".into(),
+                CostMeasure::Counts => "multiplications of a step".into(),
             },
             slopes: slopes(&curves),
             curves,
             floor: None,
         },
-        Part::Defaults => {
+        ChartPart::Defaults => {
             let loosest = points.iter().map(|p| p.tol).fold(0.0, f64::max);
-            Panel {
+            LogPanel {
                 title: "Defaults: asked for, come out".into(),
                 x_name: "tolerance asked for".into(),
                 y_name: "true relative error".into(),
@@ -132,16 +132,16 @@ fn panel(chart: &Chart, part: Part, work: Work) -> Option<Panel> {
 }
 
 /// What the tolerance of a default analysis costs.
-fn cost(chart: &Chart) -> Option<Panel> {
-    let mut curves: Vec<Curve> = Vec::new();
-    for (p, m) in chart.points.iter().filter(|p| p.part == Part::Defaults).filter_map(|p| Some((p, p.measured?))) {
+fn cost(chart: &Chart) -> Option<LogPanel> {
+    let mut curves: Vec<LogCurve> = Vec::new();
+    for (p, m) in chart.points.iter().filter(|p| p.part == ChartPart::Defaults).filter_map(|p| Some((p, p.measured?))) {
         let k = curves.iter().position(|c| c.name == p.method).unwrap_or_else(|| {
-            curves.push(Curve { name: p.method.to_owned(), points: Vec::new(), labels: Vec::new() });
+            curves.push(LogCurve { name: p.method.to_owned(), points: Vec::new(), labels: Vec::new() });
             curves.len() - 1
         });
         curves[k].points.push([p.tol, m.seconds]);
     }
-    (!curves.is_empty()).then(|| Panel {
+    (!curves.is_empty()).then(|| LogPanel {
         title: "Defaults: what it costs".into(),
         x_name: "tolerance asked for".into(),
         y_name: "time of a command [s]".into(),
@@ -151,16 +151,16 @@ fn cost(chart: &Chart) -> Option<Panel> {
     })
 }
 
-fn effort(m: &Measured, work: Work) -> f64 {
+fn effort(m: &RunMeasurement, work: CostMeasure) -> f64 {
     match work {
-        Work::Time => m.seconds,
-        Work::Counts => m.count() as f64,
+        CostMeasure::Time => m.seconds,
+        CostMeasure::Counts => m.count() as f64,
     }
 }
 
 /// n below the first curve, which is the recursion's where it is there, and n³ above the highest point.
-fn slopes(curves: &[Curve]) -> Vec<Slope> {
-    let largest = |c: &Curve| c.points.iter().copied().max_by(|a, b| a[0].total_cmp(&b[0]));
+fn slopes(curves: &[LogCurve]) -> Vec<Slope> {
+    let largest = |c: &LogCurve| c.points.iter().copied().max_by(|a, b| a[0].total_cmp(&b[0]));
     let mut slopes = Vec::new();
     if let Some(p) = curves.first().and_then(largest) {
         slopes.push(Slope { name: "n".into(), through: [p[0], 0.6 * p[1]], exponent: 1.0 });

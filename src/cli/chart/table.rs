@@ -1,7 +1,7 @@
 //! The points of a chart as CSV, as cells of a page, and as a report.
 
 use crate::cli::report;
-use bimorph::analysis::chart::{Chart, ChartPoint, Part};
+use bimorph::analysis::chart::{Chart, ChartPart, ChartPoint};
 use bimorph::results::csv::field;
 use bimorph::results::plot::axis::quantity;
 use std::fmt::Write;
@@ -50,10 +50,10 @@ pub(crate) const HEADS: [&str; 8] = ["run", "tolerance", "band", "unknowns", "er
 /// The cells of a point for people: short, in engineering units; a failure is told instead of numbers.
 pub(crate) fn cells(p: &ChartPoint) -> Vec<String> {
     let run = match p.part {
-        Part::Precision => format!("{} {}", p.formulation.name(), p.method),
-        Part::Order => p.formulation.name().to_owned(),
-        Part::Solvers => p.solver.to_owned(),
-        Part::Defaults => p.method.to_owned(),
+        ChartPart::Precision => format!("{} {}", p.formulation.name(), p.method),
+        ChartPart::Order => p.formulation.name().to_owned(),
+        ChartPart::Solvers => p.solver.to_owned(),
+        ChartPart::Defaults => p.method.to_owned(),
     };
     let band = p.band_hz.map_or_else(|| "by shape".to_owned(), |b| quantity(b, "Hz"));
     let mut cells = vec![run, format!("{:.0e}", p.tol), band, p.unknowns.to_string()];
@@ -73,12 +73,16 @@ pub(crate) fn cells(p: &ChartPoint) -> Vec<String> {
 }
 
 /// What a part's table shows, in one line.
-pub(crate) fn caption(part: Part) -> &'static str {
+pub(crate) fn caption(part: ChartPart) -> &'static str {
     match part {
-        Part::Precision => "Methods and tolerances on one model; work: factorizations, solves and force evaluations",
-        Part::Order => "Models of growing order against the finest; work: factorizations, solves and force evaluations",
-        Part::Solvers => "One step of Rodas4 by solver; work: multiplications of its factorization and solves",
-        Part::Defaults => {
+        ChartPart::Precision => {
+            "Methods and tolerances on one model; work: factorizations, solves and force evaluations"
+        }
+        ChartPart::Order => {
+            "Models of growing order against the finest; work: factorizations, solves and force evaluations"
+        }
+        ChartPart::Solvers => "One step of Rodas4 by solver; work: multiplications of its factorization and solves",
+        ChartPart::Defaults => {
             "Default analyses by tolerance, against a tenth of the tightest: asked for, come out, told, and the time"
         }
     }
@@ -87,7 +91,7 @@ pub(crate) fn caption(part: Part) -> &'static str {
 /// A report: one table for each part, and the reasons of what failed.
 pub(crate) fn text(chart: &Chart) -> String {
     let mut text = String::new();
-    for part in Part::ALL {
+    for part in ChartPart::ALL {
         let rows: Vec<Vec<String>> = chart.points.iter().filter(|p| p.part == part).map(cells).collect();
         if !rows.is_empty() {
             let _ = writeln!(text, "{}\n{}", caption(part), report::columns(&HEADS, &rows));

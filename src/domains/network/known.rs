@@ -4,26 +4,26 @@
 use crate::sets::Sets;
 
 /// A node that a source touches, reached from the one before it.
-pub(super) struct Step {
+pub(super) struct TreeStep {
     pub(super) node: usize,
     /// The source that it hangs on, 1 where it is at its plus and −1 where at its minus, and the node at the other end; none: ground.
     pub(super) by: Option<(usize, f64, Option<usize>)>,
 }
 
 /// What sources say of potentials: nodes that they join have one unknown between them, and differ by the sources in between.
-pub(super) struct Known {
+pub(super) struct KnownPotentials {
     /// The unknown that a node's potential stands on; none: it is at ground but for sources.
     pub(super) row: Vec<Option<usize>>,
     /// Number of unknowns.
     pub(super) free: usize,
     /// Nodes that sources touch, each after the one that it hangs on.
-    pub(super) order: Vec<Step>,
+    pub(super) order: Vec<TreeStep>,
     /// For each node that a source touches the sources between it and where its unknown is, with signs, in `sources`.
     offsets: Vec<(usize, usize)>,
     sources: Vec<(usize, f64)>,
 }
 
-impl Known {
+impl KnownPotentials {
     /// Of a circuit with these nodes, grounds and sources (plus, minus; none: ground), whose parts are joined in `part`; one that nothing ties to ground has its first node there.
     pub(super) fn new(
         (nodes, grounds): (usize, &[usize]),
@@ -88,7 +88,7 @@ impl Known {
                     }
                     known.sources.push((s, sign));
                     known.offsets[other] = (begin, known.sources.len());
-                    known.order.push(Step { node: other, by: Some((s, sign, (node < nodes).then_some(node))) });
+                    known.order.push(TreeStep { node: other, by: Some((s, sign, (node < nodes).then_some(node))) });
                     waiting.push(other);
                 }
             }
@@ -100,7 +100,7 @@ impl Known {
                 known.row[node] = Some(known.free);
                 known.free += 1;
                 if first[node] < first[node + 1] {
-                    known.order.push(Step { node, by: None });
+                    known.order.push(TreeStep { node, by: None });
                     spread(&mut known, &mut reached, &mut waiting, node);
                 }
             }

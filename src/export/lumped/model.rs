@@ -1,6 +1,6 @@
 //! The model of rigid parts that slide: coordinates, springs and dampers, gaps, and what is read.
 
-use super::super::linear::{Port, SignalShown};
+use super::super::linear::{ReducedPort, SignalShown};
 pub use crate::domains::Law;
 use nalgebra::{DMatrix, DVector, Vector2};
 
@@ -38,7 +38,7 @@ pub struct LumpedGap {
 
 /// What a port or signal reads.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Reading {
+pub enum LumpedOutput {
     /// Current of an electrical port: conductance to each port [S], and what the netlist's own sources drive [A].
     Current(DVector<f64>, f64),
     /// A displacement, per coordinate.
@@ -61,9 +61,9 @@ pub enum Reading {
 
 /// The model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Lumped {
+pub struct LumpedModel {
     /// Ports; they have no operating point.
-    pub ports: Vec<Port>,
+    pub ports: Vec<ReducedPort>,
     /// Signals.
     pub signals: Vec<SignalShown>,
     /// Coordinates.
@@ -79,7 +79,7 @@ pub struct Lumped {
     /// Gaps.
     pub gaps: Vec<LumpedGap>,
     /// What each port answers, then what each signal shows, in SI.
-    pub rows: Vec<Reading>,
+    pub rows: Vec<LumpedOutput>,
     /// Volts or amperes of the circuit per unit of each row.
     pub scales: Vec<f64>,
     /// Unit of what is given per volt or ampere of the circuit, of each port.

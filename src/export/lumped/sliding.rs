@@ -3,14 +3,14 @@
 
 use super::super::ExportError;
 use super::model::Coordinate;
-use crate::domains::{Point, System};
+use crate::domains::{MaterialPoint, System};
 use crate::multibody::BodyId;
 use crate::multibody::forces::{add_damping, add_elastic};
 use crate::multibody::planar::Pose;
 use nalgebra::{DMatrix, DVector, Vector2};
 
 /// Most coordinates of a lumped mechanism.
-const MOST: usize = 24;
+const MAX_COORDINATES: usize = 24;
 /// What the rate of a part is measured in that no spring holds [rad/s].
 pub(super) const UNHELD: f64 = 1e5;
 /// Share of a spring's force that may be beside a straight line [1].
@@ -52,7 +52,9 @@ pub(super) fn coordinates(system: &System) -> Result<Vec<Coordinate>, ExportErro
     }
     match out.len() {
         0 => refused("nothing moves".into()),
-        n if n > MOST => refused(format!("{n} directions in which parts slide are more than {MOST}")),
+        n if n > MAX_COORDINATES => {
+            refused(format!("{n} directions in which parts slide are more than {MAX_COORDINATES}"))
+        }
         _ => Ok(out),
     }
 }
@@ -73,7 +75,7 @@ pub(super) fn dampers(system: &System, coordinates: &[Coordinate]) -> DMatrix<f6
 }
 
 /// How far a point goes along an axis with each coordinate [1].
-pub(super) fn along(coordinates: &[Coordinate], point: &Point, axis: Vector2<f64>) -> DVector<f64> {
+pub(super) fn along(coordinates: &[Coordinate], point: &MaterialPoint, axis: Vector2<f64>) -> DVector<f64> {
     let of = |c: &Coordinate| if point.body == BodyId::Free(c.body) { c.direction.dot(&axis) } else { 0.0 };
     DVector::from_iterator(coordinates.len(), coordinates.iter().map(of))
 }

@@ -3,7 +3,7 @@
 use super::error::{SweepError, bad};
 use super::values::Values;
 use crate::netlist::Setting;
-use crate::options::{CompileOptions, MODEL, ModelOption, Range, Value};
+use crate::options::{CompileOptions, MODEL, ModelOption, OptionValue, Range};
 use std::collections::HashSet;
 
 /// What stands behind the name of a port in the name of an axis of its voltages: `heat.v`. No netlist parameter has a point in its name.
@@ -111,13 +111,13 @@ fn named(name: &str) -> Option<&'static ModelOption> {
 }
 
 /// A setting as a value of an option; one that does not fit becomes one that the option refuses.
-fn value_of(option: &ModelOption, setting: &Setting) -> Value {
+fn value_of(option: &ModelOption, setting: &Setting) -> OptionValue {
     match (option.about.range, setting) {
         (Range::Count(..), Setting::Number(x)) if x.fract() == 0.0 && (0.0..=9e15).contains(x) => {
-            Value::Count(*x as usize)
+            OptionValue::Count(*x as usize)
         }
-        (Range::Flag, Setting::Text(text)) if text == "true" || text == "false" => Value::Flag(text == "true"),
-        (_, Setting::Number(x)) => Value::Number(*x),
-        (_, Setting::Text(text)) => Value::Name(text.clone()),
+        (Range::Flag, Setting::Text(text)) if text == "true" || text == "false" => OptionValue::Flag(text == "true"),
+        (_, Setting::Number(x)) => OptionValue::Number(*x),
+        (_, Setting::Text(text)) => OptionValue::Name(text.clone()),
     }
 }

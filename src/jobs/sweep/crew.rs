@@ -4,7 +4,7 @@ use super::error::SweepError;
 use rayon::prelude::*;
 
 /// Who runs the pieces of a sweep: on which threads, and when.
-pub trait Crew: Sync {
+pub trait Executor: Sync {
     /// How many pieces it may run at once.
     fn size(&self) -> usize;
 
@@ -15,9 +15,9 @@ pub trait Crew: Sync {
 
 /// Threads of its own, all at work at once.
 #[derive(Debug)]
-pub struct Pool(rayon::ThreadPool);
+pub struct ThreadPool(rayon::ThreadPool);
 
-impl Pool {
+impl ThreadPool {
     /// So many threads; 0: one for each core.
     ///
     /// # Errors
@@ -33,7 +33,7 @@ impl Pool {
     }
 }
 
-impl Crew for Pool {
+impl Executor for ThreadPool {
     fn size(&self) -> usize {
         self.0.current_num_threads()
     }

@@ -9,12 +9,12 @@
 use super::axis::at;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::AnalysisError;
-use crate::analysis::mesh::given::{Judged, judged};
-use crate::analysis::mesh::{self, Request};
-use crate::compile::{CompileOptions, Compiled, Drawn, draw};
+use crate::analysis::mesh::given::{Assessment, assess};
+use crate::analysis::mesh::{self, MeshRequest};
+use crate::compile::{CompileOptions, CompiledModel, ParsedStructure, draw};
 use crate::discretize::DiscretizeError;
-use crate::netlist::{Setting, Source};
-use crate::refine::model_order::ModelOrder;
+use crate::netlist::{NetlistSource, Setting};
+use crate::refine::model_order::Mesh;
 use crate::structure::Beam;
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
@@ -23,30 +23,34 @@ use std::sync::{Arc, OnceLock};
 const SHARES: [f64; 3] = [0.6, 0.2, 0.06];
 
 /// See the module.
-pub(super) struct Family<'a> {
+pub(super) struct SharedMeshes<'a> {
     spec: &'a SweepSpec,
-    source: &'a Source,
+    source: &'a NetlistSource,
     options: Arc<CompileOptions>,
     /// The analysis at the middle of the grid, for which meshes are searched.
     analysis: Cow<'a, SweepAnalysis>,
-    first: OnceLock<Option<Compiled>>,
+    first: OnceLock<Option<CompiledModel>>,
     meshes: [OnceLock<Option<Vec<usize>>>; SHARES.len()],
 }
 
-impl<'a> Family<'a> {
-    pub(super) fn new(spec: &'a SweepSpec, source: &'a Source, options: Arc<CompileOptions>) -> Self {
+impl<'a> SharedMeshes<'a> {
+    pub(super) fn new(spec: &'a SweepSpec, source: &'a NetlistSource, options: Arc<CompileOptions>) -> Self {
         let analysis = spec.analysis_at(&middle(spec));
         Self { spec, source, options, analysis, first: OnceLock::new(), meshes: Default::default() }
     }
 
     /// The result of a point on the first shared mesh that holds for it; none where it needs its own.
-    pub(super) fn solve(&self, drawn: &Drawn, request: &Request<'_>) -> Result<Option<Judged>, AnalysisError> {
+    pub(super) fn solve(
+        &self,
+        drawn: &ParsedStructure,
+        request: &MeshRequest<'_>,
+    ) -> Result<Option<Assessment>, AnalysisError> {
         let Some(first) = self.like(drawn) else { return Ok(None) };
         for (mesh, share) in self.meshes.iter().zip(SHARES) {
             let Some(segments) = mesh.get_or_init(|| self.search(first, share)) else { continue };
-            let order = ModelOrder { segments: segments.clone(), estimated_error: None, modes_in_band: 0, passes: 0 };
+            let order = Mesh { segments: segments.clone(), estimated_error: None, modes_in_band: 0, passes: 0 };
             let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
-            match judged(&drawn.clone().on(order).map_err(refused)?, request) {
+            match assess(&drawn.clone().on(order).map_err(refused)?, request) {
                 Ok(judged) if judged.holds => return Ok(Some(judged)),
                 Ok(_) => {}
                 // near a fold a mesh may have no equilibrium where a finer one has: the point finds its own, or says why not
@@ -57,7 +61,7 @@ impl<'a> Family<'a> {
     }
 
     /// The variant that meshes are searched for and the first of these meshes, where they fit this one.
-    pub(super) fn first_mesh(&self, drawn: &Drawn) -> Option<(&Compiled, &Vec<usize>)> {
+    pub(super) fn first_mesh(&self, drawn: &ParsedStructure) -> Option<(&CompiledModel, &Vec<usize>)> {
         let first = self.like(drawn)?;
         let segments = self.meshes[0].get_or_init(|| self.search(first, SHARES[0])).as_ref()?;
         Some((first, segments))
@@ -70,7 +74,7 @@ impl<'a> Family<'a> {
     }
 
     /// The variant that meshes are searched for, where they fit this one.
-    fn like(&self, drawn: &Drawn) -> Option<&Compiled> {
+    fn like(&self, drawn: &ParsedStructure) -> Option<&CompiledModel> {
         if !self.shares() || drawn.structure.beams.is_empty() {
             return None;
         }
@@ -79,7 +83,7 @@ impl<'a> Family<'a> {
     }
 
     /// The mesh that holds a share of the tolerance for one variant.
-    fn search(&self, first: &Compiled, share: f64) -> Option<Vec<usize>> {
+    fn search(&self, first: &CompiledModel, share: f64) -> Option<Vec<usize>> {
         let mut sharper = first.clone();
         sharper.options.tol *= share;
         let order = mesh::order(&sharper, &self.analysis.request()?).ok()?;
@@ -87,7 +91,7 @@ impl<'a> Family<'a> {
     }
 
     /// The middle of the grid.
-    fn middle(&self) -> Option<Compiled> {
+    fn middle(&self) -> Option<CompiledModel> {
         let options = at(&self.options, &middle(self.spec));
         draw(self.source, &options).ok()?.compile().ok()
     }

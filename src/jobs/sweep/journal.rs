@@ -21,7 +21,7 @@ const SYNC: Duration = Duration::from_secs(1);
 
 /// A point that is done.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Kept {
+pub struct JournalRow {
     /// Its number in the full grid, from 0.
     pub point: usize,
     /// Name, unit and value; no value where the quantity does not exist at this point.
@@ -36,7 +36,7 @@ pub struct Kept {
 
 /// The first line.
 #[derive(Debug, Serialize, Deserialize)]
-struct Head {
+struct JournalHeader {
     bimorph: String,
     sweep: String,
 }
@@ -122,7 +122,7 @@ impl Journal {
     ///
     /// # Errors
     /// [`JournalError`]: a file is there and `resume` is not said, it is of another sweep, or the file system refuses.
-    pub fn open(path: &Path, name: &str, resume: bool) -> Result<(Self, Vec<Kept>), JournalError> {
+    pub fn open(path: &Path, name: &str, resume: bool) -> Result<(Self, Vec<JournalRow>), JournalError> {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
         let mut file = File::options().read(true).append(true).create(true).open(path).map_err(failed)?;
         match file.try_lock() {
@@ -135,7 +135,7 @@ impl Journal {
         if bytes.contains(&b'\n') && !resume {
             return Err(JournalError::Exists { path: path.to_owned() });
         }
-        let Lines { known, good, damaged } = read(path, name, &bytes)?;
+        let JournalContents { known, good, damaged } = read(path, name, &bytes)?;
         file.set_len(good as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
         let open = Open { file, good: good as u64, synced: Instant::now() };
         let journal = Self { path: path.to_owned(), file: Mutex::new(open), damaged };
@@ -149,7 +149,7 @@ impl Journal {
     ///
     /// # Errors
     /// [`JournalError`]: it is of another sweep, or the file system refuses.
-    pub fn read(path: &Path, name: &str) -> Result<Vec<Kept>, JournalError> {
+    pub fn read(path: &Path, name: &str) -> Result<Vec<JournalRow>, JournalError> {
         let bytes = std::fs::read(path).map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
         read(path, name, &bytes).map(|lines| lines.known)
     }
@@ -158,7 +158,7 @@ impl Journal {
     ///
     /// # Errors
     /// [`JournalError::Io`].
-    pub fn keep(&self, kept: &Kept) -> Result<(), JournalError> {
+    pub fn keep(&self, kept: &JournalRow) -> Result<(), JournalError> {
         let line = lines(std::slice::from_ref(kept)).map_err(|error| self.failed(error))?;
         self.write(&line, |open| open.synced.elapsed() >= SYNC)
     }
@@ -218,8 +218,8 @@ impl Journal {
 
 /// What a journal has.
 #[derive(Default)]
-struct Lines {
-    known: Vec<Kept>,
+struct JournalContents {
+    known: Vec<JournalRow>,
     /// Bytes of whole lines.
     good: usize,
     /// Lines that are whole and no points.
@@ -228,7 +228,7 @@ struct Lines {
 
 /// The first line of the journal of the sweep `name`.
 fn head(name: &str) -> io::Result<Vec<u8>> {
-    let head = Head { bimorph: env!("CARGO_PKG_VERSION").to_owned(), sweep: name.to_owned() };
+    let head = JournalHeader { bimorph: env!("CARGO_PKG_VERSION").to_owned(), sweep: name.to_owned() };
     let mut line = serde_json::to_vec(&head)?;
     line.push(b'\n');
     Ok(line)
@@ -236,10 +236,10 @@ fn head(name: &str) -> io::Result<Vec<u8>> {
 
 /// Reads a journal. A line that is cut off at its end is as if it had never been, and so is a first line that a disk made room for and did not
 /// fill before the power went. A first line of which one byte is damaged is still that of its sweep: names have 32 digits.
-fn read(path: &Path, name: &str, bytes: &[u8]) -> Result<Lines, JournalError> {
+fn read(path: &Path, name: &str, bytes: &[u8]) -> Result<JournalContents, JournalError> {
     let own = head(name).map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
     let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
-    let mut found = Lines::default();
+    let mut found = JournalContents::default();
     let named = bytes.get(..own.len()).is_some_and(|line| line.iter().zip(&own).filter(|(a, b)| a != b).count() <= 1);
     if !named {
         let unfilled =
@@ -261,7 +261,7 @@ fn read(path: &Path, name: &str, bytes: &[u8]) -> Result<Lines, JournalError> {
 ///
 /// # Errors
 /// A number that is no number, which no point has.
-pub fn lines(points: &[Kept]) -> io::Result<Vec<u8>> {
+pub fn lines(points: &[JournalRow]) -> io::Result<Vec<u8>> {
     let mut lines = Vec::new();
     for point in points {
         lines.extend(sealed(serde_json::to_vec(point)?));
@@ -274,10 +274,10 @@ mod tests {
     //! A journal gives back what was put in, however it was cut off.
     use super::*;
 
-    fn kept(point: usize) -> Kept {
+    fn kept(point: usize) -> JournalRow {
         let values =
             vec![("b.x".into(), "m".into(), Some(0.1 + 0.2 * point as f64)), ("release".into(), "V".into(), None)];
-        Kept { point, values, estimated_error: Some(1e-3 / 3.0), warning: "W040: \"off\"".into(), error: None }
+        JournalRow { point, values, estimated_error: Some(1e-3 / 3.0), warning: "W040: \"off\"".into(), error: None }
     }
 
     #[test]
@@ -287,7 +287,7 @@ mod tests {
         let (journal, known) = Journal::open(&path, "sweep", true).unwrap();
         assert!(known.is_empty());
         (0..4).for_each(|k| journal.keep(&kept(k)).unwrap());
-        journal.keep(&Kept { error: Some("no\nway".into()), values: Vec::new(), ..kept(9) }).unwrap();
+        journal.keep(&JournalRow { error: Some("no\nway".into()), values: Vec::new(), ..kept(9) }).unwrap();
         drop(journal);
         let whole = std::fs::read(&path).unwrap();
         let ends: Vec<usize> = (0..whole.len()).filter(|&k| whole[k] == b'\n').map(|k| k + 1).collect();

@@ -7,13 +7,13 @@ use std::sync::{PoisonError, RwLock};
 
 /// What each point may use: all that its sweep may, as long as there is something left of what its owner may.
 #[derive(Debug, Default)]
-pub(super) struct Means {
+pub(super) struct PointBudget {
     budget: Option<Budget>,
     /// Held by all that is computed; by one alone where there was no room for it beside others of this sweep.
     room: RwLock<()>,
 }
 
-impl Means {
+impl PointBudget {
     /// Those of the thread at hand.
     pub(super) fn here() -> Self {
         Self { budget: budget::current(), room: RwLock::default() }
@@ -32,7 +32,7 @@ impl Means {
     pub(super) fn guarded<T>(&self, job: impl Fn() -> Result<T, String>) -> Result<T, Failed> {
         let Some(budget) = &self.budget else { return caught(|| Ok(job()?)) };
         let attempt = || {
-            let part = budget.part();
+            let part = budget.child();
             let outcome = caught(|| Ok(budget::within(&part, &job)??));
             outcome.map_err(|why| of_itself(why, part.used()))
         };
@@ -66,13 +66,13 @@ fn caught<T>(job: impl FnOnce() -> Result<T, Failed>) -> Result<T, Failed> {
 mod tests {
     //! Who needs more than there is in all is an error of its own; who needs more than is left beside others has it alone.
     use super::*;
-    use crate::budget::{Allowance, Purse};
+    use crate::budget::{Allowance, OwnerQuota};
     use std::sync::{Arc, Barrier};
 
-    fn means(most: usize) -> (Means, Arc<Purse>) {
-        let purse = Arc::new(Purse::new(Some(most), None));
+    fn means(most: usize) -> (PointBudget, Arc<OwnerQuota>) {
+        let purse = Arc::new(OwnerQuota::new(Some(most), None));
         let allowance = Allowance { purse: Some(Arc::clone(&purse)), ..Allowance::default() };
-        (Means { budget: Some(Budget::new(allowance)), room: RwLock::default() }, purse)
+        (PointBudget { budget: Some(Budget::new(allowance)), room: RwLock::default() }, purse)
     }
 
     #[test]

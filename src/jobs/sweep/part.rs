@@ -13,7 +13,7 @@ pub const COLUMN: &str = "part";
 
 /// A part of a sweep: `1/3 of 201 points of 0123456789abcdef0123456789abcdef`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Part {
+pub struct SweepPart {
     shard: String,
     /// Points of the whole.
     pub points: usize,
@@ -21,7 +21,7 @@ pub struct Part {
     sweep: String,
 }
 
-impl Part {
+impl SweepPart {
     /// The part of a sweep that a specification asks for.
     ///
     /// # Errors
@@ -38,7 +38,7 @@ impl Part {
     }
 }
 
-impl fmt::Display for Part {
+impl fmt::Display for SweepPart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} of {} points of {}", self.shard, self.points, self.sweep)
     }
@@ -46,19 +46,19 @@ impl fmt::Display for Part {
 
 /// It is not written as a part is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NoPart;
+pub struct SweepPartError;
 
-impl FromStr for Part {
-    type Err = NoPart;
+impl FromStr for SweepPart {
+    type Err = SweepPartError;
 
-    fn from_str(text: &str) -> Result<Self, NoPart> {
+    fn from_str(text: &str) -> Result<Self, SweepPartError> {
         let mut words = text.split(' ');
-        let mut word = || words.next().ok_or(NoPart);
+        let mut word = || words.next().ok_or(SweepPartError);
         let (shard, of, points, name, of_sweep, sweep) = (word()?, word()?, word()?, word()?, word()?, word()?);
         if (of, name, of_sweep, words.next()) != ("of", "points", "of", None) {
-            return Err(NoPart);
+            return Err(SweepPartError);
         }
-        let points = points.parse().map_err(|_| NoPart)?;
+        let points = points.parse().map_err(|_| SweepPartError)?;
         Ok(Self { shard: shard.to_owned(), points, sweep: sweep.to_owned() })
     }
 }

@@ -1,18 +1,18 @@
 //! The points of a sweep in pieces: as many at once as are laid out side by side.
 
 use super::axis;
-use super::crew::Crew;
+use super::crew::Executor;
 use super::error::SweepError;
 use super::failed::Failed;
-use super::family::Family;
-use super::means::Means;
-use super::point::{self, Outcome};
+use super::family::SharedMeshes;
+use super::means::PointBudget;
+use super::point::{self, PointOutcome};
 use super::spec::{SweepAnalysis, SweepSpec};
-use super::together::{self, Together};
-use super::transient::{self, Transients};
+use super::together::{self, BatchedSweep};
+use super::transient::{self, TransientSweep};
 use crate::budget::Stopped;
 use crate::compile::CompileOptions;
-use crate::netlist::{Bundle, Source};
+use crate::netlist::{Bundle, NetlistSource};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
@@ -25,19 +25,19 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 pub(super) fn run(
     (spec, bundle, options): (&SweepSpec, &Bundle, &CompileOptions),
     numbers: &[usize],
-    crew: &dyn Crew,
-    each: &(dyn Fn(&Outcome) -> bool + Sync),
-    take: &(dyn Fn(Vec<Outcome>) + Sync),
+    crew: &dyn Executor,
+    each: &(dyn Fn(&PointOutcome) -> bool + Sync),
+    take: &(dyn Fn(Vec<PointOutcome>) + Sync),
 ) -> Result<bool, SweepError> {
     let stop = AtomicBool::new(false);
-    let (means, full) = (Means::here(), OnceLock::new());
+    let (means, full) = (PointBudget::here(), OnceLock::new());
     let end = |why: SweepError| {
         let _ = full.set(why);
         stop.store(true, Ordering::Relaxed);
     };
-    let source = Source::new(bundle);
+    let source = NetlistSource::new(bundle);
     let go_on = || !stop.load(Ordering::Relaxed);
-    let counted = |outcome: &Outcome| {
+    let counted = |outcome: &PointOutcome| {
         // it may have a result another time: it is no row
         if let Err(Failed::Owner(why)) = outcome.values {
             end(SweepError::Owner(why));
@@ -54,9 +54,9 @@ pub(super) fn run(
         go_on()
     };
     let at_once = at_once(spec, numbers.len(), crew.size());
-    let groups: Vec<Group<'_>> =
-        spec.by_options(numbers).into_iter().map(|numbers| Group::new(numbers, at_once)).collect();
-    let pieces: Vec<(&Group<'_>, &[usize])> =
+    let groups: Vec<PointGroup<'_>> =
+        spec.by_options(numbers).into_iter().map(|numbers| PointGroup::new(numbers, at_once)).collect();
+    let pieces: Vec<(&PointGroup<'_>, &[usize])> =
         groups.iter().flat_map(|group| group.numbers.chunks(at_once).map(move |piece| (group, piece))).collect();
     crew.run(pieces.len(), &|number| {
         let (group, piece) = pieces[number];
@@ -83,14 +83,14 @@ fn at_once(spec: &SweepSpec, points: usize, threads: usize) -> usize {
 }
 
 /// Points with the same options; what they share is there from their first piece to their last.
-struct Group<'a> {
+struct PointGroup<'a> {
     numbers: Vec<usize>,
     variants: Mutex<Option<Arc<Variants<'a>>>>,
     /// Pieces that are not over.
     left: AtomicUsize,
 }
 
-impl<'a> Group<'a> {
+impl<'a> PointGroup<'a> {
     fn new(numbers: Vec<usize>, at_once: usize) -> Self {
         let left = AtomicUsize::new(numbers.len().div_ceil(at_once));
         Self { numbers, variants: Mutex::default(), left }
@@ -100,7 +100,7 @@ impl<'a> Group<'a> {
         self.variants.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn variants(&self, spec: &'a SweepSpec, source: &'a Source, options: &CompileOptions) -> Arc<Variants<'a>> {
+    fn variants(&self, spec: &'a SweepSpec, source: &'a NetlistSource, options: &CompileOptions) -> Arc<Variants<'a>> {
         let new = || Arc::new(Variants::new(spec, source, axis::chosen(options, &spec.settings(self.numbers[0]))));
         Arc::clone(self.held().get_or_insert_with(new))
     }
@@ -116,19 +116,19 @@ impl<'a> Group<'a> {
 /// What points with the same options have in common.
 struct Variants<'a> {
     spec: &'a SweepSpec,
-    source: &'a Source,
+    source: &'a NetlistSource,
     options: Arc<CompileOptions>,
-    family: Arc<Family<'a>>,
-    together: Together<'a>,
-    transients: Transients<'a>,
+    family: Arc<SharedMeshes<'a>>,
+    together: BatchedSweep<'a>,
+    transients: TransientSweep<'a>,
 }
 
 impl<'a> Variants<'a> {
-    fn new(spec: &'a SweepSpec, source: &'a Source, options: CompileOptions) -> Self {
+    fn new(spec: &'a SweepSpec, source: &'a NetlistSource, options: CompileOptions) -> Self {
         let options = Arc::new(options);
-        let family = Arc::new(Family::new(spec, source, Arc::clone(&options)));
-        let together = Together::new(spec, source, Arc::clone(&options), Arc::clone(&family));
-        let transients = Transients::new(spec, source, Arc::clone(&options));
+        let family = Arc::new(SharedMeshes::new(spec, source, Arc::clone(&options)));
+        let together = BatchedSweep::new(spec, source, Arc::clone(&options), Arc::clone(&family));
+        let transients = TransientSweep::new(spec, source, Arc::clone(&options));
         Self { spec, source, options, family, together, transients }
     }
 
@@ -136,10 +136,10 @@ impl<'a> Variants<'a> {
     fn run(
         &self,
         numbers: &[usize],
-        means: &Means,
-        counted: &(dyn Fn(&Outcome) -> bool + Sync),
+        means: &PointBudget,
+        counted: &(dyn Fn(&PointOutcome) -> bool + Sync),
         go_on: &(dyn Fn() -> bool + Sync),
-    ) -> Option<Vec<Outcome>> {
+    ) -> Option<Vec<PointOutcome>> {
         match self.spec.analysis {
             SweepAnalysis::Transient { .. } => {
                 self.transients.run(numbers, means, &|outcome| outcome.is_none_or(counted) && go_on())

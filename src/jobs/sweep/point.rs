@@ -3,16 +3,16 @@
 use super::axis::{VOLTS, at, chosen};
 use super::error::SweepError;
 use super::failed::Failed;
-use super::family::Family;
-use super::journal::Kept;
-use super::means::Means;
+use super::family::SharedMeshes;
+use super::journal::JournalRow;
+use super::means::PointBudget;
 use super::spec::{SweepAnalysis, SweepSpec};
-use crate::analysis::mesh::given::{Answer, Judged, judged, searched};
-use crate::analysis::mesh::{self, Request};
+use crate::analysis::mesh::given::{AnalysisResult, Assessment, assess, refine_and_assess};
+use crate::analysis::mesh::{self, MeshRequest};
 use crate::analysis::{AnalysisError, statics};
 use crate::budget;
 use crate::compile::{CompileError, CompileOptions, draw};
-use crate::netlist::{Setting, Severity, Source};
+use crate::netlist::{NetlistSource, Setting, Severity};
 use crate::readout::signal::Signal;
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -20,41 +20,41 @@ use std::collections::HashSet;
 /// What columns of a static sweep are called.
 const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q";
 /// Ports that a refusal names.
-const MOST_TOLD: usize = 20;
+const MAX_TOLD: usize = 20;
 /// The code of the diagnostic for a setting that names no parameter.
 const NO_PARAMETER: &str = "E048";
 
 /// A result: its column, its unit, and its value; none: the quantity does not exist at this point.
-pub(super) struct Value {
+pub(super) struct PointValue {
     pub(super) name: String,
     pub(super) unit: Cow<'static, str>,
     pub(super) value: Option<f64>,
 }
 
 /// What came of one point.
-pub(super) struct Outcome {
+pub(super) struct PointOutcome {
     pub(super) number: usize,
     pub(super) parameters: Vec<Setting>,
-    pub(super) values: Result<Found, Failed>,
+    pub(super) values: Result<PointResults, Failed>,
 }
 
 /// The results of a point.
-pub(super) struct Found {
-    pub(super) values: Vec<Value>,
+pub(super) struct PointResults {
+    pub(super) values: Vec<PointValue>,
     /// Largest estimated relative error by the mesh [1].
     pub(super) estimated_error: Option<f64>,
     /// Code and message; empty without one.
     pub(super) warning: String,
 }
 
-impl Outcome {
+impl PointOutcome {
     /// Bytes that it takes until the table is made, about.
     pub(super) fn bytes(&self) -> usize {
         let parameter = |value: &Setting| if let Setting::Text(text) = value { text.len() } else { 0 };
         let parameters: usize = self.parameters.iter().map(|value| size_of::<Setting>() + parameter(value)).sum();
         let values = match &self.values {
             Ok(found) => {
-                let values = found.values.iter().map(|value| size_of::<Value>() + value.name.len());
+                let values = found.values.iter().map(|value| size_of::<PointValue>() + value.name.len());
                 values.sum::<usize>() + found.warning.len()
             }
             Err(error) => error.to_string().len(),
@@ -64,9 +64,9 @@ impl Outcome {
     }
 }
 
-impl Outcome {
+impl PointOutcome {
     /// What a journal keeps of it.
-    pub(super) fn kept(&self) -> Kept {
+    pub(super) fn kept(&self) -> JournalRow {
         let (values, estimated_error, warning, error) = match &self.values {
             Ok(found) => {
                 let each = found.values.iter().map(|v| (v.name.clone(), v.unit.clone().into_owned(), v.value));
@@ -74,26 +74,26 @@ impl Outcome {
             }
             Err(error) => (Vec::new(), None, String::new(), Some(error.to_string())),
         };
-        Kept { point: self.number, values, estimated_error, warning, error }
+        JournalRow { point: self.number, values, estimated_error, warning, error }
     }
 }
 
-impl Kept {
+impl JournalRow {
     /// The point as it was.
-    pub(super) fn outcome(self, spec: &SweepSpec) -> Outcome {
+    pub(super) fn outcome(self, spec: &SweepSpec) -> PointOutcome {
         let parameters = spec.settings(self.point).into_iter().map(|(_, value)| value).collect();
         self.with(parameters)
     }
 
     /// The same with the values of its parameters.
-    pub(super) fn with(self, parameters: Vec<Setting>) -> Outcome {
+    pub(super) fn with(self, parameters: Vec<Setting>) -> PointOutcome {
         let Self { point: number, values, estimated_error, warning, error } = self;
-        let value = |(name, unit, value): (String, String, _)| Value { name, unit: unit.into(), value };
+        let value = |(name, unit, value): (String, String, _)| PointValue { name, unit: unit.into(), value };
         let values = match error {
             Some(error) => Err(error.into()),
-            None => Ok(Found { values: values.into_iter().map(value).collect(), estimated_error, warning }),
+            None => Ok(PointResults { values: values.into_iter().map(value).collect(), estimated_error, warning }),
         };
-        Outcome { number, parameters, values }
+        PointOutcome { number, parameters, values }
     }
 }
 
@@ -101,18 +101,22 @@ impl Kept {
 pub(super) fn run(
     spec: &SweepSpec,
     number: usize,
-    source: &Source,
+    source: &NetlistSource,
     options: &CompileOptions,
-    family: &Family<'_>,
-    means: &Means,
-) -> Outcome {
+    family: &SharedMeshes<'_>,
+    means: &PointBudget,
+) -> PointOutcome {
     let settings = spec.settings(number);
     let values = means.guarded(|| solve(spec, &settings, source, options, family));
-    Outcome { number, parameters: settings.into_iter().map(|(_, value)| value).collect(), values }
+    PointOutcome { number, parameters: settings.into_iter().map(|(_, value)| value).collect(), values }
 }
 
 /// Refuses parameters and outputs that the netlist does not have: at every point they would be an error.
-pub(super) fn check_names(spec: &SweepSpec, source: &Source, options: &CompileOptions) -> Result<(), SweepError> {
+pub(super) fn check_names(
+    spec: &SweepSpec,
+    source: &NetlistSource,
+    options: &CompileOptions,
+) -> Result<(), SweepError> {
     let refused =
         |what: &str, expected: String, got: String| Err(SweepError::BadSpec { what: what.into(), expected, got });
     let settings = spec.settings(0);
@@ -129,7 +133,7 @@ pub(super) fn check_names(spec: &SweepSpec, source: &Source, options: &CompileOp
     let ports = || drawn.structure.ports.iter().map(|port| port.name.as_str());
     let names: HashSet<&str> = ports().collect();
     if let Some(none) = spec.ports().find(|name| !names.contains(name)) {
-        let known = ports().take(MOST_TOLD).map(|port| format!("{port}{VOLTS}")).collect::<Vec<_>>().join(", ");
+        let known = ports().take(MAX_TOLD).map(|port| format!("{port}{VOLTS}")).collect::<Vec<_>>().join(", ");
         return refused("parameters", format!("voltages of ports ({known})"), format!("\"{none}{VOLTS}\""));
     }
     let outputs = match &spec.analysis {
@@ -168,15 +172,15 @@ pub(super) fn check_names(spec: &SweepSpec, source: &Source, options: &CompileOp
 fn solve(
     spec: &SweepSpec,
     settings: &[(String, Setting)],
-    source: &Source,
+    source: &NetlistSource,
     options: &CompileOptions,
-    family: &Family<'_>,
-) -> Result<Found, String> {
+    family: &SharedMeshes<'_>,
+) -> Result<PointResults, String> {
     let drawn = draw(source, &at(options, settings)).map_err(|error| brief(&error))?;
     let said = |error: AnalysisError| error.to_string();
     let analysis = spec.analysis_at(settings);
     let request = analysis.request().ok_or("a transient is no request for a mesh")?;
-    if let Request::Modes { count, .. } = request {
+    if let MeshRequest::Modes { count, .. } = request {
         // where it does not compile the point says so below
         budget::modes(count, || drawn.clone().compile().map_or(0, |compiled| compiled.unknowns()));
     }
@@ -185,7 +189,7 @@ fn solve(
         Some(judged) => judged,
         None => {
             let compiled = drawn.compile().map_err(|error| brief(&error))?;
-            let judge = if options.segments.is_some() { judged } else { searched };
+            let judge = if options.segments.is_some() { assess } else { refine_and_assess };
             judge(&compiled, &request).map_err(said)?
         }
     };
@@ -193,14 +197,14 @@ fn solve(
 }
 
 /// What is kept of a result.
-pub(super) fn found(judged: Judged, spec: &SweepSpec, options: &CompileOptions) -> Result<Found, String> {
+pub(super) fn found(judged: Assessment, spec: &SweepSpec, options: &CompileOptions) -> Result<PointResults, String> {
     let estimated_error = judged.estimated_error;
     let beyond = mesh::beyond(options.tol, estimated_error).map(|message| format!("{}: {message}", mesh::WARNING));
     let warnings: Vec<String> = beyond.into_iter().chain(judged.warnings).collect();
     let values = values(&judged.answer, &spec.analysis)?;
     // what is told of it stands in the warning; files of JSON have no infinity
     let estimated_error = estimated_error.filter(|error| error.is_finite());
-    Ok(Found { values, estimated_error, warning: warnings.join("; ") })
+    Ok(PointResults { values, estimated_error, warning: warnings.join("; ") })
 }
 
 /// A table has one line for an error: of a netlist's, the first with its place.
@@ -215,24 +219,24 @@ pub(super) fn brief(error: &CompileError) -> String {
     format!("{}:{}:{}: {} {}{more}", first.file, first.line, first.column, first.code, first.message)
 }
 
-fn values(answer: &Answer, analysis: &SweepAnalysis) -> Result<Vec<Value>, String> {
+fn values(answer: &AnalysisResult, analysis: &SweepAnalysis) -> Result<Vec<PointValue>, String> {
     match answer {
-        Answer::Static(result) => {
+        AnalysisResult::Static(result) => {
             let SweepAnalysis::Static { outputs, .. } = analysis else { return Ok(Vec::new()) };
             static_values(result, outputs)
         }
-        Answer::Modes(result) => {
+        AnalysisResult::Modes(result) => {
             let named = |(i, f): (usize, &f64)| value(format!("f{}", i + 1), "Hz", Some(*f));
             finite(result.frequencies_hz.iter().enumerate().map(named).collect())
         }
-        Answer::PullIn(result) => finite(vec![
+        AnalysisResult::PullIn(result) => finite(vec![
             value("pull_in".into(), "V", Some(result.pull_in_v)),
             value("release".into(), "V", result.release_v),
         ]),
     }
 }
 
-fn static_values(result: &statics::StaticResult, outputs: &[String]) -> Result<Vec<Value>, String> {
+fn static_values(result: &statics::StaticResult, outputs: &[String]) -> Result<Vec<PointValue>, String> {
     if outputs.is_empty() {
         let mut all = Vec::with_capacity(3 * result.nodes.len());
         for (node, motion) in &result.nodes {
@@ -263,12 +267,12 @@ fn static_values(result: &statics::StaticResult, outputs: &[String]) -> Result<V
     finite(outputs.iter().map(pick).collect::<Result<_, _>>()?)
 }
 
-fn value(name: String, unit: &'static str, value: Option<f64>) -> Value {
-    Value { name, unit: unit.into(), value }
+fn value(name: String, unit: &'static str, value: Option<f64>) -> PointValue {
+    PointValue { name, unit: unit.into(), value }
 }
 
 /// A table holds numbers or a reason; an infinity or a NaN is neither.
-fn finite(values: Vec<Value>) -> Result<Vec<Value>, String> {
+fn finite(values: Vec<PointValue>) -> Result<Vec<PointValue>, String> {
     match values.iter().find(|v| v.value.is_some_and(|x| !x.is_finite())) {
         Some(v) => Err(format!("{} is not finite", v.name)),
         None => Ok(values),

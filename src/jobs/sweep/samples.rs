@@ -10,7 +10,7 @@ use std::collections::HashSet;
 /// Parameters whose correlations are asked for.
 const CORRELATED_MOST: usize = 200;
 
-/// What to draw. [`Samples::new`] checks it.
+/// What to draw. [`SampleGenerator::new`] checks it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sampling {
     /// Parameters that vary.
@@ -27,7 +27,7 @@ pub struct Sampling {
 
 /// Samples that can be drawn.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Samples {
+pub struct SampleGenerator {
     /// What was asked for.
     pub asked: Sampling,
     cube: Cube,
@@ -35,7 +35,7 @@ pub struct Samples {
     factor: Option<DMatrix<f64>>,
 }
 
-impl Samples {
+impl SampleGenerator {
     /// # Errors
     /// [`SweepError::BadSpec`] for distributions, counts and correlations that mean nothing.
     pub fn new(asked: Sampling) -> Result<Self, SweepError> {
@@ -121,7 +121,7 @@ mod tests {
                 design,
                 correlations: vec![("w".into(), "E".into(), -0.7)],
             };
-            let samples = Samples::new(asked).unwrap();
+            let samples = SampleGenerator::new(asked).unwrap();
             let column = |c: usize| -> Vec<f64> {
                 let number =
                     |(_, value): &(String, Setting)| if let Setting::Number(x) = value { *x } else { f64::NAN };
@@ -149,7 +149,7 @@ mod tests {
             .to_vec();
         let with = |pairs: &[(&str, &str, f64)]| {
             let correlations = pairs.iter().map(|(a, b, rho)| ((*a).to_owned(), (*b).to_owned(), *rho)).collect();
-            Samples::new(Sampling { vary: vary.clone(), count: 2, correlations, ..Sampling::default() })
+            SampleGenerator::new(Sampling { vary: vary.clone(), count: 2, correlations, ..Sampling::default() })
         };
         assert!(with(&[("a", "b", 0.5)]).is_ok());
         for pairs in [

@@ -2,14 +2,14 @@
 
 use super::axis::{SweepParameter, VOLTS, Varied, varied};
 use super::error::{SweepError, bad};
-use super::samples::Samples;
-use crate::analysis::mesh::Request;
+use super::samples::SampleGenerator;
+use crate::analysis::mesh::MeshRequest;
 use crate::netlist::Setting;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashSet};
 
 /// Points of a shard, at most: their numbers are laid out.
-const MOST_POINTS: usize = 100_000_000;
+const MAX_POINTS: usize = 100_000_000;
 
 /// What to sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +17,7 @@ pub struct SweepSpec {
     /// The full grid of these is run; the last one varies fastest. Empty: one point, as the netlist stands.
     pub parameters: Vec<SweepParameter>,
     /// Samples that are drawn at every point of the grid, and vary faster than it.
-    pub samples: Option<Samples>,
+    pub samples: Option<SampleGenerator>,
     /// What to compute at each point.
     pub analysis: SweepAnalysis,
     /// Which part of the grid to run.
@@ -83,11 +83,11 @@ impl SweepAnalysis {
     }
 
     /// What it asks of a mesh; none for a transient.
-    pub(super) fn request(&self) -> Option<Request<'_>> {
+    pub(super) fn request(&self) -> Option<MeshRequest<'_>> {
         match self {
-            Self::Static { voltages, .. } => Some(Request::Static { voltages }),
-            Self::Modes { count, voltages } => Some(Request::Modes { count: *count, voltages }),
-            Self::PullIn { port, max } => Some(Request::PullIn { port: port.as_deref(), max: *max }),
+            Self::Static { voltages, .. } => Some(MeshRequest::Static { voltages }),
+            Self::Modes { count, voltages } => Some(MeshRequest::Modes { count: *count, voltages }),
+            Self::PullIn { port, max } => Some(MeshRequest::PullIn { port: port.as_deref(), max: *max }),
             Self::Transient { .. } => None,
         }
     }
@@ -188,8 +188,8 @@ impl SweepSpec {
         }
         let points = self.grid_points()?;
         let own = points.saturating_sub(index).div_ceil(count);
-        if own > MOST_POINTS {
-            let text = format!("at most {MOST_POINTS} points at once; give each of several machines a --shard of them");
+        if own > MAX_POINTS {
+            let text = format!("at most {MAX_POINTS} points at once; give each of several machines a --shard of them");
             return Err(bad("parameters".into(), &text, &format!("{own}")));
         }
         self.parameters.iter().try_for_each(SweepParameter::check)?;

@@ -32,7 +32,7 @@ pub enum Relation {
 
 /// What a result, or a parameter, must keep to: `yoke.y>-1.1u`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Limit {
+pub struct YieldLimit {
     /// Name of the column.
     pub name: String,
     /// How its values and the limit compare.
@@ -41,7 +41,7 @@ pub struct Limit {
     pub value: f64,
 }
 
-impl FromStr for Limit {
+impl FromStr for YieldLimit {
     type Err = SweepError;
 
     fn from_str(text: &str) -> Result<Self, SweepError> {
@@ -65,7 +65,7 @@ impl FromStr for Limit {
     }
 }
 
-impl fmt::Display for Limit {
+impl fmt::Display for YieldLimit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let relation = match self.relation {
             Relation::Below => "<",
@@ -77,7 +77,7 @@ impl fmt::Display for Limit {
     }
 }
 
-impl Limit {
+impl YieldLimit {
     fn holds(&self, value: f64) -> bool {
         match self.relation {
             Relation::Below => value < self.value,
@@ -140,7 +140,7 @@ pub struct SweepStatistics {
     /// One for each result.
     pub columns: Vec<ColumnStatistics>,
     /// Points that keep to each limit.
-    pub limits: Vec<(Limit, Fraction)>,
+    pub limits: Vec<(YieldLimit, Fraction)>,
     /// Points that keep to all of them: the yield.
     pub passed: Fraction,
 }
@@ -150,7 +150,7 @@ impl SweepStatistics {
     ///
     /// # Errors
     /// [`SweepError`] for a limit on what is no column.
-    pub fn of(table: &SweepTable, limits: &[Limit]) -> Result<Self, SweepError> {
+    pub fn of(table: &SweepTable, limits: &[YieldLimit]) -> Result<Self, SweepError> {
         let columns = (0..table.results.len()).map(|k| column(table, k)).collect();
         let points = table.rows.len();
         let mut passes = vec![true; points];
@@ -293,16 +293,16 @@ mod tests {
     #[test]
     fn yields() {
         let values: Vec<Option<f64>> = (1..=10).map(|k| (k != 9).then_some(f64::from(k))).collect();
-        let limits: Vec<Limit> = ["f1>=1", "f1 < 10"].iter().map(|text| text.parse().expect("a limit")).collect();
+        let limits: Vec<YieldLimit> = ["f1>=1", "f1 < 10"].iter().map(|text| text.parse().expect("a limit")).collect();
         let found = SweepStatistics::of(&table(&values), &limits).expect("statistics");
         assert_eq!(found.limits.iter().map(|(_, fraction)| fraction.passed).collect::<Vec<_>>(), [9, 8]);
         assert_eq!(found.passed, Fraction { passed: 8, points: 10 });
         let [low, high] = found.passed.interval();
         assert!((low - 0.490_162_5).abs() < 1e-7 && (high - 0.943_317_8).abs() < 1e-7, "{low} {high}");
-        let limit: Limit = "yoke.y>-1.1u".parse().expect("a limit");
+        let limit: YieldLimit = "yoke.y>-1.1u".parse().expect("a limit");
         assert_eq!((limit.name.as_str(), limit.relation, limit.value), ("yoke.y", Relation::Above, -1.1e-6));
         for wrong in ["f1", ">3", "f1>", "f1=3", "f1>x", "f1>nan"] {
-            assert!(wrong.parse::<Limit>().is_err(), "{wrong}");
+            assert!(wrong.parse::<YieldLimit>().is_err(), "{wrong}");
         }
         let error = SweepStatistics::of(&table(&values), &["f2>0".parse().expect("a limit")]).expect_err("no column");
         assert!(error.to_string().contains("one of k, f1"), "{error}");

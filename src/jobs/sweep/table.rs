@@ -1,6 +1,6 @@
 //! The rows of a sweep, and the same as CSV.
 
-use super::point::Outcome;
+use super::point::PointOutcome;
 use crate::netlist::Setting;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -34,7 +34,7 @@ pub struct SweepRow {
 }
 
 /// Puts the points into one table. A netlist whose nodes depend on a parameter has more columns than any one point.
-pub(super) fn assemble(parameters: Vec<String>, outcomes: Vec<Outcome>) -> SweepTable {
+pub(super) fn assemble(parameters: Vec<String>, outcomes: Vec<PointOutcome>) -> SweepTable {
     let mut table = SweepTable { parameters, ..SweepTable::default() };
     let mut columns = BTreeMap::new();
     for value in outcomes.iter().filter_map(|outcome| outcome.values.as_ref().ok()).flat_map(|found| &found.values) {
@@ -57,7 +57,7 @@ pub(super) fn assemble(parameters: Vec<String>, outcomes: Vec<Outcome>) -> Sweep
             }
             Err(error) => (Err(error.to_string()), None, String::new()),
         };
-        let Outcome { number: point, parameters, .. } = outcome;
+        let PointOutcome { number: point, parameters, .. } = outcome;
         table.rows.push(SweepRow { point, parameters, values, estimated_error, warning });
     }
     table

@@ -10,19 +10,19 @@
 use super::axis::{SweepParameter, at};
 use super::failed::Failed;
 use super::family::{alike, middle};
-use super::means::Means;
-use super::point::{Found, Outcome, Value, brief};
-use super::samples::Samples;
+use super::means::PointBudget;
+use super::point::{PointOutcome, PointResults, PointValue, brief};
+use super::samples::SampleGenerator;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::AnalysisError;
 use crate::analysis::mesh;
 use crate::analysis::side_by_side::{self, RunEnd};
 use crate::analysis::step_error;
 use crate::analysis::transient::{TransientOptions, transient};
-use crate::compile::{CompileOptions, Compiled, draw};
-use crate::netlist::{Setting, Source};
+use crate::compile::{CompileOptions, CompiledModel, draw};
+use crate::netlist::{NetlistSource, Setting};
 use crate::readout::signal::Signal;
-use crate::refine::model_order::ModelOrder;
+use crate::refine::model_order::Mesh;
 use crate::structure::Beam;
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
@@ -30,7 +30,7 @@ use std::sync::{Arc, OnceLock};
 /// Points that are laid out at once.
 pub(super) const CHUNK: usize = 64;
 /// Corners that are all looked at; where there are more, the ends of each axis with the others in the middle.
-const MOST_CORNERS: usize = 8;
+const MAX_CORNERS: usize = 8;
 
 /// Where steps are judged that all points share.
 const IN_THE_MIDDLE: &str = "in the middle of the grid";
@@ -38,9 +38,9 @@ const IN_THE_MIDDLE: &str = "in the middle of the grid";
 const JUDGED: usize = 201;
 
 /// The mesh of a sweep.
-struct Shared {
+struct SweepMesh {
     beams: Vec<Beam>,
-    order: ModelOrder,
+    order: Mesh,
     /// The steps in the middle of the grid.
     steps: Steps,
 }
@@ -57,23 +57,23 @@ struct Steps {
 }
 
 /// A point on its mesh.
-struct Prepared {
-    compiled: Compiled,
+struct MeshedPoint {
+    compiled: CompiledModel,
     steps: Steps,
     /// What its run leaves out.
     told: Vec<String>,
 }
 
 /// What all points have in common.
-pub(super) struct Transients<'a> {
+pub(super) struct TransientSweep<'a> {
     spec: &'a SweepSpec,
-    source: &'a Source,
+    source: &'a NetlistSource,
     options: Arc<CompileOptions>,
-    mesh: OnceLock<Option<Shared>>,
+    mesh: OnceLock<Option<SweepMesh>>,
 }
 
-impl<'a> Transients<'a> {
-    pub(super) fn new(spec: &'a SweepSpec, source: &'a Source, options: Arc<CompileOptions>) -> Self {
+impl<'a> TransientSweep<'a> {
+    pub(super) fn new(spec: &'a SweepSpec, source: &'a NetlistSource, options: Arc<CompileOptions>) -> Self {
         Self { spec, source, options, mesh: OnceLock::new() }
     }
 
@@ -81,19 +81,19 @@ impl<'a> Transients<'a> {
     pub(super) fn run(
         &self,
         numbers: &[usize],
-        means: &Means,
-        finished: &(dyn Fn(Option<&Outcome>) -> bool + Sync),
-    ) -> Option<Vec<Outcome>> {
+        means: &PointBudget,
+        finished: &(dyn Fn(Option<&PointOutcome>) -> bool + Sync),
+    ) -> Option<Vec<PointOutcome>> {
         let go_on = || finished(None);
         let prepare = |&number: &usize| means.guarded(|| self.prepare(&self.spec.settings(number), &go_on));
-        let prepared: Vec<Result<Prepared, Failed>> = numbers.iter().map(prepare).collect();
+        let prepared: Vec<Result<MeshedPoint, Failed>> = numbers.iter().map(prepare).collect();
         // lanes have one tolerance for all
         let tol = prepared.iter().flatten().next().map_or(self.options.tol, |point| point.steps.tol);
-        let like = |p: &'_ Result<Prepared, Failed>| p.as_ref().is_ok_and(|point| point.steps.tol == tol);
-        let variants: Vec<(usize, &Compiled)> = (prepared.iter().enumerate().filter(|(_, p)| like(p)))
+        let like = |p: &'_ Result<MeshedPoint, Failed>| p.as_ref().is_ok_and(|point| point.steps.tol == tol);
+        let variants: Vec<(usize, &CompiledModel)> = (prepared.iter().enumerate().filter(|(_, p)| like(p)))
             .filter_map(|(k, p)| Some((k, &p.as_ref().ok()?.compiled)))
             .collect();
-        let compiled: Vec<&Compiled> = variants.iter().map(|(_, compiled)| *compiled).collect();
+        let compiled: Vec<&CompiledModel> = variants.iter().map(|(_, compiled)| *compiled).collect();
         // lanes have one voltage for all
         let same = self.spec.ports().next().is_none();
         let side_by_side = same.then(|| {
@@ -118,7 +118,7 @@ impl<'a> Transients<'a> {
                 (Ok(point), None) => means.guarded(|| self.found(point, &options, alone(point, &options)?)),
             };
             let parameters = settings.into_iter().map(|(_, value)| value).collect();
-            let outcome = Outcome { number, parameters, values };
+            let outcome = PointOutcome { number, parameters, values };
             if !finished(Some(&outcome)) {
                 return None;
             }
@@ -143,7 +143,7 @@ impl<'a> Transients<'a> {
     }
 
     /// A point on its mesh.
-    fn prepare(&self, settings: &[(String, Setting)], go_on: &dyn Fn() -> bool) -> Result<Prepared, String> {
+    fn prepare(&self, settings: &[(String, Setting)], go_on: &dyn Fn() -> bool) -> Result<MeshedPoint, String> {
         let drawn = draw(self.source, &at(&self.options, settings)).map_err(|error| brief(&error))?;
         let options = self.transient(settings);
         let shared =
@@ -163,8 +163,8 @@ impl<'a> Transients<'a> {
     }
 
     /// The mesh that is fine enough at every probe.
-    fn search(&self, go_on: &dyn Fn() -> bool) -> Option<Shared> {
-        let mut shared: Option<Shared> = None;
+    fn search(&self, go_on: &dyn Fn() -> bool) -> Option<SweepMesh> {
+        let mut shared: Option<SweepMesh> = None;
         for settings in probes(self.spec) {
             let drawn = draw(self.source, &at(&self.options, &settings));
             let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
@@ -172,7 +172,7 @@ impl<'a> Transients<'a> {
             match &mut shared {
                 None => {
                     let steps = Steps { tol: self.options.tol, error: None, place: IN_THE_MIDDLE };
-                    shared = Some(Shared { beams: compiled.structure.beams.clone(), order, steps });
+                    shared = Some(SweepMesh { beams: compiled.structure.beams.clone(), order, steps });
                 }
                 Some(shared) if alike(&shared.beams, &compiled.structure.beams) => {
                     for (most, n) in shared.order.segments.iter_mut().zip(order.segments) {
@@ -195,15 +195,15 @@ impl<'a> Transients<'a> {
         Some(shared)
     }
 
-    fn found(&self, point: &Prepared, options: &TransientOptions<'_>, end: RunEnd) -> Result<Found, String> {
-        let Prepared { compiled, steps: Steps { error, place, .. }, told } = point;
+    fn found(&self, point: &MeshedPoint, options: &TransientOptions<'_>, end: RunEnd) -> Result<PointResults, String> {
+        let MeshedPoint { compiled, steps: Steps { error, place, .. }, told } = point;
         let mut values = Vec::with_capacity(end.values.len());
         for (name, value) in options.signals.iter().zip(end.values) {
             if !value.is_finite() {
                 return Err(format!("{name} is not finite"));
             }
             let unit = Signal::find(compiled, name).map_err(|error| error.to_string())?.unit();
-            values.push(Value { name: name.clone(), unit: unit.into(), value: Some(value) });
+            values.push(PointValue { name: name.clone(), unit: unit.into(), value: Some(value) });
         }
         let estimated_error = compiled.order.estimated_error;
         let beyond = mesh::beyond(self.options.tol, estimated_error);
@@ -215,25 +215,25 @@ impl<'a> Transients<'a> {
         let told = told.iter().cloned();
         let warnings: Vec<String> = beyond.into_iter().chain(told).chain(steps).chain(end.warnings).collect();
         let estimated_error = estimated_error.filter(|error| error.is_finite());
-        Ok(Found { values, estimated_error, warning: warnings.join("; ") })
+        Ok(PointResults { values, estimated_error, warning: warnings.join("; ") })
     }
 }
 
 /// A point on its mesh, with what its run leaves out.
-fn prepared(compiled: Compiled, options: &TransientOptions<'_>, steps: Steps) -> Prepared {
-    let told = mesh::told_of_run(&compiled, None, &options.voltages);
-    Prepared { steps, told: told.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
+fn prepared(compiled: CompiledModel, options: &TransientOptions<'_>, steps: Steps) -> MeshedPoint {
+    let told = mesh::run_warnings(&compiled, None, &options.voltages);
+    MeshedPoint { steps, told: told.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
 }
 
 /// The steps of a run of this variant.
-fn steps(compiled: &Compiled, run: TransientOptions<'_>, place: &'static str, go_on: &dyn Fn() -> bool) -> Steps {
+fn steps(compiled: &CompiledModel, run: TransientOptions<'_>, place: &'static str, go_on: &dyn Fn() -> bool) -> Steps {
     let options = TransientOptions { points: JUDGED, ..run };
     let (error, tol) = step_error::step_error(&options, compiled, &mut |_| go_on());
     Steps { tol, error, place }
 }
 
 /// A run of its own.
-fn alone(point: &Prepared, options: &TransientOptions<'_>) -> Result<RunEnd, String> {
+fn alone(point: &MeshedPoint, options: &TransientOptions<'_>) -> Result<RunEnd, String> {
     let options = TransientOptions { tol: point.steps.tol, ..options.clone() };
     let result = transient(&point.compiled, &options, &mut |_, _| (), &mut |_| true);
     let result = result.map_err(|error: AnalysisError| error.to_string())?;
@@ -258,7 +258,7 @@ fn probes(spec: &SweepSpec) -> Vec<Vec<(String, Setting)>> {
         probe.iter().map(other).collect::<Vec<_>>()
     };
     let mut probes = vec![middle.clone()];
-    if ends.iter().map(Vec::len).fold(1, usize::saturating_mul) <= MOST_CORNERS {
+    if ends.iter().map(Vec::len).fold(1, usize::saturating_mul) <= MAX_CORNERS {
         let mut corners = vec![middle];
         for ends in &ends {
             corners = ends.iter().flat_map(|end| corners.iter().map(|corner| with(corner, end))).collect();
@@ -286,6 +286,6 @@ fn ends(group: &[SweepParameter]) -> Vec<Vec<(String, Setting)>> {
 
 /// The ends of what is drawn.
 fn drawn(spec: &SweepSpec) -> impl Iterator<Item = Vec<Vec<(String, Setting)>>> {
-    let both = |samples: &Samples| samples.quantiles(RARE).into_iter().zip(samples.quantiles(1.0 - RARE));
+    let both = |samples: &SampleGenerator| samples.quantiles(RARE).into_iter().zip(samples.quantiles(1.0 - RARE));
     spec.samples.iter().flat_map(both).map(|(low, high)| vec![vec![low], vec![high]])
 }

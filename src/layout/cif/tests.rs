@@ -2,12 +2,12 @@
 //! Sources: Mead and Conway (1980), coordinates by hand.
 
 use super::*;
-use crate::layout::Drawing;
+use crate::layout::FlatLayout;
 use crate::layout::drawing::Polygon;
 use crate::layout::regions;
 use proptest::prelude::*;
 
-fn drawing(text: &str) -> Drawing {
+fn drawing(text: &str) -> FlatLayout {
     read(text.as_bytes(), "x.cif").unwrap_or_else(|e| panic!("{e}")).flatten(None).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -18,7 +18,7 @@ fn fault(text: &str) -> String {
     }
 }
 
-fn only(d: &Drawing, layer: &str) -> Polygon {
+fn only(d: &FlatLayout, layer: &str) -> Polygon {
     assert_eq!(d.layers[layer].len(), 1, "{d:?}");
     d.layers[layer][0].clone()
 }

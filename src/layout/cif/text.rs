@@ -9,7 +9,7 @@ const LARGEST: i64 = 1_000_000_000_000;
 /// Comments nest at most this deep.
 const DEEPEST_COMMENT: usize = 1000;
 
-pub(super) struct Reader<'a> {
+pub(super) struct CifReader<'a> {
     text: &'a [u8],
     file: &'a str,
     at: usize,
@@ -17,7 +17,7 @@ pub(super) struct Reader<'a> {
     placed: (usize, usize),
 }
 
-impl<'a> Reader<'a> {
+impl<'a> CifReader<'a> {
     pub(super) fn new(text: &'a [u8], file: &'a str) -> Self {
         Self { text, file, at: 0, placed: (0, 1) }
     }

@@ -1,11 +1,11 @@
 //! What holds a layer: where its anchors lie, and which stretches of a line run over them.
 
-use super::areas::Areas;
-use super::joints::Joint;
+use super::areas::AreaIndex;
+use super::joints::LimbJoint;
 use super::limbs::Limb;
 use super::medial::Medial;
-use crate::layout::drawing::{Drawing, Polygon};
-use crate::layout::process::{self, Layer};
+use crate::layout::drawing::{FlatLayout, Polygon};
+use crate::layout::process::{self, StructuralLayer};
 use crate::layout::regions;
 
 /// A pad is at least this much wider than its limb [1].
@@ -13,9 +13,9 @@ const PAD: f64 = 1.5;
 
 /// What tells which parts are held.
 #[derive(Debug)]
-pub(super) enum Rule {
+pub(super) enum AnchorRule {
     /// Polygons that hold.
-    Drawn(Held),
+    Drawn(AnchorAreas),
     /// Parts wider than twice this many database units are held.
     Wide(f64),
     /// Nothing is drawn: pads at the end of a single limb, and parts without limbs, are held.
@@ -24,34 +24,34 @@ pub(super) enum Rule {
 
 /// Polygons that hold, found by place.
 #[derive(Debug)]
-pub(super) struct Held(Areas);
+pub(super) struct AnchorAreas(AreaIndex);
 
-fn drawn(drawing: &Drawing, names: &[String]) -> Vec<Polygon> {
+fn drawn(drawing: &FlatLayout, names: &[String]) -> Vec<Polygon> {
     let of = drawing.layers.iter().filter(|(name, _)| process::names(names, name));
     of.flat_map(|(_, polygons)| polygons.iter().cloned()).collect()
 }
 
 /// Everything that is drawn to say what of a layer is held.
-pub(super) fn marks(drawing: &Drawing, layer: &Layer) -> Vec<Polygon> {
+pub(super) fn marks(drawing: &FlatLayout, layer: &StructuralLayer) -> Vec<Polygon> {
     [&layer.anchoring.drawn, &layer.anchoring.released].iter().flat_map(|names| drawn(drawing, names)).collect()
 }
 
-impl Rule {
+impl AnchorRule {
     /// The rule for a layer of a drawing, as [`process::Anchoring`] says.
-    pub(super) fn of(drawing: &Drawing, layer: &Layer, solid: &[Polygon]) -> Self {
+    pub(super) fn of(drawing: &FlatLayout, layer: &StructuralLayer, solid: &[Polygon]) -> Self {
         let anchors = drawn(drawing, &layer.anchoring.drawn);
         if !anchors.is_empty() {
-            return Self::Drawn(Held::of(&regions::intersection(solid, &anchors)));
+            return Self::Drawn(AnchorAreas::of(&regions::intersection(solid, &anchors)));
         }
         let released = drawn(drawing, &layer.anchoring.released);
         if !released.is_empty() {
-            return Self::Drawn(Held::of(&regions::difference(solid, &released)));
+            return Self::Drawn(AnchorAreas::of(&regions::difference(solid, &released)));
         }
         layer.anchoring.undercut.map_or(Self::Pads, |reach| Self::Wide(reach / drawing.unit_m))
     }
 
     /// Whether a joint is held where it is a body.
-    pub(super) fn holds_body(&self, axis: &Medial, origin: [f64; 2], limbs: &[Limb], joint: &Joint) -> bool {
+    pub(super) fn holds_body(&self, axis: &Medial, origin: [f64; 2], limbs: &[Limb], joint: &LimbJoint) -> bool {
         match self {
             Self::Drawn(held) => held.touches(axis, origin, &joint.edges),
             Self::Wide(reach) => half_width(axis, joint) >= *reach,
@@ -77,14 +77,14 @@ impl Rule {
 }
 
 /// Half of the largest width of a joint.
-pub(super) fn half_width(axis: &Medial, joint: &Joint) -> f64 {
+pub(super) fn half_width(axis: &Medial, joint: &LimbJoint) -> f64 {
     let ends = joint.edges.iter().flat_map(|e| axis.edges[*e as usize].ends);
     ends.map(|v| axis.vertices[v as usize].r).fold(0.0, f64::max)
 }
 
-impl Held {
+impl AnchorAreas {
     fn of(polygons: &[Polygon]) -> Self {
-        Self(Areas::of(polygons))
+        Self(AreaIndex::of(polygons))
     }
 
     /// Whether a point lies in one of them.

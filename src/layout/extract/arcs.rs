@@ -4,7 +4,7 @@ use super::{Arc, Extraction};
 use std::f64::consts::PI;
 
 /// Fewest beams that make an arc.
-const FEWEST: usize = 4;
+const MIN_BEAMS: usize = 4;
 /// Nodes may lie off the circle by so many database units, and this share of the width.
 const OFF: [f64; 2] = [3.0, 0.02];
 /// Largest change of the width along an arc [1].
@@ -48,17 +48,17 @@ pub(super) fn arcs(result: &mut Extraction, unit: f64) {
     let mut gone = vec![false; result.beams.len()];
     for chain in chains {
         let mut first = 0;
-        while first + FEWEST <= chain.len() {
+        while first + MIN_BEAMS <= chain.len() {
             crate::budget::check();
             let fits = |count: usize| {
                 first + count <= chain.len() && fit(result, &chain[first..first + count], unit).is_some()
             };
-            if !fits(FEWEST) {
+            if !fits(MIN_BEAMS) {
                 first += 1;
                 continue;
             }
             // the longest that fits: doubling, then halving
-            let (mut low, mut high) = (FEWEST, 2 * FEWEST);
+            let (mut low, mut high) = (MIN_BEAMS, 2 * MIN_BEAMS);
             while fits(high) {
                 (low, high) = (high, 2 * high);
             }
@@ -80,14 +80,14 @@ pub(super) fn arcs(result: &mut Extraction, unit: f64) {
 
 /// A beam in a chain, from one node to the next.
 #[derive(Debug, Clone, Copy)]
-struct Link {
+struct ChainLink {
     beam: usize,
     from: usize,
     to: usize,
 }
 
 /// Beams that follow each other with nothing else at the nodes between them.
-fn chains(result: &Extraction) -> Vec<Vec<Link>> {
+fn chains(result: &Extraction) -> Vec<Vec<ChainLink>> {
     let mut at: Vec<Vec<usize>> = vec![Vec::new(); result.nodes.len()];
     for (k, beam) in result.beams.iter().enumerate() {
         beam.nodes.iter().for_each(|n| at[*n].push(k));
@@ -113,14 +113,14 @@ fn chains(result: &Extraction) -> Vec<Vec<Link>> {
                     done[beam] = true;
                     let [a, b] = result.beams[beam].nodes;
                     let to = if a == from { b } else { a };
-                    chain.push(Link { beam, from, to });
+                    chain.push(ChainLink { beam, from, to });
                     if !through[to] || to == start {
                         break;
                     }
                     let Some(next) = at[to].iter().find(|k| **k != beam) else { break };
                     (from, beam) = (to, *next);
                 }
-                if chain.len() >= FEWEST {
+                if chain.len() >= MIN_BEAMS {
                     chains.push(chain);
                 }
             }
@@ -130,7 +130,7 @@ fn chains(result: &Extraction) -> Vec<Vec<Link>> {
 }
 
 /// The arc through the first, a middle and the last node, if all others lie on it.
-fn fit(result: &Extraction, run: &[Link], unit: f64) -> Option<Arc> {
+fn fit(result: &Extraction, run: &[ChainLink], unit: f64) -> Option<Arc> {
     let beam = &result.beams[run[0].beam];
     let place = |n: usize| result.nodes[n].at;
     let (a, m, b) = (place(run[0].from), place(run[run.len() / 2].from), place(run[run.len() - 1].to));

@@ -11,7 +11,7 @@ pub(super) const BYTES_PER_POINT: usize = 112;
 
 /// An edge of an area.
 #[derive(Debug, Clone, Copy)]
-struct Edge {
+struct AreaEdge {
     a: [f64; 2],
     b: [f64; 2],
     of: u32,
@@ -19,15 +19,15 @@ struct Edge {
 
 /// Areas, by number.
 #[derive(Debug)]
-pub(super) struct Areas {
+pub(super) struct AreaIndex {
     extents: Vec<Extent>,
     near: Boxes,
-    edges: Vec<Edge>,
+    edges: Vec<AreaEdge>,
     /// Boxes of the edges.
     tree: Boxes,
 }
 
-impl Areas {
+impl AreaIndex {
     /// Of polygons [database units], in their order. Cost: n log n.
     pub(super) fn of<'a>(polygons: impl IntoIterator<Item = &'a Polygon>) -> Self {
         let (mut edges, mut extents) = (Vec::new(), Vec::new());
@@ -35,8 +35,11 @@ impl Areas {
             crate::budget::check();
             for contour in &polygon.contours {
                 let next = contour.iter().cycle().skip(1);
-                let edge =
-                    |(a, b): (&[i32; 2], &[i32; 2])| Edge { a: a.map(f64::from), b: b.map(f64::from), of: of as u32 };
+                let edge = |(a, b): (&[i32; 2], &[i32; 2])| AreaEdge {
+                    a: a.map(f64::from),
+                    b: b.map(f64::from),
+                    of: of as u32,
+                };
                 edges.extend(contour.iter().zip(next).map(edge));
             }
             extents.push(boxes::around(polygon.contours.iter().flatten().map(|p| p.map(f64::from))));
@@ -50,7 +53,7 @@ impl Areas {
         self.extents.len()
     }
 
-    fn edges(&self, window: &Extent) -> impl Iterator<Item = &Edge> {
+    fn edges(&self, window: &Extent) -> impl Iterator<Item = &AreaEdge> {
         self.tree.overlapping(window).into_iter().map(|k| &self.edges[k as usize])
     }
 
@@ -58,7 +61,7 @@ impl Areas {
     pub(super) fn holding(&self, p: [f64; 2]) -> Vec<u32> {
         let mut about = self.near.overlapping(&[p, p]);
         let Some(right) = about.iter().map(|k| self.extents[*k as usize][1][0]).reduce(f64::max) else { return about };
-        let crossed = |e: &&Edge| {
+        let crossed = |e: &&AreaEdge| {
             (e.a[1] > p[1]) != (e.b[1] > p[1])
                 && p[0] < e.a[0] + (e.b[0] - e.a[0]) * (p[1] - e.a[1]) / (e.b[1] - e.a[1])
         };
@@ -78,7 +81,7 @@ impl Areas {
         let sides: Vec<_> = cell.iter().zip(cell.iter().cycle().skip(1)).collect();
         let side =
             |p: &[f64; 2], q: &[f64; 2], r: &[f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-        let meets = |e: &&Edge| {
+        let meets = |e: &&AreaEdge| {
             let (p, q) = (&e.a, &e.b);
             inside(&outline, e.a)
                 || inside(&outline, e.b)
@@ -94,7 +97,7 @@ impl Areas {
     pub(super) fn over(&self, a: [f64; 2], b: [f64; 2]) -> Vec<[f64; 2]> {
         let mut cuts = vec![0.0, 1.0];
         let d = [b[0] - a[0], b[1] - a[1]];
-        for Edge { a: p, b: q, .. } in self.edges(&boxes::around([a, b])) {
+        for AreaEdge { a: p, b: q, .. } in self.edges(&boxes::around([a, b])) {
             let e = [q[0] - p[0], q[1] - p[1]];
             let across = d[0] * e[1] - d[1] * e[0];
             let f = [p[0] - a[0], p[1] - a[1]];
@@ -165,7 +168,7 @@ mod tests {
     #[test]
     fn a_perforated_plane() {
         let others = [Polygon::rectangle([14, 14], [16, 16]), Polygon::rectangle([-5, 1], [2, 2])];
-        let areas = Areas::of([perforated(3)].iter().chain(&others));
+        let areas = AreaIndex::of([perforated(3)].iter().chain(&others));
         assert_eq!(areas.len(), 3);
         let holding = [([1.0, 0.5], vec![0]), ([1.0, 1.5], vec![0, 2]), ([5.0, 5.0], vec![]), ([15.0, 15.0], vec![1])];
         for (p, want) in holding.into_iter().chain([([-1.0, 0.5], vec![]), ([31.0, 5.0], vec![])]) {
@@ -186,7 +189,7 @@ mod tests {
     /// Whatever a plane has elsewhere, a question meets few of its edges: on a ray, those of a row of holes; at a cell, those near it.
     #[test]
     fn questions_meet_few_edges() {
-        let areas = Areas::of([&perforated(200)]);
+        let areas = AreaIndex::of([&perforated(200)]);
         let all = areas.edges.len();
         let (ray, cell) = ([[995.0, 995.0], [2000.0, 995.0]], [[990.0, 990.0], [1010.0, 1010.0]]);
         assert!(areas.edges(&ray).count() * 200 < all && areas.edges(&cell).count() <= 20, "{all}");

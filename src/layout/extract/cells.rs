@@ -2,7 +2,7 @@
 
 use super::areas::distance;
 use super::boxes::{self, Boxes};
-use super::joints::Parts;
+use super::joints::LimbGraph;
 use super::medial::Medial;
 
 /// A place on the edge of a part may lie this far outside [database units].
@@ -33,7 +33,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    pub(super) fn of(axis: &Medial, parts: &Parts) -> Self {
+    pub(super) fn of(axis: &Medial, parts: &LimbGraph) -> Self {
         let joints = parts
             .joints
             .iter()

@@ -4,11 +4,11 @@
 //! parts, so that what carries them is seen as it is without them; their mass stays.
 
 use super::boxes::{self, Boxes, Extent};
-use super::joints::Kind;
+use super::joints::JointRole;
 use super::moments::Moments;
 use super::part::Part;
 use crate::budget;
-use crate::layout::drawing::{Point, Polygon};
+use crate::layout::drawing::{GridPoint, Polygon};
 use crate::sets::Sets;
 
 /// Length over width of the shortest finger [1].
@@ -31,14 +31,14 @@ pub(super) struct Finger {
     width: f64,
     /// Numbers of the points after which and before which it stands on its contour, and points to put there.
     cut: [u32; 2],
-    ends: [Point; 2],
+    ends: [GridPoint; 2],
     /// A part of its own: it hangs on nothing.
     loose: bool,
 }
 
 /// Fingers of two parts with one gap and one overlap.
 #[derive(Debug, Clone)]
-pub(super) struct Comb {
+pub(super) struct FingerArray {
     /// The two parts.
     pub(super) parts: [usize; 2],
     /// Where it pulls: on the line of the roots of each part's fingers.
@@ -56,22 +56,22 @@ pub(super) struct Comb {
 }
 
 /// All combs of a layer, and the fingers in them.
-pub(super) fn combs(parts: &[Part]) -> (Vec<Comb>, Vec<Finger>) {
+pub(super) fn combs(parts: &[Part]) -> (Vec<FingerArray>, Vec<Finger>) {
     let all: Vec<Finger> = parts.iter().enumerate().flat_map(|(k, part)| fingers(k, part)).collect();
-    let (pairs, apart): (Vec<Pair>, Vec<Pair>) =
+    let (pairs, apart): (Vec<NeighbourFingers>, Vec<NeighbourFingers>) =
         neighbours(&all).into_iter().partition(|p| p.fingers.iter().all(|k| !all[*k].loose));
     let mut sets = Sets::new(all.len());
     for pair in &pairs {
         sets.join(pair.fingers[0], pair.fingers[1]);
     }
-    let mut order: Vec<(usize, &Pair)> = pairs.iter().map(|p| (sets.first(p.fingers[0]), p)).collect();
+    let mut order: Vec<(usize, &NeighbourFingers)> = pairs.iter().map(|p| (sets.first(p.fingers[0]), p)).collect();
     order.sort_by(|a, b| {
-        let keys = |p: &Pair| (p.parts.to_owned(), p.fingers.to_owned());
+        let keys = |p: &NeighbourFingers| (p.parts.to_owned(), p.fingers.to_owned());
         a.0.cmp(&b.0).then(a.1.gap.total_cmp(&b.1.gap)).then(keys(a.1).cmp(&keys(b.1)))
     });
-    let mut groups: Vec<(usize, Vec<&Pair>)> = Vec::new();
+    let mut groups: Vec<(usize, Vec<&NeighbourFingers>)> = Vec::new();
     for (set, pair) in order {
-        let fits = |(s, group): &&mut (usize, Vec<&Pair>)| {
+        let fits = |(s, group): &&mut (usize, Vec<&NeighbourFingers>)| {
             *s == set
                 && group[0].parts == pair.parts
                 && (group[0].gap - pair.gap).abs() <= ALIKE
@@ -84,7 +84,7 @@ pub(super) fn combs(parts: &[Part]) -> (Vec<Comb>, Vec<Finger>) {
         }
     }
     let mut taken = vec![false; all.len()];
-    let mut combs: Vec<Comb> =
+    let mut combs: Vec<FingerArray> =
         groups.iter().filter(|(_, g)| g.len() >= 2).map(|(_, group)| comb(&all, group, &mut taken)).collect();
     lone(&all, &apart, &mut combs, &mut taken);
     let used = all.into_iter().zip(taken).filter(|(_, taken)| *taken).map(|(finger, _)| finger).collect();
@@ -93,7 +93,7 @@ pub(super) fn combs(parts: &[Part]) -> (Vec<Comb>, Vec<Finger>) {
 
 /// Two neighbours: of the parts with the smaller and the larger number.
 #[derive(Debug)]
-struct Pair {
+struct NeighbourFingers {
     fingers: [usize; 2],
     parts: [usize; 2],
     gap: f64,
@@ -105,11 +105,11 @@ fn fingers(k: usize, part: &Part) -> Vec<Finger> {
     let origin = part.origin();
     let mut fingers = Vec::new();
     for joint in &found.joints {
-        let ([port], Kind::Node(tip)) = (joint.ports.as_slice(), &joint.kind) else { continue };
+        let ([port], JointRole::Node(tip)) = (joint.ports.as_slice(), &joint.kind) else { continue };
         let limb = &found.limbs[port.limb];
         let other = &found.joints[found.at[port.limb][1 - port.end]];
         let width = 0.5 * (limb.width[0] + limb.width[1]);
-        let loose = other.ports.len() == 1 && matches!(other.kind, Kind::Node(_));
+        let loose = other.ports.len() == 1 && matches!(other.kind, JointRole::Node(_));
         if loose && found.limbs.len() > 1 {
             continue;
         }
@@ -138,7 +138,7 @@ fn fingers(k: usize, part: &Part) -> Vec<Finger> {
 }
 
 /// Nearest opposite fingers on each side, where both are each other's nearest.
-fn neighbours(all: &[Finger]) -> Vec<Pair> {
+fn neighbours(all: &[Finger]) -> Vec<NeighbourFingers> {
     let extents: Vec<Extent> = all
         .iter()
         .map(|f| {
@@ -177,17 +177,17 @@ fn neighbours(all: &[Finger]) -> Vec<Pair> {
             let mutual = nearest[*j].iter().flatten().any(|(k, ..)| *k == i);
             if mutual && all[i].part < all[*j].part {
                 let parts = [all[i].part, all[*j].part];
-                pairs.push(Pair { fingers: [i, *j], parts, gap: *gap, overlap: *overlap });
+                pairs.push(NeighbourFingers { fingers: [i, *j], parts, gap: *gap, overlap: *overlap });
             }
         }
     }
     pairs
 }
 
-fn comb(all: &[Finger], group: &[&Pair], taken: &mut [bool]) -> Comb {
+fn comb(all: &[Finger], group: &[&NeighbourFingers], taken: &mut [bool]) -> FingerArray {
     let count = group.len() as f64;
     let along = all[group[0].fingers[0]].along;
-    let mean = |value: &dyn Fn(&Pair) -> f64| group.iter().map(|p| value(p)).sum::<f64>() / count;
+    let mean = |value: &dyn Fn(&NeighbourFingers) -> f64| group.iter().map(|p| value(p)).sum::<f64>() / count;
     let seen = |p: [f64; 2]| [p[0] * along[0] + p[1] * along[1], along[0] * p[1] - along[1] * p[0]];
     let across = mean(&|p| 0.5 * p.fingers.iter().map(|k| seen(all[*k].root)[1]).sum::<f64>());
     let roots = [0, 1].map(|i| {
@@ -206,7 +206,7 @@ fn comb(all: &[Finger], group: &[&Pair], taken: &mut [bool]) -> Comb {
             }
         }
     }
-    Comb {
+    FingerArray {
         parts: group[0].parts,
         roots,
         gaps: group.len(),
@@ -219,11 +219,11 @@ fn comb(all: &[Finger], group: &[&Pair], taken: &mut [bool]) -> Comb {
 }
 
 /// Fingers of a comb that have nothing but loose ones beside them belong to it too; the loose ones are told.
-fn lone(all: &[Finger], apart: &[Pair], combs: &mut [Comb], taken: &mut [bool]) {
+fn lone(all: &[Finger], apart: &[NeighbourFingers], combs: &mut [FingerArray], taken: &mut [bool]) {
     for pair in apart {
         let [a, b] = pair.fingers;
         let (own, other) = if all[b].loose { (a, b) } else { (b, a) };
-        let alike = |c: &&mut Comb| {
+        let alike = |c: &&mut FingerArray| {
             (c.gap - pair.gap).abs() <= ALIKE
                 && (c.overlap - pair.overlap).abs() <= ALIKE
                 && c.parts.contains(&all[own].part)
@@ -268,8 +268,8 @@ pub(super) fn without(part: &Part, fingers: &[&Finger]) -> Polygon {
         ends[to as usize] = Some(finger.ends[1]);
     }
     let mut point = 0;
-    let keep = |contour: &Vec<Point>| -> Vec<Point> {
-        let mut kept: Vec<Point> = Vec::with_capacity(contour.len());
+    let keep = |contour: &Vec<GridPoint>| -> Vec<GridPoint> {
+        let mut kept: Vec<GridPoint> = Vec::with_capacity(contour.len());
         for p in contour {
             if !drop[point] {
                 kept.push(*p);

@@ -7,35 +7,37 @@
 use super::boxes::{self, Boxes, Extent};
 use super::cells::Owner;
 use super::holes::Hole;
-use super::joints::Parts;
+use super::joints::LimbGraph;
 use super::medial::Medial;
 use super::moments::Moments;
 use crate::budget;
 
 /// An outline with its corners in order.
-pub(super) type Outline = Vec<[f64; 2]>;
+pub(super) type OrderedOutline = Vec<[f64; 2]>;
 
 /// What holes take of a limb or joint.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Lack {
+pub(super) struct MaterialCutout {
     /// Moments of all pieces.
     pub(super) moments: Moments,
     /// The pieces.
-    pub(super) pieces: Vec<Outline>,
+    pub(super) pieces: Vec<OrderedOutline>,
 }
 
 /// What holes take of the limbs and joints of a part, in coordinates of its axis.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Cut {
-    pub(super) limbs: Vec<Lack>,
-    pub(super) joints: Vec<Lack>,
+pub(super) struct HoleCutouts {
+    pub(super) limbs: Vec<MaterialCutout>,
+    pub(super) joints: Vec<MaterialCutout>,
 }
 
-impl Cut {
+impl HoleCutouts {
     /// Cuts the holes of a part whose box has its lower left corner at `origin`. Cost: n log n, where cells overlap few holes.
-    pub(super) fn of(axis: &Medial, parts: &Parts, holes: &[Hole], origin: [f64; 2]) -> Self {
-        let mut cut =
-            Self { limbs: vec![Lack::default(); parts.limbs.len()], joints: vec![Lack::default(); parts.joints.len()] };
+    pub(super) fn of(axis: &Medial, parts: &LimbGraph, holes: &[Hole], origin: [f64; 2]) -> Self {
+        let mut cut = Self {
+            limbs: vec![MaterialCutout::default(); parts.limbs.len()],
+            joints: vec![MaterialCutout::default(); parts.joints.len()],
+        };
         if holes.is_empty() {
             return cut;
         }
@@ -45,7 +47,7 @@ impl Cut {
             .collect();
         let near = Boxes::of(&extents);
         let local = |p: &[f64; 2]| [p[0] - origin[0], p[1] - origin[1]];
-        let outlines: Vec<Outline> = holes.iter().map(|hole| hole.outline.iter().map(local).collect()).collect();
+        let outlines: Vec<OrderedOutline> = holes.iter().map(|hole| hole.outline.iter().map(local).collect()).collect();
         // for each hole what is not found yet, and who has most of it
         let mut left: Vec<(f64, f64, Option<Owner>)> = holes.iter().map(|hole| (hole.area, 0.0, None)).collect();
         for (owner, edges) in owners(parts) {
@@ -79,7 +81,7 @@ impl Cut {
         cut
     }
 
-    fn of_owner(&mut self, owner: Owner) -> &mut Lack {
+    fn of_owner(&mut self, owner: Owner) -> &mut MaterialCutout {
         match owner {
             Owner::Limb(k) => &mut self.limbs[k],
             Owner::Joint(j) => &mut self.joints[j],
@@ -87,8 +89,8 @@ impl Cut {
     }
 }
 
-impl Lack {
-    fn take(&mut self, moments: Moments, piece: Outline) {
+impl MaterialCutout {
+    fn take(&mut self, moments: Moments, piece: OrderedOutline) {
         self.moments += moments;
         self.pieces.push(piece);
     }
@@ -102,7 +104,7 @@ impl Lack {
 }
 
 /// Limbs and joints with the edges of the axis whose areas they have.
-fn owners(parts: &Parts) -> impl Iterator<Item = (Owner, &[u32])> {
+fn owners(parts: &LimbGraph) -> impl Iterator<Item = (Owner, &[u32])> {
     let joints = parts.joints.iter().enumerate().map(|(j, joint)| (Owner::Joint(j), joint.edges.as_slice()));
     let limbs = parts.limbs.iter().enumerate().map(|(k, limb)| (Owner::Limb(k), limb.edges.as_slice()));
     joints.chain(limbs)
@@ -115,7 +117,7 @@ fn halves(cell: &[[f64; 2]; 6]) -> [[[f64; 2]; 4]; 2] {
 }
 
 /// What of an outline lies in a convex one; the direction of the first is kept.
-pub(super) fn clipped(outline: &[[f64; 2]], convex: &[[f64; 2]]) -> Outline {
+pub(super) fn clipped(outline: &[[f64; 2]], convex: &[[f64; 2]]) -> OrderedOutline {
     let mut kept = outline.to_vec();
     let middle = convex[0];
     let turns = convex

@@ -1,10 +1,10 @@
 //! Why a drawing has no model.
 
-use crate::layout::crossings::Tangled;
+use crate::layout::crossings::CrossingContours;
 use thiserror::Error;
 
 /// Most points of one layer after its polygons are merged.
-pub const MOST_POINTS: usize = 4_000_000;
+pub const MAX_POINTS: usize = 4_000_000;
 
 /// Why there is no model.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -31,10 +31,10 @@ pub enum ExtractError {
         /// Name of the layer.
         layer: String,
         /// How often, and where.
-        tangled: Tangled,
+        tangled: CrossingContours,
     },
     /// More points than are worked on.
-    #[error("layer {layer}: {points} points after its polygons were merged, at most {MOST_POINTS} are extracted")]
+    #[error("layer {layer}: {points} points after its polygons were merged, at most {MAX_POINTS} are extracted")]
     TooLarge {
         /// Name of the layer.
         layer: String,

@@ -14,37 +14,37 @@ pub struct Extraction {
     /// Layers that move.
     pub layers: Vec<LayerResult>,
     /// Points of the model.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<ExtractedNode>,
     /// Flexible beams.
-    pub beams: Vec<Beam>,
+    pub beams: Vec<ExtractedBeam>,
     /// Beams along a circle.
     pub arcs: Vec<Arc>,
     /// Rigid bodies.
-    pub bodies: Vec<Body>,
+    pub bodies: Vec<ExtractedBody>,
     /// Rigid, massless connections of two nodes.
     pub links: Vec<[usize; 2]>,
     /// Elastic edges of perforated plates where limbs stand on them.
-    pub roots: Vec<Root>,
+    pub roots: Vec<ExtractedRoot>,
     /// Nodes that are held.
     pub anchors: Vec<usize>,
     /// Areas that are held, with the nodes on them.
-    pub pads: Vec<Pad>,
+    pub pads: Vec<ExtractedPad>,
     /// Nets that labels name.
     pub nets: Vec<Net>,
-    /// Parts between nets, whose beams carry current: [`Node::part`], in order.
+    /// Parts between nets, whose beams carry current: [`ExtractedNode::part`], in order.
     pub live: Vec<usize>,
     /// Where cells stand in the drawing.
     pub cells: Vec<Placement>,
     /// Size of a database unit [m].
     pub unit: f64,
     /// Comb drives.
-    pub combs: Vec<Comb>,
+    pub combs: Vec<ExtractedComb>,
     /// Lumped plates that face each other.
     pub plates: Vec<Plates>,
     /// Beams that face another part.
-    pub facing: Vec<Facing>,
+    pub facing: Vec<ExtractedFacing>,
     /// What is not in the model.
-    pub unrecognised: Vec<Unrecognised>,
+    pub unrecognised: Vec<UnmodelledArea>,
     /// What a reader should know, in words with places and sizes.
     pub notes: Vec<String>,
 }
@@ -77,7 +77,7 @@ pub struct LayerResult {
 
 /// A point of the model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Node {
+pub struct ExtractedNode {
     /// Its name.
     pub name: String,
     /// Its place [m].
@@ -92,7 +92,7 @@ pub struct Node {
 
 /// An area that is held.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pad {
+pub struct ExtractedPad {
     /// Nodes on it; it may have none.
     pub nodes: Vec<usize>,
     /// Index of its layer.
@@ -116,7 +116,7 @@ pub struct Net {
 
 /// A straight beam.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Beam {
+pub struct ExtractedBeam {
     /// Index of its layer.
     pub layer: usize,
     /// Nodes at its start and end.
@@ -144,7 +144,7 @@ pub struct Arc {
 
 /// A rigid body.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Body {
+pub struct ExtractedBody {
     /// Index of its layer.
     pub layer: usize,
     /// Node at its centroid.
@@ -157,7 +157,7 @@ pub struct Body {
 
 /// Where a limb stands on the elastic edge of a perforated plate: a spring between two nodes in one place.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Root {
+pub struct ExtractedRoot {
     /// Nodes of the plate and of the limb.
     pub nodes: [usize; 2],
     /// Direction of the limb.
@@ -170,7 +170,7 @@ pub struct Root {
 
 /// A comb drive.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Comb {
+pub struct ExtractedComb {
     /// Index of its layer.
     pub layer: usize,
     /// Nodes where it pulls: the side that moves, and the other.
@@ -200,7 +200,7 @@ pub struct Plates {
 
 /// A piece of a beam that faces another part.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Facing {
+pub struct ExtractedFacing {
     /// Index of its layer.
     pub layer: usize,
     /// Nodes along the beam, and those across the gap, to the right of the way from the first to the second.
@@ -213,7 +213,7 @@ pub struct Facing {
 
 /// Something that is not in the model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Unrecognised {
+pub struct UnmodelledArea {
     /// The drawn layer, or the name of one that moves.
     pub layer: String,
     /// Its area [m²].

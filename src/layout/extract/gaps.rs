@@ -4,9 +4,9 @@
 //! [`WIDEST`] apart and side by side over at least [`SLENDER`] gaps, are plates; of several one behind the other the nearest counts.
 
 use super::boxes::{self, Boxes, Extent};
-use super::combs::Comb;
-use super::joints::Kind;
-use super::medial::Site;
+use super::combs::FingerArray;
+use super::joints::JointRole;
+use super::medial::BoundarySite;
 use super::part::Part;
 use crate::budget;
 use std::collections::BTreeMap;
@@ -60,7 +60,7 @@ impl Gap {
 }
 
 /// All capacitors between parts of which at least one moves; `moves` says which do, `widest` is in database units.
-pub(super) fn gaps(parts: &[Part], moves: &[bool], combs: &[Comb], widest: f64) -> Vec<Gap> {
+pub(super) fn gaps(parts: &[Part], moves: &[bool], combs: &[FingerArray], widest: f64) -> Vec<Gap> {
     let faces: Vec<Face> = parts.iter().enumerate().flat_map(|(k, part)| faces(k, part)).collect();
     let extents: Vec<Extent> = faces
         .iter()
@@ -157,7 +157,7 @@ fn faces(k: usize, part: &Part) -> Vec<Face> {
             continue;
         }
         let [p, q] = [0, 1].map(|end| match (&found.joints[at[end]].kind, found.joints[at[end]].ports.len()) {
-            (Kind::Node(tip), 1) => *tip,
+            (JointRole::Node(tip), 1) => *tip,
             _ => limb.ends[end],
         });
         let d = limb.direction();
@@ -166,11 +166,11 @@ fn faces(k: usize, part: &Part) -> Vec<Face> {
         faces.push(Face { part: k, a: shifted(p, 1.0), b: shifted(q, 1.0), limb: Some(width) });
         faces.push(Face { part: k, a: shifted(q, -1.0), b: shifted(p, -1.0), limb: Some(width) });
     }
-    for joint in found.joints.iter().filter(|joint| matches!(joint.kind, Kind::Body(_))) {
+    for joint in found.joints.iter().filter(|joint| matches!(joint.kind, JointRole::Body(_))) {
         let mut of_side: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
         for edge in joint.edges.iter().map(|e| &axis.edges[*e as usize]) {
             for site in edge.sites {
-                let Site::Side(side) = site else { continue };
+                let BoundarySite::Side(side) = site else { continue };
                 let [a, b] = axis.side(side);
                 let (d, l2) = ([b[0] - a[0], b[1] - a[1]], (b[0] - a[0]).powi(2) + (b[1] - a[1]).powi(2));
                 for v in edge.ends {

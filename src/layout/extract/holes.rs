@@ -6,7 +6,7 @@
 //! with and without holes in series: E′/E = (1 − s)/(1 − s + s²), s = √p.
 
 use super::boxes::{self, Extent};
-use crate::layout::drawing::{Point, Polygon, twice_area};
+use crate::layout::drawing::{GridPoint, Polygon, twice_area};
 use std::f64::consts::SQRT_2;
 
 /// Least share of the smallest rectangle around it that a hole fills, less what rounding of its corners to the grid takes [1].
@@ -54,15 +54,15 @@ impl Hole {
 
 /// Sides of the rectangle of least area around some points: one of its sides lies along their hull (H. Freeman, R. Shapira, CACM 18,
 /// 1975). Cost: n log n.
-fn smallest_rectangle(mut points: Vec<Point>) -> [f64; 2] {
+fn smallest_rectangle(mut points: Vec<GridPoint>) -> [f64; 2] {
     points.sort_unstable();
     points.dedup();
-    let turn = |a: Point, b: Point, c: Point| {
+    let turn = |a: GridPoint, b: GridPoint, c: GridPoint| {
         let [ux, uy, vx, vy] = [b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]].map(i128::from);
         ux * vy - uy * vx
     };
-    let half = |points: &mut dyn Iterator<Item = Point>| {
-        let mut chain: Vec<Point> = Vec::new();
+    let half = |points: &mut dyn Iterator<Item = GridPoint>| {
+        let mut chain: Vec<GridPoint> = Vec::new();
         for p in points {
             while chain.len() > 1 && turn(chain[chain.len() - 2], chain[chain.len() - 1], p) <= 0 {
                 chain.pop();
@@ -123,7 +123,7 @@ mod tests {
         for degrees in [0.0f64, 1.0, 30.0, 45.0, 89.0, 120.0] {
             let (s, c) = degrees.to_radians().sin_cos();
             let turned = [[0.0, 0.0], [3e5, 0.0], [3e5, 1e5], [0.0, 1e5]];
-            let corners: Vec<Point> = turned
+            let corners: Vec<GridPoint> = turned
                 .iter()
                 .map(|[x, y]: &[f64; 2]| [(c * x - s * y).round() as i32, (s * x + c * y).round() as i32])
                 .collect();

@@ -26,7 +26,7 @@ const IN_LINE: f64 = 0.02;
 
 /// One end of a limb at a joint.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Port {
+pub(super) struct LimbEnd {
     pub(super) limb: usize,
     /// 0 at its start, 1 at its end.
     pub(super) end: usize,
@@ -34,22 +34,22 @@ pub(super) struct Port {
 
 /// A joint.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Joint {
+pub(super) struct LimbJoint {
     /// Limb ends in it.
-    pub(super) ports: Vec<Port>,
+    pub(super) ports: Vec<LimbEnd>,
     /// Its area.
     pub(super) cell: Moments,
     /// Edges of the axis whose areas it has.
     pub(super) edges: Vec<u32>,
     /// What it becomes.
-    pub(super) kind: Kind,
+    pub(super) kind: JointRole,
     /// Of a body whose edge is elastic, for each port, its compliance: shift [1], turn [1/square database unit]; none: it is rigid there.
     pub(super) roots: Vec<Option<[f64; 2]>>,
 }
 
 /// What a joint becomes.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) enum Kind {
+pub(super) enum JointRole {
     /// Limbs end here; for a tip this is where the material ends.
     Node([f64; 2]),
     /// Nodes along a bar, with the width of the bar; for each port the node it ends in.
@@ -63,15 +63,15 @@ pub(super) enum Kind {
 
 /// Limbs and joints of one part.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Parts {
+pub(super) struct LimbGraph {
     pub(super) limbs: Vec<Limb>,
-    pub(super) joints: Vec<Joint>,
+    pub(super) joints: Vec<LimbJoint>,
     /// For each limb the joints at its start and end.
     pub(super) at: Vec<[usize; 2]>,
 }
 
 /// Finds the joints between limbs and says what they become.
-pub(super) fn joints(skeleton: &Skeleton<'_>, mut limbs: Vec<Limb>) -> Parts {
+pub(super) fn joints(skeleton: &Skeleton<'_>, mut limbs: Vec<Limb>) -> LimbGraph {
     let axis = skeleton.axis;
     let mut of_limb = vec![usize::MAX; axis.edges.len()];
     for (k, limb) in limbs.iter().enumerate() {
@@ -92,12 +92,12 @@ pub(super) fn joints(skeleton: &Skeleton<'_>, mut limbs: Vec<Limb>) -> Parts {
         inner[v as usize] = usize::MAX;
     }
     let mut number = vec![usize::MAX; axis.vertices.len()];
-    let mut joints: Vec<Joint> = Vec::new();
-    let mut joint = |v: u32, joints: &mut Vec<Joint>, sets: &mut crate::sets::Sets| {
+    let mut joints: Vec<LimbJoint> = Vec::new();
+    let mut joint = |v: u32, joints: &mut Vec<LimbJoint>, sets: &mut crate::sets::Sets| {
         let first = sets.first(v as usize);
         if number[first] == usize::MAX {
             number[first] = joints.len();
-            joints.push(Joint::default());
+            joints.push(LimbJoint::default());
         }
         number[first]
     };
@@ -105,7 +105,7 @@ pub(super) fn joints(skeleton: &Skeleton<'_>, mut limbs: Vec<Limb>) -> Parts {
     for (k, limb) in limbs.iter().enumerate() {
         for end in 0..2 {
             at[k][end] = joint(limb.vertices[end], &mut joints, &mut sets);
-            joints[at[k][end]].ports.push(Port { limb: k, end });
+            joints[at[k][end]].ports.push(LimbEnd { limb: k, end });
         }
     }
     for (e, edge) in axis.edges.iter().enumerate() {
@@ -127,7 +127,7 @@ pub(super) fn joints(skeleton: &Skeleton<'_>, mut limbs: Vec<Limb>) -> Parts {
     for joint in &mut joints {
         joint.kind = kind(skeleton, &limbs, joint);
     }
-    Parts { limbs, joints, at }
+    LimbGraph { limbs, joints, at }
 }
 
 /// An end of a limb seen from it: place, outward direction, width.
@@ -157,14 +157,14 @@ impl Lead {
     }
 }
 
-fn kind(skeleton: &Skeleton<'_>, limbs: &[Limb], joint: &Joint) -> Kind {
+fn kind(skeleton: &Skeleton<'_>, limbs: &[Limb], joint: &LimbJoint) -> JointRole {
     let leads: Vec<Lead> = joint.ports.iter().map(|p| Lead::of(&limbs[p.limb], p.end)).collect();
     let point = match leads.as_slice() {
         [] => None,
         [lead] => tip(lead, &joint.cell),
         _ => crossing(&leads, joint.cell.area),
     };
-    let simple = point.map(Kind::Node).or_else(|| bar(&leads, joint.cell.area));
+    let simple = point.map(JointRole::Node).or_else(|| bar(&leads, joint.cell.area));
     simple.unwrap_or_else(|| body(skeleton, limbs, joint))
 }
 
@@ -183,9 +183,9 @@ pub(super) fn from_corner(axis: &Medial, limb: &Limb, end: usize) -> f64 {
 }
 
 /// A joint as a rigid body: its limbs end at its edge.
-pub(super) fn body(skeleton: &Skeleton<'_>, limbs: &[Limb], joint: &Joint) -> Kind {
-    let place = |p: &Port| mouth(skeleton, &limbs[p.limb], p.end, &Lead::of(&limbs[p.limb], p.end));
-    Kind::Body(joint.ports.iter().map(place).collect())
+pub(super) fn body(skeleton: &Skeleton<'_>, limbs: &[Limb], joint: &LimbJoint) -> JointRole {
+    let place = |p: &LimbEnd| mouth(skeleton, &limbs[p.limb], p.end, &Lead::of(&limbs[p.limb], p.end));
+    JointRole::Body(joint.ports.iter().map(place).collect())
 }
 
 /// Where a limb with a rectangular end ends.
@@ -246,7 +246,7 @@ fn least_squares(leads: &[Lead]) -> Option<[f64; 2]> {
 }
 
 /// Two limbs in line, and others across them.
-fn bar(leads: &[Lead], area: f64) -> Option<Kind> {
+fn bar(leads: &[Lead], area: f64) -> Option<JointRole> {
     let (i, j) = (0..leads.len()).flat_map(|i| (i + 1..leads.len()).map(move |j| (i, j))).find(|&(i, j)| {
         let (a, b) = (&leads[i], &leads[j]);
         let [ahead, left] = a.seen(b.e);
@@ -284,7 +284,7 @@ fn bar(leads: &[Lead], area: f64) -> Option<Kind> {
         ends[k] = nodes.len() - 1;
     }
     ends[j] = nodes.len() - 1;
-    Some(Kind::Bar { nodes, width, ends })
+    Some(JointRole::Bar { nodes, width, ends })
 }
 
 /// Where a limb ends at the edge of a body: where its centreline crosses the edge next to one of its sides; an edge at right angles

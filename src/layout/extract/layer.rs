@@ -1,23 +1,23 @@
 //! One layer: merged, taken apart into parts that hang together, and put into the result.
 
-use super::anchors::{self, Rule};
+use super::anchors::{self, AnchorRule};
 use super::combs::{self, Finger};
-use super::error::{ExtractError, MOST_POINTS};
+use super::error::{ExtractError, MAX_POINTS};
 use super::gaps::{self, Pull};
 use super::holes::{self, Hole};
 use super::joints;
 use super::limbs;
 use super::medial::Medial;
-use super::model::Model;
-use super::part::{Found, Part};
+use super::model::PartModel;
+use super::part::{AxisAnalysis, Part};
 use super::perforated::perforated;
-use super::sink::Sink;
+use super::sink::ExtractionSink;
 use super::skeleton::Skeleton;
 use super::snap;
-use super::{Extraction, Facing, LayerResult, Plates, Unrecognised};
+use super::{ExtractedFacing, Extraction, LayerResult, Plates, UnmodelledArea};
 use crate::budget;
 use crate::layout::crossings::bounded;
-use crate::layout::drawing::{Drawing, Polygon};
+use crate::layout::drawing::{FlatLayout, Polygon};
 use crate::layout::process;
 use crate::layout::regions;
 use std::collections::{HashMap, HashSet};
@@ -31,10 +31,10 @@ const BALANCE: f64 = 1e-9;
 
 /// What is known of shapes: a drawing repeats them.
 #[derive(Default)]
-struct Shapes(HashMap<Polygon, Result<Found, String>>);
+struct ShapeCache(HashMap<Polygon, Result<AxisAnalysis, String>>);
 
-impl Shapes {
-    fn analyse(&mut self, polygon: Polygon, holes: Vec<Hole>, rule: &Rule) -> Result<Part, (Polygon, String)> {
+impl ShapeCache {
+    fn analyse(&mut self, polygon: Polygon, holes: Vec<Hole>, rule: &AnchorRule) -> Result<Part, (Polygon, String)> {
         let found = self.0.entry(at_origin(&polygon)).or_insert_with(|| {
             let axis = Medial::of(&polygon).map_err(|e| e.to_string())?;
             let parts = {
@@ -66,8 +66,8 @@ fn at_origin(polygon: &Polygon) -> Polygon {
 
 /// Adds the model of a layer to the result; answers the outlines of its parts in which something moves.
 pub(super) fn extract(
-    drawing: &Drawing,
-    layer: &process::Layer,
+    drawing: &FlatLayout,
+    layer: &process::StructuralLayer,
     drawn: &[Polygon],
     result: &mut Extraction,
 ) -> Result<Vec<Polygon>, ExtractError> {
@@ -88,11 +88,11 @@ pub(super) fn extract(
         None => regions::area(&solid),
     };
     let points: usize = solid.iter().flat_map(|p| &p.contours).map(Vec::len).sum();
-    if points > MOST_POINTS {
+    if points > MAX_POINTS {
         return Err(ExtractError::TooLarge { layer: layer.name.clone(), points });
     }
     budget::lay_out(points.saturating_mul(BYTES_PER_POINT));
-    let rule = Rule::of(drawing, layer, &solid);
+    let rule = AnchorRule::of(drawing, layer, &solid);
     let mut done = LayerResult {
         name: layer.name.clone(),
         thickness: layer.thickness,
@@ -105,7 +105,7 @@ pub(super) fn extract(
     if let Some(fluid) = layer.fluid {
         done.material.push(("fluid".to_owned(), fluid));
     }
-    let mut shapes = Shapes::default();
+    let mut shapes = ShapeCache::default();
     let mut parts = Vec::new();
     for polygon in solid {
         budget::check();
@@ -131,21 +131,21 @@ pub(super) fn extract(
     let model = |(carrier, taps): (&Part, &Vec<([f64; 2], bool)>)| {
         budget::check();
         let (axis, found) = &carrier.found;
-        Model::of(axis, carrier.origin(), found, &rule, taps, &carrier.holes)
+        PartModel::of(axis, carrier.origin(), found, &rule, taps, &carrier.holes)
     };
     let bare: Vec<Vec<([f64; 2], bool)>> = vec![Vec::new(); parts.len()];
-    let models: Vec<Model> = carriers.iter().zip(&bare).map(model).collect();
+    let models: Vec<PartModel> = carriers.iter().zip(&bare).map(model).collect();
     let moves: Vec<bool> = models.iter().map(|m| !(m.beams.is_empty() && m.bodies.is_empty())).collect();
     let gaps = gaps::gaps(&carriers, &moves, &combs, gaps::WIDEST / unit);
     gaps.iter().flat_map(gaps::Gap::pulls).for_each(|pull| taps[pull.part].push((pull.at, pull.on_axis)));
     let first = result.layers.iter().map(|layer| layer.parts).sum();
     let rigidity = layer.material.get("Youngsmodulus").filter(|e| **e > 0.0).map(|e| e * layer.thickness);
-    let mut sink = Sink { layer: result.layers.len(), result, first, unit, rigidity };
+    let mut sink = ExtractionSink { layer: result.layers.len(), result, first, unit, rigidity };
     // for each part, the nodes where combs pull
     let mut pulled: Vec<Option<std::vec::IntoIter<usize>>> = Vec::new();
     // those at which something pulls once more, with nodes there
     let pulled_at = models.into_iter().zip(carriers.iter().zip(&taps));
-    let models: Vec<Model> = pulled_at.map(|(bare, of)| if of.1.is_empty() { bare } else { model(of) }).collect();
+    let models: Vec<PartModel> = pulled_at.map(|(bare, of)| if of.1.is_empty() { bare } else { model(of) }).collect();
     let mut loose = vec![false; parts.len()];
     combs.iter().flat_map(|comb| &comb.loose).for_each(|k| loose[*k] = true);
     let held = models.iter().filter(|model| model.is_held()).count();
@@ -196,7 +196,7 @@ pub(super) fn extract(
                 let mut row = |pulls: &Vec<Pull>| pulls.iter().map(&mut node).collect::<Option<Vec<usize>>>();
                 if let (Some(upper), Some(lower)) = (row(upper), row(lower)) {
                     let widths = width.map(|w| w * unit);
-                    sink.result.facing.extend(upper.windows(2).zip(lower.windows(2)).map(|(u, l)| Facing {
+                    sink.result.facing.extend(upper.windows(2).zip(lower.windows(2)).map(|(u, l)| ExtractedFacing {
                         layer: sink.layer,
                         nodes: [u[0], u[1], l[0], l[1]],
                         width: widths,
@@ -211,7 +211,7 @@ pub(super) fn extract(
 }
 
 /// The parts without the fingers of combs.
-fn strip(shapes: &mut Shapes, parts: &[Part], fingers: &[Finger], rule: &Rule) -> Vec<Part> {
+fn strip(shapes: &mut ShapeCache, parts: &[Part], fingers: &[Finger], rule: &AnchorRule) -> Vec<Part> {
     let mut of_part: Vec<Vec<&Finger>> = vec![Vec::new(); parts.len()];
     fingers.iter().for_each(|finger| of_part[finger.part].push(finger));
     let stripped = parts.iter().zip(&of_part).map(|(part, fingers)| {
@@ -227,8 +227,8 @@ fn strip(shapes: &mut Shapes, parts: &[Part], fingers: &[Finger], rule: &Rule) -
     stripped.collect()
 }
 
-fn lost(layer: &process::Layer, polygon: &Polygon, unit: f64, area: f64, why: &str) -> Unrecognised {
+fn lost(layer: &process::StructuralLayer, polygon: &Polygon, unit: f64, area: f64, why: &str) -> UnmodelledArea {
     let [low, high] = polygon.extent().unwrap_or_default();
     let at = [0, 1].map(|i| 0.5 * (f64::from(low[i]) + f64::from(high[i])) * unit);
-    Unrecognised { layer: layer.name.clone(), area, at, polygons: vec![polygon.clone()], why: why.to_owned() }
+    UnmodelledArea { layer: layer.name.clone(), area, at, polygons: vec![polygon.clone()], why: why.to_owned() }
 }

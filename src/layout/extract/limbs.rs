@@ -4,7 +4,7 @@
 //! that only a corner on one side interrupts are one. A piece is a limb when it is long enough for its width, or one of several that
 //! follow a curve. What is left between limbs are the joints.
 
-use super::medial::Site;
+use super::medial::BoundarySite;
 use super::moments::Moments;
 use super::skeleton::Skeleton;
 
@@ -77,7 +77,7 @@ impl Limb {
 
 /// One step along a chain.
 #[derive(Debug, Clone, Copy)]
-struct Step {
+struct ChainStep {
     edge: u32,
     from: u32,
     to: u32,
@@ -98,7 +98,7 @@ pub(super) fn limbs(skeleton: &Skeleton<'_>) -> Vec<Limb> {
 }
 
 /// Paths between vertices where the skeleton ends or branches, and closed rings.
-fn chains(skeleton: &Skeleton<'_>) -> Vec<Vec<Step>> {
+fn chains(skeleton: &Skeleton<'_>) -> Vec<Vec<ChainStep>> {
     let mut done: Vec<bool> = skeleton.alive.iter().map(|alive| !alive).collect();
     let mut found = Vec::new();
     let count = skeleton.axis.vertices.len() as u32;
@@ -113,7 +113,7 @@ fn chains(skeleton: &Skeleton<'_>) -> Vec<Vec<Step>> {
                 while !done[edge as usize] {
                     done[edge as usize] = true;
                     let to = skeleton.across(edge, from);
-                    chain.push(Step { edge, from, to });
+                    chain.push(ChainStep { edge, from, to });
                     if skeleton.degree(to) != 2 {
                         break;
                     }
@@ -130,7 +130,7 @@ fn chains(skeleton: &Skeleton<'_>) -> Vec<Vec<Step>> {
 }
 
 /// The straight strips of a chain, those of one line joined.
-fn pieces(skeleton: &Skeleton<'_>, chain: &[Step]) -> Vec<Limb> {
+fn pieces(skeleton: &Skeleton<'_>, chain: &[ChainStep]) -> Vec<Limb> {
     let mut pieces: Vec<Limb> = Vec::new();
     // edges since the last piece, with their length
     let (mut between, mut gap) = (Vec::new(), 0.0);
@@ -162,10 +162,10 @@ fn pieces(skeleton: &Skeleton<'_>, chain: &[Step]) -> Vec<Limb> {
 }
 
 /// The strip of one edge, if it is one.
-fn straight(skeleton: &Skeleton<'_>, step: &Step, length: f64) -> Option<Limb> {
+fn straight(skeleton: &Skeleton<'_>, step: &ChainStep, length: f64) -> Option<Limb> {
     let axis = skeleton.axis;
     let edge = &axis.edges[step.edge as usize];
-    let [Site::Side(first), Site::Side(second)] = edge.sites else { return None };
+    let [BoundarySite::Side(first), BoundarySite::Side(second)] = edge.sites else { return None };
     let [u, v] = [step.from, step.to].map(|v| skeleton.vertex(v));
     if length <= 0.0 || (u.r - v.r).abs() > TAPER * length || u.r.min(v.r) <= 0.0 {
         return None;

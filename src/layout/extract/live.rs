@@ -4,7 +4,7 @@
 //! is conducted and what it does, they are `beam2det`, else `beam2de`. Etch holes that take the share p of a beam leave (1 − p)/(1 + p) of
 //! what it conducts (Maxwell's mixture in the plane).
 
-use super::{Beam, Extraction, LayerResult, Node};
+use super::{ExtractedBeam, ExtractedNode, Extraction, LayerResult};
 
 /// Relative change of the width below which a beam has one width [1]: what rounding to the grid does.
 const UNIFORM: f64 = 5e-3;
@@ -48,7 +48,7 @@ pub(super) fn divide_tapers(result: &mut Extraction) {
         .filter(|k| result.carries(result.beams[*k].nodes[0]) && tapers(result.beams[*k].width))
         .collect();
     for k in tapers {
-        let Beam { layer, nodes: [a, b], width, porosity } = result.beams[k].clone();
+        let ExtractedBeam { layer, nodes: [a, b], width, porosity } = result.beams[k].clone();
         let [p, q] = [a, b].map(|n| result.nodes[n].at);
         let (part, reach) = (result.nodes[a].part, width[0].max(width[1]));
         let mut last = a;
@@ -58,11 +58,11 @@ pub(super) fn divide_tapers(result: &mut Extraction) {
                 b
             } else {
                 let at = [0, 1].map(|i| p[i] + t * (q[i] - p[i]));
-                result.nodes.push(Node { name: String::new(), at, reach, labelled: false, part });
+                result.nodes.push(ExtractedNode { name: String::new(), at, reach, labelled: false, part });
                 result.nodes.len() - 1
             };
             let middle = width[0] + (t - 0.5 / PIECES as f64) * (width[1] - width[0]);
-            let beam = Beam { layer, nodes: [last, node], width: [middle; 2], porosity };
+            let beam = ExtractedBeam { layer, nodes: [last, node], width: [middle; 2], porosity };
             if piece == 0 {
                 result.beams[k] = beam;
             } else {

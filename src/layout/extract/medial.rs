@@ -7,14 +7,14 @@
 //! Coordinates are database units from the lower left corner of the polygon's box: a moved polygon has the same axis, bit by bit.
 
 use super::moments::Moments;
-use crate::layout::drawing::{Point, Polygon};
+use crate::layout::drawing::{GridPoint, Polygon};
 use boostvoronoi::prelude::{Builder, BvError, Diagram, SourceCategory};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What an edge of the axis keeps its distance from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Site {
+pub enum BoundarySite {
     /// The polygon's edge from the point of this number to the next one of its contour.
     Side(u32),
     /// The point of this number.
@@ -32,11 +32,11 @@ pub struct Vertex {
 
 /// An edge of the axis.
 #[derive(Debug, Clone, Copy)]
-pub struct Edge {
+pub struct AxisEdge {
     /// Its vertices.
     pub ends: [u32; 2],
     /// What lies on both sides of it.
-    pub sites: [Site; 2],
+    pub sites: [BoundarySite; 2],
     /// The area between them.
     pub cell: Moments,
 }
@@ -53,27 +53,27 @@ pub struct Medial {
     /// Points of the axis.
     pub vertices: Vec<Vertex>,
     /// Edges of the axis.
-    pub edges: Vec<Edge>,
+    pub edges: Vec<AxisEdge>,
 }
 
 /// The diagram of a polygon's edges could not be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("its medial axis could not be computed ({0})")]
-pub struct NoAxis(String);
+pub struct AxisError(String);
 
-impl From<BvError> for NoAxis {
+impl From<BvError> for AxisError {
     fn from(why: BvError) -> Self {
         Self(why.to_string())
     }
 }
 
 /// The Voronoi diagram of segments. Its predicates give up on some outlines that are a few database units wide by a panic.
-fn diagram(segments: &[[i32; 4]]) -> Result<Diagram, NoAxis> {
+fn diagram(segments: &[[i32; 4]]) -> Result<Diagram, AxisError> {
     let build = || Ok(Builder::<i32>::default().with_segments(segments.iter())?.build()?);
     MAY_PANIC.set(true);
     let built = catch_unwind(AssertUnwindSafe(build));
     MAY_PANIC.set(false);
-    built.unwrap_or_else(|_| Err(NoAxis("its edges are too close together".to_owned())))
+    built.unwrap_or_else(|_| Err(AxisError("its edges are too close together".to_owned())))
 }
 
 thread_local! {
@@ -92,7 +92,7 @@ impl Medial {
     ///
     /// # Errors
     /// The diagram could not be made.
-    pub fn of(polygon: &Polygon) -> Result<Self, NoAxis> {
+    pub fn of(polygon: &Polygon) -> Result<Self, AxisError> {
         let split = super::snap::split(polygon);
         let polygon = split.as_ref().unwrap_or(polygon);
         let [origin, _] = polygon.extent().unwrap_or_default();
@@ -100,7 +100,7 @@ impl Medial {
         let mut segments: Vec<[i32; 4]> = Vec::new();
         for contour in &polygon.contours {
             let first = axis.points.len() as u32;
-            let shifted: Vec<Point> = contour.iter().map(|p| [p[0] - origin[0], p[1] - origin[1]]).collect();
+            let shifted: Vec<GridPoint> = contour.iter().map(|p| [p[0] - origin[0], p[1] - origin[1]]).collect();
             for (k, (p, q)) in shifted.iter().zip(shifted.iter().cycle().skip(1)).enumerate() {
                 axis.points.push([f64::from(p[0]), f64::from(p[1])]);
                 axis.next.push(if k + 1 == shifted.len() { first } else { first + k as u32 + 1 });
@@ -114,14 +114,14 @@ impl Medial {
             let (source, category) = cells[cell].source_index_2();
             let k = source.usize();
             match category {
-                SourceCategory::SegmentStart | SourceCategory::SinglePoint => Site::Corner(k as u32),
-                SourceCategory::SegmentEnd => Site::Corner(axis.next[k]),
-                SourceCategory::Segment => Site::Side(k as u32),
+                SourceCategory::SegmentStart | SourceCategory::SinglePoint => BoundarySite::Corner(k as u32),
+                SourceCategory::SegmentEnd => BoundarySite::Corner(axis.next[k]),
+                SourceCategory::Segment => BoundarySite::Side(k as u32),
             }
         };
         let places: Vec<[f64; 2]> = diagram.vertices().iter().map(|v| [v.x(), v.y()]).collect();
         // Candidates: finite primary edges, each once, with a verdict where a side tells it.
-        let mut found: Vec<([u32; 2], [Site; 2], Option<bool>)> = Vec::new();
+        let mut found: Vec<([u32; 2], [BoundarySite; 2], Option<bool>)> = Vec::new();
         for edge in diagram.edges() {
             let twin = edge.twin()?;
             if edge.is_secondary() || twin.usize() < edge.id().usize() {
@@ -132,11 +132,11 @@ impl Medial {
             let sites = [site(edge.cell()?.usize()), site(other.cell()?.usize())];
             let ends = [a.usize() as u32, b.usize() as u32];
             let verdict = sites.iter().find_map(|s| match s {
-                Site::Side(k) => {
+                BoundarySite::Side(k) => {
                     let left = axis.left_of(*k, places[a.usize()]) + axis.left_of(*k, places[b.usize()]);
                     Some(left > 0.0)
                 }
-                Site::Corner(_) => None,
+                BoundarySite::Corner(_) => None,
             });
             found.push((ends, sites, verdict));
         }
@@ -156,7 +156,7 @@ impl Medial {
                 *n
             });
             let cell = axis.cell(ends, sites);
-            axis.edges.push(Edge { ends, sites, cell });
+            axis.edges.push(AxisEdge { ends, sites, cell });
         }
         Ok(axis)
     }
@@ -178,10 +178,10 @@ impl Medial {
     }
 
     /// The point of a site nearest to `p`, which lies in the site's cell.
-    pub fn foot(&self, site: Site, p: [f64; 2]) -> [f64; 2] {
+    pub fn foot(&self, site: BoundarySite, p: [f64; 2]) -> [f64; 2] {
         match site {
-            Site::Corner(k) => self.points[k as usize],
-            Site::Side(k) => {
+            BoundarySite::Corner(k) => self.points[k as usize],
+            BoundarySite::Side(k) => {
                 let [a, b] = self.side(k);
                 let d = [b[0] - a[0], b[1] - a[1]];
                 let t = ((p[0] - a[0]) * d[0] + (p[1] - a[1]) * d[1]) / (d[0] * d[0] + d[1] * d[1]);
@@ -191,19 +191,19 @@ impl Medial {
         }
     }
 
-    fn distance(&self, site: Site, p: [f64; 2]) -> f64 {
+    fn distance(&self, site: BoundarySite, p: [f64; 2]) -> f64 {
         let f = self.foot(site, p);
         (p[0] - f[0]).hypot(p[1] - f[1])
     }
 
     /// Corners of the area of an edge: from vertex to vertex over the feet on both sites.
-    pub fn outline(&self, ends: [u32; 2], sites: [Site; 2]) -> [[f64; 2]; 6] {
+    pub fn outline(&self, ends: [u32; 2], sites: [BoundarySite; 2]) -> [[f64; 2]; 6] {
         let [p, q] = ends.map(|v| self.vertices[v as usize].at);
         let [a, b] = sites;
         [p, self.foot(a, p), self.foot(a, q), q, self.foot(b, q), self.foot(b, p)]
     }
 
-    fn cell(&self, ends: [u32; 2], sites: [Site; 2]) -> Moments {
+    fn cell(&self, ends: [u32; 2], sites: [BoundarySite; 2]) -> Moments {
         Moments::of(&self.outline(ends, sites))
     }
 }
@@ -211,8 +211,8 @@ impl Medial {
 /// Which edges lie inside: those that a side says so of, and those between two corners that hang together with them.
 fn spread(
     places: &[[f64; 2]],
-    found: &[([u32; 2], [Site; 2], Option<bool>)],
-    distance: impl Fn(u32, Site) -> f64,
+    found: &[([u32; 2], [BoundarySite; 2], Option<bool>)],
+    distance: impl Fn(u32, BoundarySite) -> f64,
 ) -> Vec<bool> {
     let mut verdict = vec![None; places.len()];
     let mut inside: Vec<Option<bool>> = found.iter().map(|f| f.2).collect();

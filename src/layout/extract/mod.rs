@@ -42,15 +42,18 @@ mod snap;
 mod strips;
 mod taps;
 
-pub use error::{ExtractError, MOST_POINTS};
-pub use found::{Arc, Beam, Body, Comb, Extraction, Facing, LayerResult, Net, Node, Pad, Plates, Root, Unrecognised};
-pub use netlist::{Written, netlist, written};
+pub use error::{ExtractError, MAX_POINTS};
+pub use found::{
+    Arc, ExtractedBeam, ExtractedBody, ExtractedComb, ExtractedFacing, ExtractedNode, ExtractedPad, ExtractedRoot,
+    Extraction, LayerResult, Net, Plates, UnmodelledArea,
+};
+pub use netlist::{WrittenNetlist, netlist, written};
 
 use super::crossings::bounded;
-use super::drawing::{Drawing, Polygon};
+use super::drawing::{FlatLayout, Polygon};
 use super::process::{self, Process};
 use super::regions;
-use nets::Moving;
+use nets::MovingLayer;
 
 /// How a drawing is read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -61,7 +64,7 @@ pub struct ExtractOptions {}
 ///
 /// # Errors
 /// Nothing that moves is drawn, or there is too much of it.
-pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -> Result<Extraction, ExtractError> {
+pub fn extract(drawing: &FlatLayout, process: &Process, options: &ExtractOptions) -> Result<Extraction, ExtractError> {
     let ExtractOptions {} = options;
     let mut result = Extraction {
         source: drawing.source.clone(),
@@ -82,7 +85,7 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
             .flat_map(|(_, polygons)| polygons.iter().cloned())
             .collect();
         if !drawn.is_empty() {
-            moving.push(Moving { layer, parts: layer::extract(drawing, layer, &drawn, &mut result)? });
+            moving.push(MovingLayer { layer, parts: layer::extract(drawing, layer, &drawn, &mut result)? });
         }
     }
     if result.layers.is_empty() {
@@ -106,7 +109,7 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
 }
 
 /// Tells of layers that the process does not know.
-fn unknown_layers(drawing: &Drawing, process: &Process, result: &mut Extraction) -> Result<(), ExtractError> {
+fn unknown_layers(drawing: &FlatLayout, process: &Process, result: &mut Extraction) -> Result<(), ExtractError> {
     for (name, polygons) in &drawing.layers {
         if process.role_of(name).is_some() {
             continue;
@@ -119,7 +122,7 @@ fn unknown_layers(drawing: &Drawing, process: &Process, result: &mut Extraction)
                 [0, 1].map(|i| 0.5 * (f64::from(low[i]) + f64::from(high[i])) * drawing.unit_m)
             });
             let why = format!("process `{}` does not know layer {name}", process.name);
-            result.unrecognised.push(Unrecognised { layer: name.clone(), area, at, polygons: merged, why });
+            result.unrecognised.push(UnmodelledArea { layer: name.clone(), area, at, polygons: merged, why });
         }
     }
     Ok(())

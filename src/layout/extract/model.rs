@@ -1,10 +1,10 @@
 //! From limbs and joints to nodes, beams, rigid bodies and anchors.
 
-use super::anchors::Rule;
+use super::anchors::AnchorRule;
 use super::cells::{Cells, Owner, Tap};
-use super::cut::Cut;
+use super::cut::HoleCutouts;
 use super::holes::Hole;
-use super::joints::{self, Kind, Parts};
+use super::joints::{self, JointRole, LimbGraph};
 use super::medial::Medial;
 use super::moments::Moments;
 
@@ -13,20 +13,20 @@ const ROUNDED: f64 = 1e-2;
 
 /// The model of one part, in database units of the drawing.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Model {
+pub(super) struct PartModel {
     pub(super) nodes: Vec<[f64; 2]>,
     /// How far from each node a label may stand that names it.
     pub(super) reach: Vec<f64>,
-    pub(super) beams: Vec<Beam>,
-    pub(super) bodies: Vec<Body>,
+    pub(super) beams: Vec<PartBeam>,
+    pub(super) bodies: Vec<PartBody>,
     /// Rigid and massless connections.
     pub(super) links: Vec<[usize; 2]>,
     /// Elastic edges.
-    pub(super) roots: Vec<Root>,
+    pub(super) roots: Vec<PartRoot>,
     /// Nodes that are held.
     pub(super) anchors: Vec<usize>,
     /// Areas that are held, with their nodes.
-    pub(super) pads: Vec<Pad>,
+    pub(super) pads: Vec<PartPad>,
     /// For each tap its node, and whether it is held.
     pub(super) taps: Vec<usize>,
     /// Area that is held, of the whole part.
@@ -37,7 +37,7 @@ pub(super) struct Model {
 
 /// An area that is held.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Pad {
+pub(super) struct PartPad {
     pub(super) nodes: Vec<usize>,
     /// Outlines of what it consists of.
     pub(super) outlines: Vec<Vec<[f64; 2]>>,
@@ -45,7 +45,7 @@ pub(super) struct Pad {
 
 /// A straight beam, perhaps with a width that changes along it.
 #[derive(Debug, Clone)]
-pub(super) struct Beam {
+pub(super) struct PartBeam {
     pub(super) a: usize,
     pub(super) b: usize,
     pub(super) width: [f64; 2],
@@ -55,7 +55,7 @@ pub(super) struct Beam {
 
 /// An elastic edge between a node of a body and that of a limb in the same place.
 #[derive(Debug, Clone)]
-pub(super) struct Root {
+pub(super) struct PartRoot {
     pub(super) nodes: [usize; 2],
     /// Direction of the limb.
     pub(super) along: [f64; 2],
@@ -65,13 +65,13 @@ pub(super) struct Root {
 
 /// A rigid body.
 #[derive(Debug, Clone)]
-pub(super) struct Body {
+pub(super) struct PartBody {
     /// Node at its centroid.
     pub(super) node: usize,
     pub(super) moments: Moments,
 }
 
-impl Model {
+impl PartModel {
     /// Whether anything of it is held, with a node there or without.
     pub(super) fn is_held(&self) -> bool {
         !self.anchors.is_empty() || !self.pads.is_empty()
@@ -82,8 +82,8 @@ impl Model {
     pub(super) fn of(
         axis: &Medial,
         origin: [f64; 2],
-        parts: &Parts,
-        rule: &Rule,
+        parts: &LimbGraph,
+        rule: &AnchorRule,
         taps: &[([f64; 2], bool)],
         holes: &[Hole],
     ) -> Self {
@@ -99,7 +99,7 @@ impl Model {
             adjoining: Vec::new(),
             taps: Vec::new(),
             cells: Cells::default(),
-            holes: Cut::of(axis, parts, holes, origin),
+            holes: HoleCutouts::of(axis, parts, holes, origin),
             led: vec![[0.0; 2]; parts.limbs.len()],
         };
         if !taps.is_empty() {
@@ -130,12 +130,12 @@ impl Model {
 }
 
 pub(super) struct Builder<'a> {
-    pub(super) model: Model,
+    pub(super) model: PartModel,
     pub(super) axis: &'a Medial,
     /// Lower left corner of the part's box.
     pub(super) origin: [f64; 2],
-    pub(super) parts: &'a Parts,
-    pub(super) rule: &'a Rule,
+    pub(super) parts: &'a LimbGraph,
+    pub(super) rule: &'a AnchorRule,
     /// For each node, whether it is held.
     pub(super) anchored: Vec<bool>,
     /// For each joint, the node that stands for it.
@@ -147,7 +147,7 @@ pub(super) struct Builder<'a> {
     pub(super) taps: Vec<Tap>,
     pub(super) cells: Cells,
     /// What holes take of limbs and joints.
-    pub(super) holes: Cut,
+    pub(super) holes: HoleCutouts,
     /// For each limb, the area of holes where it is led into bodies beyond its cells; less than nothing where it ends before.
     pub(super) led: Vec<[f64; 2]>,
 }
@@ -163,7 +163,7 @@ impl Builder<'_> {
 
     fn holds(&self, local: [f64; 2]) -> bool {
         let origin = self.origin;
-        matches!(self.rule, Rule::Drawn(held) if held.holds([local[0] + origin[0], local[1] + origin[1]]))
+        matches!(self.rule, AnchorRule::Drawn(held) if held.holds([local[0] + origin[0], local[1] + origin[1]]))
     }
 
     /// Makes the nodes of a joint and returns those of its ports.
@@ -171,13 +171,13 @@ impl Builder<'_> {
         let joint = &self.parts.joints[j];
         let first = self.model.nodes.len();
         let ends = match &joint.kind {
-            Kind::Node(at) => {
+            JointRole::Node(at) => {
                 let held = joint.ports.len() > 1 && self.holds(*at);
                 self.count(joint.cell.area - self.holes.joints[j].moments.area, held);
                 let width = joint.ports.iter().map(|p| self.parts.limbs[p.limb].width[p.end]).fold(0.0, f64::max);
                 vec![self.node(*at, width, held); joint.ports.len()]
             }
-            Kind::Bar { nodes, width, ends } => {
+            JointRole::Bar { nodes, width, ends } => {
                 self.count(joint.cell.area - self.holes.joints[j].moments.area, false);
                 let made: Vec<usize> = nodes.iter().map(|at| self.node(*at, *width, self.holds(*at))).collect();
                 for (pair, at) in made.windows(2).zip(nodes.windows(2)) {
@@ -185,12 +185,12 @@ impl Builder<'_> {
                     if joints::stout(length, *width) {
                         self.model.links.push([pair[0], pair[1]]);
                     } else {
-                        self.model.beams.push(Beam { a: pair[0], b: pair[1], width: [*width; 2], porosity: 0.0 });
+                        self.model.beams.push(PartBeam { a: pair[0], b: pair[1], width: [*width; 2], porosity: 0.0 });
                     }
                 }
                 ends.iter().map(|k| made[*k]).collect()
             }
-            Kind::Body(places) => {
+            JointRole::Body(places) => {
                 let held = self.rule.holds_body(self.axis, self.origin, &self.parts.limbs, joint);
                 self.count(joint.cell.area - self.holes.joints[j].moments.area, held);
                 let size = joint.cell.area.max(0.0).sqrt();
@@ -207,15 +207,15 @@ impl Builder<'_> {
                         let along = self.parts.limbs[joint.ports[p].limb].direction();
                         let root = self.node(places[p], 0.0, false);
                         self.model.links.push([node, root]);
-                        self.model.roots.push(Root { nodes: [root, end], along, compliance });
+                        self.model.roots.push(PartRoot { nodes: [root, end], along, compliance });
                     }
-                    self.model.bodies.push(Body { node, moments });
+                    self.model.bodies.push(PartBody { node, moments });
                 } else if ends.is_empty() {
                     self.node(joint.cell.centroid(), size, true);
                 }
                 ends
             }
-            Kind::Unset => unreachable!("every joint becomes something"),
+            JointRole::Unset => unreachable!("every joint becomes something"),
         };
         // of a free body its own node, made last; else the first made
         let made = self.model.nodes.len();
@@ -242,7 +242,7 @@ impl Builder<'_> {
             let j = self.parts.at[k][end];
             let joint = &self.parts.joints[j];
             let port = joint.ports.iter().position(|p| p.limb == k && p.end == end);
-            let (Kind::Body(places), Some(p)) = (&joint.kind, port) else { continue };
+            let (JointRole::Body(places), Some(p)) = (&joint.kind, port) else { continue };
             let (d, e, place) = (limb.direction(), limb.ends[end], places[p]);
             let ahead = (place[0] - e[0]) * d[0] + (place[1] - e[1]) * d[1];
             let ahead = if end == 1 { ahead } else { -ahead };

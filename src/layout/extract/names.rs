@@ -3,15 +3,15 @@
 use super::Extraction;
 use super::boxes::Boxes;
 use super::identifier::identifier;
-use super::nets::OnNet;
-use crate::layout::drawing::Drawing;
+use super::nets::LabelTarget;
+use crate::layout::drawing::FlatLayout;
 use std::collections::HashSet;
 
 /// Labels that are told one by one.
-const TOLD: usize = 20;
+const MAX_REPORTED: usize = 20;
 
 /// Names all nodes; `nets` says for each label what conductor it stands on.
-pub(super) fn name(result: &mut Extraction, drawing: &Drawing, nets: &[Option<OnNet>]) {
+pub(super) fn name(result: &mut Extraction, drawing: &FlatLayout, nets: &[Option<LabelTarget>]) {
     let boxes: Vec<_> = result.nodes.iter().map(|n| [n.at.map(|x| x - n.reach), n.at.map(|x| x + n.reach)]).collect();
     let tree = Boxes::of(&boxes);
     let mut taken: HashSet<String> = result.layers.iter().map(|layer| layer.name.clone()).collect();
@@ -75,9 +75,11 @@ pub(super) fn told(result: &mut Extraction) {
     let mut count = 0usize;
     result.notes.retain(|note| {
         count += usize::from(note.starts_with("label `"));
-        count <= TOLD || !note.starts_with("label `")
+        count <= MAX_REPORTED || !note.starts_with("label `")
     });
-    if count > TOLD {
-        result.notes.push(format!("{} more labels that name nothing, or what has a name already", count - TOLD));
+    if count > MAX_REPORTED {
+        result
+            .notes
+            .push(format!("{} more labels that name nothing, or what has a name already", count - MAX_REPORTED));
     }
 }

@@ -5,8 +5,8 @@
 
 use super::Extraction;
 use super::conductors;
-use super::repeats::{self, Instance, Scope, Subnet};
-use super::rows::{Frame, Item, Row, Rows, Value};
+use super::repeats::{self, Scope, Subnet, SubnetInstance};
+use super::rows::{Item, LocalFrame, NetlistRow, RowBuilder, RowValue};
 use crate::sets::Sets;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -17,7 +17,7 @@ const SHARED: [usize; 2] = [2, 3];
 
 /// A netlist with the names of its nodes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Written {
+pub struct WrittenNetlist {
     /// The netlist.
     pub text: String,
     /// Full name of each node of the extraction in it.
@@ -32,16 +32,16 @@ pub fn netlist(extraction: &Extraction) -> String {
 }
 
 /// The netlist of an extraction, and what its nodes are called there.
-pub fn written(extraction: &Extraction) -> Written {
-    let rows = Rows::new(extraction);
+pub fn written(extraction: &Extraction) -> WrittenNetlist {
+    let rows = RowBuilder::new(extraction);
     let items = items(extraction);
     let mut text = String::new();
     let marks = RefCell::new(Vec::new());
     head(extraction, &mut text, &mut marks.borrow_mut());
-    let flat: Vec<Row> = items.iter().map(|item| rows.row(item, &Frame::DRAWING)).collect();
+    let flat: Vec<NetlistRow> = items.iter().map(|item| rows.row(item, &LocalFrame::DRAWING)).collect();
     let words = Words::new(&flat, &mut text);
     let (scope, subnets) = repeats::scope(extraction, &rows, items);
-    let writer = Writer { extraction, words, rows, subnets: &subnets, marks };
+    let writer = NetlistWriter { extraction, words, rows, subnets: &subnets, marks };
     let locals: Vec<HashMap<usize, String>> = subnets.iter().map(|subnet| writer.locals(subnet)).collect();
     for (subnet, local) in subnets.iter().zip(&locals) {
         let formals: Vec<&str> = subnet.terminals.iter().map(|n| local[n].as_str()).collect();
@@ -54,7 +54,7 @@ pub fn written(extraction: &Extraction) -> Written {
     let all: HashMap<usize, usize> = (0..names.len()).map(|n| (n, n)).collect();
     writer.inner(&scope, "", &all, &locals, &mut names);
     let places = writer.places_of_lines(&text);
-    Written { text, names, places }
+    WrittenNetlist { text, names, places }
 }
 
 /// All elements in the order in which they are written.
@@ -72,7 +72,7 @@ fn items(extraction: &Extraction) -> Vec<Item> {
     items
 }
 
-fn head(extraction: &Extraction, out: &mut String, marks: &mut Vec<Mark>) {
+fn head(extraction: &Extraction, out: &mut String, marks: &mut Vec<LineMark>) {
     let clean = |text: &str| text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
     let _ = writeln!(
         out,
@@ -94,7 +94,11 @@ fn head(extraction: &Extraction, out: &mut String, marks: &mut Vec<Mark>) {
     for (k, layer) in extraction.layers.iter().enumerate() {
         let first = extraction.bodies.iter().find(|b| b.layer == k).map(|b| b.node);
         let first = first.or_else(|| extraction.beams.iter().find(|b| b.layer == k).map(|b| b.nodes[0]));
-        marks.extend(first.map(|n| Mark { at: out.len(), layer: layer.name.clone(), place: extraction.nodes[n].at }));
+        marks.extend(first.map(|n| LineMark {
+            at: out.len(),
+            layer: layer.name.clone(),
+            place: extraction.nodes[n].at,
+        }));
         let entries: Vec<String> =
             layer.material.iter().map(|(name, value)| format!("{name}={}", number(*value))).collect();
         let _ = writeln!(out, "process {} = [ {} h={} ]", layer.name, entries.join(" "), micro(layer.thickness));
@@ -102,7 +106,7 @@ fn head(extraction: &Extraction, out: &mut String, marks: &mut Vec<Mark>) {
 }
 
 /// Where a line begins, and what it stands for.
-struct Mark {
+struct LineMark {
     /// Byte of the netlist.
     at: usize,
     layer: String,
@@ -110,15 +114,15 @@ struct Mark {
     place: [f64; 2],
 }
 
-struct Writer<'a> {
+struct NetlistWriter<'a> {
     extraction: &'a Extraction,
     words: Words,
-    rows: Rows<'a>,
+    rows: RowBuilder<'a>,
     subnets: &'a [Subnet],
-    marks: RefCell<Vec<Mark>>,
+    marks: RefCell<Vec<LineMark>>,
 }
 
-impl Writer<'_> {
+impl NetlistWriter<'_> {
     /// What lines of the netlist stand for, by their numbers.
     fn places_of_lines(&self, text: &str) -> BTreeMap<usize, (String, [f64; 2])> {
         let (mut line, mut from, mut places) = (1, 0, BTreeMap::new());
@@ -152,7 +156,7 @@ impl Writer<'_> {
             let place = [0, 1].map(|i| {
                 nodes.iter().map(|n| self.extraction.nodes[*n].at[i]).sum::<f64>() / nodes.len().max(1) as f64
             });
-            self.marks.borrow_mut().push(Mark { at: out.len(), layer: row.layer.clone(), place });
+            self.marks.borrow_mut().push(LineMark { at: out.len(), layer: row.layer.clone(), place });
             let _ = writeln!(out, "{indent}{}", self.words.line(&row, name));
         }
     }
@@ -210,7 +214,7 @@ impl Writer<'_> {
         locals: &[HashMap<usize, String>],
         names: &mut [String],
     ) {
-        for Instance { name, subnet, nodes, .. } in &scope.instances {
+        for SubnetInstance { name, subnet, nodes, .. } in &scope.instances {
             let path = format!("{path}{name}.");
             let here: HashMap<usize, usize> = nodes.iter().map(|(first, own)| (*first, from[own])).collect();
             let inside = &self.subnets[*subnet];
@@ -230,30 +234,30 @@ struct Words {
 
 impl Words {
     /// Finds them, and writes them down.
-    fn new(rows: &[Row], out: &mut String) -> Self {
+    fn new(rows: &[NetlistRow], out: &mut String) -> Self {
         let values = || rows.iter().flat_map(|row| &row.values).map(|(_, value)| value);
-        let wide = values().filter_map(|v| if let Value::Wide(x) = v { Some(micro(*x)) } else { None });
-        let long = values().filter_map(|v| if let Value::Long(x) = v { Some(micro(*x)) } else { None });
+        let wide = values().filter_map(|v| if let RowValue::Wide(x) = v { Some(micro(*x)) } else { None });
+        let long = values().filter_map(|v| if let RowValue::Long(x) = v { Some(micro(*x)) } else { None });
         Self { wide: shared("w", "width", SHARED[0], wide, out), long: shared("l", "length", SHARED[1], long, out) }
     }
 
-    fn value(&self, value: &Value) -> Option<String> {
+    fn value(&self, value: &RowValue) -> Option<String> {
         let or = |words: &HashMap<String, String>, x: f64| {
             let plain = micro(x);
             words.get(&plain).cloned().unwrap_or(plain)
         };
         Some(match value {
-            Value::Long(x) => or(&self.long, *x),
-            Value::Wide(x) => or(&self.wide, *x),
-            Value::Metres(x) => micro(*x),
-            Value::Turn(x) => return direction(*x),
-            Value::Angle(x) => format!("deg({})", degrees(*x)),
-            Value::Plain(x) => number(*x),
-            Value::Count(n) => n.to_string(),
+            RowValue::Long(x) => or(&self.long, *x),
+            RowValue::Wide(x) => or(&self.wide, *x),
+            RowValue::Metres(x) => micro(*x),
+            RowValue::Turn(x) => return direction(*x),
+            RowValue::Angle(x) => format!("deg({})", degrees(*x)),
+            RowValue::Plain(x) => number(*x),
+            RowValue::Count(n) => n.to_string(),
         })
     }
 
-    fn line(&self, row: &Row, name: &dyn Fn(usize) -> String) -> String {
+    fn line(&self, row: &NetlistRow, name: &dyn Fn(usize) -> String) -> String {
         let nodes: Vec<String> = row.nodes.iter().map(|n| name(*n)).collect();
         let values = row.values.iter().filter_map(|(key, value)| Some(format!("{key}={}", self.value(value)?)));
         let values: Vec<String> = values.collect();

@@ -4,13 +4,13 @@
 //! join the pads that they overlap, and a part in which nothing moves is one conductor. Between two nets or more, the beams of a part carry
 //! current.
 
-use super::areas::{self, Areas};
+use super::areas::{self, AreaIndex};
 use super::boxes::{self, Boxes, Extent};
-use super::error::{ExtractError, MOST_POINTS};
+use super::error::{ExtractError, MAX_POINTS};
 use super::identifier::identifier;
 use super::{Extraction, Net};
 use crate::layout::crossings::bounded;
-use crate::layout::drawing::{Drawing, Label, Polygon};
+use crate::layout::drawing::{FlatLayout, Label, Polygon};
 use crate::layout::mask;
 use crate::layout::process::{self, Process};
 use crate::layout::regions;
@@ -19,8 +19,8 @@ use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 /// What moves of a layer.
-pub(super) struct Moving<'a> {
-    pub(super) layer: &'a process::Layer,
+pub(super) struct MovingLayer<'a> {
+    pub(super) layer: &'a process::StructuralLayer,
     /// Outlines of the parts in which something moves, etch holes filled.
     pub(super) parts: Vec<Polygon>,
 }
@@ -30,7 +30,7 @@ const GROUNDS: [&str; 4] = ["gnd", "ground", "vss", "0"];
 
 /// What a label stands on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct OnNet {
+pub(super) struct LabelTarget {
     /// The pad under it; none: wiring.
     pub(super) pad: Option<usize>,
     /// Index of the net; none: it has another name already.
@@ -43,11 +43,11 @@ pub(super) struct OnNet {
 /// Wiring of too many points, or whose polygons cut one another too often to be merged.
 pub(super) fn find(
     result: &mut Extraction,
-    drawing: &Drawing,
+    drawing: &FlatLayout,
     process: &Process,
-    moving: &[Moving<'_>],
-) -> Result<Vec<Option<OnNet>>, ExtractError> {
-    let under = Under::new(result, wiring(drawing, process)?, moving);
+    moving: &[MovingLayer<'_>],
+) -> Result<Vec<Option<LabelTarget>>, ExtractError> {
+    let under = ConductorIndex::new(result, wiring(drawing, process)?, moving);
     let still = still(result);
     let mut sets = joined(result, &under, &still);
     let count = result.pads.len();
@@ -67,7 +67,7 @@ pub(super) fn find(
         };
         let told = format!("label `{}` at {}", label.text, drawing.place(at));
         let Some(name) = identifier(&label.text) else {
-            labels.push(Some(OnNet { pad, net: None }));
+            labels.push(Some(LabelTarget { pad, net: None }));
             continue;
         };
         let root = sets.first(conductor);
@@ -92,7 +92,7 @@ pub(super) fn find(
                 Some(result.nets.len() - 1)
             }
         };
-        labels.push(Some(OnNet { pad, net }));
+        labels.push(Some(LabelTarget { pad, net }));
     }
     for k in 0..count {
         if let Some(net) = net_of.get(&sets.first(k)) {
@@ -112,17 +112,17 @@ enum Conductor {
 }
 
 /// Pads, wiring and parts that move, found by place.
-struct Under<'a> {
+struct ConductorIndex<'a> {
     /// Outlines of pads, each with its pad.
     pads: Vec<(usize, Vec<[f64; 2]>)>,
     tree: Boxes,
     wiring: Wiring,
     /// Layers with their parts that move, sorted in when a label asks.
-    moving: Vec<(&'a Moving<'a>, OnceCell<Areas>)>,
+    moving: Vec<(&'a MovingLayer<'a>, OnceCell<AreaIndex>)>,
 }
 
-impl<'a> Under<'a> {
-    fn new(result: &Extraction, wiring: Wiring, moving: &'a [Moving<'a>]) -> Self {
+impl<'a> ConductorIndex<'a> {
+    fn new(result: &Extraction, wiring: Wiring, moving: &'a [MovingLayer<'a>]) -> Self {
         let all = result.pads.iter().enumerate();
         let cells = all.flat_map(|(k, pad)| pad.outlines.iter().map(move |outline| (k, outline.clone())));
         let pads: Vec<_> = cells.filter(|(_, outline)| outline.iter().any(|p| *p != outline[0])).collect();
@@ -144,7 +144,7 @@ impl<'a> Under<'a> {
             }
             let parts = parts.get_or_init(|| {
                 crate::budget::lay_out(points(&moving.parts) * areas::BYTES_PER_POINT);
-                Areas::of(&moving.parts)
+                AreaIndex::of(&moving.parts)
             });
             if !parts.holding(at).is_empty() {
                 return None;
@@ -156,7 +156,7 @@ impl<'a> Under<'a> {
 }
 
 /// Pads, then polygons of wiring: which of them are one conductor.
-fn joined(result: &Extraction, under: &Under<'_>, still: &[bool]) -> Sets {
+fn joined(result: &Extraction, under: &ConductorIndex<'_>, still: &[bool]) -> Sets {
     let count = result.pads.len();
     let mut sets = Sets::new(count + under.wiring.areas.len());
     for (pad, outline) in &under.pads {
@@ -184,7 +184,7 @@ fn joined(result: &Extraction, under: &Under<'_>, still: &[bool]) -> Sets {
 
 /// Conductors that are no part: merged polygons of layers that hold still, and of metal.
 struct Wiring {
-    areas: Areas,
+    areas: AreaIndex,
     /// The layers that polygons can join, none: all, from the polygon of that number on.
     layers: Vec<(usize, Option<Vec<String>>)>,
 }
@@ -202,7 +202,7 @@ fn points(polygons: &[Polygon]) -> usize {
 }
 
 /// Finds the wiring of a drawing.
-fn wiring(drawing: &Drawing, process: &Process) -> Result<Wiring, ExtractError> {
+fn wiring(drawing: &FlatLayout, process: &Process) -> Result<Wiring, ExtractError> {
     let drawn = |names: &[String]| {
         let of = drawing.layers.iter().filter(|(name, _)| process::names(names, name));
         let all: Vec<Polygon> = of.flat_map(|(_, polygons)| polygons.iter().cloned()).collect();
@@ -210,7 +210,7 @@ fn wiring(drawing: &Drawing, process: &Process) -> Result<Wiring, ExtractError> 
         bounded(all.iter()).map_err(|tangled| ExtractError::Tangled { layer: layer(), tangled })?;
         let merged = regions::union(&all);
         let points = points(&merged);
-        if points > MOST_POINTS {
+        if points > MAX_POINTS {
             return Err(ExtractError::TooLarge { layer: layer(), points });
         }
         crate::budget::lay_out(points * areas::BYTES_PER_POINT);
@@ -229,7 +229,7 @@ fn wiring(drawing: &Drawing, process: &Process) -> Result<Wiring, ExtractError> 
         layers.push((all.len(), Some(joins)));
         all.extend(drawn(&metal)?);
     }
-    Ok(Wiring { areas: Areas::of(&all), layers })
+    Ok(Wiring { areas: AreaIndex::of(&all), layers })
 }
 
 /// For each part whether nothing in it moves.

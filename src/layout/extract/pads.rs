@@ -1,12 +1,12 @@
 //! Areas that are held, with the nodes on them: what labels stand on.
 
-use super::model::{Builder, Pad};
+use super::model::{Builder, PartPad};
 use crate::sets::Sets;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// A stretch of a limb as shares of its length, with nodes on it.
-pub(super) type Stretch = ([f64; 2], Vec<usize>);
+pub(super) type AnchoredStretch = ([f64; 2], Vec<usize>);
 
 impl Builder<'_> {
     /// What a joint holds: those of the nodes made for it that are anchored, and its whole area.
@@ -21,11 +21,11 @@ impl Builder<'_> {
             axis.outline(edge.ends, edge.sites).map(|p| [p[0] + origin[0], p[1] + origin[1]]).to_vec()
         });
         self.pad_of[j] = Some(self.model.pads.len());
-        self.model.pads.push(Pad { nodes: held, outlines: cells.collect() });
+        self.model.pads.push(PartPad { nodes: held, outlines: cells.collect() });
     }
 
     /// What is held of a limb between two nodes, with those of them that are anchored.
-    pub(super) fn held(&self, covered: &[[f64; 2]], a: usize, b: usize) -> Vec<Stretch> {
+    pub(super) fn held(&self, covered: &[[f64; 2]], a: usize, b: usize) -> Vec<AnchoredStretch> {
         let ends = |t: &[f64; 2]| {
             let ends = [(t[0] == 0.0, a), (t[1] == 1.0, b)];
             ends.into_iter().filter(|(there, n)| *there && self.anchored[*n]).map(|(_, n)| n).collect()
@@ -34,7 +34,7 @@ impl Builder<'_> {
     }
 
     /// Makes pads of what is held of limb `k`, whose centreline goes from `p` to `q`.
-    pub(super) fn stretches(&mut self, k: usize, [p, q]: [[f64; 2]; 2], held: Vec<Stretch>) {
+    pub(super) fn stretches(&mut self, k: usize, [p, q]: [[f64; 2]; 2], held: Vec<AnchoredStretch>) {
         let limb = &self.parts.limbs[k];
         let long = (q[0] - p[0]).hypot(q[1] - p[1]);
         let n = [-(q[1] - p[1]) / long, (q[0] - p[0]) / long];
@@ -48,7 +48,7 @@ impl Builder<'_> {
             let reached = [(t0 == 0.0, joints[0]), (t1 == 1.0, joints[1])];
             let pad = self.model.pads.len();
             self.adjoining.extend(reached.into_iter().filter(|(there, _)| *there).map(|(_, joint)| (joint, pad)));
-            self.model.pads.push(Pad { nodes, outlines: vec![outline] });
+            self.model.pads.push(PartPad { nodes, outlines: vec![outline] });
         }
     }
 
@@ -64,7 +64,7 @@ impl Builder<'_> {
                 sets.join(*of_node[*n].get_or_insert(k), k);
             });
         }
-        let mut joined: BTreeMap<usize, Pad> = BTreeMap::new();
+        let mut joined: BTreeMap<usize, PartPad> = BTreeMap::new();
         for (k, pad) in std::mem::take(&mut self.model.pads).into_iter().enumerate() {
             let whole = joined.entry(sets.first(k)).or_default();
             whole.nodes.extend(pad.nodes);

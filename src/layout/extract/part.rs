@@ -1,13 +1,13 @@
 //! A part of a layer that hangs together, and what is known of its shape.
 
 use super::holes::Hole;
-use super::joints::Parts;
+use super::joints::LimbGraph;
 use super::medial::Medial;
 use crate::layout::drawing::Polygon;
 use std::sync::Arc;
 
 /// What was found along the axis of a shape.
-pub(super) type Found = (Arc<Medial>, Arc<Parts>);
+pub(super) type AxisAnalysis = (Arc<Medial>, Arc<LimbGraph>);
 
 /// A part that hangs together.
 #[derive(Debug, Clone)]
@@ -15,7 +15,7 @@ pub(super) struct Part {
     /// Its outline.
     pub(super) polygon: Polygon,
     /// Its axis, limbs and joints.
-    pub(super) found: Found,
+    pub(super) found: AxisAnalysis,
     /// Etch holes in it, in coordinates of the drawing.
     pub(super) holes: Vec<Hole>,
 }

@@ -8,11 +8,11 @@
 //! The edge of a perforated plate gives way where a narrow limb stands on it, as the half-plane E′ of the plate does: by a spring for shifts and
 //! turns, and by [`ROOT`] widths by which the limb is led into it.
 
-use super::anchors::{self, Rule};
+use super::anchors::{self, AnchorRule};
 use super::boxes;
-use super::cut::Cut;
+use super::cut::HoleCutouts;
 use super::holes::{self, Hole};
-use super::joints::{self, Joint, Kind, Parts, Port};
+use super::joints::{self, JointRole, LimbEnd, LimbGraph, LimbJoint};
 use super::limbs::{self, Limb};
 use super::medial::Medial;
 use super::skeleton::Skeleton;
@@ -44,19 +44,25 @@ const LONG: [f64; 2] = [1.0 / 3.0, 0.3];
 const NARROW: f64 = 0.5;
 
 /// Limbs and joints of a part with holes; `plain` are those of its outline alone.
-pub(super) fn perforated(axis: &Medial, plain: &Parts, holes: &[Hole], origin: [f64; 2], rule: &Rule) -> Parts {
+pub(super) fn perforated(
+    axis: &Medial,
+    plain: &LimbGraph,
+    holes: &[Hole],
+    origin: [f64; 2],
+    rule: &AnchorRule,
+) -> LimbGraph {
     let skeleton = Skeleton::of(axis);
-    let cut = Cut::of(axis, plain, holes, origin);
+    let cut = HoleCutouts::of(axis, plain, holes, origin);
     let rigid = plates(axis, plain, &cut, origin, rule);
     let mut kept = rigid.iter();
     let mut limbs = limbs::limbs(&skeleton);
     limbs.retain(|_| !kept.next().is_some_and(|rigid| *rigid));
     let mut parts = joints::joints(&skeleton, limbs);
-    let cut = Cut::of(axis, &parts, holes, origin);
+    let cut = HoleCutouts::of(axis, &parts, holes, origin);
     for j in 0..parts.joints.len() {
         let joint = &parts.joints[j];
-        let point =
-            matches!(joint.kind, Kind::Bar { .. }) || matches!(joint.kind, Kind::Node(_)) && joint.ports.len() > 1;
+        let point = matches!(joint.kind, JointRole::Bar { .. })
+            || matches!(joint.kind, JointRole::Node(_)) && joint.ports.len() > 1;
         // where a limb stands on a perforated one, its way to the centreline would weigh twice, by different densities
         let stands = joint.ports.len() > 2 && joint.ports.iter().any(|port| cut.limbs[port.limb].moments.area > 0.0);
         if point && (stands || cut.joints[j].moments.area > 0.0) {
@@ -67,12 +73,13 @@ pub(super) fn perforated(axis: &Medial, plain: &Parts, holes: &[Hole], origin: [
         let elastic = cut.joints[j].moments.area > 0.0 && !rule.holds_body(axis, origin, limbs, joint);
         let wide = 2.0 * anchors::half_width(axis, joint);
         let stiffness = holes::stiffness(cut.joints[j].moments.area / joint.cell.area);
-        let narrow = |port: &Port| elastic && limbs[port.limb].width[port.end] <= NARROW * wide;
+        let narrow = |port: &LimbEnd| elastic && limbs[port.limb].width[port.end] <= NARROW * wide;
         let elastic: Vec<bool> = joint.ports.iter().map(narrow).collect();
-        let yields =
-            |(port, narrow): (&Port, &bool)| narrow.then(|| edge(axis, joint, &limbs[port.limb], port.end, stiffness));
+        let yields = |(port, narrow): (&LimbEnd, &bool)| {
+            narrow.then(|| edge(axis, joint, &limbs[port.limb], port.end, stiffness))
+        };
         joint.roots = joint.ports.iter().zip(&elastic).map(yields).collect();
-        if let Kind::Body(places) = &mut joint.kind {
+        if let JointRole::Body(places) = &mut joint.kind {
             for ((place, port), narrow) in places.iter_mut().zip(&joint.ports).zip(elastic) {
                 *place = root(*place, &limbs[port.limb], port.end, joint.cell.area, narrow);
             }
@@ -82,7 +89,7 @@ pub(super) fn perforated(axis: &Medial, plain: &Parts, holes: &[Hole], origin: [
 }
 
 /// By how much the edge of a plate gives way under a limb that stands on it, times E·thickness: shift, turn.
-fn edge(axis: &Medial, joint: &Joint, limb: &Limb, end: usize, stiffness: f64) -> [f64; 2] {
+fn edge(axis: &Medial, joint: &LimbJoint, limb: &Limb, end: usize, stiffness: f64) -> [f64; 2] {
     let (width, d) = (limb.width[end], limb.direction());
     let room = joints::from_corner(axis, limb, end);
     let corner = 1.0 + FLUSH[0] * (-room / (FLUSH[1] * width)).exp();
@@ -106,7 +113,7 @@ fn root(mouth: [f64; 2], limb: &Limb, end: usize, area: f64, deep: bool) -> [f64
 }
 
 /// For each limb whether it is a piece of a plate.
-fn plates(axis: &Medial, parts: &Parts, cut: &Cut, origin: [f64; 2], rule: &Rule) -> Vec<bool> {
+fn plates(axis: &Medial, parts: &LimbGraph, cut: &HoleCutouts, origin: [f64; 2], rule: &AnchorRule) -> Vec<bool> {
     let porosity = |k: usize| cut.limbs[k].moments.area / parts.limbs[k].cell.area;
     let compliance: Vec<f64> = (0..parts.limbs.len()).map(|k| compliance(&parts.limbs[k], porosity(k))).collect();
     let mut rigid: Vec<bool> = parts.limbs.iter().map(|limb| !rule.holds_limb(limb, origin)).collect();

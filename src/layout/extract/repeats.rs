@@ -7,18 +7,18 @@
 
 use super::Extraction;
 use super::boxes::Boxes;
-use super::rows::{Frame, Item, Row, Rows};
+use super::rows::{Item, LocalFrame, NetlistRow, RowBuilder};
 use crate::layout::drawing::Placement;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 /// Places are one when they are the same to this [m]: below any grid, above rounding of arithmetic.
 const QUANTUM: f64 = 1e-10;
 /// Fewest elements of a subnet.
-const FEWEST: usize = 2;
+const MIN_ELEMENTS: usize = 2;
 /// Two magnifications are one up to this [1].
 const MAGNIFIED: f64 = 1e-9;
 /// Most kinds of content of cells with one name: with more they do not repeat, and the others stay flat.
-const MOST_KINDS: usize = 64;
+const MAX_KINDS: usize = 64;
 /// Looking into the cells of one round may meet so many times the elements and nodes of the scope, and as many at least: side by side they
 /// have each once, and boxes that all lie over each other, because something far away is in them, make no subnets.
 const LOOKED_AT: [usize; 2] = [8, 100_000];
@@ -28,10 +28,10 @@ const BYTES_PER_ROW: usize = 400;
 /// Elements and instances in one frame.
 #[derive(Debug)]
 pub(super) struct Scope {
-    pub(super) frame: Frame,
+    pub(super) frame: LocalFrame,
     /// Elements that are in no instance.
     pub(super) items: Vec<Item>,
-    pub(super) instances: Vec<Instance>,
+    pub(super) instances: Vec<SubnetInstance>,
 }
 
 /// A subnet with what is in the first of its instances.
@@ -45,11 +45,11 @@ pub(super) struct Subnet {
 
 /// A subnet in a place.
 #[derive(Debug)]
-pub(super) struct Instance {
+pub(super) struct SubnetInstance {
     pub(super) name: String,
     /// Index of its subnet.
     pub(super) subnet: usize,
-    pub(super) frame: Frame,
+    pub(super) frame: LocalFrame,
     /// What it is given for the subnet's terminals.
     pub(super) terminals: Vec<usize>,
     /// Its node for each node of the first instance.
@@ -57,7 +57,7 @@ pub(super) struct Instance {
 }
 
 /// The drawing as a scope, and the subnets of its instances; those used by others come first.
-pub(super) fn scope(found: &Extraction, rows: &Rows<'_>, items: Vec<Item>) -> (Scope, Vec<Subnet>) {
+pub(super) fn scope(found: &Extraction, rows: &RowBuilder<'_>, items: Vec<Item>) -> (Scope, Vec<Subnet>) {
     let places: Vec<_> = found.nodes.iter().map(|n| [n.at, n.at]).collect();
     let mut inside = vec![Vec::new(); found.cells.len()];
     let mut top = Vec::new();
@@ -80,13 +80,13 @@ pub(super) fn scope(found: &Extraction, rows: &Rows<'_>, items: Vec<Item>) -> (S
         counts: HashMap::new(),
     };
     let labelled: HashSet<usize> = (0..found.nodes.len()).filter(|n| found.nodes[*n].labelled).collect();
-    let scope = finder.group(items, top, Frame::DRAWING, &labelled);
+    let scope = finder.group(items, top, LocalFrame::DRAWING, &labelled);
     (scope, finder.subnets)
 }
 
 struct Finder<'a> {
     found: &'a Extraction,
-    rows: &'a Rows<'a>,
+    rows: &'a RowBuilder<'a>,
     /// Nodes by place.
     nodes: Boxes,
     /// Placed cells in each placed cell.
@@ -100,20 +100,20 @@ struct Finder<'a> {
 }
 
 /// Elements of a scope, with those at each node.
-struct Elements {
+struct ElementIndex {
     items: Vec<Item>,
     at: HashMap<usize, Vec<usize>>,
 }
 
 /// What is in a placed cell.
 struct Content {
-    frame: Frame,
+    frame: LocalFrame,
     /// Indices among the scope's items, sorted.
     items: Vec<usize>,
     /// Its nodes in the order of their places in it.
     nodes: Vec<usize>,
     /// Its elements on numbers of those nodes, in order.
-    rows: Vec<Row>,
+    rows: Vec<NetlistRow>,
 }
 
 impl Content {
@@ -126,12 +126,12 @@ impl Content {
 
 impl Finder<'_> {
     /// Elements of a scope, with what repeats taken out; nodes of `outer` are needed outside of it.
-    fn group(&mut self, items: Vec<Item>, cells: Vec<usize>, frame: Frame, outer: &HashSet<usize>) -> Scope {
+    fn group(&mut self, items: Vec<Item>, cells: Vec<usize>, frame: LocalFrame, outer: &HashSet<usize>) -> Scope {
         let mut at: HashMap<usize, Vec<usize>> = HashMap::new();
         for (k, item) in items.iter().enumerate() {
             self.found.nodes_of(item).into_iter().for_each(|n| at.entry(n).or_default().push(k));
         }
-        let all = Elements { items, at };
+        let all = ElementIndex { items, at };
         let mut gone = vec![false; all.items.len()];
         let mut instances = Vec::new();
         let mut open = cells;
@@ -156,7 +156,7 @@ impl Finder<'_> {
     /// `left` to look at, the others stay flat.
     fn alike(
         &mut self,
-        all: &Elements,
+        all: &ElementIndex,
         gone: &[bool],
         members: Vec<usize>,
         left: &mut usize,
@@ -168,7 +168,7 @@ impl Finder<'_> {
             if *left == 0 {
                 break;
             }
-            let Some(mut content) = self.content(all, gone, k, left).filter(|c| c.items.len() >= FEWEST) else {
+            let Some(mut content) = self.content(all, gone, k, left).filter(|c| c.items.len() >= MIN_ELEMENTS) else {
                 next.extend(&self.inside[k]);
                 continue;
             };
@@ -178,7 +178,7 @@ impl Finder<'_> {
                     content.rows = Vec::new();
                     alike[kind].push((content, k));
                 }
-                None if alike.len() < MOST_KINDS => alike.push(vec![(content, k)]),
+                None if alike.len() < MAX_KINDS => alike.push(vec![(content, k)]),
                 None => next.extend(&self.inside[k]),
             }
         }
@@ -213,10 +213,10 @@ impl Finder<'_> {
     }
 
     /// What is in a placed cell, of what is left of the scope's elements; what is met on the way is taken off `left`.
-    fn content(&mut self, all: &Elements, gone: &[bool], k: usize, left: &mut usize) -> Option<Content> {
+    fn content(&mut self, all: &ElementIndex, gone: &[bool], k: usize, left: &mut usize) -> Option<Content> {
         let cell = &self.found.cells[k];
         let unit = self.found.unit;
-        let frame = Frame { origin: cell.origin.map(|x| x * unit), angle: cell.angle, mirrored: cell.mirrored };
+        let frame = LocalFrame { origin: cell.origin.map(|x| x * unit), angle: cell.angle, mirrored: cell.mirrored };
         let [low, high] = cell.extent.map(|p| p.map(|x| f64::from(x) * unit));
         let own = self.own_box(cell, &frame);
         let near = self.nodes.overlapping(&[low.map(|x| x - unit), high.map(|x| x + unit)]);
@@ -251,7 +251,7 @@ impl Finder<'_> {
         nodes.sort_unstable();
         let nodes: Vec<usize> = nodes.into_iter().map(|(_, _, n)| n).collect();
         let number: HashMap<usize, usize> = nodes.iter().enumerate().map(|(k, n)| (*n, k)).collect();
-        let mut rows: Vec<Row> = chosen.iter().map(|i| self.rows.row(&all.items[*i], &frame)).collect();
+        let mut rows: Vec<NetlistRow> = chosen.iter().map(|i| self.rows.row(&all.items[*i], &frame)).collect();
         rows.iter_mut().flat_map(|row| &mut row.nodes).for_each(|n| *n = number[n]);
         rows.iter_mut().filter(|row| row.model == "wire").for_each(|row| row.nodes.sort_unstable());
         rows.sort_by(|a, b| (a.model, &a.nodes).cmp(&(b.model, &b.nodes)));
@@ -259,7 +259,7 @@ impl Finder<'_> {
     }
 
     /// The box of a cell in its own frame [m]: that of the first placed one, exact when that is turned by quarters.
-    fn own_box(&mut self, cell: &Placement, frame: &Frame) -> [[f64; 2]; 2] {
+    fn own_box(&mut self, cell: &Placement, frame: &LocalFrame) -> [[f64; 2]; 2] {
         let key = format!("{} {:e}", cell.cell, (cell.magnification / MAGNIFIED).round());
         let quarters = frame.angle / std::f64::consts::FRAC_PI_2;
         let exact = (quarters - quarters.round()).abs() < 1e-9;
@@ -277,7 +277,12 @@ impl Finder<'_> {
     }
 
     /// Makes a subnet of contents that are the same.
-    fn subnet(&mut self, all: &Elements, members: Vec<(Content, usize)>, outer: &HashSet<usize>) -> Vec<Instance> {
+    fn subnet(
+        &mut self,
+        all: &ElementIndex,
+        members: Vec<(Content, usize)>,
+        outer: &HashSet<usize>,
+    ) -> Vec<SubnetInstance> {
         let (first, cell) = &members[0];
         let outside = |content: &Content, n: &usize| {
             outer.contains(n) || all.at[n].iter().any(|i| content.items.binary_search(i).is_err())
@@ -295,7 +300,7 @@ impl Finder<'_> {
         let scope = self.group(own, self.inside[*cell].clone(), first.frame, &given);
         self.subnets.push(Subnet { name, terminals: terminals.iter().map(|k| first.nodes[*k]).collect(), scope });
         let subnet = self.subnets.len() - 1;
-        let instance = |(content, _): &(Content, usize)| Instance {
+        let instance = |(content, _): &(Content, usize)| SubnetInstance {
             name: self.unused(&word, false),
             subnet,
             frame: content.frame,

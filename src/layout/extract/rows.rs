@@ -1,19 +1,19 @@
 //! Elements of an extraction as rows of a netlist, seen from any frame: what is placed twice has the same rows in its own frames.
 
-use super::{Beam, Extraction, LayerResult, holes, live};
+use super::{ExtractedBeam, Extraction, LayerResult, holes, live};
 
 /// Two values are one up to this share of them, and to this many metres or radians: rounding of arithmetic, not of a grid.
 const SAME: [f64; 2] = [1e-9, 1e-15];
 
 /// Where something is seen from: p ↦ origin + R(angle)·(mirrored ? (x, −y) : (x, y)) leads out of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Frame {
+pub(super) struct LocalFrame {
     pub(super) origin: [f64; 2],
     pub(super) angle: f64,
     pub(super) mirrored: bool,
 }
 
-impl Frame {
+impl LocalFrame {
     /// That of the drawing.
     pub(super) const DRAWING: Self = Self { origin: [0.0; 2], angle: 0.0, mirrored: false };
 
@@ -64,7 +64,7 @@ pub(super) enum Item {
 
 /// A value of a row.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Value {
+pub(super) enum RowValue {
     /// Length of a beam [m]: a parameter where several share it.
     Long(f64),
     /// Width of a beam [m]: a parameter where several share it.
@@ -80,7 +80,7 @@ pub(super) enum Value {
     Count(usize),
 }
 
-impl Value {
+impl RowValue {
     fn number(&self) -> f64 {
         match self {
             Self::Long(x) | Self::Wide(x) | Self::Metres(x) | Self::Turn(x) | Self::Angle(x) | Self::Plain(x) => *x,
@@ -100,17 +100,17 @@ impl Value {
 
 /// A line of a netlist.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Row {
+pub(super) struct NetlistRow {
     /// Name of the element; empty: none.
     pub(super) name: String,
     pub(super) model: &'static str,
     pub(super) layer: String,
     pub(super) nodes: Vec<usize>,
-    pub(super) values: Vec<(&'static str, Value)>,
+    pub(super) values: Vec<(&'static str, RowValue)>,
     pub(super) comment: String,
 }
 
-impl Row {
+impl NetlistRow {
     /// The same element on other nodes, but for rounding.
     pub(super) fn same(&self, other: &Self) -> bool {
         (&self.name, self.model, &self.layer, &self.comment) == (&other.name, other.model, &other.layer, &other.comment)
@@ -138,12 +138,12 @@ impl Extraction {
 }
 
 /// An extraction with the layer of each node.
-pub(super) struct Rows<'a> {
+pub(super) struct RowBuilder<'a> {
     found: &'a Extraction,
     layer_of: Vec<Option<usize>>,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> RowBuilder<'a> {
     pub(super) fn new(found: &'a Extraction) -> Self {
         let mut layer_of = vec![None; found.nodes.len()];
         let pads = found.pads.iter().flat_map(|pad| pad.nodes.iter().map(|n| (*n, pad.layer)));
@@ -153,15 +153,15 @@ impl<'a> Rows<'a> {
         Self { found, layer_of }
     }
 
-    fn between(&self, frame: &Frame, a: usize, b: usize) -> [f64; 2] {
+    fn between(&self, frame: &LocalFrame, a: usize, b: usize) -> [f64; 2] {
         let [p, q] = [a, b].map(|n| self.found.nodes[n].at);
         frame.direction([q[0] - p[0], q[1] - p[1]])
     }
 
     /// An element as it is seen from a frame.
-    pub(super) fn row(&self, item: &Item, frame: &Frame) -> Row {
+    pub(super) fn row(&self, item: &Item, frame: &LocalFrame) -> NetlistRow {
         let none = String::new;
-        let row = |model, layer: &str, nodes: Vec<usize>, values| Row {
+        let row = |model, layer: &str, nodes: Vec<usize>, values| NetlistRow {
             name: none(),
             model,
             layer: layer.to_owned(),
@@ -174,23 +174,23 @@ impl<'a> Rows<'a> {
             Item::Anchor(n) => row("anchor", self.layer_at(*n), vec![*n], Vec::new()),
             Item::Wire(nodes) => row("wire", "*", nodes.clone(), Vec::new()),
             Item::Ground(n) => row("eground", "*", vec![*n], Vec::new()),
-            Item::Port(port, n) => Row { name: port.clone(), ..row("port", "*", vec![*n], Vec::new()) },
+            Item::Port(port, n) => NetlistRow { name: port.clone(), ..row("port", "*", vec![*n], Vec::new()) },
             Item::Body(k) => {
                 let body = &self.found.bodies[*k];
-                let values = vec![("A", Value::Plain(body.area)), ("Ip", Value::Plain(body.polar))];
+                let values = vec![("A", RowValue::Plain(body.area)), ("Ip", RowValue::Plain(body.polar))];
                 row("body2d", name(body.layer), vec![body.node], values)
             }
             Item::Link(k) => {
                 let [a, b] = self.found.links[*k];
                 let d = self.between(frame, a, b);
-                row("link2d", "*", vec![a, b], vec![("l", Value::Metres(d[0].hypot(d[1]))), ("oz", turn(d))])
+                row("link2d", "*", vec![a, b], vec![("l", RowValue::Metres(d[0].hypot(d[1]))), ("oz", turn(d))])
             }
             Item::Root(k) => {
                 let root = &self.found.roots[*k];
-                let shift = Value::Plain(root.shift);
+                let shift = RowValue::Plain(root.shift);
                 let along = turn(frame.direction(root.along));
                 let values =
-                    vec![("kx", shift.clone()), ("ky", shift), ("krz", Value::Plain(root.turn)), ("oz", along)];
+                    vec![("kx", shift.clone()), ("ky", shift), ("krz", RowValue::Plain(root.turn)), ("oz", along)];
                 row("spring2d", "*", root.nodes.to_vec(), values)
             }
             Item::Beam(k) => self.beam_row(&self.found.beams[*k], frame),
@@ -203,10 +203,10 @@ impl<'a> Rows<'a> {
                 let radius = 0.5 * d[0].hypot(d[1]) / (0.5 * alpha).sin();
                 let start = d[1].atan2(d[0]) - 0.5 * alpha;
                 let values = vec![
-                    ("radius", Value::Metres(radius)),
-                    ("alpha", Value::Angle(alpha)),
-                    ("w", Value::Wide(arc.width)),
-                    ("oz", Value::Turn(start.sin().atan2(start.cos()))),
+                    ("radius", RowValue::Metres(radius)),
+                    ("alpha", RowValue::Angle(alpha)),
+                    ("w", RowValue::Wide(arc.width)),
+                    ("oz", RowValue::Turn(start.sin().atan2(start.cos()))),
                 ];
                 let mut row = row("arc2d", name(arc.layer), vec![a, b], values);
                 row.values.extend(perforated(&self.found.layers[arc.layer], arc.porosity, false));
@@ -216,15 +216,15 @@ impl<'a> Rows<'a> {
                 let comb = &self.found.combs[*k];
                 let d = self.between(frame, comb.nodes[0], comb.nodes[1]);
                 let values = vec![
-                    ("N", Value::Count(comb.gaps)),
-                    ("gap", Value::Metres(comb.gap)),
-                    ("l", Value::Metres(comb.overlap)),
+                    ("N", RowValue::Count(comb.gaps)),
+                    ("gap", RowValue::Metres(comb.gap)),
+                    ("l", RowValue::Metres(comb.overlap)),
                     // the other side lies at 2·L − l
-                    ("L", Value::Metres(0.5 * (d[0].hypot(d[1]) + comb.overlap))),
+                    ("L", RowValue::Metres(0.5 * (d[0].hypot(d[1]) + comb.overlap))),
                     ("oz", turn(d)),
                 ];
                 let comment = format!("{} and {} fingers", comb.fingers[0], comb.fingers[1]);
-                Row { comment, ..row("comb2de", name(comb.layer), comb.nodes.to_vec(), values) }
+                NetlistRow { comment, ..row("comb2de", name(comb.layer), comb.nodes.to_vec(), values) }
             }
             Item::Plates(k) => {
                 let plates = &self.found.plates[*k];
@@ -232,7 +232,7 @@ impl<'a> Rows<'a> {
                 let nodes = if backwards(self.between(frame, a, b)) { [b, a] } else { [a, b] };
                 let d = self.between(frame, nodes[0], nodes[1]);
                 let values =
-                    vec![("A", Value::Plain(plates.area)), ("gap", Value::Metres(plates.gap)), ("oz", turn(d))];
+                    vec![("A", RowValue::Plain(plates.area)), ("gap", RowValue::Metres(plates.gap)), ("oz", turn(d))];
                 row("plategap2d", name(plates.layer), nodes.to_vec(), values)
             }
             Item::Facing(k) => {
@@ -242,10 +242,10 @@ impl<'a> Rows<'a> {
                 let nodes = if frame.mirrored { [b, a, d, c] } else { facing.nodes };
                 let along = self.between(frame, nodes[0], nodes[1]);
                 let values = vec![
-                    ("l", Value::Metres(along[0].hypot(along[1]))),
-                    ("w1", Value::Metres(facing.width[0])),
-                    ("w2", Value::Metres(facing.width[1])),
-                    ("gap", Value::Metres(facing.gap)),
+                    ("l", RowValue::Metres(along[0].hypot(along[1]))),
+                    ("w1", RowValue::Metres(facing.width[0])),
+                    ("w2", RowValue::Metres(facing.width[1])),
+                    ("gap", RowValue::Metres(facing.gap)),
                     ("oz", turn(along)),
                 ];
                 row("gap2dforce", name(facing.layer), nodes.to_vec(), values)
@@ -254,7 +254,7 @@ impl<'a> Rows<'a> {
     }
 
     /// A beam from left to right, or upwards.
-    fn beam_row(&self, beam: &Beam, frame: &Frame) -> Row {
+    fn beam_row(&self, beam: &ExtractedBeam, frame: &LocalFrame) -> NetlistRow {
         let ([mut a, mut b], mut width) = (beam.nodes, beam.width);
         let mut d = self.between(frame, a, b);
         let long = d[0].hypot(d[1]);
@@ -265,17 +265,24 @@ impl<'a> Rows<'a> {
         }
         let layer = &self.found.layers[beam.layer];
         let live = if self.found.carries(a) { live::model(layer) } else { None };
-        let mut values = vec![("l", Value::Long(long))];
+        let mut values = vec![("l", RowValue::Long(long))];
         let taper = live.is_none() && live::tapers(width);
         if taper {
-            values.extend([("w1", Value::Wide(width[0])), ("w2", Value::Wide(width[1]))]);
+            values.extend([("w1", RowValue::Wide(width[0])), ("w2", RowValue::Wide(width[1]))]);
         } else {
-            values.push(("w", Value::Wide(0.5 * (width[0] + width[1]))));
+            values.push(("w", RowValue::Wide(0.5 * (width[0] + width[1]))));
         }
         values.push(("oz", turn(d)));
         values.extend(perforated(layer, beam.porosity, live.is_some()));
         let model = live.unwrap_or(if taper { "taper2d" } else { "beam2d" });
-        Row { name: String::new(), model, layer: layer.name.clone(), nodes: vec![a, b], values, comment: String::new() }
+        NetlistRow {
+            name: String::new(),
+            model,
+            layer: layer.name.clone(),
+            nodes: vec![a, b],
+            values,
+            comment: String::new(),
+        }
     }
 
     /// The layer of a node.
@@ -290,12 +297,12 @@ fn backwards(d: [f64; 2]) -> bool {
     d[0] < -tiny || (d[0] <= tiny && d[1] < 0.0)
 }
 
-fn turn(d: [f64; 2]) -> Value {
-    Value::Turn(d[1].atan2(d[0]))
+fn turn(d: [f64; 2]) -> RowValue {
+    RowValue::Turn(d[1].atan2(d[0]))
 }
 
 /// What etch holes leave of a beam's stiffness, mass and film, and of what it conducts.
-fn perforated(layer: &LayerResult, porosity: f64, conducts: bool) -> Vec<(&'static str, Value)> {
+fn perforated(layer: &LayerResult, porosity: f64, conducts: bool) -> Vec<(&'static str, RowValue)> {
     if porosity <= 0.0 {
         return Vec::new();
     }
@@ -304,5 +311,5 @@ fn perforated(layer: &LayerResult, porosity: f64, conducts: bool) -> Vec<(&'stat
     let conduction = live::perforated(porosity).into_iter().filter(|_| conducts);
     let known = |name: &str| layer.material.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
     let changed = solid.into_iter().chain(conduction);
-    changed.filter_map(|(name, factor)| Some((name, Value::Plain(known(name)? * factor)))).collect()
+    changed.filter_map(|(name, factor)| Some((name, RowValue::Plain(known(name)? * factor)))).collect()
 }

@@ -1,20 +1,20 @@
 //! Models of parts into the result: nodes with numbers of the whole drawing, SI units, and notes on what holds a layer.
 
-use super::anchors::Rule;
+use super::anchors::AnchorRule;
 use super::combs;
-use super::model::Model;
+use super::model::PartModel;
 use super::moments::Moments;
 use super::part::Part;
-use super::{Beam, Body, Comb, Extraction, Node, Pad, Root};
-use crate::layout::drawing::Drawing;
+use super::{ExtractedBeam, ExtractedBody, ExtractedComb, ExtractedNode, ExtractedPad, ExtractedRoot, Extraction};
+use crate::layout::drawing::FlatLayout;
 use crate::layout::process;
 use std::collections::HashSet;
 
 /// So many bodies of a part that only their width holds are told of.
-const MOST_MIDDLES: usize = 3;
+const MAX_MIDDLES: usize = 3;
 
 /// Puts models into the result, in SI units.
-pub(super) struct Sink<'a> {
+pub(super) struct ExtractionSink<'a> {
     pub(super) result: &'a mut Extraction,
     pub(super) layer: usize,
     /// Number of the layer's first part.
@@ -24,9 +24,9 @@ pub(super) struct Sink<'a> {
     pub(super) rigidity: Option<f64>,
 }
 
-impl Sink<'_> {
+impl ExtractionSink<'_> {
     /// Takes the model of a part in; answers the nodes of its taps.
-    pub(super) fn add(&mut self, model: &Model, part: usize) -> std::vec::IntoIter<usize> {
+    pub(super) fn add(&mut self, model: &PartModel, part: usize) -> std::vec::IntoIter<usize> {
         let (unit, layer) = (self.unit, self.layer);
         let mut used = vec![false; model.nodes.len()];
         let ends = model.beams.iter().flat_map(|b| [b.a, b.b]).chain(model.links.iter().flatten().copied());
@@ -41,7 +41,7 @@ impl Sink<'_> {
             number[n] = self.node(at.map(|x| x * unit), model.reach[n] * unit, self.first + part);
         }
         let result = &mut *self.result;
-        result.beams.extend(model.beams.iter().map(|b| Beam {
+        result.beams.extend(model.beams.iter().map(|b| ExtractedBeam {
             layer,
             nodes: [number[b.a], number[b.b]],
             width: b.width.map(|w| w * unit),
@@ -54,12 +54,12 @@ impl Sink<'_> {
             match self.rigidity {
                 Some(e) => {
                     let (shift, turn) = (e / shift, e * unit * unit / turn);
-                    result.roots.push(Root { nodes, along: root.along, shift, turn });
+                    result.roots.push(ExtractedRoot { nodes, along: root.along, shift, turn });
                 }
                 None => result.links.push(nodes),
             }
         }
-        result.pads.extend(model.pads.iter().map(|pad| Pad {
+        result.pads.extend(model.pads.iter().map(|pad| ExtractedPad {
             nodes: pad.nodes.iter().map(|n| number[*n]).filter(|n| *n != usize::MAX).collect(),
             layer,
             part: self.first + part,
@@ -70,18 +70,18 @@ impl Sink<'_> {
     }
 
     fn node(&mut self, at: [f64; 2], reach: f64, part: usize) -> usize {
-        self.result.nodes.push(Node { name: String::new(), at, reach, labelled: false, part });
+        self.result.nodes.push(ExtractedNode { name: String::new(), at, reach, labelled: false, part });
         self.result.nodes.len() - 1
     }
 
     /// Tells by what rule parts are held where no anchor is drawn, and what nothing holds.
     pub(super) fn notes(
         &mut self,
-        drawing: &Drawing,
-        layer: &process::Layer,
-        rule: &Rule,
+        drawing: &FlatLayout,
+        layer: &process::StructuralLayer,
+        rule: &AnchorRule,
         parts: &[Part],
-        models: &[Model],
+        models: &[PartModel],
         loose: &[bool],
     ) {
         let place = |k: usize| {
@@ -94,7 +94,7 @@ impl Sink<'_> {
             format!("{} at {}{more}", some.len(), shown.join(", "))
         };
         let name = &layer.name;
-        if matches!(rule, Rule::Pads) {
+        if matches!(rule, AnchorRule::Pads) {
             let whole: Vec<usize> = (0..parts.len())
                 .filter(|k| !loose[*k] && models[*k].beams.is_empty() && models[*k].bodies.is_empty())
                 .collect();
@@ -107,7 +107,7 @@ impl Sink<'_> {
             self.result.notes.push(told);
         }
         self.result.notes.extend(parts.iter().flat_map(|part| middles(drawing, name, rule, part)));
-        if !models.iter().any(Model::is_held) {
+        if !models.iter().any(PartModel::is_held) {
             self.result.notes.push(format!("layer {name}: nothing holds it"));
             return;
         }
@@ -121,7 +121,7 @@ impl Sink<'_> {
     }
 
     /// A comb between two nodes, with its fingers as bodies on the sides that move.
-    pub(super) fn comb(&mut self, comb: &combs::Comb, nodes: [usize; 2], anchored: &HashSet<usize>) {
+    pub(super) fn comb(&mut self, comb: &combs::FingerArray, nodes: [usize; 2], anchored: &HashSet<usize>) {
         let held = nodes.map(|n| anchored.contains(&n));
         for (i, node) in nodes.into_iter().enumerate() {
             if !held[i] && comb.masses[i].area > 0.0 {
@@ -133,7 +133,7 @@ impl Sink<'_> {
         }
         // the side that moves comes first
         let order = if held[0] && !held[1] { [1, 0] } else { [0, 1] };
-        self.result.combs.push(Comb {
+        self.result.combs.push(ExtractedComb {
             layer: self.layer,
             nodes: order.map(|i| nodes[i]),
             gaps: comb.gaps,
@@ -146,8 +146,8 @@ impl Sink<'_> {
 
 /// Tells of bodies that only their width holds, though all of their limbs lead to other places that are held: where that is the mechanism
 /// itself, no undercut can say so.
-fn middles(drawing: &Drawing, layer: &str, rule: &Rule, part: &Part) -> Vec<String> {
-    let (Rule::Wide(reach), (axis, found)) = (rule, &part.found) else { return Vec::new() };
+fn middles(drawing: &FlatLayout, layer: &str, rule: &AnchorRule, part: &Part) -> Vec<String> {
+    let (AnchorRule::Wide(reach), (axis, found)) = (rule, &part.found) else { return Vec::new() };
     let held: Vec<bool> =
         found.joints.iter().map(|joint| rule.holds_body(axis, part.origin(), &found.limbs, joint)).collect();
     let mut notes = Vec::new();
@@ -166,10 +166,10 @@ fn middles(drawing: &Drawing, layer: &str, rule: &Rule, part: &Part) -> Vec<Stri
         }
     }
     // a middle is told of, not each pad of a chain
-    notes.truncate(MOST_MIDDLES);
+    notes.truncate(MAX_MIDDLES);
     notes
 }
 
-fn body(layer: usize, node: usize, moments: &Moments, unit: f64) -> Body {
-    Body { layer, node, area: moments.area * unit * unit, polar: moments.polar() * unit.powi(4) }
+fn body(layer: usize, node: usize, moments: &Moments, unit: f64) -> ExtractedBody {
+    ExtractedBody { layer, node, area: moments.area * unit * unit, polar: moments.polar() * unit.powi(4) }
 }

@@ -5,7 +5,7 @@
 
 use super::boxes::{self, Boxes, Extent};
 use crate::budget;
-use crate::layout::drawing::{Point, Polygon};
+use crate::layout::drawing::{GridPoint, Polygon};
 
 /// Corners up to this far from an edge are put on it [database units].
 const NEAR: f64 = 1.5;
@@ -22,12 +22,13 @@ pub(super) fn split(polygon: &Polygon) -> Option<Polygon> {
 
 /// Edges are led through corners at a distance that `wanted` says yes to.
 fn lead_through(polygons: &[Polygon], wanted: impl Fn(f64) -> bool) -> Option<Vec<Polygon>> {
-    let float = |p: Point| p.map(f64::from);
+    let float = |p: GridPoint| p.map(f64::from);
     let edges = || {
         let contours = polygons.iter().flat_map(|polygon| &polygon.contours);
         contours.flat_map(|c| c.iter().zip(c.iter().cycle().skip(1)).map(|(p, q)| (*p, *q)))
     };
-    let length = |(p, q): &(Point, Point)| (f64::from(q[0]) - f64::from(p[0])).hypot(f64::from(q[1]) - f64::from(p[1]));
+    let length =
+        |(p, q): &(GridPoint, GridPoint)| (f64::from(q[0]) - f64::from(p[0])).hypot(f64::from(q[1]) - f64::from(p[1]));
     let count = edges().count();
     let chunk = 4.0 * edges().map(|e| length(&e)).sum::<f64>() / count.max(1) as f64;
     // long edges at an angle have large boxes: they are looked at piece by piece
@@ -44,11 +45,11 @@ fn lead_through(polygons: &[Polygon], wanted: impl Fn(f64) -> bool) -> Option<Ve
         }
     }
     let tree = Boxes::of(&extents);
-    let all: Vec<(Point, Point)> = edges().collect();
-    let mut corners: Vec<Point> = all.iter().map(|e| e.0).collect();
+    let all: Vec<(GridPoint, GridPoint)> = edges().collect();
+    let mut corners: Vec<GridPoint> = all.iter().map(|e| e.0).collect();
     corners.sort_unstable();
     corners.dedup();
-    let mut on: Vec<(u32, f64, Point)> = Vec::new();
+    let mut on: Vec<(u32, f64, GridPoint)> = Vec::new();
     for corner in corners {
         budget::check();
         let c = float(corner);
@@ -73,7 +74,7 @@ fn lead_through(polygons: &[Polygon], wanted: impl Fn(f64) -> bool) -> Option<Ve
     }
     on.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
     let (mut k, mut next) = (0u32, 0usize);
-    let through = |contour: &Vec<Point>| {
+    let through = |contour: &Vec<GridPoint>| {
         let mut led = Vec::with_capacity(contour.len());
         for p in contour {
             led.push(*p);
@@ -85,7 +86,7 @@ fn lead_through(polygons: &[Polygon], wanted: impl Fn(f64) -> bool) -> Option<Ve
         }
         led
     };
-    let contours: Vec<Vec<Point>> = polygons.iter().flat_map(|p| &p.contours).map(through).collect();
+    let contours: Vec<Vec<GridPoint>> = polygons.iter().flat_map(|p| &p.contours).map(through).collect();
     let mut contours = contours.into_iter();
     Some(polygons.iter().map(|p| Polygon { contours: contours.by_ref().take(p.contours.len()).collect() }).collect())
 }

@@ -1,9 +1,9 @@
 //! A limb as beams between nodes: less what is held, divided where something pulls.
 
-use super::anchors::Rule;
+use super::anchors::AnchorRule;
 use super::cells::{Owner, Tap};
-use super::joints::Kind;
-use super::model::{Beam, Builder};
+use super::joints::JointRole;
+use super::model::{Builder, PartBeam};
 
 /// A free end beyond an anchor shorter than this many widths is part of the anchor [1].
 const STUMP: f64 = 1.5;
@@ -18,12 +18,12 @@ impl Builder<'_> {
         let long = (q[0] - p[0]).hypot(q[1] - p[1]);
         let loose = |end: usize| {
             let joint = &self.parts.joints[self.parts.at[k][end]];
-            joint.ports.len() == 1 && matches!(joint.kind, Kind::Node(_))
+            joint.ports.len() == 1 && matches!(joint.kind, JointRole::Node(_))
         };
         let covered = match self.rule {
-            Rule::Drawn(held) => held.over(p, q),
-            Rule::Wide(reach) if limb.width[0].min(limb.width[1]) >= 2.0 * reach => vec![[0.0, 1.0]],
-            Rule::Pads if self.parts.limbs.len() == 1 && loose(0) && loose(1) => vec![[0.0, 1.0]],
+            AnchorRule::Drawn(held) => held.over(p, q),
+            AnchorRule::Wide(reach) if limb.width[0].min(limb.width[1]) >= 2.0 * reach => vec![[0.0, 1.0]],
+            AnchorRule::Pads if self.parts.limbs.len() == 1 && loose(0) && loose(1) => vec![[0.0, 1.0]],
             _ => Vec::new(),
         };
         let mut held = self.held(&covered, a, b);
@@ -83,7 +83,7 @@ impl Builder<'_> {
             along.push((t1, end));
             for pair in along.windows(2) {
                 let width = [width(pair[0].0), width(pair[1].0)];
-                self.model.beams.push(Beam { a: pair[0].1, b: pair[1].1, width, porosity });
+                self.model.beams.push(PartBeam { a: pair[0].1, b: pair[1].1, width, porosity });
             }
         }
         for (t, tap) in taps {
@@ -113,7 +113,7 @@ impl Builder<'_> {
         for end in 0..2 {
             let j = self.parts.at[k][end];
             let joint = &self.parts.joints[j];
-            if let (1, Kind::Node(_)) = (joint.ports.len(), &joint.kind) {
+            if let (1, JointRole::Node(_)) = (joint.ports.len(), &joint.kind) {
                 solid += joint.cell.area;
                 missing += self.holes.joints[j].moments.area;
                 continue;

@@ -1,7 +1,7 @@
 //! Where combs and gaps pull at a part: which limb or joint the place belongs to, and the node there.
 
 use super::cells::{Owner, Tap};
-use super::joints::Kind;
+use super::joints::JointRole;
 use super::model::Builder;
 
 impl Builder<'_> {
@@ -11,7 +11,7 @@ impl Builder<'_> {
         let mut owner = self.cells.nearest(self.axis, at);
         // the end of a limb is part of it
         if let Owner::Joint(j) = owner
-            && let ([port], Kind::Node(_)) = (self.parts.joints[j].ports.as_slice(), &self.parts.joints[j].kind)
+            && let ([port], JointRole::Node(_)) = (self.parts.joints[j].ports.as_slice(), &self.parts.joints[j].kind)
         {
             owner = Owner::Limb(port.limb);
         }

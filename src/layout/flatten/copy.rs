@@ -1,26 +1,26 @@
 //! The second pass: every shape and label in its place on the grid.
 
-use super::bounds::MOST_PLACEMENTS;
-use super::counts::{Count, placed, shifted};
+use super::bounds::MAX_PLACEMENTS;
+use super::counts::{FlattenedSize, placed, shifted};
 use crate::budget;
-use crate::layout::cells::{Call, Library, Shape, Transform};
-use crate::layout::crossings::Tangled;
-use crate::layout::drawing::{Drawing, Label, Placement, Point, Polygon};
+use crate::layout::cells::{CellReference, CellShape, Library, Transform};
+use crate::layout::crossings::CrossingContours;
+use crate::layout::drawing::{FlatLayout, GridPoint, Label, Placement, Polygon};
 use crate::layout::simple;
 use std::collections::HashMap;
 
 /// The second pass.
 pub(super) struct Flat<'a> {
-    pub(super) drawing: Drawing,
+    pub(super) drawing: FlatLayout,
     pub(super) polygons: Vec<Vec<Polygon>>,
     pub(super) library: &'a Library,
     pub(super) by_name: &'a HashMap<String, usize>,
-    pub(super) counts: &'a [Count],
+    pub(super) counts: &'a [FlattenedSize],
     pub(super) grid: f64,
     pub(super) places: bool,
     pub(super) crossing: usize,
     /// A layer with a polygon that crosses itself too often.
-    pub(super) tangled: Option<(String, Tangled)>,
+    pub(super) tangled: Option<(String, CrossingContours)>,
     pub(super) vanished: usize,
 }
 
@@ -59,8 +59,13 @@ impl Flat<'_> {
 
     fn placement(&mut self, called: usize, name: &str, t: &Transform, parent: Option<usize>) -> Option<usize> {
         let extent = self.counts[called].drawn.filter(|_| self.places)?;
-        let call =
-            Call { cell: String::new(), place: String::new(), transform: *t, count: [1, 1], pitch: [[0.0; 2]; 2] };
+        let call = CellReference {
+            cell: String::new(),
+            place: String::new(),
+            transform: *t,
+            count: [1, 1],
+            pitch: [[0.0; 2]; 2],
+        };
         let [low, high] = placed(&call, extent);
         let [a, b] = t.columns[0];
         self.drawing.cells.push(Placement {
@@ -75,13 +80,13 @@ impl Flat<'_> {
         Some(self.drawing.cells.len() - 1)
     }
 
-    fn point(&self, p: [f64; 2]) -> Point {
+    fn point(&self, p: [f64; 2]) -> GridPoint {
         // The first pass bounds coordinates; rounding of a rotation may add one unit to its box.
         p.map(|x| (x * self.grid).round() as i32)
     }
 
-    fn shape(&mut self, shape: &Shape, transform: &Transform) {
-        let mut contour: Vec<Point> = Vec::with_capacity(shape.points.len());
+    fn shape(&mut self, shape: &CellShape, transform: &Transform) {
+        let mut contour: Vec<GridPoint> = Vec::with_capacity(shape.points.len());
         for p in &shape.points {
             let p = self.point(transform.apply(*p));
             if contour.last() != Some(&p) {
@@ -93,19 +98,19 @@ impl Flat<'_> {
         }
         let to = &mut self.polygons[shape.layer as usize];
         match simple::polygons(contour) {
-            simple::Outcome::Simple(polygon) => to.push(polygon),
-            simple::Outcome::Crossing(parts) => {
+            simple::ContourContent::Simple(polygon) => to.push(polygon),
+            simple::ContourContent::Crossing(parts) => {
                 self.crossing += 1;
                 to.extend(parts);
             }
-            simple::Outcome::Nothing => self.vanished += 1,
-            simple::Outcome::Tangled(tangled) => {
+            simple::ContourContent::Nothing => self.vanished += 1,
+            simple::ContourContent::Tangled(tangled) => {
                 self.tangled.get_or_insert((self.library.layers[shape.layer as usize].clone(), tangled));
             }
         }
     }
 
-    pub(super) fn finish(mut self, placements: u64) -> (Drawing, Vec<Vec<Polygon>>) {
+    pub(super) fn finish(mut self, placements: u64) -> (FlatLayout, Vec<Vec<Polygon>>) {
         if self.crossing > 0 {
             let text = format!(
                 "{} of a contour that crosses or touches itself: what it encloses was taken",
@@ -119,7 +124,7 @@ impl Flat<'_> {
         if !self.places {
             self.drawing
                 .notes
-                .push(format!("{placements} placed cells: their places are not kept (at most {MOST_PLACEMENTS})"));
+                .push(format!("{placements} placed cells: their places are not kept (at most {MAX_PLACEMENTS})"));
         }
         (self.drawing, self.polygons)
     }

@@ -1,13 +1,13 @@
 //! The first pass: what every cell comes to with all it calls, bounded before anything is laid out.
 
-use super::bounds::{DEEPEST, FARTHEST, MOST_CALLS, MOST_LABELS, MOST_POINTS, MOST_POLYGONS};
+use super::bounds::{DEEPEST, FARTHEST, MAX_CALLS, MAX_LABELS, MAX_POINTS, MAX_POLYGONS};
 use super::error::FlattenError;
-use crate::layout::cells::{Call, Library};
+use crate::layout::cells::{CellReference, Library};
 use std::collections::HashMap;
 
 /// What a cell comes to.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Count {
+pub(super) struct FlattenedSize {
     pub(super) polygons: u64,
     pub(super) points: u64,
     pub(super) labels: u64,
@@ -26,12 +26,12 @@ impl Library {
         &self,
         top: usize,
         by_name: &HashMap<String, usize>,
-    ) -> Result<(Vec<Count>, Vec<usize>), FlattenError> {
+    ) -> Result<(Vec<FlattenedSize>, Vec<usize>), FlattenError> {
         const NEW: u8 = 0;
         const OPEN: u8 = 1;
         const DONE: u8 = 2;
         let mut state = vec![NEW; self.cells.len()];
-        let mut counts = vec![Count::default(); self.cells.len()];
+        let mut counts = vec![FlattenedSize::default(); self.cells.len()];
         let mut order = Vec::new();
         let mut stack = vec![(top, 0)];
         state[top] = OPEN;
@@ -67,10 +67,14 @@ impl Library {
         &self,
         index: usize,
         by_name: &HashMap<String, usize>,
-        counts: &[Count],
-    ) -> Result<Count, FlattenError> {
+        counts: &[FlattenedSize],
+    ) -> Result<FlattenedSize, FlattenError> {
         let cell = &self.cells[index];
-        let mut sum = Count { polygons: cell.shapes.len() as u64, labels: cell.texts.len() as u64, ..Count::default() };
+        let mut sum = FlattenedSize {
+            polygons: cell.shapes.len() as u64,
+            labels: cell.texts.len() as u64,
+            ..FlattenedSize::default()
+        };
         for p in cell.shapes.iter().flat_map(|s| &s.points) {
             sum.points += 1;
             sum.extent = Some(enclose(sum.extent, [*p, *p]));
@@ -107,10 +111,10 @@ impl Library {
             return Err(FlattenError::Deep { cell: cell(), depth: sum.depth });
         }
         let bounds = [
-            ("polygons", sum.polygons, MOST_POLYGONS),
-            ("points", sum.points, MOST_POINTS),
-            ("labels", sum.labels, MOST_LABELS),
-            ("placed cells", sum.placements, MOST_CALLS),
+            ("polygons", sum.polygons, MAX_POLYGONS),
+            ("points", sum.points, MAX_POINTS),
+            ("labels", sum.labels, MAX_LABELS),
+            ("placed cells", sum.placements, MAX_CALLS),
         ];
         if let Some((what, count, most)) = bounds.into_iter().find(|(_, count, most)| count > most) {
             return Err(FlattenError::Large { cell: cell(), what, count, most });
@@ -126,7 +130,7 @@ fn enclose(a: Option<[[f64; 2]; 2]>, b: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
 }
 
 /// The box around all that a call places, given the box of the cell.
-pub(super) fn placed(call: &Call, [low, high]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+pub(super) fn placed(call: &CellReference, [low, high]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
     let corners = [low, [low[0], high[1]], high, [high[0], low[1]]];
     let last = [f64::from(call.count[0] - 1), f64::from(call.count[1] - 1)];
     let mut all = None;
@@ -146,7 +150,7 @@ pub(super) fn shifted(p: [f64; 2], pitch: &[[f64; 2]; 2], column: f64, row: f64)
 }
 
 /// The largest coordinate, or what is no number [units].
-pub(super) fn reach(count: &Count) -> f64 {
+pub(super) fn reach(count: &FlattenedSize) -> f64 {
     let extent = count.extent.unwrap_or_default();
     let largest = |r: f64, x: &f64| if x.is_finite() { r.max(x.abs()) } else { f64::INFINITY };
     extent.iter().flatten().fold(0.0, largest)

@@ -1,7 +1,7 @@
 //! Why a hierarchy has no flat drawing.
 
 use super::bounds::{DEEPEST, FARTHEST};
-use crate::layout::crossings::Tangled;
+use crate::layout::crossings::CrossingContours;
 use thiserror::Error;
 
 /// Why a hierarchy is not flattened.
@@ -54,7 +54,7 @@ pub enum FlattenError {
         /// Its layer.
         layer: String,
         /// How often, and where.
-        tangled: Tangled,
+        tangled: CrossingContours,
     },
     /// The chosen cell is not there, or none is chosen and there are several.
     #[error("{message}")]

@@ -1,7 +1,7 @@
 //! The integer grid of a flat drawing: the file's own unit where all falls on it, else a power of ten of it.
 
 use super::bounds::DEEPEST;
-use super::counts::{Count, reach};
+use super::counts::{FlattenedSize, reach};
 use crate::layout::cells::Library;
 use crate::layout::drawing::LARGEST_COORDINATE;
 
@@ -12,7 +12,7 @@ const DECIMALS: u32 = 4;
 
 impl Library {
     /// Grid points in one of the file's units: a power of ten, below 1 only where the drawing would not fit.
-    pub(super) fn grid(&mut self, total: &Count, order: &[usize], counts: &[Count]) -> f64 {
+    pub(super) fn grid(&mut self, total: &FlattenedSize, order: &[usize], counts: &[FlattenedSize]) -> f64 {
         let largest = f64::from(LARGEST_COORDINATE) - 1.0;
         let reach = reach(total).max(1.0);
         let fits = |grid: f64| reach * grid <= largest;

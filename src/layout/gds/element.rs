@@ -12,7 +12,7 @@ pub(super) const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
 /// An element that is being read.
 #[derive(Debug, Default)]
-pub(super) struct Element {
+pub(super) struct GdsElement {
     pub(super) name: &'static str,
     pub(super) kind: u8,
     pub(super) layer: Option<u16>,
@@ -32,15 +32,15 @@ pub(super) struct Element {
 
 /// What was passed over or taken for something else.
 #[derive(Debug, Default)]
-pub(super) struct Noted {
+pub(super) struct IgnoredContent {
     pub(super) nodes: usize,
     pub(super) lines: usize,
     pub(super) absolute: usize,
     pub(super) unknown: usize,
 }
 
-impl Element {
-    pub(super) fn take(&mut self, record: &Record<'_>, noted: &mut Noted) -> Result<(), GdsFault> {
+impl GdsElement {
+    pub(super) fn take(&mut self, record: &Record<'_>, noted: &mut IgnoredContent) -> Result<(), GdsFault> {
         let short = || record.short(0).ok_or_else(|| data(record, "a two-byte number"));
         let long = || record.long(0).ok_or_else(|| data(record, "a four-byte number"));
         let real = || record.real(0).ok_or_else(|| data(record, "a real"));

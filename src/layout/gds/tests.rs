@@ -3,7 +3,7 @@
 
 use super::record::real_to;
 use super::*;
-use crate::layout::Drawing;
+use crate::layout::FlatLayout;
 use crate::layout::drawing::Polygon;
 use crate::layout::flatten::FlattenError;
 use proptest::prelude::*;
@@ -58,7 +58,7 @@ fn stream(cells: &[Vec<u8>]) -> Vec<u8> {
     .concat()
 }
 
-fn drawing(cells: &[Vec<u8>]) -> Drawing {
+fn drawing(cells: &[Vec<u8>]) -> FlatLayout {
     let library = read(stream(cells).as_slice(), "x.gds", &mut |_| true).unwrap_or_else(|e| panic!("{e}"));
     library.flatten(None).unwrap_or_else(|e| panic!("{e}"))
 }

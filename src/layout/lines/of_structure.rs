@@ -3,7 +3,7 @@
 mod circuit;
 mod fields;
 
-use super::{Line, Lines, ProcessLine};
+use super::{ElementLine, ElementLines, ProcessLine};
 use crate::sets::Sets;
 use crate::structure::{Beam, BeamGap, Mass, NodeId, Structure};
 use std::collections::{HashMap, HashSet};
@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 pub(crate) type Left = Vec<String>;
 
 /// Makes lines of a structure; also tells what has no line.
-pub(crate) fn lines(structure: &Structure) -> (Lines, Left) {
+pub(crate) fn lines(structure: &Structure) -> (ElementLines, Left) {
     let mut of = OfStructure {
         structure,
         processes: Vec::new(),
@@ -45,7 +45,7 @@ pub(crate) fn lines(structure: &Structure) -> (Lines, Left) {
         let line = of.lines.remove(k);
         of.lines.insert(0, line);
     }
-    (Lines { processes: of.processes, elements: of.lines }, of.left)
+    (ElementLines { processes: of.processes, elements: of.lines }, of.left)
 }
 
 /// True for elements that touch nodes and are no beams.
@@ -66,7 +66,7 @@ struct OfStructure<'a> {
     structure: &'a Structure,
     processes: Vec<ProcessLine>,
     by_key: HashMap<Vec<u64>, usize>,
-    lines: Vec<Line>,
+    lines: Vec<ElementLine>,
     left: Left,
     resistors: HashMap<&'a str, usize>,
     used_resistors: HashSet<usize>,
@@ -87,7 +87,7 @@ impl<'a> OfStructure<'a> {
         let nodes = nodes.iter().map(|id| self.node(*id)).collect();
         let parameters = parameters.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
         let (name, model, process) = (name.to_owned(), model.to_owned(), process.to_owned());
-        self.lines.push(Line { name, model, process, nodes, parameters });
+        self.lines.push(ElementLine { name, model, process, nodes, parameters });
     }
 
     /// The process with these entries, new or known.
@@ -304,7 +304,7 @@ impl<'a> OfStructure<'a> {
         let structure = self.structure;
         let ids: HashMap<&str, usize> = structure.nodes.iter().map(|n| n.name.as_str()).zip(0..).collect();
         let mut sets = Sets::new(structure.nodes.len());
-        let placing = |line: &&Line| {
+        let placing = |line: &&ElementLine| {
             line.process != "*"
                 || matches!(
                     line.model.as_str(),

@@ -4,7 +4,7 @@
 //! that something outside touches is called `INSTANCE_NODE` there; an element that has the name of an instance makes
 //! that instance's elements `INSTANCE_NAME`. Nodes and names are not changed otherwise.
 
-use super::{Line, Lines};
+use super::{ElementLine, ElementLines};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
 
@@ -13,20 +13,20 @@ const DEEPEST: usize = 32;
 
 /// An instance: its own elements, and those in it.
 #[derive(Default)]
-struct Group<'a> {
+struct InstanceGroup<'a> {
     /// Indices of lines and names of instances in order of appearance.
-    parts: Vec<Part>,
-    inside: BTreeMap<String, Group<'a>>,
-    lines: Vec<&'a Line>,
+    parts: Vec<GroupPart>,
+    inside: BTreeMap<String, InstanceGroup<'a>>,
+    lines: Vec<&'a ElementLine>,
 }
 
-enum Part {
+enum GroupPart {
     Line(usize),
     Group(String),
 }
 
 /// The netlist.
-pub(crate) fn netlist(lines: &Lines, heading: &str) -> String {
+pub(crate) fn netlist(lines: &ElementLines, heading: &str) -> String {
     let lines = &unclashed(lines);
     let mut text = String::new();
     for line in heading.lines() {
@@ -35,21 +35,25 @@ pub(crate) fn netlist(lines: &Lines, heading: &str) -> String {
     for process in &lines.processes {
         let _ = writeln!(text, "{process}");
     }
-    let mut top = Group::default();
+    let mut top = InstanceGroup::default();
     for line in &lines.elements {
         let path: Vec<&str> = line.name.split('.').collect();
         let mut group = &mut top;
         for part in &path[..path.len() - 1] {
             if !group.inside.contains_key(*part) {
-                group.parts.push(Part::Group((*part).to_owned()));
+                group.parts.push(GroupPart::Group((*part).to_owned()));
             }
             group = group.inside.entry((*part).to_owned()).or_default();
         }
-        group.parts.push(Part::Line(group.lines.len()));
+        group.parts.push(GroupPart::Line(group.lines.len()));
         group.lines.push(line);
     }
-    let mut writer =
-        Writer { subnets: HashMap::new(), taken: BTreeSet::new(), definitions: String::new(), outside: outside(lines) };
+    let mut writer = GroupWriter {
+        subnets: HashMap::new(),
+        taken: BTreeSet::new(),
+        definitions: String::new(),
+        outside: outside(lines),
+    };
     let body = writer.body(&top, "", &HashMap::new());
     text.push_str(&writer.definitions);
     if !writer.definitions.is_empty() {
@@ -60,7 +64,7 @@ pub(crate) fn netlist(lines: &Lines, heading: &str) -> String {
 }
 
 /// Lines whose names are neither those of instances nor nested too deep.
-fn unclashed(lines: &Lines) -> Lines {
+fn unclashed(lines: &ElementLines) -> ElementLines {
     let mut lines = lines.clone();
     let names: BTreeSet<String> = lines.elements.iter().map(|l| l.name.clone()).collect();
     for name in lines.elements.iter_mut().flat_map(|line| std::iter::once(&mut line.name).chain(&mut line.nodes)) {
@@ -98,7 +102,7 @@ fn flat(name: &str) -> String {
 }
 
 /// Nodes of instances that something outside the instance touches.
-fn outside(lines: &Lines) -> BTreeSet<String> {
+fn outside(lines: &ElementLines) -> BTreeSet<String> {
     let mut all = BTreeSet::new();
     for line in &lines.elements {
         let own = line.name.rsplit_once('.').map_or("", |(group, _)| group);
@@ -119,9 +123,9 @@ fn within(inner: &str, outer: &str) -> bool {
 }
 
 /// Nodes of all elements in an instance, in order.
-fn all_nodes<'a>(group: &Group<'a>) -> impl Iterator<Item = &'a String> {
+fn all_nodes<'a>(group: &InstanceGroup<'a>) -> impl Iterator<Item = &'a String> {
     let mut stack = vec![group];
-    let mut all: Vec<&'a Line> = Vec::new();
+    let mut all: Vec<&'a ElementLine> = Vec::new();
     while let Some(group) = stack.pop() {
         all.extend(&group.lines);
         stack.extend(group.inside.values().rev());
@@ -129,7 +133,7 @@ fn all_nodes<'a>(group: &Group<'a>) -> impl Iterator<Item = &'a String> {
     all.into_iter().flat_map(|line| &line.nodes)
 }
 
-struct Writer {
+struct GroupWriter {
     /// Names of subnets by their text.
     subnets: HashMap<String, String>,
     taken: BTreeSet<String>,
@@ -137,23 +141,23 @@ struct Writer {
     outside: BTreeSet<String>,
 }
 
-impl Writer {
+impl GroupWriter {
     /// The elements of an instance; `formals` are the names that nodes from outside have in it.
-    fn body(&mut self, group: &Group<'_>, path: &str, formals: &HashMap<String, String>) -> String {
+    fn body(&mut self, group: &InstanceGroup<'_>, path: &str, formals: &HashMap<String, String>) -> String {
         let mut text = String::new();
         for part in &group.parts {
             match part {
-                Part::Line(k) => {
+                GroupPart::Line(k) => {
                     let line = group.lines[*k];
                     let name = line.name.rsplit('.').next().unwrap_or(&line.name).to_owned();
                     let nodes = line.nodes.iter().map(|n| self.local(n, path, formals)).collect();
-                    let local = Line { name, nodes, ..line.clone() }.to_string();
+                    let local = ElementLine { name, nodes, ..line.clone() }.to_string();
                     // A netlist numbers its nameless elements itself.
                     let unnamed =
                         local.strip_prefix("anon").map(|rest| rest.trim_start_matches(|c: char| c.is_ascii_digit()));
                     let _ = writeln!(text, "{}", unnamed.and_then(|rest| rest.strip_prefix(' ')).unwrap_or(&local));
                 }
-                Part::Group(name) => {
+                GroupPart::Group(name) => {
                     let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
                     let given = self.given(&group.inside[name], &inner);
                     let words = self.words(&group.inside[name], &inner, &given);
@@ -169,7 +173,7 @@ impl Writer {
     }
 
     /// Nodes that an instance is given: those that are not its own, in order of appearance.
-    fn given(&self, group: &Group<'_>, path: &str) -> Vec<String> {
+    fn given(&self, group: &InstanceGroup<'_>, path: &str) -> Vec<String> {
         let (mut seen, mut given) = (BTreeSet::new(), Vec::new());
         for node in all_nodes(group) {
             let own = node.strip_prefix(path).is_some_and(|rest| rest.starts_with('.'));
@@ -181,7 +185,7 @@ impl Writer {
     }
 
     /// What given nodes are called in an instance: n1, n2 …, but for what its own nodes are called.
-    fn words(&self, group: &Group<'_>, path: &str, given: &[String]) -> Vec<String> {
+    fn words(&self, group: &InstanceGroup<'_>, path: &str, given: &[String]) -> Vec<String> {
         let handed: BTreeSet<&String> = given.iter().collect();
         let own: BTreeSet<String> =
             all_nodes(group).filter(|n| !handed.contains(n)).map(|n| self.local(n, path, &HashMap::new())).collect();

@@ -1,21 +1,21 @@
 //! A process as its file has it.
 
 use super::error::ProcessError;
-use super::stack::{Anchoring, Fixed, LARGEST_HOLE, Layer, Metal, THICKEST, is_name};
+use super::stack::{Anchoring, FixedLayer, LARGEST_HOLE, MetalLayer, StructuralLayer, THICKEST, is_name};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct File {
+pub(super) struct ProcessFile {
     pub(super) name: String,
     #[serde(default)]
     pub(super) about: String,
     pub(super) material: BTreeMap<String, BTreeMap<String, f64>>,
     pub(super) layer: Vec<FileLayer>,
     #[serde(default)]
-    pub(super) fixed: Vec<Fixed>,
-    pub(super) metal: Option<Metal>,
+    pub(super) fixed: Vec<FixedLayer>,
+    pub(super) metal: Option<MetalLayer>,
     #[serde(default)]
     pub(super) ignored: Ignored,
 }
@@ -52,7 +52,7 @@ impl FileLayer {
         self,
         materials: &BTreeMap<String, BTreeMap<String, f64>>,
         file: &str,
-    ) -> Result<Layer, ProcessError> {
+    ) -> Result<StructuralLayer, ProcessError> {
         let Some(material) = materials.get(&self.material) else {
             let known: Vec<&str> = materials.keys().map(String::as_str).collect();
             let message = format!(
@@ -89,7 +89,7 @@ impl FileLayer {
         length("thickness", Some(self.thickness))?;
         let (fluid, undercut) = (length("fluid", self.fluid)?, length("undercut", self.undercut)?);
         let largest_hole = length("largest_hole", self.largest_hole)?.unwrap_or(LARGEST_HOLE);
-        Ok(Layer {
+        Ok(StructuralLayer {
             name: self.name,
             drawn: self.drawn,
             thickness: self.thickness,

@@ -16,18 +16,18 @@ pub struct Process {
     /// One line about it.
     pub about: String,
     /// Layers that move, in file order.
-    pub layers: Vec<Layer>,
+    pub layers: Vec<StructuralLayer>,
     /// Layers that hold still: wiring and electrodes under the others.
-    pub fixed: Vec<Fixed>,
+    pub fixed: Vec<FixedLayer>,
     /// Metal on top of layers; none: the process has none.
-    pub metal: Option<Metal>,
+    pub metal: Option<MetalLayer>,
     /// Drawn layers that do not change a model.
     pub ignored: Vec<String>,
 }
 
 /// A layer that moves.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Layer {
+pub struct StructuralLayer {
     /// Name of the netlist's `process` that is made of it.
     pub name: String,
     /// Drawn layers it consists of, by any of their names.
@@ -63,7 +63,7 @@ pub struct Anchoring {
 /// A layer that holds still.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Fixed {
+pub struct FixedLayer {
     /// Its name.
     pub name: String,
     /// Drawn layers it consists of.
@@ -76,7 +76,7 @@ pub struct Fixed {
 /// Metal on top.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Metal {
+pub struct MetalLayer {
     /// Thickness [m].
     pub thickness: f64,
     /// Sheet resistance [Ω/square].

@@ -26,27 +26,27 @@ pub struct ZeroPivot {
 
 /// Counts of the pivots' signs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Inertia {
+pub struct PivotSigns {
     /// Negative pivots: the number of negative eigenvalues.
     pub negative: usize,
 }
 
 /// A symmetric block as L·D·Lᵀ.
-pub(super) struct Decomposed<T: Scalar, const N: usize> {
+pub(super) struct BlockFactor<T: Scalar, const N: usize> {
     /// L, unit lower triangle.
     l: SMatrix<T, N, N>,
     /// D⁻¹.
     reciprocal: [T; N],
 }
 
-impl<T: Scalar, const N: usize> Decomposed<T, N> {
+impl<T: Scalar, const N: usize> BlockFactor<T, N> {
     /// Decomposes the lower triangle of `a`; adds the pivots' signs to `inertia`. `vanished` decides about a direction
     /// whose pivot vanished: an error, or to hold it.
     #[inline]
     pub(super) fn new(
         a: &SMatrix<T, N, N>,
         scale: &SVector<f64, N>,
-        inertia: &mut Inertia,
+        inertia: &mut PivotSigns,
         vanished: &mut dyn FnMut(usize) -> Result<(), ZeroPivot>,
     ) -> Result<Self, ZeroPivot> {
         let mut l = *a;

@@ -46,7 +46,7 @@ impl<T: Number> LaneDouble<T> {
     /// A number without anything left.
     #[inline(always)]
     pub fn of(high: T) -> Self {
-        Self { high, low: high.like(0.0) }
+        Self { high, low: high.splat_like(0.0) }
     }
 
     /// The sum.

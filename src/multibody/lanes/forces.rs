@@ -1,38 +1,44 @@
 //! Elastic forces, tangent, damping and inertia over lanes: [`crate::multibody::forces`].
 
 use super::joint::{LaneKinematics, LanePair, LanePlaced, LaneSection, kinematics};
-use super::model::{LaneJoint, LaneModel, Shared};
-use super::{Eight, LaneBlock, LaneMatrix, LanePose, Wide, add, load, load_block, store, times};
+use super::model::{LaneJoint, LaneModel, SharedSections};
+use super::{Lane8, LaneBlock, LaneMatrix, LanePose, SimdReal, add, load, load_block, store, times};
 use crate::multibody::BodyId;
-use crate::multibody::section::{NONE, Place};
+use crate::multibody::section::{NONE, PairSlot};
 
 /// What sets the axial rest offsets, or the change of it.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneRest<'a> {
+pub struct LaneRestStrain<'a> {
     /// Free strain of each group of joints [1].
-    pub expansion: &'a [Eight],
+    pub expansion: &'a [Lane8],
     /// Share of the built-in offsets that acts, the same in every lane [1].
     pub built_in: f64,
 }
 
 /// Puts every body where `q` says; ground stays behind the last.
 #[inline(always)]
-pub fn place<W: Wide>(simd: W::Simd, q: &[LanePose], placed: &mut [LanePlaced]) {
+pub fn place<W: SimdReal>(simd: W::Simd, q: &[LanePose], placed: &mut [LanePlaced]) {
     for (placed, q) in placed.iter_mut().zip(q) {
         placed.put::<W>(simd, q);
     }
 }
 
 /// A joint at work: what it shares with others, its kinematics, and its axial rest offset.
-struct Strained<W> {
+struct StrainedJoint<W> {
     section: LaneSection<W>,
     k: LaneKinematics<W>,
     offset: W,
 }
 
-impl<W: Wide> Strained<W> {
+impl<W: SimdReal> StrainedJoint<W> {
     #[inline(always)]
-    fn new(simd: W::Simd, joint: &LaneJoint, shared: &Shared, placed: &[LanePlaced], rest: &LaneRest<'_>) -> Self {
+    fn new(
+        simd: W::Simd,
+        joint: &LaneJoint,
+        shared: &SharedSections,
+        placed: &[LanePlaced],
+        rest: &LaneRestStrain<'_>,
+    ) -> Self {
         // ground is the largest index, and stands last
         let at = |body: u32| placed[(body as usize).min(placed.len() - 1)].load::<W>(simd);
         let section = shared.section.load::<W>(simd);
@@ -49,8 +55,8 @@ impl<W: Wide> Strained<W> {
 }
 
 #[inline(always)]
-fn offset<W: Wide>(simd: W::Simd, joint: &LaneJoint, shared: &Shared, rest: &LaneRest<'_>) -> W {
-    let of = |x: &Eight| W::load(simd, x);
+fn offset<W: SimdReal>(simd: W::Simd, joint: &LaneJoint, shared: &SharedSections, rest: &LaneRestStrain<'_>) -> W {
+    let of = |x: &Lane8| W::load(simd, x);
     let heat = match &shared.expansion {
         Some((group, length)) => of(length) * of(&rest.expansion[*group]),
         None => W::splat(simd, 0.0),
@@ -60,15 +66,15 @@ fn offset<W: Wide>(simd: W::Simd, joint: &LaneJoint, shared: &Shared, rest: &Lan
 
 /// `r +=` the elastic forces of bodies at `q`, where they have been placed, from the last joint to the first.
 #[inline(always)]
-pub fn add_elastic_backwards<W: Wide>(
+pub fn add_elastic_backwards<W: SimdReal>(
     simd: W::Simd,
     model: &LaneModel,
     (q, placed): (&[LanePose], &[LanePlaced]),
-    rest: &LaneRest<'_>,
+    rest: &LaneRestStrain<'_>,
     r: &mut [LanePose],
 ) {
     for joint in model.joints.iter().rev() {
-        let strained = Strained::<W>::new(simd, joint, &model.sections[joint.section as usize], placed, rest);
+        let strained = StrainedJoint::<W>::new(simd, joint, &model.sections[joint.section as usize], placed, rest);
         scatter(simd, joint.place, &strained.k.forces(&strained.stress()), r);
     }
     add_couplings::<W>(simd, model, q, r);
@@ -76,16 +82,16 @@ pub fn add_elastic_backwards<W: Wide>(
 
 /// `tangent +=` that of the elastic forces, and `r +=` the forces.
 #[inline(always)]
-pub fn add_tangent<W: Wide>(
+pub fn add_tangent<W: SimdReal>(
     simd: W::Simd,
     model: &LaneModel,
     (q, placed): (&[LanePose], &[LanePlaced]),
-    rest: &LaneRest<'_>,
+    rest: &LaneRestStrain<'_>,
     tangent: &mut LaneMatrix,
     r: &mut [LanePose],
 ) {
     for joint in &model.joints {
-        let strained = Strained::<W>::new(simd, joint, &model.sections[joint.section as usize], placed, rest);
+        let strained = StrainedJoint::<W>::new(simd, joint, &model.sections[joint.section as usize], placed, rest);
         let stress = strained.stress();
         scatter(simd, joint.place, &strained.k.forces(&stress), r);
         add_pair(simd, joint.place, tangent, &strained.k.tangent(&strained.section, &stress));
@@ -96,22 +102,22 @@ pub fn add_tangent<W: Wide>(
 
 /// `r +=` the forces that a change of the rest offsets brings; lanes without a change stay as they are.
 #[inline(always)]
-pub fn add_rest_change<W: Wide>(
+pub fn add_rest_change<W: SimdReal>(
     simd: W::Simd,
     model: &LaneModel,
     placed: &[LanePlaced],
-    change: &LaneRest<'_>,
+    change: &LaneRestStrain<'_>,
     r: &mut [LanePose],
 ) {
     for joint in &model.joints {
         let shared = &model.sections[joint.section as usize];
         let offset = offset::<W>(simd, joint, shared, change);
-        let mut acts = Eight::NONE;
+        let mut acts = Lane8::NONE;
         offset.store(&mut acts);
         if acts.0.iter().all(|x| *x == 0.0) {
             continue;
         }
-        let strained = Strained::<W>::new(simd, joint, shared, placed, change);
+        let strained = StrainedJoint::<W>::new(simd, joint, shared, placed, change);
         let none = W::splat(simd, 0.0);
         let (a, b) = strained.k.forces(&strained.section.stress(&[-offset, none, none]));
         for (body, force) in [(joint.place.a, a), (joint.place.b, b)] {
@@ -127,7 +133,7 @@ pub fn add_rest_change<W: Wide>(
 
 /// `r +=` the forces of dampers at the rates `v`.
 #[inline(always)]
-pub fn add_dampers<W: Wide>(simd: W::Simd, model: &LaneModel, v: &[LanePose], r: &mut [LanePose]) {
+pub fn add_dampers<W: SimdReal>(simd: W::Simd, model: &LaneModel, v: &[LanePose], r: &mut [LanePose]) {
     for damper in &model.dampers {
         let mut pair = [W::splat(simd, 0.0); 6];
         for (id, from) in [(damper.bodies.0, 0), (damper.bodies.1, 3)] {
@@ -153,8 +159,8 @@ pub fn add_dampers<W: Wide>(simd: W::Simd, model: &LaneModel, v: &[LanePose], r:
 
 /// `matrix += m·M + c·C`.
 #[inline(always)]
-pub fn add_inertia<W: Wide>(simd: W::Simd, model: &LaneModel, m: W, c: W, matrix: &mut LaneMatrix) {
-    let plus = |to: &mut Eight, x: W| (W::load(simd, to) + x).store(to);
+pub fn add_inertia<W: SimdReal>(simd: W::Simd, model: &LaneModel, m: W, c: W, matrix: &mut LaneMatrix) {
+    let plus = |to: &mut Lane8, x: W| (W::load(simd, to) + x).store(to);
     for (block, body) in matrix.diagonal.iter_mut().zip(&model.bodies) {
         let body = body.load::<W>(simd);
         let first = [body.first[0] * c, body.first[1] * c];
@@ -169,7 +175,7 @@ pub fn add_inertia<W: Wide>(simd: W::Simd, model: &LaneModel, m: W, c: W, matrix
     }
     for damper in &model.dampers {
         let at = |i: usize, j: usize| W::load(simd, &damper.matrix[i][j]) * c;
-        let Place { a, b, block } = damper.place;
+        let PairSlot { a, b, block } = damper.place;
         for (body, from) in [(a, 0), (b, 3)] {
             if body != NONE {
                 add_corner(simd, &mut matrix.diagonal[body as usize], |i, j| at(from + i, from + j));
@@ -188,7 +194,7 @@ pub fn add_inertia<W: Wide>(simd: W::Simd, model: &LaneModel, m: W, c: W, matrix
 
 /// Removes the held directions from a vector.
 #[inline(always)]
-pub fn project<W: Wide>(simd: W::Simd, model: &LaneModel, x: &mut [LanePose]) {
+pub fn project<W: SimdReal>(simd: W::Simd, model: &LaneModel, x: &mut [LanePose]) {
     if model.holds {
         for (x, held) in x.iter_mut().zip(&model.held) {
             if let Some((p, _)) = held {
@@ -199,14 +205,14 @@ pub fn project<W: Wide>(simd: W::Simd, model: &LaneModel, x: &mut [LanePose]) {
 }
 
 #[inline(always)]
-fn add_corner<W: Wide>(simd: W::Simd, block: &mut LaneBlock, entry: impl Fn(usize, usize) -> W) {
+fn add_corner<W: SimdReal>(simd: W::Simd, block: &mut LaneBlock, entry: impl Fn(usize, usize) -> W) {
     for (j, column) in block.iter_mut().enumerate() {
         add(simd, column, &[entry(0, j), entry(1, j), entry(2, j)]);
     }
 }
 
 #[inline(always)]
-fn scatter<W: Wide>(simd: W::Simd, place: Place, (a, b): &(LanePose<W>, LanePose<W>), r: &mut [LanePose]) {
+fn scatter<W: SimdReal>(simd: W::Simd, place: PairSlot, (a, b): &(LanePose<W>, LanePose<W>), r: &mut [LanePose]) {
     if place.a != NONE {
         add(simd, &mut r[place.a as usize], a);
     }
@@ -216,7 +222,7 @@ fn scatter<W: Wide>(simd: W::Simd, place: Place, (a, b): &(LanePose<W>, LanePose
 }
 
 #[inline(always)]
-fn add_pair<W: Wide>(simd: W::Simd, place: Place, matrix: &mut LaneMatrix, h: &LanePair<W>) {
+fn add_pair<W: SimdReal>(simd: W::Simd, place: PairSlot, matrix: &mut LaneMatrix, h: &LanePair<W>) {
     if place.a != NONE {
         h.add_aa(simd, &mut matrix.diagonal[place.a as usize]);
     }
@@ -229,7 +235,7 @@ fn add_pair<W: Wide>(simd: W::Simd, place: Place, matrix: &mut LaneMatrix, h: &L
 }
 
 #[inline(always)]
-fn add_couplings<W: Wide>(simd: W::Simd, model: &LaneModel, q: &[LanePose], r: &mut [LanePose]) {
+fn add_couplings<W: SimdReal>(simd: W::Simd, model: &LaneModel, q: &[LanePose], r: &mut [LanePose]) {
     let at = |id: BodyId| if let BodyId::Free(k) = id { W::load(simd, &q[k][2]) } else { W::splat(simd, 0.0) };
     for coupling in &model.couplings {
         let between = |(a, b): (BodyId, BodyId)| at(b) - at(a);

@@ -1,13 +1,13 @@
 //! Strains of a joint, its forces and its tangent: [`crate::multibody::planar`] over lanes.
 
-use super::{Eight, LaneBlock, LanePose, Number, STILL, Wide, add, load};
+use super::{Lane8, LaneBlock, LanePose, Number, STILL, SimdReal, add, load};
 
 /// Two numbers of the plane.
-pub type Pair<T = Eight> = [T; 2];
+pub type LaneVector<T = Lane8> = [T; 2];
 
 /// Sine and cosine of half of a body's rotation, with R(θ) − 1.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneTurn<T = Eight> {
+pub struct LaneTurn<T = Lane8> {
     sin: T,
     cos: T,
     less: T,
@@ -16,23 +16,23 @@ pub struct LaneTurn<T = Eight> {
 
 impl LaneTurn {
     /// Of ground.
-    const REST: Self = Self { sin: Eight::NONE, cos: Eight::of(1.0), less: Eight::NONE, whole: Eight::NONE };
+    const REST: Self = Self { sin: Lane8::NONE, cos: Lane8::of(1.0), less: Lane8::NONE, whole: Lane8::NONE };
 
     #[inline(always)]
-    fn load<W: Wide>(&self, simd: W::Simd) -> LaneTurn<W> {
-        let of = |x: &Eight| W::load(simd, x);
+    fn load<W: SimdReal>(&self, simd: W::Simd) -> LaneTurn<W> {
+        let of = |x: &Lane8| W::load(simd, x);
         LaneTurn { sin: of(&self.sin), cos: of(&self.cos), less: of(&self.less), whole: of(&self.whole) }
     }
 }
 
 impl<T: Number> LaneTurn<T> {
     #[inline(always)]
-    fn swing(&self, v: &Pair<T>) -> Pair<T> {
+    fn rotation_minus_identity(&self, v: &LaneVector<T>) -> LaneVector<T> {
         [self.less * v[0] - self.whole * v[1], self.whole * v[0] + self.less * v[1]]
     }
 
     #[inline(always)]
-    fn mean(&self, other: &Self, v: &Pair<T>) -> Pair<T> {
+    fn mean(&self, other: &Self, v: &LaneVector<T>) -> LaneVector<T> {
         let c = self.cos * other.cos - self.sin * other.sin;
         let s = self.sin * other.cos + self.cos * other.sin;
         [c * v[0] - s * v[1], s * v[0] + c * v[1]]
@@ -41,7 +41,7 @@ impl<T: Number> LaneTurn<T> {
 
 /// Where a body is: its displacement and its turn, looked up by each of its joints.
 #[derive(Debug, Clone, Copy)]
-pub struct LanePlaced<T = Eight> {
+pub struct LanePlaced<T = Lane8> {
     q: LanePose<T>,
     turn: LaneTurn<T>,
 }
@@ -52,7 +52,7 @@ impl LanePlaced {
 
     /// A body at `q`.
     #[inline(always)]
-    pub fn put<W: Wide>(&mut self, simd: W::Simd, q: &LanePose) {
+    pub fn put<W: SimdReal>(&mut self, simd: W::Simd, q: &LanePose) {
         self.q = *q;
         let (sin, cos) = (W::load(simd, &q[2]) * 0.5).sin_cos(simd);
         sin.store(&mut self.turn.sin);
@@ -63,7 +63,7 @@ impl LanePlaced {
 
     /// From memory.
     #[inline(always)]
-    pub fn load<W: Wide>(&self, simd: W::Simd) -> LanePlaced<W> {
+    pub fn load<W: SimdReal>(&self, simd: W::Simd) -> LanePlaced<W> {
         LanePlaced { q: load(simd, &self.q), turn: self.turn.load(simd) }
     }
 }
@@ -78,9 +78,9 @@ impl<T: Number> LanePlaced<T> {
 
 /// What joints of one section share.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneSection<T = Eight> {
+pub struct LaneSection<T = Lane8> {
     /// Cosine and sine of the drawn angle.
-    pub axis: Pair<T>,
+    pub axis: LaneVector<T>,
     /// Stiffness: uu, ug, up, gg, gp, pp.
     pub stiffness: [T; 6],
     /// Q over (g, p): gg, gp, pp.
@@ -90,7 +90,7 @@ pub struct LaneSection<T = Eight> {
 impl LaneSection {
     /// From memory.
     #[inline(always)]
-    pub fn load<W: Wide>(&self, simd: W::Simd) -> LaneSection<W> {
+    pub fn load<W: SimdReal>(&self, simd: W::Simd) -> LaneSection<W> {
         let Self { axis, stiffness, second } = self;
         LaneSection { axis: load(simd, axis), stiffness: load(simd, stiffness), second: load(simd, second) }
     }
@@ -106,34 +106,34 @@ impl<T: Number> LaneSection<T> {
 
 /// Strains with what their derivatives need.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneKinematics<T = Eight> {
+pub struct LaneKinematics<T = Lane8> {
     /// e_u [m], g [m], p [rad].
     pub strain: LanePose<T>,
     axial: T,
     shear: T,
-    bent: Pair<T>,
-    opening: Pair<T>,
-    radius_a: Pair<T>,
-    radius_b: Pair<T>,
-    e1: Pair<T>,
+    bent: LaneVector<T>,
+    opening: LaneVector<T>,
+    radius_a: LaneVector<T>,
+    radius_b: LaneVector<T>,
+    e1: LaneVector<T>,
 }
 
 /// The tangent of a pair of bodies, see [`crate::multibody::planar::PairTangent`].
 #[derive(Debug, Clone, Copy)]
-pub struct LanePair<T = Eight> {
+pub struct LanePair<T = Lane8> {
     shift: [T; 3],
-    shift_a: Pair<T>,
-    shift_b: Pair<T>,
+    shift_a: LaneVector<T>,
+    shift_b: LaneVector<T>,
     turn: [T; 3],
 }
 
 #[inline(always)]
-fn turn<T: Number>(v: &Pair<T>) -> Pair<T> {
+fn perpendicular<T: Number>(v: &LaneVector<T>) -> LaneVector<T> {
     [-v[1], v[0]]
 }
 
 #[inline(always)]
-fn dot<T: Number>(a: &Pair<T>, b: &Pair<T>) -> T {
+fn dot<T: Number>(a: &LaneVector<T>, b: &LaneVector<T>) -> T {
     a[0] * b[0] + a[1] * b[1]
 }
 
@@ -144,7 +144,7 @@ fn dot3<T: Number>(a: &LanePose<T>, b: &LanePose<T>) -> T {
 
 /// a·x + b·y.
 #[inline(always)]
-fn combine<T: Number>(a: &Pair<T>, x: T, b: &Pair<T>, y: T) -> Pair<T> {
+fn combine<T: Number>(a: &LaneVector<T>, x: T, b: &LaneVector<T>, y: T) -> LaneVector<T> {
     [a[0] * x + b[0] * y, a[1] * x + b[1] * y]
 }
 
@@ -158,16 +158,16 @@ fn multiply<T: Number>(k: &[T; 6], x: &LanePose<T>) -> LanePose<T> {
 #[inline(always)]
 pub fn kinematics<T: Number>(
     section: &LaneSection<T>,
-    (arm_a, arm_b): (&Pair<T>, &Pair<T>),
+    (arm_a, arm_b): (&LaneVector<T>, &LaneVector<T>),
     LanePlaced { q: qa, turn: a }: &LanePlaced<T>,
     LanePlaced { q: qb, turn: b }: &LanePlaced<T>,
 ) -> LaneKinematics<T> {
-    let (swing_a, swing_b) = (a.swing(arm_a), b.swing(arm_b));
+    let (swing_a, swing_b) = (a.rotation_minus_identity(arm_a), b.rotation_minus_identity(arm_b));
     let radius_a = [arm_a[0] + swing_a[0], arm_a[1] + swing_a[1]];
     let radius_b = [arm_b[0] + swing_b[0], arm_b[1] + swing_b[1]];
     let opening = [qb[0] - qa[0] + swing_b[0] - swing_a[0], qb[1] - qa[1] + swing_b[1] - swing_a[1]];
     let e1 = a.mean(b, &section.axis);
-    let (u, g, p) = (dot(&opening, &e1), dot(&opening, &turn(&e1)), qb[2] - qa[2]);
+    let (u, g, p) = (dot(&opening, &e1), dot(&opening, &perpendicular(&e1)), qb[2] - qa[2]);
     let second = &section.second;
     let bent = [second[0] * g + second[1] * p, second[1] * g + second[2] * p];
     let strain = [u + bent[0] * g + bent[1] * p, g, p];
@@ -180,9 +180,9 @@ impl<T: Number> LaneKinematics<T> {
     pub fn forces(&self, stress: &LanePose<T>) -> (LanePose<T>, LanePose<T>) {
         let double = stress[0] * 2.0;
         let (shear, moment) = (stress[1] + double * self.bent[0], stress[2] + double * self.bent[1]);
-        let n = combine(&self.e1, stress[0], &turn(&self.e1), shear);
+        let n = combine(&self.e1, stress[0], &perpendicular(&self.e1), shear);
         let frame = (self.shear * stress[0] - self.axial * shear) * 0.5;
-        let (at_a, at_b) = (dot(&turn(&self.radius_a), &n), dot(&turn(&self.radius_b), &n));
+        let (at_a, at_b) = (dot(&perpendicular(&self.radius_a), &n), dot(&perpendicular(&self.radius_b), &n));
         ([-n[0], -n[1], frame - at_a - moment], [n[0], n[1], frame + at_b + moment])
     }
 
@@ -194,8 +194,8 @@ impl<T: Number> LaneKinematics<T> {
         let [q_gg, q_gp, q_pp] = section.second;
         let [q_gg, q_gp, q_pp] = [double * q_gg, double * q_gp, double * q_pp];
         let mut h = self.elastic(&[uu, ug, up, gg + q_gg, gp + q_gp, pp + q_pp]);
-        let n = combine(&self.e1, stress[0], &turn(&self.e1), stress[1] + double * self.bent[0]);
-        let [x, y] = turn(&n);
+        let n = combine(&self.e1, stress[0], &perpendicular(&self.e1), stress[1] + double * self.bent[0]);
+        let [x, y] = perpendicular(&n);
         let across = [x * 0.5, y * 0.5];
         for i in 0..2 {
             h.shift_a[i] += across[i];
@@ -210,9 +210,9 @@ impl<T: Number> LaneKinematics<T> {
 
     #[inline(always)]
     fn elastic(&self, stiffness: &[T; 6]) -> LanePair<T> {
-        let (g, half_g, half_u) = (turn(&self.e1), self.shear * 0.5, self.axial * 0.5);
-        let one = self.shear.like(1.0);
-        let (ta, tb) = (turn(&self.radius_a), turn(&self.radius_b));
+        let (g, half_g, half_u) = (perpendicular(&self.e1), self.shear * 0.5, self.axial * 0.5);
+        let one = self.shear.splat_like(1.0);
+        let (ta, tb) = (perpendicular(&self.radius_a), perpendicular(&self.radius_b));
         let (u_a, u_b) = (half_g - dot(&self.e1, &ta), half_g + dot(&self.e1, &tb));
         let (g_a, g_b) = (-half_u - dot(&g, &ta), -half_u + dot(&g, &tb));
         let twice = [self.bent[0] * 2.0, self.bent[1] * 2.0];
@@ -231,7 +231,7 @@ impl<T: Number> LaneKinematics<T> {
     }
 }
 
-impl<W: Wide> LanePair<W> {
+impl<W: SimdReal> LanePair<W> {
     /// Adds the block of body a twice.
     #[inline(always)]
     pub fn add_aa(&self, simd: W::Simd, block: &mut LaneBlock) {
@@ -260,7 +260,7 @@ impl<W: Wide> LanePair<W> {
 
 /// `block += more`, columns.
 #[inline(always)]
-fn add_block<W: Wide>(simd: W::Simd, block: &mut LaneBlock, more: LaneBlock<W>) {
+fn add_block<W: SimdReal>(simd: W::Simd, block: &mut LaneBlock, more: LaneBlock<W>) {
     for (column, more) in block.iter_mut().zip(&more) {
         add(simd, column, more);
     }

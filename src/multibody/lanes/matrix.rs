@@ -3,11 +3,11 @@
 //! A pivot that vanishes in one variant spoils that lane alone: its name is told, and what comes of it is not looked at.
 
 use super::{
-    BLANK, Eight, LANES, LaneBlock, LanePose, STILL, Wide, load, load_block, product, store, store_block, times,
+    BLANK, LANES, Lane8, LaneBlock, LanePose, STILL, SimdReal, load, load_block, product, store, store_block, times,
 };
 use crate::multibody::Pattern;
 use crate::multibody::factor::LOST;
-use crate::multibody::model::LEAST_HELD;
+use crate::multibody::model::MIN_HELD;
 
 /// A symmetric matrix of blocks on a pattern in each variant; after [`LaneMatrix::factor`], its factors.
 #[derive(Debug, Clone)]
@@ -39,7 +39,7 @@ impl LaneMatrix {
 
     /// Replaces the matrix by its factors. Returns the lanes in which a pivot vanished.
     #[inline(always)]
-    pub fn factor<W: Wide>(&mut self, simd: W::Simd, pattern: &Pattern) -> [bool; LANES] {
+    pub fn factor<W: SimdReal>(&mut self, simd: W::Simd, pattern: &Pattern) -> [bool; LANES] {
         let mut sound = W::splat(simd, 0.0);
         for (scale, block) in self.scale.iter_mut().zip(&self.diagonal) {
             for i in 0..3 {
@@ -48,7 +48,7 @@ impl LaneMatrix {
         }
         for j in 0..pattern.bodies() {
             let (block, scale) = (load_block::<W>(simd, &self.diagonal[j]), load(simd, &self.scale[j]));
-            let own = Decomposed::new(block, &scale, &mut sound);
+            let own = LaneBlockFactor::new(block, &scale, &mut sound);
             store_block(own.inverse(), &mut self.diagonal[j]);
             let column = pattern.column(j);
             let mut target = pattern.targets(j).iter();
@@ -72,14 +72,14 @@ impl LaneMatrix {
                 store_block(later, &mut self.diagonal[row as usize]);
             }
         }
-        let mut spoilt = Eight::NONE;
+        let mut spoilt = Lane8::NONE;
         sound.store(&mut spoilt);
         spoilt.0.map(f64::is_nan)
     }
 
     /// How many pivots are negative in each lane: as many as eigenvalues are (Sylvester). Not a number where a block has none.
     #[inline(always)]
-    pub fn negative<W: Wide>(&self, simd: W::Simd) -> W {
+    pub fn negative<W: SimdReal>(&self, simd: W::Simd) -> W {
         let mut signs = W::splat(simd, 0.0);
         for inverse in &self.diagonal {
             // a block and its inverse have as many
@@ -97,7 +97,7 @@ impl LaneMatrix {
 
     /// Solves in place with the factors.
     #[inline(always)]
-    pub fn solve<W: Wide>(&self, simd: W::Simd, pattern: &Pattern, b: &mut [LanePose]) {
+    pub fn solve<W: SimdReal>(&self, simd: W::Simd, pattern: &Pattern, b: &mut [LanePose]) {
         let zero = W::splat(simd, 0.0);
         for j in 0..pattern.bodies() {
             let pivot = load::<W, 3>(simd, &b[j]);
@@ -127,12 +127,12 @@ impl LaneMatrix {
 
     /// P·A·P with pivots in what the projectors `held` (body, projector, what it leaves out) take away, as `projected` of one model has them.
     #[inline(always)]
-    pub fn project<W: Wide>(&mut self, simd: W::Simd, pattern: &Pattern, held: &[Option<(LaneBlock, LaneBlock)>]) {
+    pub fn project<W: SimdReal>(&mut self, simd: W::Simd, pattern: &Pattern, held: &[Option<(LaneBlock, LaneBlock)>]) {
         let block = |from: &LaneBlock| load_block::<W>(simd, from);
         for (j, own) in held.iter().enumerate() {
             if let Some((p, rest)) = own {
                 let (p, own) = (block(p), block(&self.diagonal[j]));
-                let size = own[0][0].abs() + own[1][1].abs() + W::splat(simd, LEAST_HELD);
+                let size = own[0][0].abs() + own[1][1].abs() + W::splat(simd, MIN_HELD);
                 store_block(product(&product(&p, &own), &p), &mut self.diagonal[j]);
                 let mut rest = block(rest);
                 for column in &mut rest[..2] {
@@ -155,20 +155,20 @@ impl LaneMatrix {
 }
 
 /// A symmetric block as L·D·Lᵀ.
-struct Decomposed<W> {
+struct LaneBlockFactor<W> {
     l: LaneBlock<W>,
     reciprocal: [W; 3],
 }
 
-impl<W: Wide> Decomposed<W> {
+impl<W: SimdReal> LaneBlockFactor<W> {
     /// `sound` stops being a number in lanes where a pivot vanishes, or is none.
     #[inline(always)]
     fn new(mut l: LaneBlock<W>, scale: &LanePose<W>, sound: &mut W) -> Self {
         let mut reciprocal = *scale;
         for j in 0..3 {
             let d = l[j][j];
-            *sound = d.abs().spoil(scale[j] * LOST, *sound) + d * 0.0;
-            reciprocal[j] = d.like(1.0) / d;
+            *sound = d.abs().mark_nan(scale[j] * LOST, *sound) + d * 0.0;
+            reciprocal[j] = d.splat_like(1.0) / d;
             for i in j + 1..3 {
                 let below = l[j][i];
                 l[j][i] = below * reciprocal[j];
@@ -184,7 +184,7 @@ impl<W: Wide> Decomposed<W> {
     /// L⁻ᵀ·D⁻¹·L⁻¹.
     #[inline(always)]
     fn inverse(&self) -> LaneBlock<W> {
-        let (zero, one) = (self.reciprocal[0].like(0.0), self.reciprocal[0].like(1.0));
+        let (zero, one) = (self.reciprocal[0].splat_like(0.0), self.reciprocal[0].splat_like(1.0));
         let mut li = [[zero; 3]; 3];
         for j in 0..3 {
             li[j][j] = one;

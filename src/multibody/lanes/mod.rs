@@ -35,14 +35,14 @@ pub use number::Number;
 pub use precise::{LanePrecise, PrecisePose};
 #[cfg(test)]
 pub(crate) use wide::one_by_one;
-pub use wide::{Eight, Kernel, LANES, Wide, across, add, everywhere, load, store};
+pub use wide::{Kernel, LANES, Lane8, SimdReal, across, add, everywhere, load, store};
 
 /// Displacement, rate or force of a body in each variant: x, y, θ.
-pub type LanePose<T = Eight> = [T; 3];
+pub type LanePose<T = Lane8> = [T; 3];
 /// A block of a matrix in each variant, column by column.
-pub type LaneBlock<T = Eight> = [[T; 3]; 3];
+pub type LaneBlock<T = Lane8> = [[T; 3]; 3];
 
-impl Eight {
+impl Lane8 {
     /// Zero in every lane.
     pub const NONE: Self = Self([0.0; LANES]);
 
@@ -53,7 +53,7 @@ impl Eight {
 }
 
 /// Nothing in every lane.
-pub const STILL: LanePose = [Eight::NONE; 3];
+pub const STILL: LanePose = [Lane8::NONE; 3];
 /// A block of zeros in every lane.
 pub const BLANK: LaneBlock = [STILL; 3];
 
@@ -83,13 +83,13 @@ pub fn product<T: Number>(a: &LaneBlock<T>, b: &LaneBlock<T>) -> LaneBlock<T> {
 
 /// A block from memory.
 #[inline(always)]
-pub fn load_block<W: Wide>(simd: W::Simd, from: &LaneBlock) -> LaneBlock<W> {
+pub fn load_block<W: SimdReal>(simd: W::Simd, from: &LaneBlock) -> LaneBlock<W> {
     [load(simd, &from[0]), load(simd, &from[1]), load(simd, &from[2])]
 }
 
 /// A block to memory.
 #[inline(always)]
-pub fn store_block<W: Wide>(block: LaneBlock<W>, to: &mut LaneBlock) {
+pub fn store_block<W: SimdReal>(block: LaneBlock<W>, to: &mut LaneBlock) {
     for (column, to) in block.into_iter().zip(to) {
         store(column, to);
     }

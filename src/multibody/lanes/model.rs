@@ -1,22 +1,22 @@
 //! Bodies and joints of variants side by side.
 
-use super::joint::{LaneSection, Pair};
-use super::{BLANK, Eight, LaneBlock, LanePose, Number, Real, STILL, Wide, load};
+use super::joint::{LaneSection, LaneVector};
+use super::{BLANK, Lane8, LaneBlock, LanePose, Number, Real, STILL, SimdReal, load};
 use crate::multibody::planar::Block;
-use crate::multibody::section::{LaidJoint, Place, Section};
+use crate::multibody::section::{JointSection, PackedJoint, PairSlot};
 use crate::multibody::{Body, BodyId, Model, Pattern};
 use nalgebra::Matrix3;
 use std::sync::Arc;
 
 /// A body in each variant.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneBody<T = Eight> {
+pub struct LaneBody<T = Lane8> {
     /// Mass [kg] and moment of inertia [kg·m²], as the mass matrix' diagonal.
     pub mass: LanePose<T>,
     /// Drag on translation [N·s/m].
     pub drag: T,
     /// Its first moment [N·s].
-    pub first: Pair<T>,
+    pub first: LaneVector<T>,
     /// Its second moment [N·m·s].
     pub second: T,
 }
@@ -24,18 +24,18 @@ pub struct LaneBody<T = Eight> {
 /// A joint in each variant.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LaneJoint {
-    pub(crate) place: Place,
+    pub(crate) place: PairSlot,
     pub(crate) section: u32,
-    pub(crate) arm_a: Pair,
-    pub(crate) arm_b: Pair,
-    pub(crate) rest: Eight,
+    pub(crate) arm_a: LaneVector,
+    pub(crate) arm_b: LaneVector,
+    pub(crate) rest: Lane8,
 }
 
 /// What joints share, and what lengthens them.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shared {
+pub(crate) struct SharedSections {
     pub(crate) section: LaneSection,
-    pub(crate) expansion: Option<(usize, Eight)>,
+    pub(crate) expansion: Option<(usize, Lane8)>,
 }
 
 /// Two joints whose moments depend on both rotations.
@@ -43,20 +43,20 @@ pub(crate) struct Shared {
 pub(crate) struct LaneCoupling {
     pub(crate) first: (BodyId, BodyId),
     pub(crate) second: (BodyId, BodyId),
-    pub(crate) stiffness: Eight,
+    pub(crate) stiffness: Lane8,
 }
 
 /// A damper.
 #[derive(Debug, Clone)]
 pub(crate) struct LaneDamper {
     pub(crate) bodies: (BodyId, BodyId),
-    pub(crate) place: Place,
+    pub(crate) place: PairSlot,
     /// Rows.
-    pub(crate) matrix: [[Eight; 6]; 6],
+    pub(crate) matrix: [[Lane8; 6]; 6],
 }
 
 /// A projector onto what a support leaves free, and the rest of the identity.
-pub(crate) type Held = Option<(LaneBlock, LaneBlock)>;
+pub(crate) type SupportProjector = Option<(LaneBlock, LaneBlock)>;
 
 /// Models of as many variants as there are lanes.
 #[derive(Debug, Clone)]
@@ -66,10 +66,10 @@ pub struct LaneModel {
     /// Bodies in elimination order.
     pub bodies: Vec<LaneBody>,
     pub(crate) joints: Vec<LaneJoint>,
-    pub(crate) sections: Vec<Shared>,
+    pub(crate) sections: Vec<SharedSections>,
     pub(crate) couplings: Vec<LaneCoupling>,
     pub(crate) dampers: Vec<LaneDamper>,
-    pub(crate) held: Vec<Held>,
+    pub(crate) held: Vec<SupportProjector>,
     pub(crate) holds: bool,
 }
 
@@ -79,22 +79,22 @@ impl LaneModel {
         if model.linear {
             return None;
         }
-        let none = Eight::NONE;
+        let none = Lane8::NONE;
         let body = LaneBody { mass: STILL, drag: none, first: [none; 2], second: none };
         let section = LaneSection { axis: [none; 2], stiffness: [none; 6], second: [none; 3] };
-        let joint = |j: &LaidJoint| LaneJoint {
+        let joint = |j: &PackedJoint| LaneJoint {
             place: j.place,
             section: j.section() as u32,
             arm_a: [none; 2],
             arm_b: [none; 2],
             rest: none,
         };
-        let expansion = |s: &Section| s.expansion.map(|(group, _)| (group, none));
+        let expansion = |s: &JointSection| s.expansion.map(|(group, _)| (group, none));
         let mut laid = Self {
             pattern: model.pattern.clone(),
             bodies: vec![body; model.bodies.len()],
             joints: model.joints.iter().map(joint).collect(),
-            sections: model.sections.iter().map(|s| Shared { section, expansion: expansion(s) }).collect(),
+            sections: model.sections.iter().map(|s| SharedSections { section, expansion: expansion(s) }).collect(),
             couplings: (model.couplings.iter())
                 .map(|c| LaneCoupling { first: c.first, second: c.second, stiffness: none })
                 .collect(),
@@ -105,17 +105,17 @@ impl LaneModel {
             holds: model.bodies.iter().any(|b| b.free.is_some()),
         };
         for lane in 0..super::LANES {
-            laid.put(lane, model);
+            laid.set_lane(lane, model);
         }
         Some(laid)
     }
 
     /// True for a model that differs from those laid here in numbers alone.
     pub fn fits(&self, model: &Model) -> bool {
-        let bodies = |(held, body): (&Held, &Body)| held.is_some() == body.free.is_some();
+        let bodies = |(held, body): (&SupportProjector, &Body)| held.is_some() == body.free.is_some();
         // joints of one section here must be alike in the other model too
         let mut others = vec![u32::MAX; self.sections.len()];
-        let joints = |(own, other): (&LaneJoint, &LaidJoint)| {
+        let joints = |(own, other): (&LaneJoint, &PackedJoint)| {
             let known = &mut others[own.section as usize];
             let section = other.section() as u32;
             let alike = *known == section || *known == u32::MAX;
@@ -138,7 +138,7 @@ impl LaneModel {
     }
 
     /// Puts the numbers of a model that fits into one lane.
-    pub fn put(&mut self, lane: usize, model: &Model) {
+    pub fn set_lane(&mut self, lane: usize, model: &Model) {
         for (to, from) in self.bodies.iter_mut().zip(&model.bodies) {
             set(lane, &mut to.mass, from.mass_diagonal().as_slice());
             to.drag.set_lane(lane, from.drag.amount);
@@ -177,7 +177,7 @@ impl LaneModel {
     }
 }
 
-fn set(lane: usize, to: &mut [Eight], from: &[f64]) {
+fn set(lane: usize, to: &mut [Lane8], from: &[f64]) {
     for (to, from) in to.iter_mut().zip(from) {
         to.set_lane(lane, *from);
     }
@@ -192,7 +192,7 @@ fn put_block(lane: usize, to: &mut LaneBlock, from: &Block) {
 impl LaneBody {
     /// From memory.
     #[inline(always)]
-    pub fn load<W: Wide>(&self, simd: W::Simd) -> LaneBody<W> {
+    pub fn load<W: SimdReal>(&self, simd: W::Simd) -> LaneBody<W> {
         LaneBody {
             mass: load(simd, &self.mass),
             drag: W::load(simd, &self.drag),

@@ -16,12 +16,12 @@ pub trait Number:
     + Mul<f64, Output = Self>
 {
     /// `x`, in as many lanes as this has.
-    fn like(self, x: f64) -> Self;
+    fn splat_like(self, x: f64) -> Self;
 }
 
 impl Number for f64 {
     #[inline(always)]
-    fn like(self, x: f64) -> Self {
+    fn splat_like(self, x: f64) -> Self {
         x
     }
 }

@@ -1,30 +1,30 @@
 //! The product of a tangent with a displacement in extended precision: [`crate::multibody::precise`] over lanes.
 
 use super::double::LaneDouble;
-use super::{Eight, LANES, LanePose, Real, Wide, load};
+use super::{LANES, Lane8, LanePose, Real, SimdReal, load};
 use crate::multibody::Model;
 use crate::multibody::forces::{RestStrain, factored};
 use crate::multibody::planar::Pose;
-use crate::multibody::section::{NONE, Place};
+use crate::multibody::section::{NONE, PairSlot};
 
 /// Numbers of a pair's tangent: the slopes u, g, of both turns, the stiffness, and the rest.
 const NUMBERS: usize = 21;
 
 /// A force on each body as a sum of two numbers.
-pub type PrecisePose<T = Eight> = [[T; 2]; 3];
+pub type PrecisePose<T = Lane8> = [[T; 2]; 3];
 
 /// ∂²U/∂q² of the joints of each variant, unsummed.
 #[derive(Debug, Clone, Default)]
 pub struct LanePrecise {
-    joints: Vec<(Place, [Eight; NUMBERS])>,
+    joints: Vec<(PairSlot, [Lane8; NUMBERS])>,
 }
 
 impl LanePrecise {
     /// Puts the tangent of a model at `q` into one lane. All lanes must have the same joints, and none of them couplings.
-    pub fn put(&mut self, lane: usize, model: &Model, q: &[Pose], rest: &RestStrain<'_>) {
+    pub fn set_lane(&mut self, lane: usize, model: &Model, q: &[Pose], rest: &RestStrain<'_>) {
         let joints = factored(model, q, rest);
         if self.joints.len() != joints.len() {
-            self.joints = joints.iter().map(|(place, _)| (*place, [Eight::NONE; NUMBERS])).collect();
+            self.joints = joints.iter().map(|(place, _)| (*place, [Lane8::NONE; NUMBERS])).collect();
         }
         debug_assert!(lane < LANES && model.couplings.is_empty());
         for ((_, to), (_, tangent)) in self.joints.iter_mut().zip(&joints) {
@@ -36,7 +36,7 @@ impl LanePrecise {
 
     /// `y += K·x`.
     #[inline(always)]
-    pub fn multiply_add<W: Wide>(&self, simd: W::Simd, x: &[LanePose], y: &mut [PrecisePose]) {
+    pub fn multiply_add<W: SimdReal>(&self, simd: W::Simd, x: &[LanePose], y: &mut [PrecisePose]) {
         let none = W::splat(simd, 0.0);
         for (place, numbers) in &self.joints {
             let at = |body: u32| if body == NONE { [none; 3] } else { load(simd, &x[body as usize]) };
@@ -59,7 +59,7 @@ type Three<W> = [LaneDouble<W>; 3];
 
 /// The product of a pair's tangent with the poses of its bodies: forces on both.
 #[inline(always)]
-fn times<W: Wide>(t: &[W; NUMBERS], qa: &[W; 3], qb: &[W; 3]) -> (Three<W>, Three<W>) {
+fn times<W: SimdReal>(t: &[W; NUMBERS], qa: &[W; 3], qb: &[W; 3]) -> (Three<W>, Three<W>) {
     let of = LaneDouble::of;
     let (dx, dy) = (of(qb[0]).minus(of(qa[0])), of(qb[1]).minus(of(qa[1])));
     let (a, b) = (of(qa[2]), of(qb[2]));

@@ -1,6 +1,6 @@
 //! A number in every lane, in registers.
 //!
-//! In memory eight lanes are an array ([`Eight`]); a kernel loads what it needs, computes in [`Wide`] numbers and stores what it has
+//! In memory eight lanes are an array ([`Lane8`]); a kernel loads what it needs, computes in [`SimdReal`] numbers and stores what it has
 //! found. As long as arrays themselves were added and multiplied, compilers moved them through the stack between any two
 //! operations, which took half of the time. (For the same reason there are loops here, and no closures over arrays: those are not always
 //! inlined, and a call of one vector instruction costs more than it.) Operations are those of `f64`, lane by lane; none is fused.
@@ -14,31 +14,31 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 /// Lanes that go side by side.
 pub const LANES: usize = 8;
 /// A number in each lane, in memory.
-pub type Eight = Lanes<LANES>;
+pub type Lane8 = Lanes<LANES>;
 
 /// A number in every lane, in registers.
-pub trait Wide: Number {
+pub trait SimdReal: Number {
     /// The instructions at hand.
     type Simd: Copy;
     /// `x` in every lane.
     fn splat(simd: Self::Simd, x: f64) -> Self;
     /// From memory.
-    fn load(simd: Self::Simd, from: &Eight) -> Self;
+    fn load(simd: Self::Simd, from: &Lane8) -> Self;
     /// To memory.
-    fn store(self, to: &mut Eight);
+    fn store(self, to: &mut Lane8);
     /// |x|.
     fn abs(self) -> Self;
     /// √x.
     fn sqrt(self) -> Self;
     /// `mark`, but not a number in lanes where this is at most `bound`.
-    fn spoil(self, bound: Self, mark: Self) -> Self;
+    fn mark_nan(self, bound: Self, mark: Self) -> Self;
     /// `this` in lanes that are zero, `other` elsewhere.
     fn if_zero(self, this: Self, other: Self) -> Self;
 
     /// Sine and cosine [rad].
     #[inline(always)]
     fn sin_cos(self, simd: Self::Simd) -> (Self, Self) {
-        let mut angles = Eight::of(0.0);
+        let mut angles = Lane8::of(0.0);
         self.store(&mut angles);
         let (mut near, mut cosines) = (true, angles);
         for x in angles.0 {
@@ -56,7 +56,7 @@ pub trait Wide: Number {
 
 /// Some numbers from memory.
 #[inline(always)]
-pub fn load<W: Wide, const K: usize>(simd: W::Simd, from: &[Eight; K]) -> [W; K] {
+pub fn load<W: SimdReal, const K: usize>(simd: W::Simd, from: &[Lane8; K]) -> [W; K] {
     let mut numbers = [W::splat(simd, 0.0); K];
     for i in 0..K {
         numbers[i] = W::load(simd, &from[i]);
@@ -66,7 +66,7 @@ pub fn load<W: Wide, const K: usize>(simd: W::Simd, from: &[Eight; K]) -> [W; K]
 
 /// Some numbers to memory.
 #[inline(always)]
-pub fn store<W: Wide, const K: usize>(numbers: [W; K], to: &mut [Eight; K]) {
+pub fn store<W: SimdReal, const K: usize>(numbers: [W; K], to: &mut [Lane8; K]) {
     for (to, x) in to.iter_mut().zip(numbers) {
         x.store(to);
     }
@@ -74,7 +74,7 @@ pub fn store<W: Wide, const K: usize>(numbers: [W; K], to: &mut [Eight; K]) {
 
 /// `to += x`, in memory.
 #[inline(always)]
-pub fn add<W: Wide, const K: usize>(simd: W::Simd, to: &mut [Eight; K], x: &[W; K]) {
+pub fn add<W: SimdReal, const K: usize>(simd: W::Simd, to: &mut [Lane8; K], x: &[W; K]) {
     for (to, x) in to.iter_mut().zip(x) {
         (W::load(simd, to) + *x).store(to);
     }
@@ -147,12 +147,12 @@ impl<S: Simd, const M: usize> SubAssign for Registers<S, M> {
 
 impl<S: Simd, const M: usize> Number for Registers<S, M> {
     #[inline(always)]
-    fn like(self, x: f64) -> Self {
+    fn splat_like(self, x: f64) -> Self {
         Self::splat(self.simd, x)
     }
 }
 
-impl<S: Simd, const M: usize> Wide for Registers<S, M> {
+impl<S: Simd, const M: usize> SimdReal for Registers<S, M> {
     type Simd = S;
 
     #[inline(always)]
@@ -161,7 +161,7 @@ impl<S: Simd, const M: usize> Wide for Registers<S, M> {
     }
 
     #[inline(always)]
-    fn load(simd: S, from: &Eight) -> Self {
+    fn load(simd: S, from: &Lane8) -> Self {
         let (registers, _) = S::as_simd_f64s(&from.0);
         let mut to = Self::splat(simd, 0.0);
         to.x.copy_from_slice(&registers[..M]);
@@ -169,7 +169,7 @@ impl<S: Simd, const M: usize> Wide for Registers<S, M> {
     }
 
     #[inline(always)]
-    fn store(self, to: &mut Eight) {
+    fn store(self, to: &mut Lane8) {
         let (registers, _) = S::as_mut_simd_f64s(&mut to.0);
         registers[..M].copy_from_slice(&self.x);
     }
@@ -191,7 +191,7 @@ impl<S: Simd, const M: usize> Wide for Registers<S, M> {
     }
 
     #[inline(always)]
-    fn spoil(self, bound: Self, mut mark: Self) -> Self {
+    fn mark_nan(self, bound: Self, mut mark: Self) -> Self {
         let (simd, nan) = (self.simd, self.simd.splat_f64s(f64::NAN));
         for i in 0..M {
             let small = simd.less_than_or_equal_f64s(self.x[i], bound.x[i]);
@@ -214,7 +214,7 @@ impl<S: Simd, const M: usize> Wide for Registers<S, M> {
 /// Work over lanes.
 pub trait Kernel {
     /// Does it with these registers.
-    fn run<W: Wide>(self, simd: W::Simd);
+    fn run<W: SimdReal>(self, simd: W::Simd);
 }
 
 struct Over<K, const M: usize>(K);
@@ -282,13 +282,13 @@ mod tests {
     }
 
     #[inline(always)]
-    fn operations<W: Wide>(simd: W::Simd, a: &[f64; LANES], b: &[f64; LANES]) -> [[f64; LANES]; 11] {
+    fn operations<W: SimdReal>(simd: W::Simd, a: &[f64; LANES], b: &[f64; LANES]) -> [[f64; LANES]; 11] {
         let (x, y) = (W::load(simd, &Lanes(*a)), W::load(simd, &Lanes(*b)));
         let (sin, cos) = x.sin_cos(simd);
         let all =
             [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, x.abs().sqrt(), y.if_zero(x, x + y), sin, cos];
         all.map(|x| {
-            let mut to = Eight::of(0.0);
+            let mut to = Lane8::of(0.0);
             x.store(&mut to);
             to.0
         })

@@ -6,7 +6,7 @@
 //! the whole stiffness of the softest. Strains that are taken first, with digits to spare, are right.
 
 use super::joint::{JointKinematics, Symmetric};
-use super::turn;
+use super::perpendicular;
 use crate::multibody::double::Double;
 use nalgebra::{Vector2, Vector3};
 
@@ -39,7 +39,7 @@ impl JointKinematics {
         let double = 2.0 * stress.x;
         let [uu, ug, up, gg, gp, pp] = stiffness.0;
         let [bend_gg, bend_gp, bend_pp] = second.map(|q| double * q);
-        let n = self.e1 * stress.x + turn(self.e1) * (stress.y + double * self.bent.x);
+        let n = self.e1 * stress.x + perpendicular(self.e1) * (stress.y + double * self.bent.x);
         let quarter = 0.25 * n.dot(&self.opening);
         let between = 0.5 * (n.dot(&self.radius_b) - n.dot(&self.radius_a));
         FactoredTangent {
@@ -48,7 +48,7 @@ impl JointKinematics {
             turn_a: s.turn_a,
             turn_b: s.turn_b,
             stiffness: Symmetric([uu, ug, up, gg + bend_gg, gp + bend_gp, pp + bend_pp]),
-            half: turn(n) * 0.5,
+            half: perpendicular(n) * 0.5,
             turn: [-quarter, between - quarter, -quarter],
         }
     }

@@ -15,7 +15,7 @@
 //! Strains depend on translations through the opening alone, so their derivatives with respect to the position of body a
 //! are those of body b with the other sign, and ten numbers make up the 6×6 tangent of a pair.
 
-use super::{Block, HalfTurn, PairRow, Pose, turn};
+use super::{Block, HalfTurn, PairRow, Pose, perpendicular};
 use nalgebra::{Matrix3, Matrix6, Vector2, Vector3, Vector6};
 
 /// Geometry of a joint: where it sits and how its frame is drawn.
@@ -148,11 +148,11 @@ impl JointFrame {
         second: &[f64; 3],
     ) -> JointKinematics {
         // one sine and cosine of half an angle for each body serve everything: R − 1 of the body, and R of the mean
-        let (swing_a, swing_b) = (a.swing(self.arm_a), b.swing(self.arm_b));
+        let (swing_a, swing_b) = (a.rotation_minus_identity(self.arm_a), b.rotation_minus_identity(self.arm_b));
         let (ra, rb) = (self.arm_a + swing_a, self.arm_b + swing_b);
         let opening = Vector2::new(qb.x - qa.x, qb.y - qa.y) + swing_b - swing_a;
         let e1 = a.mean(b, self.axis);
-        let (u, g, p) = (opening.dot(&e1), opening.dot(&turn(e1)), qb.z - qa.z);
+        let (u, g, p) = (opening.dot(&e1), opening.dot(&perpendicular(e1)), qb.z - qa.z);
         let bent = Vector2::new(second[0] * g + second[1] * p, second[1] * g + second[2] * p);
         let strain = Vector3::new(u + bent.x * g + bent.y * p, g, p);
         JointKinematics { strain, axial: u, shear: g, bent, opening, radius_a: ra, radius_b: rb, e1 }
@@ -171,8 +171,8 @@ impl JointFrame {
 impl JointKinematics {
     #[inline(always)]
     pub(super) fn slopes(&self) -> Slopes {
-        let (g, half_g, half_u) = (turn(self.e1), 0.5 * self.shear, 0.5 * self.axial);
-        let (ta, tb) = (turn(self.radius_a), turn(self.radius_b));
+        let (g, half_g, half_u) = (perpendicular(self.e1), 0.5 * self.shear, 0.5 * self.axial);
+        let (ta, tb) = (perpendicular(self.radius_a), perpendicular(self.radius_b));
         // the frame turns by half (u: +g/2, g: −u/2), the point turns with its body
         let (u_a, u_b) = (half_g - self.e1.dot(&ta), half_g + self.e1.dot(&tb));
         let (g_a, g_b) = (-half_u - g.dot(&ta), -half_u + g.dot(&tb));
@@ -207,10 +207,10 @@ impl JointKinematics {
         // the second-order strain passes the axial force on to shear and moment
         let double = 2.0 * stress.x;
         let (shear, moment) = (stress.y + double * self.bent.x, stress.z + double * self.bent.y);
-        let n = self.e1 * stress.x + turn(self.e1) * shear;
+        let n = self.e1 * stress.x + perpendicular(self.e1) * shear;
         // the frame turns by half with each body
         let frame = 0.5 * (self.shear * stress.x - self.axial * shear);
-        let (at_a, at_b) = (turn(self.radius_a).dot(&n), turn(self.radius_b).dot(&n));
+        let (at_a, at_b) = (perpendicular(self.radius_a).dot(&n), perpendicular(self.radius_b).dot(&n));
         (Pose::new(-n.x, -n.y, frame - at_a - moment), Pose::new(n.x, n.y, frame + at_b + moment))
     }
 
@@ -238,8 +238,8 @@ impl JointKinematics {
         let [bend_gg, bend_gp, bend_pp] = second.map(|q| double * q);
         let mut h = self.elastic(&Symmetric([uu, ug, up, gg + bend_gg, gp + bend_gp, pp + bend_pp]));
         // the force on b, as in `forces`
-        let n = self.e1 * stress.x + turn(self.e1) * (stress.y + double * self.bent.x);
-        let half = turn(n) * 0.5;
+        let n = self.e1 * stress.x + perpendicular(self.e1) * (stress.y + double * self.bent.x);
+        let half = perpendicular(n) * 0.5;
         h.shift_a += half;
         h.shift_b += half;
         let quarter = 0.25 * n.dot(&self.opening);
@@ -253,7 +253,7 @@ impl JointKinematics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::multibody::planar::swing;
+    use crate::multibody::planar::rotation_minus_identity;
 
     fn sample() -> (JointFrame, [f64; 3], Pose, Pose) {
         let frame = JointFrame {
@@ -315,7 +315,7 @@ mod tests {
         let (theta, shift) = (0.8, Vector2::new(2.0, -1.0));
         // both centres of mass turn about the origin; the joint lies at arm_a from a at the origin
         let xb = frame.arm_a - frame.arm_b;
-        let moved = swing(theta, xb);
+        let moved = rotation_minus_identity(theta, xb);
         let qa = Pose::new(shift.x, shift.y, theta);
         let qb = Pose::new(shift.x + moved.x, shift.y + moved.y, theta);
         assert!(frame.kinematics(&qa, &qb, &second).strain.norm() < 1e-15);

@@ -4,10 +4,10 @@
 //! e = (u + [g p]Q[g p]ᵀ, g, p), and their second derivative is A·a + b(v): the rows A and the part b of the velocities are
 //! formed here. A rotation is multiplied by the lever of its body, so that rows of one closure have one unit.
 
-use super::data::{Given, Task, Workspace};
+use super::data::{ReductionInput, ReductionTask, Workspace};
 use super::mechanism::ClosureShape;
-use super::pair::{Pair, minus, plus, turn};
-use super::placed::Placed;
+use super::pair::{LinkageVector, minus, perpendicular, plus};
+use super::placed::BodyKinematics;
 use super::scalar::Real;
 use super::schedule::NONE;
 use std::ops::Range;
@@ -26,7 +26,7 @@ impl<T: Real> ClosureShape<T> {
     /// The constraints of the closure at two placed bodies, its axial offset being `rest`; those beyond their number are not
     /// filled.
     #[inline(always)]
-    fn constraints(&self, rest: T, a: &Placed<T>, b: &Placed<T>) -> [Strain<T>; 3] {
+    fn constraints(&self, rest: T, a: &BodyKinematics<T>, b: &BodyKinematics<T>) -> [Strain<T>; 3] {
         let mut out = [Strain::NONE; 3];
         if self.pin {
             [out[0], out[1]] = self.pin_constraints(a, b);
@@ -52,8 +52,8 @@ impl<T: Real> ClosureShape<T> {
 
     /// A pin keeps two material points together: rows along x and y need no joint axes.
     #[inline(always)]
-    fn pin_constraints(&self, a: &Placed<T>, b: &Placed<T>) -> [Strain<T>; 2] {
-        let (sa, sb) = (a.swing(self.arm_a), b.swing(self.arm_b));
+    fn pin_constraints(&self, a: &BodyKinematics<T>, b: &BodyKinematics<T>) -> [Strain<T>; 2] {
+        let (sa, sb) = (a.rotation_minus_identity(self.arm_a), b.rotation_minus_identity(self.arm_b));
         let (ra, rb) = (plus(self.arm_a, sa), plus(self.arm_b, sb));
         let (wa, wb) = (a.rate[2], b.rate[2]);
         let (wa2, wb2) = (wa * wa, wb * wb);
@@ -78,15 +78,15 @@ impl<T: Real> ClosureShape<T> {
 
     /// The three strains (e_u, g, p) of a joint.
     #[inline(always)]
-    pub(super) fn strains(&self, a: &Placed<T>, b: &Placed<T>) -> [Strain<T>; 3] {
+    pub(super) fn strains(&self, a: &BodyKinematics<T>, b: &BodyKinematics<T>) -> [Strain<T>; 3] {
         let (half, two) = (T::splat(0.5), T::splat(2.0));
-        let dot = |x: Pair<T>, y: Pair<T>| x[0] * y[0] + x[1] * y[1];
-        let (sa, sb) = (a.swing(self.arm_a), b.swing(self.arm_b));
+        let dot = |x: LinkageVector<T>, y: LinkageVector<T>| x[0] * y[0] + x[1] * y[1];
+        let (sa, sb) = (a.rotation_minus_identity(self.arm_a), b.rotation_minus_identity(self.arm_b));
         let (ra, rb) = (plus(self.arm_a, sa), plus(self.arm_b, sb));
-        let (ta, tb) = (turn(ra), turn(rb));
+        let (ta, tb) = (perpendicular(ra), perpendicular(rb));
         let d = [(b.pose[0] - a.pose[0]) + (sb[0] - sa[0]), (b.pose[1] - a.pose[1]) + (sb[1] - sa[1])];
         let e1 = a.mean(b, self.axis);
-        let e2 = turn(e1);
+        let e2 = perpendicular(e1);
         let (u, g, p) = (dot(d, e1), dot(d, e2), b.pose[2] - a.pose[2]);
         let (wa, wb) = (a.rate[2], b.rate[2]);
         let dd =
@@ -135,11 +135,11 @@ impl<T: Real> ClosureShape<T> {
 impl<T: Real> Workspace<T> {
     /// Writes the constraint rows of the closures of `range`. Returns the largest residual of a row.
     #[inline(always)]
-    pub(super) fn write_rows(&mut self, given: Given<'_, T>, range: Range<usize>) -> T {
-        let Given { task, mechanism, offsets, placement, .. } = given;
+    pub(super) fn write_rows(&mut self, given: ReductionInput<'_, T>, range: Range<usize>) -> T {
+        let ReductionInput { task, mechanism, offsets, placement, .. } = given;
         let schedule = &mechanism.schedule;
         let mut largest = T::ZERO;
-        let ground = Placed::REST;
+        let ground = BodyKinematics::REST;
         let of = mechanism.closures[range.clone()].iter().zip(&offsets.closures[range.clone()]);
         for ((closure, offset), entry) in of.zip(&schedule.entries[range]) {
             let turn = schedule.turn(entry.body);
@@ -157,9 +157,9 @@ impl<T: Real> Workspace<T> {
                     row[at..at + 3].copy_from_slice(other);
                 }
                 row[width - 1] = -match task {
-                    Task::Accelerations => strain.bias,
-                    Task::Rates => strain.rate,
-                    Task::Positions => strain.value,
+                    ReductionTask::Accelerations => strain.bias,
+                    ReductionTask::Rates => strain.rate,
+                    ReductionTask::Positions => strain.value,
                 };
                 largest = largest.max(row[width - 1].abs());
             }

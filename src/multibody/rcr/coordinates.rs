@@ -1,6 +1,6 @@
 //! Joint coordinates of given poses.
 
-use super::tree::{Linkage, Parent};
+use super::tree::{Linkage, LinkageParent};
 use crate::multibody::planar::{JointFrame, Pose};
 
 impl Linkage {
@@ -10,9 +10,9 @@ impl Linkage {
         for (body, link) in self.links.iter().enumerate() {
             let here = poses[body];
             let parent = match link.parent {
-                Parent::Body(p) => poses[p],
-                Parent::Ground => Pose::zeros(),
-                Parent::Free => {
+                LinkageParent::Body(p) => poses[p],
+                LinkageParent::Ground => Pose::zeros(),
+                LinkageParent::Free => {
                     q[link.first..link.first + 3].copy_from_slice(here.as_slice());
                     continue;
                 }

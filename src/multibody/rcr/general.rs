@@ -3,17 +3,17 @@
 //! The front is assembled from the body's inertia, its couplings and the rows that reach it, [`super::front`] takes its
 //! coordinates out, and what is left goes to the bodies of the front. [`super::fast::kernels`] does the same for small fronts.
 
-use super::data::{Added, Given, Scratch, Task, Workspace};
+use super::data::{FrontScratch, ReductionInput, ReductionTask, StageInertia, Workspace};
 use super::front::Front;
-use super::mechanism::Mechanism;
+use super::mechanism::MechanismConstants;
 use super::scalar::Real;
-use super::schedule::{NONE, Turn};
+use super::schedule::{BodyElimination, NONE};
 
 impl<T: Real> Workspace<T> {
     /// Assembles a body's front, takes its coordinates out, and hands the rest on.
     #[inline(never)]
-    pub(super) fn any_inward(&mut self, given: Given<'_, T>, body: usize) {
-        let mut scratch = Scratch {
+    pub(super) fn any_inward(&mut self, given: ReductionInput<'_, T>, body: usize) {
+        let mut scratch = FrontScratch {
             m: std::mem::take(&mut self.front.m),
             g: std::mem::take(&mut self.front.g),
             r: std::mem::take(&mut self.front.r),
@@ -23,8 +23,8 @@ impl<T: Real> Workspace<T> {
     }
 
     #[inline(always)]
-    fn take_out(&mut self, given: Given<'_, T>, body: usize, Scratch { m, g, r }: &mut Scratch<T>) {
-        let Given { task, mechanism, placement, .. } = given;
+    fn take_out(&mut self, given: ReductionInput<'_, T>, body: usize, FrontScratch { m, g, r }: &mut FrontScratch<T>) {
+        let ReductionInput { task, mechanism, placement, .. } = given;
         let turn = mechanism.schedule.turn(body);
         let (nd, w, h) = (turn.freedom, turn.front, turn.rows);
         let k = nd + 3 * w;
@@ -42,7 +42,7 @@ impl<T: Real> Workspace<T> {
         self.assemble(given, body, (&s, &torque), m, g);
         self.add_joint_inertia(mechanism, body, nd > 1, m);
         let [dx, dy] = placement.hanging[body].shift();
-        let bias = if task == Task::Accelerations { placement.hanging[body].bias } else { [T::ZERO; 2] };
+        let bias = if task == ReductionTask::Accelerations { placement.hanging[body].bias } else { [T::ZERO; 2] };
         let source = 3 + 3 * w + 1;
         for l in 0..h {
             let row = &self.rows[turn.row_start + l * source..turn.row_start + (l + 1) * source];
@@ -95,13 +95,13 @@ impl<T: Real> Workspace<T> {
     #[inline(always)]
     pub(super) fn assemble(
         &mut self,
-        given: Given<'_, T>,
+        given: ReductionInput<'_, T>,
         body: usize,
         (s, torque): (&[[T; 3]], &[T]),
         m: &mut [T],
         g: &mut [T],
     ) {
-        let Given { task, mechanism, placement, .. } = given;
+        let ReductionInput { task, mechanism, placement, .. } = given;
         let turn = mechanism.schedule.turn(body);
         let (nd, w) = (turn.freedom, turn.front);
         let k = nd + 3 * w;
@@ -109,7 +109,7 @@ impl<T: Real> Workspace<T> {
         let own = [[a, b, d], [b, c, e], [d, e, f]];
         let mut force = self.take_force(given, body);
         let hanging = &placement.hanging[body];
-        let bias = if task == Task::Accelerations { hanging.bias } else { [T::ZERO; 2] };
+        let bias = if task == ReductionTask::Accelerations { hanging.bias } else { [T::ZERO; 2] };
         for i in 0..3 {
             force[i] -= own[i][0] * bias[0] + own[i][1] * bias[1];
         }
@@ -120,7 +120,7 @@ impl<T: Real> Workspace<T> {
             for i in 0..3 {
                 hs[q][i] = own[i][0] * s[q][0] + own[i][1] * s[q][1] + own[i][2] * s[q][2];
             }
-            let along = if task == Task::Accelerations { torque[q] } else { T::ZERO };
+            let along = if task == ReductionTask::Accelerations { torque[q] } else { T::ZERO };
             g[q] = along + (s[q][0] * force[0] + s[q][1] * force[1] + s[q][2] * force[2]);
             for p in 0..=q {
                 m[q * k + p] = s[p][0] * hs[q][0] + s[p][1] * hs[q][1] + s[p][2] * hs[q][2];
@@ -183,8 +183,8 @@ impl<T: Real> Workspace<T> {
 
     /// Adds what an implicit step adds to the inertia of a body's joint; `scaled`: to coordinates in units of length.
     #[inline(always)]
-    pub(super) fn add_joint_inertia(&self, mechanism: &Mechanism<T>, body: usize, scaled: bool, m: &mut [T]) {
-        let Some(Added { joint: added, .. }) = self.added.get(body) else { return };
+    pub(super) fn add_joint_inertia(&self, mechanism: &MechanismConstants<T>, body: usize, scaled: bool, m: &mut [T]) {
+        let Some(StageInertia { joint: added, .. }) = self.added.get(body) else { return };
         let turn = mechanism.schedule.turn(body);
         let (nd, k) = (turn.freedom, turn.freedom + 3 * turn.front);
         let mut at = 0;
@@ -202,7 +202,7 @@ impl<T: Real> Workspace<T> {
 
     /// Adds what is left of a front to the bodies in it.
     #[inline(always)]
-    pub(super) fn hand_on(&mut self, mechanism: &Mechanism<T>, turn: Turn, m: &[T], g: &[T]) {
+    pub(super) fn hand_on(&mut self, mechanism: &MechanismConstants<T>, turn: BodyElimination, m: &[T], g: &[T]) {
         let (nd, w) = (turn.freedom, turn.front);
         let k = nd + 3 * w;
         let mut target = mechanism.schedule.targets[turn.targets..].iter();
@@ -235,8 +235,14 @@ impl<T: Real> Workspace<T> {
 
     /// Acceleration of the body, from those of its front.
     #[inline(never)]
-    pub(super) fn any_outward(&self, given: Given<'_, T>, body: usize, accelerations: &mut [[T; 3]], out: &mut [T]) {
-        let Given { task, mechanism, placement, .. } = given;
+    pub(super) fn any_outward(
+        &self,
+        given: ReductionInput<'_, T>,
+        body: usize,
+        accelerations: &mut [[T; 3]],
+        out: &mut [T],
+    ) {
+        let ReductionInput { task, mechanism, placement, .. } = given;
         let schedule = &mechanism.schedule;
         let turn = schedule.turn(body);
         let hanging = &placement.hanging[body];
@@ -271,7 +277,7 @@ impl<T: Real> Workspace<T> {
             let (up, [dx, dy]) = (accelerations[p], hanging.shift());
             a = [up[0] - dy * up[2], up[1] + dx * up[2], up[2]];
         }
-        if task == Task::Accelerations {
+        if task == ReductionTask::Accelerations {
             a[0] += hanging.bias[0];
             a[1] += hanging.bias[1];
         }

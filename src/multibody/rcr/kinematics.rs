@@ -10,15 +10,15 @@
 //! S are the columns ∂(x, y, θ)/∂(e_u, g, p) of the directions that move, and c gathers the centripetal and Coriolis parts,
 //! the acceleration when q̈ = 0 and the parent's is zero.
 
-use super::mechanism::{Arms, JointShape, Mechanism};
-use super::pair::{Pair, minus, plus, times, turn};
-use super::placed::{Hanging, Placed, Placement};
+use super::mechanism::{Arms, JointShape, MechanismConstants};
+use super::pair::{LinkageVector, minus, perpendicular, plus, times};
+use super::placed::{BodyKinematics, MechanismKinematics, ParentOffset};
 use super::scalar::Real;
 use std::ops::Range;
 
 /// A body that nothing holds: its coordinates are its pose, its axes the directions themselves.
 #[inline(always)]
-fn place_free<T: Real>(out: &mut Placed<T>, q: &[T], v: &[T], axes: &mut [[T; 3]]) {
+fn place_free<T: Real>(out: &mut BodyKinematics<T>, q: &[T], v: &[T], axes: &mut [[T; 3]]) {
     for (k, axis) in axes.iter_mut().enumerate() {
         *axis = [T::ZERO; 3];
         axis[k] = T::ONE;
@@ -29,9 +29,10 @@ fn place_free<T: Real>(out: &mut Placed<T>, q: &[T], v: &[T], axes: &mut [[T; 3]
 
 /// A pin: rotation alone, no axial second-order strain.
 #[inline(always)]
-fn place_pin<T: Real>(arms: &Arms<T>, parent: &Placed<T>, out: &mut Placed<T>) -> Hanging<T> {
+fn place_pin<T: Real>(arms: &Arms<T>, parent: &BodyKinematics<T>, out: &mut BodyKinematics<T>) -> ParentOffset<T> {
     let (wp, w) = (parent.rate[2], out.rate[2]);
-    let (swung, swung_parent) = (out.swing(arms.arm), parent.swing(arms.arm_parent));
+    let (swung, swung_parent) =
+        (out.rotation_minus_identity(arms.arm), parent.rotation_minus_identity(arms.arm_parent));
     let lever = plus(arms.arm, swung);
     let to = plus(arms.arm_parent, swung_parent);
     let (wp2, w2) = (wp * wp, w * w);
@@ -39,18 +40,18 @@ fn place_pin<T: Real>(arms: &Arms<T>, parent: &Placed<T>, out: &mut Placed<T>) -
     out.pose[1] = parent.pose[1] + (swung_parent[1] - swung[1]);
     out.rate[0] = parent.rate[0] + (w * lever[1] - wp * to[1]);
     out.rate[1] = parent.rate[1] + (wp * to[0] - w * lever[0]);
-    Hanging { lever_parent: to, lever, bias: [w2 * lever[0] - wp2 * to[0], w2 * lever[1] - wp2 * to[1]] }
+    ParentOffset { lever_parent: to, lever, bias: [w2 * lever[0] - wp2 * to[0], w2 * lever[1] - wp2 * to[1]] }
 }
 
 /// A joint with any directions; `rest` is the axial offset of a locked one.
 fn place_joint<T: Real>(
     (arms, sign, joint, rest): (&Arms<T>, T, &JointShape<T>, T),
-    parent: &Placed<T>,
-    out: &mut Placed<T>,
+    parent: &BodyKinematics<T>,
+    out: &mut BodyKinematics<T>,
     q: &[T],
     v: &[T],
     axes: &mut [[T; 3]],
-) -> Hanging<T> {
+) -> ParentOffset<T> {
     let (mut e, mut de) = ([rest, T::ZERO, T::ZERO], [T::ZERO; 3]);
     let mut next = 0;
     for i in 0..3 {
@@ -68,12 +69,13 @@ fn place_joint<T: Real>(
     let dw = [de[0] - two * (bent[0] * de[1] + bent[1] * de[2]), de[1]];
     let ddw = [-(two * (bent_rate[0] * de[1] + bent_rate[1] * de[2])), T::ZERO];
     let omega = out.rate[2];
-    let (swung, swung_parent) = (out.swing(arms.arm), parent.swing(arms.arm_parent));
+    let (swung, swung_parent) =
+        (out.rotation_minus_identity(arms.arm), parent.rotation_minus_identity(arms.arm_parent));
     let lever = plus(arms.arm, swung);
     let lever_parent = plus(arms.arm_parent, swung_parent);
     let e1 = out.mean(parent, joint.axis);
-    let e2 = turn(e1);
-    let along = |w: Pair<T>| plus(times(w[0], e1), times(w[1], e2));
+    let e2 = perpendicular(e1);
+    let along = |w: LinkageVector<T>| plus(times(w[0], e1), times(w[1], e2));
     let (rw, rdw, rddw) = (along(w), along(dw), along(ddw));
     let opening = times(sign, rw);
     let shift = minus(plus(lever_parent, opening), lever);
@@ -81,18 +83,18 @@ fn place_joint<T: Real>(
     (out.pose[0], out.pose[1]) = (parent.pose[0] + d[0], parent.pose[1] + d[1]);
     let wp = parent.rate[2];
     let frame_rate = wp + sign * T::splat(0.5) * de[2];
-    let (to_joint, from_joint) = (turn(lever_parent), turn(lever));
-    let opening_rate = plus(times(frame_rate, turn(rw)), rdw);
+    let (to_joint, from_joint) = (perpendicular(lever_parent), perpendicular(lever));
+    let opening_rate = plus(times(frame_rate, perpendicular(rw)), rdw);
     let x = minus(plus(times(wp, to_joint), times(sign, opening_rate)), times(omega, from_joint));
     (out.rate[0], out.rate[1]) = (parent.rate[0] + x[0], parent.rate[1] + x[1]);
-    let turning = plus(minus(times(two * frame_rate, turn(rdw)), times(frame_rate * frame_rate, rw)), rddw);
+    let turning = plus(minus(times(two * frame_rate, perpendicular(rdw)), times(frame_rate * frame_rate, rw)), rddw);
     let bias = minus(plus(times(omega * omega, lever), times(sign, turning)), times(wp * wp, lever_parent));
     let slope = [two * bent[0], two * bent[1]];
     let columns = [
         [sign * e1[0], sign * e1[1], T::ZERO],
         [sign * (e2[0] - slope[0] * e1[0]), sign * (e2[1] - slope[0] * e1[1]), T::ZERO],
         {
-            let half = times(T::splat(0.5), turn(rw));
+            let half = times(T::splat(0.5), perpendicular(rw));
             let x = minus(minus(half, times(sign, from_joint)), times(sign * slope[1], e1));
             [x[0], x[1], sign]
         },
@@ -104,20 +106,27 @@ fn place_joint<T: Real>(
             next += 1;
         }
     }
-    Hanging { lever_parent: shift, lever: [T::ZERO; 2], bias }
+    ParentOffset { lever_parent: shift, lever: [T::ZERO; 2], bias }
 }
 
 /// Bodies whose sines are taken together.
 const BLOCK: usize = 16;
 
-impl<T: Real> Placement<T> {
+impl<T: Real> MechanismKinematics<T> {
     /// Places the bodies of `range`, root → leaf, in blocks: angles first, so that the sines of a block are taken side by
     /// side. `rests` are the axial offsets of locked joints.
     #[inline(always)]
-    pub(super) fn place(&mut self, mechanism: &Mechanism<T>, rests: &[T], q: &[T], v: &[T], range: Range<usize>) {
+    pub(super) fn place(
+        &mut self,
+        mechanism: &MechanismConstants<T>,
+        rests: &[T],
+        q: &[T],
+        v: &[T],
+        range: Range<usize>,
+    ) {
         let steps = &mechanism.schedule.steps;
         let Self { placed, hanging, axes } = self;
-        let ground = Placed::REST;
+        let ground = BodyKinematics::REST;
         let mut end = range.end;
         while end > range.start {
             let start = end.saturating_sub(BLOCK).max(range.start);
@@ -159,7 +168,7 @@ impl<T: Real> Placement<T> {
                 let joint = &mechanism.joints[step.joint as usize];
                 *hanging = if joint.free {
                     place_free(out, q, v, axes);
-                    Hanging::REST
+                    ParentOffset::REST
                 } else {
                     place_joint((arms, *sign, joint, rests[step.joint as usize]), parent, out, q, v, axes)
                 };

@@ -1,22 +1,22 @@
 //! A mechanism as the recursion reads it: what its bodies, joints and closures are, over lanes of variants, and the schedule.
 //!
-//! Nothing of it changes after [`Mechanism::new`], so that all who step one mechanism share it.
+//! Nothing of it changes after [`MechanismConstants::new`], so that all who step one mechanism share it.
 
-use super::pair::Pair;
+use super::pair::LinkageVector;
 use super::scalar::Real;
 use super::schedule::{Plan, Schedule};
-use super::tree::{Closure, Link, Linkage, Parent};
+use super::tree::{Closure, Linkage, LinkageBody, LinkageParent};
 use crate::multibody::Joint;
 
 /// What does not move.
 #[derive(Debug)]
-pub(super) struct Mechanism<T> {
+pub(super) struct MechanismConstants<T> {
     pub schedule: Schedule,
     /// One a body, in elimination order.
-    pub inertias: Vec<Inertia<T>>,
+    pub inertias: Vec<LaneInertia<T>>,
     /// One a body.
     pub arms: Vec<Arms<T>>,
-    /// One a body, see [`super::Link::sign`].
+    /// One a body, see [`super::LinkageBody::sign`].
     pub signs: Vec<T>,
     /// One for each body on a joint that is no pin.
     pub joints: Vec<JointShape<T>>,
@@ -32,7 +32,7 @@ pub(super) struct Mechanism<T> {
 
 /// Inertia of one body over lanes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Inertia<T> {
+pub(super) struct LaneInertia<T> {
     /// [kg]
     pub mass: T,
     /// About the centre of mass [kg·m²].
@@ -42,15 +42,15 @@ pub(super) struct Inertia<T> {
 /// From the centres of mass of a link's parent and of itself to their joint, as drawn [m], over lanes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Arms<T> {
-    pub arm_parent: Pair<T>,
-    pub arm: Pair<T>,
+    pub arm_parent: LinkageVector<T>,
+    pub arm: LinkageVector<T>,
 }
 
 /// What a joint has beyond a pin.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct JointShape<T> {
     /// Its axial direction, as drawn.
-    pub axis: Pair<T>,
+    pub axis: LinkageVector<T>,
     /// Second-order axial strain Q: gg, gp, pp.
     pub second: [T; 3],
     /// Directions that move.
@@ -63,10 +63,10 @@ pub(super) struct JointShape<T> {
 #[derive(Debug, Clone)]
 pub(super) struct ClosureShape<T> {
     /// From the centres of mass of its two bodies to the joint, as drawn [m].
-    pub arm_a: Pair<T>,
-    pub arm_b: Pair<T>,
+    pub arm_a: LinkageVector<T>,
+    pub arm_b: LinkageVector<T>,
     /// Its axial direction, as drawn.
-    pub axis: Pair<T>,
+    pub axis: LinkageVector<T>,
     /// Second-order axial strain Q: gg, gp, pp.
     pub second: [T; 3],
     /// What makes a rotation comparable with a displacement [m].
@@ -79,7 +79,7 @@ pub(super) struct ClosureShape<T> {
     pub pin: bool,
 }
 
-impl<T: Real> Mechanism<T> {
+impl<T: Real> MechanismConstants<T> {
     /// Lays out one variant per lane; all have the same tree and loops. Fewer variants than lanes are repeated.
     pub(super) fn new(variants: &[&Linkage], plan: Plan) -> Self {
         let linkage = variants[0];
@@ -95,7 +95,7 @@ impl<T: Real> Mechanism<T> {
         }
         Self {
             schedule: Schedule::new(linkage, plan),
-            inertias: (0..count).map(|b| Inertia::new(&of(b))).collect(),
+            inertias: (0..count).map(|b| LaneInertia::new(&of(b))).collect(),
             arms: (0..count).map(|b| Arms::new(&of(b))).collect(),
             signs: (0..count).map(|b| lane(&of(b), &|link| link.sign)).collect(),
             joints: (0..count).filter(|&b| !linkage.links[b].pin).map(|b| JointShape::new(&of(b))).collect(),
@@ -113,7 +113,7 @@ impl<T: Real> Mechanism<T> {
 }
 
 /// A number of each variant, side by side.
-pub(super) fn lane<T: Real>(of: &[&Link], f: &dyn Fn(&Link) -> f64) -> T {
+pub(super) fn lane<T: Real>(of: &[&LinkageBody], f: &dyn Fn(&LinkageBody) -> f64) -> T {
     let mut out = T::ZERO;
     for k in 0..T::LANES {
         out.set_lane(k, f(of[k % of.len()]));
@@ -122,26 +122,26 @@ pub(super) fn lane<T: Real>(of: &[&Link], f: &dyn Fn(&Link) -> f64) -> T {
 }
 
 impl<T: Real> JointShape<T> {
-    fn new(of: &[&Link]) -> Self {
-        let lane = |f: &dyn Fn(&Link) -> f64| lane(of, f);
+    fn new(of: &[&LinkageBody]) -> Self {
+        let lane = |f: &dyn Fn(&LinkageBody) -> f64| lane(of, f);
         Self {
             axis: [lane(&|l| l.frame.axis.x), lane(&|l| l.frame.axis.y)],
             second: [lane(&|l| l.second[(0, 0)]), lane(&|l| l.second[(0, 1)]), lane(&|l| l.second[(1, 1)])],
             moving: of[0].moving,
-            free: of[0].parent == Parent::Free,
+            free: of[0].parent == LinkageParent::Free,
         }
     }
 }
 
-impl<T: Real> Inertia<T> {
-    fn new(of: &[&Link]) -> Self {
+impl<T: Real> LaneInertia<T> {
+    fn new(of: &[&LinkageBody]) -> Self {
         Self { mass: lane(of, &|l| l.mass), moment: lane(of, &|l| l.inertia) }
     }
 }
 
 impl<T: Real> Arms<T> {
-    fn new(of: &[&Link]) -> Self {
-        let lane = |f: &dyn Fn(&Link) -> f64| lane(of, f);
+    fn new(of: &[&LinkageBody]) -> Self {
+        let lane = |f: &dyn Fn(&LinkageBody) -> f64| lane(of, f);
         Self {
             arm_parent: [lane(&|l| l.frame.arm_a.x), lane(&|l| l.frame.arm_a.y)],
             arm: [lane(&|l| l.frame.arm_b.x), lane(&|l| l.frame.arm_b.y)],

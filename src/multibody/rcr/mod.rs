@@ -56,12 +56,12 @@ mod stages;
 mod traversal;
 pub mod tree;
 
-pub use data::Task;
+pub use data::ReductionTask;
 pub use lanes::Lanes;
 pub(crate) use lanes::has_lanes;
 pub use reduction::{Reduction, Traversed};
-pub use rotary::Counts;
+pub use rotary::CoordinateCounts;
 pub use scalar::Real;
 pub use singular::Singularity;
 pub use stages::AddedInertia;
-pub use tree::{Closure, Link, Linkage, Parent};
+pub use tree::{Closure, Linkage, LinkageBody, LinkageParent};

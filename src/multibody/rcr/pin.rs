@@ -14,33 +14,33 @@
 //! Reference: R. Featherstone, "Rigid Body Dynamics Algorithms" (2008), chapter 7, for the articulated inertia; the choice
 //! of the pin as its point of reference is ours.
 
-use super::data::{Given, Handed, Node, Workspace};
-use super::mechanism::Inertia;
-use super::placed::Hanging;
+use super::data::{FrontAccumulator, PinContribution, ReductionInput, Workspace};
+use super::mechanism::LaneInertia;
+use super::placed::ParentOffset;
 use super::scalar::Real;
 
 /// A body on a pin.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pinned<'a, T> {
-    pub inertia: &'a Inertia<T>,
+pub(super) struct PinElimination<'a, T> {
+    pub inertia: &'a LaneInertia<T>,
     pub sign: T,
-    pub hanging: &'a Hanging<T>,
+    pub hanging: &'a ParentOffset<T>,
     /// Wrench on it.
     pub force: &'a [T; 3],
     /// Force on its coordinate.
     pub torque: T,
 }
 
-impl<T: Real> Handed<T> {
+impl<T: Real> PinContribution<T> {
     /// Takes the coordinate of the body out, to which this was handed, and what has gathered in `node`. Returns base and
     /// slope of its angular acceleration, and what it hands on. `FORCED`: with forces and velocity parts.
     #[inline(always)]
     pub(super) fn inward<const FORCED: bool>(
         self,
-        body: Pinned<'_, T>,
-        node: Option<&mut Node<T>>,
+        body: PinElimination<'_, T>,
+        node: Option<&mut FrontAccumulator<T>>,
     ) -> (T, [T; 2], Self) {
-        let Pinned { inertia: own, sign, hanging, force, torque } = body;
+        let PinElimination { inertia: own, sign, hanging, force, torque } = body;
         let ([px, py], [dx, dy]) = (hanging.lever_parent, hanging.shift());
         let (lx, ly) = (px - dx, py - dy);
         let [cx, cy] = hanging.bias;
@@ -98,7 +98,7 @@ impl<T: Real> Handed<T> {
 
     /// Adds it to the node of the next body, about that one's centre of mass.
     #[inline(always)]
-    pub(super) fn give(&self, node: &mut Node<T>) {
+    pub(super) fn give(&self, node: &mut FrontAccumulator<T>) {
         let ([kxx, kxy, kyy], [px, py], [fx, fy]) = (self.inertia, self.lever, self.force);
         let (mx, my) = (kxy * px - kxx * py, kyy * px - kxy * py);
         for (sum, x) in node.inertia.iter_mut().zip([kxx, kxy, kyy, mx, my, my * px - mx * py]) {
@@ -115,7 +115,7 @@ impl<T: Real> Handed<T> {
 pub(super) fn outward<const FORCED: bool, T: Real>(
     (base, slope): (T, [T; 2]),
     sign: T,
-    hanging: &Hanging<T>,
+    hanging: &ParentOffset<T>,
     up: [T; 3],
 ) -> ([T; 3], T) {
     let ([px, py], [dx, dy]) = (hanging.lever_parent, hanging.shift());
@@ -132,18 +132,18 @@ pub(super) fn outward<const FORCED: bool, T: Real>(
 impl<T: Real> Workspace<T> {
     /// Takes the coordinate of one body on a pin out.
     #[inline(always)]
-    pub(super) fn pin_inward<const FORCED: bool>(&mut self, given: Given<'_, T>, body: usize) {
+    pub(super) fn pin_inward<const FORCED: bool>(&mut self, given: ReductionInput<'_, T>, body: usize) {
         let (mechanism, schedule) = (given.mechanism, &given.mechanism.schedule);
         let step = &schedule.steps[body];
         let first = step.first as usize;
-        let pinned = Pinned {
+        let pinned = PinElimination {
             inertia: &mechanism.inertias[body],
             sign: mechanism.signs[body],
             hanging: &given.placement.hanging[body],
             force: &given.force[body],
             torque: given.torque[first],
         };
-        let handed = std::mem::replace(&mut self.handed, Handed::NOTHING);
+        let handed = std::mem::replace(&mut self.handed, PinContribution::NOTHING);
         let node = step.gathers.then(|| &mut self.nodes[step.node as usize]);
         let (base, slope, left) = handed.inward::<FORCED>(pinned, node);
         self.base[first] = base;
@@ -160,7 +160,7 @@ impl<T: Real> Workspace<T> {
     #[inline(always)]
     pub(super) fn pin_outward<const FORCED: bool>(
         &self,
-        given: Given<'_, T>,
+        given: ReductionInput<'_, T>,
         body: usize,
         accelerations: &mut [[T; 3]],
         out: &mut [T],

@@ -6,19 +6,19 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §VII.2 (projection methods).
 
-use super::data::Task;
+use super::data::ReductionTask;
 use super::reduction::{Reduction, Traversal, Traversed};
 use super::singular::Singularity;
 
 /// A loop's pivot below 1/100 of its lever loses more than 1e-12: the path for singular configurations is taken instead.
 const NEAR: f64 = 1e2;
 /// Gauss–Newton steps of a projection.
-const MOST: usize = 30;
+const MAX_ITERATIONS: usize = 30;
 
 impl Reduction<f64> {
     /// [`Reduction::reduce`], or [`Reduction::reduce_singular`] where that is too near to a singular configuration; then
     /// says what was met.
-    pub fn solve(&mut self, task: Task, out: &mut [f64]) -> Option<Singularity> {
+    pub fn solve(&mut self, task: ReductionTask, out: &mut [f64]) -> Option<Singularity> {
         if self.mechanism.schedule.redundant == 0 {
             self.reduce(task, out);
             if self.nearness <= NEAR && out.iter().all(|x| x.is_finite()) {
@@ -32,17 +32,17 @@ impl Reduction<f64> {
     /// bodies placed there at rates `v`. Returns the largest gap left [m].
     pub fn project_positions(&mut self, q: &mut [f64], v: &[f64], change: &mut [f64]) -> f64 {
         self.place(q, v);
-        let mut gap = self.largest(Task::Positions);
-        for _ in 0..MOST {
+        let mut gap = self.largest(ReductionTask::Positions);
+        for _ in 0..MAX_ITERATIONS {
             if gap == 0.0 || self.mechanism.constraints == 0 {
                 break;
             }
-            self.solve(Task::Positions, change);
+            self.solve(ReductionTask::Positions, change);
             for (q, d) in q.iter_mut().zip(change.iter()) {
                 *q += d;
             }
             self.place(q, v);
-            let now = self.largest(Task::Positions);
+            let now = self.largest(ReductionTask::Positions);
             // rounding is reached when a step no longer helps
             if now >= 0.25 * gap {
                 if now > gap {
@@ -66,7 +66,7 @@ impl Reduction<f64> {
         }
         for _ in 0..2 {
             self.place(q, v);
-            self.solve(Task::Rates, change);
+            self.solve(ReductionTask::Rates, change);
             for (v, d) in v.iter_mut().zip(change.iter()) {
                 *v += d;
             }
@@ -75,7 +75,7 @@ impl Reduction<f64> {
     }
 
     /// Largest residual of the loops [m, or m/s].
-    pub fn largest(&mut self, task: Task) -> f64 {
+    pub fn largest(&mut self, task: ReductionTask) -> f64 {
         <f64 as Traversed>::Traversal::rows(self, task)
     }
 }

@@ -10,20 +10,20 @@
 //! Reference: K. S. Anderson, J. H. Critchley, "Improved 'order-N' performance algorithm for the simulation of constrained
 //! multi-rigid-body dynamic systems", Multibody System Dynamics 9 (2003) 185–212.
 
-use super::data::{Given, Task, Workspace};
+use super::data::{ReductionInput, ReductionTask, Workspace};
 use super::scalar::Real;
-use super::schedule::Kind;
+use super::schedule::EliminationKind;
 use std::ops::Range;
 
 impl<T: Real> Workspace<T> {
     /// Takes the coordinates of the bodies of `range` out, leaf → root.
     #[inline(always)]
-    pub(super) fn inward(&mut self, given: Given<'_, T>, range: Range<usize>) {
-        let (schedule, forced) = (&given.mechanism.schedule, given.task == Task::Accelerations);
+    pub(super) fn inward(&mut self, given: ReductionInput<'_, T>, range: Range<usize>) {
+        let (schedule, forced) = (&given.mechanism.schedule, given.task == ReductionTask::Accelerations);
         let mut body = range.start;
         while body < range.end {
             match schedule.steps[body].kind {
-                Kind::Pin if schedule.plan.fast => {
+                EliminationKind::Pin if schedule.plan.fast => {
                     body = if forced {
                         self.pins_inward::<true>(given, body..range.end)
                     } else {
@@ -31,10 +31,10 @@ impl<T: Real> Workspace<T> {
                     };
                     continue;
                 }
-                Kind::Pin if forced => self.pin_inward::<true>(given, body),
-                Kind::Pin => self.pin_inward::<false>(given, body),
-                Kind::Small(small) => self.small_inward(given, small, body),
-                Kind::Any => self.any_inward(given, body),
+                EliminationKind::Pin if forced => self.pin_inward::<true>(given, body),
+                EliminationKind::Pin => self.pin_inward::<false>(given, body),
+                EliminationKind::Small(small) => self.small_inward(given, small, body),
+                EliminationKind::Any => self.any_inward(given, body),
             }
             body += 1;
         }
@@ -44,17 +44,17 @@ impl<T: Real> Workspace<T> {
     #[inline(always)]
     pub(super) fn outward(
         &mut self,
-        given: Given<'_, T>,
+        given: ReductionInput<'_, T>,
         range: Range<usize>,
         accelerations: &mut [[T; 3]],
         out: &mut [T],
     ) {
-        let (schedule, forced) = (&given.mechanism.schedule, given.task == Task::Accelerations);
+        let (schedule, forced) = (&given.mechanism.schedule, given.task == ReductionTask::Accelerations);
         let mut end = range.end;
         while end > range.start {
             let body = end - 1;
             match schedule.steps[body].kind {
-                Kind::Pin if schedule.plan.fast => {
+                EliminationKind::Pin if schedule.plan.fast => {
                     end = if forced {
                         self.pins_outward::<true>(given, range.start..end, accelerations, out)
                     } else {
@@ -62,10 +62,10 @@ impl<T: Real> Workspace<T> {
                     };
                     continue;
                 }
-                Kind::Pin if forced => self.pin_outward::<true>(given, body, accelerations, out),
-                Kind::Pin => self.pin_outward::<false>(given, body, accelerations, out),
-                Kind::Small(small) => self.small_outward(given, small, body, accelerations, out),
-                Kind::Any => self.any_outward(given, body, accelerations, out),
+                EliminationKind::Pin if forced => self.pin_outward::<true>(given, body, accelerations, out),
+                EliminationKind::Pin => self.pin_outward::<false>(given, body, accelerations, out),
+                EliminationKind::Small(small) => self.small_outward(given, small, body, accelerations, out),
+                EliminationKind::Any => self.any_outward(given, body, accelerations, out),
             }
             end = body;
         }

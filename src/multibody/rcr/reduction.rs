@@ -1,11 +1,11 @@
 //! The recursion with its storage, loads in and accelerations out; and what a number says of how its bodies are gone through.
 
-use super::data::{Given, Offsets, Task, Workspace};
-use super::mechanism::Mechanism;
-use super::placed::{Placed, Placement};
+use super::data::{Offsets, ReductionInput, ReductionTask, Workspace};
+use super::mechanism::MechanismConstants;
+use super::placed::{BodyKinematics, MechanismKinematics};
 use super::scalar::Real;
 use super::schedule::Plan;
-use super::singular::Room;
+use super::singular::RowPool;
 use super::tree::Linkage;
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// The recursion with its storage, over one mechanism or over lanes of variants. Copies share what does not move.
 #[derive(Debug, Clone)]
 pub struct Reduction<T: Traversed> {
-    pub(super) mechanism: Arc<Mechanism<T>>,
+    pub(super) mechanism: Arc<MechanismConstants<T>>,
     /// Wrench on each body: forces along x and y and moment about the centre of mass [N, N·m]. Set before reducing.
     pub force: Vec<[T; 3]>,
     /// Force on each coordinate [N or N·m]. Set before reducing.
@@ -24,9 +24,9 @@ pub struct Reduction<T: Traversed> {
     /// a singular configuration. The squares of it multiply rounding errors.
     pub nearness: T,
     pub(super) offsets: Offsets<T>,
-    pub(super) placement: Placement<T>,
+    pub(super) placement: MechanismKinematics<T>,
     pub(super) work: Workspace<T>,
-    pub(super) room: Room,
+    pub(super) room: RowPool,
     /// How the bodies are gone through, where not one after the other.
     pub(super) traversal: Option<Box<T::Traversal>>,
 }
@@ -40,7 +40,7 @@ pub trait Traversed: Real {
     fn place(reduction: &mut Reduction<Self>, q: &[Self], v: &[Self]);
 
     /// Reduces for `task` likewise.
-    fn reduce(reduction: &mut Reduction<Self>, task: Task, out: &mut [Self]);
+    fn reduce(reduction: &mut Reduction<Self>, task: ReductionTask, out: &mut [Self]);
 }
 
 /// The passes over all bodies. What comes out has the same bits whatever the way.
@@ -52,16 +52,16 @@ pub trait Traversal<T: Traversed>: Sized + Clone + Debug + Send + Sync + 'static
     fn place(reduction: &mut Reduction<T>, q: &[T], v: &[T]);
 
     /// Writes the rows of all closures for `task`. Returns the largest residual.
-    fn rows(reduction: &mut Reduction<T>, task: Task) -> T;
+    fn rows(reduction: &mut Reduction<T>, task: ReductionTask) -> T;
 
     /// Reduces for `task`.
-    fn reduce(reduction: &mut Reduction<T>, task: Task, out: &mut [T]);
+    fn reduce(reduction: &mut Reduction<T>, task: ReductionTask, out: &mut [T]);
 
     /// Where a body is and how it moves, that went another way.
-    fn placed(&self, body: usize) -> Option<Placed<T>>;
+    fn placed(&self, body: usize) -> Option<BodyKinematics<T>>;
 
     /// Places all those bodies where one after the other would have.
-    fn spread(&self, placement: &mut Placement<T>);
+    fn spread(&self, placement: &mut MechanismKinematics<T>);
 
     /// Takes the offsets of locked directions over.
     fn prescribe(&mut self, offsets: &Offsets<T>);
@@ -91,16 +91,16 @@ impl<T: Traversed> Reduction<T> {
 
     pub(super) fn planned(variants: &[&Linkage], plan: Plan) -> Self {
         let coordinates = variants[0].coordinates;
-        let mechanism = Mechanism::new(variants, plan);
+        let mechanism = MechanismConstants::new(variants, plan);
         Self {
             force: vec![[T::ZERO; 3]; mechanism.bodies()],
             torque: vec![T::ZERO; coordinates],
             accelerations: vec![[T::ZERO; 3]; mechanism.bodies()],
             nearness: T::ZERO,
             offsets: Offsets::new(variants),
-            placement: Placement::new(&mechanism, coordinates),
+            placement: MechanismKinematics::new(&mechanism, coordinates),
             work: Workspace::new(&mechanism, coordinates),
-            room: Room::new(&mechanism.schedule),
+            room: RowPool::new(&mechanism.schedule),
             traversal: None,
             mechanism: Arc::new(mechanism),
         }
@@ -127,14 +127,14 @@ impl<T: Traversed> Reduction<T> {
     }
 
     /// Where a body is and how it moves.
-    pub(super) fn placed(&self, body: usize) -> Placed<T> {
+    pub(super) fn placed(&self, body: usize) -> BodyKinematics<T> {
         self.traversal.as_ref().and_then(|t| t.placed(body)).unwrap_or(self.placement.placed[body])
     }
 
     /// What a reduction reads, what it works in, and where accelerations go.
     #[inline(always)]
-    pub(super) fn parts(&mut self, task: Task) -> (Given<'_, T>, &mut Workspace<T>, &mut [[T; 3]]) {
+    pub(super) fn parts(&mut self, task: ReductionTask) -> (ReductionInput<'_, T>, &mut Workspace<T>, &mut [[T; 3]]) {
         let Self { mechanism, force, torque, offsets, placement, work, accelerations, .. } = self;
-        (Given { task, mechanism, offsets, placement, force, torque }, work, accelerations)
+        (ReductionInput { task, mechanism, offsets, placement, force, torque }, work, accelerations)
     }
 }

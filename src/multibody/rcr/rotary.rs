@@ -5,19 +5,19 @@
 //!
 //! **Counts.** The paper counts every joint as a coordinate and cuts loops through bodies, three constraints for each. A
 //! tree here hangs on the joints, so a loop is cut at a joint instead: two constraints, and its rotation no coordinate.
-//! [`Counts`] tells the paper's numbers; n − m, the freedom, is the same. With every beam in two (its question 1), a bank
+//! [`CoordinateCounts`] tells the paper's numbers; n − m, the freedom, is the same. With every beam in two (its question 1), a bank
 //! has 12 joints a bimorph (hot arm, tip bar, cold arm, flexure, link, and its share of yoke and tether), and the quarter
 //! stage of ten n = 10·12 + 3 = 123, the three of the free plate, and m = 20·3 = 60, which is the n and m ≈ n/2 of the paper.
 
 use crate::multibody::planar::Symmetric;
-use crate::multibody::section::Section;
+use crate::multibody::section::JointSection;
 use crate::multibody::{BodyId, Model};
 use crate::sets::Sets;
 use nalgebra::Matrix3;
 
 /// Coordinates and constraints as the paper counts them: loops cut through bodies, the last body free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Counts {
+pub struct CoordinateCounts {
     /// Generalized coordinates: directions of joints that move, and three for each part that hangs together.
     pub coordinates: usize,
     /// Closed loops, those through ground included.
@@ -26,7 +26,7 @@ pub struct Counts {
     pub constraints: usize,
 }
 
-impl Section {
+impl JointSection {
     /// Takes the couplings of its directions away and keeps what each gives way by alone: where the others are rigid, a
     /// spring half a segment away must not stiffen the rotation.
     fn uncouple(&mut self) {
@@ -74,7 +74,7 @@ impl Model {
     }
 
     /// Coordinates, loops and constraints as the paper counts them.
-    pub fn counts(&self) -> Counts {
+    pub fn counts(&self) -> CoordinateCounts {
         let mut joined = Sets::new(self.bodies.len());
         let mut parts = self.bodies.len();
         let mut edges = 0;
@@ -92,6 +92,6 @@ impl Model {
         let loops = edges + parts - self.bodies.len();
         let held: usize =
             self.bodies.iter().map(|b| b.free.as_ref().map_or(0, |p| 3 - p.trace().round() as usize)).sum();
-        Counts { coordinates: coordinates + 3 * parts, loops, constraints: 3 * loops + held }
+        CoordinateCounts { coordinates: coordinates + 3 * parts, loops, constraints: 3 * loops + held }
     }
 }

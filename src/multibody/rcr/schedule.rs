@@ -10,26 +10,26 @@
 mod lay;
 mod slots;
 
-use super::fast::Small;
+use super::fast::SmallFront;
 
 /// No place.
 pub(super) const NONE: usize = usize::MAX;
 
 /// Which code a body's turn takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum EliminationKind {
     /// A pin to ground or to one parent, no loop.
     Pin,
     /// One coordinate, a small front and few rows: in closed form.
-    Small(Small),
+    Small(SmallFront),
     /// Anything else.
     Any,
 }
 
 /// What the passes over all bodies read first.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Step {
-    pub kind: Kind,
+pub(super) struct EliminationStep {
+    pub kind: EliminationKind,
     /// A pin: its one coordinate turns it.
     pub pin: bool,
     /// Other bodies than the one before in a run of pins hand something to it.
@@ -40,9 +40,9 @@ pub(super) struct Step {
     parent: u32,
     /// Its last coordinate turns it.
     turns: bool,
-    /// See [`Turn::coupled`].
+    /// See [`BodyElimination::coupled`].
     pub coupled: bool,
-    /// See [`Turn::freedom`].
+    /// See [`BodyElimination::freedom`].
     pub freedom: u8,
     /// First coordinate.
     pub first: u32,
@@ -50,13 +50,13 @@ pub(super) struct Step {
     pub joint: u32,
     /// Where what is handed to it gathers.
     pub node: u32,
-    /// See [`Turn::column`].
+    /// See [`BodyElimination::column`].
     pub column: u32,
-    /// See [`Turn::coefficient_start`].
+    /// See [`BodyElimination::coefficient_start`].
     pub coefficient_start: u32,
 }
 
-impl Step {
+impl EliminationStep {
     /// Parent body; none: ground or free.
     #[inline(always)]
     pub(super) fn parent(&self) -> Option<usize> {
@@ -72,7 +72,7 @@ impl Step {
 
 /// Where the rows of a closure enter.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Entry {
+pub(super) struct ClosureEntry {
     /// The body.
     pub body: usize,
     /// First of its rows there.
@@ -98,11 +98,11 @@ pub(super) struct Plan {
 #[derive(Debug, Clone)]
 pub(super) struct Schedule {
     pub plan: Plan,
-    turns: Vec<Packed>,
-    pub steps: Vec<Step>,
+    turns: Vec<PackedElimination>,
+    pub steps: Vec<EliminationStep>,
     /// Bodies of all fronts.
     pub fronts: Vec<u32>,
-    /// Where what is handed to them gathers: [`Step::node`] of each.
+    /// Where what is handed to them gathers: [`EliminationStep::node`] of each.
     pub nodes: Vec<u32>,
     /// Where the couplings of a body to them gather.
     pub blocks: Vec<u32>,
@@ -112,7 +112,7 @@ pub(super) struct Schedule {
     pub node_count: usize,
     /// Couplings in use at one time.
     pub block_count: usize,
-    pub entries: Vec<Entry>,
+    pub entries: Vec<ClosureEntry>,
     /// Place of each front body at the body the rows go to: 0 itself, 1 + slot of its front.
     maps: Vec<u32>,
     pub row_entries: usize,
@@ -125,7 +125,7 @@ pub(super) struct Schedule {
 
 /// One body's turn.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Turn {
+pub(super) struct BodyElimination {
     /// Coordinates of its joint.
     pub freedom: usize,
     /// Bodies of its front: rows of its column in the pattern.
@@ -145,7 +145,7 @@ pub(super) struct Turn {
     /// Start of its rows in the row arena; each row has 3 + 3·front + 1 entries.
     pub row_start: usize,
     /// Start of its coefficients in the coefficient arena: two of a pin, 3·front of any other coordinate that is alone,
-    /// `freedom` rows of freedom + 3·front entries where [`Kind::Any`] takes them out.
+    /// `freedom` rows of freedom + 3·front entries where [`EliminationKind::Any`] takes them out.
     pub coefficient_start: usize,
     /// Start of its row transformation in the transformation arena.
     pub next: usize,
@@ -155,9 +155,9 @@ pub(super) struct Turn {
     pub map_start: usize,
 }
 
-/// What a body's turn needs besides its step; the meanings are those of [`Turn`].
+/// What a body's turn needs besides its step; the meanings are those of [`BodyElimination`].
 #[derive(Debug, Clone, Copy)]
-struct Packed {
+struct PackedElimination {
     front: u32,
     rows: u32,
     parent: u32,
@@ -171,9 +171,9 @@ struct Packed {
 impl Schedule {
     /// One body's turn.
     #[inline(always)]
-    pub(super) fn turn(&self, body: usize) -> Turn {
+    pub(super) fn turn(&self, body: usize) -> BodyElimination {
         let (step, packed) = (&self.steps[body], &self.turns[body]);
-        Turn {
+        BodyElimination {
             freedom: step.freedom as usize,
             front: packed.front as usize,
             rows: packed.rows as usize,
@@ -191,11 +191,11 @@ impl Schedule {
     }
 
     /// The turns of all bodies.
-    pub(super) fn turns(&self) -> impl Iterator<Item = Turn> {
+    pub(super) fn turns(&self) -> impl Iterator<Item = BodyElimination> {
         (0..self.steps.len()).map(|body| self.turn(body))
     }
 
-    /// Place of a front body at the body its rows go to, by the index from [`Turn::map_start`] on; none: not there.
+    /// Place of a front body at the body its rows go to, by the index from [`BodyElimination::map_start`] on; none: not there.
     #[inline(always)]
     pub(super) fn map(&self, index: usize) -> usize {
         wide(self.maps[index])

@@ -23,9 +23,9 @@ mod orthogonal;
 mod path;
 mod room;
 
-pub(super) use room::Room;
+pub(super) use room::RowPool;
 
-use super::data::Task;
+use super::data::ReductionTask;
 
 /// Ratio up to which a row is squared into the inertia: its square times the rounding unit is lost.
 const LIGHT: f64 = 30.0;
@@ -48,7 +48,7 @@ pub struct Singularity {
     pub contradiction: f64,
 }
 
-impl Task {
+impl ReductionTask {
     /// Length below which a hard row is zero, see [`ZERO`] and [`IDLE`].
     fn zero(self) -> f64 {
         if self == Self::Accelerations { ZERO } else { IDLE }

@@ -3,7 +3,7 @@
 //! The coordinates of the tree are the strains of its joints, so their forces are −K·(e − e₀) as they stand. An elastic
 //! direction of a closure acts on its two bodies through its rows.
 
-use super::placed::Placed;
+use super::placed::BodyKinematics;
 use super::reduction::{Reduction, Traversal};
 use super::stages::AddedInertia;
 use super::tree::{Closure, Linkage};
@@ -63,7 +63,7 @@ impl Reduction<f64> {
             }
             let at = |id| match id {
                 BodyId::Free(k) => self.placed(k),
-                BodyId::Ground => Placed::REST,
+                BodyId::Ground => BodyKinematics::REST,
             };
             let strains = self.mechanism.closures[c].strains(&at(joint.a), &at(joint.b));
             let mut e = Vector3::from_fn(|i, _| if joint.locked[i] { 0.0 } else { strains[i].value });
@@ -97,7 +97,7 @@ impl Reduction<f64> {
             }
             let at = |id| match id {
                 BodyId::Free(k) => self.placed(k),
-                BodyId::Ground => Placed::REST,
+                BodyId::Ground => BodyKinematics::REST,
             };
             let strains = self.mechanism.closures[c].strains(&at(joint.a), &at(joint.b));
             let [ra, rb] = [0, 1].map(|side| {
@@ -144,7 +144,7 @@ impl Reduction<f64> {
             let Closure::Joint(joint) = closure else { continue };
             let at = |id| match id {
                 BodyId::Free(k) => self.placed(k),
-                BodyId::Ground => Placed::REST,
+                BodyId::Ground => BodyKinematics::REST,
             };
             let strains = self.mechanism.closures[c].strains(&at(joint.a), &at(joint.b));
             let mut e = Vector3::from_fn(|i, _| if joint.locked[i] { 0.0 } else { strains[i].value });

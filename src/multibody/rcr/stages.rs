@@ -13,7 +13,7 @@
 //! Coriolis terms) for zero, so that the iteration converges linearly, at the rate of what is left out over W. What it
 //! converges to does not depend on W.
 
-use super::data::{Added, Task};
+use super::data::{ReductionTask, StageInertia};
 use super::reduction::Reduction;
 use super::schedule::Plan;
 use super::singular::Singularity;
@@ -130,7 +130,7 @@ impl Reduction<f64> {
             }
         }
         self.lay(added);
-        let met = self.solve(Task::Accelerations, out);
+        let met = self.solve(ReductionTask::Accelerations, out);
         self.work.added.clear();
         self.work.added_coupling.clear();
         met
@@ -139,7 +139,7 @@ impl Reduction<f64> {
     /// Lays what is added where the turns find it.
     fn lay(&mut self, added: &AddedInertia) {
         let own = added.joints.iter().zip(&added.bodies.diagonal);
-        self.work.added.extend(own.map(|(&joint, block)| Added {
+        self.work.added.extend(own.map(|(&joint, block)| StageInertia {
             joint,
             body: [block[(0, 0)], block[(1, 0)], block[(1, 1)], block[(2, 0)], block[(2, 1)], block[(2, 2)]],
         }));

@@ -1,9 +1,9 @@
 //! How the bodies of a mechanism are gone through: one after the other, or, where a number has a faster way, by that.
 
-use super::data::{Offsets, Task};
+use super::data::{Offsets, ReductionTask};
 use super::fast;
 use super::lanes::Lanes;
-use super::placed::{Placed, Placement};
+use super::placed::{BodyKinematics, MechanismKinematics};
 use super::reduction::{Reduction, Traversal, Traversed};
 use super::tree::Linkage;
 
@@ -16,7 +16,7 @@ impl<T: Traversed> Reduction<T> {
     /// Solves for `task` at the placed configuration; `out` receives q̈, or the change of the rates or coordinates.
     ///
     /// The result is right to rounding times the square of [`Reduction::nearness`].
-    pub fn reduce(&mut self, task: Task, out: &mut [T]) {
+    pub fn reduce(&mut self, task: ReductionTask, out: &mut [T]) {
         T::reduce(self, task, out);
     }
 
@@ -24,7 +24,7 @@ impl<T: Traversed> Reduction<T> {
     /// [`Reduction::torque`] hold: [`Reduction::place`] and [`Reduction::reduce`] at one go.
     pub fn accelerate(&mut self, q: &[T], v: &[T], out: &mut [T]) {
         T::place(self, q, v);
-        T::reduce(self, Task::Accelerations, out);
+        T::reduce(self, ReductionTask::Accelerations, out);
     }
 }
 
@@ -44,13 +44,13 @@ impl<T: Traversed> Traversal<T> for OneByOne {
     }
 
     #[inline(always)]
-    fn rows(reduction: &mut Reduction<T>, task: Task) -> T {
+    fn rows(reduction: &mut Reduction<T>, task: ReductionTask) -> T {
         let (given, work, _) = reduction.parts(task);
         work.write_rows(given, 0..given.mechanism.closures.len())
     }
 
     #[inline(always)]
-    fn reduce(reduction: &mut Reduction<T>, task: Task, out: &mut [T]) {
+    fn reduce(reduction: &mut Reduction<T>, task: ReductionTask, out: &mut [T]) {
         let (given, work, accelerations) = reduction.parts(task);
         let (bodies, closures) = (0..given.mechanism.bodies(), 0..given.mechanism.closures.len());
         work.nearness = T::ZERO;
@@ -60,11 +60,11 @@ impl<T: Traversed> Traversal<T> for OneByOne {
         reduction.nearness = reduction.work.nearness;
     }
 
-    fn placed(&self, _: usize) -> Option<Placed<T>> {
+    fn placed(&self, _: usize) -> Option<BodyKinematics<T>> {
         None
     }
 
-    fn spread(&self, _: &mut Placement<T>) {}
+    fn spread(&self, _: &mut MechanismKinematics<T>) {}
 
     fn prescribe(&mut self, _: &Offsets<T>) {}
 
@@ -81,7 +81,7 @@ impl<const N: usize> Traversed for Lanes<N> {
         fast::place(reduction, q, v);
     }
 
-    fn reduce(reduction: &mut Reduction<Self>, task: Task, out: &mut [Self]) {
+    fn reduce(reduction: &mut Reduction<Self>, task: ReductionTask, out: &mut [Self]) {
         fast::reduce(reduction, task, out);
     }
 }

@@ -15,7 +15,7 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 /// What a body hangs on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Parent {
+pub enum LinkageParent {
     /// A joint to ground.
     Ground,
     /// A joint to a body that is eliminated later.
@@ -26,9 +26,9 @@ pub enum Parent {
 
 /// A body with the joint that it hangs on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Link {
+pub struct LinkageBody {
     /// What it hangs on.
-    pub parent: Parent,
+    pub parent: LinkageParent,
     /// Geometry of the joint, `a` the parent and `b` this body.
     pub frame: JointFrame,
     /// −1 where the model's joint counts its strains from this body to the parent.
@@ -55,7 +55,7 @@ pub struct Link {
     pub lever: f64,
 }
 
-impl Link {
+impl LinkageBody {
     /// Number of coordinates.
     pub fn freedom(&self) -> usize {
         self.moving.iter().filter(|&&m| m).count()
@@ -123,7 +123,7 @@ impl Closure {
 #[derive(Debug, Clone)]
 pub struct Linkage {
     /// One link per body, in elimination order.
-    pub links: Vec<Link>,
+    pub links: Vec<LinkageBody>,
     /// Loop closures, by the body at which they enter the recursion.
     pub closures: Vec<Closure>,
     /// Couplings of the bodies' accelerations, fill included.
@@ -175,7 +175,7 @@ impl Linkage {
                 (moving, other)
             });
             let mut link = match chosen {
-                Some(k) => hang(body, &all[k]),
+                Some(k) => attach_to_parent(body, &all[k]),
                 None => free(),
             };
             link.pin = link.turns_about_a_point();
@@ -218,17 +218,17 @@ impl Linkage {
 }
 
 /// The body that `joint` connects to `body` becomes its parent.
-fn hang(body: usize, joint: &Joint) -> Link {
+fn attach_to_parent(body: usize, joint: &Joint) -> LinkageBody {
     let reversed = joint.a == BodyId::Free(body);
     let (parent, arm_a, arm_b) = if reversed {
         (joint.b, joint.frame.arm_b, joint.frame.arm_a)
     } else {
         (joint.a, joint.frame.arm_a, joint.frame.arm_b)
     };
-    Link {
+    LinkageBody {
         parent: match parent {
-            BodyId::Ground => Parent::Ground,
-            BodyId::Free(p) => Parent::Body(p),
+            BodyId::Ground => LinkageParent::Ground,
+            BodyId::Free(p) => LinkageParent::Body(p),
         },
         frame: JointFrame { arm_a, arm_b, axis: joint.frame.axis },
         sign: if reversed { -1.0 } else { 1.0 },
@@ -245,9 +245,9 @@ fn hang(body: usize, joint: &Joint) -> Link {
     }
 }
 
-fn free() -> Link {
-    Link {
-        parent: Parent::Free,
+fn free() -> LinkageBody {
+    LinkageBody {
+        parent: LinkageParent::Free,
         frame: JointFrame { arm_a: Vector2::zeros(), arm_b: Vector2::zeros(), axis: Vector2::x() },
         sign: 1.0,
         pin: false,

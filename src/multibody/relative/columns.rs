@@ -1,7 +1,7 @@
 //! Blocks of three by three, and vectors of three, in registers of four: what a factorization and its solves multiply.
 
-use super::kinematics::Map;
-use super::tree::{Link, Parent};
+use super::kinematics::MotionMap;
+use super::tree::{TreeJoint, TreeParent};
 use crate::multibody::planar::Pose;
 use nalgebra::Matrix3;
 use pulp::{Arch, Simd, WithSimd};
@@ -71,9 +71,9 @@ pub(super) fn in_fours<W: WithSimd>(work: W) -> W::Output {
 
 /// A block by its columns.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Columns(pub(super) [Four; 3]);
+pub(super) struct ColumnBlock(pub(super) [Four; 3]);
 
-impl Columns {
+impl ColumnBlock {
     pub(super) const ZERO: Self = Self([Four::ZERO; 3]);
     pub(super) const IDENTITY: Self =
         Self([Four([1.0, 0.0, 0.0, 0.0]), Four([0.0, 1.0, 0.0, 0.0]), Four([0.0, 0.0, 1.0, 0.0])]);
@@ -87,10 +87,10 @@ impl Columns {
 
     /// S: one motion for each coordinate that moves.
     #[inline(always)]
-    pub(super) fn motions(map: &Map<f64>, link: &Link) -> Self {
+    pub(super) fn motions(map: &MotionMap<f64>, link: &TreeJoint) -> Self {
         let mut motions = match (&link.free, link.parent) {
             (Some(free), _) => return Self::of(free),
-            (None, Parent::Free) => return Self::IDENTITY,
+            (None, TreeParent::Free) => return Self::IDENTITY,
             _ => {
                 let [u, g, p] = &map.columns;
                 Self([Four([u[0], u[1], 0.0, 0.0]), Four([g[0], g[1], 0.0, 0.0]), Four([p[0], p[1], link.sign, 0.0])])
@@ -108,7 +108,7 @@ impl Columns {
 
     /// Xᵀ.
     #[inline(always)]
-    pub(super) fn passing(map: &Map<f64>) -> Self {
+    pub(super) fn passing(map: &MotionMap<f64>) -> Self {
         let mut passing = Self::IDENTITY;
         (passing.0[0].0[2], passing.0[1].0[2]) = (map.lever[0], map.lever[1]);
         passing
@@ -116,7 +116,7 @@ impl Columns {
 
     /// A·X.
     #[inline(always)]
-    pub(super) fn shifted<S: Simd>(&self, simd: S, map: &Map<f64>) -> Self {
+    pub(super) fn shifted<S: Simd>(&self, simd: S, map: &MotionMap<f64>) -> Self {
         let [x, y, z] = self.0;
         Self([x, y, z.plus(simd, x.scaled(simd, map.lever[0]).plus(simd, y.scaled(simd, map.lever[1])))])
     }

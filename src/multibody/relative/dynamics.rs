@@ -3,15 +3,15 @@
 
 use super::columns::Four;
 use super::kinematics::triple;
-use super::placed::{Eights, Placed, place_of, tiles};
-use super::tree::{Link, Parent, Tree};
+use super::placed::{LaneJointStates, TreeKinematics, place_of, tiles};
+use super::tree::{Tree, TreeJoint, TreeParent};
 use crate::multibody::forces::RestStrain;
-use crate::multibody::lanes::{Eight, Kernel, LanePose, STILL, Wide, everywhere, load, store};
+use crate::multibody::lanes::{Kernel, Lane8, LanePose, STILL, SimdReal, everywhere, load, store};
 use crate::multibody::planar::{JointFrame, Pose};
 use nalgebra::Vector3;
 use pulp::{Arch, Simd, WithSimd};
 
-impl Link {
+impl TreeJoint {
     /// Axial rest offset of the joint, or its change with `rest` [m].
     #[inline(always)]
     pub fn offset(&self, rest: &RestStrain<'_>) -> f64 {
@@ -25,7 +25,7 @@ impl Link {
     }
 }
 
-impl Placed {
+impl TreeKinematics {
     /// Minus the force over the coordinates that wrenches on the bodies and the tree's springs leave: `wrench` becomes its sum over everything
     /// that hangs on each body.
     #[inline]
@@ -39,16 +39,16 @@ impl Placed {
         for (j, up) in tree.upward.iter().enumerate().rev() {
             let s = &s[j];
             out[j] = match up.parent {
-                Parent::Free => *s,
-                Parent::Ground => Pose::from(self.map(j).apply(up.sign, &[0.0; 3], &triple(s))),
-                Parent::Body(p) => Pose::from(self.map(j).apply(up.sign, &triple(&out[p as usize]), &triple(s))),
+                TreeParent::Free => *s,
+                TreeParent::Ground => Pose::from(self.map(j).apply(up.sign, &[0.0; 3], &triple(s))),
+                TreeParent::Body(p) => Pose::from(self.map(j).apply(up.sign, &triple(&out[p as usize]), &triple(s))),
             };
         }
     }
 }
 
 struct Resist<'a> {
-    placed: &'a Placed,
+    placed: &'a TreeKinematics,
     tree: &'a Tree,
     stresses: &'a Stresses,
     wrench: &'a mut [Pose],
@@ -65,7 +65,7 @@ impl WithSimd for Resist<'_> {
             let (map, f, stress) = (placed.map(j), triple(&wrench[j]), stresses.of(j));
             let [u, g, p] = map.gather(up.sign, &f);
             *out = Four([-(u + stress.x), -(g + stress.y), -(p + stress.z), 0.0]);
-            if let Parent::Body(p) = up.parent {
+            if let TreeParent::Body(p) = up.parent {
                 wrench[p as usize] += Pose::from(map.pass(&f));
             }
         }
@@ -76,7 +76,7 @@ impl WithSimd for Resist<'_> {
 #[derive(Debug, Clone)]
 pub struct Stresses {
     /// Axial rest offsets [m].
-    offsets: Vec<Eight>,
+    offsets: Vec<Lane8>,
     /// By coordinates.
     out: Vec<LanePose>,
 }
@@ -85,12 +85,12 @@ impl Stresses {
     /// Storage for a tree.
     pub fn new(tree: &Tree) -> Self {
         let count = tiles(tree.links.len());
-        Self { offsets: vec![Eight::NONE; count], out: vec![STILL; count] }
+        Self { offsets: vec![Lane8::NONE; count], out: vec![STILL; count] }
     }
 
     /// Fills in the stresses at coordinates `at`.
     #[inline]
-    pub fn fill(&mut self, tree: &Tree, at: &[Eights], rest: &RestStrain<'_>) {
+    pub fn fill(&mut self, tree: &Tree, at: &[LaneJointStates], rest: &RestStrain<'_>) {
         for &j in &tree.offset {
             let (tile, lane) = place_of(j as usize);
             self.offsets[tile].0[lane] = tree.links[j as usize].offset(rest);
@@ -110,12 +110,12 @@ impl Stresses {
 struct Stress<'a> {
     stresses: &'a mut Stresses,
     tree: &'a Tree,
-    at: &'a [Eights],
+    at: &'a [LaneJointStates],
 }
 
 impl Kernel for Stress<'_> {
     #[inline(always)]
-    fn run<W: Wide>(self, simd: W::Simd) {
+    fn run<W: SimdReal>(self, simd: W::Simd) {
         let Stresses { offsets, out } = self.stresses;
         for (((at, offset), springs), out) in self.at.iter().zip(offsets).zip(&self.tree.springs).zip(out) {
             let [u, g, p] = load::<W, 3>(simd, &at.q);
@@ -132,10 +132,10 @@ impl Tree {
         let ground = Pose::zeros();
         for (j, link) in self.links.iter().enumerate() {
             s[j] = match link.parent {
-                Parent::Free => q[j],
+                TreeParent::Free => q[j],
                 parent => {
                     let of = match parent {
-                        Parent::Body(p) => &q[p as usize],
+                        TreeParent::Body(p) => &q[p as usize],
                         _ => &ground,
                     };
                     link.strains(of, &q[j])
@@ -150,10 +150,10 @@ impl Tree {
         let ground = Pose::zeros();
         for (j, link) in self.links.iter().enumerate() {
             s[j] = match link.parent {
-                Parent::Free => v[j],
+                TreeParent::Free => v[j],
                 parent => {
                     let (of, moving) = match parent {
-                        Parent::Body(p) => (&q[p as usize], &v[p as usize]),
+                        TreeParent::Body(p) => (&q[p as usize], &v[p as usize]),
                         _ => (&ground, &ground),
                     };
                     link.strain_rates((of, &q[j]), (moving, &v[j]))
@@ -164,7 +164,7 @@ impl Tree {
     }
 }
 
-impl Link {
+impl TreeJoint {
     fn frame(&self) -> JointFrame {
         let (arm_a, arm_b) = if self.sign < 0.0 { (self.arm, self.arm_parent) } else { (self.arm_parent, self.arm) };
         JointFrame { arm_a, arm_b, axis: self.axis }

@@ -16,13 +16,13 @@
 //! Reference: R. Featherstone, "The calculation of robot dynamics using articulated-body inertias", Int. J. Robotics Research
 //! 2 (1983), for the branch; K. S. Anderson, J. H. Critchley (2003) for loops inside the recursion.
 
-use super::columns::{Columns, Four, in_fours};
+use super::columns::{ColumnBlock, Four, in_fours};
 use super::geometric::Geometric;
-use super::kinematics::Map;
-use super::placed::Placed;
+use super::kinematics::MotionMap;
+use super::placed::TreeKinematics;
 use super::solve::{Factors, both_motions};
-use super::tree::{Link, Parent, Tree};
-use crate::multibody::factor::{Inertia, ZeroPivot};
+use super::tree::{Tree, TreeJoint, TreeParent};
+use crate::multibody::factor::{PivotSigns, ZeroPivot};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Pattern};
 use pulp::{Simd, WithSimd};
@@ -36,16 +36,16 @@ pub struct JointMatrix {
     /// Blocks over the bodies' motions.
     pub bodies: BlockMatrix<f64, 3>,
     /// The same in the course of the elimination.
-    diagonal: Vec<Columns>,
-    below: Vec<Columns>,
+    diagonal: Vec<ColumnBlock>,
+    below: Vec<ColumnBlock>,
     /// The factors.
     pub(super) factors: Factors,
     /// C_r of the column at hand.
-    column: Vec<Columns>,
+    column: Vec<ColumnBlock>,
     /// For each block of a column, the block that takes over its motion with the column's parent; [`OWN`] where the row is
     /// the parent itself.
     heir: Vec<u32>,
-    pub(super) maps: Vec<Map<f64>>,
+    pub(super) maps: Vec<MotionMap<f64>>,
 }
 
 /// The parent's own diagonal.
@@ -58,12 +58,12 @@ impl JointMatrix {
         let count = pattern.bodies();
         Self {
             bodies: BlockMatrix::new(pattern),
-            diagonal: vec![Columns::ZERO; count],
-            below: vec![Columns::ZERO; pattern.off_blocks()],
+            diagonal: vec![ColumnBlock::ZERO; count],
+            below: vec![ColumnBlock::ZERO; pattern.off_blocks()],
             factors: Factors::new(tree),
             column: Vec::with_capacity((0..count).map(|j| pattern.column(j).len()).max().unwrap_or(0)),
             heir: heirs(tree),
-            maps: vec![Map::REST; count],
+            maps: vec![MotionMap::REST; count],
         }
     }
 
@@ -75,10 +75,10 @@ impl JointMatrix {
     pub fn factor(
         &mut self,
         tree: &Tree,
-        placed: &Placed,
+        placed: &TreeKinematics,
         scale: f64,
         geometric: Option<&[Geometric]>,
-    ) -> Result<Inertia, ZeroPivot> {
+    ) -> Result<PivotSigns, ZeroPivot> {
         for (j, map) in self.maps.iter_mut().enumerate() {
             *map = placed.map(j);
         }
@@ -92,18 +92,18 @@ impl JointMatrix {
         tree: &Tree,
         scale: f64,
         geometric: Option<&[Geometric]>,
-    ) -> Result<Inertia, ZeroPivot> {
+    ) -> Result<PivotSigns, ZeroPivot> {
         let pattern = &tree.pattern;
-        let mut inertia = Inertia::default();
+        let mut inertia = PivotSigns::default();
         let from = self.bodies.diagonal.iter().chain(&self.bodies.below);
         for (to, from) in self.diagonal.iter_mut().chain(&mut self.below).zip(from) {
-            *to = Columns::of(from);
+            *to = ColumnBlock::of(from);
         }
         for (j, link) in tree.links.iter().enumerate() {
             let map = self.maps[j];
             let block = self.diagonal[j];
             let extra = geometric.map(|g| &g[j]);
-            let along = Columns::motions(&map, link);
+            let along = ColumnBlock::motions(&map, link);
             let share = along.transposed();
             let ds = block.product(simd, &along);
             let own = share.product(simd, &ds).plus(simd, &joint_block(simd, link, scale, extra));
@@ -111,7 +111,7 @@ impl JointMatrix {
             let inverse = invert(simd, (own, size), link, &mut inertia, j)?;
             self.factors.keep(j, (&along, &share), &inverse);
             let parent = match link.parent {
-                Parent::Body(p) => Some(p as usize),
+                TreeParent::Body(p) => Some(p as usize),
                 _ => None,
             };
             let handed = parent.map(|p| self.hand_over(simd, pattern, (j, p), &block, &map, extra));
@@ -121,10 +121,10 @@ impl JointMatrix {
                 let row = row as usize;
                 let is_parent = parent == Some(row);
                 let below = &self.below[k];
-                let (mut c, mut to) = (Columns::ZERO, self.diagonal[row]);
+                let (mut c, mut to) = (ColumnBlock::ZERO, self.diagonal[row]);
                 if is_parent {
-                    to = to.plus(simd, handed.as_ref().unwrap_or(&Columns::ZERO));
-                    c = Columns::passing(&map).product(simd, &ds);
+                    to = to.plus(simd, handed.as_ref().unwrap_or(&ColumnBlock::ZERO));
+                    c = ColumnBlock::passing(&map).product(simd, &ds);
                     if let Some(g) = extra {
                         for (column, cross) in c.0.iter_mut().zip(g.cross) {
                             column.0[2] += cross;
@@ -166,11 +166,11 @@ impl JointMatrix {
         simd: S,
         pattern: &Pattern,
         (j, p): (usize, usize),
-        block: &Columns,
-        map: &Map<f64>,
+        block: &ColumnBlock,
+        map: &MotionMap<f64>,
         extra: Option<&Geometric>,
-    ) -> Columns {
-        let mut own = Columns::passing(map).product(simd, &block.shifted(simd, map));
+    ) -> ColumnBlock {
+        let mut own = ColumnBlock::passing(map).product(simd, &block.shifted(simd, map));
         for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
             let below = &self.below[k];
             if below.is_zero() {
@@ -201,7 +201,7 @@ pub(super) struct Eliminate<'a> {
 }
 
 impl WithSimd for Eliminate<'_> {
-    type Output = Result<Inertia, ZeroPivot>;
+    type Output = Result<PivotSigns, ZeroPivot>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
@@ -214,7 +214,7 @@ fn heirs(tree: &Tree) -> Vec<u32> {
     let pattern = &tree.pattern;
     let mut heirs = vec![OWN; pattern.off_blocks()];
     for (j, link) in tree.links.iter().enumerate() {
-        let Parent::Body(p) = link.parent else { continue };
+        let TreeParent::Body(p) = link.parent else { continue };
         let p = p as usize;
         for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
             let row = row as usize;
@@ -229,11 +229,11 @@ fn heirs(tree: &Tree) -> Vec<u32> {
 
 /// The joint's own block: springs and what its force brings.
 #[inline(always)]
-fn joint_block<S: Simd>(simd: S, link: &Link, scale: f64, extra: Option<&Geometric>) -> Columns {
+fn joint_block<S: Simd>(simd: S, link: &TreeJoint, scale: f64, extra: Option<&Geometric>) -> ColumnBlock {
     let [uu, ug, up, gg, gp, pp] = link.stiffness.0;
-    let own = Columns([Four([uu, ug, up, 0.0]), Four([ug, gg, gp, 0.0]), Four([up, gp, pp, 0.0])]);
+    let own = ColumnBlock([Four([uu, ug, up, 0.0]), Four([ug, gg, gp, 0.0]), Four([up, gp, pp, 0.0])]);
     let own = own.scaled(simd, scale);
-    extra.map_or(own, |g| own.plus(simd, &Columns::of(&g.own)))
+    extra.map_or(own, |g| own.plus(simd, &ColumnBlock::of(&g.own)))
 }
 
 /// The inverse of a symmetric block over what moves, and the signs of its pivots. `size` is that of the body's own block before what a
@@ -241,22 +241,22 @@ fn joint_block<S: Simd>(simd: S, link: &Link, scale: f64, extra: Option<&Geometr
 #[inline(always)]
 fn invert<S: Simd>(
     simd: S,
-    (mut a, size): (Columns, f64),
-    link: &Link,
-    inertia: &mut Inertia,
+    (mut a, size): (ColumnBlock, f64),
+    link: &TreeJoint,
+    inertia: &mut PivotSigns,
     body: usize,
-) -> Result<Columns, ZeroPivot> {
+) -> Result<ColumnBlock, ZeroPivot> {
     if link.free.is_none() && link.moving == [true; 3] {
         return inverse(&a, inertia, body);
     }
     // what does not move has a pivot of its own, and no inverse; a guide at an angle mixes it with what moves, so it is of that size
     let (still, size) = match &link.free {
-        Some(free) => (Columns::IDENTITY.less(simd, &Columns::of(free)), if size > 0.0 { size } else { 1.0 }),
+        Some(free) => (ColumnBlock::IDENTITY.less(simd, &ColumnBlock::of(free)), if size > 0.0 { size } else { 1.0 }),
         None => {
             let held = |i: usize| if link.moving[i] { 0.0 } else { 1.0 };
             let still =
                 [Four([held(0), 0.0, 0.0, 0.0]), Four([0.0, held(1), 0.0, 0.0]), Four([0.0, 0.0, held(2), 0.0])];
-            (Columns(still), 1.0)
+            (ColumnBlock(still), 1.0)
         }
     };
     a = a.plus(simd, &still.scaled(simd, size));
@@ -265,7 +265,7 @@ fn invert<S: Simd>(
 
 /// The inverse of a symmetric block by its L·D·Lᵀ without exchanges, and the signs of its pivots.
 #[inline(always)]
-fn inverse(a: &Columns, inertia: &mut Inertia, body: usize) -> Result<Columns, ZeroPivot> {
+fn inverse(a: &ColumnBlock, inertia: &mut PivotSigns, body: usize) -> Result<ColumnBlock, ZeroPivot> {
     let mut pivot = |d: f64, direction: usize, from: f64| {
         if d.abs() <= LOST * from.abs() || !d.is_finite() {
             return Err(ZeroPivot { body, direction });
@@ -288,7 +288,7 @@ fn inverse(a: &Columns, inertia: &mut Inertia, body: usize) -> Result<Columns, Z
     let i11 = r1 - l21 * i21;
     let i10 = -l10 * r1 - l21 * i20;
     let i00 = r0 + l10 * l10 * r1 + m * i20;
-    Ok(Columns([Four([i00, i10, i20, 0.0]), Four([i10, i11, i21, 0.0]), Four([i20, i21, i22, 0.0])]))
+    Ok(ColumnBlock([Four([i00, i10, i20, 0.0]), Four([i10, i11, i21, 0.0]), Four([i20, i21, i22, 0.0])]))
 }
 
 #[cfg(test)]
@@ -296,7 +296,7 @@ mod tests {
     use super::*;
     use crate::compile::{CompileOptions, Scheme, compile};
     use crate::multibody::lanes::one_by_one;
-    use crate::multibody::relative::placed::{Eights, Place};
+    use crate::multibody::relative::placed::{LaneJointStates, PlaceTree};
     use crate::multibody::relative::solve::Solve;
     use crate::netlist::Bundle;
     use pulp::Scalar;
@@ -324,10 +324,10 @@ mod tests {
                 .map(|_| Pose::new(noise() * size * 1e-6, noise() * size * 1e-6, noise() * size))
                 .collect()
         };
-        let given = Eights::tiles(&poses(2.0), &poses(1e5), &poses(1e11));
-        let (mut here, mut alone) = (Placed::new(&tree), Placed::new(&tree));
+        let given = LaneJointStates::tiles(&poses(2.0), &poses(1e5), &poses(1e11));
+        let (mut here, mut alone) = (TreeKinematics::new(&tree), TreeKinematics::new(&tree));
         here.place(&tree, &given);
-        one_by_one(Place { placed: &mut alone, tree: &tree, given: &given });
+        one_by_one(PlaceTree { placed: &mut alone, tree: &tree, given: &given });
         assert_eq!((&here.at, &here.rate, &here.acceleration), (&alone.at, &alone.rate, &alone.acceleration));
         let mut matrix = JointMatrix::new(&tree);
         for (block, body) in matrix.bodies.diagonal.iter_mut().zip(&model.bodies) {

@@ -4,9 +4,9 @@
 //! everything that hangs on body c. The last sum has four variables a joint, and its coefficients are those of the bias of
 //! [`super::kinematics`], which is the same second derivative.
 
-use super::kinematics::{Map, dot};
-use super::placed::Placed;
-use super::tree::{Link, Parent, Tree};
+use super::kinematics::{MotionMap, dot};
+use super::placed::TreeKinematics;
+use super::tree::{Tree, TreeJoint, TreeParent};
 use crate::multibody::planar::Pose;
 use nalgebra::Matrix3;
 
@@ -28,15 +28,16 @@ impl Geometric {
 }
 
 /// Fills in `out` at coordinates `q`, where the bodies have been placed; `force` holds the wrench on everything that hangs on
-/// each body, as [`Placed::resist`] leaves it. Arms and openings are taken from the maps: nothing is turned again.
-pub fn fill(tree: &Tree, placed: &Placed, q: impl Fn(usize) -> Pose, force: &[Pose], out: &mut [Geometric]) {
+/// each body, as [`TreeKinematics::resist`] leaves it. Arms and openings are taken from the maps: nothing is turned again.
+pub fn fill(tree: &Tree, placed: &TreeKinematics, q: impl Fn(usize) -> Pose, force: &[Pose], out: &mut [Geometric]) {
     for (j, link) in tree.links.iter().enumerate() {
-        out[j] = if link.parent == Parent::Free { Geometric::ZERO } else { of(link, &placed.map(j), &q(j), &force[j]) };
+        out[j] =
+            if link.parent == TreeParent::Free { Geometric::ZERO } else { of(link, &placed.map(j), &q(j), &force[j]) };
     }
 }
 
 #[inline(always)]
-fn of(link: &Link, map: &Map<f64>, q: &Pose, force: &Pose) -> Geometric {
+fn of(link: &TreeJoint, map: &MotionMap<f64>, q: &Pose, force: &Pose) -> Geometric {
     let s = link.sign;
     let (f, right) = ([force.x, force.y], [-force.y, force.x]);
     let [u, _, p] = &map.columns;

@@ -19,7 +19,7 @@ use crate::multibody::lanes::Number;
 use crate::multibody::planar::Pose;
 
 /// A pair of numbers.
-pub(super) type Pair<T> = [T; 2];
+pub(super) type TreeVector<T> = [T; 2];
 /// Three numbers: of the plane, or of a joint.
 pub(super) type Triple<T> = [T; 3];
 
@@ -29,29 +29,29 @@ pub(super) fn triple(x: &Pose) -> Triple<f64> {
 }
 
 #[inline(always)]
-fn turn<T: Number>(v: Pair<T>) -> Pair<T> {
+fn perpendicular<T: Number>(v: TreeVector<T>) -> TreeVector<T> {
     [-v[1], v[0]]
 }
 
 #[inline(always)]
-pub(super) fn dot<T: Number>(a: Pair<T>, b: Pair<T>) -> T {
+pub(super) fn dot<T: Number>(a: TreeVector<T>, b: TreeVector<T>) -> T {
     a[0] * b[0] + a[1] * b[1]
 }
 
 /// How a body moves with its parent's rotation and with its own coordinates.
 #[derive(Debug, Clone, Copy)]
-pub struct Map<T> {
+pub struct MotionMap<T> {
     /// t(L): motion with the parent's rotation [m/rad].
-    pub(super) lever: Pair<T>,
+    pub(super) lever: TreeVector<T>,
     /// S_u, S_g, S_p.
-    pub(super) columns: [Pair<T>; 3],
+    pub(super) columns: [TreeVector<T>; 3],
 }
 
-impl Map<f64> {
+impl MotionMap<f64> {
     pub(super) const REST: Self = Self { lever: [0.0; 2], columns: [[0.0; 2]; 3] };
 }
 
-impl<T: Number> Map<T> {
+impl<T: Number> MotionMap<T> {
     /// The body's motion from the parent's and from the coordinates' motion `s`.
     #[inline(always)]
     pub(super) fn apply(&self, sign: f64, parent: &Triple<T>, s: &Triple<T>) -> Triple<T> {
@@ -61,7 +61,7 @@ impl<T: Number> Map<T> {
 
     /// Displacement beyond the parent's with the parent's rotation and the coordinates' motion `s`.
     #[inline(always)]
-    fn along(&self, turn: T, s: &Triple<T>) -> Pair<T> {
+    fn along(&self, turn: T, s: &Triple<T>) -> TreeVector<T> {
         let [u, g, p] = &self.columns;
         let mut out = self.lever;
         for i in 0..2 {
@@ -87,32 +87,32 @@ impl<T: Number> Map<T> {
 
 /// What does not move of a joint.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shape<T> {
+pub(super) struct JointGeometry<T> {
     /// σ.
     pub(super) sign: T,
     /// Arms as drawn, of the parent and of the body [m].
-    pub(super) arms: [Pair<T>; 2],
+    pub(super) arms: [TreeVector<T>; 2],
     /// Cosine and sine of the drawn angle of the joint's x axis.
-    pub(super) axis: Pair<T>,
+    pub(super) axis: TreeVector<T>,
     /// Q over (g, p) as (gg, gp, pp).
     pub(super) second: Triple<T>,
 }
 
 /// How a body is turned, and turns.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Turned<T> {
+pub(super) struct RotationState<T> {
     /// Sine and cosine of half its rotation.
-    pub(super) half: Pair<T>,
+    pub(super) half: TreeVector<T>,
     /// Rate [rad/s].
     pub(super) spin: T,
     /// Rate of that [rad/s²].
     pub(super) spin_rate: T,
 }
 
-impl<T: Number> Turned<T> {
+impl<T: Number> RotationState<T> {
     /// (R − 1)·v without cancellation.
     #[inline(always)]
-    fn swing(&self, v: Pair<T>) -> Pair<T> {
+    fn rotation_minus_identity(&self, v: TreeVector<T>) -> TreeVector<T> {
         let [sin, cos] = self.half;
         let (less, whole) = (sin * sin * -2.0, sin * cos * 2.0);
         [less * v[0] - whole * v[1], whole * v[0] + less * v[1]]
@@ -121,7 +121,7 @@ impl<T: Number> Turned<T> {
 
 /// Coordinates, rates and accelerations of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Given<T> {
+pub struct JointState<T> {
     /// Coordinates.
     pub q: Triple<T>,
     /// Their rates.
@@ -132,33 +132,38 @@ pub struct Given<T> {
 
 /// A body less its parent, in x and y.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Hung<T> {
-    pub(super) map: Map<T>,
+pub(super) struct RelativeOffset<T> {
+    pub(super) map: MotionMap<T>,
     /// Displacement, rate and acceleration.
-    pub(super) beyond: [Pair<T>; 3],
+    pub(super) beyond: [TreeVector<T>; 3],
 }
 
 /// A body with rotation `own` on a parent with rotation `parent`.
 #[inline(always)]
-pub(super) fn hang<T: Number>(shape: &Shape<T>, parent: &Turned<T>, own: &Turned<T>, at: &Given<T>) -> Hung<T> {
+pub(super) fn offset_from_parent<T: Number>(
+    shape: &JointGeometry<T>,
+    parent: &RotationState<T>,
+    own: &RotationState<T>,
+    at: &JointState<T>,
+) -> RelativeOffset<T> {
     let s = shape.sign;
     let ([stretch, g, p], [arm_parent, arm]) = (at.q, shape.arms);
-    let (swing_parent, swing) = (parent.swing(arm_parent), own.swing(arm));
+    let (swing_parent, swing) = (parent.rotation_minus_identity(arm_parent), own.rotation_minus_identity(arm));
     // the frame turns with the mean of both
     let ([sin_m, cos_m], [sin_c, cos_c]) = (parent.half, own.half);
     let cos = cos_c * cos_m - sin_c * sin_m;
     let sin = sin_c * cos_m + cos_c * sin_m;
     let e1 = [cos * shape.axis[0] - sin * shape.axis[1], sin * shape.axis[0] + cos * shape.axis[1]];
-    let e2 = turn(e1);
+    let e2 = perpendicular(e1);
     let [gg, gp, pp] = shape.second;
     let bent = [g * gg + p * gp, g * gp + p * pp];
     let u = stretch - (bent[0] * g + bent[1] * p);
     let d = [e1[0] * u + e2[0] * g, e1[1] * u + e2[1] * g];
-    let t = turn(d);
+    let t = perpendicular(d);
     let r_parent = [swing_parent[0] + arm_parent[0], swing_parent[1] + arm_parent[1]];
     let r = [swing[0] + arm[0], swing[1] + arm[1]];
-    let tr = turn(r);
-    let lever = turn([r_parent[0] - r[0] + d[0] * s, r_parent[1] - r[1] + d[1] * s]);
+    let tr = perpendicular(r);
+    let lever = perpendicular([r_parent[0] - r[0] + d[0] * s, r_parent[1] - r[1] + d[1] * s]);
     let mut columns = [e1, e2, t];
     let mut displaced = swing;
     for i in 0..2 {
@@ -167,7 +172,7 @@ pub(super) fn hang<T: Number>(shape: &Shape<T>, parent: &Turned<T>, own: &Turned
         columns[2][i] = t[i] * 0.5 - (tr[i] + bent[1] * e1[i] * 2.0) * s;
         displaced[i] = swing_parent[i] - swing[i] + d[i] * s;
     }
-    let map = Map { lever, columns };
+    let map = MotionMap { lever, columns };
     let (v, rate) = (at.v, map.along(parent.spin, &at.v));
     let frame = (parent.spin + own.spin) * 0.5;
     let rate_u = v[0] - (bent[0] * v[1] + bent[1] * v[2]) * 2.0;
@@ -179,5 +184,5 @@ pub(super) fn hang<T: Number>(shape: &Shape<T>, parent: &Turned<T>, own: &Turned
         let joint = (mixed_2 * e2[i] - mixed_1 * e1[i] - squared_frame * d[i]) * s;
         acceleration[i] += squared * r[i] - squared_parent * r_parent[i] + joint;
     }
-    Hung { map, beyond: [displaced, rate, acceleration] }
+    RelativeOffset { map, beyond: [displaced, rate, acceleration] }
 }

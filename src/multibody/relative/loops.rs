@@ -1,46 +1,46 @@
 //! Forces of the joints that close loops, eight side by side: the bodies have been placed, and their sines are known.
 
-use super::placed::Placed;
+use super::placed::TreeKinematics;
 use crate::multibody::Model;
 use crate::multibody::forces::RestStrain;
-use crate::multibody::lanes::joint::{LanePlaced, LaneSection, Pair, kinematics};
-use crate::multibody::lanes::{Eight, Kernel, LANES, LanePose, STILL, Wide, everywhere, load, store};
+use crate::multibody::lanes::joint::{LanePlaced, LaneSection, LaneVector, kinematics};
+use crate::multibody::lanes::{Kernel, LANES, Lane8, LanePose, STILL, SimdReal, everywhere, load, store};
 use crate::multibody::planar::Pose;
-use crate::multibody::section::{LaidJoint, NONE};
+use crate::multibody::section::{NONE, PackedJoint};
 
 /// Up to eight joints. A lane without one lies between ground and ground, and is as soft as nothing.
 #[derive(Debug, Clone)]
-struct Eightfold {
+struct LaneClosures {
     bodies: [[u32; LANES]; 2],
-    arms: [Pair; 2],
+    arms: [LaneVector; 2],
     section: LaneSection,
     /// Built-in axial rest offsets [m].
-    rest: Eight,
+    rest: Lane8,
     /// Lanes that are heated, with group and length.
     expansion: Vec<(usize, usize, f64)>,
 }
 
 /// The joints that close loops. Immutable.
 #[derive(Debug, Clone)]
-pub struct Loops(Vec<Eightfold>);
+pub struct Loops(Vec<LaneClosures>);
 
 impl Loops {
     /// Lays out `joints` of `model`.
-    pub fn new(model: &Model, joints: &[LaidJoint]) -> Self {
-        Self(joints.chunks(LANES).map(|joints| Eightfold::new(model, joints)).collect())
+    pub fn new(model: &Model, joints: &[PackedJoint]) -> Self {
+        Self(joints.chunks(LANES).map(|joints| LaneClosures::new(model, joints)).collect())
     }
 
     /// `r +=` their forces on the bodies.
-    pub fn add_forces(&self, placed: &Placed, rest: &RestStrain<'_>, r: &mut [Pose]) {
+    pub fn add_forces(&self, placed: &TreeKinematics, rest: &RestStrain<'_>, r: &mut [Pose]) {
         everywhere(Forces { loops: &self.0, placed, rest, r });
     }
 }
 
-impl Eightfold {
-    fn new(model: &Model, joints: &[LaidJoint]) -> Self {
-        let none = [Eight::NONE; 2];
-        let section = LaneSection { axis: none, stiffness: [Eight::NONE; 6], second: [Eight::NONE; 3] };
-        let (bodies, arms, rest) = ([[NONE; LANES]; 2], [none; 2], Eight::NONE);
+impl LaneClosures {
+    fn new(model: &Model, joints: &[PackedJoint]) -> Self {
+        let none = [Lane8::NONE; 2];
+        let section = LaneSection { axis: none, stiffness: [Lane8::NONE; 6], second: [Lane8::NONE; 3] };
+        let (bodies, arms, rest) = ([[NONE; LANES]; 2], [none; 2], Lane8::NONE);
         let mut all = Self { bodies, arms, section, rest, expansion: Vec::new() };
         for (k, joint) in joints.iter().enumerate() {
             let section = model.section(joint);
@@ -63,15 +63,15 @@ impl Eightfold {
 }
 
 struct Forces<'a> {
-    loops: &'a [Eightfold],
-    placed: &'a Placed,
+    loops: &'a [LaneClosures],
+    placed: &'a TreeKinematics,
     rest: &'a RestStrain<'a>,
     r: &'a mut [Pose],
 }
 
 impl Kernel for Forces<'_> {
     #[inline(always)]
-    fn run<W: Wide>(self, simd: W::Simd) {
+    fn run<W: SimdReal>(self, simd: W::Simd) {
         let Self { loops, placed, rest, r } = self;
         for joints in loops {
             let mut offsets = joints.rest;
@@ -93,8 +93,8 @@ impl Kernel for Forces<'_> {
 
 /// Bodies in lanes.
 #[inline(always)]
-fn place<W: Wide>(simd: W::Simd, placed: &Placed, bodies: &[u32; LANES]) -> LanePlaced<W> {
-    let (mut q, mut sin, mut cos) = (STILL, Eight::NONE, Eight::of(1.0));
+fn place<W: SimdReal>(simd: W::Simd, placed: &TreeKinematics, bodies: &[u32; LANES]) -> LanePlaced<W> {
+    let (mut q, mut sin, mut cos) = (STILL, Lane8::NONE, Lane8::of(1.0));
     for (k, &body) in bodies.iter().enumerate().filter(|(_, body)| **body != NONE) {
         let at = &placed.at[body as usize];
         (q[0].0[k], q[1].0[k], q[2].0[k]) = (at.x, at.y, at.z);
@@ -105,7 +105,7 @@ fn place<W: Wide>(simd: W::Simd, placed: &Placed, bodies: &[u32; LANES]) -> Lane
 
 /// Adds forces in lanes to those of their bodies.
 #[inline(always)]
-fn add<W: Wide>(force: LanePose<W>, bodies: &[u32; LANES], r: &mut [Pose]) {
+fn add<W: SimdReal>(force: LanePose<W>, bodies: &[u32; LANES], r: &mut [Pose]) {
     let mut lanes = STILL;
     store(force, &mut lanes);
     for (k, &body) in bodies.iter().enumerate().filter(|(_, body)| **body != NONE) {

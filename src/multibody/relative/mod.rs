@@ -32,4 +32,4 @@ pub mod solve;
 pub mod tree;
 
 pub use factor::JointMatrix;
-pub use tree::{Link, Parent, Tree, Unfit};
+pub use tree::{Tree, TreeJoint, TreeParent, UnsupportedModel};

@@ -89,7 +89,7 @@ impl Add<f64> for Dual {
 
 impl Number for Dual {
     #[inline(always)]
-    fn like(self, x: f64) -> Self {
+    fn splat_like(self, x: f64) -> Self {
         Self::constant(x)
     }
 }

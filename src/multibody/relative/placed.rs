@@ -4,15 +4,17 @@
 //! other; then each body of a tile finds in a lane of its own how it hangs on its parent ([`super::kinematics`]); then displacements are
 //! summed. Lanes beyond the last body hold nothing.
 
-use super::kinematics::{Given, Hung, Map, Pair, Shape, Turned, hang};
-use super::tree::{Parent, Tree};
-use crate::multibody::lanes::{Eight, Kernel, LANES, Number, STILL, Wide, everywhere, load, store};
+use super::kinematics::{
+    JointGeometry, JointState, MotionMap, RelativeOffset, RotationState, TreeVector, offset_from_parent,
+};
+use super::tree::{Tree, TreeParent};
+use crate::multibody::lanes::{Kernel, LANES, Lane8, Number, STILL, SimdReal, everywhere, load, store};
 use crate::multibody::planar::Pose;
 
 /// Coordinates, rates and accelerations of eight bodies.
-pub type Eights = Given<Eight>;
+pub type LaneJointStates = JointState<Lane8>;
 
-impl Eights {
+impl LaneJointStates {
     /// Nothing moves.
     pub const STILL: Self = Self { q: STILL, v: STILL, z: STILL };
 
@@ -46,12 +48,12 @@ impl Eights {
     }
 
     #[inline(always)]
-    pub(crate) fn load<W: Wide>(&self, simd: W::Simd) -> Given<W> {
-        Given { q: load(simd, &self.q), v: load(simd, &self.v), z: load(simd, &self.z) }
+    pub(crate) fn load<W: SimdReal>(&self, simd: W::Simd) -> JointState<W> {
+        JointState { q: load(simd, &self.q), v: load(simd, &self.v), z: load(simd, &self.z) }
     }
 
     #[inline(always)]
-    pub(crate) fn store<W: Wide>(&mut self, given: Given<W>) {
+    pub(crate) fn store<W: SimdReal>(&mut self, given: JointState<W>) {
         store(given.q, &mut self.q);
         store(given.v, &mut self.v);
         store(given.z, &mut self.z);
@@ -71,32 +73,32 @@ pub(crate) const fn tiles(count: usize) -> usize {
 
 /// Eight bodies on the way.
 #[derive(Debug, Clone, Copy)]
-struct Tile {
+struct BodyTile {
     /// Rotation; then sine and cosine of half of it.
-    theta: Eight,
-    half: [Eight; 2],
+    theta: Lane8,
+    half: [Lane8; 2],
     /// Rate of the rotation, and the rate of that.
-    spin: [Eight; 2],
+    spin: [Lane8; 2],
     /// Lever, then columns.
-    map: [Eight; 8],
+    map: [Lane8; 8],
     /// Displacement, rate and acceleration less the parent's.
-    beyond: [Eight; 6],
+    beyond: [Lane8; 6],
 }
 
 const GROUND: [f64; 4] = [0.0, 1.0, 0.0, 0.0];
 
-const REST: Tile = Tile {
-    theta: Eight::NONE,
-    half: [Eight::NONE, Eight::of(1.0)],
-    spin: [Eight::NONE; 2],
-    map: [Eight::NONE; 8],
-    beyond: [Eight::NONE; 6],
+const REST: BodyTile = BodyTile {
+    theta: Lane8::NONE,
+    half: [Lane8::NONE, Lane8::of(1.0)],
+    spin: [Lane8::NONE; 2],
+    map: [Lane8::NONE; 8],
+    beyond: [Lane8::NONE; 6],
 };
 
 /// Where the bodies are, with the maps that their motion goes through.
 #[derive(Debug, Clone)]
-pub struct Placed {
-    tiles: Vec<Tile>,
+pub struct TreeKinematics {
+    tiles: Vec<BodyTile>,
     /// Displacement and rotation of each body.
     pub at: Vec<Pose>,
     /// Their rates.
@@ -105,7 +107,7 @@ pub struct Placed {
     pub acceleration: Vec<Pose>,
 }
 
-impl Placed {
+impl TreeKinematics {
     /// Storage for a tree.
     pub fn new(tree: &Tree) -> Self {
         let zeros = vec![Pose::zeros(); tree.links.len()];
@@ -121,39 +123,39 @@ impl Placed {
 
     /// Places the bodies at a motion of the coordinates.
     #[inline]
-    pub fn place(&mut self, tree: &Tree, given: &[Eights]) {
-        everywhere(Place { placed: self, tree, given });
+    pub fn place(&mut self, tree: &Tree, given: &[LaneJointStates]) {
+        everywhere(PlaceTree { placed: self, tree, given });
     }
 
     /// How body `j` moves with its parent and its coordinates.
     #[inline(always)]
-    pub fn map(&self, j: usize) -> Map<f64> {
+    pub fn map(&self, j: usize) -> MotionMap<f64> {
         let (tile, lane) = place_of(j);
         let of = |i: usize| self.tiles[tile].map[i].0[lane];
-        Map { lever: [of(0), of(1)], columns: [[of(2), of(3)], [of(4), of(5)], [of(6), of(7)]] }
+        MotionMap { lever: [of(0), of(1)], columns: [[of(2), of(3)], [of(4), of(5)], [of(6), of(7)]] }
     }
 }
 
-pub(super) struct Place<'a> {
-    pub(super) placed: &'a mut Placed,
+pub(super) struct PlaceTree<'a> {
+    pub(super) placed: &'a mut TreeKinematics,
     pub(super) tree: &'a Tree,
-    pub(super) given: &'a [Eights],
+    pub(super) given: &'a [LaneJointStates],
 }
 
-impl Kernel for Place<'_> {
+impl Kernel for PlaceTree<'_> {
     #[inline(always)]
-    fn run<W: Wide>(self, simd: W::Simd) {
+    fn run<W: SimdReal>(self, simd: W::Simd) {
         let Self { placed, tree, given } = self;
         // along an arm each sum waits for the one before it: those of other arms fill the time
         for (t, given) in given.iter().enumerate().rev() {
-            placed.turn(tree, t, given);
+            placed.rotate(tree, t, given);
         }
         for tile in &mut placed.tiles {
             let (sin, cos) = (W::load(simd, &tile.theta) * 0.5).sin_cos(simd);
             store([sin, cos], &mut tile.half);
         }
         for (t, given) in given.iter().enumerate() {
-            placed.hang::<W>(simd, tree, t, given);
+            placed.attach_to_parents::<W>(simd, tree, t, given);
         }
         for (t, given) in given.iter().enumerate().rev() {
             placed.sum(tree, t, given);
@@ -161,20 +163,20 @@ impl Kernel for Place<'_> {
     }
 }
 
-impl Placed {
+impl TreeKinematics {
     /// Rotations of a tile's bodies, and their rates.
     #[inline(always)]
-    fn turn(&mut self, tree: &Tree, t: usize, given: &Eights) {
+    fn rotate(&mut self, tree: &Tree, t: usize, given: &LaneJointStates) {
         let tile = &mut self.tiles[t];
         for (k, up) in tree.upward[t * LANES..].iter().take(LANES).enumerate().rev() {
             let j = t * LANES + k;
             let own = [given.q[2].0[k], given.v[2].0[k], given.z[2].0[k]].map(|x| x * up.sign);
             let [theta, spin, rate] = match up.parent {
-                Parent::Body(p) => {
+                TreeParent::Body(p) => {
                     let p = p as usize;
                     [self.at[p].z + own[0], self.rate[p].z + own[1], self.acceleration[p].z + own[2]]
                 }
-                Parent::Ground | Parent::Free => own,
+                TreeParent::Ground | TreeParent::Free => own,
             };
             (self.at[j].z, self.rate[j].z, self.acceleration[j].z) = (theta, spin, rate);
             (tile.theta.0[k], tile.spin[0].0[k], tile.spin[1].0[k]) = (theta, spin, rate);
@@ -183,23 +185,23 @@ impl Placed {
 
     /// How each body of a tile hangs on its parent.
     #[inline(always)]
-    fn hang<W: Wide>(&mut self, simd: W::Simd, tree: &Tree, t: usize, given: &Eights) {
+    fn attach_to_parents<W: SimdReal>(&mut self, simd: W::Simd, tree: &Tree, t: usize, given: &LaneJointStates) {
         let (mut half, mut spin) = (REST.half, REST.spin);
         for (k, up) in tree.upward[t * LANES..].iter().take(LANES).enumerate() {
             let [sin, cos, rate, push] = match up.parent {
-                Parent::Body(p) => {
+                TreeParent::Body(p) => {
                     let (tile, lane) = place_of(p as usize);
                     let of = &self.tiles[tile];
                     [of.half[0].0[lane], of.half[1].0[lane], of.spin[0].0[lane], of.spin[1].0[lane]]
                 }
-                Parent::Ground | Parent::Free => GROUND,
+                TreeParent::Ground | TreeParent::Free => GROUND,
             };
             (half[0].0[k], half[1].0[k], spin[0].0[k], spin[1].0[k]) = (sin, cos, rate, push);
         }
         let tile = &mut self.tiles[t];
         let (shape, given) = (tree.shapes[t].load::<W>(simd), given.load::<W>(simd));
         let (parent, own) = (turned::<W>(simd, &half, &spin), turned::<W>(simd, &tile.half, &tile.spin));
-        let Hung { map, beyond } = hang(&shape, &parent, &own, &given);
+        let RelativeOffset { map, beyond } = offset_from_parent(&shape, &parent, &own, &given);
         let [u, g, p] = map.columns;
         store([map.lever[0], map.lever[1], u[0], u[1], g[0], g[1], p[0], p[1]], &mut tile.map);
         let [at, rate, push] = beyond;
@@ -208,28 +210,28 @@ impl Placed {
 
     /// Sums displacements, rates and accelerations along the tree.
     #[inline(always)]
-    fn sum(&mut self, tree: &Tree, t: usize, given: &Eights) {
+    fn sum(&mut self, tree: &Tree, t: usize, given: &LaneJointStates) {
         for (k, up) in tree.upward[t * LANES..].iter().take(LANES).enumerate().rev() {
             let j = t * LANES + k;
-            let beyond = |i: usize| -> Pair<f64> {
+            let beyond = |i: usize| -> TreeVector<f64> {
                 let of = &self.tiles[t].beyond;
                 [of[2 * i].0[k], of[2 * i + 1].0[k]]
             };
             let (at, rate, push) = (beyond(0), beyond(1), beyond(2));
             match up.parent {
-                Parent::Free => {
+                TreeParent::Free => {
                     [self.at[j], self.rate[j], self.acceleration[j]] = given.of(k);
                     // its coordinates are its own displacement and rotation
                     for (to, x) in self.tiles[t].map.iter_mut().zip([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0]) {
                         to.0[k] = x;
                     }
                 }
-                Parent::Ground => {
+                TreeParent::Ground => {
                     (self.at[j].x, self.at[j].y) = (at[0], at[1]);
                     (self.rate[j].x, self.rate[j].y) = (rate[0], rate[1]);
                     (self.acceleration[j].x, self.acceleration[j].y) = (push[0], push[1]);
                 }
-                Parent::Body(p) => {
+                TreeParent::Body(p) => {
                     let p = p as usize;
                     (self.at[j].x, self.at[j].y) = (self.at[p].x + at[0], self.at[p].y + at[1]);
                     (self.rate[j].x, self.rate[j].y) = (self.rate[p].x + rate[0], self.rate[p].y + rate[1]);
@@ -242,15 +244,15 @@ impl Placed {
 }
 
 #[inline(always)]
-fn turned<W: Wide>(simd: W::Simd, half: &[Eight; 2], spin: &[Eight; 2]) -> Turned<W> {
+fn turned<W: SimdReal>(simd: W::Simd, half: &[Lane8; 2], spin: &[Lane8; 2]) -> RotationState<W> {
     let [spin, spin_rate] = load(simd, spin);
-    Turned { half: load(simd, half), spin, spin_rate }
+    RotationState { half: load(simd, half), spin, spin_rate }
 }
 
-impl Shape<Eight> {
+impl JointGeometry<Lane8> {
     #[inline(always)]
-    fn load<W: Wide>(&self, simd: W::Simd) -> Shape<W> {
-        Shape {
+    fn load<W: SimdReal>(&self, simd: W::Simd) -> JointGeometry<W> {
+        JointGeometry {
             sign: W::load(simd, &self.sign),
             arms: [load(simd, &self.arms[0]), load(simd, &self.arms[1])],
             axis: load(simd, &self.axis),
@@ -259,11 +261,11 @@ impl Shape<Eight> {
     }
 
     /// Of one body.
-    pub(super) fn of<T: Number>(&self, lane: usize, one: T) -> Shape<T> {
-        let like = |x: &Eight| one.like(x.0[lane]);
-        let pair = |x: &Pair<Eight>| [like(&x[0]), like(&x[1])];
+    pub(super) fn of<T: Number>(&self, lane: usize, one: T) -> JointGeometry<T> {
+        let like = |x: &Lane8| one.splat_like(x.0[lane]);
+        let pair = |x: &TreeVector<Lane8>| [like(&x[0]), like(&x[1])];
         let second = &self.second;
-        Shape {
+        JointGeometry {
             sign: like(&self.sign),
             arms: [pair(&self.arms[0]), pair(&self.arms[1])],
             axis: pair(&self.axis),

@@ -10,34 +10,34 @@
 //! ```
 //! Along a beam each body waits for the one before it, and one product is all that it waits for.
 
-use super::columns::{Columns, Four, in_fours};
-use super::kinematics::{Map, triple};
-use super::tree::{Link, Parent, Tree};
+use super::columns::{ColumnBlock, Four, in_fours};
+use super::kinematics::{MotionMap, triple};
+use super::tree::{Tree, TreeJoint, TreeParent};
 use crate::multibody::planar::Pose;
 use pulp::{Simd, WithSimd};
 use std::ops::Range;
 
 /// A coupling L and its transpose.
 #[derive(Debug, Clone, Copy)]
-struct Coupling {
+struct BodyCoupling {
     row: u32,
-    lower: Columns,
-    upper: Columns,
+    lower: ColumnBlock,
+    upper: ColumnBlock,
 }
 
 /// What a solve takes of one body.
 #[derive(Debug, Clone)]
-struct Turn {
+struct BodySolve {
     /// Sᵀ and S.
-    share: Columns,
-    along: Columns,
+    share: ColumnBlock,
+    along: ColumnBlock,
     /// H⁻¹, zero in what is locked.
-    inverse: Columns,
+    inverse: ColumnBlock,
     /// P and its transpose; zero without a parent.
-    pass: Columns,
-    back: Columns,
+    pass: ColumnBlock,
+    back: ColumnBlock,
     /// The coupling with its parent; without one, zero, and with a body beyond the last.
-    parent: Coupling,
+    parent: BodyCoupling,
     /// Couplings with other bodies.
     others: Range<usize>,
 }
@@ -45,8 +45,8 @@ struct Turn {
 /// Factors of a form.
 #[derive(Debug, Clone)]
 pub(super) struct Factors {
-    turns: Vec<Turn>,
-    others: Vec<Coupling>,
+    turns: Vec<BodySolve>,
+    others: Vec<BodyCoupling>,
     /// The place of each block of the pattern among the others.
     places: Vec<u32>,
 }
@@ -54,20 +54,20 @@ pub(super) struct Factors {
 impl Factors {
     pub(super) fn new(tree: &Tree) -> Self {
         let (pattern, mut others) = (&tree.pattern, Vec::new());
-        let none = Coupling { row: tree.links.len() as u32, lower: Columns::ZERO, upper: Columns::ZERO };
+        let none = BodyCoupling { row: tree.links.len() as u32, lower: ColumnBlock::ZERO, upper: ColumnBlock::ZERO };
         let mut places = vec![u32::MAX; pattern.off_blocks()];
-        let mut turn = |(j, link): (usize, &Link)| {
+        let mut turn = |(j, link): (usize, &TreeJoint)| {
             let (first, mut parent) = (others.len(), none);
             for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
-                if link.parent == Parent::Body(row) {
+                if link.parent == TreeParent::Body(row) {
                     parent.row = row;
                 } else {
                     places[k] = others.len() as u32;
-                    others.push(Coupling { row, ..none });
+                    others.push(BodyCoupling { row, ..none });
                 }
             }
-            let (zero, others) = (Columns::ZERO, first..others.len());
-            Turn { share: zero, along: zero, inverse: zero, pass: zero, back: zero, parent, others }
+            let (zero, others) = (ColumnBlock::ZERO, first..others.len());
+            BodySolve { share: zero, along: zero, inverse: zero, pass: zero, back: zero, parent, others }
         };
         let turns = tree.links.iter().enumerate().map(&mut turn).collect();
         Self { turns, others, places }
@@ -75,7 +75,7 @@ impl Factors {
 
     /// Keeps S and H⁻¹ of body `j`, whose directions that do not move are zero in both.
     #[inline(always)]
-    pub(super) fn keep(&mut self, j: usize, (along, share): (&Columns, &Columns), inverse: &Columns) {
+    pub(super) fn keep(&mut self, j: usize, (along, share): (&ColumnBlock, &ColumnBlock), inverse: &ColumnBlock) {
         let turn = &mut self.turns[j];
         (turn.along, turn.share, turn.inverse) = (*along, *share, *inverse);
     }
@@ -86,12 +86,12 @@ impl Factors {
         &mut self,
         simd: S,
         (j, k, is_parent): (usize, usize, bool),
-        map: &Map<f64>,
-        lower: &Columns,
+        map: &MotionMap<f64>,
+        lower: &ColumnBlock,
     ) {
         let turn = &mut self.turns[j];
         let coupling = if is_parent {
-            let pass = Columns::passing(map).less(simd, &lower.product(simd, &turn.share));
+            let pass = ColumnBlock::passing(map).less(simd, &lower.product(simd, &turn.share));
             (turn.pass, turn.back) = (pass, pass.transposed());
             &mut turn.parent
         } else {
@@ -141,7 +141,7 @@ impl WithSimd for Solve<'_> {
 #[inline]
 pub(super) fn both_motions(
     tree: &Tree,
-    maps: &[Map<f64>],
+    maps: &[MotionMap<f64>],
     (s, t): (&[Pose], &[Pose]),
     (to_s, to_t): (&mut [Pose], &mut [Pose]),
 ) {
@@ -149,9 +149,9 @@ pub(super) fn both_motions(
         let moved = |parent: &Pose, s: &Pose| Pose::from(maps[j].apply(link.sign, &triple(parent), &triple(s)));
         let still = Pose::zeros();
         (to_s[j], to_t[j]) = match link.parent {
-            Parent::Free => (s[j], t[j]),
-            Parent::Ground => (moved(&still, &s[j]), moved(&still, &t[j])),
-            Parent::Body(p) => (moved(&to_s[p as usize], &s[j]), moved(&to_t[p as usize], &t[j])),
+            TreeParent::Free => (s[j], t[j]),
+            TreeParent::Ground => (moved(&still, &s[j]), moved(&still, &t[j])),
+            TreeParent::Body(p) => (moved(&to_s[p as usize], &s[j]), moved(&to_t[p as usize], &t[j])),
         };
     }
 }

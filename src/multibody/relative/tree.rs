@@ -10,20 +10,20 @@
 //! Coordinates are the strains of the joints, (e_u, g, p) of [`planar`](crate::multibody::planar), in one slot of three for
 //! each body; a locked direction keeps its slot, with the value 0. The slot of a root holds its displacement and rotation.
 
-use super::kinematics::Shape;
-use crate::multibody::lanes::{Eight, LANES};
+use super::kinematics::JointGeometry;
+use crate::multibody::lanes::{LANES, Lane8};
 use crate::multibody::planar::{Block, JointFrame, Pose, Symmetric};
-use crate::multibody::section::LaidJoint;
+use crate::multibody::section::PackedJoint;
 use crate::multibody::{BodyId, Joint, Model, Pattern};
 use nalgebra::Vector2;
 use thiserror::Error;
 
 /// Directions (u, g, p) of a joint that are coordinates.
-pub type Moving = [bool; 3];
+pub type FreeDirections = [bool; 3];
 
 /// What a body hangs on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Parent {
+pub enum TreeParent {
     /// A joint to ground.
     Ground,
     /// A joint to a body that is eliminated later.
@@ -34,9 +34,9 @@ pub enum Parent {
 
 /// A body's joint to its parent.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Link {
+pub struct TreeJoint {
     /// What it hangs on.
-    pub parent: Parent,
+    pub parent: TreeParent,
     /// −1 where the joint counts its strains from this body to the parent.
     pub sign: f64,
     /// From the parent's centre of mass to the joint, as drawn [m].
@@ -46,7 +46,7 @@ pub struct Link {
     /// Cosine and sine of the drawn angle of the joint's x axis.
     pub axis: Vector2<f64>,
     /// Directions that are coordinates.
-    pub moving: Moving,
+    pub moving: FreeDirections,
     /// Stress per strain, zero where a direction is locked.
     pub stiffness: Symmetric,
     /// Q over (g, p) as (gg, gp, pp).
@@ -63,9 +63,9 @@ pub struct Link {
 #[derive(Debug, Clone)]
 pub struct Tree {
     /// One link for each body, in elimination order.
-    pub links: Vec<Link>,
+    pub links: Vec<TreeJoint>,
     /// The joints that close loops.
-    pub closures: Vec<LaidJoint>,
+    pub closures: Vec<PackedJoint>,
     /// Couplings of the bodies, fill included.
     pub pattern: Pattern,
     /// Coordinates n.
@@ -73,8 +73,8 @@ pub struct Tree {
     /// What each body hangs on, once more, close together for whoever goes along the tree.
     pub(super) upward: Vec<Upward>,
     /// The tree's joints, eight side by side: what does not move, and springs as (uu, ug, up, gg, gp, pp).
-    pub(super) shapes: Vec<Shape<Eight>>,
-    pub(super) springs: Vec<[Eight; 6]>,
+    pub(super) shapes: Vec<JointGeometry<Lane8>>,
+    pub(super) springs: Vec<[Lane8; 6]>,
     /// Bodies whose joints have rest offsets, and those of them that are heated.
     pub(super) offset: Vec<u32>,
     pub(crate) heated: Vec<u32>,
@@ -83,13 +83,13 @@ pub struct Tree {
 /// What a body hangs on, and the sign of the joint.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Upward {
-    pub(super) parent: Parent,
+    pub(super) parent: TreeParent,
     pub(super) sign: f64,
 }
 
 /// Why a model has no tree whose loops close by springs.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum Unfit {
+pub enum UnsupportedModel {
     /// Small displacements about the drawn geometry were asked for.
     #[error("joint coordinates are not small displacements; leave out --linear or take compliant")]
     Linear,
@@ -114,14 +114,14 @@ impl Tree {
     /// The tree of `model` with everything elastic that is drawn so.
     ///
     /// # Errors
-    /// [`Unfit`].
-    pub fn elastic(model: &Model) -> Result<Self, Unfit> {
+    /// [`UnsupportedModel`].
+    pub fn elastic(model: &Model) -> Result<Self, UnsupportedModel> {
         if model.linear {
-            return Err(Unfit::Linear);
+            return Err(UnsupportedModel::Linear);
         }
         // a supported body keeps its own coordinates
         if let Some(body) = model.bodies.iter().find(|b| b.inertia == 0.0 && b.free.is_none()) {
-            return Err(Unfit::NoInertia { body: body.name.to_string() });
+            return Err(UnsupportedModel::NoInertia { body: body.name.to_string() });
         }
         let tree = Self::new(model, |_| [false; 3]);
         match tree.closures.iter().find(|j| model.section(j).locked != [false; 3]) {
@@ -131,7 +131,7 @@ impl Tree {
                     BodyId::Ground => String::new(),
                 };
                 let (a, b) = joint.bodies();
-                Err(Unfit::RigidLoop { body: name(if a == BodyId::Ground { b } else { a }) })
+                Err(UnsupportedModel::RigidLoop { body: name(if a == BodyId::Ground { b } else { a }) })
             }
             None => Ok(tree),
         }
@@ -173,7 +173,7 @@ impl Tree {
             links.push(match chosen {
                 Some(k) => {
                     in_tree[k] = true;
-                    hang(body, &all[k], locked(k).map(|l| !l))
+                    attach_to_parent(body, &all[k], locked(k).map(|l| !l))
                 }
                 None => root(supported),
             });
@@ -183,12 +183,13 @@ impl Tree {
         Self::laid(links, closures, Pattern::clone(&model.pattern))
     }
 
-    fn laid(links: Vec<Link>, closures: Vec<LaidJoint>, pattern: Pattern) -> Self {
+    fn laid(links: Vec<TreeJoint>, closures: Vec<PackedJoint>, pattern: Pattern) -> Self {
         let upward = links.iter().map(|link| Upward { parent: link.parent, sign: link.sign }).collect();
-        let which = |is: fn(&Link) -> bool| (0..links.len()).filter(|&j| is(&links[j])).map(|j| j as u32).collect();
+        let which =
+            |is: fn(&TreeJoint) -> bool| (0..links.len()).filter(|&j| is(&links[j])).map(|j| j as u32).collect();
         let tiles = || links.chunks(LANES);
         Self {
-            coordinates: links.iter().map(Link::freedom).sum(),
+            coordinates: links.iter().map(TreeJoint::freedom).sum(),
             upward,
             shapes: tiles().map(shapes).collect(),
             springs: tiles().map(|links| [0, 1, 2, 3, 4, 5].map(|i| lanes(links, |l| l.stiffness.0[i]))).collect(),
@@ -202,8 +203,8 @@ impl Tree {
 }
 
 /// A number of each link.
-fn lanes(links: &[Link], of: impl Fn(&Link) -> f64) -> Eight {
-    let mut lanes = Eight::NONE;
+fn lanes(links: &[TreeJoint], of: impl Fn(&TreeJoint) -> f64) -> Lane8 {
+    let mut lanes = Lane8::NONE;
     for (lane, link) in lanes.0.iter_mut().zip(links) {
         *lane = of(link);
     }
@@ -211,9 +212,9 @@ fn lanes(links: &[Link], of: impl Fn(&Link) -> f64) -> Eight {
 }
 
 /// What does not move of the joints of up to eight links.
-fn shapes(links: &[Link]) -> Shape<Eight> {
-    let pair = |of: fn(&Link) -> Vector2<f64>| [lanes(links, |l| of(l).x), lanes(links, |l| of(l).y)];
-    Shape {
+fn shapes(links: &[TreeJoint]) -> JointGeometry<Lane8> {
+    let pair = |of: fn(&TreeJoint) -> Vector2<f64>| [lanes(links, |l| of(l).x), lanes(links, |l| of(l).y)];
+    JointGeometry {
         sign: lanes(links, |l| l.sign),
         arms: [pair(|l| l.arm_parent), pair(|l| l.arm)],
         axis: pair(|l| l.axis),
@@ -221,7 +222,7 @@ fn shapes(links: &[Link]) -> Shape<Eight> {
     }
 }
 
-impl Link {
+impl TreeJoint {
     /// Number of coordinates.
     pub fn freedom(&self) -> usize {
         match &self.free {
@@ -232,15 +233,15 @@ impl Link {
 }
 
 /// The body that `joint` connects to `body` becomes its parent.
-fn hang(body: usize, joint: &Joint, moving: Moving) -> Link {
+fn attach_to_parent(body: usize, joint: &Joint, moving: FreeDirections) -> TreeJoint {
     let reversed = joint.a == BodyId::Free(body);
     let JointFrame { arm_a, arm_b, axis } = joint.frame;
     let (parent, arm_parent, arm) = if reversed { (joint.b, arm_b, arm_a) } else { (joint.a, arm_a, arm_b) };
     let k = |i: usize, j: usize| if moving[i] && moving[j] { joint.stiffness[(i, j)] } else { 0.0 };
-    Link {
+    TreeJoint {
         parent: match parent {
-            BodyId::Ground => Parent::Ground,
-            BodyId::Free(p) => Parent::Body(p as u32),
+            BodyId::Ground => TreeParent::Ground,
+            BodyId::Free(p) => TreeParent::Body(p as u32),
         },
         sign: if reversed { -1.0 } else { 1.0 },
         arm_parent,
@@ -255,9 +256,9 @@ fn hang(body: usize, joint: &Joint, moving: Moving) -> Link {
     }
 }
 
-fn root(free: Option<Box<Block>>) -> Link {
-    Link {
-        parent: Parent::Free,
+fn root(free: Option<Box<Block>>) -> TreeJoint {
+    TreeJoint {
+        parent: TreeParent::Free,
         sign: 1.0,
         arm_parent: Vector2::zeros(),
         arm: Vector2::zeros(),

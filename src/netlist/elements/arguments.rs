@@ -1,10 +1,10 @@
 //! The parameters of an element: given in its list, or taken from its layer.
 
-use super::super::drawing::Drawing;
-use super::super::front::Read;
+use super::super::drawing::StructureBuilder;
+use super::super::front::ReadFunction;
 use super::super::rotation::Rotation;
-use super::super::sink::{Reported, Sink};
-use super::super::source::Span;
+use super::super::sink::{DiagnosticSink, Reported};
+use super::super::source::TextSpan;
 use super::super::value::{LayerValues, Value, short};
 use super::meaning::meaning;
 use crate::structure::NodeId;
@@ -17,7 +17,7 @@ const LONGEST: f64 = 0.1;
 pub(crate) struct Argument<'p> {
     pub(crate) name: &'p str,
     pub(crate) value: Value,
-    pub(crate) span: Span,
+    pub(crate) span: TextSpan,
 }
 
 /// Given parameters before the layer's entries.
@@ -30,31 +30,31 @@ pub(crate) struct Arguments<'p> {
 
 /// An element to be built.
 #[derive(Debug)]
-pub(crate) struct Instance<'p> {
+pub(crate) struct ElementInstance<'p> {
     /// Full name.
     pub(crate) name: String,
     /// True when the netlist gives it no name.
     pub(crate) anonymous: bool,
     pub(crate) model: &'p str,
     /// Place of the model's word.
-    pub(crate) span: Span,
+    pub(crate) span: TextSpan,
     pub(crate) nodes: Vec<NodeId>,
-    pub(crate) nodes_span: Span,
+    pub(crate) nodes_span: TextSpan,
     /// Orientation, local to global.
     pub(crate) rotation: Rotation,
     pub(crate) arguments: Arguments<'p>,
 }
 
 /// An element being built: what it is, and where it goes.
-pub(crate) struct Site<'a, 'p> {
-    pub(crate) instance: &'a Instance<'p>,
-    pub(crate) drawing: &'a mut Drawing,
-    pub(crate) sink: &'a mut Sink,
+pub(crate) struct ElementSite<'a, 'p> {
+    pub(crate) instance: &'a ElementInstance<'p>,
+    pub(crate) drawing: &'a mut StructureBuilder,
+    pub(crate) sink: &'a mut DiagnosticSink,
     /// Reads an expression in a string, as SUGAR 2.
-    pub(crate) read: Read,
+    pub(crate) read: ReadFunction,
 }
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     /// The element's full name.
     pub(crate) fn name(&self) -> String {
         self.instance.name.clone()
@@ -70,7 +70,7 @@ impl Site<'_, '_> {
         self.sink.error(code, self.instance.span, message, help)
     }
 
-    fn find(&self, name: &str) -> Option<(&Value, Span)> {
+    fn find(&self, name: &str) -> Option<(&Value, TextSpan)> {
         let arguments = &self.instance.arguments;
         // most names that are as long begin otherwise
         let first = name.as_bytes().first();
@@ -86,7 +86,7 @@ impl Site<'_, '_> {
     }
 
     /// The place of a parameter: where it is given, else the element.
-    pub(crate) fn span_of(&self, name: &str) -> Span {
+    pub(crate) fn span_of(&self, name: &str) -> TextSpan {
         self.find(name).map_or(self.instance.span, |(_, span)| span)
     }
 

@@ -5,7 +5,7 @@
 
 use super::super::drawing::Fact;
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::{Link, NodeId};
 
 /// Standard gravity [m/s²].
@@ -13,7 +13,7 @@ const GRAVITY: f64 = 9.806_65;
 /// Arms shorter than this part of their length, seen in the plane, are none [1].
 const SEEN: f64 = 1e-9;
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     /// The vector of arm `number` [m], global axes; zero without a length.
     pub(super) fn arm(&mut self, number: usize) -> Result<[f64; 3], Reported> {
         let length = self.number_or(if number == 1 { "L1" } else { "L2" }, 0.0)?;
@@ -53,7 +53,7 @@ impl Site<'_, '_> {
 }
 
 /// beam3dlink and its kin: a beam between two rigid arms.
-pub(super) fn beam3dlink(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn beam3dlink(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::OutOfPlane, site.instance.span);
     if site.has_no_section()? {
         return tracer(site);
@@ -70,7 +70,7 @@ pub(super) fn beam3dlink(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// beam_link_grav: the same with its weight, which is left out.
-pub(super) fn beam_link_grav(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn beam_link_grav(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let volume = site.positive("l")? * site.positive("w")? * site.positive("h")?;
     let weight = GRAVITY * volume * site.density()?;
     site.drawing.note_number(Fact::Weight, site.instance.span, weight);
@@ -78,7 +78,7 @@ pub(super) fn beam_link_grav(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// tracer: a conductor that is drawn between two nodes and neither holds nor weighs; it places them.
-pub(super) fn tracer(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn tracer(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let length = site.positive("l")?;
     let along = site.instance.rotation.apply([length, 0.0, 0.0]);
     let (first, second) = (site.arm(1)?, site.arm(2)?);
@@ -88,7 +88,7 @@ pub(super) fn tracer(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// rigidlinkbeam: the same, where SUGAR's places its node b as if it had no arms.
-pub(super) fn rigidlinkbeam(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn rigidlinkbeam(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let reach = site.number_or("L1", 0.0)?.abs().max(site.number_or("L2", 0.0)?.abs());
     if reach > 0.0 {
         site.drawing.note_number(Fact::ArmsPlace, site.instance.span, reach);

@@ -2,7 +2,7 @@
 
 use super::super::drawing::Fact;
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::{Beam, Heater, Load, NodeId, Resistor, Yield};
 
 /// A layer's `thermcond` below this is no conductivity of a solid structural material [W/(m·K)]. The MUMPs process
@@ -10,20 +10,20 @@ use crate::structure::{Beam, Heater, Load, NodeId, Resistor, Yield};
 const SMALL_CONDUCTIVITY: f64 = 5.0;
 
 /// In-plane width, thickness and direction of a rectangular section.
-struct Section {
+struct RectangularSection {
     width: f64,
     thickness: f64,
     angle: f64,
 }
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     /// The section, turned as the element is: a quarter turn about its axis swaps width and thickness.
-    fn section(&mut self, width: f64) -> Result<Section, Reported> {
+    fn section(&mut self, width: f64) -> Result<RectangularSection, Reported> {
         let angle = self.direction(self.instance.rotation)?;
         let height = self.positive("h")?;
         match self.instance.rotation.side() {
-            Some(0) => Ok(Section { width: height, thickness: width, angle }),
-            Some(_) => Ok(Section { width, thickness: height, angle }),
+            Some(0) => Ok(RectangularSection { width: height, thickness: width, angle }),
+            Some(_) => Ok(RectangularSection { width, thickness: height, angle }),
             None => {
                 let message = format!("the section of `{}` is tilted against the drawing plane", self.instance.name);
                 Err(self.error("E061", message, "turn it about its axis (`ox`) by quarter turns only"))
@@ -107,7 +107,7 @@ impl Site<'_, '_> {
     }
 }
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     /// True for a beam that is given the width or the height 0: in SUGAR it has no stiffness and no mass, and places its nodes.
     pub(super) fn has_no_section(&mut self) -> Result<bool, Reported> {
         let none = |size: Option<f64>| size == Some(0.0);
@@ -119,7 +119,7 @@ impl Site<'_, '_> {
     }
 }
 
-pub(super) fn beam2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn beam2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     if site.has_no_section()? {
         return super::arm::tracer(site);
     }
@@ -127,13 +127,13 @@ pub(super) fn beam2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     site.add_beam(site.name(), [site.node(0), site.node(1)], width)
 }
 
-pub(super) fn beam3d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn beam3d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::OutOfPlane, site.instance.span);
     beam2d(site)
 }
 
 /// beam2de, beam3de: a resistor along a beam.
-pub(super) fn beam2de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn beam2de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (a, b) = (site.node(0), site.node(1));
     let width = site.positive("w")?;
     let resistance = site.resistance("R", "G", width)?;
@@ -143,13 +143,13 @@ pub(super) fn beam2de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     Ok(())
 }
 
-pub(super) fn beam3de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn beam3de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::OutOfPlane, site.instance.span);
     beam2de(site)
 }
 
 /// beam2de_b: a resistor of Rs·l/w along a beam.
-pub(super) fn beam2de_b(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn beam2de_b(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (a, b) = (site.node(0), site.node(1));
     let (length, width) = (site.positive("l")?, site.positive("w")?);
     let resistance = site.positive("Rs")? * length / width;
@@ -160,7 +160,7 @@ pub(super) fn beam2de_b(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// The electro-thermal beam.
-pub(super) fn beam2det(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn beam2det(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (a, b) = (site.node(0), site.node(1));
     let (length, width, height) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
     let resistance = site.resistance("R", "G", width)?;

@@ -6,10 +6,10 @@
 use super::super::drawing::Fact;
 use super::super::sink::Reported;
 use super::super::value::Value;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::{CircuitElement, CircuitKind, Port, Resistor, VoltageSource, Wire};
 
-pub(super) fn resistor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn resistor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let resistance = match (site.positive_if_any("R")?, site.positive_if_any("G")?) {
         (Some(resistance), _) => resistance,
         (None, Some(conductance)) => 1.0 / conductance,
@@ -23,7 +23,7 @@ pub(super) fn resistor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     Ok(())
 }
 
-pub(super) fn voltage_source(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn voltage_source(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     if let Some(v) = site.instance.arguments.given.iter().find(|a| a.name == "V")
         && matches!(v.value, Value::Text(_))
     {
@@ -43,7 +43,7 @@ pub(super) fn voltage_source(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// Nodes on one conductor without resistance.
-pub(super) fn wire(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn wire(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let nodes = site.instance.nodes.clone();
     site.drawing.electrical(&nodes);
     site.drawing.structure.wires.push(Wire { name: site.name(), nodes });
@@ -51,7 +51,10 @@ pub(super) fn wire(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// The elements of Clark's circuits for SUGAR are drawn too: between arms, `len` long, without being members.
-fn drawn(site: &mut Site<'_, '_>, build: fn(&mut Site<'_, '_>) -> Result<(), Reported>) -> Result<(), Reported> {
+fn drawn(
+    site: &mut ElementSite<'_, '_>,
+    build: fn(&mut ElementSite<'_, '_>) -> Result<(), Reported>,
+) -> Result<(), Reported> {
     if let Some(length) = site.number("len")? {
         let (first, second) = (site.arm(1)?, site.arm(2)?);
         let along = site.instance.rotation.apply([length, 0.0, 0.0]);
@@ -61,24 +64,24 @@ fn drawn(site: &mut Site<'_, '_>, build: fn(&mut Site<'_, '_>) -> Result<(), Rep
     build(site)
 }
 
-pub(super) fn drawn_resistor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn drawn_resistor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     drawn(site, resistor)
 }
 
-pub(super) fn drawn_capacitor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn drawn_capacitor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     drawn(site, capacitor)
 }
 
-pub(super) fn drawn_inductor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn drawn_inductor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     drawn(site, inductor)
 }
 
-pub(super) fn drawn_source(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn drawn_source(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     drawn(site, voltage_source)
 }
 
 /// A wire that is drawn: its nodes are at one potential.
-pub(super) fn drawn_short(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn drawn_short(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     drawn(site, |site| {
         draw(site, CircuitKind::VoltageSource, Some(0.0));
         source(site, 0.0)
@@ -86,7 +89,7 @@ pub(super) fn drawn_short(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// A switch. SUGAR draws it and gives it no equation: it is open.
-pub(super) fn drawn_switch(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn drawn_switch(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     drawn(site, |site| {
         let nodes = site.instance.nodes.clone();
         site.drawing.electrical(&nodes);
@@ -96,19 +99,19 @@ pub(super) fn drawn_switch(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// Ground at the first node; the second is where its picture ends.
-pub(super) fn drawn_ground(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn drawn_ground(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     drawn(site, eground)
 }
 
 /// Keeps an element as drawn.
-fn draw(site: &mut Site<'_, '_>, kind: CircuitKind, value: Option<f64>) {
+fn draw(site: &mut ElementSite<'_, '_>, kind: CircuitKind, value: Option<f64>) {
     let nodes = site.instance.nodes.to_vec();
     site.drawing.electrical(&nodes);
     site.drawing.structure.circuit.push(CircuitElement { name: site.name(), kind, nodes, value, small_signal: None });
 }
 
 /// A current source, from the first node through it to the second. It takes no part in the model.
-pub(super) fn current_source(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn current_source(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let current = site.required("I")?;
     site.drawing.note(Fact::ActiveCircuit, site.instance.span);
     draw(site, CircuitKind::CurrentSource, Some(current));
@@ -116,14 +119,14 @@ pub(super) fn current_source(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// An ideal operational amplifier. It takes no part in the model.
-pub(super) fn op_amp(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn op_amp(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::ActiveCircuit, site.instance.span);
     draw(site, CircuitKind::OpAmp, None);
     Ok(())
 }
 
 /// A voltage source controlled by a voltage. It takes no part in the model.
-pub(super) fn amplifier(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn amplifier(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let gain = site.required("A")?;
     site.drawing.note(Fact::ActiveCircuit, site.instance.span);
     draw(site, CircuitKind::Amplifier, Some(gain));
@@ -131,7 +134,7 @@ pub(super) fn amplifier(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// An inductor is a short circuit for the slow device: a source of 0 V.
-pub(super) fn inductor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn inductor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let inductance = site.number("L")?;
     if let Some(value) = inductance.filter(|l| *l <= 0.0) {
         return Err(site.out_of_range("L", value, "positive"));
@@ -143,7 +146,7 @@ pub(super) fn inductor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     source(site, 0.0)
 }
 
-fn source(site: &mut Site<'_, '_>, voltage: f64) -> Result<(), Reported> {
+fn source(site: &mut ElementSite<'_, '_>, voltage: f64) -> Result<(), Reported> {
     let (plus, minus) = (site.node(0), site.node(1));
     site.drawing.electrical(&[plus, minus]);
     site.drawing.structure.voltage_sources.push(VoltageSource { name: site.name(), plus, minus, voltage });
@@ -151,14 +154,14 @@ fn source(site: &mut Site<'_, '_>, voltage: f64) -> Result<(), Reported> {
 }
 
 /// A capacitor is open in statics and takes no part in the device.
-pub(super) fn capacitor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn capacitor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let capacitance = site.positive_if_any("C")?;
     site.drawing.note(Fact::Capacitor, site.instance.span);
     draw(site, CircuitKind::Capacitor, capacitance);
     Ok(())
 }
 
-pub(super) fn eground(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn eground(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let node = site.node(0);
     site.drawing.electrical(&[node]);
     if site.drawing.grounded.insert(node) {
@@ -167,7 +170,7 @@ pub(super) fn eground(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     Ok(())
 }
 
-pub(super) fn port(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn port(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let name = site.name();
     let nodes = &site.instance.nodes;
     site.drawing.electrical(nodes);

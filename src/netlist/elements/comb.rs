@@ -1,10 +1,10 @@
 //! Comb drives: SUGAR's comb2d at a fixed voltage, and comb2de between two electrical nodes.
 
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::{Comb, GapVoltage};
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     fn comb(&mut self, finite: bool, parasitic: f64, voltage: GapVoltage) -> Result<(), Reported> {
         self.told_apart();
         let angle = self.direction(self.instance.rotation)?;
@@ -40,12 +40,12 @@ impl Site<'_, '_> {
     }
 }
 
-pub(super) fn comb2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn comb2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let voltage = GapVoltage::Fixed(site.required("V")?);
     site.comb(false, 0.0, voltage)
 }
 
-pub(super) fn comb2de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn comb2de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let parasitic = site.non_negative_or("Cp", 0.0)?;
     let voltage = site.across(0, 1);
     site.comb(true, parasitic, voltage)

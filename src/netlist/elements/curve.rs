@@ -11,7 +11,7 @@
 use super::super::drawing::Fact;
 use super::super::sink::Reported;
 use super::super::value::short;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::{Beam, NodeId};
 use std::f64::consts::TAU;
 
@@ -20,7 +20,7 @@ const CHORDS: usize = 30;
 /// Turn of an arc from chord to chord, at most [rad]: 2.5°.
 const TURN: f64 = TAU / 144.0;
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     /// Adds a chain of straight beams through `points` [m], local axes, from the first node to the second. Inner nodes and beams are
     /// called `NAME.1`, `NAME.2`, …
     fn add_chain(&mut self, ends: [NodeId; 2], points: &[[f64; 2]], width: f64) -> Result<(), Reported> {
@@ -52,13 +52,13 @@ impl Site<'_, '_> {
 }
 
 /// SUGAR's arcs, which bend out of the plane too.
-pub(super) fn spatial_arc(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn spatial_arc(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::OutOfPlane, site.instance.span);
     arc(site)
 }
 
 /// A circular arc of the angle `alpha` that starts along local x and turns to its left.
-pub(super) fn arc(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn arc(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (radius, width) = (site.positive("radius")?, site.positive("w")?);
     let alpha = site.required("alpha")?;
     if alpha == 0.0 || alpha.abs() > TAU {
@@ -82,7 +82,7 @@ pub(super) fn arc(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// A beam that is bent as drawn: its far end is displaced by (qx2, qy2) and its ends lean by qoz1 and qoz2.
-pub(super) fn predisplaced(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn predisplaced(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::OutOfPlane, site.instance.span);
     let (length, width) = (site.positive("l")?, site.positive("w")?);
     for across in ["qz2", "qoy1", "qoy2"] {
@@ -115,16 +115,16 @@ pub(super) fn predisplaced(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 const STEEP: f64 = 0.025;
 
 /// Most pieces of a taper.
-const MOST_PIECES: usize = 400;
+const MAX_PIECES: usize = 400;
 
 /// A beam whose width goes from `w1` to `w2` along it, as pieces over which the width changes by one factor, each of the width whose compliance in
 /// bending is that of the piece: `1/w³ = ∫ dx/w(x)³ / l`.
-pub(super) fn taper(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn taper(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (length, w1, w2) = (site.positive("l")?, site.positive("w1")?, site.positive("w2")?);
     let direction = site.direction(site.instance.rotation)?;
     let name = site.name();
     let steep = (w2 / w1).ln();
-    let pieces = ((steep.abs() / STEEP).ceil() as usize).clamp(CHORDS, MOST_PIECES);
+    let pieces = ((steep.abs() / STEEP).ceil() as usize).clamp(CHORDS, MAX_PIECES);
     let share = |k: usize| k as f64 / pieces as f64;
     // where the width is w, the share (w − w1)/(w2 − w1) of the length is behind
     let behind = |k: usize| if steep == 0.0 { share(k) } else { (steep * share(k)).exp_m1() / steep.exp_m1() };

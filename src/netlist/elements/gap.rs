@@ -3,13 +3,13 @@
 use super::super::drawing::Fact;
 use super::super::sink::Reported;
 use super::super::value::short;
-use super::arguments::Site;
-use crate::structure::{BeamGap, GapVoltage, IMPACT_SPEEDS, Impact, LEAST_RESTITUTION, NodeId, PlateGap, Resistor};
+use super::arguments::ElementSite;
+use crate::structure::{BeamGap, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, NodeId, PlateGap, Resistor};
 
 /// SUGAR's factor on the fringe field: α = 1 + 1.12·gap/h.
 const FRINGE: f64 = 1.12;
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     /// Widths of the upper and the lower beam [m]: `w1` and `w2`, or `w` for both.
     fn widths(&mut self) -> Result<[f64; 2], Reported> {
         let both = self.positive_if_any("w")?;
@@ -46,7 +46,7 @@ impl Site<'_, '_> {
             x => Ok(x),
         };
         let elastic = "1 is elastic contact; the default is 0.5 at the speed `speed` [m/s]";
-        let restitution = within(self, "restitution", [LEAST_RESTITUTION, 1.0], elastic)?;
+        let restitution = within(self, "restitution", [MIN_RESTITUTION, 1.0], elastic)?;
         let speed =
             within(self, "speed", IMPACT_SPEEDS, "a speed of impact [m/s]; by default it is found from statics")?;
         Ok(Impact { restitution, speed })
@@ -116,21 +116,21 @@ impl Site<'_, '_> {
 }
 
 /// gap2d: two beams and the field between them, at a fixed voltage.
-pub(super) fn gap2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn gap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let voltage = GapVoltage::Fixed(site.required("V")?);
     site.facing_beams()?;
     site.facing(voltage)
 }
 
 /// gap2dforce: the field alone, at the voltage between nodes a and c.
-pub(super) fn gap2dforce(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn gap2dforce(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.no_voltage("gap2d");
     let voltage = site.across(0, 2);
     site.facing(voltage)
 }
 
 /// gap2de: two conducting beams and the field between them.
-pub(super) fn gap2de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn gap2de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.no_voltage("gap2dV");
     let [w1, w2] = site.widths()?;
     for (end, part, width, r, g) in [(0, "upper", w1, "R1", "G1"), (2, "lower", w2, "R2", "G2")] {
@@ -145,7 +145,7 @@ pub(super) fn gap2de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// gap2de_b and those after it: two beams of the sheet resistance `Rs` and the field between them, which is that of `gap2de`.
-pub(super) fn gap2de_b(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn gap2de_b(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.no_voltage("gap2dV");
     let ([w1, w2], length, sheet) = (site.widths()?, site.positive("l")?, site.positive("Rs")?);
     site.drawing.note(Fact::TrialGap, site.instance.span);
@@ -156,18 +156,18 @@ pub(super) fn gap2de_b(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     site.facing(voltage)
 }
 
-pub(super) fn gap3d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn gap3d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::OutOfPlane, site.instance.span);
     gap2d(site)
 }
 
-pub(super) fn gap3de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn gap3de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::OutOfPlane, site.instance.span);
     gap2de(site)
 }
 
 /// plategap2d: two lumped plates; b lies at `gap` along local x from a.
-pub(super) fn plategap2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let angle = site.direction(site.instance.rotation)?;
     let (area, gap) = (site.positive("A")?, site.positive("gap")?);
     let permittivity = site.permittivity()?;

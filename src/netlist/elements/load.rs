@@ -1,19 +1,19 @@
 //! Dead loads: f2d, f3d, and the pair of loads of a prestressed beam.
 
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::Load;
 
 /// Part of a force or moment that may point out of the plane, or of a moment that may lie in it, unsaid [1].
 const NEGLIGIBLE: f64 = 1e-6;
 
-pub(super) fn f2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn f2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let moment = site.number("M")?;
     add(site, moment.unwrap_or(0.0), moment.is_some())
 }
 
 /// f3d: force and moment both act along the local x axis.
-pub(super) fn f3d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn f3d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let moment = site.number("M")?;
     let along_z = site.instance.rotation.x_axis()[2];
     if let Some(m) = moment
@@ -27,7 +27,7 @@ pub(super) fn f3d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     add(site, moment.unwrap_or(0.0) * along_z, moment.is_some())
 }
 
-fn add(site: &mut Site<'_, '_>, moment: f64, moment_given: bool) -> Result<(), Reported> {
+fn add(site: &mut ElementSite<'_, '_>, moment: f64, moment_given: bool) -> Result<(), Reported> {
     let force = site.number("F")?;
     if force.is_none() && !moment_given {
         let message = format!("`{}` has neither `F` (force [N]) nor `M` (moment [N·m])", site.instance.model);
@@ -48,7 +48,7 @@ fn add(site: &mut Site<'_, '_>, moment: f64, moment_given: bool) -> Result<(), R
 
 /// prestressedbeam: no beam, but the loads K22·q on its first node and −K22·q on its second that SUGAR's has for a beam whose end
 /// is displaced by q = (qx, qy, qoz in degrees), as SUGAR has them: the moments do not balance the forces' couple.
-pub(super) fn prestressed(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn prestressed(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (l, w, h) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
     let modulus = site.material()?.youngs_modulus;
     let angle = site.direction(site.instance.rotation)?;

@@ -1,11 +1,11 @@
 //! Lumped parts: plates, masses, links, springs and dampers.
 
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::{Mass, SpringDamper};
 
 /// A rigid plate centred at its node, with a Couette film under it.
-pub(super) fn plate2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn plate2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (l, w, h) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
     let mass = site.density()? * l * w * h;
     let [viscosity, fluid] = site.film()?;
@@ -27,7 +27,7 @@ pub(super) fn plate2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// A rigid body of any outline, given by its area and polar second moment about its node, with a Couette film under it.
-pub(super) fn body2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn body2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (area, polar, h) = (site.positive("A")?, site.positive("Ip")?, site.positive("h")?);
     let outline = [site.positive_if_any("l")?, site.positive_if_any("w")?];
     let density = site.density()?;
@@ -52,7 +52,7 @@ pub(super) fn body2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     Ok(())
 }
 
-pub(super) fn mass2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn mass2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let mass = site.positive("m")?;
     let inertia = site.non_negative_or("J", 0.0)?;
     let drag = [site.non_negative_or("b", 0.0)?, site.non_negative_or("brz", 0.0)?];
@@ -63,7 +63,7 @@ pub(super) fn mass2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// A rigid, massless link; without a length it joins its nodes where others place them.
-pub(super) fn link2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn link2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let angle = site.direction(site.instance.rotation)?;
     let (a, b) = (site.node(0), site.node(1));
     if site.is_given("l") {
@@ -76,18 +76,18 @@ pub(super) fn link2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     Ok(())
 }
 
-pub(super) fn spring2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn spring2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let stiffness = [site.number_or("kx", 0.0)?, site.number_or("ky", 0.0)?, site.number_or("krz", 0.0)?];
     site.spring_damper(stiffness, [0.0; 3], "kx, ky or krz")
 }
 
-pub(super) fn damper2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn damper2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let damping =
         [site.non_negative_or("bx", 0.0)?, site.non_negative_or("by", 0.0)?, site.non_negative_or("brz", 0.0)?];
     site.spring_damper([0.0; 3], damping, "bx, by or brz")
 }
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     fn spring_damper(&mut self, stiffness: [f64; 3], damping: [f64; 3], names: &str) -> Result<(), Reported> {
         if stiffness == [0.0; 3] && damping == [0.0; 3] {
             let message = format!("`{}` does nothing: all its coefficients are 0", self.instance.name);

@@ -2,7 +2,7 @@
 
 use super::super::drawing::Fact;
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::{MOLTEN, Material};
 
 /// Poisson's ratio where a layer gives none [1]. Planar beams do not depend on it.
@@ -31,7 +31,7 @@ const READ: [&str; 9] = [
     "ambienttemperature",
 ];
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     /// The material of a flexible member. That of a layer is read once.
     pub(super) fn material(&mut self) -> Result<Material, Reported> {
         let instance = self.instance;

@@ -20,13 +20,13 @@ mod support;
 mod table;
 pub(crate) mod upright;
 
-pub(crate) use arguments::{Argument, Arguments, Instance, Site};
-pub(crate) use table::{Model, model, models};
+pub(crate) use arguments::{Argument, Arguments, ElementInstance, ElementSite};
+pub(crate) use table::{ElementModel, model, models};
 
-use super::drawing::Drawing;
-use super::front::Read;
-use super::sink::{Reported, Sink};
-use super::source::Span;
+use super::drawing::StructureBuilder;
+use super::front::ReadFunction;
+use super::sink::{DiagnosticSink, Reported};
+use super::source::TextSpan;
 use super::suggest::{did_you_mean, nearest};
 
 /// The entry of a layer that a name which nothing reads is a slip of: near it, or the same but for its case.
@@ -51,10 +51,10 @@ pub(crate) fn turns(name: &str) -> bool {
 
 /// Builds one element: checks its node count and its parameter names, then adds it to the drawing. `read` is for expressions in strings.
 pub(crate) fn build(
-    instance: &Instance<'_>,
-    drawing: &mut Drawing,
-    sink: &mut Sink,
-    read: Read,
+    instance: &ElementInstance<'_>,
+    drawing: &mut StructureBuilder,
+    sink: &mut DiagnosticSink,
+    read: ReadFunction,
 ) -> Result<(), Reported> {
     let Some(model) = model(instance.model) else {
         return Err(unknown(sink, instance.model, instance.span, []));
@@ -64,11 +64,11 @@ pub(crate) fn build(
 
 /// The same with the element looked up; `sound`: it takes all of its parameters.
 pub(crate) fn build_as(
-    (model, sound): (&Model, bool),
-    instance: &Instance<'_>,
-    drawing: &mut Drawing,
-    sink: &mut Sink,
-    read: Read,
+    (model, sound): (&ElementModel, bool),
+    instance: &ElementInstance<'_>,
+    drawing: &mut StructureBuilder,
+    sink: &mut DiagnosticSink,
+    read: ReadFunction,
 ) -> Result<(), Reported> {
     let got = instance.nodes.len();
     if !model.nodes.contains(&got) {
@@ -84,14 +84,14 @@ pub(crate) fn build_as(
     if !sound {
         stray_parameters(model, instance, sink);
     }
-    (model.build)(&mut Site { instance, drawing, sink, read })
+    (model.build)(&mut ElementSite { instance, drawing, sink, read })
 }
 
 /// Reports an unknown element, with the nearest known one or the reason why it is left out.
 pub(crate) fn unknown<'a>(
-    sink: &mut Sink,
+    sink: &mut DiagnosticSink,
     name: &str,
-    span: Span,
+    span: TextSpan,
     subnets: impl IntoIterator<Item = &'a str>,
 ) -> Reported {
     if let Some((_, reason)) = table::LEFT_OUT.iter().find(|(left_out, _)| *left_out == name) {
@@ -111,7 +111,7 @@ fn differ_in_numbers(a: &str, b: &str) -> bool {
 }
 
 /// Warns of parameters that the element does not take.
-fn stray_parameters(model: &Model, instance: &Instance<'_>, sink: &mut Sink) {
+fn stray_parameters(model: &ElementModel, instance: &ElementInstance<'_>, sink: &mut DiagnosticSink) {
     for argument in &instance.arguments.given {
         if model.takes(argument.name) {
             continue;
@@ -133,7 +133,7 @@ pub(crate) fn stray_actuals<'a>(
     subnet: &str,
     given: &[Argument<'_>],
     formals: impl Iterator<Item = &'a str> + Clone,
-    sink: &mut Sink,
+    sink: &mut DiagnosticSink,
 ) {
     for argument in given {
         crate::budget::check();

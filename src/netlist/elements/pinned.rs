@@ -5,11 +5,11 @@
 //! every direction. Along the bar the two pins are E·A/l; across it they carry nothing but inertia, also where it turns far.
 
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::{Mass, SpringDamper};
 
 /// A bar between two pins.
-pub(super) fn bar(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn bar(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (length, width, height) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
     let angle = site.direction(site.instance.rotation)?;
     let material = site.material()?;

@@ -1,12 +1,12 @@
 //! Elements that mean something to one domain alone: where they are and their numbers are kept for it.
 
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::domains::elements;
-use crate::structure::Placed;
+use crate::structure::PlacedElement;
 
 /// An element of a domain's own.
-pub(super) fn placed(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn placed(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let Some(element) = elements().find(|element| element.name == site.instance.model) else { return Ok(()) };
     let mut values = Vec::with_capacity(element.parameters.len());
     for parameter in element.parameters {
@@ -21,6 +21,6 @@ pub(super) fn placed(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let nodes = site.instance.nodes.clone();
     site.drawing.mechanical(&nodes);
     let name = site.name();
-    site.drawing.structure.placed.push(Placed { element: element.name.to_owned(), name, nodes, angle, values });
+    site.drawing.structure.placed.push(PlacedElement { element: element.name.to_owned(), name, nodes, angle, values });
     Ok(())
 }

@@ -6,7 +6,7 @@ use super::super::bundle::Bundle;
 use super::super::setting::Setting;
 use super::super::sink::Reported;
 use super::super::value::Value;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::Load;
 
 /// Pieces of the length over which the load is summed, each by Gauss's rule of three points: exact for polynomials to x² in the
@@ -16,7 +16,7 @@ const PIECES: usize = 8;
 const GAUSS: [(f64, f64); 3] =
     [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
 
-pub(super) fn p3d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn p3d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let length = site.positive("l")?;
     let given = site.instance.arguments.given.iter().find(|a| a.name == "P").map(|a| (a.value.clone(), a.span));
     let (text, span) = match given {

@@ -2,12 +2,12 @@
 
 use super::super::drawing::Fact;
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 
 /// What `softjointlr` and `hinge3` leave of the bending stiffness [1].
 const SOFT: f64 = 1e-2;
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     /// Adds a straight beam whose section has `area` [m²] and the second moment `second` [m⁴] about z.
     fn add_equivalent(&mut self, area: f64, second: f64) -> Result<(), Reported> {
         self.drawing.note(Fact::OutOfPlane, self.instance.span);
@@ -22,7 +22,7 @@ impl Site<'_, '_> {
 }
 
 /// trapezoidalbeam: the width goes from `wbottom` to `wtop` through the thickness.
-pub(super) fn trapezoidal(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn trapezoidal(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (bottom, top, height) = (site.positive("wbottom")?, site.positive("wtop")?, site.positive("h")?);
     site.drawing.note(Fact::Trapezoid, site.instance.span);
     // ∫ w(z)³/12 dz of a width that is linear in z
@@ -31,7 +31,7 @@ pub(super) fn trapezoidal(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 }
 
 /// softjointlr, hinge3: a beam whose second moment is a hundredth.
-pub(super) fn soft_joint(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn soft_joint(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (width, height) = (site.positive("w")?, site.positive("h")?);
     site.add_equivalent(width * height, SOFT * height * width.powi(3) / 12.0)
 }

@@ -1,14 +1,14 @@
 //! Stops: how far a part may move.
 
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::Stop;
 
 /// Area on which a rigid stop bears unless it is given [m²]: 10 µm by 10 µm.
 const AREA: f64 = 1e-10;
 
 /// stop2d: a may move by `gap` along local x, and by `back` against it, relative to b or to where it was drawn.
-pub(super) fn stop2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let angle = site.direction(site.instance.rotation)?;
     let ways = [site.positive_if_any("gap")?, site.positive_if_any("back")?];
     if ways == [None; 2] {

@@ -3,10 +3,10 @@
 use super::super::drawing::Fact;
 use super::super::rotation::Rotation;
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use crate::structure::{NodeId, Pad, Support};
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     fn support(&mut self, held: [bool; 3]) -> Result<(), Reported> {
         let [l, w, _] = [self.positive_if_any("l")?, self.positive_if_any("w")?, self.positive_if_any("h")?];
         let node = self.node(0);
@@ -26,7 +26,7 @@ impl Site<'_, '_> {
 }
 
 /// An anchor holds every node that it is given.
-pub(super) fn anchor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn anchor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.support([true, true, true])?;
     let angle = site.instance.rotation.angle();
     for k in 1..site.instance.nodes.len() {
@@ -36,27 +36,27 @@ pub(super) fn anchor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     Ok(())
 }
 
-pub(super) fn hinge(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn hinge(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.support([true, true, false])
 }
 
-pub(super) fn slider(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn slider(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.support([false, false, true])
 }
 
 /// SUGAR's pinjoint holds z only: nothing in the drawing plane.
-pub(super) fn pinjoint(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn pinjoint(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.place(site.instance.span, &[site.node(0)], &[[0.0; 2]]);
     Ok(())
 }
 
-pub(super) fn guide2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn guide2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.direction(site.instance.rotation)?;
     site.support([false, true, true])
 }
 
 /// slider2: a beam whose far end slides along a direction of the whole drawing, that of x turned by `sliderox slideroy slideroz`.
-pub(super) fn slider2(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn slider2(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::OutOfPlane, site.instance.span);
     let [ox, oy, oz] =
         [site.number_or("sliderox", 0.0)?, site.number_or("slideroy", 0.0)?, site.number_or("slideroz", 0.0)?];
@@ -69,7 +69,7 @@ pub(super) fn slider2(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     Ok(())
 }
 
-pub(super) fn pos(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+pub(super) fn pos(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let offset = [site.number_or("x", 0.0)?, site.number_or("y", 0.0)?, site.number_or("z", 0.0)?];
     let [x, y, _] = site.instance.rotation.apply(offset);
     site.drawing.lay(site.instance.span, &[site.node(0), site.node(1)], &[[0.0; 2], [x, y]]);

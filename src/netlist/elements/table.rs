@@ -1,14 +1,14 @@
 //! Which elements there are, and what they take.
 
 use super::super::sink::Reported;
-use super::arguments::Site;
+use super::arguments::ElementSite;
 use super::{arm, beam, circuit, comb, curve, gap, load, lumped, pinned, placed, pressure, section, stop, support};
 use crate::domains::elements;
 use std::sync::LazyLock;
 
 /// An element of the language.
 #[derive(Debug)]
-pub(crate) struct Model {
+pub(crate) struct ElementModel {
     pub(crate) name: &'static str,
     /// Numbers of nodes it can have.
     pub(crate) nodes: &'static [usize],
@@ -18,10 +18,10 @@ pub(crate) struct Model {
     pub(crate) parameters: &'static [&'static str],
     /// True for SUGAR's own elements, whose old netlists carry parameters that were always ignored.
     pub(crate) sugar: bool,
-    pub(crate) build: fn(&mut Site<'_, '_>) -> Result<(), Reported>,
+    pub(crate) build: fn(&mut ElementSite<'_, '_>) -> Result<(), Reported>,
 }
 
-impl Model {
+impl ElementModel {
     /// True for a parameter that means something to it, or that old netlists carry along.
     pub(crate) fn takes(&self, name: &str) -> bool {
         self.parameters.contains(&name) || LAYER_ENTRIES.contains(&name) || (self.sugar && STRAY.contains(&name))
@@ -29,13 +29,13 @@ impl Model {
 }
 
 /// The element of that name.
-pub(crate) fn model(name: &str) -> Option<&'static Model> {
+pub(crate) fn model(name: &str) -> Option<&'static ElementModel> {
     models().find(|m| m.name == name)
 }
 
 /// Every element: those of the language, then those of domains that have their own.
-pub(crate) fn models() -> impl Iterator<Item = &'static Model> {
-    static OF_DOMAINS: LazyLock<Vec<Model>> = LazyLock::new(|| {
+pub(crate) fn models() -> impl Iterator<Item = &'static ElementModel> {
+    static OF_DOMAINS: LazyLock<Vec<ElementModel>> = LazyLock::new(|| {
         elements().map(|e| own(e.name, e.nodes, e.node_names, e.parameters, placed::placed)).collect()
     });
     MODELS.iter().chain(OF_DOMAINS.iter())
@@ -139,9 +139,9 @@ const fn sugar(
     nodes: &'static [usize],
     node_names: &'static str,
     parameters: &'static [&'static str],
-    build: fn(&mut Site<'_, '_>) -> Result<(), Reported>,
-) -> Model {
-    Model { name, nodes, node_names, parameters, sugar: true, build }
+    build: fn(&mut ElementSite<'_, '_>) -> Result<(), Reported>,
+) -> ElementModel {
+    ElementModel { name, nodes, node_names, parameters, sugar: true, build }
 }
 
 const fn own(
@@ -149,13 +149,13 @@ const fn own(
     nodes: &'static [usize],
     node_names: &'static str,
     parameters: &'static [&'static str],
-    build: fn(&mut Site<'_, '_>) -> Result<(), Reported>,
-) -> Model {
-    Model { name, nodes, node_names, parameters, sugar: false, build }
+    build: fn(&mut ElementSite<'_, '_>) -> Result<(), Reported>,
+) -> ElementModel {
+    ElementModel { name, nodes, node_names, parameters, sugar: false, build }
 }
 
 /// Every element of the language.
-const MODELS: &[Model] = &[
+const MODELS: &[ElementModel] = &[
     sugar("anchor", PADS, "[a …]", SIZE, support::anchor),
     sugar("bondingpad", PADS, "[a …]", SIZE, support::anchor),
     sugar("commonground", PADS, "[a …]", SIZE, support::anchor),

@@ -4,15 +4,15 @@
 //! * a post, normal to the plane and not longer than it is thick, joins what lies above each other: a rigid connection;
 //! * any other belongs to a spatial model, and is an error.
 
-use super::super::drawing::{Drawing, Fact, Upright};
-use super::super::sink::{Reported, Sink};
-use super::arguments::Site;
+use super::super::drawing::{Fact, StructureBuilder, Upright};
+use super::super::sink::{DiagnosticSink, Reported};
+use super::arguments::ElementSite;
 use crate::structure::{Link, NodeId};
 
 /// How far the direction of a post may be from the normal of the plane, as a part of its length [1].
 const NORMAL: f64 = 1e-6;
 
-impl Site<'_, '_> {
+impl ElementSite<'_, '_> {
     /// True when a beam of this element leaves the drawing plane, or its section is tilted against it.
     pub(super) fn leaves_plane(&self) -> bool {
         !self.instance.rotation.x_in_plane() || self.instance.rotation.side().is_none()
@@ -46,7 +46,7 @@ impl Site<'_, '_> {
 }
 
 /// Decides on every member that leaves the plane.
-pub(crate) fn settle(drawing: &mut Drawing, sink: &mut Sink) {
+pub(crate) fn settle(drawing: &mut StructureBuilder, sink: &mut DiagnosticSink) {
     if drawing.upright.is_empty() {
         return;
     }

@@ -21,7 +21,7 @@ impl UserData for LuaNode {
 
 /// The arguments of an element.
 #[derive(Debug, Default)]
-pub(super) struct Call {
+pub(super) struct ElementCall {
     pub(super) name: Option<String>,
     pub(super) model: Option<String>,
     pub(super) nodes: Vec<NodeId>,
@@ -42,20 +42,20 @@ pub(super) struct Fault {
 }
 
 /// Items of one call or material: each element looks through them.
-const MOST: usize = 1000;
+const MAX_ITEMS: usize = 1000;
 
 /// Words of a call that are no parameters.
 const APART: [&str; 4] = ["rot", "parent", "wrapmf", "material"];
 
-impl Call {
+impl ElementCall {
     /// Reads a table: nodes (and the material) by position, parameters by name.
     pub(super) fn read(table: &Table) -> mlua::Result<Result<Self, Fault>> {
         let mut call = Self::default();
         let long = || {
-            let message = format!("a table of more than {MOST} items");
+            let message = format!("a table of more than {MAX_ITEMS} items");
             Err(Fault { code: "E018", message, help: "split the element, or name what it takes" })
         };
-        if table.raw_len() > MOST {
+        if table.raw_len() > MAX_ITEMS {
             return Ok(long());
         }
         let mut material = table.raw_get::<LuaValue>("material")?;
@@ -97,7 +97,7 @@ impl Call {
                 (_, Some(axis), Value::Number(angle)) => call.angles[axis] = *angle,
                 _ => call.given.push((key, value)),
             }
-            if call.given.len() > MOST {
+            if call.given.len() > MAX_ITEMS {
                 return Ok(long());
             }
         }
@@ -127,7 +127,7 @@ fn numbers(table: &Table) -> mlua::Result<Vec<(String, Value)>> {
             }
             _ => {}
         }
-        if entries.len() > MOST {
+        if entries.len() > MAX_ITEMS {
             break;
         }
     }

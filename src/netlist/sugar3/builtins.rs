@@ -1,16 +1,16 @@
 //! The functions of SUGAR 3 netlists: nodes, materials, elements, subnets, and mathematics.
 
-use super::super::elements::{self, Argument, Arguments, Instance};
+use super::super::elements::{self, Argument, Arguments, ElementInstance};
 use super::super::sink::Reported;
-use super::super::source::Span;
+use super::super::source::TextSpan;
 use super::super::sugar2;
 use super::super::value::{Value, short};
-use super::arguments::{Call, Fault, LuaNode, called, plain};
-use super::drawn::{bounded, told};
+use super::arguments::{ElementCall, Fault, LuaNode, called, plain};
+use super::drawn::{abort, bounded};
 use super::files::use_file;
 use super::instance::subnet;
 use super::language::{language, mathematics, shown};
-use super::state::{Shared, State};
+use super::state::{LuaState, SharedState};
 use crate::budget;
 use crate::structure::{Load, NodeId};
 use mlua::{Function, Lua, Table, Value as LuaValue};
@@ -25,7 +25,7 @@ const SHORT: [&str; 3] = ["R", "L", "C"];
 pub(super) const OWN: [&str; 3] = ["force", "constraint", "constraint2d"];
 
 /// Puts all functions into a sandbox.
-pub(super) fn install(lua: &Lua, shared: &Shared) -> mlua::Result<()> {
+pub(super) fn install(lua: &Lua, shared: &SharedState) -> mlua::Result<()> {
     let globals = lua.globals();
     globals.raw_set("pi", PI)?;
     globals.raw_set("PI", PI)?;
@@ -69,7 +69,7 @@ pub(super) fn install(lua: &Lua, shared: &Shared) -> mlua::Result<()> {
 }
 
 /// The short names of circuit elements.
-pub(super) fn install_short(lua: &Lua, _: &Shared) -> mlua::Result<()> {
+pub(super) fn install_short(lua: &Lua, _: &SharedState) -> mlua::Result<()> {
     let globals = lua.globals();
     for name in SHORT {
         let build: LuaValue = globals.raw_get(format!("mf{name}"))?;
@@ -78,7 +78,7 @@ pub(super) fn install_short(lua: &Lua, _: &Shared) -> mlua::Result<()> {
     Ok(())
 }
 
-fn drawing(lua: &Lua, shared: &Shared, globals: &Table) -> mlua::Result<()> {
+fn drawing(lua: &Lua, shared: &SharedState, globals: &Table) -> mlua::Result<()> {
     let state = Rc::clone(shared);
     globals
         .raw_set("use", lua.create_function(move |lua, name: String| use_file(lua, &state, &name, install_short))?)?;
@@ -121,7 +121,7 @@ fn node_of(value: &LuaValue) -> Option<NodeId> {
 }
 
 /// `node "A"`, `node {name="A"}`, `node {x, y, z; name="A"}`.
-fn node(lua: &Lua, shared: &Shared, value: &LuaValue) -> mlua::Result<LuaNode> {
+fn node(lua: &Lua, shared: &SharedState, value: &LuaValue) -> mlua::Result<LuaNode> {
     let mut state = shared.borrow_mut();
     let span = state.here(lua);
     let (name, at) = match value {
@@ -134,7 +134,7 @@ fn node(lua: &Lua, shared: &Shared, value: &LuaValue) -> mlua::Result<LuaNode> {
         other => {
             let message = format!("a node takes a name, this is {}", called(other));
             state.sink.error("E050", span, message, "write `node \"A\"` or `node {0, 0, 0; name=\"A\"}`");
-            return Err(told(&state));
+            return Err(abort(&state));
         }
     };
     let name = match name {
@@ -153,7 +153,7 @@ fn node(lua: &Lua, shared: &Shared, value: &LuaValue) -> mlua::Result<LuaNode> {
 }
 
 /// Notes the coordinates of a node [m]; the first ones hold.
-fn lie(state: &mut State, id: NodeId, at: [f64; 2], span: Span) {
+fn lie(state: &mut LuaState, id: NodeId, at: [f64; 2], span: TextSpan) {
     match state.coordinates.entry(id) {
         Entry::Occupied(known) if *known.get() != at => {
             let name = &state.drawing.structure.nodes[id.0].name;
@@ -174,7 +174,7 @@ fn lie(state: &mut State, id: NodeId, at: [f64; 2], span: Span) {
 }
 
 /// `_n("c_3")` of converted netlists: what `_currnodes` has under that name, else the node.
-fn named_node(lua: &Lua, shared: &Shared, name: &LuaValue) -> mlua::Result<LuaValue> {
+fn named_node(lua: &Lua, shared: &SharedState, name: &LuaValue) -> mlua::Result<LuaValue> {
     let nodes: LuaValue = lua.globals().raw_get("_currnodes")?;
     if let LuaValue::Table(nodes) = nodes {
         let found: LuaValue = nodes.raw_get(name.clone())?;
@@ -190,7 +190,7 @@ fn named_node(lua: &Lua, shared: &Shared, name: &LuaValue) -> mlua::Result<LuaVa
 }
 
 /// `material {parent=p, h=2u}`: its own entries before those of its parent.
-fn material(lua: &Lua, shared: &Shared, table: Table) -> mlua::Result<Table> {
+fn material(lua: &Lua, shared: &SharedState, table: Table) -> mlua::Result<Table> {
     let mut slips = Vec::new();
     for pair in table.pairs::<LuaValue, LuaValue>().take(1000) {
         if let (LuaValue::String(key), LuaValue::Integer(_) | LuaValue::Number(_)) = pair? {
@@ -219,15 +219,15 @@ fn material(lua: &Lua, shared: &Shared, table: Table) -> mlua::Result<Table> {
     Ok(table)
 }
 
-fn model_function(lua: &Lua, shared: &Shared, name: &'static str) -> mlua::Result<Function> {
+fn model_function(lua: &Lua, shared: &SharedState, name: &'static str) -> mlua::Result<Function> {
     let state = Rc::clone(shared);
     lua.create_function(move |lua, table: Table| element(lua, &state, Some(name), &table))
 }
 
 /// Builds an element. What is wrong with it is reported, and the netlist goes on.
-fn element(lua: &Lua, shared: &Shared, model: Option<&str>, table: &Table) -> mlua::Result<()> {
+fn element(lua: &Lua, shared: &SharedState, model: Option<&str>, table: &Table) -> mlua::Result<()> {
     budget::check();
-    let call = Call::read(table)?;
+    let call = ElementCall::read(table)?;
     let mut state = shared.borrow_mut();
     let span = state.here(lua);
     state.elements += 1;
@@ -260,7 +260,7 @@ fn element(lua: &Lua, shared: &Shared, model: Option<&str>, table: &Table) -> ml
     Ok(())
 }
 
-fn build(state: &mut State, model: &str, call: &Call, span: Span) -> Result<(), Reported> {
+fn build(state: &mut LuaState, model: &str, call: &ElementCall, span: TextSpan) -> Result<(), Reported> {
     let degree = if state.radians { 1.0 } else { PI / 180.0 };
     let [ox, oy, oz] = call.angles.map(|angle| angle * degree);
     let rotation = state.scope().rotation.turned(ox, oy, oz);
@@ -284,7 +284,7 @@ fn build(state: &mut State, model: &str, call: &Call, span: Span) -> Result<(), 
         value => value.clone(),
     };
     let given = call.given.iter().map(|(name, given)| Argument { name, value: value(name, given), span }).collect();
-    let instance = Instance {
+    let instance = ElementInstance {
         name,
         anonymous: call.name.is_none(),
         model,
@@ -298,7 +298,7 @@ fn build(state: &mut State, model: &str, call: &Call, span: Span) -> Result<(), 
 }
 
 /// SUGAR 3's own `force`: x, y [N] and rz [N·m] on a node, global axes.
-fn force(state: &mut State, name: String, call: &Call, span: Span) -> Result<(), Reported> {
+fn force(state: &mut LuaState, name: String, call: &ElementCall, span: TextSpan) -> Result<(), Reported> {
     let [node] = call.nodes[..] else {
         let message = format!("`force` takes 1 node, {} given", call.nodes.len());
         return Err(state.sink.error("E054", span, message, "write `force {A; x=1u}`"));

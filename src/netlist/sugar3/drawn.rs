@@ -1,32 +1,32 @@
 //! What a netlist has drawn so far: counted, named, and ended where it is too much.
 
-use super::super::source::Span;
-use super::state::State;
+use super::super::source::TextSpan;
+use super::state::LuaState;
 use crate::budget;
 
 /// Elements and nodes that one netlist may build.
-const MOST_ELEMENTS: usize = 300_000;
+const MAX_ELEMENTS: usize = 300_000;
 
 /// A message was put into the sink, and the netlist cannot go on.
-pub(super) fn told(state: &State) -> mlua::Error {
+pub(super) fn abort(state: &LuaState) -> mlua::Error {
     state.told.set(true);
     mlua::Error::runtime("told")
 }
 
 /// Counts what is drawn, and ends it where it is too much.
-pub(super) fn bounded(state: &mut State) -> mlua::Result<()> {
+pub(super) fn bounded(state: &mut LuaState) -> mlua::Result<()> {
     let drawn = state.elements.max(state.drawing.structure.nodes.len());
-    if drawn > MOST_ELEMENTS {
-        let message = format!("the netlist builds more than {MOST_ELEMENTS} elements or nodes");
-        state.sink.error("E046", Span::NOWHERE, message, "look for a loop without end");
-        return Err(told(state));
+    if drawn > MAX_ELEMENTS {
+        let message = format!("the netlist builds more than {MAX_ELEMENTS} elements or nodes");
+        state.sink.error("E046", TextSpan::NOWHERE, message, "look for a loop without end");
+        return Err(abort(state));
     }
     Ok(())
 }
 
-impl State {
+impl LuaState {
     /// Notes an element's or instance's name, and warns of a second one.
-    pub(super) fn name(&mut self, full: &str, given: bool, span: Span) {
+    pub(super) fn name(&mut self, full: &str, given: bool, span: TextSpan) {
         use super::super::drawing::{ELEMENT_BYTES, NAME_COPIES};
         budget::lay_out(ELEMENT_BYTES + NAME_COPIES * full.len());
         if given && !self.names.insert(full.to_owned()) {

@@ -1,19 +1,19 @@
 //! Runs a SUGAR 3 netlist.
 
 use super::super::bundle::Bundle;
-use super::super::drawing::Drawing;
+use super::super::drawing::StructureBuilder;
 use super::super::elements;
 use super::super::finish::finish;
-use super::super::front::{FrontEnd, Loaded};
+use super::super::front::{FrontEnd, LoadedNetlist};
 use super::super::rotation::Rotation;
 use super::super::setting::Setting;
-use super::super::sink::Sink;
-use super::super::source::Span;
+use super::super::sink::DiagnosticSink;
+use super::super::source::TextSpan;
 use super::super::suggest;
 use super::builtins;
 use super::files::run;
-use super::sandbox::{Limit, Progress, sandbox};
-use super::state::{Scope, Shared, State, file_number};
+use super::sandbox::{SandboxLimit, SandboxProgress, sandbox};
+use super::state::{LuaState, NameScope, SharedState, file_number};
 use crate::budget;
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -51,13 +51,13 @@ impl Sugar3 {
 }
 
 impl FrontEnd for Sugar3 {
-    fn load(&self, set: &[(String, Setting)]) -> Result<Loaded, super::super::Diagnostics> {
+    fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, super::super::Diagnostics> {
         let bytes: usize = self.bundle.files.values().map(String::len).sum();
-        let progress = Rc::new(Progress::default());
-        let state = State {
-            drawing: Drawing::default(),
-            sink: Sink::new(&self.bundle.root),
-            scopes: vec![Scope { nodes: HashMap::new(), prefix: String::new(), rotation: Rotation::IDENTITY }],
+        let progress = Rc::new(SandboxProgress::default());
+        let state = LuaState {
+            drawing: StructureBuilder::default(),
+            sink: DiagnosticSink::new(&self.bundle.root),
+            scopes: vec![NameScope { nodes: HashMap::new(), prefix: String::new(), rotation: Rotation::IDENTITY }],
             names: HashSet::new(),
             elements: 0,
             anonymous: 0,
@@ -86,7 +86,7 @@ impl FrontEnd for Sugar3 {
         });
         let mut state = shared.borrow_mut();
         if let Err(error) = outcome {
-            state.sink.error("E046", Span::NOWHERE, format!("Lua does not start: {error}"), "");
+            state.sink.error("E046", TextSpan::NOWHERE, format!("Lua does not start: {error}"), "");
         }
         unasked(&mut state, set);
         let parameters = std::mem::take(&mut state.parameters).into_values().collect();
@@ -95,7 +95,7 @@ impl FrontEnd for Sugar3 {
 }
 
 /// Puts what Lua says into words of a netlist, with its place.
-fn tell(shared: &Shared, progress: &Progress, error: &mlua::Error) {
+fn tell(shared: &SharedState, progress: &SandboxProgress, error: &mlua::Error) {
     let mut state = shared.borrow_mut();
     if state.told.get() {
         return;
@@ -116,10 +116,10 @@ fn tell(shared: &Shared, progress: &Progress, error: &mlua::Error) {
     }
     let memory = matches!(cause, mlua::Error::MemoryError(_)) || text.contains("not enough memory");
     let (code, message, help) = match progress.met.get() {
-        Some(Limit::Instructions) => {
+        Some(SandboxLimit::Instructions) => {
             ("E046", "the netlist runs too many instructions".to_owned(), "look for a loop without end")
         }
-        Some(Limit::Time) => {
+        Some(SandboxLimit::Time) => {
             ("E046", "the netlist runs too long without drawing anything".to_owned(), "look for a loop without end")
         }
         None if memory => (
@@ -154,18 +154,18 @@ fn called_nothing(text: &str) -> Option<&str> {
 }
 
 /// The place that a message of Lua's begins with, "file 2:13: …", and the rest of it.
-fn split_place(state: &State, text: &str) -> (Span, String) {
+fn split_place(state: &LuaState, text: &str) -> (TextSpan, String) {
     let parsed = || {
         let rest = text.strip_prefix("file ")?;
         let (file, rest) = rest.split_once(':')?;
         let (line, rest) = rest.split_once(':')?;
         Some((state.line(file.parse().ok()?, line.parse().ok()?), rest.trim_start().to_owned()))
     };
-    parsed().unwrap_or((Span::NOWHERE, text.to_owned()))
+    parsed().unwrap_or((TextSpan::NOWHERE, text.to_owned()))
 }
 
 /// Reports settings that the netlist never asked for.
-fn unasked(state: &mut State, set: &[(String, Setting)]) {
+fn unasked(state: &mut LuaState, set: &[(String, Setting)]) {
     let known: Vec<String> = state.parameters.values().map(|(name, _)| name.clone()).collect();
     for (name, _) in set.iter().filter(|(name, _)| !known.contains(name)) {
         let listed = match known.as_slice() {
@@ -177,7 +177,7 @@ fn unasked(state: &mut State, set: &[(String, Setting)]) {
             None => listed,
         };
         if !state.sink.failed() {
-            state.sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), help);
+            state.sink.error("E048", TextSpan::NOWHERE, format!("the netlist has no parameter `{name}` to set"), help);
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Files of a SUGAR 3 netlist, and those that they use.
 
-use super::super::bundle::MOST_INCLUDES;
-use super::super::source::Span;
-use super::state::{Shared, Text};
+use super::super::bundle::MAX_INCLUDES;
+use super::super::source::TextSpan;
+use super::state::{IndexedText, SharedState};
 use super::translate::translate;
 use mlua::{ChunkMode, Lua};
 use std::rc::Rc;
@@ -12,10 +12,10 @@ const BUILT_IN: [&str; 7] =
     ["std.net", "std2.net", "stdlib.net", "std2cvt.net", "xformstack.lua", "relpos.lua", "subnetize.lua"];
 
 /// Makes functions known to a netlist.
-pub(super) type Install = fn(&Lua, &Shared) -> mlua::Result<()>;
+pub(super) type Install = fn(&Lua, &SharedState) -> mlua::Result<()>;
 
 /// Runs a file of the bundle.
-pub(super) fn run(lua: &Lua, shared: &Shared, name: &str) -> mlua::Result<()> {
+pub(super) fn run(lua: &Lua, shared: &SharedState, name: &str) -> mlua::Result<()> {
     let (number, text) = {
         let state = shared.borrow();
         (state.texts.len(), state.bundle.files.get(name).cloned().unwrap_or_default())
@@ -27,11 +27,11 @@ pub(super) fn run(lua: &Lua, shared: &Shared, name: &str) -> mlua::Result<()> {
         if number > 0 {
             state.sink.files.push(name.to_owned());
         }
-        state.texts.push(Rc::new(Text { starts, text }));
+        state.texts.push(Rc::new(IndexedText { starts, text }));
         if let Err(found) = &translated {
             let at = |offset: usize| u32::try_from(offset).unwrap_or(u32::MAX);
             let file = u16::try_from(number).unwrap_or(u16::MAX);
-            let span = Span { file, start: at(found.start), end: at(found.end) };
+            let span = TextSpan { file, start: at(found.start), end: at(found.end) };
             state.sink.error("E071", span, found.message.clone(), found.help);
             state.told.set(true);
         }
@@ -41,7 +41,7 @@ pub(super) fn run(lua: &Lua, shared: &Shared, name: &str) -> mlua::Result<()> {
 }
 
 /// `use("FILE")`: a library of SUGAR 3's, which `short` makes known, or a file of the bundle, once.
-pub(super) fn use_file(lua: &Lua, shared: &Shared, name: &str, short: Install) -> mlua::Result<()> {
+pub(super) fn use_file(lua: &Lua, shared: &SharedState, name: &str, short: Install) -> mlua::Result<()> {
     let span = shared.borrow().here(lua);
     let stopped = || Err(mlua::Error::runtime("told"));
     {
@@ -65,8 +65,8 @@ pub(super) fn use_file(lua: &Lua, shared: &Shared, name: &str, short: Install) -
             state.told.set(true);
             return stopped();
         }
-        if state.used.len() > MOST_INCLUDES {
-            state.sink.error("E024", span, format!("more than {MOST_INCLUDES} included files"), "");
+        if state.used.len() > MAX_INCLUDES {
+            state.sink.error("E024", span, format!("more than {MAX_INCLUDES} included files"), "");
             state.told.set(true);
             return stopped();
         }

@@ -1,8 +1,8 @@
 //! Instances of subnets.
 
 use super::arguments::plain;
-use super::drawn::{bounded, told};
-use super::state::{Scope, Shared};
+use super::drawn::{abort, bounded};
+use super::state::{NameScope, SharedState};
 use crate::budget;
 use mlua::{Function, Lua, MultiValue, Table, Value as LuaValue};
 use std::collections::HashMap;
@@ -14,7 +14,7 @@ const DEEPEST_INSTANCE: usize = 100;
 /// An instance of a subnet: named arguments, a scope of its own for nodes, its angles.
 pub(super) fn subnet(
     lua: &Lua,
-    shared: &Shared,
+    shared: &SharedState,
     model: &str,
     formals: &[String],
     body: &Function,
@@ -28,7 +28,7 @@ pub(super) fn subnet(
             let message =
                 format!("subnet instances nest more than {DEEPEST_INSTANCE} deep: `{model}` calls itself without end");
             state.sink.error("E052", span, message, "end the recursion with an `if`");
-            return Err(told(&state));
+            return Err(abort(&state));
         }
         state.elements += 1;
         state.progress.drawn.set(state.progress.drawn.get() + 1);
@@ -46,14 +46,14 @@ pub(super) fn subnet(
             if !angle.is_finite() {
                 let message = format!("`{axis}` must be a finite number, this is {angle}");
                 state.sink.error("E050", span, message, "");
-                return Err(told(&state));
+                return Err(abort(&state));
             }
         }
         let full = format!("{}{local}", state.scope().prefix);
         state.name(&full, given, span);
         let rotation = state.scope().rotation.turned(angles[0], angles[1], angles[2]);
         state.sink.instances.push(full.clone());
-        state.scopes.push(Scope { nodes: HashMap::new(), prefix: format!("{full}."), rotation });
+        state.scopes.push(NameScope { nodes: HashMap::new(), prefix: format!("{full}."), rotation });
     }
     let globals = lua.globals();
     let outer: LuaValue = globals.raw_get("_currnodes")?;

@@ -2,21 +2,21 @@
 
 use super::super::value::short;
 use super::arguments::{called, number};
-use super::drawn::told;
-use super::state::Shared;
+use super::drawn::abort;
+use super::state::SharedState;
 use crate::budget;
 use mlua::{Lua, MultiValue, Table, Value as LuaValue};
 use std::f64::consts::PI;
 use std::rc::Rc;
 
 /// Items of a table that is gone over by its keys.
-const MOST_KEYS: usize = 10_000;
+const MAX_KEYS: usize = 10_000;
 
 /// A function of one number.
 type OfNumber = fn(f64) -> f64;
 
 /// Functions of numbers. Angles are in degrees until `std2cvt.net` is used, then in radians.
-pub(super) fn mathematics(lua: &Lua, shared: &Shared, globals: &Table) -> mlua::Result<()> {
+pub(super) fn mathematics(lua: &Lua, shared: &SharedState, globals: &Table) -> mlua::Result<()> {
     let plain: [(&str, OfNumber); 8] = [
         ("sqrt", f64::sqrt),
         ("exp", f64::exp),
@@ -71,7 +71,7 @@ fn whole(x: f64) -> LuaValue {
 }
 
 /// Functions of the language itself that run in bounded steps and in an order that is always the same.
-pub(super) fn language(lua: &Lua, shared: &Shared, globals: &Table) -> mlua::Result<()> {
+pub(super) fn language(lua: &Lua, shared: &SharedState, globals: &Table) -> mlua::Result<()> {
     globals.raw_set("isdef", lua.create_function(|_, x: LuaValue| Ok(!matches!(x, LuaValue::Nil)))?)?;
     globals.raw_set("tostring", lua.create_function(|_, x: LuaValue| Ok(shown(&x)))?)?;
     globals.raw_set("strlen", lua.create_function(|_, x: mlua::String| Ok(x.as_bytes().len()))?)?;
@@ -118,12 +118,12 @@ pub(super) fn language(lua: &Lua, shared: &Shared, globals: &Table) -> mlua::Res
 }
 
 /// The netlist's own `assert` or `error`.
-fn gives_up(lua: &Lua, shared: &Shared, text: Option<String>, which: &str) -> mlua::Error {
+fn gives_up(lua: &Lua, shared: &SharedState, text: Option<String>, which: &str) -> mlua::Error {
     let mut state = shared.borrow_mut();
     let span = state.here(lua);
     let text = text.unwrap_or_else(|| format!("`{which}` without a text"));
     state.sink.error("E042", span, text, format!("the netlist's own `{which}` failed"));
-    told(&state)
+    abort(&state)
 }
 
 /// Goes over a table by its keys in order: numbers first, then names. A function, as other iterators are, passes.
@@ -134,11 +134,11 @@ fn each(lua: &Lua, (value, rest): (LuaValue, MultiValue)) -> mlua::Result<MultiV
         return Ok(all);
     };
     let mut keys = Vec::new();
-    let long = || mlua::Error::runtime(format!("a table of more than {MOST_KEYS} items; go over it by numbers"));
+    let long = || mlua::Error::runtime(format!("a table of more than {MAX_KEYS} items; go over it by numbers"));
     for pair in table.pairs::<LuaValue, LuaValue>() {
         budget::check();
         keys.push(pair?.0);
-        if keys.len() > MOST_KEYS {
+        if keys.len() > MAX_KEYS {
             return Err(long());
         }
     }

@@ -25,40 +25,40 @@ const MEMORY_PER_ELEMENT: usize = 4 << 10;
 /// string as long as the memory, so that instructions alone do not bound time.
 const PATIENCE: Duration = Duration::from_millis(25);
 /// Time between two looks at processor time, which the system tells in a file.
-const LOOK: Duration = Duration::from_millis(5);
+const CLOCK_INTERVAL: Duration = Duration::from_millis(5);
 /// Where the system tells no processor time: so many times as long by the wall clock.
 const WALL: u32 = 20;
 
 /// What stays of Lua's own functions.
-const KEPT: [&str; 3] = ["tonumber", "type", "select"];
+const LUA_FUNCTIONS: [&str; 3] = ["tonumber", "type", "select"];
 
 /// Why a netlist was stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Limit {
+pub(super) enum SandboxLimit {
     Instructions,
     Time,
 }
 
 /// What has been drawn so far, for the limits.
 #[derive(Debug, Default)]
-pub(super) struct Progress {
+pub(super) struct SandboxProgress {
     /// Elements and nodes.
     pub(super) drawn: Cell<usize>,
     /// The limit that was met.
-    pub(super) met: Cell<Option<Limit>>,
+    pub(super) met: Cell<Option<SandboxLimit>>,
     /// Where: chunk and line.
     pub(super) at: RefCell<Option<(String, usize)>>,
 }
 
 /// A fresh Lua for a netlist of so many bytes.
-pub(super) fn sandbox(bytes: usize, progress: &Rc<Progress>) -> mlua::Result<Lua> {
+pub(super) fn sandbox(bytes: usize, progress: &Rc<SandboxProgress>) -> mlua::Result<Lua> {
     let lua = Lua::new_with(StdLib::NONE, LuaOptions::new().catch_rust_panics(false))?;
     let globals = lua.globals();
     let mut names = Vec::new();
     for pair in globals.pairs::<String, Value>() {
         names.push(pair?.0);
     }
-    for name in names.into_iter().filter(|name| !KEPT.contains(&name.as_str())) {
+    for name in names.into_iter().filter(|name| !LUA_FUNCTIONS.contains(&name.as_str())) {
         globals.raw_set(name, Value::Nil)?;
     }
     let memory = MEMORY + MEMORY_PER_BYTE * bytes;
@@ -73,9 +73,9 @@ pub(super) fn sandbox(bytes: usize, progress: &Rc<Progress>) -> mlua::Result<Lua
         let mut clock = clock.borrow_mut();
         let allowed = INSTRUCTIONS + INSTRUCTIONS_PER_BYTE * bytes + INSTRUCTIONS_PER_ELEMENT * drawn;
         let limit = if run.get() > allowed {
-            Some(Limit::Instructions)
-        } else if drawn == clock.drawn && clock.late() {
-            Some(Limit::Time)
+            Some(SandboxLimit::Instructions)
+        } else if drawn == clock.drawn && clock.is_stalled() {
+            Some(SandboxLimit::Time)
         } else {
             None
         };
@@ -113,20 +113,20 @@ impl Clock {
     }
 
     /// True when nothing was drawn for too long, in processor time: the machine may have other things to do.
-    fn late(&mut self) -> bool {
+    fn is_stalled(&mut self) -> bool {
         let now = Instant::now();
         if now < self.next {
             return false;
         }
         self.looks += 1;
-        self.next = now + LOOK;
+        self.next = now + CLOCK_INTERVAL;
         match (self.cpu, budget::thread_cpu()) {
             (Some(start), Some(cpu)) => cpu.saturating_sub(start) > PATIENCE,
             (None, Some(cpu)) => {
                 self.cpu = Some(cpu);
                 false
             }
-            (_, None) => LOOK * self.looks > PATIENCE * WALL,
+            (_, None) => CLOCK_INTERVAL * self.looks > PATIENCE * WALL,
         }
     }
 }

@@ -1,13 +1,13 @@
 //! What the functions of a SUGAR 3 netlist work on.
 
 use super::super::bundle::Bundle;
-use super::super::drawing::Drawing;
+use super::super::drawing::StructureBuilder;
 use super::super::rotation::Rotation;
 use super::super::setting::Setting;
-use super::super::sink::Sink;
-use super::super::source::Span;
+use super::super::sink::DiagnosticSink;
+use super::super::source::TextSpan;
 use super::arguments::{LuaNode, number};
-use super::sandbox::Progress;
+use super::sandbox::SandboxProgress;
 use crate::structure::NodeId;
 use mlua::{Lua, Value};
 use std::cell::{Cell, RefCell};
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// Where names of one scope live: the netlist itself, or one subnet instance.
 #[derive(Debug)]
-pub(super) struct Scope {
+pub(super) struct NameScope {
     pub(super) nodes: HashMap<String, NodeId>,
     /// Names of the enclosing instances with a point after each.
     pub(super) prefix: String,
@@ -26,10 +26,10 @@ pub(super) struct Scope {
 
 /// What the functions of a netlist work on.
 #[derive(Debug)]
-pub(super) struct State {
-    pub(super) drawing: Drawing,
-    pub(super) sink: Sink,
-    pub(super) scopes: Vec<Scope>,
+pub(super) struct LuaState {
+    pub(super) drawing: StructureBuilder,
+    pub(super) sink: DiagnosticSink,
+    pub(super) scopes: Vec<NameScope>,
     /// Full names of elements so far.
     pub(super) names: HashSet<String>,
     pub(super) elements: usize,
@@ -44,41 +44,41 @@ pub(super) struct State {
     /// Files read so far, by name.
     pub(super) used: HashSet<String>,
     /// Text of each file, in the order of the sink's.
-    pub(super) texts: Vec<Rc<Text>>,
+    pub(super) texts: Vec<Rc<IndexedText>>,
     pub(super) bundle: Arc<Bundle>,
     /// Globals that were read before anything was assigned to them, with their place in the order of reading.
     pub(super) asked: HashMap<String, usize>,
     pub(super) settings: BTreeMap<String, Setting>,
     pub(super) parameters: BTreeMap<usize, (String, Setting)>,
-    pub(super) progress: Rc<Progress>,
+    pub(super) progress: Rc<SandboxProgress>,
     /// True once a message says why the netlist stops.
     pub(super) told: Cell<bool>,
 }
 
 /// A text with the starts of its lines.
 #[derive(Debug)]
-pub(super) struct Text {
+pub(super) struct IndexedText {
     pub(super) starts: Vec<usize>,
     pub(super) text: String,
 }
 
-pub(super) type Shared = Rc<RefCell<State>>;
+pub(super) type SharedState = Rc<RefCell<LuaState>>;
 
-impl State {
+impl LuaState {
     /// The place of line `line` (from 1) of file number `file`.
-    pub(super) fn line(&self, file: usize, line: usize) -> Span {
-        let Some(text) = self.texts.get(file) else { return Span::NOWHERE };
-        let Some(&start) = line.checked_sub(1).and_then(|line| text.starts.get(line)) else { return Span::NOWHERE };
+    pub(super) fn line(&self, file: usize, line: usize) -> TextSpan {
+        let Some(text) = self.texts.get(file) else { return TextSpan::NOWHERE };
+        let Some(&start) = line.checked_sub(1).and_then(|line| text.starts.get(line)) else { return TextSpan::NOWHERE };
         let end = text.starts.get(line).map_or(text.text.len(), |next| next - 1);
         let body = text.text.get(start..end).unwrap_or("");
         let indent = body.len() - body.trim_start().len();
         let at = |offset: usize| u32::try_from(offset).unwrap_or(u32::MAX);
         let file = u16::try_from(file).unwrap_or(u16::MAX);
-        Span { file, start: at(start + indent), end: at(start + body.trim_end().len().max(indent)) }
+        TextSpan { file, start: at(start + indent), end: at(start + body.trim_end().len().max(indent)) }
     }
 
     /// The line of the netlist that is being run.
-    pub(super) fn here(&self, lua: &Lua) -> Span {
+    pub(super) fn here(&self, lua: &Lua) -> TextSpan {
         for level in 1..6 {
             let found = lua.inspect_stack(level, |debug| {
                 let source = debug.source().source.map(|name| name.into_owned());
@@ -90,16 +90,16 @@ impl State {
                 None => break,
             }
         }
-        Span::NOWHERE
+        TextSpan::NOWHERE
     }
 
-    pub(super) fn scope(&mut self) -> &mut Scope {
+    pub(super) fn scope(&mut self) -> &mut NameScope {
         let last = self.scopes.len() - 1;
         &mut self.scopes[last]
     }
 
     /// The node of that name in the scope at hand, a new one when the name is new.
-    pub(super) fn node(&mut self, name: &str, span: Span) -> NodeId {
+    pub(super) fn node(&mut self, name: &str, span: TextSpan) -> NodeId {
         if let Some(&id) = self.scope().nodes.get(name) {
             return id;
         }

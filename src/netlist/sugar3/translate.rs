@@ -5,7 +5,7 @@
 //! * `for k, v in t do` goes over a table.
 
 use super::super::lexer::{scaled, suffix};
-use super::words::{Kind, Word, words};
+use super::words::{Word, WordKind, words};
 
 /// What has no counterpart: the bytes of the place, what it is, a way out.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub(crate) struct Untranslatable {
 
 /// What closes an open block.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Block {
+enum OpenBlock {
     Plain,
     Subnet,
 }
@@ -44,38 +44,39 @@ pub(crate) fn translate(text: &str) -> Result<String, Untranslatable> {
             copied = from;
         };
         match (word.kind, spelled(k)) {
-            (Kind::Number, number) => {
+            (WordKind::Number, number) => {
                 if let Some(plain) = without_suffix(number) {
                     put(word.start, word.end, &plain);
                 }
             }
-            (Kind::Name, "subnet")
-                if words.get(k + 1).is_some_and(|w| w.kind == Kind::Name) && spelled(k + 2) == "(" =>
+            (WordKind::Name, "subnet")
+                if words.get(k + 1).is_some_and(|w| w.kind == WordKind::Name) && spelled(k + 2) == "(" =>
             {
                 let close = (k + 3..words.len()).find(|&n| spelled(n) == ")").unwrap_or(k + 2);
-                let formals: Vec<&str> = (k + 3..close).filter(|&n| words[n].kind == Kind::Name).map(spelled).collect();
+                let formals: Vec<&str> =
+                    (k + 3..close).filter(|&n| words[n].kind == WordKind::Name).map(spelled).collect();
                 let name = spelled(k + 1);
                 let head = format!("{name} = subnetize(\"{name}\", \"{}\", function", formals.join(","));
                 put(word.start, words[k + 1].end, &head);
                 let more = if formals.is_empty() { "args" } else { ", args" };
                 put(words[close].start, words[close].start, more);
-                blocks.push(Block::Subnet);
+                blocks.push(OpenBlock::Subnet);
                 k = close;
             }
-            (Kind::Name, "in") => {
+            (WordKind::Name, "in") => {
                 headers += 1;
                 put(word.end, word.end, " each(");
             }
-            (Kind::Name, "do") => {
+            (WordKind::Name, "do") => {
                 if headers > 0 {
                     headers -= 1;
                     put(word.start, word.start, ") ");
                 }
-                blocks.push(Block::Plain);
+                blocks.push(OpenBlock::Plain);
             }
-            (Kind::Name, "function" | "if") => blocks.push(Block::Plain),
-            (Kind::Name, "end") if blocks.pop() == Some(Block::Subnet) => put(word.end, word.end, ")"),
-            (Kind::Symbol, "%") if upvalue(&words, k) => {
+            (WordKind::Name, "function" | "if") => blocks.push(OpenBlock::Plain),
+            (WordKind::Name, "end") if blocks.pop() == Some(OpenBlock::Subnet) => put(word.end, word.end, ")"),
+            (WordKind::Symbol, "%") if upvalue(&words, k) => {
                 let message = format!("`%{}` is an upvalue of Lua 4", spelled(k + 1));
                 let help = "write `local old = NAME` above the function, and `old` in it";
                 return Err(Untranslatable { start: word.start, end: words[k + 1].end, message, help });
@@ -91,8 +92,8 @@ pub(crate) fn translate(text: &str) -> Result<String, Untranslatable> {
 /// True for the `%` of an upvalue: it stands before a name, and not after an operand.
 fn upvalue(words: &[Word], k: usize) -> bool {
     let (percent, next) = (words[k], words.get(k + 1));
-    let named = next.is_some_and(|next| next.kind == Kind::Name && next.start == percent.end);
-    let operand = k > 0 && !percent.starts_line && words[k - 1].kind != Kind::Symbol;
+    let named = next.is_some_and(|next| next.kind == WordKind::Name && next.start == percent.end);
+    let operand = k > 0 && !percent.starts_line && words[k - 1].kind != WordKind::Symbol;
     named && !operand
 }
 

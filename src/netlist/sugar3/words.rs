@@ -2,7 +2,7 @@
 
 /// What a word is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum WordKind {
     Name,
     Number,
     Text,
@@ -12,7 +12,7 @@ pub(crate) enum Kind {
 /// A word and its bytes in the text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Word {
-    pub(crate) kind: Kind,
+    pub(crate) kind: WordKind,
     pub(crate) start: usize,
     pub(crate) end: usize,
     /// True for the first word of a line.
@@ -48,7 +48,7 @@ pub(crate) fn words(text: &str) -> Vec<Word> {
             }
             b'[' if matches!(peek(at + 1), b'[' | b'=') && long(text, at).is_some() => {
                 at = long(text, at).unwrap_or(at + 1);
-                Kind::Text
+                WordKind::Text
             }
             b'"' | b'\'' => {
                 at += 1;
@@ -56,26 +56,26 @@ pub(crate) fn words(text: &str) -> Vec<Word> {
                     at += if bytes[at] == b'\\' { 2 } else { 1 };
                 }
                 at = (at + 1).min(bytes.len());
-                Kind::Text
+                WordKind::Text
             }
             b'0'..=b'9' => {
                 at = number(bytes, at);
-                Kind::Number
+                WordKind::Number
             }
             b'.' if peek(at + 1).is_ascii_digit() && !(at > 0 && bytes[at - 1] == b'.') => {
                 at = number(bytes, at);
-                Kind::Number
+                WordKind::Number
             }
             b'a'..=b'z' | b'A'..=b'Z' | b'_' => {
                 at = run(at, &|b| b.is_ascii_alphanumeric() || b == b'_');
-                Kind::Name
+                WordKind::Name
             }
             _ => {
                 at += 1;
                 while at < bytes.len() && !text.is_char_boundary(at) {
                     at += 1;
                 }
-                Kind::Symbol
+                WordKind::Symbol
             }
         };
         out.push(Word { kind, start, end: at, starts_line: std::mem::take(&mut starts_line) });
@@ -128,11 +128,11 @@ pub(crate) fn uses_of(text: &str) -> Vec<String> {
     let spelled = |word: &Word| &text[word.start..word.end];
     let mut found = Vec::new();
     for (k, word) in words.iter().enumerate() {
-        if word.kind != Kind::Name || spelled(word) != "use" {
+        if word.kind != WordKind::Name || spelled(word) != "use" {
             continue;
         }
         let next = words[k + 1..].iter().find(|next| spelled(next) != "(");
-        if let Some(name) = next.filter(|next| next.kind == Kind::Text) {
+        if let Some(name) = next.filter(|next| next.kind == WordKind::Text) {
             found.push(spelled(name).trim_matches(['"', '\'']).to_owned());
         }
     }

@@ -3,7 +3,7 @@
 //! Displacements travel as whole numbers of a ten-thousandth of the largest one, so that a page stays small.
 
 use super::parts::bounds;
-use super::shapes::{Motion, Moved, Point, comb_outlines, plate_outline, rectangle};
+use super::shapes::{DisplacedShape, NodeDisplacement, PlanePoint, comb_outlines, plate_outline, rectangle};
 use super::svg::escape;
 use crate::structure::Structure;
 use std::fmt::Write;
@@ -16,13 +16,13 @@ const SHARE: f64 = 0.07;
 
 /// One state of the mechanism: an instant, or a mode.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
+pub struct AnimationFrame {
     /// Its time or frequency, for the reader.
     pub label: String,
     /// Displacement of each node by [`crate::structure::NodeId`].
-    pub nodes: Vec<Motion>,
+    pub nodes: Vec<NodeDisplacement>,
     /// Displacement of points along each beam, equally spaced, ends included; empty: of its ends alone.
-    pub curves: Vec<Vec<Motion>>,
+    pub curves: Vec<Vec<NodeDisplacement>>,
 }
 
 /// How frames follow each other.
@@ -35,7 +35,7 @@ pub enum Play {
 }
 
 /// The page.
-pub fn page(structure: &Structure, title: &str, play: Play, frames: &[Frame]) -> String {
+pub fn page(structure: &Structure, title: &str, play: Play, frames: &[AnimationFrame]) -> String {
     let data = data(structure, play, frames);
     let (title, slider) = (escape(title), if play == Play::Time { "time" } else { "mode" });
     format!(
@@ -55,8 +55,8 @@ pub fn page(structure: &Structure, title: &str, play: Play, frames: &[Frame]) ->
 }
 
 /// What was drawn and how it moves, as JSON. Lengths are in micrometres.
-fn data(structure: &Structure, play: Play, frames: &[Frame]) -> String {
-    let mut points: Vec<Point> = structure.nodes.iter().map(|n| n.position).collect();
+fn data(structure: &Structure, play: Play, frames: &[AnimationFrame]) -> String {
+    let mut points: Vec<PlanePoint> = structure.nodes.iter().map(|n| n.position).collect();
     let inner = |beam: usize| frames.first().and_then(|f| f.curves.get(beam)).map_or(0, |c| c.len().saturating_sub(2));
     let mut beams = Vec::new();
     for (index, beam) in structure.beams.iter().enumerate() {
@@ -75,7 +75,7 @@ fn data(structure: &Structure, play: Play, frames: &[Frame]) -> String {
         all.map(|m| if d == 2 { m[2].abs() } else { m[0].abs().max(m[1].abs()) }).fold(0.0, f64::max)
     };
     let unit = [largest(0), largest(0), largest(2)].map(|x| if x > 0.0 { x / COUNTS } else { 1.0 });
-    let count = |m: &Motion| format!("{:.0},{:.0},{:.0}", m[0] / unit[0], m[1] / unit[1], m[2] / unit[2]);
+    let count = |m: &NodeDisplacement| format!("{:.0},{:.0},{:.0}", m[0] / unit[0], m[1] / unit[1], m[2] / unit[2]);
     let rows: Vec<String> = frames
         .iter()
         .map(|frame| {
@@ -86,7 +86,7 @@ fn data(structure: &Structure, play: Play, frames: &[Frame]) -> String {
             format!("[{}]", row.join(",").replace("-0,", "0,"))
         })
         .collect();
-    let rest = Moved::default();
+    let rest = DisplacedShape::default();
     let areas = super::parts::outlines(structure, &rest);
     let (low, high) = bounds(areas.iter().flat_map(|o| o.shape.iter().copied()), structure);
     let extent = (high[0] - low[0]).max(high[1] - low[1]).max(f64::MIN_POSITIVE);
@@ -115,12 +115,12 @@ fn data(structure: &Structure, play: Play, frames: &[Frame]) -> String {
 /// Areas that move with a node, relative to it, and areas that stand still.
 fn rigid(structure: &Structure, symbol: f64) -> (String, String) {
     let (mut bodies, mut fixed) = (Vec::new(), Vec::new());
-    let moving = |node: usize, shape: Vec<Point>| {
+    let moving = |node: usize, shape: Vec<PlanePoint>| {
         let [x, y] = structure.nodes[node].position;
         let relative: Vec<String> = shape.iter().map(|p| pair([p[0] - x, p[1] - y])).collect();
         format!("{{\"at\":{node},\"shape\":[{}]}}", relative.join(","))
     };
-    let standing = |shape: Vec<Point>, pad: bool| {
+    let standing = |shape: Vec<PlanePoint>, pad: bool| {
         let corners: Vec<String> = shape.iter().map(|p| pair(*p)).collect();
         format!("{{\"pad\":{pad},\"shape\":[{}]}}", corners.join(","))
     };
@@ -129,17 +129,18 @@ fn rigid(structure: &Structure, symbol: f64) -> (String, String) {
         fixed.push(standing(rectangle(at, support.angle, [-symbol, symbol], [-symbol, symbol]), true));
     }
     for mass in &structure.masses {
-        bodies.extend(plate_outline(structure, mass, &Moved::default()).map(|shape| moving(mass.node.0, shape)));
+        bodies
+            .extend(plate_outline(structure, mass, &DisplacedShape::default()).map(|shape| moving(mass.node.0, shape)));
     }
     for comb in &structure.combs {
-        let (rotor, stator) = comb_outlines(structure, comb, &Moved::default());
+        let (rotor, stator) = comb_outlines(structure, comb, &DisplacedShape::default());
         bodies.extend(rotor.into_iter().map(|shape| moving(comb.a.0, shape)));
         fixed.extend(stator.into_iter().map(|shape| standing(shape, false)));
     }
     (bodies.join(","), fixed.join(","))
 }
 
-fn pair(p: Point) -> String {
+fn pair(p: PlanePoint) -> String {
     format!("[{},{}]", micro(p[0]), micro(p[1]))
 }
 
@@ -162,8 +163,11 @@ mod tests {
         let node = |x| Node { name: String::new(), position: [x, 0.0], mechanical: true, electrical: false };
         let mut structure = Structure { nodes: vec![node(0.0), node(100e-6)], ..Structure::default() };
         structure.links.push(Link { name: "l".into(), a: NodeId(0), b: NodeId(1) });
-        let frame =
-            |v: f64| Frame { label: "1 \"µs\"".into(), nodes: vec![[0.0; 3], [0.0, v, -1e-3]], curves: vec![] };
+        let frame = |v: f64| AnimationFrame {
+            label: "1 \"µs\"".into(),
+            nodes: vec![[0.0; 3], [0.0, v, -1e-3]],
+            curves: vec![],
+        };
         let frames = [frame(0.0), frame(1e-6)];
         let page = page(&structure, "</title>", Play::Time, &frames);
         assert!(!page.contains("http") && !page.contains("src=") && page.contains("&lt;/title&gt;"));

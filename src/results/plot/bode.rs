@@ -11,7 +11,7 @@ use super::svg::{Align, Paint, Picture};
 
 /// A curve.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct BodeCurve {
     /// Name in the legend.
     pub name: String,
     /// Unit over that of the drive.
@@ -29,19 +29,19 @@ const TOP: f64 = 58.0;
 const INK: &str = "#333333";
 const FAINT: &str = "#e4e4e4";
 /// Curves shown.
-const MOST_CURVES: usize = 7;
+const MAX_CURVES: usize = 7;
 /// Decades of magnitude shown below the largest.
 const DECADES: f64 = 14.0;
 
 /// Ticks of an axis at shares of its length, with fine lines without labels.
-struct Scale {
+struct AxisScale {
     ticks: Vec<(f64, String)>,
     fine: Vec<f64>,
 }
 
 /// Draws the curves over `frequencies` [Hz], ascending; over a linear axis where `linear` says so.
-pub fn draw(title: &str, frequencies: &[f64], linear: bool, curves: &[Curve]) -> Picture {
-    let shown = &curves[..curves.len().min(MOST_CURVES)];
+pub fn draw(title: &str, frequencies: &[f64], linear: bool, curves: &[BodeCurve]) -> Picture {
+    let shown = &curves[..curves.len().min(MAX_CURVES)];
     let mut units: Vec<&str> = Vec::new();
     for curve in shown {
         if !units.contains(&curve.unit.as_str()) {
@@ -60,11 +60,13 @@ pub fn draw(title: &str, frequencies: &[f64], linear: bool, curves: &[Curve]) ->
     let (log, plain) = (LogAxis { low: low.log10(), high: high.log10() }, axis(low, high, "Hz", 8, false));
     let share = |f: f64| if decades { log.share(f) } else { (f - plain.low) / (plain.high - plain.low) };
     let x_scale = match decades {
-        true => Scale {
+        true => AxisScale {
             ticks: log.ticks().into_iter().map(|(f, label)| (share(f), label)).collect(),
             fine: log.between().into_iter().map(share).collect(),
         },
-        false => Scale { ticks: plain.ticks.iter().map(|(f, l)| (share(*f), l.clone())).collect(), fine: Vec::new() },
+        false => {
+            AxisScale { ticks: plain.ticks.iter().map(|(f, l)| (share(*f), l.clone())).collect(), fine: Vec::new() }
+        }
     };
     let unit = if decades { "Hz" } else { plain.unit.as_str() };
     let width = WIDTH - LEFT - RIGHT;
@@ -77,8 +79,10 @@ pub fn draw(title: &str, frequencies: &[f64], linear: bool, curves: &[Curve]) ->
         let most = all().fold(0.0, f64::max);
         let mut y = LogAxis::new(all().filter(|v| *v > most * 10f64.powf(-DECADES)));
         y.low = y.low.max(y.high - DECADES - 1.0);
-        let scale =
-            Scale { ticks: y.ticks().into_iter().map(|(v, label)| (y.share(v), label)).collect(), fine: Vec::new() };
+        let scale = AxisScale {
+            ticks: y.ticks().into_iter().map(|(v, label)| (y.share(v), label)).collect(),
+            fine: Vec::new(),
+        };
         panel(&mut picture, [top, HEIGHT], &x_scale, &scale, None);
         picture.text(LEFT, top - 6.0, 12.0, Align::Start, INK, &format!("{} [{unit}]", named(unit)));
         legend(&mut picture, top, &own.iter().map(|k| (*k, shown[*k].name.as_str())).collect::<Vec<_>>());
@@ -98,7 +102,7 @@ pub fn draw(title: &str, frequencies: &[f64], linear: bool, curves: &[Curve]) ->
     let step = if highest - lowest > 720.0 { 180.0 * ((highest - lowest) / 1080.0).ceil() } else { 90.0 };
     let count = ((highest - lowest) / step) as usize;
     let ticks = (0..=count).map(|k| lowest + step * k as f64);
-    let scale = Scale {
+    let scale = AxisScale {
         ticks: ticks.map(|p| ((p - lowest) / (highest - lowest), format!("{p:.0}"))).collect(),
         fine: Vec::new(),
     };
@@ -124,7 +128,7 @@ fn named(unit: &str) -> String {
     word(own).to_owned()
 }
 
-fn panel(picture: &mut Picture, [top, height]: [f64; 2], x: &Scale, y: &Scale, below: Option<&str>) {
+fn panel(picture: &mut Picture, [top, height]: [f64; 2], x: &AxisScale, y: &AxisScale, below: Option<&str>) {
     let width = WIDTH - LEFT - RIGHT;
     for share in x.fine.iter().filter(|s| (0.0..=1.0).contains(*s)) {
         let x = LEFT + width * share;
@@ -220,7 +224,7 @@ mod tests {
 
     #[test]
     fn panels_by_unit() {
-        let curve = |name: &str, unit: &str| Curve {
+        let curve = |name: &str, unit: &str| BodeCurve {
             name: name.into(),
             unit: unit.into(),
             values: vec![[1.0, 0.0], [f64::NAN; 2], [1e-3, -1e-3], [1e-6, 0.0]],

@@ -26,7 +26,7 @@ pub struct Panel {
 
 /// Panels over one independent quantity.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chart {
+pub struct PanelChart {
     /// Line above the panels.
     pub title: String,
     /// Name of the independent quantity.
@@ -46,10 +46,10 @@ const RIGHT: f64 = 24.0;
 const INK: &str = "#333333";
 
 /// Curves shown in one panel; of more, those that move most.
-const MOST_CURVES: usize = 7;
+const MAX_CURVES: usize = 7;
 
 /// Draws a chart.
-pub fn draw(chart: &Chart) -> Picture {
+pub fn draw(chart: &PanelChart) -> Picture {
     let panel_height = if chart.panels.len() <= 2 { 260.0 } else { 150.0 };
     let top = 40.0;
     let pitch = panel_height + 34.0;
@@ -65,7 +65,14 @@ pub fn draw(chart: &Chart) -> Picture {
     picture
 }
 
-fn draw_panel(picture: &mut Picture, chart: &Chart, panel: &Panel, x_axis: &Axis, [top, height]: [f64; 2], last: bool) {
+fn draw_panel(
+    picture: &mut Picture,
+    chart: &PanelChart,
+    panel: &Panel,
+    x_axis: &Axis,
+    [top, height]: [f64; 2],
+    last: bool,
+) {
     let width = WIDTH - LEFT - RIGHT;
     let shown = loudest(&panel.series);
     let (low, high) = shown.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), s| {
@@ -145,13 +152,13 @@ fn range(values: &[f64]) -> (f64, f64) {
 /// The curves to show, in their own order: all, or those with the widest range where there are too many.
 fn loudest(series: &[Series]) -> Vec<&Series> {
     let mut order: Vec<usize> = (0..series.len()).collect();
-    if series.len() > MOST_CURVES {
+    if series.len() > MAX_CURVES {
         let span = |i: &usize| {
             let (low, high) = range(&series[*i].values);
             high - low
         };
         order.sort_by(|a, b| span(b).total_cmp(&span(a)).then(a.cmp(b)));
-        order.truncate(MOST_CURVES);
+        order.truncate(MAX_CURVES);
         order.sort_unstable();
     }
     order.into_iter().map(|i| &series[i]).collect()
@@ -206,7 +213,7 @@ mod tests {
     fn too_many_curves() {
         let series = (0..20).map(|k| Series { name: format!("s{k}"), values: vec![0.0, f64::from(k)] }).collect();
         let panel = Panel { title: "Motion".into(), unit: "m".into(), series };
-        let chart = Chart {
+        let chart = PanelChart {
             title: "t".into(),
             x_name: "time".into(),
             x_unit: "s".into(),

@@ -6,7 +6,7 @@ use super::svg::{Align, Paint, Picture};
 
 /// One curve with a mark at each point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct LogCurve {
     /// Name in the legend.
     pub name: String,
     /// Points (x, y) in SI; those that are not positive and finite are left out.
@@ -28,7 +28,7 @@ pub struct Slope {
 
 /// One pair of logarithmic axes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Panel {
+pub struct LogPanel {
     /// Line above the panel.
     pub title: String,
     /// Name of the horizontal quantity, with its unit.
@@ -36,7 +36,7 @@ pub struct Panel {
     /// Name of the vertical quantity, with its unit.
     pub y_name: String,
     /// The curves, in the order of their legend.
-    pub curves: Vec<Curve>,
+    pub curves: Vec<LogCurve>,
     /// A level to mark with its name, such as the error of a reference.
     pub floor: Option<(String, f64)>,
     /// Slopes for the eye.
@@ -49,7 +49,7 @@ pub struct LogChart {
     /// Line above everything.
     pub title: String,
     /// Panels, two in a row.
-    pub panels: Vec<Panel>,
+    pub panels: Vec<LogPanel>,
     /// Notes: what was measured, and on what; an empty one makes room.
     pub notes: Vec<String>,
 }
@@ -68,7 +68,7 @@ const LETTER: f64 = 0.62;
 
 /// Draws a chart.
 pub fn draw(chart: &LogChart) -> Picture {
-    let rows: Vec<&[Panel]> = chart.panels.chunks(2).collect();
+    let rows: Vec<&[LogPanel]> = chart.panels.chunks(2).collect();
     let legends: Vec<f64> =
         (rows.iter()).map(|row| row.iter().map(|p| legend_lines(p) as f64).fold(1.0, f64::max) * LEGEND_LINE).collect();
     let heights: Vec<f64> = legends.iter().map(|legend| 26.0 + legend + PLOT_HEIGHT + 56.0).collect();
@@ -111,7 +111,7 @@ fn wrapped(note: &str, room: f64) -> Vec<String> {
     lines
 }
 
-fn draw_panel(picture: &mut Picture, panel: &Panel, [x0, y0]: [f64; 2], legend: f64) {
+fn draw_panel(picture: &mut Picture, panel: &LogPanel, [x0, y0]: [f64; 2], legend: f64) {
     let (left, width) = (x0 + LEFT, PITCH - LEFT - RIGHT);
     let top = y0 + 26.0 + legend;
     picture.text(left, y0 + 12.0, 13.0, Align::Start, INK, &panel.title);
@@ -189,7 +189,7 @@ fn draw_slope(
     }
 }
 
-fn draw_legend(picture: &mut Picture, panel: &Panel, left: f64, top: f64) {
+fn draw_legend(picture: &mut Picture, panel: &LogPanel, left: f64, top: f64) {
     for (k, (x, line)) in legend_places(panel).into_iter().enumerate() {
         let (x, y) = (left + x, top + LEGEND_LINE * line as f64);
         picture.polyline(&[[x, y - 4.0], [x + 18.0, y - 4.0]], Paint { opacity: 0.55, ..Paint::line(colour(k), 1.6) });
@@ -199,7 +199,7 @@ fn draw_legend(picture: &mut Picture, panel: &Panel, left: f64, top: f64) {
 }
 
 /// Where each entry of the legend stands: offset from the left and line.
-fn legend_places(panel: &Panel) -> Vec<(f64, usize)> {
+fn legend_places(panel: &LogPanel) -> Vec<(f64, usize)> {
     let (mut x, mut line) = (0.0, 0);
     let mut places = Vec::with_capacity(panel.curves.len());
     for curve in &panel.curves {
@@ -213,7 +213,7 @@ fn legend_places(panel: &Panel) -> Vec<(f64, usize)> {
     places
 }
 
-fn legend_lines(panel: &Panel) -> usize {
+fn legend_lines(panel: &LogPanel) -> usize {
     legend_places(panel).last().map_or(1, |p| p.1 + 1)
 }
 
@@ -246,8 +246,8 @@ mod tests {
     #[test]
     fn nothing_to_draw() {
         let curve =
-            Curve { name: "<a>".into(), points: vec![[0.0, 1.0], [1.0, f64::NAN], [-1.0, 2.0]], labels: vec![] };
-        let panel = Panel {
+            LogCurve { name: "<a>".into(), points: vec![[0.0, 1.0], [1.0, f64::NAN], [-1.0, 2.0]], labels: vec![] };
+        let panel = LogPanel {
             title: "t".into(),
             x_name: "x".into(),
             y_name: "y".into(),
@@ -262,9 +262,10 @@ mod tests {
     /// A legend that is wider than its panel goes on in the next line.
     #[test]
     fn long_legends_wrap() {
-        let curves =
-            (0..7).map(|k| Curve { name: format!("generalized-alpha {k}"), points: vec![], labels: vec![] }).collect();
-        let panel = Panel {
+        let curves = (0..7)
+            .map(|k| LogCurve { name: format!("generalized-alpha {k}"), points: vec![], labels: vec![] })
+            .collect();
+        let panel = LogPanel {
             title: String::new(),
             x_name: String::new(),
             y_name: String::new(),

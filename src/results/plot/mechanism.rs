@@ -1,31 +1,31 @@
 //! The mechanism as it was drawn, in grey, and deflected, in colour: one large drawing, or a grid of small ones.
 
 use super::axis::{nice_step, quantity};
-use super::parts::{View, bounds, draw_lines, draw_ports, draw_supports, outlines};
-use super::shapes::{Motion, Moved};
+use super::parts::{PixelTransform, bounds, draw_lines, draw_ports, draw_supports, outlines};
+use super::shapes::{DisplacedShape, NodeDisplacement};
 use super::svg::{Align, Paint, Picture};
 use crate::structure::Structure;
 
 /// What to draw.
 #[derive(Debug, Clone, Copy)]
-pub struct Drawing<'a> {
+pub struct MechanismFigure<'a> {
     /// The drawn parts.
     pub structure: &'a Structure,
     /// Line above the drawing.
     pub title: &'a str,
     /// Displacement of each node by [`crate::structure::NodeId`]; empty: at rest only.
-    pub motion: &'a [Motion],
+    pub motion: &'a [NodeDisplacement],
     /// Displacement of points along each beam, equally spaced, ends included; empty: beams are bent by their ends alone.
-    pub curves: &'a [Vec<Motion>],
+    pub curves: &'a [Vec<NodeDisplacement>],
     /// Mean temperature of beams [K], by name; colours the deflected beams.
     pub temperatures: &'a [(String, f64)],
     /// How large displacements are drawn.
-    pub scale: Scale,
+    pub scale: DisplacementScale,
 }
 
 /// How large displacements are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Scale {
+pub enum DisplacementScale {
     /// Times a round factor that makes them visible; to scale where they are visible by themselves.
     Visible,
     /// Times this factor.
@@ -35,7 +35,7 @@ pub enum Scale {
 }
 
 const WIDTH: f64 = super::chart::WIDTH;
-const MOST_HEIGHT: f64 = 640.0;
+const MAX_HEIGHT: f64 = 640.0;
 const MARGIN: f64 = 46.0;
 const INK: &str = "#333333";
 const REST: Paint<'static> = Paint { fill: "#d0d0d0", stroke: "#a8a8a8", width: 0.6, opacity: 1.0 };
@@ -44,35 +44,36 @@ const MOVED: &str = "#0072B2";
 const SHAPE: f64 = 0.07;
 
 /// A drawing with its displacements enlarged and its bounds found.
-struct Prepared<'a> {
-    drawing: &'a Drawing<'a>,
+struct ScaledFigure<'a> {
+    drawing: &'a MechanismFigure<'a>,
     factor: f64,
-    motion: Vec<Motion>,
-    curves: Vec<Vec<Motion>>,
+    motion: Vec<NodeDisplacement>,
+    curves: Vec<Vec<NodeDisplacement>>,
     low: [f64; 2],
     high: [f64; 2],
     /// Size of support symbols [m].
     symbol: f64,
 }
 
-impl<'a> Prepared<'a> {
-    fn new(drawing: &'a Drawing<'a>) -> Self {
+impl<'a> ScaledFigure<'a> {
+    fn new(drawing: &'a MechanismFigure<'a>) -> Self {
         let structure = drawing.structure;
-        let rest = outlines(structure, &Moved::default());
+        let rest = outlines(structure, &DisplacedShape::default());
         let (low, high) = bounds(rest.iter().flat_map(|o| o.shape.iter().copied()), structure);
         let extent = (high[0] - low[0]).max(high[1] - low[1]).max(f64::MIN_POSITIVE);
         let all = drawing.motion.iter().chain(drawing.curves.iter().flatten());
         let largest = all.map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max);
         let factor = match drawing.scale {
-            Scale::Visible => round_factor(largest, extent),
-            Scale::Times(factor) => factor,
-            Scale::Shape if largest > 0.0 => SHAPE * extent / largest,
-            Scale::Shape => 1.0,
+            DisplacementScale::Visible => round_factor(largest, extent),
+            DisplacementScale::Times(factor) => factor,
+            DisplacementScale::Shape if largest > 0.0 => SHAPE * extent / largest,
+            DisplacementScale::Shape => 1.0,
         };
-        let enlarge = |m: &Motion| m.map(|x| x * factor);
-        let motion: Vec<Motion> = drawing.motion.iter().map(enlarge).collect();
-        let curves: Vec<Vec<Motion>> = drawing.curves.iter().map(|c| c.iter().map(enlarge).collect()).collect();
-        let moved = Moved { nodes: &motion, curves: &curves, enlarged: factor != 1.0 };
+        let enlarge = |m: &NodeDisplacement| m.map(|x| x * factor);
+        let motion: Vec<NodeDisplacement> = drawing.motion.iter().map(enlarge).collect();
+        let curves: Vec<Vec<NodeDisplacement>> =
+            drawing.curves.iter().map(|c| c.iter().map(enlarge).collect()).collect();
+        let moved = DisplacedShape { nodes: &motion, curves: &curves, enlarged: factor != 1.0 };
         let points = rest.into_iter().chain(outlines(structure, &moved)).flat_map(|o| o.shape);
         let (low, high) = bounds(points, structure);
         let symbol = 0.022 * extent;
@@ -85,12 +86,12 @@ impl<'a> Prepared<'a> {
     }
 
     /// Draws grey and colour.
-    fn paint(&self, picture: &mut Picture, view: &View) {
+    fn paint(&self, picture: &mut Picture, view: &PixelTransform) {
         let structure = self.drawing.structure;
-        let moved = Moved { nodes: &self.motion, curves: &self.curves, enlarged: self.factor != 1.0 };
+        let moved = DisplacedShape { nodes: &self.motion, curves: &self.curves, enlarged: self.factor != 1.0 };
         draw_supports(picture, structure, view, self.symbol);
-        draw_lines(picture, structure, &Moved::default(), view, "#b4b4b4");
-        for outline in outlines(structure, &Moved::default()) {
+        draw_lines(picture, structure, &DisplacedShape::default(), view, "#b4b4b4");
+        for outline in outlines(structure, &DisplacedShape::default()) {
             picture.polygon(&view.all(&outline.shape), REST);
         }
         if self.motion.is_empty() {
@@ -114,21 +115,21 @@ fn hottest(temperatures: &[(String, f64)]) -> Option<&(String, f64)> {
 }
 
 /// The lowest temperature there is: that of the surroundings, where nothing is colder [K].
-fn coldest(drawing: &Drawing<'_>) -> f64 {
+fn coldest(drawing: &MechanismFigure<'_>) -> f64 {
     let ambient = drawing.structure.beams.iter().filter(|b| b.heater.is_some() || b.temperature.is_some());
     let ambient = ambient.map(|b| b.material.ambient_temperature);
     drawing.temperatures.iter().map(|(_, t)| *t).chain(ambient).fold(f64::INFINITY, f64::min)
 }
 
 /// Draws a mechanism.
-pub fn draw(drawing: &Drawing<'_>) -> Picture {
-    let prepared = Prepared::new(drawing);
+pub fn draw(drawing: &MechanismFigure<'_>) -> Picture {
+    let prepared = ScaledFigure::new(drawing);
     let [across, up] = prepared.size();
-    let scale = ((WIDTH - 2.0 * MARGIN) / across).min(MOST_HEIGHT / up);
+    let scale = ((WIDTH - 2.0 * MARGIN) / across).min(MAX_HEIGHT / up);
     let height = up * scale;
     let mut picture = Picture::new(WIDTH, height + 116.0);
     let left = (WIDTH - across * scale) / 2.0;
-    let view = View { low: prepared.low, scale, bottom: 52.0 + height, left };
+    let view = PixelTransform { low: prepared.low, scale, bottom: 52.0 + height, left };
     picture.text(MARGIN, 24.0, 15.0, Align::Start, INK, drawing.title);
     prepared.paint(&mut picture, &view);
     draw_ports(&mut picture, drawing.structure, &view);
@@ -147,14 +148,14 @@ pub struct Ground {
 
 /// Draws a mechanism over the layout that it came from: the layout pale, the mechanism in blue, what is in no part of it red.
 pub fn over(title: &str, structure: &Structure, ground: &Ground) -> Picture {
-    let rest = outlines(structure, &Moved::default());
+    let rest = outlines(structure, &DisplacedShape::default());
     let points = rest.iter().flat_map(|o| &o.shape).chain(ground.drawn.iter().flatten()).copied();
     let (low, high) = bounds(points, structure);
     let (across, up) = ((high[0] - low[0]).max(f64::MIN_POSITIVE), (high[1] - low[1]).max(f64::MIN_POSITIVE));
-    let scale = ((WIDTH - 2.0 * MARGIN) / across).min(MOST_HEIGHT / up);
+    let scale = ((WIDTH - 2.0 * MARGIN) / across).min(MAX_HEIGHT / up);
     let height = up * scale;
     let mut picture = Picture::new(WIDTH, height + 116.0);
-    let view = View { low, scale, bottom: 52.0 + height, left: (WIDTH - across * scale) / 2.0 };
+    let view = PixelTransform { low, scale, bottom: 52.0 + height, left: (WIDTH - across * scale) / 2.0 };
     picture.text(MARGIN, 24.0, 15.0, Align::Start, INK, title);
     for contour in &ground.drawn {
         picture.polygon(&view.all(contour), Paint { fill: "#f0e2b8", stroke: "#c9b06b", width: 0.5, opacity: 1.0 });
@@ -163,7 +164,7 @@ pub fn over(title: &str, structure: &Structure, ground: &Ground) -> Picture {
         picture.polygon(&view.all(&outline.shape), Paint { fill: MOVED, stroke: MOVED, width: 0.8, opacity: 0.45 });
     }
     draw_supports(&mut picture, structure, &view, 0.012 * across.max(up));
-    draw_lines(&mut picture, structure, &Moved::default(), &view, MOVED);
+    draw_lines(&mut picture, structure, &DisplacedShape::default(), &view, MOVED);
     for contour in &ground.foreign {
         picture.polygon(&view.all(contour), Paint { fill: "#D55E00", stroke: "#D55E00", width: 1.2, opacity: 0.8 });
     }
@@ -179,8 +180,8 @@ pub fn over(title: &str, structure: &Structure, ground: &Ground) -> Picture {
 }
 
 /// Draws several states of mechanisms side by side, each under its own title, all to one scale of length.
-pub fn grid(title: &str, drawings: &[Drawing<'_>]) -> Picture {
-    let mut prepared: Vec<Prepared<'_>> = drawings.iter().map(Prepared::new).collect();
+pub fn grid(title: &str, drawings: &[MechanismFigure<'_>]) -> Picture {
+    let mut prepared: Vec<ScaledFigure<'_>> = drawings.iter().map(ScaledFigure::new).collect();
     // each at the same place of its cell
     for i in 0..2 {
         let low = prepared.iter().map(|p| p.low[i]).fold(f64::INFINITY, f64::min);
@@ -194,7 +195,7 @@ pub fn grid(title: &str, drawings: &[Drawing<'_>]) -> Picture {
     let (gap, head) = (18.0, 26.0);
     let room = WIDTH - 2.0 * MARGIN - gap * (columns as f64 - 1.0);
     let cell = room / columns as f64;
-    let scale = (cell / across).min(0.75 * MOST_HEIGHT / up);
+    let scale = (cell / across).min(0.75 * MAX_HEIGHT / up);
     let height = up * scale;
     let rows = prepared.len().div_ceil(columns);
     let pitch = head + height + gap;
@@ -207,7 +208,7 @@ pub fn grid(title: &str, drawings: &[Drawing<'_>]) -> Picture {
         let left = x + (cell - wide * scale) / 2.0;
         let bottom = y + head + (height + tall * scale) / 2.0;
         picture.text(x + cell / 2.0, y + 13.0, 13.0, Align::Middle, INK, prepared.drawing.title);
-        prepared.paint(&mut picture, &View { low: prepared.low, scale, bottom, left });
+        prepared.paint(&mut picture, &PixelTransform { low: prepared.low, scale, bottom, left });
     }
     if let Some(first) = drawings.first() {
         legend(&mut picture, first, prepared[0].factor, None, scale, 52.0 + rows as f64 * pitch + 6.0);
@@ -227,13 +228,20 @@ fn round_factor(largest: f64, extent: f64) -> f64 {
     if factor.is_finite() { factor } else { 1.0 }
 }
 
-fn legend(picture: &mut Picture, drawing: &Drawing<'_>, factor: f64, hot: Option<&(String, f64)>, scale: f64, y: f64) {
+fn legend(
+    picture: &mut Picture,
+    drawing: &MechanismFigure<'_>,
+    factor: f64,
+    hot: Option<&(String, f64)>,
+    scale: f64,
+    y: f64,
+) {
     let length = nice_step(110.0 / scale / 2.0);
     let x = MARGIN;
     picture.polyline(&[[x, y], [x + length * scale, y]], Paint::line(INK, 3.0));
     picture.text(x, y + 17.0, 12.0, Align::Start, INK, &round_length(length));
     let mut parts = vec!["grey: as drawn".to_owned()];
-    if drawing.scale == Scale::Shape {
+    if drawing.scale == DisplacementScale::Shape {
         parts.push("colour: shape of the mode".to_owned());
     } else if !drawing.motion.is_empty() {
         let times = if factor == 1.0 { "to scale".to_owned() } else { format!("displacements × {factor}") };
@@ -272,13 +280,13 @@ mod tests {
         structure.links.push(Link { name: "l".into(), a: NodeId(0), b: NodeId(1) });
         let picture = |v: f64| {
             let motion = [[0.0; 3], [0.0, v, 0.0]];
-            let drawing = Drawing {
+            let drawing = MechanismFigure {
                 structure: &structure,
                 title: "t",
                 motion: &motion,
                 curves: &[],
                 temperatures: &[],
-                scale: Scale::Visible,
+                scale: DisplacementScale::Visible,
             };
             draw(&drawing).to_svg()
         };

@@ -1,52 +1,52 @@
 //! The parts of a drawn mechanism as shapes on a picture: beams and plates, supports, links, springs, ports.
 
 use super::chart::WIDTH;
-use super::shapes::{Moved, Point, beam_outline, comb_outlines, plate_outline, rectangle};
+use super::shapes::{DisplacedShape, PlanePoint, beam_outline, comb_outlines, plate_outline, rectangle};
 use super::svg::{Align, Paint, Picture};
 use crate::structure::{NodeId, Structure};
 
 /// Metres to pixels.
-pub(super) struct View {
-    pub(super) low: Point,
+pub(super) struct PixelTransform {
+    pub(super) low: PlanePoint,
     pub(super) scale: f64,
     pub(super) bottom: f64,
     pub(super) left: f64,
 }
 
-impl View {
-    pub(super) fn at(&self, p: Point) -> Point {
+impl PixelTransform {
+    pub(super) fn at(&self, p: PlanePoint) -> PlanePoint {
         [self.left + (p[0] - self.low[0]) * self.scale, self.bottom - (p[1] - self.low[1]) * self.scale]
     }
 
-    pub(super) fn all(&self, points: &[Point]) -> Vec<Point> {
+    pub(super) fn all(&self, points: &[PlanePoint]) -> Vec<PlanePoint> {
         points.iter().map(|p| self.at(*p)).collect()
     }
 }
 
 /// The area of a part.
-pub(super) struct Outline<'a> {
+pub(super) struct PartOutline<'a> {
     pub(super) name: &'a str,
-    pub(super) shape: Vec<Point>,
+    pub(super) shape: Vec<PlanePoint>,
 }
 
 /// Every part that moves or stands still with an area.
-pub(super) fn outlines<'a>(structure: &'a Structure, motion: &Moved<'_>) -> Vec<Outline<'a>> {
-    let mut list: Vec<Outline<'_>> = Vec::new();
+pub(super) fn outlines<'a>(structure: &'a Structure, motion: &DisplacedShape<'_>) -> Vec<PartOutline<'a>> {
+    let mut list: Vec<PartOutline<'_>> = Vec::new();
     for (index, beam) in structure.beams.iter().enumerate() {
-        list.push(Outline { name: &beam.name, shape: beam_outline(structure, index, motion) });
+        list.push(PartOutline { name: &beam.name, shape: beam_outline(structure, index, motion) });
     }
     for mass in &structure.masses {
-        list.extend(plate_outline(structure, mass, motion).map(|shape| Outline { name: &mass.name, shape }));
+        list.extend(plate_outline(structure, mass, motion).map(|shape| PartOutline { name: &mass.name, shape }));
     }
     for comb in &structure.combs {
         let (moving, fixed) = comb_outlines(structure, comb, motion);
         let shapes = if motion.nodes.is_empty() { [moving, fixed].concat() } else { moving };
-        list.extend(shapes.into_iter().map(|shape| Outline { name: &comb.name, shape }));
+        list.extend(shapes.into_iter().map(|shape| PartOutline { name: &comb.name, shape }));
     }
     list
 }
 
-pub(super) fn bounds(points: impl Iterator<Item = Point>, structure: &Structure) -> (Point, Point) {
+pub(super) fn bounds(points: impl Iterator<Item = PlanePoint>, structure: &Structure) -> (PlanePoint, PlanePoint) {
     let nodes = structure.nodes.iter().filter(|n| n.mechanical).map(|n| n.position);
     let start = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let (low, high) = points
@@ -57,7 +57,7 @@ pub(super) fn bounds(points: impl Iterator<Item = Point>, structure: &Structure)
 }
 
 /// Ground hatching at supports; a guide gets two rails along its free direction.
-pub(super) fn draw_supports(picture: &mut Picture, structure: &Structure, view: &View, size: f64) {
+pub(super) fn draw_supports(picture: &mut Picture, structure: &Structure, view: &PixelTransform, size: f64) {
     for support in &structure.supports {
         let at = structure.nodes[support.node.0].position;
         let frame = |along: [f64; 2], across: [f64; 2]| view.all(&rectangle(at, support.angle, along, across));
@@ -81,7 +81,13 @@ pub(super) fn draw_supports(picture: &mut Picture, structure: &Structure, view: 
 }
 
 /// Parts without an area: rigid links, springs, facing plates, lumped masses.
-pub(super) fn draw_lines(picture: &mut Picture, structure: &Structure, moved: &Moved<'_>, view: &View, colour: &str) {
+pub(super) fn draw_lines(
+    picture: &mut Picture,
+    structure: &Structure,
+    moved: &DisplacedShape<'_>,
+    view: &PixelTransform,
+    colour: &str,
+) {
     let at = |node: NodeId| {
         let [x, y] = structure.nodes[node.0].position;
         let [u, v, _] = moved.nodes.get(node.0).copied().unwrap_or_default();
@@ -94,7 +100,7 @@ pub(super) fn draw_lines(picture: &mut Picture, structure: &Structure, moved: &M
         let (a, b) = (at(spring.a), at(spring.b));
         let length = (b[0] - a[0]).hypot(b[1] - a[1]).max(1.0);
         let across = [-(b[1] - a[1]) / length * 6.0, (b[0] - a[0]) / length * 6.0];
-        let zigzag: Vec<Point> = (0..=12)
+        let zigzag: Vec<PlanePoint> = (0..=12)
             .map(|k| {
                 let s = f64::from(k) / 12.0;
                 let side = if !(2..=10).contains(&k) {
@@ -133,7 +139,7 @@ pub(super) fn draw_lines(picture: &mut Picture, structure: &Structure, moved: &M
     }
 }
 
-pub(super) fn draw_ports(picture: &mut Picture, structure: &Structure, view: &View) {
+pub(super) fn draw_ports(picture: &mut Picture, structure: &Structure, view: &PixelTransform) {
     for port in &structure.ports {
         for (k, node) in places(structure, port.plus).into_iter().enumerate() {
             let [x, y] = view.at(structure.nodes[node.0].position);

@@ -7,7 +7,7 @@ use super::svg::{Align, Paint, Picture};
 
 /// One curve.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct PlaneCurve {
     /// Name in the legend.
     pub name: String,
     /// Points in SI, in the order in which they are joined.
@@ -27,7 +27,7 @@ pub enum Sign {
 
 /// A marked point with a word beside it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mark {
+pub struct PlaneMark {
     /// Where, in SI.
     pub at: [f64; 2],
     /// Its shape.
@@ -40,7 +40,7 @@ pub struct Mark {
 
 /// Curves over two quantities.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plane {
+pub struct PlaneChart {
     /// Line above the curves.
     pub title: String,
     /// Name and SI unit of the horizontal quantity.
@@ -48,9 +48,9 @@ pub struct Plane {
     /// Name and SI unit of the vertical quantity.
     pub y: [String; 2],
     /// The curves.
-    pub curves: Vec<Curve>,
+    pub curves: Vec<PlaneCurve>,
     /// Marks.
-    pub marks: Vec<Mark>,
+    pub marks: Vec<PlaneMark>,
     /// One scale for both axes.
     pub equal: bool,
     /// A line of explanation below; empty: none.
@@ -65,7 +65,7 @@ const INK: &str = "#333333";
 const DASH: [f64; 2] = [7.0, 5.0];
 
 /// Draws the plane.
-pub fn draw(plane: &Plane) -> Picture {
+pub fn draw(plane: &PlaneChart) -> Picture {
     let width = WIDTH - LEFT - RIGHT;
     let (x_axis, y_axis, height) = axes(plane, width);
     let foot = if plane.note.is_empty() { 52.0 } else { 72.0 };
@@ -104,7 +104,7 @@ pub fn draw(plane: &Plane) -> Picture {
 }
 
 /// Both axes, and the height of the frame [px].
-fn axes(plane: &Plane, width: f64) -> (Axis, Axis, f64) {
+fn axes(plane: &PlaneChart, width: f64) -> (Axis, Axis, f64) {
     let range = |i: usize| {
         let all = plane.curves.iter().flat_map(|c| c.points.iter().map(|p| p[i])).filter(|v| v.is_finite());
         all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
@@ -124,7 +124,7 @@ fn axes(plane: &Plane, width: f64) -> (Axis, Axis, f64) {
     (axis(x.0, x.1, &plane.x[1], 9, false), axis(y.0, y.1, &plane.y[1], (height / 60.0) as usize, false), height)
 }
 
-fn grid(picture: &mut Picture, plane: &Plane, x_axis: &Axis, y_axis: &Axis, [width, height]: [f64; 2]) {
+fn grid(picture: &mut Picture, plane: &PlaneChart, x_axis: &Axis, y_axis: &Axis, [width, height]: [f64; 2]) {
     for (value, label) in &y_axis.ticks {
         let y = TOP + height * (y_axis.high - value) / (y_axis.high - y_axis.low);
         let line = if *value == 0.0 { "#b0b0b0" } else { "#e4e4e4" };
@@ -144,7 +144,7 @@ fn grid(picture: &mut Picture, plane: &Plane, x_axis: &Axis, y_axis: &Axis, [wid
     picture.text(LEFT, TOP - 8.0, 12.0, Align::Start, INK, &y_name);
 }
 
-fn legend(picture: &mut Picture, plane: &Plane, right: f64) {
+fn legend(picture: &mut Picture, plane: &PlaneChart, right: f64) {
     if plane.curves.len() < 2 {
         return;
     }
@@ -158,7 +158,7 @@ fn legend(picture: &mut Picture, plane: &Plane, right: f64) {
 }
 
 /// Solid and dashed runs of a curve.
-fn draw_curve(picture: &mut Picture, curve: &Curve, colour: &str, at: &impl Fn([f64; 2]) -> [f64; 2]) {
+fn draw_curve(picture: &mut Picture, curve: &PlaneCurve, colour: &str, at: &impl Fn([f64; 2]) -> [f64; 2]) {
     let dashed = |k: usize| curve.dashed.get(k).copied().unwrap_or(false);
     let mut k = 1;
     while k < curve.points.len() {
@@ -221,9 +221,9 @@ mod tests {
     #[test]
     fn one_scale() {
         let square = vec![[0.0, 0.0], [1e-6, 0.0], [1e-6, 1e-6], [0.0, 1e-6]];
-        let curve = Curve { name: "a".into(), points: square, dashed: vec![] };
+        let curve = PlaneCurve { name: "a".into(), points: square, dashed: vec![] };
         let names = || ["x".to_owned(), "m".to_owned()];
-        let plane = Plane {
+        let plane = PlaneChart {
             title: "t".into(),
             x: names(),
             y: names(),

@@ -3,27 +3,27 @@
 use crate::structure::{Comb, Mass, Structure};
 
 /// Displacement of a node: x, y [m] and rotation [rad].
-pub type Motion = [f64; 3];
+pub type NodeDisplacement = [f64; 3];
 
 /// A point in the plane [m].
-pub type Point = [f64; 2];
+pub type PlanePoint = [f64; 2];
 
 /// Pieces into which a whole bent beam is divided at least.
 const PIECES: usize = 14;
 
 /// Displacements to draw, already enlarged.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Moved<'a> {
+pub struct DisplacedShape<'a> {
     /// Of each node by [`crate::structure::NodeId`]; empty: at rest.
-    pub nodes: &'a [Motion],
+    pub nodes: &'a [NodeDisplacement],
     /// Of points along each beam, equally spaced, ends included; empty: from the beam's ends alone.
-    pub curves: &'a [Vec<Motion>],
+    pub curves: &'a [Vec<NodeDisplacement>],
     /// Displacements are enlarged: slopes grow with them, instead of turning round and round.
     pub enlarged: bool,
 }
 
-impl Moved<'_> {
-    fn node(&self, structure: &Structure, node: usize) -> (Point, f64) {
+impl DisplacedShape<'_> {
+    fn node(&self, structure: &Structure, node: usize) -> (PlanePoint, f64) {
         let [x, y] = structure.nodes[node].position;
         let [u, v, turn] = self.nodes.get(node).copied().unwrap_or_default();
         ([x + u, y + v], if self.enlarged { turn.atan() } else { turn })
@@ -32,7 +32,7 @@ impl Moved<'_> {
 
 /// The outline of the `index`-th beam. Its centreline is the cubic through neighbouring points with their directions, which
 /// for small motion is the shape of a beam loaded at these points alone.
-pub fn beam_outline(structure: &Structure, index: usize, moved: &Moved<'_>) -> Vec<Point> {
+pub fn beam_outline(structure: &Structure, index: usize, moved: &DisplacedShape<'_>) -> Vec<PlanePoint> {
     let beam = &structure.beams[index];
     let [a, b] = [beam.a.0, beam.b.0].map(|n| structure.nodes[n].position);
     let ends = [beam.a.0, beam.b.0].map(|n| moved.nodes.get(n).copied().unwrap_or_default());
@@ -76,7 +76,7 @@ pub fn beam_outline(structure: &Structure, index: usize, moved: &Moved<'_>) -> V
 }
 
 /// Point and derivative at `s` of the cubic from p with derivative tp to q with derivative tq.
-fn hermite(s: f64, [p, tp, q, tq]: [Point; 4]) -> (Point, Point) {
+fn hermite(s: f64, [p, tp, q, tq]: [PlanePoint; 4]) -> (PlanePoint, PlanePoint) {
     let (s2, s3) = (s * s, s * s * s);
     let at = |i: usize| {
         (2.0 * s3 - 3.0 * s2 + 1.0) * p[i]
@@ -91,7 +91,7 @@ fn hermite(s: f64, [p, tp, q, tq]: [Point; 4]) -> (Point, Point) {
 }
 
 /// The outline of a plate whose node moved; none for a lumped mass.
-pub fn plate_outline(structure: &Structure, mass: &Mass, motion: &Moved<'_>) -> Option<Vec<Point>> {
+pub fn plate_outline(structure: &Structure, mass: &Mass, motion: &DisplacedShape<'_>) -> Option<Vec<PlanePoint>> {
     let [along, across, angle] = mass.outline;
     if along <= 0.0 || across <= 0.0 {
         return None;
@@ -101,7 +101,7 @@ pub fn plate_outline(structure: &Structure, mass: &Mass, motion: &Moved<'_>) -> 
 }
 
 /// A rectangle given in a turned frame at `origin`.
-pub fn rectangle(origin: Point, angle: f64, along: [f64; 2], across: [f64; 2]) -> Vec<Point> {
+pub fn rectangle(origin: PlanePoint, angle: f64, along: [f64; 2], across: [f64; 2]) -> Vec<PlanePoint> {
     let (sin, cos) = angle.sin_cos();
     let corners = [[along[0], across[0]], [along[1], across[0]], [along[1], across[1]], [along[0], across[1]]];
     corners.iter().map(|[x, y]| [origin[0] + cos * x - sin * y, origin[1] + sin * x + cos * y]).collect()
@@ -111,9 +111,13 @@ pub fn rectangle(origin: Point, angle: f64, along: [f64; 2], across: [f64; 2]) -
 ///
 /// The roots of the two sides are two finger lengths less the overlap apart, which gives the length. How wide a finger
 /// is the netlist does not say: it is drawn as wide as its gap.
-pub fn comb_outlines(structure: &Structure, comb: &Comb, motion: &Moved<'_>) -> (Vec<Vec<Point>>, Vec<Vec<Point>>) {
+pub fn comb_outlines(
+    structure: &Structure,
+    comb: &Comb,
+    motion: &DisplacedShape<'_>,
+) -> (Vec<Vec<PlanePoint>>, Vec<Vec<PlanePoint>>) {
     let (rotor, turn) = motion.node(structure, comb.a.0);
-    let (stator, _) = Moved::default().node(structure, comb.b.0);
+    let (stator, _) = DisplacedShape::default().node(structure, comb.b.0);
     let rest = structure.nodes[comb.a.0].position;
     let apart = (stator[0] - rest[0]) * comb.axis[0] + (stator[1] - rest[1]) * comb.axis[1];
     let length = ((apart + comb.overlap) / 2.0).max(comb.gap);
@@ -170,7 +174,7 @@ mod tests {
     }
 
     /// The middle of an outline's sides.
-    fn middle(outline: &[Point]) -> f64 {
+    fn middle(outline: &[PlanePoint]) -> f64 {
         let half = outline.len() / 4;
         f64::midpoint(outline[half][1], outline[outline.len() - 1 - half][1])
     }
@@ -178,7 +182,7 @@ mod tests {
     /// A beam at rest is its rectangle.
     #[test]
     fn at_rest() {
-        let outline = beam_outline(&cantilever(), 0, &Moved::default());
+        let outline = beam_outline(&cantilever(), 0, &DisplacedShape::default());
         assert_eq!(outline, [[0.0, 0.1], [1.0, 0.1], [1.0, -0.1], [0.0, -0.1]]);
     }
 
@@ -187,7 +191,7 @@ mod tests {
     fn bent() {
         let tip = 1e-3;
         for enlarged in [false, true] {
-            let moved = Moved { nodes: &[[0.0; 3], [0.0, tip, 1.5 * tip]], curves: &[], enlarged };
+            let moved = DisplacedShape { nodes: &[[0.0; 3], [0.0, tip, 1.5 * tip]], curves: &[], enlarged };
             let outline = beam_outline(&cantilever(), 0, &moved);
             approx::assert_relative_eq!(middle(&outline), 5.0 / 16.0 * tip, max_relative = 1e-4);
         }
@@ -197,7 +201,7 @@ mod tests {
     #[test]
     fn bent_between_its_ends() {
         let curves = [vec![[0.0; 3], [0.0, 0.1, 0.0], [0.0; 3]]];
-        let moved = Moved { nodes: &[[0.0; 3], [0.0; 3]], curves: &curves, enlarged: true };
+        let moved = DisplacedShape { nodes: &[[0.0; 3], [0.0; 3]], curves: &curves, enlarged: true };
         approx::assert_relative_eq!(middle(&beam_outline(&cantilever(), 0, &moved)), 0.1, max_relative = 1e-12);
     }
 }

@@ -1,6 +1,6 @@
 //! The reading half. Nothing in a file is trusted: counts are checked against what is there before space is taken.
 
-use super::super::table::{Column, Samples, Table};
+use super::super::table::{Column, ColumnSamples, Table};
 use super::unit_of;
 use thiserror::Error;
 
@@ -109,9 +109,9 @@ fn read_plot(title: &str, cursor: &mut Cursor<'_>) -> Result<Table, RawError> {
     for (i, (name, unit)) in columns.into_iter().enumerate() {
         let rows = (0..points).map(|row| row * stride + i * width);
         let samples = if complex {
-            Samples::Complex(rows.map(|k| [numbers[k], numbers[k + 1]]).collect())
+            ColumnSamples::Complex(rows.map(|k| [numbers[k], numbers[k + 1]]).collect())
         } else {
-            Samples::Real(rows.map(|k| numbers[k]).collect())
+            ColumnSamples::Real(rows.map(|k| numbers[k]).collect())
         };
         // All columns have `points` samples, so this cannot fail; the error is passed on all the same.
         table

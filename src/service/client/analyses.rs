@@ -1,6 +1,6 @@
 //! Analyses on a server.
 
-use super::link::{Link, is_broken, reason, unexpected};
+use super::link::{ServerLink, is_broken, reason, unexpected};
 use super::verified;
 use crate::analysis::harmonic::{HarmonicOptions, HarmonicResult};
 use crate::analysis::integrator::Integrator;
@@ -25,7 +25,7 @@ use tonic::{Code, Response, Status, Streaming};
 pub struct Client {
     pub(super) address: String,
     access: Access,
-    pub(super) link: Link,
+    pub(super) link: ServerLink,
 }
 
 /// What went wrong on the way, or on the server.
@@ -82,14 +82,14 @@ impl Client {
     /// # Errors
     /// [`ClientError`].
     pub fn connect_with(uri: &str, access: &Access, deadline: Duration) -> Result<Self, ClientError> {
-        let link = Link::connect(uri, access, deadline).map_err(|status| error(uri, &status))?;
+        let link = ServerLink::connect(uri, access, deadline).map_err(|status| error(uri, &status))?;
         Ok(Self { address: uri.to_owned(), access: access.clone(), link })
     }
 
     /// Connects anew: what a network has made silent stays so.
     pub(super) fn reconnect(&mut self) -> Result<(), ClientError> {
-        self.link =
-            Link::connect(&self.address, &self.access, self.link.deadline).map_err(|status| self.error(&status))?;
+        self.link = ServerLink::connect(&self.address, &self.access, self.link.deadline)
+            .map_err(|status| self.error(&status))?;
         Ok(())
     }
 

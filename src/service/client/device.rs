@@ -1,8 +1,8 @@
 //! A device on a server, over one bidirectional stream.
 
-use super::link::{Link, is_not_found, reason, unexpected};
+use super::link::{ServerLink, is_not_found, reason, unexpected};
 use super::replay::Replay;
-use super::trial_stream::{Stream, ended, open_request};
+use super::trial_stream::{OpenTrialStream, ended, open_request};
 use super::verified;
 use crate::compile::CompileOptions;
 use crate::device::{Description, Device, DeviceError, OpenRequest, SmallSignal, Token, Trial, TrialReply};
@@ -38,8 +38,8 @@ pub struct RemoteDevice {
     /// What the server warned of when it compiled the model.
     warnings: Vec<Diagnostic>,
     /// Declared before `link`: a stream is let go before the runtime that drives it.
-    pub(super) stream: Option<Stream>,
-    pub(super) link: Option<Link>,
+    pub(super) stream: Option<OpenTrialStream>,
+    pub(super) link: Option<ServerLink>,
     /// Why the link was lost, for calls that come after.
     lost: Option<String>,
     /// What it was opened with.
@@ -116,7 +116,7 @@ impl RemoteDevice {
     /// Connects and compiles.
     fn reach(&mut self) -> Result<(), Status> {
         let left = self.until.saturating_duration_since(Instant::now());
-        let mut link = Link::connect(&self.address, &self.access, left)?;
+        let mut link = ServerLink::connect(&self.address, &self.access, left)?;
         link.deadline = self.deadline;
         link.end_by(self.until);
         let described = link.compile(&self.bundle, &self.options)?;
@@ -135,7 +135,7 @@ impl RemoteDevice {
         let (requests, queue) = mpsc::channel(QUEUE);
         let mut rpc = link.rpc.clone();
         let replies = link.call(rpc.trial(ReceiverStream::new(queue)))?.into_inner();
-        self.stream = Some(Stream::new(requests, replies));
+        self.stream = Some(OpenTrialStream::new(requests, replies));
         Ok(())
     }
 
@@ -204,7 +204,7 @@ impl RemoteDevice {
     }
 
     pub(super) fn shape(&self) -> (usize, usize) {
-        self.stream.as_ref().map_or((0, 0), Stream::shape)
+        self.stream.as_ref().map_or((0, 0), OpenTrialStream::shape)
     }
 
     fn small_signal(&mut self, request: proto::SmallSignalRequest) -> Result<proto::SmallSignal, DeviceError> {
@@ -220,7 +220,7 @@ impl RemoteDevice {
     }
 
     fn opened(&self) -> bool {
-        self.stream.as_ref().is_some_and(Stream::is_open)
+        self.stream.as_ref().is_some_and(OpenTrialStream::is_open)
     }
 
     /// The error of a device that is not open: never opened, or lost since.

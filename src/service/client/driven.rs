@@ -20,10 +20,10 @@ const FLUSH: usize = 4;
 const LOOK: Duration = Duration::from_micros(200);
 
 /// The loop.
-pub(super) struct Loop {
+pub(super) struct DrivenRuntime {
     /// There until it is dropped.
     runtime: Option<Runtime>,
-    state: Mutex<State>,
+    state: Mutex<LoopState>,
     /// What its thread waits for where it does not drive it: that it is over. That nobody asks any more it finds by looking.
     over: Condvar,
     /// What it waits for where it does.
@@ -34,7 +34,7 @@ pub(super) struct Loop {
 }
 
 #[derive(Default)]
-struct State {
+struct LoopState {
     /// Threads that ask, which drive the loop.
     asking: usize,
     /// How often somebody did.
@@ -43,16 +43,16 @@ struct State {
 }
 
 /// Somebody asks.
-struct Asking<'a>(&'a Loop);
+struct ActiveRequest<'a>(&'a DrivenRuntime);
 
-impl Drop for Asking<'_> {
+impl Drop for ActiveRequest<'_> {
     fn drop(&mut self) {
         self.0.state().asking -= 1;
     }
 }
 
-impl Loop {
-    /// A loop with its thread, which ends with [`Loop::end`].
+impl DrivenRuntime {
+    /// A loop with its thread, which ends with [`DrivenRuntime::end`].
     pub(super) fn new() -> io::Result<Arc<Self>> {
         let runtime = Builder::new_current_thread().enable_all().build()?;
         let (state, over, asked, soon) = (Mutex::default(), Condvar::new(), Notify::new(), AtomicBool::new(true));
@@ -70,7 +70,7 @@ impl Loop {
         self.asked.notify_one();
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, LoopState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -91,7 +91,7 @@ impl Loop {
             state.asking += 1;
             state.asks += 1;
         }
-        let _asking = Asking(self);
+        let _asking = ActiveRequest(self);
         self.asked.notify_one();
         runtime.block_on(wanted(self.looked_for(answer), waits))
     }
@@ -147,7 +147,7 @@ impl Loop {
     }
 }
 
-impl Drop for Loop {
+impl Drop for DrivenRuntime {
     fn drop(&mut self) {
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_background();

@@ -2,7 +2,7 @@
 
 use super::analyses::{Client, ClientError};
 use crate::compile::CompileOptions;
-use crate::jobs::sweep::journal::Kept;
+use crate::jobs::sweep::journal::JournalRow;
 use crate::jobs::sweep::{self, SweepProgress, SweepSpec, SweepTable};
 use crate::netlist::{Bundle, Setting};
 use crate::service::convert::model::bundle_to_wire;
@@ -86,9 +86,9 @@ impl JobStatus {
 
 /// What has come of a job so far.
 #[derive(Debug, Default)]
-struct Heard {
+struct JobRows {
     parameters: Vec<String>,
-    rows: Vec<(Vec<Setting>, Kept)>,
+    rows: Vec<(Vec<Setting>, JournalRow)>,
     failed: u64,
     points: BTreeSet<usize>,
 }
@@ -195,7 +195,7 @@ impl Client {
             let request = proto::GetJobRequest { name: name.to_owned() };
             client.call(client.link.rpc.clone().get_job(request)).map(|job| job.metadata.unwrap_or_default().points)
         })?;
-        let mut all = Heard::default();
+        let mut all = JobRows::default();
         let job = self.persist(|client, heard| client.hear(name, points, &mut all, heard, progress))?;
         if all.rows.len() as u64 != job.rows {
             let text = format!("the rows of {name} ended after {} of {}", all.rows.len(), job.rows);
@@ -208,7 +208,7 @@ impl Client {
         &self,
         name: &str,
         points: u64,
-        all: &mut Heard,
+        all: &mut JobRows,
         heard: &mut bool,
         progress: &mut dyn FnMut(SweepProgress) -> bool,
     ) -> Result<JobStatus, ClientError> {

@@ -1,9 +1,9 @@
-//! Questions to one device on a server, as bytes: what [`Questions`](crate::service::inside::Questions) are in process. For programs
+//! Questions to one device on a server, as bytes: what [`DeviceChannel`](crate::service::inside::DeviceChannel) are in process. For programs
 //! in other languages, whose own gRPC is slower.
 //!
 //! Connections are driven by who asks, and by a thread of their own while nobody does ([`super::driven`]).
 
-use super::driven::Loop;
+use super::driven::DrivenRuntime;
 use super::link::{is_broken, reason, unexpected};
 use crate::service::address::Address;
 use crate::service::inside::{decoded, not_asynchronous};
@@ -31,27 +31,27 @@ const PING: Duration = Duration::from_millis(2000);
 const PONG: Duration = Duration::from_millis(2500);
 
 /// Connections to servers without TLS, by address and number: a server takes only so many streams on each.
-pub struct Lines {
-    runtime: Arc<Loop>,
+pub struct TrialConnections {
+    runtime: Arc<DrivenRuntime>,
     open: Mutex<BTreeMap<(String, usize), Channel>>,
 }
 
 /// A Trial stream.
-pub struct Line {
-    runtime: Arc<Loop>,
+pub struct TrialChannel {
+    runtime: Arc<DrivenRuntime>,
     requests: mpsc::Sender<proto::DeviceRequest>,
     replies: Streaming<proto::DeviceReply>,
     /// Replies to come.
     owed: usize,
 }
 
-impl Lines {
+impl TrialConnections {
     /// None yet.
     ///
     /// # Errors
     /// A system that gives no thread.
     pub fn new() -> io::Result<Self> {
-        Ok(Self { runtime: Loop::new()?, open: Mutex::default() })
+        Ok(Self { runtime: DrivenRuntime::new()?, open: Mutex::default() })
     }
 
     /// A stream to the server at `uri` (`unix:///path`, `host:port`), showing `authorization`, on the connection of that `number`, which is
@@ -65,7 +65,7 @@ impl Lines {
         authorization: Option<&str>,
         patience: Duration,
         waits: &dyn Fn() -> bool,
-    ) -> Result<Line, Status> {
+    ) -> Result<TrialChannel, Status> {
         not_asynchronous()?;
         let value = authorization.map(str::parse::<MetadataValue<Ascii>>).transpose();
         let value = value.map_err(|_| Status::invalid_argument("a token has characters that no token has"))?;
@@ -89,7 +89,7 @@ impl Lines {
             begin()
         });
         let (replies, requests) = begun.map_err(|status: Status| said(&status, asked, patience))?;
-        Ok(Line { runtime: Arc::clone(&self.runtime), requests, replies: replies.into_inner(), owed: 0 })
+        Ok(TrialChannel { runtime: Arc::clone(&self.runtime), requests, replies: replies.into_inner(), owed: 0 })
     }
 
     fn channel(&self, uri: &str, number: usize) -> Result<Channel, Status> {
@@ -111,13 +111,13 @@ impl Lines {
     }
 }
 
-impl Drop for Lines {
+impl Drop for TrialConnections {
     fn drop(&mut self) {
         self.runtime.end();
     }
 }
 
-impl Line {
+impl TrialChannel {
     /// The reply to a question, within `patience`; none to an accept that asks for none. Where the answer is not waited for to its
     /// end, the next question still gets its own.
     ///

@@ -23,13 +23,13 @@ use tonic::{Code, Request, Status};
 const MESSAGE_BYTES: usize = 64 << 20;
 
 /// The calls of a server, with what it asks for.
-pub(super) type Rpc = BimorphClient<InterceptedService<Channel, Shown>>;
+pub(super) type Rpc = BimorphClient<InterceptedService<Channel, CallToken>>;
 
 /// The token that goes with every call.
 #[derive(Debug, Clone)]
-pub(super) struct Shown(Option<MetadataValue<Ascii>>);
+pub(super) struct CallToken(Option<MetadataValue<Ascii>>);
 
-impl Shown {
+impl CallToken {
     fn new(address: &Address, access: &Access) -> Result<Self, Status> {
         let Some(token) = access.token(address).map_err(|error| unusable(&error))? else { return Ok(Self(None)) };
         let mut value: MetadataValue<Ascii> = format!("Bearer {}", token.0)
@@ -40,7 +40,7 @@ impl Shown {
     }
 }
 
-impl Interceptor for Shown {
+impl Interceptor for CallToken {
     fn call(&mut self, mut request: Request<()>) -> Result<Request<()>, Status> {
         if let Some(value) = &self.0 {
             request.metadata_mut().insert("authorization", value.clone());
@@ -55,7 +55,7 @@ fn unusable(error: &AccessError) -> Status {
 
 /// A connected server.
 #[derive(Debug)]
-pub(super) struct Link {
+pub(super) struct ServerLink {
     runtime: Runtime,
     pub(super) rpc: Rpc,
     /// Longest time of one call.
@@ -64,7 +64,7 @@ pub(super) struct Link {
     until: Cell<Option<Instant>>,
 }
 
-impl Link {
+impl ServerLink {
     /// Connects within the deadline.
     pub(super) fn connect(uri: &str, access: &Access, deadline: Duration) -> Result<Self, Status> {
         if tokio::runtime::Handle::try_current().is_ok() {
@@ -72,7 +72,7 @@ impl Link {
             return Err(Status::failed_precondition(text));
         }
         let address: Address = uri.parse().map_err(|error| Status::invalid_argument(format!("{error}")))?;
-        let shown = Shown::new(&address, access)?;
+        let shown = CallToken::new(&address, access)?;
         let endpoint = Endpoint::from_shared(address.uri())
             .map_err(|error| Status::invalid_argument(error.to_string()))?
             .connect_timeout(deadline)

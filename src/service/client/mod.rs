@@ -1,7 +1,7 @@
 //! Blocking clients: a [`RemoteDevice`] for circuits and a [`Client`] for analyses.
 //!
 //! Both drive a single-threaded runtime of their own, only while a call runs: no thread is started in the host, and a
-//! round trip never waits for another thread to be woken. [`Lines`] are for programs in other languages.
+//! round trip never waits for another thread to be woken. [`TrialConnections`] are for programs in other languages.
 
 mod analyses;
 mod device;
@@ -25,4 +25,4 @@ pub use analyses::{Client, ClientError, RemoteTransient};
 pub use device::RemoteDevice;
 pub use jobs::{JobStatus, Submission};
 #[cfg(feature = "server")]
-pub use line::{Line, Lines};
+pub use line::{TrialChannel, TrialConnections};

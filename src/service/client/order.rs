@@ -7,23 +7,23 @@ const SHORTENED: usize = 500;
 
 /// The trials of a stream so far.
 #[derive(Debug, Default)]
-pub(super) struct Order {
+pub(super) struct TrialOrder {
     /// The last trial with a state, and the name of that.
-    last: Option<(Asked, Token)>,
+    last: Option<(PendingTrial, Token)>,
     /// Trials in a row that asked for a shorter step.
     shortened: usize,
 }
 
 /// A trial, as it was asked.
 #[derive(Debug, PartialEq)]
-struct Asked {
+struct PendingTrial {
     mode: Mode,
     parent: Option<Token>,
     dt: u64,
     voltages: Vec<u64>,
 }
 
-impl Asked {
+impl PendingTrial {
     fn of(trial: &Trial<'_>) -> Self {
         let voltages = trial.voltages.iter().map(|volts| volts.to_bits()).collect();
         let dt = if trial.mode == Mode::Static { 0 } else { trial.dt.to_bits() };
@@ -31,7 +31,7 @@ impl Asked {
     }
 }
 
-impl Order {
+impl TrialOrder {
     /// Checks the reply to the next trial.
     ///
     /// # Errors
@@ -42,7 +42,7 @@ impl Order {
             return Err(format!("need_dt: {SHORTENED} trials in a row asked for a shorter step"));
         }
         let Some(token) = reply.token else { return Ok(()) };
-        let asked = Asked::of(trial);
+        let asked = PendingTrial::of(trial);
         if self.last.as_ref().is_some_and(|(other, before)| *before == token && *other != asked) {
             return Err("it names the state of an earlier trial".to_owned());
         }
@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn replies_to_earlier_trials_show() {
-        let mut order = Order::default();
+        let mut order = TrialOrder::default();
         let trial = |volts| Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: volts };
         let reply = |token| TrialReply { token: Some(Token(token)), status: Status::Ok, ..TrialReply::default() };
         assert_eq!(order.check(&trial(&[1.0]), &reply(5)), Ok(()));

@@ -8,7 +8,7 @@ use crate::service::proto;
 use std::collections::HashMap;
 
 /// Requests that are remembered, at most: a hundred megabytes. Beyond that nothing is asked again.
-const MOST: usize = 1 << 20;
+const MAX_REQUESTS: usize = 1 << 20;
 
 /// The requests that led to the states of a device.
 #[derive(Debug, Default)]
@@ -29,7 +29,7 @@ impl Replay {
 
     /// A state that a request made.
     pub(super) fn made(&mut self, token: u64, request: &proto::TrialRequest) {
-        if self.made.len() >= MOST {
+        if self.made.len() >= MAX_REQUESTS {
             self.clear();
             self.lost = true;
         }

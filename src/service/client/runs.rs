@@ -3,7 +3,7 @@
 use super::RemoteDevice;
 use super::link::{Rpc, is_broken, reason, unexpected};
 use super::verified;
-use crate::device::run::{Course, Ran, Start};
+use crate::device::run::{DriveSchedule, Ran, Start};
 use crate::device::{DeviceError, Mode, Trial, TrialReply};
 use crate::service::convert::device as wire;
 use crate::service::convert::run::{pack, unpack};
@@ -17,7 +17,7 @@ impl RemoteDevice {
     ///
     /// # Errors
     /// [`DeviceError`]; a step that has no answer is none, see [`Ran::error`].
-    pub fn run(&mut self, start: &Start<'_>, course: &Course<'_>) -> Result<Ran, DeviceError> {
+    pub fn run(&mut self, start: &Start<'_>, course: &DriveSchedule<'_>) -> Result<Ran, DeviceError> {
         let request = |session: String| proto::RunRequest {
             lanes: vec![proto::RunLane {
                 session,
@@ -91,7 +91,12 @@ impl RemoteDevice {
 }
 
 /// Rows of a run that follow those of the `before` first steps, of a device with so many ports and signals.
-fn rows_fit(rows: &proto::RunRows, course: &Course<'_>, (p, _): (usize, usize), before: usize) -> Result<(), String> {
+fn rows_fit(
+    rows: &proto::RunRows,
+    course: &DriveSchedule<'_>,
+    (p, _): (usize, usize),
+    before: usize,
+) -> Result<(), String> {
     let count = rows.count as usize;
     if rows.lane != 0 || rows.first != before as u64 || count > course.times.len() - before {
         return Err(format!(
@@ -144,7 +149,7 @@ mod tests {
     #[test]
     fn rows_of_other_shapes_are_named() {
         let signals = ["m.x".to_owned()];
-        let course = Course { times: &[1.0, 2.0, 3.0], values: &[0.0], signals: &signals, ports: true };
+        let course = DriveSchedule { times: &[1.0, 2.0, 3.0], values: &[0.0], signals: &signals, ports: true };
         let said = |rows: &proto::RunRows, before| rows_fit(rows, &course, (1, 5), before).err().unwrap_or_default();
         assert_eq!(said(&rows(0, 2, &[0.0; 2]), 0), "");
         for (begins, rows, before) in [

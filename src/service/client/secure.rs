@@ -1,7 +1,7 @@
 //! The client's end of TLS.
 
 use crate::service::access::{Access, AccessError};
-use crate::service::tls::{ALPN, Pair, PemError, authorities, inner, provider};
+use crate::service::tls::{ALPN, CertificateFiles, PemError, authorities, inner, provider};
 use hyper_util::rt::TokioIo;
 use std::future::Future;
 use std::io;
@@ -46,7 +46,7 @@ impl Connect {
             .with_root_certificates(roots);
         let mut config = match (&access.certificate, &access.key) {
             (Some(certificate), Some(key)) => {
-                let Pair { chain, key } = Pair::read(certificate, key)?;
+                let CertificateFiles { chain, key } = CertificateFiles::read(certificate, key)?;
                 builder.with_client_auth_cert(chain, key).map_err(|error| AccessError::File {
                     what: "certificate",
                     path: certificate.clone(),

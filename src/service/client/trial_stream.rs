@@ -1,7 +1,7 @@
 //! The Trial stream of a device: a request, its reply, and what was opened.
 
 use super::link::unexpected;
-use super::order::Order;
+use super::order::TrialOrder;
 use crate::device::OpenRequest;
 use crate::service::proto;
 use proto::device_reply::Kind as ReplyKind;
@@ -14,27 +14,27 @@ use tonic::{Status, Streaming};
 
 /// A stream and what is open on it.
 #[derive(Debug)]
-pub(super) struct Stream {
+pub(super) struct OpenTrialStream {
     requests: mpsc::Sender<proto::DeviceRequest>,
     replies: Streaming<proto::DeviceReply>,
     /// Ports and signals of the device; none: it is not open.
     shape: Option<(usize, usize)>,
-    pub(super) order: Order,
+    pub(super) order: TrialOrder,
     /// Id of the session that is open; empty: none.
     pub(super) session: String,
 }
 
-impl Stream {
+impl OpenTrialStream {
     /// One on which nothing is open yet.
     pub(super) fn new(requests: mpsc::Sender<proto::DeviceRequest>, replies: Streaming<proto::DeviceReply>) -> Self {
-        Self { requests, replies, shape: None, order: Order::default(), session: String::new() }
+        Self { requests, replies, shape: None, order: TrialOrder::default(), session: String::new() }
     }
 
     /// A device was opened on it.
     pub(super) fn open(&mut self, session: &str, device: &proto::DeviceDescription) {
         session.clone_into(&mut self.session);
         self.shape = Some((device.ports.len(), device.signals.len()));
-        self.order = Order::default();
+        self.order = TrialOrder::default();
     }
 
     /// Whether a device is open on it.

@@ -4,9 +4,9 @@ use super::{Violation, named, number, pairs};
 use crate::analysis::modes::ModesResult;
 use crate::analysis::pull_in::PullInResult;
 use crate::analysis::statics::{NodeMotion, StaticResult};
-use crate::analysis::transient::{Counters, Event, Statistics, TransientResult, Until};
+use crate::analysis::transient::{Counters, CrossingEvent, Statistics, TransientResult, Until};
 use crate::service::proto;
-use crate::solve::equilibrium::{LossKind, Passed};
+use crate::solve::equilibrium::{LossKind, StabilityLoss};
 use crate::solve::event::Direction;
 
 fn size(n: u64) -> usize {
@@ -32,7 +32,7 @@ pub fn static_to_wire(result: &StaticResult) -> proto::StaticResponse {
     }
 }
 
-fn passed_to_wire(passed: &Passed) -> proto::PassedLoss {
+fn passed_to_wire(passed: &StabilityLoss) -> proto::PassedLoss {
     let kind = match passed.kind {
         LossKind::LimitPoint => proto::passed_loss::Kind::LimitPoint,
         LossKind::Bifurcation => proto::passed_loss::Kind::Bifurcation,
@@ -40,12 +40,12 @@ fn passed_to_wire(passed: &Passed) -> proto::PassedLoss {
     proto::PassedLoss { kind: kind.into(), share: passed.share, direction: passed.direction.clone() }
 }
 
-fn passed_from_wire(wire: proto::PassedLoss) -> Passed {
+fn passed_from_wire(wire: proto::PassedLoss) -> StabilityLoss {
     let kind = match wire.kind() {
         proto::passed_loss::Kind::LimitPoint => LossKind::LimitPoint,
         proto::passed_loss::Kind::Bifurcation => LossKind::Bifurcation,
     };
-    Passed { kind, share: wire.share, direction: wire.direction }
+    StabilityLoss { kind, share: wire.share, direction: wire.direction }
 }
 
 /// A static equilibrium back.
@@ -241,7 +241,7 @@ pub fn transient_from_wire(
         reliable_until,
         after_contact,
     } = summary;
-    let event = |e: proto::Crossing| Event {
+    let event = |e: proto::Crossing| CrossingEvent {
         signal: e.signal,
         level: e.level,
         t: e.t,

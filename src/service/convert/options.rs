@@ -6,7 +6,7 @@
 use super::Violation;
 use super::model::{setting_from_wire, setting_to_wire};
 use crate::compile::CompileOptions;
-use crate::options::{Described, MODEL, ModelOption, Range, Refused, Value};
+use crate::options::{MODEL, ModelOption, OptionDescription, OptionError, OptionValue, Range};
 use crate::service::proto;
 use prost::Message;
 use prost::encoding::{DecodeContext, WireType, decode_key, decode_varint, encode_key, encode_varint, skip_field};
@@ -36,7 +36,7 @@ pub fn options_from_wire(options: Option<proto::CompileOptions>) -> Result<Compi
     for option in MODEL.iter() {
         let value = take(option, &bytes).map_err(|_| Violation::new(field(option), "cannot be read"))?;
         // an empty name says nothing, as an absent one
-        if let Some(value) = value.filter(|value| *value != Value::Name(String::new())) {
+        if let Some(value) = value.filter(|value| *value != OptionValue::Name(String::new())) {
             options.choose(option, value).map_err(refused)?;
         }
     }
@@ -44,7 +44,7 @@ pub fn options_from_wire(options: Option<proto::CompileOptions>) -> Result<Compi
 }
 
 /// The field that an option out of its range came in.
-pub(crate) fn refused(refused: Refused) -> Violation {
+pub(crate) fn refused(refused: OptionError) -> Violation {
     let option = MODEL.iter().find(|option| option.about.name == refused.option);
     let field = option.map_or_else(|| format!("options.{}", refused.option), field);
     Violation::new(field, format!("expected {}, got {}", refused.expected, refused.got))
@@ -54,7 +54,7 @@ pub(crate) fn refused(refused: Refused) -> Violation {
 ///
 /// # Errors
 /// A violation of its field.
-pub(crate) fn analysis(about: &Described, value: Value) -> Result<(), Violation> {
+pub(crate) fn analysis(about: &OptionDescription, value: OptionValue) -> Result<(), Violation> {
     about.check(&value).map_err(|r| Violation::new(about.wire, format!("expected {}, got {}", r.expected, r.got)))
 }
 
@@ -62,22 +62,22 @@ fn field(option: &ModelOption) -> String {
     format!("options.{}", option.about.wire)
 }
 
-fn put(number: u32, value: &Value, bytes: &mut Vec<u8>) {
+fn put(number: u32, value: &OptionValue, bytes: &mut Vec<u8>) {
     match value {
-        Value::Unset => {}
-        Value::Flag(flag) => {
+        OptionValue::Unset => {}
+        OptionValue::Flag(flag) => {
             encode_key(number, WireType::Varint, bytes);
             encode_varint(u64::from(*flag), bytes);
         }
-        Value::Count(count) => {
+        OptionValue::Count(count) => {
             encode_key(number, WireType::Varint, bytes);
             encode_varint(u64::from(u32::try_from(*count).unwrap_or(u32::MAX)), bytes);
         }
-        Value::Number(x) => {
+        OptionValue::Number(x) => {
             encode_key(number, WireType::SixtyFourBit, bytes);
             bytes.extend(x.to_le_bytes());
         }
-        Value::Name(name) => {
+        OptionValue::Name(name) => {
             encode_key(number, WireType::LengthDelimited, bytes);
             encode_varint(name.len() as u64, bytes);
             bytes.extend(name.as_bytes());
@@ -86,7 +86,7 @@ fn put(number: u32, value: &Value, bytes: &mut Vec<u8>) {
 }
 
 /// The value of an option's field in a message; none: the field is absent.
-fn take(option: &ModelOption, mut bytes: &[u8]) -> Result<Option<Value>, prost::DecodeError> {
+fn take(option: &ModelOption, mut bytes: &[u8]) -> Result<Option<OptionValue>, prost::DecodeError> {
     while !bytes.is_empty() {
         let (number, kind) = decode_key(&mut bytes)?;
         if number != option.number {
@@ -98,14 +98,14 @@ fn take(option: &ModelOption, mut bytes: &[u8]) -> Result<Option<Value>, prost::
             _ => decode_varint(&mut bytes)?,
         };
         return Ok(Some(match (option.about.range, kind) {
-            (Range::Flag, WireType::Varint) => Value::Flag(length != 0),
-            (_, WireType::Varint) => Value::Count(usize::try_from(length).unwrap_or(usize::MAX)),
+            (Range::Flag, WireType::Varint) => OptionValue::Flag(length != 0),
+            (_, WireType::Varint) => OptionValue::Count(usize::try_from(length).unwrap_or(usize::MAX)),
             (_, WireType::SixtyFourBit) => {
-                Value::Number(bytes.first_chunk().map_or(f64::NAN, |chunk| f64::from_le_bytes(*chunk)))
+                OptionValue::Number(bytes.first_chunk().map_or(f64::NAN, |chunk| f64::from_le_bytes(*chunk)))
             }
             _ => {
                 let text = bytes.get(..usize::try_from(length).unwrap_or(usize::MAX)).unwrap_or_default();
-                Value::Name(String::from_utf8_lossy(text).into_owned())
+                OptionValue::Name(String::from_utf8_lossy(text).into_owned())
             }
         }));
     }
@@ -149,10 +149,10 @@ mod tests {
     fn every_option_travels() {
         for option in MODEL.iter() {
             let value = match option.about.range {
-                Range::Flag => Value::Flag(option.about.default != Value::Flag(true)),
-                Range::Count(low, _) => Value::Count(low + 1),
-                Range::Above(low, high) | Range::Within(low, high) => Value::Number(low + 0.25 * (high - low)),
-                Range::Names(names) => Value::Name(names[0].to_owned()),
+                Range::Flag => OptionValue::Flag(option.about.default != OptionValue::Flag(true)),
+                Range::Count(low, _) => OptionValue::Count(low + 1),
+                Range::Above(low, high) | Range::Within(low, high) => OptionValue::Number(low + 0.25 * (high - low)),
+                Range::Names(names) => OptionValue::Name(names[0].to_owned()),
             };
             let mut options = CompileOptions::default();
             options.choose(option, value).unwrap_or_else(|e| panic!("{e}"));

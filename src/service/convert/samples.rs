@@ -1,7 +1,7 @@
 //! Samples of parameters that vary by chance.
 
 use super::{Violation, number, required};
-use crate::jobs::sweep::{Design, Distribution, Samples, Sampling, Vary};
+use crate::jobs::sweep::{Design, Distribution, SampleGenerator, Sampling, Vary};
 use crate::service::proto;
 use proto::sweep_vary::Distribution as Wire;
 
@@ -34,7 +34,7 @@ pub(super) fn to_wire(asked: &Sampling) -> proto::SweepSamples {
 }
 
 /// Checked samples. Nothing is laid out for them.
-pub(super) fn from_wire(samples: proto::SweepSamples) -> Result<Samples, Violation> {
+pub(super) fn from_wire(samples: proto::SweepSamples) -> Result<SampleGenerator, Violation> {
     use proto::sweep_samples::Design as WireDesign;
     let design = match WireDesign::try_from(samples.design) {
         Ok(WireDesign::Random) => Design::Random,
@@ -72,5 +72,5 @@ pub(super) fn from_wire(samples: proto::SweepSamples) -> Result<Samples, Violati
         design,
         correlations: samples.correlations.into_iter().map(|c| (c.a, c.b, c.value)).collect(),
     };
-    Samples::new(asked).map_err(|error| Violation::new("spec.samples", error.to_string()))
+    SampleGenerator::new(asked).map_err(|error| Violation::new("spec.samples", error.to_string()))
 }

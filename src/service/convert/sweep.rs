@@ -2,11 +2,11 @@
 
 use super::model::{setting_from_wire, setting_to_wire};
 use super::{Violation, named, number, options, required, samples, voltages};
-use crate::jobs::sweep::journal::Kept;
+use crate::jobs::sweep::journal::JournalRow;
 use crate::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepRow, SweepSpec, SweepTable};
 use crate::netlist::Setting;
 use crate::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_STOP};
-use crate::options::{Described, Value};
+use crate::options::{OptionDescription, OptionValue};
 use crate::service::proto;
 use proto::sweep_parameter::Values;
 use proto::sweep_spec::Analysis;
@@ -94,7 +94,7 @@ pub fn spec_from_wire(spec: Option<proto::SweepSpec>) -> Result<SweepSpec, Viola
     for (i, axis) in spec.parameters.into_iter().enumerate() {
         parameters.push(axis_from_wire(&format!("spec.parameters[{i}]"), axis)?);
     }
-    let within = |part: &str, about: &Described, value: Value| {
+    let within = |part: &str, about: &OptionDescription, value: OptionValue| {
         options::analysis(about, value)
             .map_err(|refused| Violation { field: format!("spec.{part}.{}", refused.field), ..refused })
     };
@@ -104,15 +104,15 @@ pub fn spec_from_wire(spec: Option<proto::SweepSpec>) -> Result<SweepSpec, Viola
         }
         Analysis::Modes(m) => {
             let count = modes_of(&m);
-            within("modes", &MODES_COUNT, Value::Count(count))?;
+            within("modes", &MODES_COUNT, OptionValue::Count(count))?;
             SweepAnalysis::Modes { count, voltages: voltages("spec.modes.voltages", m.voltages)? }
         }
         Analysis::PullIn(p) => {
-            within("pull_in", &PULL_IN_MAX, Value::Number(p.max_v))?;
+            within("pull_in", &PULL_IN_MAX, OptionValue::Number(p.max_v))?;
             SweepAnalysis::PullIn { port: (!p.port.is_empty()).then_some(p.port), max: p.max_v }
         }
         Analysis::Transient(t) => {
-            within("transient", &TRAN_STOP, Value::Number(t.stop_s))?;
+            within("transient", &TRAN_STOP, OptionValue::Number(t.stop_s))?;
             let voltages = voltages("spec.transient.voltages", t.voltages)?;
             SweepAnalysis::Transient { stop: t.stop_s, outputs: t.outputs, voltages }
         }
@@ -161,7 +161,7 @@ pub fn row_to_wire(row: &SweepRow) -> proto::SweepRow {
 pub fn job_row_from_wire(
     row: proto::SweepRow,
     columns: Option<&proto::JobColumns>,
-) -> Result<(Vec<Setting>, Kept), Violation> {
+) -> Result<(Vec<Setting>, JournalRow), Violation> {
     let convert = |value| setting_from_wire("rows.parameters", value);
     let settings = row.parameters.into_iter().map(convert).collect::<Result<_, _>>()?;
     let columns = columns.filter(|_| row.error.is_empty());
@@ -174,7 +174,7 @@ pub fn job_row_from_wire(
     }
     let number = |x: f64| (!x.is_nan()).then_some(x);
     let values = names.iter().zip(units).zip(row.results);
-    let kept = Kept {
+    let kept = JournalRow {
         point: usize::try_from(row.point).unwrap_or(usize::MAX),
         values: values.map(|((name, unit), x)| (name.clone(), unit.clone(), number(x))).collect(),
         estimated_error: row.estimated_error,
@@ -213,13 +213,13 @@ pub fn chunk_from_wire(chunk: proto::SweepChunk, table: &mut SweepTable) -> Resu
 mod tests {
     //! A specification and a row come back as they were sent.
     use super::*;
-    use crate::jobs::sweep::{Design, Samples, Sampling};
+    use crate::jobs::sweep::{Design, SampleGenerator, Sampling};
 
-    fn samples() -> Samples {
+    fn samples() -> SampleGenerator {
         let vary = ["w=normal:2u:0.1u", "g=uniform:1u:2u", "E=lognormal:165e9:0.1"].map(|text| text.parse().unwrap());
         let correlations = vec![("w".to_owned(), "E".to_owned(), -0.5)];
         let asked = Sampling { vary: vary.to_vec(), count: 7, seed: u64::MAX, design: Design::Sobol, correlations };
-        Samples::new(asked).unwrap()
+        SampleGenerator::new(asked).unwrap()
     }
 
     /// However many and long the axes are, their product is known without them.

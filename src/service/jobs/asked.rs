@@ -4,7 +4,7 @@ use super::super::convert::{self, Violation};
 use super::super::proto;
 use super::super::turns::client;
 use crate::content::Fnv;
-use crate::jobs::sweep::part::Part;
+use crate::jobs::sweep::part::SweepPart;
 use crate::jobs::sweep::{SweepParameter, SweepSpec, journal};
 use crate::netlist::Bundle;
 use crate::options::CompileOptions;
@@ -20,7 +20,7 @@ const LONGEST_TITLE: usize = 200;
 
 /// What is known of a job from its first moment: what a folder keeps of it beside the request itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Asked {
+pub(super) struct JobOrigin {
     /// Who asked: the name of a client.
     pub(super) owner: String,
     /// What the client calls its request; empty: nothing.
@@ -49,7 +49,7 @@ pub(super) struct Asked {
     pub(super) points: u64,
 }
 
-impl Asked {
+impl JobOrigin {
     /// By the client at hand.
     ///
     /// # Errors
@@ -108,7 +108,7 @@ impl Asked {
         }
         self.sweep = journal::name(spec, bundle, options);
         // a grid that is none has none, and is refused
-        let part = (spec.shard.count > 1).then(|| Part::of(spec, bundle, options).ok()).flatten();
+        let part = (spec.shard.count > 1).then(|| SweepPart::of(spec, bundle, options).ok()).flatten();
         self.part = part.map(|part| part.to_string()).unwrap_or_default();
         self.netlist = bundle.root.chars().take(LONGEST_TITLE).collect();
         self

@@ -3,13 +3,13 @@
 use super::super::analyses::count;
 use super::super::convert::{Violation, sweep as sweeps_wire};
 use super::super::models::check_size;
-use super::super::shared::{Calls, Reply};
+use super::super::shared::{BimorphService, Reply};
 use super::super::{proto, status};
-use super::asked::Asked;
+use super::asked::JobOrigin;
 use super::job::Job;
 use super::pages::Page;
-use super::registry::{Jobs, Task};
-use super::standing::Stop;
+use super::registry::{JobRegistry, SweepTask};
+use super::standing::JobStopReason;
 use super::streams::{self, JobStream, RowStream};
 use proto::submit_job_request::Task as Wire;
 use std::sync::Arc;
@@ -20,14 +20,14 @@ fn id(name: &str) -> Result<&str, Status> {
     name.strip_prefix("jobs/").ok_or_else(|| status::not_found("job", name))
 }
 
-impl Calls {
+impl BimorphService {
     /// Starts a job, or finds the one that was started under the same name.
     pub(super) async fn started(&self, request: proto::SubmitJobRequest) -> Result<Arc<Job>, Status> {
         if self.0.shutdown.draining.is_cancelled() {
             return Err(status::stopping());
         }
         let limits = &self.0.limits;
-        let asked = Asked::by(&request).map_err(status::violation)?;
+        let asked = JobOrigin::by(&request).map_err(status::violation)?;
         let sizes = request.task.as_ref().map(|Wire::Sweep(spec)| {
             (sweeps_wire::grid_points(spec), sweeps_wire::outputs(spec), sweeps_wire::modes(spec))
         });
@@ -41,12 +41,12 @@ impl Calls {
         }
         let shared = Arc::clone(&self.0);
         let job = move || {
-            let task = Task::of(request.clone()).map_err(status::violation)?;
+            let task = SweepTask::of(request.clone()).map_err(status::violation)?;
             check_size(&task.bundle, &shared.limits)?;
             let job = shared.jobs.submit(asked.clone(), task, &request, &shared.limits)?;
             if shared.shutdown.draining.is_cancelled() {
                 // it came after those that run were told
-                job.stop(Stop::Suspended);
+                job.stop(JobStopReason::Suspended);
             }
             Ok(job)
         };
@@ -87,7 +87,7 @@ impl Calls {
 
     pub(in super::super) async fn cancelled_job(&self, name: &str) -> Reply<proto::CancelJobResponse> {
         let job = self.0.jobs.get(id(name)?, "job")?;
-        aside(move || Jobs::cancel(&job)).await?;
+        aside(move || JobRegistry::cancel(&job)).await?;
         Ok(Response::new(proto::CancelJobResponse {}))
     }
 

@@ -3,10 +3,10 @@
 //! the journal, and a job without its last file goes on. All of it counts among the bytes of the folder of states.
 
 use super::super::snapshots::checksum;
-use super::super::store::Store;
+use super::super::store::SessionStore;
 use super::super::survey::is_id;
-use super::asked::Asked;
-use crate::jobs::sweep::journal::{self, Journal, JournalError, Kept};
+use super::asked::JobOrigin;
+use crate::jobs::sweep::journal::{self, Journal, JournalError, JournalRow};
 use crate::jobs::sweep::sealed::{opened, sealed};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -21,7 +21,7 @@ const HEAD: &[u8; 16] = b"bimorph jobs 1\r\n";
 
 /// How a job ended.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct End {
+pub(super) struct JobOutcome {
     /// Code of gRPC; 0: with all of its rows.
     pub(super) code: i32,
     /// Why.
@@ -35,23 +35,23 @@ pub(super) struct End {
 }
 
 /// What was asked, and the request as it came.
-type Head = (Asked, Vec<u8>);
+type StoredRequest = (JobOrigin, Vec<u8>);
 
 /// What a folder has of a job.
-pub(super) struct Found {
+pub(super) struct StoredJob {
     pub(super) id: String,
-    pub(super) asked: Asked,
+    pub(super) asked: JobOrigin,
     /// The request as it came.
     pub(super) request: Vec<u8>,
     /// How it ended, as far as that is known.
-    pub(super) end: Option<End>,
+    pub(super) end: Option<JobOutcome>,
     pub(super) file: JobFile,
 }
 
 /// The files of one job.
 #[derive(Debug)]
 pub(super) struct JobFile {
-    store: Arc<Store>,
+    store: Arc<SessionStore>,
     id: String,
     sweep: String,
     journal: Option<Journal>,
@@ -63,7 +63,7 @@ pub(super) struct JobFile {
 ///
 /// # Errors
 /// What the system said, or the bound; then nothing of it is left.
-pub(super) fn begin(store: &Arc<Store>, id: &str, asked: &Asked, request: &[u8]) -> io::Result<JobFile> {
+pub(super) fn begin(store: &Arc<SessionStore>, id: &str, asked: &JobOrigin, request: &[u8]) -> io::Result<JobFile> {
     let file = JobFile::of(store, id, &asked.sweep);
     let head = head(asked, request)?;
     file.take(head.len())?;
@@ -86,7 +86,7 @@ pub(super) fn begin(store: &Arc<Store>, id: &str, asked: &Asked, request: &[u8])
 ///
 /// # Errors
 /// A folder that cannot be read.
-pub(super) fn ids(store: &Store) -> io::Result<BTreeSet<String>> {
+pub(super) fn ids(store: &SessionStore) -> io::Result<BTreeSet<String>> {
     let mut ids = BTreeSet::new();
     for entry in fs::read_dir(folder(store))? {
         let name = entry?.file_name().to_string_lossy().into_owned();
@@ -96,14 +96,14 @@ pub(super) fn ids(store: &Store) -> io::Result<BTreeSet<String>> {
 }
 
 /// What a folder has of a job. What was left of one that was never answered is removed.
-pub(super) fn find(store: &Arc<Store>, id: &str) -> Option<Found> {
+pub(super) fn find(store: &Arc<SessionStore>, id: &str) -> Option<StoredJob> {
     let file = JobFile::of(store, id, "");
     let counted = ["job", "rows", "end", "new"].iter().map(|end| file.size(end)).sum::<u64>();
     file.bytes.store(usize::try_from(counted).unwrap_or(usize::MAX), Ordering::Relaxed);
     match file.read() {
         Ok(Some(((asked, request), end))) => {
             let file = JobFile { sweep: asked.sweep.clone(), ..file };
-            return Some(Found { id: id.to_owned(), asked, request, end, file });
+            return Some(StoredJob { id: id.to_owned(), asked, request, end, file });
         }
         // there is nothing that could go on
         Ok(None) => file.remove(),
@@ -112,11 +112,11 @@ pub(super) fn find(store: &Arc<Store>, id: &str) -> Option<Found> {
     None
 }
 
-fn folder(store: &Store) -> PathBuf {
+fn folder(store: &SessionStore) -> PathBuf {
     store.folder.join("jobs")
 }
 
-fn head(asked: &Asked, request: &[u8]) -> io::Result<Vec<u8>> {
+fn head(asked: &JobOrigin, request: &[u8]) -> io::Result<Vec<u8>> {
     let asked = serde_json::to_vec(asked)?;
     let mut out = Vec::with_capacity(48 + asked.len() + request.len());
     out.extend(HEAD);
@@ -130,7 +130,7 @@ fn head(asked: &Asked, request: &[u8]) -> io::Result<Vec<u8>> {
 }
 
 /// None for a file that is not whole.
-fn read_head(bytes: &[u8]) -> Option<Head> {
+fn read_head(bytes: &[u8]) -> Option<StoredRequest> {
     let (head, rest) = bytes.split_at_checked(32)?;
     if !head.starts_with(HEAD) || head[16..] != checksum(rest).to_le_bytes() {
         return None;
@@ -142,7 +142,7 @@ fn read_head(bytes: &[u8]) -> Option<Head> {
 }
 
 impl JobFile {
-    fn of(store: &Arc<Store>, id: &str, sweep: &str) -> Self {
+    fn of(store: &Arc<SessionStore>, id: &str, sweep: &str) -> Self {
         let (store, id, sweep) = (Arc::clone(store), id.to_owned(), sweep.to_owned());
         Self { store, id, sweep, journal: None, bytes: AtomicUsize::new(0) }
     }
@@ -156,7 +156,7 @@ impl JobFile {
     }
 
     /// What was asked, and how it ended; none where it was never answered.
-    fn read(&self) -> io::Result<Option<(Head, Option<End>)>> {
+    fn read(&self) -> io::Result<Option<(StoredRequest, Option<JobOutcome>)>> {
         let there = |end: &str| match fs::read(self.path(end)) {
             Ok(bytes) => Ok(Some(bytes)),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -167,7 +167,7 @@ impl JobFile {
         let head = read_head(&bytes).ok_or_else(strange)?;
         // one that is damaged is as if it had never been: the job goes on
         let end = there("end")?.and_then(|bytes| {
-            let end: Option<End> = opened(&bytes).and_then(|object| serde_json::from_slice(&object).ok());
+            let end: Option<JobOutcome> = opened(&bytes).and_then(|object| serde_json::from_slice(&object).ok());
             if end.is_none() {
                 tracing::warn!(job = self.id, "its end is damaged, so it goes on");
             }
@@ -197,7 +197,7 @@ impl JobFile {
     ///
     /// # Errors
     /// What the system said.
-    pub(super) fn open(&mut self) -> io::Result<Vec<Kept>> {
+    pub(super) fn open(&mut self) -> io::Result<Vec<JournalRow>> {
         let path = self.path("rows");
         let before = self.size("rows");
         let (journal, rows) = self.store.disk().journal(&path, &self.sweep).map_err(io_error)?;
@@ -223,7 +223,7 @@ impl JobFile {
     ///
     /// # Errors
     /// What the system said.
-    pub(super) fn read_rows(&self) -> io::Result<Vec<Kept>> {
+    pub(super) fn read_rows(&self) -> io::Result<Vec<JournalRow>> {
         Journal::read(&self.path("rows"), &self.sweep).map_err(io_error)
     }
 
@@ -231,7 +231,7 @@ impl JobFile {
     ///
     /// # Errors
     /// What the system said, or the bound; then none of them is there.
-    pub(super) fn append(&self, rows: &[Kept]) -> io::Result<()> {
+    pub(super) fn append(&self, rows: &[JournalRow]) -> io::Result<()> {
         let lines = journal::lines(rows)?;
         self.take(lines.len())?;
         let Some(journal) = &self.journal else { return Err(io::Error::other("its journal is closed")) };
@@ -242,8 +242,9 @@ impl JobFile {
     ///
     /// # Errors
     /// What the system said.
-    pub(super) fn end(&self, end: &End) -> io::Result<()> {
-        let end = End { bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), Journal::bytes), ..end.clone() };
+    pub(super) fn end(&self, end: &JobOutcome) -> io::Result<()> {
+        let end =
+            JobOutcome { bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), Journal::bytes), ..end.clone() };
         let (bytes, path, unfinished) = (sealed(serde_json::to_vec(&end)?), self.path("end"), self.path("new"));
         let before = usize::try_from(self.size("end")).unwrap_or(usize::MAX);
         self.store.room().count(0, bytes.len());

@@ -4,23 +4,23 @@ use std::collections::{BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
 /// Connections of its client that a job remembers; of more, the last.
-const MOST: usize = 1024;
+const MAX_CONNECTIONS: usize = 1024;
 
 /// Connections by which a job was asked for.
 #[derive(Debug, Default)]
-pub(super) struct Holders {
+pub(super) struct JobHolders {
     connections: VecDeque<u64>,
     /// Since when all of them are closed.
     gone: Option<Instant>,
 }
 
-impl Holders {
+impl JobHolders {
     /// It was asked for by one.
     pub(super) fn take(&mut self, connection: u64) {
         self.gone = None;
         if !self.connections.contains(&connection) {
             self.connections.push_back(connection);
-            if self.connections.len() > MOST {
+            if self.connections.len() > MAX_CONNECTIONS {
                 self.connections.pop_front();
             }
         }

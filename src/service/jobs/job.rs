@@ -4,14 +4,14 @@
 //! the disk is waited for go there together.
 
 use super::super::{proto, status};
-use super::asked::{Asked, now_ms};
-use super::folder::{End, JobFile};
-use super::holders::Holders;
-use super::rows::Rows;
-use super::standing::{Standing, Stop, state_of};
+use super::asked::{JobOrigin, now_ms};
+use super::folder::{JobFile, JobOutcome};
+use super::holders::JobHolders;
+use super::rows::FinishedRows;
+use super::standing::{JobState, JobStopReason, state_of};
 use super::wire;
 use crate::budget::{Budget, Stopped};
-use crate::jobs::sweep::journal::Kept;
+use crate::jobs::sweep::journal::JournalRow;
 use crate::jobs::sweep::{SweepError, SweepSpec, SweepTable};
 use proto::job_metadata::State;
 use std::collections::BTreeSet;
@@ -29,29 +29,29 @@ const BATCH: Duration = Duration::from_millis(20);
 #[derive(Debug)]
 pub(super) struct Job {
     pub(super) id: String,
-    pub(super) asked: Asked,
+    pub(super) asked: JobOrigin,
     pub(super) spec: SweepSpec,
     pub(super) budget: Budget,
     options: Option<proto::CompileOptions>,
-    pub(super) standing: watch::Sender<Standing>,
+    pub(super) standing: watch::Sender<JobState>,
     /// None: on the disk alone.
-    pub(super) rows: Mutex<Option<Rows>>,
+    pub(super) rows: Mutex<Option<FinishedRows>>,
     /// Its table, while somebody reads it.
     pub(super) table: Mutex<Weak<SweepTable>>,
-    waiting: Mutex<Waiting>,
+    waiting: Mutex<UnwrittenRows>,
     /// Where it is kept; none: nowhere, or not any more.
     pub(super) file: Mutex<Option<JobFile>>,
     kept: bool,
-    stop: OnceLock<Stop>,
+    stop: OnceLock<JobStopReason>,
     pub(super) stopped: CancellationToken,
     pub(super) used: Mutex<Instant>,
-    holders: Mutex<Holders>,
+    holders: Mutex<JobHolders>,
 }
 
 /// Rows on their way to the disk.
 #[derive(Debug, Default)]
-struct Waiting {
-    rows: Vec<Kept>,
+struct UnwrittenRows {
+    rows: Vec<JournalRow>,
     /// Whether somebody takes them there.
     carried: bool,
 }
@@ -64,10 +64,10 @@ impl Job {
     /// With the rows that it has; none: they are on the disk alone.
     pub(super) fn new(
         id: String,
-        (asked, spec, options): (Asked, SweepSpec, Option<proto::CompileOptions>),
+        (asked, spec, options): (JobOrigin, SweepSpec, Option<proto::CompileOptions>),
         budget: Budget,
         file: Option<JobFile>,
-        (rows, standing): (Option<Rows>, Standing),
+        (rows, standing): (Option<FinishedRows>, JobState),
     ) -> Arc<Self> {
         Arc::new(Self {
             id,
@@ -89,12 +89,12 @@ impl Job {
     }
 
     /// Where it stands, now and later.
-    pub(super) fn watch(&self) -> watch::Receiver<Standing> {
+    pub(super) fn watch(&self) -> watch::Receiver<JobState> {
         self.standing.subscribe()
     }
 
     /// Where it stands.
-    pub(super) fn standing(&self) -> Standing {
+    pub(super) fn standing(&self) -> JobState {
         self.standing.borrow().clone()
     }
 
@@ -106,7 +106,7 @@ impl Job {
     /// Whether it goes on, or has ended with all of its rows, and is not told to stop.
     pub(super) fn lives(&self) -> bool {
         match self.standing.borrow().state {
-            State::Done => !matches!(self.stop.get(), Some(Stop::Deleted)),
+            State::Done => !matches!(self.stop.get(), Some(JobStopReason::Deleted)),
             State::Cancelled | State::Failed => false,
             State::Waiting | State::Running | State::Unspecified => self.stop.get().is_none(),
         }
@@ -141,12 +141,12 @@ impl Job {
         if self.is_watched() {
             held(&self.holders).are_there();
         } else if held(&self.holders).are_gone(open).is_some_and(|time| time >= release) {
-            self.stop(Stop::Released(release));
+            self.stop(JobStopReason::Released(release));
         }
     }
 
     /// Stops it; the first reason holds.
-    pub(super) fn stop(&self, why: Stop) {
+    pub(super) fn stop(&self, why: JobStopReason) {
         // before its points are stopped: what comes of them from here on is not theirs
         let _ = self.stop.set(why);
         self.budget.cancel();
@@ -182,7 +182,7 @@ impl Job {
     }
 
     /// A point is done; whether to go on.
-    pub(super) fn found(self: &Arc<Self>, kept: Kept, runtime: &Handle) -> bool {
+    pub(super) fn found(self: &Arc<Self>, kept: JournalRow, runtime: &Handle) -> bool {
         if self.stop.get().is_some() {
             return false;
         }
@@ -221,12 +221,12 @@ impl Job {
             Ok(()) => self.publish(rows),
             Err(error) => {
                 tracing::warn!(%error, job = self.id, "its rows cannot be kept");
-                self.stop(Stop::Disk(error));
+                self.stop(JobStopReason::Disk(error));
             }
         }
     }
 
-    fn publish(&self, found: Vec<Kept>) {
+    fn publish(&self, found: Vec<JournalRow>) {
         let mut rows = held(&self.rows);
         let rows = rows.get_or_insert_default();
         found.into_iter().for_each(|kept| rows.push(kept));
@@ -240,17 +240,17 @@ impl Job {
     /// [`SweepError`] where it has no room for them.
     pub(super) fn points(&self) -> Result<BTreeSet<usize>, SweepError> {
         let rows = held(&self.rows);
-        let bytes = rows.iter().map(Rows::bytes).sum();
+        let bytes = rows.iter().map(FinishedRows::bytes).sum();
         self.budget.take(bytes).map_err(|why| match why {
             Stopped::Bytes { most, .. } => SweepError::TooLarge { most },
             why => SweepError::Owner(why),
         })?;
-        Ok(rows.iter().flat_map(Rows::points).collect())
+        Ok(rows.iter().flat_map(FinishedRows::points).collect())
     }
 
-    fn ending(&self, standing: &Standing, code: Code, message: String) -> End {
-        let Standing { rows, failed, .. } = *standing;
-        End { code: code as i32, message, rows, failed, ended_ms: now_ms(), bytes: 0 }
+    fn ending(&self, standing: &JobState, code: Code, message: String) -> JobOutcome {
+        let JobState { rows, failed, .. } = *standing;
+        JobOutcome { code: code as i32, message, rows, failed, ended_ms: now_ms(), bytes: 0 }
     }
 
     /// It is over: with all of its rows, for the reason that it was stopped for, or for what `why` says.
@@ -260,7 +260,7 @@ impl Job {
         let stop = self.stop.get();
         let failure = match (stop, why) {
             _ if standing.rows == self.asked.points => None,
-            (Some(Stop::Suspended), _) if self.kept => {
+            (Some(JobStopReason::Suspended), _) if self.kept => {
                 self.standing.send_modify(|standing| standing.suspended = true);
                 return;
             }
@@ -273,7 +273,7 @@ impl Job {
     }
 
     /// It has ended so. What it was told of is on the disk before, as far as there is room for it.
-    pub(super) fn end(&self, end: End) {
+    pub(super) fn end(&self, end: JobOutcome) {
         // held until it is told, so that nobody keeps another end after this one
         let mut file = held(&self.file);
         if let Some(file) = file.as_mut() {
@@ -306,7 +306,7 @@ impl Job {
 
     /// Comes back when nothing of it is computed any more.
     pub(super) async fn quiet(&self) {
-        let over = |standing: &Standing| standing.end.is_some() || standing.suspended;
+        let over = |standing: &JobState| standing.end.is_some() || standing.suspended;
         // the sender is there as long as the job
         let _ = self.watch().wait_for(over).await;
     }
@@ -318,7 +318,7 @@ impl Job {
 
     /// Stops and removes it, with its files.
     pub(super) fn delete(&self) {
-        self.stop(Stop::Deleted);
+        self.stop(JobStopReason::Deleted);
         if let Some(file) = held(&self.file).take() {
             file.remove();
         }

@@ -1,7 +1,7 @@
 //! The older calls of sweeps, on the same jobs: a sweep is called as its job is, without "jobs/".
 
 use super::super::proto;
-use super::super::shared::{Calls, Reply};
+use super::super::shared::{BimorphService, Reply};
 use super::calls::aside;
 use super::job::Job;
 use super::streams::{self, SweepStream, TableStream};
@@ -9,7 +9,7 @@ use proto::job_metadata::State;
 use proto::sweep_status::State as Older;
 use tonic::{Response, Status};
 
-impl Calls {
+impl BimorphService {
     pub(in super::super) async fn submitted_sweep(
         &self,
         request: proto::SubmitSweepRequest,

@@ -1,18 +1,18 @@
 //! A machine may lose its power at any moment of a job: a job that was answered is there, with every row that was given out, and one
 //! that was told to have ended has ended.
 
-use super::super::power_cuts::{Bytes, Machine};
-use super::super::store::Store;
-use super::asked::Asked;
-use super::folder::{self, End, Found};
-use crate::jobs::sweep::journal::Kept;
+use super::super::power_cuts::{Machine, UnsyncedBytes};
+use super::super::store::SessionStore;
+use super::asked::JobOrigin;
+use super::folder::{self, JobOutcome, StoredJob};
+use crate::jobs::sweep::journal::JournalRow;
 use std::sync::Arc;
 
 const ID: &str = "0123456789abcdef0123456789abcdef";
 const REQUEST: &[u8] = b"what was asked";
 
-fn asked() -> Asked {
-    Asked {
+fn asked() -> JobOrigin {
+    JobOrigin {
         owner: String::new(),
         request: "by name".into(),
         content: String::new(),
@@ -29,9 +29,9 @@ fn asked() -> Asked {
     }
 }
 
-fn row(point: usize) -> Kept {
+fn row(point: usize) -> JournalRow {
     let values = vec![("yoke.y".into(), "m".into(), Some(1e-9 / (1 + point) as f64))];
-    Kept { point, values, estimated_error: Some(1e-4), warning: "w".repeat(30 * point), error: None }
+    JournalRow { point, values, estimated_error: Some(1e-4), warning: "w".repeat(30 * point), error: None }
 }
 
 /// What was answered.
@@ -46,7 +46,7 @@ enum Answered {
 #[test]
 fn nothing_that_a_job_gave_out_is_lost_with_the_power() {
     let folder = tempfile::tempdir().expect("a folder");
-    let store = Arc::new(Store::open(folder.path(), true, 1 << 20).expect("opens"));
+    let store = Arc::new(SessionStore::open(folder.path(), true, 1 << 20).expect("opens"));
     let done = || store.disk().done.lock().expect("nobody panicked").clone();
     let mut answered = Vec::new();
     let mut file = folder::begin(&store, ID, &asked(), REQUEST).expect("there is room");
@@ -56,7 +56,7 @@ fn nothing_that_a_job_gave_out_is_lost_with_the_power() {
         file.append(&(first..last).map(row).collect::<Vec<_>>()).expect("kept");
         answered.push((Answered::Rows(last), done().len()));
     }
-    let end = End { code: 0, message: String::new(), rows: 12, failed: 0, ended_ms: 7, bytes: 0 };
+    let end = JobOutcome { code: 0, message: String::new(), rows: 12, failed: 0, ended_ms: 7, bytes: 0 };
     file.end(&end).expect("kept");
     answered.push((Answered::End, done().len()));
     drop(file);
@@ -65,12 +65,12 @@ fn nothing_that_a_job_gave_out_is_lost_with_the_power() {
         let machine = Machine::after(&done[..power]);
         let before = || answered.iter().filter(|(_, when)| *when <= power).map(|(what, _)| *what);
         let rows = before().filter_map(|what| if let Answered::Rows(n) = what { Some(n) } else { None }).max();
-        for bytes in Bytes::ALL {
+        for bytes in UnsyncedBytes::ALL {
             for new_names in [false, true] {
                 let case = format!("{bytes:?}, {new_names}, after {power} of {}", done.len());
                 let found = machine.found(folder.path(), bytes, new_names);
-                let store = Arc::new(Store::open(found.path(), true, 1 << 20).expect("opens"));
-                let Some(Found { asked: known, request, end, mut file, .. }) = folder::find(&store, ID) else {
+                let store = Arc::new(SessionStore::open(found.path(), true, 1 << 20).expect("opens"));
+                let Some(StoredJob { asked: known, request, end, mut file, .. }) = folder::find(&store, ID) else {
                     assert_eq!(before().count(), 0, "lost: {case}");
                     continue;
                 };

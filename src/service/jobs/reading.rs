@@ -1,11 +1,11 @@
 //! The rows of a job as they are read, from memory or from the disk.
 
 use super::super::{proto, status};
-use super::folder::End;
+use super::folder::JobOutcome;
 use super::job::{Job, held};
-use super::rows::{Reading, Rows};
+use super::rows::{FinishedRows, RowCursor};
 use super::standing::state_of;
-use crate::jobs::sweep::journal::Kept;
+use crate::jobs::sweep::journal::JournalRow;
 use crate::jobs::sweep::{self, SweepTable};
 use std::sync::{Arc, MutexGuard};
 use std::time::Instant;
@@ -16,7 +16,7 @@ impl Job {
     ///
     /// # Errors
     /// Files that cannot be read, or do not have what they had.
-    fn loaded(&self) -> Result<MutexGuard<'_, Option<Rows>>, Status> {
+    fn loaded(&self) -> Result<MutexGuard<'_, Option<FinishedRows>>, Status> {
         let file = held(&self.file);
         let mut rows = held(&self.rows);
         if rows.is_some() {
@@ -36,7 +36,7 @@ impl Job {
             self.lose(&status);
             return Err(status);
         }
-        let mut found = Rows::default();
+        let mut found = FinishedRows::default();
         read.into_iter().for_each(|kept| found.push(kept));
         *rows = Some(found);
         Ok(rows)
@@ -45,7 +45,7 @@ impl Job {
     /// Its rows are damaged on the disk: it is not done any more. That is not kept, so the next server computes them again.
     fn lose(&self, why: &Status) {
         self.standing.send_modify(|standing| {
-            let lost = standing.end.as_ref().map(|end| End {
+            let lost = standing.end.as_ref().map(|end| JobOutcome {
                 code: why.code() as i32,
                 message: why.message().to_owned(),
                 ..end.clone()
@@ -60,7 +60,7 @@ impl Job {
     ///
     /// # Errors
     /// As it is read.
-    pub(super) fn chunk(&self, reading: &mut Reading, end: u64) -> Result<proto::JobRows, Status> {
+    pub(super) fn chunk(&self, reading: &mut RowCursor, end: u64) -> Result<proto::JobRows, Status> {
         *held(&self.used) = Instant::now();
         let mut rows = self.loaded()?;
         Ok(rows.get_or_insert_default().chunk(&self.spec, reading, end))
@@ -85,8 +85,9 @@ impl Job {
             return Ok(table);
         }
         let rows = self.loaded()?;
-        let with = |kept: Kept| (self.spec.settings(kept.point).into_iter().map(|(_, value)| value).collect(), kept);
-        let found = rows.iter().flat_map(Rows::found).map(with).collect();
+        let with =
+            |kept: JournalRow| (self.spec.settings(kept.point).into_iter().map(|(_, value)| value).collect(), kept);
+        let found = rows.iter().flat_map(FinishedRows::found).map(with).collect();
         drop(rows);
         self.unload();
         let table = Arc::new(sweep::table_of(self.spec.names().map(str::to_owned).collect(), found));

@@ -6,17 +6,17 @@ use super::super::convert::Violation;
 use super::super::ids::Ids;
 use super::super::limits::Limits;
 use super::super::models::check_size;
-use super::super::store::Store;
+use super::super::store::SessionStore;
 use super::super::turns::client;
 use super::super::work::{allowance, of_client};
 use super::super::{convert, proto, status};
-use super::asked::Asked;
-use super::folder::{self, End, Found, JobFile};
+use super::asked::JobOrigin;
+use super::folder::{self, JobFile, JobOutcome, StoredJob};
 use super::job::Job;
 use super::pages::{Page, token};
-use super::rows::Rows;
-use super::running::Crews;
-use super::standing::{Standing, Stop, state_of};
+use super::rows::FinishedRows;
+use super::running::JobExecutors;
+use super::standing::{JobState, JobStopReason, state_of};
 use crate::budget::{Allowance, Budget};
 use crate::jobs::sweep::{self, SweepError, SweepSpec};
 use crate::netlist::Bundle;
@@ -30,13 +30,13 @@ use std::time::Duration;
 use tonic::{Code, Status};
 
 /// What a job computes.
-pub(super) struct Task {
+pub(super) struct SweepTask {
     pub(super) spec: SweepSpec,
     pub(super) bundle: Bundle,
     pub(super) options: CompileOptions,
 }
 
-impl Task {
+impl SweepTask {
     /// As it was asked for.
     ///
     /// # Errors
@@ -53,20 +53,20 @@ impl Task {
 }
 
 /// The jobs of a server.
-pub(in super::super) struct Jobs {
+pub(in super::super) struct JobRegistry {
     kept: Mutex<BTreeMap<String, Arc<Job>>>,
     /// Held by who takes in a job, until it is on the disk.
     taking_in: Mutex<()>,
     sequence: AtomicU64,
     ids: Ids,
-    crews: Arc<Crews>,
-    store: Option<Arc<Store>>,
+    crews: Arc<JobExecutors>,
+    store: Option<Arc<SessionStore>>,
 }
 
-impl Jobs {
+impl JobRegistry {
     /// None yet; with a folder, those that are in it are there after [`Self::wake`]. Within a runtime.
-    pub(in super::super) fn new(limits: &Limits, store: Option<Arc<Store>>) -> Self {
-        let crews = Arc::new(Crews::new(limits));
+    pub(in super::super) fn new(limits: &Limits, store: Option<Arc<SessionStore>>) -> Self {
+        let crews = Arc::new(JobExecutors::new(limits));
         Self {
             kept: Mutex::default(),
             taking_in: Mutex::default(),
@@ -92,12 +92,12 @@ impl Jobs {
     /// INVALID_ARGUMENT, or RESOURCE_EXHAUSTED where there is no room.
     pub(super) fn submit(
         &self,
-        asked: Asked,
-        task: Task,
+        asked: JobOrigin,
+        task: SweepTask,
         request: &proto::SubmitJobRequest,
         limits: &Limits,
     ) -> Result<Arc<Job>, Status> {
-        let Task { spec, bundle, options } = task;
+        let SweepTask { spec, bundle, options } = task;
         // before anything is laid out for each value
         let violation = |error: SweepError| status::bad_request(&error.to_string(), [spec_violation(&error)]);
         let points = spec.grid_points().map_err(violation)?;
@@ -126,7 +126,7 @@ impl Jobs {
             room(&kept, &asked.owner, limits)?;
         }
         let sequence = self.sequence.fetch_add(1, Ordering::Relaxed);
-        let asked = Asked { sequence, points, ..asked };
+        let asked = JobOrigin { sequence, points, ..asked };
         let file = self.store.as_ref().map(|store| -> std::io::Result<JobFile> {
             let mut file = folder::begin(store, &id, &asked, &request.encode_to_vec())?;
             file.open().inspect_err(|_| file.remove())?;
@@ -134,8 +134,8 @@ impl Jobs {
         });
         let file = file.transpose().map_err(|error| status::not_kept("the job is", &error))?;
         let parts = (asked, spec, request.options.clone());
-        let standing = Standing { state: State::Waiting, ..Standing::default() };
-        let job = Job::new(id.clone(), parts, budget, file, (Some(Rows::default()), standing));
+        let standing = JobState { state: State::Waiting, ..JobState::default() };
+        let job = Job::new(id.clone(), parts, budget, file, (Some(FinishedRows::default()), standing));
         job.touch(client().number);
         self.kept().insert(id, Arc::clone(&job));
         self.crews.start(&job, bundle, options);
@@ -159,16 +159,16 @@ impl Jobs {
         Ok(())
     }
 
-    fn wake_one(&self, found: Found, accounts: &Accounts, limits: &Limits) -> Result<(), String> {
-        let Found { id, asked, request, end, mut file } = found;
+    fn wake_one(&self, found: StoredJob, accounts: &Accounts, limits: &Limits) -> Result<(), String> {
+        let StoredJob { id, asked, request, end, mut file } = found;
         let request = proto::SubmitJobRequest::decode(&*request).map_err(|error| error.to_string())?;
         let wire_options = request.options.clone();
-        let Task { spec, bundle, options } = Task::of(request).map_err(|violation| violation.description)?;
+        let SweepTask { spec, bundle, options } = SweepTask::of(request).map_err(|violation| violation.description)?;
         let purse = accounts.of(&asked.owner).purse.clone();
         let budget = Budget::new(Allowance { purse, ..allowance(limits) });
         // what it was told of is there, whole: its rows are read again when somebody asks for them
-        let whole = |end: &End| end.code != Code::Ok as i32 || end.rows == asked.points;
-        let are_there = |end: &End| {
+        let whole = |end: &JobOutcome| end.code != Code::Ok as i32 || end.rows == asked.points;
+        let are_there = |end: &JobOutcome| {
             let found = file.read_rows().map_or(0, |rows| rows.len() as u64);
             if found < end.rows {
                 tracing::warn!(job = id, "{} of its {} rows are damaged", end.rows - found, end.rows);
@@ -177,12 +177,12 @@ impl Jobs {
         };
         if let Some(end) = end.clone().filter(|end| end.bytes == file.row_bytes() && whole(end) && are_there(end)) {
             let (state, rows, failed) = (state_of(end.code), end.rows, end.failed);
-            let standing = Standing { state, rows, failed, end: Some(end), ..Standing::default() };
+            let standing = JobState { state, rows, failed, end: Some(end), ..JobState::default() };
             let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (None, standing));
             self.kept().insert(id, job);
             return Ok(());
         }
-        let mut rows = Rows::default();
+        let mut rows = FinishedRows::default();
         let lost = match file.open() {
             Ok(found) => {
                 found.into_iter().for_each(|kept| rows.push(kept));
@@ -194,7 +194,7 @@ impl Jobs {
             }
         };
         let standing =
-            Standing { state: State::Waiting, rows: rows.len(), failed: rows.failed(), ..Standing::default() };
+            JobState { state: State::Waiting, rows: rows.len(), failed: rows.failed(), ..JobState::default() };
         let cancelled = end.filter(|end| end.code != Code::Ok as i32);
         let why_not = goes_on(&asked, &bundle, limits).err().filter(|_| standing.rows < asked.points);
         let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (Some(rows), standing));
@@ -238,7 +238,7 @@ impl Jobs {
     /// It is stopped, but not on the disk.
     pub(super) fn cancel(job: &Job) -> Result<(), Status> {
         let kept = job.keep_cancelled();
-        job.stop(Stop::Cancelled);
+        job.stop(JobStopReason::Cancelled);
         kept.map_err(|error| status::not_kept("the job is stopped; that it is cancelled is", &error))
     }
 
@@ -251,7 +251,7 @@ impl Jobs {
     /// Stops all that run: those in a folder go on with the next server.
     pub(in super::super) fn suspend(&self) {
         let jobs: Vec<_> = self.kept().values().cloned().collect();
-        jobs.iter().filter(|job| !job.has_ended()).for_each(|job| job.stop(Stop::Suspended));
+        jobs.iter().filter(|job| !job.has_ended()).for_each(|job| job.stop(JobStopReason::Suspended));
     }
 
     /// Comes back when all that were suspended have stopped, and lets go of the folder.
@@ -288,7 +288,7 @@ impl Jobs {
 }
 
 /// Whether this server may go on with a job that another one began.
-fn goes_on(asked: &Asked, bundle: &Bundle, limits: &Limits) -> Result<(), Status> {
+fn goes_on(asked: &JobOrigin, bundle: &Bundle, limits: &Limits) -> Result<(), Status> {
     let own = env!("CARGO_PKG_VERSION");
     if asked.version != own {
         let text =
@@ -321,7 +321,7 @@ fn room(kept: &BTreeMap<String, Arc<Job>>, owner: &str, limits: &Limits) -> Resu
 }
 
 /// Among those that are kept, the one that its client asked for by the same name.
-fn already(kept: &BTreeMap<String, Arc<Job>>, asked: &Asked) -> Result<Option<Arc<Job>>, Status> {
+fn already(kept: &BTreeMap<String, Arc<Job>>, asked: &JobOrigin) -> Result<Option<Arc<Job>>, Status> {
     let mut same = kept.values().filter_map(|job| job.asked.is(asked).map(|same| (job, same)));
     if asked.share {
         return Ok(same.filter(|(_, same)| *same).map(|(job, _)| job).find(|job| job.lives()).cloned());

@@ -5,24 +5,24 @@ use super::super::convert::model::setting_to_wire;
 use super::super::pace::CHUNK_BYTES;
 use super::super::proto;
 use crate::jobs::sweep::SweepSpec;
-use crate::jobs::sweep::journal::Kept;
+use crate::jobs::sweep::journal::JournalRow;
 use prost::Message;
 use std::collections::BTreeMap;
 
 /// Names and units of the columns of a row.
-type Columns = Vec<(String, String)>;
+type RowColumns = Vec<(String, String)>;
 
 /// Rows in the order in which they were finished.
 #[derive(Debug, Default)]
-pub(super) struct Rows {
-    columns: Vec<Columns>,
-    known: BTreeMap<Columns, u32>,
-    rows: Vec<Row>,
+pub(super) struct FinishedRows {
+    columns: Vec<RowColumns>,
+    known: BTreeMap<RowColumns, u32>,
+    rows: Vec<FinishedRow>,
     failed: u64,
 }
 
 #[derive(Debug)]
-struct Row {
+struct FinishedRow {
     point: usize,
     columns: u32,
     /// NaN where the quantity does not exist.
@@ -35,7 +35,7 @@ struct Row {
 
 /// How far a stream has come.
 #[derive(Debug, Default)]
-pub(super) struct Reading {
+pub(super) struct RowCursor {
     /// The next row.
     pub(super) next: u64,
     /// Columns that it was told of, and their numbers on the stream.
@@ -44,19 +44,19 @@ pub(super) struct Reading {
     pub(super) begun: bool,
 }
 
-impl Reading {
+impl RowCursor {
     /// From a row on.
     pub(super) fn from(next: u64) -> Self {
         Self { next, ..Self::default() }
     }
 }
 
-impl Rows {
+impl FinishedRows {
     /// Takes in a row.
-    pub(super) fn push(&mut self, kept: Kept) {
-        let Kept { point, values, estimated_error, warning, error } = kept;
+    pub(super) fn push(&mut self, kept: JournalRow) {
+        let JournalRow { point, values, estimated_error, warning, error } = kept;
         let numbers = values.iter().map(|(_, _, value)| value.unwrap_or(f64::NAN)).collect();
-        let columns: Columns = values.into_iter().map(|(name, unit, _)| (name, unit)).collect();
+        let columns: RowColumns = values.into_iter().map(|(name, unit, _)| (name, unit)).collect();
         let last = self.rows.last().map(|row| row.columns).filter(|last| self.columns[*last as usize] == columns);
         let columns = match last.or_else(|| self.known.get(&columns).copied()) {
             Some(known) => known,
@@ -69,7 +69,7 @@ impl Rows {
         };
         self.failed += u64::from(error.is_some());
         let (warning, error) = (warning.into(), error.map(Into::into));
-        self.rows.push(Row { point, columns, values: numbers, estimated_error, warning, error });
+        self.rows.push(FinishedRow { point, columns, values: numbers, estimated_error, warning, error });
     }
 
     /// Rows that there are.
@@ -89,16 +89,16 @@ impl Rows {
 
     /// Bytes that they take, about.
     pub(super) fn bytes(&self) -> usize {
-        let texts = |row: &Row| row.warning.len() + row.error.as_ref().map_or(0, |error| error.len());
-        self.rows.iter().map(|row| size_of::<Row>() + 8 * row.values.len() + texts(row)).sum()
+        let texts = |row: &FinishedRow| row.warning.len() + row.error.as_ref().map_or(0, |error| error.len());
+        self.rows.iter().map(|row| size_of::<FinishedRow>() + 8 * row.values.len() + texts(row)).sum()
     }
 
     /// Every row as it was found.
-    pub(super) fn found(&self) -> impl Iterator<Item = Kept> {
+    pub(super) fn found(&self) -> impl Iterator<Item = JournalRow> {
         self.rows.iter().map(|row| {
             let number = |x: &f64| (!x.is_nan()).then_some(*x);
             let columns = self.columns[row.columns as usize].iter().zip(&row.values);
-            Kept {
+            JournalRow {
                 point: row.point,
                 values: columns.map(|((name, unit), x)| (name.clone(), unit.clone(), number(x))).collect(),
                 estimated_error: row.estimated_error,
@@ -109,7 +109,7 @@ impl Rows {
     }
 
     /// The next rows of a stream, as many as fit into a message, and below `end`.
-    pub(super) fn chunk(&self, spec: &SweepSpec, reading: &mut Reading, end: u64) -> proto::JobRows {
+    pub(super) fn chunk(&self, spec: &SweepSpec, reading: &mut RowCursor, end: u64) -> proto::JobRows {
         let mut chunk = proto::JobRows { first_row: reading.next, ..Default::default() };
         if !std::mem::replace(&mut reading.begun, true) {
             chunk.parameters = spec.names().map(str::to_owned).collect();
@@ -141,12 +141,12 @@ impl Rows {
     }
 }
 
-fn wire_columns(columns: &Columns) -> proto::JobColumns {
+fn wire_columns(columns: &RowColumns) -> proto::JobColumns {
     let (results, units) = columns.iter().cloned().unzip();
     proto::JobColumns { results, units }
 }
 
-impl Row {
+impl FinishedRow {
     fn to_wire(&self, spec: &SweepSpec) -> proto::SweepRow {
         proto::SweepRow {
             point: self.point as u64,
@@ -165,10 +165,10 @@ mod tests {
     use super::*;
     use crate::jobs::sweep::{Shard, SweepAnalysis};
 
-    fn kept(point: usize, columns: &[&str], error: Option<&str>) -> Kept {
+    fn kept(point: usize, columns: &[&str], error: Option<&str>) -> JournalRow {
         let value = |name: &&str| ((*name).to_owned(), "m".to_owned(), (*name != "gone").then_some(point as f64));
         let values = if error.is_some() { Vec::new() } else { columns.iter().map(value).collect() };
-        Kept { point, values, estimated_error: Some(0.5), warning: "w".into(), error: error.map(str::to_owned) }
+        JournalRow { point, values, estimated_error: Some(0.5), warning: "w".into(), error: error.map(str::to_owned) }
     }
 
     #[test]
@@ -179,7 +179,7 @@ mod tests {
             kept(0, &["a"], None),
             kept(2, &["a", "gone"], None),
         ];
-        let mut rows = Rows::default();
+        let mut rows = FinishedRows::default();
         given.iter().cloned().for_each(|kept| rows.push(kept));
         assert_eq!((rows.len(), rows.failed()), (4, 1));
         assert!(rows.found().eq(given.iter().cloned()));
@@ -188,7 +188,7 @@ mod tests {
         let spec =
             SweepSpec { parameters: vec![axis], samples: None, analysis, shard: Shard::default(), threads: None };
         for first in 0..=4 {
-            let mut reading = Reading::from(first);
+            let mut reading = RowCursor::from(first);
             let chunk = rows.chunk(&spec, &mut reading, 4);
             assert_eq!((chunk.first_row, chunk.parameters.as_slice()), (first, &["w".to_owned()][..]));
             assert_eq!(reading.next, 4);

@@ -6,10 +6,10 @@
 
 use super::super::limits::Limits;
 use super::super::status;
-use super::super::turns::{Party, Turns};
+use super::super::turns::{FairSemaphore, Waiter};
 use super::super::work::caught;
 use super::job::Job;
-use crate::jobs::sweep::{self, Crew, Pool, SweepError};
+use crate::jobs::sweep::{self, Executor, SweepError, ThreadPool};
 use crate::netlist::Bundle;
 use crate::options::CompileOptions;
 use std::sync::{Arc, OnceLock};
@@ -18,28 +18,28 @@ use tokio_util::sync::CancellationToken;
 use tonic::Status;
 
 /// The threads of all jobs, and their turns.
-pub(super) struct Crews {
-    turns: Arc<Turns>,
+pub(super) struct JobExecutors {
+    turns: Arc<FairSemaphore>,
     places: usize,
-    pool: OnceLock<Result<Pool, SweepError>>,
+    pool: OnceLock<Result<ThreadPool, SweepError>>,
     runtime: Handle,
 }
 
 /// The turns of one job.
-struct Taken<'a> {
-    crews: &'a Crews,
-    pool: &'a Pool,
-    party: Party,
+struct JobPermits<'a> {
+    crews: &'a JobExecutors,
+    pool: &'a ThreadPool,
+    party: Waiter,
     stopped: &'a CancellationToken,
     /// Told of each piece that is begun.
     begin: &'a (dyn Fn() + Sync),
 }
 
-impl Crews {
+impl JobExecutors {
     /// As many places as analyses have. Within a runtime.
     pub(super) fn new(limits: &Limits) -> Self {
         let places = limits.analyses.max(1);
-        Self { turns: Turns::new(places), places, pool: OnceLock::new(), runtime: Handle::current() }
+        Self { turns: FairSemaphore::new(places), places, pool: OnceLock::new(), runtime: Handle::current() }
     }
 
     /// Computes what a job has no row of yet. A thread of its own waits for its turns, not one of those on which calls are answered: jobs
@@ -66,9 +66,9 @@ impl Crews {
     }
 
     fn run(&self, job: &Arc<Job>, bundle: &Bundle, options: &CompileOptions) -> Result<bool, SweepError> {
-        let pool = self.pool.get_or_init(|| Pool::new(self.places)).as_ref().map_err(Clone::clone)?;
-        let party = Party { client: job.asked.owner.as_str().into(), number: job.asked.sequence };
-        let crew = Taken { crews: self, pool, party, stopped: &job.stopped, begin: &|| job.begin() };
+        let pool = self.pool.get_or_init(|| ThreadPool::new(self.places)).as_ref().map_err(Clone::clone)?;
+        let party = Waiter { client: job.asked.owner.as_str().into(), number: job.asked.sequence };
+        let crew = JobPermits { crews: self, pool, party, stopped: &job.stopped, begin: &|| job.begin() };
         let known = job.points()?;
         let mut numbers = job.spec.point_numbers()?;
         numbers.retain(|number| !known.contains(number));
@@ -76,7 +76,7 @@ impl Crews {
     }
 }
 
-impl Crew for Taken<'_> {
+impl Executor for JobPermits<'_> {
     fn size(&self) -> usize {
         self.crews.places
     }
@@ -113,8 +113,8 @@ mod tests {
     use super::*;
     use std::sync::Mutex;
 
-    fn other() -> Party {
-        Party { client: "other".into(), number: 9 }
+    fn other() -> Waiter {
+        Waiter { client: "other".into(), number: 9 }
     }
 
     /// One place. While it is taken, two jobs of one client and one of another queue up for it. From then on every second piece is the
@@ -124,14 +124,14 @@ mod tests {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).build().expect("a runtime");
         let crews = {
             let _within = runtime.enter();
-            Crews::new(&Limits { analyses: 1, ..Limits::default() })
+            JobExecutors::new(&Limits { analyses: 1, ..Limits::default() })
         };
         let (pool, order, stopped) =
-            (Pool::new(1).expect("a thread"), Mutex::new(String::new()), CancellationToken::new());
+            (ThreadPool::new(1).expect("a thread"), Mutex::new(String::new()), CancellationToken::new());
         let jobs = [("one", 'a', 40), ("one", 'b', 40), ("two", 'c', 10)];
         let run = |client: &str, job: char, count: usize| {
-            let party = Party { client: client.into(), number: u64::from(job) };
-            let crew = Taken { crews: &crews, pool: &pool, party, stopped: &stopped, begin: &|| {} };
+            let party = Waiter { client: client.into(), number: u64::from(job) };
+            let crew = JobPermits { crews: &crews, pool: &pool, party, stopped: &stopped, begin: &|| {} };
             crew.run(count, &|_| {
                 let mut order = order.lock().expect("no panic");
                 order.push(job);
@@ -167,14 +167,14 @@ mod tests {
     fn a_crew_that_is_stopped_comes_back() {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).build().expect("a runtime");
         let _within = runtime.enter();
-        let crews = Crews::new(&Limits { analyses: 1, ..Limits::default() });
-        let (pool, stopped) = (Pool::new(1).expect("a thread"), CancellationToken::new());
+        let crews = JobExecutors::new(&Limits { analyses: 1, ..Limits::default() });
+        let (pool, stopped) = (ThreadPool::new(1).expect("a thread"), CancellationToken::new());
         let place = std::thread::scope(|scope| {
             let place = scope.spawn(|| runtime.block_on(crews.turns.place(other()))).join().expect("no panic");
-            let crew = Taken {
+            let crew = JobPermits {
                 crews: &crews,
                 pool: &pool,
-                party: Party { client: "one".into(), number: 1 },
+                party: Waiter { client: "one".into(), number: 1 },
                 stopped: &stopped,
                 begin: &|| {},
             };

@@ -1,7 +1,7 @@
 //! Where a job stands, and why one is to stop.
 
 use super::super::{proto, status};
-use super::folder::End;
+use super::folder::JobOutcome;
 use proto::job_metadata::State;
 use std::io;
 use std::time::Duration;
@@ -9,11 +9,11 @@ use tonic::{Code, Status};
 
 /// Where a job stands.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Standing {
+pub(super) struct JobState {
     pub(super) state: State,
     pub(super) rows: u64,
     pub(super) failed: u64,
-    pub(super) end: Option<End>,
+    pub(super) end: Option<JobOutcome>,
     /// It has ended for this server alone: another one may go on with it.
     pub(super) refused: bool,
     /// Deleted.
@@ -24,7 +24,7 @@ pub(super) struct Standing {
 
 /// Why a job is to stop.
 #[derive(Debug)]
-pub(super) enum Stop {
+pub(super) enum JobStopReason {
     Cancelled,
     /// Its client was gone for so long.
     Released(Duration),
@@ -35,7 +35,7 @@ pub(super) enum Stop {
     Disk(io::Error),
 }
 
-impl Stop {
+impl JobStopReason {
     /// As clients are told.
     pub(super) fn told(&self) -> Status {
         match self {

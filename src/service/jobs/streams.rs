@@ -2,12 +2,12 @@
 
 use super::super::convert::sweep::row_to_wire;
 use super::super::pace::{CHUNK_BYTES, HEARTBEAT};
-use super::super::shared::Sending;
+use super::super::shared::SendingPermit;
 use super::super::shutdown::Shutdown;
 use super::super::{proto, status};
 use super::job::Job;
-use super::rows::Reading;
-use super::standing::Standing;
+use super::rows::RowCursor;
+use super::standing::JobState;
 use crate::jobs::sweep::SweepTable;
 use prost::Message;
 use std::future::Future;
@@ -26,16 +26,16 @@ const WATCH_INTERVAL: Duration = Duration::from_millis(100);
 /// Time in which rows gather for one message.
 const GATHERING: Duration = Duration::from_millis(20);
 
-type Answers<T> = Pin<Box<ReceiverStream<Result<T, Status>>>>;
+type ReplyStream<T> = Pin<Box<ReceiverStream<Result<T, Status>>>>;
 /// Where a job stands, again and again.
-pub(in super::super) type JobStream = Answers<proto::Job>;
+pub(in super::super) type JobStream = ReplyStream<proto::Job>;
 /// The same for older clients.
-pub(in super::super) type SweepStream = Answers<proto::SweepStatus>;
+pub(in super::super) type SweepStream = ReplyStream<proto::SweepStatus>;
 /// Rows as they come.
-pub(in super::super) type RowStream = Answers<proto::JobRows>;
+pub(in super::super) type RowStream = ReplyStream<proto::JobRows>;
 
 /// What comes next of a job that is watched.
-enum Next {
+enum JobChange {
     Told,
     Quiet,
     /// There is nothing more to send.
@@ -44,20 +44,20 @@ enum Next {
 
 /// Waits until there is something new, or for a heartbeat.
 async fn next<T>(
-    standing: &mut watch::Receiver<Standing>,
+    standing: &mut watch::Receiver<JobState>,
     sender: &mpsc::Sender<Result<T, Status>>,
     shutdown: &Shutdown,
-) -> Next {
+) -> JobChange {
     tokio::select! {
-        changed = standing.changed() => if changed.is_ok() { Next::Told } else { Next::Over(None) },
-        () = tokio::time::sleep(HEARTBEAT) => Next::Quiet,
-        () = sender.closed() => Next::Over(None),
-        () = shutdown.ending.cancelled() => Next::Over(Some(status::stopping())),
+        changed = standing.changed() => if changed.is_ok() { JobChange::Told } else { JobChange::Over(None) },
+        () = tokio::time::sleep(HEARTBEAT) => JobChange::Quiet,
+        () = sender.closed() => JobChange::Over(None),
+        () = shutdown.ending.cancelled() => JobChange::Over(Some(status::stopping())),
     }
 }
 
 /// One less looks at a job: rows of one that has ended need not stay in memory.
-fn unwatched(job: &Arc<Job>, standing: watch::Receiver<Standing>) {
+fn unwatched(job: &Arc<Job>, standing: watch::Receiver<JobState>) {
     drop(standing);
     if job.has_ended() {
         let job = Arc::clone(job);
@@ -74,7 +74,7 @@ fn say_last<T>(sender: &mpsc::Sender<Result<T, Status>>, why: Option<Status>) {
 }
 
 /// Where a job stands, as `say` has it, until it has ended.
-pub(super) fn watch<T: Send + 'static>(job: Arc<Job>, shutdown: &Shutdown, say: fn(&Job) -> T) -> Answers<T> {
+pub(super) fn watch<T: Send + 'static>(job: Arc<Job>, shutdown: &Shutdown, say: fn(&Job) -> T) -> ReplyStream<T> {
     let (sender, receiver) = mpsc::channel(1);
     let (mut standing, shutdown) = (job.watch(), shutdown.clone());
     tokio::spawn(async move {
@@ -86,7 +86,7 @@ pub(super) fn watch<T: Send + 'static>(job: Arc<Job>, shutdown: &Shutdown, say: 
             if sender.send(said).await.is_err() || last {
                 break;
             }
-            if let Next::Over(why) = next(&mut standing, &sender, &shutdown).await {
+            if let JobChange::Over(why) = next(&mut standing, &sender, &shutdown).await {
                 say_last(&sender, why);
                 break;
             }
@@ -102,7 +102,7 @@ pub(super) fn watch<T: Send + 'static>(job: Arc<Job>, shutdown: &Shutdown, say: 
 pub(super) fn rows(
     job: Arc<Job>,
     (first, only_finished): (u64, bool),
-    place: Sending,
+    place: SendingPermit,
     shutdown: &Shutdown,
 ) -> RowStream {
     let (sender, receiver) = mpsc::channel(1);
@@ -118,11 +118,11 @@ pub(super) fn rows(
 async fn send_rows(
     job: &Arc<Job>,
     (first, only_finished): (u64, bool),
-    standing: &mut watch::Receiver<Standing>,
+    standing: &mut watch::Receiver<JobState>,
     sender: &mpsc::Sender<Result<proto::JobRows, Status>>,
     shutdown: &Shutdown,
 ) {
-    let mut reading = Reading::from(first);
+    let mut reading = RowCursor::from(first);
     let mut quiet = false;
     loop {
         let now = standing.borrow_and_update().clone();
@@ -156,9 +156,9 @@ async fn send_rows(
             return;
         }
         match next(standing, sender, shutdown).await {
-            Next::Told => tokio::time::sleep(GATHERING).await,
-            Next::Quiet => quiet = true,
-            Next::Over(why) => {
+            JobChange::Told => tokio::time::sleep(GATHERING).await,
+            JobChange::Quiet => quiet = true,
+            JobChange::Over(why) => {
                 say_last(sender, why);
                 return;
             }
@@ -167,13 +167,13 @@ async fn send_rows(
 }
 
 /// The next message of a stream: on a thread of its own, as it may read a disk.
-async fn chunk(job: &Arc<Job>, mut reading: Reading, end: u64) -> (Result<proto::JobRows, Status>, Reading) {
+async fn chunk(job: &Arc<Job>, mut reading: RowCursor, end: u64) -> (Result<proto::JobRows, Status>, RowCursor) {
     let job = Arc::clone(job);
     let made = tokio::task::spawn_blocking(move || {
         let chunk = job.chunk(&mut reading, end);
         (chunk, reading)
     });
-    made.await.unwrap_or_else(|_| (Err(status::fault()), Reading::default()))
+    made.await.unwrap_or_else(|_| (Err(status::fault()), RowCursor::default()))
 }
 
 /// A table on its way: columns first, then rows in as few messages as fit, each made when the one before is taken. A
@@ -183,12 +183,12 @@ pub(in super::super) struct TableStream {
     /// Rows sent; none before the first message.
     sent: Option<usize>,
     ending: Pin<Box<WaitForCancellationFutureOwned>>,
-    _place: Sending,
+    _place: SendingPermit,
 }
 
 impl TableStream {
     /// A table from its first row on.
-    pub(super) fn new(table: Arc<SweepTable>, place: Sending, shutdown: &Shutdown) -> Self {
+    pub(super) fn new(table: Arc<SweepTable>, place: SendingPermit, shutdown: &Shutdown) -> Self {
         Self { table, sent: None, ending: Box::pin(shutdown.ending.clone().cancelled_owned()), _place: place }
     }
 

@@ -1,16 +1,16 @@
 //! A job as clients are told of it.
 
 use super::super::proto;
-use super::asked::Asked;
-use super::standing::Standing;
+use super::asked::JobOrigin;
+use super::standing::JobState;
 use crate::jobs::sweep::SweepSpec;
 
 /// A job, which outlives the server or not. What clients are told again and again is without the options, which may be long.
 pub(super) fn job(
     id: &str,
-    asked: &Asked,
+    asked: &JobOrigin,
     provenance: proto::Provenance,
-    (standing, kept): (&Standing, bool),
+    (standing, kept): (&JobState, bool),
 ) -> proto::Job {
     let end = standing.end.as_ref();
     let metadata = proto::JobMetadata {
@@ -36,7 +36,7 @@ pub(super) fn job(
 }
 
 /// What the rows of a job come from, but for the options.
-pub(super) fn provenance(asked: &Asked, spec: &SweepSpec) -> proto::Provenance {
+pub(super) fn provenance(asked: &JobOrigin, spec: &SweepSpec) -> proto::Provenance {
     proto::Provenance {
         version: asked.version.clone(),
         netlist: asked.netlist.clone(),

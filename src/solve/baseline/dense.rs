@@ -8,7 +8,7 @@
 //!
 //! Reference: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), §3.4.
 
-use super::plain::{Scratch, flatten, spread, unflatten};
+use super::plain::{SolveScratch, flatten, spread, unflatten};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};
@@ -21,14 +21,14 @@ use std::cell::RefCell;
 
 /// A dense pivoted factorization with its storage.
 #[derive(Debug)]
-pub struct Dense {
+pub struct DensePivoted {
     lu: Mat<f64>,
     forward: Vec<usize>,
     backward: Vec<usize>,
-    scratch: RefCell<Scratch>,
+    scratch: RefCell<SolveScratch>,
 }
 
-impl Dense {
+impl DensePivoted {
     /// Storage for matrices on `pattern`.
     pub fn new(pattern: &Pattern) -> Self {
         let n = DOF * pattern.bodies();
@@ -38,19 +38,19 @@ impl Dense {
             lu: Mat::zeros(n, n),
             forward: vec![0; n],
             backward: vec![0; n],
-            scratch: RefCell::new(Scratch { flat: vec![0.0; n], memory: MemBuffer::new(memory) }),
+            scratch: RefCell::new(SolveScratch { flat: vec![0.0; n], memory: MemBuffer::new(memory) }),
         }
     }
 }
 
-impl LinearSolver for Dense {
+impl LinearSolver for DensePivoted {
     fn factor(&mut self, pattern: &Pattern, matrix: &mut BlockMatrix<f64, 3>) -> Result<(), ZeroPivot> {
         self.lu.fill(0.0);
         spread(pattern, matrix, |i, j, value| {
             self.lu[(i, j)] = value;
             self.lu[(j, i)] = value;
         });
-        let Scratch { memory, .. } = self.scratch.get_mut();
+        let SolveScratch { memory, .. } = self.scratch.get_mut();
         let stack = MemStack::new(memory);
         let (lu, params) = (self.lu.as_mut(), Default::default());
         factor::lu_in_place(lu, &mut self.forward, &mut self.backward, Par::Seq, stack, params);
@@ -62,7 +62,7 @@ impl LinearSolver for Dense {
     }
 
     fn solve(&self, _: &Pattern, _: &BlockMatrix<f64, 3>, b: &mut [Pose]) {
-        let Scratch { flat, memory } = &mut *self.scratch.borrow_mut();
+        let SolveScratch { flat, memory } = &mut *self.scratch.borrow_mut();
         flatten(b, flat);
         let n = flat.len();
         let permutation = PermRef::new_checked(&self.forward, &self.backward, n);

@@ -23,12 +23,12 @@ pub(crate) fn spread(pattern: &Pattern, matrix: &BlockMatrix<f64, 3>, mut visit:
 }
 
 /// A right-hand side and working memory: a solve needs both, and changes nothing that can be seen.
-pub(super) struct Scratch {
+pub(super) struct SolveScratch {
     pub(super) flat: Vec<f64>,
     pub(super) memory: MemBuffer,
 }
 
-impl std::fmt::Debug for Scratch {
+impl std::fmt::Debug for SolveScratch {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Scratch").field("flat", &self.flat).finish_non_exhaustive()
     }

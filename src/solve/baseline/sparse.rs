@@ -10,7 +10,7 @@
 //! Anal. Appl. 17 (1996).
 
 use super::kind::{SolverKind, TooLarge};
-use super::plain::{Scratch, flatten, unflatten};
+use super::plain::{SolveScratch, flatten, unflatten};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};
@@ -30,7 +30,7 @@ pub struct Sparse {
     values: Vec<f64>,
     symbolic: SymbolicCholesky<usize>,
     factor: Vec<f64>,
-    scratch: RefCell<Scratch>,
+    scratch: RefCell<SolveScratch>,
 }
 
 impl Sparse {
@@ -55,7 +55,7 @@ impl Sparse {
         Ok(Self {
             values: vec![0.0; lower.row_idx().len()],
             factor: vec![0.0; symbolic.len_val()],
-            scratch: RefCell::new(Scratch { flat: vec![0.0; n], memory: MemBuffer::new(memory) }),
+            scratch: RefCell::new(SolveScratch { flat: vec![0.0; n], memory: MemBuffer::new(memory) }),
             lower,
             symbolic,
         })
@@ -100,7 +100,7 @@ impl LinearSolver for Sparse {
                 *value = source[(i % DOF, j % DOF)];
             }
         });
-        let Scratch { memory, .. } = self.scratch.get_mut();
+        let SolveScratch { memory, .. } = self.scratch.get_mut();
         let a = SparseColMatRef::new(self.lower.as_ref(), &self.values[..]);
         let factored = self.symbolic.factorize_numeric_ldlt(
             &mut self.factor,
@@ -118,7 +118,7 @@ impl LinearSolver for Sparse {
     }
 
     fn solve(&self, _: &Pattern, _: &BlockMatrix<f64, 3>, b: &mut [Pose]) {
-        let Scratch { flat, memory } = &mut *self.scratch.borrow_mut();
+        let SolveScratch { flat, memory } = &mut *self.scratch.borrow_mut();
         flatten(b, flat);
         let n = flat.len();
         let right = MatMut::from_column_major_slice_mut(flat, n, 1);

@@ -1,13 +1,19 @@
 //! Folds and bifurcations between two points of a path, and the branches that leave or return there.
 
-use super::corrector::{Continuation, Place, Plane, inner};
+use super::corrector::{Continuation, CorrectorPlane, PathState, inner};
 use super::options::Branch;
 use crate::multibody::planar::Pose;
-use crate::solve::family::Blend;
+use crate::solve::family::LoadFamily;
 
 impl Continuation {
     /// Illinois on s′ over the step; and whether it came to its end.
-    pub(super) fn find_fold(&mut self, family: &mut Blend, here: &Place, next: &Place, step: f64) -> (Place, bool) {
+    pub(super) fn find_fold(
+        &mut self,
+        family: &mut LoadFamily,
+        here: &PathState,
+        next: &PathState,
+        step: f64,
+    ) -> (PathState, bool) {
         let (mut a, mut fa, mut b, mut fb) = (0.0, here.ds, step, next.ds);
         let mut best = next.clone();
         for _ in 0..40 {
@@ -31,11 +37,11 @@ impl Continuation {
     /// Bisection on the number of negative pivots; the place on the near side, and whether it came to its end.
     pub(super) fn find_bifurcation(
         &mut self,
-        family: &mut Blend,
-        here: &Place,
+        family: &mut LoadFamily,
+        here: &PathState,
         after: usize,
         step: f64,
-    ) -> (Place, bool) {
+    ) -> (PathState, bool) {
         let (mut low, mut high) = (0.0, step);
         let mut best = here.clone();
         for _ in 0..40 {
@@ -53,7 +59,7 @@ impl Continuation {
     }
 
     /// First point on the branch that leaves along the null vector.
-    pub(super) fn branch_off(&mut self, family: &mut Blend, at: &Place) -> Option<Place> {
+    pub(super) fn branch_off(&mut self, family: &mut LoadFamily, at: &PathState) -> Option<PathState> {
         let mut way = at.clone();
         way.dq = self.null_vector(family, at)?;
         way.ds = 0.0;
@@ -66,9 +72,9 @@ impl Continuation {
             for (q, dq) in guess.q.iter_mut().zip(&way.dq) {
                 *q += dq * distance;
             }
-            let plane = Plane { from: &way, dq: &way.dq, ds: 0.0, distance };
+            let plane = CorrectorPlane { from: &way, dq: &way.dq, ds: 0.0, distance };
             if let Ok((mut place, _)) = self.correct(family, &plane, guess) {
-                self.turn(family, &mut place, &way);
+                self.update_tangent(family, &mut place, &way);
                 return Some(place);
             }
         }
@@ -77,7 +83,7 @@ impl Continuation {
 
     /// First point back on the path that a branch has come to: a little ahead or back, where it is more stable. The way
     /// is the tangent without its share of the null vector, along which the branch came.
-    pub(super) fn rejoin(&mut self, family: &mut Blend, at: &Place) -> Option<Place> {
+    pub(super) fn rejoin(&mut self, family: &mut LoadFamily, at: &PathState) -> Option<PathState> {
         let null = self.null_vector(family, at)?;
         self.linearize(family, at).ok()?;
         let system = family.system();
@@ -89,7 +95,7 @@ impl Continuation {
         }
         way.ds = 1.0 / (1.0 + inner(system, &way.dq, &way.dq)).sqrt();
         way.dq.iter_mut().for_each(|dq| *dq *= way.ds);
-        let mut found: Option<Place> = None;
+        let mut found: Option<PathState> = None;
         for sign in [1.0, -1.0] {
             let distance = sign * 0.25 * self.options.longest / way.ds;
             let mut guess = way.clone();
@@ -97,10 +103,10 @@ impl Continuation {
                 *q += dq * distance;
             }
             guess.s += distance * way.ds;
-            let plane = Plane { from: &way, dq: &way.dq, ds: way.ds, distance };
+            let plane = CorrectorPlane { from: &way, dq: &way.dq, ds: way.ds, distance };
             let Ok((mut place, _)) = self.correct(family, &plane, guess) else { continue };
-            let sense = Place { dq: way.dq.iter().map(|dq| dq * sign).collect(), ds: sign * way.ds, ..way.clone() };
-            self.turn(family, &mut place, &sense);
+            let sense = PathState { dq: way.dq.iter().map(|dq| dq * sign).collect(), ds: sign * way.ds, ..way.clone() };
+            self.update_tangent(family, &mut place, &sense);
             let moved: Vec<Pose> = place.q.iter().zip(&at.q).map(|(a, b)| a - b).collect();
             let aside = inner(family.system(), &null, &moved).abs() > 0.3 * distance.abs();
             if !aside && found.as_ref().is_none_or(|best| place.negative < best.negative) {
@@ -111,7 +117,7 @@ impl Continuation {
     }
 
     /// Null vector of the nearly singular tangent by inverse iteration, of length 1, to the side of [`System::side`](crate::domains::System::side).
-    fn null_vector(&mut self, family: &mut Blend, at: &Place) -> Option<Vec<Pose>> {
+    fn null_vector(&mut self, family: &mut LoadFamily, at: &PathState) -> Option<Vec<Pose>> {
         self.linearize(family, at).ok()?;
         let system = family.system();
         let mut x = vec![Pose::zeros(); at.q.len()];

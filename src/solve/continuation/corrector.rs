@@ -3,7 +3,7 @@
 //! Each Newton step costs one factorization of ∂r/∂q and two solves (block elimination). The tangent keeps its sense against
 //! the one before.
 
-use super::family::Blend;
+use super::family::LoadFamily;
 use super::options::ContinuationOptions;
 use crate::domains::System;
 use crate::multibody::BlockMatrix;
@@ -18,7 +18,7 @@ const IN_CONTACT: usize = 4;
 
 /// Position and unit tangent.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Place {
+pub(super) struct PathState {
     pub(super) q: Vec<Pose>,
     pub(super) s: f64,
     pub(super) dq: Vec<Pose>,
@@ -27,8 +27,8 @@ pub(super) struct Place {
 }
 
 /// The plane that a corrector returns across: ⟨n_q, q − q₀⟩ + n_s·(s − s₀) = distance.
-pub(super) struct Plane<'a> {
-    pub(super) from: &'a Place,
+pub(super) struct CorrectorPlane<'a> {
+    pub(super) from: &'a PathState,
     pub(super) dq: &'a [Pose],
     pub(super) ds: f64,
     pub(super) distance: f64,
@@ -66,10 +66,10 @@ impl Continuation {
     /// the iteration did not settle.
     pub(super) fn correct(
         &mut self,
-        family: &mut Blend,
-        plane: &Plane<'_>,
-        mut at: Place,
-    ) -> Result<(Place, usize), Option<ZeroPivot>> {
+        family: &mut LoadFamily,
+        plane: &CorrectorPlane<'_>,
+        mut at: PathState,
+    ) -> Result<(PathState, usize), Option<ZeroPivot>> {
         let mut last = f64::INFINITY;
         let mut most = self.options.iterations;
         let mut count = 0;
@@ -122,7 +122,7 @@ impl Continuation {
     }
 
     /// Factors the tangent at a place, with residual and slope; counts negative pivots.
-    pub(super) fn linearize(&mut self, family: &mut Blend, at: &Place) -> Result<usize, Option<ZeroPivot>> {
+    pub(super) fn linearize(&mut self, family: &mut LoadFamily, at: &PathState) -> Result<usize, Option<ZeroPivot>> {
         family.slope(&at.q, at.s, &mut self.slope);
         family.tangent(&at.q, &mut self.tangent, &mut self.residual);
         let inertia = self.tangent.factor(&family.system().model.pattern).map_err(Some)?;
@@ -131,7 +131,7 @@ impl Continuation {
 
     /// Sets the unit tangent of a place, in the sense of the one before, and its inertia. Where the tangent matrix is
     /// singular to the last digit the secant stands in.
-    pub(super) fn turn(&mut self, family: &mut Blend, at: &mut Place, before: &Place) {
+    pub(super) fn update_tangent(&mut self, family: &mut LoadFamily, at: &mut PathState, before: &PathState) {
         match self.linearize(family, at) {
             Ok(negative) => {
                 let system = family.system();

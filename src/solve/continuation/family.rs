@@ -2,9 +2,9 @@
 //!
 //! At a fixed configuration the residual is then a polynomial of degree two in s: loads and built-in strains enter linearly,
 //! the pull of gaps and the heat of resistors with the square of voltages. Its derivative is therefore the central
-//! difference over any interval, exactly, and [`Blend::slope`] is that, whatever a gap function's law in q.
+//! difference over any interval, exactly, and [`LoadFamily::slope`] is that, whatever a gap function's law in q.
 
-use crate::domains::{Drive, Load, System};
+use crate::domains::{DeadLoad, Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use thiserror::Error;
@@ -26,25 +26,25 @@ pub enum NotAFamily {
 
 /// What differs between the ends.
 #[derive(Debug, Clone)]
-struct End {
-    loads: Vec<Load>,
+struct FamilyEnd {
+    loads: Vec<DeadLoad>,
     rest: Vec<f64>,
     sources: Vec<f64>,
 }
 
 /// The family: a system whose loads, built-in strains and voltages are those at one s.
 #[derive(Debug, Clone)]
-pub struct Blend {
+pub struct LoadFamily {
     system: System,
     drive: Drive,
     sources: Vec<f64>,
     rise: Vec<f64>,
-    ends: [End; 2],
+    ends: [FamilyEnd; 2],
     before: Vec<Pose>,
     still: Option<f64>,
 }
 
-impl Blend {
+impl LoadFamily {
     /// From `from` at source voltages `from_sources` [V] at s = 0 to `to` at s = 1.
     ///
     /// # Errors
@@ -69,7 +69,7 @@ impl Blend {
         if e.gap_rows != f.gap_rows || e.heating != f.heating || e.ports != f.ports {
             return Err(NotAFamily::Network);
         }
-        let end = |system: &System, sources: &[f64]| End {
+        let end = |system: &System, sources: &[f64]| FamilyEnd {
             loads: system.loads.clone(),
             rest: system.model.joints.iter().map(|j| j.rest).collect(),
             sources: sources.to_vec(),
@@ -81,7 +81,7 @@ impl Blend {
             rise: vec![0.0; e.heating.heaters.len()],
             ends: [end(from, from_sources), end(to, to_sources)],
             before: vec![Pose::zeros(); from.bodies()],
-            still: still(from, from_sources, to_sources),
+            still: field_free_point(from, from_sources, to_sources),
         };
         blend.set(0.0);
         Ok(blend)
@@ -116,7 +116,7 @@ impl Blend {
     }
 
     /// Where every gap is without voltage, if the family comes through such an s with voltages on both sides.
-    pub fn still(&self) -> Option<f64> {
+    pub fn field_free_point(&self) -> Option<f64> {
         self.still
     }
 
@@ -150,7 +150,7 @@ impl Blend {
 }
 
 /// Where no gap has a voltage.
-fn still(system: &System, from: &[f64], to: &[f64]) -> Option<f64> {
+fn field_free_point(system: &System, from: &[f64], to: &[f64]) -> Option<f64> {
     let rows = &system.electrics.gap_rows;
     let gap = |g: usize, u: &[f64]| u.iter().enumerate().map(|(i, v)| rows[(g, i)] * v).sum::<f64>();
     let volts = (0..rows.nrows()).map(|g| [gap(g, from), gap(g, to)]).filter(|[a, b]| *a != 0.0 || *b != 0.0);

@@ -1,12 +1,17 @@
 //! One step along a path: how long it may be, and whether it stayed on its branch.
 
-use super::corrector::{Continuation, Place, Plane, dot, inner};
+use super::corrector::{Continuation, CorrectorPlane, PathState, dot, inner};
 use crate::domains::System;
-use crate::solve::family::Blend;
+use crate::solve::family::LoadFamily;
 
 impl Continuation {
     /// One step of length `step` (shortened in place where needed), and the iterations it took.
-    pub(super) fn advance(&mut self, family: &mut Blend, here: &Place, step: &mut f64) -> Option<(Place, usize)> {
+    pub(super) fn advance(
+        &mut self,
+        family: &mut LoadFamily,
+        here: &PathState,
+        step: &mut f64,
+    ) -> Option<(PathState, usize)> {
         loop {
             if let Some((next, cost)) = self.probe(family, here, *step) {
                 let family_system = family.system();
@@ -28,7 +33,7 @@ impl Continuation {
     }
 
     /// True when a step stayed on its branch: it closed or opened no gap by much, and ends near where the tangent led.
-    fn keeps_branch(&self, family: &Blend, here: &Place, next: &Place, step: f64) -> bool {
+    fn keeps_branch(&self, family: &LoadFamily, here: &PathState, next: &PathState, step: f64) -> bool {
         let system = family.system();
         let leap = self.leaps(system, here, next);
         let off = next.q.iter().zip(&here.q).zip(&here.dq).map(|((a, b), dq)| a - b - dq * step);
@@ -38,17 +43,22 @@ impl Continuation {
     }
 
     /// True where a gap changes more from one place to the other than it may in a step.
-    fn leaps(&self, system: &System, here: &Place, next: &Place) -> bool {
+    fn leaps(&self, system: &System, here: &PathState, next: &PathState) -> bool {
         (0..system.members.len()).filter(|&g| system.touching(g).is_some()).any(|g| {
-            let (a, b) = (system.room(g, &here.q), system.room(g, &next.q));
+            let (a, b) = (system.clearance(g, &here.q), system.clearance(g, &next.q));
             (a - b).abs() > self.options.closing * a.min(b)
         })
     }
 
     /// True when a `place` lies on the branch through the two `ends` of a step, between which it was expected at `guess`.
-    pub(super) fn is_between(&self, family: &Blend, ends: (&Place, &Place), (guess, place): (&Place, &Place)) -> bool {
+    pub(super) fn is_between(
+        &self,
+        family: &LoadFamily,
+        ends: (&PathState, &PathState),
+        (guess, place): (&PathState, &PathState),
+    ) -> bool {
         let system = family.system();
-        let apart = |a: &Place, b: &Place| -> f64 {
+        let apart = |a: &PathState, b: &PathState| -> f64 {
             let all = a.q.iter().zip(&b.q).map(|(a, b)| a - b);
             (all.map(|x| dot(system, &x, &x)).sum::<f64>() / a.q.len().max(1) as f64).sqrt()
         };
@@ -57,15 +67,20 @@ impl Continuation {
     }
 
     /// The point at arc length `distance` from `here`, with its tangent.
-    pub(super) fn probe(&mut self, family: &mut Blend, here: &Place, distance: f64) -> Option<(Place, usize)> {
+    pub(super) fn probe(
+        &mut self,
+        family: &mut LoadFamily,
+        here: &PathState,
+        distance: f64,
+    ) -> Option<(PathState, usize)> {
         let mut guess = here.clone();
         for (q, dq) in guess.q.iter_mut().zip(&here.dq) {
             *q += dq * distance;
         }
         guess.s += distance * here.ds;
-        let plane = Plane { from: here, dq: &here.dq, ds: here.ds, distance };
+        let plane = CorrectorPlane { from: here, dq: &here.dq, ds: here.ds, distance };
         let (mut next, cost) = self.correct(family, &plane, guess).ok()?;
-        self.turn(family, &mut next, here);
+        self.update_tangent(family, &mut next, here);
         Some((next, cost))
     }
 }

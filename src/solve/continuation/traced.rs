@@ -15,7 +15,7 @@ pub struct PathPoint {
 
 /// What happened at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Event {
+pub enum PathEvent {
     /// s turns back.
     Fold,
     /// Another path crosses.
@@ -42,11 +42,11 @@ pub enum PathEnd {
 
 /// A traced path.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Traced {
+pub struct TracedPath {
     /// Its points; folds and bifurcations are among them.
     pub points: Vec<PathPoint>,
     /// What happened, with the index of its point.
-    pub events: Vec<(Event, usize)>,
+    pub events: Vec<(PathEvent, usize)>,
     /// Points of events that were not located to rounding: the path was lost between its points there.
     pub rough: Vec<usize>,
     /// Points of bifurcations where no branch was found, so that the path goes straight on.

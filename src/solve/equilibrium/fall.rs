@@ -20,17 +20,17 @@ const TURN_WEIGHT: f64 = 0.1;
 /// First and largest radius of the trust region, in mean segment lengths and radians.
 const RADIUS: [f64; 2] = [0.05, 0.3];
 /// Smallest radius: below it the energy no longer falls.
-const LEAST_RADIUS: f64 = 1e-11;
+const MIN_RADIUS: f64 = 1e-11;
 /// Steps below this are not tested for energy: rounding.
 const UNTESTED: f64 = 1e-6;
 /// A step without μ below this ends the fall.
 const SETTLED: f64 = 1e-9;
 /// First μ and the μ that counts as none, as fractions of the median stiffness.
-const LEAST_SHIFT: [f64; 2] = [1e-14, 1e-15];
+const MIN_SHIFT: [f64; 2] = [1e-14, 1e-15];
 /// A μ that rounding of the stiffness may ask for next to a loss of stability, in first μ.
 const NEUTRAL: f64 = 10.0;
 /// A μ that no finite stiffness needs, in median stiffnesses.
-pub(super) const MOST_SHIFT: f64 = 1e20;
+pub(super) const MAX_SHIFT: f64 = 1e20;
 /// Fractions of the predicted decrease of energy: below the first a step is rejected, below the second the region shrinks, above the third it grows.
 const RATIO: [f64; 3] = [0.05, 0.25, 0.75];
 /// Rounding of the energy, as a fraction of it.
@@ -56,7 +56,7 @@ impl Units {
             length += beam.length;
             segments += beam.segments();
         }
-        let gaps = system.members.iter().any(|member| member.closes() || member.touching().is_some());
+        let gaps = system.members.iter().any(|member| member.is_electrostatic() || member.touching().is_some());
         Self { length: if segments == 0 || gaps { system.length_scale } else { length / segments as f64 } }
     }
 
@@ -102,7 +102,7 @@ impl Units {
 }
 
 /// A trust region.
-struct Region {
+struct TrustRegion {
     units: Units,
     shift: f64,
     least: [f64; 2],
@@ -112,7 +112,7 @@ struct Region {
 
 /// A step that was taken.
 #[derive(Debug, Clone, Copy)]
-struct Accepted {
+struct AcceptedStep {
     /// Its largest displacement, in the units of W.
     length: f64,
     /// True where the energy it gains is more than rounding.
@@ -121,7 +121,7 @@ struct Accepted {
 
 /// Why a fall ended without an equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Unsettled {
+pub(super) enum FallFailure {
     /// The energy falls without end.
     Budget,
     /// Numbers overflowed, or no step decreases the energy.
@@ -152,16 +152,16 @@ impl Equilibrium {
         s: f64,
         q: &mut [Pose],
         done: &mut Path,
-    ) -> Result<(), Unsettled> {
+    ) -> Result<(), FallFailure> {
         path.at(s, &mut self.drive);
         let units = Units::of(system);
         let energy = system.potential(q, &self.drive);
-        let mut region = Region { units, shift: 0.0, least: [0.0; 2], radius: RADIUS[0], energy };
+        let mut region = TrustRegion { units, shift: 0.0, least: [0.0; 2], radius: RADIUS[0], energy };
         let mut last = f64::INFINITY;
         for _ in 0..self.options.fall_steps {
             crate::budget::check();
             done.iterations += 1;
-            let Some(Accepted { length, resolved }) = self.try_step(system, q, &mut region)? else { continue };
+            let Some(AcceptedStep { length, resolved }) = self.try_step(system, q, &mut region)? else { continue };
             for (q, step) in q.iter_mut().zip(&self.step) {
                 *q += step;
             }
@@ -173,21 +173,26 @@ impl Equilibrium {
             last = if neutral { length } else { f64::INFINITY };
             region.shift = if region.shift / 8.0 < region.least[1] { 0.0 } else { region.shift / 8.0 };
         }
-        Err(Unsettled::Budget)
+        Err(FallFailure::Budget)
     }
 
     /// One factorization: the step from `q`, where it is accepted.
-    fn try_step(&mut self, system: &System, q: &[Pose], region: &mut Region) -> Result<Option<Accepted>, Unsettled> {
+    fn try_step(
+        &mut self,
+        system: &System,
+        q: &[Pose],
+        region: &mut TrustRegion,
+    ) -> Result<Option<AcceptedStep>, FallFailure> {
         let units = region.units;
         system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
         if region.least[0] == 0.0 {
             let median = units.median_stiffness(&self.tangent);
-            region.least = LEAST_SHIFT.map(|least| least * median);
+            region.least = MIN_SHIFT.map(|least| least * median);
         }
-        let raise = |region: &mut Region, factor: f64| {
+        let raise = |region: &mut TrustRegion, factor: f64| {
             region.shift = (factor * region.shift).max(region.least[0]);
-            let bounded = region.shift < MOST_SHIFT / LEAST_SHIFT[0] * region.least[0];
-            if bounded { Ok(None) } else { Err(Unsettled::Stuck) }
+            let bounded = region.shift < MAX_SHIFT / MIN_SHIFT[0] * region.least[0];
+            if bounded { Ok(None) } else { Err(FallFailure::Stuck) }
         };
         units.add_shift(region.shift, &mut self.tangent);
         system.model.project_matrix(&mut self.tangent);
@@ -210,7 +215,7 @@ impl Equilibrium {
             // what noise of the energy made small may grow again
             region.radius = (2.0 * region.radius).min(RADIUS[1]);
             region.energy = there;
-            return Ok(Some(Accepted { length, resolved: false }));
+            return Ok(Some(AcceptedStep { length, resolved: false }));
         }
         let work: f64 = self.residual.iter().zip(&self.step).map(|(r, d)| -r.dot(d)).sum();
         let predicted = 0.5 * (work + region.shift * units.weigh(&self.step));
@@ -222,8 +227,8 @@ impl Equilibrium {
         };
         if ratio.is_nan() || ratio < RATIO[0] || self.closes_too_far(system, q) || self.overturns(system, q) {
             region.radius = region.radius.min(length) / 3.0;
-            if region.radius < LEAST_RADIUS {
-                return Err(Unsettled::Stuck);
+            if region.radius < MIN_RADIUS {
+                return Err(FallFailure::Stuck);
             }
             return raise(region, 3.0);
         }
@@ -233,7 +238,7 @@ impl Equilibrium {
             region.radius *= 0.5;
         }
         region.energy = there;
-        Ok(Some(Accepted { length, resolved: predicted > noise }))
+        Ok(Some(AcceptedStep { length, resolved: predicted > noise }))
     }
 
     /// Factors the tangent; true where it is positive definite, motions aside that are free from the start.
@@ -262,12 +267,12 @@ impl Equilibrium {
     /// True where the step to `trial` changes the distance of a gap by so much that it may lead across.
     fn closes_too_far(&self, system: &System, from: &[Pose]) -> bool {
         let far = |gap: usize| {
-            let (before, after) = (system.room(gap, from), system.room(gap, &self.trial));
+            let (before, after) = (system.clearance(gap, from), system.clearance(gap, &self.trial));
             (after - before).abs() > CLOSING * before.abs().max(after.abs())
         };
         let acts = |gap: &usize| {
             let member = &system.members[*gap];
-            member.touching().is_some() || (member.closes() && self.drive.volts[*gap] != 0.0)
+            member.touching().is_some() || (member.is_electrostatic() && self.drive.volts[*gap] != 0.0)
         };
         (0..system.members.len()).filter(acts).any(far)
     }

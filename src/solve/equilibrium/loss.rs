@@ -8,7 +8,7 @@
 //! in the units of W. At a limit point the part goes where the force does work. At a bifurcation both sides are alike, and
 //! [`System::side`] decides by a rule that turns with the drawing.
 
-use super::fall::{MOST_SHIFT, Units, Unsettled};
+use super::fall::{FallFailure, MAX_SHIFT, Units};
 use super::path::LoadPath;
 use super::{Equilibrium, Path};
 use crate::domains::System;
@@ -44,7 +44,7 @@ pub enum LossKind {
 
 /// A loss of stability that a path passed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Passed {
+pub struct StabilityLoss {
     /// Its kind.
     pub kind: LossKind,
     /// Fraction of the path where it lies [1].
@@ -55,7 +55,7 @@ pub struct Passed {
 
 /// Where a part goes at a loss of stability.
 #[derive(Debug, Clone)]
-pub(super) struct Towards {
+pub(super) struct EscapeDirection {
     pub(super) kind: LossKind,
     /// Of the softest motion.
     pub(super) sign: f64,
@@ -84,7 +84,7 @@ impl Equilibrium {
         self.before.copy_from_slice(q);
         path.at(s, &mut self.drive);
         let known = self.softest(system, q).is_some();
-        let mut why = Unsettled::Stuck;
+        let mut why = FallFailure::Stuck;
         for factor in BEYOND {
             let to = beyond(factor);
             path.at(to, &mut self.drive);
@@ -93,11 +93,11 @@ impl Equilibrium {
             match self.fall(system, path, to, q, done) {
                 // a segment far from its chord stretches without strain: its energy is none of a beam
                 Ok(()) if Self::beyond_beams(system, q).is_none() => {
-                    let Towards { kind, direction, .. } = towards.unwrap_or_else(Towards::unknown);
-                    done.passed.push(Passed { kind, share: s, direction });
+                    let EscapeDirection { kind, direction, .. } = towards.unwrap_or_else(EscapeDirection::unknown);
+                    done.passed.push(StabilityLoss { kind, share: s, direction });
                     return Ok((to, if loaded { BEYOND_LOADED[1] } else { 0.25 * to }));
                 }
-                Ok(()) => why = Unsettled::Stuck,
+                Ok(()) => why = FallFailure::Stuck,
                 Err(unsettled) => why = unsettled,
             }
             self.stopped.copy_from_slice(q);
@@ -114,7 +114,7 @@ impl Equilibrium {
         if done.passed.is_empty() || Self::beyond_beams(system, q).is_none() {
             return Ok(());
         }
-        Err(self.lost(system, s, Unsettled::Stuck, done, q))
+        Err(self.lost(system, s, FallFailure::Stuck, done, q))
     }
 
     /// Puts the softest motion at `q` into `soft`, its largest displacement 1 in the units of W; none where it is not finite.
@@ -131,7 +131,7 @@ impl Equilibrium {
                 break;
             }
             shift = if shift == 0.0 { least } else { 2.0 * shift };
-            if shift.is_nan() || least.is_nan() || shift >= MOST_SHIFT * least {
+            if shift.is_nan() || least.is_nan() || shift >= MAX_SHIFT * least {
                 return None;
             }
         }
@@ -152,7 +152,7 @@ impl Equilibrium {
     }
 
     /// Kind and direction of a loss from the softest motion in `soft` and the force at `q` and the drive of now.
-    pub(super) fn judge(&mut self, system: &System, q: &[Pose]) -> Towards {
+    pub(super) fn judge(&mut self, system: &System, q: &[Pose]) -> EscapeDirection {
         let length = Units::of(system).length;
         system.residual(q, &self.drive, &mut self.residual);
         let (mut work, mut motion, mut force) = (0.0, 0.0, 0.0);
@@ -168,10 +168,10 @@ impl Equilibrium {
         let norm = (motion * force).sqrt();
         if unbalanced && norm > 0.0 && work.abs() > PARTICIPATION * norm {
             let sign = work.signum();
-            return Towards { kind: LossKind::LimitPoint, sign, direction: system.side(q, &self.soft, sign).1 };
+            return EscapeDirection { kind: LossKind::LimitPoint, sign, direction: system.side(q, &self.soft, sign).1 };
         }
         let sign = system.side(q, &self.soft, 1.0).0 * if self.options.mirrored { -1.0 } else { 1.0 };
-        Towards { kind: LossKind::Bifurcation, sign, direction: system.side(q, &self.soft, sign).1 }
+        EscapeDirection { kind: LossKind::Bifurcation, sign, direction: system.side(q, &self.soft, sign).1 }
     }
 
     /// Moves `q` a little along `sign`·`soft`: the imperfection that every real part has.
@@ -184,7 +184,7 @@ impl Equilibrium {
     }
 }
 
-impl Towards {
+impl EscapeDirection {
     fn unknown() -> Self {
         Self { kind: LossKind::LimitPoint, sign: 0.0, direction: String::new() }
     }

@@ -1,6 +1,6 @@
 //! Why no equilibrium was found, as a physical reason where one can be measured.
 
-use super::fall::Unsettled;
+use super::fall::FallFailure;
 use super::loss::MAX_LOSSES;
 use super::{Equilibrium, Path};
 use crate::domains::{BeamLine, Domain, System};
@@ -26,7 +26,14 @@ const GONE: f64 = 100.0;
 
 impl Equilibrium {
     /// The reason why the search ended at the displacement `q` beyond the last stable equilibrium at `share`.
-    pub(super) fn lost(&mut self, system: &System, share: f64, why: Unsettled, done: &Path, q: &[Pose]) -> SolveError {
+    pub(super) fn lost(
+        &mut self,
+        system: &System,
+        share: f64,
+        why: FallFailure,
+        done: &Path,
+        q: &[Pose],
+    ) -> SolveError {
         let coarse = Self::coarse_beams(system, q);
         let reason = (self.touching_without_contact(system, q))
             .or_else(|| Self::beyond_beams(system, q))
@@ -66,7 +73,7 @@ impl Equilibrium {
         (0..system.members.len())
             .find(|&gap| {
                 let member = &system.members[gap];
-                member.closes()
+                member.is_electrostatic()
                     && member.touching().is_none()
                     && system.distance(gap, q) <= 0.1 * system.distance(gap, &self.before)
             })
@@ -136,8 +143,8 @@ impl Equilibrium {
         Some(format!("\"{name}\" moves away without end: nothing that this load cannot overcome holds it"))
     }
 
-    fn unsettled(&mut self, system: &System, why: Unsettled, q: &[Pose]) -> String {
-        if let (Unsettled::Budget, Some((beam, turn))) = (why, Self::wound(system, q)) {
+    fn unsettled(&mut self, system: &System, why: FallFailure, q: &[Pose]) -> String {
+        if let (FallFailure::Budget, Some((beam, turn))) = (why, Self::wound(system, q)) {
             return format!(
                 "beyond it beam {beam} winds up, by {:.0}° along its length where the search ended: a loop slides along its beam with next to no \
                  resistance, so that nothing holds it",
@@ -150,10 +157,10 @@ impl Equilibrium {
         let name = system.model.bodies.get(worst).map_or(String::new(), |body| body.name.to_string());
         let force = self.residual.get(worst).map_or(0.0, |r| r.amax());
         match why {
-            Unsettled::Budget => format!(
+            FallFailure::Budget => format!(
                 "beyond it the part falls on and on, farthest from equilibrium at \"{name}\" ({force:.1e} N): no stable equilibrium near"
             ),
-            Unsettled::Stuck => format!(
+            FallFailure::Stuck => format!(
                 "beyond it rounding hides which way the energy falls, farthest from equilibrium at \"{name}\" ({force:.1e} N): the stiffness of \
                  its parts differs too much, or the load is beyond beams"
             ),

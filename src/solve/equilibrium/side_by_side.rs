@@ -12,12 +12,12 @@ pub use storage::LaneEquilibrium;
 use super::path::LoadPath;
 use super::{EquilibriumOptions, LEAP, STALLED};
 use crate::domains::{Domain, Drive, System};
-use crate::multibody::lanes::{Eight, LANES, LanePose, Real, across};
+use crate::multibody::lanes::{LANES, Lane8, LanePose, Real, across};
 use crate::multibody::planar::Pose;
-use kernels::{Task, Work};
+use kernels::{EquilibriumKernel, EquilibriumPass};
 
 /// A variant, its path, and the equilibrium (or near it) where that begins.
-pub struct Way<'a> {
+pub struct BatchPath<'a> {
     /// The mechanism.
     pub system: &'a System,
     /// What acts on it.
@@ -28,7 +28,7 @@ pub struct Way<'a> {
 
 /// The end of a path.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Arrived {
+pub struct ConvergedPath {
     /// The equilibrium.
     pub q: Vec<Pose>,
     /// Newton iterations.
@@ -37,7 +37,7 @@ pub struct Arrived {
 
 /// A lane's course.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Course {
+enum LaneStatus {
     Goes,
     Arrived(usize),
     GivenUp,
@@ -45,14 +45,14 @@ enum Course {
 
 impl LaneEquilibrium {
     /// Goes the ways of variants that fit, [`LANES`] at most. None for one that has to go alone.
-    pub fn follow(&mut self, ways: &[Way<'_>]) -> Vec<Option<Arrived>> {
+    pub fn follow(&mut self, ways: &[BatchPath<'_>]) -> Vec<Option<ConvergedPath>> {
         let Some(last) = ways.len().checked_sub(1) else { return Vec::new() };
         let way = |lane: usize| &ways[lane.min(last)];
         let mut drives: [Drive; LANES] = std::array::from_fn(|lane| way(lane).system.electrics.drive());
         let mut slopes = drives.clone();
         for lane in 0..LANES {
-            let Way { system, path, q } = way(lane);
-            self.model.put(lane, &system.model);
+            let BatchPath { system, path, q } = way(lane);
+            self.model.set_lane(lane, &system.model);
             for (to, q) in self.trial.iter_mut().zip(*q) {
                 (0..3).for_each(|i| to[i].set_lane(lane, q[i]));
             }
@@ -60,18 +60,18 @@ impl LaneEquilibrium {
             path.slope(0.0, &mut slopes[lane]);
         }
         self.built_in = [drives[0].load, slopes[0].load];
-        let mut course = [Course::Goes; LANES];
+        let mut course = [LaneStatus::Goes; LANES];
         for (lane, course) in course.iter_mut().enumerate() {
             // one share of built-in strains for all
             if [drives[lane].load, slopes[lane].load] != self.built_in {
-                *course = Course::GivenUp;
+                *course = LaneStatus::GivenUp;
             }
         }
-        self.goes = Eight::of(1.0);
+        self.goes = Lane8::of(1.0);
         let predicted = self.predict(&way, &drives, &slopes);
         course.iter_mut().zip(self.vanished).for_each(|(course, vanished)| {
             if vanished {
-                *course = Course::GivenUp;
+                *course = LaneStatus::GivenUp;
             }
         });
         for (lane, drive) in drives.iter_mut().enumerate() {
@@ -83,7 +83,7 @@ impl LaneEquilibrium {
         self.built_in[0] = drives[0].load;
         self.correct(&way, &drives, &predicted, &mut course);
         let arrived = |lane: usize| match course[lane] {
-            Course::Arrived(iterations) => Some(Arrived { q: self.lane(&self.trial, lane), iterations }),
+            LaneStatus::Arrived(iterations) => Some(ConvergedPath { q: self.lane(&self.trial, lane), iterations }),
             _ => None,
         };
         (0..ways.len()).map(arrived).collect()
@@ -92,7 +92,7 @@ impl LaneEquilibrium {
     /// The tangent's prediction of the end of the way into `trial`; answers how far it goes.
     fn predict<'w>(
         &mut self,
-        way: &dyn Fn(usize) -> &'w Way<'w>,
+        way: &dyn Fn(usize) -> &'w BatchPath<'w>,
         drives: &[Drive; LANES],
         slopes: &[Drive; LANES],
     ) -> [f64; LANES] {
@@ -100,14 +100,14 @@ impl LaneEquilibrium {
         expand(&mut self.rate, slopes);
         self.balance(way, drives);
         self.residual.copy_from_slice(&self.force);
-        self.run(Task::Change);
+        self.run(EquilibriumPass::Change);
         for lane in 0..LANES {
             let system = way(lane).system;
             self.take(lane);
             system.add_body_drive_force(&self.q, &drives[lane], &slopes[lane], &mut self.r);
             self.give(lane);
         }
-        self.run(Task::Predict);
+        self.run(EquilibriumPass::Predict);
         self.prediction.copy_from_slice(&self.trial);
         self.sizes(way, |m, k, i, lane| m.force[k][i].0[lane])
     }
@@ -115,35 +115,35 @@ impl LaneEquilibrium {
     /// Newton's method at the end of the way.
     fn correct<'w>(
         &mut self,
-        way: &dyn Fn(usize) -> &'w Way<'w>,
+        way: &dyn Fn(usize) -> &'w BatchPath<'w>,
         drives: &[Drive; LANES],
         predicted: &[f64; LANES],
-        course: &mut [Course; LANES],
+        course: &mut [LaneStatus; LANES],
     ) {
         let options = EquilibriumOptions::default();
         let mut last = [f64::INFINITY; LANES];
         expand(&mut self.expansion, drives);
         for iteration in 1..=options.iterations {
             for (goes, course) in self.goes.0.iter_mut().zip(&*course) {
-                *goes = if *course == Course::Goes { 1.0 } else { 0.0 };
+                *goes = if *course == LaneStatus::Goes { 1.0 } else { 0.0 };
             }
             if self.goes.0 == [0.0; LANES] {
                 return;
             }
             crate::budget::check();
             self.balance(way, drives);
-            self.run(Task::Correct);
+            self.run(EquilibriumPass::Correct);
             let corrections = self.sizes(way, |m, k, i, lane| m.force[k][i].0[lane]);
             let reaches = self.sizes(way, |m, k, i, lane| m.trial[k][i].0[lane]);
             let away = self.sizes(way, |m, k, i, lane| m.trial[k][i].0[lane] - m.prediction[k][i].0[lane]);
-            for lane in (0..LANES).filter(|&lane| course[lane] == Course::Goes).collect::<Vec<_>>() {
+            for lane in (0..LANES).filter(|&lane| course[lane] == LaneStatus::Goes).collect::<Vec<_>>() {
                 let (system, correction) = (way(lane).system, corrections[lane]);
                 let scale = system.length_scale;
                 if self.vanished[lane]
                     || !correction.is_finite()
                     || (correction > last[lane] && correction > 1e-3 * scale)
                 {
-                    course[lane] = Course::GivenUp;
+                    course[lane] = LaneStatus::GivenUp;
                     continue;
                 }
                 let reach = reaches[lane].max(1e-6 * scale);
@@ -154,7 +154,7 @@ impl LaneEquilibrium {
                     let touching = !system.members.is_empty()
                         && system.contact_scale(&self.lane(&self.trial, lane), &drives[lane].volts) > 0.0;
                     if touching {
-                        course[lane] = Course::GivenUp;
+                        course[lane] = LaneStatus::GivenUp;
                         continue;
                     }
                 }
@@ -162,18 +162,18 @@ impl LaneEquilibrium {
                     let stable = self.negative.lane(lane) == 0.0;
                     let near = away[lane] <= 0.5 * predicted[lane] + 1e-3 * scale;
                     let sound = stable && near && !self.leaps(lane, way(lane), &drives[lane]);
-                    course[lane] = if sound { Course::Arrived(iteration) } else { Course::GivenUp };
+                    course[lane] = if sound { LaneStatus::Arrived(iteration) } else { LaneStatus::GivenUp };
                 }
             }
         }
-        for course in course.iter_mut().filter(|course| **course == Course::Goes) {
-            *course = Course::GivenUp;
+        for course in course.iter_mut().filter(|course| **course == LaneStatus::Goes) {
+            *course = LaneStatus::GivenUp;
         }
     }
 
     /// The tangent at `trial`, factored, and the residual in `force`.
-    fn balance<'w>(&mut self, way: &dyn Fn(usize) -> &'w Way<'w>, drives: &[Drive; LANES]) {
-        self.run(Task::Tangent);
+    fn balance<'w>(&mut self, way: &dyn Fn(usize) -> &'w BatchPath<'w>, drives: &[Drive; LANES]) {
+        self.run(EquilibriumPass::Tangent);
         for (lane, drive) in drives.iter().enumerate() {
             let system = way(lane).system;
             if self.goes.0[lane] == 0.0 || !system.is_acted_on(drive) {
@@ -199,7 +199,7 @@ impl LaneEquilibrium {
                 }
             }
         }
-        self.run(Task::Factor);
+        self.run(EquilibriumPass::Factor);
     }
 
     /// Displacement of a lane's bodies that are acted on, and the force on them.
@@ -221,9 +221,9 @@ impl LaneEquilibrium {
     }
 
     /// As `leaps` of [`super::Equilibrium`].
-    fn leaps(&self, lane: usize, way: &Way<'_>, drive: &Drive) -> bool {
+    fn leaps(&self, lane: usize, way: &BatchPath<'_>, drive: &Drive) -> bool {
         let system = way.system;
-        let closes = |(gap, volts): &(usize, &f64)| **volts != 0.0 && system.members[*gap].closes();
+        let closes = |(gap, volts): &(usize, &f64)| **volts != 0.0 && system.members[*gap].is_electrostatic();
         let mut closing = drive.volts.iter().enumerate().filter(closes).peekable();
         if closing.peek().is_none() {
             return false;
@@ -239,7 +239,7 @@ impl LaneEquilibrium {
     #[inline(always)]
     fn sizes<'w>(
         &self,
-        way: &dyn Fn(usize) -> &'w Way<'w>,
+        way: &dyn Fn(usize) -> &'w BatchPath<'w>,
         at: impl Fn(&Self, usize, usize, usize) -> f64,
     ) -> [f64; LANES] {
         let scale: [f64; LANES] = std::array::from_fn(|lane| way(lane).system.length_scale);
@@ -256,13 +256,13 @@ impl LaneEquilibrium {
         largest
     }
 
-    fn run(&mut self, task: Task) {
-        across(Work(self, task));
+    fn run(&mut self, task: EquilibriumPass) {
+        across(EquilibriumKernel(self, task));
     }
 }
 
 /// Free strains of heaters from the drive of each lane.
-fn expand(expansion: &mut [Eight], drives: &[Drive; LANES]) {
+fn expand(expansion: &mut [Lane8], drives: &[Drive; LANES]) {
     for (k, expansion) in expansion.iter_mut().enumerate() {
         for (lane, drive) in drives.iter().enumerate() {
             expansion.set_lane(lane, drive.expansion[k]);

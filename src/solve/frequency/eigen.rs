@@ -12,7 +12,7 @@
 //!
 //! Reference: T. Ericsson, A. Ruhe, "The spectral transformation Lanczos method", Math. Comp. 35 (1980).
 
-use super::inverse_iteration::{self, Block};
+use super::inverse_iteration::{self, ModeBlock};
 use super::lanczos::{self, CLOSED, Pairs};
 use super::mass::shifted;
 use super::refined::{ROUNDING, Refined};
@@ -26,7 +26,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 /// Models of at most this many coordinates are solved densely.
 const DENSE: usize = 60;
 /// Modes that are settled beyond those asked for: they keep the last wanted one apart from what follows.
-const BESIDE: usize = 2;
+const GUARD_MODES: usize = 2;
 /// A factor whose solves are off by more than this share is corrected in every solve.
 const ROUGH: f64 = 1e-9;
 /// Residual at which an iteration stops [1].
@@ -122,7 +122,7 @@ pub fn lowest_modes(
     let x = root.clone();
     let mut operator =
         Operator { refined: &mut refined, factor: &factor, shift, model, root: &root, corrected: rounding > ROUGH, x };
-    let wide = (count + BESIDE).min(massive);
+    let wide = (count + GUARD_MODES).min(massive);
     let pairs = if 3 * root.len() <= DENSE { dense(&mut operator, wide) } else { sparse(&mut operator, wide, massive) };
     let few = if pairs.settled >= wide && rounding <= ROUGH { count } else { wide };
     let start: Vec<Vec<Pose>> = (0..few.min(pairs.theta.len()))
@@ -134,9 +134,9 @@ pub fn lowest_modes(
     };
     let found = settle(&mut refined, start.clone(), wanted);
     // only where nothing is known of it yet
-    let lost = |found: &Block| missed(model, stiffness, &found.lambda, rounding);
-    let sound = |found: &Block| found.lambda.len() == count && found.residuals.iter().all(|&r| r <= RELIABLE);
-    let complete = |found: &Block| sound(found) && !lost(found);
+    let lost = |found: &ModeBlock| missed(model, stiffness, &found.lambda, rounding);
+    let sound = |found: &ModeBlock| found.lambda.len() == count && found.residuals.iter().all(|&r| r <= RELIABLE);
+    let complete = |found: &ModeBlock| sound(found) && !lost(found);
     let mut known = None;
     let found = match found {
         Some(found) if complete(&found) => {

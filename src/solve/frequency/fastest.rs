@@ -5,7 +5,7 @@
 //! is enough to foretell the number of steps.
 
 use crate::multibody::forces::RestStrain;
-use crate::multibody::rcr::{Linkage, Reduction, Task};
+use crate::multibody::rcr::{Linkage, Reduction, ReductionTask};
 
 /// Displacement of the iterates over the scale of a coordinate: small against 1, large against rounding.
 const SMALL: f64 = 1e-7;
@@ -43,7 +43,7 @@ pub fn fastest(linkage: &Linkage, scale: &[f64], groups: usize) -> Option<Fastes
         reduction.force.fill([0.0; 3]);
         reduction.torque.fill(0.0);
         reduction.add_elastic(linkage, &x, &rest);
-        reduction.solve(Task::Accelerations, &mut a);
+        reduction.solve(ReductionTask::Accelerations, &mut a);
         omega2 = norm(&a, scale) / SMALL;
         if !omega2.is_finite() || omega2 == 0.0 {
             return None;

@@ -12,11 +12,11 @@ use crate::domains::System;
 use nalgebra::Complex;
 
 /// Vectors at most: more modes than take part in any band.
-const MOST: usize = 60;
+const MAX_VECTORS: usize = 60;
 /// Share of the right-hand side at which the residual is rounding [1].
 const ENOUGH: f64 = 1e-14;
 
-type Vector = Vec<ComplexPose>;
+type ComplexVector = Vec<ComplexPose>;
 
 /// Solves for one force with the matrix that `harmonic` has factored and a frame at `rate` [rad/s]; `x` holds the force and
 /// becomes the response. `omega` in rad/s.
@@ -26,8 +26,8 @@ pub fn solve(harmonic: &mut Harmonic, system: &System, (omega, rate): (f64, f64)
         return;
     }
     let factor = Complex::new(0.0, 2.0 * omega * rate);
-    let apply = |harmonic: &mut Harmonic, v: &Vector| -> Vector {
-        let mut w: Vector = v
+    let apply = |harmonic: &mut Harmonic, v: &ComplexVector| -> ComplexVector {
+        let mut w: ComplexVector = v
             .iter()
             .zip(&system.model.bodies)
             .map(|(v, body)| {
@@ -48,11 +48,11 @@ pub fn solve(harmonic: &mut Harmonic, system: &System, (omega, rate): (f64, f64)
         return;
     }
     // Arnoldi with Givens rotations; x₀ = 0
-    let mut basis: Vec<Vector> = vec![x.iter().map(|p| p / Complex::from(size)).collect()];
+    let mut basis: Vec<ComplexVector> = vec![x.iter().map(|p| p / Complex::from(size)).collect()];
     let mut columns: Vec<Vec<Complex<f64>>> = Vec::new();
     let mut turns: Vec<(f64, Complex<f64>)> = Vec::new();
     let mut rest = vec![Complex::from(size)];
-    while columns.len() < MOST && rest.last().is_some_and(|r| r.norm() > ENOUGH * size) {
+    while columns.len() < MAX_VECTORS && rest.last().is_some_and(|r| r.norm() > ENOUGH * size) {
         crate::budget::check();
         let k = columns.len();
         let mut w = apply(harmonic, &basis[k]);

@@ -134,7 +134,7 @@ impl Harmonic {
     ) {
         let model = &system.model;
         for _ in 0..CORRECTIONS {
-            let [stiff_re, stiff_im] = [false, true].map(|imaginary| refined.product(&part(x, imaginary)));
+            let [stiff_re, stiff_im] = [false, true].map(|imaginary| refined.product(&component(x, imaginary)));
             let dragged = self.dragged(system, x);
             let square = s * s;
             for (j, rest) in self.rest.iter_mut().enumerate() {
@@ -158,7 +158,7 @@ impl Harmonic {
     pub(super) fn dragged(&self, system: &System, x: &[ComplexPose]) -> Vec<ComplexPose> {
         let [re, im] = [false, true].map(|imaginary| {
             let mut y = vec![Pose::zeros(); x.len()];
-            self.damping.multiply_add(&system.model.pattern, &part(x, imaginary), &mut y);
+            self.damping.multiply_add(&system.model.pattern, &component(x, imaginary), &mut y);
             y
         });
         re.iter().zip(&im).map(|(re, im)| re.zip_map(im, Complex::new)).collect()
@@ -166,6 +166,6 @@ impl Harmonic {
 }
 
 /// The real or the imaginary parts.
-fn part(x: &[ComplexPose], imaginary: bool) -> Vec<Pose> {
+fn component(x: &[ComplexPose], imaginary: bool) -> Vec<Pose> {
     x.iter().map(|x| x.map(|c| if imaginary { c.im } else { c.re })).collect()
 }

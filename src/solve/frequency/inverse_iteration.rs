@@ -16,13 +16,13 @@ use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};
 
 /// Rounds at most.
-const MOST: usize = 30;
+const MAX_ROUNDS: usize = 30;
 /// Error of a solve that only tells how large a residual is [1].
 const MEASURED: f64 = 1e-3;
 
 /// Modes with their residuals.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Block {
+pub struct ModeBlock {
     /// λ of the wanted modes, ascending [rad²/s²].
     pub lambda: Vec<f64>,
     /// All shapes of the block, xᵀMx = 1, the wanted ones first.
@@ -41,10 +41,10 @@ pub fn settle(
     mut x: Vec<Vec<Pose>>,
     wanted: usize,
     goal: f64,
-) -> Option<Block> {
-    let mut best: Option<(f64, Block)> = None;
+) -> Option<ModeBlock> {
+    let mut best: Option<(f64, ModeBlock)> = None;
     let mut stalls = 0;
-    for _ in 0..MOST {
+    for _ in 0..MAX_ROUNDS {
         let (next, loose) = improve(model, refined, (factor, shift), &x, goal)?;
         x = next;
         let (lambda, mut residuals) = measure(model, refined, stiffness, shift.abs(), &x[..wanted]);
@@ -52,7 +52,7 @@ pub fn settle(
         let worst = residuals.iter().fold(0.0, |w: f64, r| if r.is_nan() { f64::INFINITY } else { w.max(*r) });
         stalls = if best.as_ref().is_some_and(|(w, _)| worst > 0.9 * w) { stalls + 1 } else { 0 };
         if best.as_ref().is_none_or(|(w, _)| worst < *w) {
-            best = Some((worst, Block { lambda, shapes: x.clone(), residuals }));
+            best = Some((worst, ModeBlock { lambda, shapes: x.clone(), residuals }));
         }
         if worst <= goal || stalls > 1 {
             break;
@@ -118,7 +118,7 @@ fn measure(
 }
 
 /// Ascending λ.
-fn sort(block: &mut Block) {
+fn sort(block: &mut ModeBlock) {
     let mut order: Vec<usize> = (0..block.lambda.len()).collect();
     order.sort_by(|&a, &b| block.lambda[a].total_cmp(&block.lambda[b]));
     block.lambda = order.iter().map(|&i| block.lambda[i]).collect();

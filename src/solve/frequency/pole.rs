@@ -14,7 +14,7 @@ use crate::multibody::planar::Pose;
 use nalgebra::Complex;
 
 /// Iterations at most.
-const MOST: usize = 20;
+const MAX_ITERATIONS: usize = 20;
 /// Change of s that is rounding [1].
 const SETTLED: f64 = 1e-14;
 /// A change no smaller than that before is rounding too where it is below this [1].
@@ -35,7 +35,7 @@ pub fn pole(
     let mut s = guess;
     let mut x: Vec<ComplexPose> = push.iter().map(|f| f.map(Complex::from)).collect();
     let mut last = f64::INFINITY;
-    for _ in 0..MOST {
+    for _ in 0..MAX_ITERATIONS {
         crate::budget::check();
         if harmonic.factor_at(system, stiffness, s).is_err() {
             return Some(s); // it is one to the last digit

@@ -14,7 +14,7 @@ use crate::multibody::precise::PreciseTangent;
 use crate::multibody::{BlockMatrix, Model};
 
 /// Corrections of one solve at most.
-const MOST: usize = 40;
+const MAX_CORRECTIONS: usize = 40;
 /// An error below this share of the solution is rounding.
 pub const ROUNDING: f64 = 1e-15;
 
@@ -34,7 +34,7 @@ pub struct Refined<'a> {
 
 /// How a solve went.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settled {
+pub struct SolveAccuracy {
     /// Size of the first correction over that of the solution: about the relative error of the factor [1].
     pub first: f64,
     /// Share by which the solution may still be off [1].
@@ -118,13 +118,13 @@ impl<'a> Refined<'a> {
 
     /// Solves (K − σM)·x = b in place to about the relative error `goal`, with the factor of about that matrix. Corrections are left
     /// out where the first solve of all has shown that rounding is less than that.
-    pub fn solve(&mut self, factor: &BlockMatrix<f64, 3>, shift: f64, b: &mut [Pose], goal: f64) -> Settled {
+    pub fn solve(&mut self, factor: &BlockMatrix<f64, 3>, shift: f64, b: &mut [Pose], goal: f64) -> SolveAccuracy {
         let (model, pattern) = (self.model, &self.model.pattern);
         if self.rounding <= goal {
             model.project(b);
             factor.solve(pattern, b);
             model.project(b);
-            return Settled { first: self.rounding, left: self.rounding };
+            return SolveAccuracy { first: self.rounding, left: self.rounding };
         }
         let right = b.to_vec();
         model.project(b);
@@ -134,9 +134,9 @@ impl<'a> Refined<'a> {
             *to = [x.x.into(), x.y.into(), x.z.into()];
         }
         let size = size(model, b);
-        let mut settled = Settled { first: 0.0, left: 0.0 };
+        let mut settled = SolveAccuracy { first: 0.0, left: 0.0 };
         let mut last = 1.0;
-        for round in 0..MOST {
+        for round in 0..MAX_CORRECTIONS {
             crate::budget::check();
             self.multiply();
             for (j, (rest, b)) in self.correction.iter_mut().zip(&right).enumerate() {

@@ -18,15 +18,15 @@ mod ritz;
 mod storage;
 mod vectors;
 
-pub(crate) use ritz::Small;
+pub(crate) use ritz::RitzMatrices;
 pub use storage::LaneModes;
 pub(crate) use vectors::{dot, weigh};
 
 use super::eigen::Modes;
 use crate::domains::System;
-use crate::multibody::lanes::{Eight, LANES, LanePose, Real, across};
+use crate::multibody::lanes::{LANES, Lane8, LanePose, Real, across};
 use crate::multibody::planar::Pose;
-use kernels::{Task, Work};
+use kernels::{ModesKernel, ModesPass};
 use storage::Which;
 
 /// Inverse iterations of all shapes before the best modes in their span are taken.
@@ -46,13 +46,13 @@ impl LaneModes {
         crate::budget::check();
         for lane in 0..LANES {
             let system = systems.get(lane).copied().unwrap_or(last);
-            self.model.put(lane, &system.model);
+            self.model.set_lane(lane, &system.model);
             let q = vec![Pose::zeros(); system.bodies()];
-            self.precise.put(lane, &system.model, &q, &system.electrics.drive().rest());
+            self.precise.set_lane(lane, &system.model, &q, &system.electrics.drive().rest());
         }
         for (x, start) in self.x.iter_mut().zip(&self.start) {
             for (x, start) in x.iter_mut().zip(start) {
-                *x = [Eight::of(start.x), Eight::of(start.y), Eight::of(start.z)];
+                *x = [Lane8::of(start.x), Lane8::of(start.y), Lane8::of(start.z)];
             }
         }
         let mut sound = self.spread();
@@ -68,34 +68,34 @@ impl LaneModes {
                     *sound &= counted && !self.vanished[lane];
                 }
                 for _ in 0..iterations {
-                    self.run(Task::Invert(Which::Shifted, k));
+                    self.run(ModesPass::Invert(Which::Shifted, k));
                 }
             }
-            self.run(Task::Measure(k));
+            self.run(ModesPass::Measure(k));
         }
         (0..systems.len()).map(|lane| sound[lane].then(|| self.modes(lane, wanted)).flatten()).collect()
     }
 
     /// The best modes in the span of all shapes after some inverse iterations; answers the lanes that have them.
     fn spread(&mut self) -> [bool; LANES] {
-        self.run(Task::Stiffness);
+        self.run(ModesPass::Stiffness);
         self.factor(Which::Plain);
         let sound = std::array::from_fn(|lane| !self.vanished[lane] && self.below.lane(lane) == 0.0);
         for k in 0..self.start.len() {
             for _ in 0..SPREAD {
-                self.run(Task::Invert(Which::Plain, k));
+                self.run(ModesPass::Invert(Which::Plain, k));
             }
         }
-        self.run(Task::Ritz);
+        self.run(ModesPass::Ritz);
         self.small.sort(&mut self.lambda);
-        self.run(Task::Combine);
+        self.run(ModesPass::Combine);
         sound
     }
 
     /// Factors K, or K − σM.
     fn factor(&mut self, which: Which) {
         let (shift, matrix) = match which {
-            Which::Plain => (Eight::NONE, &mut self.plain),
+            Which::Plain => (Lane8::NONE, &mut self.plain),
             Which::Shifted => (self.shift, &mut self.shifted),
         };
         matrix.diagonal.copy_from_slice(&self.stiffness.diagonal);
@@ -107,12 +107,12 @@ impl LaneModes {
                 }
             }
         }
-        self.run(Task::Factor(which));
+        self.run(ModesPass::Factor(which));
     }
 
     /// What a lane has found.
     fn modes(&self, lane: usize, wanted: usize) -> Option<Modes> {
-        let of = |numbers: &[Eight]| numbers.iter().map(|x| x.lane(lane)).collect::<Vec<f64>>();
+        let of = |numbers: &[Lane8]| numbers.iter().map(|x| x.lane(lane)).collect::<Vec<f64>>();
         let lambda = of(&self.lambda);
         let residuals = of(&self.residual[..wanted.min(lambda.len())]);
         let settled = residuals.iter().all(|r| *r <= SETTLED);
@@ -127,7 +127,7 @@ impl LaneModes {
         Some(Modes { lambda, shapes, residuals, missed: false, rounding })
     }
 
-    fn run(&mut self, task: Task) {
-        across(Work(self, task));
+    fn run(&mut self, task: ModesPass) {
+        across(ModesKernel(self, task));
     }
 }

@@ -11,11 +11,11 @@ use crate::multibody::{BlockMatrix, Model};
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 /// Iterations at most.
-const MOST: usize = 60;
+const MAX_ITERATIONS: usize = 60;
 
 /// Modes as columns.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Modes {
+pub struct SubspaceModes {
     /// λ = ω² of each vector of the block, ascending [rad²/s²].
     pub lambda: Vec<f64>,
     /// Shapes with xᵀMx = 1.
@@ -42,7 +42,7 @@ pub fn iterate(
     start: Vec<Vec<Pose>>,
     wanted: usize,
     tolerance: f64,
-) -> Option<Modes> {
+) -> Option<SubspaceModes> {
     let (n, count) = (model.bodies.len(), start.len());
     let mass: Vec<Pose> = (0..n).map(|k| model.mass(k)).collect();
     let mut x = columns(&start);
@@ -59,7 +59,7 @@ pub fn iterate(
         }
         z
     };
-    for iterations in 1..=MOST {
+    for iterations in 1..=MAX_ITERATIONS {
         let z = weigh(&x);
         let mut y = z.clone();
         for mut column in y.column_iter_mut() {
@@ -85,7 +85,7 @@ pub fn iterate(
             let shapes = (x.column_iter())
                 .map(|c| (0..n).map(|k| Pose::new(c[3 * k], c[3 * k + 1], c[3 * k + 2])).collect())
                 .collect();
-            return Some(Modes { lambda, shapes, iterations });
+            return Some(SubspaceModes { lambda, shapes, iterations });
         }
     }
     None

@@ -3,7 +3,7 @@
 //! Reference: A. Dubrulle, R. S. Martin, J. H. Wilkinson, "The implicit QL algorithm", in: Handbook for Automatic Computation II (1971).
 
 /// Steps for one eigenvalue at most; two or three are usual.
-const MOST: usize = 60;
+const MAX_STEPS: usize = 60;
 
 /// All eigenvalues, in no order, and for each its vector of length 1. `beside` is the diagonal next to the main one.
 pub(super) fn eigen(diagonal: &[f64], beside: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
@@ -25,7 +25,7 @@ fn rotated(diagonal: &[f64], beside: &[f64], mut vectors: Vec<Vec<f64>>) -> (Vec
     let mut d: Vec<f64> = diagonal.iter().map(|x| x / scale).collect();
     let mut e: Vec<f64> = beside.iter().map(|x| x / scale).chain([0.0]).collect();
     for l in 0..n {
-        for _ in 0..MOST {
+        for _ in 0..MAX_STEPS {
             let end = (l..n - 1).find(|&m| e[m].abs() <= f64::EPSILON * (d[m].abs() + d[m + 1].abs())).unwrap_or(n - 1);
             if end == l {
                 break;

@@ -4,11 +4,11 @@
 //! What an error is beside a motion the equations say ([`Equations::share`]). The next step is 0.9·err^(−1/p) times the last, between 0.2
 //! and 5 times, where the estimated error falls with the p-th power of the step (Hairer & Wanner 1996, §IV.8).
 
-use super::method::{Method, Motion, StepFailure, Work};
-use super::pace::{self, Pace};
+use super::method::{Method, Motion, SolverCounters, StepFailure};
+use super::pace::{self, StepController};
 use super::rodas4::Rodas4;
 pub use crate::equations::Control;
-use crate::equations::{Equations, Place, Unknown};
+use crate::equations::{DegreeOfFreedom, Equations, Unknown};
 use crate::multibody::planar::Pose;
 use crate::solve::{SolveError, WhyFailed};
 
@@ -34,9 +34,9 @@ pub struct Adaptive<M = Rodas4, X = Pose> {
     steps: u64,
     rejected: u64,
     /// What the equations counted.
-    spent: Work,
+    spent: SolverCounters,
     /// What the method counted.
-    done: Work,
+    done: SolverCounters,
     before: Motion<X>,
     error: Motion<X>,
     carried_before: Vec<Motion<X>>,
@@ -49,8 +49,8 @@ impl<M, X: Unknown> Adaptive<M, X> {
             method,
             steps: 0,
             rejected: 0,
-            spent: Work::default(),
-            done: Work::default(),
+            spent: SolverCounters::default(),
+            done: SolverCounters::default(),
             before: Motion::zeros(unknowns),
             error: Motion::zeros(unknowns),
             carried_before: Vec::new(),
@@ -58,8 +58,12 @@ impl<M, X: Unknown> Adaptive<M, X> {
     }
 
     /// Work so far.
-    pub fn work(&self) -> Work {
-        self.spent.and(self.done).and(Work { steps: self.steps, rejected: self.rejected, ..Work::default() })
+    pub fn work(&self) -> SolverCounters {
+        self.spent.and(self.done).and(SolverCounters {
+            steps: self.steps,
+            rejected: self.rejected,
+            ..SolverCounters::default()
+        })
     }
 
     /// Advances `motion` from the start of the equations to their end, and with it what the method carries. `h` holds the first
@@ -147,7 +151,7 @@ impl<M, X: Unknown> Adaptive<M, X> {
     where
         M: Method<E>,
     {
-        let mut pace = Pace::new((0.0, equations.end()), *h, self.method.error_order());
+        let mut pace = StepController::new((0.0, equations.end()), *h, self.method.error_order());
         let mut steps = 0;
         while !pace.is_over() {
             if steps == max_steps {
@@ -210,7 +214,7 @@ impl<M, X: Unknown> Adaptive<M, X> {
             self.method.step(equations, t, h, motion, &mut self.error).map_err(|e| failed(equations, t, h, e))?;
             equations.close(end, &self.before.q, motion, 1.0);
             if let Some(place) = motion.not_finite() {
-                return Err(told(equations, (t, h), WhyFailed::NotFinite, place));
+                return Err(solve_error(equations, (t, h), WhyFailed::NotFinite, place));
             }
             self.steps += 1;
             if !observe(t, h, &self.before, motion) {
@@ -252,10 +256,10 @@ pub fn failed<E: Equations>(equations: &E, t: f64, dt: f64, failure: StepFailure
         }
         StepFailure::NoInertia { body } => (WhyFailed::NoInertia, (body, 0)),
     };
-    told(equations, (t, dt), why, place)
+    solve_error(equations, (t, dt), why, place)
 }
 
-fn told<E: Equations>(equations: &E, (t, dt): (f64, f64), why: WhyFailed, place: Place) -> SolveError {
+fn solve_error<E: Equations>(equations: &E, (t, dt): (f64, f64), why: WhyFailed, place: DegreeOfFreedom) -> SolveError {
     let (body, direction) = equations.named(place);
     SolveError::StepFailed { t, dt, why, body, direction }
 }

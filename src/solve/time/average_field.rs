@@ -14,7 +14,7 @@
 
 use super::method::{Method, Motion, StepFailure};
 use crate::equations::linear::LinearSolver;
-use crate::equations::newton::{Equation, Newton, Sample};
+use crate::equations::newton::{Equation, ForceEvaluation, Newton};
 use crate::multibody::planar::Pose;
 
 /// Half of 1/√3.
@@ -58,7 +58,7 @@ impl<S: LinearSolver> Method<Newton<'_, S>> for AverageField {
             self.constant[k] = model.mass(k).component_mul(v) * (-2.0 / h);
             self.x[k] = v * h;
         }
-        let samples = POINTS.map(|share| Sample { weight: 0.5, share, time: t + share * h });
+        let samples = POINTS.map(|share| ForceEvaluation { weight: 0.5, share, time: t + share * h });
         let (base, constant) = (&motion.q, &self.constant);
         let (m, c, rates) = (2.0 / (h * h), 1.0 / h, &self.still);
         let quotient = equations.system().can_touch().then_some(h);

@@ -19,7 +19,7 @@
 
 use super::method::Method;
 use super::rodas4::tableau::GAMMA;
-use crate::equations::{Bodies, Motion, StepFailure, Work};
+use crate::equations::{Bodies, Motion, SolverCounters, StepFailure};
 use crate::multibody::planar::Pose;
 use nalgebra::Complex;
 
@@ -182,7 +182,7 @@ impl<'s, M: Propagates<'s>> Method<Bodies<'s>> for Estimated<'_, M> {
         self.method.carried()
     }
 
-    fn work(&self) -> Work {
+    fn work(&self) -> SolverCounters {
         self.method.work()
     }
 }

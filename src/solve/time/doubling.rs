@@ -5,7 +5,7 @@
 //!
 //! Reference: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I" (1993), §II.4, eq. 4.4.
 
-use super::method::{Method, Motion, StepFailure, Work};
+use super::method::{Method, Motion, SolverCounters, StepFailure};
 use crate::equations::{Equations, Unknown};
 use crate::multibody::planar::Pose;
 
@@ -65,7 +65,7 @@ impl<E: Equations, M: Method<E>> Method<E> for Doubling<M, E::Unknown> {
         self.method.carried()
     }
 
-    fn work(&self) -> Work {
+    fn work(&self) -> SolverCounters {
         self.method.work()
     }
 }

@@ -1,7 +1,7 @@
 //! Rodas4 in the formulation of a model: a circuit, a service or a sweep steps a mechanism without asking which it is.
 
 use super::joint_rodas4::JointRodas4;
-use super::method::{Method, Motion, StepFailure, Work};
+use super::method::{Method, Motion, SolverCounters, StepFailure};
 use super::rodas4::Rodas4;
 use crate::domains::System;
 use crate::equations::{Bodies, Joints};
@@ -101,7 +101,7 @@ impl Method<Bodies<'_>> for Formulated {
         }
     }
 
-    fn work(&self) -> Work {
+    fn work(&self) -> SolverCounters {
         match self {
             Self::Bodies(m) => m.work(),
             Self::Joints(m) => m.work(),

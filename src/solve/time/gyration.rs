@@ -9,12 +9,12 @@
 //! 2|Ω|γh + |Ω̇|(γh)² a term, some 10⁻⁵ for a gyroscope at its own steps, and the sum is exact to rounding.
 
 use super::method::StepFailure;
-use crate::domains::inputs::Frame;
+use crate::domains::inputs::FrameMotion;
 use crate::multibody::planar::Pose;
 use crate::multibody::{Body, Model};
 
 /// Terms of the series at most; what wants more wants shorter steps.
-const MOST_TERMS: usize = 12;
+const MAX_TERMS: usize = 12;
 /// Share of the solution at which the series ends [1].
 const NEGLIGIBLE: f64 = 1e-16;
 
@@ -29,7 +29,7 @@ pub struct Gyration {
 
 impl Gyration {
     /// Of a frame's motion.
-    pub fn new(frame: Frame) -> Self {
+    pub fn new(frame: FrameMotion) -> Self {
         Self { rate: 2.0 * frame.rate, turning: frame.turning }
     }
 
@@ -53,8 +53,8 @@ impl Gyration {
         }
         let ratio = self.rate.abs() * gh + self.turning.abs() * gh * gh;
         let terms = (NEGLIGIBLE.ln() / ratio.ln()).ceil();
-        if ratio >= 0.5 || terms > MOST_TERMS as f64 {
-            return Err(StepFailure::Diverged { iterations: MOST_TERMS, body: 0, direction: 0 });
+        if ratio >= 0.5 || terms > MAX_TERMS as f64 {
+            return Err(StepFailure::Diverged { iterations: MAX_TERMS, body: 0, direction: 0 });
         }
         Ok(terms.max(1.0) as usize)
     }

@@ -3,7 +3,7 @@
 //! Accelerations come from the recursion, and each accepted step is taken back to the loops ([`crate::multibody::rcr`]).
 
 use super::dormand_prince::SecondOrder;
-use crate::multibody::rcr::{Linkage, Reduction, Singularity, Task};
+use crate::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
 use thiserror::Error;
 
 /// Accelerations are not finite: forces are, so the mechanism has a coordinate without inertia.
@@ -60,7 +60,7 @@ impl<F: FnMut(f64, &[f64], &[f64], &mut Reduction<f64>)> SecondOrder for JointMo
         reduction.force.fill([0.0; 3]);
         reduction.torque.fill(0.0);
         (self.loads)(t, q, v, reduction);
-        if let Some(met) = reduction.solve(Task::Accelerations, a) {
+        if let Some(met) = reduction.solve(ReductionTask::Accelerations, a) {
             self.singular += 1;
             self.met = met;
         }

@@ -23,7 +23,7 @@ mod ports;
 mod stages;
 mod tableau;
 
-use super::method::{Method, Motion, StepFailure, Work};
+use super::method::{Method, Motion, SolverCounters, StepFailure};
 use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I, moves_on};
 use super::stage_loss::StageLoss;
 use crate::domains::Drive;
@@ -34,10 +34,10 @@ use crate::multibody::relative::JointMatrix;
 use crate::multibody::relative::columns::Four;
 use crate::multibody::relative::dynamics::Stresses;
 use crate::multibody::relative::geometric::{self, Geometric};
-use crate::multibody::relative::placed::{Placed, place_of};
-use error::Defect;
-use ports::Ports;
-use stages::Stages;
+use crate::multibody::relative::placed::{TreeKinematics, place_of};
+use error::JointDefectEstimate;
+use ports::JointPortSensitivities;
+use stages::JointStages;
 use std::sync::Arc;
 
 /// Share of the shortest time at which accelerations are made consistent: directions without inertia follow their springs,
@@ -49,13 +49,13 @@ const CONSISTENT: f64 = 1e-3;
 pub struct JointRodas4 {
     joints: Arc<Joints>,
     w: JointMatrix,
-    placed: Placed,
+    placed: TreeKinematics,
     stresses: Stresses,
     geometric: Vec<Geometric>,
     /// Coordinates and rates, and accelerations (with nothing beside them); then the same of each sensitivity.
     carried: Vec<Motion>,
-    stages: Stages,
-    ports: Ports,
+    stages: JointStages,
+    ports: JointPortSensitivities,
     /// ∂(bodies' motion)/∂(final voltage of a source), one for each source given to [`JointRodas4::new`].
     pub sensitivity: Vec<Motion>,
     force: Vec<Pose>,
@@ -72,10 +72,10 @@ pub struct JointRodas4 {
     /// Accelerations are those of the motion to come.
     resumed: bool,
     /// The error of the motion, where it is wanted.
-    defect: Option<Box<Defect>>,
+    defect: Option<Box<JointDefectEstimate>>,
     /// About the shortest time in which something moves [s].
     shortest: f64,
-    work: Work,
+    work: SolverCounters,
 }
 
 impl JointRodas4 {
@@ -88,12 +88,12 @@ impl JointRodas4 {
         let electrics = &closures.electrics;
         Self {
             w: JointMatrix::new(tree),
-            placed: Placed::new(tree),
+            placed: TreeKinematics::new(tree),
             stresses: Stresses::new(tree),
             geometric: vec![Geometric::ZERO; count],
             carried: vec![Motion::zeros(count); 2 + 2 * sources.len()],
-            stages: Stages::new(count),
-            ports: Ports::new(&joints, sources),
+            stages: JointStages::new(count),
+            ports: JointPortSensitivities::new(&joints, sources),
             sensitivity: vec![Motion::zeros(count); sources.len()],
             force: zeros.clone(),
             right: vec![Four::ZERO; count],
@@ -106,7 +106,7 @@ impl JointRodas4 {
             resumed: false,
             defect: None,
             shortest,
-            work: Work::default(),
+            work: SolverCounters::default(),
             joints,
         }
     }
@@ -196,7 +196,7 @@ impl JointRodas4 {
         let rate = GAMMA_I[i] * h;
         let Self { joints, stages, right, wrench, forcing, force, loss, .. } = self;
         let Joints { tree, closures, inertias, drags, .. } = &**joints;
-        let loses = loss.as_ref().is_some_and(|loss| loss.start.acts());
+        let loses = loss.as_ref().is_some_and(|loss| loss.start.is_nonzero());
         stages.move_bodies(i, h, *drags || loses);
         for ((j, inertia), (wrench, forcing)) in inertias.iter().enumerate().zip(wrench.iter_mut().zip(forcing)) {
             *wrench = Four::from(inertia.force(&stages.push(j), &stages.drift(j)) - *forcing * rate);
@@ -304,7 +304,7 @@ impl Method<Bodies<'_>> for JointRodas4 {
         &mut self.carried
     }
 
-    fn work(&self) -> Work {
+    fn work(&self) -> SolverCounters {
         self.work
     }
 }

@@ -2,7 +2,7 @@
 //! [`super::adaptive`] drives any of them, chosen at compile time.
 
 use crate::equations::Equations;
-pub use crate::equations::{Motion, StepFailure, Work};
+pub use crate::equations::{Motion, SolverCounters, StepFailure};
 
 /// A one-step method with its storage, for some equations or for all.
 pub trait Method<E: Equations> {
@@ -49,7 +49,7 @@ pub trait Method<E: Equations> {
     }
 
     /// Work so far that the equations do not count themselves; steps are counted by whoever accepts them.
-    fn work(&self) -> Work {
-        Work::default()
+    fn work(&self) -> SolverCounters {
+        SolverCounters::default()
     }
 }

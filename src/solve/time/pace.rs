@@ -7,7 +7,7 @@ const MAX_REJECTED: usize = 40;
 
 /// Where a motion is on its way, and how long its next step is. Errors are relative to what a step may make.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pace {
+pub(super) struct StepController {
     /// Now [s].
     pub(super) t: f64,
     end: f64,
@@ -19,7 +19,7 @@ pub(super) struct Pace {
     pub(super) rejected: usize,
 }
 
-impl Pace {
+impl StepController {
     /// From `t` to `end` [s], with `h` [s] to begin with, by a method whose errors fall with the power `order` of the step.
     pub(super) fn new((t, end): (f64, f64), h: f64, order: f64) -> Self {
         Self { t, end, h, exponent: -1.0 / order, rejected: 0 }

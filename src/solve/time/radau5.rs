@@ -10,7 +10,7 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.8; coefficients of its RADAU5.
 
-use super::method::{Method, Motion, StepFailure, Work};
+use super::method::{Method, Motion, SolverCounters, StepFailure};
 use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, Ramp, System};
 use crate::equations::Bodies;
@@ -66,7 +66,7 @@ pub struct Radau5 {
     start_force: Vec<Pose>,
     at: Motion,
     drive: Drive,
-    work: Work,
+    work: SolverCounters,
 }
 
 impl Radau5 {
@@ -91,7 +91,7 @@ impl Radau5 {
             start_force: vec![Pose::zeros(); n],
             at: Motion::zeros(n),
             drive: system.electrics.drive(),
-            work: Work::default(),
+            work: SolverCounters::default(),
         }
     }
 
@@ -283,7 +283,7 @@ impl Method<Bodies<'_>> for Radau5 {
         if let Some(loss) = &mut self.loss {
             let rate = |k: usize| motion.v[k];
             loss.at(system, &motion.q, rate);
-            if loss.acts() {
+            if loss.is_nonzero() {
                 loss.add_stiffness(1.0, &mut self.tangent);
                 system.add_loss(&motion.q, rate, &mut self.start_force);
                 model.project(&mut self.start_force);
@@ -334,7 +334,7 @@ impl Method<Bodies<'_>> for Radau5 {
         Ok(())
     }
 
-    fn work(&self) -> Work {
+    fn work(&self) -> SolverCounters {
         self.work
     }
 }

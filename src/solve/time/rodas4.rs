@@ -26,7 +26,7 @@ pub(in crate::solve) mod tableau;
 
 use super::defect::Propagates;
 pub use super::method::Motion;
-use super::method::{Method, StepFailure, Work};
+use super::method::{Method, SolverCounters, StepFailure};
 use crate::domains::{Drive, System};
 use crate::equations::Bodies;
 use crate::equations::linear::{LinearSolver, Recursion};
@@ -34,8 +34,8 @@ use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
 use crate::solve::time::gyration::{Gyration, held_out, skew};
 use crate::solve::time::stage_loss::StageLoss;
-use defect::Defect;
-use ports::{Ports, Turning};
+use defect::DefectEstimate;
+use ports::{FrameRotation, PortSensitivities};
 use stages::Stages;
 use tableau::{ALPHA, GAMMA, moves_on};
 
@@ -47,15 +47,15 @@ pub struct Rodas4<S = Recursion> {
     stages: Stages,
     drive: Drive,
     rate: Drive,
-    ports: Ports,
+    ports: PortSensitivities,
     loss: Option<Box<StageLoss>>,
     /// Terms of the series in a frame that turns; empty where no input turns it.
     scratch: Vec<Pose>,
     /// ∂motion/∂(final voltage of a source), one for each source given to [`Rodas4::new`]; advanced with the motion.
     pub sensitivity: Vec<Motion>,
     /// The error of the motion, where it is wanted.
-    defect: Option<Box<Defect>>,
-    work: Work,
+    defect: Option<Box<DefectEstimate>>,
+    work: SolverCounters,
 }
 
 impl Rodas4 {
@@ -74,12 +74,12 @@ impl<S: LinearSolver> Rodas4<S> {
             stages: Stages::new(&system.model),
             drive: system.electrics.drive(),
             rate: system.electrics.drive(),
-            ports: Ports::new(system, sources),
+            ports: PortSensitivities::new(system, sources),
             loss: StageLoss::new(system, !sources.is_empty()).map(Box::new),
             scratch: vec![Pose::zeros(); if system.turns() { system.bodies() } else { 0 }],
             sensitivity: vec![Motion::zeros(system.bodies()); sources.len()],
             defect: None,
-            work: Work::default(),
+            work: SolverCounters::default(),
         }
     }
 }
@@ -107,7 +107,7 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
         let mut turning = None;
         if let Some(frame) = system.frame(&self.drive).filter(|_| system.turns()) {
             let start = Gyration::new(frame);
-            turning = Some(Turning { start, now: start, terms: start.terms(gh)? });
+            turning = Some(FrameRotation { start, now: start, terms: start.terms(gh)? });
             let rate = system.frame(&self.rate).map(Gyration::new).unwrap_or_default();
             for ((force, body), v) in self.stages.forcing.iter_mut().zip(&model.bodies).zip(&motion.v) {
                 *force += held_out(body, skew(body, rate.rate, v));
@@ -183,20 +183,20 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
         &mut self.sensitivity
     }
 
-    fn work(&self) -> Work {
+    fn work(&self) -> SolverCounters {
         self.work
     }
 }
 
 impl<'s, S: LinearSolver> Propagates<'s> for Rodas4<S> {
     fn begin_error(&mut self) {
-        self.defect = Some(Box::new(Defect::zeros(self.stages.forcing.len())));
+        self.defect = Some(Box::new(DefectEstimate::zeros(self.stages.forcing.len())));
     }
 
     fn error(&mut self, bodies: &mut Bodies<'s>, (s, h): (f64, f64), ends: [&Motion; 2], _: &[Motion]) -> &Motion {
         let Self { solver, w, drive, defect, .. } = self;
         let Bodies { system, ramp, .. } = *bodies;
-        let defect = defect.get_or_insert_with(|| Box::new(Defect::zeros(system.bodies())));
+        let defect = defect.get_or_insert_with(|| Box::new(DefectEstimate::zeros(system.bodies())));
         defect.advance(system, (ramp, drive), (&*solver, w), (s, h), ends)
     }
 }

@@ -7,7 +7,7 @@
 //! and says why.
 
 use super::method::Motion;
-use super::pace::Pace;
+use super::pace::StepController;
 use super::rodas4::lanes::{Lane, LaneRodas4};
 use crate::domains::{Ramp, System};
 use crate::equations::bodies::{FLOOR, contact_error, dragged};
@@ -17,7 +17,7 @@ use crate::multibody::lanes::LANES;
 const ORDER: f64 = 4.0;
 
 /// A run of one variant.
-pub struct Variant<'a> {
+pub struct BatchRun<'a> {
     /// The mechanism.
     pub system: &'a System,
     /// Its sources, which hold their voltages, and heat.
@@ -37,7 +37,7 @@ pub trait Watcher {
     /// True where the motions before and after the step from `s` to `s` + `h` [s] are to be seen.
     fn wants(&self, s: f64, h: f64) -> bool;
     /// A step that was wanted; answers whether to go on.
-    fn see(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> bool;
+    fn observe(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> bool;
 }
 
 /// How a run ended.
@@ -52,18 +52,18 @@ pub enum Ended {
 }
 
 /// A lane at work.
-struct Running<'a> {
+struct RunningLane<'a> {
     number: usize,
     tol: f64,
     watcher: &'a mut dyn Watcher,
     mass: f64,
     contacts: bool,
-    pace: Pace,
+    pace: StepController,
     steps: u64,
 }
 
-impl<'a> Running<'a> {
-    fn start(number: usize, system: &System, (pace, tol): (Pace, f64), watcher: &'a mut dyn Watcher) -> Self {
+impl<'a> RunningLane<'a> {
+    fn start(number: usize, system: &System, (pace, tol): (StepController, f64), watcher: &'a mut dyn Watcher) -> Self {
         Self {
             number,
             tol,
@@ -91,7 +91,7 @@ pub struct LaneWork {
 /// mechanism of `first`; variants that differ from it in more than numbers end as [`Ended::Unlike`] at once.
 pub fn advance<'a>(
     first: &System,
-    next: &mut dyn FnMut() -> Option<(usize, Variant<'a>)>,
+    next: &mut dyn FnMut() -> Option<(usize, BatchRun<'a>)>,
     done: &mut dyn FnMut(usize, Ended),
 ) -> LaneWork {
     let mut work = LaneWork::default();
@@ -102,7 +102,7 @@ pub fn advance<'a>(
         return work;
     };
     let mut lanes: [Option<Lane<'a>>; LANES] = [const { None }; LANES];
-    let mut running: [Option<Running<'a>>; LANES] = [const { None }; LANES];
+    let mut running: [Option<RunningLane<'a>>; LANES] = [const { None }; LANES];
     let (mut s, mut step) = ([0.0; LANES], [1.0; LANES]);
     let (mut before, mut after) = (Motion::zeros(first.bodies()), Motion::zeros(first.bodies()));
     let mut error_motion = before.clone();
@@ -114,10 +114,10 @@ pub fn advance<'a>(
                     done(number, Ended::Unlike);
                     continue;
                 }
-                method.put(k, variant.system, &variant.ramp, &variant.motion);
-                let pace = Pace::new((0.0, variant.ramp.dt), variant.h, ORDER);
+                method.set_lane(k, variant.system, &variant.ramp, &variant.motion);
+                let pace = StepController::new((0.0, variant.ramp.dt), variant.h, ORDER);
                 lanes[k] = Some(Lane { system: variant.system, ramp: variant.ramp });
-                running[k] = Some(Running::start(number, variant.system, (pace, variant.tol), variant.watcher));
+                running[k] = Some(RunningLane::start(number, variant.system, (pace, variant.tol), variant.watcher));
             }
         }
         if running.iter().all(Option::is_none) {
@@ -158,7 +158,7 @@ pub fn advance<'a>(
                 run.pace.accept(h, error);
                 run.steps += 1;
                 work.accepted += 1;
-                if wanted && !run.watcher.see(run.pace.t - h, h, &before, &after) {
+                if wanted && !run.watcher.observe(run.pace.t - h, h, &before, &after) {
                     ended = Some(Ended::Alone);
                 } else if run.pace.is_over() {
                     method.motion.take(k, &mut after);
@@ -180,7 +180,7 @@ pub fn advance<'a>(
 }
 
 /// The error of a step over what it may be, as [`crate::equations::bodies`] has it.
-fn relative_error(method: &LaneRodas4, k: usize, system: &System, run: &Running<'_>, h: f64, contact: f64) -> f64 {
+fn relative_error(method: &LaneRodas4, k: usize, system: &System, run: &RunningLane<'_>, h: f64, contact: f64) -> f64 {
     if run.mass == 0.0 {
         return 0.0;
     }

@@ -2,7 +2,7 @@
 
 use crate::support::{Run, complex, deviation, real, run, versions};
 use bimorph::cosim::CosimOptions;
-use bimorph::cosim::around::{Around, around};
+use bimorph::cosim::around::{DeckSpec, around};
 use bimorph::netlist::{Bundle, load};
 use std::path::Path;
 
@@ -23,12 +23,12 @@ fn run_beside(netlist: &str, text: &str, ngspice: &Path) -> Run {
 
 fn deck(netlist: &str, analyses: &[&str], drives: &[(&str, &str)]) -> String {
     let loaded = load(&Bundle::from_text("Part.net", netlist), &[]).unwrap_or_else(|d| panic!("{d}"));
-    let wanted = Around {
+    let wanted = DeckSpec {
         file: "Part.net".into(),
         signals: vec!["M(1).x".into()],
         analyses: analyses.iter().map(|line| (*line).to_owned()).collect(),
         drives: drives.iter().map(|(name, wave)| ((*name).to_owned(), (*wave).to_owned())).collect(),
-        ..Around::default()
+        ..DeckSpec::default()
     };
     around(&loaded.structure, &wanted).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -1,11 +1,11 @@
 //! A run repeated with half the steps and a tenth of the tolerances tells how far off it is.
 
 use crate::support::{all_decks, deck, versions};
-use bimorph::cosim::check::{Checked, check};
+use bimorph::cosim::check::{CosimCheck, check};
 use bimorph::cosim::{CosimError, CosimOptions};
 use std::path::Path;
 
-fn checked(folder: &Path, text: &str, ngspice: &Path) -> Result<Checked, CosimError> {
+fn checked(folder: &Path, text: &str, ngspice: &Path) -> Result<CosimCheck, CosimError> {
     let deck = folder.join("deck.cir");
     std::fs::write(&deck, text).unwrap();
     check(&CosimOptions { deck, ngspice: Some(ngspice.to_owned()), ..CosimOptions::default() }, &|| true)

@@ -2,11 +2,11 @@
 
 use crate::support::{complex, deviation, real, run, versions};
 use bimorph::analysis::mesh::in_circuit;
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::cosim::CosimOptions;
-use bimorph::export::compare::{Fitted, fit};
+use bimorph::export::compare::{ModelFit, fit};
 use bimorph::export::names::Pins;
-use bimorph::export::{Request, lumped, lumped_spice, spice};
+use bimorph::export::{ExportRequest, lumped, lumped_spice, spice};
 use bimorph::netlist::Bundle;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -75,7 +75,7 @@ fn netlist(file: &str) -> PathBuf {
 }
 
 impl Scene {
-    fn compiled(&self) -> Arc<Compiled> {
+    fn compiled(&self) -> Arc<CompiledModel> {
         let bundle = Bundle::read(&netlist(self.file), &[]).unwrap();
         let drawn = compile(&bundle, &CompileOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", self.file));
         Arc::new(in_circuit(&drawn))
@@ -85,8 +85,8 @@ impl Scene {
         self.electrical.iter().map(|(name, _)| *name).chain(self.forces.iter().copied()).collect()
     }
 
-    fn request(&self) -> Request {
-        Request {
+    fn request(&self) -> ExportRequest {
+        ExportRequest {
             ports: self.ports().into_iter().map(|name| (name.to_owned(), None)).collect(),
             signals: self.signals.iter().map(|(name, scale)| ((*name).to_owned(), *scale)).collect(),
             bias: self.electrical.iter().map(|(name, volts)| ((*name).to_owned(), *volts)).collect(),
@@ -96,12 +96,12 @@ impl Scene {
         }
     }
 
-    fn exported(&self) -> Fitted {
+    fn exported(&self) -> ModelFit {
         fit(&self.compiled(), &self.request()).unwrap_or_else(|e| panic!("{}: {e}", self.file))
     }
 
     /// The subcircuit of a reduced model.
-    fn linear(fitted: &Fitted) -> String {
+    fn linear(fitted: &ModelFit) -> String {
         let pins = Pins::of(&fitted.model.ports, &fitted.model.signals).unwrap();
         spice::write(fitted, &pins, "part", &["a test".to_owned()])
     }

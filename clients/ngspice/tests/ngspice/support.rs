@@ -1,7 +1,7 @@
 //! What the tests that run ngspice share: finding it, running a deck, reading what came out.
 
 use bimorph::cosim::{self, CosimError, CosimOptions};
-use bimorph::results::table::{Samples, Table};
+use bimorph::results::table::{ColumnSamples, Table};
 use std::path::{Path, PathBuf};
 
 /// A deck's run: every plot of its raw file.
@@ -98,16 +98,16 @@ impl Run {
 /// A column of real samples.
 pub(crate) fn real<'a>(plot: &'a Table, name: &str) -> &'a [f64] {
     match &plot.column(name).unwrap_or_else(|| panic!("no column {name}")).samples {
-        Samples::Real(samples) => samples,
-        Samples::Complex(_) => panic!("{name} is complex"),
+        ColumnSamples::Real(samples) => samples,
+        ColumnSamples::Complex(_) => panic!("{name} is complex"),
     }
 }
 
 /// A column of complex samples.
 pub(crate) fn complex<'a>(plot: &'a Table, name: &str) -> &'a [[f64; 2]] {
     match &plot.column(name).unwrap_or_else(|| panic!("no column {name}")).samples {
-        Samples::Complex(samples) => samples,
-        Samples::Real(_) => panic!("{name} is real"),
+        ColumnSamples::Complex(samples) => samples,
+        ColumnSamples::Real(_) => panic!("{name} is real"),
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::support::{Run, all_decks, complex_deviation, deviation, real, run, run_text, versions};
 use bimorph::cosim::CosimOptions;
-use bimorph::results::table::{Samples, Table};
+use bimorph::results::table::{ColumnSamples, Table};
 use std::path::{Path, PathBuf};
 
 /// Columns of a transient that are compared, with the share of their range by which versions may differ: motion and
@@ -72,11 +72,11 @@ fn difference(a: &Run, b: &Run) -> (f64, String) {
         for column in p.columns().iter().filter(|c| c.name != "frequency") {
             let Some(other) = q.column(&column.name) else { continue };
             let off = match (&column.samples, &other.samples) {
-                (Samples::Complex(x), Samples::Complex(y)) => {
+                (ColumnSamples::Complex(x), ColumnSamples::Complex(y)) => {
                     let still = |z: &[[f64; 2]]| z.iter().all(|z| *z == [0.0; 2]);
                     if still(x) && still(y) { 0.0 } else { complex_deviation(x, y) }
                 }
-                (Samples::Real(x), Samples::Real(y)) => {
+                (ColumnSamples::Real(x), ColumnSamples::Real(y)) => {
                     let size = y.iter().fold(0.0f64, |m, y| m.max(y.abs()));
                     let off = x.iter().zip(y).fold(0.0f64, |m, (x, y)| m.max((x - y).abs()));
                     if size > 0.0 { off / size } else { off }

@@ -5,7 +5,7 @@
 //! survives a fork: the package makes one for each process.
 
 use bimorph::service::client;
-use bimorph::service::inside::{Answers, Inside, Questions};
+use bimorph::service::inside::{DeviceChannel, InProcessServer, ReplyMessages};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyOSError};
 use pyo3::prelude::*;
@@ -66,13 +66,13 @@ impl Stop {
 
 /// The service in this process.
 #[pyclass(frozen)]
-struct Engine(Inside);
+struct Engine(InProcessServer);
 
 #[pymethods]
 impl Engine {
     #[new]
     fn new() -> PyResult<Self> {
-        Inside::new().map(Self).map_err(|error| PyOSError::new_err(error.to_string()))
+        InProcessServer::new().map(Self).map_err(|error| PyOSError::new_err(error.to_string()))
     }
 
     /// A call with one answer, by its name in the protocol.
@@ -101,7 +101,7 @@ impl Engine {
 
 /// Answers of a call that has many.
 #[pyclass(frozen)]
-struct Stream(Mutex<Option<Answers>>);
+struct Stream(Mutex<Option<ReplyMessages>>);
 
 #[pymethods]
 impl Stream {
@@ -124,7 +124,7 @@ impl Stream {
 
 /// The questions of one device, in order.
 #[pyclass(frozen)]
-struct Line(Mutex<Option<Questions>>);
+struct Line(Mutex<Option<DeviceChannel>>);
 
 #[pymethods]
 impl Line {
@@ -145,13 +145,13 @@ impl Line {
 
 /// Connections to servers.
 #[pyclass(frozen)]
-struct Servers(client::Lines);
+struct Servers(client::TrialConnections);
 
 #[pymethods]
 impl Servers {
     #[new]
     fn new() -> PyResult<Self> {
-        client::Lines::new().map(Self).map_err(|error| PyOSError::new_err(error.to_string()))
+        client::TrialConnections::new().map(Self).map_err(|error| PyOSError::new_err(error.to_string()))
     }
 
     /// The questions of one device on the server at an address without TLS, each answered within `patience` [s], over the connection of
@@ -172,7 +172,7 @@ impl Servers {
 
 /// The questions of one device on a server, in order.
 #[pyclass(frozen)]
-struct RemoteLine(Mutex<Option<client::Line>>);
+struct RemoteLine(Mutex<Option<client::TrialChannel>>);
 
 #[pymethods]
 impl RemoteLine {

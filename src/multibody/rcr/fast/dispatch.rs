@@ -4,15 +4,15 @@
 //! set and chosen at run time (AVX-512, AVX2, NEON or the base set); as nothing is fused, the bits do not depend on the
 //! choice.
 
-use crate::multibody::rcr::data::Task;
+use crate::multibody::rcr::data::ReductionTask;
 use crate::multibody::rcr::reduction::{Reduction, Traversal, Traversed};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Places the bodies.
-struct Place<'a, T: Traversed>(&'a mut Reduction<T>, &'a [T], &'a [T]);
+struct PlaceBodies<'a, T: Traversed>(&'a mut Reduction<T>, &'a [T], &'a [T]);
 /// Reduces.
-struct Reduce<'a, T: Traversed>(&'a mut Reduction<T>, Task, &'a mut [T]);
-impl<T: Traversed> WithSimd for Place<'_, T> {
+struct ReduceBodies<'a, T: Traversed>(&'a mut Reduction<T>, ReductionTask, &'a mut [T]);
+impl<T: Traversed> WithSimd for PlaceBodies<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -21,7 +21,7 @@ impl<T: Traversed> WithSimd for Place<'_, T> {
     }
 }
 
-impl<T: Traversed> WithSimd for Reduce<'_, T> {
+impl<T: Traversed> WithSimd for ReduceBodies<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -32,12 +32,16 @@ impl<T: Traversed> WithSimd for Reduce<'_, T> {
 
 /// [`Traversal::place`] in the widest instructions.
 pub(in crate::multibody::rcr) fn place<T: Traversed>(reduction: &mut Reduction<T>, q: &[T], v: &[T]) {
-    Arch::new().dispatch(Place(reduction, q, v));
+    Arch::new().dispatch(PlaceBodies(reduction, q, v));
 }
 
 /// [`Traversal::reduce`] in the widest instructions.
-pub(in crate::multibody::rcr) fn reduce<T: Traversed>(reduction: &mut Reduction<T>, task: Task, out: &mut [T]) {
-    Arch::new().dispatch(Reduce(reduction, task, out));
+pub(in crate::multibody::rcr) fn reduce<T: Traversed>(
+    reduction: &mut Reduction<T>,
+    task: ReductionTask,
+    out: &mut [T],
+) {
+    Arch::new().dispatch(ReduceBodies(reduction, task, out));
 }
 
 /// Runs `work` over lanes in the widest instructions. It is not compiled for a processor without any: that copy would be the

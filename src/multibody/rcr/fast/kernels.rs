@@ -1,24 +1,29 @@
 //! Turns of bodies with one coordinate and a front of one or two bodies, with the rows of loops, in closed form. They do what
 //! the turn of any body does (`general.rs`, `front.rs`), in the same order, with nothing left to decide while running.
 
-use super::small::Small;
-use crate::multibody::rcr::data::{Given, Task, Workspace};
+use super::small::SmallFront;
+use crate::multibody::rcr::data::{ReductionInput, ReductionTask, Workspace};
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::schedule::NONE;
 
 impl<T: Real> Workspace<T> {
     /// Takes the coordinate of a body with a small front out.
     #[inline(always)]
-    pub(in crate::multibody::rcr) fn small_inward(&mut self, given: Given<'_, T>, small: Small, body: usize) {
+    pub(in crate::multibody::rcr) fn small_inward(
+        &mut self,
+        given: ReductionInput<'_, T>,
+        small: SmallFront,
+        body: usize,
+    ) {
         match small {
-            Small(4) => self.one_inward::<1, 0>(given, body),
-            Small(5) => self.one_inward::<1, 1>(given, body),
-            Small(6) => self.one_inward::<1, 2>(given, body),
-            Small(7) => self.one_inward::<1, 3>(given, body),
-            Small(8) => self.one_inward::<2, 0>(given, body),
-            Small(9) => self.one_inward::<2, 1>(given, body),
-            Small(10) => self.one_inward::<2, 2>(given, body),
-            Small(_) => self.one_inward::<2, 3>(given, body),
+            SmallFront(4) => self.one_inward::<1, 0>(given, body),
+            SmallFront(5) => self.one_inward::<1, 1>(given, body),
+            SmallFront(6) => self.one_inward::<1, 2>(given, body),
+            SmallFront(7) => self.one_inward::<1, 3>(given, body),
+            SmallFront(8) => self.one_inward::<2, 0>(given, body),
+            SmallFront(9) => self.one_inward::<2, 1>(given, body),
+            SmallFront(10) => self.one_inward::<2, 2>(given, body),
+            SmallFront(_) => self.one_inward::<2, 3>(given, body),
         }
     }
 
@@ -26,22 +31,22 @@ impl<T: Real> Workspace<T> {
     #[inline(always)]
     pub(in crate::multibody::rcr) fn small_outward(
         &self,
-        given: Given<'_, T>,
-        small: Small,
+        given: ReductionInput<'_, T>,
+        small: SmallFront,
         body: usize,
         accelerations: &mut [[T; 3]],
         out: &mut [T],
     ) {
         match small {
-            Small(4..8) => self.one_outward::<1>(given, body, accelerations, out),
-            Small(_) => self.one_outward::<2>(given, body, accelerations, out),
+            SmallFront(4..8) => self.one_outward::<1>(given, body, accelerations, out),
+            SmallFront(_) => self.one_outward::<2>(given, body, accelerations, out),
         }
     }
 
     /// A body with one coordinate, a front of `W` bodies and `H` constraint rows.
     #[inline(always)]
-    fn one_inward<const W: usize, const H: usize>(&mut self, given: Given<'_, T>, body: usize) {
-        let Given { task, mechanism, placement, .. } = given;
+    fn one_inward<const W: usize, const H: usize>(&mut self, given: ReductionInput<'_, T>, body: usize) {
+        let ReductionInput { task, mechanism, placement, .. } = given;
         let turn = mechanism.schedule.turn(body);
         let inertia = self.take_inertia(mechanism, body);
         let mut force = self.take_force(given, body);
@@ -57,7 +62,7 @@ impl<T: Real> Workspace<T> {
         let [dx, dy] = hanging.shift();
         let mut bias = [T::ZERO; 2];
         let mut own = T::ZERO;
-        if task == Task::Accelerations {
+        if task == ReductionTask::Accelerations {
             bias = hanging.bias;
             own = given.torque[turn.first];
         }
@@ -256,12 +261,12 @@ impl<T: Real> Workspace<T> {
     #[inline(always)]
     fn one_outward<const W: usize>(
         &self,
-        given: Given<'_, T>,
+        given: ReductionInput<'_, T>,
         body: usize,
         accelerations: &mut [[T; 3]],
         out: &mut [T],
     ) {
-        let Given { task, mechanism, placement, .. } = given;
+        let ReductionInput { task, mechanism, placement, .. } = given;
         let step = mechanism.schedule.steps[body];
         let turn = mechanism.schedule.turn(body);
         let first = step.first as usize;
@@ -273,8 +278,11 @@ impl<T: Real> Workspace<T> {
             let c = &self.coefficients[turn.coefficient_start + 3 * slot..turn.coefficient_start + 3 + 3 * slot];
             x -= c[0] * other[0] + c[1] * other[1] + c[2] * other[2];
         }
-        let mut a =
-            if task == Task::Accelerations { [hanging.bias[0], hanging.bias[1], T::ZERO] } else { [T::ZERO; 3] };
+        let mut a = if task == ReductionTask::Accelerations {
+            [hanging.bias[0], hanging.bias[1], T::ZERO]
+        } else {
+            [T::ZERO; 3]
+        };
         if let Some(parent) = step.parent() {
             let up = accelerations[parent];
             a[0] += up[0] - shift[1] * up[2];

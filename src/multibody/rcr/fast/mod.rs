@@ -14,4 +14,4 @@ mod pins;
 mod small;
 
 pub(super) use dispatch::{place, reduce};
-pub(super) use small::Small;
+pub(super) use small::SmallFront;

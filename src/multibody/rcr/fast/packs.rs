@@ -17,9 +17,9 @@ mod packing;
 mod subtrees;
 
 use super::dispatch::{self, across};
-use crate::multibody::rcr::data::{Offsets, Task};
+use crate::multibody::rcr::data::{Offsets, ReductionTask};
 use crate::multibody::rcr::lanes::Lanes;
-use crate::multibody::rcr::placed::{Placed, Placement};
+use crate::multibody::rcr::placed::{BodyKinematics, MechanismKinematics};
 use crate::multibody::rcr::reduction::{Reduction, Traversal, Traversed};
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::tree::Linkage;
@@ -31,7 +31,7 @@ use std::sync::Arc;
 /// Subtrees side by side.
 const WIDTH: usize = 8;
 /// A number of each of them.
-type Wide = Lanes<WIDTH>;
+type PackedReal = Lanes<WIDTH>;
 
 /// A subtree's first body, coordinate, closure and joint (that is no pin), in the mechanism or among the packs.
 #[derive(Debug, Clone, Copy, Default)]
@@ -44,7 +44,7 @@ struct First {
 
 /// Eight equal subtrees.
 #[derive(Debug)]
-struct Pack {
+struct SubtreePack {
     /// Where they lie among the packs.
     at: First,
     /// How many bodies, coordinates, closures and joints one of them has.
@@ -55,7 +55,7 @@ struct Pack {
 
 /// A body of the packs whose front holds shared bodies, and where what it hands to them is kept.
 #[derive(Debug)]
-struct Hand {
+struct PackContribution {
     body: usize,
     /// Among [`Packing::nodes`].
     nodes: Range<usize>,
@@ -65,7 +65,7 @@ struct Hand {
 
 /// What the recursion over the rest does, in elimination order.
 #[derive(Debug)]
-enum Item {
+enum RemainingStep {
     /// Takes the turns of these bodies.
     Turns(Range<usize>),
     /// Adds what was kept for a body, the numbers of this range of [`Packing::order`].
@@ -77,17 +77,17 @@ enum Item {
 /// How the equal subtrees of a mechanism lie in packs. Immutable.
 #[derive(Debug)]
 struct Packing {
-    packs: Vec<Pack>,
+    packs: Vec<SubtreePack>,
     /// Bodies of all packs; the shared ones follow.
     bodies: usize,
     /// Which bodies of the mechanism each shared body is, lane by lane.
     shared: Vec<[u32; WIDTH]>,
-    hands: Vec<Hand>,
+    hands: Vec<PackContribution>,
     /// The shared bodies that something is handed to.
     nodes: Vec<usize>,
     /// Their pairs, as blocks of the packs' pattern.
     blocks: Vec<usize>,
-    items: Vec<Item>,
+    items: Vec<RemainingStep>,
     /// Which of what is kept is added, times the lanes, plus the lane.
     order: Vec<u32>,
     /// Bodies of the mechanism that are in no pack.
@@ -103,14 +103,14 @@ struct Packing {
 pub struct Packs {
     packing: Arc<Packing>,
     /// The subtrees, with the shared bodies as roots at the end.
-    lanes: Reduction<Wide>,
-    q: Vec<Wide>,
-    v: Vec<Wide>,
-    out: Vec<Wide>,
+    lanes: Reduction<PackedReal>,
+    q: Vec<PackedReal>,
+    v: Vec<PackedReal>,
+    out: Vec<PackedReal>,
     /// Inertia and wrench handed to shared bodies.
-    kept: Vec<[Wide; 9]>,
+    kept: Vec<[PackedReal; 9]>,
     /// Couplings handed to pairs of shared bodies.
-    kept_blocks: Vec<[Wide; 9]>,
+    kept_blocks: Vec<[PackedReal; 9]>,
 }
 
 /// Numbers alone are laid side by side where subtrees are equal.
@@ -121,7 +121,7 @@ impl Traversed for f64 {
         dispatch::place(reduction, q, v);
     }
 
-    fn reduce(reduction: &mut Reduction<f64>, task: Task, out: &mut [f64]) {
+    fn reduce(reduction: &mut Reduction<f64>, task: ReductionTask, out: &mut [f64]) {
         dispatch::reduce(reduction, task, out);
     }
 }
@@ -145,7 +145,7 @@ impl Traversal<f64> for Packs {
     }
 
     #[inline(always)]
-    fn rows(reduction: &mut Reduction<f64>, task: Task) -> f64 {
+    fn rows(reduction: &mut Reduction<f64>, task: ReductionTask) -> f64 {
         let mut traversal = reduction.traversal.take();
         let mut largest = traversal.as_mut().map_or(0.0, |packs| packs.rows_of_lanes(task));
         let (given, work, _) = reduction.parts(task);
@@ -158,15 +158,15 @@ impl Traversal<f64> for Packs {
     }
 
     #[inline(always)]
-    fn reduce(reduction: &mut Reduction<f64>, task: Task, out: &mut [f64]) {
+    fn reduce(reduction: &mut Reduction<f64>, task: ReductionTask, out: &mut [f64]) {
         let mut traversal = reduction.traversal.take();
         let (given, work, accelerations) = reduction.parts(task);
         let schedule = &given.mechanism.schedule;
         let (bodies, closures) = (0..given.mechanism.bodies(), 0..given.mechanism.closures.len());
-        let all = Item::Turns(bodies.clone());
+        let all = RemainingStep::Turns(bodies.clone());
         work.nearness = 0.0;
         if let Some(packs) = &mut traversal {
-            if task == Task::Accelerations {
+            if task == ReductionTask::Accelerations {
                 packs.take_loads(given.force, given.torque);
             }
             packs.lanes_inward(task);
@@ -177,11 +177,11 @@ impl Traversal<f64> for Packs {
         }
         for item in traversal.as_ref().map_or(from_ref(&all), |t| &t.packing.items) {
             match (item, &traversal) {
-                (Item::Turns(range), _) => work.inward(given, range.clone()),
-                (Item::Node(to, terms), Some(packs)) => {
+                (RemainingStep::Turns(range), _) => work.inward(given, range.clone()),
+                (RemainingStep::Node(to, terms), Some(packs)) => {
                     packs.add_node(terms.clone(), &mut work.nodes[schedule.steps[*to].node as usize]);
                 }
-                (Item::Block(to, terms), Some(packs)) => {
+                (RemainingStep::Block(to, terms), Some(packs)) => {
                     packs.add_block(terms.clone(), &mut work.coupling[schedule.blocks[*to] as usize]);
                 }
                 (_, None) => {}
@@ -199,12 +199,12 @@ impl Traversal<f64> for Packs {
         reduction.nearness = reduction.work.nearness;
     }
 
-    fn placed(&self, body: usize) -> Option<Placed<f64>> {
+    fn placed(&self, body: usize) -> Option<BodyKinematics<f64>> {
         let (at, lane) = self.lane_of(body)?;
         Some(self.lanes.placement.placed[at].lane(lane))
     }
 
-    fn spread(&self, placement: &mut Placement<f64>) {
+    fn spread(&self, placement: &mut MechanismKinematics<f64>) {
         self.give_placement(placement);
     }
 
@@ -218,15 +218,15 @@ impl Traversal<f64> for Packs {
 }
 
 /// Places the subtrees.
-struct Place<'a>(&'a mut Packs);
+struct PlacePacks<'a>(&'a mut Packs);
 /// Writes the rows of their closures, and finds the largest residual.
-struct Rows<'a>(&'a mut Packs, Task);
+struct WritePackRows<'a>(&'a mut Packs, ReductionTask);
 /// Writes the rows and reduces.
-struct Inward<'a>(&'a mut Packs, Task);
+struct ReducePacks<'a>(&'a mut Packs, ReductionTask);
 /// Finds the accelerations.
-struct Outward<'a>(&'a mut Packs, Task);
+struct SolvePacks<'a>(&'a mut Packs, ReductionTask);
 
-impl WithSimd for Place<'_> {
+impl WithSimd for PlacePacks<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
@@ -236,7 +236,7 @@ impl WithSimd for Place<'_> {
     }
 }
 
-impl WithSimd for Rows<'_> {
+impl WithSimd for WritePackRows<'_> {
     type Output = f64;
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> f64 {
@@ -245,7 +245,7 @@ impl WithSimd for Rows<'_> {
     }
 }
 
-impl WithSimd for Inward<'_> {
+impl WithSimd for ReducePacks<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
@@ -254,7 +254,7 @@ impl WithSimd for Inward<'_> {
         let (given, work, _) = lanes.parts(task);
         let schedule = &given.mechanism.schedule;
         work.write_rows(given, 0..given.mechanism.closures.len());
-        work.nearness = Wide::ZERO;
+        work.nearness = PackedReal::ZERO;
         let mut from = 0;
         for k in 0..=hands.len() {
             let to = hands.get(k).map_or(*bodies, |h| h.body + 1);
@@ -263,18 +263,18 @@ impl WithSimd for Inward<'_> {
             let Some(hand) = hands.get(k) else { break };
             for (kept, &node) in kept[hand.nodes.clone()].iter_mut().zip(&nodes[hand.nodes.clone()]) {
                 let node = &mut work.nodes[schedule.steps[node].node as usize];
-                let [a, b, c, d, e, f] = std::mem::replace(&mut node.inertia, [Wide::ZERO; 6]);
-                let [x, y, w] = std::mem::replace(&mut node.momentum, [Wide::ZERO; 3]);
+                let [a, b, c, d, e, f] = std::mem::replace(&mut node.inertia, [PackedReal::ZERO; 6]);
+                let [x, y, w] = std::mem::replace(&mut node.momentum, [PackedReal::ZERO; 3]);
                 *kept = [a, b, c, d, e, f, x, y, w];
             }
             for (kept, &block) in kept_blocks[hand.blocks.clone()].iter_mut().zip(&blocks[hand.blocks.clone()]) {
-                *kept = std::mem::replace(&mut work.coupling[schedule.blocks[block] as usize], [Wide::ZERO; 9]);
+                *kept = std::mem::replace(&mut work.coupling[schedule.blocks[block] as usize], [PackedReal::ZERO; 9]);
             }
         }
     }
 }
 
-impl WithSimd for Outward<'_> {
+impl WithSimd for SolvePacks<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
@@ -288,22 +288,22 @@ impl WithSimd for Outward<'_> {
 impl Packs {
     #[inline(never)]
     fn place_lanes(&mut self) {
-        across(Place(self));
+        across(PlacePacks(self));
     }
 
     #[inline(never)]
-    fn lanes_inward(&mut self, task: Task) {
-        across(Inward(self, task));
+    fn lanes_inward(&mut self, task: ReductionTask) {
+        across(ReducePacks(self, task));
     }
 
     #[inline(never)]
-    fn lanes_outward(&mut self, task: Task) {
-        across(Outward(self, task));
+    fn lanes_outward(&mut self, task: ReductionTask) {
+        across(SolvePacks(self, task));
     }
 
     /// Writes the rows of the subtrees' closures for `task`. Returns the largest residual.
     #[inline(never)]
-    fn rows_of_lanes(&mut self, task: Task) -> f64 {
-        if self.lanes.mechanism.closures.is_empty() { 0.0 } else { across(Rows(self, task)) }
+    fn rows_of_lanes(&mut self, task: ReductionTask) -> f64 {
+        if self.lanes.mechanism.closures.is_empty() { 0.0 } else { across(WritePackRows(self, task)) }
     }
 }

@@ -1,9 +1,9 @@
 //! Runs of pins: what one hands to the next stays in registers, and all that a run reads is walked side by side.
 
-use crate::multibody::rcr::data::{Given, Handed, Workspace};
-use crate::multibody::rcr::pin::{Pinned, outward};
+use crate::multibody::rcr::data::{PinContribution, ReductionInput, Workspace};
+use crate::multibody::rcr::pin::{PinElimination, outward};
 use crate::multibody::rcr::scalar::Real;
-use crate::multibody::rcr::schedule::{Kind, Schedule};
+use crate::multibody::rcr::schedule::{EliminationKind, Schedule};
 use std::ops::Range;
 
 /// Pins that are looked for at a time: what is read here is still near when their turn comes.
@@ -13,7 +13,7 @@ const PIECE: usize = 256;
 #[inline(always)]
 fn run(schedule: &Schedule, range: Range<usize>) -> Range<usize> {
     let steps = &schedule.steps[range.start..range.end.min(range.start + PIECE)];
-    range.start..range.start + steps.iter().position(|s| s.kind != Kind::Pin).unwrap_or(steps.len())
+    range.start..range.start + steps.iter().position(|s| s.kind != EliminationKind::Pin).unwrap_or(steps.len())
 }
 
 /// Pins of one run that end `range`, at most [`PIECE`].
@@ -21,7 +21,7 @@ fn run(schedule: &Schedule, range: Range<usize>) -> Range<usize> {
 fn run_before(schedule: &Schedule, range: Range<usize>) -> Range<usize> {
     let end = range.end;
     let start = end.saturating_sub(PIECE).max(range.start);
-    let first = schedule.steps[start..end].iter().rposition(|s| s.kind != Kind::Pin);
+    let first = schedule.steps[start..end].iter().rposition(|s| s.kind != EliminationKind::Pin);
     first.map_or(start, |k| start + k + 1)..end
 }
 
@@ -31,11 +31,11 @@ impl<T: Real> Workspace<T> {
     #[inline(always)]
     pub(in crate::multibody::rcr) fn pins_inward<const FORCED: bool>(
         &mut self,
-        given: Given<'_, T>,
+        given: ReductionInput<'_, T>,
         range: Range<usize>,
     ) -> usize {
         let schedule = &given.mechanism.schedule;
-        let (end, mut pins, mut handed) = (range.end, run(schedule, range), Handed::NOTHING);
+        let (end, mut pins, mut handed) = (range.end, run(schedule, range), PinContribution::NOTHING);
         while !pins.is_empty() {
             handed = self.some_pins_inward::<FORCED>(given, pins.clone(), handed);
             pins = run(schedule, pins.end..end);
@@ -47,11 +47,11 @@ impl<T: Real> Workspace<T> {
     #[inline(always)]
     fn some_pins_inward<const FORCED: bool>(
         &mut self,
-        given: Given<'_, T>,
+        given: ReductionInput<'_, T>,
         run: Range<usize>,
-        mut handed: Handed<T>,
-    ) -> Handed<T> {
-        let Given { mechanism, placement, .. } = given;
+        mut handed: PinContribution<T>,
+    ) -> PinContribution<T> {
+        let ReductionInput { mechanism, placement, .. } = given;
         let steps = &mechanism.schedule.steps[run.clone()];
         // a pin has one coordinate, so those of a run follow each other
         let coordinates = steps[0].first as usize..steps[0].first as usize + steps.len();
@@ -60,13 +60,13 @@ impl<T: Real> Workspace<T> {
             .zip(placement.hanging[run.clone()].iter().zip(&given.force[run]))
             .zip(self.base[coordinates.clone()].iter_mut().zip(slopes).zip(&given.torque[coordinates]));
         for (((step, (inertia, sign)), (hanging, force)), ((to_base, to_slope), torque)) in zipped {
-            let pinned = Pinned { inertia, sign: *sign, hanging, force, torque: *torque };
+            let pinned = PinElimination { inertia, sign: *sign, hanging, force, torque: *torque };
             let node = step.gathers.then(|| &mut self.nodes[step.node as usize]);
             let left;
             (*to_base, *to_slope, left) = handed.inward::<FORCED>(pinned, node);
             handed = left;
             if !step.hands_on {
-                handed = Handed::NOTHING;
+                handed = PinContribution::NOTHING;
                 if step.parent().is_some() {
                     left.give(&mut self.nodes[mechanism.schedule.nodes[step.column as usize] as usize]);
                 }
@@ -79,7 +79,7 @@ impl<T: Real> Workspace<T> {
     #[inline(always)]
     pub(in crate::multibody::rcr) fn pins_outward<const FORCED: bool>(
         &self,
-        given: Given<'_, T>,
+        given: ReductionInput<'_, T>,
         range: Range<usize>,
         accelerations: &mut [[T; 3]],
         out: &mut [T],
@@ -98,7 +98,7 @@ impl<T: Real> Workspace<T> {
     #[inline(always)]
     fn some_pins_outward<const FORCED: bool>(
         &self,
-        given: Given<'_, T>,
+        given: ReductionInput<'_, T>,
         run: Range<usize>,
         mut after: [T; 3],
         accelerations: &mut [[T; 3]],

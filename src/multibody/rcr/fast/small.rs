@@ -2,9 +2,9 @@
 
 /// How small a front is: four times its bodies, and the constraint rows that reach it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::multibody::rcr) struct Small(pub u8);
+pub(in crate::multibody::rcr) struct SmallFront(pub u8);
 
-impl Small {
+impl SmallFront {
     /// Of a body with one coordinate, a front of one or two bodies and at most three rows; none of any other.
     pub(in crate::multibody::rcr) fn of(freedom: usize, front: usize, rows: usize) -> Option<Self> {
         let small = freedom == 1 && (1..=2).contains(&front) && rows <= 3;

@@ -1,15 +1,15 @@
 //! Lays the schedule out: one sweep over the bodies in elimination order.
 
 use super::slots::Slots;
-use super::{Entry, Kind, NONE, Packed, Plan, Schedule, Step};
-use crate::multibody::rcr::fast::Small;
-use crate::multibody::rcr::tree::{Closure, Linkage, Parent};
+use super::{ClosureEntry, EliminationKind, EliminationStep, NONE, PackedElimination, Plan, Schedule};
+use crate::multibody::rcr::fast::SmallFront;
+use crate::multibody::rcr::tree::{Closure, Linkage, LinkageParent};
 use crate::multibody::{BodyId, Pattern};
 
 impl Schedule {
     /// The schedule of a linkage.
     pub(in crate::multibody::rcr) fn new(linkage: &Linkage, plan: Plan) -> Self {
-        let mut sweep = Sweep::new(linkage, plan);
+        let mut sweep = SymbolicSweep::new(linkage, plan);
         for body in 0..linkage.links.len() {
             sweep.lay(body);
         }
@@ -22,7 +22,7 @@ impl Schedule {
     /// Marks what goes from pin to pin within a run, and who receives anything else.
     fn mark_runs(&mut self, pattern: &Pattern) {
         for body in 0..self.steps.len() {
-            let pin = |k: usize| self.steps.get(k).is_some_and(|s| s.kind == Kind::Pin);
+            let pin = |k: usize| self.steps.get(k).is_some_and(|s| s.kind == EliminationKind::Pin);
             let hands_on = self.steps[body].parent() == Some(body + 1) && pin(body) && pin(body + 1);
             self.steps[body].hands_on = hands_on;
             for k in pattern.column(body).filter(|_| !hands_on) {
@@ -33,7 +33,7 @@ impl Schedule {
 }
 
 /// The sweep on its way.
-struct Sweep<'a> {
+struct SymbolicSweep<'a> {
     linkage: &'a Linkage,
     /// Which blocks of the pattern couple.
     coupled: Vec<bool>,
@@ -48,7 +48,7 @@ struct Sweep<'a> {
     schedule: Schedule,
 }
 
-impl<'a> Sweep<'a> {
+impl<'a> SymbolicSweep<'a> {
     /// Before the first body: closures stand at the bodies where their rows begin.
     fn new(linkage: &'a Linkage, plan: Plan) -> Self {
         let pattern = &linkage.pattern;
@@ -70,7 +70,7 @@ impl<'a> Sweep<'a> {
                 Closure::Joint(joint) => [free(joint.a), free(joint.b)],
                 Closure::Held { body, .. } => [Some(*body as u32), None],
             };
-            entries.push(Entry { body, row: incoming[body], other: slot, count: closure.constraints(), ends });
+            entries.push(ClosureEntry { body, row: incoming[body], other: slot, count: closure.constraints(), ends });
             incoming[body] += closure.constraints();
             if closure.constraints() > 0 {
                 support[body].extend(other);
@@ -105,7 +105,7 @@ impl<'a> Sweep<'a> {
         let (parent, bodies) = self.touched(body);
         let coupled = pattern.column(body).any(|k| self.coupled[k]);
         let schedule = &mut self.schedule;
-        let mut turn = Packed {
+        let mut turn = PackedElimination {
             front: narrow(front),
             rows: narrow(rows),
             parent: narrow(parent),
@@ -131,16 +131,16 @@ impl<'a> Sweep<'a> {
         let schedule = &mut self.schedule;
         let alone = rows == 0 && !coupled && !schedule.plan.coupled;
         let pin = link.pin && alone && (front == 0 || front == 1 && parent != NONE);
-        let small = Small::of(freedom, front, rows).filter(|_| schedule.plan.fast);
-        let kind = if pin { Kind::Pin } else { small.map_or(Kind::Any, Kind::Small) };
-        schedule.steps.push(Step {
+        let small = SmallFront::of(freedom, front, rows).filter(|_| schedule.plan.fast);
+        let kind = if pin { EliminationKind::Pin } else { small.map_or(EliminationKind::Any, EliminationKind::Small) };
+        schedule.steps.push(EliminationStep {
             kind,
             pin: link.pin,
             gathers: false,
             hands_on: false,
             parent: match link.parent {
-                Parent::Body(p) => narrow(p),
-                Parent::Ground | Parent::Free => u32::MAX,
+                LinkageParent::Body(p) => narrow(p),
+                LinkageParent::Ground | LinkageParent::Free => u32::MAX,
             },
             turns: link.moving[2],
             coupled,
@@ -152,9 +152,9 @@ impl<'a> Sweep<'a> {
             coefficient_start: narrow(schedule.coefficient_entries),
         });
         schedule.coefficient_entries += match kind {
-            Kind::Pin => 2,
-            Kind::Small(_) => 3 * front,
-            Kind::Any => freedom * (freedom + 3 * front),
+            EliminationKind::Pin => 2,
+            EliminationKind::Small(_) => 3 * front,
+            EliminationKind::Any => freedom * (freedom + 3 * front),
         };
         self.joint += u32::from(!link.pin);
         schedule.turns.push(turn);
@@ -164,7 +164,7 @@ impl<'a> Sweep<'a> {
     fn touched(&mut self, body: usize) -> (usize, Vec<usize>) {
         let mut bodies = std::mem::take(&mut self.support[body]);
         let mut parent = NONE;
-        if let Parent::Body(p) = self.linkage.links[body].parent {
+        if let LinkageParent::Body(p) = self.linkage.links[body].parent {
             parent = slot_of(&self.linkage.pattern, body, p);
             if self.incoming[body] > 0 {
                 bodies.push(p);

@@ -1,12 +1,12 @@
-//! Orthogonal elimination of rows in a [`Room`]: Householder reflections over a coordinate, and QR with the longest rows first.
+//! Orthogonal elimination of rows in a [`RowPool`]: Householder reflections over a coordinate, and QR with the longest rows first.
 //!
 //! Reference: A. J. Cox, N. J. Higham, "Stability of Householder QR factorization for weighted least squares problems" (1998).
 
 use super::Singularity;
-use super::room::Room;
+use super::room::RowPool;
 use std::ops::Range;
 
-impl Room {
+impl RowPool {
     /// Length of a row over the bodies' columns, which lie at `columns`; rotations count per `length`.
     pub(super) fn norm(&self, row: u32, columns: Range<usize>, length: f64) -> f64 {
         let first = columns.start;

@@ -1,20 +1,20 @@
 //! The path itself: rows enter with the closures, each body's coordinates are taken out, and accelerations come back.
 
-use super::room::Room;
+use super::room::RowPool;
 use super::{LIGHT, Singularity};
-use crate::multibody::rcr::data::{Given, Task, Workspace};
+use crate::multibody::rcr::data::{ReductionInput, ReductionTask, Workspace};
 use crate::multibody::rcr::reduction::{Reduction, Traversal};
 use crate::multibody::rcr::schedule::NONE;
 
 impl Reduction<f64> {
     /// [`Reduction::reduce`] for any configuration: in a singular one too it gives the accelerations of least constraint.
     /// Slower by a factor; meant for when [`Reduction::nearness`] is large. Nothing is allocated.
-    pub fn reduce_singular(&mut self, task: Task, out: &mut [f64]) -> Singularity {
+    pub fn reduce_singular(&mut self, task: ReductionTask, out: &mut [f64]) -> Singularity {
         if let Some(traversal) = &self.traversal {
             traversal.spread(&mut self.placement);
         }
         let Self { mechanism, force, torque, offsets, placement, work, room, accelerations, .. } = self;
-        let given = Given { task, mechanism, offsets, placement, force, torque };
+        let given = ReductionInput { task, mechanism, offsets, placement, force, torque };
         work.write_rows(given, 0..mechanism.closures.len());
         let mut report = Singularity::default();
         room.enter(given, work);
@@ -28,9 +28,9 @@ impl Reduction<f64> {
     }
 }
 
-impl Room {
+impl RowPool {
     /// Lets the closures' own rows wait at the bodies where they enter.
-    fn enter(&mut self, given: Given<'_, f64>, work: &Workspace<f64>) {
+    fn enter(&mut self, given: ReductionInput<'_, f64>, work: &Workspace<f64>) {
         let schedule = &given.mechanism.schedule;
         for entry in &schedule.entries {
             let turn = schedule.turn(entry.body);
@@ -45,8 +45,14 @@ impl Room {
     }
 
     /// Takes the coordinates of a body out and passes the rows on.
-    fn inward(&mut self, given: Given<'_, f64>, work: &mut Workspace<f64>, body: usize, report: &mut Singularity) {
-        let Given { task, mechanism, placement, .. } = given;
+    fn inward(
+        &mut self,
+        given: ReductionInput<'_, f64>,
+        work: &mut Workspace<f64>,
+        body: usize,
+        report: &mut Singularity,
+    ) {
+        let ReductionInput { task, mechanism, placement, .. } = given;
         let turn = mechanism.schedule.turn(body);
         let length = mechanism.levers[body];
         let (nd, w) = (turn.freedom, turn.front);
@@ -122,12 +128,12 @@ impl Room {
     }
 
     /// Rows over the motion of a body and its front become rows over its coordinates and its front.
-    fn over_coordinates(&mut self, given: Given<'_, f64>, body: usize, rows: &[u32], axes: &[[f64; 3]; 3]) {
-        let Given { task, mechanism, placement, .. } = given;
+    fn over_coordinates(&mut self, given: ReductionInput<'_, f64>, body: usize, rows: &[u32], axes: &[[f64; 3]; 3]) {
+        let ReductionInput { task, mechanism, placement, .. } = given;
         let turn = mechanism.schedule.turn(body);
         let (nd, w) = (turn.freedom, turn.front);
         let hanging = placement.hanging[body];
-        let bias = if task == Task::Accelerations { hanging.bias } else { [0.0; 2] };
+        let bias = if task == ReductionTask::Accelerations { hanging.bias } else { [0.0; 2] };
         let [dx, dy] = hanging.shift();
         for &row in rows {
             let entries = self.row_mut(row);
@@ -168,8 +174,8 @@ impl Room {
         }
     }
 
-    fn outward(&self, given: Given<'_, f64>, body: usize, accelerations: &mut [[f64; 3]], out: &mut [f64]) {
-        let Given { task, mechanism, placement, .. } = given;
+    fn outward(&self, given: ReductionInput<'_, f64>, body: usize, accelerations: &mut [[f64; 3]], out: &mut [f64]) {
+        let ReductionInput { task, mechanism, placement, .. } = given;
         let schedule = &mechanism.schedule;
         let turn = schedule.turn(body);
         let (nd, front) = (turn.freedom, &schedule.fronts[turn.column..turn.column + turn.front]);
@@ -196,7 +202,7 @@ impl Room {
             let (up, [dx, dy]) = (accelerations[parent], hanging.shift());
             a = [up[0] - dy * up[2], up[1] + dx * up[2], up[2]];
         }
-        if task == Task::Accelerations {
+        if task == ReductionTask::Accelerations {
             a[0] += hanging.bias[0];
             a[1] += hanging.bias[1];
         }

@@ -1,7 +1,7 @@
 //! Room for the rows of loops near singular configurations: which are in use, which wait at a body, and which are kept for the
 //! way out.
 
-use super::super::schedule::{Schedule, Turn};
+use super::super::schedule::{BodyElimination, Schedule};
 
 /// No row.
 const NOWHERE: u32 = u32::MAX;
@@ -9,7 +9,7 @@ const NOWHERE: u32 = u32::MAX;
 /// Room for rows. A body takes as many out as its coordinates bring in, so there are never more at a time than constraints,
 /// and those of one body's coordinates.
 #[derive(Debug, Clone)]
-pub(in crate::multibody::rcr) struct Room {
+pub(in crate::multibody::rcr) struct RowPool {
     /// Entries of every row, `width` apart: the columns of a body's front, a_i first, and the right-hand side.
     entries: Vec<f64>,
     width: usize,
@@ -39,7 +39,7 @@ pub(in crate::multibody::rcr) struct Room {
     taken_coordinate: Vec<usize>,
 }
 
-impl Room {
+impl RowPool {
     /// Room for a mechanism with this schedule.
     pub(in crate::multibody::rcr) fn new(schedule: &Schedule) -> Self {
         let (mut start, mut coordinates) = (0, 0);
@@ -81,7 +81,7 @@ impl Room {
         &mut self.entries[row as usize * self.width..(row as usize + 1) * self.width]
     }
 
-    /// The weight of a row, see [`Room`].
+    /// The weight of a row, see [`RowPool`].
     pub(super) fn base(&self, row: u32) -> f64 {
         self.base[row as usize]
     }
@@ -130,7 +130,7 @@ impl Room {
     }
 
     /// Passes a row over a body's own columns to the first body of its front that it touches.
-    pub(super) fn pass(&mut self, schedule: &Schedule, turn: Turn, row: u32) {
+    pub(super) fn pass(&mut self, schedule: &Schedule, turn: BodyElimination, row: u32) {
         let nd = turn.freedom;
         let k = nd + 3 * turn.front;
         let front = &schedule.fronts[turn.column..turn.column + turn.front];
@@ -159,7 +159,7 @@ impl Room {
     }
 
     /// Keeps `row` as the way to find the `at`-th coordinate that was taken out of a body, which is its `coordinate`.
-    pub(super) fn keep(&mut self, (body, turn): (usize, Turn), at: usize, coordinate: usize, row: u32) {
+    pub(super) fn keep(&mut self, (body, turn): (usize, BodyElimination), at: usize, coordinate: usize, row: u32) {
         let width = turn.freedom + 3 * turn.front + 1;
         let start = self.taken_start[body] + at * width;
         let from = row as usize * self.width;
@@ -169,7 +169,7 @@ impl Room {
     }
 
     /// The coordinate that was the `at`-th to be taken out of a body, and its row.
-    pub(super) fn kept(&self, (body, turn): (usize, Turn), at: usize) -> (usize, &[f64]) {
+    pub(super) fn kept(&self, (body, turn): (usize, BodyElimination), at: usize) -> (usize, &[f64]) {
         let width = turn.freedom + 3 * turn.front + 1;
         let start = self.taken_start[body] + at * width;
         (self.taken_coordinate[turn.first + at], &self.taken[start..start + width])

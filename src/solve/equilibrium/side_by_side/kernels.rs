@@ -4,12 +4,12 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::storage::LaneEquilibrium;
-use crate::multibody::lanes::forces::{self, LaneRest};
-use crate::multibody::lanes::{Kernel, STILL, Wide, add, load, store};
+use crate::multibody::lanes::forces::{self, LaneRestStrain};
+use crate::multibody::lanes::{Kernel, STILL, SimdReal, add, load, store};
 
 /// A part that goes over all lanes.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Task {
+pub(super) enum EquilibriumPass {
     Tangent,
     Factor,
     Change,
@@ -17,35 +17,35 @@ pub(super) enum Task {
     Correct,
 }
 
-pub(super) struct Work<'a>(pub(super) &'a mut LaneEquilibrium, pub(super) Task);
+pub(super) struct EquilibriumKernel<'a>(pub(super) &'a mut LaneEquilibrium, pub(super) EquilibriumPass);
 
-impl Kernel for Work<'_> {
+impl Kernel for EquilibriumKernel<'_> {
     #[inline(always)]
-    fn run<W: Wide>(self, simd: W::Simd) {
+    fn run<W: SimdReal>(self, simd: W::Simd) {
         let m = self.0;
         match self.1 {
-            Task::Tangent => m.lay_tangent::<W>(simd),
-            Task::Factor => m.eliminate::<W>(simd),
-            Task::Change => m.change::<W>(simd),
-            Task::Predict => m.solve::<W>(simd, true),
-            Task::Correct => m.solve::<W>(simd, false),
+            EquilibriumPass::Tangent => m.lay_tangent::<W>(simd),
+            EquilibriumPass::Factor => m.eliminate::<W>(simd),
+            EquilibriumPass::Change => m.change::<W>(simd),
+            EquilibriumPass::Predict => m.solve::<W>(simd, true),
+            EquilibriumPass::Correct => m.solve::<W>(simd, false),
         }
     }
 }
 
 impl LaneEquilibrium {
     #[inline(always)]
-    fn lay_tangent<W: Wide>(&mut self, simd: W::Simd) {
+    fn lay_tangent<W: SimdReal>(&mut self, simd: W::Simd) {
         self.tangent.clear();
         self.force.fill(STILL);
-        let rest = LaneRest { expansion: &self.expansion, built_in: self.built_in[0] };
+        let rest = LaneRestStrain { expansion: &self.expansion, built_in: self.built_in[0] };
         forces::place::<W>(simd, &self.trial, &mut self.placed);
         let at = (self.trial.as_slice(), self.placed.as_slice());
         forces::add_tangent::<W>(simd, &self.model, at, &rest, &mut self.tangent, &mut self.force);
     }
 
     #[inline(always)]
-    fn eliminate<W: Wide>(&mut self, simd: W::Simd) {
+    fn eliminate<W: SimdReal>(&mut self, simd: W::Simd) {
         forces::project::<W>(simd, &self.model, &mut self.force);
         if self.model.holds {
             self.tangent.project::<W>(simd, &self.model.pattern, &self.model.held);
@@ -56,15 +56,15 @@ impl LaneEquilibrium {
 
     /// What the change of free strains brings, in `force`.
     #[inline(always)]
-    fn change<W: Wide>(&mut self, simd: W::Simd) {
+    fn change<W: SimdReal>(&mut self, simd: W::Simd) {
         self.force.fill(STILL);
-        let change = LaneRest { expansion: &self.rate, built_in: self.built_in[1] };
+        let change = LaneRestStrain { expansion: &self.rate, built_in: self.built_in[1] };
         forces::add_rest_change::<W>(simd, &self.model, &self.placed, &change, &mut self.force);
     }
 
     /// The step from the change or from the residual in `force`, and where it leads.
     #[inline(always)]
-    fn solve<W: Wide>(&mut self, simd: W::Simd, predicts: bool) {
+    fn solve<W: SimdReal>(&mut self, simd: W::Simd, predicts: bool) {
         let Self { model, tangent, trial, force, residual, goes, .. } = self;
         if predicts {
             forces::project::<W>(simd, model, force);

@@ -2,7 +2,7 @@
 
 use crate::domains::System;
 use crate::multibody::lanes::joint::LanePlaced;
-use crate::multibody::lanes::{Eight, LANES, LaneMatrix, LaneModel, LanePose, STILL};
+use crate::multibody::lanes::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, STILL};
 use crate::multibody::planar::Pose;
 use crate::multibody::rcr::has_lanes;
 use crate::multibody::{BlockMatrix, Pattern};
@@ -13,8 +13,8 @@ pub struct LaneEquilibrium {
     pub(super) model: LaneModel,
     pub(super) tangent: LaneMatrix,
     pub(super) placed: Vec<LanePlaced>,
-    pub(super) expansion: Vec<Eight>,
-    pub(super) rate: Vec<Eight>,
+    pub(super) expansion: Vec<Lane8>,
+    pub(super) rate: Vec<Lane8>,
     /// Share of built-in strains, and the change of it.
     pub(super) built_in: [f64; 2],
     pub(super) trial: Vec<LanePose>,
@@ -23,8 +23,8 @@ pub struct LaneEquilibrium {
     pub(super) residual: Vec<LanePose>,
     pub(super) prediction: Vec<LanePose>,
     /// Not zero for lanes that go on.
-    pub(super) goes: Eight,
-    pub(super) negative: Eight,
+    pub(super) goes: Lane8,
+    pub(super) negative: Lane8,
     pub(super) vanished: [bool; LANES],
     /// Bodies that gaps and loads act on, and the blocks between them.
     pub(super) acted: Vec<usize>,
@@ -50,15 +50,15 @@ impl LaneEquilibrium {
         Some(Self {
             tangent: LaneMatrix::new(pattern),
             placed: vec![LanePlaced::GROUND; n + 1],
-            expansion: vec![Eight::NONE; heaters],
-            rate: vec![Eight::NONE; heaters],
+            expansion: vec![Lane8::NONE; heaters],
+            rate: vec![Lane8::NONE; heaters],
             built_in: [0.0; 2],
             trial: vec![STILL; n],
             force: vec![STILL; n],
             residual: vec![STILL; n],
             prediction: vec![STILL; n],
-            goes: Eight::of(1.0),
-            negative: Eight::NONE,
+            goes: Lane8::of(1.0),
+            negative: Lane8::NONE,
             vanished: [false; LANES],
             blocks: acted.iter().flat_map(between).collect(),
             acted,

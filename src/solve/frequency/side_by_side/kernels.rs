@@ -5,12 +5,12 @@
 
 use super::storage::{LaneModes, Which};
 use super::vectors::{dot, mass_product, scale, weigh};
-use crate::multibody::lanes::forces::{self, LaneRest};
-use crate::multibody::lanes::{Kernel, LaneDouble, Wide, load, store};
+use crate::multibody::lanes::forces::{self, LaneRestStrain};
+use crate::multibody::lanes::{Kernel, LaneDouble, SimdReal, load, store};
 
 /// A part that goes over all lanes.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Task {
+pub(super) enum ModesPass {
     /// K at the drawn geometry.
     Stiffness,
     /// Its factor, or that of K − σM, and how many pivots are negative.
@@ -25,36 +25,36 @@ pub(super) enum Task {
     Measure(usize),
 }
 
-pub(super) struct Work<'a>(pub(super) &'a mut LaneModes, pub(super) Task);
+pub(super) struct ModesKernel<'a>(pub(super) &'a mut LaneModes, pub(super) ModesPass);
 
-impl Kernel for Work<'_> {
+impl Kernel for ModesKernel<'_> {
     #[inline(always)]
-    fn run<W: Wide>(self, simd: W::Simd) {
+    fn run<W: SimdReal>(self, simd: W::Simd) {
         let m = self.0;
         match self.1 {
-            Task::Stiffness => m.tangent::<W>(simd),
-            Task::Factor(which) => m.eliminate::<W>(simd, which),
-            Task::Invert(which, k) => m.invert::<W>(simd, which, k),
-            Task::Ritz => m.ritz::<W>(simd),
-            Task::Combine => m.small.combine::<W>(simd, &m.model, &mut m.x, &mut m.given),
-            Task::Measure(k) => m.measure::<W>(simd, k),
+            ModesPass::Stiffness => m.tangent::<W>(simd),
+            ModesPass::Factor(which) => m.eliminate::<W>(simd, which),
+            ModesPass::Invert(which, k) => m.invert::<W>(simd, which, k),
+            ModesPass::Ritz => m.ritz::<W>(simd),
+            ModesPass::Combine => m.small.combine::<W>(simd, &m.model, &mut m.x, &mut m.given),
+            ModesPass::Measure(k) => m.measure::<W>(simd, k),
         }
     }
 }
 
 impl LaneModes {
     #[inline(always)]
-    fn tangent<W: Wide>(&mut self, simd: W::Simd) {
+    fn tangent<W: SimdReal>(&mut self, simd: W::Simd) {
         let Self { model, stiffness, placed, still, expansion, force, .. } = self;
         stiffness.clear();
         // nothing acts: neither heat nor built-in strain
-        let rest = LaneRest { expansion, built_in: 0.0 };
+        let rest = LaneRestStrain { expansion, built_in: 0.0 };
         forces::place::<W>(simd, still, placed);
         forces::add_tangent::<W>(simd, model, (still, placed), &rest, stiffness, force);
     }
 
     #[inline(always)]
-    fn eliminate<W: Wide>(&mut self, simd: W::Simd, which: Which) {
+    fn eliminate<W: SimdReal>(&mut self, simd: W::Simd, which: Which) {
         let Self { model, plain, shifted, vanished, below, .. } = self;
         let matrix = if which == Which::Plain { plain } else { shifted };
         if model.holds {
@@ -65,7 +65,7 @@ impl LaneModes {
     }
 
     #[inline(always)]
-    fn invert<W: Wide>(&mut self, simd: W::Simd, which: Which, k: usize) {
+    fn invert<W: SimdReal>(&mut self, simd: W::Simd, which: Which, k: usize) {
         let Self { model, plain, shifted, x, given, force, shift, lambda, .. } = self;
         let (x, given) = (&mut x[k], &mut given[k]);
         let (matrix, shift) = match which {
@@ -87,7 +87,7 @@ impl LaneModes {
     }
 
     #[inline(always)]
-    fn ritz<W: Wide>(&mut self, simd: W::Simd) {
+    fn ritz<W: SimdReal>(&mut self, simd: W::Simd) {
         let Self { model, x, given, small, lambda, .. } = self;
         small.resize(x.len());
         for i in 0..x.len() {
@@ -101,7 +101,7 @@ impl LaneModes {
     }
 
     #[inline(always)]
-    fn measure<W: Wide>(&mut self, simd: W::Simd, k: usize) {
+    fn measure<W: SimdReal>(&mut self, simd: W::Simd, k: usize) {
         let Self { model, precise, plain, x, force, product, lambda, residual, .. } = self;
         let none = W::splat(simd, 0.0);
         for product in product.iter_mut().flatten() {

@@ -9,56 +9,57 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::vectors::{mass_product, scale};
-use crate::multibody::lanes::{Eight, LANES, LaneModel, LanePose, Wide, load, store};
+use crate::multibody::lanes::{LANES, Lane8, LaneModel, LanePose, SimdReal, load, store};
 
 /// Rows at most.
-pub(super) const MOST: usize = 10;
+pub(super) const MAX_ROWS: usize = 10;
 /// Sweeps over all pairs.
 const SWEEPS: usize = 6;
 
-type Matrix<T = Eight> = [[T; MOST]; MOST];
+type RitzMatrix<T = Lane8> = [[T; MAX_ROWS]; MAX_ROWS];
 
 /// The matrices.
 #[derive(Debug, Clone)]
-pub(crate) struct Small {
+pub(crate) struct RitzMatrices {
     count: usize,
     /// Lower triangles.
-    a: Matrix,
-    b: Matrix,
+    a: RitzMatrix,
+    b: RitzMatrix,
     /// Vectors, v[row][column].
-    v: Matrix,
+    v: RitzMatrix,
 }
 
-impl Default for Small {
+impl Default for RitzMatrices {
     fn default() -> Self {
-        let none = [[Eight::NONE; MOST]; MOST];
+        let none = [[Lane8::NONE; MAX_ROWS]; MAX_ROWS];
         Self { count: 0, a: none, b: none, v: none }
     }
 }
 
-impl Small {
+impl RitzMatrices {
     /// Takes so many rows.
     pub(crate) fn resize(&mut self, count: usize) {
-        self.count = count.min(MOST);
+        self.count = count.min(MAX_ROWS);
     }
 
     /// A, its lower triangle.
-    pub(crate) fn a(&mut self, row: usize, column: usize) -> &mut Eight {
+    pub(crate) fn a(&mut self, row: usize, column: usize) -> &mut Lane8 {
         &mut self.a[row][column]
     }
 
     /// B, its lower triangle.
-    pub(crate) fn b(&mut self, row: usize, column: usize) -> &mut Eight {
+    pub(crate) fn b(&mut self, row: usize, column: usize) -> &mut Lane8 {
         &mut self.b[row][column]
     }
 
     /// Finds all λ and v, vᵀBv = 1, in no order.
     #[inline(always)]
-    pub(crate) fn solve<W: Wide>(&mut self, simd: W::Simd, lambda: &mut [Eight]) {
+    pub(crate) fn solve<W: SimdReal>(&mut self, simd: W::Simd, lambda: &mut [Lane8]) {
         let n = self.count;
         let zero = W::splat(simd, 0.0);
         let one = W::splat(simd, 1.0);
-        let (mut a, mut l, mut v) = ([[zero; MOST]; MOST], [[zero; MOST]; MOST], [[zero; MOST]; MOST]);
+        let (mut a, mut l, mut v) =
+            ([[zero; MAX_ROWS]; MAX_ROWS], [[zero; MAX_ROWS]; MAX_ROWS], [[zero; MAX_ROWS]; MAX_ROWS]);
         for i in 0..n {
             for j in 0..=i {
                 a[i][j] = W::load(simd, &self.a[i][j]);
@@ -123,12 +124,12 @@ impl Small {
     }
 
     /// An entry of a vector.
-    pub(crate) fn vector(&self, row: usize, vector: usize) -> &Eight {
+    pub(crate) fn vector(&self, row: usize, vector: usize) -> &Lane8 {
         &self.v[row][vector]
     }
 
     /// Sorts λ and its vectors in each lane.
-    pub(crate) fn sort(&mut self, lambda: &mut [Eight]) {
+    pub(crate) fn sort(&mut self, lambda: &mut [Lane8]) {
         let n = self.count;
         for lane in 0..LANES {
             for end in (1..n).rev() {
@@ -148,7 +149,7 @@ impl Small {
 
     /// Replaces the shapes by the combinations that the vectors say, of length 1 in the mass. What `room` holds is lost.
     #[inline(always)]
-    pub(super) fn combine<W: Wide>(
+    pub(super) fn combine<W: SimdReal>(
         &self,
         simd: W::Simd,
         model: &LaneModel,
@@ -176,7 +177,7 @@ impl Small {
 
 /// Turns rows and columns p and q of `a` so that what couples them is gone, and the columns of `v` with them.
 #[inline(always)]
-fn rotate<W: Wide>(a: &mut Matrix<W>, v: &mut Matrix<W>, n: usize, (p, q): (usize, usize), one: W) {
+fn rotate<W: SimdReal>(a: &mut RitzMatrix<W>, v: &mut RitzMatrix<W>, n: usize, (p, q): (usize, usize), one: W) {
     let coupling = a[p][q];
     let apart = a[q][q] - a[p][p];
     let root = (apart * apart + coupling * coupling * 4.0).sqrt();

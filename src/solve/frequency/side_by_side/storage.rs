@@ -1,9 +1,9 @@
 //! What modes of variants side by side are found with.
 
-use super::ritz::{MOST, Small};
+use super::ritz::{MAX_ROWS, RitzMatrices};
 use crate::domains::System;
 use crate::multibody::lanes::joint::LanePlaced;
-use crate::multibody::lanes::{Eight, LANES, LaneMatrix, LaneModel, LanePose, LanePrecise, PrecisePose, STILL};
+use crate::multibody::lanes::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, LanePrecise, PrecisePose, STILL};
 use crate::multibody::planar::Pose;
 use crate::multibody::rcr::has_lanes;
 
@@ -27,7 +27,7 @@ pub struct LaneModes {
     pub(super) shifted: LaneMatrix,
     pub(super) placed: Vec<LanePlaced>,
     pub(super) still: Vec<LanePose>,
-    pub(super) expansion: Vec<Eight>,
+    pub(super) expansion: Vec<Lane8>,
     /// Shapes that every variant begins with.
     pub(super) start: Vec<Vec<Pose>>,
     pub(super) x: Vec<Vec<LanePose>>,
@@ -35,20 +35,20 @@ pub struct LaneModes {
     pub(super) given: Vec<Vec<LanePose>>,
     pub(super) force: Vec<LanePose>,
     pub(super) product: Vec<PrecisePose>,
-    pub(super) lambda: Vec<Eight>,
-    pub(super) residual: Vec<Eight>,
+    pub(super) lambda: Vec<Lane8>,
+    pub(super) residual: Vec<Lane8>,
     /// σ.
-    pub(super) shift: Eight,
+    pub(super) shift: Lane8,
     /// Modes below it.
-    pub(super) below: Eight,
+    pub(super) below: Lane8,
     pub(super) vanished: [bool; LANES],
-    pub(super) small: Small,
+    pub(super) small: RitzMatrices,
 }
 
 impl LaneModes {
     /// Lanes for variants like `first`, beginning with these shapes; none where it has no lanes, or more shapes than they hold.
     pub fn new(first: &System, start: Vec<Vec<Pose>>) -> Option<Self> {
-        let able = has_lanes() && first.model.couplings.is_empty() && (1..=MOST).contains(&start.len());
+        let able = has_lanes() && first.model.couplings.is_empty() && (1..=MAX_ROWS).contains(&start.len());
         let model = LaneModel::new(&first.model).filter(|_| able)?;
         let (n, pattern) = (first.bodies(), &first.model.pattern);
         let block = vec![vec![STILL; n]; start.len()];
@@ -59,17 +59,17 @@ impl LaneModes {
             shifted: LaneMatrix::new(pattern),
             placed: vec![LanePlaced::GROUND; n + 1],
             still: vec![STILL; n],
-            expansion: vec![Eight::NONE; first.electrics.heating.heaters.len()],
+            expansion: vec![Lane8::NONE; first.electrics.heating.heaters.len()],
             x: block.clone(),
             given: block,
             force: vec![STILL; n],
-            product: vec![[[Eight::NONE; 2]; 3]; n],
-            lambda: vec![Eight::NONE; start.len()],
-            residual: vec![Eight::NONE; start.len()],
-            shift: Eight::NONE,
-            below: Eight::NONE,
+            product: vec![[[Lane8::NONE; 2]; 3]; n],
+            lambda: vec![Lane8::NONE; start.len()],
+            residual: vec![Lane8::NONE; start.len()],
+            shift: Lane8::NONE,
+            below: Lane8::NONE,
             vanished: [false; LANES],
-            small: Small::default(),
+            small: RitzMatrices::default(),
             start,
             model,
         })
@@ -83,12 +83,12 @@ impl LaneModes {
     }
 
     /// λ of each shape, in each lane.
-    pub(crate) fn lambda(&self) -> &[Eight] {
+    pub(crate) fn lambda(&self) -> &[Lane8] {
         &self.lambda
     }
 
     /// The models, the factor of K, the shapes, and their λ.
-    pub(crate) fn found(&self) -> (&LaneModel, &LaneMatrix, &[Vec<LanePose>], &[Eight]) {
+    pub(crate) fn found(&self) -> (&LaneModel, &LaneMatrix, &[Vec<LanePose>], &[Lane8]) {
         (&self.model, &self.plain, &self.x, &self.lambda)
     }
 }

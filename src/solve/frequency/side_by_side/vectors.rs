@@ -3,11 +3,11 @@
 // blocks of fixed size are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
 
-use crate::multibody::lanes::{LaneModel, LanePose, Wide, load, store};
+use crate::multibody::lanes::{LaneModel, LanePose, SimdReal, load, store};
 
 /// xᵀy.
 #[inline(always)]
-pub(crate) fn dot<W: Wide>(simd: W::Simd, x: &[LanePose], y: &[LanePose]) -> W {
+pub(crate) fn dot<W: SimdReal>(simd: W::Simd, x: &[LanePose], y: &[LanePose]) -> W {
     let mut sum = [W::splat(simd, 0.0); 3];
     for (x, y) in x.iter().zip(y) {
         let (x, y) = (load::<W, 3>(simd, x), load::<W, 3>(simd, y));
@@ -20,7 +20,7 @@ pub(crate) fn dot<W: Wide>(simd: W::Simd, x: &[LanePose], y: &[LanePose]) -> W {
 
 /// xᵀMy.
 #[inline(always)]
-pub(crate) fn mass_product<W: Wide>(simd: W::Simd, model: &LaneModel, x: &[LanePose], y: &[LanePose]) -> W {
+pub(crate) fn mass_product<W: SimdReal>(simd: W::Simd, model: &LaneModel, x: &[LanePose], y: &[LanePose]) -> W {
     let mut sum = [W::splat(simd, 0.0); 3];
     for ((x, y), body) in x.iter().zip(y).zip(&model.bodies) {
         let (x, y, m) = (load::<W, 3>(simd, x), load::<W, 3>(simd, y), load::<W, 3>(simd, &body.mass));
@@ -33,7 +33,7 @@ pub(crate) fn mass_product<W: Wide>(simd: W::Simd, model: &LaneModel, x: &[LaneP
 
 /// `x *= s`.
 #[inline(always)]
-pub(crate) fn scale<W: Wide>(simd: W::Simd, x: &mut [LanePose], s: W) {
+pub(crate) fn scale<W: SimdReal>(simd: W::Simd, x: &mut [LanePose], s: W) {
     for x in x {
         let mut scaled = load::<W, 3>(simd, x);
         for i in 0..3 {
@@ -45,7 +45,7 @@ pub(crate) fn scale<W: Wide>(simd: W::Simd, x: &mut [LanePose], s: W) {
 
 /// `y` = M·x.
 #[inline(always)]
-pub(crate) fn weigh<W: Wide>(simd: W::Simd, model: &LaneModel, x: &[LanePose], y: &mut [LanePose]) {
+pub(crate) fn weigh<W: SimdReal>(simd: W::Simd, model: &LaneModel, x: &[LanePose], y: &mut [LanePose]) {
     for ((y, x), body) in y.iter_mut().zip(x).zip(&model.bodies) {
         let (mut x, m) = (load::<W, 3>(simd, x), load::<W, 3>(simd, &body.mass));
         for i in 0..3 {

@@ -1,6 +1,6 @@
 //! From one time to another within tolerances: the PI rule for the step, the first step, and what may go wrong.
 
-use super::{Dense, DormandPrince, Pair, SecondOrder, continuous};
+use super::{DenseOutput, DormandPrince, PhasePoint, SecondOrder, continuous};
 use thiserror::Error;
 
 /// Bounds of an error: every component may be wrong by atol + rtol·|y| in a step, in the mean square over all.
@@ -17,7 +17,7 @@ pub struct Tolerances {
 impl Tolerances {
     /// The norm of `x` against these bounds, where the state is the larger of `a` and `b`: 1 is just allowed. Also the
     /// component with the largest share (rates follow coordinates).
-    fn norm(&self, x: &Pair, a: &Pair, b: &Pair) -> (f64, usize) {
+    fn norm(&self, x: &PhasePoint, a: &PhasePoint, b: &PhasePoint) -> (f64, usize) {
         let (mut sum, mut worst, mut component) = (0.0, -1.0, 0);
         let n = x.q.len();
         let halves = [(&x.q, &a.q, &b.q, &self.atol_q), (&x.v, &a.v, &b.v, &self.atol_v)];
@@ -95,7 +95,7 @@ impl DormandPrince {
         h: &mut f64,
         tolerances: &Tolerances,
         max_steps: u64,
-        observe: &mut dyn FnMut(&Dense<'_>) -> bool,
+        observe: &mut dyn FnMut(&DenseOutput<'_>) -> bool,
     ) -> Result<Option<f64>, IntegrationError<P::Error>> {
         let (mut t, end) = span;
         if t == end || q.is_empty() {
@@ -105,7 +105,7 @@ impl DormandPrince {
         self.forget();
         let failed = |t, h, source| IntegrationError::Accelerations { t, h, source };
         if self.terms[0].q.len() != q.len() {
-            self.terms = std::array::from_fn(|_| Pair::zeros(q.len()));
+            self.terms = std::array::from_fn(|_| PhasePoint::zeros(q.len()));
         }
         self.begin(&mut |t, q: &_, v: &_, a: &mut _| problem.accelerations(t, q, v, a), t, q, v)
             .map_err(|e| failed(t, *h, e))?;
@@ -114,7 +114,7 @@ impl DormandPrince {
         }
         *h = sign * h.abs();
         let (mut last_error, mut rejected, mut steps) = (1e-4, 0, 0);
-        let mut now = Pair { q: q.to_vec(), v: v.to_vec() };
+        let mut now = PhasePoint { q: q.to_vec(), v: v.to_vec() };
         while (end - t) * sign > 0.0 {
             crate::budget::check();
             if steps == max_steps {
@@ -138,7 +138,7 @@ impl DormandPrince {
                 last_error = error.max(1e-4);
                 let to = if last { end } else { t + step };
                 self.accept(problem, to, step, q, v, &mut now).map_err(|e| failed(t, step, e))?;
-                let dense = Dense { t, h: step, terms: &self.terms };
+                let dense = DenseOutput { t, h: step, terms: &self.terms };
                 rejected = 0;
                 self.effort.steps += 1;
                 t = to;
@@ -168,7 +168,7 @@ impl DormandPrince {
         h: f64,
         q: &mut [f64],
         v: &mut [f64],
-        now: &mut Pair,
+        now: &mut PhasePoint,
     ) -> Result<(), P::Error> {
         now.copy(&self.next);
         problem.project(to, &mut now.q, &mut now.v)?;
@@ -200,7 +200,7 @@ impl DormandPrince {
         v: &[f64],
         tolerances: &Tolerances,
     ) -> Result<f64, P::Error> {
-        let now = Pair { q: q.to_vec(), v: v.to_vec() };
+        let now = PhasePoint { q: q.to_vec(), v: v.to_vec() };
         let (size, slope) = (tolerances.norm(&now, &now, &now).0, tolerances.norm(&self.slopes[0], &now, &now).0);
         let guess = if size < 1e-5 || slope < 1e-5 { 1e-6 * span.abs() } else { 0.01 * size / slope };
         let h = guess.min(span.abs()) * span.signum();

@@ -82,19 +82,19 @@ pub struct Effort {
 }
 
 /// Coordinates and rates, or changes of them.
-pub type Pair = Motion<f64>;
+pub type PhasePoint = Motion<f64>;
 
 /// The continuous extension of one accepted step.
 #[derive(Debug, Clone, Copy)]
-pub struct Dense<'a> {
+pub struct DenseOutput<'a> {
     /// Start of the step [s].
     pub t: f64,
     /// Its length [s]; negative when time runs backwards.
     pub h: f64,
-    terms: &'a [Pair; 5],
+    terms: &'a [PhasePoint; 5],
 }
 
-impl Dense<'_> {
+impl DenseOutput<'_> {
     /// Coordinates and rates at time `t` within the step, with an error of order 5 in its length.
     pub fn at(&self, t: f64, q: &mut [f64], v: &mut [f64]) {
         let x = (t - self.t) / self.h;

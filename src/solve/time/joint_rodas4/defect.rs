@@ -1,7 +1,7 @@
 //! The error of a motion in joint coordinates, see [`crate::solve::time::defect`].
 
 use super::JointRodas4;
-use super::error::Defect;
+use super::error::JointDefectEstimate;
 use crate::equations::{Bodies, Joints};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
@@ -35,13 +35,13 @@ impl JointRodas4 {
 
 impl<'s> Propagates<'s> for JointRodas4 {
     fn begin_error(&mut self) {
-        self.defect = Some(Box::new(Defect::zeros(self.joints.tree.links.len())));
+        self.defect = Some(Box::new(JointDefectEstimate::zeros(self.joints.tree.links.len())));
     }
 
     fn error(&mut self, bodies: &mut Bodies<'s>, (s, h): (f64, f64), _: [&Motion; 2], start: &[Motion]) -> &Motion {
         let count = self.joints.tree.links.len();
-        let mut defect = self.defect.take().unwrap_or_else(|| Box::new(Defect::zeros(count)));
-        let Defect { error, room, impulses, right, wrench, force } = &mut *defect;
+        let mut defect = self.defect.take().unwrap_or_else(|| Box::new(JointDefectEstimate::zeros(count)));
+        let JointDefectEstimate { error, room, impulses, right, wrench, force } = &mut *defect;
         self.residuals(bodies, (s, h), start, impulses);
         let gh = GAMMA * h;
         let Joints { tree, closures, inertias, .. } = &*self.joints;

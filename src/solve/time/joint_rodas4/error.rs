@@ -7,7 +7,7 @@ use crate::solve::time::method::Motion;
 
 /// The error, over the coordinates and over the bodies' motions, and storage for a step of it.
 #[derive(Debug, Clone)]
-pub(super) struct Defect {
+pub(super) struct JointDefectEstimate {
     pub(super) error: [Motion; 2],
     pub(super) room: [Motion; 2],
     pub(super) impulses: Impulses,
@@ -18,7 +18,7 @@ pub(super) struct Defect {
     pub(super) force: Vec<Pose>,
 }
 
-impl Defect {
+impl JointDefectEstimate {
     /// Storage for so many bodies, without an error.
     pub(super) fn zeros(count: usize) -> Self {
         Self {

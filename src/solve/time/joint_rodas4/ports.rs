@@ -3,7 +3,7 @@
 //! Where the bodies are is a function of the coordinates that curves; its change comes from the same kinematics run over
 //! values with their derivatives, so that partials are those of the numbers that the step returns.
 
-use super::stages::Stages;
+use super::stages::JointStages;
 use crate::domains::{Drive, Ramp};
 use crate::equations::Joints;
 use crate::multibody::planar::Pose;
@@ -17,9 +17,9 @@ use crate::solve::time::stage_loss::StageLoss;
 
 /// Sources whose final voltages the motion is differentiated by.
 #[derive(Debug, Clone)]
-pub(super) struct Ports {
+pub(super) struct JointPortSensitivities {
     sources: Vec<usize>,
-    stages: Vec<Stages>,
+    stages: Vec<JointStages>,
     /// ∂r/∂q of closures and gaps in the stage at hand; without sources on an empty pattern.
     pub(super) tangent: BlockMatrix<f64, 3>,
     /// Wrenches of the stage at hand, not summed.
@@ -35,7 +35,7 @@ pub(super) struct Ports {
     change: Drive,
 }
 
-impl Ports {
+impl JointPortSensitivities {
     pub(super) fn new(joints: &Joints, sources: &[usize]) -> Self {
         let Joints { tree, closures, .. } = joints;
         let count = tree.links.len();
@@ -44,7 +44,7 @@ impl Ports {
         let pattern = &tree.pattern;
         Self {
             sources: sources.to_vec(),
-            stages: sources.iter().map(|_| Stages::new(count)).collect(),
+            stages: sources.iter().map(|_| JointStages::new(count)).collect(),
             tangent: BlockMatrix::new(if sources.is_empty() { &nothing } else { pattern }),
             force: zeros.clone(),
             forcing: sources.iter().map(|_| (zeros.clone(), zeros.clone())).collect(),
@@ -94,7 +94,7 @@ impl Ports {
         joints: &Joints,
         ramp: &Ramp<'_>,
         (i, s, h, rate): (usize, f64, f64, f64),
-        (at, poses, drive): (&Stages, &[Pose], &Drive),
+        (at, poses, drive): (&JointStages, &[Pose], &Drive),
         (w, loss): (&JointMatrix, Option<&StageLoss>),
         start: &[Motion],
     ) -> u64 {
@@ -157,7 +157,14 @@ impl Ports {
 
     /// After the last stage of a step of length `h` [s]: the new sensitivities, and those of the bodies, whose coordinates
     /// are at `at`.
-    pub(super) fn finish(&mut self, tree: &Tree, h: f64, at: &Stages, carried: &mut [Motion], bodies: &mut [Motion]) {
+    pub(super) fn finish(
+        &mut self,
+        tree: &Tree,
+        h: f64,
+        at: &JointStages,
+        carried: &mut [Motion],
+        bodies: &mut [Motion],
+    ) {
         for ((stages, carried), bodies) in self.stages.iter_mut().zip(carried.chunks_exact_mut(2)).zip(bodies) {
             let [now, push] = carried else { continue };
             stages.finish(h, now, push);

@@ -3,11 +3,11 @@
 //! side by side.
 
 use super::tableau::TABLEAU;
-use crate::multibody::lanes::{Kernel, LanePose, STILL, Wide, add_scaled, everywhere, load, store};
+use crate::multibody::lanes::{Kernel, LanePose, STILL, SimdReal, add_scaled, everywhere, load, store};
 use crate::multibody::planar::Pose;
 use crate::multibody::relative::columns::Four;
-use crate::multibody::relative::kinematics::Given;
-use crate::multibody::relative::placed::{Eights, place_of, tiles};
+use crate::multibody::relative::kinematics::JointState;
+use crate::multibody::relative::placed::{LaneJointStates, place_of, tiles};
 use crate::multibody::relative::{JointMatrix, Tree};
 use crate::solve::time::method::Motion;
 use crate::solve::time::rodas4::tableau::{A, GAMMA};
@@ -17,18 +17,18 @@ type Increments = [LanePose; 6];
 
 /// See the module.
 #[derive(Debug, Clone)]
-pub(super) struct Stages {
+pub(super) struct JointStages {
     /// Increments of the coordinates.
     increments: Vec<Increments>,
     /// Motions of the bodies with them.
     moved: Vec<Increments>,
     /// Coordinates, rates and accelerations at the start of the step.
-    start: Vec<Eights>,
+    start: Vec<LaneJointStates>,
     /// Motions of the bodies with the rates and the accelerations at the start of the step.
     rate: Vec<LanePose>,
     acceleration: Vec<LanePose>,
     /// Where the stage at hand takes the forces; after the last one the end of the step.
-    pub(super) argument: Vec<Eights>,
+    pub(super) argument: Vec<LaneJointStates>,
     /// Motion of the bodies with r₁/(γh) + r₂: what inertia acts on.
     push: Vec<LanePose>,
     /// Motion of the bodies with r₁: what damping acts on, where it was asked for.
@@ -39,17 +39,17 @@ pub(super) struct Stages {
 
 const LAST: usize = 5;
 
-impl Stages {
+impl JointStages {
     pub(super) fn new(count: usize) -> Self {
         let (tiles, room) = (tiles(count), vec![Pose::zeros(); count]);
         let zeros = vec![STILL; tiles];
         Self {
             increments: vec![[STILL; 6]; tiles],
             moved: vec![[STILL; 6]; tiles],
-            start: vec![Eights::STILL; tiles],
+            start: vec![LaneJointStates::STILL; tiles],
             rate: zeros.clone(),
             acceleration: zeros.clone(),
-            argument: vec![Eights::STILL; tiles],
+            argument: vec![LaneJointStates::STILL; tiles],
             push: zeros.clone(),
             drift: zeros,
             room: [room.clone(), room],
@@ -83,13 +83,13 @@ impl Stages {
         if i == 0 {
             return self.begin_first(now, push);
         }
-        everywhere(Sums { stages: self, task: Task::Begin(i), h });
+        everywhere(Sums { stages: self, task: StageSum::Begin(i), h });
         false
     }
 
     /// What inertia acts on in stage `i`, and damping where something `drags`.
     pub(super) fn move_bodies(&mut self, i: usize, h: f64, drags: bool) {
-        everywhere(Sums { stages: self, task: Task::Move(i, drags), h });
+        everywhere(Sums { stages: self, task: StageSum::Move(i, drags), h });
     }
 
     /// What inertia of body `j` acts on.
@@ -117,7 +117,7 @@ impl Stages {
 
     /// After the last stage: the argument becomes the end of the step.
     pub(super) fn finish(&mut self, h: f64, now: &mut Motion, push: &mut Motion) {
-        everywhere(Sums { stages: self, task: Task::Finish, h });
+        everywhere(Sums { stages: self, task: StageSum::Finish, h });
         for (j, ((q, v), z)) in now.q.iter_mut().zip(&mut now.v).zip(&mut push.q).enumerate() {
             let (tile, lane) = place_of(j);
             [*q, *v, *z] = self.argument[tile].of(lane);
@@ -126,7 +126,7 @@ impl Stages {
 
     /// Motions of the bodies with the increments of the last stage: of the coordinates, and of the rates.
     pub(super) fn last(&mut self, h: f64, displacements: &mut [Pose], rates: &mut [Pose]) {
-        everywhere(Sums { stages: self, task: Task::Drift(LAST), h });
+        everywhere(Sums { stages: self, task: StageSum::Drift(LAST), h });
         let gh = GAMMA * h;
         for (j, (displacement, rate)) in displacements.iter_mut().zip(rates).enumerate() {
             let (tile, lane) = place_of(j);
@@ -154,7 +154,7 @@ fn set(to: &mut [LanePose], j: usize, pose: &Pose) {
 
 /// A sum over the stages.
 #[derive(Debug, Clone, Copy)]
-enum Task {
+enum StageSum {
     /// The argument of a stage.
     Begin(usize),
     /// What inertia acts on in a stage, and damping.
@@ -166,36 +166,36 @@ enum Task {
 }
 
 struct Sums<'a> {
-    stages: &'a mut Stages,
-    task: Task,
+    stages: &'a mut JointStages,
+    task: StageSum,
     h: f64,
 }
 
 impl Kernel for Sums<'_> {
     #[inline(always)]
-    fn run<W: Wide>(self, simd: W::Simd) {
+    fn run<W: SimdReal>(self, simd: W::Simd) {
         let Self { stages, task, h } = self;
         match task {
-            Task::Begin(1) => stages.begin_stage::<W, 1>(simd, h),
-            Task::Begin(2) => stages.begin_stage::<W, 2>(simd, h),
-            Task::Begin(3) => stages.begin_stage::<W, 3>(simd, h),
-            Task::Begin(4) => stages.begin_stage::<W, 4>(simd, h),
-            Task::Begin(_) => stages.begin_stage::<W, 5>(simd, h),
-            Task::Move(i, drags) => {
+            StageSum::Begin(1) => stages.begin_stage::<W, 1>(simd, h),
+            StageSum::Begin(2) => stages.begin_stage::<W, 2>(simd, h),
+            StageSum::Begin(3) => stages.begin_stage::<W, 3>(simd, h),
+            StageSum::Begin(4) => stages.begin_stage::<W, 4>(simd, h),
+            StageSum::Begin(_) => stages.begin_stage::<W, 5>(simd, h),
+            StageSum::Move(i, drags) => {
                 stages.push_stage::<W>(simd, i, h);
                 if drags {
                     stages.drift_stage::<W>(simd, i, h);
                 }
             }
-            Task::Drift(i) => stages.drift_stage::<W>(simd, i, h),
-            Task::Finish => stages.finish_step::<W>(simd, h),
+            StageSum::Drift(i) => stages.drift_stage::<W>(simd, i, h),
+            StageSum::Finish => stages.finish_step::<W>(simd, h),
         }
     }
 }
 
 /// `sum + Σ c_k·u_k` over the first stages.
 #[inline(always)]
-fn sum<W: Wide>(simd: W::Simd, mut sum: LanePose<W>, u: &[LanePose], c: &[f64]) -> LanePose<W> {
+fn sum<W: SimdReal>(simd: W::Simd, mut sum: LanePose<W>, u: &[LanePose], c: &[f64]) -> LanePose<W> {
     for (u, c) in u.iter().zip(c) {
         add_scaled(&mut sum, &load(simd, u), W::splat(simd, *c));
     }
@@ -204,21 +204,21 @@ fn sum<W: Wide>(simd: W::Simd, mut sum: LanePose<W>, u: &[LanePose], c: &[f64]) 
 
 /// `x·a + y·b`.
 #[inline(always)]
-fn both<W: Wide>(simd: W::Simd, (x, a): (&LanePose<W>, f64), (y, b): (&LanePose<W>, f64)) -> LanePose<W> {
+fn both<W: SimdReal>(simd: W::Simd, (x, a): (&LanePose<W>, f64), (y, b): (&LanePose<W>, f64)) -> LanePose<W> {
     let (a, b) = (W::splat(simd, a), W::splat(simd, b));
     [x[0] * a + y[0] * b, x[1] * a + y[1] * b, x[2] * a + y[2] * b]
 }
 
-impl Stages {
+impl JointStages {
     #[inline(always)]
-    fn begin_stage<W: Wide, const I: usize>(&mut self, simd: W::Simd, h: f64) {
+    fn begin_stage<W: SimdReal, const I: usize>(&mut self, simd: W::Simd, h: f64) {
         let (once, twice) = (1.0 / h, 1.0 / (h * h));
         let rate = TABLEAU.rate[I].map(|c| c * once);
         let acceleration = TABLEAU.acceleration[I].map(|c| c * twice);
         let (p, t, a) = (TABLEAU.rate_start[I], TABLEAU.acceleration_start[I], TABLEAU.acceleration_rate[I] * once);
         for ((u, start), argument) in self.increments.iter().zip(&self.start).zip(&mut self.argument) {
-            let Given { q, v, z } = start.load::<W>(simd);
-            let mut at = Given { q, v: v.map(|v| v * p), z: both(simd, (&z, t), (&v, a)) };
+            let JointState { q, v, z } = start.load::<W>(simd);
+            let mut at = JointState { q, v: v.map(|v| v * p), z: both(simd, (&z, t), (&v, a)) };
             for k in 0..I {
                 let u = load::<W, 3>(simd, &u[k]);
                 add_scaled(&mut at.q, &u, W::splat(simd, A[I][k]));
@@ -230,7 +230,7 @@ impl Stages {
     }
 
     #[inline(always)]
-    fn push_stage<W: Wide>(&mut self, simd: W::Simd, i: usize, h: f64) {
+    fn push_stage<W: SimdReal>(&mut self, simd: W::Simd, i: usize, h: f64) {
         let (once, twice) = (1.0 / h, 1.0 / (h * h));
         let pushed = TABLEAU.push[i].map(|c| c * twice);
         let (t, s) = (TABLEAU.acceleration_start[i], TABLEAU.push_rate[i] * once);
@@ -241,7 +241,7 @@ impl Stages {
     }
 
     #[inline(always)]
-    fn drift_stage<W: Wide>(&mut self, simd: W::Simd, i: usize, h: f64) {
+    fn drift_stage<W: SimdReal>(&mut self, simd: W::Simd, i: usize, h: f64) {
         let lag = TABLEAU.lag[i].map(|c| c / h);
         let p = TABLEAU.rate_start[i];
         for ((u, v), drift) in self.moved.iter().zip(&self.rate).zip(&mut self.drift) {
@@ -251,13 +251,13 @@ impl Stages {
     }
 
     #[inline(always)]
-    fn finish_step<W: Wide>(&mut self, simd: W::Simd, h: f64) {
+    fn finish_step<W: SimdReal>(&mut self, simd: W::Simd, h: f64) {
         let (once, twice) = (1.0 / h, 1.0 / (h * h));
         let (lag, pushed) = (TABLEAU.lag[LAST].map(|c| c * once), TABLEAU.push[LAST].map(|c| c * twice));
         let (p, t, s) = (TABLEAU.rate_start[LAST], TABLEAU.acceleration_start[LAST], TABLEAU.push_rate[LAST] * once);
         let gh = GAMMA * h;
         for ((u, start), argument) in self.increments.iter().zip(&self.start).zip(&mut self.argument) {
-            let Given { v, z, .. } = start.load::<W>(simd);
+            let JointState { v, z, .. } = start.load::<W>(simd);
             let rate = sum(simd, v.map(|v| v * p), &u[..LAST], &lag);
             let acceleration = sum(simd, both(simd, (&z, t), (&v, s)), &u[..LAST], &pushed);
             let (mut end, u) = (argument.load::<W>(simd), load::<W, 3>(simd, &u[LAST]));

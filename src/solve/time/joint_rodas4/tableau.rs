@@ -13,35 +13,35 @@
 
 use crate::solve::time::rodas4::tableau::{A, C, GAMMA};
 
-type Rows = [[f64; 6]; 6];
+type TableauRows = [[f64; 6]; 6];
 
 /// See the module. Row i belongs to stage i.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Tableau {
+pub(super) struct JointTableau {
     /// V: rates by increments.
-    pub(super) rate: Rows,
+    pub(super) rate: TableauRows,
     /// p: rates, and r₁, by the rate at the start.
     pub(super) rate_start: [f64; 6],
     /// Z: accelerations by increments.
-    pub(super) acceleration: Rows,
+    pub(super) acceleration: TableauRows,
     /// t: accelerations, and what inertia acts on, by the acceleration at the start.
     pub(super) acceleration_start: [f64; 6],
     /// a: accelerations by the rate at the start.
     pub(super) acceleration_rate: [f64; 6],
     /// R: r₁ by increments.
-    pub(super) lag: Rows,
+    pub(super) lag: TableauRows,
     /// S: what inertia acts on by increments.
-    pub(super) push: Rows,
+    pub(super) push: TableauRows,
     /// s: what inertia acts on by the rate at the start.
     pub(super) push_rate: [f64; 6],
 }
 
 /// Those of the method.
-pub(super) const TABLEAU: Tableau = tableau();
+pub(super) const TABLEAU: JointTableau = tableau();
 
-const fn tableau() -> Tableau {
+const fn tableau() -> JointTableau {
     let none = [[0.0; 6]; 6];
-    let mut t = Tableau {
+    let mut t = JointTableau {
         rate: none,
         rate_start: [1.0; 6],
         acceleration: none,

@@ -14,7 +14,7 @@ const RESOLVED: f64 = 10.0;
 
 /// The error, and storage for a step of it.
 #[derive(Debug, Clone)]
-pub(super) struct Defect {
+pub(super) struct DefectEstimate {
     error: Motion,
     impulses: Impulses,
     /// r at the start of the step; then the acceleration there.
@@ -24,7 +24,7 @@ pub(super) struct Defect {
     rho: Vec<Pose>,
 }
 
-impl Defect {
+impl DefectEstimate {
     /// Storage for so many bodies, without an error.
     pub(super) fn zeros(count: usize) -> Self {
         let zeros = vec![Pose::zeros(); count];

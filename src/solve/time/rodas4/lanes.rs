@@ -12,7 +12,7 @@ mod storage;
 pub use motion::{LaneMotion, Norms};
 pub use storage::{Lane, LaneRodas4};
 
-use kernels::{Task, Work};
+use kernels::{StepKernel, StepPass};
 
 use super::tableau::{ALPHA, moves_on};
 use crate::domains::{Ramp, System};
@@ -32,11 +32,11 @@ impl LaneRodas4 {
 
     /// Puts the numbers of a variant that fits, and its motion, into one lane. The sources of its ramp must hold their
     /// voltages.
-    pub fn put(&mut self, lane: usize, system: &System, ramp: &Ramp<'_>, motion: &Motion) {
+    pub fn set_lane(&mut self, lane: usize, system: &System, ramp: &Ramp<'_>, motion: &Motion) {
         debug_assert_eq!(ramp.from, ramp.to);
-        self.model.put(lane, &system.model);
-        self.motion.put(lane, motion);
-        self.heat.put(lane, ramp);
+        self.model.set_lane(lane, &system.model);
+        self.motion.set_lane(lane, motion);
+        self.heat.set_lane(lane, ramp);
         ramp.at(0.0, &mut self.drives[lane]);
         self.drives[lane].load = 1.0;
     }
@@ -46,7 +46,7 @@ impl LaneRodas4 {
     pub fn step(&mut self, lanes: &[Option<Lane<'_>>; LANES], s: &[f64; LANES], h: &[f64; LANES]) -> [bool; LANES] {
         self.h.0 = *h;
         self.heat.at(of_lanes(lanes, s));
-        self.run(Task::Forcing);
+        self.run(StepPass::Forcing);
         for (i, alpha) in ALPHA.into_iter().enumerate() {
             if moves_on(i) {
                 let mut at = *s;
@@ -54,20 +54,20 @@ impl LaneRodas4 {
                     *at += alpha * h;
                 }
                 self.heat.at(of_lanes(lanes, &at));
-                self.run(Task::Expand);
+                self.run(StepPass::Expand);
             }
-            self.run(Task::Begin(i));
+            self.run(StepPass::Begin(i));
             if i == 0 {
-                self.run(Task::Tangent);
+                self.run(StepPass::Tangent);
                 self.act(lanes, i);
-                self.run(Task::Factor);
+                self.run(StepPass::Factor);
             } else {
-                self.run(Task::Elastic(i));
+                self.run(StepPass::Elastic(i));
                 self.act(lanes, i);
             }
-            self.run(Task::Solve);
+            self.run(StepPass::Solve);
         }
-        self.run(Task::Finish);
+        self.run(StepPass::Finish);
         self.vanished
     }
 
@@ -76,8 +76,8 @@ impl LaneRodas4 {
         self.motion.copy_lane(lane, &self.before);
     }
 
-    fn run(&mut self, task: Task) {
-        across(Work(self, task));
+    fn run(&mut self, task: StepPass) {
+        across(StepKernel(self, task));
     }
 }
 

@@ -12,7 +12,7 @@ use crate::solve::time::stage_loss::StageLoss;
 
 /// How the frame turns: at the start of a step, and in the stage at hand.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Turning {
+pub(super) struct FrameRotation {
     pub(super) start: Gyration,
     pub(super) now: Gyration,
     /// Terms of the series that a solve takes.
@@ -21,7 +21,7 @@ pub(super) struct Turning {
 
 /// Sources whose final voltages the motion is differentiated by, with the stages of each derivative.
 #[derive(Debug, Clone)]
-pub(super) struct Ports {
+pub(super) struct PortSensitivities {
     sources: Vec<usize>,
     stages: Vec<Stages>,
     /// ∂r/∂q of the stage at hand; without sources on an empty pattern.
@@ -30,7 +30,7 @@ pub(super) struct Ports {
     scratch: Vec<Pose>,
 }
 
-impl Ports {
+impl PortSensitivities {
     pub(super) fn new(system: &System, sources: &[usize]) -> Self {
         let model = &system.model;
         let nothing = Pattern::new(0, &[]);
@@ -110,7 +110,7 @@ impl Ports {
         (i, s, h): (usize, f64, f64),
         (q, drive): (&[Pose], &Drive),
         (solver, w): (&S, &BlockMatrix<f64, 3>),
-        (turning, loss): (Option<(&Stages, Turning)>, Option<&StageLoss>),
+        (turning, loss): (Option<(&Stages, FrameRotation)>, Option<&StageLoss>),
         start: &mut [Motion],
     ) -> u64 {
         let model = &system.model;

@@ -17,13 +17,13 @@ const TILE: usize = 16;
 
 /// Change of the displacement and rate of one body.
 #[derive(Debug, Clone, Copy)]
-struct Change {
+struct BodyIncrement {
     q: Pose,
     v: Pose,
 }
 
 /// Increments of a tile of bodies in each stage but the last, whose increments go into the result at once.
-type Tile = [[Change; TILE]; 5];
+type TileIncrements = [[BodyIncrement; TILE]; 5];
 
 /// The stages of one motion.
 #[derive(Debug, Clone)]
@@ -37,7 +37,7 @@ pub(super) struct Stages {
     at: Vec<Pose>,
     /// r₁ of the stage at hand.
     r1: Vec<Pose>,
-    tiles: Vec<Tile>,
+    tiles: Vec<TileIncrements>,
 }
 
 /// From this stage on the motion itself carries the argument: the last stages add increments to it, as the result does.
@@ -48,7 +48,7 @@ impl Stages {
     pub(super) fn new(model: &Model) -> Self {
         let bodies = model.bodies.len();
         let zeros = vec![Pose::zeros(); bodies];
-        let none = Change { q: Pose::zeros(), v: Pose::zeros() };
+        let none = BodyIncrement { q: Pose::zeros(), v: Pose::zeros() };
         Self {
             force: zeros.clone(),
             forcing: zeros.clone(),
@@ -175,11 +175,11 @@ impl Stages {
 
 /// Increment of a stage whose solve left `solved`.
 #[inline(always)]
-fn increment(body: &Body, solved: &Pose, r1: &Pose, gh: f64) -> Change {
+fn increment(body: &Body, solved: &Pose, r1: &Pose, gh: f64) -> BodyIncrement {
     let q = -solved;
     let v = q / gh - r1;
     match &body.free {
-        Some(free) => Change { q: **free * q, v: **free * v },
-        None => Change { q, v },
+        Some(free) => BodyIncrement { q: **free * q, v: **free * v },
+        None => BodyIncrement { q, v },
     }
 }

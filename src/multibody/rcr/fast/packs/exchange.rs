@@ -1,13 +1,13 @@
 //! What packs and the rest of the mechanism exchange.
 
-use super::{Packs, WIDTH, Wide};
-use crate::multibody::rcr::data::{Node, Offsets};
-use crate::multibody::rcr::placed::{Placed, Placement};
+use super::{PackedReal, Packs, WIDTH};
+use crate::multibody::rcr::data::{FrontAccumulator, Offsets};
+use crate::multibody::rcr::placed::{BodyKinematics, MechanismKinematics};
 use std::ops::Range;
 
 /// Copies the numbers of each lane, from where its subtree starts.
 #[inline(always)]
-fn gather(to: &mut [Wide], from: &[f64], starts: [usize; WIDTH]) {
+fn gather(to: &mut [PackedReal], from: &[f64], starts: [usize; WIDTH]) {
     for (lane, start) in starts.into_iter().enumerate() {
         for (to, from) in to.iter_mut().zip(&from[start..]) {
             to.0[lane] = *from;
@@ -18,7 +18,7 @@ fn gather(to: &mut [Wide], from: &[f64], starts: [usize; WIDTH]) {
 impl Packs {
     /// Takes coordinates `q` and rates `v` of the mechanism over, and where the shared bodies are.
     #[inline(always)]
-    pub(super) fn take_motion(&mut self, placed: &[Placed<f64>], q: &[f64], v: &[f64]) {
+    pub(super) fn take_motion(&mut self, placed: &[BodyKinematics<f64>], q: &[f64], v: &[f64]) {
         let Self { packing, lanes, .. } = self;
         for pack in &packing.packs {
             let range = pack.at.coordinate..pack.at.coordinate + pack.size.coordinate;
@@ -70,7 +70,7 @@ impl Packs {
 
     /// The sum of what was kept in `kept` and `sum`, one term after the other.
     #[inline(always)]
-    fn sum(kept: &[[Wide; 9]], order: &[u32], mut sum: [f64; 9]) -> [f64; 9] {
+    fn sum(kept: &[[PackedReal; 9]], order: &[u32], mut sum: [f64; 9]) -> [f64; 9] {
         for &k in order {
             let (kept, lane) = (&kept[k as usize / WIDTH], k as usize % WIDTH);
             for (sum, x) in sum.iter_mut().zip(kept) {
@@ -82,11 +82,11 @@ impl Packs {
 
     /// Adds the terms of `range` to what gathers at a body.
     #[inline(always)]
-    pub(super) fn add_node(&self, range: Range<usize>, node: &mut Node<f64>) {
+    pub(super) fn add_node(&self, range: Range<usize>, node: &mut FrontAccumulator<f64>) {
         let ([a, b, c, d, e, f], [x, y, w]) = (node.inertia, node.momentum);
         let order = &self.packing.order[range];
         let [a, b, c, d, e, f, x, y, w] = Self::sum(&self.kept, order, [a, b, c, d, e, f, x, y, w]);
-        *node = Node { inertia: [a, b, c, d, e, f], momentum: [x, y, w] };
+        *node = FrontAccumulator { inertia: [a, b, c, d, e, f], momentum: [x, y, w] };
     }
 
     /// Adds the terms of `range` to a block of couplings.
@@ -127,7 +127,7 @@ impl Packs {
     }
 
     /// Gives places, levers and joint axes of all subtrees to the mechanism.
-    pub(super) fn give_placement(&self, to: &mut Placement<f64>) {
+    pub(super) fn give_placement(&self, to: &mut MechanismKinematics<f64>) {
         let from = &self.lanes.placement;
         for pack in &self.packing.packs {
             let (at, size) = (pack.at, pack.size);

@@ -1,12 +1,12 @@
 //! How equal subtrees are laid into packs, once for a mechanism.
 
 use super::subtrees::equal;
-use super::{First, Hand, Item, Pack, Packing, Packs, WIDTH, Wide};
+use super::{First, PackContribution, PackedReal, Packing, Packs, RemainingStep, SubtreePack, WIDTH};
 use crate::multibody::rcr::lanes::has_lanes;
 use crate::multibody::rcr::reduction::Reduction;
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::schedule::{NONE, Schedule};
-use crate::multibody::rcr::tree::{Closure, Link, Linkage, Parent};
+use crate::multibody::rcr::tree::{Closure, Linkage, LinkageBody, LinkageParent};
 use crate::multibody::{BodyId, Pattern};
 use std::ops::Range;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ impl Packs {
         if groups.is_empty() {
             return None;
         }
-        let layout = Layout::new(linkage, schedule, &groups);
+        let layout = PackLayout::new(linkage, schedule, &groups);
         let pattern = layout.pattern(linkage);
         let variants: Vec<Linkage> = (0..WIDTH)
             .map(|lane| {
@@ -30,12 +30,12 @@ impl Packs {
                 layout.linkage(linkage, lane, pattern)
             })
             .collect();
-        let lanes = Reduction::<Wide>::without_packs(&variants.iter().collect::<Vec<_>>());
-        let room = vec![Wide::ZERO; variants[0].coordinates];
+        let lanes = Reduction::<PackedReal>::without_packs(&variants.iter().collect::<Vec<_>>());
+        let room = vec![PackedReal::ZERO; variants[0].coordinates];
         let packing = Packing::new(linkage, schedule, layout, &pattern);
         Some(Self {
-            kept: vec![[Wide::ZERO; 9]; packing.nodes.len()],
-            kept_blocks: vec![[Wide::ZERO; 9]; packing.blocks.len()],
+            kept: vec![[PackedReal::ZERO; 9]; packing.nodes.len()],
+            kept_blocks: vec![[PackedReal::ZERO; 9]; packing.blocks.len()],
             packing: Arc::new(packing),
             lanes,
             q: room.clone(),
@@ -47,7 +47,7 @@ impl Packs {
 
 impl Packing {
     /// `pattern` couples the bodies of the packs.
-    fn new(linkage: &Linkage, schedule: &Schedule, layout: Layout, pattern: &Pattern) -> Self {
+    fn new(linkage: &Linkage, schedule: &Schedule, layout: PackLayout, pattern: &Pattern) -> Self {
         let place = layout.place(linkage.links.len());
         let mut packing = Self {
             rest_closures: runs(schedule.entries.iter().map(|e| place[e.body] == u32::MAX)),
@@ -80,7 +80,11 @@ impl Packing {
             for (k, &row) in rows.iter().enumerate().skip(inner) {
                 self.blocks.extend(rows[inner..k].iter().filter_map(|&to| pattern.block(row as usize, to as usize)));
             }
-            self.hands.push(Hand { body, nodes: nodes..self.nodes.len(), blocks: blocks..self.blocks.len() });
+            self.hands.push(PackContribution {
+                body,
+                nodes: nodes..self.nodes.len(),
+                blocks: blocks..self.blocks.len(),
+            });
         }
     }
 
@@ -117,12 +121,12 @@ impl Packing {
                 self.order.extend(terms.iter().map(|t| t.2));
                 let range = start..self.order.len();
                 let (block, to, _) = terms[0];
-                self.items.push(if block { Item::Block(to, range) } else { Item::Node(to, range) });
+                self.items.push(if block { RemainingStep::Block(to, range) } else { RemainingStep::Node(to, range) });
             }
             waiting.clear();
             from = range.end;
             if !range.is_empty() {
-                self.items.push(Item::Turns(range.clone()));
+                self.items.push(RemainingStep::Turns(range.clone()));
                 self.rest.push(range);
             }
         }
@@ -142,8 +146,8 @@ fn runs(of: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
 }
 
 /// Where everything lies.
-struct Layout {
-    packs: Vec<Pack>,
+struct PackLayout {
+    packs: Vec<SubtreePack>,
     /// How many of a pack's lanes are not repeated.
     lanes: Vec<usize>,
     /// Shared bodies of the mechanism by lane, sorted, so that those of one pack stand in elimination order.
@@ -152,7 +156,7 @@ struct Layout {
     coordinates: usize,
 }
 
-impl Layout {
+impl PackLayout {
     fn new(linkage: &Linkage, schedule: &Schedule, groups: &[Vec<Range<usize>>]) -> Self {
         let closure = |body: usize| schedule.entries.partition_point(|e| e.body < body);
         let joint = |body: usize| schedule.steps.get(body).map_or(usize::MAX, |s| s.joint as usize);
@@ -172,7 +176,7 @@ impl Layout {
                 closure: closure(end) - start.closure,
                 joint: members[0].clone().filter(|&b| !linkage.links[b].pin).count(),
             };
-            layout.packs.push(Pack { at, size, of });
+            layout.packs.push(SubtreePack { at, size, of });
             layout.lanes.push(members.len());
             at.body += size.body;
             at.coordinate += size.coordinate;
@@ -190,7 +194,7 @@ impl Layout {
     }
 
     /// Where body `body` of the subtree in `lane` of `pack`, or a body that it shares, lies among the packs.
-    fn seat(&self, linkage: &Linkage, pack: &Pack, lane: usize, body: usize) -> usize {
+    fn seat(&self, linkage: &Linkage, pack: &SubtreePack, lane: usize, body: usize) -> usize {
         let start = pack.of[lane].body;
         if body < start + pack.size.body {
             return pack.at.body + body - start;
@@ -226,14 +230,14 @@ impl Layout {
 
     /// The subtrees of one lane as a linkage of their own, the shared bodies as roots without coordinates at the end.
     fn linkage(&self, linkage: &Linkage, lane: usize, pattern: Pattern) -> Linkage {
-        let mut links: Vec<Link> = Vec::with_capacity(self.bodies + self.shared.len());
+        let mut links: Vec<LinkageBody> = Vec::with_capacity(self.bodies + self.shared.len());
         let mut closures = Vec::new();
         for pack in &self.packs {
             let of = pack.of[lane];
             for body in of.body..of.body + pack.size.body {
                 let mut link = linkage.links[body].clone();
                 link.first = pack.at.coordinate + link.first - of.coordinate;
-                if let Parent::Body(parent) = &mut link.parent {
+                if let LinkageParent::Body(parent) = &mut link.parent {
                     *parent = self.seat(linkage, pack, lane, *parent);
                 }
                 links.push(link);
@@ -253,8 +257,8 @@ impl Layout {
                 closures.push(closure);
             }
         }
-        links.extend(self.shared.iter().map(|of| Link {
-            parent: Parent::Free,
+        links.extend(self.shared.iter().map(|of| LinkageBody {
+            parent: LinkageParent::Free,
             pin: false,
             moving: [false; 3],
             first: self.coordinates,
@@ -265,7 +269,7 @@ impl Layout {
     }
 }
 
-impl Pack {
+impl SubtreePack {
     /// The body in place `slot` of what each lane's subtree shares.
     fn shared(&self, linkage: &Linkage, slot: usize) -> [u32; WIDTH] {
         self.of.map(|of| linkage.pattern.rows(of.body + self.size.body - 1)[slot])

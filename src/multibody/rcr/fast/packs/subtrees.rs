@@ -8,24 +8,24 @@
 //! fronts, counted from the subtree; only geometry, masses and stiffnesses may differ. Bodies are numbered by what they are
 //! and by what hangs in them, leaf → root, so a mechanism is compared in one sweep.
 
-use crate::multibody::rcr::schedule::{Entry, NONE, Schedule};
-use crate::multibody::rcr::tree::{Closure, Linkage, Parent};
+use crate::multibody::rcr::schedule::{ClosureEntry, NONE, Schedule};
+use crate::multibody::rcr::tree::{Closure, Linkage, LinkageParent};
 use std::collections::HashMap;
 use std::ops::Range;
 
 /// Fewest subtrees that are reduced side by side: a pack costs about as much as four subtrees one after the other.
-const FEWEST: usize = 5;
+const MIN_SUBTREES: usize = 5;
 
 /// Equal subtrees, each the range of its bodies in elimination order.
-pub(super) type Equal = Vec<Range<usize>>;
+pub(super) type EqualSubtrees = Vec<Range<usize>>;
 
-/// The groups of at least [`FEWEST`] equal subtrees of a mechanism, the largest subtrees there are, disjoint. What is left
-/// over of a group when packs of `width` are full, and is fewer than `FEWEST`, is left out.
-pub(super) fn equal(linkage: &Linkage, schedule: &Schedule, width: usize) -> Vec<Equal> {
-    let mut groups = Shapes::new(linkage, schedule).choose();
+/// The groups of at least [`MIN_SUBTREES`] equal subtrees of a mechanism, the largest subtrees there are, disjoint. What is left
+/// over of a group when packs of `width` are full, and is fewer than `MIN_SUBTREES`, is left out.
+pub(super) fn equal(linkage: &Linkage, schedule: &Schedule, width: usize) -> Vec<EqualSubtrees> {
+    let mut groups = SubtreeShapes::new(linkage, schedule).choose();
     for group in &mut groups {
         let left = group.len() % width;
-        if left < FEWEST {
+        if left < MIN_SUBTREES {
             group.truncate(group.len() - left);
         }
     }
@@ -33,7 +33,7 @@ pub(super) fn equal(linkage: &Linkage, schedule: &Schedule, width: usize) -> Vec
 }
 
 /// What each body's subtree is.
-struct Shapes {
+struct SubtreeShapes {
     /// Equal numbers: equal subtrees. None: a subtree that cannot be taken out of the recursion.
     shape: Vec<Option<u32>>,
     /// Bodies of the subtree.
@@ -41,7 +41,7 @@ struct Shapes {
     shapes: usize,
 }
 
-impl Shapes {
+impl SubtreeShapes {
     fn new(linkage: &Linkage, schedule: &Schedule) -> Self {
         let (pattern, count) = (&linkage.pattern, linkage.links.len());
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); count];
@@ -89,17 +89,17 @@ impl Shapes {
         Self { shape, size, shapes: known.len() }
     }
 
-    /// The largest subtrees of which there are [`FEWEST`] that are equal.
-    fn choose(&self) -> Vec<Equal> {
+    /// The largest subtrees of which there are [`MIN_SUBTREES`] that are equal.
+    fn choose(&self) -> Vec<EqualSubtrees> {
         let mut number = vec![0usize; self.shapes];
         for &shape in self.shape.iter().flatten() {
             number[shape as usize] += 1;
         }
-        let mut members: Vec<Equal> = vec![Vec::new(); self.shapes];
+        let mut members: Vec<EqualSubtrees> = vec![Vec::new(); self.shapes];
         let mut end = self.shape.len();
         while end > 0 {
             let body = end - 1;
-            match self.shape[body].filter(|&s| number[s as usize] >= FEWEST) {
+            match self.shape[body].filter(|&s| number[s as usize] >= MIN_SUBTREES) {
                 Some(shape) => {
                     let start = end - self.size[body];
                     members[shape as usize].push(start..end);
@@ -109,7 +109,7 @@ impl Shapes {
             }
         }
         // others of a shape may lie within larger subtrees
-        members.retain(|m| m.len() >= FEWEST);
+        members.retain(|m| m.len() >= MIN_SUBTREES);
         members.iter_mut().for_each(|m| m.reverse());
         members
     }
@@ -121,15 +121,15 @@ fn describe(linkage: &Linkage, schedule: &Schedule, body: usize, closures: Range
     let flags = |of: [bool; 3]| of.iter().fold(0, |bits, &b| 2 * bits + u32::from(b));
     let slot = |s: usize| if s == NONE { u32::MAX } else { s as u32 };
     let hangs = match link.parent {
-        Parent::Ground => 0,
-        Parent::Free => 1,
-        Parent::Body(_) => 2,
+        LinkageParent::Ground => 0,
+        LinkageParent::Free => 1,
+        LinkageParent::Body(_) => 2,
     };
     let turn = schedule.turn(body);
     key.extend([hangs, slot(turn.parent), turn.front as u32, u32::from(link.pin), flags(link.moving)]);
     key.push(closures.len() as u32);
     for k in closures {
-        let Entry { other, count, ends, .. } = schedule.entries[k];
+        let ClosureEntry { other, count, ends, .. } = schedule.entries[k];
         let first_is_a = ends[0] == Some(body as u32);
         let (kind, locked) = match &linkage.closures[k] {
             Closure::Held { .. } => (0, 0),

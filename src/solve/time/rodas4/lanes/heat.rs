@@ -4,8 +4,8 @@
 
 use crate::domains::Ramp;
 use crate::domains::lag::Lag;
-use crate::domains::thermal::Heater;
-use crate::multibody::lanes::{Eight, LANES, Real, Wide};
+use crate::domains::thermal::HeatConductor;
+use crate::multibody::lanes::{LANES, Lane8, Real, SimdReal};
 
 /// Time constants that a heater is compared with: those of the last heaters.
 const COMPARED: usize = 4;
@@ -16,22 +16,22 @@ struct LaneHeater {
     /// Which of the lags is its own.
     lag: usize,
     /// Thermal expansion [1/K].
-    expansion: Eight,
+    expansion: Lane8,
     /// Rise at the start, and at last [K].
-    start: Eight,
-    steady: Eight,
+    start: Lane8,
+    steady: Lane8,
     /// Time constant [s]; 1 where there is none.
-    time_constant: Eight,
+    time_constant: Lane8,
 }
 
 /// What a time is to a time constant, in each variant: [`Lag`].
 #[derive(Debug, Clone, Copy)]
 struct LaneLag {
     /// [s]; 0: none.
-    time_constant: Eight,
-    decay: Eight,
-    x: Eight,
-    first: Eight,
+    time_constant: Lane8,
+    decay: Lane8,
+    x: Lane8,
+    first: Lane8,
 }
 
 /// The heaters of a mechanism.
@@ -40,21 +40,21 @@ pub(super) struct LaneHeat {
     heaters: Vec<LaneHeater>,
     lags: Vec<LaneLag>,
     /// Time constants as they are, heater by heater [s].
-    time_constants: Vec<Eight>,
+    time_constants: Vec<Lane8>,
 }
 
 impl LaneHeat {
     /// For so many heaters as these.
-    pub(super) fn new(heaters: &[Heater]) -> Self {
-        let none = Eight::NONE;
-        let heater = |_: &Heater| LaneHeater {
+    pub(super) fn new(heaters: &[HeatConductor]) -> Self {
+        let none = Lane8::NONE;
+        let heater = |_: &HeatConductor| LaneHeater {
             lag: 0,
             expansion: none,
             start: none,
             steady: none,
-            time_constant: Eight::of(1.0),
+            time_constant: Lane8::of(1.0),
         };
-        let time_constants = heaters.iter().map(|h| Eight::of(h.time_constant)).collect();
+        let time_constants = heaters.iter().map(|h| Lane8::of(h.time_constant)).collect();
         let mut new = Self { heaters: heaters.iter().map(heater).collect(), lags: Vec::new(), time_constants };
         new.share();
         new
@@ -65,7 +65,7 @@ impl LaneHeat {
     }
 
     /// Puts the heaters of a variant into one lane.
-    pub(super) fn put(&mut self, lane: usize, ramp: &Ramp<'_>) {
+    pub(super) fn set_lane(&mut self, lane: usize, ramp: &Ramp<'_>) {
         let all = ramp.electrics.heating.heaters.iter().enumerate();
         for ((to, tau), (k, heater)) in self.heaters.iter_mut().zip(&mut self.time_constants).zip(all) {
             let lags = heater.time_constant > 0.0;
@@ -87,7 +87,7 @@ impl LaneHeat {
             heater.lag = match known {
                 Some(k) => first + k,
                 None => {
-                    let none = Eight::NONE;
+                    let none = Lane8::NONE;
                     self.lags.push(LaneLag { time_constant: *tau, decay: none, x: none, first: none });
                     self.lags.len() - 1
                 }
@@ -112,7 +112,7 @@ impl LaneHeat {
 
     /// The free strain of each heater at that time.
     #[inline(always)]
-    pub(super) fn expansions<W: Wide>(&self, simd: W::Simd, to: &mut [Eight]) {
+    pub(super) fn expansions<W: SimdReal>(&self, simd: W::Simd, to: &mut [Lane8]) {
         for (heater, to) in self.heaters.iter().zip(to) {
             (W::load(simd, &heater.expansion) * self.rise::<W>(simd, heater)).store(to);
         }
@@ -120,17 +120,17 @@ impl LaneHeat {
 
     /// Its rate of change [1/s].
     #[inline(always)]
-    pub(super) fn rates<W: Wide>(&self, simd: W::Simd, to: &mut [Eight]) {
+    pub(super) fn rates<W: SimdReal>(&self, simd: W::Simd, to: &mut [Lane8]) {
         for (heater, to) in self.heaters.iter().zip(to) {
-            let of = |x: &Eight| W::load(simd, x);
+            let of = |x: &Lane8| W::load(simd, x);
             let slope = (of(&heater.steady) - self.rise::<W>(simd, heater)) / of(&heater.time_constant);
             (of(&heater.expansion) * slope).store(to);
         }
     }
 
     #[inline(always)]
-    fn rise<W: Wide>(&self, simd: W::Simd, heater: &LaneHeater) -> W {
-        let (lag, of) = (&self.lags[heater.lag], |x: &Eight| W::load(simd, x));
+    fn rise<W: SimdReal>(&self, simd: W::Simd, heater: &LaneHeater) -> W {
+        let (lag, of) = (&self.lags[heater.lag], |x: &Lane8| W::load(simd, x));
         of(&heater.start) * of(&lag.decay) + of(&lag.x) * (of(&heater.steady) * of(&lag.first))
     }
 }

@@ -5,15 +5,15 @@
 
 use super::super::tableau::{A, C, GAMMA, GAMMA_I};
 use super::motion::{Norms, mass_norm};
-use super::storage::{Change, IN_PLACE, LaneRodas4};
-use crate::multibody::lanes::forces::{self, LaneRest};
+use super::storage::{IN_PLACE, LaneIncrement, LaneRodas4};
+use crate::multibody::lanes::forces::{self, LaneRestStrain};
 use crate::multibody::lanes::{
-    Kernel, LaneModel, LanePose, STILL, Wide, add, add_scaled, load, load_block, store, times,
+    Kernel, LaneModel, LanePose, STILL, SimdReal, add, add_scaled, load, load_block, store, times,
 };
 
 /// A part of a step that goes over all lanes.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Task {
+pub(super) enum StepPass {
     Forcing,
     Expand,
     Begin(usize),
@@ -24,24 +24,24 @@ pub(super) enum Task {
     Finish,
 }
 
-pub(super) struct Work<'a>(pub(super) &'a mut LaneRodas4, pub(super) Task);
+pub(super) struct StepKernel<'a>(pub(super) &'a mut LaneRodas4, pub(super) StepPass);
 
 impl LaneRodas4 {
     #[inline(always)]
-    fn forcing<W: Wide>(&mut self, simd: W::Simd) {
+    fn forcing<W: SimdReal>(&mut self, simd: W::Simd) {
         self.heat.expansions::<W>(simd, &mut self.expansion);
         self.heat.rates::<W>(simd, &mut self.rate);
         self.before.q.copy_from_slice(&self.motion.q);
         self.before.v.copy_from_slice(&self.motion.v);
         self.forcing.fill(STILL);
-        let change = LaneRest { expansion: &self.rate, built_in: 0.0 };
+        let change = LaneRestStrain { expansion: &self.rate, built_in: 0.0 };
         forces::place::<W>(simd, &self.motion.q, &mut self.placed);
         forces::add_rest_change::<W>(simd, &self.model, &self.placed, &change, &mut self.forcing);
         forces::project::<W>(simd, &self.model, &mut self.forcing);
     }
 
     #[inline(always)]
-    fn begin<W: Wide, const I: usize>(&mut self, simd: W::Simd) {
+    fn begin<W: SimdReal, const I: usize>(&mut self, simd: W::Simd) {
         let h = W::load(simd, &self.h);
         let (gh, rate) = (h * GAMMA, h * GAMMA_I[I]);
         let mut c = [h; 5];
@@ -99,23 +99,23 @@ impl LaneRodas4 {
     }
 
     #[inline(always)]
-    fn elastic<W: Wide>(&mut self, simd: W::Simd, i: usize) {
+    fn elastic<W: SimdReal>(&mut self, simd: W::Simd, i: usize) {
         let q = if i < IN_PLACE { &self.at } else { &self.motion.q };
-        let rest = LaneRest { expansion: &self.expansion, built_in: 1.0 };
+        let rest = LaneRestStrain { expansion: &self.expansion, built_in: 1.0 };
         forces::place::<W>(simd, q, &mut self.placed);
         forces::add_elastic_backwards::<W>(simd, &self.model, (q, &self.placed), &rest, &mut self.force);
     }
 
     #[inline(always)]
-    fn tangent<W: Wide>(&mut self, simd: W::Simd) {
+    fn tangent<W: SimdReal>(&mut self, simd: W::Simd) {
         self.w.clear();
-        let rest = LaneRest { expansion: &self.expansion, built_in: 1.0 };
+        let rest = LaneRestStrain { expansion: &self.expansion, built_in: 1.0 };
         // the first stage is where the step begins: the bodies have been placed there
         forces::add_tangent::<W>(simd, &self.model, (&self.at, &self.placed), &rest, &mut self.w, &mut self.force);
     }
 
     #[inline(always)]
-    fn factor<W: Wide>(&mut self, simd: W::Simd) {
+    fn factor<W: SimdReal>(&mut self, simd: W::Simd) {
         let (gh, one) = (W::load(simd, &self.h) * GAMMA, W::splat(simd, 1.0));
         forces::add_inertia(simd, &self.model, one / (gh * gh), one / gh, &mut self.w);
         if self.model.holds {
@@ -125,13 +125,13 @@ impl LaneRodas4 {
     }
 
     #[inline(always)]
-    fn solve<W: Wide>(&mut self, simd: W::Simd) {
+    fn solve<W: SimdReal>(&mut self, simd: W::Simd) {
         forces::project::<W>(simd, &self.model, &mut self.force);
         self.w.solve::<W>(simd, &self.model.pattern, &mut self.force);
     }
 
     #[inline(always)]
-    fn finish<W: Wide>(&mut self, simd: W::Simd) {
+    fn finish<W: SimdReal>(&mut self, simd: W::Simd) {
         let gh = W::load(simd, &self.h) * GAMMA;
         for k in 0..self.model.bodies.len() {
             let last = increment::<W>(simd, &self.model, k, &self.force[k], &self.r1[k], gh);
@@ -149,38 +149,38 @@ impl LaneRodas4 {
     }
 }
 
-impl Kernel for Work<'_> {
+impl Kernel for StepKernel<'_> {
     #[inline(always)]
-    fn run<W: Wide>(self, simd: W::Simd) {
+    fn run<W: SimdReal>(self, simd: W::Simd) {
         let m = self.0;
         match self.1 {
-            Task::Forcing => m.forcing::<W>(simd),
-            Task::Expand => m.heat.expansions::<W>(simd, &mut m.expansion),
-            Task::Begin(0) => m.begin::<W, 0>(simd),
-            Task::Begin(1) => m.begin::<W, 1>(simd),
-            Task::Begin(2) => m.begin::<W, 2>(simd),
-            Task::Begin(3) => m.begin::<W, 3>(simd),
-            Task::Begin(4) => m.begin::<W, 4>(simd),
-            Task::Begin(_) => m.begin::<W, 5>(simd),
-            Task::Elastic(i) => m.elastic::<W>(simd, i),
-            Task::Tangent => m.tangent::<W>(simd),
-            Task::Factor => m.factor::<W>(simd),
-            Task::Solve => m.solve::<W>(simd),
-            Task::Finish => m.finish::<W>(simd),
+            StepPass::Forcing => m.forcing::<W>(simd),
+            StepPass::Expand => m.heat.expansions::<W>(simd, &mut m.expansion),
+            StepPass::Begin(0) => m.begin::<W, 0>(simd),
+            StepPass::Begin(1) => m.begin::<W, 1>(simd),
+            StepPass::Begin(2) => m.begin::<W, 2>(simd),
+            StepPass::Begin(3) => m.begin::<W, 3>(simd),
+            StepPass::Begin(4) => m.begin::<W, 4>(simd),
+            StepPass::Begin(_) => m.begin::<W, 5>(simd),
+            StepPass::Elastic(i) => m.elastic::<W>(simd, i),
+            StepPass::Tangent => m.tangent::<W>(simd),
+            StepPass::Factor => m.factor::<W>(simd),
+            StepPass::Solve => m.solve::<W>(simd),
+            StepPass::Finish => m.finish::<W>(simd),
         }
     }
 }
 
 /// Increment of a stage of body `k` whose solve left `solved`.
 #[inline(always)]
-fn increment<W: Wide>(
+fn increment<W: SimdReal>(
     simd: W::Simd,
     model: &LaneModel,
     k: usize,
     solved: &LanePose,
     r1: &LanePose,
     gh: W,
-) -> Change<W> {
+) -> LaneIncrement<W> {
     let (solved, r1) = (load::<W, 3>(simd, solved), load::<W, 3>(simd, r1));
     let (mut q, mut v) = (solved, r1);
     for i in 0..3 {
@@ -190,8 +190,8 @@ fn increment<W: Wide>(
     match &model.held[k] {
         Some((free, _)) => {
             let free = load_block::<W>(simd, free);
-            Change { q: times(&free, &q), v: times(&free, &v) }
+            LaneIncrement { q: times(&free, &q), v: times(&free, &v) }
         }
-        None => Change { q, v },
+        None => LaneIncrement { q, v },
     }
 }

@@ -1,6 +1,6 @@
 //! The motion of variants side by side, and its measure.
 
-use crate::multibody::lanes::{Eight, LANES, LaneModel, LanePose, Real, STILL, Wide, load};
+use crate::multibody::lanes::{LANES, Lane8, LaneModel, LanePose, Real, STILL, SimdReal, load};
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;
 
@@ -19,7 +19,7 @@ impl LaneMotion {
     }
 
     /// Puts a motion into one lane.
-    pub fn put(&mut self, lane: usize, motion: &Motion) {
+    pub fn set_lane(&mut self, lane: usize, motion: &Motion) {
         for (to, from) in [(&mut self.q, &motion.q), (&mut self.v, &motion.v)] {
             for (to, from) in to.iter_mut().zip(from) {
                 for i in 0..3 {
@@ -69,13 +69,13 @@ impl Default for Norms {
 
 /// √(xᵀMx).
 #[inline(always)]
-pub(super) fn mass_norm<W: Wide>(simd: W::Simd, model: &LaneModel, x: &[LanePose]) -> [f64; LANES] {
+pub(super) fn mass_norm<W: SimdReal>(simd: W::Simd, model: &LaneModel, x: &[LanePose]) -> [f64; LANES] {
     let mut sum = W::splat(simd, 0.0);
     for (x, body) in x.iter().zip(&model.bodies) {
         let (x, mass) = (load::<W, 3>(simd, x), load::<W, 3>(simd, &body.mass));
         sum += x[0] * (mass[0] * x[0]) + x[1] * (mass[1] * x[1]) + x[2] * (mass[2] * x[2]);
     }
-    let mut square = Eight::NONE;
+    let mut square = Lane8::NONE;
     sum.store(&mut square);
     square.0.map(f64::sqrt)
 }

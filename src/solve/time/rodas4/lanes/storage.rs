@@ -5,7 +5,7 @@ use super::motion::{LaneMotion, Norms};
 use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, Ramp, System};
 use crate::multibody::lanes::joint::LanePlaced;
-use crate::multibody::lanes::{Eight, LANES, LaneMatrix, LaneModel, LanePose, STILL, Wide, load};
+use crate::multibody::lanes::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, STILL, SimdReal, load};
 use crate::multibody::planar::Pose;
 use crate::multibody::rcr::has_lanes;
 use crate::multibody::{BlockMatrix, Pattern};
@@ -24,15 +24,15 @@ pub struct Lane<'a> {
 
 /// Change of the displacement and rate of one body.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Change<T = Eight> {
+pub(super) struct LaneIncrement<T = Lane8> {
     pub(super) q: LanePose<T>,
     pub(super) v: LanePose<T>,
 }
 
-impl Change {
+impl LaneIncrement {
     #[inline(always)]
-    pub(super) fn load<W: Wide>(&self, simd: W::Simd) -> Change<W> {
-        Change { q: load(simd, &self.q), v: load(simd, &self.v) }
+    pub(super) fn load<W: SimdReal>(&self, simd: W::Simd) -> LaneIncrement<W> {
+        LaneIncrement { q: load(simd, &self.q), v: load(simd, &self.v) }
     }
 }
 
@@ -53,15 +53,15 @@ pub struct LaneRodas4 {
     pub(super) forcing: Vec<LanePose>,
     pub(super) at: Vec<LanePose>,
     pub(super) r1: Vec<LanePose>,
-    pub(super) increments: Vec<[Change; 5]>,
+    pub(super) increments: Vec<[LaneIncrement; 5]>,
     /// Rates by which dampers lag, for each body; empty without dampers.
     pub(super) lags: Vec<LanePose>,
     pub(super) placed: Vec<LanePlaced>,
     pub(super) heat: LaneHeat,
-    pub(super) expansion: Vec<Eight>,
-    pub(super) rate: Vec<Eight>,
+    pub(super) expansion: Vec<Lane8>,
+    pub(super) rate: Vec<Lane8>,
     pub(super) vanished: [bool; LANES],
-    pub(super) h: Eight,
+    pub(super) h: Lane8,
     pub(super) acted: Vec<usize>,
     pub(super) acted_blocks: Vec<usize>,
     pub(super) drives: Vec<Drive>,
@@ -86,7 +86,7 @@ impl LaneRodas4 {
         let (n, pattern) = (system.bodies(), &system.model.pattern);
         let acted = system.acted_on();
         let between = |&row: &usize| acted.iter().filter_map(move |&column| block(pattern, row, column));
-        let none = Change { q: STILL, v: STILL };
+        let none = LaneIncrement { q: STILL, v: STILL };
         let heaters = system.electrics.heating.heaters.len();
         Some(Self {
             w: LaneMatrix::new(pattern),
@@ -102,10 +102,10 @@ impl LaneRodas4 {
             lags: vec![STILL; if model.dampers.is_empty() { 0 } else { n }],
             placed: vec![LanePlaced::GROUND; n + 1],
             heat: LaneHeat::new(&system.electrics.heating.heaters),
-            expansion: vec![Eight::NONE; heaters],
-            rate: vec![Eight::NONE; heaters],
+            expansion: vec![Lane8::NONE; heaters],
+            rate: vec![Lane8::NONE; heaters],
             vanished: [false; LANES],
-            h: Eight::of(1.0),
+            h: Lane8::of(1.0),
             acted_blocks: acted.iter().flat_map(between).collect(),
             acted,
             drives: vec![system.electrics.drive(); LANES],
