@@ -20,7 +20,8 @@ def quantiles(values):
 def reason(message):
     """The kind of a refusal: its message without numbers and names."""
     text = re.sub(r'"[^"]*"|`[^`]*`', "…", message.removeprefix("error:").strip())
-    return re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", text)[:150]
+    text = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", text)
+    return re.sub(r"^no static equilibrium: the last stable equilibrium that was found bears # of the load( \([^)]*\))?: ", "", text)[:200]
 
 
 def share(part, whole):
