@@ -9,8 +9,12 @@ mod currents;
 mod export;
 mod harmonic;
 mod held;
+#[cfg(feature = "remote")]
+mod liar;
 mod lines;
 mod look;
+#[cfg(feature = "remote")]
+mod lying;
 mod measure;
 mod models;
 mod noise;
