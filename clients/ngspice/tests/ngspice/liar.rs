@@ -102,7 +102,6 @@ impl Liar {
         match self.0 {
             "compile controls" => return Err(Status::invalid_argument(format!("{CONTROLS}line\nother"))),
             "compile ports" => model.ports = vec![CONTROLS.to_owned(); 3],
-            "compile huge" => model.nodes = vec!["n".repeat(100); 600_000],
             "compile nothing" => return Ok(Response::new(proto::CompileResponse::default())),
             _ => {}
         }

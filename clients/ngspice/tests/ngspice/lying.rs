@@ -12,10 +12,9 @@ const DEADLINE: u64 = 2;
 const AROUND: Duration = Duration::from_secs(8);
 
 /// Each lie, and what is said of it.
-const LIES: [(&str, &str); 28] = [
+const LIES: [(&str, &str); 27] = [
     ("compile controls", "line"),
     ("compile ports", "port: expected a name"),
-    ("compile huge", ""),
     ("compile nothing", "described no model"),
     ("open kind", "another kind"),
     ("open ports", "ports: expected the 2 that were asked for"),
@@ -61,7 +60,7 @@ fn told(lie: &'static str) -> (String, Duration) {
     let error = match run_text(&deck(&format!("unix:{}", socket.display())), &ngspice) {
         Err(CosimError::Stopped { reason, .. }) => reason,
         Err(other) => other.to_string(),
-        Ok(_) => panic!("{lie}: the run went on"),
+        Ok(_) => "the run went on".to_owned(),
     };
     (error, begun.elapsed())
 }
