@@ -98,10 +98,7 @@ pub fn harmonic(
     let mut exact = ExactResponse::new(compiled, options)?;
     let mut warnings = warnings(&exact);
     let (inside, wanted) = (modal::below(&exact, TAU * options.to), modal::below(&exact, TAU * BEYOND * options.to));
-    let count = match options.modes {
-        Some(count) => count,
-        None => (wanted + GUARDS).min(MAX_MODES),
-    };
+    let count = options.modes.unwrap_or_else(|| (wanted + GUARDS).min(MAX_MODES));
     let many = inside > MAX_MODES;
     if many {
         warnings.push(format!(

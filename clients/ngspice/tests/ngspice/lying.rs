@@ -75,7 +75,8 @@ fn lies_end_a_run_and_are_named() {
     for (lie, what) in LIES {
         let (error, took) = told(lie);
         println!("{lie:16} {:5.1} s  {}", took.as_secs_f64(), error.chars().take(160).collect::<String>());
-        let named = error.contains("instance a1") && error.contains("server unix:");
+        // a device that has no equilibrium says so itself: that is an answer, whoever gives it
+        let named = error.contains("instance a1") && (lie == "fails" || error.contains("server unix:"));
         let clean = !error.chars().any(|c| c.is_control() && c != '\n' && c != '\t') && error.len() < 70_000;
         if !named || !clean || !error.contains(what) || took > Duration::from_secs(DEADLINE) + AROUND {
             wrong.push(format!("{lie}, after {took:?}: {}", error.chars().take(400).collect::<String>()));
