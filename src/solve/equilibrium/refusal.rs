@@ -36,6 +36,7 @@ impl Equilibrium {
     ) -> SolveError {
         let coarse = Self::coarse_beams(system, q);
         let reason = (self.touching_without_contact(system, q))
+            .or_else(|| Self::overbent(system, q))
             .or_else(|| Self::beyond_beams(system, q))
             .or_else(|| self.unheld(system, q))
             .or_else(|| self.gone(system, q))
@@ -90,21 +91,13 @@ impl Equilibrium {
             (0..beam.segments()).filter_map(move |k| {
                 let state = beam.segment(k, q, linear);
                 let turn = state.turns[0].abs().max(state.turns[1].abs());
-                let curvature = (state.turns[0] - state.turns[1]).abs() / beam.segment_length();
-                let bent = 0.5 * beam.width * curvature;
-                let over = (turn / TURNED).max(state.strain.abs() / CRUSHED).max(bent / OVERBENT);
-                (over > 1.0).then_some((over, beam, k, turn, state.strain, curvature))
+                let over = (turn / TURNED).max(state.strain.abs() / CRUSHED);
+                (over > 1.0).then_some((over, beam, k, turn, state.strain))
             })
         });
-        let (_, beam, k, turn, strain, curvature) = states.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (_, beam, k, turn, strain) = states.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let place = format!("segment {} of beam {}", k + 1, beam.name);
-        Some(if 0.5 * beam.width * curvature > OVERBENT {
-            format!(
-                "{place} is bent to a radius of {:.2e} m where the search ended, less than half its width of {:.2e} m: the load is beyond beams",
-                1.0 / curvature,
-                beam.width
-            )
-        } else if turn > TURNED {
+        Some(if turn > TURNED {
             format!(
                 "{place} is turned {:.0}° from its chord where the search ended: finer segments are needed (--segments), or the load is beyond \
                  beams (strain {strain:.2})",
@@ -113,6 +106,26 @@ impl Equilibrium {
         } else {
             format!("{place} comes to a strain of {strain:.2} where the search ended: the load is beyond beams")
         })
+    }
+
+    /// The segment whose radius is farthest below half the width of its beam, in words: strains of 1, whatever the law of a segment says.
+    fn overbent(system: &System, q: &[Pose]) -> Option<String> {
+        let linear = system.model.linear;
+        let curvature = |beam: &BeamLine, k: usize| {
+            let [a, b] = beam.segment(k, q, linear).turns;
+            (a - b).abs() / beam.segment_length()
+        };
+        let all = system.beams.iter().filter(|_| !linear).flat_map(|beam| (0..beam.segments()).map(move |k| (beam, k)));
+        let bent = all.map(|(beam, k)| (0.5 * beam.width * curvature(beam, k), beam, k));
+        let (_, beam, k) = bent.filter(|(bent, ..)| *bent > OVERBENT).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(format!(
+            "segment {} of beam {} is bent to a radius of {:.2e} m where the search ended, less than half its width of {:.2e} m: the load is \
+             beyond beams",
+            k + 1,
+            beam.name,
+            1.0 / curvature(beam, k),
+            beam.width
+        ))
     }
 
     /// Beams with segments that bend farther than their law describes well, by index.
