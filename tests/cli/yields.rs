@@ -77,7 +77,7 @@ fn rejected() {
         ("--limits b.y", 2, "NAME>NUMBER"),
         ("--limits b.y>x", 2, "a number behind the relation"),
         ("--limits c.y>0", 1, "one of w, b.y"),
-        ("--out w.txt", 2, ".csv, .parquet, .svg, .png or .html"),
+        ("--out w.txt", 1, ".csv, .parquet, .svg, .png or .html"),
     ] {
         let done = bench.run(&format!("{SWEEP} --param w=1.9u,2u {words}"));
         assert_eq!((done.status, done.stdout.as_str()), (status, ""), "{words}: {}", done.stderr);
