@@ -61,7 +61,9 @@ def tables(rows, frames):
         lines += [
             "",
             f"Of these frames {len(lost)} lose stability before the full load. Where the reference reaches the full load without a loss, "
-            f"{sum(r['branch'] for r in on_path)} of {len(on_path)} states are on its branch; {unstable} printed states are unstable in the reference.",
+            f"{sum(r['branch'] for r in on_path)} of {len(on_path)} states are on its branch. "
+            f"{unstable} runs are not confirmed because the equilibrium of the reference next to the printed nodes is unstable: a beam between them has buckled, "
+            "and nodes do not show which way.",
         ]
     why = Counter(reason(r["refused"]) for r in rows if "refused" in r)
     if why:
