@@ -7,6 +7,7 @@ import pickle
 import signal
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -129,6 +130,15 @@ def test_what_does_not_fit_is_named(plate: bimorph.Model, times: Any, voltages: 
         assert session.t == 0.0
 
 
+@pytest.fixture
+def interrupts() -> Iterator[None]:
+    """SIGINT raises KeyboardInterrupt, also where whoever started the tests has it ignored, as shells do for what runs in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interrupts")
 def test_ctrl_c_ends_a_run_and_leaves_the_session(model: bimorph.Model) -> None:
     """A run of minutes is over soon after Ctrl-C; the session stands where it stood, and has the bits of a quiet one."""
     times, volts = course(300)
@@ -147,6 +157,7 @@ def test_ctrl_c_ends_a_run_and_leaves_the_session(model: bimorph.Model) -> None:
         assert time.monotonic() - left < 20.0
 
 
+@pytest.mark.usefixtures("interrupts")
 def test_interrupts_leave_the_connection_as_it_was(plate: bimorph.Model) -> None:
     """After each of ten interrupts of a run, with requests of 7 MB, other sessions of the same connection are opened and stepped."""
     long = 1e-7 * np.arange(1, 900_001)
