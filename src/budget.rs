@@ -81,6 +81,11 @@ impl Budget {
         self.0.order.store(CANCELLED, Ordering::Relaxed);
     }
 
+    /// Whether both are the same budget.
+    pub fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
     /// The same for want of time.
     pub fn expire(&self) {
         self.0.order.store(LATE, Ordering::Relaxed);

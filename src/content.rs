@@ -4,6 +4,9 @@
 use crate::netlist::{Bundle, Setting};
 use crate::options::CompileOptions;
 
+/// Bytes of a text between two checks of the budget.
+const CHUNK: usize = 1 << 20;
+
 /// A hash in the making.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fnv(u128);
@@ -25,7 +28,10 @@ impl Fnv {
     /// Adds a text with its length.
     pub fn text(&mut self, text: &str) {
         self.bytes(&(text.len() as u64).to_le_bytes());
-        self.bytes(text.as_bytes());
+        for chunk in text.as_bytes().chunks(CHUNK) {
+            crate::budget::check();
+            self.bytes(chunk);
+        }
     }
 
     /// Adds everything that a model comes from.

@@ -183,7 +183,7 @@ impl SweepCommand {
         let shard = part.map(|_| format!(" (shard {index}/{count})")).unwrap_or_default();
         eprintln!("{}", delivery::summary(table, &shard));
         if !self.limits.is_empty() {
-            eprintln!("{}", sweep_files::report(&SweepStatistics::of(table, &self.limits)?));
+            eprintln!("{}", sweep_files::report(&SweepStatistics::of(table, &self.limits)?, spec.samples.is_some()));
         }
         Ok(written)
     }

@@ -206,8 +206,8 @@ fn curves(title: &str, table: &SweepTable, result: usize, over: usize) -> PlaneC
     }
 }
 
-/// Statistics of every result, and the yield, as text.
-pub(super) fn report(found: &SweepStatistics) -> String {
+/// Statistics of every result, and the yield, as text; with its confidence interval where the points are samples.
+pub(super) fn report(found: &SweepStatistics, is_random: bool) -> String {
     let mut lines = vec![format!(
         "{:<24}{:>14}{:>14}{:>14}{:>14}{:>14}{:>14}{:>14}",
         "result", "mean", "deviation", "minimum", "5 %", "50 %", "95 %", "maximum"
@@ -215,12 +215,24 @@ pub(super) fn report(found: &SweepStatistics) -> String {
     for ColumnStatistics { name, unit, mean, deviation, percentiles: [p5, p50, p95], range: [low, high], .. } in
         &found.columns
     {
-        let numbers = [mean, deviation, low, p5, p50, p95, high].map(|value| format!("{value:>14.6e}")).concat();
+        let number = |value: &f64| if value.is_finite() { format!("{value:>14.6e}") } else { format!("{:>14}", "-") };
+        let numbers = [mean, deviation, low, p5, p50, p95, high].map(number).concat();
         lines.push(format!("{:<24}{numbers}", format!("{name} [{unit}]")));
     }
     let percent = |fraction: Fraction| format!("{:.2} % of {} points", 100.0 * fraction.value(), fraction.points);
     lines.extend(found.limits.iter().map(|(limit, fraction)| format!("{limit}: {}", percent(*fraction))));
     let [low, high] = found.passed.interval().map(|end| 100.0 * end);
-    lines.push(format!("yield: {}, 95 % confidence {low:.2} % to {high:.2} %", percent(found.passed)));
+    let interval = if is_random {
+        format!(", 95 % confidence {low:.2} % to {high:.2} % (of independent samples)")
+    } else {
+        String::new()
+    };
+    lines.push(format!("yield: {}{interval}", percent(found.passed)));
+    if found.undecided > 0 {
+        lines.push(format!(
+            "{} points are closer to a limit than their estimated error: a smaller --tol decides them",
+            found.undecided
+        ));
+    }
     lines.join("\n")
 }

@@ -12,6 +12,7 @@ use crate::budget::Budget;
 use crate::device::run::{Run, Stepped};
 use crate::device::{Device, DeviceError, Token, TrialReply};
 use prost::Message;
+use std::collections::HashSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio_stream::wrappers::ReceiverStream;
@@ -62,7 +63,12 @@ impl BimorphService {
             }
         }
         let (mut lanes, mut values, mut shared) = (Vec::new(), 0usize, Some(request.values));
+        let mut named = HashSet::new();
         for (number, lane) in (0..).zip(request.lanes) {
+            if !named.insert(lane.session.clone()) {
+                let twice = format!("expected each session once, got \"{}\" twice", lane.session);
+                return Err(status::violation(Violation::new(format!("lanes[{number}].session"), twice)));
+            }
             let session = self.0.session(&lane.session).await?;
             let opened = session.description.lock().map_or_else(|e| e.into_inner().clone(), |d| d.clone());
             let ports = opened.ports.len();
@@ -154,6 +160,7 @@ impl RunLane {
         outlet: &mut MessageSink<proto::RunEvent>,
     ) -> Result<(), Status> {
         let session = Arc::clone(&self.session);
+        session.begin_run(budget);
         loop {
             let stepped = session.burst(budget, |device| self.burst(device, course, sender))?;
             let failed = stepped.map_err(|error| status::device(&error))?;
@@ -165,6 +172,7 @@ impl RunLane {
                 sender.flush(outlet);
             }
             if ends || !outlet.wanted() {
+                session.finish_run(budget);
                 return Ok(());
             }
             outlet.give_way();

@@ -37,6 +37,8 @@ pub(super) struct Session {
     /// Held by who works on the device for long.
     turn: Arc<Semaphore>,
     pub(super) usage: Usage,
+    /// What a run of this session that is under way may use.
+    run: Mutex<Option<Budget>>,
     closed: AtomicBool,
     /// Its place in the account of who opened it, where that is bounded.
     pub(super) seat: Mutex<Option<SessionLease>>,
@@ -83,9 +85,35 @@ impl Session {
             turn: Arc::new(Semaphore::new(1)),
             inline: model.unknowns() <= limits.inline_unknowns,
             usage: Usage::default(),
+            run: Mutex::default(),
             closed: AtomicBool::new(false),
             due: AtomicU64::new(0),
         }))
+    }
+
+    /// A run under this budget begins, and ends another one that is under way: its next steps would push out the states of this one.
+    pub(super) fn begin_run(&self, budget: &Budget) {
+        let before = self.run_under_way().replace(budget.clone());
+        before.iter().for_each(Budget::cancel);
+    }
+
+    /// Ends a run that is under way where its next steps would push out the state that is asked for.
+    fn end_run_for(&self, question: &StreamRequest) {
+        if matches!(question, StreamRequest::Trial(_)) {
+            self.run_under_way().take().iter().for_each(Budget::cancel);
+        }
+    }
+
+    /// The run under this budget has ended.
+    pub(super) fn finish_run(&self, budget: &Budget) {
+        let mut run = self.run_under_way();
+        if run.as_ref().is_some_and(|run| run.is_same(budget)) {
+            *run = None;
+        }
+    }
+
+    fn run_under_way(&self) -> MutexGuard<'_, Option<Budget>> {
+        self.run.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn id(&self) -> &str {
@@ -99,6 +127,7 @@ impl Session {
     /// Answers one question; none for an accept. Waits for the device. A fault inside closes this session and no other;
     /// what the budget stops is refused, and the session goes on.
     pub(super) fn answer(&self, question: &StreamRequest, budget: &Budget) -> Option<ReplyKind> {
+        self.end_run_for(question);
         let device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
         self.answer_with(device, question, budget).unwrap_or_else(|why| self.refuse(question, &status::stopped(why)))
     }
@@ -118,6 +147,7 @@ impl Session {
         {
             return Err(NeedsThread);
         }
+        self.end_run_for(question);
         let device = match self.device.try_lock() {
             Ok(device) => device,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),

@@ -1,6 +1,7 @@
 //! Many steps in one call: the bits of the same steps one by one, ended by a step without an answer, by a client that leaves, and no longer
 //! in the way of others than a burst.
 
+use super::attached::Attached;
 use super::cuts::LOCAL;
 use super::running::{Running, block_on, bundle, compiled, start_with};
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
@@ -213,7 +214,7 @@ fn what_does_not_fit_is_refused() {
             ports: true,
         };
         type Change<'a> = &'a dyn Fn(&mut proto::RunRequest);
-        let refused: [(Code, &str, Change<'_>); 10] = [
+        let refused: [(Code, &str, Change<'_>); 11] = [
             (Code::InvalidArgument, "times[1]", &|r| r.times = pack(&[1.0, 1.0])),
             (Code::InvalidArgument, "times[0]", &|r| r.lanes[0].t = 1.0),
             (Code::InvalidArgument, "times", &|r| r.times.clear()),
@@ -223,6 +224,7 @@ fn what_does_not_fit_is_refused() {
             (Code::InvalidArgument, "lanes[0].start", &|r| r.lanes[0].start.clear()),
             (Code::InvalidArgument, "signals", &|r| r.signals = vec!["y".into()]),
             (Code::NotFound, "no session", &|r| r.lanes[0].session = "none".into()),
+            (Code::InvalidArgument, "lanes[1].session", &|r| r.lanes.push(lane(&id, 0.0))),
             (Code::ResourceExhausted, "transient_values", &|r| r.times = pack(&[1.0, 2.0, 3.0, 4.0])),
         ];
         for (code, begins, change) in refused {
@@ -274,5 +276,38 @@ fn a_run_is_in_no_way_and_ends_with_its_client() {
             last = now;
         }
         panic!("it goes on without a client");
+    });
+}
+
+/// Another run of a session, and a trial, end the run that is under way: its next steps would push out their states.
+#[test]
+fn the_next_question_to_a_session_ends_its_run() {
+    let server = start_with("127.0.0.1:0", Limits::default(), fussy);
+    block_on(async {
+        let (mut client, id) = session(&server).await;
+        let request = |steps: u32| proto::RunRequest {
+            lanes: vec![lane(&id, 0.0)],
+            times: pack(&(1..=steps).map(f64::from).collect::<Vec<_>>()),
+            values: pack(&[1.0]),
+            signals: vec!["x".into()],
+            ports: false,
+        };
+        let ended = async |mut stream: tonic::Streaming<proto::RunEvent>| loop {
+            match stream.message().await {
+                Ok(Some(_)) => {}
+                Ok(None) => return None,
+                Err(status) => return Some(status.code()),
+            }
+        };
+        let mut long = client.run(request(1_000_000)).await.expect("runs").into_inner();
+        long.message().await.expect("goes on").expect("rows");
+        let short = client.run(request(3)).await.expect("runs").into_inner();
+        assert_eq!(ended(short).await, None);
+        assert_eq!(ended(long).await, Some(Code::Cancelled));
+        // one that has ended is in nobody's way
+        let mut long = client.run(request(1_000_000)).await.expect("runs").into_inner();
+        long.message().await.expect("goes on").expect("rows");
+        Attached::to(&mut client, &id).await.trial(0, 1.0, 1.0).await;
+        assert_eq!(ended(long).await, Some(Code::Cancelled));
     });
 }

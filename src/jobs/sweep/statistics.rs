@@ -86,6 +86,12 @@ impl YieldLimit {
             Relation::AtLeast => value >= self.value,
         }
     }
+
+    /// Whether the estimated error of a result, a fraction of it, reaches to the limit. Parameters have none.
+    fn is_within_error(&self, row: &SweepRow, place: Place, value: f64) -> bool {
+        let error = row.estimated_error.filter(|_| matches!(place, Place::Result(_)));
+        error.is_some_and(|error| (value - self.value).abs() <= error * value.abs())
+    }
 }
 
 /// A fraction of the points of a sweep.
@@ -143,6 +149,8 @@ pub struct SweepStatistics {
     pub limits: Vec<(YieldLimit, Fraction)>,
     /// Points that keep to all of them: the yield.
     pub passed: Fraction,
+    /// Points with a result that is closer to a limit than its estimated error.
+    pub undecided: usize,
 }
 
 impl SweepStatistics {
@@ -154,19 +162,22 @@ impl SweepStatistics {
         let columns = (0..table.results.len()).map(|k| column(table, k)).collect();
         let points = table.rows.len();
         let mut passes = vec![true; points];
+        let mut is_close = vec![false; points];
         let mut found = Vec::with_capacity(limits.len());
         for limit in limits {
             let place = place(table, &limit.name)?;
             let mut passed = 0;
-            for (row, passes) in table.rows.iter().zip(&mut passes) {
+            for (row, (passes, is_close)) in table.rows.iter().zip(passes.iter_mut().zip(&mut is_close)) {
                 let keeps = value(row, place).is_some_and(|value| limit.holds(value));
                 passed += usize::from(keeps);
                 *passes &= keeps;
+                *is_close |= value(row, place).is_some_and(|value| limit.is_within_error(row, place, value));
             }
             found.push((limit.clone(), Fraction { passed, points }));
         }
-        let passed = passes.iter().filter(|passes| **passes).count();
-        Ok(Self { columns, limits: found, passed: Fraction { passed, points } })
+        let count = |of: &[bool]| of.iter().filter(|one| **one).count();
+        let (passed, undecided) = (count(&passes), count(&is_close));
+        Ok(Self { columns, limits: found, passed: Fraction { passed, points }, undecided })
     }
 }
 
@@ -296,7 +307,12 @@ mod tests {
         let limits: Vec<YieldLimit> = ["f1>=1", "f1 < 10"].iter().map(|text| text.parse().expect("a limit")).collect();
         let found = SweepStatistics::of(&table(&values), &limits).expect("statistics");
         assert_eq!(found.limits.iter().map(|(_, fraction)| fraction.passed).collect::<Vec<_>>(), [9, 8]);
-        assert_eq!(found.passed, Fraction { passed: 8, points: 10 });
+        assert_eq!((found.passed, found.undecided), (Fraction { passed: 8, points: 10 }, 0));
+        // 10 is closer to the limit than 1e-3 of itself
+        let mut estimated = table(&values);
+        estimated.rows.iter_mut().for_each(|row| row.estimated_error = Some(1e-3));
+        let found_with_errors = SweepStatistics::of(&estimated, &limits).expect("statistics");
+        assert_eq!((found_with_errors.passed, found_with_errors.undecided), (found.passed, 2));
         let [low, high] = found.passed.interval();
         assert!((low - 0.490_162_5).abs() < 1e-7 && (high - 0.943_317_8).abs() < 1e-7, "{low} {high}");
         let limit: YieldLimit = "yoke.y>-1.1u".parse().expect("a limit");

@@ -7,7 +7,6 @@ import math
 import os
 import queue
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import showing
 from .arguments import mapping, names, one_of, wrong_type
 from .channel import Channel
-from .errors import InvalidRequest, NotFound, StepFailed, Unavailable, shown
+from .errors import InvalidRequest, StepFailed, Unavailable, shown
 from .local import ADDRESS
 from .stopping import Stopping, check, current
 from .v1 import device_pb2, run_pb2
@@ -34,10 +33,6 @@ Given = Mapping[str, "ArrayLike"]
 
 _AHEAD = 4
 """Most events that are read ahead of the caller."""
-_AGAIN = 4
-"""Attempts at a part of a run."""
-_STOPS = 0.05
-"""A server stops a run that its client leaves within this time [s]."""
 _PART = 1 << 20
 """Most port values of one request: longer runs are made of several."""
 
@@ -175,30 +170,9 @@ def advance(
             return
         for lane in here:
             lane.session._own()
-        for again in range(_AGAIN):
-            try:
-                _advance(here, times, slice(first, first + part), signals, ports, progress)
-                break
-            except NotFound:
-                # the last steps of a run that was left push out states of this one; that it starts from is held by both
-                if again + 1 == _AGAIN or not all(_held(lane.session) for lane in here):
-                    raise
-                for lane in here:
-                    lane.done, lane.last = min(lane.done, first), None
-                time.sleep(_STOPS)
+        _advance(here, times, slice(first, first + part), signals, ports, progress)
         for lane in here:
             lane.settle(times)
-
-
-def _held(session: Session) -> bool:
-    """Whether the server still has the accepted state of a session."""
-    if session.accepted is None:
-        return True
-    try:
-        session._channel.call("Snapshot", device_pb2.SnapshotRequest(session=session._session, token=session.accepted.token))
-    except NotFound:
-        return False
-    return True
 
 
 def _advance(
@@ -293,9 +267,6 @@ def _heard(channel: Channel, request: Any, timeout: float) -> Iterator[Iterator[
             yield reader.events(timeout)
         finally:
             reader.leave()
-            if not reader.ended:
-                # the server's steps on the way would push later states of the session out
-                time.sleep(_STOPS)
         return
     before = current.set(own)
     try:
@@ -314,8 +285,6 @@ class _Reader:
         self._events: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._room: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._left = False
-        self.ended = False
-        """Whether the stream has ended by itself."""
         for _ in range(_AHEAD):
             self._room.put(None)
         threading.Thread(target=self._read, daemon=True).start()
@@ -339,8 +308,6 @@ class _Reader:
                 event = self._events.get(timeout=None if timeout == math.inf else timeout)
             except queue.Empty:
                 raise Unavailable(f"server {self._channel.address}: no answer within {timeout} s") from None
-            if event is None or isinstance(event, BaseException):
-                self.ended = True
             if event is None:
                 return
             if isinstance(event, BaseException):

@@ -115,6 +115,8 @@ class SweepStatistics:
     """Each limit, with the fraction of points that keep to it."""
     passed: Fraction
     """Points that keep to all of them: the yield. Without limits: those with a result."""
+    undecided: int = 0
+    """Points with a result that is closer to a limit than its estimated error."""
 
     def _repr_html_(self) -> str:
         rows = [
@@ -124,7 +126,7 @@ class SweepStatistics:
         percentages = [f"{percentage:g} %" for percentage in next((list(one.percentiles) for one in self.columns.values()), [])]
         low, high = self.passed.interval
         kept = [f"{limit}: {fraction.value:.2%}" for limit, fraction in self.limits]
-        note = " · ".join([*kept, f"yield {self.passed.value:.2%}, 95 % interval {low:.2%} to {high:.2%}"])
+        note = " · ".join([*kept, f"yield {self.passed.value:.2%}, 95 % interval of independent samples {low:.2%} to {high:.2%}"])
         return html(["result", "points", "mean", "standard deviation", "minimum", *percentages, "maximum"], rows, note)
 
 
@@ -164,17 +166,22 @@ def statistics_of(table: Table, limits: str | Limit | Iterable[str | Limit] = ()
     shares = [_percentage(f"percentiles[{k}]", one) for k, one in enumerate(items("percentiles", percentiles, "a list of percentages"))]
     columns = {name: _column(table, name, shares) for name in table.results}
     passes = np.ones(len(table.rows), dtype=bool)
+    is_close = np.zeros(len(table.rows), dtype=bool)
+    errors = np.array([math.nan if row.estimated_error is None else row.estimated_error for row in table.rows], dtype=np.float64)
     fractions = []
     for limit in wanted:
         if limit.name not in table.results and limit.name not in table.parameters:
             known = ", ".join([*table.parameters, *table.results])
             raise InvalidRequest(f"limits: no column {limit.name!r}; there are {known}")
-        keeps = _RELATIONS[limit.relation](values_of(table, limit.name), limit.value)
+        values = values_of(table, limit.name)
+        keeps = _RELATIONS[limit.relation](values, limit.value)
+        if limit.name in table.results:
+            is_close |= np.abs(values - limit.value) <= errors * np.abs(values)
         fractions.append((limit, Fraction(int(keeps.sum()), len(table.rows))))
         passes &= keeps
     if not wanted:
         passes = np.array([not row.error for row in table.rows], dtype=bool)
-    return SweepStatistics(len(table.rows), columns, tuple(fractions), Fraction(int(passes.sum()), len(table.rows)))
+    return SweepStatistics(len(table.rows), columns, tuple(fractions), Fraction(int(passes.sum()), len(table.rows)), int(is_close.sum()))
 
 
 def histogram_of(table: Table, name: str, bins: int | str = "auto") -> Histogram:
