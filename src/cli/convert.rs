@@ -93,7 +93,7 @@ impl ConvertCommand {
         if self.out.is_some() {
             return output::print(&report);
         }
-        eprint!("{report}");
+        stderr_text!("{report}");
         output::print(&converted.netlist)
     }
 

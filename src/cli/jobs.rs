@@ -84,7 +84,7 @@ impl Attach {
         let (table, job) = followed?;
         let part = (!job.part.is_empty()).then_some(job.part.as_str());
         delivery::deliver(self.out.as_deref(), &table, part)?;
-        eprintln!("{}", delivery::summary(&table, ""));
+        stderr_line!("{}", delivery::summary(&table, ""));
         match failure(&at.to, &job) {
             Some(failure) => Err(failure),
             None => delivery::nothing(&table),
