@@ -1,6 +1,6 @@
 //! From netlist text to a ready model: netlist → structure → discretize.
 
-use crate::discretize::{Assembly, DiscretizeError, discretize_like, order, yielded};
+use crate::discretize::{Assembly, DiscretizeError, discretize_like, order, permanent_strain};
 use crate::equations::Joints;
 use crate::multibody::planar::Pose;
 use crate::multibody::relative::UnsupportedModel;
@@ -207,9 +207,10 @@ fn laid_out(
     other: Option<&Assembly>,
 ) -> Result<Assembly, DiscretizeError> {
     let mut parts = discretize_like(structure, options, segments, other)?;
-    for (arm, strain) in yielded::arms(&parts, &structure.yields).iter().zip(structure.yields.iter().map(|y| y.strain))
+    for (arm, strain) in
+        permanent_strain::arms(&parts, &structure.yields).iter().zip(structure.yields.iter().map(|y| y.strain))
     {
-        yielded::strain(&mut parts, arm, strain);
+        permanent_strain::strain(&mut parts, arm, strain);
     }
     if let Some(share) = options.imperfection {
         imperfection::apply(&mut parts, share * structure.extent());

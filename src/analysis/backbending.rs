@@ -2,7 +2,7 @@
 use super::statics::operating_point;
 use super::{AnalysisError, PortVoltages};
 use crate::compile::CompiledModel;
-use crate::discretize::yielded;
+use crate::discretize::permanent_strain;
 use crate::domains::backbending::Strength;
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::{RestStrain, add_offset_change, axial_change, axial_force};
@@ -40,7 +40,7 @@ struct YieldingBeam {
     heater: usize,
     strength: Strength,
     area: f64,
-    joints: yielded::YieldingJoints,
+    joints: permanent_strain::YieldingJoints,
     /// Shortening so far [1].
     strain: f64,
 }
@@ -74,7 +74,7 @@ pub fn backbend(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<Bac
 
 fn arms(compiled: &CompiledModel) -> Vec<YieldingBeam> {
     let yields = &compiled.structure.yields;
-    let joints = yielded::arms(&compiled.parts, yields);
+    let joints = permanent_strain::arms(&compiled.parts, yields);
     (yields.iter().zip(joints).enumerate())
         .filter_map(|(index, (y, joints))| {
             let heater = compiled.parts.heaters.iter().position(|&beam| beam == y.beam)?;
@@ -170,6 +170,6 @@ fn pressures(
 fn apply(bent: &mut CompiledModel, arms: &[YieldingBeam]) {
     for arm in arms {
         let before = std::mem::replace(&mut Arc::make_mut(&mut bent.structure).yields[arm.index].strain, -arm.strain);
-        yielded::strain(&mut bent.parts, &arm.joints, -arm.strain - before);
+        permanent_strain::strain(&mut bent.parts, &arm.joints, -arm.strain - before);
     }
 }

@@ -5,7 +5,7 @@
 //! a millionth of the mass of all bodies.
 
 use crate::domains::domain::Domain;
-use crate::domains::drawn::PlacedMember;
+use crate::domains::from_structure::PlacedMember;
 use crate::domains::member::Member;
 use crate::multibody::{Body, BodyId};
 use crate::options::CompileOptions;

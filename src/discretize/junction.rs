@@ -17,7 +17,7 @@
 //! ratios of widths beyond 8 and stems that lean by more than 45° (the last row holds).
 
 use super::bar::bar;
-use super::excess::{self, Excess, Meetings};
+use super::junction_mass::{self, Excess, Meetings};
 use super::junction_springs::{JunctionEnd, corner, interpolate};
 use super::junction_table as table;
 use super::overlap::{IN_LINE, Strip, turn};
@@ -145,7 +145,7 @@ pub fn find(structure: &Structure, rigid: &RigidGroups, kind: Junctions, undampe
             known.push((bar, raw, *both));
         }
     }
-    ends.excess = excess::find(structure, &ends.beams, &ends.meetings, undamped);
+    ends.excess = junction_mass::find(structure, &ends.beams, &ends.meetings, undamped);
     ends
 }
 

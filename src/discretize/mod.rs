@@ -17,7 +17,7 @@
 //! | [`junction_springs`] | offset and spring at the end of a beam |
 //! | [`junction_table`] | the springs' numbers, from plane stress |
 //! | `sprung` | the second-order strain of segments that end in those springs |
-//! | `excess` | mass and drag that junctions have twice, or lack |
+//! | `junction_mass` | mass and drag that junctions have twice, or lack |
 //! | [`overlap`] | mass that is drawn twice where beams meet |
 //! | [`scheme`] | ways to cut a beam: places, stiffness and second-order strain of joints, masses |
 //! | [`beam`] | a cut beam in the drawing: bodies, masses, joints, points |
@@ -31,21 +31,21 @@ pub mod beam;
 mod contact_mass;
 pub mod cubic;
 mod error;
-mod excess;
 pub mod frame;
 mod free_rotation;
 pub mod junction;
 pub mod junction_limits;
+mod junction_mass;
 pub mod junction_springs;
 pub mod junction_table;
 pub mod order;
 pub mod overlap;
+pub mod permanent_strain;
 pub mod ports;
 pub mod rigid;
 pub mod scheme;
 mod sprung;
 mod stations;
-pub mod yielded;
 
 pub use crate::options::{Junctions, Scheme};
 pub use error::{DiscretizeError, MAX_SEGMENTS};

@@ -2,8 +2,8 @@
 
 use super::approach::MaterialPoint;
 use super::domain::{Configuration, Domain};
-use super::drawn::{FromStructure, StructureView};
 use super::element::DomainElement;
+use super::from_structure::{FromStructure, StructureView};
 use crate::multibody::planar::{JointFrame, Pose};
 use crate::multibody::{BlockMatrix, BodyId, Damper, Pattern};
 use crate::structure::GapVoltage;

@@ -5,7 +5,7 @@ use super::capacitor::{Capacitance, Capacitor};
 use super::contact::{Contact, touching_distance};
 use super::contact_loss::{Loss, fall_at_pull_in};
 use super::domain::{Chord, Configuration, Domain, Law};
-use super::drawn::{FromStructure, StructureView};
+use super::from_structure::{FromStructure, StructureView};
 use super::quotient::{self, quotient};
 use crate::multibody::model::locate;
 use crate::multibody::planar::Pose;

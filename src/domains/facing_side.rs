@@ -1,7 +1,7 @@
 //! One side of a gap along beams: the points that bear it, and the distances and slopes that they measure.
 
 use super::approach::MaterialPoint;
-use super::drawn::Station;
+use super::from_structure::Station;
 use crate::multibody::BodyId;
 use crate::multibody::planar::{self, Pose};
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3, Vector4};

@@ -5,9 +5,9 @@
 //! work-equivalent to a pressure along that cubic put the bodies exactly where a linear beam under the pressure has them. What is
 //! left is the shape within a segment, p·s²·(h − s)²/(24·EI), whose share in the deflection falls with the fourth power of h.
 
-use super::drawn::{Station, StructureView};
 use super::facing::FacingStretch;
 use super::facing_side::{EndWeights, Flank};
+use super::from_structure::{Station, StructureView};
 use super::quadrature::{hermite, hermite_slope};
 use crate::multibody::BodyId;
 use crate::structure::{BeamGap, NodeId, Structure};

@@ -3,8 +3,8 @@
 use super::approach::{Approach, MaterialPoint};
 use super::contact_loss::Loss;
 use super::domain::{Chord, Configuration, Domain, Law};
-use super::drawn::{FromStructure, PlacedMember, StructureView};
 use super::element::DomainElement;
+use super::from_structure::{FromStructure, PlacedMember, StructureView};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Damper, Pattern};
 use nalgebra::Vector2;

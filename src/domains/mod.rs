@@ -19,7 +19,7 @@
 //! | [`loss_derivatives`] | derivatives of the forces of that over the bodies |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
 //! | [`dashpot`] | a damper to the ground |
-//! | [`drawn`], [`element`] | from a drawing to them; elements of their own |
+//! | [`from_structure`], [`element`] | from a drawing to them; elements of their own |
 //! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
 //! | [`load`], [`moving_frame`] | dead loads, and forces that sources give; the motion of the frame |
 //! | [`facing`] | a stretch of two facing beams: pressure along a gap that varies over their length |
@@ -48,7 +48,6 @@ pub mod contact_loss;
 pub mod contact_speed;
 pub mod dashpot;
 pub mod domain;
-pub mod drawn;
 pub mod drive;
 pub mod electrodes;
 pub mod element;
@@ -59,6 +58,7 @@ pub mod facing_local;
 mod facing_loss;
 mod facing_side;
 mod facing_stretches;
+pub mod from_structure;
 mod input;
 pub mod inputs;
 pub mod lag;
@@ -80,10 +80,10 @@ pub mod thermal;
 pub use approach::MaterialPoint;
 pub use beam_line::BeamLine;
 pub use domain::{Configuration, Domain, Law};
-pub use drawn::{PlacedMember, Station, StructureView};
 pub use drive::{Drive, Ramp};
 pub use element::DomainElement;
 pub use facing_stretches::BeamRows;
+pub use from_structure::{PlacedMember, Station, StructureView};
 pub use input::Input;
 pub use lag::Lags;
 pub use load::DeadLoad;

@@ -8,12 +8,12 @@
 //! between them. What is left is a network of conductors (`laplacian`); the current of each source is what leaves the part of its tree
 //! that hangs on it.
 
-mod known;
+mod source_tree;
 
 use super::laplacian::Laplacian;
 use crate::sets::Sets;
-use known::KnownPotentials;
 use nalgebra::{DMatrix, DVector};
+use source_tree::KnownPotentials;
 use thiserror::Error;
 
 /// A network by node indices. Sources come in the order of the source vector.

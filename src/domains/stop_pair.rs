@@ -4,7 +4,7 @@ use super::approach::{Approach, MaterialPoint};
 use super::contact::TOUCH;
 use super::contact_loss::Loss;
 use super::domain::{Chord, Configuration, Domain, Law};
-use super::drawn::{FromStructure, StructureView};
+use super::from_structure::{FromStructure, StructureView};
 use super::quotient::{self, quotient};
 use super::stop::{StopKind, lost, nearer};
 use crate::multibody::model::locate;
