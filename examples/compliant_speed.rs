@@ -12,11 +12,11 @@ mod topologies;
 
 use bimorph::domains::{Drive, System};
 use bimorph::equations::Joints;
+use bimorph::multibody::joint_coordinates::sprung_loops::JointMatrix;
+use bimorph::multibody::joint_coordinates::sprung_loops::columns::Four;
+use bimorph::multibody::joint_coordinates::sprung_loops::dynamics::Stresses;
+use bimorph::multibody::joint_coordinates::sprung_loops::poses::{LaneJointStates, TreeKinematics};
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::relative::JointMatrix;
-use bimorph::multibody::relative::columns::Four;
-use bimorph::multibody::relative::dynamics::Stresses;
-use bimorph::multibody::relative::placed::{LaneJointStates, TreeKinematics};
 use bimorph::multibody::{BlockMatrix, forces};
 use std::hint::black_box;
 use std::time::Instant;

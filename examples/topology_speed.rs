@@ -10,7 +10,7 @@
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
-use bimorph::multibody::rcr::{Lanes, Linkage, Real, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Lanes, Linkage, Real, Reduction, ReductionTask};
 use std::hint::black_box;
 use std::time::Instant;
 use topologies::Topology;

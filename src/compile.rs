@@ -2,8 +2,8 @@
 
 use crate::discretize::{Assembly, DiscretizeError, discretize_like, order, permanent_strain};
 use crate::equations::Joints;
+use crate::multibody::joint_coordinates::sprung_loops::UnsupportedModel;
 use crate::multibody::planar::Pose;
-use crate::multibody::relative::UnsupportedModel;
 use crate::netlist::{Bundle, Diagnostic, Diagnostics, NetlistSource, Setting};
 use crate::options::OptionError;
 use crate::refine::imperfection;

@@ -6,7 +6,7 @@ mod topologies;
 use bimorph::domains::System;
 use bimorph::equations::constrained::Constrained;
 use bimorph::equations::{Control, Equations};
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use bimorph::solve::dirk::Dirk;
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;

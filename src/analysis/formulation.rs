@@ -12,7 +12,7 @@ use super::integrator::Integrator;
 use super::transient::options::TransientOptions;
 use crate::compile::CompiledModel;
 use crate::domains::System;
-use crate::multibody::rcr::{Linkage, LinkageParent};
+use crate::multibody::joint_coordinates::constrained_loops::{Linkage, LinkageParent};
 use crate::multibody::{BodyId, Model};
 use crate::solve::baseline::SolverKind;
 use crate::solve::fastest::fastest;

@@ -1,6 +1,6 @@
 //! Motion in time in joint coordinates: the recursion of the paper, loops closed after each step.
 //!
-//! Accelerations come from [`crate::multibody::rcr`] in O(n + m). Dormand and Prince's pair advances them explicitly, or an
+//! Accelerations come from [`crate::multibody::joint_coordinates::constrained_loops`] in O(n + m). Dormand and Prince's pair advances them explicitly, or an
 //! implicit method does, whose stages the same recursion solves ([`crate::equations::constrained`]). An explicit step is about
 //! 1/ω long, ω the highest natural frequency of the model, whatever the tolerance: joints that only turn have a moderate
 //! one, elastic axial directions a very high one. The number of explicit steps is foretold, and refused when it is beyond
@@ -22,7 +22,7 @@ use super::transient::result::TransientResult;
 use super::{AnalysisError, Watch};
 use crate::compile::CompiledModel;
 use crate::equations::Motion;
-use crate::multibody::rcr::Linkage;
+use crate::multibody::joint_coordinates::constrained_loops::Linkage;
 use crate::solve::fastest::{Fastest, fastest};
 use in_joints::InJoints;
 use on_tree::on_tree;

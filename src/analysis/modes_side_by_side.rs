@@ -7,7 +7,7 @@ use super::PortVoltages;
 use super::modes::{GUARDS, ModesResult, about_equilibrium, unloaded};
 use crate::compile::CompiledModel;
 use crate::multibody::BlockMatrix;
-use crate::multibody::lanes::LANES;
+use crate::multibody::batch::LANES;
 use crate::multibody::planar::Pose;
 use crate::refine::side_by_side::{BatchVariant, LaneReference};
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};

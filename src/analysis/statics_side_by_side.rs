@@ -7,7 +7,7 @@ use super::PortVoltages;
 use super::contact_range::within_contact_range;
 use super::statics::{OperatingPoint, settled, source_vector};
 use crate::compile::CompiledModel;
-use crate::multibody::lanes::LANES;
+use crate::multibody::batch::LANES;
 use crate::multibody::planar::Pose;
 use crate::solve::equilibrium::Path;
 use crate::solve::equilibrium::side_by_side::{BatchPath, LaneEquilibrium};

@@ -15,7 +15,7 @@ use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
 use bimorph::compile::{CompiledModel, Formulation};
-use bimorph::multibody::relative::UnsupportedModel;
+use bimorph::multibody::joint_coordinates::sprung_loops::UnsupportedModel;
 use bimorph::options::OptionValue;
 use bimorph::options::analysis::{TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use clap::Args;

@@ -1,11 +1,11 @@
-//! Joint coordinates whose loops are constraints, reduced inside the recursion ([`crate::multibody::rcr`]).
+//! Joint coordinates whose loops are constraints, reduced inside the recursion ([`crate::multibody::joint_coordinates::constrained_loops`]).
 //!
 //! Accelerations are one reduction. A stage of an implicit method asks for accelerations that the motion they lead to has,
 //! ```text
 //! a = A(t, q + β·a, q̇ + γ·a),      A: accelerations by the recursion, loops reduced on the way
 //! ```
 //! Newton's method solves it with the recursion itself: each iteration places the bodies, takes the forces and their
-//! stiffness there, and reduces with M + γ·C + β·K in the place of M ([`crate::multibody::rcr::AddedInertia`]). No matrix
+//! stiffness there, and reduces with M + γ·C + β·K in the place of M ([`crate::multibody::joint_coordinates::constrained_loops::AddedInertia`]). No matrix
 //! is assembled, and an iteration costs O(n + m). How inertia and reactions change with the configuration is left out of
 //! that matrix, not out of the equation: the iteration is linear, accelerated by what the last ones tell
 //! (`anderson.rs`). θ is the ratio of the last two corrections, and it ends when what is left, δ·θ/(1 − θ), is below
@@ -18,7 +18,9 @@
 use super::anderson::Anderson;
 use super::loads::Loads;
 use super::{Control, DegreeOfFreedom, Equations, Motion, SolverCounters, Stage, Staged, StepFailure};
-use crate::multibody::rcr::{AddedInertia, Linkage, Reduction, ReductionTask, Singularity};
+use crate::multibody::joint_coordinates::constrained_loops::{
+    AddedInertia, Linkage, Reduction, ReductionTask, Singularity,
+};
 
 /// Most iterations of a stage.
 const MAX_ITERATIONS: usize = 60;

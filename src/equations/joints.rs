@@ -3,9 +3,9 @@
 
 use crate::domains::System;
 use crate::multibody::Drag;
+use crate::multibody::joint_coordinates::sprung_loops::loops::Loops;
+use crate::multibody::joint_coordinates::sprung_loops::{Tree, UnsupportedModel};
 use crate::multibody::planar::Pose;
-use crate::multibody::relative::loops::Loops;
-use crate::multibody::relative::{Tree, UnsupportedModel};
 
 /// A system on a tree. Immutable; shared by sessions.
 #[derive(Debug, Clone)]

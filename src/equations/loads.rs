@@ -8,8 +8,8 @@
 use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, Ramp, System};
 use crate::multibody::forces;
+use crate::multibody::joint_coordinates::constrained_loops::{AddedInertia, Closure, Linkage, Reduction};
 use crate::multibody::planar::Pose;
-use crate::multibody::rcr::{AddedInertia, Closure, Linkage, Reduction};
 
 /// What acts on a mechanism in joint coordinates.
 pub trait Loads {

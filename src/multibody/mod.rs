@@ -15,8 +15,8 @@
 //! | [`body`] | a rigid body: name, mass, drag, held directions |
 //! | [`section`] | joints as they are stored: what those of one beam share, and where their couplings lie |
 //! | [`model`] | bodies, joints, dampers: the immutable model and the mutable state |
-//! | [`rcr`] | the same graph in relative joint coordinates, loops reduced inside the recursion |
-//! | [`relative`] | joint coordinates on a spanning tree, loops closed by springs |
+//! | [`joint_coordinates`] | the same graph in relative joint coordinates: loops closed by springs or by constraints |
+//! | [`batch`] | bodies and joints of eight variants at a time, one variant a lane |
 //! | [`agitation`] | the random forces that come with drag and dampers |
 //! | [`linear_system`] | K, M and C of a linear frame on one pattern |
 //! | [`forces`] | elastic forces, energy and tangent of a model at a configuration |
@@ -25,12 +25,13 @@
 //! | [`double`] | double-double numbers |
 
 pub mod agitation;
+pub mod batch;
 pub mod body;
 pub mod double;
 pub mod factor;
 pub mod forces;
 pub mod joint;
-pub mod lanes;
+pub mod joint_coordinates;
 pub mod layout;
 pub mod linear_system;
 pub mod model;
@@ -38,8 +39,6 @@ pub mod order;
 pub mod pattern;
 pub mod planar;
 pub mod precise;
-pub mod rcr;
-pub mod relative;
 pub mod section;
 pub mod sine;
 pub mod unstressed;

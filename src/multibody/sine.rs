@@ -4,7 +4,7 @@
 //! Reference: the minimax polynomials of K. C. Ng, FreeBSD msun `k_sin.c` and `k_cos.c` (1993), which carry |x| ≤ π/4 with an
 //! error of the series below 2⁻⁵⁸.
 
-use crate::multibody::lanes::Number;
+use crate::multibody::batch::Number;
 use std::f64::consts::FRAC_PI_4;
 
 /// Largest angle of [`small`] [rad].

@@ -9,7 +9,7 @@ use super::order_error::{own_stiffness, relative};
 use super::span::{BeamSpan, spans};
 use crate::discretize::Assembly;
 use crate::multibody::BodyId;
-use crate::multibody::lanes::{Kernel, LANES, Lane8, LanePose, Real, STILL, SimdReal, across, forces, load, store};
+use crate::multibody::batch::{Kernel, LANES, Lane8, LanePose, Real, STILL, SimdReal, across, forces, load, store};
 use crate::options::CompileOptions;
 use crate::solve::frequency::mac;
 use crate::solve::frequency::side_by_side::{LaneModes, RitzMatrices, dot, weigh};

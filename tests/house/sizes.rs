@@ -17,7 +17,7 @@ const LONG_FILES: &[&str] = &[];
 /// Functions that are longer, by file and name.
 const LONG_FUNCTIONS: &[&str] = &[
     "src/layout/extract/layer.rs extract",
-    "src/multibody/rcr/fast/kernels.rs one_inward",
+    "src/multibody/joint_coordinates/constrained_loops/fast/kernels.rs one_inward",
     "src/netlist/check.rs facts",
     "src/netlist/instance.rs element",
 ];

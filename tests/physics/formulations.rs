@@ -9,7 +9,7 @@ use bimorph::analysis::transient::{TransientOptions, TransientResult, transient}
 use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::domains::Ramp;
 use bimorph::equations::loads::JointLoads;
-use bimorph::multibody::rcr::Reduction;
+use bimorph::multibody::joint_coordinates::constrained_loops::Reduction;
 use bimorph::netlist::Setting;
 use bimorph::solve::dormand_prince::{DormandPrince, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;

@@ -5,7 +5,7 @@ use bimorph::analysis::transient::{TransientOptions, TransientResult, transient}
 use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Scheme, compile};
 use bimorph::domains::Ramp;
 use bimorph::equations::{Bodies, Joints};
-use bimorph::multibody::relative::{Tree, UnsupportedModel};
+use bimorph::multibody::joint_coordinates::sprung_loops::{Tree, UnsupportedModel};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::time::joint_rodas4::JointRodas4;
 

@@ -3,7 +3,7 @@
 use crate::dense;
 use crate::mechanism::{Mechanism, PIN, Stream, WELD};
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use nalgebra::Matrix2;
 
 /// A random tree of `count` bodies with `loops` further joints of random kinds.

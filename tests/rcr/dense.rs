@@ -4,8 +4,8 @@
 //! second derivatives of the strains. Of a pin the two material points must coincide, which is said along x and y: cut pins
 //! of random coordinates stand open, and an open pin has other strains in its turning frame. Nothing of the recursion is used.
 
+use bimorph::multibody::joint_coordinates::constrained_loops::Reduction;
 use bimorph::multibody::planar::{Pose, Symmetric};
-use bimorph::multibody::rcr::Reduction;
 use bimorph::multibody::{BodyId, Joint, Model};
 use nalgebra::{DMatrix, DVector, Rotation2, Vector3, Vector6};
 

@@ -2,7 +2,7 @@
 
 use crate::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask, Singularity};
 
 /// A shuttle on arms of two links; `kinks` are the angles between the links, `turn` the direction of the first arm.
 fn star(kinks: &[f64], turn: f64) -> Mechanism {

@@ -5,7 +5,7 @@
 mod topologies;
 
 use crate::mechanism::{Mechanism, PIN, Stream, WELD};
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use bimorph::multibody::{BodyId, Model};
 
 fn bits(of: &[f64]) -> Vec<u64> {

@@ -1,7 +1,7 @@
 //! Initial states off the loops, and loops that close twice.
 
 use super::mechanism::Mechanism;
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask, Singularity};
 use bimorph::multibody::{BodyId, Model};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::{JointMotion, NotFinite};

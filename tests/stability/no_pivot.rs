@@ -5,7 +5,7 @@ use super::mechanism::Stream;
 use super::symbolic::{Chosen, Symbolic};
 use bimorph::multibody::Model;
 use bimorph::multibody::forces::RestStrain;
-use bimorph::multibody::rcr::{Linkage, LinkageParent, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, LinkageParent, Reduction, ReductionTask};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 

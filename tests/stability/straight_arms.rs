@@ -1,7 +1,7 @@
 //! Arms that come straight: a star of six two-link arms between a shuttle and ground, against 60-digit references.
 
 use super::mechanism::Mechanism;
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask, Singularity};
 use bimorph::multibody::{BodyId, Model};
 use nalgebra::{DMatrix, DVector};
 

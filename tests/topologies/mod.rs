@@ -17,8 +17,8 @@
 
 use bimorph::equations::loads::Loads;
 use bimorph::multibody::forces::RestStrain;
+use bimorph::multibody::joint_coordinates::constrained_loops::{AddedInertia, Linkage, Reduction};
 use bimorph::multibody::planar::JointFrame;
-use bimorph::multibody::rcr::{AddedInertia, Linkage, Reduction};
 use bimorph::multibody::{Body, BodyId, BodyName, Drag, Joint, Model};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;

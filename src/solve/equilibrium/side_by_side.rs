@@ -12,7 +12,7 @@ pub use storage::LaneEquilibrium;
 use super::path::LoadPath;
 use super::{EquilibriumOptions, LEAP, STALLED};
 use crate::domains::{Domain, Drive, System};
-use crate::multibody::lanes::{LANES, Lane8, LanePose, Real, across};
+use crate::multibody::batch::{LANES, Lane8, LanePose, Real, across};
 use crate::multibody::planar::Pose;
 use kernels::{EquilibriumKernel, EquilibriumPass};
 

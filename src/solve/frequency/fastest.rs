@@ -5,7 +5,7 @@
 //! is enough to foretell the number of steps.
 
 use crate::multibody::forces::RestStrain;
-use crate::multibody::rcr::{Linkage, Reduction, ReductionTask};
+use crate::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 
 /// Displacement of the iterates over the scale of a coordinate: small against 1, large against rounding.
 const SMALL: f64 = 1e-7;

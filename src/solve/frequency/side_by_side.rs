@@ -24,7 +24,7 @@ pub(crate) use vectors::{dot, weigh};
 
 use super::eigen::Modes;
 use crate::domains::System;
-use crate::multibody::lanes::{LANES, Lane8, LanePose, Real, across};
+use crate::multibody::batch::{LANES, Lane8, LanePose, Real, across};
 use crate::multibody::planar::Pose;
 use kernels::{ModesKernel, ModesPass};
 use storage::Which;

@@ -1,9 +1,9 @@
 //! Equations of motion in joint coordinates, for the integrators that work on flat slices.
 //!
-//! Accelerations come from the recursion, and each accepted step is taken back to the loops ([`crate::multibody::rcr`]).
+//! Accelerations come from the recursion, and each accepted step is taken back to the loops ([`crate::multibody::joint_coordinates::constrained_loops`]).
 
 use super::dormand_prince::SecondOrder;
-use crate::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
+use crate::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask, Singularity};
 use thiserror::Error;
 
 /// Accelerations are not finite: forces are, so the mechanism has a coordinate without inertia.

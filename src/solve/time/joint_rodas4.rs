@@ -1,6 +1,6 @@
 //! Rodas4 in relative joint coordinates: one factorization a step, stages by inverse dynamics and one back-substitution.
 //!
-//! With q the coordinates of a [`Tree`](crate::multibody::relative::Tree), v their rates and z their accelerations, the motion is the differential-algebraic
+//! With q the coordinates of a [`Tree`](crate::multibody::joint_coordinates::sprung_loops::Tree), v their rates and z their accelerations, the motion is the differential-algebraic
 //! system q̇ = v, v̇ = z, 0 = R(q, v, z, t): R is the force that the motion would take, inertia included. The accelerations are
 //! carried from step to step, so that no stage needs a reduction of its own. In the variables U of a Rosenbrock method
 //! ```text
@@ -29,12 +29,12 @@ use super::stage_loss::StageLoss;
 use crate::domains::Drive;
 use crate::equations::{Bodies, Joints};
 use crate::multibody::forces;
+use crate::multibody::joint_coordinates::sprung_loops::JointMatrix;
+use crate::multibody::joint_coordinates::sprung_loops::columns::Four;
+use crate::multibody::joint_coordinates::sprung_loops::dynamics::Stresses;
+use crate::multibody::joint_coordinates::sprung_loops::geometric::{self, Geometric};
+use crate::multibody::joint_coordinates::sprung_loops::poses::{TreeKinematics, place_of};
 use crate::multibody::planar::Pose;
-use crate::multibody::relative::JointMatrix;
-use crate::multibody::relative::columns::Four;
-use crate::multibody::relative::dynamics::Stresses;
-use crate::multibody::relative::geometric::{self, Geometric};
-use crate::multibody::relative::placed::{TreeKinematics, place_of};
 use error::JointDefectEstimate;
 use ports::JointPortSensitivities;
 use stages::JointStages;

@@ -11,7 +11,7 @@ use super::pace::StepController;
 use super::rodas4::lanes::{Lane, LaneRodas4};
 use crate::domains::{Ramp, System};
 use crate::equations::bodies::{FLOOR, contact_error, dragged};
-use crate::multibody::lanes::LANES;
+use crate::multibody::batch::LANES;
 
 /// The estimated error falls with this power of the step.
 const ORDER: f64 = 4.0;

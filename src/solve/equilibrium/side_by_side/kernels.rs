@@ -4,8 +4,8 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::storage::LaneEquilibrium;
-use crate::multibody::lanes::forces::{self, LaneRestStrain};
-use crate::multibody::lanes::{Kernel, STILL, SimdReal, add, load, store};
+use crate::multibody::batch::forces::{self, LaneRestStrain};
+use crate::multibody::batch::{Kernel, STILL, SimdReal, add, load, store};
 
 /// A part that goes over all lanes.
 #[derive(Debug, Clone, Copy)]

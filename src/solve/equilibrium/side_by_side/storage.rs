@@ -1,10 +1,10 @@
 //! What equilibria of variants side by side are found with.
 
 use crate::domains::System;
-use crate::multibody::lanes::joint::LanePlaced;
-use crate::multibody::lanes::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, STILL};
+use crate::multibody::batch::joint::LanePlaced;
+use crate::multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, STILL};
+use crate::multibody::joint_coordinates::constrained_loops::has_lanes;
 use crate::multibody::planar::Pose;
-use crate::multibody::rcr::has_lanes;
 use crate::multibody::{BlockMatrix, Pattern};
 
 /// As many variants as there are lanes, with storage.

@@ -5,8 +5,8 @@
 
 use super::storage::{LaneModes, Which};
 use super::vectors::{dot, mass_product, scale, weigh};
-use crate::multibody::lanes::forces::{self, LaneRestStrain};
-use crate::multibody::lanes::{Kernel, LaneDouble, SimdReal, load, store};
+use crate::multibody::batch::forces::{self, LaneRestStrain};
+use crate::multibody::batch::{Kernel, LaneDouble, SimdReal, load, store};
 
 /// A part that goes over all lanes.
 #[derive(Debug, Clone, Copy)]

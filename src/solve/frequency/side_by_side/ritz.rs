@@ -9,7 +9,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::vectors::{mass_product, scale};
-use crate::multibody::lanes::{LANES, Lane8, LaneModel, LanePose, SimdReal, load, store};
+use crate::multibody::batch::{LANES, Lane8, LaneModel, LanePose, SimdReal, load, store};
 
 /// Rows at most.
 pub(super) const MAX_ROWS: usize = 10;

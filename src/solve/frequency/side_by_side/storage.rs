@@ -2,10 +2,10 @@
 
 use super::ritz::{MAX_ROWS, RitzMatrices};
 use crate::domains::System;
-use crate::multibody::lanes::joint::LanePlaced;
-use crate::multibody::lanes::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, LanePrecise, PrecisePose, STILL};
+use crate::multibody::batch::joint::LanePlaced;
+use crate::multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, LanePrecise, PrecisePose, STILL};
+use crate::multibody::joint_coordinates::constrained_loops::has_lanes;
 use crate::multibody::planar::Pose;
-use crate::multibody::rcr::has_lanes;
 
 /// Which factor.
 #[derive(Debug, Clone, Copy, PartialEq)]

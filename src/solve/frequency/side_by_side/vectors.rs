@@ -3,7 +3,7 @@
 // blocks of fixed size are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
 
-use crate::multibody::lanes::{LaneModel, LanePose, SimdReal, load, store};
+use crate::multibody::batch::{LaneModel, LanePose, SimdReal, load, store};
 
 /// xᵀy.
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! Storage for the error of a motion in joint coordinates.
 
+use crate::multibody::joint_coordinates::sprung_loops::columns::Four;
 use crate::multibody::planar::Pose;
-use crate::multibody::relative::columns::Four;
 use crate::solve::time::defect::Impulses;
 use crate::solve::time::method::Motion;
 

@@ -6,11 +6,11 @@
 use super::stages::JointStages;
 use crate::domains::{Drive, Ramp};
 use crate::equations::Joints;
+use crate::multibody::joint_coordinates::sprung_loops::columns::Four;
+use crate::multibody::joint_coordinates::sprung_loops::derivatives::Changes;
+use crate::multibody::joint_coordinates::sprung_loops::poses::place_of;
+use crate::multibody::joint_coordinates::sprung_loops::{JointMatrix, Tree};
 use crate::multibody::planar::Pose;
-use crate::multibody::relative::changes::Changes;
-use crate::multibody::relative::columns::Four;
-use crate::multibody::relative::placed::place_of;
-use crate::multibody::relative::{JointMatrix, Tree};
 use crate::multibody::{BlockMatrix, Pattern, forces};
 use crate::solve::time::method::Motion;
 use crate::solve::time::stage_loss::StageLoss;

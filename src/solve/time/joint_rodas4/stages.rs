@@ -3,12 +3,12 @@
 //! side by side.
 
 use super::tableau::TABLEAU;
-use crate::multibody::lanes::{Kernel, LanePose, STILL, SimdReal, add_scaled, everywhere, load, store};
+use crate::multibody::batch::{Kernel, LanePose, STILL, SimdReal, add_scaled, everywhere, load, store};
+use crate::multibody::joint_coordinates::sprung_loops::columns::Four;
+use crate::multibody::joint_coordinates::sprung_loops::kinematics::JointState;
+use crate::multibody::joint_coordinates::sprung_loops::poses::{LaneJointStates, place_of, tiles};
+use crate::multibody::joint_coordinates::sprung_loops::{JointMatrix, Tree};
 use crate::multibody::planar::Pose;
-use crate::multibody::relative::columns::Four;
-use crate::multibody::relative::kinematics::JointState;
-use crate::multibody::relative::placed::{LaneJointStates, place_of, tiles};
-use crate::multibody::relative::{JointMatrix, Tree};
 use crate::solve::time::method::Motion;
 use crate::solve::time::rodas4::tableau::{A, GAMMA};
 

@@ -16,7 +16,7 @@ use kernels::{StepKernel, StepPass};
 
 use super::tableau::{ALPHA, moves_on};
 use crate::domains::{Ramp, System};
-use crate::multibody::lanes::{LANES, across};
+use crate::multibody::batch::{LANES, across};
 use crate::solve::time::method::Motion;
 
 impl LaneRodas4 {

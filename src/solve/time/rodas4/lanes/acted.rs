@@ -2,8 +2,8 @@
 
 use super::super::tableau::{C, GAMMA};
 use super::storage::{IN_PLACE, Lane, LaneRodas4};
-use crate::multibody::lanes::Real;
-use crate::multibody::lanes::{LANES, LanePose};
+use crate::multibody::batch::Real;
+use crate::multibody::batch::{LANES, LanePose};
 use crate::multibody::planar::Pose;
 
 impl LaneRodas4 {

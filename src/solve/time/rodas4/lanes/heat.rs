@@ -5,7 +5,7 @@
 use crate::domains::Ramp;
 use crate::domains::lag::Lag;
 use crate::domains::thermal::HeatConductor;
-use crate::multibody::lanes::{LANES, Lane8, Real, SimdReal};
+use crate::multibody::batch::{LANES, Lane8, Real, SimdReal};
 
 /// Time constants that a heater is compared with: those of the last heaters.
 const COMPARED: usize = 4;

@@ -6,8 +6,8 @@
 use super::super::tableau::{A, C, GAMMA, GAMMA_I};
 use super::motion::{Norms, mass_norm};
 use super::storage::{IN_PLACE, LaneIncrement, LaneRodas4};
-use crate::multibody::lanes::forces::{self, LaneRestStrain};
-use crate::multibody::lanes::{
+use crate::multibody::batch::forces::{self, LaneRestStrain};
+use crate::multibody::batch::{
     Kernel, LaneModel, LanePose, STILL, SimdReal, add, add_scaled, load, load_block, store, times,
 };
 

@@ -1,6 +1,6 @@
 //! The motion of variants side by side, and its measure.
 
-use crate::multibody::lanes::{LANES, Lane8, LaneModel, LanePose, Real, STILL, SimdReal, load};
+use crate::multibody::batch::{LANES, Lane8, LaneModel, LanePose, Real, STILL, SimdReal, load};
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;
 

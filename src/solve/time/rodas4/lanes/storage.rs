@@ -4,10 +4,10 @@ use super::heat::LaneHeat;
 use super::motion::{LaneMotion, Norms};
 use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, Ramp, System};
-use crate::multibody::lanes::joint::LanePlaced;
-use crate::multibody::lanes::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, STILL, SimdReal, load};
+use crate::multibody::batch::joint::LanePlaced;
+use crate::multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, STILL, SimdReal, load};
+use crate::multibody::joint_coordinates::constrained_loops::has_lanes;
 use crate::multibody::planar::Pose;
-use crate::multibody::rcr::has_lanes;
 use crate::multibody::{BlockMatrix, Pattern};
 
 /// From this stage on the motion itself carries the argument.
