@@ -11,7 +11,7 @@ use crate::multibody::batch::LANES;
 use crate::multibody::planar::Pose;
 use crate::refine::side_by_side::{BatchVariant, LaneReference};
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
-use crate::solve::frequency::side_by_side::LaneModes;
+use crate::solve::frequency::batch::LaneModes;
 
 /// Lanes for variants like one of them.
 #[derive(Debug, Clone)]

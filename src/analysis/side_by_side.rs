@@ -17,8 +17,8 @@ use crate::domains::{Drive, Ramp};
 use crate::readout::signal::{Signal, SignalView};
 use crate::solve::baseline::SolverKind;
 use crate::solve::dense::interpolate;
+use crate::solve::time::batch::{self, BatchRun, Ended, LaneWork, Watcher};
 use crate::solve::time::method::Motion;
-use crate::solve::time::side_by_side::{self, BatchRun, Ended, LaneWork, Watcher};
 
 use super::integrator::Integrator;
 
@@ -85,7 +85,7 @@ pub fn ends(
                 Ended::Alone => {}
             };
             let first = &variants[left[0]].parts.system;
-            let round = side_by_side::advance(first, &mut next, &mut done);
+            let round = batch::advance(first, &mut next, &mut done);
             work.together += round.together;
             work.accepted += round.accepted;
             work.rejected += round.rejected;

@@ -10,7 +10,7 @@ use crate::compile::CompiledModel;
 use crate::multibody::batch::LANES;
 use crate::multibody::planar::Pose;
 use crate::solve::equilibrium::Path;
-use crate::solve::equilibrium::side_by_side::{BatchPath, LaneEquilibrium};
+use crate::solve::equilibrium::batch::{BatchPath, LaneEquilibrium};
 use crate::solve::path::SourcePath;
 
 /// Lanes for variants like one of them.

@@ -11,8 +11,8 @@ use crate::discretize::Assembly;
 use crate::multibody::BodyId;
 use crate::multibody::batch::{Kernel, LANES, Lane8, LanePose, Real, STILL, SimdReal, across, forces, load, store};
 use crate::options::CompileOptions;
+use crate::solve::frequency::batch::{LaneModes, RitzMatrices, dot, weigh};
 use crate::solve::frequency::mac;
-use crate::solve::frequency::side_by_side::{LaneModes, RitzMatrices, dot, weigh};
 use crate::structure::Structure;
 use nalgebra::{DMatrix, Matrix6};
 

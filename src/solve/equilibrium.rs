@@ -11,11 +11,11 @@
 //! Reference: E. Riks, "An incremental approach to the solution of snapping and buckling problems", Int. J. Solids
 //! Structures 15 (1979), for limit points.
 
+pub mod batch;
 mod fall;
 mod loss;
 pub mod path;
 mod refusal;
-pub mod side_by_side;
 
 pub use loss::{LossKind, StabilityLoss};
 

@@ -6,9 +6,9 @@ use bimorph::domains::Ramp;
 use bimorph::equations::Bodies;
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::time::adaptive::{Adaptive, Control};
+use bimorph::solve::time::batch::{self, BatchRun, Ended, Watcher};
 use bimorph::solve::time::method::Motion;
 use bimorph::solve::time::rodas4::Rodas4;
-use bimorph::solve::time::side_by_side::{self, BatchRun, Ended, Watcher};
 
 /// The final motion and the accepted steps of a run.
 type Ran = (Vec<(f64, f64)>, Motion);
@@ -74,7 +74,7 @@ fn together(variants: &[CompiledModel], volts: &[f64], stop: f64, tol: f64) -> V
                 ends[number] = Some(motion);
             }
         };
-        let work = side_by_side::advance(&variants[0].parts.system, &mut next, &mut done);
+        let work = batch::advance(&variants[0].parts.system, &mut next, &mut done);
         assert!(work.together < work.accepted + work.rejected, "nothing was side by side: {work:?}");
     }
     notes.into_iter().zip(ends).map(|(notes, end)| Some((notes.0, end?))).collect()

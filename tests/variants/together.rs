@@ -10,9 +10,9 @@ use bimorph::multibody::BlockMatrix;
 use bimorph::multibody::planar::Pose;
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::eigen::{Modes, lowest_modes};
-use bimorph::solve::equilibrium::side_by_side::{BatchPath, LaneEquilibrium};
+use bimorph::solve::equilibrium::batch::{BatchPath, LaneEquilibrium};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
-use bimorph::solve::frequency::side_by_side::LaneModes;
+use bimorph::solve::frequency::batch::LaneModes;
 use bimorph::solve::path::SourcePath;
 
 fn variants(text: &str, name: &str, values: &[f64]) -> Vec<CompiledModel> {

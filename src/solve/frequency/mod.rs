@@ -8,12 +8,13 @@
 //! | [`mac`] | which mode of one model is which of another |
 //! | [`refined`] | solves that correct themselves in extended precision |
 //! | [`subspace`] | many of them at once |
-//! | [`side_by_side`] | modes of variants of one mechanism, in lanes |
+//! | [`batch`] | modes of variants of one mechanism, in lanes |
 //! | [`fastest`] | the highest natural frequency in joint coordinates |
 //! | [`harmonic`] | small-signal response at one frequency: the same factorization over complex numbers |
 //! | [`pole`] | where that has no bound: a damped mode |
 //! | [`gyroscopic`] | the same in a frame that turns |
 
+pub mod batch;
 pub mod eigen;
 pub mod fastest;
 pub mod gyroscopic;
@@ -24,6 +25,5 @@ pub mod mac;
 mod mass;
 pub mod pole;
 pub mod refined;
-pub mod side_by_side;
 pub mod subspace;
 mod tridiagonal;

@@ -32,11 +32,12 @@
 //! | [`defect`] | the error of a run with Rodas4, by its defect |
 //! | `stage_loss` | forces of contact that loses energy in the stages of both |
 //! | [`gyration`] | Coriolis' force in a frame that turns |
-//! | [`side_by_side`] | runs of many variants in lanes |
+//! | [`batch`] | runs of many variants in lanes |
 
 pub mod adaptive;
 pub mod alpha;
 pub mod average_field;
+pub mod batch;
 pub mod defect;
 pub mod dirk;
 pub mod dormand_prince;
@@ -52,6 +53,5 @@ pub mod method;
 mod pace;
 pub mod radau5;
 pub mod rodas4;
-pub mod side_by_side;
 mod stage_loss;
 pub mod tableau;
