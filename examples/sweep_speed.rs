@@ -15,7 +15,7 @@ use bimorph::analysis::{modes::modes, statics::static_equilibrium};
 use bimorph::compile::{CompileOptions, CompiledModel, compile, draw};
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepSpec};
 use bimorph::netlist::{Bundle, NetlistSource};
-use bimorph::refine::model_order::Mesh;
+use bimorph::refine::mesh_search::Mesh;
 use std::hint::black_box;
 use std::path::Path;
 

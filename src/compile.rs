@@ -7,7 +7,7 @@ use crate::multibody::planar::Pose;
 use crate::netlist::{Bundle, Diagnostic, Diagnostics, NetlistSource, Setting};
 use crate::options::OptionError;
 use crate::refine::imperfection;
-use crate::refine::model_order::{self, Mesh};
+use crate::refine::mesh_search::{self, Mesh};
 use crate::structure::Structure;
 use std::sync::Arc;
 use thiserror::Error;
@@ -156,7 +156,7 @@ impl ParsedStructure {
     /// See [`CompileError`].
     pub fn compile(self) -> Result<CompiledModel, CompileError> {
         let order = match (self.options.band, self.options.segments) {
-            (Some(band), None) => model_order::choose(&self.structure, &self.options, band)?,
+            (Some(band), None) => mesh_search::choose(&self.structure, &self.options, band)?,
             _ => {
                 let segments = order::a_priori(&self.structure, &self.options)?;
                 Mesh { segments, estimated_error: None, modes_in_band: 0, passes: 0 }

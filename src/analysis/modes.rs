@@ -13,7 +13,7 @@ use crate::multibody::planar::Pose;
 use crate::readout::signal::{Signal, SignalView};
 use crate::refine::axial::axial_forces;
 use crate::refine::doubling;
-use crate::refine::order_error::{own_stiffness, relative_of_loaded_modes};
+use crate::refine::mode_errors::{own_stiffness, relative_of_loaded_modes};
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
 use serde::Serialize;
 use std::f64::consts::TAU;

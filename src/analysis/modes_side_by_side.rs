@@ -9,7 +9,7 @@ use crate::compile::CompiledModel;
 use crate::multibody::BlockMatrix;
 use crate::multibody::batch::LANES;
 use crate::multibody::planar::Pose;
-use crate::refine::side_by_side::{BatchVariant, LaneReference};
+use crate::refine::batch_mode_errors::{BatchVariant, LaneReference};
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
 use crate::solve::frequency::batch::LaneModes;
 

@@ -7,8 +7,8 @@
 //!
 //! Reference: L. F. Richardson, "The deferred approach to the limit", Phil. Trans. R. Soc. A 226 (1927).
 
-use super::aim::Mesh;
 use super::groups::{Groups, MARGIN};
+use super::mesh_target::Mesh;
 use crate::options::CompileOptions;
 use crate::structure::Structure;
 

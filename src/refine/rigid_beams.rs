@@ -5,10 +5,10 @@
 //! that touch ground, that are heated or under stress, and electrodes of facing beams stay elastic, as they may matter where
 //! nothing rings.
 
-use super::aim::{Mesh, MeshTarget};
+use super::band_modes::{MeshModes, solve_modes};
 use super::groups::{Groups, MARGIN};
-use super::look::{MeshModes, solve_modes};
-use super::order_error::{relative, strain_shares};
+use super::mesh_target::{Mesh, MeshTarget};
+use super::mode_errors::{relative, strain_shares};
 use crate::discretize::{Assembly, DiscretizeError, discretize_with};
 use crate::domains::{BeamRows, MaterialPoint};
 use crate::multibody::planar::Pose;

@@ -9,7 +9,7 @@ use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::multibody::BlockMatrix;
 use bimorph::multibody::planar::Pose;
 use bimorph::netlist::Bundle;
-use bimorph::refine::model_order::Mesh;
+use bimorph::refine::mesh_search::Mesh;
 use nalgebra::Vector2;
 use std::fmt::Write;
 use std::sync::Arc;

@@ -180,7 +180,7 @@ fn modes_about_stress_converge_at_junctions() {
     assert!(model.warnings.items.is_empty(), "{:?}", model.warnings.items);
     let found = modes(&model, 3, &[]).unwrap().frequencies_hz;
     let finer: Vec<usize> = model.order.segments.iter().map(|n| 8 * n).collect();
-    let finer = model.with_order(bimorph::refine::model_order::Mesh { segments: finer, ..model.order.clone() });
+    let finer = model.with_order(bimorph::refine::mesh_search::Mesh { segments: finer, ..model.order.clone() });
     let finer = modes(&finer.unwrap(), 3, &[]).unwrap().frequencies_hz;
     let error = found.iter().zip(&finer).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
     assert!(error <= 1e-6 && error < 2.0 * told, "{error:e}, told {told:e}");

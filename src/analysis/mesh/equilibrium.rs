@@ -21,9 +21,9 @@ use super::softening;
 use super::warnings::{near_buckling, of_fingers, of_heat, of_segments, of_stress};
 use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
-use crate::refine::carry::carried;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::Mesh;
+use crate::refine::mesh_search::Mesh;
+use crate::refine::transfer::carried;
 use crate::solve::equilibrium::Equilibrium;
 use std::borrow::Cow;
 

@@ -29,9 +29,9 @@ use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};
 use crate::netlist::Diagnostic;
 use crate::options::CompileOptions;
-use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::{self, Mesh, MeshTarget};
+use crate::refine::lowest_modes;
+use crate::refine::mesh_search::{self, Mesh, MeshTarget};
 use crate::solve::eigen::lowest_modes;
 use std::f64::consts::TAU;
 
@@ -89,7 +89,7 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
         let mesh = match given {
             true => still.clone(),
             false => {
-                let counted = counted::choose(&moving.structure, &moving.options, count).map_err(refused)?;
+                let counted = lowest_modes::choose(&moving.structure, &moving.options, count).map_err(refused)?;
                 merged(&still, &counted)
             }
         };
@@ -115,10 +115,10 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
             return Ok((merged(&still, &Mesh { estimated_error, ..still.clone() }), left));
         }
         // the estimates of frequencies have been found too small: a part of the tolerance is theirs, and what is told is the estimate
-        let sharper = tolerances.iter().map(|t| (counted::SAFETY * t).max(MIN_FREQUENCY_ERROR)).collect();
+        let sharper = tolerances.iter().map(|t| (lowest_modes::SAFETY * t).max(MIN_FREQUENCY_ERROR)).collect();
         let aim = MeshTarget { band: 1.01 * modes[highest].frequency, tolerances: sharper, rigid: false };
-        let order = model_order::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
-        let order = order.with_estimate_times(looser * counted::SAFETY);
+        let order = mesh_search::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
+        let order = order.with_estimate_times(looser * lowest_modes::SAFETY);
         let mesh = merged(&still, &order);
         if order.estimated_error.is_some() {
             return Ok((mesh, left));

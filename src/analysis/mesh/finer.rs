@@ -3,8 +3,8 @@
 use super::super::statics::OperatingPoint;
 use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
-use crate::refine::carry::carried;
 use crate::refine::doubling;
+use crate::refine::transfer::carried;
 
 /// Segments of all beams together up to which the side of a limit is sought.
 pub(super) const MAX_NEAR_LIMIT: usize = 5000;

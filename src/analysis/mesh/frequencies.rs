@@ -8,9 +8,9 @@ use super::mode_pairs;
 use crate::compile::CompiledModel;
 use crate::discretize::DiscretizeError;
 use crate::options::{CompileOptions, Junctions};
-use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::Mesh;
+use crate::refine::lowest_modes;
+use crate::refine::mesh_search::Mesh;
 
 /// Modes beyond which none are compared with those of a finer mesh: their own estimates stand.
 const MAX_COMPARED: usize = 64;
@@ -52,7 +52,7 @@ pub(super) fn for_modes(
         compiled.order.clone()
     } else {
         let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
-        counted::choose(&compiled.structure, &compiled.options, count).map_err(detail)?
+        lowest_modes::choose(&compiled.structure, &compiled.options, count).map_err(detail)?
     };
     let mut compared = ComparedMeshes { compiled, count, voltages, meshes: Vec::new() };
     if !loaded {
@@ -65,7 +65,8 @@ pub(super) fn for_modes(
     let (still, _) = equilibrium::order(compiled, voltages, order.segments)?;
     let (own, found) = own_estimate(compiled, still.clone(), count, voltages)?;
     let carried = is_carried(compiled, &found.0, still.estimated_error);
-    let enough = carried && own.estimated_error.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
+    let enough =
+        carried && own.estimated_error.is_some_and(|error| error <= lowest_modes::SAFETY * compiled.options.tol);
     if (enough && !is_fine(compiled)) || count > MAX_COMPARED {
         let (result, curves) = found;
         let faster = result.per_deflection.iter().copied().fold(1.0, f64::max);

@@ -17,8 +17,8 @@ use super::pull_in::{pull_in_outputs, pull_in_warnings};
 use super::{MeshRequest, fitted};
 use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
-use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
+use crate::refine::lowest_modes;
 
 /// What an analysis found.
 #[derive(Debug, Clone)]
@@ -141,7 +141,7 @@ pub(crate) fn judged_modes(
     // a mesh without so many modes says nothing about those that it lacks
     let all = found.frequencies_hz.len() == count;
     let own = worst(found.errors.iter().copied());
-    let sure = own.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
+    let sure = own.is_some_and(|error| error <= lowest_modes::SAFETY * compiled.options.tol);
     let loaded = about_equilibrium(compiled, voltages);
     let moved = if loaded { equilibrium::assess(compiled, voltages)?.1 } else { Some(0.0) };
     let (own, sure) = match own {

@@ -25,9 +25,9 @@ use super::meshed::{chosen, meshed, on};
 use super::refined::refining;
 use crate::compile::CompiledModel;
 use crate::discretize::DiscretizeError;
-use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::{self, Mesh, MeshTarget};
+use crate::refine::lowest_modes;
+use crate::refine::mesh_search::{self, Mesh, MeshTarget};
 use nalgebra::Complex;
 use std::cell::OnceCell;
 use std::f64::consts::TAU;
@@ -114,9 +114,9 @@ fn order(compiled: &CompiledModel, options: &HarmonicOptions) -> Result<Mesh, An
 /// The mesh for the modes up to the end of the band, about the drawing.
 fn for_band(compiled: &CompiledModel, options: &HarmonicOptions) -> Result<Vec<usize>, AnalysisError> {
     let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
-    let tolerances = vec![counted::SAFETY * compiled.options.tol; MAX_MODES];
+    let tolerances = vec![lowest_modes::SAFETY * compiled.options.tol; MAX_MODES];
     let aim = MeshTarget { band: options.to, tolerances, rigid: false };
-    let order = model_order::choose_for(&compiled.structure, &compiled.options, &aim).map_err(detail)?;
+    let order = mesh_search::choose_for(&compiled.structure, &compiled.options, &aim).map_err(detail)?;
     Ok(order.segments.iter().zip(&compiled.order.segments).map(|(a, b)| *a.max(b)).collect())
 }
 

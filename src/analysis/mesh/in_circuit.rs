@@ -11,7 +11,7 @@ use super::warnings::{WARNING, beyond};
 use crate::budget::bounded;
 use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
-use crate::refine::model_order::Mesh;
+use crate::refine::mesh_search::Mesh;
 
 /// Unknowns of the finest mesh that is taken, and of the largest drawing for which one is sought: a circuit is not to wait for it. Meshes
 /// that it is compared with may have twice as many.

@@ -5,7 +5,7 @@ use super::warnings::{WARNING, beyond};
 use crate::compile::CompiledModel;
 use crate::discretize::DiscretizeError;
 use crate::netlist::Diagnostic;
-use crate::refine::model_order::Mesh;
+use crate::refine::mesh_search::Mesh;
 use std::borrow::Cow;
 
 /// True where the number of segments is the user's.

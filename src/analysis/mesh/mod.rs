@@ -44,7 +44,7 @@ use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
 use crate::netlist::Diagnostic;
 use crate::readout::signal::Signal;
-use crate::refine::model_order::Mesh;
+use crate::refine::mesh_search::Mesh;
 pub use equilibrium::static_fitted;
 use excited::motion_warnings;
 use frequencies::for_modes;

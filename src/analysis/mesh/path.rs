@@ -13,7 +13,7 @@ use super::refined::refining;
 use super::warnings::of_stress;
 use crate::compile::CompiledModel;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::Mesh;
+use crate::refine::mesh_search::Mesh;
 use crate::solve::continuation::Branch;
 
 /// Folds that are compared, and bifurcations: the first.

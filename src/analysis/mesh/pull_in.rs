@@ -10,7 +10,7 @@ use super::warnings::of_stress;
 use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
 use crate::refine::doubling::{self, Output};
-use crate::refine::model_order::Mesh;
+use crate::refine::mesh_search::Mesh;
 
 /// Share of the pull-in voltage that stands for the fold itself, next to which nothing has an equilibrium for sure.
 const NEXT: f64 = 0.98;

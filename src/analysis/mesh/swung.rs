@@ -25,7 +25,7 @@ use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
 use crate::readout::signal::Signal;
 use crate::refine::doubling;
-use crate::refine::model_order::Mesh;
+use crate::refine::mesh_search::Mesh;
 
 /// Share of the way by which what a run would do with the stiffness of its end may differ from what it does, for its modes to tell its mesh.
 const STRAIGHT: f64 = 0.03;

@@ -14,7 +14,7 @@ use crate::analysis::mesh::{self, MeshRequest};
 use crate::compile::{CompileOptions, CompiledModel, ParsedStructure, draw};
 use crate::discretize::DiscretizeError;
 use crate::netlist::{NetlistSource, Setting};
-use crate::refine::model_order::Mesh;
+use crate::refine::mesh_search::Mesh;
 use crate::structure::Beam;
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};

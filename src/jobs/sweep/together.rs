@@ -17,7 +17,7 @@ use crate::analysis::modes_side_by_side::BatchModes;
 use crate::analysis::statics_side_by_side::BatchStatics;
 use crate::compile::{CompileOptions, CompiledModel, draw};
 use crate::netlist::NetlistSource;
-use crate::refine::model_order::Mesh;
+use crate::refine::mesh_search::Mesh;
 use std::sync::{Arc, OnceLock};
 
 /// Points that are laid out at once, at most.

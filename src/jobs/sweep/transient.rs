@@ -22,7 +22,7 @@ use crate::analysis::transient::{TransientOptions, transient};
 use crate::compile::{CompileOptions, CompiledModel, draw};
 use crate::netlist::{NetlistSource, Setting};
 use crate::readout::signal::Signal;
-use crate::refine::model_order::Mesh;
+use crate::refine::mesh_search::Mesh;
 use crate::structure::Beam;
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};

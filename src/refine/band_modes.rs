@@ -2,9 +2,9 @@
 //!
 //! Each look starts the iteration of the modes from the shapes of the mesh looked at before, carried over.
 
-use super::aim::MeshTarget;
-use super::carry::carried;
-use super::order_error::{ModeErrors, of_modes};
+use super::mesh_target::MeshTarget;
+use super::mode_errors::{ModeErrors, of_modes};
+use super::transfer::carried;
 use crate::discretize::{Assembly, DiscretizeError, discretize_with};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;

@@ -4,9 +4,9 @@
 //! pivots of K − ω²M (Sylvester), reaches the number asked for. Found by bisection on a first mesh, then [`model_order`] chooses the mesh for that
 //! band, and the band is looked up again on it until the modes asked for lie within.
 
-use super::aim::{Mesh, MeshTarget};
-use super::look::mechanics;
-use super::model_order;
+use super::band_modes::mechanics;
+use super::mesh_search;
+use super::mesh_target::{Mesh, MeshTarget};
 use crate::discretize::{Assembly, DiscretizeError, discretize_with, order};
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::add_inertia;
@@ -39,7 +39,7 @@ pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> 
         let parts = discretize_with(&bare, options, &segments)?;
         let Some(frequency) = highest_of(&parts, count) else {
             let finer: Vec<usize> = segments.iter().map(|&n| options.scheme.segments(2 * n)).collect();
-            if finer == segments || finer.iter().sum::<usize>() > model_order::MAX_SEGMENTS {
+            if finer == segments || finer.iter().sum::<usize>() > mesh_search::MAX_SEGMENTS {
                 break;
             }
             segments = finer;
@@ -47,7 +47,7 @@ pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> 
         };
         let tolerances = vec![SAFETY * options.tol; count];
         let aim = MeshTarget { band: frequency * (1.0 + ABOVE), tolerances, rigid: false };
-        let order = model_order::choose_for(structure, options, &aim)?.with_estimate_times(SAFETY);
+        let order = mesh_search::choose_for(structure, options, &aim)?.with_estimate_times(SAFETY);
         let done = order.estimated_error.is_none() || order.modes_in_band >= count;
         segments.clone_from(&order.segments);
         chosen = Some(order);

@@ -1,11 +1,11 @@
-//! What modes of variants side by side are off by: the estimate of [`super::order_error`] over lanes, about the drawn geometry.
+//! What modes of variants side by side are off by: the estimate of [`super::mode_errors`] over lanes, about the drawn geometry.
 //!
 //! Beams of a variant stand beside those of the others, with the same points; matrices of a segment have no terms between along and across.
 
 // small matrices are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
 
-use super::order_error::{own_stiffness, relative};
+use super::mode_errors::{own_stiffness, relative};
 use super::span::{BeamSpan, spans};
 use crate::discretize::Assembly;
 use crate::multibody::BodyId;

@@ -1,7 +1,7 @@
 //! Model order from a band and a tolerance: the fewest segments for which the estimate holds.
 //!
 //! Starts from the rule of [`order`], computes the modes within the band and their estimated errors
-//! ([`order_error`](super::order_error)), and takes a beam's contribution to fall with the power of its scheme in the number
+//! ([`order_error`](super::mode_errors)), and takes a beam's contribution to fall with the power of its scheme in the number
 //! of its segments. From the fewest segments that the band allows upwards, the beams that gain most per body get one more
 //! until every mode is predicted to hold. The prediction is then computed; what fails is refined, what holds may be coarsened
 //! further. Beams of equal length, section and material get equal numbers, so that symmetric mechanisms stay symmetric.
@@ -16,10 +16,10 @@
 //! Reference: J. O. Dow, "A Unified Approach to the Finite Element Method and Error Analysis Procedures" (1999), for
 //! refinement led by an estimate.
 
-pub use super::aim::{Mesh, MeshTarget};
+use super::band_modes::{MeshModes, mechanics, solve_modes};
 use super::groups::{Groups, MARGIN};
-use super::look::{MeshModes, mechanics, solve_modes};
-use super::order_error::ModeErrors;
+pub use super::mesh_target::{Mesh, MeshTarget};
+use super::mode_errors::ModeErrors;
 use super::rigid_beams::stiffen;
 use crate::discretize::{DiscretizeError, order};
 use crate::options::{CompileOptions, Scheme};
