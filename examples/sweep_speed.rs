@@ -8,8 +8,8 @@
 //! ways; *lanes* is the integration alone, *sweep* has the reading and the estimate too. Their ends are compared bit by bit.
 //! *parts*, on its own: what a point is made of, `part,us`.
 
+use bimorph::analysis::batch_transient;
 use bimorph::analysis::mesh::{MeshRequest, fitted};
-use bimorph::analysis::side_by_side;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::analysis::{modes::modes, statics::static_equilibrium};
 use bimorph::compile::{CompileOptions, CompiledModel, compile, draw};

@@ -2,6 +2,9 @@
 
 pub mod after_contact;
 pub mod backbending;
+pub(crate) mod batch_modes;
+pub(crate) mod batch_statics;
+pub mod batch_transient;
 pub mod chart;
 pub(crate) mod contact_range;
 pub mod continuation;
@@ -15,14 +18,11 @@ mod linear_stress;
 mod loose_parts;
 pub mod mesh;
 pub mod modes;
-pub(crate) mod modes_side_by_side;
 pub mod pull_in;
-mod rotary_left_out;
+mod rotary_inertia_error;
 mod sensitivity;
-pub mod side_by_side;
 mod stability;
 pub mod statics;
-pub(crate) mod statics_side_by_side;
 pub mod step_error;
 pub mod transient;
 mod weak_parts;

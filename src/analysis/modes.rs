@@ -1,7 +1,7 @@
 //! Natural frequencies and shapes about the operating point.
 use super::contact_range::comb_beyond_told;
 use super::loose_parts;
-use super::rotary_left_out;
+use super::rotary_inertia_error;
 use super::sensitivity::LinearizationPoint;
 use super::statics::{NodeMotion, notes_at, operating_point, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
@@ -217,7 +217,7 @@ fn assess(
     found.lambda.truncate(count);
     found.shapes.truncate(count);
     found.residuals.truncate(count);
-    warnings.extend(rotary_left_out::rotary_inertia_note(compiled, &found.shapes));
+    warnings.extend(rotary_inertia_error::rotary_inertia_note(compiled, &found.shapes));
     ModesResult {
         estimated_error: None,
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),

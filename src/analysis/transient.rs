@@ -4,7 +4,7 @@ mod contact_energy;
 mod crossings;
 pub(super) mod error_log;
 pub(super) mod first_step;
-mod folded;
+mod folded_segments;
 pub(super) mod options;
 pub(super) mod record;
 pub(super) mod result;

@@ -19,7 +19,7 @@ mod options;
 mod root;
 mod roots;
 
-use super::{AnalysisError, Watch, rotary_left_out};
+use super::{AnalysisError, Watch, rotary_inertia_error};
 use crate::compile::CompiledModel;
 use exact::ExactResponse;
 use modal::ModalSum;
@@ -115,7 +115,7 @@ pub fn harmonic(
                 &exact.tangent,
                 count.max(if many { 0 } else { inside + 1 }),
             )?;
-            warnings.extend(rotary_left_out::rotary_inertia_note(
+            warnings.extend(rotary_inertia_error::rotary_inertia_note(
                 compiled,
                 &found.shapes[..inside.min(found.shapes.len())],
             ));

@@ -13,10 +13,10 @@ use super::super::statics::{
     OperatingPoint, StaticResult, beam_motions, operating_point, operating_point_near, result_at,
 };
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
-use super::finer::MAX_NEAR_LIMIT;
-use super::hidden::{Hidden, hidden};
-use super::meshed::{chosen, meshed, on};
+use super::doubled_mesh::MAX_NEAR_LIMIT;
+use super::hidden_instability::{Hidden, hidden};
 use super::refined::Refinement;
+use super::remeshed::{chosen, meshed, on};
 use super::softening;
 use super::warnings::{near_buckling, of_fingers, of_heat, of_segments, of_stress};
 use crate::compile::CompiledModel;

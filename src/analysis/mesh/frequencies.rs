@@ -3,8 +3,8 @@
 use super::super::modes::{ModesResult, about_equilibrium, modes_with_curves};
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::equilibrium;
-use super::meshed::{chosen, meshed, on};
 use super::mode_pairs;
+use super::remeshed::{chosen, meshed, on};
 use crate::compile::CompiledModel;
 use crate::discretize::DiscretizeError;
 use crate::options::{CompileOptions, Junctions};

@@ -5,7 +5,7 @@ use super::super::AnalysisError;
 use super::super::modes::{higher, lowest};
 use super::equilibrium;
 use super::frequencies::for_modes;
-use super::meshed::{chosen, remeshed};
+use super::remeshed::{chosen, remeshed};
 use super::section_inertia::with_section_inertia;
 use super::warnings::{WARNING, beyond};
 use crate::budget::bounded;

@@ -5,36 +5,36 @@
 //! |---|---|---|
 //! | static | the deformed state, compared with that of twice the segments | `equilibrium` |
 //! | modes | the highest mode asked for; about a loaded state, that state and its frequencies too | `frequencies` |
-//! | strains that stay | those of heated beams that yield, compared with those of twice the segments | `yielded` |
+//! | strains that stay | those of heated beams that yield, compared with those of twice the segments | `permanent_strain` |
 //! | pull-in | both voltages, compared with those of twice the segments | `pull_in` |
 //! | path | its folds, bifurcations and end, compared with those of twice the segments | `path` |
 //! | frequency response | the response itself and the modes within the band, compared with those of twice the segments | `in_band` |
-//! | transient | the states it starts from and goes to, and the modes that the difference of the two excites | `excited` |
-//! | transient whose stiffness changes on the way, or with a part in none of the modes | the run itself, compared with that of half the segments | `swung` |
-//! | transient that closes a gap | the run up to its first contact, compared with that of half the segments | `swung` |
+//! | transient | the states it starts from and goes to, and the modes that the difference of the two excites | `excited_modes` |
+//! | transient whose stiffness changes on the way, or with a part in none of the modes | the run itself, compared with that of half the segments | `large_motion` |
+//! | transient that closes a gap | the run up to its first contact, compared with that of half the segments | `large_motion` |
 //!
 //! Who gives a number of segments gets them, and the estimate of their error. Who gives a band gets the mesh for that band at
 //! least. The estimate is in [`CompiledModel::order`]; where it is missing or beyond the tolerance, a warning is added.
 
+mod doubled_mesh;
 mod equilibrium;
-mod excited;
-mod finer;
+mod excited_modes;
 mod frequencies;
-pub(crate) mod given;
-mod hidden;
+mod hidden_instability;
 mod in_band;
 mod in_circuit;
-mod meshed;
+mod large_motion;
 mod mode_pairs;
+pub(crate) mod on_given_mesh;
 mod path;
+mod permanent_strain;
 mod pull_in;
 mod refined;
+mod remeshed;
 mod section_inertia;
-mod seen;
+mod signal_amplitudes;
 mod softening;
-mod swung;
 mod warnings;
-mod yielded;
 
 use super::linear_stress::left_out;
 use super::statics::{OperatingPoint, operating_point};
@@ -46,22 +46,22 @@ use crate::netlist::Diagnostic;
 use crate::readout::signal::Signal;
 use crate::refine::mesh_search::Mesh;
 pub use equilibrium::static_fitted;
-use excited::motion_warnings;
+use excited_modes::motion_warnings;
 use frequencies::for_modes;
 pub use frequencies::modes_fitted;
 pub use in_band::harmonic_fitted;
-use meshed::on;
 pub use path::path_fitted;
 use pull_in::for_pull_in;
 pub use pull_in::pull_in_fitted;
+use remeshed::on;
 use section_inertia::with_section_inertia;
 use warnings::{of_fingers, of_heat, of_stress};
 
 pub(crate) use equilibrium::{operating_point_warnings, transient_warnings};
 pub use in_circuit::{in_circuit, twice};
+pub use permanent_strain::static_backbent;
 pub(crate) use warnings::WARNING;
 pub use warnings::{beyond, warnings};
-pub use yielded::static_backbent;
 
 /// What a mesh is for.
 #[derive(Debug, Clone, Copy)]
@@ -164,9 +164,9 @@ fn left_out_in_time(moving: &CompiledModel, start: Option<&CompiledModel>, volta
 /// See [`fitted`].
 pub fn order_in_time(moving: &CompiledModel, options: &TransientOptions<'_>) -> Result<Mesh, AnalysisError> {
     // the modes about a closed gap are those of parts that are pressed together, and say nothing of the way there
-    let (order, left) = match swung::ends_in_contact(moving, options) {
+    let (order, left) = match large_motion::ends_in_contact(moving, options) {
         true => (Mesh { estimated_error: Some(0.0), ..moving.order.clone() }, 0.0),
-        false => excited::order(moving, options)?,
+        false => excited_modes::order(moving, options)?,
     };
-    swung::order(moving, options, order, left)
+    large_motion::order(moving, options, order, left)
 }

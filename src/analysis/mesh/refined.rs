@@ -5,8 +5,8 @@
 //! bend too far where the search ended.
 
 use super::super::AnalysisError;
-use super::finer::MAX_NEAR_LIMIT;
-use super::meshed::{chosen, meshed};
+use super::doubled_mesh::MAX_NEAR_LIMIT;
+use super::remeshed::{chosen, meshed};
 use crate::compile::CompiledModel;
 use crate::refine::doubling::doubled;
 use std::borrow::Cow;

@@ -1,7 +1,7 @@
 //! What fitting a model to a request warns of.
 
 use super::super::contact_range::comb_beyond_told;
-use super::super::rotary_left_out;
+use super::super::rotary_inertia_error;
 use super::super::statics::{OperatingPoint, too_hot};
 use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
@@ -77,7 +77,7 @@ pub(super) fn of_steps(step: f64, (frequency, share): (f64, f64)) -> Diagnostic 
 
 /// Where the rotary inertia that wide beams lack makes a run's waveform this far off.
 pub(super) fn of_rotary(compiled: &CompiledModel, error: f64) -> Option<Diagnostic> {
-    if error <= compiled.options.tol.max(rotary_left_out::WORTH) {
+    if error <= compiled.options.tol.max(rotary_inertia_error::WORTH) {
         return None;
     }
     let message = format!(

@@ -7,7 +7,7 @@ use super::super::{AnalysisError, Watch};
 use super::contact_energy::ContactEnergy;
 use super::crossings::Crossings;
 use super::error_log::{ErrorLog, SignalLoss};
-use super::folded;
+use super::folded_segments;
 use super::options::{TransientOptions, check};
 use super::result::{Counters, TransientResult};
 use super::samples::SampleRecorder;
@@ -101,7 +101,7 @@ pub(in crate::analysis) fn record(
     let see = errors.as_mut().map(|see| see as SeeError<'_>);
     let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe, see).map_err(|error| match error {
         AnalysisError::StepFailed { t, dt, detail } => {
-            AnalysisError::StepFailed { t, dt, detail: detail + &folded::addition(compiled, &motion.q) }
+            AnalysisError::StepFailed { t, dt, detail: detail + &folded_segments::addition(compiled, &motion.q) }
         }
         other => other,
     })?;

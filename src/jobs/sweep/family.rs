@@ -9,7 +9,7 @@
 use super::axis::at;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::AnalysisError;
-use crate::analysis::mesh::given::{Assessment, assess};
+use crate::analysis::mesh::on_given_mesh::{Assessment, assess};
 use crate::analysis::mesh::{self, MeshRequest};
 use crate::compile::{CompileOptions, CompiledModel, ParsedStructure, draw};
 use crate::discretize::DiscretizeError;

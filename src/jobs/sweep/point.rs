@@ -7,7 +7,7 @@ use super::family::SharedMeshes;
 use super::journal::JournalRow;
 use super::means::PointBudget;
 use super::spec::{SweepAnalysis, SweepSpec};
-use crate::analysis::mesh::given::{AnalysisResult, Assessment, assess, refine_and_assess};
+use crate::analysis::mesh::on_given_mesh::{AnalysisResult, Assessment, assess, refine_and_assess};
 use crate::analysis::mesh::{self, MeshRequest};
 use crate::analysis::{AnalysisError, statics};
 use crate::budget;

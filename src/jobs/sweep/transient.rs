@@ -15,8 +15,8 @@ use super::point::{PointOutcome, PointResults, PointValue, brief};
 use super::samples::SampleGenerator;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::AnalysisError;
+use crate::analysis::batch_transient::{self, RunEnd};
 use crate::analysis::mesh;
-use crate::analysis::side_by_side::{self, RunEnd};
 use crate::analysis::step_error;
 use crate::analysis::transient::{TransientOptions, transient};
 use crate::compile::{CompileOptions, CompiledModel, draw};
@@ -99,7 +99,7 @@ impl<'a> TransientSweep<'a> {
         let side_by_side = same.then(|| {
             let options = TransientOptions { tol, ..self.transient(&[]) };
             means.guarded(|| {
-                side_by_side::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
+                batch_transient::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
             })
         });
         let mut ends: Vec<Option<RunEnd>> = vec![None; numbers.len()];

@@ -4,7 +4,7 @@ use super::super::backbending::{BackbentMechanism, Strains, backbend};
 use super::super::statics::StaticResult;
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::equilibrium::{SMALL, static_fitted};
-use super::meshed::{chosen, meshed, remeshed, warn_of_mesh};
+use super::remeshed::{chosen, meshed, remeshed, warn_of_mesh};
 use crate::compile::CompiledModel;
 use crate::options::CompileOptions;
 use crate::refine::doubling::{self, Output};

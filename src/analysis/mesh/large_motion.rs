@@ -19,8 +19,8 @@ use super::super::integrator::Integrator;
 use super::super::statics::{OperatingPoint, operating_point};
 use super::super::step_error;
 use super::super::transient::{TransientOptions, TransientResult, Until, transient};
-use super::excited;
-use super::meshed::{chosen, meshed};
+use super::excited_modes;
+use super::remeshed::{chosen, meshed};
 use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
 use crate::readout::signal::Signal;
@@ -170,10 +170,10 @@ fn bends(moving: &CompiledModel, options: &TransientOptions<'_>, order: &Mesh) -
     };
     // without an equilibrium to go to it goes far
     let Ok(to) = operating_point(&model, &options.voltages) else { return Ok(true) };
-    let Some(straight) = excited::linear_way(&model, &from, &to) else { return Ok(true) };
+    let Some(straight) = excited_modes::linear_way(&model, &from, &to) else { return Ok(true) };
     let way: Vec<Pose> = from.q.iter().zip(&to.q).map(|(a, b)| a - b).collect();
     let off: Vec<Pose> = way.iter().zip(&straight).map(|(a, b)| a - b).collect();
-    Ok(excited::reach(&model, &off) > STRAIGHT * excited::reach(&model, &way))
+    Ok(excited_modes::reach(&model, &off) > STRAIGHT * excited_modes::reach(&model, &way))
 }
 
 /// The samples of a run on a mesh, as far as it came; none where it failed.

@@ -11,7 +11,7 @@
 
 use super::super::PortVoltages;
 use super::super::statics::{OperatingPoint, operating_point_near};
-use super::finer::{Finer, MAX_NEAR_LIMIT, finer};
+use super::doubled_mesh::{Finer, MAX_NEAR_LIMIT, finer};
 use crate::compile::CompiledModel;
 use crate::domains::BeamLine;
 use crate::multibody::BlockMatrix;

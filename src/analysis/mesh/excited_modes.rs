@@ -13,13 +13,13 @@
 
 use super::super::loose_parts;
 use super::super::modes::modes;
-use super::super::rotary_left_out;
+use super::super::rotary_inertia_error;
 use super::super::statics::{OperatingPoint, operating_point};
 use super::super::transient::TransientOptions;
 use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium;
-use super::meshed::{chosen, meshed};
-use super::seen::SignalAmplitudes;
+use super::remeshed::{chosen, meshed};
+use super::signal_amplitudes::SignalAmplitudes;
 use super::warnings::{of_rotary, of_steps};
 use crate::compile::CompiledModel;
 use crate::discretize::DiscretizeError;
@@ -260,7 +260,7 @@ fn excited(
                 frequency: omega / TAU,
                 amplitude: (share.abs() * reach(&model, x) / size / lags(omega)).min(1.0),
                 decay: damping(&system.model, x),
-                rotary: rotary_left_out::too_high(&model, x),
+                rotary: rotary_inertia_error::too_high(&model, x),
             }
         })
         .collect();
