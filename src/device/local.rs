@@ -5,9 +5,9 @@
 //! and the same bits, whatever was asked in between.
 
 use super::contract::refused;
-use super::look;
-use super::saved;
+use super::quantities;
 use super::session::DeviceSession;
+use super::snapshot;
 use super::{Description, Device, DeviceError, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
 use crate::compile::CompiledModel;
 use crate::netlist::Diagnostic;
@@ -81,7 +81,7 @@ impl Device for LocalDevice {
     }
 
     fn names(&self) -> Vec<String> {
-        look::names(&self.compiled)
+        quantities::names(&self.compiled)
     }
 
     fn look(&mut self, token: Token, name: &str) -> Result<f64, DeviceError> {
@@ -101,9 +101,9 @@ impl Device for LocalDevice {
         match only {
             Some(tokens) => {
                 let alone = session.states.only(tokens).map_err(DeviceError::UnknownToken)?;
-                Ok(saved::write(&session.opened, &alone))
+                Ok(snapshot::write(&session.opened, &alone))
             }
-            None => Ok(saved::write(&session.opened, &session.states)),
+            None => Ok(snapshot::write(&session.opened, &session.states)),
         }
     }
 
@@ -112,7 +112,7 @@ impl Device for LocalDevice {
     }
 
     fn load(&mut self, bytes: &[u8]) -> Result<Description, DeviceError> {
-        let (opened, states) = saved::read(bytes)?;
+        let (opened, states) = snapshot::read(bytes)?;
         let (mut session, description) = DeviceSession::open(&self.compiled, &opened)?;
         if !states.in_order().all(|(_, _, state)| session.fits(state)) {
             return Err(refused("states of this model", "states of another one"));

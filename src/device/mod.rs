@@ -14,27 +14,27 @@
 //! voltage, and it answers with a motion or a temperature in the place of a current; it has no charge. What is said of
 //! voltages and currents here holds for what is given and answered.
 
+mod accepted_warnings;
 pub mod agitation;
-mod answer;
 mod contact_steps;
 mod contract;
 mod growth;
 mod half_cycles;
 mod higher_modes;
 pub mod local;
-pub mod look;
 mod noise;
-mod ringing;
+mod output_gradient;
+mod phase_error;
+pub mod quantities;
+mod reply;
 pub mod run;
-mod saved;
 pub mod scale;
-mod seen;
 mod session;
-pub mod shown;
 pub(crate) mod small_signal;
+mod snapshot;
 pub mod states;
+pub mod step_history;
 mod trial;
-mod warned;
 
 pub use crate::readout::{PortKind, ports};
 pub use contract::{

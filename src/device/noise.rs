@@ -13,7 +13,7 @@
 //! An answer is that with nothing else changed: the current of a port whose voltage is held, the motion of one whose force
 //! is. Left out: fluctuations of temperature, and what Johnson's noise heats.
 
-use super::seen::{OutputGradient, surroundings};
+use super::output_gradient::{OutputGradient, surroundings};
 use super::session::DeviceSession;
 use super::states::Snapshot;
 use super::{DeviceError, Token};

@@ -3,8 +3,8 @@
 use super::agitation::ThermalForce;
 use super::contact_steps::ContactSteps;
 use super::growth::{Difference, Growth};
-use super::ringing::PhaseErrorMonitor;
-use super::seen::{OutputGradient, surroundings};
+use super::output_gradient::{OutputGradient, surroundings};
+use super::phase_error::PhaseErrorMonitor;
 use super::states::{Snapshot, States};
 use super::{Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, Token, Trial};
 use crate::analysis::transient::first_step;

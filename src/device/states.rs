@@ -1,6 +1,6 @@
 //! The states behind tokens: immutable, few, found by a hash of the request that made them.
 
-use super::shown::StepHistory;
+use super::step_history::StepHistory;
 use super::{Mode, Token, Trial};
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;

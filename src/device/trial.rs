@@ -2,9 +2,9 @@
 //! state.
 
 use super::agitation::ThermalForce;
-use super::answer::STEP_SHARE;
 use super::contact_steps::{ContactSteps, MAX_ERROR, near};
 use super::growth::{Bound, rate_along};
+use super::reply::STEP_SHARE;
 use super::session::DeviceSession;
 use super::states::Snapshot;
 use super::{Status, Trial, TrialReply};

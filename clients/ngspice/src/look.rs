@@ -1,7 +1,7 @@
 //! What an instance shows when it is looked at: numbers of the instance and its ports, its monitors, and any signal of its netlist.
 
 use crate::instance::Instance;
-use bimorph::device::{PortKind, look::WHOLE};
+use bimorph::device::{PortKind, quantities::WHOLE};
 
 /// Numbers of an instance, by name.
 const NUMBERS: [&str; 4] = ["unknowns", "points", "trials", "refused"];

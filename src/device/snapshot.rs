@@ -5,8 +5,8 @@
 //! model's.
 
 use super::contract::{Agitation, DeviceError, OpenRequest, Token, refused};
-use super::shown::StepHistory;
 use super::states::{Snapshot, States};
+use super::step_history::StepHistory;
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;
 
@@ -201,7 +201,7 @@ mod tests {
                 elapsed: 3e-6,
                 next_step: f64::INFINITY,
                 shown: StepHistory::start(vec![1.0, 2.0])
-                    .step(1e-6, vec![1.5, 2.5], 1e-3, |_| 1e-9, |_| crate::device::shown::SteppingRule::Line)
+                    .step(1e-6, vec![1.5, 2.5], 1e-3, |_| 1e-9, |_| crate::device::step_history::SteppingRule::Line)
                     .0,
                 carried,
             };

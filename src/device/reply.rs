@@ -2,8 +2,8 @@
 //! circuit may take next.
 
 use super::session::DeviceSession;
-use super::shown::{StepHistory, SteppingRule};
 use super::states::Snapshot;
+use super::step_history::{StepHistory, SteppingRule};
 use super::{Trial, TrialReply};
 use crate::compile::CompiledModel;
 use crate::domains::System;

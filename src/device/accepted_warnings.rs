@@ -3,7 +3,7 @@
 
 use super::growth::held_by_charge;
 use super::higher_modes::Split;
-use super::ringing::AcceptedState;
+use super::phase_error::AcceptedState;
 use super::session::DeviceSession;
 use super::states::Snapshot;
 use crate::analysis::mesh::{WARNING, operating_point_warnings, transient_warnings};
