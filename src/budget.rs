@@ -13,13 +13,13 @@
 mod allowance;
 mod bounded;
 mod clock;
-mod purse;
+mod owner_quota;
 mod stopped;
 
 pub use allowance::Allowance;
 pub use bounded::bounded;
 pub(crate) use clock::thread_cpu;
-pub use purse::{OwnerQuota, WINDOW};
+pub use owner_quota::{OwnerQuota, WINDOW};
 pub use stopped::Stopped;
 
 use clock::{CHECKS_PER_LOOK, CPU_INTERVAL};

@@ -23,7 +23,7 @@ pub mod discretize;
 pub mod domains;
 pub mod equations;
 pub mod export;
-pub mod front;
+pub mod input;
 pub mod jobs;
 pub mod layout;
 pub mod multibody;

@@ -3,7 +3,7 @@
 //! Drawings are masks of the examples in both formats, without the labels that carry their netlist in half of the cases, changed at random:
 //! bytes exchanged, stretches lost, doubled and mixed, numbers made extreme. A few run with every test; `make fuzz` runs them for minutes.
 
-use bimorph::front::from_bytes;
+use bimorph::input::from_bytes;
 use bimorph::layout::mask::mask;
 use bimorph::layout::{LayoutFormat, Process};
 use bimorph::netlist::{Bundle, load};

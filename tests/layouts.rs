@@ -3,7 +3,7 @@
 
 use bimorph::analysis::modes::modes;
 use bimorph::compile::{CompileOptions, compile};
-use bimorph::front::from_bytes;
+use bimorph::input::from_bytes;
 use bimorph::layout::drawing::Polygon;
 use bimorph::layout::mask::{MaskError, mask};
 use bimorph::layout::{self, LayoutFormat, Process, convert};

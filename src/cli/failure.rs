@@ -7,7 +7,7 @@ use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
 use bimorph::cosim::around::DeckError;
 use bimorph::export::ExportError;
-use bimorph::front::FrontError;
+use bimorph::input::FrontError;
 use bimorph::jobs::sweep::SweepError;
 use bimorph::jobs::sweep::journal::JournalError;
 use bimorph::layout::LayoutError;

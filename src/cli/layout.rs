@@ -42,7 +42,7 @@ impl LayoutCommand {
         output::check_folder(&self.out)?;
         let process = match self.model.asked().process()? {
             Some(process) => process,
-            None => Process::builtin(DEFAULT_PROCESS).map_err(bimorph::front::FrontError::from)?,
+            None => Process::builtin(DEFAULT_PROCESS).map_err(bimorph::input::FrontError::from)?,
         };
         let drawn = self.model.draw()?;
         let mask = mask(&drawn.structure, &process, format, &name)?;

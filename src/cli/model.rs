@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::options::Chosen;
 use super::{interrupt, progress, value};
 use bimorph::compile::{CompileOptions, CompiledModel, Junctions, ParsedStructure, compile, draw};
-use bimorph::front::{self, InputBundle, LayoutChoice};
+use bimorph::input::{self, InputBundle, LayoutChoice};
 use bimorph::layout::LayoutFormat;
 use bimorph::layout::drawing::FlatLayout;
 use bimorph::netlist::{Bundle, Diagnostic, DroppedInclude, Setting};
@@ -58,7 +58,7 @@ impl LayoutArgs {
 pub(crate) fn front_telling(path: &Path, asked: &LayoutChoice) -> Result<(FlatLayout, InputBundle), Failure> {
     interrupt::listen();
     let bar = progress::bar("reading");
-    let read = front::drawing_and_source(path, asked, &mut progress::watch(&bar, ""));
+    let read = input::drawing_and_source(path, asked, &mut progress::watch(&bar, ""));
     bar.finish_and_clear();
     Ok(read?)
 }
@@ -73,7 +73,7 @@ impl ModelArgs {
         interrupt::listen();
         let warn = &mut |dropped: DroppedInclude| eprintln!("warning: {dropped}");
         let bar = progress::bar("reading");
-        let read = front::read(&self.file, &self.include, asked, warn, &mut progress::watch(&bar, ""));
+        let read = input::read(&self.file, &self.include, asked, warn, &mut progress::watch(&bar, ""));
         bar.finish_and_clear();
         let source = read?;
         if let Some(converted) = &source.converted {

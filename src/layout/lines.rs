@@ -1,10 +1,10 @@
 //! A mechanism as netlist lines without loops, parameters and subnets: what a drawing carries as labels.
 //!
 //! A line is one element with its full name ("b1.hot") and all numbers in SI; a process is a material with its thickness.
-//! [`of_structure`] makes lines of a [`Structure`](crate::structure::Structure), [`text`] a netlist of lines, in which
+//! [`from_structure`] makes lines of a [`Structure`](crate::structure::Structure), [`text`] a netlist of lines, in which
 //! names with dots become subnets again; a line's own text is what stands in a label, and [`ElementLine::parse`] reads it back.
 
-pub(crate) mod of_structure;
+pub(crate) mod from_structure;
 pub(crate) mod text;
 
 use std::fmt;

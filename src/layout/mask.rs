@@ -8,7 +8,7 @@ use super::chords::Chords;
 use super::crossings::bounded;
 use super::draw::{self, Figure, Role, is_beam};
 use super::drawing::{FlatLayout, LARGEST_COORDINATE};
-use super::lines::{ElementLines, of_structure};
+use super::lines::{ElementLines, from_structure};
 use super::process::{Process, canonical};
 use super::read::LayoutFormat;
 use super::regions;
@@ -90,7 +90,7 @@ pub enum MaskError {
 /// See [`MaskError`].
 pub fn mask(structure: &Structure, process: &Process, format: LayoutFormat, name: &str) -> Result<Mask, MaskError> {
     let structure = &in_words(structure);
-    let (lines, left) = of_structure::lines(structure);
+    let (lines, left) = from_structure::lines(structure);
     if lines.elements.len() > MAX_PARTS {
         return Err(MaskError::Large { count: lines.elements.len() });
     }

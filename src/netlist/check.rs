@@ -1,8 +1,8 @@
 //! What can be said about a finished drawing before any physics: loose nodes, loose parts, floating potentials, and
 //! one message for each thing that the planar model leaves out.
 
+use super::diagnostic_sink::DiagnosticSink;
 use super::drawing::{Fact, StructureBuilder};
-use super::sink::DiagnosticSink;
 use super::suggest::did_you_mean;
 use super::value::short;
 use crate::domains::BeamRows;

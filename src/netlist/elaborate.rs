@@ -1,11 +1,11 @@
 //! Runs a resolved program: definitions, loops and subnets become elements of a drawing.
 
 use super::ast::{Def, Expr, Name, PI_SLOT, Program, Slot, Statement};
+use super::diagnostic_sink::{DiagnosticSink, Reported};
 use super::drawing::StructureBuilder;
 use super::elements::Argument;
 use super::rotation::Rotation;
 use super::setting::Setting;
-use super::sink::{DiagnosticSink, Reported};
 use super::source::TextSpan;
 use super::value::{LayerValues, Value, short};
 use crate::structure::NodeId;

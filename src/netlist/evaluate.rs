@@ -1,9 +1,9 @@
 //! Values of expressions in the frame at hand.
 
 use super::ast::{Binary, Expr, ExprKind};
+use super::diagnostic_sink::Reported;
 use super::elaborate::Elaborator;
 use super::functions;
-use super::sink::Reported;
 use super::source::TextSpan;
 use super::value::Value;
 

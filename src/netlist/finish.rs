@@ -2,10 +2,10 @@
 
 use super::bundle::Bundle;
 use super::diagnostic::Diagnostics;
+use super::diagnostic_sink::DiagnosticSink;
 use super::drawing::StructureBuilder;
-use super::front::LoadedNetlist;
+use super::front_end::LoadedNetlist;
 use super::setting::Setting;
-use super::sink::DiagnosticSink;
 use super::{check, elements, place};
 use std::sync::Arc;
 

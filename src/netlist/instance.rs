@@ -1,11 +1,11 @@
 //! Elements and subnet instances: parameters evaluated, layers looked up, frames opened.
 
 use super::ast::{ElementStatement, LayerDefinition, LayerRef};
+use super::diagnostic_sink::Reported;
 use super::drawing::{ELEMENT_BYTES, Fact, NAME_COPIES};
 use super::elaborate::{Elaborator, EvaluationScope};
 use super::elements::{self, Argument, Arguments, ElementInstance};
 use super::rotation::Rotation;
-use super::sink::Reported;
 use super::source::TextSpan;
 use super::value::{LayerValues, Value};
 use crate::budget;

@@ -1,6 +1,6 @@
 //! Text → tokens. The lexical rules are SUGAR 2's: free form, `%` comments, numbers with one glued suffix letter.
 
-use super::sink::DiagnosticSink;
+use super::diagnostic_sink::DiagnosticSink;
 use super::source::TextSpan;
 use super::token::{Lexeme, TokenKind};
 use crate::budget;

@@ -2,9 +2,9 @@
 
 use super::ast::{Ident, Program, Statement};
 use super::bundle::{Bundle, DEEPEST_INCLUDE, MAX_INCLUDES};
+use super::diagnostic_sink::{DiagnosticSink, Reported};
 use super::foreign;
 use super::lexer;
-use super::sink::{DiagnosticSink, Reported};
 use super::source::TextSpan;
 use super::token::{Lexeme, TokenKind};
 use std::collections::HashMap;

@@ -4,8 +4,8 @@
 //! other nodes along. A part that is not reached starts at the origin again. Nothing forces a loop of elements to
 //! close: stiffness comes from lengths and angles, not from positions, so a loop that stays open is worth a warning.
 
+use super::diagnostic_sink::DiagnosticSink;
 use super::drawing::StructureBuilder;
-use super::sink::DiagnosticSink;
 use super::value::short;
 
 /// A loop is open when it misses by more than this part of its largest element [1].

@@ -3,7 +3,7 @@
 use super::bundle::Bundle;
 use super::diagnostic::Diagnostics;
 use super::foreign;
-use super::front::{FrontEnd, LoadedNetlist};
+use super::front_end::{FrontEnd, LoadedNetlist};
 use super::setting::Setting;
 use super::sugar2::Sugar2;
 

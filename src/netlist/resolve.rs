@@ -6,9 +6,9 @@
 use super::ast::{
     Def, ElementStatement, Expr, ExprKind, Ident, LayerDefinition, LayerRef, Name, Program, Slot, Statement,
 };
+use super::diagnostic_sink::DiagnosticSink;
 use super::elements;
 use super::functions;
-use super::sink::DiagnosticSink;
 use super::suggest::{MAX_LISTED, did_you_mean};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

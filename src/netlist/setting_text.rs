@@ -3,10 +3,10 @@
 use super::ast::Statement;
 use super::bundle::Bundle;
 use super::diagnostic::Diagnostics;
+use super::diagnostic_sink::DiagnosticSink;
 use super::parser;
 use super::read::load;
 use super::setting::Setting;
-use super::sink::DiagnosticSink;
 use super::source::TextSpan;
 use std::sync::Arc;
 

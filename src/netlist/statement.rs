@@ -4,9 +4,9 @@ use super::ast::{
     Def, ElementStatement, Expr, ExprKind, Formal, Ident, LayerDefinition, LayerRef, Name, Slot, Statement,
     SubnetDefinition,
 };
+use super::diagnostic_sink::Reported;
 use super::elements;
 use super::parser::{Parsed, Parser};
-use super::sink::Reported;
 use super::source::TextSpan;
 use super::token::{Lexeme, TokenKind};
 use std::collections::HashSet;

@@ -3,11 +3,11 @@
 use super::ast::{Program, Statement};
 use super::bundle::Bundle;
 use super::diagnostic::Diagnostics;
+use super::diagnostic_sink::DiagnosticSink;
 use super::elaborate::Elaborator;
 use super::finish::finish;
-use super::front::{FrontEnd, LoadedNetlist};
+use super::front_end::{FrontEnd, LoadedNetlist};
 use super::setting::Setting;
-use super::sink::DiagnosticSink;
 use super::source::TextSpan;
 use super::suggest::MAX_LISTED;
 use super::{parser, resolve, suggest};

@@ -1,7 +1,7 @@
 //! Messages about a layout name layer and place in the drawing, never a line of the netlist that was made of it; a body that may be held by
 //! mistake is told of.
 
-use bimorph::front::from_bytes;
+use bimorph::input::from_bytes;
 use bimorph::netlist::load;
 
 /// A body of 20 µm by 20 µm about the origin on four legs, 15 µm by 0.5 µm, to pads of 5 µm by 5 µm; units of 10 nm.

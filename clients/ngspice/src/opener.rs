@@ -6,7 +6,7 @@ use bimorph::analysis::{AnalysisError, mesh};
 use bimorph::compile::{CompileError, CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError};
-use bimorph::front::{self, FrontError, LayoutChoice};
+use bimorph::input::{self, FrontError, LayoutChoice};
 use bimorph::layout::LayoutError;
 use bimorph::layout::convert::ConvertError;
 use bimorph::netlist::{self, Bundle};
@@ -183,7 +183,7 @@ fn read(file: &str, folders: &[PathBuf], directory: Option<&Path>) -> Result<Bun
         tried: candidates.iter().map(|p| format!("\"{}\"", p.display())).collect::<Vec<_>>().join(", "),
         source,
     };
-    match front::read(&path, &[], &LayoutChoice::default(), &mut |_| (), &mut |_| true) {
+    match input::read(&path, &[], &LayoutChoice::default(), &mut |_| (), &mut |_| true) {
         Ok(source) => Ok(source.bundle),
         Err(FrontError::Read { source, .. }) => Err(unread(source)),
         Err(FrontError::Convert(ConvertError::Layout(LayoutError::Read { reason, .. }))) => {

@@ -3,6 +3,7 @@
 use super::anchors::{self, AnchorRule};
 use super::combs::{self, Finger};
 use super::error::{ExtractError, MAX_POINTS};
+use super::extraction_sink::ExtractionSink;
 use super::gaps::{self, Pull};
 use super::holes::{self, Hole};
 use super::joints;
@@ -11,7 +12,6 @@ use super::medial::Medial;
 use super::model::PartModel;
 use super::part::{AxisAnalysis, Part};
 use super::perforated::perforated;
-use super::sink::ExtractionSink;
 use super::skeleton::Skeleton;
 use super::snap;
 use super::{ExtractedFacing, Extraction, LayerResult, Plates, UnmodelledArea};

@@ -17,7 +17,8 @@ mod combs;
 mod conductors;
 mod cut;
 mod error;
-mod found;
+mod extraction;
+mod extraction_sink;
 mod gaps;
 mod holes;
 mod identifier;
@@ -36,14 +37,13 @@ mod part;
 mod perforated;
 mod repeats;
 mod rows;
-mod sink;
 mod skeleton;
 mod snap;
 mod strips;
 mod taps;
 
 pub use error::{ExtractError, MAX_POINTS};
-pub use found::{
+pub use extraction::{
     Arc, ExtractedBeam, ExtractedBody, ExtractedComb, ExtractedFacing, ExtractedNode, ExtractedPad, ExtractedRoot,
     Extraction, LayerResult, Net, Plates, UnmodelledArea,
 };

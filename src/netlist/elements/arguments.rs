@@ -1,9 +1,9 @@
 //! The parameters of an element: given in its list, or taken from its layer.
 
+use super::super::diagnostic_sink::{DiagnosticSink, Reported};
 use super::super::drawing::StructureBuilder;
-use super::super::front::ReadFunction;
+use super::super::front_end::ReadFunction;
 use super::super::rotation::Rotation;
-use super::super::sink::{DiagnosticSink, Reported};
 use super::super::source::TextSpan;
 use super::super::value::{LayerValues, Value, short};
 use super::meaning::meaning;

@@ -3,8 +3,8 @@
 //! A negative length turns its arm round. What an arm has across the drawing plane is left out: it shifts the member to another
 //! height and nothing in the plane.
 
+use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
-use super::super::sink::Reported;
 use super::arguments::ElementSite;
 use crate::structure::{Link, NodeId};
 

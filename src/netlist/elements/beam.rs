@@ -1,7 +1,7 @@
 //! Straight beams: beam2d, beam3d and its kin, and beams that conduct.
 
+use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
-use super::super::sink::Reported;
 use super::arguments::ElementSite;
 use crate::structure::{Beam, Heater, Load, NodeId, Resistor, Yield};
 

@@ -3,8 +3,8 @@
 //! The model itself knows resistors and fixed voltages. The others are kept as drawn, for a deck around the device, and whoever reads
 //! the netlist for another purpose is told that they are left out.
 
+use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
-use super::super::sink::Reported;
 use super::super::value::Value;
 use super::arguments::ElementSite;
 use crate::structure::{CircuitElement, CircuitKind, Port, Resistor, VoltageSource, Wire};

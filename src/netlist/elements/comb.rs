@@ -1,6 +1,6 @@
 //! Comb drives: SUGAR's comb2d at a fixed voltage, and comb2de between two electrical nodes.
 
-use super::super::sink::Reported;
+use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
 use crate::structure::{Comb, GapVoltage};
 

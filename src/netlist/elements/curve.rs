@@ -8,8 +8,8 @@
 //! These are the positions of Clark's models for SUGAR (2001), whose semicircularbeam is condensed from 30 chords. An arc has as
 //! many here, and more where they would turn by more than [`TURN`]: chords that turn by δ are stiffer than the arc by some δ²/6.
 
+use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
-use super::super::sink::Reported;
 use super::super::value::short;
 use super::arguments::ElementSite;
 use crate::structure::{Beam, NodeId};

@@ -1,7 +1,7 @@
 //! Electrostatic gaps between facing beams (SUGAR's gap2d family) and between lumped plates.
 
+use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
-use super::super::sink::Reported;
 use super::super::value::short;
 use super::arguments::ElementSite;
 use crate::structure::{BeamGap, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, NodeId, PlateGap, Resistor};

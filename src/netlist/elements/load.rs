@@ -1,6 +1,6 @@
 //! Dead loads: f2d, f3d, and the pair of loads of a prestressed beam.
 
-use super::super::sink::Reported;
+use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
 use crate::structure::Load;
 

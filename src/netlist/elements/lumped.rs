@@ -1,6 +1,6 @@
 //! Lumped parts: plates, masses, links, springs and dampers.
 
-use super::super::sink::Reported;
+use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
 use crate::structure::{Mass, SpringDamper};
 

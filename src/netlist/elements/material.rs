@@ -1,7 +1,7 @@
 //! Material constants of an element, from its own list and its layer.
 
+use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
-use super::super::sink::Reported;
 use super::arguments::ElementSite;
 use crate::structure::{MOLTEN, Material};
 

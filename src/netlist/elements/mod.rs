@@ -23,9 +23,9 @@ pub(crate) mod upright;
 pub(crate) use arguments::{Argument, Arguments, ElementInstance, ElementSite};
 pub(crate) use table::{ElementModel, model, models};
 
+use super::diagnostic_sink::{DiagnosticSink, Reported};
 use super::drawing::StructureBuilder;
-use super::front::ReadFunction;
-use super::sink::{DiagnosticSink, Reported};
+use super::front_end::ReadFunction;
 use super::source::TextSpan;
 use super::suggest::{did_you_mean, nearest};
 

@@ -4,7 +4,7 @@
 //! Such a bar is a rigid body of its mass m = ρ·w·h·l and inertia m·l²/12 about its middle, and at each end a pin of 2·E·A/l in
 //! every direction. Along the bar the two pins are E·A/l; across it they carry nothing but inertia, also where it turns far.
 
-use super::super::sink::Reported;
+use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
 use crate::structure::{Mass, SpringDamper};
 

@@ -1,6 +1,6 @@
 //! Elements that mean something to one domain alone: where they are and their numbers are kept for it.
 
-use super::super::sink::Reported;
+use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
 use crate::domains::elements;
 use crate::structure::PlacedElement;

@@ -3,8 +3,8 @@
 //! The load is a number or, as SUGAR has it, a string with x, the way from the first node: `P="-250000*x"`.
 
 use super::super::bundle::Bundle;
+use super::super::diagnostic_sink::Reported;
 use super::super::setting::Setting;
-use super::super::sink::Reported;
 use super::super::value::Value;
 use super::arguments::ElementSite;
 use crate::structure::Load;

@@ -1,7 +1,7 @@
 //! Beams whose section is no plain rectangle, as beams of the rectangle with the same area and second moment about z.
 
+use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
-use super::super::sink::Reported;
 use super::arguments::ElementSite;
 
 /// What `softjointlr` and `hinge3` leave of the bending stiffness [1].

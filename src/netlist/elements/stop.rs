@@ -1,6 +1,6 @@
 //! Stops: how far a part may move.
 
-use super::super::sink::Reported;
+use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
 use crate::structure::Stop;
 

@@ -1,8 +1,8 @@
 //! What holds nodes: anchors, hinges, sliders, guides, beams that slide; and `pos`, which only places them.
 
+use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
 use super::super::rotation::Rotation;
-use super::super::sink::Reported;
 use super::arguments::ElementSite;
 use crate::structure::{NodeId, Pad, Support};
 

@@ -1,6 +1,6 @@
 //! Which elements there are, and what they take.
 
-use super::super::sink::Reported;
+use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
 use super::{arm, beam, circuit, comb, curve, gap, load, lumped, pinned, placed, pressure, section, stop, support};
 use crate::domains::elements;

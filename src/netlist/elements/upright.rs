@@ -4,8 +4,8 @@
 //! * a post, normal to the plane and not longer than it is thick, joins what lies above each other: a rigid connection;
 //! * any other belongs to a spatial model, and is an error.
 
+use super::super::diagnostic_sink::{DiagnosticSink, Reported};
 use super::super::drawing::{Fact, StructureBuilder, Upright};
-use super::super::sink::{DiagnosticSink, Reported};
 use super::arguments::ElementSite;
 use crate::structure::{Link, NodeId};
 

@@ -1,12 +1,12 @@
 //! The functions of SUGAR 3 netlists: nodes, materials, elements, subnets, and mathematics.
 
+use super::super::diagnostic_sink::Reported;
 use super::super::elements::{self, Argument, Arguments, ElementInstance};
-use super::super::sink::Reported;
 use super::super::source::TextSpan;
 use super::super::sugar2;
 use super::super::value::{Value, short};
 use super::arguments::{ElementCall, Fault, LuaNode, called, plain};
-use super::drawn::{abort, bounded};
+use super::build::{abort, bounded};
 use super::files::use_file;
 use super::instance::subnet;
 use super::language::{language, mathematics, shown};

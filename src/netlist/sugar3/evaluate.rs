@@ -1,13 +1,13 @@
 //! Runs a SUGAR 3 netlist.
 
 use super::super::bundle::Bundle;
+use super::super::diagnostic_sink::DiagnosticSink;
 use super::super::drawing::StructureBuilder;
 use super::super::elements;
 use super::super::finish::finish;
-use super::super::front::{FrontEnd, LoadedNetlist};
+use super::super::front_end::{FrontEnd, LoadedNetlist};
 use super::super::rotation::Rotation;
 use super::super::setting::Setting;
-use super::super::sink::DiagnosticSink;
 use super::super::source::TextSpan;
 use super::super::suggest;
 use super::builtins;

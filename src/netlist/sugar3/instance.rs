@@ -1,7 +1,7 @@
 //! Instances of subnets.
 
 use super::arguments::plain;
-use super::drawn::{abort, bounded};
+use super::build::{abort, bounded};
 use super::state::{NameScope, SharedState};
 use crate::budget;
 use mlua::{Function, Lua, MultiValue, Table, Value as LuaValue};

@@ -2,7 +2,7 @@
 
 use super::super::value::short;
 use super::arguments::{called, number};
-use super::drawn::abort;
+use super::build::abort;
 use super::state::SharedState;
 use crate::budget;
 use mlua::{Lua, MultiValue, Table, Value as LuaValue};

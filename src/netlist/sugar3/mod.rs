@@ -7,9 +7,9 @@
 #[cfg(feature = "lua")]
 mod arguments;
 #[cfg(feature = "lua")]
-mod builtins;
+mod build;
 #[cfg(feature = "lua")]
-mod drawn;
+mod builtins;
 #[cfg(feature = "lua")]
 mod evaluate;
 #[cfg(feature = "lua")]

@@ -1,10 +1,10 @@
 //! What the functions of a SUGAR 3 netlist work on.
 
 use super::super::bundle::Bundle;
+use super::super::diagnostic_sink::DiagnosticSink;
 use super::super::drawing::StructureBuilder;
 use super::super::rotation::Rotation;
 use super::super::setting::Setting;
-use super::super::sink::DiagnosticSink;
 use super::super::source::TextSpan;
 use super::arguments::{LuaNode, number};
 use super::sandbox::SandboxProgress;

@@ -1,7 +1,7 @@
 //! Netlists, settings and diagnostics.
 
 use super::{Violation, number, required};
-use crate::front;
+use crate::input;
 use crate::layout::LayoutError;
 use crate::layout::convert::ConvertError;
 use crate::layout::flatten::FlattenError;
@@ -33,7 +33,7 @@ pub fn bundle_from_wire(bundle: Option<proto::Bundle>) -> Result<Bundle, Violati
 pub(crate) fn convert(request: &proto::ConvertRequest) -> Result<proto::ConvertResponse, Violation> {
     let given = |text: &str| (!text.is_empty()).then(|| text.to_owned());
     let (process, cell) = (given(&request.process), given(&request.cell));
-    let source = front::from_bytes(&request.layout, &request.name, process.as_deref(), cell.as_deref());
+    let source = input::from_bytes(&request.layout, &request.name, process.as_deref(), cell.as_deref());
     let source = source.map_err(|error| Violation::new(field_of(&error), error.to_string()))?;
     let Some(converted) = source.converted else { return Err(Violation::new("layout", "is a netlist")) };
     let report = converted.report;
