@@ -6,25 +6,25 @@
 //! | `find` | where ngspice and the plug-in are |
 //! | `scratch` | the folder of a run, and what ngspice reads at its start |
 //! | `includes` | the files that a deck includes: where `.model` lines stand |
-//! | `heard` | what ngspice says, and whether the run was good |
+//! | `ngspice_output` | what ngspice says, and whether the run was good |
 //! | `error` | why it was not |
-//! | [`around`] | a deck around the circuit of a netlist |
+//! | [`deck`] | a deck around the circuit of a netlist |
 //! | `printed` | the `.print` lines of such a deck |
 //! | [`check`] | a run compared with a finer one |
-//! | [`finer`] | the finer deck |
+//! | [`refined_deck`] | the finer deck |
 //! | `oscillation` | frequency and amplitude of what oscillates in both |
 //! | [`compare`] | how far two results are apart |
 
-pub mod around;
 pub mod check;
 pub mod compare;
+pub mod deck;
 mod error;
 mod find;
-pub mod finer;
-mod heard;
 mod includes;
+mod ngspice_output;
 mod oscillation;
 mod printed;
+pub mod refined_deck;
 mod run;
 mod scratch;
 mod spice_names;

@@ -5,7 +5,7 @@ use bimorph::analysis::AnalysisError;
 use bimorph::analysis::chart::ChartError;
 use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
-use bimorph::cosim::around::DeckError;
+use bimorph::cosim::deck::DeckError;
 use bimorph::export::ExportError;
 use bimorph::input::FrontError;
 use bimorph::jobs::sweep::SweepError;

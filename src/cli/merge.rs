@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::merge_error::{LAST, MergeError};
 use super::output::{check_folder, print};
-use bimorph::jobs::sweep::part::{COLUMN, SweepPart, SweepPartError};
+use bimorph::jobs::sweep::shard::{COLUMN, SweepPart, SweepPartError};
 use bimorph::results::{atomic, csv::field};
 use clap::Args;
 use std::collections::BTreeMap;

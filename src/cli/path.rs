@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::model::{Context, JsonMap, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
-use super::{busiest, progress, report, statics, value};
+use super::{largest_motion, progress, report, statics, value};
 use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, PathInput, trace};
 use bimorph::analysis::mesh::path_fitted;
 use bimorph::analysis::statics::NodeMotion;
@@ -140,9 +140,9 @@ impl PathCommand {
         };
         let bar = progress::bar("path");
         if request.signals.is_empty() {
-            request.signals = busiest::every(first);
+            request.signals = largest_motion::every(first);
             let found = trace(first, &request, &mut progress::watch(&bar, CHEAPER))?;
-            request.signals = busiest::busiest(&found.signals);
+            request.signals = largest_motion::busiest(&found.signals);
         }
         let result = path_fitted(first, &request, &mut progress::watch(&bar, CHEAPER));
         bar.finish_and_clear();

@@ -1,14 +1,14 @@
 //! `bimorph sweep`: many variants.
 
-use super::chance::SamplingArgs;
 use super::failure::Failure;
 use super::model::ModelArgs;
 use super::output::print;
+use super::random_parameters::SamplingArgs;
 use super::remote::{RemoteSweepArgs, failure, follow};
-use super::{delivery, interrupt, progress, sweep_files, value};
+use super::{interrupt, progress, sweep_files, sweep_output, value};
 use bimorph::compile::CompileOptions;
 use bimorph::jobs::sweep::journal::{self, Journal, JournalRow};
-use bimorph::jobs::sweep::part::SweepPart;
+use bimorph::jobs::sweep::shard::SweepPart;
 use bimorph::jobs::sweep::statistics::{SweepStatistics, YieldLimit};
 use bimorph::jobs::sweep::{
     self, Shard, SweepAnalysis, SweepError, SweepParameter, SweepProgress, SweepSpec, SweepTable,
@@ -145,7 +145,7 @@ impl SweepCommand {
         if let Some(journal) = journal.filter(|_| written) {
             journal.finish()?;
         }
-        delivery::nothing(&table)
+        sweep_output::nothing(&table)
     }
 
     /// The sweep on a server, as a job that goes on when this process does not.
@@ -172,7 +172,7 @@ impl SweepCommand {
         }
         self.remote.forget(&mut client, &name);
         written?;
-        delivery::nothing(&table)
+        sweep_output::nothing(&table)
     }
 
     /// Writes the table and says what it has; whether there was anything to write.
@@ -181,7 +181,7 @@ impl SweepCommand {
         let shown = (spec.samples.is_some(), self.limits.as_slice());
         let written = sweep_files::deliver(&self.out, &self.model.title(), table, part, shown)?;
         let shard = part.map(|_| format!(" (shard {index}/{count})")).unwrap_or_default();
-        eprintln!("{}", delivery::summary(table, &shard));
+        eprintln!("{}", sweep_output::summary(table, &shard));
         if !self.limits.is_empty() {
             eprintln!("{}", sweep_files::report(&SweepStatistics::of(table, &self.limits)?, spec.samples.is_some()));
         }

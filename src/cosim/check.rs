@@ -2,7 +2,7 @@
 
 use super::compare::{self, PlotComparison, PrintedNumber};
 use super::error::{CosimError, io};
-use super::finer::{TIGHTER, finer, keeping_plots, measuring};
+use super::refined_deck::{TIGHTER, finer, keeping_plots, measuring};
 use super::run::{CosimOptions, CosimReport, run_whatever};
 use super::scratch::ScratchFolder;
 use crate::results::raw;

@@ -1,7 +1,7 @@
 //! The files that a deck includes. ngspice flattens them before a part is opened, and passes on neither where a `.model` line stands nor
 //! the folders of its `sourcepath`.
 
-use super::finer::logical_lines;
+use super::refined_deck::logical_lines;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 

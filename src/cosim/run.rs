@@ -10,8 +10,8 @@
 
 use super::error::{CosimError, io};
 use super::find::{find_ngspice, find_plugin};
-use super::heard::{judge, listen};
 use super::includes::Included;
+use super::ngspice_output::{judge, listen};
 use super::scratch::{InitializationFile, ScratchFolder, initialise, user_settings};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

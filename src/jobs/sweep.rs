@@ -1,39 +1,39 @@
 //! A parameter grid over one analysis, on all cores, in a fixed order.
 //!
 //! The netlist is read once. Each point of the grid draws it with its own parameter values and runs one analysis, on a mesh
-//! that was searched once for all (`family`) where the estimate of its error says so. Points do not know of each other, and
+//! that was searched once for all (`shared_meshes`) where the estimate of its error says so. Points do not know of each other, and
 //! rows come back in grid order, so the table has the same bits on one thread and on many, and the shards of a sweep put
 //! together are the whole sweep.
 
 mod axis;
-mod crew;
+mod batched;
+pub(crate) mod checksummed_line;
 mod design;
 mod distribution;
 mod error;
-mod failed;
-mod family;
+mod executor;
 pub mod journal;
-mod means;
 pub mod parse;
-pub mod part;
-mod pieces;
 mod point;
+mod point_budget;
+mod point_error;
 #[cfg(feature = "server")]
 mod points;
 mod samples;
-pub(crate) mod sealed;
+mod scheduling;
+pub mod shard;
+mod shared_meshes;
 mod spec;
 pub mod statistics;
 mod table;
-mod together;
 mod transient;
 mod values;
 
 pub use axis::SweepParameter;
-pub use crew::{Executor, ThreadPool};
 pub use design::{DESIGNS, Design};
 pub use distribution::{Distribution, Vary, number};
 pub use error::SweepError;
+pub use executor::{Executor, ThreadPool};
 #[cfg(feature = "server")]
 pub use points::points;
 pub use samples::{SampleGenerator, Sampling};
@@ -127,7 +127,7 @@ pub fn run_on(
     let found = Mutex::new(Vec::with_capacity(numbers.len()));
     let take = |outcomes| found.lock().unwrap_or_else(PoisonError::into_inner).extend(outcomes);
     let crew = ThreadPool::new(spec.threads.unwrap_or(0))?;
-    if !pieces::run((spec, bundle, options), &numbers, &crew, &each, &take)? {
+    if !scheduling::run((spec, bundle, options), &numbers, &crew, &each, &take)? {
         return Err(SweepError::Cancelled { done: done.into_inner(), points });
     }
     let mut all: Vec<PointOutcome> = known.into_values().map(|kept| kept.outcome(spec)).collect();
@@ -149,7 +149,7 @@ pub fn run_by(
     crew: &dyn Executor,
     keep: &(dyn Fn(JournalRow) -> bool + Sync),
 ) -> Result<bool, SweepError> {
-    pieces::run((spec, bundle, options), numbers, crew, &|outcome| keep(outcome.kept()), &drop)
+    scheduling::run((spec, bundle, options), numbers, crew, &|outcome| keep(outcome.kept()), &drop)
 }
 
 /// The table of points that came one by one, each with the values of its parameters, in any order.

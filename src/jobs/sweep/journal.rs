@@ -3,7 +3,7 @@
 //! was not finished, and its point is computed again.
 //! Each line has the sum of its bytes, so that one that is damaged is none.
 
-use super::sealed::{opened, sealed};
+use super::checksummed_line::{opened, sealed};
 use super::spec::SweepSpec;
 use crate::content::Fnv;
 use crate::netlist::{Bundle, Setting};

@@ -2,10 +2,10 @@
 
 use super::axis::{VOLTS, at, chosen};
 use super::error::SweepError;
-use super::failed::Failed;
-use super::family::SharedMeshes;
 use super::journal::JournalRow;
-use super::means::PointBudget;
+use super::point_budget::PointBudget;
+use super::point_error::Failed;
+use super::shared_meshes::SharedMeshes;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::mesh::on_given_mesh::{AnalysisResult, Assessment, assess, refine_and_assess};
 use crate::analysis::mesh::{self, MeshRequest};

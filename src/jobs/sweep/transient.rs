@@ -8,11 +8,11 @@
 //! at every point where it is beyond the tolerance.
 
 use super::axis::{SweepParameter, at};
-use super::failed::Failed;
-use super::family::{alike, middle};
-use super::means::PointBudget;
 use super::point::{PointOutcome, PointResults, PointValue, brief};
+use super::point_budget::PointBudget;
+use super::point_error::Failed;
 use super::samples::SampleGenerator;
+use super::shared_meshes::{alike, middle};
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::AnalysisError;
 use crate::analysis::batch_transient::{self, RunEnd};

@@ -4,7 +4,7 @@ use super::super::convert::{self, Violation};
 use super::super::proto;
 use super::super::turns::client;
 use crate::content::Fnv;
-use crate::jobs::sweep::part::SweepPart;
+use crate::jobs::sweep::shard::SweepPart;
 use crate::jobs::sweep::{SweepParameter, SweepSpec, journal};
 use crate::netlist::Bundle;
 use crate::options::CompileOptions;

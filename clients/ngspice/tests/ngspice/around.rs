@@ -2,7 +2,7 @@
 
 use crate::support::{Run, complex, deviation, real, run, versions};
 use bimorph::cosim::CosimOptions;
-use bimorph::cosim::around::{DeckSpec, around};
+use bimorph::cosim::deck::{DeckSpec, around};
 use bimorph::netlist::{Bundle, load};
 use std::path::Path;
 

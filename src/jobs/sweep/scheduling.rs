@@ -1,14 +1,14 @@
 //! The points of a sweep in pieces: as many at once as are laid out side by side.
 
 use super::axis;
-use super::crew::Executor;
+use super::batched::{self, BatchedSweep};
 use super::error::SweepError;
-use super::failed::Failed;
-use super::family::SharedMeshes;
-use super::means::PointBudget;
+use super::executor::Executor;
 use super::point::{self, PointOutcome};
+use super::point_budget::PointBudget;
+use super::point_error::Failed;
+use super::shared_meshes::SharedMeshes;
 use super::spec::{SweepAnalysis, SweepSpec};
-use super::together::{self, BatchedSweep};
 use super::transient::{self, TransientSweep};
 use crate::budget::Stopped;
 use crate::compile::CompileOptions;
@@ -77,7 +77,7 @@ fn at_once(spec: &SweepSpec, points: usize, threads: usize) -> usize {
     match spec.analysis {
         SweepAnalysis::Transient { .. } => transient::CHUNK,
         SweepAnalysis::PullIn { .. } => 1,
-        _ if spec.has_variants() => points.div_ceil(2 * threads.max(1)).clamp(1, together::CHUNK),
+        _ if spec.has_variants() => points.div_ceil(2 * threads.max(1)).clamp(1, batched::CHUNK),
         _ => 1,
     }
 }

@@ -6,9 +6,9 @@
 //! shards or on threads, but for points that spend a server's budget together.
 
 use super::axis::at;
-use super::family::SharedMeshes;
-use super::means::PointBudget;
 use super::point::{self, PointOutcome, PointResults, brief};
+use super::point_budget::PointBudget;
+use super::shared_meshes::SharedMeshes;
 use super::spec::SweepSpec;
 use crate::analysis::PortVoltages;
 use crate::analysis::batch_modes::BatchModes;

@@ -1,6 +1,6 @@
 //! What the points of a sweep may use.
 
-use super::failed::Failed;
+use super::point_error::Failed;
 use crate::budget::{self, Budget, Stopped};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{PoisonError, RwLock};
