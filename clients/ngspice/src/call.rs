@@ -2,8 +2,8 @@
 
 use crate::abi::{self, Complex, ConnectionData, InstanceHead, ModelHead, Tail, analysis, port, port_data};
 use crate::circuit::HostCircuit;
+use crate::evaluation::EvaluationRequest;
 use crate::layout::HostLayout;
-use crate::question::EvaluationRequest;
 use std::ffi::{CStr, c_char, c_int, c_void};
 
 /// Ports that are driven.

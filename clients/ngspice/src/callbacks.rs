@@ -6,12 +6,12 @@
 use crate::abi::{self, ModelHead, code};
 use crate::call::{self, ModelCall, Wanted};
 use crate::circuit::HostCircuit;
-use crate::opening::open_all;
-use crate::question::EvaluationOutcome;
+use crate::evaluation::EvaluationOutcome;
+use crate::instance_setup::open_all;
 use crate::registry::{close, registry};
 use crate::respond::{moves, respond, settle};
 use crate::table::{DEVICE, LAYOUT};
-use crate::{host, noise, panics, told, trace};
+use crate::{host, noise, panics, reported, trace};
 use std::ffi::{c_int, c_void};
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -89,7 +89,7 @@ pub(crate) unsafe extern "C" fn convergence_test(model: *mut ModelHead, circuit:
         for (_, instance) in unsafe { call::instances(model) } {
             if let Some(entry) = registry.find(instance.conn as usize) {
                 let warnings = entry.instance.settled(entry.sweeping);
-                told::of_instance(entry.instance.name(), &warnings);
+                reported::of_instance(entry.instance.name(), &warnings);
             }
         }
         code::OK
@@ -303,7 +303,7 @@ pub(crate) unsafe extern "C" fn accept(circuit: *mut c_void, model: *mut ModelHe
             if let Some(entry) = registry.find(instance.conn as usize) {
                 settle(entry, circuit);
                 let warnings = entry.instance.accept();
-                told::of_instance(entry.instance.name(), &warnings);
+                reported::of_instance(entry.instance.name(), &warnings);
             }
         }
         code::OK

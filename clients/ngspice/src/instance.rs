@@ -5,9 +5,9 @@
 
 use crate::alternation::Alternation;
 use crate::companion::DifferentiationRule;
+use crate::evaluation::{Evaluation, EvaluationOutcome, EvaluationRequest};
+use crate::failed_evaluations::FailedEvaluations;
 use crate::history::History;
-use crate::question::{Evaluation, EvaluationOutcome, EvaluationRequest};
-use crate::refusals::FailedEvaluations;
 use crate::settings::{Monitor, PortName};
 use bimorph::device::scale::PortScale;
 use bimorph::device::{

@@ -1,7 +1,7 @@
 //! From a `.model` line to a device: find the netlist, compile it once, step it here or on a server.
 
 use crate::model_card::ModelCard;
-use crate::{names, told};
+use crate::{names, reported};
 use bimorph::analysis::{AnalysisError, mesh};
 use bimorph::compile::{CompileError, CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
@@ -121,13 +121,13 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
         return Err(OpenError::Ambiguous { name, pair, file: card.file.clone() });
     }
     names::respell(card, &structure);
-    told::of_netlist(&card.file, card.options.without_circuit, &loaded.warnings.items);
+    reported::of_netlist(&card.file, card.options.without_circuit, &loaded.warnings.items);
     let own = match (&card.remote, card.share < 1.0) {
         (Some(address), false) => return connect(address, &bundle, card),
         _ => compiled(&card.file, bundle.clone(), &card.options)?,
     };
     if card.share == 1.0 {
-        told::of_netlist(&card.file, card.options.without_circuit, &own.warnings.items);
+        reported::of_netlist(&card.file, card.options.without_circuit, &own.warnings.items);
         return Ok(Box::new(LocalDevice::new(own)));
     }
     let tol = card.share * card.options.tol;
@@ -150,7 +150,7 @@ fn connect(address: &str, bundle: &Bundle, card: &ModelCard) -> Result<Box<dyn D
     let respelled = socket.map(|path| format!("unix://{}", path.display()));
     let address = respelled.as_deref().unwrap_or(address);
     let device = RemoteDevice::connect(address, bundle, &card.options, card.deadline)?.resuming();
-    told::of_netlist(&card.file, card.options.without_circuit, device.warnings());
+    reported::of_netlist(&card.file, card.options.without_circuit, device.warnings());
     Ok(Box::new(device))
 }
 

@@ -4,7 +4,7 @@ use crate::call::{Reserved, Wanted};
 use crate::circuit::HostCircuit;
 use crate::history::History;
 use crate::instance::Instance;
-use crate::look_table::LookNames;
+use crate::query_table::LookNames;
 use crate::trace;
 use bimorph::device::Token;
 use std::sync::{Mutex, MutexGuard, PoisonError};

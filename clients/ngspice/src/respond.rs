@@ -2,9 +2,9 @@
 
 use crate::call::{MONITORS, ModelCall, PORTS};
 use crate::circuit::HostCircuit;
+use crate::evaluation::{EvaluationOutcome, EvaluationRequest};
 use crate::history;
 use crate::instance::Instance;
-use crate::question::{EvaluationOutcome, EvaluationRequest};
 use crate::registry::{RegisteredInstance, Registry};
 use crate::{host, trace};
 use bimorph::device::Status;

@@ -10,8 +10,8 @@ use crate::abi::{
 use crate::callbacks;
 use crate::deck_options::{DeckValue, Declared, declared};
 use crate::layout::{HostLayout, HostLayoutError, TABLE_WORDS};
-use crate::look_table;
 use crate::model_card::DEADLINE;
+use crate::query_table;
 use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::sync::OnceLock;
@@ -262,7 +262,7 @@ impl DeviceTable {
     ///
     /// # Safety
     /// The host has called the plug-in and waits for it; it reads these two words when it looks a name up.
-    pub(crate) unsafe fn set_instance_parameters(&self, parameters: &look_table::ParameterTable) {
+    pub(crate) unsafe fn set_instance_parameters(&self, parameters: &query_table::ParameterTable) {
         // SAFETY: by contract; what they point to stays for good.
         unsafe {
             self.put(40, std::ptr::from_ref(parameters.count));
