@@ -85,7 +85,7 @@ fn transients(points: usize) {
     let each = |rate: f64| 1e6 * variants.len() as f64 / (rate * steps as f64);
     eprintln!("transient: {steps} steps; {:.2} µs a step alone", each(alone));
     let mut found = None;
-    let lanes = rate(variants.len(), || found = side_by_side::ends(&all, &run, &mut || true).ok());
+    let lanes = rate(variants.len(), || found = batch_transient::ends(&all, &run, &mut || true).ok());
     let (ends, work) = found.expect("runs");
     for (end, last) in ends.iter().zip(&last) {
         assert_eq!(end.as_ref().map(|end| end.values[0].to_bits()), Some(last.to_bits()));

@@ -1,6 +1,6 @@
 //! What a client shows a server, as options.
 
-use bimorph::service::access::Access;
+use bimorph::service::credentials::Access;
 use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use std::path::PathBuf;

@@ -12,7 +12,7 @@ use bimorph::service::address::Address;
 use bimorph::service::client::Client;
 use bimorph::service::server::{self, ServeOptions};
 use bimorph::service::settings::Settings;
-use bimorph::service::{descriptors, guard, survey};
+use bimorph::service::{authentication, descriptors, store::scan};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -70,14 +70,15 @@ impl DoctorCommand {
             return Ok(());
         }
         let options = settings.options();
-        let found = guard::look_at(&options.guard).map_err(|error| error.to_string()).map(|found| match found {
-            found if found.is_empty() => "nobody is asked for anything".to_owned(),
-            found => found.join("; "),
-        });
+        let found =
+            authentication::look_at(&options.guard).map_err(|error| error.to_string()).map(|found| match found {
+                found if found.is_empty() => "nobody is asked for anything".to_owned(),
+                found => found.join("; "),
+            });
         line("access", &found, "docs/service.md says what a server asks of its clients, and of its files")?;
         let mut good = found.is_ok();
         if let Some(folder) = &options.state_dir {
-            let found = survey::look_at(folder).map_err(|error| error.to_string());
+            let found = scan::look_at(folder).map_err(|error| error.to_string());
             good &= found.is_ok();
             line("states", &found, "name a folder of this server's own in state_dir, which its user can write")?;
         }

@@ -213,12 +213,12 @@ pub trait Device: Send {
     /// [`DeviceError::UnknownToken`], [`DeviceError::Remote`].
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError>;
 
-    /// Names that [`Device::look`] knows: those of [`look::WHOLE`] and every signal. None where a device cannot be looked at.
+    /// Names that [`Device::look`] knows: those of [`quantities::WHOLE`] and every signal. None where a device cannot be looked at.
     fn names(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Value of a signal in a state, whether it was opened or not, or of the state as a whole ([`look::WHOLE`]), in its own unit.
+    /// Value of a signal in a state, whether it was opened or not, or of the state as a whole ([`quantities::WHOLE`]), in its own unit.
     ///
     /// # Errors
     /// [`DeviceError::UnknownToken`], [`DeviceError::UnknownSignal`].

@@ -7,7 +7,7 @@
 //!
 //! Without a band only the shape decides: a slender beam gets enough segments for large static deflections.
 //!
-//! With a band this is where [`model_order`](crate::refine::mesh_search) starts from.
+//! With a band this is where [`crate::refine::mesh_search`] starts from.
 
 use super::error::{DiscretizeError, MAX_SEGMENTS};
 use crate::domains::BeamRows;

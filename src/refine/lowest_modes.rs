@@ -1,7 +1,7 @@
 //! The mesh for the lowest modes, by their number.
 //!
 //! The highest mode asked for sets the band: where the number of modes below a frequency, which is the number of negative
-//! pivots of K − ω²M (Sylvester), reaches the number asked for. Found by bisection on a first mesh, then [`model_order`] chooses the mesh for that
+//! pivots of K − ω²M (Sylvester), reaches the number asked for. Found by bisection on a first mesh, then [`mesh_search`](super::mesh_search) chooses the mesh for that
 //! band, and the band is looked up again on it until the modes asked for lie within.
 
 use super::band_modes::mechanics;

@@ -1,7 +1,7 @@
 //! Model order from a band and a tolerance: the fewest segments for which the estimate holds.
 //!
 //! Starts from the rule of [`order`], computes the modes within the band and their estimated errors
-//! ([`order_error`](super::mode_errors)), and takes a beam's contribution to fall with the power of its scheme in the number
+//! ([`mode_errors`](super::mode_errors)), and takes a beam's contribution to fall with the power of its scheme in the number
 //! of its segments. From the fewest segments that the band allows upwards, the beams that gain most per body get one more
 //! until every mode is predicted to hold. The prediction is then computed; what fails is refined, what holds may be coarsened
 //! further. Beams of equal length, section and material get equal numbers, so that symmetric mechanisms stay symmetric.

@@ -29,7 +29,7 @@
 //! Directions along and across a beam are those of the drawing, also about an equilibrium: right as long as beams turn by
 //! small angles.
 //!
-//! Valid for modes that the nodes can show: kh < 4.73, which [`model_order`](super::mesh_search) sees to.
+//! Valid for modes that the nodes can show: kh < 4.73, which [`mesh_search`](super::mesh_search) ensures.
 
 use super::reference::{Pencil, ReferenceModes, compare};
 use super::span::{BeamSpan, spans};

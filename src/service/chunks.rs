@@ -1,9 +1,9 @@
 //! Long answers in messages of at most 1 MiB.
 
 use super::convert::analysis::summary_to_wire;
+use super::fair_semaphore::{Permit, Waiter};
 use super::pace::{CHUNK_BYTES, HEARTBEAT};
 use super::shared::ServerState;
-use super::turns::{Permit, Waiter};
 use super::{proto, status};
 use crate::analysis::AnalysisError;
 use crate::analysis::mesh::{self, fitted_in_time};

@@ -6,9 +6,9 @@
 //! The HTTP layer waits for its clients when it shuts down; one that never answers would hold the server for as long as
 //! it likes. So the socket itself listens for the order to cut: reads and writes then fail, and the layer above gives up.
 
-use super::guard::{Guard, NegotiatedSocket};
+use super::authentication::{Guard, NegotiatedSocket};
 use super::limits::Limits;
-use super::presence::{Peer, PeerIdentity};
+use super::peer::{Peer, PeerIdentity};
 use socket2::{SockRef, TcpKeepalive};
 use std::cmp::Reverse;
 use std::collections::BTreeSet;

@@ -1,7 +1,9 @@
 //! What one server allows: a table, from which come the fields, their defaults, and what everybody is told of them.
 
 use super::proto;
-use super::written::{ByteSize, BytesOrNone, CountOrNone, PositiveCount, PositiveSeconds, TimeOrNone, ValueSyntax};
+use super::settings::syntax::{
+    ByteSize, BytesOrNone, CountOrNone, PositiveCount, PositiveSeconds, TimeOrNone, ValueSyntax,
+};
 use std::sync::LazyLock;
 use std::time::Duration;
 

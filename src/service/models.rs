@@ -2,9 +2,9 @@
 
 use super::convert::model::{bundle_bytes, bundle_to_wire, diagnostics_to_wire, setting_to_wire};
 use super::convert::options::options_to_wire;
+use super::fair_semaphore::client;
 use super::limits::Limits;
 use super::server::MakeDevice;
-use super::turns::client;
 use super::{proto, status};
 use crate::analysis::mesh;
 use crate::budget;

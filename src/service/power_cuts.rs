@@ -2,9 +2,9 @@
 //! each such case a state whose keeping was answered is found again, with its model.
 
 use super::disk::DiskOperation;
-use super::keeper::SessionWriter;
 use super::proto;
 use super::store::SessionStore;
+use super::store::writer::SessionWriter;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

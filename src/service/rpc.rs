@@ -1,14 +1,14 @@
 //! The calls of `service.proto`: check, look up, compute, convert.
 
 use super::analyses::TransientStream;
-use super::answerable::answerable;
 use super::convert::{self, model as text, options as options_wire};
 use super::jobs::{JobStream, RowStream, SweepStream, TableStream};
 use super::models::check_size;
-use super::question::StreamRequest;
+use super::reply_size::answerable;
 use super::runs::RunStream;
 use super::shared::{BimorphService, Reply};
 use super::stream::TrialStream;
+use super::stream_request::StreamRequest;
 use super::{proto, status};
 use crate::budget::Budget;
 use crate::compile::{CompileError, CompileOptions, compile};

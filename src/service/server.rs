@@ -2,24 +2,24 @@
 
 use super::accounts::Accounts;
 use super::address::Address;
+use super::admission::counters::AdmissionCounters;
+use super::admission::service::AdmissionService;
+use super::authentication::Guard;
 use super::connection::Connections;
 use super::descriptors;
-use super::gate::AdmissionCounters;
-use super::guard::Guard;
-use super::intake::AdmissionService;
 use super::jobs::registry::JobRegistry;
 use super::limits::Limits;
 use super::models::ModelCache;
-use super::overseen::{MonitoringState, busy};
-use super::overseer;
+use super::monitoring::http;
+use super::monitoring::report::{MonitoringState, busy};
 use super::proto::{DESCRIPTORS, ServerSetting, bimorph_server::BimorphServer};
-pub use super::serving::{MakeDevice, Ready, ServeError, ServeOptions};
+pub use super::serve_options::{MakeDevice, Ready, ServeError, ServeOptions};
 use super::sessions::SessionRegistry;
 use super::shared::{BimorphService, ServerState};
 use super::shutdown::{BoxedWait, GRACE, Shutdown};
 use super::sockets::Listener;
 use super::store::SessionStore;
-use super::survey::StoreError;
+use super::store::scan::StoreError;
 use super::work::ComputePermits;
 use crate::device::local::LocalDevice;
 use std::future::Future;
@@ -136,7 +136,7 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: BoxedWai
     let housekeeping = tokio::spawn(keep_house(Arc::clone(&shared)));
     let overseen = MonitoringState { shared: Arc::clone(&shared), gate };
     let watching = tokio::spawn(watch_over(health.clone(), overseen.clone()));
-    let overseer = overseer.map(|listener| tokio::spawn(overseer::answer(listener, overseen)));
+    let overseer = overseer.map(|listener| tokio::spawn(http::answer(listener, overseen)));
     ready(&bound);
 
     let served = tokio::select! {
@@ -202,7 +202,7 @@ async fn open_all(
     }
     let mut bound: Vec<Address> = listeners.iter().map(Listener::address).collect();
     let Some(address) = metrics else { return Ok((listeners, None, bound)) };
-    let (overseer, address) = overseer::bind(address).await?;
+    let (overseer, address) = http::bind(address).await?;
     bound.push(address);
     Ok((listeners, Some(overseer), bound))
 }

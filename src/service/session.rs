@@ -2,14 +2,14 @@
 
 use super::accounts::SessionLease;
 use super::convert::device as wire;
-use super::keeper::{SessionWriter, forget, with_those_before};
+use super::fair_semaphore::client;
 use super::limits::Limits;
 use super::models::NamedModel;
-use super::question::StreamRequest;
 use super::server::MakeDevice;
 use super::small_signal::small_signal;
 use super::snapshots;
-use super::turns::client;
+use super::store::writer::{SessionWriter, forget, with_those_before};
+use super::stream_request::StreamRequest;
 use super::usage::Usage;
 use super::work::caught;
 use super::{proto, status};

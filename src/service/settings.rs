@@ -1,15 +1,17 @@
 //! What a server is told: a table, and the places where it is said, each before the next: options of the command, the
 //! environment (`BIMORPH_SERVE_NAME`), a file, and what holds when nobody says anything.
 
-use super::access::read;
+pub mod syntax;
+
 use super::address::Address;
+use super::credentials::read;
 use super::limits::{LIMITS, Limits};
 use super::proto;
-use super::written::{AddressList, AddressOrNone, PathOrNone, ValueSyntax, YesOrNo};
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
+use syntax::{AddressList, AddressOrNone, PathOrNone, ValueSyntax, YesOrNo};
 use thiserror::Error;
 
 /// Head of the names of environment variables.

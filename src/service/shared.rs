@@ -2,6 +2,7 @@
 
 use super::accounts::{Accounts, CountLease};
 use super::connection::Connections;
+use super::fair_semaphore::client;
 use super::jobs::registry::JobRegistry;
 use super::limits::Limits;
 use super::metrics::Metrics;
@@ -10,7 +11,6 @@ use super::server::MakeDevice;
 use super::sessions::SessionRegistry;
 use super::shutdown::Shutdown;
 use super::store::SessionStore;
-use super::turns::client;
 use super::work::ComputePermits;
 use super::{proto, status};
 use std::sync::Arc;

@@ -1,8 +1,8 @@
 //! Opening the addresses of a server, and leaving no socket file behind.
 
 use super::address::Address;
+use super::authentication::Guard;
 use super::connection::{Connection, Connections};
-use super::guard::Guard;
 use super::server::ServeError;
 use super::shutdown::Shutdown;
 use std::fs;

@@ -7,12 +7,16 @@
 //!
 //! What is here is bounded: two files a session, and `state_bytes` in all, jobs among them.
 
+pub(super) mod record;
+pub mod scan;
+pub(super) mod writer;
+
+use super::byte_quota::ByteQuota;
 use super::disk::{Disk, private};
-use super::kept::SessionRecord;
 use super::proto;
-use super::room::ByteQuota;
-use super::survey::{StoreError, StoreScan};
 use prost::Message;
+use record::SessionRecord;
+use scan::{StoreError, StoreScan};
 use std::collections::BTreeMap;
 use std::fs::{self, DirBuilder, File};
 use std::io;
@@ -265,7 +269,7 @@ fn size(path: &Path) -> usize {
 #[cfg(test)]
 mod tests {
     //! What was kept is found again, and a file that is not whole gives way to the one before it.
-    use super::super::keeper::SessionWriter;
+    use super::writer::SessionWriter;
     use super::*;
     use std::sync::Arc;
 

@@ -5,11 +5,11 @@
 //! is stopped there and asked again on a blocking thread, as are models above
 //! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns), one at a time, which keeps replies in order.
 
-use super::joined::{AttachedSession, RequestAction};
-use super::question::StreamRequest;
+use super::attached_session::{AttachedSession, RequestAction};
+use super::fair_semaphore::{CLIENT, TaskOwner, client};
 use super::session::{Session, refused};
 use super::shared::ServerState;
-use super::turns::{CLIENT, TaskOwner, client};
+use super::stream_request::StreamRequest;
 use super::{proto, status};
 use crate::budget::{Allowance, Budget};
 use proto::device_reply::Kind as ReplyKind;

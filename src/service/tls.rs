@@ -1,7 +1,7 @@
 //! TLS 1.3 by rustls, with one provider of its cryptography that is always named: two in one process would leave rustls
 //! without a choice, and a program that loads this library may have its own.
 
-use super::access::read;
+use super::credentials::read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use thiserror::Error;

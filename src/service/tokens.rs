@@ -1,6 +1,6 @@
 //! Who may ask: the tokens of a file, kept as their SHA-256 and compared in constant time.
 
-use super::access::read;
+use super::credentials::read;
 use ring::digest::{SHA256, digest};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;

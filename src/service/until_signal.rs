@@ -1,8 +1,8 @@
 //! A server on threads of its own, until it is told to stop by a signal or the end of its standard input.
 
 use super::log::{self, LogLines};
+use super::serve_options::{ServeError, ServeOptions};
 use super::server::run;
-use super::serving::{ServeError, ServeOptions};
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::time::Duration;

@@ -4,10 +4,10 @@
 //! long ones, which changes nothing but its time: computations are pure until they end. So a call of a millisecond waits for slices of
 //! others, not for their minutes. A connection with a computation that is known to be long has no slices meanwhile.
 
+use super::fair_semaphore::{CLIENT, FairSemaphore, Permit, Waiter, client};
 use super::limits::Limits;
 use super::shutdown::Shutdown;
 use super::status;
-use super::turns::{CLIENT, FairSemaphore, Permit, Waiter, client};
 use crate::budget::{self, Allowance, Budget, Stopped};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};

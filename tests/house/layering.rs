@@ -9,7 +9,7 @@ const FLOORS: [&[&str]; 14] = [
     &["structure", "multibody"],
     &["domains"],
     &["netlist", "layout", "results"],
-    &["options", "equations", "front"],
+    &["options", "equations", "input"],
     &["content", "discretize", "solve"],
     &["refine"],
     &["compile"],

@@ -3,7 +3,7 @@
 use super::attached::{Attached, trial};
 use super::cuts::LOCAL;
 use super::running::{block_on, start_with, wire_bundle};
-use bimorph::service::inside::{DeviceChannel, InProcessServer};
+use bimorph::service::in_process::{DeviceChannel, InProcessServer};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use prost::Message;

@@ -1,6 +1,6 @@
 //! Clients of an earlier version are understood: their bytes, not only their messages.
 
-use bimorph::service::inside::InProcessServer;
+use bimorph::service::in_process::InProcessServer;
 use bimorph::service::proto;
 use tonic::Code;
 

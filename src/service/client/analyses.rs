@@ -1,7 +1,7 @@
 //! Analyses on a server.
 
 use super::link::{ServerLink, is_broken, reason, unexpected};
-use super::verified;
+use super::reply_checks;
 use crate::analysis::harmonic::{HarmonicOptions, HarmonicResult};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::modes::ModesResult;
@@ -11,8 +11,8 @@ use crate::analysis::transient::{TransientResult, Until};
 use crate::analysis::{PortVoltages, Watch};
 use crate::compile::CompileOptions;
 use crate::netlist::Bundle;
-use crate::service::access::Access;
 use crate::service::convert::{analysis as results, harmonic as harmonics, named};
+use crate::service::credentials::Access;
 use crate::service::proto;
 use proto::transient_event::Kind as EventKind;
 use std::future::Future;
@@ -118,7 +118,7 @@ impl Client {
         let request = proto::StaticRequest { model: model.to_owned(), voltages: named(voltages) };
         let mut rpc = self.link.rpc.clone();
         let reply = self.call(rpc.r#static(request))?;
-        self.checked(verified::statics(&reply))?;
+        self.checked(reply_checks::statics(&reply))?;
         Ok(results::static_from_wire(reply))
     }
 
@@ -131,7 +131,7 @@ impl Client {
         let request = proto::ModesRequest { model: model.to_owned(), count, voltages: named(voltages) };
         let mut rpc = self.link.rpc.clone();
         let reply = self.call(rpc.modes(request))?;
-        self.checked(verified::modes(&reply))?;
+        self.checked(reply_checks::modes(&reply))?;
         Ok(results::modes_from_wire(reply))
     }
 
@@ -147,7 +147,7 @@ impl Client {
         let request = harmonics::request_to_wire(model, options);
         let mut rpc = self.link.rpc.clone();
         let reply = self.call(rpc.frequency_response(request))?;
-        self.checked(verified::response(&options.signals, &reply))?;
+        self.checked(reply_checks::response(&options.signals, &reply))?;
         Ok(harmonics::result_from_wire(&options.drive, reply))
     }
 
@@ -196,7 +196,7 @@ impl Client {
             match event.kind {
                 Some(EventKind::Samples(samples)) => {
                     let last = t.last().copied().unwrap_or(f64::NEG_INFINITY);
-                    self.checked(verified::samples(last, columns.len(), &samples))?;
+                    self.checked(reply_checks::samples(last, columns.len(), &samples))?;
                     t.extend(samples.t);
                     for (column, more) in columns.iter_mut().zip(samples.signals) {
                         column.extend(more.values);

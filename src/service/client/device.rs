@@ -2,13 +2,13 @@
 
 use super::link::{ServerLink, is_not_found, reason, unexpected};
 use super::replay::Replay;
+use super::reply_checks;
 use super::trial_stream::{OpenTrialStream, ended, open_request};
-use super::verified;
 use crate::compile::CompileOptions;
 use crate::device::{Description, Device, DeviceError, OpenRequest, SmallSignal, Token, Trial, TrialReply};
 use crate::netlist::{Bundle, Diagnostic};
-use crate::service::access::Access;
 use crate::service::convert::device as wire;
+use crate::service::credentials::Access;
 use crate::service::proto;
 use proto::device_reply::Kind as ReplyKind;
 use proto::device_request::Kind as RequestKind;
@@ -120,7 +120,7 @@ impl RemoteDevice {
         link.deadline = self.deadline;
         link.end_by(self.until);
         let described = link.compile(&self.bundle, &self.options)?;
-        self.warnings = verified::warnings(&described.warnings);
+        self.warnings = reply_checks::warnings(&described.warnings);
         self.model = described.id;
         self.link = Some(link);
         Ok(())
@@ -184,7 +184,7 @@ impl RemoteDevice {
         }
         let ReplyKind::Opened(opened) = self.send(open_request(&self.model, &self.asked)).ok()? else { return None };
         let device = opened.device.unwrap_or_default();
-        verified::opened(&self.asked, &device).ok()?;
+        reply_checks::opened(&self.asked, &device).ok()?;
         self.stream.as_mut()?.open(&opened.session, &device);
         for trial in way {
             self.send(RequestKind::Trial(trial)).ok().filter(|reply| matches!(reply, ReplyKind::Trial(_)))?;
@@ -249,7 +249,7 @@ impl RemoteDevice {
     }
 
     fn fault(&mut self, fault: proto::Fault) -> DeviceError {
-        verified::fault(wire::fault_from_wire(fault, &self.address))
+        reply_checks::fault(wire::fault_from_wire(fault, &self.address))
     }
 
     /// Opens on the stream there is.
@@ -283,7 +283,7 @@ impl Device for RemoteDevice {
         match reply? {
             ReplyKind::Opened(opened) => {
                 let device = opened.device.unwrap_or_default();
-                self.checked(verified::opened(request, &device))?;
+                self.checked(reply_checks::opened(request, &device))?;
                 self.lost = None;
                 self.stream.iter_mut().for_each(|stream| stream.open(&opened.session, &device));
                 Ok(wire::description_from_wire(device))
@@ -302,8 +302,8 @@ impl Device for RemoteDevice {
         let remembered = self.replay.is_some().then(|| asked.clone());
         match self.ask(RequestKind::Trial(asked))? {
             ReplyKind::Trial(answer) => {
-                self.checked(verified::trial(request, self.shape(), &answer))?;
-                let answer = proto::TrialReply { reason: verified::text(&answer.reason), ..answer };
+                self.checked(reply_checks::trial(request, self.shape(), &answer))?;
+                let answer = proto::TrialReply { reason: reply_checks::text(&answer.reason), ..answer };
                 let read = wire::reply_from_wire(answer, reply);
                 let stream = self.stream.as_mut();
                 let found = read.and_then(|()| stream.map_or(Ok(()), |stream| stream.order.check(request, reply)));
@@ -331,7 +331,7 @@ impl Device for RemoteDevice {
 
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError> {
         let answer = self.small_signal(proto::SmallSignalRequest { token: token.0, omega, noise: false })?;
-        self.checked(verified::small_signal(self.shape(), &answer))?;
+        self.checked(reply_checks::small_signal(self.shape(), &answer))?;
         wire::small_signal_from_wire(&answer, reply);
         Ok(())
     }
@@ -341,7 +341,7 @@ impl Device for RemoteDevice {
         if !answer.admittance_re.is_empty() {
             return Err(self.remote("it is of an earlier version, which knows no noise".into()));
         }
-        self.checked(verified::noise(self.shape(), &answer))?;
+        self.checked(reply_checks::noise(self.shape(), &answer))?;
         wire::noise_from_wire(&answer, reply);
         Ok(())
     }

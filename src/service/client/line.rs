@@ -1,12 +1,12 @@
-//! Questions to one device on a server, as bytes: what [`DeviceChannel`](crate::service::inside::DeviceChannel) are in process. For programs
+//! Questions to one device on a server, as bytes: what [`DeviceChannel`](crate::service::in_process::DeviceChannel) are in process. For programs
 //! in other languages, whose own gRPC is slower.
 //!
-//! Connections are driven by who asks, and by a thread of their own while nobody does ([`super::driven`]).
+//! Connections are driven by who asks, and by a thread of their own while nobody does ([`super::driven_runtime`]).
 
-use super::driven::DrivenRuntime;
+use super::driven_runtime::DrivenRuntime;
 use super::link::{is_broken, reason, unexpected};
 use crate::service::address::Address;
-use crate::service::inside::{decoded, not_asynchronous};
+use crate::service::in_process::{decoded, not_asynchronous};
 use crate::service::proto;
 use prost::Message;
 use proto::bimorph_client::BimorphClient;

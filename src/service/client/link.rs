@@ -1,12 +1,12 @@
 //! A connection, the token it shows, and the runtime that drives it while a call runs.
 
-use super::verified;
+use super::reply_checks;
 use crate::compile::CompileOptions;
 use crate::netlist::Bundle;
-use crate::service::access::{Access, AccessError};
 use crate::service::address::Address;
 use crate::service::convert::model::bundle_to_wire;
 use crate::service::convert::options::options_to_wire;
+use crate::service::credentials::{Access, AccessError};
 use crate::service::proto::{self, bimorph_client::BimorphClient};
 use std::cell::Cell;
 use std::future::Future;
@@ -111,7 +111,7 @@ impl ServerLink {
             Ok(response) => {
                 let model = response.into_inner().model;
                 let model = model.ok_or_else(|| unexpected("it compiled, but described no model"))?;
-                verified::model(&model).map_err(|what| unexpected(&what))?;
+                reply_checks::model(&model).map_err(|what| unexpected(&what))?;
                 Ok(model)
             }
             Err(status) if status.code() == Code::InvalidArgument => {
@@ -194,7 +194,7 @@ pub(super) fn is_broken(status: &Status) -> bool {
 
 /// What happened, in words: a netlist's diagnostics as they are, anything else with its kind.
 pub(super) fn reason(status: &Status) -> String {
-    verified::text(&said(status))
+    reply_checks::text(&said(status))
 }
 
 fn said(status: &Status) -> String {

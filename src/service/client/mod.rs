@@ -6,20 +6,20 @@
 mod analyses;
 mod device;
 #[cfg(feature = "server")]
-mod driven;
+mod driven_runtime;
 mod jobs;
 #[cfg(feature = "server")]
 mod line;
 mod link;
-mod order;
-mod persistence;
 mod replay;
+mod reply_checks;
+mod reply_order;
+mod retry;
 mod runs;
 #[cfg(feature = "tls")]
 mod secure;
 mod sweeps;
 mod trial_stream;
-mod verified;
 
 pub use analyses::{Client, ClientError, RemoteTransient};
 pub use device::RemoteDevice;

@@ -2,7 +2,7 @@
 
 use super::RemoteDevice;
 use super::link::{Rpc, is_broken, reason, unexpected};
-use super::verified;
+use super::reply_checks;
 use crate::device::run::{DriveSchedule, Ran, Start};
 use crate::device::{DeviceError, Mode, Trial, TrialReply};
 use crate::service::convert::device as wire;
@@ -49,12 +49,12 @@ impl RemoteDevice {
             for end in event.ends {
                 end_fits(&end, ran.steps, course.times.len()).map_err(|what| self.unexpected_run(&what))?;
                 ran.trials = usize::try_from(end.trials).unwrap_or(usize::MAX);
-                ran.error = (!end.error.is_empty()).then(|| verified::text(&end.error));
+                ran.error = (!end.error.is_empty()).then(|| reply_checks::text(&end.error));
                 if let Some(last) = end.last {
                     let t = course.times[ran.steps - 1];
                     let trial = Trial { mode: Mode::Transient, parent: None, t, dt: 0.0, voltages: &[] };
                     let mut reply = TrialReply::default();
-                    verified::trial(&trial, shape, &last)
+                    reply_checks::trial(&trial, shape, &last)
                         .and_then(|()| wire::reply_from_wire(last, &mut reply))
                         .map_err(|what| self.unexpected_run(&what))?;
                     ran.last = Some(reply);
@@ -126,7 +126,7 @@ fn end_fits(end: &proto::RunEnd, came: usize, steps: usize) -> Result<(), String
         let said = if end.error.is_empty() { "no error" } else { "an error" };
         return Err(format!("end: expected that of {came} of {steps} steps, got one of {} with {said}", end.steps));
     }
-    verified::length("last", usize::from(end.last.is_some()), usize::from(came > 0))
+    reply_checks::length("last", usize::from(end.last.is_some()), usize::from(came > 0))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The client's end of TLS.
 
-use crate::service::access::{Access, AccessError};
+use crate::service::credentials::{Access, AccessError};
 use crate::service::tls::{ALPN, CertificateFiles, PemError, authorities, inner, provider};
 use hyper_util::rt::TokioIo;
 use std::future::Future;

@@ -1,7 +1,7 @@
 //! The Trial stream of a device: a request, its reply, and what was opened.
 
 use super::link::unexpected;
-use super::order::TrialOrder;
+use super::reply_order::TrialOrder;
 use crate::device::OpenRequest;
 use crate::service::proto;
 use proto::device_reply::Kind as ReplyKind;

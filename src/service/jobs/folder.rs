@@ -4,8 +4,8 @@
 
 use super::super::snapshots::checksum;
 use super::super::store::SessionStore;
-use super::super::survey::is_id;
-use super::asked::JobOrigin;
+use super::super::store::scan::is_id;
+use super::job_origin::JobOrigin;
 use crate::jobs::sweep::checksummed_line::{opened, sealed};
 use crate::jobs::sweep::journal::{self, Journal, JournalError, JournalRow};
 use serde::{Deserialize, Serialize};

@@ -4,11 +4,11 @@
 //! the disk is waited for go there together.
 
 use super::super::{proto, status};
-use super::asked::{JobOrigin, now_ms};
 use super::folder::{JobFile, JobOutcome};
 use super::holders::JobHolders;
+use super::job_origin::{JobOrigin, now_ms};
+use super::job_state::{JobState, JobStopReason, state_of};
 use super::rows::FinishedRows;
-use super::standing::{JobState, JobStopReason, state_of};
 use super::wire;
 use crate::budget::{Budget, Stopped};
 use crate::jobs::sweep::journal::JournalRow;

@@ -3,8 +3,8 @@
 
 use super::super::power_cuts::{Machine, UnsyncedBytes};
 use super::super::store::SessionStore;
-use super::asked::JobOrigin;
 use super::folder::{self, JobOutcome, StoredJob};
+use super::job_origin::JobOrigin;
 use crate::jobs::sweep::journal::JournalRow;
 use std::sync::Arc;
 

@@ -3,8 +3,8 @@
 use super::super::{proto, status};
 use super::folder::JobOutcome;
 use super::job::{Job, held};
+use super::job_state::state_of;
 use super::rows::{FinishedRows, RowCursor};
-use super::standing::state_of;
 use crate::jobs::sweep::journal::JournalRow;
 use crate::jobs::sweep::{self, SweepTable};
 use std::sync::{Arc, MutexGuard};

@@ -4,9 +4,9 @@
 //! each client gets one before any gets its second, whatever it has submitted, and so do the jobs of one client among themselves. Which
 //! pieces are computed beside each other changes no row.
 
+use super::super::fair_semaphore::{FairSemaphore, Waiter};
 use super::super::limits::Limits;
 use super::super::status;
-use super::super::turns::{FairSemaphore, Waiter};
 use super::super::work::caught;
 use super::job::Job;
 use crate::jobs::sweep::{self, Executor, SweepError, ThreadPool};

@@ -1,8 +1,8 @@
 //! A job as clients are told of it.
 
 use super::super::proto;
-use super::asked::JobOrigin;
-use super::standing::JobState;
+use super::job_origin::JobOrigin;
+use super::job_state::JobState;
 use crate::jobs::sweep::SweepSpec;
 
 /// A job, which outlives the server or not. What clients are told again and again is without the options, which may be long.

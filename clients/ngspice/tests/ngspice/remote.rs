@@ -2,9 +2,9 @@
 
 use crate::support::{all_decks, deck, deviation, real, run, skipped};
 use bimorph::cosim::{CosimError, CosimOptions};
-use bimorph::service::access::Access;
 use bimorph::service::address::Address;
-use bimorph::service::guard::GuardFiles;
+use bimorph::service::authentication::GuardFiles;
+use bimorph::service::credentials::Access;
 use bimorph::service::server::{self, ServeOptions};
 use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};

@@ -5,7 +5,7 @@
 //! survives a fork: the package makes one for each process.
 
 use bimorph::service::client;
-use bimorph::service::inside::{DeviceChannel, InProcessServer, ReplyMessages};
+use bimorph::service::in_process::{DeviceChannel, InProcessServer, ReplyMessages};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyOSError};
 use pyo3::prelude::*;

@@ -1,8 +1,8 @@
 //! What a client asked for, and by which name.
 
 use super::super::convert::{self, Violation};
+use super::super::fair_semaphore::client;
 use super::super::proto;
-use super::super::turns::client;
 use crate::content::Fnv;
 use crate::jobs::sweep::shard::SweepPart;
 use crate::jobs::sweep::{SweepParameter, SweepSpec, journal};

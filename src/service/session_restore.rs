@@ -4,12 +4,12 @@
 //! behind, and one that was asleep sleeps on.
 
 use super::convert::{model as text, options as options_wire};
-use super::keeper::SessionWriter;
 use super::models::{NamedModel, check_size};
 use super::session::Session;
 use super::shared::ServerState;
 use super::status;
 use super::store::SessionStore;
+use super::store::writer::SessionWriter;
 use std::sync::Arc;
 use tonic::Status;
 

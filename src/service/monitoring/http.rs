@@ -2,9 +2,9 @@
 //!
 //! Nothing secret is told, so nobody is asked for a token. A connection answers once and closes; few are open at once.
 
-use super::address::Address;
-use super::overseen::{MonitoringState, busy, text};
-use super::server::ServeError;
+use super::report::{MonitoringState, busy, text};
+use crate::service::address::Address;
+use crate::service::server::ServeError;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use std::collections::VecDeque;
 use std::convert::Infallible;
@@ -19,7 +19,7 @@ const MAX_CONNECTIONS: usize = 16;
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Opens the address.
-pub(super) async fn bind(address: &Address) -> Result<(TcpListener, Address), ServeError> {
+pub(in crate::service) async fn bind(address: &Address) -> Result<(TcpListener, Address), ServeError> {
     let Address::Tcp(socket) = address else { return Err(ServeError::Metrics { address: address.clone() }) };
     let refused = |reason| ServeError::Bind { address: address.clone(), reason };
     let listener = TcpListener::bind(socket).await.map_err(refused)?;
@@ -29,7 +29,7 @@ pub(super) async fn bind(address: &Address) -> Result<(TcpListener, Address), Se
 
 /// Answers until it is dropped. A request is answered as it comes, so those that are open have not asked, or do not read: where all
 /// places are taken, the oldest one makes room.
-pub(super) async fn answer(listener: TcpListener, overseen: MonitoringState) {
+pub(in crate::service) async fn answer(listener: TcpListener, overseen: MonitoringState) {
     // ends all that are open when this is dropped
     let mut tasks = JoinSet::new();
     let mut open: VecDeque<AbortHandle> = VecDeque::new();

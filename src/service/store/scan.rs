@@ -69,20 +69,20 @@ fn probe(folder: &Path) -> io::Result<()> {
 
 /// What is in a folder.
 #[derive(Default)]
-pub(super) struct StoreScan {
+pub(in crate::service) struct StoreScan {
     /// Sessions with their models.
-    pub(super) sessions: BTreeMap<String, String>,
+    pub(in crate::service) sessions: BTreeMap<String, String>,
     /// How many jobs there are.
-    pub(super) jobs: usize,
+    pub(in crate::service) jobs: usize,
     /// Bytes of sessions, their models, and jobs.
-    pub(super) bytes: usize,
+    pub(in crate::service) bytes: usize,
     /// Models of no session.
-    pub(super) left: Vec<PathBuf>,
+    pub(in crate::service) left: Vec<PathBuf>,
 }
 
 impl StoreScan {
     /// Looks around.
-    pub(super) fn of(folder: &Path) -> io::Result<Self> {
+    pub(in crate::service) fn of(folder: &Path) -> io::Result<Self> {
         let mut found = Self::default();
         for entry in fs::read_dir(folder.join("sessions"))? {
             let entry = entry?;
@@ -119,7 +119,7 @@ impl StoreScan {
     }
 }
 
-/// Whether this is a name that [`super::ids`] makes; no other becomes a path.
-pub(super) fn is_id(text: &str) -> bool {
+/// Whether this is a name that [`crate::service::ids`] makes; no other becomes a path.
+pub(in crate::service) fn is_id(text: &str) -> bool {
     text.len() == 32 && text.bytes().all(|byte| byte.is_ascii_hexdigit())
 }

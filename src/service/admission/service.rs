@@ -6,11 +6,11 @@
 //! answered), and a message that was begun must go on. Who may not ask is refused here; whether the server is well may be
 //! asked by everybody, in a few small places of its own, so that nobody is in the way of others by asking that.
 
-use super::bodies::{RequestBody, ResponseBody};
-use super::gate::{AdmissionCounters, OPEN, REQUEST_ID};
-use super::metrics::{self};
-use super::status;
-use super::turns::{CLIENT, TaskOwner};
+use super::body::{RequestBody, ResponseBody};
+use super::counters::{AdmissionCounters, OPEN, REQUEST_ID};
+use crate::service::fair_semaphore::{CLIENT, TaskOwner};
+use crate::service::metrics;
+use crate::service::status;
 use std::convert::Infallible;
 use std::future::Future;
 use std::pin::Pin;
@@ -27,13 +27,13 @@ const STREAMS: [&str; 2] = ["/Trial", "/ServerReflectionInfo"];
 
 /// A service whose calls enter through an [`AdmissionCounters`].
 #[derive(Clone)]
-pub(super) struct AdmissionService<S> {
+pub(in crate::service) struct AdmissionService<S> {
     service: S,
     gate: Arc<AdmissionCounters>,
 }
 
 impl<S> AdmissionService<S> {
-    pub(super) fn new(service: S, gate: &Arc<AdmissionCounters>) -> Self {
+    pub(in crate::service) fn new(service: S, gate: &Arc<AdmissionCounters>) -> Self {
         Self { service, gate: Arc::clone(gate) }
     }
 }

@@ -1,23 +1,23 @@
 //! What is kept of one session: two files in turn, each with a checksum, of which one is whole at any moment.
 
-use super::kept::SessionRecord;
-use super::proto;
-use super::store::SessionStore;
+use super::SessionStore;
+use super::record::SessionRecord;
 use crate::device::{Device, DeviceError, Token};
+use crate::service::proto;
 use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Keeps the states of one session.
 #[derive(Debug)]
-pub(super) struct SessionWriter {
+pub(in crate::service) struct SessionWriter {
     store: Arc<SessionStore>,
     id: String,
     model: String,
     sequence: u64,
     /// The last accepted state; 0: none yet.
-    pub(super) accepted: u64,
+    pub(in crate::service) accepted: u64,
     /// For how long the session is kept without use [ms]; 0: as long as any.
-    pub(super) lease_ms: u64,
+    pub(in crate::service) lease_ms: u64,
 }
 
 impl SessionWriter {
@@ -25,7 +25,7 @@ impl SessionWriter {
     ///
     /// # Errors
     /// What the system said, or the bound.
-    pub(super) fn new(
+    pub(in crate::service) fn new(
         store: &Arc<SessionStore>,
         id: &str,
         model: &str,
@@ -36,7 +36,7 @@ impl SessionWriter {
     }
 
     /// Of one that goes on; it sleeps until [`SessionStore::wake`].
-    pub(super) fn after(store: &Arc<SessionStore>, id: &str, model: &str, kept: &SessionRecord) -> Self {
+    pub(in crate::service) fn after(store: &Arc<SessionStore>, id: &str, model: &str, kept: &SessionRecord) -> Self {
         Self::of(store, id, model, kept.sequence, kept.accepted, kept.lease_ms)
     }
 
@@ -49,7 +49,7 @@ impl SessionWriter {
     ///
     /// # Errors
     /// What the system said, or the bound; what was kept before is still there.
-    pub(super) fn keep(&mut self, accepted: u64, sealed: &[u8]) -> io::Result<()> {
+    pub(in crate::service) fn keep(&mut self, accepted: u64, sealed: &[u8]) -> io::Result<()> {
         let sequence = self.sequence + 1;
         let path = self.store.session(&self.id, &self.model, sequence % 2);
         let bytes = SessionRecord::write(sequence, accepted, self.lease_ms, sealed);
@@ -66,7 +66,7 @@ impl SessionWriter {
     ///
     /// # Errors
     /// As [`Self::keep`]; what was asked for before holds on.
-    pub(super) fn lease(&mut self, lease_ms: u64) -> io::Result<()> {
+    pub(in crate::service) fn lease(&mut self, lease_ms: u64) -> io::Result<()> {
         let before = std::mem::replace(&mut self.lease_ms, lease_ms);
         let kept = (before != lease_ms).then(|| self.store.load(&self.id, &self.model)).flatten();
         let written = kept.map_or(Ok(()), |kept| self.keep(kept.accepted, &kept.sealed));
@@ -74,24 +74,28 @@ impl SessionWriter {
     }
 
     /// What is kept waits for somebody to ask for it.
-    pub(super) fn sleep(&self) {
+    pub(in crate::service) fn sleep(&self) {
         self.store.sleep(&self.id);
     }
 
     /// Removes what is kept.
-    pub(super) fn forget(&self) {
+    pub(in crate::service) fn forget(&self) {
         self.store.forget(&self.id);
     }
 }
 
 /// Removes what is kept of a session that is closed: whoever keeps at this moment is waited for, and then finds it closed.
-pub(super) fn forget(keeper: &Mutex<SessionWriter>) {
+pub(in crate::service) fn forget(keeper: &Mutex<SessionWriter>) {
     keeper.lock().unwrap_or_else(PoisonError::into_inner).forget();
 }
 
 /// A state as bytes, with those that a client may go back to: the one it was tried from, and the one accepted `before`. A client
 /// that was not told of an accept takes its step again, or another one, from the state that it knows.
-pub(super) fn with_those_before(device: &dyn Device, token: Token, before: Token) -> Result<Vec<u8>, DeviceError> {
+pub(in crate::service) fn with_those_before(
+    device: &dyn Device,
+    token: Token,
+    before: Token,
+) -> Result<Vec<u8>, DeviceError> {
     let mut tokens = vec![token];
     for other in [device.parent(token), Some(before)].into_iter().flatten() {
         if other.0 != 0 && !tokens.contains(&other) {

@@ -1,9 +1,9 @@
 //! What an overseer is told: every metric as Prometheus reads it, and whether a server is ready for more.
 
-use super::gate::AdmissionCounters;
-use super::log;
-use super::metrics::{METRICS, Metric};
-use super::shared::ServerState;
+use crate::service::admission::counters::AdmissionCounters;
+use crate::service::log;
+use crate::service::metrics::{METRICS, Metric};
+use crate::service::shared::ServerState;
 use std::fmt::Write;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -11,13 +11,13 @@ use std::time::UNIX_EPOCH;
 
 /// What an overseer may ask for.
 #[derive(Clone)]
-pub(super) struct MonitoringState {
-    pub(super) shared: Arc<ServerState>,
-    pub(super) gate: Arc<AdmissionCounters>,
+pub(in crate::service) struct MonitoringState {
+    pub(in crate::service) shared: Arc<ServerState>,
+    pub(in crate::service) gate: Arc<AdmissionCounters>,
 }
 
 /// Why a server is not ready for more; none: it is.
-pub(super) fn busy(shared: &ServerState, gate: &AdmissionCounters) -> Option<String> {
+pub(in crate::service) fn busy(shared: &ServerState, gate: &AdmissionCounters) -> Option<String> {
     let limits = &shared.limits;
     if shared.shutdown.draining.is_cancelled() {
         return Some("it is stopping".to_owned());
@@ -43,7 +43,7 @@ pub(super) fn busy(shared: &ServerState, gate: &AdmissionCounters) -> Option<Str
 const WAITING: usize = 8;
 
 /// Everything, as Prometheus reads it.
-pub(super) fn text(shared: &ServerState, gate: &AdmissionCounters) -> String {
+pub(in crate::service) fn text(shared: &ServerState, gate: &AdmissionCounters) -> String {
     let mut out = String::with_capacity(8192);
     for Metric { name, kind, help } in METRICS {
         let _ = writeln!(out, "# HELP {name} {help}\n# TYPE {name} {kind}");

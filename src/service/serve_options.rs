@@ -1,10 +1,10 @@
 //! What a server may be told, and why it does not run.
 
 use super::address::Address;
-use super::guard::{GuardError, GuardFiles};
+use super::authentication::{GuardError, GuardFiles};
 use super::limits::Limits;
 use super::settings::Settings;
-use super::survey::StoreError;
+use super::store::scan::StoreError;
 use crate::compile::CompiledModel;
 use crate::device::Device;
 use std::path::PathBuf;

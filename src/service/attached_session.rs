@@ -1,10 +1,10 @@
 //! The session that a stream of questions is about: opened by it, or joined.
 
-use super::answerable::answerable;
 use super::proto;
-use super::question::StreamRequest;
+use super::reply_size::answerable;
 use super::session::{Session, refused};
 use super::shared::ServerState;
+use super::stream_request::StreamRequest;
 use proto::device_reply::Kind as ReplyKind;
 use proto::device_request::Kind as RequestKind;
 use std::sync::Arc;

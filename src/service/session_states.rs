@@ -1,8 +1,8 @@
 //! The states of a session as sealed bytes, and back, and the memory that its device takes.
 
-use super::answerable::bounded;
 use super::convert::device as wire;
 use super::limits::Limits;
+use super::reply_size::bounded;
 use super::session::Session;
 use super::snapshots;
 use super::{proto, status};

@@ -1,8 +1,8 @@
 //! The service without a network: the same calls on the same models, in the process that asks. Messages are those of the
 //! protocol as bytes, so that whoever speaks it to a server speaks it here, and gets the same bits and the same errors.
 
+use super::attached_session::{AttachedSession, RequestAction};
 use super::connection::Connections;
-use super::joined::{AttachedSession, RequestAction};
 use super::limits::Limits;
 use super::server::share;
 use super::shared::{BimorphService, ServerState};

@@ -1,12 +1,12 @@
 //! The gate through which calls come in: counts of them and of what their requests hold, and who may ask.
 
-use super::accounts::{Account, Accounts, CountLease};
-use super::guard::Guard;
-use super::ids::Ids;
-use super::limits::Limits;
-use super::metrics::{self, Metrics};
-use super::presence::Peer;
-use super::status;
+use crate::service::accounts::{Account, Accounts, CountLease};
+use crate::service::authentication::Guard;
+use crate::service::ids::Ids;
+use crate::service::limits::Limits;
+use crate::service::metrics::{self, Metrics};
+use crate::service::peer::Peer;
+use crate::service::status;
 use std::sync::atomic::{AtomicI32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
@@ -15,40 +15,40 @@ use tonic::codegen::http;
 use tonic::{Code, Status};
 
 /// Counts for all services of a server.
-pub(super) struct AdmissionCounters {
-    pub(super) calls: AtomicUsize,
+pub(in crate::service) struct AdmissionCounters {
+    pub(in crate::service) calls: AtomicUsize,
     /// Calls of health: those that are answered at once, and those that go on.
-    pub(super) health: [AtomicUsize; 2],
-    pub(super) held: AtomicUsize,
-    pub(super) most_calls: usize,
-    pub(super) most_held: usize,
+    pub(in crate::service) health: [AtomicUsize; 2],
+    pub(in crate::service) held: AtomicUsize,
+    pub(in crate::service) most_calls: usize,
+    pub(in crate::service) most_held: usize,
     /// Bytes of requests of one connection, by the lengths that they announce.
     most_announced: usize,
     /// Bytes of one message.
     most_message: usize,
-    pub(super) pause: Duration,
-    pub(super) guard: Arc<Guard>,
-    pub(super) accounts: Arc<Accounts>,
-    pub(super) metrics: Arc<Metrics>,
+    pub(in crate::service) pause: Duration,
+    pub(in crate::service) guard: Arc<Guard>,
+    pub(in crate::service) accounts: Arc<Accounts>,
+    pub(in crate::service) metrics: Arc<Metrics>,
     /// What requests of this server are called, before their number.
-    pub(super) name: String,
-    pub(super) requests: AtomicU64,
+    pub(in crate::service) name: String,
+    pub(in crate::service) requests: AtomicU64,
 }
 
 /// Header with the name of a request, which the client may choose.
-pub(super) const REQUEST_ID: &str = "x-request-id";
+pub(in crate::service) const REQUEST_ID: &str = "x-request-id";
 /// Longest name that is taken from a client.
 const LONGEST_ID: usize = 64;
 
 /// A service without tokens: who watches over servers has none.
-pub(super) const OPEN: &str = "grpc.health.v1.Health";
+pub(in crate::service) const OPEN: &str = "grpc.health.v1.Health";
 /// Calls of it at once of each kind: `Check`, and `Watch`, which goes on.
 const HEALTH_CALLS: usize = 64;
 /// Bytes of a request of it.
 const HEALTH_BYTES: usize = 1 << 10;
 
 impl AdmissionCounters {
-    pub(super) fn new(
+    pub(in crate::service) fn new(
         limits: &Limits,
         guard: Arc<Guard>,
         metrics: Arc<Metrics>,
@@ -73,17 +73,17 @@ impl AdmissionCounters {
     }
 
     /// Calls under way.
-    pub(super) fn calls(&self) -> usize {
+    pub(in crate::service) fn calls(&self) -> usize {
         self.calls.load(Ordering::Relaxed)
     }
 
     /// Bytes of requests that are held.
-    pub(super) fn held(&self) -> usize {
+    pub(in crate::service) fn held(&self) -> usize {
         self.held.load(Ordering::Relaxed)
     }
 
     /// The name of a request: the client's, or the next one of this server.
-    pub(super) fn request_id(&self, headers: &http::HeaderMap) -> http::HeaderValue {
+    pub(in crate::service) fn request_id(&self, headers: &http::HeaderMap) -> http::HeaderValue {
         let is_name = |value: &&http::HeaderValue| {
             (1..=LONGEST_ID).contains(&value.len()) && value.as_bytes().iter().all(u8::is_ascii_graphic)
         };
@@ -94,7 +94,7 @@ impl AdmissionCounters {
         })
     }
 
-    pub(super) fn enter(self: &Arc<Self>, request: &http::Request<Body>, is_health: bool) -> AdmittedCall {
+    pub(in crate::service) fn enter(self: &Arc<Self>, request: &http::Request<Body>, is_health: bool) -> AdmittedCall {
         let path = request.uri().path();
         let call = AdmittedCall {
             gate: Arc::clone(self),
@@ -118,7 +118,11 @@ impl AdmissionCounters {
     }
 
     /// Whether a call may go on, and whose it is.
-    pub(super) fn admit(&self, call: &AdmittedCall, headers: &http::HeaderMap) -> Result<Arc<Account>, Status> {
+    pub(in crate::service) fn admit(
+        &self,
+        call: &AdmittedCall,
+        headers: &http::HeaderMap,
+    ) -> Result<Arc<Account>, Status> {
         let presence = call.presence.as_ref().ok_or_else(|| Status::unauthenticated("nobody is known to ask"))?;
         let (most, name) = if call.is_health() { (HEALTH_CALLS, "health") } else { (self.most_calls, "calls") };
         if call.count().load(Ordering::Relaxed) > most {
@@ -137,51 +141,51 @@ impl AdmissionCounters {
 }
 
 /// One call, from its first byte until its answer is sent.
-pub(super) struct AdmittedCall {
-    pub(super) gate: Arc<AdmissionCounters>,
-    pub(super) presence: Option<Arc<Peer>>,
+pub(in crate::service) struct AdmittedCall {
+    pub(in crate::service) gate: Arc<AdmissionCounters>,
+    pub(in crate::service) presence: Option<Arc<Peer>>,
     /// Its kind among those of health; none: any other.
-    pub(super) health: Option<usize>,
-    pub(super) held: AtomicUsize,
+    pub(in crate::service) health: Option<usize>,
+    pub(in crate::service) held: AtomicUsize,
     /// Bytes that its request announces, and whose account has them.
     announced: Mutex<(usize, Option<Arc<Account>>)>,
     /// Its place in the account of its client.
     counted: OnceLock<CountLease>,
     /// Its place among the calls that are counted.
-    pub(super) place: usize,
-    pub(super) started: Instant,
+    pub(in crate::service) place: usize,
+    pub(in crate::service) started: Instant,
     /// How it ended.
-    pub(super) code: AtomicI32,
+    pub(in crate::service) code: AtomicI32,
 }
 
 impl AdmittedCall {
     /// The count that it is in.
-    pub(super) fn count(&self) -> &AtomicUsize {
+    pub(in crate::service) fn count(&self) -> &AtomicUsize {
         self.health.map_or(&self.gate.calls, |kind| &self.gate.health[kind])
     }
 
     /// Whether it asks for the health of this server.
-    pub(super) fn is_health(&self) -> bool {
+    pub(in crate::service) fn is_health(&self) -> bool {
         self.health.is_some()
     }
 
     /// How long its request may pause.
-    pub(super) fn longest_pause(&self) -> Duration {
+    pub(in crate::service) fn longest_pause(&self) -> Duration {
         self.gate.pause
     }
 
     /// How it ended, as far as is known.
-    pub(super) fn code(&self) -> Code {
+    pub(in crate::service) fn code(&self) -> Code {
         Code::from_i32(self.code.load(Ordering::Relaxed))
     }
 
     /// How long it has taken so far.
-    pub(super) fn time(&self) -> Duration {
+    pub(in crate::service) fn time(&self) -> Duration {
         self.started.elapsed()
     }
 
     /// Takes note of the code in headers or trailers.
-    pub(super) fn hear(&self, headers: &http::HeaderMap) {
+    pub(in crate::service) fn hear(&self, headers: &http::HeaderMap) {
         let code = headers.get("grpc-status").and_then(|value| value.to_str().ok()).and_then(|text| text.parse().ok());
         if let Some(code) = code {
             self.code.store(code, Ordering::Relaxed);
@@ -189,7 +193,7 @@ impl AdmittedCall {
     }
 
     /// More of its request has come.
-    pub(super) fn hold(&self, bytes: usize) -> Result<(), Status> {
+    pub(in crate::service) fn hold(&self, bytes: usize) -> Result<(), Status> {
         let own = self.held.fetch_add(bytes, Ordering::Relaxed) + bytes;
         if self.is_health() {
             return if own > HEALTH_BYTES { Err(long_health()) } else { Ok(()) };
@@ -202,7 +206,7 @@ impl AdmittedCall {
     }
 
     /// A message of its request announces its length, which counts before any of it has come.
-    pub(super) fn announce(&self, bytes: usize, account: &Arc<Account>) -> Result<(), Status> {
+    pub(in crate::service) fn announce(&self, bytes: usize, account: &Arc<Account>) -> Result<(), Status> {
         if self.is_health() {
             return if bytes > HEALTH_BYTES { Err(long_health()) } else { Ok(()) };
         }
@@ -225,7 +229,7 @@ impl AdmittedCall {
     }
 
     /// What has come, and what was announced, is not held any more.
-    pub(super) fn release(&self) {
+    pub(in crate::service) fn release(&self) {
         let announced = std::mem::take(&mut *self.announced.lock().unwrap_or_else(PoisonError::into_inner));
         if let (bytes, Some(account)) = announced {
             account.release(bytes);

@@ -1,26 +1,26 @@
 //! What is kept of a session, as bytes that tell whether they are whole.
 
-use super::snapshots::checksum;
+use crate::service::snapshots::checksum;
 
 /// What a file begins with.
-pub(super) const HEAD: &[u8; 16] = b"bimorph states 2";
+pub(in crate::service) const HEAD: &[u8; 16] = b"bimorph states 2";
 /// Head, checksum, sequence number, token, lease, length.
 const BEFORE: usize = 16 + 16 + 4 * 8;
 
 /// What is kept of a session.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct SessionRecord {
-    pub(super) sequence: u64,
+pub(in crate::service) struct SessionRecord {
+    pub(in crate::service) sequence: u64,
     /// The last accepted state; 0: none yet.
-    pub(super) accepted: u64,
+    pub(in crate::service) accepted: u64,
     /// For how long it is kept without use [ms]; 0: as long as any.
-    pub(super) lease_ms: u64,
+    pub(in crate::service) lease_ms: u64,
     /// States in their envelope.
-    pub(super) sealed: Vec<u8>,
+    pub(in crate::service) sealed: Vec<u8>,
 }
 
 impl SessionRecord {
-    pub(super) fn write(sequence: u64, accepted: u64, lease_ms: u64, sealed: &[u8]) -> Vec<u8> {
+    pub(in crate::service) fn write(sequence: u64, accepted: u64, lease_ms: u64, sealed: &[u8]) -> Vec<u8> {
         let mut out = Vec::with_capacity(BEFORE + sealed.len());
         out.extend(HEAD);
         out.extend([0; 16]);
@@ -34,7 +34,7 @@ impl SessionRecord {
     }
 
     /// None for a file that is not whole: the server ended while it was written.
-    pub(super) fn read(bytes: &[u8]) -> Option<Self> {
+    pub(in crate::service) fn read(bytes: &[u8]) -> Option<Self> {
         let (head, rest) = bytes.split_at_checked(32)?;
         let word = |k: usize| rest.get(8 * k..8 * k + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
         let [sequence, accepted, lease_ms, length] = [word(0)?, word(1)?, word(2)?, word(3)?];

@@ -1,6 +1,6 @@
 //! How what a server is told is written: whole numbers, bytes, times, files, addresses.
 
-use super::address::Address;
+use crate::service::address::Address;
 use std::marker::PhantomData;
 use std::path::PathBuf;
 use std::time::Duration;

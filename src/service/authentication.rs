@@ -2,7 +2,7 @@
 //!
 //! A Unix socket asks for nothing: its mode lets in its owner alone.
 
-use super::presence::{Peer, PeerIdentity};
+use super::peer::{Peer, PeerIdentity};
 use super::tls::{ALPN, CertificateFiles, PemError, authorities, certificates, provider, validity};
 use super::tokens::{TokenError, Tokens, is_open, sha256};
 use std::io;

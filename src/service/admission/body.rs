@@ -1,8 +1,8 @@
 //! The bodies of requests and answers, as they pass the gate: what comes in is counted, and how an answer ends is noted.
 
-use super::accounts::Account;
-use super::framing::Framing;
-use super::gate::AdmittedCall;
+use super::counters::AdmittedCall;
+use crate::service::accounts::Account;
+use crate::service::framing::Framing;
 use http_body::{Frame, SizeHint};
 use std::future::Future;
 use std::pin::Pin;
@@ -15,7 +15,7 @@ use tonic::{Code, Status};
 use tracing::Span;
 
 /// The body of a request: counted, and passed on by whole messages.
-pub(super) struct RequestBody {
+pub(in crate::service) struct RequestBody {
     body: Body,
     call: Arc<AdmittedCall>,
     account: Arc<Account>,
@@ -27,12 +27,12 @@ pub(super) struct RequestBody {
 
 impl RequestBody {
     /// Of no body yet.
-    pub(super) fn new(call: Arc<AdmittedCall>, account: Arc<Account>, stream: bool) -> Self {
+    pub(in crate::service) fn new(call: Arc<AdmittedCall>, account: Arc<Account>, stream: bool) -> Self {
         Self { body: Body::empty(), call, account, framing: Framing::default(), stream, pause: None }
     }
 
     /// The same of a body.
-    pub(super) fn of(self, body: Body) -> Self {
+    pub(in crate::service) fn of(self, body: Body) -> Self {
         Self { body, ..self }
     }
 
@@ -95,10 +95,10 @@ impl http_body::Body for RequestBody {
 }
 
 /// The body of an answer; the call is over when it is dropped.
-pub(super) struct ResponseBody {
-    pub(super) body: Body,
-    pub(super) call: Arc<AdmittedCall>,
-    pub(super) span: Span,
+pub(in crate::service) struct ResponseBody {
+    pub(in crate::service) body: Body,
+    pub(in crate::service) call: Arc<AdmittedCall>,
+    pub(in crate::service) span: Span,
 }
 
 impl Drop for ResponseBody {

@@ -2,7 +2,7 @@
 //! wake it. Where there is another core for the server, who asks looks for the answer for a while before it sleeps: to be woken costs more
 //! than a small model's step. While nobody asks a thread of its own drives it, so that a network that fails is noticed.
 
-use crate::service::inside::wanted;
+use crate::service::in_process::wanted;
 use std::future::Future;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
