@@ -1,7 +1,7 @@
 //! `bimorph cosim`: a circuit with mechanisms in it.
 
-use super::access::AccessArgs;
 use super::cosim_netlist::{NetlistArgs, is_netlist};
+use super::credentials::AccessArgs;
 use super::failure::Failure;
 use super::output::{check_folder, write};
 use super::plot::{chart_of, longest};

@@ -5,7 +5,6 @@
 
 mod ac;
 mod ac_report;
-mod access;
 mod chart;
 mod check;
 mod convert;
@@ -13,6 +12,7 @@ mod convert_picture;
 mod cosim;
 mod cosim_check;
 mod cosim_netlist;
+mod credentials;
 mod doctor;
 mod draw_motion;
 mod export;

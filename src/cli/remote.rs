@@ -1,6 +1,6 @@
 //! A server that computes sweeps as jobs.
 
-use super::access::AccessArgs;
+use super::credentials::AccessArgs;
 use super::failure::Failure;
 use super::{interrupt, value};
 use bimorph::compile::CompileOptions;

@@ -1,6 +1,6 @@
 //! Each analysis prints the JSON that is documented, in SI, against closed forms.
 
-use crate::bench::{Bench, CANTILEVER, PLATE, number};
+use crate::command::{Bench, CANTILEVER, PLATE, number};
 use approx::assert_relative_eq;
 
 /// `check` counts what is there and fails nowhere.

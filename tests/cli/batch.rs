@@ -1,6 +1,6 @@
 //! Sweeps as jobs: samples of what varies, points that outlive the process, shards put together.
 
-use crate::bench::Bench;
+use crate::command::Bench;
 use std::time::{Duration, Instant};
 
 /// A cantilever under a force, with parameters to vary.

@@ -1,6 +1,6 @@
 //! `bimorph chart`, and the baselines behind `--solver`.
 
-use crate::bench::{Bench, CANTILEVER, number};
+use crate::command::{Bench, CANTILEVER, number};
 use serde_json::Value;
 
 const CHART: &str = "chart c.net --set F=1u --release F --stop 8u --points 41 --signals b.y --undamped \

@@ -1,7 +1,7 @@
 //! What a server is told: options before the environment before a file; `Info` shows it, and docs/service.md has every setting.
 
-use crate::bench::Bench;
-use crate::serving::Server;
+use crate::command::Bench;
+use crate::serve_process::Server;
 use bimorph::service::limits::{LIMITS, Limits};
 use bimorph::service::proto;
 use bimorph::service::settings::{SETTINGS, Settings, variable};

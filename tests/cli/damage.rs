@@ -1,11 +1,11 @@
 //! Files that a disk has changed by one bit, and commands that are killed: no number is wrong, and nothing is lost but the record that the bit is
 //! in.
 
-use crate::bench::{Bench, CANTILEVER, PLATE};
-use crate::kept::{Numbers, kill_after};
-use crate::overseen::block_on;
-use crate::serving::Server;
+use crate::command::{Bench, CANTILEVER, PLATE};
+use crate::monitoring::block_on;
+use crate::serve_process::Server;
 use crate::stepping::{Stream, client, compiled};
+use crate::stored_sessions::{Numbers, kill_after};
 use bimorph::netlist::Bundle;
 use bimorph::service::convert::model::bundle_to_wire;
 use bimorph::service::proto;

@@ -1,6 +1,6 @@
 //! Bad input gives one clear message on standard error, exit status 1, nothing on standard output and no file.
 
-use crate::bench::{Bench, CANTILEVER, PLATE};
+use crate::command::{Bench, CANTILEVER, PLATE};
 
 /// Runs a command that must fail and returns its message.
 fn fails(bench: &Bench, words: &str) -> String {

@@ -1,6 +1,6 @@
 //! `bimorph export`: what the files hold, and what is refused.
 
-use crate::bench::{Bench, CANTILEVER, PLATE, number};
+use crate::command::{Bench, CANTILEVER, PLATE, number};
 use std::collections::BTreeSet;
 
 /// A heated chevron with a comb and a plate: every kind of port.

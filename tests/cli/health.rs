@@ -1,9 +1,9 @@
 //! Whether a server is well may be asked by everybody, and by nobody so that others are in want: `grpc.health.v1` without a token.
 
-use crate::bench::Bench;
-use crate::overseen::{block_on, channel, get, start, value};
-use crate::secure::{self, access, asked, certified};
-use crate::serving::Server;
+use crate::command::Bench;
+use crate::monitoring::{block_on, channel, get, start, value};
+use crate::serve_process::Server;
+use crate::tls_and_tokens::{self, access, asked, certified};
 use bimorph::service::proto;
 use proto::bimorph_client::BimorphClient;
 use proto::device_request::Kind as Ask;
@@ -35,7 +35,7 @@ async fn watch(channel: &Channel) -> Result<Streaming<HealthCheckResponse>, Code
 /// As many connections as there may be, with a watch each and no token: who has a token gets a place.
 #[test]
 fn watches_lock_nobody_out() {
-    let bench = secure::bench();
+    let bench = tls_and_tokens::bench();
     let server = Server::start(&bench, "--listen 127.0.0.1:0 --token-file tokens --max-connections 4");
     block_on(async {
         let mut watches = Vec::new();
@@ -74,8 +74,8 @@ fn health_has_small_places_of_its_own() {
 /// Who speaks plainly where TLS is spoken is told so, whatever it asks.
 #[test]
 fn health_is_not_told_plainly_where_tls_is_spoken() {
-    let bench = secure::bench();
-    let authority = secure::tls("authority.pem");
+    let bench = tls_and_tokens::bench();
+    let authority = tls_and_tokens::tls("authority.pem");
     let server = Server::start(&bench, &format!("{} --tls-client-ca {}", certified("server"), authority.display()));
     block_on(async {
         let channel = channel(server.address.trim_start_matches("https://")).await;

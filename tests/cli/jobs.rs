@@ -1,7 +1,7 @@
 //! `bimorph sweep --to` and `bimorph jobs`: the bytes of the same sweep in this process, whoever waits for it, and whoever lets go.
 
-use crate::bench::{Bench, PLATE};
-use crate::serving::Server;
+use crate::command::{Bench, PLATE};
+use crate::serve_process::Server;
 use std::process::{Command, Stdio};
 
 const SWEEP: &str = "sweep plate.net --analysis pullin --max 30 --param gap=1.5u:2.5u";

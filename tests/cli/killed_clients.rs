@@ -1,9 +1,9 @@
 //! Clients that are killed at any moment, in the middle of a step too: the server goes on, what was accepted is there, each step is
 //! in the run once, and sessions that nobody can come back to are gone.
 
-use crate::bench::Bench;
-use crate::overseen::{block_on, get, start, value};
-use crate::serving::Server;
+use crate::command::Bench;
+use crate::monitoring::{block_on, get, start, value};
+use crate::serve_process::Server;
 use crate::stepping::{Stream, client, compiled};
 use bimorph::service::proto;
 use proto::device_request::Kind as Ask;

@@ -1,6 +1,6 @@
 //! `layout` and `convert` from outside: files, reports, and layouts where netlists go.
 
-use crate::bench::{Bench, CANTILEVER};
+use crate::command::{Bench, CANTILEVER};
 
 /// A netlist becomes a layout, the layout a netlist and a picture, and every analysis takes it as it is.
 #[test]

@@ -1,11 +1,11 @@
 //! What goes wrong around a server while it runs: clients that say nothing, files that are changed or damaged, and one client that takes
 //! all that it can.
 
-use crate::bench::{Bench, PLATE};
-use crate::overseen::{block_on, get, start};
-use crate::secure::{TOKEN, access, bench as guarded, tls};
-use crate::serving::Server;
+use crate::command::{Bench, PLATE};
+use crate::monitoring::{block_on, get, start};
+use crate::serve_process::Server;
 use crate::stepping::{Stream, client, compiled};
+use crate::tls_and_tokens::{TOKEN, access, bench as guarded, tls};
 use bimorph::netlist::Bundle;
 use bimorph::service::client::Client;
 use bimorph::service::convert::model::bundle_to_wire;

@@ -1,7 +1,7 @@
 //! A session that is stepped: each step is tried and accepted.
 
-use crate::bench::{Bench, PLATE};
-use crate::serving::Server;
+use crate::command::{Bench, PLATE};
+use crate::serve_process::Server;
 use bimorph::netlist::Bundle;
 use bimorph::service::convert::model::bundle_to_wire;
 use bimorph::service::proto;

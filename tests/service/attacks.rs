@@ -3,7 +3,7 @@
 //! gigabyte, answers the attack with the right code, rests, and stops when it is told to.
 #![cfg(target_os = "linux")]
 
-use super::victim::{Reader, Victim, Wire, netlist};
+use super::serve_process::{Reader, Victim, Wire, netlist};
 use bimorph::service::proto;
 use proto::device_request::Kind as Ask;
 use std::fmt::Write as _;

@@ -1,6 +1,6 @@
 //! Every call answers over a real socket.
 
-use super::running::{PLATE, block_on, compiled, start, wire_bundle};
+use super::test_server::{PLATE, block_on, compiled, start, wire_bundle};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use proto::device_reply::Kind as Reply;

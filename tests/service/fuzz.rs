@@ -5,8 +5,8 @@
 //! test; `make fuzz` runs them for minutes.
 
 use super::attached::{Attached, trial};
-use super::running::{DEADLINE, Running, compiled, start_with};
-use super::sound::sound;
+use super::test_server::{DEADLINE, Running, compiled, start_with};
+use super::valid_requests::sound;
 use bimorph::content::Fnv;
 use bimorph::device::local::LocalDevice;
 use bimorph::service::limits::Limits;

@@ -1,8 +1,8 @@
 //! Jobs: rows come as they are finished and from any one on, clients see their own, and what was cancelled stays.
 
-use super::cuts::LOCAL;
 use super::quotas;
-use super::running::{block_on, bundle, start_with};
+use super::session_faults::LOCAL;
+use super::test_server::{block_on, bundle, start_with};
 use bimorph::compile::CompileOptions;
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepSpec};
 use bimorph::netlist::Bundle;

@@ -1,7 +1,7 @@
 //! How long a session is kept without use, by the server that was asked and by the one after it.
 
 use super::attached::Attached;
-use super::running::{block_on, compiled, start_kept};
+use super::test_server::{block_on, compiled, start_kept};
 use bimorph::compile::CompiledModel;
 use bimorph::device::Device;
 use bimorph::device::local::LocalDevice;

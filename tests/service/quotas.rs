@@ -1,9 +1,9 @@
 //! What one client may have is bounded, told with what is used, and costs no other client anything.
 
 use super::attached::trial;
-use super::cuts::LOCAL;
 use super::jobs::{MANY, request};
-use super::running::{Running, block_on, start_guarded, wire_bundle};
+use super::session_faults::LOCAL;
+use super::test_server::{Running, block_on, start_guarded, wire_bundle};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use proto::bimorph_client::BimorphClient;

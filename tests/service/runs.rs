@@ -2,8 +2,8 @@
 //! in the way of others than a burst.
 
 use super::attached::Attached;
-use super::cuts::LOCAL;
-use super::running::{Running, block_on, bundle, compiled, start_with};
+use super::session_faults::LOCAL;
+use super::test_server::{Running, block_on, bundle, compiled, start_with};
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::run::{DriveSchedule, Ran, Start, steps};

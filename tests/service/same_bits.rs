@@ -1,6 +1,6 @@
 //! A model on a server and the same model in process give the same bits: trials, small signals, analyses and sweeps.
 
-use super::running::{DEADLINE, PLATE, Running, bundle, start_with};
+use super::test_server::{DEADLINE, PLATE, Running, bundle, start_with};
 use bimorph::analysis::harmonic::HarmonicOptions;
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::mesh::fitted_in_time;

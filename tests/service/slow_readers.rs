@@ -1,6 +1,6 @@
 //! Who reads the rows of a sweep slowly gets all of them once, holds nobody up, and is told when they are not all.
 
-use super::running::{Running, block_on, start_with};
+use super::test_server::{Running, block_on, start_with};
 use bimorph::device::local::LocalDevice;
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;

@@ -2,7 +2,7 @@
 //! from one of another model.
 
 use super::attached::Attached;
-use super::running::{Running, block_on, compiled, start_with, wire_bundle};
+use super::test_server::{Running, block_on, compiled, start_with, wire_bundle};
 use bimorph::device::local::LocalDevice;
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;

@@ -1,10 +1,10 @@
 //! Sweeps of variants: what they share (a mesh, the reading of the netlist, the steps of a run) changes no promise about any
 //! one of them.
 
-mod lanes;
-mod listed;
+mod batch_transients;
+mod batched;
+mod point_lists;
 mod ports;
-mod together;
 
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, compile};

@@ -1,6 +1,6 @@
 //! A sound message of every call.
 
-use super::running::wire_bundle;
+use super::test_server::wire_bundle;
 use bimorph::service::convert::run::pack;
 use bimorph::service::proto;
 use prost::Message;

@@ -2,8 +2,8 @@
 //!
 //! The certificates are those of tests/tls: of one authority for this machine, an expired one, and one of a stranger.
 
-use crate::bench::{Bench, PLATE, Ran};
-use crate::serving::Server;
+use crate::command::{Bench, PLATE, Ran};
+use crate::serve_process::Server;
 use bimorph::compile::CompileOptions;
 use bimorph::device::{Device, OpenRequest};
 use bimorph::netlist::Bundle;

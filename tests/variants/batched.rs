@@ -130,7 +130,7 @@ fn modes_are_those_alone() {
     assert!(found.iter().flatten().count() >= 9, "{:?}", found.iter().map(Option::is_some).collect::<Vec<_>>());
     let twice = "param l=60u\nprocess p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=l w=2u]\n\
                  anchor p [c] []\nbeam2d p [c d] [l=60u w=2u]\n";
-    let twins = super::together::variants(twice, "l", &[50e-6, 60e-6]);
+    let twins = super::batched::variants(twice, "l", &[50e-6, 60e-6]);
     let apart = modes_alone(&twins[0].parts.system, 4);
     let mut lanes = LaneModes::new(&twins[0].parts.system, apart.shapes).expect("lanes");
     let found = lanes.find(&[&twins[0].parts.system, &twins[1].parts.system], 2);

@@ -19,7 +19,7 @@ fn bytes_of_older_clients_are_understood() {
         out
     }
     let inside = InProcessServer::new().expect("a thread");
-    let text = super::running::PLATE;
+    let text = super::test_server::PLATE;
     let file = [field(1, b"plate.net"), field(2, text.as_bytes())].concat();
     let bundle = [field(1, b"plate.net"), field(2, &file)].concat();
     // V from 0 to 1 in 5 values; pull-in below 1 V, which no point has

@@ -2,8 +2,8 @@
 //! these tests.
 #![cfg(target_os = "linux")]
 
-use super::running::block_on;
-use super::victim::{Victim, netlist};
+use super::serve_process::{Victim, netlist};
+use super::test_server::block_on;
 use bimorph::service::proto;
 use std::time::{Duration, Instant};
 use tonic::Code;

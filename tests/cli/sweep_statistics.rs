@@ -1,6 +1,6 @@
 //! `bimorph sweep --limits`, and what a sweep is written to: statistics on standard error, tables and pictures.
 
-use crate::bench::Bench;
+use crate::command::Bench;
 
 /// A cantilever under a force, whose width varies.
 const CANTILEVER: &str = "param F=1u, w=2u, l=100u

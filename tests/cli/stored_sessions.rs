@@ -1,7 +1,7 @@
 //! `serve --state-dir`: accepted states outlive a server that is killed at any moment; none is lost and none doubled.
 
-use crate::bench::Bench;
-use crate::serving::Server;
+use crate::command::Bench;
+use crate::serve_process::Server;
 use crate::stepping::{Stream, client, compiled};
 use bimorph::service::proto;
 use proto::device_request::Kind as Ask;

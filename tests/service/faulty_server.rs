@@ -1,7 +1,7 @@
 //! A server that lies: whatever it answers to a device in a circuit, the answer is one error that names the server and what is wrong,
 //! and the next open begins anew. The lies are those of a device behind a server that passes them on.
 
-use super::running::{Running, start_with};
+use super::test_server::{Running, start_with};
 use bimorph::compile::CompiledModel;
 use bimorph::device::{
     Description, Device, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, SmallSignal, Status, Token,
@@ -160,7 +160,7 @@ fn no_call_outlives_its_deadline() {
     let deadline = Duration::from_millis(500);
     let mut device = bimorph::service::client::RemoteDevice::connect(
         &server.address.uri(),
-        &super::running::bundle(),
+        &super::test_server::bundle(),
         &bimorph::compile::CompileOptions::default(),
         deadline,
     )

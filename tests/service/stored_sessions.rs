@@ -1,7 +1,7 @@
 //! What is kept of a session outlives panics, wakes that are stopped, and whatever happens while one wakes.
 
 use super::attached::{Attached, refusal, trial};
-use super::running::{Running, block_on, compiled, start_kept};
+use super::test_server::{Running, block_on, compiled, start_kept};
 use bimorph::budget;
 use bimorph::compile::CompiledModel;
 use bimorph::device::local::LocalDevice;

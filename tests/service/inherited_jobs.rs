@@ -1,9 +1,9 @@
 //! Jobs that another server left, and files that were damaged meanwhile: nothing sound is lost, and nothing is taken for what it is not.
 
-use super::cuts::LOCAL;
 use super::jobs::{MANY, Wire, fetch, meta, request, rest};
-use super::jobs_kept::{ended, file, job, server, some_rows};
-use super::running::{block_on, start_kept};
+use super::session_faults::LOCAL;
+use super::stored_jobs::{ended, file, job, server, some_rows};
+use super::test_server::{block_on, start_kept};
 use bimorph::content::Fnv;
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;

@@ -1,8 +1,8 @@
 //! What a folder of states gives back after a kill, whatever happened before it: every state that a client may go back to, however
 //! old, and no model that is half written.
 
-use crate::bench::PLATE;
-use crate::overseen::block_on;
+use crate::command::PLATE;
+use crate::monitoring::block_on;
 use crate::stepping::Killed;
 use bimorph::netlist::Bundle;
 use bimorph::service::convert::model::bundle_to_wire;

@@ -2,7 +2,7 @@
 
 use super::attached::trial;
 use super::echo::echo;
-use super::running::{DEADLINE, block_on, compiled, start_with};
+use super::test_server::{DEADLINE, block_on, compiled, start_with};
 use bimorph::compile::CompiledModel;
 use bimorph::device::{Description, Device, DeviceError, OpenRequest, SmallSignal, Token, Trial, TrialReply};
 use bimorph::service::client::{TrialChannel, TrialConnections};

@@ -1,7 +1,7 @@
 //! A server that lies: whatever it answers, the run ends within the deadline of its device with one error that names instance and server,
 //! and no character that controls a terminal passes.
 
-use crate::liar::serve;
+use crate::faulty_server::serve;
 use crate::support::{run_text, skipped};
 use bimorph::cosim::{self, CosimError};
 use std::time::{Duration, Instant};

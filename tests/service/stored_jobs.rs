@@ -1,8 +1,8 @@
 //! Jobs in a folder: what was told of is there after a restart, damage is a job's own error, and a full disk ends a job and not the server.
 
-use super::cuts::LOCAL;
 use super::jobs::{MANY, Wire, fetch, gaps, meta, request, rest};
-use super::running::{Running, block_on, start_kept};
+use super::session_faults::LOCAL;
+use super::test_server::{Running, block_on, start_kept};
 use bimorph::compile::CompileOptions;
 use bimorph::jobs::sweep;
 use bimorph::service::limits::Limits;
@@ -199,7 +199,7 @@ fn a_full_folder_ends_a_job_and_not_the_server() {
         let (rows, last) = rest(&mut fetch(&mut wire, &name, 0).await.expect("a stream"), 0).await.expect("ends");
         assert_eq!((rows.len() as u64, last.as_ref()), (meta(&full).rows, Some(&full)));
         let mut large = request(3);
-        let text = format!("{}* {}\n", super::running::PLATE, "x".repeat(20_000));
+        let text = format!("{}* {}\n", super::test_server::PLATE, "x".repeat(20_000));
         large
             .bundle
             .as_mut()

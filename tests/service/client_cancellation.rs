@@ -2,8 +2,8 @@
 //! connection is gone. Against the command itself.
 #![cfg(target_os = "linux")]
 
-use super::running::block_on;
-use super::victim::{Victim, Wire, netlist};
+use super::serve_process::{Victim, Wire, netlist};
+use super::test_server::block_on;
 use bimorph::service::proto;
 use std::fmt::Write;
 use std::pin::Pin;

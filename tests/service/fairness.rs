@@ -3,8 +3,8 @@
 
 use super::quotas::Known;
 use super::quotas::Shows;
-use super::running::block_on;
-use super::victim::{Victim, netlist};
+use super::serve_process::{Victim, netlist};
+use super::test_server::block_on;
 use bimorph::service::proto;
 use proto::bimorph_client::BimorphClient;
 use std::fmt::Write;

@@ -1,7 +1,7 @@
 //! Random request sequences never kill the server: after each, it still answers as before.
 
 use super::echo::PANIC;
-use super::running::{Running, block_on, compiled, start};
+use super::test_server::{Running, block_on, compiled, start};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use proptest::prelude::*;

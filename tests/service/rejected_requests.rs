@@ -1,7 +1,7 @@
 //! What cannot be served is refused with the right code, and says which field, and the server goes on.
 
 use super::echo::PANIC;
-use super::running::{DEADLINE, block_on, bundle, compiled, start};
+use super::test_server::{DEADLINE, block_on, bundle, compiled, start};
 use bimorph::compile::CompileOptions;
 use bimorph::device::{Device, DeviceError, Mode, OpenRequest, Token, Trial, TrialReply};
 use bimorph::netlist::Bundle;

@@ -1,8 +1,8 @@
 //! The service without a network gives what a server gives: the same bytes, the same refusals.
 
 use super::attached::{Attached, trial};
-use super::cuts::LOCAL;
-use super::running::{block_on, start_with, wire_bundle};
+use super::session_faults::LOCAL;
+use super::test_server::{block_on, start_with, wire_bundle};
 use bimorph::service::in_process::{DeviceChannel, InProcessServer};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
@@ -43,7 +43,7 @@ fn it_says_what_a_server_says() {
     let open = proto::OpenRequest { model: model.clone(), ..Default::default() };
     let (there, refused, device, replies) = block_on(async {
         let mut client = server.client().await;
-        assert_eq!(super::running::compiled(&mut client).await, model);
+        assert_eq!(super::test_server::compiled(&mut client).await, model);
         let there = client.r#static(statics.clone()).await.expect("an equilibrium").into_inner();
         let refused = client.pull_in(pull_in.clone()).await.expect_err("nothing pulls in");
         let session = client.open(open.clone()).await.expect("opens").into_inner().session;

@@ -1,6 +1,6 @@
 //! `bimorph serve` in a process of its own, with a stranger who asks for `Info` while it is attacked.
 
-use super::running::DEADLINE;
+use super::test_server::DEADLINE;
 use bimorph::service::proto;
 use proto::bimorph_client::BimorphClient;
 use std::io::{BufRead, BufReader, Read};

@@ -1,7 +1,7 @@
 //! A network that fails: a way between clients and a server that goes silent, is reset, ends within a message, or holds back what
 //! it was given until others have gone on.
 
-use super::running::DEADLINE;
+use super::test_server::DEADLINE;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};

@@ -1,9 +1,9 @@
 //! Sweeps through a network that fails at any moment: no finished point is lost, none is there twice, and nothing counts as complete that
 //! is not.
 
-use super::cut::Cut;
-use super::cuts::{LOCAL, PATIENCE, socket};
-use super::running::{block_on, bundle, start_with, wire_bundle};
+use super::network_faults::Cut;
+use super::session_faults::{LOCAL, PATIENCE, socket};
+use super::test_server::{block_on, bundle, start_with, wire_bundle};
 use bimorph::compile::CompileOptions;
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepSpec};
 use bimorph::service::client::Client;

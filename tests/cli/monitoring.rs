@@ -1,7 +1,7 @@
 //! What those see who watch over a server: metrics, readiness, health, logs with the ids of requests.
 
-use crate::bench::{Bench, PLATE};
-use crate::serving::Server;
+use crate::command::{Bench, PLATE};
+use crate::serve_process::Server;
 use bimorph::netlist::Bundle;
 use bimorph::service::convert::model::bundle_to_wire;
 use bimorph::service::metrics::METRICS;

@@ -1,6 +1,6 @@
 //! A server that is told to stop stops, whatever its clients do.
 
-use super::running::{Running, block_on, compiled, start};
+use super::test_server::{Running, block_on, compiled, start};
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;

@@ -2,8 +2,8 @@
 //! told to.
 
 use super::attached::{refusal, trial};
-use super::cut::Cut;
-use super::running::{Running, block_on, bundle, compiled, start_kept, start_with};
+use super::network_faults::Cut;
+use super::test_server::{Running, block_on, bundle, compiled, start_kept, start_with};
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError, Mode, OpenRequest, Status, Token, Trial, TrialReply};

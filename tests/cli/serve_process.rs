@@ -1,6 +1,6 @@
 //! A `bimorph serve` that ends with its test.
 
-use crate::bench::Bench;
+use crate::command::Bench;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, ChildStderr, Command, Stdio};
 

@@ -1,7 +1,7 @@
 //! Disks that are full: what was accepted stays, what cannot be kept is told, and bytes are counted as files have them.
 
-use crate::bench::{Bench, CANTILEVER, PLATE};
-use crate::overseen::{block_on, get, value};
+use crate::command::{Bench, CANTILEVER, PLATE};
+use crate::monitoring::{block_on, get, value};
 use crate::stepping::Killed;
 use bimorph::service::proto;
 use std::path::Path;

@@ -1,9 +1,9 @@
 //! Requests that no client of ours sends: other kinds of content, and states with numbers that are none. The command refuses them with what
 //! the protocol says, and answers the next one.
 
-use crate::bench::Bench;
-use crate::overseen::block_on;
-use crate::serving::Server;
+use crate::command::Bench;
+use crate::monitoring::block_on;
+use crate::serve_process::Server;
 use crate::stepping::{Stream, client, compiled};
 use bimorph::service::proto;
 use proto::device_request::Kind as Ask;
