@@ -112,7 +112,7 @@ struct ThreadBudget {
     cpu_at_start: Option<Duration>,
     cpu_next: Cell<Instant>,
     /// Processor time that the purse was told of.
-    cpu_told: Cell<Duration>,
+    cpu_charged: Cell<Duration>,
 }
 
 thread_local! {
@@ -142,7 +142,7 @@ pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped>
         checks: Cell::new(0),
         cpu_at_start: budget.0.allowance.counts_cpu().then(thread_cpu).flatten(),
         cpu_next: Cell::new(Instant::now() + CPU_INTERVAL),
-        cpu_told: Cell::default(),
+        cpu_charged: Cell::default(),
     };
     let restore = Restore(HELD.with(|h| h.borrow_mut().replace(held)));
     let outcome = catch_unwind(AssertUnwindSafe(|| {
@@ -153,11 +153,13 @@ pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped>
     if budget.0.allowance.purse.is_some() {
         HELD.with(|held| held.borrow().as_ref().map(ThreadBudget::settle));
     }
-    let told = HELD.with(|held| held.borrow().as_ref().map_or(Duration::ZERO, |held| held.cpu_told.get()));
+    let reported = HELD.with(|held| held.borrow().as_ref().map_or(Duration::ZERO, |held| held.cpu_charged.get()));
     drop(restore);
     if budget.0.allowance.purse.is_some() {
         // of what a part told the purse the whole does not tell it again
-        HELD.with(|held| held.borrow().iter().for_each(|whole| whole.cpu_told.set(whole.cpu_told.get() + told)));
+        HELD.with(|held| {
+            held.borrow().iter().for_each(|whole| whole.cpu_charged.set(whole.cpu_charged.get() + reported))
+        });
     }
     outcome.or_else(|payload| match payload.downcast::<StopPayload>() {
         Ok(stop) => Err(stop.0),
@@ -257,7 +259,7 @@ impl ThreadBudget {
     fn settle(&self) -> Option<Duration> {
         let used = thread_cpu()?.saturating_sub(self.cpu_at_start?);
         if let Some(purse) = &self.budget.0.allowance.purse {
-            purse.charge_cpu(used.saturating_sub(self.cpu_told.replace(used)));
+            purse.charge_cpu(used.saturating_sub(self.cpu_charged.replace(used)));
         }
         Some(used)
     }

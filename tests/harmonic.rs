@@ -149,8 +149,8 @@ fn modes_add_up() {
                 }
             }
             let few = run(&compiled, &HarmonicOptions { modes: Some(2), ..all });
-            let told = few.modal_error.unwrap();
-            assert!(few.modes == Some(2) && told > 1e-6, "{told}");
+            let reported = few.modal_error.unwrap();
+            assert!(few.modes == Some(2) && reported > 1e-6, "{reported}");
         }
     }
     println!("sum over modes, largest difference: damped {:.1e}, undamped {:.1e}", worst[0], worst[1]);
@@ -246,8 +246,8 @@ fn the_told_error_is_the_mesh() {
         let drawn = model(ELBOW, CompileOptions { tol, ..CompileOptions::default() });
         let options = HarmonicOptions { even: true, points: 41, ..asked("b.fx", &["b.x", "b.y"], 1e3, 2e6) };
         let (fitted, result) = harmonic_fitted(&drawn, &options, &mut |_| true).unwrap();
-        let told = result.estimated_error.unwrap();
-        assert!(told <= tol, "{tol}: {told}");
+        let reported = result.estimated_error.unwrap();
+        assert!(reported <= tol, "{tol}: {reported}");
         let finer = model(ELBOW, CompileOptions { segments: Some(96), ..CompileOptions::default() });
         let reference = run(&finer, &options);
         let shifted = |f: f64| HarmonicOptions { from: options.from * f, to: options.to * f, ..options.clone() };
@@ -260,7 +260,10 @@ fn the_told_error_is_the_mesh() {
                 worst = worst.max((value(&result, s, j) - here).norm() / size);
             }
         }
-        assert!(worst <= 1.3 * told && told <= 10.0 * worst.max(1e-6), "{tol}: told {told:.1e}, is {worst:.1e}");
+        assert!(
+            worst <= 1.3 * reported && reported <= 10.0 * worst.max(1e-6),
+            "{tol}: told {reported:.1e}, is {worst:.1e}"
+        );
         assert!(fitted.order.segments.iter().sum::<usize>() < 96);
     }
 }

@@ -159,18 +159,18 @@ fn degrees_of_arms() {
 /// anchors, corners and arcs are not.
 #[test]
 fn junctions_beyond_their_table() {
-    let told = |text: &str| -> Vec<String> {
+    let reported = |text: &str| -> Vec<String> {
         let compiled =
             compile(&Bundle::from_text("t.net", &format!("{HEAD}{text}")), &CompileOptions::default()).unwrap();
         compiled.warnings.items.into_iter().filter(|d| d.code == "W017").map(|d| d.message).collect()
     };
     let bridge =
         "beam2d p1 [a b] [l=50u w=20u]\nneck beam2d p1 [b c] [l=12u w=2u oz=pi/2]\nbeam2d p1 [c d] [l=50u w=20u]\n";
-    let found = told(bridge);
+    let found = reported(bridge);
     assert!(found.len() == 1 && found[0].contains("`neck`") && found[0].contains("nine tenths"), "{found:?}");
-    assert!(told("beam2d p1 [a b] [l=2u w=50u]")[0].contains("shorter than wide"));
+    assert!(reported("beam2d p1 [a b] [l=2u w=50u]")[0].contains("shorter than wide"));
     let plain = "beam2d p1 [a b] [l=20u w=10u]\nbeam2d p1 [b c] [l=50u w=5u oz=pi/2]\narc2d p1 [c d] [radius=10u alpha=pi w=8u]\n";
-    assert_eq!(told(plain), [""; 0]);
+    assert_eq!(reported(plain), [""; 0]);
 }
 
 /// A comb whose fingers have gone through its other side is told with its way: 5 µN at 0.1 N/m are 50 µm of 15 µm.
@@ -182,15 +182,15 @@ fn fingers_that_go_through() {
             dr comb2d p1 [m s] [N=100 gap=2u l=5u L=20u V=0]\n"
         )
     };
-    let told = |force: &str| {
+    let reported = |force: &str| {
         let compiled = compile(&Bundle::from_text("t.net", &text(force)), &CompileOptions::default()).unwrap();
         let found = static_fitted(&compiled, &[]).unwrap().0.warnings.items;
         found.into_iter().filter(|d| d.code == "W024").map(|d| d.message).collect::<Vec<_>>()
     };
-    let found = told("5u");
+    let found = reported("5u");
     assert!(
         found.len() == 1 && ["`dr`", "50.000 µm", "15.000 µm"].iter().all(|part| found[0].contains(part)),
         "{found:?}"
     );
-    assert_eq!(told("1u"), [""; 0]);
+    assert_eq!(reported("1u"), [""; 0]);
 }

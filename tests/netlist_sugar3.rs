@@ -288,13 +288,13 @@ fn angles_coordinates_and_materials() {
         loaded.warnings.items.into_iter().map(|d| (d.code, d.line, d.message)).collect::<Vec<_>>()
     };
     let again = "node {0, 60u; name=\"B\"}\n";
-    let told = warned(&format!("{LAYER}{nodes}{again}beam2d {{O, B; material=p1, w=2u}}\n"));
-    assert_eq!(told.len(), 1, "{told:?}");
-    assert!(told[0].0 == "W011" && told[0].1 == 6 && told[0].2.contains("`B`"), "{told:?}");
+    let reported = warned(&format!("{LAYER}{nodes}{again}beam2d {{O, B; material=p1, w=2u}}\n"));
+    assert_eq!(reported.len(), 1, "{reported:?}");
+    assert!(reported[0].0 == "W011" && reported[0].1 == 6 && reported[0].2.contains("`B`"), "{reported:?}");
     let cantilever = "anchor {node \"A\"; material=q}\nbeam2d {node \"A\", node \"B\"; material=q, l=100u, w=2u}\n";
     let text = format!("{LAYER}q = material {{parent=p1, stress=\"100M\"}}\n{cantilever}");
     let found = refused(&text);
     assert!(found.code == "E050" && found.message.contains("`stress`"), "{found:?}");
-    let told = warned(&format!("{LAYER}q = material {{parent=p1, strss=1}}\n{cantilever}"));
-    assert!(told.len() == 1 && told[0].0 == "W004" && told[0].2.contains("`strss`"), "{told:?}");
+    let reported = warned(&format!("{LAYER}q = material {{parent=p1, strss=1}}\n{cantilever}"));
+    assert!(reported.len() == 1 && reported[0].0 == "W004" && reported[0].2.contains("`strss`"), "{reported:?}");
 }

@@ -213,13 +213,13 @@ fn every_front_takes_the_same_options() {
         assert_eq!(status, Some(0), "{flag} {inside}: {err}");
         if name != "segments" {
             let document: serde_json::Value = serde_json::from_str(&out).expect("a document");
-            let told = match &inside {
+            let reported = match &inside {
                 OptionValue::Number(x) => document[about.wire].as_f64() == Some(*x),
                 OptionValue::Flag(flag) => document[about.wire].as_bool() == Some(*flag),
                 OptionValue::Name(name) => document[about.wire].as_str() == Some(name),
                 _ => false,
             };
-            assert!(told, "{flag}: {out}");
+            assert!(reported, "{flag}: {out}");
         }
         if let Some(beyond) = &beyond {
             let (status, _, err) = command(beyond);

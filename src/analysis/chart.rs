@@ -26,7 +26,7 @@ pub use spec::{Chart, ChartError, ChartPart, ChartPoint, ChartSpec, Formulation,
 pub use variant::released;
 
 use super::modes::modes;
-use super::{AnalysisError, PortVoltages, Watch};
+use super::{AnalysisError, PortVoltages, ProgressCallback};
 use crate::compile::CompileOptions;
 use crate::netlist::Bundle;
 use runs::{ChartProgress, RunSeries, order, precision};
@@ -45,7 +45,7 @@ pub fn chart(
     bundle: &Bundle,
     options: &CompileOptions,
     spec: &ChartSpec,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<Chart, ChartError> {
     check(spec)?;
     let release = spec.release.as_deref();

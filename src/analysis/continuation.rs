@@ -2,7 +2,7 @@
 //! and through bifurcations.
 use super::contact_range::{comb_beyond_told, within_contact_range};
 use super::statics::{OperatingPoint, beam_motions, node_motions, notes_at, operating_point, source_vector, too_hot};
-use super::{AnalysisError, BeamMotions, NodeMotions, Watch};
+use super::{AnalysisError, BeamMotions, NodeMotions, ProgressCallback};
 use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
 use crate::readout::signal::{Signal, SignalView};
@@ -86,7 +86,7 @@ pub struct ContinuationResult {
 pub fn trace(
     compiled: &CompiledModel,
     request: &ContinuationRequest<'_>,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<ContinuationResult, AnalysisError> {
     let bad = |what: &str, detail: String| AnalysisError::BadRequest { what: what.to_owned(), detail };
     if !(request.from.is_finite() && request.to.is_finite() && request.from != request.to) {

@@ -19,12 +19,12 @@ use super::integrator::{IntegrationRule, Integrator};
 use super::transient::options::TransientOptions;
 use super::transient::record::record;
 use super::transient::result::TransientResult;
-use super::{AnalysisError, Watch};
+use super::{AnalysisError, ProgressCallback};
 use crate::compile::CompiledModel;
 use crate::equations::Motion;
 use crate::multibody::joint_coordinates::constrained_loops::Linkage;
 use crate::solve::fastest::{Fastest, fastest};
-use in_joints::InJoints;
+use in_joints::JointPropagator;
 use on_tree::on_tree;
 pub use report::JointReport;
 pub use rotary::RIGID;
@@ -43,7 +43,7 @@ pub fn joint_transient(
     formulation: Formulation,
     options: &TransientOptions<'_>,
     sample: &mut dyn FnMut(f64, &[f64]),
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<(TransientResult, JointReport), AnalysisError> {
     if options.method == Integrator::Rodas4 {
         return on_tree(compiled, formulation, options, sample, watch);
@@ -58,7 +58,7 @@ pub fn joint_transient(
         affordable(formulation, &linkage, top, options.stop)?;
     }
     let start = options.release.map(|start| rotary::locked(start, formulation));
-    let mut carrier = InJoints {
+    let mut carrier = JointPropagator {
         formulation,
         system,
         now: Motion::zeros(linkage.coordinates),

@@ -33,7 +33,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 /// Told how far a long analysis has come, as a fraction 0…1; answers whether to go on.
-pub type Watch<'a> = &'a mut dyn FnMut(f64) -> bool;
+pub type ProgressCallback<'a> = &'a mut dyn FnMut(f64) -> bool;
 
 /// Why an analysis has no result.
 #[derive(Debug, Clone, PartialEq, Error)]

@@ -20,11 +20,11 @@ mod samples;
 use super::integrator::Integrator;
 pub(super) use super::transient::error_log::least;
 use super::transient::{TransientOptions, TransientResult, transient};
-use super::{AnalysisError, Watch};
+use super::{AnalysisError, ProgressCallback};
 use crate::compile::{CompiledModel, Formulation};
 use companion::{companion, compared};
 pub use run::RunFunction;
-use run::{AT_THE_END, LOOSER, MAX_AGAIN, MAX_KEPT, room};
+use run::{AT_THE_END, COMPANION_TOLERANCE_RATIO, MAX_AGAIN, MAX_STORED_SAMPLES, room};
 pub(crate) use run::{beyond, unknown};
 use samples::{BufferedSamples, SelectedSamples, resolved};
 use std::cell::Cell;
@@ -51,7 +51,7 @@ pub fn with_step_error<T>(
     model: &CompiledModel,
     run: RunFunction<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<(TransientResult, T), AnalysisError> {
     held(options, model, run, sample, watch).map(|(result, more, _)| (result, more))
 }
@@ -62,7 +62,7 @@ fn held<T>(
     model: &CompiledModel,
     run: RunFunction<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<(TransientResult, T, f64), AnalysisError> {
     if !propagates(options, model) {
         let first = companion(options, model.unknowns(), run, watch)?;
@@ -110,10 +110,10 @@ fn first<T>(
     model: &CompiledModel,
     run: RunFunction<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<SampledRun<T>, AnalysisError> {
     let unknowns = model.unknowns() as f64;
-    let long = Cell::new(options.points * options.signals.len() > MAX_KEPT);
+    let long = Cell::new(options.points * options.signals.len() > MAX_STORED_SAMPLES);
     let (mut kept, mut picked) = (BufferedSamples::default(), SelectedSamples::new(options));
     let mut keep = |t: f64, values: &[f64]| {
         picked.add(values);
@@ -144,7 +144,7 @@ fn sharper<T>(
     options: &TransientOptions<'_>,
     model: &CompiledModel,
     run: RunFunction<'_, T>,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<SampledRun<T>, AnalysisError> {
     let room = room(options.tol, made.result.estimated_error);
     let unknowns = model.unknowns() as f64;
@@ -188,9 +188,9 @@ fn sharper<T>(
 pub(crate) fn step_error(
     options: &TransientOptions<'_>,
     model: &CompiledModel,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> (Option<f64>, f64) {
-    let mut run = |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
+    let mut run = |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: ProgressCallback<'_>| {
         Ok((transient(model, options, sample, watch)?, ()))
     };
     let found = held(options, model, &mut run, &mut |_, _| (), watch);
@@ -198,7 +198,7 @@ pub(crate) fn step_error(
     let tenths = |tol: f64| {
         let mut held = options.tol;
         while held > tol {
-            held /= LOOSER;
+            held /= COMPANION_TOLERANCE_RATIO;
         }
         held
     };

@@ -13,7 +13,7 @@ mod samples;
 use super::formulation::Formulation;
 use super::integrator::Integrator;
 use super::joint_transient::joint_transient;
-use super::{AnalysisError, Watch};
+use super::{AnalysisError, ProgressCallback};
 use crate::compile::CompiledModel;
 use crate::domains::{Ramp, System};
 use crate::equations::Bodies;
@@ -74,7 +74,7 @@ pub fn transient(
     compiled: &CompiledModel,
     options: &TransientOptions<'_>,
     sample: &mut dyn FnMut(f64, &[f64]),
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<TransientResult, AnalysisError> {
     let system = &compiled.parts.system;
     let (suited, method) = Formulation::of_run(compiled, options);

@@ -148,14 +148,14 @@ impl ModelArgs {
 
     /// The same of a run in which `compiled` moves and `drawn` is what the netlist says.
     pub(crate) fn context_of<'a>(&'a self, drawn: &'a CompiledModel, compiled: &'a CompiledModel) -> Context<'a> {
-        let mut told: Vec<&Diagnostic> = compiled.warnings.items.iter().collect();
-        told.extend(drawn.warnings.items.iter().filter(|d| !compiled.warnings.items.contains(d)));
+        let mut reported: Vec<&Diagnostic> = compiled.warnings.items.iter().collect();
+        reported.extend(drawn.warnings.items.iter().filter(|d| !compiled.warnings.items.contains(d)));
         Context {
             file: self.file.display().to_string(),
             parameters: OrderedMap(&drawn.parameters),
             options: Keys(&drawn.options),
             estimated_error: compiled.order.estimated_error,
-            warnings: told.into_iter().map(|d| d.message.as_str()).collect(),
+            warnings: reported.into_iter().map(|d| d.message.as_str()).collect(),
         }
     }
 

@@ -22,7 +22,7 @@ use std::sync::LazyLock;
                         bimorph serve --config /etc/bimorph/serve.toml")]
 pub(crate) struct ServeCommand {
     #[command(flatten)]
-    told: SettingSources,
+    reported: SettingSources,
 
     /// Stop when standard input ends, as it does when the program that started this server ends
     #[arg(long)]
@@ -31,7 +31,7 @@ pub(crate) struct ServeCommand {
 
 impl ServeCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
-        let options = self.told.settings()?.options();
+        let options = self.reported.settings()?.options();
         let calls = options.listen.len();
         let ready = move |addresses: &[Address]| {
             for (k, address) in addresses.iter().enumerate() {
@@ -120,9 +120,9 @@ impl SettingSources {
 
 impl FromArgMatches for SettingSources {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
-        let mut told = Self::default();
-        told.take(matches)?;
-        Ok(told)
+        let mut reported = Self::default();
+        reported.take(matches)?;
+        Ok(reported)
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {

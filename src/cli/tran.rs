@@ -6,7 +6,7 @@ use super::output::OutputArgs;
 use super::solver::SolverChoice;
 use super::tran_report::{TransientDocument, picture, table, text};
 use super::{draw_motion, progress, value};
-use bimorph::analysis::Watch;
+use bimorph::analysis::ProgressCallback;
 use bimorph::analysis::chart::released;
 use bimorph::analysis::frame::{frame, frame_transient};
 use bimorph::analysis::integrator::Integrator;
@@ -265,14 +265,15 @@ impl TransientCommand {
                 frame(compiled).and_then(|frame| frame_transient(compiled, &frame, options, watch)).map(|r| (r, None))
             }
             _ => {
-                let mut run =
-                    |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
-                        if matches!(formulation, Formulation::Rcr | Formulation::RcrElastic) {
-                            joint_transient(compiled, formulation, options, sample, watch).map(|(r, j)| (r, Some(j)))
-                        } else {
-                            transient(compiled, options, sample, watch).map(|r| (r, None))
-                        }
-                    };
+                let mut run = |options: &TransientOptions<'_>,
+                               sample: &mut dyn FnMut(f64, &[f64]),
+                               watch: ProgressCallback<'_>| {
+                    if matches!(formulation, Formulation::Rcr | Formulation::RcrElastic) {
+                        joint_transient(compiled, formulation, options, sample, watch).map(|(r, j)| (r, Some(j)))
+                    } else {
+                        transient(compiled, options, sample, watch).map(|r| (r, None))
+                    }
+                };
                 with_step_error(options, compiled, &mut run, &mut |_, _| (), watch)
             }
         };

@@ -109,8 +109,8 @@ fn hear(stderr: impl Read, capture: bool) -> std::io::Result<(Option<String>, bo
             // told whatever is not shown: an option that is misspelt and so left out by ngspice, and how far off a model may be
             let of_model = text.starts_with("bimorph: ") && text.contains(": warning[");
             if of_model || text.contains("unrecognized parameter") {
-                let told = if of_model { format!("{text}\n") } else { format!("warning: {text}\n") };
-                let _ = std::io::stderr().write_all(told.as_bytes());
+                let reported = if of_model { format!("{text}\n") } else { format!("warning: {text}\n") };
+                let _ = std::io::stderr().write_all(reported.as_bytes());
             }
             messages.extend_from_slice(&line);
         } else {

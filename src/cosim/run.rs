@@ -138,8 +138,9 @@ pub(super) fn run_whatever(options: &CosimOptions, keep_going: &dyn Fn() -> bool
     let heard = listen(child, options.capture, keep_going).map_err(io(|| "ngspice's output cannot be read".into()))?;
 
     let has_control = has_control(&String::from_utf8_lossy(&text));
-    let judged = if heard.cancelled { Err(CosimError::Cancelled) } else { judge(&heard, &failure, deck, has_control) };
-    match (judged, unfinished, &options.raw) {
+    let assessed =
+        if heard.cancelled { Err(CosimError::Cancelled) } else { judge(&heard, &failure, deck, has_control) };
+    match (assessed, unfinished, &options.raw) {
         (Err(error), Some(path), _) => {
             let _ = std::fs::remove_file(path);
             return Err(error);

@@ -38,7 +38,7 @@ impl DeviceSession {
             true => operating_point_warnings(compiled, &point),
             false => transient_warnings(compiled, &point).into_iter().map(|warning| (warning, 1.0)).collect(),
         };
-        let mut told: Vec<Diagnostic> =
+        let mut reported: Vec<Diagnostic> =
             found.into_iter().filter_map(|(warning, size)| self.grown(warning, size)).collect();
         if let Some(mode) = &compiled.lowest {
             let (charges, seen) = (self.charges(), AcceptedState { t: state.elapsed, values: state.shown.values() });
@@ -58,7 +58,7 @@ impl DeviceSession {
             let split = Split { modes: &compiled.higher, rates: &rates, step, coupling: &coupling };
             if let Some((text, n)) = self.ringing.tell(mode, compiled.options.tol, seen, &charges, &split) {
                 let text = format!("{text} ({})", self.seen_name(n, compiled));
-                told.push(Diagnostic::warning(WARNING, text, "give the model `segments` or a `band`"));
+                reported.push(Diagnostic::warning(WARNING, text, "give the model `segments` or a `band`"));
             }
         }
         if state.elapsed > 0.0
@@ -69,9 +69,9 @@ impl DeviceSession {
                 held_by_charge(seconds),
                 "a voltage source in place of the charge would close or open the gap",
             );
-            told.extend(self.grown(warning, 1.0));
+            reported.extend(self.grown(warning, 1.0));
         }
-        told
+        reported
     }
 
     /// Which of the values that the circuit sees are charges: their change is a current.
@@ -97,8 +97,8 @@ impl DeviceSession {
     /// A warning, where it was not given before, or where it told of less than a tenth of this.
     fn grown(&mut self, warning: Diagnostic, size: f64) -> Option<Diagnostic> {
         match self.warned.iter_mut().find(|(code, _)| *code == warning.code) {
-            Some((_, told)) if size < 10.0 * *told => return None,
-            Some((_, told)) => *told = size,
+            Some((_, reported)) if size < 10.0 * *reported => return None,
+            Some((_, reported)) => *reported = size,
             None => self.warned.push((warning.code.clone(), size)),
         }
         Some(warning)

@@ -42,7 +42,7 @@ pub(super) struct PhaseErrorMonitor {
     errors: Vec<f64>,
     higher: HigherModes,
     /// What is told next, in tolerances [1].
-    told: f64,
+    reported: f64,
 }
 
 /// The worst of what is off.
@@ -72,8 +72,8 @@ impl PhaseErrorMonitor {
         if t <= self.at || self.courses.len() != 2 * count {
             let courses = values.iter().chain(std::iter::repeat_n(&0.0, count)).map(|y| Waveform::at(*y)).collect();
             let none = vec![0.0; count];
-            let (rates, rated, told) = (none.clone(), (values.to_vec(), t), self.told);
-            *self = Self { at: t, courses, rates, rated, errors: none, higher: HigherModes::default(), told };
+            let (rates, rated, reported) = (none.clone(), (values.to_vec(), t), self.reported);
+            *self = Self { at: t, courses, rates, rated, errors: none, higher: HigherModes::default(), reported };
             return worst;
         }
         let (before, half) = (self.at, 0.5 / mode.frequency_hz);
@@ -124,10 +124,10 @@ impl PhaseErrorMonitor {
         split: &Split<'_>,
     ) -> Option<(String, usize)> {
         let Worst { error, cycles, n, higher } = self.observe(mode, at, charges, Some(split));
-        if error <= tol * self.told.max(1.0) {
+        if error <= tol * self.reported.max(1.0) {
             return None;
         }
-        self.told = GROWS * error / tol;
+        self.reported = GROWS * error / tol;
         let frequency = match higher {
             None => format!(
                 "the mesh may be off by {:.1e} in the lowest frequency, {:.4e} Hz,",
@@ -171,12 +171,12 @@ mod tests {
     /// A free swing of a hundred cycles: what is told is what a frequency that is off by so much makes of it, ω·t·e of the amplitude.
     #[test]
     fn a_free_swing_is_out_of_step_by_its_phase() {
-        let told = worst(&MODE, 0.1, |t| (TAU * 1e3 * t).cos());
+        let reported = worst(&MODE, 0.1, |t| (TAU * 1e3 * t).cos());
         let real = (0..10_000)
             .map(|k| f64::from(k) * 1e-5)
             .map(|t| 0.5 * ((TAU * 1e3 * t).cos() - (TAU * 1e3 * (1.0 + MODE.error) * t).cos()).abs())
             .fold(0.0, f64::max);
-        assert!((told / real - 1.0).abs() < 0.05, "{told} against {real}");
+        assert!((reported / real - 1.0).abs() < 0.05, "{reported} against {real}");
     }
 
     /// What dies away is out of step by what is left of it, and a steady swing at resonance by 2Q·e.

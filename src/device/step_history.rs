@@ -16,11 +16,11 @@ use serde::{Deserialize, Serialize};
 
 /// Share of its range by which a quantity may leave the line as either term tells, in units of the compilation's tolerance
 /// [1]: 0.2 % at the default, 28 points for a cycle of a full swing, which then stays within 0.5 %.
-const SHARE: f64 = 2.0;
+const BEND_FRACTION: f64 = 2.0;
 
 /// The same of a charge [1]. Nobody looks at it but at its change: with even steps the trapezoidal rule keeps that within 0.2 % of its range,
 /// with 28 points a cycle. (Without them an oscillator that its own current drives takes 43 points a cycle where it takes 36.)
-const SHARE_DIFFERENTIATED: f64 = 3.6;
+const BEND_FRACTION_OF_CHARGES: f64 = 3.6;
 
 /// How the circuit's steps follow a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,7 +81,7 @@ impl StepHistory {
             next.slopes.push(slope);
             let Some(slope_before) = self.slopes.get(n) else { continue };
             let follow = follow(n);
-            let share = if follow == SteppingRule::Differentiated { SHARE_DIFFERENTIATED } else { SHARE };
+            let share = if follow == SteppingRule::Differentiated { BEND_FRACTION_OF_CHARGES } else { BEND_FRACTION };
             let allowed = share * tol * (next.high[n] - next.low[n]) + floor(n);
             let bend = (slope - slope_before) / (self.steps[0] + dt);
             next.bends.push(bend);

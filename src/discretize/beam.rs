@@ -30,7 +30,7 @@ pub struct JointBuilder {
 }
 
 /// Beams that are remembered.
-const MAX_KNOWN: usize = 16;
+const MAX_CACHED_BEAMS: usize = 16;
 
 /// Lays a beam: adds its inner bodies, masses and joints. Returns the equally spaced points along it, the drawn ends
 /// included.
@@ -141,7 +141,7 @@ fn sprung<'a>(
     if let Some(k) = known.iter().position(|other| other.drawn == drawn) {
         return &known[k];
     }
-    if known.len() == MAX_KNOWN {
+    if known.len() == MAX_CACHED_BEAMS {
         known.clear();
     }
     // a rigid beam is the rods of a single segment, which its one body holds together

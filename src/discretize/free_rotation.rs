@@ -14,7 +14,7 @@ use crate::structure::Structure;
 use nalgebra::Vector2;
 
 /// Distance below which two points of a body are one, as a fraction of the size of the drawing [1]: coordinates are sums of rounded lengths.
-const SAME: f64 = 1e-9;
+const POINT_TOLERANCE: f64 = 1e-9;
 
 /// What is known of the rotation of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,7 +39,7 @@ pub(super) struct BodyActions<'a> {
 
 /// Holds the rotations that nothing uses.
 pub(super) fn hold(acting: &BodyActions<'_>, rigid: &mut RigidGroups) {
-    let same = SAME * acting.structure.extent();
+    let same = POINT_TOLERANCE * acting.structure.extent();
     let mut rotations = vec![RotationUse::Unknown; rigid.bodies.len()];
     let mut see = |id: BodyId, at: Option<Vector2<f64>>| {
         let BodyId::Free(k) = id else { return };

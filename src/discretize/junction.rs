@@ -32,7 +32,7 @@ use std::f64::consts::PI;
 /// Share of a beam that its two offsets may take together.
 const MAX_OFFSET_FRACTION: f64 = 0.9;
 /// Kinds of beams whose settled ends are remembered.
-const MAX_KNOWN: usize = 16;
+const MAX_CACHED_ENDS: usize = 16;
 
 /// One beam as its junction sees it.
 #[derive(Debug, Clone, Copy)]
@@ -141,7 +141,7 @@ pub fn find(structure: &Structure, rigid: &RigidGroups, kind: Junctions, undampe
                 _ => end.spring.fill(0.0),
             }
         }
-        if known.len() < MAX_KNOWN {
+        if known.len() < MAX_CACHED_ENDS {
             known.push((bar, raw, *both));
         }
     }

@@ -8,7 +8,7 @@ use crate::structure::Structure;
 const RATIO: f64 = 8.0;
 /// Lean of a stem up to which the table goes, and sharpest turn of a corner [rad].
 const LEAN: f64 = std::f64::consts::FRAC_PI_4;
-const SHARPEST: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
+const MAX_TABLE_TURN: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
 /// Beams that turn by less than this go on as one, as the chords of an arc do [rad].
 const STRAIGHT: f64 = std::f64::consts::FRAC_PI_6;
 /// Rounding of ratios and angles [1].
@@ -55,6 +55,6 @@ fn at_node<'a, I: Iterator<Item = &'a Strip>>(strip: &Strip, others: impl Fn() -
         return Some("it meets one of more than eight times its width");
     }
     let sharpest = others().map(|other| turn(strip.angle, other.angle)).fold(0.0, f64::max);
-    let limit = if others().count() > 1 { std::f64::consts::PI - LEAN } else { SHARPEST };
+    let limit = if others().count() > 1 { std::f64::consts::PI - LEAN } else { MAX_TABLE_TURN };
     (sharpest > limit + ROUNDING).then_some("it meets another at a sharper angle than the table has")
 }

@@ -12,7 +12,7 @@ use crate::structure::{Beam, Structure};
 use nalgebra::Vector2;
 
 /// Sharpest turn up to which beams lie above each other within their rigid ends only [rad].
-const SHARPEST: f64 = 0.75 * std::f64::consts::PI;
+const MAX_OVERLAP_TURN: f64 = 0.75 * std::f64::consts::PI;
 /// Share of the mass that beams bring to a junction which it may have twice.
 const MAX_MASS: f64 = 0.5;
 
@@ -123,7 +123,7 @@ pub(super) fn find(
 /// True where two beams lie along each other, one turning back sharply.
 fn folded(strips: &[Strip]) -> bool {
     let others = |k: usize| strips.iter().skip(k + 1);
-    strips.iter().enumerate().any(|(k, strip)| others(k).any(|other| turn(strip.angle, other.angle) > SHARPEST))
+    strips.iter().enumerate().any(|(k, strip)| others(k).any(|other| turn(strip.angle, other.angle) > MAX_OVERLAP_TURN))
 }
 
 /// The rigid end of a beam, of a length, about its node.

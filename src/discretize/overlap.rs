@@ -29,7 +29,7 @@ pub struct Strip {
 /// Turn below which two branches go on in line and leave no outer corner [rad].
 pub const IN_LINE: f64 = 50.0 * PI / 180.0;
 /// Sharpest turn whose outer corner is filled [rad].
-const SHARPEST: f64 = 2.1;
+const MAX_FILLED_TURN: f64 = 2.1;
 /// Lines for each band between two corners.
 const LINES: usize = 24;
 
@@ -41,7 +41,7 @@ pub fn turn(a: f64, b: f64) -> f64 {
 }
 
 /// Junctions that a thread remembers.
-const MAX_KNOWN: usize = 512;
+const MAX_CACHED_JUNCTIONS: usize = 512;
 /// Strips that are looked up without memory of their own.
 const FEW: usize = 8;
 
@@ -74,7 +74,7 @@ pub fn overlap(strips: &[Strip]) -> Lump {
         integrated(&sorted)
     };
     KNOWN.with_borrow_mut(|known| {
-        if known.len() >= MAX_KNOWN {
+        if known.len() >= MAX_CACHED_JUNCTIONS {
             known.clear();
         }
         known.insert(key.to_vec(), found);
@@ -168,7 +168,7 @@ fn past(strips: &[Strip], k: usize) -> f64 {
     if strips.len() > 2 && others().any(|(turn, _)| turn < IN_LINE) {
         return 0.0;
     }
-    others().map(|(turn, s)| 0.5 * s.width * (0.5 * turn.min(SHARPEST)).tan()).fold(0.0, f64::max)
+    others().map(|(turn, s)| 0.5 * s.width * (0.5 * turn.min(MAX_FILLED_TURN)).tan()).fold(0.0, f64::max)
 }
 
 fn add(lump: &mut Lump, y: f64, low: f64, high: f64, height: f64) {

@@ -5,8 +5,8 @@ use super::domain::{Configuration, Domain};
 use super::drive::Drive;
 pub use super::input::Input;
 use super::load::DeadLoad;
+use super::moving_frame::FrameInertiaForces;
 pub use super::moving_frame::FrameMotion;
-use super::moving_frame::InFrame;
 use super::system::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
@@ -92,7 +92,7 @@ impl System {
         })
     }
 
-    fn in_frame(&self) -> InFrame<'_> {
-        InFrame(&self.model.bodies)
+    fn in_frame(&self) -> FrameInertiaForces<'_> {
+        FrameInertiaForces(&self.model.bodies)
     }
 }

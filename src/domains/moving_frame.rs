@@ -26,9 +26,9 @@ pub struct FrameMotion {
 
 /// All bodies in a frame. What drives them is its motion.
 #[derive(Debug, Clone, Copy)]
-pub struct InFrame<'a>(pub &'a [Body]);
+pub struct FrameInertiaForces<'a>(pub &'a [Body]);
 
-impl InFrame<'_> {
+impl FrameInertiaForces<'_> {
     /// `r += m·(a + Ω̇ e×r − outward·r)` and the moment J·Ω̇.
     fn add(&self, q: &[Pose], frame: &FrameMotion, outward: f64, r: &mut [Pose]) {
         for ((r, q), body) in r.iter_mut().zip(q).zip(self.0) {
@@ -41,7 +41,7 @@ impl InFrame<'_> {
     }
 }
 
-impl Domain for InFrame<'_> {
+impl Domain for FrameInertiaForces<'_> {
     type Given = FrameMotion;
 
     fn bodies(&self, see: impl FnMut(BodyId)) {

@@ -14,7 +14,7 @@ use nalgebra::{SMatrix, SVector};
 /// Differences kept.
 const DEPTH: usize = 4;
 /// A difference that is this much shorter than what it was before the others were taken out tells nothing new.
-const SAME: f64 = 1e-10;
+const DEPENDENCE_TOLERANCE: f64 = 1e-10;
 
 /// The last iterates, as differences. Nothing is allocated after [`Anderson::new`].
 #[derive(Debug, Clone)]
@@ -95,7 +95,7 @@ impl Anderson {
                 l[(i, j)] = sum / l[(j, j)];
                 left -= l[(i, j)] * l[(i, j)];
             }
-            used[i] = left > SAME * own && left.is_finite();
+            used[i] = left > DEPENDENCE_TOLERANCE * own && left.is_finite();
             if used[i] {
                 l[(i, i)] = left.sqrt();
                 let mut sum = dot(&self.df[i], &self.f);

@@ -103,7 +103,7 @@ pub fn fit(compiled: &Arc<CompiledModel>, request: &ExportRequest) -> Result<Mod
         };
         let grid = grid(&all, to);
         let answers = grid.iter().map(|omega| exact.response(*omega)).collect::<Result<Vec<_>, _>>()?;
-        let judged = |basis: &Basis| {
+        let assessed = |basis: &Basis| {
             let mut model = mechanism.reduced(basis);
             model.at_rest.copy_from(&at_rest);
             let (error, worst) = deviation(&model, &all, &grid, &answers);
@@ -124,7 +124,7 @@ pub fn fit(compiled: &Arc<CompiledModel>, request: &ExportRequest) -> Result<Mod
                 // one after the other, or all at once where there are many
                 let swinging = if most <= MANY { (0..=most).collect() } else { vec![0, most] };
                 for more in swinging.into_iter().filter(|more| depth == 1 || *more > 0) {
-                    let fitted = judged(&corrected.first(kept.len() + more));
+                    let fitted = assessed(&corrected.first(kept.len() + more));
                     if fitted.error <= request.within {
                         return Ok(fitted);
                     }

@@ -26,7 +26,7 @@ use crate::readout::ports::{OpenedPorts, PortResponse};
 use crate::readout::signal::Signal;
 pub use model::{Coordinate, Law, LumpedGap, LumpedModel, LumpedOutput};
 use nalgebra::{DMatrix, DVector};
-use sliding::{UNHELD, along, axis, coordinates, dampers, springs};
+use sliding::{FREE_RATE, along, axis, coordinates, dampers, springs};
 
 /// The lumped model of a request; its operating point, modes and errors are not looked at.
 ///
@@ -48,7 +48,7 @@ pub fn lump(compiled: &CompiledModel, request: &ExportRequest) -> Result<LumpedM
     let (stiffness, force) = springs(system, &coordinates)?;
     for (k, c) in coordinates.iter_mut().enumerate() {
         let omega = (stiffness[(k, k)] / c.mass).sqrt();
-        c.omega = if omega.is_finite() && omega > 0.0 { omega } else { UNHELD };
+        c.omega = if omega.is_finite() && omega > 0.0 { omega } else { FREE_RATE };
     }
     let damping = dampers(system, &coordinates);
     let mut load = -force;

@@ -5,7 +5,7 @@
 use super::drawing::Polygon;
 
 /// Edges a bucket, on average.
-const SHARE: f64 = 2.0;
+const EDGES_PER_BUCKET: f64 = 2.0;
 /// Most buckets along one side.
 const MAX_BUCKETS: f64 = 4096.0;
 
@@ -34,7 +34,7 @@ impl Chords {
         let high = [0, 1].map(|i| all().map(|p| p[i]).fold(f64::NEG_INFINITY, f64::max));
         let [width, height] =
             [high[0] - low[0], high[1] - low[1]].map(|s| if s.is_finite() { s.max(1.0) } else { 1.0 });
-        let wanted = (edges.len() as f64 / SHARE).max(1.0);
+        let wanted = (edges.len() as f64 / EDGES_PER_BUCKET).max(1.0);
         let size = (width * height / wanted).sqrt().max(width.max(height) / MAX_BUCKETS);
         let (columns, rows) = ((width / size) as usize + 1, (height / size) as usize + 1);
         let mut chords =

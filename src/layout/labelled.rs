@@ -212,10 +212,10 @@ fn measure(
         if l == 0.0 && is_beam(&line.model) {
             return Err(LabelledError::Short { place: place.clone(), line: line.name.clone() });
         }
-        let told = [line.get("l").unwrap_or(0.0), line.get("oz").unwrap_or(0.0)];
-        let miss = (told[0] * told[1].cos() - dx).hypot(told[0] * told[1].sin() - dy);
+        let reported = [line.get("l").unwrap_or(0.0), line.get("oz").unwrap_or(0.0)];
+        let miss = (reported[0] * reported[1].cos() - dx).hypot(reported[0] * reported[1].sin() - dy);
         if miss > ROUNDING * unit {
-            tell(format!("`{}` is drawn {} µm long, its label says {}", line.name, um(l), um(told[0])));
+            tell(format!("`{}` is drawn {} µm long, its label says {}", line.name, um(l), um(reported[0])));
             line.set("l", l);
             line.set("oz", oz);
         }

@@ -93,7 +93,7 @@ fn reach([c, s]: [f64; 2]) -> f64 {
 }
 
 /// Cosine of the sharpest turn with a mitre: 120°, the mitre is then twice the half width.
-const SHARPEST: f64 = -0.5;
+const MITRE_COSINE: f64 = -0.5;
 
 /// True when inner corners lie inside their stretches and no turn is sharper than [`SHARPEST`].
 fn unfolded(path: &[[f64; 2]], h: f64) -> bool {
@@ -103,7 +103,7 @@ fn unfolded(path: &[[f64; 2]], h: f64) -> bool {
         let length = (path[k][0] - path[k - 1][0]).hypot(path[k][1] - path[k - 1][1]);
         let next = path.get(k + 1).map(|after| turn(d, direction(path[k], *after)));
         let here = next.map_or(0.0, reach);
-        let fits = h * (before + here) <= length && next.is_none_or(|[c, _]| c >= SHARPEST - 1e-12);
+        let fits = h * (before + here) <= length && next.is_none_or(|[c, _]| c >= MITRE_COSINE - 1e-12);
         before = here;
         fits
     })
@@ -187,7 +187,7 @@ fn pieces(path: &[[f64; 2]], h: f64, style: Style) -> Vec<Vec<[f64; 2]>> {
             let corner = |d: [f64; 2]| [path[k][0] + outer * d[1], path[k][1] - outer * d[0]];
             let (first, second) = (corner(d), corner(e));
             let mut wedge = vec![path[k], first];
-            if c >= SHARPEST - 1e-12 {
+            if c >= MITRE_COSINE - 1e-12 {
                 let t = h * s.abs() / (1.0 + c);
                 wedge.push([first[0] + t * d[0], first[1] + t * d[1]]);
             }

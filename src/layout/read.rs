@@ -106,8 +106,8 @@ pub fn from_file(
             cif::read(&text, &name)?
         }
         LayoutFormat::Gds => {
-            let mut told = |at: u64| watch(at as f64 / size.max(1) as f64);
-            gds::read(BufReader::with_capacity(1 << 16, file), &name, &mut told)?
+            let mut reported = |at: u64| watch(at as f64 / size.max(1) as f64);
+            gds::read(BufReader::with_capacity(1 << 16, file), &name, &mut reported)?
         }
     };
     Ok(library.flatten(cell)?)

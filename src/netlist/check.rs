@@ -23,9 +23,9 @@ const RESISTANCES: RangeInclusive<f64> = 1e-300..=1e300;
 /// Reports what has become infinite or vanished: sizes may be in range one by one and not in their products.
 pub(crate) fn finite(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     let s = &drawing.structure;
-    let mut told = HashSet::new();
+    let mut reported = HashSet::new();
     let mut look = |name: &str, node: NodeId, good: bool| {
-        if !good && told.len() < MAX_REPORTED && told.insert(name.to_owned()) {
+        if !good && reported.len() < MAX_REPORTED && reported.insert(name.to_owned()) {
             let message = format!("what `{name}` has in the model is not finite: its sizes are out of any range");
             let help = "check its numbers, their suffixes and exponents";
             sink.error("E060", drawing.first_named[node.0], message, help);
@@ -263,11 +263,11 @@ fn unheld_parts(drawing: &StructureBuilder, connected: &[bool], parts: &mut Sets
     for support in &structure.supports {
         held[parts.first(support.node.0)] = true;
     }
-    let mut told = vec![false; structure.nodes.len()];
+    let mut reported = vec![false; structure.nodes.len()];
     let mut loose = Vec::new();
     for index in (0..structure.nodes.len()).filter(|&i| connected[i]) {
         let root = parts.first(index);
-        if !held[root] && !std::mem::replace(&mut told[root], true) {
+        if !held[root] && !std::mem::replace(&mut reported[root], true) {
             loose.push(index);
         }
     }
@@ -313,11 +313,11 @@ fn floating_potentials(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
             nets.join(minus.0, ground);
         }
     }
-    let mut told = vec![false; structure.nodes.len() + 1];
+    let mut reported = vec![false; structure.nodes.len() + 1];
     let mut floating = Vec::new();
     for index in (0..structure.nodes.len()).filter(|&i| structure.nodes[i].electrical) {
         let root = nets.first(index);
-        if root != nets.first(ground) && !std::mem::replace(&mut told[root], true) {
+        if root != nets.first(ground) && !std::mem::replace(&mut reported[root], true) {
             floating.push(index);
         }
     }

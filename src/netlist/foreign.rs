@@ -97,7 +97,7 @@ fn matlab(line: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn told(text: &str) -> (char, u32) {
+    fn language(text: &str) -> (char, u32) {
         match kind(text, 0) {
             FileKind::Lua(span) => ('l', span.start),
             FileKind::Matlab(span) => ('m', span.start),
@@ -108,23 +108,23 @@ mod tests {
     /// Files are told by the first line that only their language has; comments of SUGAR 2 decide nothing.
     #[test]
     fn files_are_told_apart() {
-        assert_eq!(told("% net=cho_load('x.net');\nuses mumps.net\nanchor p1 [a] []\n"), ('n', 0));
-        assert_eq!(told("% title\nuse(\"mumps.net\")\n"), ('l', 8));
-        assert_eq!(told("use 'mumps.net'\n"), ('l', 0));
-        assert_eq!(told("p1 = material {h=2u}\n"), ('l', 0));
-        assert_eq!(told("subnet s (A, B)\n"), ('l', 0));
-        assert_eq!(told("subnet s [a b] [l=1u]\nx = [\n"), ('n', 0));
-        assert_eq!(told("-- title\n"), ('l', 0));
-        assert_eq!(told("A = 1\nanchor {A; material=p1}\n"), ('l', 6));
-        assert_eq!(told("function [q] = f(net)\n"), ('m', 0));
-        assert_eq!(told("x=1;\nnet = cho_load('a.net', p);\n"), ('m', 5));
-        assert_eq!(told("functions = 3\nfunction_of beam2d p1 [a b] [l=1u]\n"), ('n', 0));
-        assert_eq!(told("local = 3\nlocal beam2d p1 [a b] [l=1u]\n"), ('n', 0));
-        assert_eq!(told("x = 1\nlocal y = 3\n"), ('l', 6));
-        assert_eq!(told("u = 1e-6; %m\nh = 2*u;\nw = 2*u;\n"), ('m', 0));
-        assert_eq!(told("u = 1;\nh = 2;\nw = 2;\nanchor p1 [a] []\n"), ('n', 0));
-        assert_eq!(told("clear all\n"), ('m', 0));
-        assert_eq!(told("used = 1\nuser = 2\nuses a.net\n"), ('n', 0));
-        assert_eq!(told(""), ('n', 0));
+        assert_eq!(language("% net=cho_load('x.net');\nuses mumps.net\nanchor p1 [a] []\n"), ('n', 0));
+        assert_eq!(language("% title\nuse(\"mumps.net\")\n"), ('l', 8));
+        assert_eq!(language("use 'mumps.net'\n"), ('l', 0));
+        assert_eq!(language("p1 = material {h=2u}\n"), ('l', 0));
+        assert_eq!(language("subnet s (A, B)\n"), ('l', 0));
+        assert_eq!(language("subnet s [a b] [l=1u]\nx = [\n"), ('n', 0));
+        assert_eq!(language("-- title\n"), ('l', 0));
+        assert_eq!(language("A = 1\nanchor {A; material=p1}\n"), ('l', 6));
+        assert_eq!(language("function [q] = f(net)\n"), ('m', 0));
+        assert_eq!(language("x=1;\nnet = cho_load('a.net', p);\n"), ('m', 5));
+        assert_eq!(language("functions = 3\nfunction_of beam2d p1 [a b] [l=1u]\n"), ('n', 0));
+        assert_eq!(language("local = 3\nlocal beam2d p1 [a b] [l=1u]\n"), ('n', 0));
+        assert_eq!(language("x = 1\nlocal y = 3\n"), ('l', 6));
+        assert_eq!(language("u = 1e-6; %m\nh = 2*u;\nw = 2*u;\n"), ('m', 0));
+        assert_eq!(language("u = 1;\nh = 2;\nw = 2;\nanchor p1 [a] []\n"), ('n', 0));
+        assert_eq!(language("clear all\n"), ('m', 0));
+        assert_eq!(language("used = 1\nuser = 2\nuses a.net\n"), ('n', 0));
+        assert_eq!(language(""), ('n', 0));
     }
 }

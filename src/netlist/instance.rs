@@ -14,7 +14,7 @@ use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::sync::Arc;
 
 /// Nodes of an instance that room is made for at first, at most.
-const MAX_ROOM: usize = 32;
+const MAX_INITIAL_CAPACITY: usize = 32;
 /// Subnet instances may nest this deep.
 const DEEPEST_INSTANCE: usize = 100;
 
@@ -232,7 +232,10 @@ impl<'p> Elaborator<'p> {
         prefix.push('.');
         let frame = EvaluationScope {
             values: vec![Value::Undefined; subnet.variables],
-            nodes: FxHashMap::with_capacity_and_hasher((nodes.len() + subnet.body.len()).min(MAX_ROOM), FxBuildHasher),
+            nodes: FxHashMap::with_capacity_and_hasher(
+                (nodes.len() + subnet.body.len()).min(MAX_INITIAL_CAPACITY),
+                FxBuildHasher,
+            ),
             prefix: Arc::from(prefix),
             rotation: call.rotation,
             layer,

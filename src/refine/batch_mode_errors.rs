@@ -9,7 +9,7 @@ use super::mode_errors::{own_stiffness, relative};
 use super::span::{BeamSpan, spans};
 use crate::discretize::Assembly;
 use crate::multibody::BodyId;
-use crate::multibody::batch::{Kernel, LANES, Lane8, LanePose, Real, STILL, SimdReal, across, forces, load, store};
+use crate::multibody::batch::{Kernel, LANES, Lane8, LanePose, Real, SimdReal, ZERO_POSE, across, forces, load, store};
 use crate::options::CompileOptions;
 use crate::solve::frequency::batch::{LaneModes, RitzMatrices, dot, weigh};
 use crate::solve::frequency::mac;
@@ -93,11 +93,11 @@ impl LaneReference {
         };
         let spans: Vec<LaneSpan> = beams(first).iter().map(span).collect();
         let longest = spans.iter().map(|span| span.points.len()).max().unwrap_or(0);
-        let block = vec![vec![STILL; first.2.system.bodies()]; modes];
+        let block = vec![vec![ZERO_POSE; first.2.system.bodies()]; modes];
         Some(Self {
             spans,
-            local: vec![STILL; longest],
-            force: vec![STILL; longest],
+            local: vec![ZERO_POSE; longest],
+            force: vec![ZERO_POSE; longest],
             plain: block.clone(),
             x: block.clone(),
             kx: block.clone(),
@@ -226,7 +226,7 @@ impl Kernel for ReferenceKernel<'_> {
             weigh::<W>(simd, model, &x[k], &mut mx[k]);
             let scratch = (&mut local[..], &mut force[..]);
             add_beams::<W>(simd, spans, &x[k], [one, zero, one], scratch, &mut mx[k]);
-            bent[k].fill(STILL);
+            bent[k].fill(ZERO_POSE);
             let scratch = (&mut local[..], &mut force[..]);
             add_beams::<W>(simd, spans, &x[k], [zero, one, zero], scratch, &mut bent[k]);
         }

@@ -210,8 +210,8 @@ mod tests {
                 Ok::<_, ()>(vec![Output { value: 3.0 + error(n), scale: 1.0 }, Output { value: f64::NAN, scale: 1.0 }])
             };
             let order = fit(&structure, &options, vec![2, 2], &mut analyse).unwrap();
-            let (found, told) = (error(&order.segments), order.estimated_error.unwrap());
-            assert!(found <= tol && (1.1..1.4).contains(&(told / found)), "{tol}: {found} {told}");
+            let (found, reported) = (error(&order.segments), order.estimated_error.unwrap());
+            assert!(found <= tol && (1.1..1.4).contains(&(reported / found)), "{tol}: {found} {reported}");
             assert!(order.segments[0] >= 2 * order.segments[1], "{:?}", order.segments);
             assert!(meshes <= 20, "{meshes}");
         }
@@ -228,9 +228,9 @@ mod tests {
         let options = CompileOptions { tol: 1e-7, ..CompileOptions::default() };
         let mut analyse = |n: &[usize]| Ok::<_, ()>(vec![Output { value: 3.0 + error(n[0]), scale: 1.0 }]);
         let order = fit(&structure, &options, vec![2], &mut analyse).unwrap();
-        let (found, told) = (error(order.segments[0]), order.estimated_error.unwrap());
+        let (found, reported) = (error(order.segments[0]), order.estimated_error.unwrap());
         assert!(order.segments[0] < 64 && found < 20.0 * error(9), "{found:e} with {:?}", order.segments);
-        assert!(told > options.tol && told > 0.2 * found, "{told:e} of {found:e}");
+        assert!(reported > options.tol && reported > 0.2 * found, "{reported:e} of {found:e}");
     }
 
     /// Results that do not settle are told, not refined for ever.

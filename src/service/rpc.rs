@@ -40,7 +40,7 @@ impl proto::bimorph_server::Bimorph for BimorphService {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             protocols: vec!["bimorph.v1".to_owned()],
             limits: Some(limits.to_wire()),
-            settings: self.0.told.clone(),
+            settings: self.0.reported.clone(),
         }))
     }
 

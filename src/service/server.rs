@@ -102,8 +102,8 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: BoxedWai
     drop(sender);
     let rereading = tokio::spawn(reread(Arc::clone(&guard), reload));
 
-    let told = settings.map(|settings| settings.reported()).unwrap_or_default();
-    let shared = share(limits, told, (make, store, connections), &signals);
+    let reported = settings.map(|settings| settings.reported()).unwrap_or_default();
+    let shared = share(limits, reported, (make, store, connections), &signals);
     wake(&shared, state_dir)?;
     let calls = BimorphServer::new(BimorphService(Arc::clone(&shared)))
         .max_decoding_message_size(shared.limits.message_bytes)
@@ -163,7 +163,7 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: BoxedWai
         tracing::warn!("some clients did not let go; their connections are cut");
         ended = tokio::time::timeout(GRACE, &mut serving).await.ok();
     }
-    shared.jobs.let_go(GRACE).await;
+    shared.jobs.release(GRACE).await;
     housekeeping.abort();
     rereading.abort();
     overseer.iter().for_each(tokio::task::JoinHandle::abort);
@@ -210,7 +210,7 @@ async fn open_all(
 /// What all calls share. Within a runtime.
 pub(super) fn share(
     limits: Limits,
-    told: Vec<ServerSetting>,
+    reported: Vec<ServerSetting>,
     (make, store, connections): (MakeDevice, Option<Arc<SessionStore>>, Arc<Connections>),
     signals: &Shutdown,
 ) -> Arc<ServerState> {
@@ -219,7 +219,7 @@ pub(super) fn share(
         desk: ComputePermits::sliced(limits.analyses, &limits, signals.clone()),
         trials: ComputePermits::new(limits.analyses.saturating_mul(2), &limits, signals.clone()),
         results: Arc::new(Semaphore::new(limits.result_streams.min(Semaphore::MAX_PERMITS))),
-        told,
+        reported,
         make,
         models: ModelCache::default(),
         sessions: SessionRegistry::default(),
@@ -236,14 +236,14 @@ pub(super) fn share(
 /// Tells by the health service whether this server is ready for more.
 async fn watch_over(health: HealthReporter, overseen: MonitoringState) {
     let mut ticks = tokio::time::interval(LOOK);
-    let mut told = None;
+    let mut reported = None;
     loop {
         ticks.tick().await;
         let busy = busy(&overseen.shared, &overseen.gate);
-        if told == Some(busy.is_none()) {
+        if reported == Some(busy.is_none()) {
             continue;
         }
-        told = Some(busy.is_none());
+        reported = Some(busy.is_none());
         if let Some(why) = &busy {
             tracing::warn!(why, "not ready for more");
         }
@@ -254,15 +254,15 @@ async fn watch_over(health: HealthReporter, overseen: MonitoringState) {
 
 /// What is done beside the calls, for as long as the server runs.
 async fn keep_house(shared: Arc<ServerState>) {
-    tokio::join!(expire(Arc::clone(&shared)), look_for_clients(shared));
+    tokio::join!(expire(Arc::clone(&shared)), check_clients(shared));
 }
 
 /// Cancels jobs whose clients are gone, for as long as the server runs.
-async fn look_for_clients(shared: Arc<ServerState>) {
+async fn check_clients(shared: Arc<ServerState>) {
     let mut ticks = tokio::time::interval(LOOK);
     loop {
         ticks.tick().await;
-        shared.jobs.look_for_clients(&shared.connections);
+        shared.jobs.check_clients(&shared.connections);
     }
 }
 

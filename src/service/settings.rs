@@ -273,12 +273,12 @@ impl Settings {
             Some(SettingSource::Environment) => "environment",
             Some(SettingSource::Option) => "option",
         };
-        let told = settings.chain(limits).map(|(name, value)| proto::ServerSetting {
+        let reported = settings.chain(limits).map(|(name, value)| proto::ServerSetting {
             name: name.to_owned(),
             value,
             source: source(name).to_owned(),
         });
-        told.collect()
+        reported.collect()
     }
 }
 

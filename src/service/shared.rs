@@ -21,7 +21,7 @@ use tonic::{Response, Status};
 pub(super) struct ServerState {
     pub(super) limits: Limits,
     /// Everything that this server was told, for Info.
-    pub(super) told: Vec<proto::ServerSetting>,
+    pub(super) reported: Vec<proto::ServerSetting>,
     pub(super) make: MakeDevice,
     pub(super) models: ModelCache,
     pub(super) sessions: SessionRegistry,

@@ -169,21 +169,21 @@ pub(super) fn say_undecodable(headers: &mut HeaderMap) {
     if headers.get("grpc-status").is_none_or(|code| code != "13") {
         return;
     }
-    if let Some(told) = Status::from_header_map(headers) {
-        let _ = undecodable(&told).add_header(headers);
+    if let Some(reported) = Status::from_header_map(headers) {
+        let _ = undecodable(&reported).add_header(headers);
     }
 }
 
 /// The same for a message of a stream.
-pub(super) fn undecodable(told: &Status) -> Status {
-    let text = told.message();
-    if told.code() == Code::Internal && UNDECODABLE.iter().any(|begin| text.starts_with(begin)) {
+pub(super) fn undecodable(reported: &Status) -> Status {
+    let text = reported.message();
+    if reported.code() == Code::Internal && UNDECODABLE.iter().any(|begin| text.starts_with(begin)) {
         return Status::invalid_argument(cut(
             format!("expected messages of the protocol (proto/bimorph): {text}"),
             MESSAGE_BYTES,
         ));
     }
-    told.clone()
+    reported.clone()
 }
 
 #[cfg(test)]

@@ -44,9 +44,9 @@ pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
         let hangup = signal(SignalKind::hangup()).map_err(ServeError::Runtime)?;
         tokio::spawn(reload_on(hangup, Arc::clone(&options.reload)));
         let input = input_ends(options.while_stdin);
-        let (first, told) = tokio::sync::oneshot::channel();
+        let (first, reported) = tokio::sync::oneshot::channel();
         let mut serving = std::pin::pin!(run(options, async {
-            let _ = told.await;
+            let _ = reported.await;
         }));
         tokio::select! {
             outcome = &mut serving => return outcome,

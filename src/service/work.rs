@@ -145,7 +145,7 @@ impl ComputePermits {
             let ComputationOutcome { answer, is_late, cpu } =
                 self.compute(Arc::clone(&job), place, end, deadline).await?;
             if !is_late || end == deadline {
-                return answer.map_err(|status| self.told(status));
+                return answer.map_err(|status| self.reported(status));
             }
             if cpu.is_none_or(|cpu| cpu >= STARVED) {
                 break;
@@ -154,7 +154,7 @@ impl ComputePermits {
         let _known = self.short.as_ref().map(|_| self.long.enter(party.number));
         let place = self.place_of(&self.places, party, deadline).await?;
         let ComputationOutcome { answer, .. } = self.compute(job, place, deadline, deadline).await?;
-        answer.map_err(|status| self.told(status))
+        answer.map_err(|status| self.reported(status))
     }
 
     /// Computes in a place until `end`.
@@ -187,7 +187,7 @@ impl ComputePermits {
     }
 
     /// A computation that noticed its deadline itself says the same as one that did not.
-    fn told(&self, status: Status) -> Status {
+    fn reported(&self, status: Status) -> Status {
         if status.code() == tonic::Code::DeadlineExceeded { self.late("computing") } else { status }
     }
 

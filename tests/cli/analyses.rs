@@ -36,10 +36,10 @@ fn auto_says_what_it_takes() {
         );
     }
     assert!(bench.run(&format!("{words} --scheme a2")).stdout.contains("formulation auto took rcr"));
-    let told = bench.run("check pivots.net --formulation auto").stdout;
-    assert!(told.contains("formulation auto takes compliant: joints are elastic in every direction"), "{told}");
-    let told = bench.run("check pivots.net --formulation rcr --segments 1").stdout;
-    assert!(told.contains("formulation rcr: 24 coordinates, 0 loops closed by springs, scheme es"), "{told}");
+    let reported = bench.run("check pivots.net --formulation auto").stdout;
+    assert!(reported.contains("formulation auto takes compliant: joints are elastic in every direction"), "{reported}");
+    let reported = bench.run("check pivots.net --formulation rcr --segments 1").stdout;
+    assert!(reported.contains("formulation rcr: 24 coordinates, 0 loops closed by springs, scheme es"), "{reported}");
 }
 
 /// The tip of a cantilever moves by F·l³/(3·E·I) and turns by F·l²/(2·E·I); every option is in the document.
@@ -236,8 +236,8 @@ fn resonances_behind_an_anchor_are_not_seen() {
     let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbig beam2d p [a b] [l=200u w=2u]\n\
                 small beam2d p [a d] [l=100u w=2u oz=pi]\n";
     let bench = Bench::new(&[("two.net", text)]);
-    let told = bench.run("ac two.net --drive d.fy --signals d.y --from 1k --to 400k --junctions centreline").stdout;
-    let rows: Vec<&str> = told.lines().filter(|line| line.contains("undamped")).collect();
-    assert_eq!(rows.len(), 2, "{told}");
-    assert!(rows[0].contains("not seen") && rows[1].contains("no bound"), "{told}");
+    let reported = bench.run("ac two.net --drive d.fy --signals d.y --from 1k --to 400k --junctions centreline").stdout;
+    let rows: Vec<&str> = reported.lines().filter(|line| line.contains("undamped")).collect();
+    assert_eq!(rows.len(), 2, "{reported}");
+    assert!(rows[0].contains("not seen") && rows[1].contains("no bound"), "{reported}");
 }

@@ -12,7 +12,7 @@ use tonic::transport::Endpoint;
 const FILE: &str = "listen = [\"127.0.0.1:0\"]\ntoken_file = \"keys/tokens\"\n\n[limits]\nsessions = 3\nmodels = 4\nmemory = \"64M\"\nidle = 1.5\n";
 
 /// The settings of a server as `Info` tells them: value and source by name.
-fn told(address: &str) -> BTreeMap<String, (String, String)> {
+fn reported(address: &str) -> BTreeMap<String, (String, String)> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
     let info = runtime.block_on(async {
         let endpoint = Endpoint::from_shared(address.to_owned()).expect("a uri");
@@ -36,9 +36,9 @@ fn options_before_the_environment_before_a_file() {
     command.env("BIMORPH_SERVE_CONFIG", "etc/serve.toml").env("BIMORPH_SERVE_MODELS", "5");
     command.env("BIMORPH_SERVE_SESSIONS", "7").env("BIMORPH_SERVE_LISTEN", "127.0.0.1:1").env("BIMORPH_SERVE_IDLE", "");
     let server = Server::spawn(command);
-    let told = told(&server.address);
+    let reported = reported(&server.address);
     let names: Vec<&str> = SETTINGS.iter().map(|s| s.name).chain(LIMITS.iter().map(|l| l.name)).collect();
-    assert_eq!(told.len(), names.len());
+    assert_eq!(reported.len(), names.len());
     for (name, value, source) in [
         ("listen", socket.as_str(), "option"),
         ("models", "6", "option"),
@@ -49,7 +49,7 @@ fn options_before_the_environment_before_a_file() {
         ("tls_cert", "", "default"),
         ("message_bytes", "64M", "default"),
     ] {
-        assert_eq!(told[name], (value.to_owned(), source.to_owned()), "{name}");
+        assert_eq!(reported[name], (value.to_owned(), source.to_owned()), "{name}");
     }
 }
 
@@ -70,7 +70,7 @@ fn defaults_and_variables_of_kubernetes_are_taken() {
         inside.env(format!("BIMORPH_SERVE_{name}"), text);
     }
     let server = Server::spawn(inside);
-    assert_eq!(told(&format!("http://{}", server.address))["program_bytes"], ("0".to_owned(), "option".to_owned()));
+    assert_eq!(reported(&format!("http://{}", server.address))["program_bytes"], ("0".to_owned(), "option".to_owned()));
     let ran = command().env("BIMORPH_SERVE_PORT", "1").output().expect("it runs");
     let stderr = String::from_utf8_lossy(&ran.stderr);
     assert!(stderr.contains("BIMORPH_SERVE_PORT: there is no such setting"), "{stderr}");

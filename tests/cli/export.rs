@@ -143,9 +143,9 @@ fn a_jump_is_told() {
     let bench = bench();
     let ran = bench.run("export plate.net --spice --port drive=12");
     assert_eq!(ran.status, 0, "{}", ran.stderr);
-    let told = "the part pulled in, snapped or buckled on the way to this operating point";
-    assert!(ran.stderr.contains(told) && ran.stdout.contains(&format!("* warning: {told}")), "{}", ran.stderr);
-    assert!(!bench.run("export plate.net --spice --port drive=1").stderr.contains(told));
+    let reported = "the part pulled in, snapped or buckled on the way to this operating point";
+    assert!(ran.stderr.contains(reported) && ran.stdout.contains(&format!("* warning: {reported}")), "{}", ran.stderr);
+    assert!(!bench.run("export plate.net --spice --port drive=1").stderr.contains(reported));
 }
 
 /// What cannot be written is refused with one message that names it and a way out.

@@ -124,8 +124,8 @@ fn connections_fit_into_open_files() {
     });
     drop(silent);
     let doctor = within("doctor --config serve.toml").output().expect("runs");
-    let told = String::from_utf8_lossy(&doctor.stdout).into_owned();
-    assert!(told.contains("missing  files    connections: 512 do not fit into 64 open files"), "{told}");
+    let reported = String::from_utf8_lossy(&doctor.stdout).into_owned();
+    assert!(reported.contains("missing  files    connections: 512 do not fit into 64 open files"), "{reported}");
     let whole = bench.run("doctor --config serve.toml");
     assert!(whole.stdout.contains("ok       files"), "{}", whole.stdout);
 }
@@ -322,9 +322,9 @@ fn one_client_leaves_the_others_their_part() {
         assert_eq!((jobs, refused.code()), (8, Code::ResourceExhausted), "{refused}");
         bob.submit_job(endless(99)).await.expect("bob has room");
         // what holds where nobody says it is told
-        let settings = bob.info(proto::InfoRequest {}).await.expect("told").into_inner().settings;
-        let told = settings.iter().find(|setting| setting.name == "client_sessions").expect("told");
-        assert_eq!((told.value.as_str(), told.source.as_str()), ("64", "default"));
+        let settings = bob.info(proto::InfoRequest {}).await.expect("reported").into_inner().settings;
+        let reported = settings.iter().find(|setting| setting.name == "client_sessions").expect("reported");
+        assert_eq!((reported.value.as_str(), reported.source.as_str()), ("64", "default"));
     });
 }
 

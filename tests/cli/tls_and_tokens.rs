@@ -223,12 +223,12 @@ fn a_token_file_that_others_can_read() {
     use std::fs::{Permissions, set_permissions};
     use std::os::unix::fs::PermissionsExt;
     let bench = bench();
-    for (mode, told) in [(0o644, true), (0o600, false)] {
+    for (mode, reported) in [(0o644, true), (0o600, false)] {
         set_permissions(bench.path("tokens"), Permissions::from_mode(mode)).expect("set");
         // it ends by itself, at an address that metrics cannot have
         let ran = bench.run("serve --listen 127.0.0.1:0 --token-file tokens --metrics unix:///tmp/nosuch");
         assert_eq!(ran.status, 1);
-        assert_eq!(ran.stderr.contains("others can read this file: chmod 600"), told, "{mode:o}: {}", ran.stderr);
+        assert_eq!(ran.stderr.contains("others can read this file: chmod 600"), reported, "{mode:o}: {}", ran.stderr);
     }
 }
 

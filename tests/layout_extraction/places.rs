@@ -45,9 +45,9 @@ fn a_body_that_an_undercut_holds() {
         source.converted.unwrap().report
     };
     let held = convert("undercut = 2e-6");
-    let told: Vec<&String> = held.notes.iter().filter(|n| n.contains("undercut")).collect();
+    let reported: Vec<&String> = held.notes.iter().filter(|n| n.contains("undercut")).collect();
     assert!(
-        told.len() == 1 && told[0].contains("the body at (0, 0) µm is held") && told[0].contains("4 limbs"),
+        reported.len() == 1 && reported[0].contains("the body at (0, 0) µm is held") && reported[0].contains("4 limbs"),
         "{held:?}"
     );
     assert_eq!((held.counts["bodies"], held.counts["anchors"]), (0, 8));

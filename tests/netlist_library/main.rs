@@ -299,12 +299,12 @@ fn angles_are_parameters_too() {
 /// What is no netlist is told in words, and help names no other thing.
 #[test]
 fn told_in_words() {
-    let told =
+    let reported =
         |name: &str, text: &str| load(&Bundle::from_text(name, text), &[]).expect_err("an error").items.remove(0);
-    let script = told("run.m", "% a sweep\nnet = cho_load('a.net');\n");
+    let script = reported("run.m", "% a sweep\nnet = cho_load('a.net');\n");
     assert_eq!((script.code.as_str(), script.line), ("E006", 2));
     assert_eq!(script.message, "`run.m` is a MATLAB file, not a netlist");
-    let library = told("cell.m", "% a cell\nsubnet cell [a b] [l=*] [ beam2d p7 [a b] [l=l w=width] ]\n");
+    let library = reported("cell.m", "% a cell\nsubnet cell [a b] [l=*] [ beam2d p7 [a b] [l=l w=width] ]\n");
     assert_eq!((library.code.as_str(), library.line), ("E007", 2));
     assert_eq!(library.message, "`cell.m` is a library: it has 1 subnet and draws nothing");
     let found = refused("slider1 p1 [a b] [l=1u]\n");

@@ -84,8 +84,8 @@ fn what_has_yielded_stays_on_every_mesh() {
     let (exact, _) = at(1e-3, Some(24));
     assert!(exact > 1e-7, "{exact}");
     for tol in [1e-2, 1e-3, 1e-4] {
-        let (y, told) = at(tol, None);
-        assert!(told.is_some_and(|told| told <= tol), "{tol}: {told:?}");
+        let (y, reported) = at(tol, None);
+        assert!(reported.is_some_and(|reported| reported <= tol), "{tol}: {reported:?}");
         close(y, exact, tol);
     }
 }

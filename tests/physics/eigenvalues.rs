@@ -85,8 +85,8 @@ fn estimates_hold_under_stress() {
         let (few, many) = (found(&text(stress), 6, 3).unwrap(), found(&text(stress), 60, 3).unwrap());
         for mode in 0..3 {
             let off = few.frequencies_hz[mode] / many.frequencies_hz[mode] - 1.0;
-            let told = few.errors[mode].unwrap();
-            assert!((0.5..2.0).contains(&(told / off)), "{k} mode {mode}: told {told:e}, off {off:e}");
+            let reported = few.errors[mode].unwrap();
+            assert!((0.5..2.0).contains(&(reported / off)), "{k} mode {mode}: told {reported:e}, off {off:e}");
         }
     }
 }
@@ -137,13 +137,16 @@ fn a_balanced_motion_is_told_and_an_imperfection_takes_the_branch() {
         let result = transient(&compiled, &asked, &mut |_, _| (), &mut |_| true).unwrap();
         (result.signals[0].2.last().copied().unwrap(), result.warnings, compiled)
     };
-    let (straight, told, ideal) = run(None);
-    assert!(straight.abs() < 1e-9 && told.len() == 1 && told[0].contains("unstable"), "{straight:e} {told:?}");
+    let (straight, reported, ideal) = run(None);
+    assert!(
+        straight.abs() < 1e-9 && reported.len() == 1 && reported[0].contains("unstable"),
+        "{straight:e} {reported:?}"
+    );
     let rests = static_equilibrium(&ideal, &volts).unwrap().nodes;
     let branch = rests.iter().find(|(name, _)| name == "m").unwrap().1.y.abs();
     for side in [1.0, -1.0] {
-        let (bent, told, _) = run(Some(side * 1e-4));
-        assert!(told.is_empty(), "{told:?}");
+        let (bent, reported, _) = run(Some(side * 1e-4));
+        assert!(reported.is_empty(), "{reported:?}");
         close(bent, side * branch, 0.05);
     }
 }

@@ -177,17 +177,18 @@ fn runs_end_at_their_events() {
 /// contact, with means: of 100 elastic bounces no two runs have the same.
 #[test]
 fn claims_after_contact() {
-    let told = |impact: &str, stop: f64| {
+    let reported = |impact: &str, stop: f64| {
         let compiled = plate(impact);
         let options = TransientOptions { stop, ..closing(Integrator::Rodas4, None) };
-        let mut go = |o: &TransientOptions<'_>, s: &mut dyn FnMut(f64, &[f64]), w: bimorph::analysis::Watch<'_>| {
-            transient(&compiled, o, s, w).map(|r| (r, ()))
-        };
+        let mut go =
+            |o: &TransientOptions<'_>, s: &mut dyn FnMut(f64, &[f64]), w: bimorph::analysis::ProgressCallback<'_>| {
+                transient(&compiled, o, s, w).map(|r| (r, ()))
+            };
         with_step_error(&options, &compiled, &mut go, &mut |_, _| (), &mut |_| true).unwrap().0
     };
-    let held = told("", 200e-6);
+    let held = reported("", 200e-6);
     assert!(held.reliable_until.is_none() && held.after_contact.is_empty(), "{:?}", held.warnings);
-    let lost = told("restitution=1", 4e-3);
+    let lost = reported("restitution=1", 4e-3);
     let contact = lost.events.iter().find(|e| e.contact).unwrap().t;
     let until = lost.reliable_until.expect("elastic bounces do not hold");
     assert!(until >= contact && until < 4e-3, "{until:e}");

@@ -257,8 +257,8 @@ fn events() {
         ..TransientOptions::default()
     };
     let found = transient(&compiled, &asked, &mut |_, _| {}, &mut |_| true).unwrap().events;
-    let told: Vec<_> = found.iter().map(|e| (e.contact, e.direction, e.level)).take(2).collect();
-    assert_eq!(told, [(false, Direction::Up, 1e-6), (true, Direction::Down, 1e-7)], "{found:?}");
+    let reported: Vec<_> = found.iter().map(|e| (e.contact, e.direction, e.level)).take(2).collect();
+    assert_eq!(reported, [(false, Direction::Up, 1e-6), (true, Direction::Down, 1e-7)], "{found:?}");
     assert!(found[0].t < found[1].t && found[1].signal.ends_with(".gap"));
 }
 

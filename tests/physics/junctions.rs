@@ -63,8 +63,8 @@ fn rotary_inertia_left_out_is_told() {
     let ((without, said), (with, silent)) = (found(false), found(true));
     let said = said.expect("a warning");
     assert!(said.contains("mode 2"), "{said}");
-    let told: f64 = said.split("about ").nth(1).and_then(|s| s.split(' ').next()).unwrap().parse().unwrap();
-    close(1e-2 * told, without / with - 1.0, 0.1);
+    let reported: f64 = said.split("about ").nth(1).and_then(|s| s.split(' ').next()).unwrap().parse().unwrap();
+    close(1e-2 * reported, without / with - 1.0, 0.1);
     assert_eq!(silent, None);
     let narrow = with_text_modes(
         "anchor p1 [a] []

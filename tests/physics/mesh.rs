@@ -39,11 +39,11 @@ fn elastica_within_the_tolerance() {
             let tip = node(&static_equilibrium(&model, &[]).unwrap(), "t");
             let size = across.hypot(along) * 1e-3;
             let error = (tip.y - across * 1e-3).abs().max((tip.x - along * 1e-3).abs()) / size;
-            let told = model.order.estimated_error.unwrap();
-            println!("{load} {tol:e}: {error:.1e}, estimated {told:.1e}, {} unknowns", model.unknowns());
-            assert!(error <= tol && told <= tol, "{load} {tol:e}: {error:e} {told:e}");
+            let reported = model.order.estimated_error.unwrap();
+            println!("{load} {tol:e}: {error:.1e}, estimated {reported:.1e}, {} unknowns", model.unknowns());
+            assert!(error <= tol && reported <= tol, "{load} {tol:e}: {error:e} {reported:e}");
             // below 1e-7 the equilibrium's own tolerance shows
-            assert!(error < 3.0 * told + 1e-7, "{load} {tol:e}: {error:e} {told:e}");
+            assert!(error < 3.0 * reported + 1e-7, "{load} {tol:e}: {error:e} {reported:e}");
             assert!(model.warnings.items.is_empty(), "{:?}", model.warnings.items);
         }
     }
@@ -74,8 +74,8 @@ fn modes_by_their_number() {
     let fine = modes(&fitted(&fine, &MeshRequest::Modes { count: 3, voltages: &[] }).unwrap(), 3, &[]).unwrap();
     for k in 0..3 {
         let error = found.frequencies_hz[k] / fine.frequencies_hz[k] - 1.0;
-        let told = found.errors[k].unwrap();
-        assert!(error.abs() <= 1e-3 && (1.0 / 3.0..3.0).contains(&(told / error)), "{k}: {error:e} {told:e}");
+        let reported = found.errors[k].unwrap();
+        assert!(error.abs() <= 1e-3 && (1.0 / 3.0..3.0).contains(&(reported / error)), "{k}: {error:e} {reported:e}");
     }
 }
 
@@ -89,10 +89,10 @@ fn segments_of_the_user_are_told() {
     assert_eq!(model.order.segments, [1]);
     let tip = node(&static_equilibrium(&model, &[]).unwrap(), "t");
     let error = (tip.y / 0.669964181278e-3 - 1.0).abs().max((tip.x / 0.328941242247e-3 + 1.0).abs());
-    let told = model.order.estimated_error.unwrap();
-    assert!((1.0 / 3.0..3.0).contains(&(told / error)), "{told:e} {error:e}");
+    let reported = model.order.estimated_error.unwrap();
+    assert!((1.0 / 3.0..3.0).contains(&(reported / error)), "{reported:e} {error:e}");
     let warned: Vec<&str> = model.warnings.items.iter().map(|d| d.code.as_str()).collect();
-    assert_eq!(warned, ["W040"], "{told}");
+    assert_eq!(warned, ["W040"], "{reported}");
 }
 
 /// Modes about a heated and about a stressed state hold the tolerance there: those of 1e-3 within it of those of 1e-5.
@@ -107,11 +107,11 @@ fn modes_about_a_loaded_state() {
             let model = fitted(&model, &MeshRequest::Modes { count: 4, voltages: &[] }).unwrap();
             (modes(&model, 4, &[]).unwrap().frequencies_hz, model.order.estimated_error.unwrap())
         };
-        let ((found, told), (fine, _)) = (at(1e-3), at(1e-5));
+        let ((found, reported), (fine, _)) = (at(1e-3), at(1e-5));
         for (found, fine) in found.iter().zip(&fine) {
             close(*found, *fine, 1e-3);
         }
-        assert!(told <= 1.05e-3, "{told:e}");
+        assert!(reported <= 1.05e-3, "{reported:e}");
     }
 }
 
@@ -147,9 +147,9 @@ fn transients_hold_over_their_length() {
     for formulation in [Formulation::Compliant, Formulation::Rcr] {
         for tol in [1e-2, 1e-3] {
             let found = run(tol, formulation);
-            let (error, told) = (apart(&found, &reference), found.estimated_error.unwrap());
-            println!("{formulation:?} {tol:e}: {error:.1e}, estimated {told:.1e}, {} unknowns", found.unknowns);
-            assert!(error <= tol && told <= 1.05 * tol, "{formulation:?} {tol:e}: {error:e} {told:e}");
+            let (error, reported) = (apart(&found, &reference), found.estimated_error.unwrap());
+            println!("{formulation:?} {tol:e}: {error:.1e}, estimated {reported:.1e}, {} unknowns", found.unknowns);
+            assert!(error <= tol && reported <= 1.05 * tol, "{formulation:?} {tol:e}: {error:e} {reported:e}");
         }
     }
 }
@@ -175,15 +175,15 @@ fn modes_about_stress_converge_at_junctions() {
         &MeshRequest::Modes { count: 3, voltages: &[] },
     );
     let model = model.unwrap();
-    let told = model.order.estimated_error.unwrap();
-    assert!(told <= 1e-6 && model.unknowns() < 100_000, "{told:e}, {} unknowns", model.unknowns());
+    let reported = model.order.estimated_error.unwrap();
+    assert!(reported <= 1e-6 && model.unknowns() < 100_000, "{reported:e}, {} unknowns", model.unknowns());
     assert!(model.warnings.items.is_empty(), "{:?}", model.warnings.items);
     let found = modes(&model, 3, &[]).unwrap().frequencies_hz;
     let finer: Vec<usize> = model.order.segments.iter().map(|n| 8 * n).collect();
     let finer = model.with_order(bimorph::refine::mesh_search::Mesh { segments: finer, ..model.order.clone() });
     let finer = modes(&finer.unwrap(), 3, &[]).unwrap().frequencies_hz;
     let error = found.iter().zip(&finer).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
-    assert!(error <= 1e-6 && error < 2.0 * told, "{error:e}, told {told:e}");
+    assert!(error <= 1e-6 && error < 2.0 * reported, "{error:e}, told {reported:e}");
 }
 
 /// The mesh of circuits becomes finer with the tolerance up to 3,000 unknowns; where more would be needed it is no coarser, and W040 says how far
@@ -196,10 +196,10 @@ fn meshes_of_circuits_have_no_cliff() {
     let mut before = 0;
     for (tol, holds) in [(1e-3, true), (1e-5, true), (1e-6, false)] {
         let found = in_circuit(&compile(&bundle, &CompileOptions { tol, ..CompileOptions::default() }).unwrap());
-        let told = found.warnings.items.iter().find(|warning| warning.code == "W040");
-        println!("{tol}: {} unknowns, {told:?}", found.unknowns());
+        let reported = found.warnings.items.iter().find(|warning| warning.code == "W040");
+        println!("{tol}: {} unknowns, {reported:?}", found.unknowns());
         assert!((before..=3000).contains(&found.unknowns()), "{tol}: {} after {before}", found.unknowns());
-        assert_eq!(told.is_none(), holds, "{tol}: {told:?}");
+        assert_eq!(reported.is_none(), holds, "{tol}: {reported:?}");
         before = found.unknowns();
     }
 }
@@ -216,7 +216,10 @@ fn circuits_know_the_error_of_their_lowest_mode() {
             in_circuit(&compile(&bundle, &options).unwrap()).lowest.unwrap()
         };
         let (found, exact) = (at(None), at(Some(32)));
-        let (told, off) = (found.error.abs(), (found.frequency_hz / exact.frequency_hz - 1.0).abs());
-        assert!(off < 3.0 * told + 1e-5 && told < 3.0 * off + 1e-5, "{formulation:?}: {off:e}, told {told:e}");
+        let (reported, off) = (found.error.abs(), (found.frequency_hz / exact.frequency_hz - 1.0).abs());
+        assert!(
+            off < 3.0 * reported + 1e-5 && reported < 3.0 * off + 1e-5,
+            "{formulation:?}: {off:e}, told {reported:e}"
+        );
     }
 }

@@ -115,10 +115,11 @@ fn one_step_compared_with_itself() {
     let start = model(&OSCILLATOR.replace("F=0", "F=1u"), &CompileOptions::default());
     let compiled = model(OSCILLATOR, &CompileOptions::default());
     let options = TransientOptions { step: Some(6e-4), ..options(6.3e-4, Some(&start)) };
-    let mut run =
-        |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: bimorph::analysis::Watch<'_>| {
-            Ok((transient(&compiled, options, sample, watch)?, ()))
-        };
+    let mut run = |options: &TransientOptions<'_>,
+                   sample: &mut dyn FnMut(f64, &[f64]),
+                   watch: bimorph::analysis::ProgressCallback<'_>| {
+        Ok((transient(&compiled, options, sample, watch)?, ()))
+    };
     let (result, ()) = with_step_error(&options, &compiled, &mut run, &mut |_, _| {}, &mut |_| true).unwrap();
     assert_eq!(result.step_error, None);
     assert!(result.warnings.iter().any(|w| w.contains("nothing tells how far the steps")), "{:?}", result.warnings);
@@ -132,16 +133,17 @@ fn loose_steps_tell_enough() {
     let compiled = model(&text, &CompileOptions::default());
     let options = TransientOptions { tol: 0.15, points: 1001, ..options(1e-2, Some(&start)) };
     let mut samples = Vec::new();
-    let mut run =
-        |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: bimorph::analysis::Watch<'_>| {
-            Ok((transient(&compiled, options, sample, watch)?, ()))
-        };
+    let mut run = |options: &TransientOptions<'_>,
+                   sample: &mut dyn FnMut(f64, &[f64]),
+                   watch: bimorph::analysis::ProgressCallback<'_>| {
+        Ok((transient(&compiled, options, sample, watch)?, ()))
+    };
     let mut see = |t: f64, values: &[f64]| samples.push((t, values[0]));
     let (result, ()) = with_step_error(&options, &compiled, &mut run, &mut see, &mut |_| true).unwrap();
     let off = |(t, x): &(f64, f64)| (x - 1e-6 * (1e5 * t).cos()).powi(2);
     let error = (samples.iter().map(off).sum::<f64>() / samples.len() as f64).sqrt() / 1e-6;
-    let told = result.step_error.unwrap();
-    assert!((1.0 / 1.5..1.5).contains(&(told / error)), "{told:e} reported, {error:e}");
+    let reported = result.step_error.unwrap();
+    assert!((1.0 / 1.5..1.5).contains(&(reported / error)), "{reported:e} reported, {error:e}");
 }
 
 /// A parameter that moves drawn nodes is no load to let go.

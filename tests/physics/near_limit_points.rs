@@ -32,9 +32,9 @@ fn modes_next_to_pull_in() {
     };
     let (exact, _) = at(&CompileOptions { segments: Some(48), ..CompileOptions::default() });
     for tol in [1e-2, 1e-3] {
-        let (found, told) = at(&CompileOptions { tol, ..CompileOptions::default() });
+        let (found, reported) = at(&CompileOptions { tol, ..CompileOptions::default() });
         let off = (found / exact - 1.0).abs();
-        assert!(off <= told.unwrap().max(tol), "{tol}: {found} against {exact}, told {told:?}");
+        assert!(off <= reported.unwrap().max(tol), "{tol}: {found} against {exact}, told {reported:?}");
     }
 }
 
@@ -112,12 +112,12 @@ fn a_path_that_ends_at_rest() {
 fn pull_in_of_a_buckled_part_is_told() {
     let plate =
         "anchor * [e] []\nplategap2d * [m e] [A=2e-9 gap=3u oz=-pi/2]\neground * [e] []\ndrive port * [m e] []\n";
-    let told = |s: f64| {
+    let reported = |s: f64| {
         let (_, found) = pull_in_fitted(&stressed(plate, s, &CompileOptions::default()), None, 200.0).unwrap();
         found.notes().join("; ")
     };
-    assert!(told(-80e6).contains("snapped through or buckled"), "{}", told(-80e6));
-    assert!(!told(0.0).contains("buckled"), "{}", told(0.0));
+    assert!(reported(-80e6).contains("snapped through or buckled"), "{}", reported(-80e6));
+    assert!(!reported(0.0).contains("buckled"), "{}", reported(0.0));
 }
 
 /// A jump on a finer mesh is told although the first mesh did not make it: a column under 1.0012 of Euler's load (217.13 µN by
@@ -154,9 +154,9 @@ fn a_linear_model_tells_what_it_leaves_out() {
     let k = (f / (165e9 * 2e-6 * 8e-18 / 12.0)).sqrt();
     let exact = s / f * ((k * l).tan() / k - l);
     let share = exact / node(&result, "b").y - 1.0;
-    let told = warnings(&fitted).find(|w| w.contains("stress")).expect("a warning");
-    let told: f64 = told.rsplit(' ').next().unwrap().parse().unwrap();
-    close(told, share, 0.05);
+    let reported = warnings(&fitted).find(|w| w.contains("stress")).expect("a warning");
+    let reported: f64 = reported.rsplit(' ').next().unwrap().parse().unwrap();
+    close(reported, share, 0.05);
 }
 
 /// A voltage that no circuit has, and one that is given twice, are refused by name; the largest that is taken ends too.
@@ -215,22 +215,25 @@ fn beyond_a_buckling_load_nothing_stays_straight() {
         for beyond in [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5] {
             let stress = buckled * (1.0 + beyond);
             let (exact, _) = deflection(&stressed("", stress, &fine));
-            let (found, told) = deflection(&stressed("", stress, &options));
-            println!("tol {tol}, {beyond} beyond: {found:e} of {exact:e}, told {told:?}");
+            let (found, reported) = deflection(&stressed("", stress, &options));
+            println!("tol {tol}, {beyond} beyond: {found:e} of {exact:e}, told {reported:?}");
             let off = (found / exact - 1.0).abs();
             assert!(
-                told.is_none_or(|told| off <= tol.max(3.0 * told)),
-                "{tol} {beyond}: {found:e} of {exact:e}, {told:?}"
+                reported.is_none_or(|reported| off <= tol.max(3.0 * reported)),
+                "{tol} {beyond}: {found:e} of {exact:e}, {reported:?}"
             );
-            assert!(told.is_some() || beyond < 1e-4, "{tol} {beyond}: nothing is told");
+            assert!(reported.is_some() || beyond < 1e-4, "{tol} {beyond}: nothing is told");
         }
         let frequency = |options: &CompileOptions, beyond: f64| {
             let (_, found, _) = modes_fitted(&stressed("", buckled * (1.0 + beyond), options), 1, &[]).unwrap();
             (found.frequencies_hz[0], found.estimated_error)
         };
-        let ((exact, _), (found, told)) = (frequency(&fine, 3e-4), frequency(&options, 3e-4));
+        let ((exact, _), (found, reported)) = (frequency(&fine, 3e-4), frequency(&options, 3e-4));
         let off = (found / exact - 1.0).abs();
-        assert!(told.is_none_or(|told| off <= tol.max(3.0 * told)), "{tol}: {found} Hz of {exact}, told {told:?}");
+        assert!(
+            reported.is_none_or(|reported| off <= tol.max(3.0 * reported)),
+            "{tol}: {found} Hz of {exact}, told {reported:?}"
+        );
     }
 }
 
@@ -258,12 +261,12 @@ fn a_column_in_one_piece_buckles() {
         let options = CompileOptions { tol, ..CompileOptions::default() };
         for beyond in [5e-3, 2e-3, 1e-3] {
             let load = buckled * (1.0 + beyond);
-            let ((exact, _), (found, told)) = (pressed(load, &fine), pressed(load, &options));
-            println!("tol {tol}, {beyond} beyond: {found:e} of {exact:e}, told {told:?}");
+            let ((exact, _), (found, reported)) = (pressed(load, &fine), pressed(load, &options));
+            println!("tol {tol}, {beyond} beyond: {found:e} of {exact:e}, told {reported:?}");
             let off = (found / exact - 1.0).abs();
             assert!(
-                told.is_none_or(|told| off <= tol.max(3.0 * told)),
-                "{tol} {beyond}: {found:e} of {exact:e}, {told:?}"
+                reported.is_none_or(|reported| off <= tol.max(3.0 * reported)),
+                "{tol} {beyond}: {found:e} of {exact:e}, {reported:?}"
             );
         }
     }

@@ -115,9 +115,9 @@ fn the_mesh_of_a_path_holds_the_tolerance() {
     let exact = both(&found(&CompileOptions { segments: Some(128), ..CompileOptions::default() }).1);
     for tol in [1e-2, 1e-3, 1e-4] {
         let (fitted, path) = found(&CompileOptions { tol, ..CompileOptions::default() });
-        let told = fitted.order.estimated_error.unwrap();
+        let reported = fitted.order.estimated_error.unwrap();
         let error = both(&path).iter().zip(exact).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
-        assert!(error <= tol && told <= tol && 3.0 * told >= error, "{tol}: off by {error}, told {told}");
+        assert!(error <= tol && reported <= tol && 3.0 * reported >= error, "{tol}: off by {error}, told {reported}");
     }
     // a path that ends for want of points ends nowhere in particular: nothing is told of its error
     let last = scene("column/column.net", &[("F", to)], &CompileOptions::default());

@@ -178,8 +178,8 @@ fn the_estimate_is_effective() {
         let estimate = compiled.order.estimated_error.unwrap();
         assert!((0.8..=2.0).contains(&(estimate / truth)), "{band:e} {tol:e}: {estimate:e} for {truth:e}");
         assert!(estimate <= tol && truth <= 1.25 * tol, "{band:e} {tol:e}: {estimate:e} for {truth:e}");
-        let told = found.errors.iter().take(count).map(|e| e.unwrap().abs()).fold(0.0, f64::max);
-        close(told, estimate, 0.05);
+        let reported = found.errors.iter().take(count).map(|e| e.unwrap().abs()).fold(0.0, f64::max);
+        close(reported, estimate, 0.05);
         if band == 4.5e5 {
             assert!(found.unknowns <= 60, "{}", found.unknowns);
         }
@@ -203,11 +203,11 @@ fn every_scheme_has_its_error_and_knows_it() {
         let (found, _) = error(scheme, 16, false);
         close(found, want, 0.03);
         let estimates = modes(&beam(scheme, 16, false, 2e-6), 3, &[]).unwrap().errors;
-        let told = estimates.iter().map(|e| e.unwrap().abs()).fold(0.0, f64::max);
+        let reported = estimates.iter().map(|e| e.unwrap().abs()).fold(0.0, f64::max);
         if want > 1e-3 {
-            close(told, found, 0.1);
+            close(reported, found, 0.1);
         }
-        assert!((told / found - 1.0).abs() < 1.0, "{scheme:?}: {told:e} for {found:e}");
+        assert!((reported / found - 1.0).abs() < 1.0, "{scheme:?}: {reported:e} for {found:e}");
     }
 }
 
@@ -283,8 +283,8 @@ fn thick_beams() {
     for (fine_error, coarse_error) in errors(&fine).iter().zip(errors(&coarse)) {
         assert!(fine_error.abs() < 1e-2 && fine_error.abs() < coarse_error.abs() / 3.0);
     }
-    for (error, told) in errors(&fine).iter().zip(&fine.errors) {
-        close(told.unwrap(), *error, 0.2);
+    for (error, reported) in errors(&fine).iter().zip(&fine.errors) {
+        close(reported.unwrap(), *error, 0.2);
     }
     let slender = modes(&model(text, &CompileOptions { segments: Some(16), ..CompileOptions::default() }), 1, &[]);
     let above = slender.unwrap().frequencies_hz[0] / want[0] - 1.0;
@@ -333,7 +333,7 @@ fn estimates_under_load() {
     let loose = modes(&beam(Scheme::E4, 6, true, 2e-6), 1, &[]).unwrap();
     assert!(coarse.frequencies_hz[0] > 1.5 * loose.frequencies_hz[0]);
     for k in 0..2 {
-        let (told, is) = (coarse.errors[k].unwrap(), coarse.frequencies_hz[k] / fine.frequencies_hz[k] - 1.0);
-        assert!((0.3..1.3).contains(&(told / is)), "{told:e} for {is:e}");
+        let (reported, is) = (coarse.errors[k].unwrap(), coarse.frequencies_hz[k] / fine.frequencies_hz[k] - 1.0);
+        assert!((0.3..1.3).contains(&(reported / is)), "{reported:e} for {is:e}");
     }
 }

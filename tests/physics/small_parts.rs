@@ -40,11 +40,14 @@ fn a_signal_has_the_mesh_that_it_shows() {
         for tol in [1e-2, 1e-3] {
             let found = run(signals, tol, None);
             let error = relative_error(&reference, &found);
-            let told = found.estimated_error.unwrap();
-            println!("{signals:?} {tol:e}: {error:.1e}, told {told:.1e}, {} unknowns", found.unknowns);
+            let reported = found.estimated_error.unwrap();
+            println!("{signals:?} {tol:e}: {error:.1e}, told {reported:.1e}, {} unknowns", found.unknowns);
             // beside another it is measured by a thirtieth of that one's swing
             let own = if signals.len() == 1 { 1.0 } else { 400.0 / 30.0 };
-            assert!(error <= own * tol && error <= own * 3.0 * told, "{signals:?} {tol:e}: {error:e}, told {told:e}");
+            assert!(
+                error <= own * tol && error <= own * 3.0 * reported,
+                "{signals:?} {tol:e}: {error:e}, told {reported:e}"
+            );
         }
     }
 }

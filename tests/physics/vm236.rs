@@ -138,9 +138,10 @@ fn a_switch_closes_at_a_coarse_tolerance() {
 fn the_switch_closes_in_time() {
     let (drawn, options) = (vm236(16), closing(20e-6));
     let (moving, _) = fitted_in_time(&drawn, &options).unwrap();
-    let mut go = |o: &TransientOptions<'_>, s: &mut dyn FnMut(f64, &[f64]), w: bimorph::analysis::Watch<'_>| {
-        transient(&moving, o, s, w).map(|r| (r, ()))
-    };
+    let mut go =
+        |o: &TransientOptions<'_>, s: &mut dyn FnMut(f64, &[f64]), w: bimorph::analysis::ProgressCallback<'_>| {
+            transient(&moving, o, s, w).map(|r| (r, ()))
+        };
     let run = with_step_error(&options, &moving, &mut go, &mut |_, _| (), &mut |_| true).unwrap().0;
     let first = run.events.iter().find(|event| event.contact).unwrap();
     close(first.t, 0.64263e-6, 1e-3);

@@ -30,7 +30,7 @@ fn example(name: &str) -> Bundle {
 }
 
 /// A run with what is told of its steps.
-fn told(model: &CompiledModel, start: &CompiledModel, options: &TransientOptions<'_>) -> TransientResult {
+fn reported(model: &CompiledModel, start: &CompiledModel, options: &TransientOptions<'_>) -> TransientResult {
     let options = TransientOptions { release: Some(start), ..options.clone() };
     let mut run =
         |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
@@ -49,16 +49,16 @@ fn steps_in_time_tell_their_error() {
     let moving = chart::released(&example("single_bimorph"), &start, "F").unwrap();
     let run = |tol: f64| {
         let signals = vec!["tip.y".to_owned()];
-        told(&moving, &start, &TransientOptions { stop: 50e-6, tol, signals, ..TransientOptions::default() })
+        reported(&moving, &start, &TransientOptions { stop: 50e-6, tol, signals, ..TransientOptions::default() })
     };
     let exact = run(1e-6);
     for tol in [1e-2, 1e-3, 1e-4] {
         let found = run(tol);
-        let (error, told) = (chart::error::relative_error(&exact, &found), found.step_error.unwrap());
-        println!("{tol:e}: {error:.1e}, told {told:.1e}, {} steps", found.counters.steps);
-        assert!((0.25..4.0).contains(&(told / error)), "{tol:e}: {error:e} {told:e}");
-        assert_eq!(found.warnings.iter().any(|w| w.contains("steps in time")), told > tol, "{:?}", found.warnings);
-        assert!(error <= tol || told > tol, "{tol:e}: {error:e} {told:e}");
+        let (error, reported) = (chart::error::relative_error(&exact, &found), found.step_error.unwrap());
+        println!("{tol:e}: {error:.1e}, told {reported:.1e}, {} steps", found.counters.steps);
+        assert!((0.25..4.0).contains(&(reported / error)), "{tol:e}: {error:e} {reported:e}");
+        assert_eq!(found.warnings.iter().any(|w| w.contains("steps in time")), reported > tol, "{:?}", found.warnings);
+        assert!(error <= tol || reported > tol, "{tol:e}: {error:e} {reported:e}");
     }
 }
 
@@ -152,7 +152,7 @@ fn steps_that_outrun_the_motion_are_told() {
         compile(&Bundle::from_text("told.net", text), &options).unwrap()
     };
     let (start, moving) = (drawn(1e-6), drawn(0.0));
-    let told = |step: f64| {
+    let reported = |step: f64| {
         let run = TransientOptions {
             stop: 2e-3,
             step: Some(step),
@@ -163,8 +163,8 @@ fn steps_that_outrun_the_motion_are_told() {
         let (model, _) = fitted_in_time(&moving, &run).unwrap();
         model.warnings.items.iter().any(|d| d.code == "W044")
     };
-    assert!(told(100e-6));
-    assert!(!told(1e-6));
+    assert!(reported(100e-6));
+    assert!(!reported(1e-6));
 }
 
 /// A part that is unstable where it is drawn, and rests on its gap without any voltage, is said to be so: nothing pulls it in.

@@ -75,8 +75,8 @@ fn given(formulation: Formulation, share: f64) -> Vec<f64> {
 fn kinds_are_told() {
     let mut device = LocalDevice::new(compiled(SHUTTLE, Formulation::Compliant));
     let ports = PORTS.iter().map(|(name, ..)| (*name).to_owned()).collect();
-    let told = device.open(&OpenRequest { ports, signals: vec![], noise: None }).unwrap();
-    for (port, (name, kind, _)) in told.ports.iter().zip(PORTS) {
+    let reported = device.open(&OpenRequest { ports, signals: vec![], noise: None }).unwrap();
+    for (port, (name, kind, _)) in reported.ports.iter().zip(PORTS) {
         assert_eq!((port.name.as_str(), port.kind), (name, kind));
     }
 }

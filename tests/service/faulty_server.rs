@@ -120,7 +120,7 @@ fn caught(server: &Running, lie: &str) -> String {
 #[test]
 fn lies_are_named() {
     let server = start_with("127.0.0.1:0", Limits::default(), liar);
-    for (lie, told) in [
+    for (lie, reported) in [
         ("truth", ""),
         ("nan", "currents[1]: expected a finite number, got NaN"),
         ("infinite", "charges[0]: expected a finite number, got inf"),
@@ -142,8 +142,8 @@ fn lies_are_named() {
         ("ports", "port: expected a name, got \"a\\u{1b}[2J\""),
     ] {
         let error = caught(&server, lie);
-        assert!(error.contains(told) && (told.is_empty() == error.is_empty()), "{lie}: {error}");
-        let is_plain = told.is_empty() || matches!(lie, "fails" | "controls");
+        assert!(error.contains(reported) && (reported.is_empty() == error.is_empty()), "{lie}: {error}");
+        let is_plain = reported.is_empty() || matches!(lie, "fails" | "controls");
         assert!(is_plain || error.contains(&server.address.to_string().replace("http://", "")), "{lie}: {error}");
         assert!(!error.contains('\u{1b}'), "{lie}: {error:?}");
     }

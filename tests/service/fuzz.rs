@@ -175,14 +175,14 @@ fn messages(seed: u64, mut done: impl FnMut(usize) -> bool) {
                 let at = maker.below(all.len());
                 maker.change(&mut all[at], &other);
             }
-            let told = all.clone();
+            let reported = all.clone();
             match tokio::time::timeout(DEADLINE, answered(&channel, call, all)).await {
                 Ok(Ok(_)) => fine += 1,
                 Ok(Err(status)) => {
                     let fault = matches!(status.code(), Code::Unknown | Code::DataLoss | Code::Internal);
-                    assert!(!fault, "seed {seed}, call {count}, {call}: {status:?}\n{told:?}");
+                    assert!(!fault, "seed {seed}, call {count}, {call}: {status:?}\n{reported:?}");
                 }
-                Err(_) => panic!("seed {seed}, call {count}, {call} has no end:\n{told:?}"),
+                Err(_) => panic!("seed {seed}, call {count}, {call} has no end:\n{reported:?}"),
             }
             count += 1;
             if count.is_multiple_of(100) {
@@ -220,13 +220,13 @@ fn snapshots(seed: u64, mut done: impl FnMut(usize) -> bool) {
                 sealed.value().to_le_bytes().to_vec()
             };
             let snapshot = [&sound[..HEAD], &sum, &body].concat();
-            let told = format!("seed {seed}, snapshot {count}: {snapshot:?}");
+            let reported = format!("seed {seed}, snapshot {count}: {snapshot:?}");
             let request = proto::RestoreRequest { model: model.clone(), snapshot };
-            match tokio::time::timeout(DEADLINE, client.restore(request)).await.expect(&told) {
+            match tokio::time::timeout(DEADLINE, client.restore(request)).await.expect(&reported) {
                 Err(status) => {
                     let refused =
                         [Code::InvalidArgument, Code::FailedPrecondition, Code::ResourceExhausted, Code::NotFound];
-                    assert!(refused.contains(&status.code()), "{status:?} {told}");
+                    assert!(refused.contains(&status.code()), "{status:?} {reported}");
                 }
                 Ok(restored) => {
                     opened += 1;
@@ -234,14 +234,14 @@ fn snapshots(seed: u64, mut done: impl FnMut(usize) -> bool) {
                     let mut stream = Attached::to(&mut client, &session).await;
                     let answer = stream.ask(trial(2, 1e-7, 1.2));
                     // a fault says that the state is none, or no longer there
-                    if let Kind::Trial(reply) = tokio::time::timeout(DEADLINE, answer).await.expect(&told)
+                    if let Kind::Trial(reply) = tokio::time::timeout(DEADLINE, answer).await.expect(&reported)
                         && reply.status() == proto::trial_reply::Status::Ok
                     {
                         let mut numbers = reply.currents.iter().chain(&reply.charges).chain(&reply.di_dv);
-                        assert!(numbers.all(|x| x.is_finite()), "{reply:?} {told}");
+                        assert!(numbers.all(|x| x.is_finite()), "{reply:?} {reported}");
                     }
                     drop(stream);
-                    client.close(proto::CloseRequest { session }).await.expect(&told);
+                    client.close(proto::CloseRequest { session }).await.expect(&reported);
                 }
             }
             count += 1;

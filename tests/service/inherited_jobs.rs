@@ -64,7 +64,7 @@ fn a_job_of_another_version_is_left_to_it() {
             let mut wire = running.client().await;
             let (first, last) = rows(&mut wire, &name).await.expect("its rows");
             assert!(first.len() >= 5);
-            let Some(proto::job::Result::Error(why)) = last.expect("told").result else { panic!("it is not done") };
+            let Some(proto::job::Result::Error(why)) = last.expect("reported").result else { panic!("it is not done") };
             assert_eq!(why.code, Code::FailedPrecondition as i32, "{why:?}");
             for _ in 0..2 {
                 assert_eq!(rows(&mut wire, &name).await.expect("its rows").0, first);

@@ -150,7 +150,7 @@ fn rows_are_those_of_the_sweep_in_process() {
             assert!(meta(&job).rows >= before, "counts never go back");
             last = Some(job);
         }
-        let last = last.expect("told");
+        let last = last.expect("reported");
         assert_eq!(last.result, Some(proto::job::Result::Response(proto::JobResponse { rows: 40, failed: 0 })));
         let mut stream = fetch(&mut wire, &job.name, 0).await.expect("a stream");
         let (mut rows, ended) = rest(&mut stream, 0).await.expect("ends");
@@ -251,7 +251,7 @@ fn a_large_job_does_not_hold_up_a_small_one() {
         while let Some(job) = watched.message().await.expect("goes on") {
             last = Some(job);
         }
-        assert_eq!(meta(&last.expect("told")).state(), State::Done);
+        assert_eq!(meta(&last.expect("reported")).state(), State::Done);
         assert_eq!(meta(alice.get_job(large).await.expect("is here").get_ref()).state(), State::Running);
     });
 }

@@ -115,10 +115,10 @@ impl Cut {
     }
 
     /// How they failed, in words.
-    pub(crate) fn told(&self) -> String {
-        let told =
+    pub(crate) fn reported(&self) -> String {
+        let reported =
             FATES.iter().zip(&self.shared.failed).map(|(fate, n)| format!("{fate:?} {}", n.load(Ordering::SeqCst)));
-        told.collect::<Vec<_>>().join(", ").to_lowercase()
+        reported.collect::<Vec<_>>().join(", ").to_lowercase()
     }
 }
 

@@ -198,7 +198,7 @@ fn a_job_of_a_client_without_processor_time() {
         while let Some(job) = watched.message().await.expect("goes on") {
             last = Some(job);
         }
-        let last = last.expect("told");
+        let last = last.expect("reported");
         let metadata = last.metadata.expect("metadata");
         let Some(proto::job::Result::Error(why)) = last.result else { panic!("it is not done: {metadata:?}") };
         assert!(why.code == Code::ResourceExhausted as i32 && why.message.starts_with("client_cpu: "), "{why:?}");

@@ -137,7 +137,7 @@ fn kept(failures: u64, seed: u64) {
             assert_eq!(*reply, expected, "step {step}");
             parent = expected.token;
         }
-        println!("kept session: {} steps, {}, {unheard} accepted unheard", done.len(), cut.told());
+        println!("kept session: {} steps, {}, {unheard} accepted unheard", done.len(), cut.reported());
     });
 }
 
@@ -199,7 +199,7 @@ fn co_simulation(failures: u64, seed: u64) {
         parent = reply.token;
         expected.push(reply);
     }
-    let (tell, told) = mpsc::channel();
+    let (tell, reported) = mpsc::channel();
     let (uri, calm) = (cut.uri(), Arc::new(AtomicBool::new(false)));
     let theirs = Arc::clone(&calm);
     let running = std::thread::spawn(move || {
@@ -211,7 +211,7 @@ fn co_simulation(failures: u64, seed: u64) {
     });
     let mut calls = 0_u64;
     loop {
-        match told.recv_timeout(HANG) {
+        match reported.recv_timeout(HANG) {
             Ok(()) => calls += 1,
             Err(mpsc::RecvTimeoutError::Timeout) => panic!("a call hangs"),
             Err(mpsc::RecvTimeoutError::Disconnected) => break,
@@ -222,7 +222,7 @@ fn co_simulation(failures: u64, seed: u64) {
         }
     }
     running.join().expect("every answer is right");
-    println!("co-simulation: {calls} calls, {}", cut.told());
+    println!("co-simulation: {calls} calls, {}", cut.reported());
 }
 
 #[test]

@@ -176,7 +176,7 @@ fn ended_jobs_make_room() {
             for (name, points) in names.iter().zip(2..6) {
                 let (rows, last) =
                     rest(&mut fetch(&mut wire, name, 0).await.expect("a stream"), 0).await.expect("ends");
-                assert_eq!((rows.len(), meta(&last.expect("told")).state()), (points, State::Done));
+                assert_eq!((rows.len(), meta(&last.expect("reported")).state()), (points, State::Done));
             }
         }
     });

@@ -57,7 +57,7 @@ fn sweeps(rounds: u64, failures: u64) {
             }
         }
         failed += cut.failed();
-        println!("sweep {round}: {}", cut.told());
+        println!("sweep {round}: {}", cut.reported());
     }
     assert!(tables > given_up && failed >= rounds, "{tables} tables, {given_up} given up, {failed} failures");
     println!("{tables} tables, {given_up} given up");

@@ -182,7 +182,7 @@ fn rows_of_modes_are_modes_on_one_mesh() {
             assert!((found.expect("a mode") / alone - 1.0).abs() < 1e-12, "{w}: {found:?} {alone}");
         }
         let own = alone.errors.iter().map(|e| e.expect("an estimate").abs()).fold(0.0, f64::max);
-        let told = row.estimated_error.expect("an estimate");
-        assert!((told / own - 1.0).abs() < 1e-2, "{w}: {told} {own}");
+        let reported = row.estimated_error.expect("an estimate");
+        assert!((reported / own - 1.0).abs() < 1e-2, "{w}: {reported} {own}");
     }
 }

@@ -60,8 +60,8 @@ fn rows_are_within_the_tolerance_of_a_finer_mesh() {
                 assert!((f - last).abs() < 0.5 * tol * scale, "the reference is not converged: {r} {last}");
                 assert!((x - f).abs() <= tol * scale, "{tol}: {x} {f} {:?}", row.parameters);
             }
-            let told = row.estimated_error.expect("an estimate");
-            assert_eq!(row.warning.is_empty(), told <= 1.05 * tol, "{told} {}", row.warning);
+            let reported = row.estimated_error.expect("an estimate");
+            assert_eq!(row.warning.is_empty(), reported <= 1.05 * tol, "{reported} {}", row.warning);
         }
     }
     let coarse = CompileOptions { tol: 1e-4, segments: Some(2), ..CompileOptions::default() };
@@ -105,7 +105,7 @@ fn frequencies_hold_their_tolerance() {
             let (f, r) = (f.expect("a frequency"), r.expect("a frequency"));
             assert!((f / r - 1.0).abs() <= options.tol, "{f} {r} {:?}", row.parameters);
         }
-        assert!(row.estimated_error.is_some_and(|told| told <= options.tol), "{row:?}");
+        assert!(row.estimated_error.is_some_and(|reported| reported <= options.tol), "{row:?}");
     }
 }
 
@@ -183,22 +183,23 @@ fn rows_tell_what_the_commands_tell() {
     for segments in [None, Some(3)] {
         let options = CompileOptions { linear: true, segments, ..CompileOptions::default() };
         let table = swept(pressed, &["F=0:6.7u:3"], statics.clone(), &options, Shard::default());
-        let told: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("W041: the linear model")).collect();
-        assert_eq!(told, [false, true, true], "{:?}", table.rows);
+        let reported: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("W041: the linear model")).collect();
+        assert_eq!(reported, [false, true, true], "{:?}", table.rows);
     }
     // beyond Euler's load modes grow; a part that is pulled in, and one that stays closed
     let buckled = SweepAnalysis::Modes { count: 1, voltages: Vec::new() };
     let linear = CompileOptions { linear: true, ..CompileOptions::default() };
     let table = swept(pressed, &["F=1u,40u"], buckled, &linear, Shard::default());
-    let told: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("the equilibrium is unstable")).collect();
-    assert_eq!(told, [false, true], "{:?}", table.rows);
+    let reported: Vec<bool> =
+        table.rows.iter().map(|row| row.warning.contains("the equilibrium is unstable")).collect();
+    assert_eq!(reported, [false, true], "{:?}", table.rows);
     let plate = "param V=1\nanchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\n\
                  anchor * [e] [l=1u w=1u h=1u]\ngap plategap2d * [m e] [A=1e-8 gap=2u]\neground * [e] []\nVsrc * [m e] [V=V]\n";
     let outputs = vec!["m.x".to_owned()];
     let still = SweepAnalysis::Static { outputs, voltages: Vec::new() };
     let table = swept(plate, &["V=1,9"], still, &CompileOptions::default(), Shard::default());
-    let told: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("pulled in on the way")).collect();
-    assert_eq!(told, [false, true], "{:?}", table.rows);
+    let reported: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("pulled in on the way")).collect();
+    assert_eq!(reported, [false, true], "{:?}", table.rows);
 }
 
 /// Rows of transients tell how far the steps may be off in the middle of the grid, where that is beyond the tolerance: a part let go far
@@ -212,12 +213,12 @@ fn rows_tell_how_far_their_steps_are_off() {
         let transients = SweepAnalysis::Transient { stop, outputs: outputs.clone(), voltages: Vec::new() };
         swept(text, &["F=50u,100u,200u"], transients, &options, Shard::default())
     };
-    let told = |table: &SweepTable| -> Vec<bool> {
+    let reported = |table: &SweepTable| -> Vec<bool> {
         table.rows.iter().map(|row| row.warning.contains("the steps in time may be off by")).collect()
     };
     let long = run(2e-3);
-    assert_eq!(told(&long), [true; 3], "{:?}", long.rows);
+    assert_eq!(reported(&long), [true; 3], "{:?}", long.rows);
     assert!(long.rows[0].warning.contains("in the middle of the grid"));
     let short = run(2e-6);
-    assert_eq!(told(&short), [false; 3], "{:?}", short.rows);
+    assert_eq!(reported(&short), [false; 3], "{:?}", short.rows);
 }

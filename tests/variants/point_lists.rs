@@ -105,7 +105,7 @@ fn corners_have_scatter() {
 #[test]
 fn slips_are_refused() {
     let axis = |text: &str| refusal(vec![text.parse().expect("an axis")]);
-    for (text, told) in [
+    for (text, reported) in [
         ("option.tool=1e-3", "one of tol, band"),
         ("option.tol=2", "above 0, below 1"),
         ("option.tol=coarse", "above 0, below 1"),
@@ -114,7 +114,7 @@ fn slips_are_refused() {
         ("option.linear=1", "true or false"),
         ("option.junctions=soft", "centreline"),
     ] {
-        assert!(axis(text).contains(told), "{text}: {}", axis(text));
+        assert!(axis(text).contains(reported), "{text}: {}", axis(text));
     }
     let short = refusal(together(&["w=1u,2u", "F=1u"]));
     assert!(short.contains("2 values, as w has"), "{short}");

@@ -118,7 +118,7 @@ pub(crate) enum Wanted {
 
 /// One call of the model by the host.
 pub(crate) struct ModelCall<'a> {
-    told: &'a abi::CircuitArguments,
+    arguments: &'a abi::CircuitArguments,
     tail: &'a Tail,
     circuit: HostCircuit,
     wanted: Wanted,
@@ -134,11 +134,11 @@ impl ModelCall<'_> {
     pub(crate) unsafe fn new(data: *mut c_void, layout: &HostLayout, circuit: HostCircuit, wanted: Wanted) -> Self {
         // SAFETY: by contract.
         unsafe {
-            let told = &*data.cast::<abi::CircuitArguments>();
+            let arguments = &*data.cast::<abi::CircuitArguments>();
             let tail = &*data.cast::<u8>().add(layout.call_tail()).cast::<Tail>();
             let as_39 = partial_at_80(tail.conn);
             let partial = port_data::PARTIAL_39 + if as_39 { 0 } else { 8 };
-            Self { told, tail, circuit, wanted, partial, matrix: layout.port_matrix(as_39) }
+            Self { arguments, tail, circuit, wanted, partial, matrix: layout.port_matrix(as_39) }
         }
     }
 
@@ -167,10 +167,10 @@ impl ModelCall<'_> {
     /// What is asked, or why it cannot be told. The circuit's step and the difference of the two times are the same up to
     /// the rounding of the times.
     pub(crate) fn question(&self) -> Result<EvaluationRequest, &'static str> {
-        let (c, delta) = (self.told, self.circuit.delta());
+        let (c, delta) = (self.arguments, self.circuit.delta());
         if self.wanted == Wanted::Small {
-            let told = (c.anal_type == analysis::AC).then_some(c.frequency);
-            return match told.or_else(|| self.circuit.omega()) {
+            let arguments = (c.anal_type == analysis::AC).then_some(c.frequency);
+            return match arguments.or_else(|| self.circuit.omega()) {
                 Some(omega) => Ok(EvaluationRequest::SmallSignal { omega }),
                 None => Err("this ngspice does not tell code models the frequency in this analysis; use .ac"),
             };
@@ -190,12 +190,12 @@ impl ModelCall<'_> {
 
     /// Currents are wanted, but the host loads as for a small signal: without inputs, and without right-hand sides.
     fn large_as_small(&self) -> bool {
-        self.wanted == Wanted::Large && self.told.anal_type == analysis::AC
+        self.wanted == Wanted::Large && self.arguments.anal_type == analysis::AC
     }
 
     /// Admittances are wanted, but the host loads as for currents: without imaginary parts.
     fn small_as_large(&self) -> bool {
-        self.wanted == Wanted::Small && self.told.anal_type != analysis::AC
+        self.wanted == Wanted::Small && self.arguments.anal_type != analysis::AC
     }
 
     /// Number of ports of a connection.

@@ -123,10 +123,11 @@ pub(crate) unsafe fn until_44(layout: &HostLayout, circuit: *mut c_void) -> bool
     let Some(slot) = layout.telling_slot() else { return layout.generation < Generation::Since43 };
     *ANSWER.get_or_init(|| {
         // SAFETY: in each of these hosts the function takes nothing and answers a pointer it owns, or null.
-        let told = unsafe { CORE.function::<unsafe extern "C" fn() -> *mut c_void>(slot)() };
+        let reported = unsafe { CORE.function::<unsafe extern "C" fn() -> *mut c_void>(slot)() };
         // Another circuit than this one is none whose bytes name a folder.
         // SAFETY: a circuit, whose first pointers hold zero bytes, or a text.
-        told == circuit || unsafe { crate::call::text(told.cast()) }.is_some_and(|text| !Path::new(&text).is_dir())
+        reported == circuit
+            || unsafe { crate::call::text(reported.cast()) }.is_some_and(|text| !Path::new(&text).is_dir())
     })
 }
 

@@ -164,12 +164,12 @@ mod tests {
         let text = NETLIST
             .replace("mass2d * [Yoke]", "mass2d * [yoke] [m=1e-10]\nspring2d * [F yoke] [kx=1]\nmass2d * [Yoke]");
         let loaded = load(&Bundle::from_text("n", &text), &[]).unwrap_or_else(|d| panic!("{d}"));
-        let told = |monitor: &str| {
+        let split = |monitor: &str| {
             let raw = RawCard { file: Some("n".into()), monitors: vec![monitor.to_owned()], ..RawCard::default() };
             ambiguous(&ModelCard::new(&raw, None).unwrap(), &loaded.structure, &[])
         };
-        assert_eq!(told("yoke.x").map(|(name, _)| name), Some("yoke".to_owned()));
-        assert_eq!((told("Yoke.x"), told("f.x")), (None, None));
+        assert_eq!(split("yoke.x").map(|(name, _)| name), Some("yoke".to_owned()));
+        assert_eq!((split("Yoke.x"), split("f.x")), (None, None));
     }
 
     /// A lower-cased path finds its file, but not where two files differ in case alone.

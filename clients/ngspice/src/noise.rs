@@ -102,13 +102,13 @@ pub(crate) unsafe fn add(
 
 /// The share of one instance in the density at the output.
 fn share(entry: &mut RegisteredInstance, gains: &[[f64; 2]], frequency: f64) -> Result<f64, String> {
-    let told = |why: &dyn std::fmt::Display, name: &str| format!("instance {name}: {why}");
+    let reported = |why: &dyn std::fmt::Display, name: &str| format!("instance {name}: {why}");
     let name = entry.instance.name().to_owned();
     let Some(token) = entry.balanced else {
-        return Err(told(&"noise needs an operating point first", &name));
+        return Err(reported(&"noise needs an operating point first", &name));
     };
     let omega = 2.0 * std::f64::consts::PI * frequency;
-    entry.instance.noise(token, omega, gains).map_err(|why| told(&why, &name))
+    entry.instance.noise(token, omega, gains).map_err(|why| reported(&why, &name))
 }
 
 impl Instance {

@@ -16,23 +16,23 @@ static REPORTED: Mutex<Vec<(String, String, String)>> = Mutex::new(Vec::new());
 /// Warnings of a netlist. Those that its circuit is left out are none where the deck has it.
 pub(crate) fn of_netlist(file: &str, has_circuit: bool, warnings: &[Diagnostic]) {
     let of_circuit = |code: &str| has_circuit && ["W013", "W021", "W022"].contains(&code);
-    warnings.iter().filter(|w| !of_circuit(&w.code)).for_each(|warning| tell(file, warning, MAX_LINES));
+    warnings.iter().filter(|w| !of_circuit(&w.code)).for_each(|warning| report(file, warning, MAX_LINES));
 }
 
 /// Warnings of what an instance came to.
 pub(crate) fn of_instance(name: &str, warnings: &[Diagnostic]) {
     let name = format!("instance {name}");
-    warnings.iter().for_each(|warning| tell(&name, warning, MAX_ALIKE));
+    warnings.iter().for_each(|warning| report(&name, warning, MAX_ALIKE));
 }
 
-fn tell(whom: &str, warning: &Diagnostic, most: usize) {
-    let mut told = REPORTED.lock().unwrap_or_else(PoisonError::into_inner);
-    let mut alike = told.iter().filter(|(of, code, _)| of == whom && *code == warning.code);
-    if told.len() == MAX_LINES || alike.clone().count() == most || alike.any(|(.., text)| *text == warning.message) {
+fn report(whom: &str, warning: &Diagnostic, most: usize) {
+    let mut printed = REPORTED.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut alike = printed.iter().filter(|(of, code, _)| of == whom && *code == warning.code);
+    if printed.len() == MAX_LINES || alike.clone().count() == most || alike.any(|(.., text)| *text == warning.message) {
         return;
     }
     let line = format!("bimorph: {whom}: warning[{}]: {}", warning.code, warning.message);
     let _ = writeln!(std::io::stderr(), "{line}");
     trace::line(format_args!("{line}"));
-    told.push((whom.to_owned(), warning.code.clone(), warning.message.clone()));
+    printed.push((whom.to_owned(), warning.code.clone(), warning.message.clone()));
 }

@@ -90,7 +90,7 @@ fn write_answer(call: &ModelCall<'_>, entry: &mut RegisteredInstance, memory: *m
 
 /// Change of a monitor from one iteration to the next at which an equilibrium has converged, relative to its value [1]. Newton's iteration
 /// converges quadratically, so one or two more iterations than ngspice's own reach it.
-const STILL: f64 = 1e-6;
+const SETTLED_CHANGE: f64 = 1e-6;
 /// Iterations for that beyond ngspice's own, at most.
 const MAX_FURTHER: u32 = 4;
 
@@ -99,7 +99,7 @@ pub(crate) fn moves(entry: &mut RegisteredInstance, circuit: HostCircuit) -> boo
     let moved = |nodes: &[i32; 2]| {
         // SAFETY: nodes of the circuit, as the host set them up.
         let (new, old) = unsafe { (circuit.solved(*nodes), circuit.loaded_at(*nodes)) };
-        (new - old).abs() > STILL * new.abs().max(old.abs())
+        (new - old).abs() > SETTLED_CHANGE * new.abs().max(old.abs())
     };
     let at_rest = entry.instance.answer().token.is_some() && entry.instance.answer().step == 0.0;
     let still_moves = at_rest && entry.further < MAX_FURTHER && entry.shown.iter().any(moved);

@@ -16,7 +16,7 @@ use crate::analysis::mesh::fitted_in_time;
 use crate::analysis::mesh::{modes_fitted, static_fitted};
 use crate::analysis::step_error::with_step_error;
 use crate::analysis::transient::{TransientOptions, TransientResult, transient};
-use crate::analysis::{AnalysisError, Watch};
+use crate::analysis::{AnalysisError, ProgressCallback};
 use crate::compile::CompileOptions;
 use crate::netlist::Bundle;
 use crate::solve::baseline::SolverKind;
@@ -111,7 +111,7 @@ fn analyse(
     (spec, stop): (&ChartSpec, f64),
     analysis: &str,
     tol: f64,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<CompletedAnalysis, ChartError> {
     let begun = Instant::now();
     let options = CompileOptions { tol, ..options.clone() };
@@ -139,9 +139,10 @@ fn analyse(
             };
             let (moving, start) = fitted_in_time(drawn.moving(), &asked)?;
             let asked = TransientOptions { release: start.as_ref(), ..asked };
-            let mut run = |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
-                transient(&moving, options, sample, watch).map(|r| (r, ()))
-            };
+            let mut run =
+                |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: ProgressCallback<'_>| {
+                    transient(&moving, options, sample, watch).map(|r| (r, ()))
+                };
             let (result, ()) = with_step_error(&asked, &moving, &mut run, &mut |_, _| (), watch)?;
             let c = result.counters;
             measured = RunMeasurement {

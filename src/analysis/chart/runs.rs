@@ -8,7 +8,7 @@ use crate::analysis::frame::{frame, frame_transient};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::joint_transient::joint_transient;
 use crate::analysis::transient::{TransientOptions, TransientResult, transient};
-use crate::analysis::{AnalysisError, Watch};
+use crate::analysis::{AnalysisError, ProgressCallback};
 use crate::solve::baseline::SolverKind;
 use std::time::Instant;
 
@@ -21,7 +21,7 @@ const TIGHTER: f64 = 1e-2;
 
 /// Counts runs, and tells the watch.
 pub(super) struct ChartProgress<'a> {
-    pub(super) watch: Watch<'a>,
+    pub(super) watch: ProgressCallback<'a>,
     pub(super) done: f64,
     pub(super) total: f64,
 }

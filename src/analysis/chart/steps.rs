@@ -20,7 +20,7 @@ use std::time::Instant;
 const MULTIPLICATIONS: u64 = 20_000_000;
 const MAX_STEPS: u64 = 20;
 /// Length of a step, as a share of the run.
-const SHARE: f64 = 1e-3;
+const STEP_FRACTION: f64 = 1e-3;
 /// A step with more multiplications than this is left out: it would take seconds.
 const MAX_MULTIPLICATIONS: u64 = 5_000_000_000;
 
@@ -70,7 +70,7 @@ pub(super) fn measure(
         rise.copy_from_slice(&begin.rise);
     }
     let ramp = Ramp::new(electrics, &sources, &sources, &rise, request.stop);
-    let h = SHARE * request.stop;
+    let h = STEP_FRACTION * request.stop;
     let steps = (MULTIPLICATIONS / multiplications.max(1)).clamp(1, MAX_STEPS) as usize;
     let mut bodies = Bodies::new(system, &ramp);
     let mut method = Rodas4::with_solver(solver, system, &[]);

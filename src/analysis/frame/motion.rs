@@ -2,7 +2,7 @@
 
 use super::super::transient::options::{TransientOptions, check};
 use super::super::transient::result::{Counters, TransientResult};
-use super::super::{AnalysisError, Watch};
+use super::super::{AnalysisError, ProgressCallback};
 use super::{balance, force, singular, steady};
 use crate::compile::CompiledModel;
 use crate::discretize::frame::LinearFrame;
@@ -22,7 +22,7 @@ pub fn frame_transient(
     compiled: &CompiledModel,
     frame: &LinearFrame,
     options: &TransientOptions<'_>,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<TransientResult, AnalysisError> {
     check(options)?;
     let (sources, _) = steady(compiled, &options.voltages)?;

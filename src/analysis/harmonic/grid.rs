@@ -17,7 +17,7 @@ pub enum Spacing {
 /// Where points are added about a resonance, in half widths.
 const ABOUT: [f64; 13] = [-8.0, -4.0, -2.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// The same where nothing damps it, as shares of its frequency: its height has no bound, so that it is drawn by its flanks.
-const BESIDE: [f64; 8] = [-1e-3, -1e-4, -1e-5, -1e-6, 1e-6, 1e-5, 1e-4, 1e-3];
+const FLANK_OFFSETS: [f64; 8] = [-1e-3, -1e-4, -1e-5, -1e-6, 1e-6, 1e-5, 1e-4, 1e-3];
 /// Points that are added at most.
 pub(super) const MAX_ADDED: usize = 4000;
 /// Doublings of the distance from a resonance at most, on its flanks.
@@ -27,7 +27,7 @@ pub(super) const UNBOUNDED: f64 = 1e-9;
 /// A step that is shorter than this share of the others is none.
 const WHOLE: f64 = 1e-6;
 /// Two frequencies nearer than this share are one.
-const SAME: f64 = 1e-12;
+const FREQUENCY_TOLERANCE: f64 = 1e-12;
 
 /// How many points the even grid has; none where they cannot be counted.
 pub fn count(spacing: Spacing, points: usize, [from, to]: [f64; 2]) -> Option<usize> {
@@ -69,23 +69,24 @@ pub(super) fn with_roots(mut grid: Vec<f64>, roots: &[Root], band: [f64; 2]) -> 
     for (own, root) in &ringing {
         let half = 0.5 * root.width_hz();
         match root.quality() {
-            None => more.extend(BESIDE.iter().map(|share| own * (1.0 + share))),
+            None => more.extend(FLANK_OFFSETS.iter().map(|share| own * (1.0 + share))),
             Some(_) => more.extend(ABOUT.iter().map(|k| own + k * half)),
         }
     }
     for (own, root) in &ringing {
         let after = grid.partition_point(|f| f < own).clamp(1, before - 1);
         let spacing = grid[after] - grid[after - 1];
-        let first =
-            root.quality().map_or(BESIDE[BESIDE.len() - 1] * own, |_| 0.5 * root.width_hz() * ABOUT[ABOUT.len() - 1]);
+        let first = root
+            .quality()
+            .map_or(FLANK_OFFSETS[FLANK_OFFSETS.len() - 1] * own, |_| 0.5 * root.width_hz() * ABOUT[ABOUT.len() - 1]);
         let distances = (1..=MAX_DOUBLED).map(|k| first * 2f64.powi(k)).take_while(|d| *d < spacing);
         more.extend(distances.flat_map(|d| [own - d, own + d]));
     }
-    more.retain(|f| *f > band[0] * (1.0 + SAME) && *f < band[1] * (1.0 - SAME));
+    more.retain(|f| *f > band[0] * (1.0 + FREQUENCY_TOLERANCE) && *f < band[1] * (1.0 - FREQUENCY_TOLERANCE));
     more.truncate(MAX_ADDED);
     grid.append(&mut more);
     grid.sort_by(f64::total_cmp);
-    grid.dedup_by(|b, a| *b - *a <= SAME * *a);
+    grid.dedup_by(|b, a| *b - *a <= FREQUENCY_TOLERANCE * *a);
     let added = grid.len().saturating_sub(before);
     (grid, added)
 }

@@ -19,7 +19,7 @@ mod options;
 mod root;
 mod roots;
 
-use super::{AnalysisError, Watch, rotary_inertia_error};
+use super::{AnalysisError, ProgressCallback, rotary_inertia_error};
 use crate::compile::CompiledModel;
 use exact::ExactResponse;
 use modal::ModalSum;
@@ -91,7 +91,7 @@ pub struct HarmonicResult {
 pub fn harmonic(
     compiled: &CompiledModel,
     options: &HarmonicOptions,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<HarmonicResult, AnalysisError> {
     options.check()?;
     let band = [options.from, options.to];
@@ -221,7 +221,7 @@ fn swept(
     sum: Option<&ModalSum>,
     frequencies: &[f64],
     poles: &[Root],
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<(ComplexColumns, usize), AnalysisError> {
     let rows = exact.rows.len();
     let mut columns = vec![Vec::with_capacity(frequencies.len()); rows];

@@ -29,7 +29,7 @@ const SEARCH_FREQUENCIES: usize = 8;
 /// Shifts about which the pencil is inverted, in units of the end of the band.
 const SHIFTS: [f64; 3] = [0.37, 0.73, -0.53];
 /// Two of them that are nearer to each other than this share are one.
-const SAME: f64 = 1e-6;
+const ROOT_TOLERANCE: f64 = 1e-6;
 
 fn sorted(mut roots: Vec<Root>) -> Vec<Root> {
     roots.sort_by(|a, b| a.frequency_hz().total_cmp(&b.frequency_hz()).then(a.re.total_cmp(&b.re)));
@@ -104,7 +104,8 @@ pub(super) fn zeros(exact: &mut ExactResponse<'_>, sum: &ModalSum, row: usize, b
         else {
             continue;
         };
-        let same = |other: &Root| (other.re - root.re).hypot(other.im - root.im) <= SAME * TAU * root.frequency_hz();
+        let same =
+            |other: &Root| (other.re - root.re).hypot(other.im - root.im) <= ROOT_TOLERANCE * TAU * root.frequency_hz();
         if !roots.iter().any(same) {
             roots.push(root);
         }
@@ -116,7 +117,7 @@ pub(super) fn zeros(exact: &mut ExactResponse<'_>, sum: &ModalSum, row: usize, b
 /// a signal whose zeros are not known may see every pole.
 pub(super) fn shaping(poles: &[Root], zeros: &[Option<Vec<Root>>]) -> Vec<Root> {
     let takes = |a: &Root, b: &Root| {
-        let size = UNSEEN * a.re.abs() + SAME * a.frequency_hz() * TAU;
+        let size = UNSEEN * a.re.abs() + ROOT_TOLERANCE * a.frequency_hz() * TAU;
         (a.re - b.re).hypot(a.im - b.im) <= size
     };
     let seen =
@@ -220,8 +221,8 @@ fn eigenvalues(a: &DMatrix<f64>, e: &DMatrix<f64>) -> Vec<Complex<f64>> {
 /// The zero of a row of the exact response next to `guess`; on the imaginary or the real axis where nothing damps and the guess is there.
 fn secant(exact: &mut ExactResponse<'_>, row: usize, guess: Complex<f64>, undamped: bool) -> Option<Complex<f64>> {
     let on = |s: Complex<f64>| match undamped {
-        true if guess.re.abs() < NEAR * SAME * guess.norm() => Complex::new(0.0, s.im),
-        true if guess.im.abs() < NEAR * SAME * guess.norm() => Complex::new(s.re, 0.0),
+        true if guess.re.abs() < NEAR * ROOT_TOLERANCE * guess.norm() => Complex::new(0.0, s.im),
+        true if guess.im.abs() < NEAR * ROOT_TOLERANCE * guess.norm() => Complex::new(s.re, 0.0),
         _ => s,
     };
     let mut value = |s: Complex<f64>| exact.at(s).map(|values| values[row]);

@@ -16,7 +16,7 @@ use crate::solve::time::defect::SeeError;
 use crate::solve::time::method::{Motion, SolverCounters};
 
 /// Joint coordinates on the way.
-pub(super) struct InJoints<'a> {
+pub(super) struct JointPropagator<'a> {
     pub(super) formulation: Formulation,
     pub(super) system: &'a System,
     pub(super) linkage: Linkage,
@@ -27,7 +27,7 @@ pub(super) struct InJoints<'a> {
     pub(super) report: JointReport,
 }
 
-impl Propagator for InJoints<'_> {
+impl Propagator for JointPropagator<'_> {
     fn begin(&mut self, ramp: &Ramp<'_>, motion: &mut Motion) -> Result<(), AnalysisError> {
         let Motion { q, v } = &mut self.now;
         self.linkage.coordinates_at(&motion.q, q);

@@ -6,7 +6,7 @@ use super::super::transient::first_step::first_step;
 use super::super::transient::options::TransientOptions;
 use super::super::transient::record::{Propagator, record};
 use super::super::transient::result::TransientResult;
-use super::super::{AnalysisError, Watch};
+use super::super::{AnalysisError, ProgressCallback};
 use super::report::JointReport;
 use crate::compile::CompiledModel;
 use crate::domains::{Ramp, System};
@@ -24,7 +24,7 @@ pub(super) fn on_tree(
     formulation: Formulation,
     options: &TransientOptions<'_>,
     sample: &mut dyn FnMut(f64, &[f64]),
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<(TransientResult, JointReport), AnalysisError> {
     let system = &compiled.parts.system;
     let joints = match &compiled.joints {
@@ -36,7 +36,8 @@ pub(super) fn on_tree(
         detail: unfit.to_string(),
     })?;
     let counts = system.model.counts();
-    let mut result = record(compiled, options, &mut OnTree { system, joints: &joints, options }, sample, watch)?;
+    let mut result =
+        record(compiled, options, &mut TreePropagator { system, joints: &joints, options }, sample, watch)?;
     result.unknowns = joints.tree.coordinates;
     let report = JointReport {
         coordinates: joints.tree.coordinates,
@@ -52,13 +53,13 @@ pub(super) fn on_tree(
 }
 
 /// Joint coordinates whose loops close by springs.
-struct OnTree<'a> {
+struct TreePropagator<'a> {
     system: &'a System,
     joints: &'a Arc<Joints>,
     options: &'a TransientOptions<'a>,
 }
 
-impl Propagator for OnTree<'_> {
+impl Propagator for TreePropagator<'_> {
     fn advance(
         &mut self,
         ramp: &Ramp<'_>,

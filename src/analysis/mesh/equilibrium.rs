@@ -289,8 +289,8 @@ pub fn static_fitted(
 ) -> Result<(CompiledModel, StaticResult, BeamMotions), AnalysisError> {
     let (order, point) = order(compiled, voltages, compiled.order.segments.clone())?;
     let mut fitted = on(compiled, order)?;
-    let told = static_warnings(&fitted, &point);
-    fitted.warnings.items.extend(told);
+    let reported = static_warnings(&fitted, &point);
+    fitted.warnings.items.extend(reported);
     let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
     Ok((fitted, result, curves))
 }

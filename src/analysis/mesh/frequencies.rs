@@ -110,7 +110,7 @@ fn about_drawing(
 }
 
 /// Meshes whose modes are kept while they are compared, at most: the mesh that holds and its double are the last two but for rounding.
-const MAX_KEPT: usize = 12;
+const MAX_CACHED_MESHES: usize = 12;
 
 /// The modes of the meshes that are compared.
 struct ComparedMeshes<'a> {
@@ -122,7 +122,7 @@ struct ComparedMeshes<'a> {
 
 impl ComparedMeshes<'_> {
     fn keep(&mut self, segments: Vec<usize>, found: ModesWithShapes) {
-        if self.meshes.len() == MAX_KEPT {
+        if self.meshes.len() == MAX_CACHED_MESHES {
             self.meshes.remove(0);
         }
         self.meshes.push((segments, found));

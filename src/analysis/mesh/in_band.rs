@@ -19,7 +19,7 @@
 use super::super::harmonic::exact::ExactResponse;
 use super::super::harmonic::modal::{self, ModalSum};
 use super::super::harmonic::{BEYOND, GUARDS, HarmonicOptions, HarmonicResult, harmonic};
-use super::super::{AnalysisError, Watch};
+use super::super::{AnalysisError, ProgressCallback};
 use super::equilibrium::static_warnings;
 use super::refined::refining;
 use super::remeshed::{chosen, meshed, on};
@@ -58,7 +58,7 @@ const SMALL: f64 = 1e-9;
 pub fn harmonic_fitted(
     compiled: &CompiledModel,
     options: &HarmonicOptions,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<(CompiledModel, HarmonicResult), AnalysisError> {
     options.check()?;
     let fitted = fitted(compiled, options)?;
@@ -81,8 +81,8 @@ fn fitted_from(compiled: &CompiledModel, options: &HarmonicOptions) -> Result<Co
     let order = order(compiled, &fewer)?;
     let mut fitted = on(compiled, order)?;
     let point = ExactResponse::new(&fitted, options)?.into_point();
-    let told = static_warnings(&fitted, &point);
-    fitted.warnings.items.extend(told);
+    let reported = static_warnings(&fitted, &point);
+    fitted.warnings.items.extend(reported);
     Ok(fitted)
 }
 

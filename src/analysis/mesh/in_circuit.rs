@@ -18,7 +18,7 @@ use crate::refine::mesh_search::Mesh;
 const MAX_UNKNOWNS: usize = 3000;
 
 /// How much looser the tolerance becomes where its mesh would be finer than that [1], and how often.
-const LOOSER: (f64, i32) = (10.0, 3);
+const TOLERANCE_RELAXATION: (f64, i32) = (10.0, 3);
 
 /// Modes whose errors are followed over a run.
 const FOLLOWED: usize = 12;
@@ -41,7 +41,11 @@ pub fn in_circuit(compiled: &CompiledModel) -> CompiledModel {
     if drawn > MAX_UNKNOWNS {
         return warned(compiled.clone(), "a drawing of so many unknowns", None);
     }
-    let finer = if given { None } else { (0..=LOOSER.1).find_map(|k| within_most(compiled, LOOSER.0.powi(k))) };
+    let finer = if given {
+        None
+    } else {
+        (0..=TOLERANCE_RELAXATION.1).find_map(|k| within_most(compiled, TOLERANCE_RELAXATION.0.powi(k)))
+    };
     let sought = finer.as_ref().and_then(|finer| finer.order.estimated_error);
     let mut fitted = finer.unwrap_or_else(|| compiled.clone());
     fitted.lowest = bounded(2 * MAX_UNKNOWNS, || lowest(&fitted, || twice(&fitted, fitted.options.tol).ok())).flatten();
@@ -60,8 +64,11 @@ pub fn in_circuit(compiled: &CompiledModel) -> CompiledModel {
 /// With a warning of what may be off by more than the tolerance, or by nobody knows how much.
 fn warned(mut fitted: CompiledModel, what: &str, error: Option<f64>) -> CompiledModel {
     let help = "give the model `segments` or a `band`; `bimorph cosim --check` compares whole runs";
-    let told = beyond(fitted.options.tol, error);
-    fitted.warnings.items.extend(told.map(|told| Diagnostic::warning(WARNING, format!("{what}: {told}"), help)));
+    let reported = beyond(fitted.options.tol, error);
+    fitted
+        .warnings
+        .items
+        .extend(reported.map(|reported| Diagnostic::warning(WARNING, format!("{what}: {reported}"), help)));
     fitted
 }
 

@@ -30,7 +30,7 @@ use crate::refine::mesh_search::Mesh;
 /// Share of the way by which what a run would do with the stiffness of its end may differ from what it does, for its modes to tell its mesh.
 const STRAIGHT: f64 = 0.03;
 /// How much looser than the run its steps are here.
-const LOOSER: f64 = 10.0;
+const STEP_TOLERANCE_RATIO: f64 = 10.0;
 /// Loosest tolerance of them.
 const LOOSEST: f64 = 0.1;
 /// Output times that are compared, at least and at most, whatever is printed.
@@ -181,7 +181,7 @@ fn sample_run(moving: &CompiledModel, options: &TransientOptions<'_>, segments: 
     let model = meshed(moving, segments).ok()?;
     let start = options.release.map(|start| meshed(start, segments)).transpose().ok()?;
     let loose = TransientOptions {
-        tol: (LOOSER * moving.options.tol).min(LOOSEST).max(moving.options.tol),
+        tol: (STEP_TOLERANCE_RATIO * moving.options.tol).min(LOOSEST).max(moving.options.tol),
         points: points(options),
         release: start.as_deref(),
         method: Integrator::default(),

@@ -123,10 +123,10 @@ pub fn fitted_in_time(
     let order = order_in_time(moving, options)?;
     let start = options.release.map(|start| on(&*with_section_inertia(start)?, order.clone())).transpose()?;
     let mut moving = on(moving, order)?;
-    let told = run_warnings(&moving, start.as_ref(), &options.voltages);
-    moving.warnings.items.extend(told);
-    let told = motion_warnings(&moving, options);
-    moving.warnings.items.extend(told);
+    let reported = run_warnings(&moving, start.as_ref(), &options.voltages);
+    moving.warnings.items.extend(reported);
+    let reported = motion_warnings(&moving, options);
+    moving.warnings.items.extend(reported);
     Ok((moving, start))
 }
 
@@ -142,8 +142,8 @@ pub(crate) fn run_warnings(
     let some = !(drawn.combs.is_empty() && moving.parts.heaters.is_empty());
     let end = if some { operating_point(moving, voltages).ok() } else { None };
     let there = end.as_ref();
-    let told = of_stress(moving, share).into_iter().chain(there.and_then(|end| of_fingers(moving, end)));
-    told.chain(there.and_then(|end| of_heat(moving, end))).collect()
+    let reported = of_stress(moving, share).into_iter().chain(there.and_then(|end| of_fingers(moving, end)));
+    reported.chain(there.and_then(|end| of_heat(moving, end))).collect()
 }
 
 /// What stress would change in the way that a linear run goes: from its first state to where it would rest.

@@ -68,9 +68,9 @@ pub(crate) fn refine_and_assess(
     let (answer, warnings) = match *request {
         MeshRequest::Static { voltages } => {
             let point = operating_point(&own, voltages)?;
-            let told = static_warnings(&own, &point);
+            let reported = static_warnings(&own, &point);
             let result = result_at(&own, &point);
-            let warnings = coded(told).into_iter().chain(result.notes()).collect();
+            let warnings = coded(reported).into_iter().chain(result.notes()).collect();
             (AnalysisResult::Static(result), warnings)
         }
         MeshRequest::Modes { count, voltages } => {
@@ -88,8 +88,8 @@ pub(crate) fn refine_and_assess(
 }
 
 /// Warnings as a table has them.
-fn coded(told: impl IntoIterator<Item = Diagnostic>) -> Vec<String> {
-    told.into_iter().map(|d| format!("{}: {}", d.code, d.message)).collect()
+fn coded(reported: impl IntoIterator<Item = Diagnostic>) -> Vec<String> {
+    reported.into_iter().map(|d| format!("{}: {}", d.code, d.message)).collect()
 }
 
 /// Within the share of the tolerance that a comparison with twice the segments may use.
@@ -99,40 +99,40 @@ fn within(compiled: &CompiledModel, error: Option<f64>) -> bool {
 
 fn assess_static(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<Assessment, AnalysisError> {
     let (point, estimated_error) = equilibrium::assess(compiled, voltages)?;
-    Ok(judged_at(compiled, point, estimated_error))
+    Ok(assess_point(compiled, point, estimated_error))
 }
 
 /// The result where the equilibrium on the mesh of `compiled` is known, and that of twice the segments.
 ///
 /// # Errors
 /// What the analysis has against the model.
-pub(crate) fn judged_static(
+pub(crate) fn assess_found_static(
     compiled: &CompiledModel,
     voltages: &PortVoltages,
     point: OperatingPoint,
     finer: (CompiledModel, OperatingPoint),
 ) -> Result<Assessment, AnalysisError> {
     let (point, estimated_error) = equilibrium::estimated_from(compiled, voltages, point, finer)?;
-    Ok(judged_at(compiled, point, estimated_error))
+    Ok(assess_point(compiled, point, estimated_error))
 }
 
-fn judged_at(compiled: &CompiledModel, point: OperatingPoint, estimated_error: Option<f64>) -> Assessment {
-    let told = static_warnings(compiled, &point);
+fn assess_point(compiled: &CompiledModel, point: OperatingPoint, estimated_error: Option<f64>) -> Assessment {
+    let reported = static_warnings(compiled, &point);
     let result = result_at(compiled, &point);
-    let warnings = coded(told).into_iter().chain(result.notes()).collect();
+    let warnings = coded(reported).into_iter().chain(result.notes()).collect();
     let answer = AnalysisResult::Static(result);
     Assessment { answer, estimated_error, warnings, holds: within(compiled, estimated_error) }
 }
 
 fn assess_modes(compiled: &CompiledModel, count: usize, voltages: &PortVoltages) -> Result<Assessment, AnalysisError> {
-    judged_modes(compiled, modes(compiled, count, voltages)?, count, voltages)
+    assess_found_modes(compiled, modes(compiled, count, voltages)?, count, voltages)
 }
 
 /// The same where the modes on the mesh of `compiled` are known.
 ///
 /// # Errors
 /// What the analysis has against the model.
-pub(crate) fn judged_modes(
+pub(crate) fn assess_found_modes(
     compiled: &CompiledModel,
     found: ModesResult,
     count: usize,

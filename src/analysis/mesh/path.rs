@@ -6,7 +6,7 @@
 use super::super::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, PathInput, trace};
 use super::super::linear_stress::left_out;
 use super::super::statics::operating_point;
-use super::super::{AnalysisError, PortVoltages, Watch};
+use super::super::{AnalysisError, PortVoltages, ProgressCallback};
 use super::equilibrium::{ROUNDING, SMALL, size};
 use super::refined::refining;
 use super::remeshed::{chosen, meshed, on};
@@ -30,7 +30,7 @@ const OTHER_BRANCH: f64 = 0.3;
 pub fn path_fitted(
     compiled: &CompiledModel,
     request: &ContinuationRequest<'_>,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<(CompiledModel, ContinuationResult), AnalysisError> {
     refining(compiled, |compiled| path_from(compiled, request, &mut *watch))
 }
@@ -39,7 +39,7 @@ pub fn path_fitted(
 fn path_from(
     compiled: &CompiledModel,
     request: &ContinuationRequest<'_>,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<(CompiledModel, ContinuationResult), AnalysisError> {
     let mut search = PathSearch { compiled, request, watch, known: Vec::new(), stopped: false };
     let segments = compiled.order.segments.clone();
@@ -62,8 +62,8 @@ fn path_from(
     let order = Mesh { estimated_error: order.estimated_error.filter(|e| compared && e.is_finite()), ..order };
     let mut fitted = on(compiled, order)?;
     let share = if fitted.options.linear { left_out_at_end(&fitted, request) } else { None };
-    let told = of_stress(&fitted, share);
-    fitted.warnings.items.extend(told);
+    let reported = of_stress(&fitted, share);
+    fitted.warnings.items.extend(reported);
     Ok((fitted, result))
 }
 
@@ -74,7 +74,7 @@ const CROSSING: [f64; 2] = [1e-3, 1e-6];
 struct PathSearch<'a, 'w> {
     compiled: &'a CompiledModel,
     request: &'a ContinuationRequest<'a>,
-    watch: Watch<'w>,
+    watch: ProgressCallback<'w>,
     known: Vec<(Vec<usize>, ContinuationResult)>,
     stopped: bool,
 }

@@ -37,8 +37,8 @@ pub fn pull_in_fitted(
         Some((_, result)) => PullInResult { estimated_error: fitted.order.estimated_error, ..result },
         None => pull_in(&fitted, port, max)?,
     };
-    let told = pull_in_warnings(&fitted, &result);
-    fitted.warnings.items.extend(told);
+    let reported = pull_in_warnings(&fitted, &result);
+    fitted.warnings.items.extend(reported);
     Ok((fitted, result))
 }
 

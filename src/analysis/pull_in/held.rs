@@ -9,7 +9,7 @@ use crate::solve::continuation::PathEnd;
 /// Longest step of the voltage on the way up, as a fraction of the voltage: pressed parts move little.
 const UPWARDS: f64 = 0.5;
 /// Releases that differ by less than this fraction are one [1].
-const SAME: f64 = 1e-6;
+const RELEASE_TOLERANCE: f64 = 1e-6;
 
 /// What holds a part down.
 pub(super) struct ReleaseVoltages {
@@ -36,7 +36,7 @@ impl VoltageSweep<'_> {
         // a way down that was not found says nothing of the one that counts
         let before = before.ok().flatten();
         let differs = match (before, release_v) {
-            (Some(a), Some(b)) => (a - b).abs() > SAME * a.max(b),
+            (Some(a), Some(b)) => (a - b).abs() > RELEASE_TOLERANCE * a.max(b),
             (a, b) => a != b,
         };
         let without = before.map_or("stays closed".to_owned(), |v| format!("is released at {v:.4} V"));

@@ -15,13 +15,16 @@ use super::super::chart::error::largest_error;
 use super::super::integrator::Integrator;
 use super::super::transient::error_log::least;
 use super::super::transient::{TransientOptions, TransientResult};
-use super::super::{AnalysisError, Watch};
-use super::run::{AT_THE_END, LOOSER, MAX_AGAIN, MAX_KEPT, MAX_WORK, RunFunction, beyond, loose, room, unknown};
+use super::super::{AnalysisError, ProgressCallback};
+use super::run::{
+    AT_THE_END, COMPANION_TOLERANCE_RATIO, MAX_AGAIN, MAX_STORED_SAMPLES, MAX_WORK, RunFunction, beyond, loose, room,
+    unknown,
+};
 use super::samples::{BufferedSamples, SelectedSamples, resolved, stride};
 use crate::compile::{CompiledModel, Formulation};
 
 /// Fraction of the difference that is reported.
-const SHARE: f64 = 0.5;
+const REPORTED_FRACTION: f64 = 0.5;
 /// The same for methods of second order, and explicit ones, whose error falls little with the tolerance.
 const SHARE_OF_SECOND: f64 = 1.0;
 /// Reserve where the companion is hardly looser [1].
@@ -40,7 +43,7 @@ pub(super) fn compared<T>(
     (companion, whole): (Option<TransientResult>, bool),
     run: RunFunction<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<(TransientResult, T, f64), AnalysisError> {
     let unknowns = model.unknowns() as f64;
     let steps = companion.as_ref().map_or(0, |c| c.counters.steps) as f64;
@@ -49,7 +52,7 @@ pub(super) fn compared<T>(
         && options.step.is_none()
         && is_high(Formulation::of_run(model, options).1)
         && MORE * MORE * steps * unknowns <= MAX_AGAIN
-        && options.points * options.signals.len() <= MAX_KEPT;
+        && options.points * options.signals.len() <= MAX_STORED_SAMPLES;
     if !again {
         let mut made = once(options, model, (companion, whole), run, sample, watch)?;
         made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
@@ -63,7 +66,7 @@ pub(super) fn compared<T>(
         && MORE * made.result.counters.steps as f64 * unknowns <= MAX_AGAIN
         && now.tol > options.tol / MAX_SHARPER
     {
-        let sharper = TransientOptions { tol: now.tol / LOOSER, ..options.clone() };
+        let sharper = TransientOptions { tol: now.tol / COMPANION_TOLERANCE_RATIO, ..options.clone() };
         let mut others = BufferedSamples::default();
         let companion = (Some(made.picked.clone()), true);
         match once(&sharper, model, companion, run, &mut |t, values| others.keep(t, values), watch) {
@@ -91,7 +94,7 @@ fn once<T>(
     (companion, whole): (Option<TransientResult>, bool),
     run: RunFunction<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<EstimatedRun<T>, AnalysisError> {
     let reached = companion.as_ref().map_or(0, sampled);
     let mut picked = SelectedSamples::new(options);
@@ -135,9 +138,9 @@ fn once<T>(
 /// Fraction of the difference that is reported. Of a companion that is hardly looser it is more than all, since the error is at best
 /// in proportion to the tolerance.
 fn reported_fraction(options: &TransientOptions<'_>, method: Integrator) -> f64 {
-    let share = if is_high(method) { SHARE } else { SHARE_OF_SECOND };
+    let share = if is_high(method) { REPORTED_FRACTION } else { SHARE_OF_SECOND };
     match options.step {
-        Some(_) => SHARE,
+        Some(_) => REPORTED_FRACTION,
         None => share.max(RESERVE / (loose(options) / options.tol - 1.0)),
     }
 }
@@ -172,7 +175,7 @@ pub(super) fn companion<T>(
     options: &TransientOptions<'_>,
     unknowns: usize,
     run: RunFunction<'_, T>,
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<(Option<TransientResult>, bool), AnalysisError> {
     let tol = loose(options);
     let looser = options.step.is_some() || tol >= 2.0 * options.tol;

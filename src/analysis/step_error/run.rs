@@ -1,10 +1,10 @@
 //! Runs, bounds of their work, and messages: common to propagated errors and to companions.
 
 use super::super::transient::{TransientOptions, TransientResult};
-use super::super::{AnalysisError, Watch};
+use super::super::{AnalysisError, ProgressCallback};
 
 /// Ratio of the tolerance of a companion to that of the run.
-pub(super) const LOOSER: f64 = 10.0;
+pub(super) const COMPANION_TOLERANCE_RATIO: f64 = 10.0;
 /// Loosest tolerance of a companion.
 const LOOSEST: f64 = 0.3;
 /// Unknowns times steps of a companion, at most.
@@ -14,7 +14,7 @@ pub(super) const MAX_AGAIN: f64 = 1e7;
 /// Fraction of the tolerance that steps have in any case.
 const MIN_ROOM: f64 = 0.3;
 /// Samples of a run that is run again, at most.
-pub(super) const MAX_KEPT: usize = 1 << 20;
+pub(super) const MAX_STORED_SAMPLES: usize = 1 << 20;
 /// Where the estimate of a single run is made.
 pub(super) const AT_THE_END: &str = "over the run";
 
@@ -22,7 +22,7 @@ pub(super) const AT_THE_END: &str = "over the run";
 pub type RunFunction<'r, T> = &'r mut dyn FnMut(
     &TransientOptions<'_>,
     &mut dyn FnMut(f64, &[f64]),
-    Watch<'_>,
+    ProgressCallback<'_>,
 ) -> Result<(TransientResult, T), AnalysisError>;
 
 /// Part of the tolerance that the error of the mesh leaves to the steps.
@@ -35,7 +35,7 @@ pub(super) fn room(tol: f64, mesh: Option<f64>) -> f64 {
 
 /// The tolerance of a companion.
 pub(super) fn loose(options: &TransientOptions<'_>) -> f64 {
-    (LOOSER * options.tol).min(LOOSEST)
+    (COMPANION_TOLERANCE_RATIO * options.tol).min(LOOSEST)
 }
 
 /// Warning about steps without an estimate.

@@ -11,7 +11,7 @@ use crate::solve::time::method::Motion;
 /// Ends of steps at which signals are compared, at most.
 const ENOUGH: f64 = 1000.0;
 /// What swings by less than this fraction of the model's length scale, or of 1 rad or 1 K, is rounding [1].
-const STILL: f64 = 1e-9;
+const NEGLIGIBLE_MOTION: f64 = 1e-9;
 /// Error of a signal, of its range, from which on it is not predictable.
 const LOST: f64 = 0.3;
 /// Growth of an error from the second to the last quarter of the time until it is lost: phases add up at most as a power of time, and
@@ -162,10 +162,10 @@ fn grows_fast(errors: &[f64]) -> bool {
 pub(in crate::analysis) fn least(unit: &str, options: &TransientOptions<'_>, model: &CompiledModel) -> f64 {
     let length = model.parts.system.length_scale;
     match unit {
-        "m" => STILL * length,
-        "rad" | "K" => STILL,
-        "m/s" => STILL * length / options.stop,
-        "rad/s" => STILL / options.stop,
+        "m" => NEGLIGIBLE_MOTION * length,
+        "rad" | "K" => NEGLIGIBLE_MOTION,
+        "m/s" => NEGLIGIBLE_MOTION * length / options.stop,
+        "rad/s" => NEGLIGIBLE_MOTION / options.stop,
         _ => 0.0,
     }
 }

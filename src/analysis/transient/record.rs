@@ -3,7 +3,7 @@
 use super::super::contact_range::within_contact_range;
 use super::super::stability::StabilityMonitor;
 use super::super::statics::{notes_at, operating_point, source_vector};
-use super::super::{AnalysisError, Watch};
+use super::super::{AnalysisError, ProgressCallback};
 use super::contact_energy::ContactEnergy;
 use super::crossings::Crossings;
 use super::error_log::{ErrorLog, SignalLoss};
@@ -52,7 +52,7 @@ pub(in crate::analysis) fn record(
     options: &TransientOptions<'_>,
     carrier: &mut impl Propagator,
     sample: &mut dyn FnMut(f64, &[f64]),
-    watch: Watch<'_>,
+    watch: ProgressCallback<'_>,
 ) -> Result<TransientResult, AnalysisError> {
     check(options)?;
     let system = &compiled.parts.system;
@@ -191,7 +191,7 @@ fn start(
     }
     let mut motion = Motion::zeros(system.bodies());
     let mut rise = vec![0.0; system.electrics.heating.heaters.len()];
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     if let Some(start) = options.release {
         let point = operating_point(start, &options.voltages)?;
         let places = |model: &CompiledModel| model.structure.nodes.iter().map(|node| node.position).collect::<Vec<_>>();
@@ -203,7 +203,11 @@ fn start(
         }
         motion.q.copy_from_slice(&point.q);
         rise.copy_from_slice(&point.rise);
-        told = notes_at(start, &point);
+        reported = notes_at(start, &point);
     }
-    Ok((motion, rise, told.into_iter().map(|way| format!("the equilibrium that it is released from: {way}")).collect()))
+    Ok((
+        motion,
+        rise,
+        reported.into_iter().map(|way| format!("the equilibrium that it is released from: {way}")).collect(),
+    ))
 }

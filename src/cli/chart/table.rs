@@ -30,10 +30,10 @@ pub(crate) fn csv(chart: &Chart) -> String {
             Some(m) => {
                 let error = m.error.map(|e| format!("{e:e}")).unwrap_or_default();
                 let products = m.multiplications.map(|n| n.to_string()).unwrap_or_default();
-                let told = m.told.map(|e| format!("{e:e}")).unwrap_or_default();
+                let reported = m.told.map(|e| format!("{e:e}")).unwrap_or_default();
                 let _ = write!(
                     text,
-                    "{error},{:e},{},{},{},{},{},{products},{told},",
+                    "{error},{:e},{},{},{},{},{},{products},{reported},",
                     m.seconds, m.steps, m.rejected, m.factorizations, m.solves, m.forces
                 );
             }

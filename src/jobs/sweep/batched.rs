@@ -14,7 +14,7 @@ use crate::analysis::PortVoltages;
 use crate::analysis::batch_modes::BatchModes;
 use crate::analysis::batch_statics::BatchStatics;
 use crate::analysis::mesh::MeshRequest;
-use crate::analysis::mesh::on_given_mesh::{Assessment, Finer, finer, judged_modes, judged_static};
+use crate::analysis::mesh::on_given_mesh::{Assessment, Finer, assess_found_modes, assess_found_static, finer};
 use crate::compile::{CompileOptions, CompiledModel, draw};
 use crate::netlist::NetlistSource;
 use crate::refine::mesh_search::Mesh;
@@ -64,7 +64,7 @@ impl SweepLanes {
             (Self::Modes(lanes), MeshRequest::Modes { count, voltages }) => {
                 let results = lanes.results(variants, voltages);
                 let judge = |(compiled, result): (&&CompiledModel, Option<_>)| {
-                    judged_modes(compiled, result?, count, voltages).ok()
+                    assess_found_modes(compiled, result?, count, voltages).ok()
                 };
                 variants.iter().zip(results).map(judge).collect()
             }
@@ -90,7 +90,7 @@ fn assess_static(
     let judge = |((compiled, point), finer): ((&&CompiledModel, Option<_>), Option<Finer>)| {
         let finer = finer?;
         let end = ends.next()??;
-        judged_static(compiled, voltages, point?, (finer.model, end)).ok()
+        assess_found_static(compiled, voltages, point?, (finer.model, end)).ok()
     };
     variants.iter().zip(points).zip(finer).map(judge).collect()
 }
@@ -142,11 +142,11 @@ impl<'a> BatchedSweep<'a> {
         let prepared: Vec<Option<CompiledModel>> = numbers.iter().map(prepare).collect();
         let variants: Vec<&CompiledModel> = prepared.iter().flatten().collect();
         let Some(lanes) = self.lanes.get().and_then(Option::as_ref) else { return none() };
-        let Ok(judged) = means.guarded(|| Ok(lanes.assess(&variants, &request))) else { return none() };
-        let mut judged = judged.into_iter();
+        let Ok(assessed) = means.guarded(|| Ok(lanes.assess(&variants, &request))) else { return none() };
+        let mut assessed = assessed.into_iter();
         let found = |compiled: &Option<CompiledModel>| {
-            let judged = compiled.as_ref().and_then(|_| judged.next().flatten())?;
-            if judged.holds { point::found(judged, self.spec, &self.options).ok() } else { None }
+            let assessed = compiled.as_ref().and_then(|_| assessed.next().flatten())?;
+            if assessed.holds { point::found(assessed, self.spec, &self.options).ok() } else { None }
         };
         prepared.iter().map(found).collect()
     }

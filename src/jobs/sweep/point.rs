@@ -20,7 +20,7 @@ use std::collections::HashSet;
 /// What columns of a static sweep are called.
 const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q";
 /// Ports that a refusal names.
-const MAX_TOLD: usize = 20;
+const MAX_LISTED_PORTS: usize = 20;
 /// The code of the diagnostic for a setting that names no parameter.
 const NO_PARAMETER: &str = "E048";
 
@@ -133,7 +133,7 @@ pub(super) fn check_names(
     let ports = || drawn.structure.ports.iter().map(|port| port.name.as_str());
     let names: HashSet<&str> = ports().collect();
     if let Some(none) = spec.ports().find(|name| !names.contains(name)) {
-        let known = ports().take(MAX_TOLD).map(|port| format!("{port}{VOLTS}")).collect::<Vec<_>>().join(", ");
+        let known = ports().take(MAX_LISTED_PORTS).map(|port| format!("{port}{VOLTS}")).collect::<Vec<_>>().join(", ");
         return refused("parameters", format!("voltages of ports ({known})"), format!("\"{none}{VOLTS}\""));
     }
     let outputs = match &spec.analysis {
@@ -185,23 +185,23 @@ fn solve(
         budget::modes(count, || drawn.clone().compile().map_or(0, |compiled| compiled.unknowns()));
     }
     let shared = family.solve(&drawn, &request).map_err(said)?;
-    let judged = match shared {
-        Some(judged) => judged,
+    let assessed = match shared {
+        Some(assessed) => assessed,
         None => {
             let compiled = drawn.compile().map_err(|error| brief(&error))?;
             let judge = if options.segments.is_some() { assess } else { refine_and_assess };
             judge(&compiled, &request).map_err(said)?
         }
     };
-    found(judged, spec, options)
+    found(assessed, spec, options)
 }
 
 /// What is kept of a result.
-pub(super) fn found(judged: Assessment, spec: &SweepSpec, options: &CompileOptions) -> Result<PointResults, String> {
-    let estimated_error = judged.estimated_error;
+pub(super) fn found(assessed: Assessment, spec: &SweepSpec, options: &CompileOptions) -> Result<PointResults, String> {
+    let estimated_error = assessed.estimated_error;
     let beyond = mesh::beyond(options.tol, estimated_error).map(|message| format!("{}: {message}", mesh::WARNING));
-    let warnings: Vec<String> = beyond.into_iter().chain(judged.warnings).collect();
-    let values = values(&judged.answer, &spec.analysis)?;
+    let warnings: Vec<String> = beyond.into_iter().chain(assessed.warnings).collect();
+    let values = values(&assessed.answer, &spec.analysis)?;
     // what is told of it stands in the warning; files of JSON have no infinity
     let estimated_error = estimated_error.filter(|error| error.is_finite());
     Ok(PointResults { values, estimated_error, warning: warnings.join("; ") })

@@ -61,13 +61,13 @@ mod tests {
 
     #[test]
     fn slips_are_refused_with_their_place() {
-        let told = |text: &str| points("p.csv", text).unwrap_err().to_string();
+        let reported = |text: &str| points("p.csv", text).unwrap_err().to_string();
         for text in ["", "w,h\n", "w\n", "\n\n"] {
-            assert!(told(text).contains("no point"), "{text:?}: {}", told(text));
+            assert!(reported(text).contains("no point"), "{text:?}: {}", reported(text));
         }
-        assert!(told("w,\n1,2\n").contains("none above column 2"));
-        assert!(told("w,h\n1,2\n3,\n").starts_with("p.csv, line 3, h: expected a number or a word, got nothing"));
-        assert!(told("w\n1u\n2 u u\n").starts_with("p.csv, line 3, w"));
-        assert!(told("w,h\n1,2\n3\n").contains("line: 3"), "{}", told("w,h\n1,2\n3\n"));
+        assert!(reported("w,\n1,2\n").contains("none above column 2"));
+        assert!(reported("w,h\n1,2\n3,\n").starts_with("p.csv, line 3, h: expected a number or a word, got nothing"));
+        assert!(reported("w\n1u\n2 u u\n").starts_with("p.csv, line 3, w"));
+        assert!(reported("w,h\n1,2\n3\n").contains("line: 3"), "{}", reported("w,h\n1,2\n3\n"));
     }
 }

@@ -51,7 +51,7 @@ impl<'a> SharedMeshes<'a> {
             let order = Mesh { segments: segments.clone(), estimated_error: None, modes_in_band: 0, passes: 0 };
             let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
             match assess(&drawn.clone().on(order).map_err(refused)?, request) {
-                Ok(judged) if judged.holds => return Ok(Some(judged)),
+                Ok(assessed) if assessed.holds => return Ok(Some(assessed)),
                 Ok(_) => {}
                 // near a fold a mesh may have no equilibrium where a finer one has: the point finds its own, or says why not
                 Err(_) => return Ok(None),

@@ -35,7 +35,7 @@ const MAX_CORNERS: usize = 8;
 /// Where steps are judged that all points share.
 const IN_THE_MIDDLE: &str = "in the middle of the grid";
 /// Output times of the run by which the steps are judged.
-const JUDGED: usize = 201;
+const ERROR_SAMPLES: usize = 201;
 
 /// The mesh of a sweep.
 struct SweepMesh {
@@ -61,7 +61,7 @@ struct MeshedPoint {
     compiled: CompiledModel,
     steps: Steps,
     /// What its run leaves out.
-    told: Vec<String>,
+    reported: Vec<String>,
 }
 
 /// What all points have in common.
@@ -196,7 +196,7 @@ impl<'a> TransientSweep<'a> {
     }
 
     fn found(&self, point: &MeshedPoint, options: &TransientOptions<'_>, end: RunEnd) -> Result<PointResults, String> {
-        let MeshedPoint { compiled, steps: Steps { error, place, .. }, told } = point;
+        let MeshedPoint { compiled, steps: Steps { error, place, .. }, reported } = point;
         let mut values = Vec::with_capacity(end.values.len());
         for (name, value) in options.signals.iter().zip(end.values) {
             if !value.is_finite() {
@@ -212,8 +212,8 @@ impl<'a> TransientSweep<'a> {
             Some(error) => step_error::beyond(options, *error, place),
             None => Some(step_error::unknown(options)),
         };
-        let told = told.iter().cloned();
-        let warnings: Vec<String> = beyond.into_iter().chain(told).chain(steps).chain(end.warnings).collect();
+        let reported = reported.iter().cloned();
+        let warnings: Vec<String> = beyond.into_iter().chain(reported).chain(steps).chain(end.warnings).collect();
         let estimated_error = estimated_error.filter(|error| error.is_finite());
         Ok(PointResults { values, estimated_error, warning: warnings.join("; ") })
     }
@@ -221,13 +221,13 @@ impl<'a> TransientSweep<'a> {
 
 /// A point on its mesh, with what its run leaves out.
 fn prepared(compiled: CompiledModel, options: &TransientOptions<'_>, steps: Steps) -> MeshedPoint {
-    let told = mesh::run_warnings(&compiled, None, &options.voltages);
-    MeshedPoint { steps, told: told.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
+    let reported = mesh::run_warnings(&compiled, None, &options.voltages);
+    MeshedPoint { steps, reported: reported.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
 }
 
 /// The steps of a run of this variant.
 fn steps(compiled: &CompiledModel, run: TransientOptions<'_>, place: &'static str, go_on: &dyn Fn() -> bool) -> Steps {
-    let options = TransientOptions { points: JUDGED, ..run };
+    let options = TransientOptions { points: ERROR_SAMPLES, ..run };
     let (error, tol) = step_error::step_error(&options, compiled, &mut |_| go_on());
     Steps { tol, error, place }
 }

@@ -6,7 +6,7 @@ use super::joints::LimbGraph;
 use super::medial::Medial;
 
 /// A place on the edge of a part may lie this far outside [database units].
-const BESIDE: f64 = 4.0;
+const EDGE_TOLERANCE: f64 = 4.0;
 
 /// Where something pulls.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +49,7 @@ impl Cells {
 
     /// Whose area is nearest to a place on the part or at its edge.
     pub(super) fn nearest(&self, axis: &Medial, at: [f64; 2]) -> Owner {
-        let near = self.boxes.overlapping(&[at.map(|x| x - BESIDE), at.map(|x| x + BESIDE)]);
+        let near = self.boxes.overlapping(&[at.map(|x| x - EDGE_TOLERANCE), at.map(|x| x + EDGE_TOLERANCE)]);
         let all = 0..self.edges.len() as u32;
         let near: Vec<u32> = if near.is_empty() { all.collect() } else { near };
         let away = |k: &u32| {

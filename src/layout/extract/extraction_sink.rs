@@ -99,12 +99,12 @@ impl ExtractionSink<'_> {
                 .filter(|k| !loose[*k] && models[*k].beams.is_empty() && models[*k].bodies.is_empty())
                 .collect();
             let pads: usize = models.iter().filter(|m| !m.beams.is_empty()).map(|m| m.anchors.len()).sum();
-            let mut told =
+            let mut reported =
                 format!("layer {name}: no anchors are drawn; by rule, {pads} ends of limbs in pads are held");
             if !whole.is_empty() {
-                told += &format!(", and parts without limbs or pads of their own: {}", list(whole));
+                reported += &format!(", and parts without limbs or pads of their own: {}", list(whole));
             }
-            self.result.notes.push(told);
+            self.result.notes.push(reported);
         }
         self.result.notes.extend(parts.iter().flat_map(|part| middles(drawing, name, rule, part)));
         if !models.iter().any(PartModel::is_held) {
@@ -114,9 +114,9 @@ impl ExtractionSink<'_> {
         let free: Vec<usize> =
             (0..parts.len()).filter(|k| !models[*k].is_held() && !models[*k].taps.is_empty()).collect();
         if !free.is_empty() {
-            let told =
+            let reported =
                 format!("layer {name}: nothing holds the parts with combs, which stay in the model: {}", list(free));
-            self.result.notes.push(told);
+            self.result.notes.push(reported);
         }
     }
 

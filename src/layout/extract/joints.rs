@@ -147,7 +147,7 @@ impl Lead {
     }
 
     /// How far a point lies ahead, and how far to the left.
-    fn seen(&self, p: [f64; 2]) -> [f64; 2] {
+    fn local(&self, p: [f64; 2]) -> [f64; 2] {
         let d = [p[0] - self.e[0], p[1] - self.e[1]];
         [d[0] * self.u[0] + d[1] * self.u[1], self.u[0] * d[1] - self.u[1] * d[0]]
     }
@@ -177,7 +177,7 @@ pub(super) fn from_corner(axis: &Medial, limb: &Limb, end: usize) -> f64 {
         let shared = if (k == 1) == (end == 1) { p } else { q };
         let length = (q[0] - p[0]).hypot(q[1] - p[1]);
         let across = (lead.u[0] * (q[1] - p[1]) - lead.u[1] * (q[0] - p[0])).abs() / length;
-        if lead.seen(shared)[0].abs() > 0.5 * lead.w || across < 0.2 { 0.0 } else { length }
+        if lead.local(shared)[0].abs() > 0.5 * lead.w || across < 0.2 { 0.0 } else { length }
     });
     room.fold(f64::INFINITY, f64::min)
 }
@@ -191,7 +191,7 @@ pub(super) fn body(skeleton: &Skeleton<'_>, limbs: &[Limb], joint: &LimbJoint) -
 /// Where a limb with a rectangular end ends.
 fn tip(lead: &Lead, cell: &Moments) -> Option<[f64; 2]> {
     let long = cell.area / lead.w;
-    let [ahead, left] = lead.seen(if cell.area > 0.0 { cell.centroid() } else { lead.e });
+    let [ahead, left] = lead.local(if cell.area > 0.0 { cell.centroid() } else { lead.e });
     let straight = left.abs() <= 0.05 * lead.w && (ahead - 0.5 * long).abs() <= 0.1 * lead.w;
     (long <= 1.5 * lead.w && straight).then(|| lead.ahead(long))
 }
@@ -218,12 +218,12 @@ fn crossing(leads: &[Lead], area: f64) -> Option<[f64; 2]> {
         };
         fits(leads, at, miss, widest).then_some(at)
     })?;
-    let led: f64 = leads.iter().map(|l| l.w * l.seen(at)[0].max(0.0)).sum();
+    let led: f64 = leads.iter().map(|l| l.w * l.local(at)[0].max(0.0)).sum();
     (area <= FULL * led + miss * widest).then_some(at)
 }
 
 fn fits(leads: &[Lead], at: [f64; 2], miss: f64, widest: f64) -> bool {
-    leads.iter().map(|l| l.seen(at)).all(|[ahead, left]| left.abs() <= miss && ahead > -miss && ahead < REACH * widest)
+    leads.iter().map(|l| l.local(at)).all(|[ahead, left]| left.abs() <= miss && ahead > -miss && ahead < REACH * widest)
 }
 
 /// The point nearest to all axes; none where they run in line.
@@ -249,7 +249,7 @@ fn least_squares(leads: &[Lead]) -> Option<[f64; 2]> {
 fn bar(leads: &[Lead], area: f64) -> Option<JointRole> {
     let (i, j) = (0..leads.len()).flat_map(|i| (i + 1..leads.len()).map(move |j| (i, j))).find(|&(i, j)| {
         let (a, b) = (&leads[i], &leads[j]);
-        let [ahead, left] = a.seen(b.e);
+        let [ahead, left] = a.local(b.e);
         let width = a.w.max(b.w);
         ahead > 0.0
             && a.u[0] * b.u[0] + a.u[1] * b.u[1] < 0.0
@@ -258,13 +258,13 @@ fn bar(leads: &[Lead], area: f64) -> Option<JointRole> {
             && (a.w - b.w).abs() <= MISS[1] * width
     })?;
     let (one, width) = (&leads[i], 0.5 * (leads[i].w + leads[j].w));
-    let long = one.seen(leads[j].e)[0];
+    let long = one.local(leads[j].e)[0];
     let miss = MISS[0] + MISS[1] * width;
     let (mut stems, mut led) = (Vec::new(), width * long);
     for (k, lead) in leads.iter().enumerate().filter(|(k, _)| *k != i && *k != j) {
         let at = least_squares(&[*one, *lead])?;
-        let [along, _] = one.seen(at);
-        let [ahead, _] = lead.seen(at);
+        let [along, _] = one.local(at);
+        let [ahead, _] = lead.local(at);
         if along < -miss || along > long + miss || ahead < -miss || ahead > REACH * width.max(lead.w) {
             return None;
         }
@@ -300,8 +300,8 @@ fn mouth(skeleton: &Skeleton<'_>, limb: &Limb, end: usize, lead: &Lead) -> [f64;
         let length = (q[0] - p[0]).hypot(q[1] - p[1]);
         let d = [(q[0] - p[0]) / length, (q[1] - p[1]) / length];
         let (along, across) = (d[0] * lead.u[0] + d[1] * lead.u[1], lead.u[0] * d[1] - lead.u[1] * d[0]);
-        let [ahead, left] = lead.seen(p);
-        let near = lead.seen(shared)[0].abs() <= REACH * lead.w;
+        let [ahead, left] = lead.local(p);
+        let near = lead.local(shared)[0].abs() <= REACH * lead.w;
         if across.abs() < 0.2 || !near {
             continue;
         }

@@ -104,7 +104,7 @@ pub fn extract(drawing: &FlatLayout, process: &Process, options: &ExtractOptions
     arcs::arcs(&mut result, drawing.unit_m);
     result.drop_unused_nodes();
     names::name(&mut result, drawing, &labels);
-    names::told(&mut result);
+    names::reported(&mut result);
     Ok(result)
 }
 

@@ -24,21 +24,21 @@ pub(super) fn name(result: &mut Extraction, drawing: &FlatLayout, nets: &[Option
         let nearest = |near: Vec<u32>| near.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)).then(a.cmp(b)));
         let pad = on.and_then(|on| on.pad).map(|pad| result.pads[pad].nodes.iter().map(|n| *n as u32).collect());
         let found = pad.and_then(nearest).or_else(|| nearest(tree.overlapping(&[at, at])));
-        let told = format!("label `{}` at {}", label.text, drawing.place(label.at.map(f64::from)));
+        let reported = format!("label `{}` at {}", label.text, drawing.place(label.at.map(f64::from)));
         let net = on.and_then(|on| on.net);
         match (found, identifier(&label.text)) {
-            (_, None) => result.notes.push(format!("{told} has no letter or digit that a netlist's name may have")),
+            (_, None) => result.notes.push(format!("{reported} has no letter or digit that a netlist's name may have")),
             (None, _) if on.is_some() => {}
-            (None, _) => result.notes.push(format!("{told} stands at no node: it names nothing")),
+            (None, _) => result.notes.push(format!("{reported} stands at no node: it names nothing")),
             (Some(n), Some(name)) => {
                 let node = &mut result.nodes[n as usize];
                 if !node.name.is_empty() && (node.name != name || net.is_none()) {
-                    result.notes.push(format!("{told} stands at node `{}`, which has a name already", node.name));
+                    result.notes.push(format!("{reported} stands at node `{}`, which has a name already", node.name));
                 } else if taken.insert(name.clone()) {
                     node.name = name;
                     node.labelled = true;
                 } else if net.is_none() {
-                    result.notes.push(format!("{told}: another node is called `{name}`, this one gets a number"));
+                    result.notes.push(format!("{reported}: another node is called `{name}`, this one gets a number"));
                 }
             }
         }
@@ -71,7 +71,7 @@ pub(super) fn name(result: &mut Extraction, drawing: &FlatLayout, nets: &[Option
 }
 
 /// Leaves of what is told of labels the first few, and how many more there are.
-pub(super) fn told(result: &mut Extraction) {
+pub(super) fn reported(result: &mut Extraction) {
     let mut count = 0usize;
     result.notes.retain(|note| {
         count += usize::from(note.starts_with("label `"));

@@ -48,8 +48,8 @@ pub(super) fn find(
     moving: &[MovingLayer<'_>],
 ) -> Result<Vec<Option<LabelTarget>>, ExtractError> {
     let under = ConductorIndex::new(result, wiring(drawing, process)?, moving);
-    let still = still(result);
-    let mut sets = joined(result, &under, &still);
+    let immobile_parts = immobile_parts(result);
+    let mut sets = joined(result, &under, &immobile_parts);
     let count = result.pads.len();
     let mut net_of: BTreeMap<usize, usize> = BTreeMap::new();
     let mut named: BTreeMap<String, usize> = BTreeMap::new();
@@ -65,7 +65,7 @@ pub(super) fn find(
                 continue;
             }
         };
-        let told = format!("label `{}` at {}", label.text, drawing.place(at));
+        let reported = format!("label `{}` at {}", label.text, drawing.place(at));
         let Some(name) = identifier(&label.text) else {
             labels.push(Some(LabelTarget { pad, net: None }));
             continue;
@@ -76,7 +76,7 @@ pub(super) fn find(
             (Some(net), _) if result.nets[net].name == name => Some(net),
             (Some(net), _) => {
                 let other = &result.nets[net].name;
-                result.notes.push(format!("{told} stands on the net `{other}`, which has a name already"));
+                result.notes.push(format!("{reported} stands on the net `{other}`, which has a name already"));
                 None
             }
             // one name in several places is one net
@@ -99,7 +99,7 @@ pub(super) fn find(
             result.nets[*net].pads.push(k);
         }
     }
-    result.live = live(result, &still);
+    result.live = live(result, &immobile_parts);
     Ok(labels)
 }
 
@@ -156,7 +156,7 @@ impl<'a> ConductorIndex<'a> {
 }
 
 /// Pads, then polygons of wiring: which of them are one conductor.
-fn joined(result: &Extraction, under: &ConductorIndex<'_>, still: &[bool]) -> Sets {
+fn joined(result: &Extraction, under: &ConductorIndex<'_>, immobile_parts: &[bool]) -> Sets {
     let count = result.pads.len();
     let mut sets = Sets::new(count + under.wiring.areas.len());
     for (pad, outline) in &under.pads {
@@ -172,7 +172,7 @@ fn joined(result: &Extraction, under: &ConductorIndex<'_>, still: &[bool]) -> Se
     let mut of_node: BTreeMap<usize, usize> = BTreeMap::new();
     for (k, pad) in result.pads.iter().enumerate() {
         // what does not move is one, and so are pads that share a node
-        if still[pad.part] {
+        if immobile_parts[pad.part] {
             sets.join(*first.entry(pad.part).or_insert(k), k);
         }
         pad.nodes.iter().for_each(|n| {
@@ -233,23 +233,23 @@ fn wiring(drawing: &FlatLayout, process: &Process) -> Result<Wiring, ExtractErro
 }
 
 /// For each part whether nothing in it moves.
-fn still(result: &Extraction) -> Vec<bool> {
+fn immobile_parts(result: &Extraction) -> Vec<bool> {
     let parts = result.layers.iter().map(|layer| layer.parts).sum();
-    let mut still = vec![true; parts];
+    let mut immobile_parts = vec![true; parts];
     let beams = result.beams.iter().flat_map(|b| b.nodes).chain(result.arcs.iter().flat_map(|a| a.nodes));
-    beams.chain(result.bodies.iter().map(|b| b.node)).for_each(|n| still[result.nodes[n].part] = false);
-    still
+    beams.chain(result.bodies.iter().map(|b| b.node)).for_each(|n| immobile_parts[result.nodes[n].part] = false);
+    immobile_parts
 }
 
 /// Parts that move and lie between nets.
-fn live(result: &mut Extraction, still: &[bool]) -> Vec<usize> {
+fn live(result: &mut Extraction, immobile_parts: &[bool]) -> Vec<usize> {
     // ground is one, by whatever names
     let ground = result.nets.iter().position(|net| net.ground).unwrap_or(0);
     // by part: its layer, and the nets on it
     let mut nets: BTreeMap<usize, (usize, Vec<usize>)> = BTreeMap::new();
     for (k, net) in result.nets.iter().enumerate() {
         let k = if net.ground { ground } else { k };
-        for pad in net.pads.iter().map(|pad| &result.pads[*pad]).filter(|pad| !still[pad.part]) {
+        for pad in net.pads.iter().map(|pad| &result.pads[*pad]).filter(|pad| !immobile_parts[pad.part]) {
             let on = &mut nets.entry(pad.part).or_insert((pad.layer, Vec::new())).1;
             if on.last() != Some(&k) {
                 on.push(k);

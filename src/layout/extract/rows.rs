@@ -3,7 +3,7 @@
 use super::{ExtractedBeam, Extraction, LayerResult, holes, live};
 
 /// Two values are one up to this share of them, and to this many metres or radians: rounding of arithmetic, not of a grid.
-const SAME: [f64; 2] = [1e-9, 1e-15];
+const VALUE_TOLERANCE: [f64; 2] = [1e-9, 1e-15];
 
 /// Where something is seen from: p ↦ origin + R(angle)·(mirrored ? (x, −y) : (x, y)) leads out of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,8 +93,8 @@ impl RowValue {
         let (a, b) = (self.number(), other.number());
         let turns = matches!(self, Self::Turn(_));
         let off = if turns { (a - b).sin().abs().max(1.0 - (a - b).cos()) } else { (a - b).abs() };
-        off <= SAME[0] * if turns { 1.0 } else { a.abs().max(b.abs()) }
-            + SAME[1] * f64::from(u8::from(!matches!(self, Self::Plain(_))))
+        off <= VALUE_TOLERANCE[0] * if turns { 1.0 } else { a.abs().max(b.abs()) }
+            + VALUE_TOLERANCE[1] * f64::from(u8::from(!matches!(self, Self::Plain(_))))
     }
 }
 

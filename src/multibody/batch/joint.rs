@@ -1,6 +1,6 @@
 //! Strains of a joint, its forces and its tangent: [`crate::multibody::planar`] over lanes.
 
-use super::{Lane8, LaneBlock, LanePose, Number, STILL, SimdReal, add, load};
+use super::{Lane8, LaneBlock, LanePose, Number, SimdReal, ZERO_POSE, add, load};
 
 /// Two numbers of the plane.
 pub type LaneVector<T = Lane8> = [T; 2];
@@ -48,7 +48,7 @@ pub struct LanePlaced<T = Lane8> {
 
 impl LanePlaced {
     /// Ground.
-    pub const GROUND: Self = Self { q: STILL, turn: LaneTurn::REST };
+    pub const GROUND: Self = Self { q: ZERO_POSE, turn: LaneTurn::REST };
 
     /// A body at `q`.
     #[inline(always)]

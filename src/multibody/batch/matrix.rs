@@ -3,7 +3,7 @@
 //! A pivot that vanishes in one variant spoils that lane alone: its name is told, and what comes of it is not looked at.
 
 use super::{
-    BLANK, LANES, Lane8, LaneBlock, LanePose, STILL, SimdReal, load, load_block, product, store, store_block, times,
+    BLANK, LANES, Lane8, LaneBlock, LanePose, SimdReal, ZERO_POSE, load, load_block, product, store, store_block, times,
 };
 use crate::multibody::Pattern;
 use crate::multibody::factor::LOST;
@@ -26,7 +26,7 @@ impl LaneMatrix {
         Self {
             diagonal: vec![BLANK; pattern.bodies()],
             below: vec![BLANK; pattern.off_blocks()],
-            scale: vec![STILL; pattern.bodies()],
+            scale: vec![ZERO_POSE; pattern.bodies()],
         }
     }
 

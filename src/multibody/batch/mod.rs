@@ -53,9 +53,9 @@ impl Lane8 {
 }
 
 /// Nothing in every lane.
-pub const STILL: LanePose = [Lane8::NONE; 3];
+pub const ZERO_POSE: LanePose = [Lane8::NONE; 3];
 /// A block of zeros in every lane.
-pub const BLANK: LaneBlock = [STILL; 3];
+pub const BLANK: LaneBlock = [ZERO_POSE; 3];
 
 /// `y += x·s`.
 #[inline(always)]

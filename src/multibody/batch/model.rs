@@ -1,7 +1,7 @@
 //! Bodies and joints of variants side by side.
 
 use super::joint::{LaneSection, LaneVector};
-use super::{BLANK, Lane8, LaneBlock, LanePose, Number, Real, STILL, SimdReal, load};
+use super::{BLANK, Lane8, LaneBlock, LanePose, Number, Real, SimdReal, ZERO_POSE, load};
 use crate::multibody::planar::Block;
 use crate::multibody::section::{JointSection, PackedJoint, PairSlot};
 use crate::multibody::{Body, BodyId, Model, Pattern};
@@ -80,7 +80,7 @@ impl LaneModel {
             return None;
         }
         let none = Lane8::NONE;
-        let body = LaneBody { mass: STILL, drag: none, first: [none; 2], second: none };
+        let body = LaneBody { mass: ZERO_POSE, drag: none, first: [none; 2], second: none };
         let section = LaneSection { axis: [none; 2], stiffness: [none; 6], second: [none; 3] };
         let joint = |j: &PackedJoint| LaneJoint {
             place: j.place,

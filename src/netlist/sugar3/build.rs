@@ -9,8 +9,8 @@ const MAX_ELEMENTS: usize = 300_000;
 
 /// A message was put into the sink, and the netlist cannot go on.
 pub(super) fn abort(state: &LuaState) -> mlua::Error {
-    state.told.set(true);
-    mlua::Error::runtime("told")
+    state.reported.set(true);
+    mlua::Error::runtime("reported")
 }
 
 /// Counts what is drawn, and ends it where it is too much.

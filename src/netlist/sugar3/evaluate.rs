@@ -71,7 +71,7 @@ impl FrontEnd for Sugar3 {
             settings: set.iter().cloned().collect(),
             parameters: BTreeMap::new(),
             progress: Rc::clone(&progress),
-            told: Cell::new(false),
+            reported: Cell::new(false),
         };
         let shared = Rc::new(RefCell::new(state));
         // what Lua itself holds beside what it is limited to
@@ -80,7 +80,7 @@ impl FrontEnd for Sugar3 {
             builtins::install(&lua, &shared)?;
             let ran = run(&lua, &shared, &self.bundle.root);
             if let Err(error) = ran {
-                tell(&shared, &progress, &error);
+                report_error(&shared, &progress, &error);
             }
             Ok(())
         });
@@ -95,9 +95,9 @@ impl FrontEnd for Sugar3 {
 }
 
 /// Puts what Lua says into words of a netlist, with its place.
-fn tell(shared: &SharedState, progress: &SandboxProgress, error: &mlua::Error) {
+fn report_error(shared: &SharedState, progress: &SandboxProgress, error: &mlua::Error) {
     let mut state = shared.borrow_mut();
-    if state.told.get() {
+    if state.reported.get() {
         return;
     }
     let mut cause = error;

@@ -33,17 +33,17 @@ pub(super) fn run(lua: &Lua, shared: &SharedState, name: &str) -> mlua::Result<(
             let file = u16::try_from(number).unwrap_or(u16::MAX);
             let span = TextSpan { file, start: at(found.start), end: at(found.end) };
             state.sink.error("E071", span, found.message.clone(), found.help);
-            state.told.set(true);
+            state.reported.set(true);
         }
     }
-    let Ok(code) = translated else { return Err(mlua::Error::runtime("told")) };
+    let Ok(code) = translated else { return Err(mlua::Error::runtime("reported")) };
     lua.load(code).set_name(format!("=file {number}")).set_mode(ChunkMode::Text).exec()
 }
 
 /// `use("FILE")`: a library of SUGAR 3's, which `short` makes known, or a file of the bundle, once.
 pub(super) fn use_file(lua: &Lua, shared: &SharedState, name: &str, short: Install) -> mlua::Result<()> {
     let span = shared.borrow().here(lua);
-    let stopped = || Err(mlua::Error::runtime("told"));
+    let stopped = || Err(mlua::Error::runtime("reported"));
     {
         let mut state = shared.borrow_mut();
         if BUILT_IN.contains(&name) {
@@ -54,7 +54,7 @@ pub(super) fn use_file(lua: &Lua, shared: &SharedState, name: &str, short: Insta
         if state.used.contains(name) {
             if name == state.bundle.root {
                 state.sink.error("E022", span, format!("`{name}` includes itself"), "remove this line");
-                state.told.set(true);
+                state.reported.set(true);
                 return stopped();
             }
             return Ok(());
@@ -62,12 +62,12 @@ pub(super) fn use_file(lua: &Lua, shared: &SharedState, name: &str, short: Insta
         if !state.bundle.files.contains_key(name) {
             let help = "it is looked for in this file's folder, the working directory and the include folders";
             state.sink.error("E021", span, format!("cannot find the file `{name}`"), help);
-            state.told.set(true);
+            state.reported.set(true);
             return stopped();
         }
         if state.used.len() > MAX_INCLUDES {
             state.sink.error("E024", span, format!("more than {MAX_INCLUDES} included files"), "");
-            state.told.set(true);
+            state.reported.set(true);
             return stopped();
         }
         state.used.insert(name.to_owned());
@@ -77,7 +77,7 @@ pub(super) fn use_file(lua: &Lua, shared: &SharedState, name: &str, short: Insta
         let mut state = shared.borrow_mut();
         let message = format!("`{name}` is a SUGAR 2 file, this is a SUGAR 3 netlist");
         state.sink.error("E071", span, message, "use the process file of SUGAR 3: `p1 = material {h=2u, …}`");
-        state.told.set(true);
+        state.reported.set(true);
         return stopped();
     }
     run(lua, shared, name)

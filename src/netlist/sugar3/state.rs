@@ -52,7 +52,7 @@ pub(super) struct LuaState {
     pub(super) parameters: BTreeMap<usize, (String, Setting)>,
     pub(super) progress: Rc<SandboxProgress>,
     /// True once a message says why the netlist stops.
-    pub(super) told: Cell<bool>,
+    pub(super) reported: Cell<bool>,
 }
 
 /// A text with the starts of its lines.

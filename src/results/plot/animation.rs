@@ -12,7 +12,7 @@ const SCRIPT: &str = include_str!("animation.js");
 /// Whole numbers that stand for the largest displacement.
 const COUNTS: f64 = 1e4;
 /// Share of the mechanism's size that the largest displacement becomes.
-const SHARE: f64 = 0.07;
+const DISPLACED_FRACTION: f64 = 0.07;
 
 /// One state of the mechanism: an instant, or a mode.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,9 +90,9 @@ fn data(structure: &Structure, play: Play, frames: &[AnimationFrame]) -> String 
     let areas = super::parts::outlines(structure, &rest);
     let (low, high) = bounds(areas.iter().flat_map(|o| o.shape.iter().copied()), structure);
     let extent = (high[0] - low[0]).max(high[1] - low[1]).max(f64::MIN_POSITIVE);
-    let room = 1.3 * SHARE * extent;
+    let room = 1.3 * DISPLACED_FRACTION * extent;
     let frame = [low[0] - room, low[1] - room, high[0] + room, high[1] + room].map(micro).join(",");
-    let factor = if largest(0) > 0.0 { SHARE * extent / largest(0) } else { 1.0 };
+    let factor = if largest(0) > 0.0 { DISPLACED_FRACTION * extent / largest(0) } else { 1.0 };
     let (bodies, fixed) = rigid(structure, 0.02 * extent);
     let labels: Vec<String> = frames.iter().map(|f| format!("\"{}\"", f.label.replace(['"', '\\'], ""))).collect();
     let links: Vec<String> = structure.links.iter().map(|l| format!("[{},{}]", l.a.0, l.b.0)).collect();

@@ -8,7 +8,7 @@ use crate::analysis::modes::ModesResult;
 use crate::analysis::pull_in::PullInResult;
 use crate::analysis::statics::StaticResult;
 use crate::analysis::transient::{TransientResult, Until};
-use crate::analysis::{PortVoltages, Watch};
+use crate::analysis::{PortVoltages, ProgressCallback};
 use crate::compile::CompileOptions;
 use crate::netlist::Bundle;
 use crate::service::convert::{analysis as results, harmonic as harmonics, named};
@@ -170,7 +170,7 @@ impl Client {
         &mut self,
         model: &str,
         options: &RemoteTransient,
-        watch: Watch<'_>,
+        watch: ProgressCallback<'_>,
     ) -> Result<TransientResult, ClientError> {
         let request = proto::TransientRequest {
             model: model.to_owned(),

@@ -51,8 +51,11 @@ pub(super) fn fault(error: DeviceError) -> DeviceError {
 }
 
 /// Warnings of a compilation, whose words control no terminal.
-pub(super) fn warnings(told: &[proto::Diagnostic]) -> Vec<Diagnostic> {
-    told.iter().map(|told| Diagnostic::warning(&text(&told.code), text(&told.message), &text(&told.help))).collect()
+pub(super) fn warnings(reported: &[proto::Diagnostic]) -> Vec<Diagnostic> {
+    reported
+        .iter()
+        .map(|reported| Diagnostic::warning(&text(&reported.code), text(&reported.message), &text(&reported.help)))
+        .collect()
 }
 
 /// A name of a port, a node or a signal.

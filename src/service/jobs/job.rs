@@ -264,7 +264,7 @@ impl Job {
                 self.standing.send_modify(|standing| standing.suspended = true);
                 return;
             }
-            (Some(stop), _) => Some(stop.told()),
+            (Some(stop), _) => Some(stop.reported()),
             (None, Some(status)) => Some(status),
             (None, None) => Some(status::fault()),
         };
@@ -312,7 +312,7 @@ impl Job {
     }
 
     /// Lets go of its files, which another server may take up.
-    pub(super) fn let_go(&self) {
+    pub(super) fn release(&self) {
         drop(held(&self.file).take());
     }
 

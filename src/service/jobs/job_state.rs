@@ -37,7 +37,7 @@ pub(super) enum JobStopReason {
 
 impl JobStopReason {
     /// As clients are told.
-    pub(super) fn told(&self) -> Status {
+    pub(super) fn reported(&self) -> Status {
         match self {
             Self::Cancelled | Self::Deleted => Status::cancelled("cancelled"),
             Self::Suspended => Status::cancelled("cancelled: the server is shutting down"),

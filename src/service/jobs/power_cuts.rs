@@ -82,8 +82,8 @@ fn nothing_that_a_job_gave_out_is_lost_with_the_power() {
                 let there = file.open().unwrap_or_else(|error| panic!("{error}: {case}"));
                 // those that were given out, in their order, and behind them others of which nobody was told; each once, and as it was
                 let points: Vec<usize> = there.iter().map(|kept| kept.point).collect();
-                let told = rows.unwrap_or(0);
-                assert!(points.iter().take(told).copied().eq(0..told), "{points:?} of {told} rows: {case}");
+                let reported = rows.unwrap_or(0);
+                assert!(points.iter().take(reported).copied().eq(0..reported), "{points:?} of {reported} rows: {case}");
                 assert!(
                     points.is_sorted_by(|a, b| a < b) && there.iter().all(|kept| *kept == row(kept.point)),
                     "{case}"

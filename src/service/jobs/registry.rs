@@ -255,7 +255,7 @@ impl JobRegistry {
     }
 
     /// Comes back when all that were suspended have stopped, and lets go of the folder.
-    pub(in super::super) async fn let_go(&self, patience: Duration) {
+    pub(in super::super) async fn release(&self, patience: Duration) {
         let jobs: Vec<_> = self.kept().values().cloned().collect();
         let quiet = async {
             for job in &jobs {
@@ -265,11 +265,11 @@ impl JobRegistry {
         if tokio::time::timeout(patience, quiet).await.is_err() {
             tracing::warn!("some points of jobs did not stop in time");
         }
-        jobs.iter().for_each(|job| job.let_go());
+        jobs.iter().for_each(|job| job.release());
     }
 
     /// Cancels jobs whose clients are gone for longer than they asked for.
-    pub(in super::super) fn look_for_clients(&self, connections: &Connections) {
+    pub(in super::super) fn check_clients(&self, connections: &Connections) {
         let jobs: Vec<_> = self.kept().values().filter(|job| job.asked.release().is_some()).cloned().collect();
         if !jobs.is_empty() {
             let open = connections.numbers();

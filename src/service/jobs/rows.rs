@@ -39,7 +39,7 @@ pub(super) struct RowCursor {
     /// The next row.
     pub(super) next: u64,
     /// Columns that it was told of, and their numbers on the stream.
-    told: BTreeMap<u32, u32>,
+    reported: BTreeMap<u32, u32>,
     /// Whether there was a message.
     pub(super) begun: bool,
 }
@@ -118,11 +118,11 @@ impl FinishedRows {
         let first = usize::try_from(reading.next).unwrap_or(usize::MAX);
         let end = usize::try_from(end).unwrap_or(usize::MAX).min(self.rows.len());
         for row in self.rows.get(first..end).unwrap_or_default() {
-            let new = !reading.told.contains_key(&row.columns) && row.error.is_none();
+            let new = !reading.reported.contains_key(&row.columns) && row.error.is_none();
             let columns = new.then(|| wire_columns(&self.columns[row.columns as usize]));
-            let number = match reading.told.get(&row.columns) {
+            let number = match reading.reported.get(&row.columns) {
                 Some(number) => *number,
-                None if new => u32::try_from(reading.told.len()).unwrap_or(u32::MAX),
+                None if new => u32::try_from(reading.reported.len()).unwrap_or(u32::MAX),
                 None => 0,
             };
             let wire = proto::JobRow { row: Some(row.to_wire(spec)), columns: number };
@@ -131,7 +131,7 @@ impl FinishedRows {
                 break;
             }
             if let Some(columns) = columns {
-                reading.told.insert(row.columns, number);
+                reading.reported.insert(row.columns, number);
                 chunk.columns.push(columns);
             }
             chunk.rows.push(wire);

@@ -10,7 +10,7 @@ use crate::solve::SolveError;
 use std::sync::Arc;
 
 /// A body that gives way so many times as far as others hangs on next to nothing.
-const UNHELD: f64 = 1e8;
+const UNSUPPORTED_COMPLIANCE_RATIO: f64 = 1e8;
 /// Rotation of the end of a segment from its chord beyond which its law means nothing [rad].
 const TURNED: f64 = 1.0;
 /// Rotation of an end of a segment from its chord, and between its ends, beyond which a refusal asks for shorter segments [rad].
@@ -210,7 +210,7 @@ impl Equilibrium {
         let stiff = sorted[sorted.len() / 20].max(f64::MIN_POSITIVE);
         let softest = (0..moved.len()).max_by(|&a, &b| moved[a].total_cmp(&moved[b])).unwrap_or(0);
         let over = moved[softest] / typical.min(stiff);
-        if over < UNHELD {
+        if over < UNSUPPORTED_COMPLIANCE_RATIO {
             return None;
         }
         let name = &model.bodies[softest].name;

@@ -32,7 +32,7 @@ use storage::Which;
 /// Inverse iterations of all shapes before the best modes in their span are taken.
 const SPREAD: usize = 2;
 /// How far below its λ a mode is iterated: as near as a pivot stays a number, and farther than rounding [1].
-const BESIDE: f64 = 1e-4;
+const SHIFT_OFFSET: f64 = 1e-4;
 /// Inverse iterations of a mode, first with a σ that is about right, then with one that is.
 const NEAR: [usize; 2] = [2, 3];
 /// A mode with a larger residual has not settled here [1].
@@ -60,7 +60,7 @@ impl LaneModes {
             crate::budget::check();
             for (pass, iterations) in NEAR.into_iter().enumerate() {
                 for (shift, lambda) in self.shift.0.iter_mut().zip(self.lambda[k].0) {
-                    *shift = lambda * (1.0 - BESIDE);
+                    *shift = lambda * (1.0 - SHIFT_OFFSET);
                 }
                 self.factor(Which::Shifted);
                 for (lane, sound) in sound.iter_mut().enumerate() {

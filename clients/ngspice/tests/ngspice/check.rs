@@ -34,13 +34,13 @@ fn the_difference_is_the_error() {
         let (low, high) = v.iter().fold((0.0f64, 0.0f64), |r, v| (r.0.min(*v), r.1.max(*v)));
         let error = t.iter().zip(v).map(|(t, v)| (v - exact(*t)).abs()).fold(0.0, f64::max) / (high - low);
         let of = |name: &str| found.plots[0].vectors.iter().find(|v| v.name == name).unwrap();
-        let (told, part) = (of("v(r)").largest, of("v(x)").largest);
+        let (reported, part) = (of("v(r)").largest, of("v(x)").largest);
         println!(
-            "ngspice {version}: {told:.2e} told, {error:.2e} off; the part {part:.1e}; {:?}",
+            "ngspice {version}: {reported:.2e} told, {error:.2e} off; the part {part:.1e}; {:?}",
             found.plots[0].points
         );
         assert!(found.plots[0].points[1] > 2 * found.plots[0].points[0] - 20, "{:?}", found.plots[0].points);
-        assert!(told > 0.5 * error && told < 2.0 * error, "ngspice {version}: {told} told, {error} off");
+        assert!(reported > 0.5 * error && reported < 2.0 * error, "ngspice {version}: {reported} told, {error} off");
         assert!(part < 1e-3, "ngspice {version}: {part}");
     }
 }

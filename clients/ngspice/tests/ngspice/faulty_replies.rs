@@ -51,7 +51,7 @@ fn deck(socket: &str) -> String {
 }
 
 /// The error of a deck's run, and how long it took.
-fn told(lie: &'static str) -> (String, Duration) {
+fn reported(lie: &'static str) -> (String, Duration) {
     let folder = tempfile::tempdir().unwrap();
     let socket = folder.path().join("s");
     serve(lie, &socket);
@@ -73,7 +73,7 @@ fn lies_end_a_run_and_are_named() {
     }
     let mut wrong = Vec::new();
     for (lie, what) in LIES {
-        let (error, took) = told(lie);
+        let (error, took) = reported(lie);
         println!("{lie:16} {:5.1} s  {}", took.as_secs_f64(), error.chars().take(160).collect::<String>());
         // a device that has no equilibrium says so itself: that is an answer, whoever gives it
         let named = error.contains("instance a1") && (lie == "fails" || error.contains("server unix:"));
@@ -91,7 +91,7 @@ fn a_server_that_never_answers_ends_a_run() {
     if skipped() {
         return;
     }
-    let (error, took) = told("never");
+    let (error, took) = reported("never");
     assert!(error.contains("instance a1") && error.contains("no answer within 2 s"), "{error}");
     assert!(took < Duration::from_secs(DEADLINE) + AROUND, "{took:?}");
 }

@@ -5,7 +5,7 @@ use bimorph::cosim::{self, CosimOptions};
 use std::path::Path;
 
 /// The bank's heaters at a voltage that melts them and drives the comb through its other side, and what was told, in order.
-fn told(ngspice: &Path, source: &str, analysis: &str) -> Vec<String> {
+fn reported(ngspice: &Path, source: &str, analysis: &str) -> Vec<String> {
     let folder = all_decks();
     let (deck, log) = (folder.path().join("hot.cir"), folder.path().join("log"));
     let text = format!(
@@ -27,11 +27,11 @@ fn states_beyond_their_range_are_told_once() {
     for (version, ngspice) in versions() {
         let both = ["W024", "W037"].map(String::from);
         for (source, analysis) in [("30", ".op"), ("0", ".dc V1 0 30 1"), ("PWL(0 0 10u 40)", ".tran 1u 400u")] {
-            let mut codes = told(&ngspice, source, analysis);
+            let mut codes = reported(&ngspice, source, analysis);
             codes.sort();
             assert_eq!(codes, both, "ngspice {version}: {analysis}");
         }
-        assert_eq!(told(&ngspice, "PWL(0 0 10u 1)", ".tran 1u 20u"), [""; 0], "ngspice {version}");
+        assert_eq!(reported(&ngspice, "PWL(0 0 10u 1)", ".tran 1u 20u"), [""; 0], "ngspice {version}");
     }
 }
 
@@ -41,7 +41,7 @@ fn states_beyond_their_range_are_told_once() {
 fn what_rings_out_of_step_is_told() {
     let net = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=200u w=2u]\n";
     for (version, ngspice) in versions() {
-        for (more, told) in [("segments=3", 4..=6), ("", 0..=0)] {
+        for (more, reported) in [("segments=3", 4..=6), ("", 0..=0)] {
             let folder = all_decks();
             let deck = folder.path().join("ring.cir");
             std::fs::write(folder.path().join("ring.net"), net).unwrap();
@@ -59,7 +59,7 @@ fn what_rings_out_of_step_is_told() {
             };
             let report = cosim::run(&options, &|| true).unwrap();
             let lines: Vec<&str> = report.warnings().filter(|line| line.contains("warning[W040]")).collect();
-            assert!(told.contains(&lines.len()), "ngspice {version}, {more}: {lines:#?}");
+            assert!(reported.contains(&lines.len()), "ngspice {version}, {more}: {lines:#?}");
         }
     }
 }

@@ -13,9 +13,9 @@ struct ChangingBody {
     turned: RotationState<Dual>,
 }
 
-const STILL: [Triple<Dual>; 3] = [[Dual::ZERO; 3]; 3];
+const ZERO_COORDINATES: [Triple<Dual>; 3] = [[Dual::ZERO; 3]; 3];
 const GROUND: ChangingBody = ChangingBody {
-    moved: STILL,
+    moved: ZERO_COORDINATES,
     turned: RotationState { half: [Dual::ZERO, Dual::constant(1.0)], spin: Dual::ZERO, spin_rate: Dual::ZERO },
 };
 

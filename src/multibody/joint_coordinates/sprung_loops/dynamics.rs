@@ -5,7 +5,7 @@ use super::columns::Four;
 use super::kinematics::triple;
 use super::poses::{LaneJointStates, TreeKinematics, place_of, tiles};
 use super::tree::{Tree, TreeJoint, TreeParent};
-use crate::multibody::batch::{Kernel, Lane8, LanePose, STILL, SimdReal, everywhere, load, store};
+use crate::multibody::batch::{Kernel, Lane8, LanePose, SimdReal, ZERO_POSE, everywhere, load, store};
 use crate::multibody::forces::RestStrain;
 use crate::multibody::planar::{JointFrame, Pose};
 use nalgebra::Vector3;
@@ -85,7 +85,7 @@ impl Stresses {
     /// Storage for a tree.
     pub fn new(tree: &Tree) -> Self {
         let count = tiles(tree.links.len());
-        Self { offsets: vec![Lane8::NONE; count], out: vec![STILL; count] }
+        Self { offsets: vec![Lane8::NONE; count], out: vec![ZERO_POSE; count] }
     }
 
     /// Fills in the stresses at coordinates `at`.

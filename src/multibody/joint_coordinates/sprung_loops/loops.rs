@@ -3,7 +3,7 @@
 use super::poses::TreeKinematics;
 use crate::multibody::Model;
 use crate::multibody::batch::joint::{LanePlaced, LaneSection, LaneVector, kinematics};
-use crate::multibody::batch::{Kernel, LANES, Lane8, LanePose, STILL, SimdReal, everywhere, load, store};
+use crate::multibody::batch::{Kernel, LANES, Lane8, LanePose, SimdReal, ZERO_POSE, everywhere, load, store};
 use crate::multibody::forces::RestStrain;
 use crate::multibody::planar::Pose;
 use crate::multibody::section::{NONE, PackedJoint};
@@ -94,7 +94,7 @@ impl Kernel for Forces<'_> {
 /// Bodies in lanes.
 #[inline(always)]
 fn place<W: SimdReal>(simd: W::Simd, placed: &TreeKinematics, bodies: &[u32; LANES]) -> LanePlaced<W> {
-    let (mut q, mut sin, mut cos) = (STILL, Lane8::NONE, Lane8::of(1.0));
+    let (mut q, mut sin, mut cos) = (ZERO_POSE, Lane8::NONE, Lane8::of(1.0));
     for (k, &body) in bodies.iter().enumerate().filter(|(_, body)| **body != NONE) {
         let at = &placed.at[body as usize];
         (q[0].0[k], q[1].0[k], q[2].0[k]) = (at.x, at.y, at.z);
@@ -106,7 +106,7 @@ fn place<W: SimdReal>(simd: W::Simd, placed: &TreeKinematics, bodies: &[u32; LAN
 /// Adds forces in lanes to those of their bodies.
 #[inline(always)]
 fn add<W: SimdReal>(force: LanePose<W>, bodies: &[u32; LANES], r: &mut [Pose]) {
-    let mut lanes = STILL;
+    let mut lanes = ZERO_POSE;
     store(force, &mut lanes);
     for (k, &body) in bodies.iter().enumerate().filter(|(_, body)| **body != NONE) {
         r[body as usize] += Pose::new(lanes[0].0[k], lanes[1].0[k], lanes[2].0[k]);

@@ -8,7 +8,7 @@ use super::kinematics::{
     JointGeometry, JointState, MotionMap, RelativeOffset, RotationState, TreeVector, offset_from_parent,
 };
 use super::tree::{Tree, TreeParent};
-use crate::multibody::batch::{Kernel, LANES, Lane8, Number, STILL, SimdReal, everywhere, load, store};
+use crate::multibody::batch::{Kernel, LANES, Lane8, Number, SimdReal, ZERO_POSE, everywhere, load, store};
 use crate::multibody::planar::Pose;
 
 /// Coordinates, rates and accelerations of eight bodies.
@@ -16,11 +16,11 @@ pub type LaneJointStates = JointState<Lane8>;
 
 impl LaneJointStates {
     /// Nothing moves.
-    pub const STILL: Self = Self { q: STILL, v: STILL, z: STILL };
+    pub const REST: Self = Self { q: ZERO_POSE, v: ZERO_POSE, z: ZERO_POSE };
 
     /// Tiles of coordinates `q`, rates `v` and accelerations `z`, one for each body.
     pub fn tiles(q: &[Pose], v: &[Pose], z: &[Pose]) -> Vec<Self> {
-        let mut given = vec![Self::STILL; tiles(q.len())];
+        let mut given = vec![Self::REST; tiles(q.len())];
         for (j, ((q, v), z)) in q.iter().zip(v).zip(z).enumerate() {
             given[j / LANES].set(j % LANES, [q, v, z]);
         }

@@ -5,7 +5,7 @@
 
 use super::storage::LaneEquilibrium;
 use crate::multibody::batch::forces::{self, LaneRestStrain};
-use crate::multibody::batch::{Kernel, STILL, SimdReal, add, load, store};
+use crate::multibody::batch::{Kernel, SimdReal, ZERO_POSE, add, load, store};
 
 /// A part that goes over all lanes.
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +37,7 @@ impl LaneEquilibrium {
     #[inline(always)]
     fn lay_tangent<W: SimdReal>(&mut self, simd: W::Simd) {
         self.tangent.clear();
-        self.force.fill(STILL);
+        self.force.fill(ZERO_POSE);
         let rest = LaneRestStrain { expansion: &self.expansion, built_in: self.built_in[0] };
         forces::place::<W>(simd, &self.trial, &mut self.placed);
         let at = (self.trial.as_slice(), self.placed.as_slice());
@@ -57,7 +57,7 @@ impl LaneEquilibrium {
     /// What the change of free strains brings, in `force`.
     #[inline(always)]
     fn change<W: SimdReal>(&mut self, simd: W::Simd) {
-        self.force.fill(STILL);
+        self.force.fill(ZERO_POSE);
         let change = LaneRestStrain { expansion: &self.rate, built_in: self.built_in[1] };
         forces::add_rest_change::<W>(simd, &self.model, &self.placed, &change, &mut self.force);
     }

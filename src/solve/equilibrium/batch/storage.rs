@@ -2,7 +2,7 @@
 
 use crate::domains::System;
 use crate::multibody::batch::joint::LanePlaced;
-use crate::multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, STILL};
+use crate::multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, ZERO_POSE};
 use crate::multibody::joint_coordinates::constrained_loops::has_lanes;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Pattern};
@@ -53,10 +53,10 @@ impl LaneEquilibrium {
             expansion: vec![Lane8::NONE; heaters],
             rate: vec![Lane8::NONE; heaters],
             built_in: [0.0; 2],
-            trial: vec![STILL; n],
-            force: vec![STILL; n],
-            residual: vec![STILL; n],
-            prediction: vec![STILL; n],
+            trial: vec![ZERO_POSE; n],
+            force: vec![ZERO_POSE; n],
+            residual: vec![ZERO_POSE; n],
+            prediction: vec![ZERO_POSE; n],
             goes: Lane8::of(1.0),
             negative: Lane8::NONE,
             vanished: [false; LANES],

@@ -3,7 +3,7 @@
 use super::ritz::{MAX_ROWS, RitzMatrices};
 use crate::domains::System;
 use crate::multibody::batch::joint::LanePlaced;
-use crate::multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, LanePrecise, PrecisePose, STILL};
+use crate::multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, LanePrecise, PrecisePose, ZERO_POSE};
 use crate::multibody::joint_coordinates::constrained_loops::has_lanes;
 use crate::multibody::planar::Pose;
 
@@ -51,18 +51,18 @@ impl LaneModes {
         let able = has_lanes() && first.model.couplings.is_empty() && (1..=MAX_ROWS).contains(&start.len());
         let model = LaneModel::new(&first.model).filter(|_| able)?;
         let (n, pattern) = (first.bodies(), &first.model.pattern);
-        let block = vec![vec![STILL; n]; start.len()];
+        let block = vec![vec![ZERO_POSE; n]; start.len()];
         Some(Self {
             precise: LanePrecise::default(),
             stiffness: LaneMatrix::new(pattern),
             plain: LaneMatrix::new(pattern),
             shifted: LaneMatrix::new(pattern),
             placed: vec![LanePlaced::GROUND; n + 1],
-            still: vec![STILL; n],
+            still: vec![ZERO_POSE; n],
             expansion: vec![Lane8::NONE; first.electrics.heating.heaters.len()],
             x: block.clone(),
             given: block,
-            force: vec![STILL; n],
+            force: vec![ZERO_POSE; n],
             product: vec![[[Lane8::NONE; 2]; 3]; n],
             lambda: vec![Lane8::NONE; start.len()],
             residual: vec![Lane8::NONE; start.len()],

@@ -3,7 +3,7 @@
 //! side by side.
 
 use super::tableau::TABLEAU;
-use crate::multibody::batch::{Kernel, LanePose, STILL, SimdReal, add_scaled, everywhere, load, store};
+use crate::multibody::batch::{Kernel, LanePose, SimdReal, ZERO_POSE, add_scaled, everywhere, load, store};
 use crate::multibody::joint_coordinates::sprung_loops::columns::Four;
 use crate::multibody::joint_coordinates::sprung_loops::kinematics::JointState;
 use crate::multibody::joint_coordinates::sprung_loops::poses::{LaneJointStates, place_of, tiles};
@@ -42,14 +42,14 @@ const LAST: usize = 5;
 impl JointStages {
     pub(super) fn new(count: usize) -> Self {
         let (tiles, room) = (tiles(count), vec![Pose::zeros(); count]);
-        let zeros = vec![STILL; tiles];
+        let zeros = vec![ZERO_POSE; tiles];
         Self {
-            increments: vec![[STILL; 6]; tiles],
-            moved: vec![[STILL; 6]; tiles],
-            start: vec![LaneJointStates::STILL; tiles],
+            increments: vec![[ZERO_POSE; 6]; tiles],
+            moved: vec![[ZERO_POSE; 6]; tiles],
+            start: vec![LaneJointStates::REST; tiles],
             rate: zeros.clone(),
             acceleration: zeros.clone(),
-            argument: vec![LaneJointStates::STILL; tiles],
+            argument: vec![LaneJointStates::REST; tiles],
             push: zeros.clone(),
             drift: zeros,
             room: [room.clone(), room],

@@ -108,14 +108,14 @@ mod tests {
             uz[i] = uv[i] / (GAMMA * h) - r2;
             let t = &TABLEAU;
             let over = |c: &[f64; 6]| (0..i).map(|k| c[k] * u[k]).sum::<f64>();
-            let told = [
+            let reported = [
                 t.rate_start[i] * v + over(&t.rate[i]) / h,
                 t.acceleration_start[i] * z + t.acceleration_rate[i] * v / h + over(&t.acceleration[i]) / (h * h),
                 t.rate_start[i] * v + over(&t.lag[i]) / h,
                 t.acceleration_start[i] * z + t.push_rate[i] * v / h + over(&t.push[i]) / (h * h),
             ];
-            for (told, expected) in told.into_iter().zip([rate, acceleration, r1, push]) {
-                assert!((told - expected).abs() <= 1e-13 * (1e4 + expected.abs()), "{i}: {told} {expected}");
+            for (reported, expected) in reported.into_iter().zip([rate, acceleration, r1, push]) {
+                assert!((reported - expected).abs() <= 1e-13 * (1e4 + expected.abs()), "{i}: {reported} {expected}");
             }
         }
     }

@@ -35,7 +35,7 @@ type PackedReal = Lanes<WIDTH>;
 
 /// A subtree's first body, coordinate, closure and joint (that is no pin), in the mechanism or among the packs.
 #[derive(Debug, Clone, Copy, Default)]
-struct First {
+struct FirstOfSubtree {
     body: usize,
     coordinate: usize,
     closure: usize,
@@ -46,11 +46,11 @@ struct First {
 #[derive(Debug)]
 struct SubtreePack {
     /// Where they lie among the packs.
-    at: First,
+    at: FirstOfSubtree,
     /// How many bodies, coordinates, closures and joints one of them has.
-    size: First,
+    size: FirstOfSubtree,
     /// Where each lies in the mechanism.
-    of: [First; WIDTH],
+    of: [FirstOfSubtree; WIDTH],
 }
 
 /// A body of the packs whose front holds shared bodies, and where what it hands to them is kept.

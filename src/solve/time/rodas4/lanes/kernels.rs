@@ -8,7 +8,7 @@ use super::motion::{Norms, mass_norm};
 use super::storage::{IN_PLACE, LaneIncrement, LaneRodas4};
 use crate::multibody::batch::forces::{self, LaneRestStrain};
 use crate::multibody::batch::{
-    Kernel, LaneModel, LanePose, STILL, SimdReal, add, add_scaled, load, load_block, store, times,
+    Kernel, LaneModel, LanePose, SimdReal, ZERO_POSE, add, add_scaled, load, load_block, store, times,
 };
 
 /// A part of a step that goes over all lanes.
@@ -33,7 +33,7 @@ impl LaneRodas4 {
         self.heat.rates::<W>(simd, &mut self.rate);
         self.before.q.copy_from_slice(&self.motion.q);
         self.before.v.copy_from_slice(&self.motion.v);
-        self.forcing.fill(STILL);
+        self.forcing.fill(ZERO_POSE);
         let change = LaneRestStrain { expansion: &self.rate, built_in: 0.0 };
         forces::place::<W>(simd, &self.motion.q, &mut self.placed);
         forces::add_rest_change::<W>(simd, &self.model, &self.placed, &change, &mut self.forcing);

@@ -1,6 +1,6 @@
 //! The motion of variants side by side, and its measure.
 
-use crate::multibody::batch::{LANES, Lane8, LaneModel, LanePose, Real, STILL, SimdReal, load};
+use crate::multibody::batch::{LANES, Lane8, LaneModel, LanePose, Real, SimdReal, ZERO_POSE, load};
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;
 
@@ -15,7 +15,7 @@ pub struct LaneMotion {
 
 impl LaneMotion {
     pub(super) fn zeros(bodies: usize) -> Self {
-        Self { q: vec![STILL; bodies], v: vec![STILL; bodies] }
+        Self { q: vec![ZERO_POSE; bodies], v: vec![ZERO_POSE; bodies] }
     }
 
     /// Puts a motion into one lane.

@@ -5,7 +5,7 @@ use super::motion::{LaneMotion, Norms};
 use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, Ramp, System};
 use crate::multibody::batch::joint::LanePlaced;
-use crate::multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, STILL, SimdReal, load};
+use crate::multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, SimdReal, ZERO_POSE, load};
 use crate::multibody::joint_coordinates::constrained_loops::has_lanes;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Pattern};
@@ -86,7 +86,7 @@ impl LaneRodas4 {
         let (n, pattern) = (system.bodies(), &system.model.pattern);
         let acted = system.acted_on();
         let between = |&row: &usize| acted.iter().filter_map(move |&column| block(pattern, row, column));
-        let none = LaneIncrement { q: STILL, v: STILL };
+        let none = LaneIncrement { q: ZERO_POSE, v: ZERO_POSE };
         let heaters = system.electrics.heating.heaters.len();
         Some(Self {
             w: LaneMatrix::new(pattern),
@@ -94,12 +94,12 @@ impl LaneRodas4 {
             before: LaneMotion::zeros(n),
             error: LaneMotion::zeros(n),
             norms: Norms::default(),
-            force: vec![STILL; n],
-            forcing: vec![STILL; n],
-            at: vec![STILL; n],
-            r1: vec![STILL; n],
+            force: vec![ZERO_POSE; n],
+            forcing: vec![ZERO_POSE; n],
+            at: vec![ZERO_POSE; n],
+            r1: vec![ZERO_POSE; n],
             increments: vec![[none; 5]; n],
-            lags: vec![STILL; if model.dampers.is_empty() { 0 } else { n }],
+            lags: vec![ZERO_POSE; if model.dampers.is_empty() { 0 } else { n }],
             placed: vec![LanePlaced::GROUND; n + 1],
             heat: LaneHeat::new(&system.electrics.heating.heaters),
             expansion: vec![Lane8::NONE; heaters],

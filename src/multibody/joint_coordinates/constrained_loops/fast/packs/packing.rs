@@ -1,7 +1,7 @@
 //! How equal subtrees are laid into packs, once for a mechanism.
 
 use super::subtrees::equal;
-use super::{First, PackContribution, PackedReal, Packing, Packs, RemainingStep, SubtreePack, WIDTH};
+use super::{FirstOfSubtree, PackContribution, PackedReal, Packing, Packs, RemainingStep, SubtreePack, WIDTH};
 use crate::multibody::joint_coordinates::constrained_loops::lanes::has_lanes;
 use crate::multibody::joint_coordinates::constrained_loops::reduction::Reduction;
 use crate::multibody::joint_coordinates::constrained_loops::scalar::Real;
@@ -162,15 +162,15 @@ impl PackLayout {
         let joint = |body: usize| schedule.steps.get(body).map_or(usize::MAX, |s| s.joint as usize);
         let coordinate = |body: usize| linkage.links.get(body).map_or(linkage.coordinates, |l| l.first);
         let mut layout = Self { packs: Vec::new(), lanes: Vec::new(), shared: Vec::new(), bodies: 0, coordinates: 0 };
-        let mut at = First::default();
+        let mut at = FirstOfSubtree::default();
         for members in groups.iter().flat_map(|group| group.chunks(WIDTH)) {
             let first = |k: usize| {
                 let body = members[k.min(members.len() - 1)].start;
-                First { body, coordinate: coordinate(body), closure: closure(body), joint: joint(body) }
+                FirstOfSubtree { body, coordinate: coordinate(body), closure: closure(body), joint: joint(body) }
             };
             let (of, end) = (std::array::from_fn(first), members[0].end);
-            let start: First = first(0);
-            let size = First {
+            let start: FirstOfSubtree = first(0);
+            let size = FirstOfSubtree {
                 body: end - start.body,
                 coordinate: coordinate(end) - start.coordinate,
                 closure: closure(end) - start.closure,
