@@ -15,7 +15,7 @@ pub(crate) struct Library {
     pub(crate) layers: Vec<String>,
     /// Cells in file order.
     pub(crate) cells: Vec<Cell>,
-    /// What the reader left out or approximated.
+    /// Features that the reader omitted or approximated, as messages.
     pub(crate) notes: Vec<String>,
     /// The cell that the file is about, where it says so.
     pub(crate) top: Option<String>,
@@ -140,7 +140,7 @@ impl Transform {
         }
     }
 
-    /// True when axes go to axes and units to units: what lies on the grid stays on it.
+    /// True for rotations by multiples of 90° without scaling: grid points stay on the grid.
     pub(crate) fn keeps_grid(&self) -> bool {
         let whole = |x: &f64| x.fract() == 0.0;
         self.columns.iter().flatten().all(whole) && self.origin.iter().all(whole)

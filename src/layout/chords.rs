@@ -73,7 +73,8 @@ impl Chords {
         all
     }
 
-    /// Distances from `p` to the nearest edges towards `normal` (of length 1) and against it, up to `reach`; none: there is none so near.
+    /// Distances from `p` to the nearest edges along `normal` (a unit vector) and against it, up to `reach`; `None`
+    /// without an edge within `reach`.
     pub(crate) fn across(&self, p: [f64; 2], normal: [f64; 2], reach: f64) -> [Option<f64>; 2] {
         let end = |s: f64| [p[0] + s * normal[0], p[1] + s * normal[1]];
         let mut nearest = [None::<f64>; 2];

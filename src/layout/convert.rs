@@ -33,12 +33,12 @@ pub enum ConvertError {
     Extract(#[from] ExtractError),
 }
 
-/// What came out.
+/// The converted netlist and its report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Converted {
     /// The netlist.
     pub netlist: String,
-    /// What became of the drawing.
+    /// Report of the conversion.
     pub report: ConversionReport,
     /// Name of the process.
     pub process: String,

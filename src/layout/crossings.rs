@@ -1,8 +1,8 @@
-//! How many times edges of polygons cut one another: what set operations on them lay out, known before they do.
+//! Number of intersections between polygon edges, which bounds the output of a set operation before it runs.
 //!
-//! Contours are taken in runs of a few edges. A sweep over x: runs that it has reached and not yet left lie in a tree over y, each at the
-//! O(log n) nodes that cover its range, and the edges of a new run are tried with those of the runs whose range meets its own. O(n·log n)
-//! where edges are along x or y, and never more than all pairs.
+//! Contours are taken in runs of a few edges. A sweep over x keeps the active runs in an interval tree over y. Each run
+//! lies at the O(log n) nodes that cover its range. The edges of a new run are tested against those of the active runs
+//! with an overlapping range. O(n·log n) where edges are along x or y, and never more than all pairs.
 //!
 //! Reference: F. P. Preparata, M. I. Shamos, "Computational Geometry" (1985), 8.8 (rectangles that meet, by interval trees).
 
@@ -12,14 +12,15 @@ use thiserror::Error;
 /// Cuts that set operations take on: some 200 bytes each.
 pub const MAX_CUTS: usize = 4_000_000;
 const BYTES_PER_CUT: usize = 200;
-/// What counting holds for each edge.
+/// Memory of the counter for each edge (bytes).
 const BYTES_PER_EDGE: usize = 200;
-/// Sum over slanted edges of the squares of how many cuts each has. Crossings of slanted edges are rounded to the grid, which moves the pieces
-/// between them, so that set operations go over them again and again: a star of n edges that all cut one another takes n³ (0.1 s at 250).
+/// Sum over slanted edges of the squares of how many cuts each has. Crossings of slanted edges are rounded to the grid,
+/// which moves the pieces between them and forces further passes of the set operation. A star of n mutually crossing
+/// edges takes n³ (0.1 s at n = 250).
 const MAX_DENSE: u64 = 20_000_000;
 /// Up to so many edges cannot come to that.
 const FEW: usize = 250;
-/// Pairs of runs that are tried: long lines side by side on a slope, none of which cut another, come to that.
+/// Pairs of runs that are tested: parallel long lines on a slope that never intersect can reach this.
 const MAX_TRIED: usize = 50_000_000;
 
 /// Polygons whose union could be too large to hold.
@@ -273,7 +274,7 @@ impl<'a> SweepLine<'a> {
 
 #[cfg(test)]
 mod tests {
-    //! Cuts of bars that cross, of boxes side by side, and of any edges against all pairs.
+    //! Intersections of crossing bars, of adjacent boxes, and of random edges against all pairs.
     use super::*;
     use proptest::prelude::*;
 
@@ -313,7 +314,8 @@ mod tests {
         assert_eq!(bounded([star(2001, 5)].iter()), Ok(()));
     }
 
-    /// Boxes side by side share edges and are not cut; shifted ones are, once for each end on another's edge.
+    /// Adjacent boxes share edges without an intersection. Shifted boxes intersect once for each end that lies on
+    /// another's edge.
     #[test]
     fn boxes_side_by_side() {
         let row = |shift: i32| -> Vec<Polygon> {

@@ -1,9 +1,9 @@
-//! Outlines of a mechanism's parts: what `bimorph layout` draws.
+//! Outlines of a mechanism's parts, as drawn by `bimorph layout`.
 //!
-//! A beam is a rectangle between its nodes, lengthened where it meets others so that the outer edges close to a corner; a plate a
-//! rectangle; an anchor a pad of the layer with a mask of anchors inside; a comb its fingers, one more than it has gaps, with a
-//! spine on either side; a field between facing beams the electrode that no beam draws. Lumped parts, links, loads and circuits
-//! have no outline.
+//! A beam is a rectangle between its nodes, extended at junctions so that the outer edges meet in a corner. A plate is
+//! a rectangle, and an anchor a pad of its layer with the anchor mask inside. A comb has one finger more than gaps and
+//! a spine on either side. A field between facing beams is drawn as the electrode that no beam represents. Lumped
+//! parts, links, loads and circuits have no outline.
 
 use super::lines::{ElementLine, ElementLines};
 use super::process::Process;
@@ -21,12 +21,12 @@ const SPINE: f64 = 2.0;
 /// Most fingers that are drawn of one comb.
 const MAX_FINGERS: f64 = 10_000.0;
 
-/// What a shape is.
+/// Function of an outline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Role {
     /// Part of a layer that moves, by index in the process.
     Layer(usize),
-    /// What holds it.
+    /// The anchored layer, by index.
     Anchor(usize),
 }
 
@@ -37,7 +37,7 @@ pub(crate) struct Figure {
     pub(crate) shapes: Vec<(Role, Vec<[f64; 2]>)>,
     /// The layer of each node that a drawn part touches.
     pub(crate) layer_of: HashMap<String, usize>,
-    /// What was drawn otherwise than the mechanism has it, or not at all.
+    /// Parts that were omitted or drawn differently from the mechanism.
     pub(crate) notes: Vec<String>,
 }
 
@@ -234,7 +234,7 @@ impl<'a> Draw<'a> {
         }
     }
 
-    /// Fingers side by side, those of the two sides in turn.
+    /// Parallel fingers, alternating between the two sides.
     fn comb(&mut self, line: &ElementLine, layer: usize) {
         let get = |name: &str| line.get(name).unwrap_or(0.0);
         let (gap, length, gaps) = (get("gap"), get("L"), get("N"));

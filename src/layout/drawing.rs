@@ -23,7 +23,7 @@ pub struct FlatLayout {
     pub top: String,
     /// Where cells stood before they were flattened, parents before children; the top cell is not among them.
     pub cells: Vec<Placement>,
-    /// What a reader left out or approximated, in words, with places and sizes.
+    /// Features that a reader omitted or approximated: messages with position and size.
     pub notes: Vec<String>,
 }
 

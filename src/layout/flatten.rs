@@ -1,8 +1,8 @@
 //! Hierarchy to polygons: everything a cell calls, in its place, on one integer grid.
 //!
-//! Two passes. The first counts what would come out, cells before those that call them, so that nothing is laid out of a
-//! file of a few lines that stands for billions of polygons. The second copies. The grid is the file's own unit where all falls on
-//! it; else the finest power of ten of it, down to 1 pm, on which the drawing fits.
+//! Two passes. The first counts the result, called cells before their callers. A file of a few lines that stands for
+//! billions of polygons is therefore rejected before any allocation. The second copies. The grid is the file's own unit
+//! where all falls on it; else the finest power of ten of it, down to 1 pm, on which the drawing fits.
 
 mod bounds;
 mod copy;

@@ -26,7 +26,8 @@ const UNITS: std::ops::RangeInclusive<f64> = 1e-15..=1e-3;
 /// Records between two reports of progress.
 const REPORT: u32 = 1 << 14;
 
-/// Reads a GDSII stream; `file` is its name in messages. `watch` is told how many bytes were read and says whether to go on.
+/// Reads a GDSII stream; `file` is its name in messages. `watch` receives the number of bytes read and returns whether
+/// to continue.
 ///
 /// # Errors
 /// See [`GdsError`]: the first thing that is wrong, with its byte and record.

@@ -42,7 +42,7 @@ fn library() -> impl Strategy<Value = Library> {
 /// A call: which cell, turned how, where, how often and how far apart.
 type RandomCall = (proptest::sample::Index, (u8, bool, [f64; 2]), u32, u32, [[f64; 2]; 2]);
 
-/// What a drawing shows, in nanometres: merged polygons by layer, labels.
+/// Visible content of a drawing (nm): merged polygons by layer, labels.
 type VisibleContent = (Vec<(String, Vec<Vec<Vec<[i64; 2]>>>)>, Vec<(String, [i64; 2])>);
 
 fn shown(d: &FlatLayout) -> VisibleContent {

@@ -1,9 +1,9 @@
 //! A drawing that carries its mechanism as labels, back to a netlist.
 //!
-//! Labels name things and say what outlines cannot: materials, kinds, lumped parts, ports. Where a node lies and how wide a beam is
-//! comes from the drawing: a number of a label stands where the drawing agrees with it to its grid, as the more exact of the
-//! two; else the drawing's is taken, with a note. At the end the mechanism is drawn again, and whatever is in only one of the two
-//! drawings is told with its area and place.
+//! Positions of nodes and widths of beams come from the drawing. A number of a label is used where the drawing agrees with it to its grid,
+//! since it is more exact. Otherwise the drawn value is used, with a note. Labels provide names and data without an
+//! outline: materials, kinds, lumped parts, ports. At the end the mechanism is drawn again. Each area that only one of
+//! the two drawings has is reported with its size and position.
 
 use super::chords::Chords;
 use super::crossings::{CrossingContours, bounded};
@@ -17,7 +17,7 @@ use super::report::{ConversionReport, LayerAreas, Unrecognised, region};
 use std::collections::{BTreeMap, HashMap};
 use thiserror::Error;
 
-/// Differences told one by one.
+/// Differences reported individually.
 const MAX_REPORTED: usize = 20;
 
 /// Why the labels of a drawing make no netlist.
@@ -57,7 +57,7 @@ pub enum LabelledError {
     /// Polygons that cut one another too often to be compared.
     #[error("{what}: {tangled}")]
     Tangled {
-        /// A layer of the drawing or of the mechanism that its labels tell of.
+        /// A layer of the drawing, or of the mechanism in its labels.
         what: String,
         /// How often, and where.
         tangled: CrossingContours,
@@ -254,7 +254,7 @@ fn on_grid(shape: &[[f64; 2]], unit: f64) -> Option<Vec<GridPoint>> {
     shape.iter().map(on).collect()
 }
 
-/// Draws the mechanism again and tells what only one of the two drawings has.
+/// Draws the mechanism again and reports areas that only one of the two drawings has.
 fn compare(
     drawing: &FlatLayout,
     process: &Process,

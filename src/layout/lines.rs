@@ -1,4 +1,4 @@
-//! A mechanism as netlist lines without loops, parameters and subnets: what a drawing carries as labels.
+//! A mechanism as netlist lines without loops, parameters and subnets, as a drawing stores them in labels.
 //!
 //! A line is one element with its full name ("b1.hot") and all numbers in SI; a process is a material with its thickness.
 //! [`from_structure`] makes lines of a [`Structure`](crate::structure::Structure), [`text`] a netlist of lines, in which
@@ -52,7 +52,7 @@ pub(crate) struct ElementLines {
 pub struct LineError {
     /// The label, cut.
     pub text: String,
-    /// What was expected.
+    /// The expected word.
     pub expected: &'static str,
 }
 
@@ -185,7 +185,7 @@ impl fmt::Display for ProcessLine {
 
 #[cfg(test)]
 mod tests {
-    //! A line reads back as it was written; what is none is told.
+    //! Lines round-trip, and malformed lines are reported.
     use super::*;
     use proptest::prelude::*;
 

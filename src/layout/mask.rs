@@ -1,4 +1,5 @@
-//! A mechanism as a layout file: its outlines on the masks of a process, with its names and what outlines cannot tell as labels.
+//! A mechanism as a layout file: its outlines on the masks of a process, with labels for names and for data that
+//! outlines cannot express.
 //!
 //! docs/layout.md describes the labels. Nodes are texts on the layer that they belong to. On the layer of notes (`BIMORPH` in CIF,
 //! 255/0 in GDSII) stand a text `bimorph layout 1 PROCESS`, one for each process and one for each element, numbered and at its place.
@@ -34,7 +35,7 @@ pub(crate) const ROUNDING: f64 = 3.0;
 pub struct Mask {
     /// The file.
     pub bytes: Vec<u8>,
-    /// What was drawn otherwise than the mechanism has it, or not at all.
+    /// Parts that were omitted or drawn differently from the mechanism.
     pub notes: Vec<String>,
     /// Polygons drawn.
     pub polygons: usize,
@@ -151,7 +152,7 @@ fn unit(figure: &Figure, at: &HashMap<String, [f64; 2]>) -> Result<f64, MaskErro
     units.into_iter().find(fits).ok_or(MaskError::Far { reach })
 }
 
-/// Beams whose width nobody can measure in the drawing are marked so: what covers them is wider than they are.
+/// Marks beams whose width cannot be measured in the drawing, because a wider shape covers them.
 fn mark_hidden(lines: &mut ElementLines, figure: &Figure, at: &HashMap<String, [f64; 2]>, unit_m: f64) {
     let widths = Widths::of_figure(figure, unit_m);
     for line in lines.elements.iter_mut().filter(|l| is_beam(&l.model)) {
@@ -165,10 +166,10 @@ fn mark_hidden(lines: &mut ElementLines, figure: &Figure, at: &HashMap<String, [
     }
 }
 
-/// What a drawing says of a beam's width.
+/// Measured width of a beam in a drawing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Width {
-    /// The width that was told.
+    /// The drawing agrees with the given width.
     AsTold,
     /// Another one, the same all along [units].
     Other(f64),
@@ -198,7 +199,7 @@ impl Widths {
         Self(measurable.map(|(k, all)| (k, Chords::new(&regions::union(&all)))).collect())
     }
 
-    /// The width of a beam between two places, told to be `w` [units].
+    /// The width of a beam between two points whose nominal width is `w` [units].
     pub(crate) fn measure(&self, layer: usize, a: [f64; 2], b: [f64; 2], w: f64) -> Width {
         let Some(chords) = self.0.get(&layer) else { return Width::Unclear };
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);

@@ -1,4 +1,4 @@
-//! What the layers of a drawing are: the process file.
+//! The process file, which defines the layers of a drawing.
 //!
 //! TOML, all numbers SI; docs/layout.md describes it. Two processes travel inside the program ([`Process::builtin`]).
 
@@ -30,7 +30,7 @@ impl Process {
     /// A process inside the program.
     ///
     /// # Errors
-    /// There is none of that name; the message lists them.
+    /// No process has that name; the message lists the known ones.
     pub fn builtin(name: &str) -> Result<Self, ProcessError> {
         let found = BUILTIN.iter().find(|(known, _)| *known == name);
         let (_, text) = found.ok_or_else(|| ProcessError::Unknown {
@@ -99,7 +99,7 @@ impl Process {
         self.layers.iter().find(|layer| names(&layer.drawn, drawn))
     }
 
-    /// What a drawn layer is for, in words; none: the process does not know it.
+    /// Function of a drawn layer, in words; `None` where the process does not define it.
     pub fn role_of(&self, drawn: &str) -> Option<&'static str> {
         let roles = self.layers.iter().flat_map(|l| {
             [

@@ -47,7 +47,7 @@ pub enum LayoutError {
     Read {
         /// Name of the file.
         file: String,
-        /// What the system says.
+        /// Message of the operating system.
         reason: String,
     },
     /// Too long to be held.
@@ -82,7 +82,7 @@ pub fn from_bytes(bytes: &[u8], name: &str, cell: Option<&str>) -> Result<FlatLa
     Ok(library.flatten(cell)?)
 }
 
-/// Reads a layout file. `watch` is told the share that was read, and says whether to go on.
+/// Reads a layout file. `watch` receives the fraction that was read and returns whether to continue.
 ///
 /// # Errors
 /// See [`LayoutError`].

@@ -16,12 +16,12 @@ pub fn union(polygons: &[Polygon]) -> Vec<Polygon> {
     combine(polygons, &[], OverlayRule::Subject)
 }
 
-/// What lies both in a polygon of `a` and in one of `b`.
+/// Intersection of the polygons of `a` with those of `b`.
 pub fn intersection(a: &[Polygon], b: &[Polygon]) -> Vec<Polygon> {
     combine(a, b, OverlayRule::Intersect)
 }
 
-/// What lies in a polygon of `a` and in none of `b`.
+/// Area in a polygon of `a` and in none of `b`.
 pub fn difference(a: &[Polygon], b: &[Polygon]) -> Vec<Polygon> {
     combine(a, b, OverlayRule::Difference)
 }
@@ -36,7 +36,7 @@ pub fn area(polygons: &[Polygon]) -> f64 {
     twice_area_of(polygons) as f64 / 2.0
 }
 
-/// What one contour encloses, whatever its direction and crossings.
+/// Area that one contour encloses, for any direction and with self-intersections.
 pub(super) fn enclosed(contour: &[GridPoint], rule: FillRule) -> Vec<Polygon> {
     let mut overlay = Overlay::<i32>::new(contour.len());
     overlay.add_path_iter(contour.iter().map(|[x, y]| IntPoint::new(*x, *y)), ShapeType::Subject);

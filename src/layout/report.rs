@@ -1,15 +1,15 @@
-//! What became of a drawing: counts, areas, and what was not understood, with its place.
+//! Report of a conversion: counts, areas, and unrecognised areas with their positions.
 
 use super::drawing::Polygon;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Pieces smaller than this share of a square of the grid's rounding are no pieces: what two roundings of the same edge leave.
+/// Pieces smaller than this fraction of a grid square are ignored: they are remnants of two roundings of the same edge.
 const SLIVER: f64 = 3.0;
-/// Pieces told one by one; the rest are added up.
+/// Pieces reported individually; the others are summed.
 const MAX_REPORTED: usize = 200;
 
-/// What a conversion has to say.
+/// Result messages of a conversion.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ConversionReport {
     /// How the drawing was read: `labels` or `geometry`.
@@ -19,9 +19,9 @@ pub struct ConversionReport {
     /// Areas.
     #[serde(flatten)]
     pub areas: LayerAreas,
-    /// What was not understood.
+    /// Areas without a model.
     pub unrecognised: Vec<Unrecognised>,
-    /// What was approximated or left out, in words.
+    /// Features that were approximated or omitted, as messages.
     pub notes: Vec<String>,
 }
 

@@ -5,7 +5,7 @@ use super::drawing::{GridPoint, Polygon, twice_area};
 use super::regions;
 use i_overlay::core::fill_rule::FillRule;
 
-/// What a contour encloses.
+/// Area that a contour encloses.
 #[derive(Debug, PartialEq)]
 pub(super) enum ContourContent {
     /// Itself, turned counter-clockwise.
@@ -21,7 +21,7 @@ pub(super) enum ContourContent {
 /// Contours with more points than this are given to the set operations without looking for crossings.
 const FEW: usize = 48;
 
-/// What a contour encloses; consecutive points differ.
+/// Area that a contour encloses; consecutive points must differ.
 pub(super) fn polygons(contour: Vec<GridPoint>) -> ContourContent {
     if contour.len() < 3 {
         return ContourContent::Nothing;

@@ -5,7 +5,7 @@ use super::gds::record::{kind, real_to};
 use super::process::canonical;
 use thiserror::Error;
 
-/// Most points of a boundary, the repeated first one included: what one record holds.
+/// Maximum number of points of a boundary, including the repeated first one: the capacity of one record.
 const MAX_POINTS: usize = 8191;
 /// Longest text of a record [bytes].
 const LONGEST_TEXT: usize = 65_000;

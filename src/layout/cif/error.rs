@@ -1,4 +1,4 @@
-//! What can be wrong in a CIF file.
+//! Errors of CIF files.
 
 use thiserror::Error;
 
@@ -12,26 +12,26 @@ pub struct CifError {
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// What is wrong there.
+    /// The fault at that position.
     pub fault: CifFault,
 }
 
-/// What can be wrong in a CIF file.
+/// Errors of CIF files.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CifFault {
     /// Another character was expected.
     #[error("expected {expected}, found {found}")]
     Expected {
-        /// What the command needs here.
+        /// Token that the command expects.
         expected: &'static str,
-        /// What stands here.
+        /// Token found.
         found: String,
     },
     /// No command of CIF begins so.
     #[error("no command begins with {found}: expected P B W R L D C E, a digit, `(` or `;`")]
     Command {
-        /// What stands here.
+        /// Token found.
         found: String,
     },
     /// A number with too many digits.

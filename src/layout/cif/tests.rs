@@ -52,7 +52,7 @@ fn calls_mirror_turn_and_shift_in_the_order_in_which_they_stand() {
 
 #[test]
 fn a_turned_box_keeps_its_width_on_a_finer_grid() {
-    // 10 um by 2 um, turned by atan(1/2): with centimicrons its corners would be off by up to 5 nm.
+    // 10 um by 2 um, turned by atan(1/2): with integer centimicrons its corners would have errors of up to 5 nm.
     let d = drawing("L A; B 1000 200 0 0 2 1; E");
     assert_eq!(d.unit_m, 1e-12);
     let area = regions::area(&d.layers["A"]) * d.unit_m * d.unit_m;

@@ -1,4 +1,4 @@
-//! Characters of CIF: what separates, numbers, names, comments.
+//! Characters of CIF: separators, numbers, names, comments.
 //!
 //! Between the parts of a command everything separates that is no digit, no capital, none of `- ( ) ;`: also `,` and small letters.
 
@@ -30,7 +30,7 @@ impl<'a> CifReader<'a> {
         self.at = (self.at + 1).min(self.text.len());
     }
 
-    /// What stands here, for messages.
+    /// The next token, for messages.
     pub(super) fn found(&self) -> String {
         match self.peek() {
             None => "the end of the file".to_owned(),
@@ -66,7 +66,7 @@ impl<'a> CifReader<'a> {
             match byte {
                 b'(' => self.comment()?,
                 b'0'..=b'9' | b'A'..=b'Z' | b'-' | b')' | b';' => break,
-                // What no text file holds: better said than read as blanks.
+                // Control characters occur in no text file: report them instead of reading them as blanks.
                 0..=8 | 14..=31 | 127.. => {
                     let found = self.found();
                     return Err(self.error(CifFault::Expected { expected: "text of a CIF file", found }));

@@ -1,4 +1,4 @@
-//! What holds a layer: where its anchors lie, and which stretches of a line run over them.
+//! Anchoring of a layer: positions of its anchors, and the stretches of a line over them.
 
 use super::areas::AreaIndex;
 use super::joints::LimbJoint;
@@ -11,7 +11,7 @@ use crate::layout::regions;
 /// A pad is at least this much wider than its limb [1].
 const PAD: f64 = 1.5;
 
-/// What tells which parts are held.
+/// Rule that decides which parts are held.
 #[derive(Debug)]
 pub(super) enum AnchorRule {
     /// Polygons that hold.

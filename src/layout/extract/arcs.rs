@@ -165,7 +165,7 @@ fn fit(result: &Extraction, run: &[ChainLink], unit: f64) -> Option<Arc> {
         angle += step;
         last = arm;
     }
-    // the pieces of a polygon's arc are alike; a straight beam at its end is none of them
+    // the pieces of a polygonal arc are equal; a straight beam at its end is longer and not part of it
     if angle > LARGEST || largest > 3.0 * smallest || largest > 0.6 || radius < 0.5 * width {
         return None;
     }

@@ -1,7 +1,7 @@
 //! Many areas with holes, found by place: which of them hold a point, which overlap a cell, which stretches of a line lie over them.
 //!
-//! A question meets the edges near it alone, whatever the areas have elsewhere: inside and outside are told along a ray to the right, by
-//! the even-odd rule (M. Shimrat, Algorithm 112, CACM 5, 1962), on edges that are sorted by place.
+//! A query costs the edges near it alone. Inside and outside follow from a ray to the right by the even-odd rule (M.
+//! Shimrat, Algorithm 112, CACM 5, 1962), on edges sorted by position.
 
 use super::boxes::{self, Boxes, Extent};
 use crate::layout::drawing::Polygon;

@@ -18,7 +18,7 @@ pub(super) struct Tap {
     pub(super) on_axis: bool,
 }
 
-/// What a place belongs to, by its index.
+/// Limb or joint that contains a point, by index.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Owner {
     Limb(usize),

@@ -218,7 +218,7 @@ fn comb(all: &[Finger], group: &[&NeighbourFingers], taken: &mut [bool]) -> Fing
     }
 }
 
-/// Fingers of a comb that have nothing but loose ones beside them belong to it too; the loose ones are told.
+/// Fingers whose only neighbours are unassigned fingers of one comb belong to it too; the remaining ones are reported.
 fn lone(all: &[Finger], apart: &[NeighbourFingers], combs: &mut [FingerArray], taken: &mut [bool]) {
     for pair in apart {
         let [a, b] = pair.fingers;

@@ -104,7 +104,7 @@ fn wires(nodes: &[usize]) -> Vec<Item> {
     wires
 }
 
-/// What is rigid in parts with current hangs together: links, roots, and pads with several nodes.
+/// Sets of nodes joined rigidly in conducting parts: links, roots, and pads with several nodes.
 fn rigid(found: &Extraction) -> Sets {
     let mut sets = Sets::new(found.nodes.len());
     let pads = found.pads.iter().map(|pad| pad.nodes.as_slice());

@@ -1,8 +1,8 @@
 //! Etch holes cut along the limbs and joints that they lie in.
 //!
-//! The areas of the axis tile a part, and each is two convex quadrangles: a hole is cut by them (I. E. Sutherland, G. W. Hodgman,
-//! CACM 17, 1974), so that a limb or joint lacks what of the hole lies in it, exactly. Pieces of outlines that cutting lays on a
-//! border run there and back: moments and further cuts do not see them.
+//! The areas of the axis tile a part, and each consists of two convex quadrangles. A hole is clipped by them (I. E.
+//! Sutherland, G. W. Hodgman, CACM 17, 1974), so that each limb or joint loses exactly its share of the hole. Pieces of
+//! outlines that cutting lays on a border run there and back: moments and further cuts do not see them.
 
 use super::boxes::{self, Boxes, Extent};
 use super::cells::Owner;
@@ -15,7 +15,7 @@ use crate::budget;
 /// An outline with its corners in order.
 pub(super) type OrderedOutline = Vec<[f64; 2]>;
 
-/// What holes take of a limb or joint.
+/// Area that holes remove from a limb or joint.
 #[derive(Debug, Clone, Default)]
 pub(super) struct MaterialCutout {
     /// Moments of all pieces.
@@ -24,7 +24,7 @@ pub(super) struct MaterialCutout {
     pub(super) pieces: Vec<OrderedOutline>,
 }
 
-/// What holes take of the limbs and joints of a part, in coordinates of its axis.
+/// Areas that holes remove from the limbs and joints of a part, in axis coordinates.
 #[derive(Debug, Clone, Default)]
 pub(super) struct HoleCutouts {
     pub(super) limbs: Vec<MaterialCutout>,
@@ -48,7 +48,7 @@ impl HoleCutouts {
         let near = Boxes::of(&extents);
         let local = |p: &[f64; 2]| [p[0] - origin[0], p[1] - origin[1]];
         let outlines: Vec<OrderedOutline> = holes.iter().map(|hole| hole.outline.iter().map(local).collect()).collect();
-        // for each hole what is not found yet, and who has most of it
+        // for each hole: the area not assigned yet, the largest assigned area, and its owner
         let mut left: Vec<(f64, f64, Option<Owner>)> = holes.iter().map(|hole| (hole.area, 0.0, None)).collect();
         for (owner, edges) in owners(parts) {
             for e in edges {
@@ -116,7 +116,7 @@ fn halves(cell: &[[f64; 2]; 6]) -> [[[f64; 2]; 4]; 2] {
     [[p, ap, aq, q], [p, q, bq, bp]]
 }
 
-/// What of an outline lies in a convex one; the direction of the first is kept.
+/// Intersection of an outline with a convex one, in the direction of the first.
 pub(super) fn clipped(outline: &[[f64; 2]], convex: &[[f64; 2]]) -> OrderedOutline {
     let mut kept = outline.to_vec();
     let middle = convex[0];

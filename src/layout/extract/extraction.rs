@@ -1,8 +1,8 @@
-//! What was found in a drawing, in SI units.
+//! Result of an extraction, in SI units.
 
 use crate::layout::drawing::{Placement, Polygon};
 
-/// What was found in a drawing, in SI units.
+/// Result of an extraction, in SI units.
 #[derive(Debug, Clone, Default)]
 pub struct Extraction {
     /// Name of the drawing.
@@ -43,9 +43,9 @@ pub struct Extraction {
     pub plates: Vec<Plates>,
     /// Beams that face another part.
     pub facing: Vec<ExtractedFacing>,
-    /// What is not in the model.
+    /// Areas that have no element in the model.
     pub unrecognised: Vec<UnmodelledArea>,
-    /// What a reader should know, in words with places and sizes.
+    /// Notes for the reader, with positions and sizes.
     pub notes: Vec<String>,
 }
 
@@ -86,7 +86,7 @@ pub struct ExtractedNode {
     pub reach: f64,
     /// A label of the drawing names it.
     pub labelled: bool,
-    /// Number of the part that it is on: what hangs together is one conductor.
+    /// Number of its part; a connected part is one conductor.
     pub part: usize,
 }
 

@@ -10,7 +10,7 @@ use crate::layout::drawing::FlatLayout;
 use crate::layout::process;
 use std::collections::HashSet;
 
-/// So many bodies of a part that only their width holds are told of.
+/// Most bodies per part reported as held by their width alone.
 const MAX_MIDDLES: usize = 3;
 
 /// Puts models into the result, in SI units.
@@ -74,7 +74,7 @@ impl ExtractionSink<'_> {
         self.result.nodes.len() - 1
     }
 
-    /// Tells by what rule parts are held where no anchor is drawn, and what nothing holds.
+    /// Notes the rule that decides which parts are held where no anchor is drawn, and parts without any support.
     pub(super) fn notes(
         &mut self,
         drawing: &FlatLayout,
@@ -144,8 +144,8 @@ impl ExtractionSink<'_> {
     }
 }
 
-/// Tells of bodies that only their width holds, though all of their limbs lead to other places that are held: where that is the mechanism
-/// itself, no undercut can say so.
+/// Notes bodies that are held by their width alone although all their limbs lead to other held places. Where such a
+/// body is the mechanism itself, no undercut can distinguish it.
 fn middles(drawing: &FlatLayout, layer: &str, rule: &AnchorRule, part: &Part) -> Vec<String> {
     let (AnchorRule::Wide(reach), (axis, found)) = (rule, &part.found) else { return Vec::new() };
     let held: Vec<bool> =
@@ -165,7 +165,7 @@ fn middles(drawing: &FlatLayout, layer: &str, rule: &AnchorRule, part: &Part) ->
             ));
         }
     }
-    // a middle is told of, not each pad of a chain
+    // one middle body is reported, not each pad of a chain
     notes.truncate(MAX_MIDDLES);
     notes
 }

@@ -1,7 +1,8 @@
 //! Edges of different parts that face each other across a narrow gap: capacitors.
 //!
-//! A face is a side of a limb, or what a rigid body has of a side of the outline. Two faces that run against each other, at most
-//! [`WIDEST`] apart and side by side over at least [`SLENDER`] gaps, are plates; of several one behind the other the nearest counts.
+//! A face is a side of a limb, or what a rigid body has of a side of the outline. Two antiparallel faces at most
+//! [`WIDEST`] apart that overlap over at least [`SLENDER`] gaps are plates. Of several faces one behind the other, the
+//! nearest counts.
 
 use super::boxes::{self, Boxes, Extent};
 use super::combs::FingerArray;

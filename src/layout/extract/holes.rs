@@ -1,8 +1,9 @@
 //! Etch holes: filled for the axis, and kept as what the part lacks.
 //!
-//! A hole no larger than the process allows for the etch and compact (at least half of the smallest rectangle around it, at any angle) is
-//! filled; larger openings shape the part. What is missing is cut along the limbs and joints that it lies in ([`super::cut`]) and taken off bodies with its moments. Along a
-//! limb it is a share p of the area: mass and film are 1 − p of the solid's, stiffness that of square holes in a square pitch, stretches
+//! A hole no larger than the process allows for the etch and compact (at least half of the smallest rectangle around
+//! it, at any angle) is filled; larger openings shape the part. The removed area is cut along the limbs and joints that
+//! contain it ([`super::cut`]) and subtracted from bodies with its moments. Along a limb, the fraction p of the area is
+//! missing: mass and film are 1 − p of the solid's. Stiffness is that of square holes at a square pitch, with stretches
 //! with and without holes in series: E′/E = (1 − s)/(1 − s + s²), s = √p.
 
 use super::boxes::{self, Extent};

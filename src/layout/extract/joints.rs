@@ -1,4 +1,4 @@
-//! What lies between limbs: points where their axes cross, tips, and rigid bodies.
+//! Areas between limbs: intersections of their axes, tips, and rigid bodies.
 //!
 //! | between limbs | becomes |
 //! |---|---|
@@ -41,13 +41,13 @@ pub(super) struct LimbJoint {
     pub(super) cell: Moments,
     /// Edges of the axis whose areas it has.
     pub(super) edges: Vec<u32>,
-    /// What it becomes.
+    /// Model element of the joint.
     pub(super) kind: JointRole,
     /// Of a body whose edge is elastic, for each port, its compliance: shift [1], turn [1/square database unit]; none: it is rigid there.
     pub(super) roots: Vec<Option<[f64; 2]>>,
 }
 
-/// What a joint becomes.
+/// Model elements of a joint.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) enum JointRole {
     /// Limbs end here; for a tip this is where the material ends.

@@ -29,7 +29,7 @@ const BYTES_PER_POINT: usize = 1200;
 /// By what share of a part its pieces may miss its area [1].
 const BALANCE: f64 = 1e-9;
 
-/// What is known of shapes: a drawing repeats them.
+/// Cached analyses of shapes, since a drawing repeats them.
 #[derive(Default)]
 struct ShapeCache(HashMap<Polygon, Result<AxisAnalysis, String>>);
 

@@ -1,8 +1,8 @@
 //! Limbs: stretches of the medial axis along which a part is a strip.
 //!
-//! An edge of the axis between two sides that face each other is a straight strip with an exact centreline; pieces of one line
-//! that only a corner on one side interrupts are one. A piece is a limb when it is long enough for its width, or one of several that
-//! follow a curve. What is left between limbs are the joints.
+//! An edge of the axis between two sides that face each other is a straight strip with an exact centreline; pieces of
+//! one line that only a corner on one side interrupts are one. A piece is a limb when it is long enough for its width,
+//! or one of several that follow a curve. The areas between limbs are the joints.
 
 use super::medial::BoundarySite;
 use super::moments::Moments;

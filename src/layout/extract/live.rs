@@ -6,13 +6,13 @@
 
 use super::{ExtractedBeam, ExtractedNode, Extraction, LayerResult};
 
-/// Relative change of the width below which a beam has one width [1]: what rounding to the grid does.
+/// Relative change of the width up to which a beam counts as uniform [1]: the effect of rounding to the grid.
 const UNIFORM: f64 = 5e-3;
 
 /// Pieces of a taper that carries current.
 const PIECES: usize = 8;
 
-/// What a beam with current is called in netlists; none: its material does not conduct.
+/// Name of the netlist element of a conducting beam; `None` where its material does not conduct.
 pub(super) fn model(layer: &LayerResult) -> Option<&'static str> {
     let knows = |name: &str| layer.material.iter().any(|(known, value)| known == name && *value != 0.0);
     if !resists(layer) {
@@ -29,7 +29,7 @@ pub(super) fn resists(layer: &LayerResult) -> bool {
         .any(|(name, value)| matches!(name.as_str(), "sheetresistance" | "resistivity") && *value > 0.0)
 }
 
-/// What etch holes change of a beam's conduction, by entry of the material: what it is multiplied by.
+/// Factors by which etch holes change a beam's conduction, by entry of the material.
 pub(super) fn perforated(porosity: f64) -> [(&'static str, f64); 3] {
     let left = (1.0 - porosity) / (1.0 + porosity);
     [("thermcond", left), ("sheetresistance", 1.0 / left), ("resistivity", 1.0 / left)]

@@ -12,7 +12,7 @@ use boostvoronoi::prelude::{Builder, BvError, Diagram, SourceCategory};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What an edge of the axis keeps its distance from.
+/// Boundary element from which an edge of the axis keeps its distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BoundarySite {
     /// The polygon's edge from the point of this number to the next one of its contour.
@@ -35,7 +35,7 @@ pub struct Vertex {
 pub struct AxisEdge {
     /// Its vertices.
     pub ends: [u32; 2],
-    /// What lies on both sides of it.
+    /// The boundary elements on both sides.
     pub sites: [BoundarySite; 2],
     /// The area between them.
     pub cell: Moments,
@@ -120,7 +120,7 @@ impl Medial {
             }
         };
         let places: Vec<[f64; 2]> = diagram.vertices().iter().map(|v| [v.x(), v.y()]).collect();
-        // Candidates: finite primary edges, each once, with a verdict where a side tells it.
+        // Candidates: finite primary edges, each once, with a verdict where one side decides it.
         let mut found: Vec<([u32; 2], [BoundarySite; 2], Option<bool>)> = Vec::new();
         for edge in diagram.edges() {
             let twin = edge.twin()?;

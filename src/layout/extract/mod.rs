@@ -1,12 +1,13 @@
 //! Extraction: from the polygons of a drawing to nodes, beams, rigid bodies and anchors.
 //!
-//! For each layer that moves: the union of what is drawn → holes of the etch filled → for each part that hangs together its medial
-//! axis ([`medial`]) → twigs cut off → straight strips, the *limbs* → *joints* between them → nodes where the axes of limbs cross, and
-//! rigid bodies where a part is wide → what lies over anchors is held. Every part of the drawn area belongs to a limb or a
-//! joint; what could not be understood is told with its place and size, and the sum is checked against the drawing.
+//! For each moving layer: 1. the union of the outlines; 2. etch holes are filled; 3. the medial axis of each connected
+//! part ([`medial`]); 4. twigs are cut off; 5. straight strips, the *limbs*; 6. *joints* between them; 7. nodes at the
+//! intersections of axes, and rigid bodies where a part is wide; 8. areas over anchors are held. Every part of the
+//! drawn area belongs to a limb or a joint. Areas without a model are reported with position and size, and the sum is
+//! checked against the drawing.
 //!
-//! The method follows Baidya, Gupta and Mukherjee (2002), who take drawings apart into rectangles, with the medial axis in the place
-//! of rectangles, so that drawings at any angle are taken apart alike.
+//! The method follows that of Baidya, Gupta and Mukherjee (2002), which decomposes drawings into rectangles. The medial
+//! axis replaces the rectangles here, so that the result does not depend on orientation.
 
 mod anchors;
 mod arcs;
@@ -108,7 +109,7 @@ pub fn extract(drawing: &FlatLayout, process: &Process, options: &ExtractOptions
     Ok(result)
 }
 
-/// Tells of layers that the process does not know.
+/// Notes layers that the process does not define.
 fn unknown_layers(drawing: &FlatLayout, process: &Process, result: &mut Extraction) -> Result<(), ExtractError> {
     for (name, polygons) in &drawing.layers {
         if process.role_of(name).is_some() {

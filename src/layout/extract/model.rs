@@ -146,7 +146,7 @@ pub(super) struct Builder<'a> {
     pub(super) adjoining: Vec<(usize, usize)>,
     pub(super) taps: Vec<Tap>,
     pub(super) cells: Cells,
-    /// What holes take of limbs and joints.
+    /// Areas that holes remove from limbs and joints.
     pub(super) holes: HoleCutouts,
     /// For each limb, the area of holes where it is led into bodies beyond its cells; less than nothing where it ends before.
     pub(super) led: Vec<[f64; 2]>,
@@ -232,8 +232,8 @@ impl Builder<'_> {
         }
     }
 
-    /// What rounding to the grid makes a limb without holes weigh more than its beam, at a place; half of it where it ends in two bodies
-    /// that take it.
+    /// Excess mass of a limb without holes over its beam, at a point, from rounding to the grid; half of it where the
+    /// limb ends in two bodies that take it.
     fn rounding(&self, k: usize, at: [f64; 2]) -> Moments {
         let limb = &self.parts.limbs[k];
         let width = 0.5 * (limb.width[0] + limb.width[1]);
@@ -258,7 +258,7 @@ impl Builder<'_> {
         Moments { area, first: at.map(|x| x * area), second: (at[0] * at[0] + at[1] * at[1]) * area }
     }
 
-    /// What a body has beyond the limbs that end at its edge: a limb led into it brings that area itself.
+    /// Moments of a body beyond the limbs that end at its edge: a limb led into the body already includes that area.
     fn without_mouths(&mut self, j: usize, places: &[[f64; 2]]) -> Moments {
         let joint = &self.parts.joints[j];
         let mut moments = joint.cell;

@@ -14,7 +14,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Of a polygon given by its corners in either direction; the area comes out positive.
+    /// Of a polygon given by its corners in either direction; the area is positive.
     pub fn of(corners: &[[f64; 2]]) -> Self {
         let Some(origin) = corners.first().copied() else { return Self::default() };
         // About a corner, so that small cells far from the origin lose no digits.
@@ -46,7 +46,7 @@ impl Moments {
         }
     }
 
-    /// The same shape with `area` more of it: what rounding left over.
+    /// The same shape with `area` added: the remainder of rounding.
     pub(super) fn grow(&mut self, area: f64) {
         if self.area > 0.0 {
             let by = (self.area + area) / self.area;

@@ -7,7 +7,7 @@ use super::nets::LabelTarget;
 use crate::layout::drawing::FlatLayout;
 use std::collections::HashSet;
 
-/// Labels that are told one by one.
+/// Labels reported individually.
 const MAX_REPORTED: usize = 20;
 
 /// Names all nodes; `nets` says for each label what conductor it stands on.
@@ -70,7 +70,7 @@ pub(super) fn name(result: &mut Extraction, drawing: &FlatLayout, nets: &[Option
     }
 }
 
-/// Leaves of what is told of labels the first few, and how many more there are.
+/// Truncates the notes on labels to the first few, with the number of the others.
 pub(super) fn reported(result: &mut Extraction) {
     let mut count = 0usize;
     result.notes.retain(|note| {

@@ -123,7 +123,7 @@ struct NetlistWriter<'a> {
 }
 
 impl NetlistWriter<'_> {
-    /// What lines of the netlist stand for, by their numbers.
+    /// Elements that lines of the netlist represent, by line number.
     fn places_of_lines(&self, text: &str) -> BTreeMap<usize, (String, [f64; 2])> {
         let (mut line, mut from, mut places) = (1, 0, BTreeMap::new());
         for mark in self.marks.borrow().iter() {
@@ -186,7 +186,7 @@ impl NetlistWriter<'_> {
         }
     }
 
-    /// What the nodes of a subnet are called in it: those handed in, and its own that no inner instance has for itself.
+    /// Names of nodes inside a subnet: its terminals, and its own nodes that no inner instance owns.
     fn locals(&self, subnet: &Subnet) -> HashMap<usize, String> {
         let mut names: HashMap<usize, String> =
             subnet.terminals.iter().enumerate().map(|(k, n)| (*n, format!("t{}", k + 1))).collect();

@@ -18,7 +18,7 @@ use crate::sets::Sets;
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
-/// What moves of a layer.
+/// The moving parts of a layer.
 pub(super) struct MovingLayer<'a> {
     pub(super) layer: &'a process::StructuralLayer,
     /// Outlines of the parts in which something moves, etch holes filled.
@@ -28,7 +28,7 @@ pub(super) struct MovingLayer<'a> {
 /// Names of electrical ground, in small letters.
 const GROUNDS: [&str; 4] = ["gnd", "ground", "vss", "0"];
 
-/// What a label stands on.
+/// Object under a label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LabelTarget {
     /// The pad under it; none: wiring.
@@ -103,7 +103,7 @@ pub(super) fn find(
     Ok(labels)
 }
 
-/// What a label can stand on.
+/// Kinds of objects under a label.
 enum Conductor {
     /// Index of a pad.
     Pad(usize),

@@ -1,4 +1,4 @@
-//! Areas that are held, with the nodes on them: what labels stand on.
+//! Held areas with the nodes on them, as targets of labels.
 
 use super::model::{Builder, PartPad};
 use crate::sets::Sets;
@@ -9,7 +9,7 @@ use std::ops::Range;
 pub(super) type AnchoredStretch = ([f64; 2], Vec<usize>);
 
 impl Builder<'_> {
-    /// What a joint holds: those of the nodes made for it that are anchored, and its whole area.
+    /// Adds the pad of a joint: the anchored ones of the nodes made for it, and its whole area.
     pub(super) fn joint_pad(&mut self, j: usize, made: Range<usize>) {
         let held: Vec<usize> = made.filter(|n| self.anchored[*n]).collect();
         if held.is_empty() {
@@ -24,7 +24,7 @@ impl Builder<'_> {
         self.model.pads.push(PartPad { nodes: held, outlines: cells.collect() });
     }
 
-    /// What is held of a limb between two nodes, with those of them that are anchored.
+    /// The held stretches of a limb between two nodes, with those of the nodes that are anchored.
     pub(super) fn held(&self, covered: &[[f64; 2]], a: usize, b: usize) -> Vec<AnchoredStretch> {
         let ends = |t: &[f64; 2]| {
             let ends = [(t[0] == 0.0, a), (t[1] == 1.0, b)];

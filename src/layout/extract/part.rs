@@ -6,7 +6,7 @@ use super::medial::Medial;
 use crate::layout::drawing::Polygon;
 use std::sync::Arc;
 
-/// What was found along the axis of a shape.
+/// Result of the axis analysis of a shape.
 pub(super) type AxisAnalysis = (Arc<Medial>, Arc<LimbGraph>);
 
 /// A part that hangs together.

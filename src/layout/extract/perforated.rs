@@ -1,12 +1,13 @@
 //! Parts with etch holes: which of their limbs are plates, and which of their joints are bodies.
 //!
-//! A perforated plate longer than wide has the axis of a beam. Its limbs are taken together with the joints between them as one rigid
-//! body, with the mass and inertia that the holes leave, where they give way by less than 1/[`STIFF`] of what they hang on, and nothing
-//! of them is held. Any other perforated limb stays a beam. A joint with a hole in it is a node only at a free end: else it is a body, so that it
-//! lacks what the hole takes; so is one where a limb stands on a perforated one.
+//! A perforated plate longer than wide has the axis of a beam. Its limbs and the joints between them become one rigid
+//! body with the mass and inertia that the holes leave. This holds where they are more than [`STIFF`] times stiffer
+//! than their support and no part of them is held. Any other perforated limb stays a beam. A joint with a hole in it is
+//! a node only at a free end: else it is a body, so that it lacks what the hole takes; so is one where a limb stands on
+//! a perforated one.
 //!
-//! The edge of a perforated plate gives way where a narrow limb stands on it, as the half-plane E′ of the plate does: by a spring for shifts and
-//! turns, and by [`ROOT`] widths by which the limb is led into it.
+//! The edge of a perforated plate is compliant where a narrow limb meets it, like the edge of a half-plane with the
+//! plate's E′. A spring represents shift and rotation, and the limb is extended into the plate by [`ROOT`] widths.
 
 use super::anchors::{self, AnchorRule};
 use super::boxes;
@@ -26,19 +27,20 @@ const BENT: f64 = 0.16;
 /// Limbs of one plate are given up together down to this share of the most compliant one [1].
 const ALIKE: f64 = 0.5;
 
-/// How far the turn of an elastic edge under a moment makes a limb longer, in widths of it [1]: for traction as in a long beam on a half-plane
-/// in plane stress the edge turns by 16.67·M/(π·E·w²) (W. J. O'Donnell, J. Appl. Mech. 27, 1960), the limb by 12·M/(E·w³) per length.
+/// Extra length of a limb from the rotation of an elastic edge under a moment, in limb widths [1]. With the traction of
+/// a long beam on a half-plane in plane stress, the edge rotates by 16.67·M/(π·E·w²) (W. J. O'Donnell, J. Appl. Mech.
+/// 27, 1960), the limb by 12·M/(E·w³) per length.
 const ROOT: f64 = 0.44;
-/// What the holes add to that turn, times E·w²·thickness [1]: fitted, as [`FLUSH`] and [`FAR`], to plane stress of the plates that
-/// `scripts/random-plates` draws.
+/// Contribution of the holes to that rotation, times E·w²·thickness [1]: fitted, as [`FLUSH`] and [`FAR`], to plane
+/// stress of the plates that `scripts/random-plates` draws.
 const TURN: f64 = 0.37;
 /// By how much an edge gives way more at a corner [1], and how far from it that is felt, in widths of the limb [1].
 const FLUSH: [f64; 2] = [1.1, 0.25];
 /// Shift of a half-plane under an even pressure on a width w, times π·E/2 over the pressure times w: ln(D/w) and this [1], for a plate of
 /// area D² (S. Timoshenko, J. N. Goodier, Theory of Elasticity, §36).
 const FAR: f64 = 1.0;
-/// What a plate of sides l along a limb and b across adds to the shift, over E′/E [1]: (l/b − 1) times a third, as of a bar that its
-/// own inertia loads, and (b²/l² − 1) times the second, fitted, for bending.
+/// Contribution to the shift of a plate with sides l along a limb and b across it, over E′/E [1]. The first term is
+/// (l/b − 1)/3, as for a bar loaded by its own inertia. The second is (b²/l² − 1) times a fitted factor, for bending.
 const LONG: [f64; 2] = [1.0 / 3.0, 0.3];
 /// Widest limb for which a body is a half-plane, over twice the radius of the largest disc in it [1].
 const NARROW: f64 = 0.5;

@@ -1,9 +1,10 @@
 //! Cells that repeat as subnets.
 //!
-//! A placed cell stands for the elements all of whose nodes lie in its box. Two placed cells whose elements are the same, each seen from its
-//! own frame, are instances of one subnet: they hang together with the rest by nodes alone, whatever the parts are that the
-//! polygons make. The nodes that something outside touches, in any of them, are the subnet's nodes. What differs stays flat, and
-//! its inner cells are looked at. Nothing is extracted twice and nothing is changed: the model is that of the flat netlist.
+//! A placed cell stands for the elements all of whose nodes lie in its box. Two placed cells whose elements are the
+//! same, each seen from its own frame, are instances of one subnet: they hang together with the rest by nodes alone,
+//! whatever the parts are that the polygons make. The nodes that something outside touches, in any of them, are the
+//! subnet's nodes. Cells that differ stay flat, and their inner cells are examined. Nothing is extracted twice and
+//! nothing is changed: the model is that of the flat netlist.
 
 use super::Extraction;
 use super::boxes::Boxes;
@@ -19,8 +20,9 @@ const MIN_ELEMENTS: usize = 2;
 const MAGNIFIED: f64 = 1e-9;
 /// Most kinds of content of cells with one name: with more they do not repeat, and the others stay flat.
 const MAX_KINDS: usize = 64;
-/// Looking into the cells of one round may meet so many times the elements and nodes of the scope, and as many at least: side by side they
-/// have each once, and boxes that all lie over each other, because something far away is in them, make no subnets.
+/// Limits on the elements and nodes visited in the cells of one round: a multiple of those of the scope, and an
+/// absolute minimum. Disjoint cells visit each once. Cells whose boxes all overlap, because of one distant element,
+/// form no subnets.
 const LOOKED_AT: [usize; 2] = [8, 100_000];
 /// Bytes of an element as a row, and of its number and nodes.
 const BYTES_PER_ROW: usize = 400;
@@ -50,7 +52,7 @@ pub(super) struct SubnetInstance {
     /// Index of its subnet.
     pub(super) subnet: usize,
     pub(super) frame: LocalFrame,
-    /// What it is given for the subnet's terminals.
+    /// Nodes connected to the subnet's terminals.
     pub(super) terminals: Vec<usize>,
     /// Its node for each node of the first instance.
     pub(super) nodes: HashMap<usize, usize>,
@@ -105,7 +107,7 @@ struct ElementIndex {
     at: HashMap<usize, Vec<usize>>,
 }
 
-/// What is in a placed cell.
+/// Content of a placed cell.
 struct Content {
     frame: LocalFrame,
     /// Indices among the scope's items, sorted.
@@ -212,7 +214,7 @@ impl Finder<'_> {
         None
     }
 
-    /// What is in a placed cell, of what is left of the scope's elements; what is met on the way is taken off `left`.
+    /// Content of a placed cell among the remaining elements of the scope; each visited element is charged to `left`.
     fn content(&mut self, all: &ElementIndex, gone: &[bool], k: usize, left: &mut usize) -> Option<Content> {
         let cell = &self.found.cells[k];
         let unit = self.found.unit;

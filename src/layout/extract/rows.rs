@@ -1,4 +1,4 @@
-//! Elements of an extraction as rows of a netlist, seen from any frame: what is placed twice has the same rows in its own frames.
+//! Elements of an extraction as rows of a netlist in any frame: cells placed twice have equal rows in their own frames.
 
 use super::{ExtractedBeam, Extraction, LayerResult, holes, live};
 
@@ -301,7 +301,7 @@ fn turn(d: [f64; 2]) -> RowValue {
     RowValue::Turn(d[1].atan2(d[0]))
 }
 
-/// What etch holes leave of a beam's stiffness, mass and film, and of what it conducts.
+/// Factors of etch holes on a beam's stiffness, mass and film, and on its conduction.
 fn perforated(layer: &LayerResult, porosity: f64, conducts: bool) -> Vec<(&'static str, RowValue)> {
     if porosity <= 0.0 {
         return Vec::new();

@@ -1,15 +1,15 @@
-//! The medial axis without its twigs: what is left when branches into corners and small bumps are cut off.
+//! The medial axis without its twigs: branches into corners and small bumps are removed.
 //!
-//! A branch that ends in a corner says how the corner is shaped and nothing about limbs. A short branch ends in a bump: what
-//! sticks out of the disk where it begins is less than [`BUMP`] of its own width (a notion of significance as in Attali and
-//! Montanvert 1997). The area of a twig goes to the vertex where it grew.
+//! A branch that ends in a corner says how the corner is shaped and nothing about limbs. A short branch ends in a bump
+//! where it protrudes from the disk at its root by less than [`BUMP`] of its own width (a notion of significance as in
+//! Attali and Montanvert 1997). The area of a twig goes to the vertex where it grew.
 
 use super::medial::{Medial, Vertex};
 use super::moments::Moments;
 
 /// A vertex nearer than this to the outline is one of its corners [database units].
 pub(super) const CORNER: f64 = 1e-3;
-/// What sticks out by less than this share of its own width is a bump [1].
+/// A branch that protrudes by less than this fraction of its own width is a bump [1].
 const BUMP: f64 = 0.75;
 
 /// The medial axis without twigs.
@@ -140,7 +140,7 @@ impl<'a> Skeleton<'a> {
 
     fn cut_bumps(&mut self) {
         let mut leaves: Vec<u32> = (0..self.degree.len() as u32).filter(|v| self.degree(*v) == 1).collect();
-        // narrow ones first: what they grow on may be a bump itself
+        // narrow ones first: their parent branch may be a bump itself
         leaves.sort_by(|a, b| self.vertex(*a).r.total_cmp(&self.vertex(*b).r).then(a.cmp(b)));
         let mut next = 0;
         while let Some(&leaf) = leaves.get(next) {

@@ -105,8 +105,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Share of a limb between two places that holes take, so that its beams weigh what is drawn: a free end is part of it, and where it is
-    /// led into a body or ends before, so are the holes there.
+    /// Fraction of a limb between two points that holes remove, so that its beams have the drawn mass. A free end
+    /// belongs to the limb. Where the limb extends into a body or ends before it, the holes there belong to it as well.
     fn porosity(&self, k: usize, [p, q]: [[f64; 2]; 2]) -> f64 {
         let limb = &self.parts.limbs[k];
         let (mut solid, mut missing) = (limb.cell.area, self.holes.limbs[k].moments.area);

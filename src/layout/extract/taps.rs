@@ -5,7 +5,7 @@ use super::joints::JointRole;
 use super::model::Builder;
 
 impl Builder<'_> {
-    /// What is nearest to a place.
+    /// The limb or joint nearest to a point.
     pub(super) fn tap(&self, place: [f64; 2], on_axis: bool) -> Tap {
         let at = [place[0] - self.origin[0], place[1] - self.origin[1]];
         let mut owner = self.cells.nearest(self.axis, at);

@@ -1,4 +1,4 @@
-//! What a flat drawing may come to.
+//! Bounds of a flat drawing.
 
 /// Most polygons of a flat drawing.
 pub const MAX_POLYGONS: u64 = 2_000_000;

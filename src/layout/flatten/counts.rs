@@ -1,11 +1,11 @@
-//! The first pass: what every cell comes to with all it calls, bounded before anything is laid out.
+//! The first pass: the flattened size of every cell with all its calls, checked before any allocation.
 
 use super::bounds::{DEEPEST, FARTHEST, MAX_CALLS, MAX_LABELS, MAX_POINTS, MAX_POLYGONS};
 use super::error::FlattenError;
 use crate::layout::cells::{CellReference, Library};
 use std::collections::HashMap;
 
-/// What a cell comes to.
+/// Flattened size of a cell.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FlattenedSize {
     pub(super) polygons: u64,

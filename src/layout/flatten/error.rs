@@ -36,7 +36,7 @@ pub enum FlattenError {
         /// How deep.
         depth: usize,
     },
-    /// Too much would come out.
+    /// The result would be too large.
     #[error("`{cell}` would be {count} {what} without hierarchy: at most {most}; name a smaller cell with --cell")]
     Large {
         /// The cell.
@@ -59,7 +59,7 @@ pub enum FlattenError {
     /// The chosen cell is not there, or none is chosen and there are several.
     #[error("{message}")]
     Top {
-        /// What can be chosen.
+        /// The available choices.
         message: String,
     },
     /// A coordinate that is no number or further away than a wafer is wide.

@@ -30,7 +30,7 @@ pub(super) struct GdsElement {
     pub(super) offset: u64,
 }
 
-/// What was passed over or taken for something else.
+/// Content that was skipped or approximated.
 #[derive(Debug, Default)]
 pub(super) struct IgnoredContent {
     pub(super) nodes: usize,
@@ -143,7 +143,7 @@ impl GdsElement {
     }
 }
 
-/// What a record holds, where it is of the kind expected.
+/// Fault of a record whose data does not have the expected kind.
 pub(super) fn data(record: &Record<'_>, expected: &'static str) -> GdsFault {
     GdsFault::Data { bytes: record.data.len(), expected }
 }

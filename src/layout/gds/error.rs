@@ -1,4 +1,4 @@
-//! What can be wrong in a GDSII file.
+//! Errors of GDSII files.
 
 use thiserror::Error;
 
@@ -12,11 +12,11 @@ pub struct GdsError {
     pub offset: u64,
     /// Name of the record's type.
     pub record: String,
-    /// What is wrong with it.
+    /// The fault at that position.
     pub fault: GdsFault,
 }
 
-/// What can be wrong in a GDSII file.
+/// Errors of GDSII files.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GdsFault {
@@ -29,33 +29,33 @@ pub enum GdsFault {
     /// It cannot be read.
     #[error("{reason}")]
     Read {
-        /// What the system says.
+        /// Message of the operating system.
         reason: String,
     },
     /// A length below that of the head, or an odd one.
     #[error("its length is {length}: expected an even number of 4 or more")]
     Length {
-        /// What the head says [bytes].
+        /// Length in the record's header (bytes).
         length: u16,
     },
     /// Not a GDSII file at all.
     #[error("this is no GDSII stream: {what}")]
     Foreign {
-        /// What it is instead, or was expected.
+        /// The kind found or expected.
         what: &'static str,
     },
     /// A record where it cannot stand.
     #[error("it cannot stand here: expected {expected}")]
     Order {
-        /// What can.
+        /// The kinds that can follow.
         expected: &'static str,
     },
     /// A record without the data that it must have.
     #[error("it holds {bytes} bytes: expected {expected}")]
     Data {
-        /// What it holds.
+        /// Bytes of the record.
         bytes: usize,
-        /// What it must.
+        /// The kind of data required.
         expected: &'static str,
     },
     /// A number that cannot be.
@@ -65,7 +65,7 @@ pub enum GdsFault {
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// The required value.
         expected: &'static str,
     },
     /// An element that lacks a record.
@@ -73,7 +73,7 @@ pub enum GdsFault {
     Incomplete {
         /// The element.
         element: &'static str,
-        /// What it lacks.
+        /// The missing record.
         lacks: &'static str,
     },
     /// Too much in one file.
@@ -84,7 +84,7 @@ pub enum GdsFault {
         /// The bound.
         most: u64,
     },
-    /// Whoever watches the progress wants no more.
+    /// The progress callback cancelled the read.
     #[error("interrupted")]
     Interrupted,
 }

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 /// Parts that no line stands for.
 pub(crate) type Left = Vec<String>;
 
-/// Makes lines of a structure; also tells what has no line.
+/// Converts a structure to lines, and returns the parts that no line can express.
 pub(crate) fn lines(structure: &Structure) -> (ElementLines, Left) {
     let mut of = OfStructure {
         structure,
@@ -199,7 +199,7 @@ impl<'a> OfStructure<'a> {
         if !(own > 0.0 && turned(own)) {
             return false;
         }
-        // no body of an area has a smaller moment than a disc: its own area, where a layer tells it
+        // no body of a given area has a smaller moment than a disc: its own area, where a layer gives it
         let disc = TAU * own;
         let of_layer = |b: &Beam| mass.mass / (b.material.density * b.thickness);
         let areas = self.structure.beams.iter().filter(|b| b.material.density > 0.0).map(of_layer);

@@ -184,7 +184,7 @@ impl GroupWriter {
         given
     }
 
-    /// What given nodes are called in an instance: n1, n2 …, but for what its own nodes are called.
+    /// Names of the given nodes in an instance: n1, n2, …, skipping the names of its own nodes.
     fn words(&self, group: &InstanceGroup<'_>, path: &str, given: &[String]) -> Vec<String> {
         let handed: BTreeSet<&String> = given.iter().collect();
         let own: BTreeSet<String> =
@@ -193,7 +193,7 @@ impl GroupWriter {
         given.iter().filter_map(|_| free.next()).collect()
     }
 
-    /// What a node is called in an instance.
+    /// Name of a node in an instance.
     fn local(&self, node: &str, path: &str, formals: &HashMap<String, String>) -> String {
         if let Some(formal) = formals.get(node) {
             return formal.clone();

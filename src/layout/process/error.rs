@@ -9,7 +9,7 @@ pub enum ProcessError {
         "there is no process `{name}`: the known ones are {known}; a file of your own is named by its path (ending in .toml)"
     )]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
         /// Names of those inside.
         known: String,
@@ -19,7 +19,7 @@ pub enum ProcessError {
     Malformed {
         /// Name of the file.
         file: String,
-        /// What is wrong, with line and column.
+        /// The fault, with line and column.
         message: String,
     },
     /// A number that cannot be.
@@ -31,7 +31,7 @@ pub enum ProcessError {
         what: String,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// The required value.
         expected: &'static str,
     },
     /// A name that leads nowhere, or that is there twice.
@@ -39,7 +39,7 @@ pub enum ProcessError {
     Inconsistent {
         /// Name of the file.
         file: String,
-        /// What does not fit.
+        /// The mismatch.
         message: String,
     },
 }

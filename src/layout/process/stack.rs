@@ -38,7 +38,7 @@ pub struct StructuralLayer {
     pub material: BTreeMap<String, f64>,
     /// Thickness of the gas film under it [m]; none: no damping.
     pub fluid: Option<f64>,
-    /// What holds it.
+    /// How the layer is anchored.
     pub anchoring: Anchoring,
     /// Drawn layers where it is taken away (etch holes drawn as such).
     pub holes: Vec<String>,
@@ -48,15 +48,15 @@ pub struct StructuralLayer {
     pub largest_hole: f64,
 }
 
-/// What holds a layer. Where one of the `drawn` layers is in the drawing, it alone counts; else what is not `released`; else what
-/// an `undercut` leaves.
+/// Anchoring of a layer. Where one of the `drawn` layers is in the drawing, it alone counts; else what is not
+/// `released`; else what an `undercut` leaves.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Anchoring {
     /// Drawn layers under which it is fixed to the wafer.
     pub drawn: Vec<String>,
     /// Drawn layers over which it is free (a trench from behind); the rest of it is held.
     pub released: Vec<String>,
-    /// How far the etchant reaches under an edge [m]: what is wider than twice this is held.
+    /// Reach of the etchant under an edge [m]: areas wider than twice this are held.
     pub undercut: Option<f64>,
 }
 

@@ -5,7 +5,7 @@ use crate::domains::elements;
 use crate::structure::{Beam, GapVoltage, Impact, NodeId};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// What an impact loses, as far as the netlist said it.
+/// Impact losses, where the netlist gives them.
 fn impact(impact: &Impact) -> impl Iterator<Item = (&'static str, f64)> {
     let given = [("restitution", impact.restitution), ("speed", impact.speed)];
     given.into_iter().filter_map(|(name, value)| Some((name, value?)))
