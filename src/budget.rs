@@ -1,11 +1,11 @@
-//! What a computation may use: bytes, unknowns, processor time, wall time; and how it is told to stop.
+//! Limits of a computation: bytes, unknowns, processor time, wall time; and its cancellation.
 //!
 //! A budget belongs to a thread for the time of [`within`], so that solvers ask it where their loops turn and no signature
 //! carries it. Without one (the command, the plug-in, a library user) every question is a load of a thread-local and
 //! nothing is refused. [`check`] stands in every inner loop that a request can make long; [`lay_out`] and [`unknowns`] stand
 //! before what a request can make large.
 //!
-//! What has to stop unwinds to its [`within`] as a panic does, but without one: no hook runs and nothing is logged
+//! A stopped computation unwinds to its [`within`] like a panic, but without one: no hook runs and nothing is logged
 //! (`std::panic::resume_unwind`; Salsa stops its queries this way). Whatever was half computed is dropped on the way. A
 //! value that outlives a stopped computation, as the storage of a device does, must be made anew:
 //! [`Device::recover`](crate::device::Device::recover).
@@ -86,7 +86,7 @@ impl Budget {
         Arc::ptr_eq(&self.0, &other.0)
     }
 
-    /// The same for want of time.
+    /// As [`Budget::cancel`], with the time limit as the reason.
     pub fn expire(&self) {
         self.0.order.store(LATE, Ordering::Relaxed);
     }
@@ -111,7 +111,7 @@ struct ThreadBudget {
     checks: Cell<u32>,
     cpu_at_start: Option<Duration>,
     cpu_next: Cell<Instant>,
-    /// Processor time that the purse was told of.
+    /// Processor time charged to the quota so far.
     cpu_charged: Cell<Duration>,
 }
 
@@ -156,7 +156,7 @@ pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped>
     let reported = HELD.with(|held| held.borrow().as_ref().map_or(Duration::ZERO, |held| held.cpu_charged.get()));
     drop(restore);
     if budget.0.allowance.purse.is_some() {
-        // of what a part told the purse the whole does not tell it again
+        // time that a part has charged is not charged again by the whole
         HELD.with(|held| {
             held.borrow().iter().for_each(|whole| whole.cpu_charged.set(whole.cpu_charged.get() + reported))
         });
@@ -167,7 +167,7 @@ pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped>
     })
 }
 
-/// Stops here if the purse is empty.
+/// Stops here if the quota is used up.
 fn check_quota() {
     let purse = HELD.with(|held| held.borrow().as_ref().and_then(|held| held.budget.0.allowance.purse.clone()));
     if let Some(Err(why)) = purse.map(|purse| purse.check_cpu()) {
@@ -255,7 +255,7 @@ impl ThreadBudget {
         cpu.filter(|most| used > *most).map(|most| Stopped::Cpu { seconds: most.as_secs() })
     }
 
-    /// Processor time since the start, of which the purse is told.
+    /// Processor time since the start, charged to the quota.
     fn settle(&self) -> Option<Duration> {
         let used = thread_cpu()?.saturating_sub(self.cpu_at_start?);
         if let Some(purse) = &self.budget.0.allowance.purse {

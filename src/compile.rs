@@ -17,7 +17,7 @@ pub use crate::options::{CompileOptions, Formulation, Junctions, Scheme};
 /// A ready model with everything it came from.
 #[derive(Debug, Clone)]
 pub struct CompiledModel {
-    /// What was drawn.
+    /// The structure.
     pub structure: Arc<Structure>,
     /// Netlist parameters with the values they took.
     pub parameters: Vec<(String, Setting)>,
@@ -92,7 +92,7 @@ impl CompiledModel {
     }
 }
 
-/// Why no model came out.
+/// Errors of a compilation.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CompileError {
@@ -118,7 +118,7 @@ pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<CompiledMode
 /// A netlist as drawn with its options settled, before any mesh.
 #[derive(Debug, Clone)]
 pub struct ParsedStructure {
-    /// What was drawn.
+    /// The structure.
     pub structure: Arc<Structure>,
     /// Netlist parameters with the values they took.
     pub parameters: Vec<(String, Setting)>,
@@ -186,7 +186,7 @@ impl ParsedStructure {
     }
 }
 
-/// What to say of junctions that the calibration does not know.
+/// Warning about junctions outside the calibrated range.
 fn beyond_table(structure: &Structure, options: &CompileOptions, parts: &Assembly) -> Option<Diagnostic> {
     if options.junctions != Junctions::Calibrated {
         return None;
@@ -228,7 +228,7 @@ fn in_joints_of(parts: &Assembly, options: &CompileOptions) -> Option<Result<Arc
 
 #[cfg(test)]
 mod tests {
-    //! What cannot be laid out is refused before anything is.
+    //! Structures beyond the limits are rejected before any allocation.
     use super::*;
 
     #[test]

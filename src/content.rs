@@ -52,7 +52,7 @@ impl Fnv {
         self.text(&format!("{:?}", CompileOptions { set: Vec::new(), ..options.clone() }));
     }
 
-    /// What has come of it.
+    /// The hash.
     pub fn value(&self) -> u128 {
         self.0
     }

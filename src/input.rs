@@ -1,6 +1,7 @@
 //! The front end of every command: a file in any language to a bundle that the rest reads.
 //!
-//! A netlist is its own bundle. A layout is converted, and the bundle holds the netlist that came out, under the layout's name.
+//! A netlist is its own bundle. A layout is converted, and the bundle holds the resulting netlist under the layout's
+//! name.
 
 use crate::layout::convert::{ConvertError, Converted, convert};
 use crate::layout::{self, FlatLayout, LayoutError, LayoutFormat, Process, ProcessError};
@@ -22,7 +23,7 @@ pub struct LayoutChoice {
 pub struct InputBundle {
     /// The netlist.
     pub bundle: Bundle,
-    /// What became of a layout; none for netlists.
+    /// Result of converting a layout; `None` for netlists.
     pub converted: Option<Converted>,
 }
 
@@ -70,7 +71,8 @@ impl LayoutChoice {
     }
 }
 
-/// Reads a netlist with everything it uses, or a layout. `watch` is told the share of a layout that was read and says whether to go on.
+/// Reads a netlist with everything it uses, or a layout. `watch` receives the fraction of a layout that was read and
+/// returns whether to continue.
 ///
 /// # Errors
 /// See [`FrontError`].

@@ -1,13 +1,14 @@
 //! Bimorph: behavioural device models of electro-mechanical microsystems, for circuits.
 //!
 //! # Layout
-//! Data flows one way. A [`netlist`] describes what was drawn ([`layout`] reads masks); it becomes a [`structure`] (materials, beams, plates,
-//! anchors, gaps, combs, ports, all in SI). [`options`] is the one table of what a model may be told. `discretize` turns beams into rigid bodies and flexible joints;
-//! `multibody` holds those bodies and the O(n+m) recursion over them; `domains` are the forces and rest offsets that
-//! heat and voltage cause. `solve` advances or balances a model, [`refine`] chooses how fine it must be, [`readout`] finds signals and ports by name, [`analysis`]
-//! holds the verbs every front shares, and [`device`] is the electrical view that a circuit simulator drives. [`results`]
-//! writes tables and pictures, [`export`] a model for other simulators.
-//! [`compile`](mod@compile) walks that path once, from netlist text to a ready model.
+//! Data flows one way. A [`netlist`] describes what was drawn ([`layout`] reads masks); it becomes a [`structure`]
+//! (materials, beams, plates, anchors, gaps, combs, ports, all in SI). [`options`] is the one table of the options of a
+//! model. `discretize` turns beams into rigid bodies and flexible joints; `multibody` holds those bodies and the O(n+m)
+//! recursion over them; `domains` are the forces and rest offsets that heat and voltage cause. `solve` advances or
+//! balances a model, [`refine`] chooses the mesh, and [`readout`] finds signals and ports by name. [`analysis`] holds
+//! the analyses that all front ends share, and [`device`] is the electrical view for a circuit simulator. [`results`]
+//! writes tables and pictures, [`export`] a model for other simulators. [`compile`](mod@compile) walks that path once,
+//! from netlist text to a ready model.
 //!
 //! [`budget`] bounds what a computation may use, and stops it.
 //!

@@ -1,10 +1,10 @@
-//! What a computation may use.
+//! Limits of a computation.
 
 use super::{OwnerQuota, Stopped};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What a computation may use.
+/// Limits of a computation.
 #[derive(Debug, Clone)]
 pub struct Allowance {
     /// Bytes that it may lay out, all together.
@@ -17,7 +17,7 @@ pub struct Allowance {
     pub cpu: Option<Duration>,
     /// When it must have ended; none: any time.
     pub deadline: Option<Instant>,
-    /// What it draws on together with others; none: nothing.
+    /// Quota that it shares with others; `None`: no quota.
     pub purse: Option<Arc<OwnerQuota>>,
 }
 

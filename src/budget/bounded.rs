@@ -11,7 +11,7 @@ impl Budget {
         self.part_with(Allowance::clone)
     }
 
-    /// Whether it was stopped for want of time.
+    /// Whether it was stopped by its time limit.
     pub fn is_late(&self) -> bool {
         self.0.order.load(Ordering::Relaxed) == LATE
     }
@@ -45,7 +45,8 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
-    /// What is beyond the bound is given up and the rest goes on, with a budget and without; the part's bytes are its own.
+    /// A part beyond its bound is abandoned and the rest continues, with a budget and without; the part's bytes are its
+    /// own.
     #[test]
     fn too_much_is_given_up() {
         assert_eq!(bounded(10, || unknowns(11)), None);

@@ -4,10 +4,10 @@ use std::time::Duration;
 
 /// Checks between two looks at the clock; a look costs some 30 ns.
 pub(super) const CHECKS_PER_LOOK: u32 = 16;
-/// Time between two looks at the thread's processor time, which the system tells in a file.
+/// Interval between reads of the thread's processor time, which the system provides in a file.
 pub(super) const CPU_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Processor time of this thread, where the system tells it (Linux); elsewhere deadlines alone hold.
+/// Processor time of this thread, where the system provides it (Linux); elsewhere deadlines alone hold.
 pub(crate) fn thread_cpu() -> Option<Duration> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     text.split_whitespace().next()?.parse().ok().map(Duration::from_nanos)

@@ -1,7 +1,7 @@
-//! What all computations of one owner may use together: bytes at once, and processor time within an hour.
+//! Quota that all computations of one owner share: bytes in use, and processor time within an hour.
 //!
-//! Processor time is a vessel that leaks: what was used flows out evenly, the whole allowance in an hour (the leaky bucket of
-//! J. Turner, 1986).
+//! Processor time follows a leaky bucket (J. Turner, 1986): used time drains at a constant rate, the whole allowance in
+//! an hour.
 
 use super::Stopped;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// Time in which the allowance of processor time comes back.
 pub const WINDOW: Duration = Duration::from_secs(3600);
 
-/// What several computations draw on.
+/// Quota shared by several computations.
 #[derive(Debug)]
 pub struct OwnerQuota {
     /// Most bytes that they lay out at once; none: any.
@@ -91,7 +91,7 @@ impl OwnerQuota {
 
 #[cfg(test)]
 mod tests {
-    //! What is taken is bounded, what is given back may be taken again, and time comes back evenly.
+    //! Reservations are bounded, released amounts can be reserved again, and time is restored at a constant rate.
     use super::*;
 
     #[test]
@@ -115,7 +115,7 @@ mod tests {
         assert_eq!(purse.solvent_at(start), Ok(()));
         purse.spend_at(start, Duration::from_secs(30));
         let Err(Stopped::OwnerCpu { used, .. }) = purse.solvent_at(start) else { panic!("it is used up") };
-        // between the making of the purse and the start no more than a moment has passed
+        // only a moment has passed between the creation of the quota and the start
         assert!((used.as_secs_f64() - 380.0).abs() < 1e-3, "{used:?}");
         // 360 s come back in an hour, one in ten seconds: 20 in 200
         assert!(purse.solvent_at(after(199)).is_err());

@@ -7,7 +7,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Stopped {
-    /// Nobody waits for it any more.
+    /// The request was cancelled.
     #[error("cancelled")]
     Cancelled,
     /// Its wall time is over.
@@ -16,15 +16,15 @@ pub enum Stopped {
     /// It used up its processor time.
     #[error("processor time: at most {seconds} s")]
     Cpu {
-        /// What it had [s].
+        /// The time limit [s].
         seconds: u64,
     },
     /// It would lay out more than it may.
     #[error("memory: at most {most} bytes, needs at least {needed}")]
     Bytes {
-        /// What it may lay out [byte].
+        /// The limit [byte].
         most: usize,
-        /// What it would have laid out by now [byte].
+        /// The required memory [byte].
         needed: usize,
     },
     /// All computations of its owner would lay out more at once than they may.
@@ -32,11 +32,11 @@ pub enum Stopped {
         "client_bytes: at most {most} bytes at once in all computations of one client, {used} used, {more} more asked for"
     )]
     OwnerBytes {
-        /// What they may lay out [byte].
+        /// The quota [byte].
         most: usize,
-        /// What they have laid out [byte].
+        /// Memory in use [byte].
         used: usize,
-        /// What this one would lay out besides [byte].
+        /// Memory that this computation requires in addition [byte].
         more: usize,
     },
     /// All computations of its owner used up their processor time.
@@ -46,25 +46,25 @@ pub enum Stopped {
         used.as_secs_f64()
     )]
     OwnerCpu {
-        /// What they may use within [`super::WINDOW`].
+        /// The quota within [`super::WINDOW`].
         most: Duration,
-        /// What they have used.
+        /// Time used.
         used: Duration,
     },
     /// More modes of more unknowns than may be sought.
     #[error("mode_work: at most {most} unknowns times modes squared, got {got}")]
     ModeWork {
-        /// What it may be.
+        /// The limit.
         most: usize,
-        /// What it would be.
+        /// The required value.
         got: usize,
     },
     /// A model with more unknowns than it may have.
     #[error("unknowns: at most {most}, got at least {got}")]
     Unknowns {
-        /// What it may have.
+        /// The limit.
         most: usize,
-        /// What it would have.
+        /// The required value.
         got: usize,
     },
 }

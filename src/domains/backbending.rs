@@ -7,9 +7,9 @@
 //! σ_y(T) = σ_0·(T_s − T)/(T_s − T_0)  for T < T_s, else 0        T_0 ambient: full strength; T_s: no strength left
 //! −N/A ≤ σ_y(T̄),   ε never falls,   rest length h·(1 + α·(T̄ − T_0) − ε)
 //! ```
-//! This is a rest offset like thermal expansion, with the opposite sign (Popa et al. 2004, Q4 and Fig. 3: "a negative spring
-//! constant shortening the beam"). What it leaves out: bending stress across the arm, yield in tension while it cools, and
-//! time. σ_0 and T_s are constants of a process to be fitted; published ones were not found.
+//! This is a rest offset like thermal expansion, with the opposite sign (Popa et al. 2004, Q4 and Fig. 3: "a negative
+//! spring constant shortening the beam"). The model omits bending stress across the arm, yield in tension during
+//! cooling, and time. σ_0 and T_s are constants of a process to be fitted; published ones were not found.
 //!
 //! Reference: J. C. Simo, T. J. R. Hughes, "Computational inelasticity" (1998), §1.2: the return to the yield surface.
 

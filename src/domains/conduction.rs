@@ -1,9 +1,9 @@
 //! Conduction of heat between nodes and to those at ambient: mean rises of beams, and how long they lag behind the heat.
 //!
-//! Where a beam has a heat capacity, its time constant is the mean delay of its rise behind the heat of all that conducts with it (the first
-//! moment of its step response; Elmore, "The transient response of damped linear networks", J. Appl. Phys. 19 (1948)): with θ the steady rise
-//! along the beams, the rise that the heat C·θ would bring over θ. Along one beam of the capacity C that is, end temperatures θ_a and θ_b, in
-//! closed form
+//! Where a beam has a heat capacity, its time constant is the mean delay of its temperature rise behind the heat of all
+//! beams in its thermal network. This is the first moment of its step response (Elmore, "The transient response of
+//! damped linear networks", J. Appl. Phys. 19 (1948)): with θ the steady rise along the beams, the rise that the heat
+//! C·θ would bring over θ. Along one beam of the capacity C that is, end temperatures θ_a and θ_b, in closed form
 //! ```text
 //! mean rise                 φ̄   = (φ_a + φ_b)/2 + C/K·((θ_a + θ_b)/24 + P/(120·K))
 //! heat into the node at a   C·(θ_a/3 + θ_b/6 + P/(24·K))

@@ -14,7 +14,7 @@
 //! come to bear one after another, as in J. A. Greenwood, J. B. P. Williamson, Proc. R. Soc. A 295 (1966) 300; P is chosen
 //! so that micromachined parts rest within a few nanometres of where they touch.
 
-/// Distance at which surfaces touch unless told otherwise [m]; see [`touching_distance`].
+/// Default distance at which surfaces touch [m]; see [`touching_distance`].
 pub const TOUCH: f64 = 0.1e-6;
 /// Pressure P that the law is measured in [Pa].
 pub const PRESSURE: f64 = 1e12;

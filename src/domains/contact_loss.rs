@@ -53,7 +53,8 @@ impl Loss {
         self.chi
     }
 
-    /// What the closing speed [m/s] adds to the elastic force, as a fraction of it, and the derivative with the speed [s/m].
+    /// Damping force at the closing speed [m/s] as a fraction of the elastic force, and its derivative with the speed
+    /// [s/m].
     #[inline]
     pub fn fraction(&self, closing: f64) -> (f64, f64) {
         let added = self.chi * closing;

@@ -4,9 +4,10 @@
 //! ```text
 //! v = ω₀·g·√((8/27)·(g/t − 1) − (1 − t/g)²)
 //! ```
-//! and a part let go at the distance w of a stop swings through its place at ω₀·w. ω₀ is Rayleigh's quotient of the shape that the
-//! load bends the drawn mechanism into: the field of the gaps at one voltage, or a force along a stop. Gaps at the same voltage
-//! fall together. Neither stress nor voltage enters, so that the speed is a constant of the element.
+//! and a part released at the distance w of a stop passes its rest position at the speed ω₀·w. ω₀ is Rayleigh's
+//! quotient of the shape that the load bends the drawn mechanism into: the field of the gaps at one voltage, or a force
+//! along a stop. Gaps at the same voltage fall together. Neither stress nor voltage enters, so that the speed is a
+//! constant of the element.
 
 use super::contact_loss::Loss;
 use super::domain::{Configuration, Domain};
@@ -98,7 +99,8 @@ impl Bent {
         Self { stiffness, rest, unused, shapes: 0 }
     }
 
-    /// ω₀ [rad/s] of the shape that contacts bend the mechanism into together; none where they cancel or there is none.
+    /// ω₀ [rad/s] of the shape into which contacts bend the mechanism together; `None` where they cancel or there is no
+    /// contact.
     fn frequency(&mut self, system: &System, contacts: &[usize]) -> Option<f64> {
         let stiffness = self.stiffness.as_ref()?;
         let at = Configuration { q: &self.rest, linear: system.model.linear };

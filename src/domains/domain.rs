@@ -1,4 +1,4 @@
-//! What couples to a mechanism: one trait for fields, contacts, loads and the motion of a frame.
+//! Force elements of a mechanism: one trait for fields, contacts, loads and the motion of a frame.
 //!
 //! The mechanism knows bodies and joints; a domain knows where those are and what drives it, and says what that does to them.
 //! Its potential Π(q, u) gives all of it, so that forces, stiffness, charges and the small-signal response agree:
@@ -49,10 +49,11 @@ pub enum Law {
 
 /// One thing that acts on bodies. Forces are those of the residual: minus the wrench on each body.
 pub trait Domain {
-    /// What drives it: the voltage across a gap [V], the share of the dead loads that acts [1], a force [N], the motion of a frame.
+    /// Its input: the voltage across a gap [V], the fraction of the dead loads that acts [1], a force [N], the motion
+    /// of a frame.
     type Given: Copy;
 
-    /// `see` is told each body that forces act on.
+    /// Calls `see` for each body that forces act on.
     fn bodies(&self, see: impl FnMut(BodyId));
 
     /// `see` is called with each pair of bodies that the tangent couples; some come more than once.
@@ -102,12 +103,13 @@ pub trait Domain {
         true
     }
 
-    /// `lever` is told each point that a force of fixed direction acts on, and the force [N]: what a linear model's tangent leaves out.
+    /// Calls `lever` for each point with a force of fixed direction, and the force [N]: terms that the tangent of a
+    /// linear model omits.
     fn load_points(&self, at: Configuration<'_>, given: Self::Given, lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
         let _ = (at, given, lever);
     }
 
-    /// Π [J] but for the shares of a field, −½·C·V², and of contact, which are told apart below.
+    /// Π [J] without the terms of the field, −½·C·V², and of contact, which have functions of their own below.
     fn energy(&self, at: Configuration<'_>, given: Self::Given) -> f64 {
         let _ = (at, given);
         0.0
@@ -166,7 +168,7 @@ pub trait Domain {
         None
     }
 
-    /// What is left until it could not be closed further [m].
+    /// Remaining travel until the gap is closed completely [m].
     fn clearance(&self, at: Configuration<'_>) -> f64 {
         self.distance(at)
     }
@@ -189,7 +191,7 @@ pub trait Domain {
         0.0
     }
 
-    /// What its contact loses; none: it has no contact.
+    /// Contact losses; `None` without contact.
     fn loss(&self) -> Option<Loss> {
         None
     }
@@ -236,7 +238,7 @@ pub trait Domain {
         self.add_tangent(chord.at[1], given, pattern, tangent);
     }
 
-    /// What it is a function of, and how, where that is one approach.
+    /// The approach and the law, where it is a function of one approach.
     fn law(&self) -> Option<(&Approach, Law)> {
         None
     }

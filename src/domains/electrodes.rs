@@ -16,13 +16,13 @@ use nalgebra::Vector2;
 /// Two electrodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Electrodes {
-    /// What they measure.
+    /// The approach that they measure.
     pub approach: Approach,
     /// C(u).
     pub capacitor: Capacitor,
     /// How they touch; none: never.
     pub contact: Option<Contact>,
-    /// What an impact loses.
+    /// Impact losses.
     pub loss: Loss,
 }
 
@@ -34,7 +34,7 @@ impl Electrodes {
 }
 
 impl Electrodes {
-    /// What rates add to that force at approach `u` that changes at `rate` [m/s], and its derivatives with both.
+    /// Rate-dependent part of that force at approach `u` that changes at `rate` [m/s], and its derivatives with both.
     fn lost(&self, (u, rate): (f64, f64)) -> (f64, f64, f64) {
         let (force, slope) = self.pressed(u);
         let (added, by_rate) = self.loss.fraction(rate);

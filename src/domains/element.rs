@@ -1,6 +1,6 @@
 //! How a netlist places a member of a domain that has an element of its own.
 
-/// An element of a domain: what a netlist and a layout need to know of it.
+/// An element of a domain, as netlists and layouts need it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DomainElement {
     /// As netlists call it.

@@ -1,8 +1,8 @@
 //! The potential whose gradient the residual is, and with it the energy that an undamped motion keeps.
 //!
-//! At constant voltages and temperatures Π = U(q) − Σ ½·C(q)·V² + contact − load · displacement, with the forces and
-//! the motion of the frame that sources give among the loads, and kinetic energy plus Π
-//! does not change: what the sources deliver is in −½·C·V².
+//! At constant voltages and temperatures, the potential is Π = U(q) − Σ ½·C(q)·V² + contact − load · displacement.
+//! Forces and frame motion from sources count among the loads. Kinetic energy plus Π is constant; the energy delivered
+//! by the sources is part of −½·C·V².
 
 use super::domain::Domain;
 use super::drive::Drive;

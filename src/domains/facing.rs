@@ -108,7 +108,7 @@ impl FacingStretch {
         Contact { touch: self.touch, area: 0.0 }.least()
     }
 
-    /// What the shape functions of a unit length take z by.
+    /// Factors from shape functions of unit length to z.
     #[inline]
     pub(super) fn scale(&self) -> Vector4<f64> {
         Vector4::new(1.0, self.length, 1.0, self.length)

@@ -71,7 +71,8 @@ impl FacingStretch {
     }
 }
 
-/// What rates add to the force over z of a stretch, and its derivatives with z and with the rate of z; none where nothing is pressed.
+/// Rate-dependent part of the force over z of a stretch, and its derivatives with z and with the rate of z; `None`
+/// where nothing is in contact.
 fn lost(beams: &FacingBeams, local: &Local<'_>, rate: &impl Fn(usize) -> Pose) -> Option<(Derivatives, Matrix4<f64>)> {
     let facing = &local.stretch.facing;
     if facing.apart(&local.z) {

@@ -15,7 +15,7 @@ pub struct Opening {
     pub side: f64,
 }
 
-/// What a station measures, with the derivatives over the pose of its body.
+/// Deflection at a station, with the derivatives over the pose of its body.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Deflection {
     /// Displacement along the axis [m], and its derivatives with x, y, θ.
@@ -28,7 +28,7 @@ pub(super) struct Deflection {
 }
 
 impl Opening {
-    /// What a point measures at a configuration.
+    /// Deflection of a point in a configuration.
     #[inline]
     pub(super) fn deflection(&self, point: &MaterialPoint, q: &[Pose], linear: bool) -> Deflection {
         let BodyId::Free(k) = point.body else { return Deflection::default() };
@@ -82,8 +82,8 @@ pub struct Flank {
 }
 
 impl Flank {
-    /// What a segment bends beyond its cubic towards the other side at a distance `at` from the start of the gap [m], under a load of
-    /// `load` along it [N/m].
+    /// Deflection of a segment beyond its cubic, towards the other side, at distance `at` from the start of the gap
+    /// [m], under the load per length `load` [N/m].
     pub(super) fn bent(&self, segment: usize, at: f64, load: f64) -> f64 {
         let Some(yields) = self.yields.get(segment) else { return 0.0 };
         let [begin, end] = [self.stations[segment].at, self.stations[segment + 1].at];
@@ -101,7 +101,7 @@ pub(super) fn onto(weights: &EndWeights, ends: Vector4<f64>) -> Vector4<f64> {
     weights.as_ref().map_or(ends, |weights| **weights * ends)
 }
 
-/// What changes with the ends of a segment where something changes by `first` with those of a stretch on it.
+/// Gradient over the ends of a segment, from the gradient `first` over the ends of a stretch on it.
 #[inline]
 pub(super) fn back(weights: &EndWeights, first: Vector4<f64>) -> Vector4<f64> {
     weights.as_ref().map_or(first, |weights| weights.tr_mul(&first))

@@ -1,9 +1,10 @@
 //! From a drawn gap to its sides and stretches: each side is cut where the beams along it are, and between two cuts of either side
 //! both shapes are cubics.
 //!
-//! A segment of a beam bends as the cubic between the bodies at its ends when forces act there alone, so that loads which are
-//! work-equivalent to a pressure along that cubic put the bodies exactly where a linear beam under the pressure has them. What is
-//! left is the shape within a segment, p·s²·(h − s)²/(24·EI), whose share in the deflection falls with the fourth power of h.
+//! Under end forces alone, a segment of a beam bends as the cubic between the bodies at its ends. Loads that are
+//! work-equivalent to a pressure along that cubic therefore place the bodies exactly as the linear beam under the
+//! pressure. The remaining term is the shape within a segment, p·s²·(h − s)²/(24·EI), whose fraction of the deflection
+//! falls with the fourth power of h.
 
 use super::facing::FacingStretch;
 use super::facing_side::{EndWeights, Flank};
@@ -35,8 +36,8 @@ impl<'d> BeamRows<'d> {
         Self { structure, at }
     }
 
-    /// The beams in a row from one node to another along a gap, each with true where it is drawn against the direction of the
-    /// gap; none where beams do not lead there in a straight line as long as the gap.
+    /// The chain of beams from one node to another along a gap, each with true where its direction is opposite to that
+    /// of the gap. `None` where no straight chain of the gap's length connects the nodes.
     fn row(&self, gap: &BeamGap, [from, to]: [NodeId; 2]) -> Option<Vec<(usize, bool)>> {
         let (mut row, mut node, mut at) = (Vec::new(), from, 0.0);
         let within = gap.length * (1.0 + ALIKE);

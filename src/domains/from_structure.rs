@@ -19,7 +19,7 @@ pub struct Station {
 /// A drawing, as domains read it.
 #[derive(Clone, Copy)]
 pub struct StructureView<'a, 'p> {
-    /// What is drawn.
+    /// The structure.
     pub structure: &'a Structure,
     /// The material point of a node.
     pub point: &'p dyn Fn(NodeId) -> MaterialPoint,
@@ -30,7 +30,7 @@ pub struct StructureView<'a, 'p> {
 }
 
 impl<'a> StructureView<'a, '_> {
-    /// What a netlist placed of a domain's own element.
+    /// Placed elements of the domain's own kind.
     pub fn placed<D: FromStructure>(&self) -> impl Iterator<Item = &'a PlacedElement> + use<'a, D> {
         self.structure.placed.iter().filter(|placed| D::ELEMENT.is_some_and(|element| placed.element == element.name))
     }
@@ -43,13 +43,13 @@ impl<'a> StructureView<'a, '_> {
 
 /// A domain whose members are drawn.
 pub trait FromStructure: Domain<Given = f64> + Sized {
-    /// `put` is told each member of the drawing: its name, the voltage across it if it has a field, and itself.
+    /// Calls `put` for each member of the structure: its name, the voltage across it if it has a field, and itself.
     fn lay<'a>(drawing: &StructureView<'a, '_>, put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self));
 
     /// The element that netlists place it with, where that is its own and no other part of a drawing.
     const ELEMENT: Option<DomainElement> = None;
 
-    /// `put` is told its dampers, before [`FromStructure::moved`]: damping is constant, and the mechanism's own.
+    /// Calls `put` for its dampers, before [`FromStructure::moved`]: damping is constant, and belongs to the mechanism.
     fn dampers(&self, put: impl FnMut(Damper)) {
         let _ = put;
     }
@@ -66,6 +66,6 @@ pub struct PlacedMember<'a, M> {
     pub name: &'a str,
     /// The voltage across it; none: it has no field.
     pub voltage: Option<&'a GapVoltage>,
-    /// What it does.
+    /// The force element.
     pub member: M,
 }

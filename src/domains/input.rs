@@ -1,4 +1,4 @@
-//! What a source gives that is no voltage: forces at points, heat into beams, the motion of the frame.
+//! Inputs other than voltages: forces at points, heat into beams, the motion of the frame.
 
 use super::approach::MaterialPoint;
 

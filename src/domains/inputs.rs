@@ -1,5 +1,5 @@
-//! What acts on a mechanism beside voltages: forces and moments at points, heat into beams, and the motion of the frame that
-//! it is mounted on ([`super::moving_frame`]).
+//! Non-electrical inputs of a mechanism: forces and moments at points, heat into beams, and the motion of the frame
+//! that it is mounted on ([`super::moving_frame`]).
 
 use super::domain::{Configuration, Domain};
 use super::drive::Drive;

@@ -34,7 +34,7 @@ pub fn lagged(start: f64, time_constant: f64, t: f64, p: [f64; 3]) -> f64 {
     Lag::new(time_constant, t).rise(start, p)
 }
 
-/// What a time is to a time constant: the exponentials that all heaters with this time constant have in common.
+/// Exponentials of a time over a time constant, common to all heaters with this time constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lag {
     time_constant: f64,

@@ -2,7 +2,7 @@
 //! conductors g become one between each two of its neighbours, gᵢ·gⱼ/Σg. In the order and on the pattern of
 //! [`crate::multibody`] that is O(n) for chains and trees.
 //!
-//! Nothing is subtracted: every conductance comes out right to some roundings, whether a network has milliohms beside teraohms or not.
+//! Nothing is subtracted: every conductance is exact to a few roundings, also in a network with milliohms and teraohms.
 //! The elimination is that of a weighted Laplacian G, without the cancellation on its diagonal.
 //!
 //! Reference: S. Rosen, "A new network theorem", J. IEE 62 (1924); W. K. Grassmann, M. I. Taksar, D. P. Heyman, "Regenerative

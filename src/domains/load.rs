@@ -6,7 +6,7 @@ use crate::multibody::planar::{self, Pose};
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
 use nalgebra::Vector2;
 
-/// A dead load on a point. What drives it is the share of it that acts [1]; of one unit, its size [N, N·m].
+/// A dead load on a point. Its input is the fraction of it that acts [1]; for a unit load, its size [N, N·m].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadLoad {
     /// Where it acts.

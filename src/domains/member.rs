@@ -42,7 +42,7 @@ macro_rules! domains {
                 all
             }
 
-            /// `put` is told its dampers, before [`Member::moved`].
+            /// Calls `put` for its dampers, before [`Member::moved`].
             pub fn dampers(&self, put: impl FnMut(Damper)) {
                 match self { $(Self::$kind(law) => law.dampers(put),)+ }
             }

@@ -1,4 +1,4 @@
-//! Domains: what heat, voltage, contact and loads do to a mechanism.
+//! Domains: the effects of heat, voltage, contact and loads on a mechanism.
 //!
 //! Two kinds (Popa et al., "Computationally efficient dynamic modeling of MEMS", Q4): a *rest offset* of a joint (thermal
 //! expansion ∝ V², residual stress) and a *force law* between two bodies (comb, plates, contact). Force laws come from a
@@ -14,7 +14,7 @@
 //! | [`beam_line`] | the centreline of a beam: how it bends in a motion, and how far its segments are turned |
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
 //! | [`contact`] | pressure between surfaces that touch |
-//! | [`contact_loss`] | what an impact loses |
+//! | [`contact_loss`] | impact losses |
 //! | [`contact_speed`] | at which speed, from statics |
 //! | [`loss_derivatives`] | derivatives of the forces of that over the bodies |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
@@ -30,13 +30,13 @@
 //! | [`thermal`] | mean temperature rise of beams that carry current |
 //! | [`lag`] | how a rise lags behind its steady value |
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
-//! | [`inputs`] | forces at points, heat into beams, the motion of the frame: what they do; `input`: which there are |
+//! | [`inputs`] | effects of forces at points, heat into beams and frame motion; `input`: their kinds |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
 //! | `side` | the side to which a part buckles |
 //! | [`stop`] | how a stop bears |
 //! | [`quotient`] | discrete gradients of members over a step |
-//! | `reading` | what is read of gaps: capacitance, distance, pull, which of them touch |
-//! | [`system`] | a multibody model with its gaps, loads and network: what `solve` works on |
+//! | `reading` | quantities of gaps: capacitance, distance, pull, contact |
+//! | [`system`] | a multibody model with its gaps, loads and network: the input of `solve` |
 
 pub mod approach;
 pub mod backbending;

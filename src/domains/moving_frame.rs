@@ -1,4 +1,4 @@
-//! The frame that a mechanism is mounted on, as it moves: what the bodies feel of its motion.
+//! Inertia forces on the bodies of a mechanism in a moving frame.
 //!
 //! Displacements are those within the frame. In a frame with the acceleration a of its origin (that of the drawing) and the
 //! rate Ω about z, a body of mass m and inertia J with its centre at r feels
@@ -24,7 +24,7 @@ pub struct FrameMotion {
     pub turning: f64,
 }
 
-/// All bodies in a frame. What drives them is its motion.
+/// All bodies in a frame. Its input is the frame motion.
 #[derive(Debug, Clone, Copy)]
 pub struct FrameInertiaForces<'a>(pub &'a [Body]);
 

@@ -4,9 +4,9 @@
 //! RC times (10 kΩ × 1 pF = 10 ns) are far below mechanical ones. Then every potential is a fixed linear function of the
 //! source voltages, found once by nodal analysis, and by reciprocity the same numbers divide displacement currents among the ports.
 //!
-//! Ideal sources form a forest: the nodes of a tree have one unknown potential, or none where it touches ground, and differ by the sources
-//! between them. What is left is a network of conductors (`laplacian`); the current of each source is what leaves the part of its tree
-//! that hangs on it.
+//! Ideal sources form a forest: the nodes of a tree have one unknown potential, or none where it touches ground, and
+//! differ by the sources between them. The remaining network consists of conductors (`laplacian`). The current of each
+//! source is the current that leaves the part of its tree beyond it.
 
 mod source_tree;
 
@@ -118,7 +118,7 @@ impl ElectricalNetwork {
         CircuitError::Range { resistor: smallest.unwrap_or(0) }
     }
 
-    /// Current into the network at the plus of each source: what leaves the nodes that hang on it.
+    /// Current into the network at the plus of each source: the current that leaves the nodes beyond it.
     fn conductance(&self, known: &KnownPotentials, potential: &DMatrix<f64>) -> DMatrix<f64> {
         let count = self.sources.len();
         // what leaves each node that a source touches
@@ -275,7 +275,8 @@ mod tests {
         assert_eq!(circuit.solve(), Err(CircuitError::SourceLoop { source_index: 1 }));
     }
 
-    /// Conductances without end, or whose sum is, are told by the smallest resistance, also without any source.
+    /// Infinite conductances, or conductances with an infinite sum, are reported by the smallest resistance, also
+    /// without any source.
     #[test]
     fn conductances_out_of_range_are_told() {
         for resistors in [vec![(0, 1, 1.0), (0, 1, 1e-310)], vec![(0, 1, 1.01e-308), (0, 1, 1e-308)]] {

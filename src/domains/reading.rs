@@ -1,12 +1,12 @@
-//! What is read of a system's gaps, by their number.
+//! Quantities of a system's gaps, by number.
 
 use super::domain::Domain;
 use super::member::Member;
 use super::system::System;
 use crate::multibody::planar::Pose;
 
-/// Largest penetration at the start of a step that may end beyond the law of contact, of the largest that the law knows [1]. What is really pressed
-/// too hard gets there in smaller steps.
+/// Largest penetration at the start of a step that may end beyond the law of contact, of the largest that the law knows
+/// [1]. A contact that is really pressed beyond it gets there in smaller steps.
 const PRESSED_BEFORE: f64 = 0.5;
 
 impl System {
@@ -54,8 +54,8 @@ impl System {
         self.members[gap].touching()
     }
 
-    /// What is left of a gap until it could not be closed further [m]: its distance; of a stop the way and, beyond it, what a touch
-    /// takes.
+    /// Remaining travel of a gap until it is closed completely [m]: its distance; for a stop, the travel and, beyond
+    /// it, the largest penetration.
     pub fn clearance(&self, gap: usize, q: &[Pose]) -> f64 {
         self.members[gap].clearance(self.at(q))
     }
@@ -65,8 +65,8 @@ impl System {
         self.touching(gap).is_some_and(|[touch, _]| self.distance(gap, q) < touch)
     }
 
-    /// What the balance of forces is measured in where parts touch [N]: the largest force of contact; at a touch that bears next to
-    /// nothing, a thousandth of the attraction there. 0 where nothing touches. `volts` of each gap.
+    /// Scale of the force balance where parts touch [N]: the largest contact force. At a contact with almost no load, a
+    /// thousandth of the attraction there. 0 where nothing touches. `volts` of each gap.
     pub fn contact_scale(&self, q: &[Pose], volts: &[f64]) -> f64 {
         let of = |(g, (gap, volts)): (usize, (&Member, &f64))| {
             let bearing = gap.bearing(self.at(q));
@@ -94,8 +94,9 @@ impl System {
         self.members.iter().map(|gap| gap.contact_work(self.at(q), dq).abs()).sum()
     }
 
-    /// The largest change of the distance of a contact with a change `dq` at the end of a step from `before` to `q`, over how far it is pressed,
-    /// `least` [m] at least [1]; infinite where the step leaps beyond the law of contact.
+    /// The largest change of a contact distance with a change `dq` at the end of a step from `before` to `q`. It is
+    /// relative to the penetration, of at least `least` [m] [1], and infinite where the step exceeds the law of
+    /// contact.
     pub fn contact_change(&self, [before, q]: [&[Pose]; 2], dq: &[Pose], least: f64) -> f64 {
         let change = |gap: &Member| {
             let [touch, allowed] = gap.touching()?;
@@ -106,7 +107,7 @@ impl System {
             }
             (pressed > 0.0).then(|| gap.distance_change(self.at(q), dq).abs() / pressed.max(least))
         };
-        // a sum with what is not a number is none
+        // a sum that includes NaN is NaN
         self.members.iter().filter_map(change).fold(0.0, |most, one| if one <= most { most } else { one })
     }
 }

@@ -76,7 +76,8 @@ impl StopKind {
     }
 }
 
-/// What rates add to the force against the approach `u` [m] that changes at `rate` [m/s], and its derivatives with both.
+/// Rate-dependent part of the force against the approach `u` [m] that changes at `rate` [m/s], and its derivatives with
+/// both.
 pub(super) fn lost(stop: &StopKind, loss: &Loss, ways: &[Option<f64>; 2], (u, rate): (f64, f64)) -> (f64, f64, f64) {
     let side = |way: Option<f64>, u: f64, closing: f64| {
         let (force, slope) = way.map_or((0.0, 0.0), |w| stop.force(w - u));

@@ -16,13 +16,13 @@ use nalgebra::Vector2;
 /// A stop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StopPair {
-    /// What it measures.
+    /// The approach that it measures.
     pub approach: Approach,
     /// Way along the approach and against it until they touch [m].
     pub ways: [Option<f64>; 2],
     /// How it bears.
     pub stop: StopKind,
-    /// What an impact loses.
+    /// Impact losses.
     pub loss: Loss,
 }
 

@@ -13,21 +13,20 @@ use crate::multibody::{BlockMatrix, BodyId, Model, forces};
 use nalgebra::Vector2;
 use std::sync::Arc;
 
-/// What `solve` works on. Immutable; shared by sessions.
+/// The mechanical system that `solve` works on. Immutable; shared by sessions.
 #[derive(Debug, Clone)]
 pub struct System {
     /// Bodies and joints.
     pub model: Model,
-    /// What acts across gaps and on bodies, in the order of [`Drive::volts`]: gaps first.
+    /// Force elements across gaps and on bodies, in the order of [`Drive::volts`]: gaps first.
     pub members: Vec<Member>,
     /// Dead loads.
     pub loads: Vec<DeadLoad>,
     /// Ports, sources, heaters.
     pub electrics: Arc<Electrics>,
-    /// What displacements are measured against [m]: the narrowest beam or the smallest gap, whichever is smaller; 1 µm where
-    /// there is neither.
+    /// Scale of displacements [m]: the narrowest beam or the smallest gap, whichever is smaller; 1 µm without either.
     pub length_scale: f64,
-    /// Centrelines of the beams in netlist order: what directions of buckling are named by.
+    /// Centrelines of the beams in netlist order, which name directions of buckling.
     pub beams: Arc<Vec<BeamLine>>,
 }
 
@@ -96,7 +95,8 @@ impl System {
         self.add_input_tangent(at, drive, tangent);
     }
 
-    /// The tangent ∂r/∂q and the residual r. The tangent's held directions are left to the caller, who may add inertia.
+    /// The tangent ∂r/∂q and the residual r. Held directions of the tangent are left to the caller, which may add
+    /// inertia.
     pub fn tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
         r.fill(Pose::zeros());
         self.add_tangent(q, drive, tangent, r);
@@ -189,8 +189,8 @@ impl System {
         self.add_levers(q, drive, tangent);
     }
 
-    /// The share in it of the points at which forces act: a body that turns by θ carries the point at its arm r along, and the force F,
-    /// which keeps its direction, gets the lever −θ·r, a moment of −θ·(r·F).
+    /// Its geometric part from the points of application of forces. A body that rotates by θ moves the point at its arm
+    /// r. The force F keeps its direction and gets the lever −θ·r, a moment of −θ·(r·F).
     pub fn add_levers(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
         if !self.model.linear {
             return;

@@ -37,8 +37,8 @@ pub struct Heating {
 }
 
 impl Heating {
-    /// Finds the forms over `sources` source voltages, of which the first drive the network. `sink[node]` tells which nodes
-    /// stay at ambient.
+    /// Finds the forms over `sources` source voltages, of which the first drive the network. `sink[node]` is true for
+    /// nodes at ambient temperature.
     ///
     /// # Errors
     /// [`NoHeatSink`].

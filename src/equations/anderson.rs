@@ -13,7 +13,7 @@ use nalgebra::{SMatrix, SVector};
 
 /// Differences kept.
 const DEPTH: usize = 4;
-/// A difference that is this much shorter than what it was before the others were taken out tells nothing new.
+/// A difference whose orthogonal remainder is shorter than this fraction of its length is dropped as dependent.
 const DEPENDENCE_TOLERANCE: f64 = 1e-10;
 
 /// The last iterates, as differences. Nothing is allocated after [`Anderson::new`].

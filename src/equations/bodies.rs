@@ -1,8 +1,9 @@
 //! Every body's own coordinates: M·q̈ + C·q̇ + r(q, t) = 0 of a system while its sources go along a ramp.
 //!
-//! **How large an error is.** In the mass norm, ‖e‖² = eᵀMe, which has one unit for translations and rotations, √(‖e_q‖² + h²‖e_v‖²) must
-//! stay below tol·(‖q‖ + floor), with ‖q‖ the larger of both ends of a step and a floor of 1e-4 of the model's length scale. Where parts
-//! touch, the time of a bounce is nothing beside that of the motion, and a displacement beside its reach: there the error of the energy,
+//! **Error norm.** The mass norm ‖e‖² = eᵀMe has one unit for translations and rotations. The error √(‖e_q‖² +
+//! h²‖e_v‖²) must stay below tol·(‖q‖ + floor). Here ‖q‖ is the larger of both ends of a step, and the floor is 1e-4 of
+//! the model's length scale. Where parts touch, the time of a bounce is nothing beside that of the motion, and a
+//! displacement beside its reach: there the error of the energy,
 //! |vᵀMe_v| + |work of the contact forces over e_q|, must also stay below tol·(kinetic energy + energy in the contacts), three times that where contact loses
 //! energy, and the error of a penetration below a tenth of it. A step that leaps beyond the law of contact is rejected, whatever its error is relative
 //! to where it ends.
@@ -20,7 +21,7 @@ pub(crate) const FLOOR: f64 = 1e-4;
 /// Names of a planar body's directions, for messages.
 pub const DIRECTIONS: [&str; 3] = ["along x", "along y", "about z"];
 
-/// What weighs displacements and rates of a system.
+/// Weights of displacements and rates of a system.
 #[derive(Debug, Clone)]
 pub struct NormWeights {
     /// Of all bodies [kg].
@@ -109,7 +110,7 @@ impl Equations for Bodies<'_> {
     }
 }
 
-/// Fraction of the error of the energy that counts where contact loses energy: what is left of an error does not last.
+/// Fraction of the energy error that counts where contact dissipates energy, since the error decays as well.
 const OF_LOSS: f64 = 0.3;
 /// Error of a contact's penetration that is allowed, of the penetration [1], and the least one that it is measured by [m]: the force grows with its fourth
 /// power, and a point without inertia is in no norm of masses.

@@ -5,11 +5,11 @@
 //! a = A(t, q + β·a, q̇ + γ·a),      A: accelerations by the recursion, loops reduced on the way
 //! ```
 //! Newton's method solves it with the recursion itself: each iteration places the bodies, takes the forces and their
-//! stiffness there, and reduces with M + γ·C + β·K in the place of M ([`crate::multibody::joint_coordinates::constrained_loops::AddedInertia`]). No matrix
-//! is assembled, and an iteration costs O(n + m). How inertia and reactions change with the configuration is left out of
-//! that matrix, not out of the equation: the iteration is linear, accelerated by what the last ones tell
-//! (`anderson.rs`). θ is the ratio of the last two corrections, and it ends when what is left, δ·θ/(1 − θ), is below
-//! the tolerance.
+//! stiffness there, and reduces with M + γ·C + β·K in the place of M
+//! ([`crate::multibody::joint_coordinates::constrained_loops::AddedInertia`]). No matrix is assembled, and an iteration
+//! costs O(n + m). That matrix, unlike the equation, neglects the dependence of inertia and reactions on the
+//! configuration: the iteration is linear, with Anderson acceleration (`anderson.rs`). θ is the ratio of the last two
+//! corrections, and it ends when what is left, δ·θ/(1 − θ), is below the tolerance.
 //!
 //! **How large an error is.** With ‖e‖ the root mean square over the coordinates against their sizes, √(‖e_q‖² + h²‖e_v‖²) must stay below
 //! tol·(‖q‖ + 1e-4). Each step is taken to the loops at its end; where heat moves them, how far that is counts too, since the stages do
@@ -36,8 +36,8 @@ const FLOOR: f64 = 1e-4;
 const STAGE_SHARE: f64 = 1e-2;
 /// Error of a stage against the motion in equal steps.
 const EQUAL: f64 = 1e-10;
-/// What loops that move take the end of a step by makes the motion late by a step, every step anew, but these errors do not add up: this
-/// share of it counts.
+/// Fraction of the projection of moving loops at the end of a step that counts as error. Each step is late by the
+/// projection, but these errors do not accumulate.
 const MOVED_SHARE: f64 = 1e-2;
 
 /// A mechanism with its forces. Nothing is allocated after [`Constrained::new`].
@@ -240,7 +240,7 @@ impl<L: Loads> Staged for Constrained<'_, L> {
             self.anderson.next(a, &self.next, &self.scale);
             let correction = stage.beta * self.norm(self.anderson.change());
             let shrink = correction / last;
-            // the first correction tells nothing about the second
+            // the first correction does not predict the second
             let left = if iteration > 1 { correction * shrink / (1.0 - shrink).max(1e-3) } else { correction };
             let stalled = iteration > 1 && correction <= STALLED * self.norm(&self.at.q).max(tolerance) && shrink > 0.1;
             if left <= tolerance || stalled {

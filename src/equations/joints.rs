@@ -22,7 +22,7 @@ pub struct Joints {
     pub(crate) drags: bool,
 }
 
-/// What of a body resists its motion.
+/// Inertia of a body.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BodyInertia {
     /// The mass matrix' diagonal.

@@ -1,5 +1,6 @@
-//! What solves with the tangent. Integrators are generic over it, so that the block recursion, on which the product is built,
-//! can be measured against others of the same matrix (`crate::solve::baseline`); the choice costs no dynamic dispatch.
+//! Linear solvers for the tangent. Integrators are generic over it, so that the block recursion, on which the product
+//! is built, can be measured against others of the same matrix (`crate::solve::baseline`); the choice costs no dynamic
+//! dispatch.
 
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;

@@ -1,9 +1,10 @@
-//! What acts on the bodies and joints of a mechanism in joint coordinates; and that of a system while its sources go along a ramp.
+//! Loads on the bodies and joints of a mechanism in joint coordinates, and their implementation for a system whose
+//! sources follow a ramp.
 //!
-//! Gaps, contacts and dead loads give each body its wrench, −(∂Π/∂q − load); gas and dampers −C·q̇; springs act along the
-//! joint coordinates. Heat and residual stress shift the rest length of an elastic axial direction, and prescribe a locked
-//! one: the rate of that prescribed length is taken as zero, so that inertia feels its slow change only through the
-//! bodies it moves. A time constant of heat much longer than the period of what moves makes this right.
+//! Gaps, contacts and dead loads give each body its wrench, −(∂Π/∂q − load); gas and dampers −C·q̇; springs act along
+//! the joint coordinates. Heat and residual stress shift the rest length of an elastic axial direction, and prescribe a
+//! locked one. The rate of that prescribed length is taken as zero, so that its slow change has inertia only through
+//! the bodies it moves. A time constant of heat much longer than the period of what moves makes this right.
 
 use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, Ramp, System};
@@ -11,7 +12,7 @@ use crate::multibody::forces;
 use crate::multibody::joint_coordinates::constrained_loops::{AddedInertia, Closure, Linkage, Reduction};
 use crate::multibody::planar::Pose;
 
-/// What acts on a mechanism in joint coordinates.
+/// Loads on a mechanism in joint coordinates.
 pub trait Loads {
     /// Sets what time alone prescribes, such as the offsets of heated joints that are locked, at `t` [s]. Before placing.
     fn prescribe(&mut self, t: f64, reduction: &mut Reduction<f64>) {
@@ -21,8 +22,8 @@ pub trait Loads {
     /// Adds what acts at time `t` [s] to the force and torque of `reduction`, whose bodies are placed at `q` and `v`.
     fn add(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>);
 
-    /// Adds β·K + γ·C of what acts where [`Loads::add`] was last called; `factors` are β [s²] and γ [s]. What is left out
-    /// costs iterations, not accuracy.
+    /// Adds β·K + γ·C of what acts where [`Loads::add`] was last called; `factors` are β [s²] and γ [s]. Omitted terms
+    /// cost iterations, not accuracy.
     fn stiffen(&mut self, reduction: &Reduction<f64>, factors: (f64, f64), added: &mut AddedInertia) {
         let _ = (reduction, factors, added);
     }

@@ -1,5 +1,5 @@
-//! The equations of motion in each formulation, as those see them who solve them: over which unknowns they are, how large an
-//! error is there, what pushes, and what an implicit step asks.
+//! The equations of motion in each formulation, as integrators see them: unknowns, error norm, forcing, and the
+//! operations of an implicit step.
 //!
 //! A method in time is written once, against [`Equations`] and [`Staged`], and knows neither bodies nor joints:
 //! ```text
@@ -10,12 +10,12 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | [`motion`] | what an unknown is; displacements and rates over unknowns |
+//! | [`motion`] | unknowns; displacements and rates over unknowns |
 //! | [`bodies`] | every body's own coordinates: a system while its sources go along a ramp |
-//! | [`newton`] | what implicit steps ask there: Newton's method with the exact tangent |
-//! | [`linear`] | what solves with that tangent |
+//! | [`newton`] | Newton's method with the exact tangent, for implicit steps over bodies |
+//! | [`linear`] | linear solvers for that tangent |
 //! | [`constrained`] | joint coordinates, loops reduced in the recursion as constraints |
-//! | [`loads`] | what acts there |
+//! | [`loads`] | loads in joint coordinates |
 //! | `anderson` | acceleration of an iteration that contracts slowly |
 //! | [`joints`] | joint coordinates, loops closed by springs: a tree, and the system of what is left to the bodies |
 
@@ -106,7 +106,7 @@ impl StepFailure {
     }
 }
 
-/// What sets the length of steps.
+/// Criterion that determines the length of steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Control {
     /// Relative error that a step may make [1].
@@ -134,7 +134,7 @@ pub struct Stage<'a, X> {
 
 /// Equations of motion of the second order, from time 0 on. See the module.
 pub trait Equations {
-    /// What an unknown is.
+    /// Type of one unknown.
     type Unknown: Unknown;
 
     /// How many there are.
@@ -170,7 +170,7 @@ pub trait Equations {
     }
 }
 
-/// What explicit and diagonally implicit methods ask beside.
+/// Extra operations required by explicit and diagonally implicit methods.
 pub trait Staged: Equations {
     /// `a` becomes q̈ at time `t` [s], displacements `q` and rates `v`; zero where there is no inertia and springs decide.
     ///

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Mul, MulAssign, Sub, SubAssign};
 
-/// What a method in time needs of an unknown.
+/// Operations of an unknown that integrators require.
 pub trait Unknown:
     Copy
     + Debug

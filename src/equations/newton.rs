@@ -1,4 +1,4 @@
-//! What implicit steps ask of bodies: Newton's method with the exact tangent.
+//! Newton's method with the exact tangent, for implicit steps over bodies.
 //!
 //! With x the displacement from a base q₀, every implicit step comes to
 //! ```text
@@ -62,7 +62,7 @@ pub struct Newton<'a, S> {
     solver: S,
     matrix: Option<BlockMatrix<f64, 3>>,
     part: Option<BlockMatrix<f64, 3>>,
-    /// 1/M, 0 where there is none.
+    /// 1/M, or 0 without mass.
     inverse: Vec<Pose>,
     /// Derivatives of what contact loses with displacements and rates; none where it loses nothing.
     loss: Option<LossDerivatives>,

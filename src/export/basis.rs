@@ -1,7 +1,7 @@
 //! The directions in which a reduced model moves: modes, and behind them the static correction.
 //!
-//! What the modes of a basis do not yield at rest, z_q = K⁻¹·b_q − Σ_j φ_j·(φ_jᵀ·b_q)/λ_j, is orthogonal to them in K and in M. Its
-//! directions may be taken for further modes with the mass and damping that they have: Ritz vectors that depend on the load (Wilson,
+//! The static remainder of a basis, z_q = K⁻¹·b_q − Σ_j φ_j·(φ_jᵀ·b_q)/λ_j, is orthogonal to its modes in K and in M.
+//! Its directions can serve as further modes with their own mass and damping: load-dependent Ritz vectors (Wilson,
 //! Yuan, Dickens, Earthquake Eng. Struct. Dyn. 10 (1982)).
 
 use super::ExportError;
@@ -65,7 +65,7 @@ impl LinearizedMechanism<'_> {
         Ok(found)
     }
 
-    /// What a push yields at rest in all directions but those of a basis.
+    /// Static response to an input in all directions outside a basis.
     pub(super) fn left(&self, push: &InputExcitation, basis: &Basis) -> Vec<Pose> {
         let mut rest = push.yielded.clone();
         for (x, lambda) in basis.shapes.iter().zip(&basis.lambda) {
@@ -75,9 +75,9 @@ impl LinearizedMechanism<'_> {
         rest
     }
 
-    /// A basis with the directions of its static correction behind it, each as one that swings: the z of all pushes, at `depth` 2 with
-    /// the K⁻¹·M·z that their inertia yields, and so on, made orthogonal in K and then in M. They are orthogonal to the basis in both
-    /// already.
+    /// The basis followed by the directions of its static correction, each as a dynamic coordinate. These are the z of
+    /// all inputs; at `depth` 2 also the response K⁻¹·M·z to their inertia, and so on. They are made orthogonal in K
+    /// and then in M, and are orthogonal to the basis in both already.
     #[must_use]
     pub fn corrected(&self, basis: &Basis, depth: usize) -> Basis {
         let model = &self.system().model;

@@ -1,11 +1,13 @@
 //! How far the reduced model is from the exact small-signal answer, and how many modes that takes.
 //!
-//! The exact answer is that of [`crate::device::Device::linearize`], which a circuit gets in `.ac`. It is compared at
-//! frequencies on a logarithmic grid from far below the first mode, and about every resonance, port by port and signal by signal, each
-//! value relative to itself; where parts cancel (a zero of the curve), to a hundredth of the parts.
+//! The exact answer is that of [`crate::device::Device::linearize`], which a circuit gets in `.ac`. The comparison uses
+//! a logarithmic frequency grid from far below the first mode, refined about every resonance. Each value is compared by
+//! port and signal, relative to itself. Where terms cancel (at a zero of the curve), the scale is a hundredth of the
+//! terms.
 //!
-//! Kept are the modes up to the end of the band that show there; then, as far as the tolerance takes it, the static correction
-//! swings, one direction after the other; then modes above the band are added, and last the others in the band.
+//! The reduced model keeps the modes within the band that contribute there. As far as the tolerance requires, it then
+//! adds dynamic directions of the static correction one by one, modes above the band, and finally the other modes in
+//! the band.
 
 use super::basis::Basis;
 use super::linear::ReducedModel;

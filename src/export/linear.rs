@@ -8,10 +8,11 @@
 //! ḣ_l = (u_q(l) − h_l)/τ_l                                              l: lags of heaters
 //! y   = y₀ + X·x + W·w + H·h + E·u + F·u̇
 //! ```
-//! x_j is the share of mode j, in micrometres of its largest displacement shown as volts, and w_j its rate over ω_j. D is the
-//! whole damping matrix between the modes that are kept, not only its diagonal. E, F and H hold, beside conductance and capacitance, the
-//! static correction: what all the modes that are left out yield at rest. So the model is exact at DC, and near every
-//! resonance that is kept. Directions of the static correction may be among the modes: [`super::reduce`].
+//! x_j is the share of mode j, in micrometres of its largest displacement shown as volts, and w_j its rate over ω_j. D
+//! is the whole damping matrix between the modes that are kept, not only its diagonal. E, F and H contain conductance,
+//! capacitance and the static correction, which is the static response of all omitted modes. So the model is exact at
+//! DC, and near every resonance that is kept. Directions of the static correction may be among the modes:
+//! [`super::reduce`].
 //!
 //! Reference: R. R. Craig, A. J. Kurdila, "Fundamentals of Structural Dynamics" (2006), §11.4, mode-acceleration.
 
@@ -23,7 +24,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 pub struct ReducedPort {
     /// Its name in the netlist, or of the quantity.
     pub name: String,
-    /// What is given and answered.
+    /// Kind of the port: its input and its output.
     pub kind: PortKind,
     /// Volts per unit of what lies across one that is not electrical.
     pub across: f64,
@@ -32,7 +33,7 @@ pub struct ReducedPort {
 }
 
 impl ReducedPort {
-    /// What a volt and an ampere are at it, in plain letters.
+    /// Meaning of a volt and an ampere at the port, in ASCII.
     pub fn meaning(&self) -> String {
         let plain = |unit: &str| unit.replace('·', " ").replace('²', "^2");
         let ((_, given), (_, answered)) = (self.kind.given(), self.kind.answered());
@@ -164,8 +165,8 @@ impl ReducedModel {
         Complex::new(self.place[(row, mode)], omega / self.modes[mode].omega * self.rate[(row, mode)])
     }
 
-    /// Magnitudes of the parts that [`ReducedModel::response`] adds up, mode by mode and the rest: what a value is small against
-    /// where they cancel, r × p.
+    /// Magnitudes of the terms that [`ReducedModel::response`] sums, mode by mode and the rest, r × p: the scale for a
+    /// value where they cancel.
     pub fn parts(&self, omega: f64) -> DMatrix<f64> {
         let mut parts = DMatrix::from_fn(self.rows(), self.ports.len(), |r, q| {
             self.direct[(r, q)].hypot(omega * self.change[(r, q)])
@@ -192,8 +193,8 @@ impl ReducedModel {
         self.by_mode(omega, row, mode).norm() * own * push / stiff.norm()
     }
 
-    /// What a mode could contribute at most, if it were the one that row sees best, that the input pushes most and that is nearest to its
-    /// resonance, r × p: below a share of it that rounding makes, a coupling is none.
+    /// Upper bound of a modal contribution, r × p: the product of the row's largest output factor, the input's largest
+    /// input factor and the nearest resonance. A coupling below the rounding fraction of it counts as zero.
     pub fn reach(&self, omega: f64) -> DMatrix<f64> {
         let n = self.modes.len();
         let seen: Vec<f64> =

@@ -1,5 +1,5 @@
-//! A mechanism of rigid parts that only slide, with its nonlinear forces: what [`super::spice`] and [`super::verilog_a`] write with
-//! `--nonlinear`.
+//! A mechanism of rigid parts in pure translation, with its nonlinear forces: the model that [`super::spice`] and
+//! [`super::verilog_a`] write with `--nonlinear`.
 //!
 //! Where every part moves along fixed directions and springs are linear in that, the whole model is
 //! ```text
@@ -145,7 +145,7 @@ fn gaps(
     system.members.iter().enumerate().filter(acts).map(gap).collect()
 }
 
-/// What a signal reads.
+/// The output expression of a signal.
 fn reading(signal: &Signal, coordinates: &[Coordinate], gaps: &[LumpedGap]) -> Result<LumpedOutput, ExportError> {
     match *signal {
         Signal::Displacement(_, 2) | Signal::Rate(_, 2) => Ok(LumpedOutput::Constant(0.0)),

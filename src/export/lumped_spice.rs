@@ -18,7 +18,7 @@ use crate::device::PortKind;
 use nalgebra::DVector;
 use std::fmt::Write;
 
-/// The file: a header that tells what it is, and the subcircuit `name`.
+/// The file: a descriptive header, and the subcircuit `name`.
 pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> String {
     let mut text = String::new();
     for line in about {

@@ -7,7 +7,7 @@ use super::names::Pins;
 use super::verilog_a::{ContributionSum, head};
 use nalgebra::DVector;
 
-/// The file: a header that tells what it is, and the module `name`.
+/// The file: a descriptive header, and the module `name`.
 pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> String {
     let coordinates = (1..=model.coordinates.len()).flat_map(|k| [format!("x{k}"), format!("v{k}")]);
     let gaps = model.gaps.iter().enumerate().flat_map(|(g, gap)| {

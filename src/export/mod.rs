@@ -13,8 +13,8 @@
 //! | [`lumped_spice`], [`lumped_verilog_a`] | that model as a subcircuit and as a module |
 //! | [`names`], `parts` | pins, and parts of a subcircuit |
 //!
-//! What lies across a port, and what flows into it, have the scales of the ngspice plug-in ([`crate::device::scale`]), so
-//! that a subcircuit takes the place of an instance pin by pin.
+//! Voltages across ports and currents into them have the scales of the ngspice plug-in ([`crate::device::scale`]), so
+//! that a subcircuit replaces an instance pin by pin.
 
 pub mod basis;
 pub mod compare;
@@ -37,7 +37,7 @@ use crate::device::DeviceError;
 use crate::readout::ReadoutError;
 use thiserror::Error;
 
-/// What is to be written.
+/// Request for an export.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExportRequest {
     /// Ports with volts per unit of what lies across them, where that is not the default; none: every electrical one.
@@ -87,7 +87,7 @@ pub enum ExportError {
         /// Its name.
         port: String,
     },
-    /// The equilibrium is none that a mechanism stays at.
+    /// The equilibrium is unstable.
     #[error(
         "the equilibrium at these voltages is unstable in {negative} direction(s): a linear model about it would grow \
          without bound; choose another --port voltage"
@@ -108,7 +108,7 @@ pub enum ExportError {
         error: f64,
         /// Up to [Hz].
         to: f64,
-        /// What was asked for [1].
+        /// The requested tolerance [1].
         within: f64,
     },
     /// The nonlinear form is one of rigid parts that slide.
@@ -117,7 +117,7 @@ pub enum ExportError {
          model about an operating point, or use the plug-in"
     )]
     NotLumped {
-        /// What stands against it.
+        /// The reason.
         why: String,
     },
     /// Two names would be the same in the file.
@@ -127,13 +127,13 @@ pub enum ExportError {
         first: String,
         /// Second of them.
         second: String,
-        /// What both become.
+        /// Their common name.
         name: String,
     },
     /// A name that files cannot have.
     #[error("--name: expected a letter, then letters, digits and _, and no word of Verilog-A, got \"{got}\"")]
     BadName {
-        /// What was given.
+        /// The given value.
         got: String,
     },
 }

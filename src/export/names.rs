@@ -56,7 +56,8 @@ fn plain(name: &str) -> String {
     out.trim_end_matches('_').to_owned()
 }
 
-/// Words of Verilog-A (LRM 2.4, annex B) and the disciplines of its standard header, that a module of that name could not be told from.
+/// Words of Verilog-A (LRM 2.4, annex B) and the disciplines of its standard header, which no module may be named
+/// after.
 const RESERVED: [&str; 221] = [
     "above",
     "abs",

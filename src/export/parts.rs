@@ -5,7 +5,7 @@ use std::fmt::Write;
 /// Text of a subcircuit, with the numbers of its sources.
 #[derive(Debug, Default)]
 pub(super) struct SubcircuitText {
-    /// What is written so far.
+    /// The lines written so far.
     pub(super) text: String,
     /// Sources named so far: G, F, I.
     counts: [usize; 3],

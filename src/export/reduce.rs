@@ -4,9 +4,10 @@
 //! ```text
 //! M·q̈ + C·q̇ + K·q = Σ b_q·u_q,     q ≈ Σ_j φ_j·η_j + Σ_q z_q·u_q,     z_q = K⁻¹·b_q − Σ_j φ_j·(φ_jᵀ·b_q)/λ_j
 //! ```
-//! φ_j are undamped modes with φᵀMφ = 1. z_q, the static correction, is what the modes that are left out yield at rest; directions of
-//! it may swing, too ([`super::basis`]). What heats at once pushes by b_q; a heater with a time constant pushes behind its lag, and all
-//! heaters with the same time constant that one port heats share one lag: their rises are in proportion to it.
+//! φ_j are undamped modes with φᵀMφ = 1. z_q, the static correction, is what the modes that are left out yield at rest;
+//! directions of it may swing, too ([`super::basis`]). Instantaneous heating excites by b_q. A heater with a time
+//! constant excites behind its lag. All heaters with the same time constant on one port share one lag, since their
+//! temperature rises are proportional to it.
 
 use super::basis::Basis;
 use super::linear::{HeatLag, ReducedMode, ReducedModel, ReducedPort};
@@ -26,7 +27,7 @@ const MICROMETRE: f64 = 1e-6;
 /// A coupling below this share of the largest of its kind is rounding.
 const NONE: f64 = 1e-10;
 
-/// What is read in a row of y.
+/// Kind of a row of y.
 #[derive(Debug, Clone, Copy)]
 enum OutputRow {
     /// A quantity of the state.
@@ -142,7 +143,7 @@ impl LinearizedMechanism<'_> {
         ReducedPort { name: self.names[k].clone(), kind, across, bias }
     }
 
-    /// What is read in each row: ports, then signals.
+    /// The rows of y: ports, then signals.
     fn rows(&self) -> Vec<OutputRow> {
         let of_signal = |signal: Signal| match signal {
             Signal::Rate(point, direction) => OutputRow::Change(Signal::Displacement(point, direction)),
@@ -188,7 +189,7 @@ impl LinearizedMechanism<'_> {
     }
 }
 
-/// Takes away couplings that are none but for rounding.
+/// Removes couplings that consist of rounding alone.
 fn without_rounding(model: &mut ReducedModel) {
     let diagonal = model.damping.diagonal();
     for j in 0..diagonal.len() {

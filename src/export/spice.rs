@@ -6,9 +6,9 @@
 //! | `x1` … | share of a mode: a capacitor of 1/ω farads that the rate charges |
 //! | `w1` … | its rate over ω: a capacitor of 1/ω farads that spring, damping and ports charge |
 //! | `h1` … | the lag of heat behind a port: τ farads against 1 S |
-//! | `u1` … | what a port with a voltage is given, less its value at the operating point |
+//! | `u1` … | the input of a port with a voltage, less its value at the operating point |
 //! | `d1` … | its rate of change: behind a capacitor, and for a force or heat across an inductor |
-//! | `y1` … | what lies across a port that a flow is given to, and the signals: sums of currents into 1 S |
+//! | `y1` … | the voltage across a port with a flow as its input, and the signals: sums of currents into 1 S |
 //!
 //! Conductances that stand for no resistance of the part are controlled sources, which make no noise.
 
@@ -23,7 +23,7 @@ use std::fmt::Write;
 const CAPACITOR: f64 = 1e-9;
 const INDUCTOR: f64 = 1.0;
 
-/// The file: a header that tells what it is, and the subcircuit `name`. `about` holds the lines that say what was exported.
+/// The file: a descriptive header, and the subcircuit `name`. `about` holds the lines that say what was exported.
 pub fn write(fitted: &ModelFit, pins: &Pins, name: &str, about: &[String]) -> String {
     let mut text = String::new();
     for line in about {
@@ -133,7 +133,7 @@ impl LinearSubcircuit<'_> {
         }
     }
 
-    /// What a port answers, or a signal shows.
+    /// Output of a port or signal.
     fn row(&mut self, row: usize) {
         let model = self.model;
         let port = model.ports.get(row);

@@ -10,7 +10,7 @@ use super::names::Pins;
 use crate::device::PortKind;
 use std::fmt::Write;
 
-/// The file: a header that tells what it is, and the module `name`.
+/// The file: a descriptive header, and the module `name`.
 pub fn write(fitted: &ModelFit, pins: &Pins, name: &str, about: &[String]) -> String {
     let model = &fitted.model;
     let inner: Vec<String> = (1..=model.modes.len())
@@ -66,7 +66,7 @@ pub fn write(fitted: &ModelFit, pins: &Pins, name: &str, about: &[String]) -> St
     text
 }
 
-/// All up to the first contribution: what the file is, pins, inner nodes and branches.
+/// All text up to the first contribution: description, pins, inner nodes and branches.
 pub(super) fn head(name: &str, pins: &Pins, inner: &[String], ports: &[ReducedPort], about: &[String]) -> String {
     let mut text = String::new();
     for line in about {

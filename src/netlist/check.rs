@@ -1,5 +1,5 @@
-//! What can be said about a finished drawing before any physics: loose nodes, loose parts, floating potentials, and
-//! one message for each thing that the planar model leaves out.
+//! Checks of a finished structure before any physics: loose nodes, loose parts, floating potentials, and one message
+//! for each feature that the planar model omits.
 
 use super::diagnostic_sink::DiagnosticSink;
 use super::drawing::{Fact, StructureBuilder};
@@ -11,10 +11,10 @@ use crate::structure::{BeamGap, GapVoltage, NodeId, Structure};
 use std::collections::HashSet;
 use std::ops::RangeInclusive;
 
-/// So many loose parts or floating nodes are told one by one.
+/// Most loose parts or floating nodes reported individually.
 const MAX_REPORTED: usize = 3;
 
-/// So many loose nodes are told.
+/// Most loose nodes reported.
 const MAX_LOOSE: usize = 20;
 
 /// Resistances that can be computed with [Ω], and conductances of heat [W/K]: sums and quotients of them stay numbers.

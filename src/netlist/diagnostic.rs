@@ -10,7 +10,7 @@ const LONGEST_LINE: usize = 1000;
 /// How bad a diagnostic is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Severity {
-    /// Nothing comes out.
+    /// No model results.
     Error,
     /// The result stands, but the author may have meant something else.
     Warning,
@@ -31,9 +31,9 @@ pub struct Diagnostic {
     pub column: usize,
     /// Width of the marked text in characters.
     pub width: usize,
-    /// What is wrong, with what was expected.
+    /// The fault and the expected input.
     pub message: String,
-    /// A way out; empty when there is none to name.
+    /// A remedy; empty where there is none to suggest.
     pub help: String,
 }
 

@@ -11,13 +11,13 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Reported;
 
-/// Errors, and lines that the netlist prints, beyond this many are left out: nobody reads them, and a loop could make millions.
+/// Most errors, and most lines printed by the netlist; further ones are omitted, since a loop could produce millions.
 const MAX_MESSAGES: usize = 100;
 
 /// Warnings of one code beyond this many are left out, so that none hides another.
 const MAX_WARNINGS: usize = 20;
 
-/// Code of the last line, which tells how many messages were left out.
+/// Code of the last line, which gives the number of omitted messages.
 const LEFT_OUT: &str = "W016";
 /// Code of what the netlist prints.
 const PRINT: &str = "W002";

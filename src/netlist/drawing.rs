@@ -99,7 +99,7 @@ pub(crate) struct Upright {
     pub(crate) nodes: [NodeId; 2],
     /// Normal to the plane and stouter than long.
     pub(crate) post: bool,
-    /// What it would be across as a cantilever [N/m].
+    /// Transverse stiffness of the same beam as a cantilever [N/m].
     pub(crate) stiffness: f64,
     /// Its axis lies in the plane, its section is askew.
     pub(crate) tilted: bool,

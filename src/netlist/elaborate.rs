@@ -29,7 +29,7 @@ pub(super) struct EvaluationScope {
     /// Names of the enclosing instances with a point after each.
     pub(super) prefix: Arc<str>,
     pub(super) rotation: Rotation,
-    /// What `parent` means here.
+    /// Layer that `parent` refers to here.
     pub(super) layer: Option<usize>,
     /// How often each anonymous line was run here.
     pub(super) anonymous: FxHashMap<usize, usize>,
@@ -48,7 +48,7 @@ pub(crate) struct Elaborator<'p> {
     from_outside: FxHashSet<usize>,
     /// Where each stands in `parameters`.
     parameter_at: FxHashMap<&'p str, usize>,
-    /// Full names given so far, without the anonymous ones: what stands before the last point, and after it.
+    /// Full names defined so far, without the anonymous ones: the part before the last point, and the part after it.
     pub(super) names: FxHashSet<(Arc<str>, Arc<str>)>,
     /// Storage of node and parameter lists that are no longer needed.
     pub(super) spare: Vec<(Vec<NodeId>, Vec<Argument<'p>>)>,
@@ -59,7 +59,7 @@ pub(crate) struct Elaborator<'p> {
     pub(super) stopped: bool,
 }
 
-/// What an elaboration yields.
+/// Result of an elaboration.
 pub(crate) struct Elaborated {
     pub(crate) drawing: StructureBuilder,
     pub(crate) parameters: Vec<(String, Setting)>,

@@ -9,7 +9,7 @@ use super::setting::Setting;
 use super::{check, elements, place};
 use std::sync::Arc;
 
-/// What every front end of netlists does with the elements that it has built: members out of the plane, positions, loose ends.
+/// Final steps of every front end: out-of-plane members, positions of nodes, checks for loose ends.
 pub(super) fn finish(
     mut drawing: StructureBuilder,
     parameters: Vec<(String, Setting)>,

@@ -1,16 +1,16 @@
 //! Files that are no netlist of SUGAR 2 though they come beside them: SUGAR 3 netlists, which are Lua, and MATLAB files.
 //!
-//! Both are told by whole statements that the language does not have. A SUGAR 3 netlist says `use("…")`, holds a Lua comment or
-//! braces at the end of a word; a MATLAB file defines a function or loads a netlist.
+//! Both are recognized by whole statements that the language does not have. A SUGAR 3 netlist says `use("…")`, holds a
+//! Lua comment or braces at the end of a word; a MATLAB file defines a function or loads a netlist.
 
 use super::source::TextSpan;
 
-/// What a file is.
+/// Language of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FileKind {
-    /// A SUGAR 3 netlist, told by the line.
+    /// A SUGAR 3 netlist, recognized by the line.
     Lua(TextSpan),
-    /// A MATLAB function or script, told by the line.
+    /// A MATLAB function or script, recognized by the line.
     Matlab(TextSpan),
     /// Anything else: a SUGAR 2 netlist, right or wrong.
     Netlist,
@@ -22,7 +22,7 @@ const ENDED: usize = 3;
 const MATLAB: [&str; 9] =
     ["clear all", "clear;", "close all", "clc", "figure(", "figure;", "addpath(", "cho_load(", "hold on"];
 
-/// What the text of file number `file` is, by its first line that decides.
+/// Language of file number `file`, by the first line that decides it.
 pub(crate) fn kind(text: &str, file: u16) -> FileKind {
     let mut start = 0;
     // statements that end with a semicolon, and the first of them; lines with a list of nodes
@@ -71,7 +71,7 @@ fn lua(line: &str) -> bool {
         || line.strip_prefix("local ").is_some_and(defines)
 }
 
-/// What follows the name that a text begins with, blanks left out; none without a name.
+/// Text after the leading name and blanks; `None` without a name.
 fn after_name(text: &str) -> Option<&str> {
     let rest = text.trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_');
     (rest.len() < text.len()).then(|| rest.trim_start())
@@ -105,7 +105,7 @@ mod tests {
         }
     }
 
-    /// Files are told by the first line that only their language has; comments of SUGAR 2 decide nothing.
+    /// The first line that only one language allows decides the language; comments of SUGAR 2 decide nothing.
     #[test]
     fn files_are_told_apart() {
         assert_eq!(language("% net=cho_load('x.net');\nuses mumps.net\nanchor p1 [a] []\n"), ('n', 0));

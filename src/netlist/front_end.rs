@@ -1,5 +1,5 @@
-//! Front ends: what is drawn in one language or another becomes a structure, parameters and messages. Nothing after this knows
-//! where a drawing came from.
+//! Front ends: each language elaborates to a structure, parameters and messages. Nothing after this knows where a
+//! drawing came from.
 
 use super::bundle::Bundle;
 use super::diagnostic::Diagnostics;
@@ -7,7 +7,7 @@ use super::setting::Setting;
 use crate::structure::Structure;
 use std::fmt::Debug;
 
-/// What a netlist elaborates to.
+/// Result of elaborating a netlist.
 #[derive(Debug, Clone)]
 pub struct LoadedNetlist {
     /// The drawing.
@@ -18,7 +18,7 @@ pub struct LoadedNetlist {
     pub warnings: Diagnostics,
 }
 
-/// A drawing that has been read in its own language. What is drawn depends on the values of parameters too.
+/// A drawing that has been read in its own language. The structure depends on the values of parameters too.
 pub trait FrontEnd: Debug + Send + Sync {
     /// Draws it with parameters set from outside.
     ///

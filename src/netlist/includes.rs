@@ -18,7 +18,7 @@ impl Bundle {
         Self::read_telling(path, include, &mut |_| ())
     }
 
-    /// The same; `dropped` is told of each file that is left out because another one has its spelled name.
+    /// As above; calls `dropped` for each include skipped because its path is already taken.
     ///
     /// # Errors
     /// As [`Bundle::read`].
@@ -43,9 +43,9 @@ pub struct DroppedInclude {
     pub by: String,
     /// The name under which it does.
     pub spelled: String,
-    /// What was read under that name.
+    /// The file read under that path.
     pub kept: PathBuf,
-    /// What is not.
+    /// The skipped file.
     pub dropped: PathBuf,
 }
 

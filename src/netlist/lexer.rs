@@ -7,7 +7,7 @@ use crate::budget;
 
 /// Tokens between two looks at the budget.
 const CHUNK: usize = 1024;
-/// What a token becomes, with its share of the syntax tree, about [byte].
+/// Memory of a token with its share of the syntax tree, approximately [byte].
 const TOKEN_BYTES: usize = 96;
 
 /// Turns the text of file number `file` into tokens. Errors go to the sink; a token stands in for what was wrong.

@@ -3,10 +3,11 @@
 //! [`Bundle`] holds the text of a netlist and of every file it includes, so that nothing after it touches the disk: a
 //! bundle can be sent to a server as it is. [`load`] turns a bundle into a structure, or into diagnostics.
 //!
-//! `foreign` tells the languages apart. SUGAR 2, one module a step: `lexer` makes tokens, `parser`, `statement` and `expression` the tree with all includes in place, `resolve`
-//! binds names, `elaborate` and `instance` run definitions, loops and subnets. SUGAR 3, which is Lua, is run by `sugar3`. What both
-//! instantiate is built by `elements`; `finish` has `place` walk over the drawing for node positions, and `check` look for loose ends.
-//! docs/netlist.md describes the languages.
+//! `foreign` recognizes the language of a file. SUGAR 2, one module a step: `lexer` makes tokens, `parser`, `statement`
+//! and `expression` the tree with all includes in place, `resolve` binds names, `elaborate` and `instance` run
+//! definitions, loops and subnets. SUGAR 3, which is Lua, is run by `sugar3`. Both front ends build elements with
+//! `elements`. `finish` calls `place` for node positions and `check` for loose ends. docs/netlist.md describes the
+//! languages.
 
 mod ast;
 mod bundle;

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Blocks, conditions and loops may nest this deep.
 const DEEPEST_NESTING: usize = 100;
-/// What a file uses to say that its `ox oy oz` are in degrees, unless there is a file of that name.
+/// File that a netlist uses to declare `ox oy oz` in degrees, unless a file of that name exists.
 const DEGREES: &str = "degrees.net";
 
 /// Parses a bundle. Every syntax error goes to the sink.

@@ -12,7 +12,7 @@ use super::value::short;
 const OPEN_LOOP: f64 = 1e-6;
 /// Nodes nearer to each other than this part of the drawing's size are in one place [1].
 const ROUNDING: f64 = 1e-9;
-/// So many open loops, and so many unplaced parts, are told one by one.
+/// Most open loops, and most unplaced parts, reported individually.
 const MAX_REPORTED: usize = 3;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -128,7 +128,7 @@ fn open_loops(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
             let at = drawing.structure.nodes[node.0].position;
             [at[0] - first[0] - offset[0], at[1] - first[1] - offset[1]]
         });
-        // Sums of many offsets round off by a few units in the last place of the farthest position.
+        // Sums of many offsets round by a few units in the last place of the farthest position.
         let rounding = 1e-12 * (first[0].abs() + first[1].abs());
         if misses.clone().all(|miss| miss[0].abs() + miss[1].abs() <= rounding) {
             continue;

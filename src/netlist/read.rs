@@ -22,12 +22,12 @@ pub struct NetlistSource {
 }
 
 impl NetlistSource {
-    /// Reads a bundle. Errors come out with [`NetlistSource::load`].
+    /// Reads a bundle. Errors are returned by [`NetlistSource::load`].
     pub fn new(bundle: &Bundle) -> Self {
         Self { front: read(bundle) }
     }
 
-    /// What another front end has read.
+    /// A source that another front end has read.
     pub fn from_front(front: Box<dyn FrontEnd>) -> Self {
         Self { front }
     }

@@ -1,4 +1,4 @@
-//! Binds names to variables, layers and subnets, in the order of the text: what is used must stand earlier.
+//! Binds names to variables, layers and subnets, in the order of the text: a definition must precede its use.
 //!
 //! A block opens a scope: names first defined inside it end with it, assignments to outer names stay. A definition
 //! inside a subnet never touches a variable of the netlist; those can be read there.
@@ -56,7 +56,7 @@ struct Resolver<'a> {
     incomplete: bool,
     /// Parameters of the list at hand, for the message that they do not see each other.
     beside: Vec<Arc<str>>,
-    /// Counts variables met, to tell constant layers.
+    /// Number of variables used, to detect constant layers.
     layers_used: usize,
 }
 
@@ -196,7 +196,8 @@ impl Resolver<'_> {
     fn element(&mut self, element: &mut ElementStatement) {
         element.subnet = self.subnets.get(&element.model.name).copied();
         if element.subnet.is_none() && self.locals.is_none() {
-            // Inside subnets this waits until an instance is built: libraries hold bodies that nobody calls.
+            // Inside subnets this waits until an instance is built, since libraries hold subnets that are never
+            // instantiated.
             self.model(&element.model);
         }
         element.layer = match (&*element.layer_name.name, self.locals.is_some()) {

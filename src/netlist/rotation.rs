@@ -53,8 +53,8 @@ impl Rotation {
         self.0[2][0].abs() < IN_PLANE
     }
 
-    /// What became of the local y axis when x lies in the plane: `Some(1)` in the plane and to the left of x,
-    /// `Some(-1)` to the right (mirrored), `Some(0)` normal to the plane, none when it is askew.
+    /// Direction of the local y axis when x lies in the plane: `Some(1)` in the plane and to the left of x, `Some(-1)`
+    /// to the right (mirrored), `Some(0)` normal to the plane, `None` when oblique.
     pub(crate) fn side(self) -> Option<i8> {
         let z = self.0[2][2];
         if (z.abs() - 1.0).abs() < IN_PLANE {

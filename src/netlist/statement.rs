@@ -173,7 +173,7 @@ impl Parser<'_> {
             self.short(formals.len(), open)?;
         }
         self.twice(formals.iter().map(|formal| &formal.name), "parameter", "last");
-        // nodes with indices may be told apart by these
+        // indices may distinguish nodes with the same base name
         self.twice(nodes.iter().filter(|n| n.indices.is_empty()).map(|n| &n.base), "node", "last");
         let body = self.block()?;
         self.program.subnets.push(SubnetDefinition { name, nodes, formals, body, variables: 0 });
@@ -312,7 +312,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Refuses a list of parameters that nobody wrote: elements look through it for each name they take.
+    /// Rejects overlong parameter lists, since elements search the list for each name.
     fn short(&mut self, length: usize, open: Lexeme) -> Parsed<()> {
         if length <= MAX_PARAMETERS {
             return Ok(());

@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub(crate) struct Sugar2 {
     bundle: Arc<Bundle>,
     program: Program,
-    /// What reading had to say.
+    /// Messages of the parser.
     sink: DiagnosticSink,
 }
 

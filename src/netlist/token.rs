@@ -2,7 +2,7 @@
 
 use super::source::TextSpan;
 
-/// What a token is. Identifiers and strings keep only their span: their text is in the source.
+/// Kind of a token. Identifiers and strings keep only their span: their text is in the source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum TokenKind {
     Identifier,

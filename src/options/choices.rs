@@ -49,7 +49,8 @@ choice! {
         E4 = "e4",
         /// Tuned pair of shear flexibility and rotary inertia.
         Es = "es",
-        /// What suits the formulation: E4, or Es in joint coordinates, where every body needs rotary inertia.
+        /// The scheme that suits the formulation: E4, or Es in joint coordinates, where every body needs rotary
+        /// inertia.
         #[default]
         Auto = "auto",
     }

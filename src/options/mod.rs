@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`model`] | the table of the options of a model |
 //! | [`analysis`] | options of single analyses |
-//! | [`table`] | what an option is, and the check of a value |
+//! | [`table`] | description of an option, and the check of a value |
 //! | [`choices`] | the names that some options take |
 
 pub mod analysis;

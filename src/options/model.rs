@@ -1,8 +1,9 @@
 //! The options of a model, one table: a line here is all that an option needs to be accepted everywhere.
 //!
-//! From it come the struct and its defaults, `--help` and the parsing of the command, the fields on the wire, the parameters of
-//! an ngspice `.model` line, the keywords of the Python client, the keys of JSON documents, and the table in docs/options.md.
-//! After a change, `BIMORPH_WRITE=1 cargo test --test options` writes what is generated from it.
+//! The struct and its defaults, the parsing and `--help` of the command, and the fields of the protocol come from it.
+//! So do the parameters of an ngspice `.model` line, the keywords of the Python client, the keys of JSON documents, and
+//! the table in docs/options.md. After a change, `BIMORPH_WRITE=1 cargo test --test options` writes what is generated
+//! from it.
 
 use super::choices::{Formulation, Junctions, Scheme};
 use super::table::{Field, OptionDescription, OptionError, OptionValue, Range};
@@ -23,7 +24,7 @@ macro_rules! options {
     ($($(#[doc = $help:literal])+
        $field:ident: $kind:ty = $default:expr, $wire:literal = $number:literal, [$unit:literal], $range:expr, $unset:literal;)+
     ) => {
-        /// What a compilation may be told. `Default` is the only place where the numbers stand.
+        /// Options of a compilation. `Default` is the only place where the numbers stand.
         #[derive(Debug, Clone, PartialEq)]
         pub struct CompileOptions {
             /// Netlist parameters set from outside.
@@ -159,7 +160,7 @@ impl CompileOptions {
 
 #[cfg(test)]
 mod tests {
-    //! What the table says of an option is what its field holds and takes.
+    //! The table's description of an option agrees with the type and range of its field.
     use super::*;
 
     #[test]

@@ -1,13 +1,13 @@
-//! What an option is: its name, unit, default, range and meaning, said once for every front.
+//! Description of an option: its name, unit, default, range and meaning, once for all front ends.
 //!
-//! A front reads what its user wrote as an [`OptionValue`] and hands it to [`OptionDescription::check`]; what it shows of an option (help,
-//! declarations, tables) it takes from here.
+//! A front end reads user input as an [`OptionValue`] and passes it to [`OptionDescription::check`]; help, declarations
+//! and tables come from here.
 
 use super::choices::{Formulation, Junctions, Scheme};
 use std::fmt;
 use thiserror::Error;
 
-/// What an option holds, whatever its type.
+/// Value of an option of any type.
 #[derive(Debug, Clone, PartialEq)]
 pub enum OptionValue {
     /// Nothing: a rule decides, see [`OptionDescription::unset`].
@@ -35,7 +35,7 @@ impl fmt::Display for OptionValue {
     }
 }
 
-/// What values an option may have.
+/// Range of an option.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
     /// Yes or no.
@@ -65,7 +65,7 @@ impl fmt::Display for Range {
     }
 }
 
-/// An option as every front shows it.
+/// Description of an option for all front ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptionDescription {
     /// Its name in decks, in Python and in the library; on the command line with `-` for `_`.
@@ -74,13 +74,13 @@ pub struct OptionDescription {
     pub wire: &'static str,
     /// Its unit; empty where it has none, "1" for a ratio.
     pub unit: &'static str,
-    /// What it may be.
+    /// Permitted values.
     pub range: Range,
-    /// What it is unless a front says otherwise.
+    /// Default, unless a front end overrides it.
     pub default: OptionValue,
-    /// Where the default is nothing: what decides then.
+    /// Meaning of an unset value, for options without a default.
     pub unset: &'static str,
-    /// What it means, in one sentence or two.
+    /// Meaning, in one sentence or two.
     pub help: &'static str,
 }
 
@@ -90,9 +90,9 @@ pub struct OptionDescription {
 pub struct OptionError {
     /// [`OptionDescription::name`].
     pub option: &'static str,
-    /// What it takes, with its unit.
+    /// The expected value, with its unit.
     pub expected: String,
-    /// What it was given.
+    /// The given value.
     pub got: String,
 }
 
@@ -102,7 +102,7 @@ impl OptionDescription {
         self.name.replace('_', "-")
     }
 
-    /// What it means, as one line.
+    /// Its meaning, as one line.
     pub fn about(&self) -> String {
         self.help.split_whitespace().collect::<Vec<_>>().join(" ").trim_end_matches('.').to_owned()
     }

@@ -11,7 +11,7 @@ pub enum ReadoutError {
     UnknownSignal {
         /// The name asked for.
         name: String,
-        /// What would be understood.
+        /// Suggested names.
         hint: String,
     },
     /// No port of that name.
@@ -25,9 +25,9 @@ pub enum ReadoutError {
     /// A port that cannot be.
     #[error("ports: expected {expected}, got {got}")]
     BadPort {
-        /// What was expected.
+        /// The expected form.
         expected: String,
-        /// What came.
+        /// The given text.
         got: String,
     },
 }

@@ -1,10 +1,10 @@
-//! What can be read from a model, and where it can be driven, by name.
+//! Quantities that can be read from a model, and places where it can be driven, by name.
 //!
-//! | file | what |
+//! | file | contents |
 //! |---|---|
 //! | [`signal`] | quantities of a state: displacements, rates, temperatures, charges, distances |
 //! | [`ports`] | ports of the netlist, and those that any node, heated beam or the frame offers |
-//! | `small_signal` | what a small change at a port does to the forces, and what is seen of the motion that follows |
+//! | `small_signal` | the effect of a small change at a port on the forces, and on the quantities read from the motion that follows |
 //!
 //! Analyses and devices stand on it; it knows neither.
 

@@ -1,4 +1,4 @@
-//! Kinds of ports: what is given to them and what they answer.
+//! Kinds of ports: their inputs and outputs.
 
 use serde::{Deserialize, Serialize};
 
@@ -37,7 +37,7 @@ impl PortKind {
         Self::Rate,
     ];
 
-    /// What is given, and its unit.
+    /// The input and its unit.
     pub fn given(self) -> (&'static str, &'static str) {
         match self {
             Self::Electrical => ("voltage", "V"),
@@ -49,7 +49,7 @@ impl PortKind {
         }
     }
 
-    /// What is answered, and its unit; for an inertial port nothing.
+    /// The output and its unit; empty for an inertial port.
     pub fn answered(self) -> (&'static str, &'static str) {
         match self {
             Self::Electrical => ("current", "A"),

@@ -1,4 +1,4 @@
-//! What ports are: electrical ones of the netlist, and those that any node, heated beam or the frame offers by name.
+//! Ports: electrical ones of the netlist, and those that any node, heated beam or the frame offers by name.
 //!
 //! | name | kind | given | answered |
 //! |---|---|---|---|
@@ -44,7 +44,7 @@ pub(crate) struct OpenedPorts {
     pub(crate) sources: Vec<usize>,
     pub(crate) kinds: Vec<PortKind>,
     pub(crate) answers: Vec<PortResponse>,
-    /// The model with the inputs among them; none where there are none.
+    /// The model with the inputs among its members; `None` without inputs.
     pub(crate) system: Option<Arc<System>>,
 }
 

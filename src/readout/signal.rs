@@ -27,7 +27,7 @@ pub enum Signal {
     Pull(usize),
 }
 
-/// What signals are read from: a state, or a change of one.
+/// State, or change of a state, that signals are read from.
 #[derive(Debug, Clone, Copy)]
 pub struct SignalView<'a> {
     /// Displacements.
@@ -150,7 +150,7 @@ pub fn names(compiled: &CompiledModel) -> Vec<String> {
     motions.chain(temperatures).chain(of_gaps).collect()
 }
 
-/// What the motion of a node consists of: displacements, then rates.
+/// Components of the motion of a node: displacements, then rates.
 const DIRECTIONS: [&str; 6] = ["x", "y", "rz", "vx", "vy", "vrz"];
 
 /// Direction and kind (true: rate) of the motion that `x`, `y`, `rz`, `vx`, `vy` and `vrz` stand for.
@@ -179,7 +179,7 @@ fn along_beam(compiled: &CompiledModel, name: &str) -> Option<MaterialPoint> {
     compiled.parts.beams[beam].get(number.parse::<usize>().ok()?).copied()
 }
 
-/// What a wrong name could have meant.
+/// Suggestions for a wrong name.
 fn hint(compiled: &CompiledModel, name: &str) -> String {
     let part = name.rsplit_once('.').map_or(name, |(part, _)| part);
     let nodes: Vec<&str> = compiled.structure.nodes.iter().filter(|n| n.mechanical).map(|n| n.name.as_str()).collect();

@@ -1,7 +1,8 @@
 //! How a small change at one source that goes as e^(st) moves a state, and what is seen of it.
 //!
-//! [`PerturbedState`] is the physics at any complex s [rad/s]: what a unit at a port does to the forces, and what is seen of the motion
-//! that follows. A device asks at s = iω, an analysis of responses at poles and zeros, too.
+//! [`PerturbedState`] is the physics at any complex s [rad/s]: the effect of a unit input on the forces, and on the
+//! quantities read from the motion that follows. A device asks at s = iω, an analysis of responses at poles and zeros,
+//! too.
 
 use super::signal::{Signal, SignalView};
 use crate::compile::CompiledModel;
@@ -24,7 +25,7 @@ pub(crate) struct PerturbedState<'a> {
     pub(crate) drive: &'a Drive,
 }
 
-/// What a unit at one source does before anything moves.
+/// Effect of a unit input at one source on the forces, without motion.
 #[derive(Debug, Clone)]
 pub(crate) struct SourceExcitation {
     /// Force on each body [N, N·m].
@@ -47,7 +48,7 @@ pub(crate) enum FrequencyDependence {
 }
 
 impl FrequencyDependence {
-    /// What it is at s [rad/s].
+    /// The factor at s [rad/s].
     pub(crate) fn factor(self, s: Complex<f64>) -> Complex<f64> {
         match self {
             Self::AtOnce => Complex::from(1.0),
@@ -119,7 +120,7 @@ impl PerturbedState<'_> {
         SignalView { q: self.q, v: self.v, rise: self.rise, volts: &self.drive.volts }
     }
 
-    /// What a unit e^(st) at source `source` does.
+    /// The effect of a unit input e^(st) at source `source`.
     pub(crate) fn push(&self, source: usize, s: Complex<f64>) -> SourceExcitation {
         let system = self.system;
         let electrics = &system.electrics;

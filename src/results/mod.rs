@@ -1,4 +1,4 @@
-//! What comes out: tables, ngspice `.raw` files, CSV, and pictures.
+//! Output: tables, ngspice `.raw` files, CSV, and pictures.
 //!
 //! A [`table::DeviceTable`] holds named columns with units. [`csv`] and [`raw`] write it, [`plot`] draws it. Every file is
 //! written through [`atomic`]: a reader sees the whole file or none.

@@ -132,7 +132,7 @@ mod tests {
     }
 
     proptest! {
-        /// What is written is read back: names, units, kinds and every bit, in both encodings, two plots in one file.
+        /// Written files round-trip: names, units, kinds and every bit, in both encodings, two plots in one file.
         #[test]
         fn round_trip(table in any_table(), second in any_table(), ascii in any::<bool>()) {
             let encoding = if ascii { Encoding::Ascii } else { Encoding::Binary };

@@ -1,4 +1,4 @@
-//! Columns of samples with names and units: what every analysis leaves behind.
+//! Columns of samples with names and units: the output of every analysis.
 
 use thiserror::Error;
 

@@ -3,7 +3,7 @@
 use super::node::NodeId;
 use serde::{Deserialize, Serialize};
 
-/// What a circuit element does.
+/// Kind of a circuit element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CircuitKind {
     /// Resistance [Ω] between two nodes.
@@ -27,7 +27,7 @@ pub enum CircuitKind {
 pub struct CircuitElement {
     /// Full element name.
     pub name: String,
-    /// What it does.
+    /// Its kind.
     pub kind: CircuitKind,
     /// Its nodes.
     pub nodes: Vec<NodeId>,

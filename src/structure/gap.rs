@@ -1,4 +1,4 @@
-//! What two parts of a drawing do across a gap: combs, plates, facing beams, and stops.
+//! Interactions of two parts across a gap: combs, plates, facing beams, and stops.
 
 use super::node::NodeId;
 use serde::{Deserialize, Serialize};
@@ -81,7 +81,7 @@ pub struct PlateGap {
     /// Distance at which the plates touch [m]; none: that of nearly closed gaps of their size.
     #[serde(default)]
     pub touch: Option<f64>,
-    /// What an impact loses.
+    /// Impact losses.
     #[serde(default)]
     pub impact: Impact,
     /// Where its voltage comes from.
@@ -112,7 +112,7 @@ pub struct BeamGap {
     /// Distance at which the beams touch [m]; none: that of nearly closed gaps of their size.
     #[serde(default)]
     pub touch: Option<f64>,
-    /// What an impact loses.
+    /// Impact losses.
     #[serde(default)]
     pub impact: Impact,
     /// Where its voltage comes from.
@@ -126,7 +126,7 @@ pub struct Stop {
     pub name: String,
     /// Moving node.
     pub a: NodeId,
-    /// What it meets; none: the ground.
+    /// The part that it touches; `None`: the ground.
     pub b: Option<NodeId>,
     /// Unit vector of the motion.
     pub axis: [f64; 2],
@@ -136,7 +136,7 @@ pub struct Stop {
     pub stiffness: Option<f64>,
     /// Area on which a rigid stop bears [m²].
     pub area: f64,
-    /// What an impact loses.
+    /// Impact losses.
     #[serde(default)]
     pub impact: Impact,
 }

@@ -1,4 +1,4 @@
-//! What bears and moves: beams with their material and heat, masses, links, supports, springs, and loads.
+//! Mechanical elements: beams with their material and heat, masses, links, supports, springs, and loads.
 
 use super::node::NodeId;
 use serde::{Deserialize, Serialize};
@@ -155,6 +155,6 @@ pub struct Yield {
     pub stress: f64,
     /// Temperature at which no strength is left [K].
     pub softening: f64,
-    /// What it has yielded so far [1]; negative: shorter. 0 as drawn.
+    /// Permanent strain so far [1]; negative: shorter. 0 as drawn.
     pub strain: f64,
 }

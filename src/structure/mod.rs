@@ -1,4 +1,4 @@
-//! What was drawn: nodes, materials, beams, plates, anchors, gaps, combs and ports, in SI units.
+//! The structure: nodes, materials, beams, plates, anchors, gaps, combs and ports, in SI units.
 //!
 //! A [`Structure`] is planar (x, y, rotation about z), knows nothing of bodies or joints, and is never changed after it
 //! was built. Node positions are those of the drawn geometry. Everything refers to nodes by [`NodeId`].

@@ -7,7 +7,7 @@ use crate::multibody::forces::RestStrain;
 use crate::multibody::planar::Pose;
 use nalgebra::DMatrix;
 
-/// What a mechanism feels at one instant, or the change of it.
+/// Electrical and thermal state that acts on a mechanism at one instant, or its change.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Drive {
     /// Voltage of each gap [V].
@@ -59,7 +59,7 @@ pub struct Electrics {
     pub conductance: DMatrix<f64>,
     /// Heated beams.
     pub heating: Heating,
-    /// What is given beside voltages.
+    /// Inputs other than voltages.
     pub inputs: Vec<Input>,
 }
 

@@ -5,8 +5,8 @@ use super::super::lag::Lags;
 use super::electrics::{Drive, Electrics};
 use crate::multibody::planar::Pose;
 
-/// Source voltages that go linearly from one value to another during a step, with the rises that follow them. What does not depend on
-/// the time is looked up once.
+/// Source voltages that go linearly from one value to another during a step, with the rises that follow them.
+/// Time-independent quantities are computed once.
 #[derive(Debug, Clone)]
 pub struct Ramp<'a> {
     /// The electrical side.

@@ -1,4 +1,4 @@
-//! What ideal sources say of potentials: the nodes of a tree of sources have one unknown between them, or none where it
+//! Constraints of ideal sources on potentials: the nodes of a tree of sources share one unknown, or none where it
 //! touches ground, and differ by the sources between them.
 
 use crate::sets::Sets;
@@ -10,7 +10,8 @@ pub(super) struct TreeStep {
     pub(super) by: Option<(usize, f64, Option<usize>)>,
 }
 
-/// What sources say of potentials: nodes that they join have one unknown between them, and differ by the sources in between.
+/// Constraints of sources on potentials: nodes that they connect share one unknown, and differ by the sources in
+/// between.
 pub(super) struct KnownPotentials {
     /// The unknown that a node's potential stands on; none: it is at ground but for sources.
     pub(super) row: Vec<Option<usize>>,

@@ -15,7 +15,7 @@ pub struct Coordinate {
     pub direction: Vector2<f64>,
     /// Mass [kg].
     pub mass: f64,
-    /// What its rate is measured in: that many per second of a micrometre is 1 V [rad/s].
+    /// Scale of its rate [rad/s]: that many micrometres per second are 1 V.
     pub omega: f64,
 }
 
@@ -26,7 +26,7 @@ pub struct LumpedGap {
     pub name: String,
     /// n: approach per coordinate [1].
     pub along: DVector<f64>,
-    /// What it does.
+    /// Force law of the gap.
     pub law: Law,
     /// χ of its contact [s/m]; 0: elastic, or none.
     pub loss: f64,
@@ -36,7 +36,7 @@ pub struct LumpedGap {
     pub constant: f64,
 }
 
-/// What a port or signal reads.
+/// Output of a port or signal.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LumpedOutput {
     /// Current of an electrical port: conductance to each port [S], and what the netlist's own sources drive [A].
@@ -78,7 +78,7 @@ pub struct LumpedModel {
     pub push: DMatrix<f64>,
     /// Gaps.
     pub gaps: Vec<LumpedGap>,
-    /// What each port answers, then what each signal shows, in SI.
+    /// The output of each port, then of each signal, in SI.
     pub rows: Vec<LumpedOutput>,
     /// Volts or amperes of the circuit per unit of each row.
     pub scales: Vec<f64>,

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Vector2};
 
 /// Most coordinates of a lumped mechanism.
 const MAX_COORDINATES: usize = 24;
-/// What the rate of a part is measured in that no spring holds [rad/s].
+/// Scale of the rate of a part without a spring [rad/s].
 pub(super) const FREE_RATE: f64 = 1e5;
 /// Share of a spring's force that may be beside a straight line [1].
 const STRAIGHT: f64 = 1e-9;

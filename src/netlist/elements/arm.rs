@@ -1,7 +1,7 @@
 //! Members between two rigid arms, as beam3dlink has them: a → arm 1 (L1 along R·R₁·x) → member → arm 2 (L2 along R·R₂·x) → b.
 //!
-//! A negative length turns its arm round. What an arm has across the drawing plane is left out: it shifts the member to another
-//! height and nothing in the plane.
+//! A negative length turns its arm round. Offsets of an arm normal to the drawing plane are omitted: they change the
+//! member's height and nothing in the plane.
 
 use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
@@ -10,7 +10,7 @@ use crate::structure::{Link, NodeId};
 
 /// Standard gravity [m/s²].
 const GRAVITY: f64 = 9.806_65;
-/// Arms shorter than this part of their length, seen in the plane, are none [1].
+/// Arms whose in-plane length is below this fraction of their length are ignored [1].
 const SEEN: f64 = 1e-9;
 
 impl ElementSite<'_, '_> {

@@ -1,7 +1,7 @@
 //! Circuit elements: resistors, capacitors, inductors, sources, amplifiers, electrical ground, ports.
 //!
-//! The model itself knows resistors and fixed voltages. The others are kept as drawn, for a deck around the device, and whoever reads
-//! the netlist for another purpose is told that they are left out.
+//! The model itself knows resistors and fixed voltages. The model itself contains resistors and fixed voltages only.
+//! Other elements are kept for a deck around the device, and all other uses of the netlist warn that they are omitted.
 
 use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;

@@ -110,8 +110,8 @@ pub(super) fn predisplaced(site: &mut ElementSite<'_, '_>) -> Result<(), Reporte
     site.between_arms(|site, ends| site.add_chain(ends, &points, width))
 }
 
-/// Most that the width of a taper changes over a piece of it, as a logarithm: what bends is then within 7e-4 of ∫ M²/EI, masses and axial
-/// compliances within 1e-4.
+/// Largest change of the width of a taper over one piece, as a logarithm. Bending compliance is then within 7e-4 of ∫
+/// M²/EI, and masses and axial compliances within 1e-4.
 const STEEP: f64 = 0.025;
 
 /// Most pieces of a taper.

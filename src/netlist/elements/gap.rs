@@ -36,7 +36,7 @@ impl ElementSite<'_, '_> {
         Ok(touch)
     }
 
-    /// What an impact loses, as far as it is given.
+    /// Impact losses, where they are given.
     pub(super) fn impact(&mut self) -> Result<Impact, Reported> {
         let within = |site: &mut Self, name: &str, [least, most]: [f64; 2], help: &str| match site.number(name)? {
             Some(x) if !(least..=most).contains(&x) => {

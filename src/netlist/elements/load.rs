@@ -46,8 +46,9 @@ fn add(site: &mut ElementSite<'_, '_>, moment: f64, moment_given: bool) -> Resul
     Ok(())
 }
 
-/// prestressedbeam: no beam, but the loads K22·q on its first node and −K22·q on its second that SUGAR's has for a beam whose end
-/// is displaced by q = (qx, qy, qoz in degrees), as SUGAR has them: the moments do not balance the forces' couple.
+/// prestressedbeam: no beam, but the loads K22·q on its first node and −K22·q on its second. SUGAR applies them for a
+/// beam whose end is displaced by q = (qx, qy, qoz in degrees). As in SUGAR, the moments do not balance the couple of
+/// the forces.
 pub(super) fn prestressed(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (l, w, h) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
     let modulus = site.material()?.youngs_modulus;

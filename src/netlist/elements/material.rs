@@ -13,12 +13,12 @@ const NO_FILM: f64 = 1.0;
 const SOLID: std::ops::Range<f64> = 1e6..2e12;
 /// Densities of solids, from foam to osmium [kg/m³].
 const DENSE: std::ops::Range<f64> = 10.0..25e3;
-/// Strain of a residual stress beyond which any solid has failed: that of whiskers and defect-free crystals [1].
+/// Strain of a residual stress beyond the strength of any solid, including defect-free crystals [1].
 const STRONGEST: f64 = 0.1;
 /// Permittivity of vacuum, as SUGAR's process files round it [F/m].
 pub(super) const VACUUM: f64 = 8.854e-12;
 
-/// What a material is made of.
+/// Parameters of a material.
 const READ: [&str; 9] = [
     "Youngsmodulus",
     "Poisson",
@@ -82,7 +82,7 @@ impl ElementSite<'_, '_> {
         })
     }
 
-    /// Ambient temperature [K]; 0, so that temperatures are rises, when there is none.
+    /// Ambient temperature [K]; 0 by default, so that temperatures are rises.
     fn ambient(&mut self) -> Result<f64, Reported> {
         let ambient = self.number_or("ambienttemperature", 0.0)?;
         if ambient < 0.0 {
@@ -95,7 +95,7 @@ impl ElementSite<'_, '_> {
         Ok(ambient)
     }
 
-    /// Density [kg/m³]; 0, with a warning, when there is none.
+    /// Density [kg/m³]; 0 with a warning where it is missing.
     pub(super) fn density(&mut self) -> Result<f64, Reported> {
         if let Some(density) = self.number("density")? {
             if density > 0.0 && !DENSE.contains(&density) {

@@ -1,6 +1,6 @@
-//! What parameters mean, for messages.
+//! Meanings of parameters, for messages.
 
-/// What a parameter is, with its unit, for messages.
+/// Meaning of a parameter, with its unit, for messages.
 pub(super) fn meaning(name: &str) -> &'static str {
     match name {
         "l" => "length [m]",

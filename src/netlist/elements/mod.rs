@@ -1,4 +1,4 @@
-//! The elements: what each takes, checks and adds to the drawing.
+//! The elements: parameters, checks, and their additions to the structure.
 
 mod arguments;
 mod arm;

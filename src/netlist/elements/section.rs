@@ -4,7 +4,7 @@ use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
 use super::arguments::ElementSite;
 
-/// What `softjointlr` and `hinge3` leave of the bending stiffness [1].
+/// Fraction of the bending stiffness that `softjointlr` and `hinge3` retain [1].
 const SOFT: f64 = 1e-2;
 
 impl ElementSite<'_, '_> {

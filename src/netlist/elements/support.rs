@@ -1,4 +1,4 @@
-//! What holds nodes: anchors, hinges, sliders, guides, beams that slide; and `pos`, which only places them.
+//! Supports: anchors, hinges, sliders, guides, sliding beams; and `pos`, which only places nodes.
 
 use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;

@@ -83,7 +83,7 @@ const PREDISPLACED: &[&str] = &[
 ];
 const PRESTRESSED: &[&str] = &["l", "w", "h", "qx", "qy", "qz", "qox", "qoy", "qoz"];
 const SLIDER: &[&str] = &["l", "w", "h", "T", "sliderox", "slideroy", "slideroz"];
-/// What any element of a drawn circuit may carry.
+/// Drawing attributes that any circuit element may have.
 const DRAWN: &[&str] = &[
     "V",
     "R",

@@ -1,4 +1,4 @@
-//! What a call of a SUGAR 3 netlist hands over: `{A, B, material; l=100u, oz=90}`.
+//! Arguments of a call in a SUGAR 3 netlist: `{A, B, material; l=100u, oz=90}`.
 
 use super::super::elements;
 use super::super::value::Value;

@@ -1,4 +1,4 @@
-//! What a netlist has drawn so far: counted, named, and ended where it is too much.
+//! Elements and nodes built so far: counted, named, and limited.
 
 use super::super::source::TextSpan;
 use super::state::LuaState;

@@ -173,7 +173,7 @@ fn lie(state: &mut LuaState, id: NodeId, at: [f64; 2], span: TextSpan) {
     }
 }
 
-/// `_n("c_3")` of converted netlists: what `_currnodes` has under that name, else the node.
+/// `_n("c_3")` of converted netlists: the entry of `_currnodes` with that name, else the node.
 fn named_node(lua: &Lua, shared: &SharedState, name: &LuaValue) -> mlua::Result<LuaValue> {
     let nodes: LuaValue = lua.globals().raw_get("_currnodes")?;
     if let LuaValue::Table(nodes) = nodes {
@@ -224,7 +224,7 @@ fn model_function(lua: &Lua, shared: &SharedState, name: &'static str) -> mlua::
     lua.create_function(move |lua, table: Table| element(lua, &state, Some(name), &table))
 }
 
-/// Builds an element. What is wrong with it is reported, and the netlist goes on.
+/// Builds an element. Errors are reported, and the netlist continues.
 fn element(lua: &Lua, shared: &SharedState, model: Option<&str>, table: &Table) -> mlua::Result<()> {
     budget::check();
     let call = ElementCall::read(table)?;

@@ -1,4 +1,4 @@
-//! What a SUGAR 3 netlist may use: no files, no system, no strings that patterns could run over for ever, and bounded
+//! Sandbox of a SUGAR 3 netlist: no files, no system, no string patterns with unbounded run time, and bounded
 //! instructions, memory and time.
 //!
 //! The library of Lua is left out but for what runs in bounded steps: a function of Lua's written in C is not interrupted. So there
@@ -24,12 +24,12 @@ const MEMORY_PER_ELEMENT: usize = 4 << 10;
 /// Time without anything drawn after which processor time is looked at, and what may pass of it then. One instruction may copy a
 /// string as long as the memory, so that instructions alone do not bound time.
 const PATIENCE: Duration = Duration::from_millis(25);
-/// Time between two looks at processor time, which the system tells in a file.
+/// Interval between reads of the processor time, which the system provides in a file.
 const CLOCK_INTERVAL: Duration = Duration::from_millis(5);
-/// Where the system tells no processor time: so many times as long by the wall clock.
+/// Where processor time is not available: the limit on wall-clock time, as a multiple.
 const WALL: u32 = 20;
 
-/// What stays of Lua's own functions.
+/// Lua functions that remain available.
 const LUA_FUNCTIONS: [&str; 3] = ["tonumber", "type", "select"];
 
 /// Why a netlist was stopped.
@@ -39,7 +39,7 @@ pub(super) enum SandboxLimit {
     Time,
 }
 
-/// What has been drawn so far, for the limits.
+/// Counts of elements and nodes so far, for the limits.
 #[derive(Debug, Default)]
 pub(super) struct SandboxProgress {
     /// Elements and nodes.

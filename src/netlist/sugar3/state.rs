@@ -1,4 +1,4 @@
-//! What the functions of a SUGAR 3 netlist work on.
+//! State shared by the functions of a SUGAR 3 netlist.
 
 use super::super::bundle::Bundle;
 use super::super::diagnostic_sink::DiagnosticSink;
@@ -24,7 +24,7 @@ pub(super) struct NameScope {
     pub(super) rotation: Rotation,
 }
 
-/// What the functions of a netlist work on.
+/// State shared by the functions of a netlist.
 #[derive(Debug)]
 pub(super) struct LuaState {
     pub(super) drawing: StructureBuilder,
@@ -114,7 +114,7 @@ impl LuaState {
         LuaNode { id, name: self.drawing.structure.nodes[id.0].name.clone() }
     }
 
-    /// A global that has no value yet: what was set from outside, if it was.
+    /// Value of an undefined global from the settings, if there is one.
     pub(super) fn ask(&mut self, name: &str) -> Option<Setting> {
         let order = self.asked.len();
         let order = *self.asked.entry(name.to_owned()).or_insert(order);

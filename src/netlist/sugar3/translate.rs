@@ -1,4 +1,5 @@
-//! SUGAR 3's Lua 4 as Lua 5.4, line by line: what is changed stays on its line, so that messages point into the netlist.
+//! SUGAR 3's Lua 4 as Lua 5.4, line by line: translated text stays on its line, so that messages point into the
+//! netlist.
 //!
 //! * a metric suffix becomes an exponent: `2u` is `2e-6`;
 //! * `subnet s(A, B, w) … end` becomes `s = subnetize("s", "A,B,w", function(A, B, w, args) … end)`;
@@ -7,7 +8,7 @@
 use super::super::lexer::{scaled, suffix};
 use super::words::{Word, WordKind, words};
 
-/// What has no counterpart: the bytes of the place, what it is, a way out.
+/// A construct without a counterpart: its byte range, its name, and a remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Untranslatable {
     pub(crate) start: usize,
@@ -16,7 +17,7 @@ pub(crate) struct Untranslatable {
     pub(crate) help: &'static str,
 }
 
-/// What closes an open block.
+/// Keyword that closes an open block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum OpenBlock {
     Plain,

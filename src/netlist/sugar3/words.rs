@@ -1,6 +1,6 @@
 //! The words of a SUGAR 3 netlist: Lua 4 with metric suffixes on numbers.
 
-/// What a word is.
+/// Kind of a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WordKind {
     Name,
@@ -19,7 +19,7 @@ pub(crate) struct Word {
     pub(crate) starts_line: bool,
 }
 
-/// All words of a text; comments and blanks are left out. Never fails: what cannot be is left to Lua.
+/// All words of a text; comments and blanks are left out. Never fails: invalid text is left to Lua.
 pub(crate) fn words(text: &str) -> Vec<Word> {
     let bytes = text.as_bytes();
     let peek = |at: usize| bytes.get(at).copied().unwrap_or(0);

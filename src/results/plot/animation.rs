@@ -54,7 +54,7 @@ pub fn page(structure: &Structure, title: &str, play: Play, frames: &[AnimationF
     )
 }
 
-/// What was drawn and how it moves, as JSON. Lengths are in micrometres.
+/// The structure and its motion as JSON. Lengths are in micrometres.
 fn data(structure: &Structure, play: Play, frames: &[AnimationFrame]) -> String {
     let mut points: Vec<PlanePoint> = structure.nodes.iter().map(|n| n.position).collect();
     let inner = |beam: usize| frames.first().and_then(|f| f.curves.get(beam)).map_or(0, |c| c.len().saturating_sub(2));

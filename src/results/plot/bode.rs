@@ -116,7 +116,7 @@ pub fn draw(title: &str, frequencies: &[f64], linear: bool, curves: &[BodeCurve]
     picture
 }
 
-/// What a quotient of units measures.
+/// Name of the quantity of a quotient of units.
 fn named(unit: &str) -> String {
     let own = if unit.starts_with("m/s/") {
         "m/s"

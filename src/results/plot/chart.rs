@@ -16,7 +16,7 @@ pub struct Series {
 /// Curves that share a unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// What the panel shows.
+    /// Title of the panel.
     pub title: String,
     /// Unit in SI; an SI prefix is chosen to fit. A unit in brackets such as "[µm]" is taken as it is.
     pub unit: String,
@@ -125,7 +125,7 @@ fn draw_panel(
     }
 }
 
-/// What a unit measures, as a title for a panel.
+/// Name of the quantity of a unit, as a title for a panel.
 pub fn word(unit: &str) -> &'static str {
     match unit {
         "m" => "displacement",

@@ -1,4 +1,4 @@
-//! Log-log charts: markers and lines in panels side by side, decades as powers of ten, one legend under each title.
+//! Log-log charts: markers and lines in adjacent panels, decades as powers of ten, one legend under each title.
 
 use super::PALETTE;
 use super::log_axis::LogAxis;
@@ -18,7 +18,7 @@ pub struct LogCurve {
 /// A line of constant slope for the eye, through the chart's own corner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slope {
-    /// What it stands for: "n³".
+    /// Label of the line: "n³".
     pub name: String,
     /// A point on it.
     pub through: [f64; 2],
@@ -50,7 +50,7 @@ pub struct LogChart {
     pub title: String,
     /// Panels, two in a row.
     pub panels: Vec<LogPanel>,
-    /// Notes: what was measured, and on what; an empty one makes room.
+    /// Notes on the measurement and the machine; an empty one adds vertical space.
     pub notes: Vec<String>,
 }
 
@@ -221,8 +221,8 @@ fn colour(k: usize) -> &'static str {
     PALETTE[k % PALETTE.len()]
 }
 
-/// The mark of the k-th curve: circle, square, triangle, diamond, ... in the curve's colour, so that colour and shape
-/// together tell curves apart in print.
+/// The mark of the k-th curve: circle, square, triangle, diamond, ... in the curve's colour, so that curves can be
+/// distinguished in print by shape and colour.
 fn mark(picture: &mut Picture, k: usize, [x, y]: [f64; 2], r: f64) {
     let paint = Paint { fill: colour(k), stroke: "#ffffff", width: 0.7, opacity: 1.0 };
     match k % 5 {

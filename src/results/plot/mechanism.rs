@@ -6,7 +6,7 @@ use super::shapes::{DisplacedShape, NodeDisplacement};
 use super::svg::{Align, Paint, Picture};
 use crate::structure::Structure;
 
-/// What to draw.
+/// Content of a figure of a mechanism.
 #[derive(Debug, Clone, Copy)]
 pub struct MechanismFigure<'a> {
     /// The drawn parts.
@@ -137,7 +137,7 @@ pub fn draw(drawing: &MechanismFigure<'_>) -> Picture {
     picture
 }
 
-/// What a mechanism is laid over.
+/// Background of a mechanism.
 #[derive(Debug, Clone, Default)]
 pub struct Ground {
     /// Contours of a layout [m].
@@ -179,7 +179,7 @@ pub fn over(title: &str, structure: &Structure, ground: &Ground) -> Picture {
     picture
 }
 
-/// Draws several states of mechanisms side by side, each under its own title, all to one scale of length.
+/// Draws several states of mechanisms in a grid, each under its own title, all to one scale of length.
 pub fn grid(title: &str, drawings: &[MechanismFigure<'_>]) -> Picture {
     let mut prepared: Vec<ScaledFigure<'_>> = drawings.iter().map(ScaledFigure::new).collect();
     // each at the same place of its cell

@@ -20,7 +20,7 @@ pub mod svg;
 
 pub use svg::Picture;
 
-/// Colours of successive curves: the palette of Okabe and Ito (2008), which colour-blind readers can tell apart.
+/// Colours of successive curves: the palette of Okabe and Ito (2008), which colour-blind readers can distinguish.
 pub const PALETTE: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"];
 
 /// Puts pictures under each other, left edges aligned.

@@ -16,7 +16,7 @@ pub struct PlaneCurve {
     pub dashed: Vec<bool>,
 }
 
-/// What a mark stands for.
+/// Meaning of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sign {
     /// A filled circle.
@@ -208,7 +208,7 @@ fn dashes(line: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     list
 }
 
-/// "fold at 17.9 µN": what a mark says.
+/// Label of a mark: "fold at 17.9 µN".
 pub fn word(what: &str, value: f64, unit: &str) -> String {
     format!("{what} at {}", quantity(value, unit))
 }

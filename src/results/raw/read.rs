@@ -13,7 +13,7 @@ pub enum RawError {
     Unexpected {
         /// Offset of the line from the start of the file.
         offset: usize,
-        /// What was expected.
+        /// The expected content.
         expected: &'static str,
         /// The line as it stands, shortened.
         found: String,
