@@ -1,4 +1,4 @@
-//! What the options leave of a beam's section: a bar, with or without shear and rotary inertia.
+//! Effect of the options on a beam's section: a bar, with or without shear and rotary inertia.
 
 use super::scheme::Bar;
 use crate::structure::Beam;
@@ -6,7 +6,7 @@ use crate::structure::Beam;
 /// Shear coefficient of a rectangular section: G·As = κ·G·A.
 pub const SHEAR_COEFFICIENT: f64 = 5.0 / 6.0;
 
-/// What the options leave of a beam: an Euler–Bernoulli beam unless shear or rotary inertia are asked for.
+/// The bar that models a beam: Euler–Bernoulli unless the options enable shear or rotary inertia.
 pub fn bar(beam: &Beam, shear: bool, rotary: bool) -> Bar {
     let m = &beam.material;
     let area = beam.width * beam.thickness;

@@ -1,7 +1,8 @@
 //! A beam of the drawing as bodies and joints of a model, cut by a [`Scheme`].
 //!
-//! At junctions the ends are [`JunctionEnd`]s: the beam proper, which is cut, runs from one offset to the other, the rods in between
-//! belong to the bodies of the nodes, and the springs' compliance is added to that of the first and the last joint.
+//! At junctions the ends are [`JunctionEnd`]s. The beam proper, which is cut, runs from one offset to the other; the
+//! rods outside it belong to the bodies of the nodes. The springs' compliance is added to that of the first and the
+//! last joint.
 
 use super::bar::shear_flexibility;
 pub use super::bar::{SHEAR_COEFFICIENT, bar};
@@ -108,7 +109,7 @@ pub fn lay(
     points
 }
 
-/// What the joints of a beam depend on.
+/// Parameters that determine the joints of a beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct JointProperties {
     /// Between the junctions.
@@ -157,7 +158,7 @@ fn sprung<'a>(
     &known[known.len() - 1]
 }
 
-/// What the joints of one beam have in common: they are mostly alike.
+/// Springs shared by the joints of one beam, most of which are equal.
 #[derive(Default)]
 struct Springs {
     /// The last joint away from the ends, and what it is.
@@ -191,7 +192,7 @@ impl Springs {
     fn with_ends(&mut self, drawn: &JointProperties, cut: &SegmentedBeam, k: usize) -> JointStress {
         let JointProperties { bar, give, ends, .. } = drawn;
         let pin = &cut.pins[k];
-        // an end without a spring is none: the joint is then one of the others to the last bit
+        // without a spring at an end, its joint equals the others to the last bit
         let next = [(k == 0).then_some(&ends[0]), (k == cut.pins.len() - 1).then_some(&ends[1])];
         let next = next.map(|end| end.filter(|end| end.spring != Matrix3::zeros()));
         let mut springs = Matrix3::zeros();

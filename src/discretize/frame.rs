@@ -37,7 +37,7 @@ pub enum ElementCount {
     Beams(Vec<usize>),
 }
 
-/// What becomes of combs, plates and facing beams.
+/// Treatment of combs, plates and facing beams.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameGaps {
     /// They are left out.
@@ -58,7 +58,7 @@ pub struct FrameOptions {
     pub shear: bool,
     /// Leave out gas damping.
     pub undamped: bool,
-    /// What becomes of gaps.
+    /// Treatment of gaps.
     pub gaps: FrameGaps,
 }
 

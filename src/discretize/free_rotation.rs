@@ -16,7 +16,7 @@ use nalgebra::Vector2;
 /// Distance below which two points of a body are one, as a fraction of the size of the drawing [1]: coordinates are sums of rounded lengths.
 const POINT_TOLERANCE: f64 = 1e-9;
 
-/// What is known of the rotation of a body.
+/// Elements that use the rotation of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum RotationUse {
     /// Nothing acts on the body yet.
@@ -27,7 +27,7 @@ enum RotationUse {
     Used,
 }
 
-/// What acts on the bodies of a model in the making.
+/// Elements acting on the bodies of a model under construction.
 pub(super) struct BodyActions<'a> {
     pub(super) structure: &'a Structure,
     pub(super) joints: &'a [Joint],

@@ -77,14 +77,14 @@ impl JunctionBeams {
     }
 }
 
-/// What junctions do to a drawing.
+/// Effects of junctions on a structure.
 #[derive(Debug, Clone)]
 pub struct JunctionEnds {
     /// For each beam, its start and its end.
     pub beams: Vec<[JunctionEnd; 2]>,
     /// Junctions with two beams or more.
     pub(super) meetings: Meetings,
-    /// What is drawn twice there.
+    /// Mass and drag that are drawn twice there.
     pub(super) excess: Vec<Excess>,
     /// Beams whose offsets were cut down.
     pub(super) cut: Vec<usize>,

@@ -21,7 +21,7 @@ pub struct Beyond {
     pub count: usize,
     /// The first one, as an index into the structure's beams.
     pub first: usize,
-    /// What is beyond the table there.
+    /// The property outside the calibrated table.
     pub why: &'static str,
 }
 
@@ -48,7 +48,7 @@ pub fn beyond(structure: &Structure, ends: &JunctionEnds) -> Option<Beyond> {
     Some(Beyond { count: why.iter().flatten().count(), first, why: why[first].unwrap_or_default() })
 }
 
-/// What is beyond the table where a strip meets others.
+/// The property outside the table where a strip meets others.
 fn at_node<'a, I: Iterator<Item = &'a Strip>>(strip: &Strip, others: impl Fn() -> I) -> Option<&'static str> {
     let widest = others().map(|other| other.width).fold(0.0, f64::max);
     if widest > RATIO * (1.0 + ROUNDING) * strip.width {

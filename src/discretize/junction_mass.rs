@@ -1,8 +1,10 @@
-//! What junctions have of mass and drag twice, and what they lack: made up for once a drawing, whatever its mesh.
+//! Corrects mass and drag that overlapping beams count twice, or miss, at a junction. Computed once per structure;
+//! independent of the mesh.
 //!
-//! It is taken off the body of the junction's node, of which the beams' rigid ends are the part that no mesh changes. Where beams lie along
-//! each other for longer than those, as where one folds straight back over the other, only so much goes as leaves half of that part: what is
-//! drawn twice further out stays, as fine meshes would else have bodies of less than no mass.
+//! It is taken off the body of the junction's node, of which the beams' rigid ends are the part that no mesh changes.
+//! Beams may overlap beyond their rigid ends, for example where one folds straight back over the other. Then the
+//! correction is limited to half of the rigid ends' mass, and the overlap further out stays, since fine meshes would
+//! otherwise have bodies of negative mass.
 
 use super::beam::drag_per_mass;
 use super::junction_springs::JunctionEnd;
@@ -44,7 +46,7 @@ impl Meetings {
     }
 }
 
-/// What is added to the body of a junction's node; of negative amount where more was drawn than is there.
+/// Correction of the body of a junction's node; negative where the drawing exceeds the union.
 #[derive(Debug, Clone)]
 pub(super) struct Excess {
     node: usize,

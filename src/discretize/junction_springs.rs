@@ -17,7 +17,7 @@ use super::scheme::Bar;
 use crate::structure::Beam;
 use nalgebra::Matrix3;
 
-/// What the junction at one end does to a beam.
+/// Effect of the junction at one end of a beam.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct JunctionEnd {
     /// Length that belongs to the rigid body of the node [m].
@@ -44,9 +44,9 @@ impl JunctionEnd {
 
     /// Moves the edge outwards until the spring gives way under every load, by at most `most` [m].
     ///
-    /// A rod of length ℓ between the old and the new edge becomes rigid, and its compliance P = [ℓ/EA, 0, 0; 0, ℓ³/3EI + ℓ/κGA,
-    /// ℓ²/2EI; 0, ℓ²/2EI, ℓ/EI] is added to the spring's, seen from the new edge. What is still negative after `most` is left
-    /// out: a beam so short has no room for its junctions.
+    /// A rod of length ℓ between the old and the new edge becomes rigid, and its compliance P = [ℓ/EA, 0, 0; 0, ℓ³/3EI
+    /// + ℓ/κGA, ℓ²/2EI; 0, ℓ²/2EI, ℓ/EI] is added to the spring's, seen from the new edge. Compliance that is still
+    /// negative after `most` is omitted, since so short a beam has no length for its junctions.
     pub fn settle(&mut self, beam: &Beam, most: f64) {
         let old = self.spring;
         let most = f64::min(most, MAX_WIDTHS * beam.width);
@@ -116,9 +116,10 @@ fn positive_part(spring: &Matrix3<f64>, beam: &Beam) -> Matrix3<f64> {
     back * eigen.recompose() * back / unit
 }
 
-/// Row of [`table::CORNER`] at a ratio of widths (other over own, by its logarithm) and a turn [°], linear in between and
-/// constant outside. Next to equal widths a step of the width in a straight beam counts by the square of its logarithm: to first
-/// order it is what the two beams make of it, so that a taper of many pieces becomes the beam that it is drawn from.
+/// Row of [`table::CORNER`] at a ratio of widths (other over own, by its logarithm) and a turn [°], linear in between
+/// and constant outside. For nearly equal widths, a step of the width in a straight beam counts by the square of its
+/// logarithm. To first order the two beams already include it, so that a taper of many pieces converges to the beam
+/// that it represents.
 pub fn corner(ratio: f64, turn: f64) -> ComplianceRow {
     let (r, share) = place(&table::RATIOS, ratio.log2());
     let equal = table::RATIOS.len() / 2;

@@ -1,14 +1,15 @@
 //! Springs of junctions, from two-dimensional plane stress. Written by `scripts/junctions/calibrate`: do not edit.
 //!
-//! Source: plane stress with Poisson's ratio 0.3, triangles with six nodes, sixteen across the widest branch and finer by
-//! a factor of up to 48 of the narrowest at re-entrant corners; loads are those of a long beam, on faces two widths away.
-//! The beams' own compliance (bending, stretch, shear with κ = 5/6) between the edge of the junction and the faces is
-//! taken away; what is left is shared among the branches by least squares over all loads in balance. What three numbers of
-//! one branch cannot say (a cross bends more easily than it shears into a rhomb) stays as an error: at worst
-//! 0.116 of the compliance of branches ten widths long.
+//! Source: plane stress with Poisson's ratio 0.3. Triangles have six nodes, with sixteen across the widest branch and
+//! refinement by a factor of up to 48 of the narrowest at re-entrant corners. Loads are those of a long beam, on faces
+//! two widths away. The beams' own compliance (bending, stretch, shear with κ = 5/6) between the edge of the junction
+//! and the faces is taken away; what is left is shared among the branches by least squares over all loads in balance.
+//! Effects that three numbers of one branch cannot represent remain as an error, at worst 0.116 of the compliance of
+//! branches ten widths long: a cross bends more easily than it shears into a rhomb.
 //!
-//! A row: the distance from the node to the edge of the junction over the other's width, then the spring there,
-//! c_uu, c_ug, c_up, c_gg, c_gp, c_pp in the unit 1/(E·t), for strains (u, g, p·w) under (N, V, M/w), w the branch's width.
+//! A row: the distance from the node to the edge of the junction over the other's width, then the spring there, c_uu,
+//! c_ug, c_up, c_gg, c_gp, c_pp. Their unit is 1/(E·t), for strains (u, g, p·w) under (N, V, M/w), with w the branch's
+//! width.
 
 #![cfg_attr(rustfmt, rustfmt_skip)]
 #![allow(clippy::approx_constant)]

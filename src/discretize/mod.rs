@@ -75,7 +75,7 @@ pub struct Assembly {
     pub beams: Vec<Arc<[MaterialPoint]>>,
     /// For each beam, what the junctions at its start and its end take of its length [m].
     pub offsets: Vec<[f64; 2]>,
-    /// What junctions do to the drawing.
+    /// Effects of junctions on the structure.
     ends: Arc<junction::JunctionEnds>,
     /// For each heater of the electrics, its beam in the structure.
     pub heaters: Vec<usize>,
@@ -103,7 +103,7 @@ pub fn discretize_with(
     discretize_like(structure, options, segments, None)
 }
 
-/// The same where `other` is the same drawing with other segments: what no mesh changes is taken from there.
+/// As [`discretize`], where `other` is the same structure on another mesh; parts independent of the mesh are reused.
 ///
 /// # Errors
 /// See [`DiscretizeError`].
@@ -117,7 +117,7 @@ pub fn discretize_like(
     if total > MAX_SEGMENTS {
         return Err(DiscretizeError::TooFine { segments: total });
     }
-    // inner bodies of beams alone: what they come to at least is refused before anything is laid out
+    // check the bodies inside beams, a lower bound, before any allocation
     budget::unknowns(3 * segments.iter().map(|n| n.saturating_sub(1)).sum::<usize>());
     budget::lay_out(total * SEGMENT_BYTES);
     if structure.nodes.is_empty() {

@@ -5,9 +5,9 @@
 //! by (w/2)·tan(turn/2), w the other's width. The difference between the beams' rectangles and their union, with its first
 //! and second moment, is integrated over lines across the junction.
 //!
-//! Where the beams' masses per area differ, the union has at each place the largest of those drawn there, and a filled corner that of the
-//! heavier beam: what lies above each other is one piece, and the heavier layer goes through. That does not depend on the order in
-//! which beams are written.
+//! Where the beams' masses per area differ, the union has the largest of the overlapping ones at each point, and a
+//! filled corner has that of the heavier beam. Overlapping shapes are one piece, with the heavier layer continuous.
+//! That does not depend on the order in which beams are written.
 
 use super::rigid::Lump;
 use nalgebra::Vector2;
@@ -46,7 +46,7 @@ const MAX_CACHED_JUNCTIONS: usize = 512;
 const FEW: usize = 8;
 
 thread_local! {
-    /// What is known of junctions: a drawing is laid out on many meshes, and has many junctions of one kind.
+    /// Cache of junctions: a structure is discretized on many meshes, and has many equal junctions.
     static KNOWN: RefCell<FxHashMap<Vec<[u64; 3]>, Lump>> = RefCell::default();
 }
 

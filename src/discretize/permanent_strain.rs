@@ -1,4 +1,4 @@
-//! Permanent strain of heated beams that have yielded: a rest offset, like thermal expansion.
+//! Permanent strain of heated beams after yield: a rest offset, like thermal expansion.
 
 use super::Assembly;
 use crate::structure::Yield;

@@ -162,7 +162,8 @@ impl RigidGroups {
         self.frame_at(self.point(a), self.point(b), middle, Vector2::new(angle.cos(), angle.sin()))
     }
 
-    /// What acts across gaps; `chord`: facing beams as SUGAR has them; `stations`: where the segments of each beam are joined.
+    /// Force elements across gaps. `chord`: facing beams in SUGAR's model; `stations`: points where the segments of
+    /// each beam are joined.
     pub fn gaps<'a>(
         &self,
         structure: &'a Structure,
@@ -275,8 +276,8 @@ impl UnfinishedBody {
         self.fixed_angle |= held[2];
     }
 
-    /// Tells `see` the point that a mass or a drag acts on, from the reference point [m]; none where it resists the rotation. What is
-    /// nearer than `same` [m] to a point is there.
+    /// Calls `see` with the point that a mass or a drag acts on, from the reference point [m]; `None` where it resists
+    /// the rotation. Points nearer than `same` [m] to each other count as one.
     pub(super) fn lumps_act(&self, same: f64, mut see: impl FnMut(Option<Vector2<f64>>)) {
         for lump in [&self.mass, &self.drag].into_iter().filter(|lump| lump.amount != 0.0 || lump.second != 0.0) {
             let center = lump.center();

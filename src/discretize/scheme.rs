@@ -1,8 +1,8 @@
 //! Schemes: the ways to cut a uniform beam into rigid bodies and flexible joints.
 //!
 //! A beam of length L is cut into N segments of length h = L/N. Joints have the three directions (u, g, p) of
-//! [`planar`](crate::multibody::planar); in the paper's words p alone is a rotary joint (type 1 inside a beam, type 2 between
-//! beams of different section, type 3 where a third beam meets) and u alone a prismatic one (type 4).
+//! [`planar`](crate::multibody::planar). In the paper's terms, p alone is a rotary joint: type 1 inside a beam, type 2
+//! between beams of different section, type 3 at a third beam. u alone is a prismatic joint (type 4).
 //!
 //! | scheme | joints | masses | frequency error |
 //! |---|---|---|---|
@@ -27,7 +27,7 @@ use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2};
 /// stretch leaves out anyway, while bending keeps ten digits of a beam a hundred times as long as wide.
 pub const PENALTY: f64 = 1e4;
 
-/// What a scheme needs to know of a beam.
+/// Beam data required by a scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bar {
     /// Length L [m].

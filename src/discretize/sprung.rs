@@ -1,9 +1,10 @@
 //! The second-order axial strain of a segment that ends in the springs of junctions.
 //!
-//! A joint's strain e = u + [g p]·Q·[g p]ᵀ lets a bent segment keep its length. Where a spring of a junction sits at the segment's end, part
-//! of g and p is the spring's, which has no length: the chord of the segment itself, of length h, is shorter by what the segment alone bends,
-//! and the spring's part turns the one against the other. With spring, segment and spring (a, o, b) in a row, each turning by p and giving
-//! way by g, and the middle direction of all of them as the joint's,
+//! A joint's strain e = u + [g p]·Q·[g p]ᵀ lets a bent segment keep its length. With a junction spring at the segment's
+//! end, part of g and p belongs to the spring, which has no length. The chord of the segment itself, of length h, is
+//! shorter because of the bending of the segment alone, and the spring's part rotates one relative to the other. With
+//! spring, segment and spring (a, o, b) in a row, each turning by p and giving way by g, and the middle direction of
+//! all of them as the joint's,
 //! ```text
 //! e = u + qₒᵀ·Qₒ·qₒ − [g_a·(p_o + p_b) − g_o·(p_a − p_b) − g_b·(p_a + p_o)]/2 − h·[p_o·(p_a + p_b) + 2·p_a·p_b]/4
 //! ```
@@ -13,8 +14,8 @@
 use super::junction_springs::JunctionEnd;
 use nalgebra::{Matrix2, RowVector2};
 
-/// Q of a joint in the middle of a segment of length `h` [m], over (g, p) as a whole: `own` is the segment's alone, `compliance` its
-/// compliance over (V, M), and `ends` the springs at its start and its end, where there are any.
+/// Q of a joint in the middle of a segment of length `h` [m], over the total (g, p). `own` is the segment's alone,
+/// `compliance` its compliance over (V, M), and `ends` the springs at its start and its end, if any.
 pub(super) fn second_strain(
     own: &Matrix2<f64>,
     h: f64,

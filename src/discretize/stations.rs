@@ -1,4 +1,4 @@
-//! Where along each beam the bodies of its segments measure: what gaps along beams are cut by.
+//! Points along each beam where the bodies of its segments measure deflection; gaps along beams are divided there.
 
 use super::junction::JunctionEnds;
 use super::rigid::RigidGroups;

@@ -1,7 +1,7 @@
 //! Thermal agitation: the random forces that come with drag and dampers.
 //!
-//! What takes energy out of a motion gives it back at random, so that every mode holds k_B·T on average (H. B. Callen,
-//! T. A. Welton, "Irreversibility and generalized noise", Phys. Rev. 83, 1951): forces F with the one-sided spectral density
+//! Every dissipative element also adds a random force, so that every mode holds k_B·T on average (H. B. Callen, T. A.
+//! Welton, "Irreversibility and generalized noise", Phys. Rev. 83, 1951): forces F with the one-sided spectral density
 //! ```text
 //! S_F = 4·k_B·T·C     [N²/Hz],   C the matrix of drag and dampers
 //! ```

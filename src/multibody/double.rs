@@ -13,7 +13,7 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 pub struct Double {
     /// The number rounded to f64.
     pub high: f64,
-    /// What is left.
+    /// The remainder.
     pub low: f64,
 }
 

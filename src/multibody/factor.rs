@@ -4,10 +4,10 @@
 //! The matrix is symmetric, not Hermitian, for complex scalars too. Each body costs one block inverse, one product per
 //! row of its column and one per pair of rows: a fixed amount for a tree. Nothing is allocated after [`BlockMatrix::new`].
 //!
-//! A block is inverted by its own L·D·Lᵀ without exchanges, so the whole is an unpivoted symmetric elimination: backward
-//! stable for the definite matrices of implicit steps and stable equilibria, and invariant to the units of each direction.
-//! The signs of the scalar pivots give the inertia (Sylvester), which tells a stable equilibrium from an unstable one and
-//! counts the modes below a shift.
+//! A block is inverted by its own L·D·Lᵀ without exchanges, so the whole is an unpivoted symmetric elimination:
+//! backward stable for the definite matrices of implicit steps and stable equilibria, and invariant to the units of
+//! each direction. The signs of the scalar pivots give the inertia (Sylvester). It distinguishes stable from unstable
+//! equilibria, and counts the modes below a shift.
 //!
 //! Reference: K. S. Anderson, J. H. Critchley, "Improved 'order-N' performance algorithm for the simulation of constrained
 //! multi-rigid-body dynamic systems", Multibody System Dynamics 9 (2003): the recursion that this elimination is, in
@@ -154,7 +154,7 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
 
     /// Solves in place with the factors: `b` becomes A⁻¹·b. Body vectors in elimination order.
     pub fn solve(&self, pattern: &Pattern, b: &mut [SVector<T, N>]) {
-        // along a beam the row is the next body: its value is handed on without a trip through memory
+        // along a beam the row is the next body: its value is passed in registers
         let count = pattern.bodies();
         let mut next = b.first().copied().unwrap_or_else(SVector::zeros);
         for j in 0..count {

@@ -72,7 +72,7 @@ impl PackedJoint {
     }
 }
 
-/// What sets the axial rest offsets of joints, or the change of it.
+/// Axial rest offsets of joints, or their change.
 #[derive(Debug, Clone, Copy)]
 pub struct RestStrain<'a> {
     /// Free strain of each group of joints [1].

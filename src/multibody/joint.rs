@@ -1,4 +1,4 @@
-//! What stands between two bodies: joints, dampers, couplings of joints.
+//! Elements between two bodies: joints, dampers, couplings of joints.
 
 use super::planar::{JointFrame, Pose};
 use nalgebra::{Matrix2, Matrix3, Matrix3x6, Matrix6, Vector3};

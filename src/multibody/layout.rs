@@ -1,7 +1,7 @@
 //! Elimination order and pattern of a graph, looked up where the same graph was laid out just before.
 //!
-//! Variants of one drawing, and the two meshes that each of them is compared on, have the same graphs again and again. What is kept depends
-//! on the graph alone, so that whether it was looked up shows in no result.
+//! Variants of one drawing, and the two meshes that each of them is compared on, have the same graphs again and again.
+//! Cached data depend on the graph alone, so that a cache hit changes no result.
 
 use super::order::elimination_order;
 use super::pattern::Pattern;

@@ -13,7 +13,7 @@
 //! | [`planar`] | everything that knows a plane from space: poses, points on bodies, joint strains and their derivatives |
 //! | [`sine`] | sine and cosine of small angles, inlined |
 //! | [`body`] | a rigid body: name, mass, drag, held directions |
-//! | [`section`] | joints as they are stored: what those of one beam share, and where their couplings lie |
+//! | [`section`] | joints as they are stored: properties shared by the joints of one beam, and offsets of their couplings |
 //! | [`model`] | bodies, joints, dampers: the immutable model and the mutable state |
 //! | [`joint_coordinates`] | the same graph in relative joint coordinates: loops closed by springs or by constraints |
 //! | [`batch`] | bodies and joints of eight variants at a time, one variant a lane |

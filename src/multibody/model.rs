@@ -21,7 +21,7 @@ pub struct Model {
     pub bodies: Vec<Body>,
     /// Joints, along the elimination order of their earlier body.
     pub joints: Vec<PackedJoint>,
-    /// What joints share.
+    /// Properties shared by joints.
     pub sections: Vec<JointSection>,
     /// Couplings of joints, see [`Model::couple`].
     pub couplings: Vec<Coupling>,
@@ -39,7 +39,7 @@ pub struct Model {
     pub(crate) damper_matrix: Vec<Matrix6<f64>>,
 }
 
-/// What a snapshot of a motion holds: displacement and rate of every body, in elimination order.
+/// State in a snapshot of a motion: displacement and rate of every body, in elimination order.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Displacements (x [m], y [m], θ [rad]).
@@ -193,7 +193,7 @@ impl Model {
         Ok(inertia)
     }
 
-    /// What a joint shares with others.
+    /// The properties that a joint shares with others.
     #[inline]
     pub fn section(&self, joint: &PackedJoint) -> &JointSection {
         &self.sections[joint.section()]

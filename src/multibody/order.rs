@@ -2,11 +2,12 @@
 //!
 //! Ground has no column in the factor, so loops that close through anchors cost nothing. A depth-first numbering that
 //! starts at ground gives a tree its order from the leaves to the root, with no fill. Where loops are left, depth first
-//! alone depends on luck: on a ladder it may run up one rail and down the other, and every rung then fills the whole path.
-//! So the body with the fewest remaining neighbours goes first, ground counted as one, and the depth-first number breaks
-//! ties: the same order on trees, and fronts of 2 or 3 bodies on chains, ladders, banks and stages, where the factorization
-//! is O(n+m). Counting ground keeps what stands on it until the end, so that joint coordinates can be counted from there.
-//! A dense two-dimensional lattice is the exception: its front grows with its side.
+//! alone depends on luck: on a ladder it may run up one rail and down the other, and every rung then fills the whole
+//! path. The body with the fewest remaining neighbours is therefore eliminated first, with ground counted as one
+//! neighbour; the depth-first number breaks ties. The order on trees is the same. Fronts have 2 or 3 bodies on chains,
+//! ladders, banks and stages, where the factorization is O(n+m). Counting ground keeps what stands on it until the end,
+//! so that joint coordinates can be counted from there. A dense two-dimensional lattice is the exception: its front
+//! grows with its side.
 //!
 //! Reference: A. George, J. W. Liu, "The evolution of the minimum degree ordering algorithm", SIAM Review 31 (1989).
 

@@ -98,7 +98,7 @@ impl Pattern {
         (self.target, self.target_start) = (target, target_start);
     }
 
-    /// What it stands for in a budget [byte]: see [`Pattern::new`].
+    /// Its memory for a budget [byte]: see [`Pattern::new`].
     pub(crate) fn bytes(&self) -> usize {
         self.row.len() * FILL_BYTES + self.target.len() * size_of::<u32>()
     }

@@ -1,13 +1,13 @@
-//! Joints as a model stores them: what the joints of one beam have in common stands once, in a section; a joint keeps its
-//! arms, its bodies and where its couplings lie. Fifty-six bytes a joint instead of some two hundred and fifty, most of
-//! which every sweep over the joints would have to read.
+//! Joints as a model stores them: the shared properties of one beam's joints are stored once, in a section; a joint
+//! stores its arms, its bodies and the offset of its couplings. Fifty-six bytes a joint instead of some two hundred and
+//! fifty, most of which every sweep over the joints would have to read.
 
 use super::joint::{BodyId, Joint};
 use super::planar::{JointFrame, Symmetric};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use rustc_hash::{FxBuildHasher, FxHashMap};
 
-/// What the joints that are cut from one beam share.
+/// Properties shared by the joints that are cut from one beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointSection {
     /// Cosine and sine of the drawn angle of the joints' x axis.
@@ -178,7 +178,7 @@ impl JointSection {
             && self.locked == other.locked
     }
 
-    /// A number that tells most sections apart.
+    /// A hash that distinguishes most sections.
     fn hash(&self) -> u64 {
         let [uu, ug, _, gg, gp, pp] = self.stiffness.0;
         let length = self.expansion.map_or(0.0, |(group, length)| length * (group + 1) as f64);

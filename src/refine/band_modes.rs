@@ -104,11 +104,11 @@ fn modes_in_band(
         }
         _ => fresh,
     };
-    // far below the errors that are to be told, which are twice as large in λ
+    // far below the errors to be reported, which are twice as large in λ
     let tightest = (0..modes).map(|m| aim.tolerance(options, m)).fold(options.tol, f64::min);
     let settled = (0.05 * tightest).clamp(1e-9, 1e-3);
     let found = subspace::iterate(model, (&factor, shift), start, modes, settled)?;
-    // two more than wanted: the highest wanted one is told from its neighbours
+    // two more than wanted, to separate the highest wanted one from its neighbours
     let some = (modes + 2).min(found.lambda.len());
     let rigid = parts.beams.iter().any(|points| points.len() == 2 && points[0].body == points[1].body);
     let error = if rigid {

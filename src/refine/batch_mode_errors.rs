@@ -1,4 +1,5 @@
-//! What modes of variants side by side are off by: the estimate of [`super::mode_errors`] over lanes, about the drawn geometry.
+//! Estimated mode errors of a batch of variants: the estimate of [`super::mode_errors`] over lanes, about the drawn
+//! geometry.
 //!
 //! Beams of a variant stand beside those of the others, with the same points; matrices of a segment have no terms between along and across.
 
@@ -22,7 +23,7 @@ const NEAR: f64 = 1e-2;
 const LONG: [usize; 2] = [0, 3];
 const ACROSS: [usize; 4] = [1, 2, 4, 5];
 
-/// A matrix of a segment: what is along, then what is across, row by row.
+/// A matrix of a segment: axial entries, then transverse ones, row by row.
 type Segment<T = Lane8> = [T; 20];
 
 /// A point of a beam.
@@ -64,7 +65,7 @@ pub(crate) struct LaneReference {
     small: RitzMatrices,
 }
 
-/// What is drawn, with its options, and the model of it.
+/// A structure, its options, and its model.
 pub(crate) type BatchVariant<'a> = (&'a Structure, &'a CompileOptions, &'a Assembly);
 
 /// The beams of a variant.
@@ -181,7 +182,7 @@ fn set(lane: usize, to: &mut [Lane8], from: &[f64]) {
     }
 }
 
-/// What is along and across in a segment's matrix.
+/// Axial and transverse entries of a segment's matrix.
 fn segment(matrix: &Matrix6<f64>) -> [f64; 20] {
     let mut segment = [0.0; 20];
     for (i, row) in LONG.into_iter().enumerate() {

@@ -1,9 +1,10 @@
 //! The mesh for whatever an analysis gives: its results are compared with those of twice the segments.
 //!
-//! The difference of the two is the error of the coarser one but for a share 2^−p, p the order of convergence; Richardson's rule
-//! takes that into account, with p = 2, the order of what stretches. What bends converges faster, and is estimated a quarter too high. Where it is beyond the tolerance, each group of beams that are alike is doubled alone: what changes is what
-//! that group contributes, and the groups that gain most per body are refined until the sum is predicted to hold. Then the
-//! prediction is computed.
+//! The difference of the two is the error of the coarser one but for a share 2^−p, p the order of convergence;
+//! Richardson's rule takes that into account, with p = 2, the order of what stretches. Bending converges faster, and
+//! its error is overestimated by a quarter. Where it exceeds the tolerance, each group of equal beams is doubled alone.
+//! The change is the contribution of that group, and the groups with the largest gain per body are refined until the
+//! predicted sum is within the tolerance. Then the prediction is computed.
 //!
 //! Reference: L. F. Richardson, "The deferred approach to the limit", Phil. Trans. R. Soc. A 226 (1927).
 
@@ -26,9 +27,9 @@ const MAX_RESULTS: usize = 24;
 /// A number that an analysis gives, and the size to which its error is relative, in one unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Output {
-    /// The number; NaN where there is none.
+    /// The number; NaN where it is unknown.
     pub value: f64,
-    /// What an error of 1 is.
+    /// Scale of the error: the value that an error of 1 refers to.
     pub scale: f64,
 }
 
@@ -41,7 +42,7 @@ pub type Analyse<'a, E> = &'a mut dyn FnMut(&[usize]) -> Result<Vec<Output>, E>;
 /// too fine. Where refinement does not help, or makes worse, it is beyond the tolerance, and the mesh is the best of those compared.
 ///
 /// # Errors
-/// What the analysis has against the first mesh.
+/// Errors of the analysis on the first mesh.
 pub fn fit<E>(
     structure: &Structure,
     options: &CompileOptions,
@@ -113,10 +114,10 @@ pub fn fit<E>(
     Ok(best.unwrap_or_else(|| order(&segments, None, MAX_PASSES)))
 }
 
-/// The estimate of a mesh as it is: what twice the segments change.
+/// The estimate of a mesh as it is: the change with twice the segments.
 ///
 /// # Errors
-/// What the analysis has against the mesh.
+/// Errors of the analysis on the mesh.
 pub fn estimate<E>(options: &CompileOptions, segments: Vec<usize>, analyse: Analyse<'_, E>) -> Result<Mesh, E> {
     let worst = |errors: Vec<f64>| errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
     let estimated_error = errors(options, &segments, analyse)?.map(worst);
@@ -126,7 +127,7 @@ pub fn estimate<E>(options: &CompileOptions, segments: Vec<usize>, analyse: Anal
 /// The relative error of each result of a mesh; none where the finer mesh has no results or would be too fine.
 ///
 /// # Errors
-/// What the analysis has against the mesh.
+/// Errors of the analysis on the mesh.
 pub fn errors<E>(options: &CompileOptions, segments: &[usize], analyse: Analyse<'_, E>) -> Result<Option<Vec<f64>>, E> {
     let coarse = analyse(segments)?;
     let twice = doubled(options, segments, |_| true);
@@ -170,7 +171,8 @@ pub(crate) fn doubled(options: &CompileOptions, segments: &[usize], some: impl F
     segments.iter().enumerate().map(|(beam, &n)| if some(beam) { twice(n) } else { n }).collect()
 }
 
-/// What twice the segments leave of an error, by Richardson's rule: what stretches converges by the second order with every scheme.
+/// Fraction of an error that twice the segments remove, by Richardson's rule: stretching converges with the second
+/// order for every scheme.
 const REST: f64 = 1.0 - 0.25;
 
 /// Relative error of a number of a mesh, by what it is on twice the segments.
@@ -233,7 +235,7 @@ mod tests {
         assert!(reported > options.tol && reported > 0.2 * found, "{reported:e} of {found:e}");
     }
 
-    /// Results that do not settle are told, not refined for ever.
+    /// Results that do not converge are reported, and refinement stops.
     #[test]
     fn gives_up_where_segments_do_not_help() {
         let text =

@@ -14,8 +14,8 @@ use crate::multibody::{BlockMatrix, BodyId};
 use crate::solve::frequency::eigen::lowest_modes;
 use nalgebra::Vector2;
 
-/// Adds the forces of an imperfection whose largest displacement is `size` [m], of either sign; nothing where no mode comes
-/// out or the lowest one is a rigid motion.
+/// Adds the forces of an imperfection whose largest displacement is `size` [m], of either sign. Adds nothing where no
+/// mode is found or the lowest one is a rigid motion.
 pub fn apply(parts: &mut Assembly, size: f64) {
     let system = &parts.system;
     let zeros = vec![Pose::zeros(); system.bodies()];

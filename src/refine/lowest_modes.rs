@@ -70,7 +70,7 @@ fn highest_of(parts: &Assembly, count: usize) -> Option<f64> {
         shifted.clone_from(&stiffness);
         add_inertia(model, -(TAU * frequency).powi(2), 0.0, &mut shifted);
         model.project_matrix(&mut shifted);
-        // a pivot of exactly zero: the frequency of a mode, a little beside it is none
+        // a zero pivot: the shift is the frequency of a mode; a nearby shift is not
         shifted.factor(&model.pattern).map_or(0, |inertia| inertia.negative)
     };
     let (mut low, mut high) = (LOWEST, 1e3);

@@ -72,7 +72,7 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &MeshTar
             if now.modes > 0 && options.scheme == Scheme::Es {
                 return by_another_scheme(structure, options, aim);
             }
-            // modes of so few segments may not be told apart: with more they are
+            // modes of so few segments may be indistinguishable: use more
             let finer: Vec<usize> = segments.iter().map(|&n| options.scheme.segments(2 * n)).collect();
             if now.modes > 0 && passes <= MAX_BLIND && finer != segments && finer.iter().sum::<usize>() <= MAX_SEGMENTS
             {
@@ -116,8 +116,8 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &MeshTar
     Ok(order)
 }
 
-/// The segments that E4 takes for half of the tolerance, where Es has no estimate of its own: with as many it is off by once to twice as
-/// much, by the same power. Whoever takes them compares them with twice as many.
+/// The segments that E4 needs for half of the tolerance, where Es has no estimate of its own. With as many segments its
+/// error is one to two times as large, with the same order. Callers compare them with twice as many.
 fn by_another_scheme(
     structure: &Structure,
     options: &CompileOptions,

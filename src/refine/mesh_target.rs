@@ -1,4 +1,4 @@
-//! What a mesh is for, and the mesh that is chosen for it.
+//! Target of a mesh, and the mesh chosen for it.
 
 use crate::options::CompileOptions;
 use serde::Serialize;
@@ -25,7 +25,7 @@ impl Mesh {
     }
 }
 
-/// What a mesh is for.
+/// Target of a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshTarget {
     /// Highest frequency whose mode matters [Hz].

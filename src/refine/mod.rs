@@ -7,7 +7,7 @@
 //! | `span` | a beam over the points of what is cut of it |
 //! | [`axial`] | the axial force that each beam carries |
 //! | [`mesh_search`] | the mesh for every mode in a band |
-//! | `mesh_target` | what a mesh is for, and what was chosen |
+//! | `mesh_target` | the target of a mesh, and the chosen mesh |
 //! | `band_modes` | one mesh looked at: its modes in the band and their errors |
 //! | `rigid_beams` | beams whose strain does not matter |
 //! | [`lowest_modes`] | the mesh for the lowest modes, by their number |

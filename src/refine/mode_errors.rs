@@ -1,9 +1,9 @@
 //! How far the frequencies of a model are from those of the beams that it was cut from.
 //!
-//! The joints of E4 and B are exact for loads at the nodes, so that their stiffness over the nodes' (x, y, θ) is that of the
-//! cubic frame on the same mesh, also about a loaded equilibrium. What differs is the mass: lumps here, and for the beam
-//! itself M_r = M_c + λ·M₂, the consistent mass with the next term of the exact dynamic stiffness ([`cubic`]), which is off
-//! by O((kh)⁸) alone. With y, λ a mode of the model, one inverse iteration
+//! The joints of E4 and B are exact for loads at the nodes, so that their stiffness over the nodes' (x, y, θ) is that
+//! of the cubic frame on the same mesh, also about a loaded equilibrium. The mass differs: lumps here, and M_r = M_c +
+//! λ·M₂ for the beam itself. M_r is the consistent mass with the next term of the exact dynamic stiffness ([`cubic`]),
+//! whose error is only O((kh)⁸). With y, λ a mode of the model, one inverse iteration
 //! ```text
 //! K·x = λ·M_r·y
 //! ```
@@ -17,12 +17,13 @@
 //! The other schemes have another stiffness as well: there K and M_c are those of a cubic frame that is assembled for the
 //! purpose, about the drawn geometry, and a beam's contribution is taken as its kinetic energy times (kh)^order.
 //!
-//! Why M₂: the cubic element's own error is +(kh)⁴/1440 where that of E4 is −(kh)⁴/1440, so that the distance of the two is
-//! twice the error inside a long beam, and anything between once and many times it where the ends weigh in.
+//! Reason for M₂: the cubic element's own error is +(kh)⁴/1440 where that of E4 is −(kh)⁴/1440. The distance of the two
+//! is therefore twice the error inside a long beam, and anything between once and many times it where the ends
+//! contribute.
 //!
 //! Under an axial force N the exact dynamic stiffness of a beam has further terms of the second order, N·λ·A and N²·B
-//! ([`cubic::second_tension`]), which segments do not have: the reference is K − N²B with M_r + N·A. Compression makes the model
-//! too stiff, tension may make it too soft or too stiff.
+//! ([`cubic::second_tension`]), which segments lack. The reference is K − N²B with M_r + N·A. Compression makes the
+//! model too stiff; tension may make it too soft or too stiff.
 //!
 //! Modes of the model and of the reference are paired by shape ([`mac`]), not by place: their frequencies may cross.
 //!

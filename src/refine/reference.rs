@@ -1,4 +1,4 @@
-//! The modes of a model by the beams' own mass: what one inverse iteration and Rayleigh–Ritz make of them.
+//! The modes of a model with the beams' consistent mass, after one inverse iteration and Rayleigh–Ritz.
 //!
 //! ```text
 //! K·x = λ·M_r·y
@@ -24,7 +24,7 @@ pub(super) struct Pencil<'a> {
     pub(super) project: &'a dyn Fn(&mut [Pose]),
 }
 
-/// What the reference says of each mode.
+/// Reference values of each mode.
 pub(super) struct ReferenceModes {
     /// λ_r.
     pub(super) reference: Vec<f64>,

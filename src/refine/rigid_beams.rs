@@ -1,9 +1,9 @@
-//! **Rigid beams.** Beams whose strain does not matter become rigid: those whose share of the strain energy of every mode
-//! in the band predicts less than is left of the tolerance (half of it, as a relative rise of the frequency). This too is
-//! computed: the frequencies with rigid beams are compared with what the elastic model said those of the beams are, and the
-//! compliance wherever a load, an electrode or heat acts with that of the elastic model, both within the tolerance. Beams
-//! that touch ground, that are heated or under stress, and electrodes of facing beams stay elastic, as they may matter where
-//! nothing rings.
+//! **Rigid beams.** Beams with negligible strain become rigid. The criterion is their fraction of the strain energy of
+//! every mode in the band: it must predict less than half of the remaining tolerance, as a relative rise of the
+//! frequency. The result is verified. The frequencies with rigid beams are compared with the estimates of the elastic
+//! model. The compliance at each load, electrode or heater is compared with that of the elastic model. Both must be
+//! within the tolerance. Beams that touch ground, that are heated or under stress, and electrodes of facing beams stay
+//! elastic, as they may matter where nothing rings.
 
 use super::band_modes::{MeshModes, solve_modes};
 use super::groups::{Groups, MARGIN};

@@ -1,8 +1,9 @@
 //! A state or a shape of one mesh on another of the same drawing.
 //!
-//! Between two points of a beam the displacement is the cubic through both with the slopes of their rotations, which are not
-//! small: at the distance s of a segment of length h, u' = h·((cos(β + θ), sin(β + θ)) − (cos β, sin β)), β the beam's direction as drawn.
-//! Bent beams keep their length to O(h⁴), so that Newton's method settles from there within a few iterations.
+//! Between two points of a beam the displacement is the cubic through both with the slopes of their rotations, which
+//! are not small. At the distance s of a segment of length h, u' = h·((cos(β + θ), sin(β + θ)) − (cos β, sin β)), with
+//! β the beam's direction as drawn. Bent beams keep their length to O(h⁴), so that Newton's method settles from there
+//! within a few iterations.
 
 use crate::discretize::Assembly;
 use crate::domains::MaterialPoint;
@@ -58,7 +59,7 @@ pub fn carried(structure: &Structure, from: &Assembly, to: &Assembly, x: &[Pose]
     y
 }
 
-/// What a rotation at an end of a segment adds to the slope there, times its length.
+/// Contribution of a rotation at an end of a segment to the slope there, times its length.
 fn slope(along: Vector2<f64>, h: f64, turn: f64, linear: bool) -> Vector2<f64> {
     let (y, x) = if linear { (turn, 0.0) } else { (turn.sin(), turn.cos() - 1.0) };
     Vector2::new(along.x * x - along.y * y, along.y * x + along.x * y) * h

@@ -7,7 +7,7 @@ use super::Number;
 pub struct LaneDouble<T> {
     /// The number rounded to f64.
     pub high: T,
-    /// What is left.
+    /// The remainder.
     pub low: T,
 }
 

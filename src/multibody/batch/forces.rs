@@ -6,7 +6,7 @@ use super::{Lane8, LaneBlock, LaneMatrix, LanePose, SimdReal, add, load, load_bl
 use crate::multibody::BodyId;
 use crate::multibody::section::{NONE, PairSlot};
 
-/// What sets the axial rest offsets, or the change of it.
+/// Axial rest offsets, or their change.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneRestStrain<'a> {
     /// Free strain of each group of joints [1].

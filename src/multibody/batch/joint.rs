@@ -76,7 +76,7 @@ impl<T: Number> LanePlaced<T> {
     }
 }
 
-/// What joints of one section share.
+/// Properties shared by the joints of one section.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneSection<T = Lane8> {
     /// Cosine and sine of the drawn angle.

@@ -1,6 +1,6 @@
 //! Symmetric block factorization and solves over lanes: [`crate::multibody::factor`].
 //!
-//! A pivot that vanishes in one variant spoils that lane alone: its name is told, and what comes of it is not looked at.
+//! A vanishing pivot in one variant invalidates that lane alone: the lane is reported, and its results are not used.
 
 use super::{
     BLANK, LANES, Lane8, LaneBlock, LanePose, SimdReal, ZERO_POSE, load, load_block, product, store, store_block, times,
@@ -161,7 +161,7 @@ struct LaneBlockFactor<W> {
 }
 
 impl<W: SimdReal> LaneBlockFactor<W> {
-    /// `sound` stops being a number in lanes where a pivot vanishes, or is none.
+    /// `sound` becomes NaN in lanes with a vanishing or invalid pivot.
     #[inline(always)]
     fn new(mut l: LaneBlock<W>, scale: &LanePose<W>, sound: &mut W) -> Self {
         let mut reciprocal = *scale;

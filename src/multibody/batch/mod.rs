@@ -1,9 +1,9 @@
-//! Variants of one mechanism side by side: the bodies' own coordinates with a lane for each of eight variants.
+//! Batch of eight variants of one mechanism in the bodies' own coordinates, one variant per lane.
 //!
-//! What the variants have in common (which bodies, joints and blocks there are, and in which order they are eliminated) stands
-//! once; every number stands as a lane of as many numbers as there are variants, and each operation is done for all of them
-//! by vector instructions. Operations and their order are those of the modules that work on one variant, without fused
-//! ones, so that a lane has the bits of its variant alone, whatever the other lanes hold. `tests/variants.rs` says so.
+//! Common data (bodies, joints, blocks and their elimination order) are stored once. Every number is stored as a lane
+//! with one entry per variant, and vector instructions apply each operation to all of them. Operations and their order
+//! are those of the modules that work on one variant, without fused ones, so that a lane has the bits of its variant
+//! alone, whatever the other lanes hold. `tests/variants.rs` says so.
 //!
 //! | file | what it holds | as for one variant in |
 //! |---|---|---|

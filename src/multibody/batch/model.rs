@@ -1,4 +1,4 @@
-//! Bodies and joints of variants side by side.
+//! Bodies and joints of a batch of variants.
 
 use super::joint::{LaneSection, LaneVector};
 use super::{BLANK, Lane8, LaneBlock, LanePose, Number, Real, SimdReal, ZERO_POSE, load};
@@ -31,7 +31,7 @@ pub(crate) struct LaneJoint {
     pub(crate) rest: Lane8,
 }
 
-/// What joints share, and what lengthens them.
+/// Properties and elongations shared by joints.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SharedSections {
     pub(crate) section: LaneSection,

@@ -1,8 +1,8 @@
-//! What formulas are written in.
+//! Scalar trait of the joint kinematics.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// What formulas are written in: a number, or one in every lane.
+/// Scalar of the joint kinematics: a number, or one per lane.
 pub trait Number:
     Copy
     + Add<Output = Self>

@@ -11,7 +11,7 @@ use crate::multibody::sine;
 use pulp::{Arch, Simd, WithSimd};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Lanes that go side by side.
+/// Number of lanes.
 pub const LANES: usize = 8;
 /// A number in each lane, in memory.
 pub type Lane8 = Lanes<LANES>;

@@ -4,7 +4,7 @@
 
 use nalgebra::{ComplexField, SMatrix, SVector};
 
-/// What a block entry can be.
+/// Type of a block entry.
 pub trait Scalar: ComplexField<RealField = f64> + Copy {}
 
 impl Scalar for f64 {}

@@ -1,9 +1,9 @@
 //! The tangent of a pair of bodies kept as what it is made of: the slopes of the strains, the stiffness between them, and
 //! the small rest that a joint's forces bring.
 //!
-//! Summed to a 6×6 block it loses what a soft mode needs: a rigid motion of two bodies that a stiff joint holds together
-//! strains nothing, but the entries of the block cancel to rounding only, and rounding of the stiffest joint is more than
-//! the whole stiffness of the softest. Strains that are taken first, with digits to spare, are right.
+//! Summation to a 6×6 block loses the accuracy that a soft mode needs. A rigid motion of two bodies on a stiff joint
+//! causes no strain, but the entries of the block cancel to rounding only. Rounding of the stiffest joint exceeds the
+//! whole stiffness of the softest. Strains that are taken first, with digits to spare, are right.
 
 use super::joint::{JointKinematics, Symmetric};
 use super::perpendicular;
@@ -25,7 +25,7 @@ pub(crate) struct FactoredTangent {
     turn: [f64; 3],
 }
 
-/// What a change of two bodies' poses brings: the force on body b (on a with the other sign), and both moments.
+/// Reaction to a change of two bodies' poses: the force on body b (on a with the other sign), and both moments.
 pub(crate) struct PairForce {
     pub(crate) force: [Double; 2],
     pub(crate) moment_a: Double,

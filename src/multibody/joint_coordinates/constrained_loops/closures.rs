@@ -1,8 +1,8 @@
 //! Loop closures: strains of a cut joint, their rows over the accelerations of its two bodies, and what velocities add.
 //!
-//! With the opening d between the two material points and the mean frame of [`crate::multibody::planar`], the strains are
-//! e = (u + [g p]Q[g p]ᵀ, g, p), and their second derivative is A·a + b(v): the rows A and the part b of the velocities are
-//! formed here. A rotation is multiplied by the lever of its body, so that rows of one closure have one unit.
+//! With the opening d between the two material points and the mean frame of [`crate::multibody::planar`], the strains
+//! are e = (u + [g p]Q[g p]ᵀ, g, p). Their second derivative is A·a + b(v). This file forms the rows A and the velocity
+//! terms b. A rotation is multiplied by the lever of its body, so that rows of one closure have one unit.
 
 use super::data::{ReductionInput, ReductionTask, Workspace};
 use super::mechanism::ClosureShape;

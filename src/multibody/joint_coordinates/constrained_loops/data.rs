@@ -1,4 +1,4 @@
-//! What changes while a mechanism is reduced: what a reduction reads beside the mechanism, and what it works in. Laid out once.
+//! Variable data of a reduction: its input beside the mechanism, and its workspace. Laid out once.
 
 use super::mechanism::{MechanismConstants, lane};
 use super::poses::MechanismKinematics;
@@ -6,7 +6,7 @@ use super::scalar::Real;
 use super::schedule::BodyElimination;
 use super::tree::{Closure, Linkage};
 
-/// What the right-hand side of a reduction is.
+/// Right-hand side of a reduction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReductionTask {
     /// Accelerations under the forces, with velocity parts.
@@ -26,7 +26,7 @@ pub struct Offsets<T> {
     pub closures: Vec<T>,
 }
 
-/// What a reduction reads; nothing of it changes on the way.
+/// Input of a reduction, constant during it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ReductionInput<'a, T> {
     pub task: ReductionTask,
@@ -39,7 +39,7 @@ pub(super) struct ReductionInput<'a, T> {
     pub torque: &'a [T],
 }
 
-/// What gathers at a body on the way in.
+/// Sums accumulated at a body during the inward pass.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrontAccumulator<T> {
     /// Inertia that outer bodies hand on: xx, xy, yy, xθ, yθ, θθ.
@@ -48,7 +48,7 @@ pub(super) struct FrontAccumulator<T> {
     pub momentum: [T; 3],
 }
 
-/// What one pin's body hands to the next inward, about the pin between them.
+/// Contribution of one pin's body to the next inward, about the pin between them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PinContribution<T> {
     /// Inertia left at the pin: xx, xy, yy [kg].
@@ -61,7 +61,7 @@ pub(super) struct PinContribution<T> {
     pub lever: [T; 2],
 }
 
-/// What an implicit step adds to the turn of one body, see [`super::AddedInertia`].
+/// Contribution of an implicit step to the elimination of one body, see [`super::AddedInertia`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StageInertia<T> {
     /// Over the coordinates of its joint, the lower triangle by rows.
@@ -70,7 +70,7 @@ pub(super) struct StageInertia<T> {
     pub body: [T; 6],
 }
 
-/// What a reduction works in.
+/// Workspace of a reduction.
 #[derive(Debug, Clone)]
 pub(super) struct Workspace<T> {
     pub nodes: Vec<FrontAccumulator<T>>,
@@ -84,11 +84,11 @@ pub(super) struct Workspace<T> {
     pub base: Vec<T>,
     /// Which orthogonal combinations of a body's coordinates were taken out; none where no body has several.
     pub combined: Vec<[[T; 3]; 3]>,
-    /// What a pin has handed to the next of its run.
+    /// Contribution of a pin to the next of its run.
     pub handed: PinContribution<T>,
     /// See [`super::Reduction::nearness`].
     pub nearness: T,
-    /// What an implicit step adds to each body; empty otherwise.
+    /// Contribution of an implicit step to each body; empty otherwise.
     pub added: Vec<StageInertia<T>>,
     /// The same to each coupling, in the order of the pattern.
     pub added_coupling: Vec<[T; 9]>,
@@ -158,7 +158,8 @@ impl<T: Real> Workspace<T> {
         }
     }
 
-    /// What the outer bodies have left at this one, with its own mass; their place is clean for the next reduction.
+    /// The accumulated inertia from outer bodies plus the body's own mass; clears the accumulator for the next
+    /// reduction.
     #[inline(always)]
     pub(super) fn take_inertia(&mut self, mechanism: &MechanismConstants<T>, body: usize) -> [T; 6] {
         let node = &mut self.nodes[mechanism.schedule.steps[body].node as usize];
@@ -175,7 +176,7 @@ impl<T: Real> Workspace<T> {
         inertia
     }
 
-    /// What has gathered in a block of the pattern; its place is clean for the next.
+    /// The accumulated block of the pattern; clears the accumulator for the next.
     #[inline(always)]
     pub(super) fn take_coupling(&mut self, mechanism: &MechanismConstants<T>, block: usize) -> [T; 9] {
         let at = mechanism.schedule.blocks[block] as usize;

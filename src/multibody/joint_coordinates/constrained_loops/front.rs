@@ -25,7 +25,7 @@ pub(super) struct Front<'a, T> {
     pub m: &'a mut [T],
     pub g: &'a mut [T],
     pub r: &'a mut [T],
-    /// Unit of each coordinate: what makes it a length.
+    /// Unit of each coordinate, which makes it a length.
     pub unit: &'a [T],
 }
 

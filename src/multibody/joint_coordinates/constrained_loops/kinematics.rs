@@ -113,8 +113,8 @@ fn place_joint<T: Real>(
 const BLOCK: usize = 16;
 
 impl<T: Real> MechanismKinematics<T> {
-    /// Places the bodies of `range`, root → leaf, in blocks: angles first, so that the sines of a block are taken side by
-    /// side. `rests` are the axial offsets of locked joints.
+    /// Places the bodies of `range`, root → leaf, in blocks: angles first, so that the sines of a block are evaluated
+    /// in vector instructions. `rests` are the axial offsets of locked joints.
     #[inline(always)]
     pub(super) fn place(
         &mut self,

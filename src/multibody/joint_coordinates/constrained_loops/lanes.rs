@@ -1,10 +1,10 @@
-//! Lanes of numbers: variants side by side, in vector instructions.
+//! Lanes of numbers: a batch of variants, in vector instructions.
 
 use super::scalar::{Real, side_by_side};
 use pulp::Arch;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// `N` variants side by side.
+/// A batch of `N` variants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct Lanes<const N: usize>(pub [f64; N]);

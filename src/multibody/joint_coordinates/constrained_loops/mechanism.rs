@@ -1,6 +1,6 @@
 //! A mechanism as the recursion reads it: what its bodies, joints and closures are, over lanes of variants, and the schedule.
 //!
-//! Nothing of it changes after [`MechanismConstants::new`], so that all who step one mechanism share it.
+//! It is constant after [`MechanismConstants::new`], so that all users of one mechanism share it.
 
 use super::plane_vector::LinkageVector;
 use super::scalar::Real;
@@ -8,7 +8,7 @@ use super::schedule::{Plan, Schedule};
 use super::tree::{Closure, Linkage, LinkageBody, LinkageParent};
 use crate::multibody::Joint;
 
-/// What does not move.
+/// Constant data of a mechanism.
 #[derive(Debug)]
 pub(super) struct MechanismConstants<T> {
     pub schedule: Schedule,
@@ -22,9 +22,9 @@ pub(super) struct MechanismConstants<T> {
     pub joints: Vec<JointShape<T>>,
     /// One a loop closure.
     pub closures: Vec<ClosureShape<T>>,
-    /// Unit of each coordinate: what makes it a length [m, or m/m].
+    /// Unit of each coordinate, which makes it a length [m, or m/m].
     pub units: Vec<T>,
-    /// What makes a rotation of each body comparable with a displacement [m].
+    /// Length that converts a rotation of each body to a displacement [m].
     pub levers: Vec<T>,
     /// Loop constraints m.
     pub constraints: usize,
@@ -46,7 +46,7 @@ pub(super) struct Arms<T> {
     pub arm: LinkageVector<T>,
 }
 
-/// What a joint has beyond a pin.
+/// Data of joints other than pins.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct JointShape<T> {
     /// Its axial direction, as drawn.
@@ -69,7 +69,7 @@ pub(super) struct ClosureShape<T> {
     pub axis: LinkageVector<T>,
     /// Second-order axial strain Q: gg, gp, pp.
     pub second: [T; 3],
-    /// What makes a rotation comparable with a displacement [m].
+    /// Length that converts a rotation to a displacement [m].
     pub lever: T,
     /// Directions of a body that supports hold; none of a joint.
     pub held: Vec<[T; 3]>,
@@ -112,7 +112,7 @@ impl<T: Real> MechanismConstants<T> {
     }
 }
 
-/// A number of each variant, side by side.
+/// One lane with a number of each variant.
 pub(super) fn lane<T: Real>(of: &[&LinkageBody], f: &dyn Fn(&LinkageBody) -> f64) -> T {
     let mut out = T::ZERO;
     for k in 0..T::LANES {

@@ -1,6 +1,6 @@
 //! Recursive Coordinate Reduction in relative joint coordinates: the formulation of the paper.
 //!
-//! What does not move and what does are apart, and each algorithm over them has a file:
+//! Constant and variable data are separate, and each algorithm over them has a file:
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -9,10 +9,10 @@
 //! | `coordinates` | joint coordinates of given poses |
 //! | [`scalar`], `lanes` | what it runs over: one number, or lanes of variants |
 //! | `plane_vector` | vectors of the plane |
-//! | `schedule` | who meets whom: fronts, rows passing through, places in the arenas |
-//! | `mechanism` | what does not move: geometry and inertia over lanes, and the schedule |
+//! | `schedule` | symbolic phase: front of each body, constraint rows passing it, arena offsets |
+//! | `mechanism` | constant data: geometry and inertia over lanes, and the schedule |
 //! | `poses` | where bodies are, how they move, and how they hang on each other |
-//! | `data` | what changes: what a reduction reads beside the mechanism, and what it works in |
+//! | `data` | variable data: input of a reduction beside the mechanism, and its workspace |
 //! | `kinematics` | outward: poses, rates, joint axes, velocity parts |
 //! | `closures` | the rows of loop closures and their velocity parts |
 //! | `front` | elimination of one body's coordinates, with a loop's row or without |
@@ -25,7 +25,7 @@
 //! | `projection` | positions and rates that fulfil the loops |
 //! | `stages` | the recursion for a stage of an implicit method |
 //! | `springs` | forces of the joints' springs |
-//! | `fast` | what is there for speed alone, with the same bits: runs of pins, small fronts, equal subtrees, wide instructions |
+//! | `fast` | bit-identical optimizations: runs of pins, small fronts, equal subtrees, wide instructions |
 //!
 //! A file names those above it. Beside that, `schedule` and `traversal` ask `fast`, and `reduction` holds the room of `singular`.
 

@@ -1,8 +1,8 @@
 //! The turn of a body on a pin that no loop passes: the articulated-body recursion about the pin.
 //!
-//! A body that hangs on a pin hands its parent a force through the pin, so what is left of its inertia there is
-//! translational: three numbers K, a force f, and the moment that the pin's own drive takes from the parent. With ρ from a
-//! body's own pin to the next one outward and ℓ from its centre of mass to its pin,
+//! A body on a pin transmits only a force to its parent. Its remaining inertia there is translational: three numbers K,
+//! a force f, and the reaction moment of the pin's own drive on the parent. With ρ from a body's own pin to the next
+//! one outward and ℓ from its centre of mass to its pin,
 //! ```text
 //! u = (m·ℓ, −m·ℓ) + K·ρ⊥      force at the pin per angular acceleration
 //! D = θ + m·ℓ² + ρ⊥·K·ρ⊥      moment about the pin per angular acceleration

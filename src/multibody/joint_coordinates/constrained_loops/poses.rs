@@ -15,12 +15,12 @@ pub struct BodyKinematics<T> {
     pub half: LinkageVector<T>,
 }
 
-/// How a placed body hangs on its parent: what the reduction needs of it, inward and outward.
+/// Offset of a placed body from its parent, for the inward and outward passes of the reduction.
 #[derive(Debug, Clone, Copy)]
 pub struct ParentOffset<T> {
     /// From the parent's centre of mass to the pin, R_p·arm_p; where there is no pin, to this body's centre of mass [m].
     pub lever_parent: LinkageVector<T>,
-    /// From this body's centre of mass to the pin, R·arm; zero where there is none [m].
+    /// From this body's centre of mass to the pin, R·arm; zero without a pin [m].
     pub lever: LinkageVector<T>,
     /// Velocity part c of the acceleration [m/s²].
     pub bias: LinkageVector<T>,

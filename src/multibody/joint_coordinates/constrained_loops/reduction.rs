@@ -1,4 +1,4 @@
-//! The recursion with its storage, loads in and accelerations out; and what a number says of how its bodies are gone through.
+//! The recursion with its storage: loads in, accelerations out; and the traversal that a scalar type selects.
 
 use super::data::{Offsets, ReductionInput, ReductionTask, Workspace};
 use super::mechanism::MechanismConstants;
@@ -27,23 +27,24 @@ pub struct Reduction<T: Traversed> {
     pub(super) placement: MechanismKinematics<T>,
     pub(super) work: Workspace<T>,
     pub(super) room: RowPool,
-    /// How the bodies are gone through, where not one after the other.
+    /// Alternative traversal of the bodies; `None`: one by one.
     pub(super) traversal: Option<Box<T::Traversal>>,
 }
 
-/// A number that says how the bodies of a mechanism over it are gone through.
+/// Scalar type that selects the traversal (serial or packed).
 pub trait Traversed: Real {
     /// One body after the other, or a faster way.
     type Traversal: Traversal<Self>;
 
-    /// Places all bodies in the instructions that are fastest for it. What stands with a number and not with every reduction is compiled once.
+    /// Places all bodies in the instructions that are fastest for it. Functions of a scalar type are compiled once, not
+    /// with every reduction.
     fn place(reduction: &mut Reduction<Self>, q: &[Self], v: &[Self]);
 
     /// Reduces for `task` likewise.
     fn reduce(reduction: &mut Reduction<Self>, task: ReductionTask, out: &mut [Self]);
 }
 
-/// The passes over all bodies. What comes out has the same bits whatever the way.
+/// The passes over all bodies. All traversals give bit-identical results.
 pub trait Traversal<T: Traversed>: Sized + Clone + Debug + Send + Sync + 'static {
     /// Lays the way out; none where one after the other is as good.
     fn new(linkage: &Linkage, reduction: &Reduction<T>) -> Option<Box<Self>>;
@@ -72,7 +73,7 @@ pub trait Traversal<T: Traversed>: Sized + Clone + Debug + Send + Sync + 'static
 
 impl<T: Traversed> Reduction<T> {
     /// Storage for one variant per lane; all must have the same tree and loops (fewer variants are repeated). Over one
-    /// `f64`, subtrees that are equal in structure go side by side through vector instructions.
+    /// `f64`, structurally equal subtrees are reduced together in vector instructions.
     pub fn new(variants: &[&Linkage]) -> Self {
         let mut reduction = Self::without_packs(variants);
         reduction.traversal = T::Traversal::new(variants[0], &reduction);
@@ -111,7 +112,7 @@ impl<T: Traversed> Reduction<T> {
         self.mechanism.schedule.multiplications
     }
 
-    /// Number of bodies that are reduced side by side with those of equal subtrees.
+    /// Number of bodies that are reduced in packs of equal subtrees.
     pub fn side_by_side(&self) -> usize {
         self.traversal.as_ref().map_or(0, |t| t.side_by_side())
     }
@@ -131,7 +132,7 @@ impl<T: Traversed> Reduction<T> {
         self.traversal.as_ref().and_then(|t| t.placed(body)).unwrap_or(self.placement.placed[body])
     }
 
-    /// What a reduction reads, what it works in, and where accelerations go.
+    /// Input, workspace and output of a reduction.
     #[inline(always)]
     pub(super) fn parts(&mut self, task: ReductionTask) -> (ReductionInput<'_, T>, &mut Workspace<T>, &mut [[T; 3]]) {
         let Self { mechanism, force, torque, offsets, placement, work, accelerations, .. } = self;

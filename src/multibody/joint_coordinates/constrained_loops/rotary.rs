@@ -3,11 +3,12 @@
 //! A beam is then a chain of rigid bodies on pins with springs: one coordinate a joint, and constraints where chains close
 //! loops. The axial direction (type 4) is rigid too; heat and residual stress prescribe its offset, a gap function.
 //!
-//! **Counts.** The paper counts every joint as a coordinate and cuts loops through bodies, three constraints for each. A
-//! tree here hangs on the joints, so a loop is cut at a joint instead: two constraints, and its rotation no coordinate.
-//! [`CoordinateCounts`] tells the paper's numbers; n − m, the freedom, is the same. With every beam in two (its question 1), a bank
-//! has 12 joints a bimorph (hot arm, tip bar, cold arm, flexure, link, and its share of yoke and tether), and the quarter
-//! stage of ten n = 10·12 + 3 = 123, the three of the free plate, and m = 20·3 = 60, which is the n and m ≈ n/2 of the paper.
+//! **Counts.** The paper counts every joint as a coordinate and cuts loops through bodies, three constraints for each.
+//! A tree here hangs on the joints, so a loop is cut at a joint instead: two constraints, and its rotation no
+//! coordinate. [`CoordinateCounts`] gives the paper's numbers; n − m, the number of degrees of freedom, is the same.
+//! With every beam in two segments (its question 1), a bank has 12 joints per bimorph: hot arm, tip bar, cold arm,
+//! flexure, link, and its part of yoke and tether. The quarter stage of ten has n = 10·12 + 3 = 123, including the
+//! three of the free plate, and m = 20·3 = 60. These are the n and m ≈ n/2 of the paper.
 
 use crate::multibody::planar::Symmetric;
 use crate::multibody::section::JointSection;

@@ -7,7 +7,7 @@ use crate::multibody::sine::{REDUCED, reduced};
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// What the recursion needs of a number.
+/// Scalar trait of the recursion.
 pub trait Real:
     Copy
     + Debug

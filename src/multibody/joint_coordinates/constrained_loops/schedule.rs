@@ -1,5 +1,5 @@
-//! What the recursion does at each body, laid out once: which bodies its front holds, how many constraint rows reach it,
-//! where they go from there, and where everything lies in the arenas.
+//! Schedule of the recursion, computed once: the front of each body, the constraint rows that reach it and their next
+//! bodies, and all arena offsets.
 //!
 //! Constraint rows enter at the body of their closure that is eliminated first. There and at every body they pass, each
 //! joint coordinate takes one row with it (a dependent coordinate, in the words of the reduction), and the rest goes on to
@@ -26,7 +26,7 @@ pub(super) enum EliminationKind {
     Any,
 }
 
-/// What the passes over all bodies read first.
+/// Data that the passes over all bodies read first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct EliminationStep {
     pub kind: EliminationKind,
@@ -48,7 +48,7 @@ pub(super) struct EliminationStep {
     pub first: u32,
     /// Its place among the joints that are no pins.
     pub joint: u32,
-    /// Where what is handed to it gathers.
+    /// Accumulator of its contributions.
     pub node: u32,
     /// See [`BodyElimination::column`].
     pub column: u32,
@@ -85,7 +85,7 @@ pub(super) struct ClosureEntry {
     pub ends: [Option<u32>; 2],
 }
 
-/// What a schedule is for.
+/// Request for a schedule.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
     /// Every pair of the pattern may be coupled, not those alone that loops couple: stages of implicit methods.
@@ -102,7 +102,7 @@ pub(super) struct Schedule {
     pub steps: Vec<EliminationStep>,
     /// Bodies of all fronts.
     pub fronts: Vec<u32>,
-    /// Where what is handed to them gathers: [`EliminationStep::node`] of each.
+    /// Accumulators of their contributions: [`EliminationStep::node`] of each.
     pub nodes: Vec<u32>,
     /// Where the couplings of a body to them gather.
     pub blocks: Vec<u32>,
@@ -155,7 +155,7 @@ pub(super) struct BodyElimination {
     pub map_start: usize,
 }
 
-/// What a body's turn needs besides its step; the meanings are those of [`BodyElimination`].
+/// Data of a body's elimination besides its step; the meanings are those of [`BodyElimination`].
 #[derive(Debug, Clone, Copy)]
 struct PackedElimination {
     front: u32,

@@ -4,8 +4,8 @@
 //! that grows with 1/ε², and squares what the other directions know away. Here nothing is squared that has grown:
 //!
 //! - A closure's row is **hard** until a coordinate has been taken out with it.
-//! - Taking x_e out by the hard row ε·x_e + n·a = γ leaves, besides the articulated-body step as if the row were not there,
-//!   one more row of weighted least squares on the rest, √D·(c/D − n/ε)·a = …, with D the inertia of the coordinate. It is
+//! - Eliminating x_e by the hard row ε·x_e + n·a = γ is the articulated-body step as if the row were absent, plus one
+//!   more row of weighted least squares on the rest: √D·(c/D − n/ε)·a = …, with D the inertia of the coordinate. It is
 //!   kept as a row. While it is light (|n/ε| up to [`LIGHT`]) it is squared into the inertia as usual; a **heavy** one
 //!   travels on.
 //! - Where heavy rows meet a coordinate, a Householder reflection over them and the coordinate's own row √D takes it out.
@@ -13,11 +13,13 @@
 //!   down to that number, so a shuttle with any number of straight arms holds three. A row without length is redundant: it
 //!   is counted, with what it contradicts the others by.
 //!
-//! Rows keep their own scale, which is what makes elimination with rows of very different weight stable (A. J. Cox,
-//! N. J. Higham, "Stability of Householder QR factorization for weighted least squares problems", 1998; C. C. Paige,
-//! "Computer solution and perturbation analysis of generalized linear least squares problems", Math. Comp. 33, 1979).
-//! Compressing rows to the rank of the shuttle is wrong when they are taken as equally hard; weighted by how hard they are
-//! it loses nothing.
+//! JSON: "t" [s]. "signals": samples by name in SI. "units": by name. "method". "counters": the work done. "events":
+//! crossings of --event levels and contacts of gaps, each with its time "t" [s] and "direction" up or down.
+//! "formulation". "estimated_error": error of the mesh, and "step_error": error of the steps, both of the amplitude.
+//! "stopped_at" [s]: with --until. "reliable_until" [s]: end of the time in which the tolerance holds after contact
+//! (null: to the end), and "after_contact": the statistics of each signal from there on. "joint_coordinates", for rcr:
+//! n, m, evaluations near singular configurations, largest gap of a loop [m]. Comp. 33, 1979). Compressing rows to the
+//! rank of the shuttle is wrong when they are taken as equally hard; weighted by how hard they are it loses nothing.
 
 mod orthogonal;
 mod path;
@@ -35,7 +37,7 @@ const ZERO: f64 = 1e-11;
 /// at the crossing of two branches such a correction would choose one at random.
 const IDLE: f64 = 1e-3;
 
-/// What a reduction near a singular configuration met.
+/// Diagnostics of a reduction near a singular configuration.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Singularity {
     /// Constraint rows that no coordinate could take at their own loop, passed inward.

@@ -1,17 +1,17 @@
-//! The same reduction for a stage of an implicit method: what damping and stiffness add to the inertia.
+//! The same reduction for a stage of an implicit method: contributions of damping and stiffness to the inertia.
 //!
 //! A stage looks for accelerations q̈ that the forces at q + β·q̈, q̇ + γ·q̈ give. Newton's method takes the forces' change
 //! along, so that the inertia M becomes
 //! ```text
 //! W = M + γ·C + β·K
 //! ```
-//! the effective mass of T. J. R. Hughes, "The Finite Element Method" (1987), §9.1. The springs of the tree's joints add to
-//! one joint's coordinates alone, and everything else (closures that give way, gaps, contacts, gas, dampers) to a body or a
-//! pair of bodies: the recursion meets them where it meets their inertia, and stays O(n + m).
+//! the effective mass of T. J. R. Hughes, "The Finite Element Method" (1987), §9.1. The springs of the tree's joints
+//! contribute to one joint's coordinates alone. All else (compliant closures, gaps, contacts, gas, dampers) contributes
+//! to a body or a pair of bodies. The recursion adds these contributions where it adds inertia, and stays O(n + m).
 //!
-//! W takes the motion of the axes and levers with the coordinates (geometric stiffness of the reactions, derivatives of
-//! Coriolis terms) for zero, so that the iteration converges linearly, at the rate of what is left out over W. What it
-//! converges to does not depend on W.
+//! W neglects the motion of the axes and levers with the coordinates (geometric stiffness of the reactions, derivatives
+//! of Coriolis terms). The iteration therefore converges linearly, at the rate of the neglected terms over W. Its limit
+//! does not depend on W.
 
 use super::data::{ReductionTask, StageInertia};
 use super::reduction::Reduction;
@@ -21,7 +21,7 @@ use super::tree::Linkage;
 use crate::multibody::BlockMatrix;
 use nalgebra::Matrix3;
 
-/// What an implicit step adds to the inertia: γ·C + β·K.
+/// Contribution of an implicit step to the inertia: γ·C + β·K.
 #[derive(Debug, Clone)]
 pub struct AddedInertia {
     /// Of each body's joint, over the coordinates that move: the lower triangle by rows.

@@ -1,4 +1,4 @@
-//! How the bodies of a mechanism are gone through: one after the other, or, where a number has a faster way, by that.
+//! Traversal of the bodies of a mechanism: one after the other, or by a faster method of the scalar type.
 
 use super::data::{Offsets, ReductionTask};
 use super::fast;

@@ -13,7 +13,7 @@ use crate::multibody::planar::JointFrame;
 use crate::multibody::{BodyId, Joint, Model, Pattern};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-/// What a body hangs on.
+/// Parent of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinkageParent {
     /// A joint to ground.
@@ -27,7 +27,7 @@ pub enum LinkageParent {
 /// A body with the joint that it hangs on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkageBody {
-    /// What it hangs on.
+    /// Its parent.
     pub parent: LinkageParent,
     /// Geometry of the joint, `a` the parent and `b` this body.
     pub frame: JointFrame,
@@ -70,7 +70,7 @@ impl LinkageBody {
     }
 }
 
-/// What closes a loop, or holds a body.
+/// Element that closes a loop, or holds a body.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Closure {
     /// A joint between two bodies, or a body and ground; its locked directions are constraints, the others may be elastic.

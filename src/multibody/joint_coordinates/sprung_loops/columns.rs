@@ -1,4 +1,4 @@
-//! Blocks of three by three, and vectors of three, in registers of four: what a factorization and its solves multiply.
+//! Blocks of three by three, and vectors of three, in registers of four: operands of a factorization and its solves.
 
 use super::kinematics::MotionMap;
 use super::tree::{TreeJoint, TreeParent};

@@ -72,7 +72,7 @@ impl WithSimd for Resist<'_> {
     }
 }
 
-/// Stresses of the tree's joints, eight bodies side by side.
+/// Stresses of the tree's joints, eight bodies per lane.
 #[derive(Debug, Clone)]
 pub struct Stresses {
     /// Axial rest offsets [m].

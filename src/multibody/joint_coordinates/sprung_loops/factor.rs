@@ -148,8 +148,8 @@ impl JointMatrix {
         Ok(inertia)
     }
 
-    /// Solves: `x` holds the right side over the coordinates and becomes the solution. `wrench` holds a right side over the
-    /// bodies' motions (zero where there is none), and becomes the bodies' motions; it has one entry more than there are bodies.
+    /// Solves: `x` holds the right side over the coordinates and becomes the solution. `wrench` holds a right side over
+    /// the bodies' motions (or zeros), and becomes the bodies' motions; it has one entry more than there are bodies.
     pub fn solve(&self, wrench: &mut [Four], x: &mut [Four]) {
         self.factors.solve(wrench, x);
     }
@@ -159,7 +159,7 @@ impl JointMatrix {
         both_motions(tree, &self.maps, of, to);
     }
 
-    /// What moves with the parent: the body's own share, which is returned, and its couplings to other bodies.
+    /// The part that moves with the parent: the body's own block, which is returned, and its couplings to other bodies.
     #[inline(always)]
     fn hand_over<S: Simd>(
         &mut self,

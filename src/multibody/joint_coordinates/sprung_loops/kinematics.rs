@@ -12,8 +12,8 @@
 //! The bias is the second derivative of the map from (θ_m, e_u, g, p) to x_c, twice along the rates: [`super::geometric`]
 //! takes its coefficients for the stiffness that a force brings.
 //!
-//! Rotations and their rates are sums along the tree; once they are known, no body waits for another here, so that eight of them go
-//! side by side ([`super::poses`]).
+//! Rotations and their rates are sums along the tree. Once they are known, no body depends on another here, so that
+//! eight of them are computed per vector ([`super::poses`]).
 
 use crate::multibody::batch::Number;
 use crate::multibody::planar::Pose;
@@ -85,7 +85,7 @@ impl<T: Number> MotionMap<T> {
     }
 }
 
-/// What does not move of a joint.
+/// Constant data of a joint.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct JointGeometry<T> {
     /// σ.

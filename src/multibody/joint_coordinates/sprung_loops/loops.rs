@@ -1,4 +1,4 @@
-//! Forces of the joints that close loops, eight side by side: the bodies have been placed, and their sines are known.
+//! Forces of the joints that close loops, eight per vector: the bodies have been placed, and their sines are known.
 
 use super::poses::TreeKinematics;
 use crate::multibody::Model;

@@ -1,15 +1,16 @@
 //! Relative joint coordinates on a spanning tree, loops closed by springs inside the recursion.
 //!
 //! The same graph, order and elements as in absolute coordinates, with other unknowns: the strains of the joints that a
-//! spanning tree takes, each direction free, elastic or locked. What a scene does not need is locked and costs nothing; what
-//! closes a loop keeps its springs and brings no constraint, so that no configuration is singular. Mechanisms of rigid loops
-//! go to [`constrained_loops`](super::constrained_loops), which reduces their constraints inside the recursion.
+//! spanning tree takes, each direction free, elastic or locked. Unused directions are locked and cost nothing. A joint
+//! that closes a loop keeps its springs and adds no constraint, so that no configuration is singular. Mechanisms of
+//! rigid loops go to [`constrained_loops`](super::constrained_loops), which reduces their constraints inside the
+//! recursion.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | [`tree`] | which body hangs on which, directions that move; closures |
 //! | [`kinematics`] | how a body hangs on its parent, and the maps of motion |
-//! | [`poses`] | poses, rates and accelerations, root → leaf, eight bodies side by side |
+//! | [`poses`] | poses, rates and accelerations, root → leaf, eight bodies per vector |
 //! | [`dual`] | a value with its derivative |
 //! | [`derivatives`] | the change of where bodies are, over those |
 //! | [`columns`] | blocks and vectors in registers |

@@ -1,4 +1,4 @@
-//! Where the bodies are: poses, rates and accelerations from the coordinates, root → leaf, eight bodies side by side.
+//! Poses, rates and accelerations of the bodies from the coordinates, root → leaf, eight bodies per vector.
 //!
 //! Bodies stand in tiles of eight as they are eliminated. First the rotations are summed along the tree, one body after the
 //! other; then each body of a tile finds in a lane of its own how it hangs on its parent ([`super::kinematics`]); then displacements are
@@ -95,7 +95,7 @@ const REST: BodyTile = BodyTile {
     beyond: [Lane8::NONE; 6],
 };
 
-/// Where the bodies are, with the maps that their motion goes through.
+/// Poses of the bodies, with the maps of their motion.
 #[derive(Debug, Clone)]
 pub struct TreeKinematics {
     tiles: Vec<BodyTile>,

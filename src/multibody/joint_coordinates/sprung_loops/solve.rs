@@ -25,7 +25,7 @@ struct BodyCoupling {
     upper: ColumnBlock,
 }
 
-/// What a solve takes of one body.
+/// Data of one body for a solve.
 #[derive(Debug, Clone)]
 struct BodySolve {
     /// Sᵀ and S.

@@ -1,11 +1,12 @@
 //! The spanning tree of a model: which body hangs on which, and which directions of the joints between them move.
 //!
-//! The tree follows the elimination order of the body graph, which is laid leaf → root: a body hangs on ground or on a body
-//! that is eliminated later, and one whose neighbours have all gone before it (the shuttle of a bank) is a root with three
-//! coordinates of its own. Of the joints that a body could hang by, the tree takes the one with the most locked directions,
-//! then the one that moves most bodies together; the others close loops. **A closure keeps all its springs**, so that a
-//! loop of elastic beams brings no constraint: its springs are one more term of the recursion, as a gap is. The couplings of
-//! tree and closures are those of the graph, and so the pattern of the factor is that of the model in absolute coordinates.
+//! The tree follows the elimination order of the body graph, leaf → root. A body's parent is ground or a body that is
+//! eliminated later. A body whose neighbours are all eliminated before it (the shuttle of a bank) is a root with three
+//! coordinates of its own. Of the joints that a body could hang by, the tree takes the one with the most locked
+//! directions, then the one that moves most bodies together; the others close loops. **A closure keeps all its
+//! springs**, so that a loop of elastic beams brings no constraint: its springs are one more term of the recursion, as
+//! a gap is. The couplings of tree and closures are those of the graph, and so the pattern of the factor is that of the
+//! model in absolute coordinates.
 //!
 //! Coordinates are the strains of the joints, (e_u, g, p) of [`planar`](crate::multibody::planar), in one slot of three for
 //! each body; a locked direction keeps its slot, with the value 0. The slot of a root holds its displacement and rotation.
@@ -21,7 +22,7 @@ use thiserror::Error;
 /// Directions (u, g, p) of a joint that are coordinates.
 pub type FreeDirections = [bool; 3];
 
-/// What a body hangs on.
+/// Parent of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TreeParent {
     /// A joint to ground.
@@ -35,7 +36,7 @@ pub enum TreeParent {
 /// A body's joint to its parent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TreeJoint {
-    /// What it hangs on.
+    /// Its parent.
     pub parent: TreeParent,
     /// −1 where the joint counts its strains from this body to the parent.
     pub sign: f64,
@@ -70,9 +71,9 @@ pub struct Tree {
     pub pattern: Pattern,
     /// Coordinates n.
     pub coordinates: usize,
-    /// What each body hangs on, once more, close together for whoever goes along the tree.
+    /// Parent of each body, once more, in a compact array for traversals of the tree.
     pub(super) upward: Vec<Upward>,
-    /// The tree's joints, eight side by side: what does not move, and springs as (uu, ug, up, gg, gp, pp).
+    /// The tree's joints, eight per vector: constant data, and springs as (uu, ug, up, gg, gp, pp).
     pub(super) shapes: Vec<JointGeometry<Lane8>>,
     pub(super) springs: Vec<[Lane8; 6]>,
     /// Bodies whose joints have rest offsets, and those of them that are heated.
@@ -80,7 +81,7 @@ pub struct Tree {
     pub(crate) heated: Vec<u32>,
 }
 
-/// What a body hangs on, and the sign of the joint.
+/// Parent of a body, and the sign of the joint.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Upward {
     pub(super) parent: TreeParent,
@@ -93,8 +94,8 @@ pub enum UnsupportedModel {
     /// Small displacements about the drawn geometry were asked for.
     #[error("joint coordinates are not small displacements; leave out --linear or take compliant")]
     Linear,
-    /// A body turns without inertia: what a step leaves of its rotation would leak, with the axes that turn, into directions
-    /// that have some.
+    /// A body rotates without inertia: the residual rotation of a step would leak, with the rotating axes, into
+    /// directions with inertia.
     #[error("body \"{body}\" turns without inertia; give it some (J of a lumped mass, --scheme es), or take compliant")]
     NoInertia {
         /// Its name.
@@ -211,7 +212,7 @@ fn lanes(links: &[TreeJoint], of: impl Fn(&TreeJoint) -> f64) -> Lane8 {
     lanes
 }
 
-/// What does not move of the joints of up to eight links.
+/// Constant data of the joints of up to eight links.
 fn shapes(links: &[TreeJoint]) -> JointGeometry<Lane8> {
     let pair = |of: fn(&TreeJoint) -> Vector2<f64>| [lanes(links, |l| of(l).x), lanes(links, |l| of(l).y)];
     JointGeometry {

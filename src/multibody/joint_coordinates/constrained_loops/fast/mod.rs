@@ -1,11 +1,11 @@
-//! What is there for speed alone, with the bits that come out without it.
+//! Optional optimizations; results are bit-identical without them.
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `pins` | runs of pins, walked side by side |
+//! | `pins` | runs of pins, traversed together |
 //! | `small`, `kernels` | one coordinate and small fronts: which, and their turn in closed form |
 //! | `dispatch` | the recursion in the widest instructions of the processor at hand |
-//! | `packs` | equal subtrees of one mechanism side by side |
+//! | `packs` | equal subtrees of one mechanism, one per lane |
 
 mod dispatch;
 mod kernels;

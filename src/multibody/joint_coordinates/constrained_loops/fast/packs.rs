@@ -1,13 +1,13 @@
-//! Equal subtrees of one mechanism reduced side by side.
+//! Equal subtrees of one mechanism, reduced together with one subtree per lane.
 //!
 //! Subtrees that are equal in structure (`subtrees`) are laid into packs of eight (`packing`), one to a lane, and all packs
 //! into one linkage over lanes, with the bodies that they share with the rest at its end. That linkage runs through the same
 //! recursion as lanes of variants:
 //!
 //! - outward, the shared bodies' poses are copied into it, and its subtrees are placed;
-//! - inward, its subtrees are reduced; what each of its bodies hands to a shared body is kept, and the recursion over the rest
-//!   adds it when that body's turn would have been: every sum has its terms in the order of the elimination, so every bit is
-//!   the one that the recursion without packs gives;
+//! - inward, its subtrees are reduced. The contribution of each body to a shared body is stored, and the recursion over
+//!   the rest adds it at the position of that body's elimination. Every sum thus has its terms in elimination order,
+//!   and all results are bit-identical to the recursion without packs;
 //! - outward, the shared bodies' accelerations are copied into it, and its own go back.
 //!
 //! Poses and rates stay in the lanes until someone asks for them. A pack that is not full repeats its last subtree.
@@ -28,7 +28,7 @@ use std::ops::Range;
 use std::slice::from_ref;
 use std::sync::Arc;
 
-/// Subtrees side by side.
+/// Number of subtrees in a pack.
 const WIDTH: usize = 8;
 /// A number of each of them.
 type PackedReal = Lanes<WIDTH>;
@@ -63,7 +63,7 @@ struct PackContribution {
     blocks: Range<usize>,
 }
 
-/// What the recursion over the rest does, in elimination order.
+/// Steps of the recursion over the remaining bodies, in elimination order.
 #[derive(Debug)]
 enum RemainingStep {
     /// Takes the turns of these bodies.
@@ -83,7 +83,7 @@ struct Packing {
     /// Which bodies of the mechanism each shared body is, lane by lane.
     shared: Vec<[u32; WIDTH]>,
     hands: Vec<PackContribution>,
-    /// The shared bodies that something is handed to.
+    /// The shared bodies that receive a contribution.
     nodes: Vec<usize>,
     /// Their pairs, as blocks of the packs' pattern.
     blocks: Vec<usize>,
@@ -113,7 +113,7 @@ pub struct Packs {
     kept_blocks: Vec<[PackedReal; 9]>,
 }
 
-/// Numbers alone are laid side by side where subtrees are equal.
+/// Only plain numbers pack equal subtrees into lanes.
 impl Traversed for f64 {
     type Traversal = Packs;
 
@@ -284,7 +284,7 @@ impl WithSimd for SolvePacks<'_> {
     }
 }
 
-// compiled once, whoever calls
+// compiled once for all callers
 impl Packs {
     #[inline(never)]
     fn place_lanes(&mut self) {

@@ -1,4 +1,4 @@
-//! Runs of pins: what one hands to the next stays in registers, and all that a run reads is walked side by side.
+//! Runs of pins: contributions pass from pin to pin in registers, and the arrays of a run are traversed together.
 
 use crate::multibody::joint_coordinates::constrained_loops::data::{PinContribution, ReductionInput, Workspace};
 use crate::multibody::joint_coordinates::constrained_loops::pin::{PinElimination, outward};
@@ -6,7 +6,7 @@ use crate::multibody::joint_coordinates::constrained_loops::scalar::Real;
 use crate::multibody::joint_coordinates::constrained_loops::schedule::{EliminationKind, Schedule};
 use std::ops::Range;
 
-/// Pins that are looked for at a time: what is read here is still near when their turn comes.
+/// Pins searched at a time: their data stay in cache until they are eliminated.
 const PIECE: usize = 256;
 
 /// Pins of one run that begin `range`, at most [`PIECE`].

@@ -1,8 +1,8 @@
-//! Storage for what is in use for a time only: a place given back serves the next who asks.
+//! Storage for temporary values: a released slot serves the next user.
 //!
-//! What is handed to a body gathers between the first turn that hands it something and its own. Along a chain one place
-//! serves all bodies one after the other and stays in the nearest cache; a place for each body would cross from main memory
-//! and back.
+//! Contributions to a body accumulate between the first elimination that contributes and its own. Along a chain one
+//! place serves all bodies one after the other and stays in the nearest cache; a place for each body would cross from
+//! main memory and back.
 
 /// Places for `of.len()` users, each of which holds one for a time.
 #[derive(Debug)]
@@ -18,7 +18,7 @@ impl Slots {
         Self { of: vec![u32::MAX; users], free: Vec::new(), count: 0 }
     }
 
-    /// The place of `user`, who gets one if there is none yet.
+    /// The slot of `user`, allocated on first use.
     pub(super) fn hold(&mut self, user: usize) -> u32 {
         if self.of[user] == u32::MAX {
             self.of[user] = self.free.pop().unwrap_or_else(|| {

@@ -19,7 +19,7 @@ impl Schedule {
         schedule
     }
 
-    /// Marks what goes from pin to pin within a run, and who receives anything else.
+    /// Marks contributions passed from pin to pin within a run, and the receivers of all others.
     fn mark_runs(&mut self, pattern: &Pattern) {
         for body in 0..self.steps.len() {
             let pin = |k: usize| self.steps.get(k).is_some_and(|s| s.kind == EliminationKind::Pin);

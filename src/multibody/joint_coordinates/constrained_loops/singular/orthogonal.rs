@@ -135,7 +135,8 @@ impl RowPool {
     }
 }
 
-/// What makes the entry of column `at` one per length: bodies' columns start at `first`, and each third is a rotation.
+/// Factor that gives the entry of column `at` the unit 1/length: bodies' columns start at `first`, and each third is a
+/// rotation.
 fn column_unit(first: usize, at: usize, length: f64) -> f64 {
     if (at - first) % 3 == 2 { 1.0 / length } else { 1.0 }
 }

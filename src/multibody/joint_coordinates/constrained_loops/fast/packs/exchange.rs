@@ -1,4 +1,4 @@
-//! What packs and the rest of the mechanism exchange.
+//! Exchange of contributions between packs and the rest of the mechanism.
 
 use super::{PackedReal, Packs, WIDTH};
 use crate::multibody::joint_coordinates::constrained_loops::data::{FrontAccumulator, Offsets};

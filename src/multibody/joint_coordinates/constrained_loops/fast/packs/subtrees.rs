@@ -1,4 +1,4 @@
-//! Subtrees of one mechanism that are equal in structure: what packs reduce side by side.
+//! Structurally equal subtrees of one mechanism, for packs.
 //!
 //! A subtree here is one of the elimination tree: a body with all bodies whose elimination changes its front. Everything that
 //! a subtree's bodies couple to lies in it, or in the front of its root, the **shared** bodies. Joints, closures and fill all
@@ -13,14 +13,14 @@ use crate::multibody::joint_coordinates::constrained_loops::tree::{Closure, Link
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Fewest subtrees that are reduced side by side: a pack costs about as much as four subtrees one after the other.
+/// Fewest equal subtrees that form a pack: a pack costs about as much as four subtrees one by one.
 const MIN_SUBTREES: usize = 5;
 
 /// Equal subtrees, each the range of its bodies in elimination order.
 pub(super) type EqualSubtrees = Vec<Range<usize>>;
 
-/// The groups of at least [`MIN_SUBTREES`] equal subtrees of a mechanism, the largest subtrees there are, disjoint. What is left
-/// over of a group when packs of `width` are full, and is fewer than `MIN_SUBTREES`, is left out.
+/// The groups of at least [`MIN_SUBTREES`] equal subtrees of a mechanism, the largest subtrees there are, disjoint. The
+/// rest of a group after full packs of `width` is skipped if it has fewer than `MIN_SUBTREES` members.
 pub(super) fn equal(linkage: &Linkage, schedule: &Schedule, width: usize) -> Vec<EqualSubtrees> {
     let mut groups = SubtreeShapes::new(linkage, schedule).choose();
     for group in &mut groups {
@@ -32,7 +32,7 @@ pub(super) fn equal(linkage: &Linkage, schedule: &Schedule, width: usize) -> Vec
     groups
 }
 
-/// What each body's subtree is.
+/// Shape of each body's subtree.
 struct SubtreeShapes {
     /// Equal numbers: equal subtrees. None: a subtree that cannot be taken out of the recursion.
     shape: Vec<Option<u32>>,
