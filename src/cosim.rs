@@ -6,7 +6,7 @@
 //! | `find` | where ngspice and the plug-in are |
 //! | `scratch` | the folder of a run, and what ngspice reads at its start |
 //! | `includes` | the files that a deck includes: where `.model` lines stand |
-//! | `ngspice_output` | what ngspice says, and whether the run was good |
+//! | `ngspice_output` | output of ngspice, and whether the run was good |
 //! | `error` | why it was not |
 //! | [`deck`] | a deck around the circuit of a netlist |
 //! | `printed` | the `.print` lines of such a deck |

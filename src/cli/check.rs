@@ -13,8 +13,8 @@ use std::fmt::Write;
 
 /// Parse and elaborate a netlist, and report every error and warning.
 ///
-/// Exit status 1 on any error. Tells the model's unknowns, and with --band their estimated error; JSON has "segments" by
-/// beam (0: rigid).
+/// Exit status 1 on any error. Prints the model's unknowns, and with --band their estimated error; JSON has "segments"
+/// by beam (0: rigid).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph check bank.net\n  bimorph check bank.net --set w=2.1u --json")]
 pub(crate) struct CheckCommand {
@@ -97,7 +97,7 @@ impl CheckCommand {
     }
 }
 
-/// What the formulation makes of the model, in a line; nothing for the bodies' own coordinates.
+/// Effect of the formulation on the model, in a line; empty for the bodies' own coordinates.
 fn formulation(compiled: &CompiledModel) -> String {
     let name = compiled.options.formulation.name();
     match &compiled.joints {

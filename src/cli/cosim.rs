@@ -42,7 +42,8 @@ pub(crate) struct CosimCommand {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Repeat the run with half the steps, a tenth of the tolerances (reltol, and tol of every model) and twice the segments, and tell the difference
+    /// Repeat the run with half the steps, a tenth of the tolerances (reltol, and tol of every model) and twice the
+    /// segments, and print the difference
     #[arg(long)]
     check: bool,
 

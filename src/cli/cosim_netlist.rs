@@ -34,7 +34,7 @@ pub(crate) struct NetlistArgs {
     #[arg(long, value_name = "SWEEP", value_parser = levels)]
     dc: Option<String>,
 
-    /// What a source or a port gives over time, as SPICE writes it: 'NAME=PULSE(0 4 1u 1u)'. Repeatable
+    /// Waveform of a source or a port, in SPICE syntax: 'NAME=PULSE(0 4 1u 1u)'. Repeatable
     #[arg(long, value_name = "NAME=WAVE", value_parser = wave)]
     drive: Vec<(String, String)>,
 

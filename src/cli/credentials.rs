@@ -1,4 +1,4 @@
-//! What a client shows a server, as options.
+//! Credentials of a client, as options.
 
 use bimorph::service::credentials::Access;
 use clap::Args;

@@ -1,4 +1,4 @@
-//! `bimorph doctor`: what works on this machine, and what to do about the rest.
+//! `bimorph doctor`: checks of this machine, with remedies.
 
 use super::failure::Failure;
 use super::output::print;
@@ -21,8 +21,8 @@ use std::time::Duration;
 
 /// Check what is installed and what works: the core, ngspice, the plug-in, a server, the Python client.
 ///
-/// Exit status 0 when the core works; the other lines say what is missing and what to do. Of a server that is told its settings
-/// by a file or the environment (BIMORPH_SERVE_NAME), certificate, key, tokens and folder of states must be good, too.
+/// Exit status 0 when the core works; the other lines say what is missing and what to do. If a file or the environment
+/// (BIMORPH_SERVE_NAME) has settings of a server, its certificate, key, tokens and folder of states must be valid, too.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph doctor\n  bimorph doctor --config /etc/bimorph/serve.toml")]
 pub(crate) struct DoctorCommand {
@@ -63,7 +63,7 @@ impl DoctorCommand {
         self.settings()
     }
 
-    /// What a server with these settings would find.
+    /// Checks the files that a server with these settings would open.
     fn settings(&self) -> Result<(), Failure> {
         let settings = SettingSources::of(self.config.clone()).settings()?;
         if settings == Settings::default() {

@@ -19,9 +19,10 @@ use std::sync::Arc;
 
 /// The model as a SPICE subcircuit or a Verilog-A module, for simulators without the plug-in.
 ///
-/// What is written is the linear model about the operating point: its modes, the static correction for all others, damping, lags of
-/// heaters, electrical, mechanical and thermal ports with the scales of the plug-in. It is compared with the exact
-/// small-signal answer up to --to, and has as many modes as --within takes. The mesh is that of a deck with the same options.
+/// The output is the linear model about the operating point: its modes, the static correction for all others, damping,
+/// lags of heaters, and electrical, mechanical and thermal ports with the scales of the plug-in. It is compared with
+/// the exact small-signal answer up to --to, and has as many modes as --within takes. The mesh is that of a deck with
+/// the same options.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  bimorph export bank.net --spice --port heat=1 --port sense=10 --signals yoke.y:1M --out bank.lib\n  \
@@ -143,7 +144,7 @@ impl ExportCommand {
         print(&(json + "\n"))
     }
 
-    /// What the file does not say by its numbers.
+    /// Limitations of the file that its numbers do not show.
     fn warnings(&self, compiled: &CompiledModel, fitted: &ModelFit) -> Vec<String> {
         let mut warnings: Vec<String> = beyond(compiled.options.tol, mesh_error(compiled)).into_iter().collect();
         if fitted.error > self.within {
@@ -255,7 +256,7 @@ fn mesh_error(compiled: &CompiledModel) -> Option<f64> {
     if compiled.structure.beams.is_empty() { Some(0.0) } else { compiled.order.estimated_error.or_else(lowest) }
 }
 
-/// How far the full model itself may be off by its mesh.
+/// Estimated error of the full model from its mesh.
 fn mesh(compiled: &CompiledModel) -> String {
     match mesh_error(compiled) {
         Some(error) if compiled.options.band.is_none() && compiled.options.segments.is_none() => format!(
@@ -266,7 +267,7 @@ fn mesh(compiled: &CompiledModel) -> String {
     }
 }
 
-/// What was written, for a person.
+/// Summary of the written file, for people.
 fn summary(fitted: &ModelFit, pins: &Pins, name: &str) -> String {
     let model = &fitted.model;
     let row = |(j, mode): (usize, &bimorph::export::linear::ReducedMode)| {

@@ -1,4 +1,4 @@
-//! The node that moves most on a path: what is shown where nobody says.
+//! The node that moves most on a path: the default signal.
 
 use bimorph::compile::CompiledModel;
 
@@ -8,7 +8,7 @@ const MAX_NODES: usize = 1000;
 /// x and y of every node; of very many, of some evenly among them.
 pub(super) fn every(compiled: &CompiledModel) -> Vec<String> {
     let nodes = || compiled.structure.nodes.iter().filter(|node| node.mechanical);
-    // of many neighbours one tells what the others do
+    // sampled nodes represent their neighbours
     let nodes = nodes().step_by(nodes().count().div_ceil(MAX_NODES).max(1));
     nodes.flat_map(|node| [format!("{}.x", node.name), format!("{}.y", node.name)]).collect()
 }
@@ -27,7 +27,7 @@ pub(super) fn busiest(signals: &[(String, String, Vec<f64>)]) -> Vec<String> {
 mod tests {
     use super::*;
 
-    /// What moves on the way and is back at its end counts; at its end nothing tells nodes apart.
+    /// Motion along the path counts even if it returns at the end, where nothing distinguishes the nodes.
     #[test]
     fn the_way_counts() {
         let signal = |name: &str, values: &[f64]| (name.to_owned(), "m".to_owned(), values.to_vec());

@@ -49,8 +49,8 @@ use std::process::ExitCode;
 
 /// Behavioural device models of electro-mechanical microsystems.
 ///
-/// A SUGAR netlist goes in; motion, modes, pull-in voltages and waveforms come out. Numbers take netlist suffixes
-/// (1.5u, 30n, 2M; m is milli, M is mega) and are SI: metres, seconds, volts, newtons, hertz.
+/// Input: a SUGAR netlist. Output: motion, modes, pull-in voltages and waveforms. Numbers take netlist suffixes (1.5u,
+/// 30n, 2M; m is milli, M is mega) and are SI: metres, seconds, volts, newtons, hertz.
 #[derive(Debug, Parser)]
 #[command(name = "bimorph", version, max_term_width = 100)]
 #[command(after_help = "Exit status: 0 done, 1 error (one message on standard error), 2 wrong usage, 130 interrupted.")]

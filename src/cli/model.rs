@@ -39,7 +39,8 @@ pub(crate) struct ModelArgs {
 /// How a layout is to be read.
 #[derive(Debug, Args)]
 pub(crate) struct LayoutArgs {
-    /// Layouts only: what their layers are; a process inside (polymumps, soi) or a process file (.toml, docs/layout.md)
+    /// Layouts only: definition of the layers; a built-in process (polymumps, soi) or a process file (.toml,
+    /// docs/layout.md)
     #[arg(long, value_name = "NAME|FILE")]
     process: Option<String>,
 
@@ -95,7 +96,7 @@ impl ModelArgs {
         self.layout.asked()
     }
 
-    /// What was drawn, with warnings on standard error. A process is then that of what is to be drawn, for netlists too.
+    /// The structure, with warnings on standard error. A process is then that of what is to be drawn, for netlists too.
     pub(crate) fn draw(&self) -> Result<ParsedStructure, Failure> {
         let asked = if LayoutFormat::of(&self.file.display().to_string()).is_some() {
             self.asked()
@@ -141,7 +142,7 @@ impl ModelArgs {
         Ok(compiled)
     }
 
-    /// What the model was made from, for JSON.
+    /// Input of the model, for JSON.
     pub(crate) fn context<'a>(&'a self, compiled: &'a CompiledModel) -> Context<'a> {
         self.context_of(compiled, compiled)
     }
@@ -165,7 +166,7 @@ impl ModelArgs {
     }
 }
 
-/// What every result of the linear frame is warned of.
+/// Warning on every result of the linear frame.
 fn baseline() -> Diagnostic {
     let message =
         "the linear frame is a baseline: small displacements, no stops, and nothing tells how far its elements are off";
@@ -220,7 +221,7 @@ pub(crate) fn warn_of(warnings: &[String]) {
     }
 }
 
-/// The options of a model as keys of a document, but the number of segments: `check` tells it of each beam.
+/// The options of a model as keys of a document, without the number of segments, which `check` lists by beam.
 #[derive(Debug)]
 struct Keys<'a>(&'a CompileOptions);
 

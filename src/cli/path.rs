@@ -36,7 +36,8 @@ pub(crate) struct PathCommand {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// What grows: a port [V], a netlist parameter that sets loads, temperatures or stresses, or `loads`, a factor on all
+    /// Path parameter: a port [V], a netlist parameter that sets loads, temperatures or stresses, or `loads`, a factor
+    /// on all
     #[arg(long, value_name = "NAME=FROM:TO", value_parser = way)]
     along: PathRange,
 
@@ -110,7 +111,7 @@ struct PathDocument<'a> {
     context: Context<'a>,
 }
 
-/// What makes a path cheaper.
+/// Ways to reduce the cost of a path.
 const CHEAPER: &str = "a shorter --along, a larger --tol or fewer --points cost less";
 
 impl PathCommand {
@@ -204,7 +205,7 @@ impl PathCommand {
         Ok(Some([at(self.along.from)?, at(self.along.to)?]))
     }
 
-    /// The unit of what grows, where what it changes tells.
+    /// The unit of the path parameter, where its effects determine it.
     fn unit(&self, drawn: &CompiledModel, ends: Option<&[CompiledModel; 2]>) -> &'static str {
         let Some([first, last]) = ends else {
             return if drawn.structure.port(&self.along.name).is_some() { "V" } else { "" };

@@ -1,4 +1,4 @@
-//! Options of parameters that vary by chance.
+//! Options of random parameters.
 
 use super::failure::Failure;
 use bimorph::jobs::sweep::{Design, SampleGenerator, Sampling, Vary};
@@ -7,7 +7,7 @@ use clap::Args;
 /// Samples of parameters that vary.
 #[derive(Debug, Args)]
 pub(crate) struct SamplingArgs {
-    /// A parameter that varies by chance: NAME=normal:MEAN:DEVIATION, NAME=uniform:LOW:HIGH or NAME=lognormal:MEDIAN:DEVIATION_OF_LN.
+    /// A random parameter: NAME=normal:MEAN:DEVIATION, NAME=uniform:LOW:HIGH or NAME=lognormal:MEDIAN:DEVIATION_OF_LN.
     /// Repeatable; beside --param the samples are drawn at every point of the grid (process corners)
     #[arg(long, value_name = "NAME=DISTRIBUTION", requires = "samples")]
     vary: Vec<Vary>,
@@ -30,7 +30,7 @@ pub(crate) struct SamplingArgs {
 }
 
 impl SamplingArgs {
-    /// What was asked for, drawn up; none where nothing varies.
+    /// The requested samples; `None` without random parameters.
     pub(crate) fn samples(&self) -> Result<Option<SampleGenerator>, Failure> {
         let Some(count) = self.samples else { return Ok(None) };
         let asked = Sampling {

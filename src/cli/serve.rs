@@ -14,7 +14,7 @@ use std::sync::LazyLock;
 ///
 /// Prints one line "listening on ADDRESS" for each address on standard error once it accepts connections. Health and
 /// reflection services are always on. An address that other machines can reach takes TLS, and tokens or certificates of
-/// clients. What options do not say is taken from the environment (BIMORPH_SERVE_NAME), then from the file of --config.
+/// clients. Missing options are taken from the environment (BIMORPH_SERVE_NAME), then from the file of --config.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph serve --listen unix:///tmp/bimorph.sock\n  \
                         bimorph serve --listen 127.0.0.1:50051 --listen unix:///run/bimorph.sock\n  \
@@ -45,7 +45,7 @@ impl ServeCommand {
     }
 }
 
-/// What the options of a server say, in the order in which files, the environment and options are asked.
+/// Settings of a server by source, in the order file, environment, options.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SettingSources {
     config: Option<PathBuf>,
@@ -63,7 +63,7 @@ const SHORT: [(&str, &str, &str); 2] = [
 ];
 
 impl SettingSources {
-    /// What a file and the environment say, without options.
+    /// Settings from a file and the environment, without options.
     pub(crate) fn of(config: Option<PathBuf>) -> Self {
         Self { config, given: Vec::new() }
     }

@@ -27,8 +27,8 @@ use std::sync::OnceLock;
 /// has its reason in the column "error". The shards of a sweep put together (`bimorph merge`) are the whole sweep; each of their rows says
 /// in a last column "part" of which sweep it is.
 ///
-/// With --out FILE.csv every point is kept in FILE.csv.journal as soon as it is done, until the table is written: after Ctrl-C, a kill or a
-/// full disk the same command with --resume goes on where it stopped, and the table has the bytes that one run would have.
+/// With --out FILE.csv every finished point is stored in FILE.csv.journal until the table is written. After Ctrl-C, a
+/// kill or a full disk the same command with --resume continues, and the table has the bytes of one uninterrupted run.
 ///
 /// With --to the sweep is a job of a server, which goes on after Ctrl-C, and when the connection is lost: `bimorph jobs` lists it, attaches to it,
 /// and cancels it.
@@ -63,7 +63,7 @@ pub(crate) struct SweepCommand {
     #[command(flatten)]
     chance: SamplingArgs,
 
-    /// What to compute at each point
+    /// Analysis at each point
     #[arg(long, value_enum, default_value_t = SweepAnalysisChoice::Static)]
     analysis: SweepAnalysisChoice,
 

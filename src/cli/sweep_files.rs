@@ -1,4 +1,4 @@
-//! What a sweep is written to: its table as CSV or Parquet, and its picture. Statistics and yields go to standard error.
+//! Output files of a sweep: its table as CSV or Parquet, and its picture. Statistics and yields go to standard error.
 
 use super::failure::Failure;
 use super::output::{check_folder, write_picture};

@@ -15,7 +15,7 @@ pub(super) fn check(out: Option<&PathBuf>) -> Result<(), Failure> {
     check_folder(out)
 }
 
-/// Whether a table is a result: one in which no point has a result is none. One of a shard is: its reasons are rows of the whole.
+/// Whether a table is a result: at least one point must have one. One of a shard is: its reasons are rows of the whole.
 pub(super) fn is_result(table: &SweepTable, part: Option<&str>) -> bool {
     part.is_some() || table.rows.is_empty() || table.failed() < table.rows.len()
 }
@@ -34,7 +34,7 @@ pub(super) fn deliver(out: Option<&Path>, table: &SweepTable, part: Option<&str>
     Ok(true)
 }
 
-/// What every point of it lacks, if all do.
+/// An error if no point has a result.
 pub(super) fn nothing(table: &SweepTable) -> Result<(), Failure> {
     match table.rows.iter().find_map(|row| row.values.as_ref().err()) {
         Some(first) if table.failed() == table.rows.len() => Err(Failure::AllPoints(first.trim_end().to_owned())),

@@ -23,13 +23,14 @@ use std::path::PathBuf;
 
 /// Motion in time, from rest or from a released equilibrium.
 ///
-/// A run whose steps turn out to be off by more than its mesh leaves of --tol is made again with sharper ones, where that takes some seconds at most.
+/// If the steps of a run prove to have a larger error than its mesh leaves of --tol, the run is repeated with sharper
+/// ones, where that takes some seconds at most.
 ///
-/// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C], GAP.gap [m], GAP.C [F], GAP.F [N].
-/// JSON: "t" [s]; "signals": samples by name in SI; "units" by name; "method"; "counters": the work done; "events":
-/// crossings of --event levels and contacts of gaps, each with its time "t" [s] and "direction" up or down; "formulation",
-/// "estimated_error" by the mesh, "step_error" by the steps, of the amplitude; "stopped_at" [s] with --until; "reliable_until" [s], up to when
-/// the tolerance holds after contact (null: to the end), and "after_contact", the statistics of each signal from there on; and for rcr "joint_coordinates": n, m, evaluations near singular configurations, largest gap of a loop [m].
+/// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C], GAP.gap
+/// [m], GAP.C [F], GAP.F [N]. JSON: "frequencies_hz": ascending [Hz]. "shapes": for each mode the displacement of every
+/// node, the largest translation being 1. "residuals": approximate relative error of each shape. "estimated_errors":
+/// relative errors by the number of segments, one for each mode, signed about the drawing, null where unknown.
+/// "deflection_m": distance of their equilibrium from the drawing.
 #[derive(Debug, Args)]
 #[command(after_help = "Methods, with their orders; steps follow --tol, or are equal with --step:\n  \
     rodas4 (4)             the default: one factorization a step; fast motions die out\n  \
@@ -79,7 +80,7 @@ pub(crate) struct TransientCommand {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// What integrates [default: rodas4; in joint coordinates whose loops do not close by springs rk45]
+    /// Integration method [default: rodas4; in joint coordinates whose loops do not close by springs rk45]
     #[arg(long, value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(Integrator::NAMES))]
     method: Option<String>,
 
@@ -91,7 +92,7 @@ pub(crate) struct TransientCommand {
     #[arg(long, value_parser = value::number, allow_negative_numbers = true)]
     rho: Option<f64>,
 
-    /// Tell when a signal crosses a level, in the signal's SI unit. Repeatable
+    /// Print when a signal crosses a level, in the signal's SI unit. Repeatable
     #[arg(long = "event", value_name = "NAME=LEVEL", value_parser = value::volts)]
     events: Vec<(String, f64)>,
 
@@ -103,7 +104,7 @@ pub(crate) struct TransientCommand {
     #[arg(long, value_name = "FILE")]
     draw: Option<PathBuf>,
 
-    /// What solves the equations; all but the recursion are baselines to compare with
+    /// Solver of the equations; all but the recursion are baselines to compare with
     #[arg(long, value_enum, default_value_t)]
     solver: SolverChoice,
 
@@ -223,7 +224,7 @@ impl TransientCommand {
         Ok(())
     }
 
-    /// What moves, and what it is released from, on the mesh for the run.
+    /// The moving model and the model that it is released from, on the mesh for the run.
     fn fitted(
         &self,
         drawn: &CompiledModel,

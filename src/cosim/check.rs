@@ -1,4 +1,5 @@
-//! A run repeated with half the steps, a tenth of the tolerances and twice the segments: how far off it may be.
+//! A run repeated with half the steps, a tenth of the tolerances and twice the segments, and the resulting error
+//! estimate.
 
 use super::compare::{self, PlotComparison, PrintedNumber};
 use super::error::{CosimError, io};
@@ -18,7 +19,7 @@ pub struct CosimCheck {
     pub plots: Vec<PlotComparison>,
     /// Every number that was printed by name.
     pub printed: Vec<PrintedNumber>,
-    /// What could not be made finer or compared, one sentence each.
+    /// Parts that could not be refined or compared, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -68,7 +69,7 @@ pub fn check(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Co
     Ok(CosimCheck { plots, printed: compare::printed(&report.output, &fine.output), notes, report })
 }
 
-/// Plots of a raw file; none where there is none.
+/// Plots of a raw file; empty if the file does not exist.
 fn read(path: &Path) -> Result<Vec<Table>, CosimError> {
     if !path.is_file() {
         return Ok(Vec::new());

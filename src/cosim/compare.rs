@@ -19,10 +19,10 @@ const MIN_SHARE: f64 = 1e-3;
 pub struct VectorComparison {
     /// Its name.
     pub name: String,
-    /// Its unit, where ngspice tells it.
+    /// Its unit, where ngspice gives it.
     pub unit: String,
-    /// What differences are relative to, in its unit: largest less smallest value, of complex ones the largest magnitude, and at least
-    /// what ngspice resolves.
+    /// Scale of differences, in its unit: largest less smallest value, of complex ones the largest magnitude, and at
+    /// least the resolution of ngspice.
     pub range: f64,
     /// Largest difference [1].
     pub largest: f64,
@@ -59,7 +59,7 @@ pub struct PlotComparison {
 pub struct PrintedNumber {
     /// Its name.
     pub name: String,
-    /// What the first run and the second said.
+    /// The values of the first run and the second.
     pub values: [f64; 2],
     /// Their difference over the larger magnitude [1].
     pub difference: f64,
@@ -146,7 +146,7 @@ fn complex(samples: &ColumnSamples) -> Vec<[f64; 2]> {
     }
 }
 
-/// What differences of a vector are relative to.
+/// Scale of the differences of a vector.
 fn range(samples: &ColumnSamples, name: &str, unit: &str) -> f64 {
     let largest = samples.magnitudes().into_iter().fold(0.0, |m: f64, y| m.max(y.abs()));
     let span = match samples {
@@ -237,8 +237,8 @@ mod tests {
         table
     }
 
-    /// The same curve at other points does not differ, by less than a straight line through them would tell; one that is off by 1 %
-    /// of its amplitude differs by half of that of its range.
+    /// The same curve sampled at other points differs by less than linear interpolation would show. A curve with an
+    /// error of 1 % of its amplitude differs by half of that of its range.
     #[test]
     fn points_of_their_own_do_not_count() {
         let (plots, notes) = plots(&[sine(60, 0.0), sine(60, 0.01)], &[sine(101, 0.0), sine(101, 0.0)]);
@@ -249,7 +249,7 @@ mod tests {
         assert!(off.rms < off.largest && off.rms > 0.3 * off.largest, "{off:?}");
     }
 
-    /// Measured and printed numbers are compared by name; times and memory that ngspice tells are none.
+    /// Measured and printed numbers are compared by name; ngspice's times and memory are excluded.
     #[test]
     fn numbers_are_compared_by_name() {
         let first =

@@ -14,7 +14,7 @@ use thiserror::Error;
 /// Gain that stands for an ideal operational amplifier [1].
 const IDEAL_GAIN: f64 = 1e6;
 
-/// What the deck shall hold beside the netlist.
+/// Content of the deck beside the netlist.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct DeckSpec {
     /// The netlist as the `.model` line names it.
@@ -27,7 +27,7 @@ pub struct DeckSpec {
     pub signals: Vec<String>,
     /// Analyses, as SPICE writes them (`.tran 1u 1m`).
     pub analyses: Vec<String>,
-    /// What sources and ports give over time, by name, as SPICE writes it (`PULSE(0 4 1u 1u)`).
+    /// Waveforms of sources and ports, by name, in SPICE syntax (`PULSE(0 4 1u 1u)`).
     pub drives: Vec<(String, String)>,
     /// The source or port that has an amplitude of 1 in small-signal analyses; none: the first.
     pub source: Option<String>,
@@ -57,7 +57,7 @@ pub enum DeckError {
     /// A name that the netlist does not have.
     #[error("there is no {what} `{name}`; there is {available}")]
     Unknown {
-        /// What was looked for.
+        /// The missing file.
         what: &'static str,
         /// The name.
         name: String,
@@ -263,7 +263,7 @@ mod tests {
         around(&loaded.structure, &DeckSpec { file: "n.net".into(), ..wanted.clone() })
     }
 
-    /// What a source gives over time stands behind its voltage; a name that is no source is told.
+    /// The waveform of a source follows its voltage; a name without a source is an error.
     #[test]
     fn sources_give_what_they_are_told() {
         let drive =
@@ -327,7 +327,7 @@ mod tests {
         assert!(text.contains("ports=[\"x\"]"), "{text}");
     }
 
-    /// Ports are driven by a source each; what is missing or unknown is told.
+    /// Each port is driven by a source; missing or unknown ones are an error.
     #[test]
     fn what_is_missing_is_told() {
         let port = "drive port * [m e] []\n";

@@ -28,15 +28,15 @@ pub enum CosimError {
     Deck {
         /// The deck.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A file or a process could not be made.
     #[error("{what}: {source}")]
     Io {
-        /// What was tried.
+        /// The attempted operation.
         what: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The plug-in ended an analysis.
@@ -68,7 +68,7 @@ pub enum CosimError {
     Raw {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         source: RawError,
     },
     /// No raw file was written.

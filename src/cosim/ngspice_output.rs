@@ -1,4 +1,4 @@
-//! What ngspice says while it runs, how it ends, and whether the run was good.
+//! Output and exit of ngspice, and whether the run was good.
 
 use super::error::CosimError;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Child;
 use std::time::Duration;
 
-/// What ngspice said and how it ended.
+/// Output and exit status of ngspice.
 pub(super) struct RunOutput {
     status: std::process::ExitStatus,
     aborted: Option<String>,
@@ -18,7 +18,8 @@ pub(super) struct RunOutput {
 /// How often a run looks whether it is still wanted.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Passes ngspice's messages on, or keeps them, and hears the ones that tell a failure. Ends ngspice when it shall not go on.
+/// Forwards ngspice's messages or captures them, and detects the ones that report a failure. Ends ngspice when it shall
+/// not go on.
 pub(super) fn listen(mut child: Child, capture: bool, keep_going: &dyn Fn() -> bool) -> std::io::Result<RunOutput> {
     let stdout = child.stdout.take().map(|mut out| {
         std::thread::spawn(move || {
@@ -67,11 +68,11 @@ pub(super) fn judge(heard: &RunOutput, failure: &Path, deck: &Path, has_control:
     }
 }
 
-/// What ngspice says where it did not do what a deck asks for; the first of these lines is the reason that is told.
+/// Messages of ngspice where it did not run a deck's request; the first of these lines is the reported reason.
 const ABORTS: [&str; 4] =
     ["simulation(s) aborted", "MIF-ERROR", "circuit not parsed", "Simulation interrupted due to error"];
 
-/// What ngspice says of a look at a part that has no such thing, before it saves a column of zeros for it.
+/// Message of ngspice about a query of an unknown quantity, before it saves a column of zeros for it.
 fn unseen(text: &str) -> Option<String> {
     let (_, name) = text.split_once("unrecognized variable")?;
     let name = name.trim_start_matches([' ', '-']).trim();
@@ -79,7 +80,7 @@ fn unseen(text: &str) -> Option<String> {
     of_part.then(|| format!("nothing is called {name}: it would be saved as zeros; names are those of the part's signals, and hottest, closest, moved in process"))
 }
 
-/// What ngspice shows of its progress, all in one line, is no message.
+/// The progress line of ngspice is not a message.
 const PROGRESS: &str = "Reference value";
 
 /// A line without what shows progress.
@@ -88,7 +89,8 @@ fn without_progress(line: &[u8]) -> Vec<u8> {
     line.split(|byte| *byte == b'\r').filter(shows).flatten().copied().collect()
 }
 
-/// Reads ngspice's messages to their end: the line that tells an abort, whether nothing was run, and what was kept.
+/// Reads ngspice's messages to their end: the line that reports an abort, whether nothing was run, and the captured
+/// text.
 fn hear(stderr: impl Read, capture: bool) -> std::io::Result<(Option<String>, bool, Vec<u8>)> {
     let (mut aborted, mut nothing_run, mut messages) = (None, false, Vec::new());
     let mut stderr = BufReader::new(stderr);
@@ -106,7 +108,7 @@ fn hear(stderr: impl Read, capture: bool) -> std::io::Result<(Option<String>, bo
             let line = without_progress(&line);
             let text = String::from_utf8_lossy(&line);
             let text = text.trim();
-            // told whatever is not shown: an option that is misspelt and so left out by ngspice, and how far off a model may be
+            // always printed: a misspelt option, which ngspice ignores, and the estimated error of a model
             let of_model = text.starts_with("bimorph: ") && text.contains(": warning[");
             if of_model || text.contains("unrecognized parameter") {
                 let reported = if of_model { format!("{text}\n") } else { format!("warning: {text}\n") };

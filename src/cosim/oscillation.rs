@@ -13,8 +13,8 @@ const REGULAR: f64 = 0.05;
 /// By how much the difference of points is larger than that of amplitudes and of frequencies where it is one of phase.
 const PHASE: f64 = 3.0;
 
-/// Part of the difference of points that the frequencies make up over the run, at least [1]. What is driven has the frequency of its source: its phase is
-/// a result.
+/// Part of the difference of points that the frequencies make up over the run, at least [1]. A driven circuit has the
+/// frequency of its source: its phase is a result.
 const DRIFTS: f64 = 0.3;
 /// By how much the swing of a cycle may be larger or smaller than the mean one [1]: of what dies away the phase is a result, too.
 const STEADY: f64 = 0.2;
@@ -105,7 +105,7 @@ mod tests {
         );
     }
 
-    /// What dies away, chirps, has few cycles, is driven or lies apart by its amplitude is compared point by point.
+    /// Signals that decay, chirp, have few cycles, are driven or differ in amplitude are compared point by point.
     #[test]
     fn nothing_else_is_an_oscillator() {
         let sine = |f: f64, phase: f64| wave(3000, move |t| (TAU * f * t + phase).sin());

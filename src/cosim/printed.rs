@@ -1,4 +1,5 @@
-//! What a deck that is made around a netlist shows: the scales of its signals, and its `.print` lines, without which `ngspice -b` runs nothing.
+//! Output section of a generated deck: the scales of its signals, and its `.print` lines, without which `ngspice -b`
+//! runs nothing.
 
 use std::fmt::Write;
 

@@ -1,9 +1,9 @@
 //! A deck made finer: half the longest step in every transient, and a tenth of `reltol`; and a deck that also writes down what its
 //! `.control` section computed.
 //!
-//! ngspice takes the last `.options` that names a thing, and where `.tran` gives no longest step the smaller of its step and a
-//! fiftieth of its time. What is changed stands in the deck itself; an included file is used as it is, and a note says so where it
-//! matters.
+//! ngspice takes the last `.options` that names a thing, and where `.tran` gives no longest step the smaller of its
+//! step and a fiftieth of its time. Changes are made in the deck itself; an included file is used as it is, and a note
+//! says so where it matters.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ const MIN_STEPS: f64 = 50.0;
 pub struct RefinedDeck {
     /// Its text.
     pub text: String,
-    /// What could not be made finer, one sentence each.
+    /// Parts that could not be refined, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -220,7 +220,7 @@ fn written(value: f64) -> String {
     format!("{rounded:e}")
 }
 
-/// What stands in braces or quotes, or is a number: something that can be part of an expression.
+/// A word in braces or quotes, or a number: anything that can be part of an expression.
 fn expression(word: &str) -> Option<String> {
     let inner = |open: char, close: char| word.strip_prefix(open).and_then(|w| w.strip_suffix(close));
     if let Some(value) = number(word) {
@@ -229,7 +229,7 @@ fn expression(word: &str) -> Option<String> {
     inner('{', '}').or_else(|| inner('\'', '\'')).map(|w| format!("({w})"))
 }
 
-/// A `.tran` line with half the longest step; none where its steps cannot be told.
+/// A `.tran` line with half the longest step; `None` where its steps cannot be determined.
 fn halved(line: &str, control: bool) -> Option<String> {
     let words = words(line);
     let uic = words.iter().skip(1).position(|w| w.eq_ignore_ascii_case("uic")).map(|n| n + 1);
@@ -254,7 +254,7 @@ fn halved(line: &str, control: bool) -> Option<String> {
     Some(format!("{} {step} {stop} {start} {longest}{tail}", words[0]))
 }
 
-/// A line with a tenth of its `reltol`; none where it names none whose value can be told.
+/// A line with a tenth of its `reltol`; `None` without a `reltol` of known value.
 fn tightened_line(line: &str) -> Option<String> {
     let at = line.to_ascii_lowercase().find("reltol")?;
     let (head, rest) = line.split_at(at + "reltol".len());
@@ -292,7 +292,7 @@ mod tests {
         assert_eq!(of("t\nR1 a 0 1\n"), "t\n.options reltol=1e-4\nR1 a 0 1\n");
     }
 
-    /// A control section's commands count as such, and what cannot be changed is told.
+    /// A control section's commands are refined too, and unchangeable ones are reported.
     #[test]
     fn control_sections_are_read() {
         let deck =
@@ -322,7 +322,7 @@ mod tests {
         assert_eq!(measuring("t\n.tran 1 2\n.end\n", raw), None);
     }
 
-    /// A comment between continuations is none of them, and a continuation may stand behind blanks.
+    /// A comment between continuations is not a continuation, and a continuation may follow blanks.
     #[test]
     fn comments_between_continuations() {
         let lines =

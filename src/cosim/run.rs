@@ -1,8 +1,8 @@
 //! One run of ngspice on a deck, from its files to its raw file.
 //!
-//! The deck is not copied or changed, unless the run is to be compared with a finer one ([`check`](super::check)): ngspice is
-//! started in the working directory it would have anyway, with an initialisation file of its own (`SPICE_USERINIT_DIR`) that
-//! first reads the user's and then loads the plug-in. So relative includes and `.control` sections work as they always do.
+//! The deck is not copied or changed, unless the run is to be compared with a finer one ([`check`](super::check)).
+//! ngspice starts in its usual working directory. Its initialisation file (`SPICE_USERINIT_DIR`) first reads the user's
+//! and then loads the plug-in. So relative includes and `.control` sections work as they always do.
 //!
 //! ngspice ends with status 0 when an analysis inside `.control` fails. Here that is an error: the plug-in leaves its
 //! reason in a file, and ngspice's own "simulation(s) aborted" is heard. A raw file appears under its name only when
@@ -17,7 +17,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// What to run.
+/// Options of a run.
 #[derive(Debug, Clone, Default)]
 pub struct CosimOptions {
     /// The deck.
@@ -40,7 +40,7 @@ pub struct CosimOptions {
     pub capture: bool,
 }
 
-/// What a good run leaves.
+/// Result of a good run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CosimReport {
     /// The ngspice that ran.
@@ -54,7 +54,7 @@ pub struct CosimReport {
 }
 
 impl CosimReport {
-    /// What the run was warned of by its models, as it was told.
+    /// Warnings of the models during the run, as printed.
     pub fn warnings(&self) -> impl Iterator<Item = &str> {
         let of_model = |line: &&str| line.starts_with("bimorph: ") && line.contains(": warning[");
         self.output.lines().map(str::trim).filter(of_model)

@@ -17,7 +17,7 @@ impl ScratchFolder {
     }
 }
 
-/// What the initialisation file of a run says beside loading the plug-in.
+/// Content of the initialisation file of a run, beside loading the plug-in.
 pub(super) struct InitializationFile<'a> {
     /// The user's own initialisation file.
     pub(super) user: Option<&'a Path>,

@@ -14,7 +14,7 @@ impl SpiceNames {
         Self { taken: ["0", "gnd"].map(|name| (name.to_owned(), 1)).into() }
     }
 
-    /// A name for `wanted` that no one else has.
+    /// An unused name close to `wanted`.
     pub(super) fn take(&mut self, wanted: &str) -> String {
         let plain = wanted.chars().filter(|c| *c != ')');
         let plain: String =

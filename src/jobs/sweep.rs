@@ -70,10 +70,10 @@ pub fn check_names(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) 
     point::check_names(spec, &NetlistSource::new(bundle), options)
 }
 
-/// What is drawn at the first point, with what the netlist is warned of there.
+/// The structure at the first point, with the warnings of its netlist.
 ///
 /// # Errors
-/// What the point would have for an error.
+/// The error that the point would have.
 pub fn first_drawn(
     spec: &SweepSpec,
     bundle: &Bundle,
@@ -83,7 +83,8 @@ pub fn first_drawn(
     draw(&NetlistSource::new(bundle), &axis::at(&axis::chosen(options, &settings), &settings))
 }
 
-/// Runs a sweep; under a budget, each point has all of its allowance, and the rows together have it once more. `progress` is told after every point, from any thread, and answers whether to go on.
+/// Runs a sweep; under a budget, each point has all of its allowance, and the rows together have it once more.
+/// `progress` is called after every point, from any thread, and returns whether to continue.
 ///
 /// # Errors
 /// [`SweepError`]; a point without a result is a row with its error, not an error here.

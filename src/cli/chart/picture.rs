@@ -6,7 +6,7 @@ use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::loglog::{self, LogChart, LogCurve, LogPanel, Slope};
 use clap::ValueEnum;
 
-/// What stands for work.
+/// Measure of work.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum CostMeasure {
     /// Wall-clock time
@@ -131,7 +131,7 @@ fn panel(chart: &Chart, part: ChartPart, work: CostMeasure) -> Option<LogPanel> 
     })
 }
 
-/// What the tolerance of a default analysis costs.
+/// Cost of a default analysis against its tolerance.
 fn cost(chart: &Chart) -> Option<LogPanel> {
     let mut curves: Vec<LogCurve> = Vec::new();
     for (p, m) in chart.points.iter().filter(|p| p.part == ChartPart::Defaults).filter_map(|p| Some((p, p.measured?))) {

@@ -47,7 +47,7 @@ pub(crate) fn csv(chart: &Chart) -> String {
 /// Heads of the columns for people.
 pub(crate) const HEADS: [&str; 8] = ["run", "tolerance", "band", "unknowns", "error", "told", "time", "work"];
 
-/// The cells of a point for people: short, in engineering units; a failure is told instead of numbers.
+/// The cells of a point for people: short, in engineering units; a failure is printed instead of numbers.
 pub(crate) fn cells(p: &ChartPoint) -> Vec<String> {
     let run = match p.part {
         ChartPart::Precision => format!("{} {}", p.formulation.name(), p.method),
@@ -72,7 +72,7 @@ pub(crate) fn cells(p: &ChartPoint) -> Vec<String> {
     cells
 }
 
-/// What a part's table shows, in one line.
+/// Caption of a part's table, in one line.
 pub(crate) fn caption(part: ChartPart) -> &'static str {
     match part {
         ChartPart::Precision => {

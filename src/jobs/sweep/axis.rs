@@ -1,4 +1,4 @@
-//! What an axis of a sweep varies: a parameter of the netlist, the voltage of a port, or an option of the model.
+//! Axis of a sweep: a parameter of the netlist, the voltage of a port, or an option of the model.
 
 use super::error::{SweepError, bad};
 use super::values::Values;
@@ -6,9 +6,10 @@ use crate::netlist::Setting;
 use crate::options::{CompileOptions, MODEL, ModelOption, OptionValue, Range};
 use std::collections::HashSet;
 
-/// What stands behind the name of a port in the name of an axis of its voltages: `heat.v`. No netlist parameter has a point in its name.
+/// Suffix of a port's name that makes the name of an axis of its voltages: `heat.v`. No netlist parameter has a point
+/// in its name.
 pub(super) const VOLTS: &str = ".v";
-/// What stands before the name of an option in the name of an axis of its values: `option.tol`.
+/// Prefix of an option's name that makes the name of an axis of its values: `option.tol`.
 const OPTION: &str = "option.";
 
 /// One axis of the grid, or of several that go together.
@@ -22,7 +23,7 @@ pub struct SweepParameter {
     pub in_step: bool,
 }
 
-/// What a name names.
+/// Kind of an axis.
 #[derive(Clone, Copy)]
 pub(super) enum Varied<'a> {
     Parameter,
@@ -32,7 +33,7 @@ pub(super) enum Varied<'a> {
     Option(&'a str),
 }
 
-/// What a name names.
+/// Kind of an axis.
 pub(super) fn varied(name: &str) -> Varied<'_> {
     match (name.strip_suffix(VOLTS), name.strip_prefix(OPTION)) {
         (Some(port), _) => Varied::Voltage(port),
@@ -50,7 +51,7 @@ impl SweepParameter {
     /// Refuses values that what it names cannot have.
     ///
     /// # Errors
-    /// [`SweepError::BadSpec`] for a voltage that is none, an option that there is not, and a value beyond its range.
+    /// [`SweepError::BadSpec`] for an invalid voltage, an unknown option, and a value out of range.
     pub(super) fn check(&self) -> Result<(), SweepError> {
         let what = || format!("parameter \"{}\"", self.name);
         if let Values::Linear { low, high, .. } = self.values

@@ -1,4 +1,5 @@
-//! The points of a sweep of statics or modes: side by side where they differ from its middle in numbers alone.
+//! Batched sweeps of statics or modes: points run in lanes where they differ from the middle of the grid in numbers
+//! alone.
 //!
 //! Points are laid out on the first mesh that all share. Equilibria in lanes have the bits of a point alone. Modes in lanes begin with
 //! those of the middle of the grid, and are those of a point alone to rounding. A point that has its result from lanes, and whose mesh
@@ -25,7 +26,7 @@ pub(super) const CHUNK: usize = 32;
 /// Bodies of a point, at most: larger ones take their time anyway, and some of them at once the memory.
 const MAX_BODIES: usize = 1000;
 
-/// What all points have in common.
+/// Data that all points share.
 pub(super) struct BatchedSweep<'a> {
     spec: &'a SweepSpec,
     source: &'a NetlistSource,
@@ -58,7 +59,7 @@ impl SweepLanes {
         }
     }
 
-    /// What the variants have from lanes, whose mesh may not hold.
+    /// Assessments of the variants from lanes; their mesh may be too coarse.
     fn assess(&self, variants: &[&CompiledModel], request: &MeshRequest<'_>) -> Vec<Option<Assessment>> {
         match (self, *request) {
             (Self::Modes(lanes), MeshRequest::Modes { count, voltages }) => {
@@ -105,7 +106,7 @@ impl<'a> BatchedSweep<'a> {
         Self { spec, source, options, family, lanes: OnceLock::new() }
     }
 
-    /// Runs some points; `finished` is told of each, and says whether to go on. None where it said no.
+    /// Runs some points; `finished` is called for each, and returns whether to continue. None where it said no.
     pub(super) fn run(
         &self,
         numbers: &[usize],
@@ -130,7 +131,7 @@ impl<'a> BatchedSweep<'a> {
         Some(outcomes)
     }
 
-    /// What points have from lanes; none for those that have to run alone, which also say what is wrong with them.
+    /// Results of points from lanes; `None` for those that have to run alone, which also finds their errors.
     fn side_by_side(&self, numbers: &[usize], means: &PointBudget) -> Vec<Option<PointResults>> {
         let none = || numbers.iter().map(|_| None).collect();
         if !self.family.shares() || matches!(self.lanes.get(), Some(None)) {

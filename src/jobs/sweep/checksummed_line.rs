@@ -1,8 +1,8 @@
-//! Lines of JSON with the sum of their bytes: one that is damaged is none.
+//! Lines of JSON with a checksum: a damaged line is rejected.
 
 use crate::content::Fnv;
 
-/// What stands before the sum of a line, and its length with what stands behind it.
+/// The text before the checksum of a line, and its length including the text after it.
 const SUM: &[u8] = b",\"sum\":\"";
 const SUMMED: usize = SUM.len() + 32 + 3;
 
@@ -30,7 +30,7 @@ pub(crate) fn opened(line: &[u8]) -> Option<Vec<u8>> {
 
 #[cfg(test)]
 mod tests {
-    //! What was sealed opens, and with any byte changed does not.
+    //! A sealed line opens, and is rejected after any change of a byte.
     use super::*;
 
     #[test]

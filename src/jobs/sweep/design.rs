@@ -87,8 +87,9 @@ fn share(seed: u64, coordinate: usize, sample: usize) -> f64 {
     ((numbers.next_u64() >> 11) as f64 + 0.5) * 2f64.powi(-53)
 }
 
-/// The slice of sample `k` of `count` in a coordinate: a permutation without a table, four rounds of Feistel's network over the next
-/// power of four, walked on until it hits a slice that is there (Black & Rogaway, "Ciphers with arbitrary finite domains", 2002).
+/// The slice of sample `k` of `count` in a coordinate: a permutation without a table. Four rounds of Feistel's network
+/// over the next power of four are repeated until they reach a slice below `count` (Black & Rogaway, "Ciphers with
+/// arbitrary finite domains", 2002).
 fn slice(seed: u64, coordinate: usize, k: usize, count: usize) -> u64 {
     let half = (u64::BITS - (count as u64 - 1).leading_zeros()).div_ceil(2).max(1);
     let mask = (1u64 << half) - 1;

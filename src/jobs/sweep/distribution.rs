@@ -21,7 +21,7 @@ pub enum Distribution {
         /// Largest value.
         high: f64,
     },
-    /// ln x is normal: what is a product of many small factors.
+    /// ln x is normal: a product of many small factors.
     LogNormal {
         /// Median, positive.
         median: f64,

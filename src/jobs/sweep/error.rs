@@ -12,9 +12,9 @@ pub enum SweepError {
     BadSpec {
         /// Which part.
         what: String,
-        /// What was expected.
+        /// The expected value.
         expected: String,
-        /// What came.
+        /// The given value.
         got: String,
     },
     /// The progress callback said stop.
@@ -28,21 +28,21 @@ pub enum SweepError {
     /// The table would take more memory than the sweep may use.
     #[error("the table needs more than {most} bytes; name the outputs that are wanted, or split the sweep into shards")]
     TooLarge {
-        /// What it may use [byte].
+        /// The limit [byte].
         most: usize,
     },
-    /// What all computations of its owner may use is used up.
+    /// The quota of its owner is used up.
     #[error("{0}")]
     Owner(Stopped),
     /// The operating system gave no threads.
     #[error("no worker threads: {reason}")]
     Threads {
-        /// What it said.
+        /// The message.
         reason: String,
     },
 }
 
-/// What of a specification means nothing.
+/// Error of an invalid entry of a specification.
 pub(super) fn bad(what: String, expected: &str, got: &str) -> SweepError {
     SweepError::BadSpec { what, expected: expected.to_owned(), got: got.to_owned() }
 }

@@ -1,15 +1,16 @@
-//! Who runs the pieces of a sweep. What comes of a point does not depend on it.
+//! Executors: threads that run the pieces of a sweep. The result of a point does not depend on the executor.
 
 use super::error::SweepError;
 use rayon::prelude::*;
 
-/// Who runs the pieces of a sweep: on which threads, and when.
+/// Executor of the pieces of a sweep: its threads and its order.
 pub trait Executor: Sync {
     /// How many pieces it may run at once.
     fn size(&self) -> usize;
 
-    /// Runs the pieces 0 to `count`, each once, on any thread, and comes back when all are over. A piece says whether to go on: after one
-    /// that says no, and when the crew is told to stop, the rest are left out.
+    /// Runs the pieces 0 to `count`, each once, on any thread, and comes back when all are over. A piece returns
+    /// whether to continue. After one that returns false, and when the executor is cancelled, the remaining pieces are
+    /// skipped.
     fn run(&self, count: usize, piece: &(dyn Fn(usize) -> bool + Sync));
 }
 
@@ -27,7 +28,7 @@ impl ThreadPool {
         pool.map(Self).map_err(|error| SweepError::Threads { reason: error.to_string() })
     }
 
-    /// Its threads, for another who says when they work.
+    /// Its threads, for another executor that schedules them.
     pub fn threads(&self) -> &rayon::ThreadPool {
         &self.0
     }
@@ -40,7 +41,7 @@ impl Executor for ThreadPool {
 
     fn run(&self, count: usize, piece: &(dyn Fn(usize) -> bool + Sync)) {
         let run = |number| if piece(number) { Ok(()) } else { Err(()) };
-        // who said no has said why
+        // the piece that returned `false` has recorded its error
         let _ = self.0.install(|| (0..count).into_par_iter().try_for_each(run));
     }
 }

@@ -1,7 +1,6 @@
-//! What a sweep has found so far, in a file that a stop in the middle leaves readable: one line of JSON for each point as soon as it
-//! is done, behind a line that names the sweep. Whoever goes on reads the points back to the same bits; a last line that is cut off
-//! was not finished, and its point is computed again.
-//! Each line has the sum of its bytes, so that one that is damaged is none.
+//! Journal of a sweep: a file that stays readable after a stop at any moment. It has a line that names the sweep, then
+//! one line of JSON for each finished point. On resumption the points are read back bit by bit. A truncated last line
+//! counts as unfinished, and its point is computed again. Each line has a checksum, so that damaged lines are rejected.
 
 use super::checksummed_line::{opened, sealed};
 use super::spec::SweepSpec;
@@ -30,7 +29,7 @@ pub struct JournalRow {
     pub estimated_error: Option<f64>,
     /// Why the numbers may be further off than the tolerance.
     pub warning: String,
-    /// Why there are none.
+    /// Error of a point without results.
     pub error: Option<String>,
 }
 
@@ -45,7 +44,7 @@ struct JournalHeader {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum JournalError {
-    /// There is one, and nobody said what to do with it.
+    /// A journal exists, and neither resumption nor removal was requested.
     #[error(
         "{} has points of a sweep that did not end; go on with it by --resume, or remove the file to begin anew", path.display()
     )]
@@ -73,7 +72,7 @@ pub enum JournalError {
     Io {
         /// Where.
         path: PathBuf,
-        /// What it says.
+        /// The system's error.
         source: io::Error,
     },
 }
@@ -117,8 +116,9 @@ pub fn name(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Stri
 }
 
 impl Journal {
-    /// Opens or makes the file of the sweep `name`. Gives the points that it has, if `resume` says to go on from them; [`Journal::damaged`]
-    /// tells of lines that are none. Its first line is on the disk when this returns: without it nothing behind it would be read.
+    /// Opens or makes the file of the sweep `name`. Returns its points if `resume` is set; [`Journal::damaged`] gives
+    /// the number of invalid lines. Its first line is on the disk when this returns: without it nothing behind it would
+    /// be read.
     ///
     /// # Errors
     /// [`JournalError`]: a file is there and `resume` is not said, it is of another sweep, or the file system refuses.
@@ -127,7 +127,7 @@ impl Journal {
         let mut file = File::options().read(true).append(true).create(true).open(path).map_err(failed)?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => return Err(JournalError::Busy { path: path.to_owned() }),
-            // a file system without locks: whoever starts two sweeps there has been told to give each its own file
+            // a file system without locks: the documentation requires a separate file for each sweep
             Err(TryLockError::Error(_)) | Ok(()) => {}
         }
         let mut bytes = Vec::new();
@@ -216,7 +216,7 @@ impl Journal {
     }
 }
 
-/// What a journal has.
+/// Content of a journal.
 #[derive(Default)]
 struct JournalContents {
     known: Vec<JournalRow>,
@@ -304,7 +304,7 @@ mod tests {
             assert_eq!(again.last(), Some(&kept(7)), "{cut}");
             assert_eq!(again.len(), known.len() + 1);
         }
-        // a line that is damaged costs its own point alone, and is told
+        // a damaged line costs its own point alone, and is reported
         let mut bytes = whole.clone();
         bytes[ends[2] - 9] ^= 1;
         std::fs::write(&path, &bytes).unwrap();
@@ -320,7 +320,7 @@ mod tests {
             std::fs::write(&path, &bytes).unwrap();
             assert_eq!(Journal::open(&path, "sweep", true).unwrap().1.len(), 5, "{at}");
         }
-        // one that is damaged further is none of this sweep, and nothing is removed
+        // a line damaged further belongs to no sweep, and nothing is removed
         (bytes[3], bytes[7]) = (0, 0);
         std::fs::write(&path, &bytes).unwrap();
         assert!(matches!(Journal::open(&path, "sweep", true), Err(JournalError::Other { .. })));

@@ -17,7 +17,7 @@ use crate::readout::signal::Signal;
 use std::borrow::Cow;
 use std::collections::HashSet;
 
-/// What columns of a static sweep are called.
+/// Names of the columns of a static sweep.
 const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q";
 /// Ports that a refusal names.
 const MAX_LISTED_PORTS: usize = 20;
@@ -31,7 +31,7 @@ pub(super) struct PointValue {
     pub(super) value: Option<f64>,
 }
 
-/// What came of one point.
+/// Outcome of one point.
 pub(super) struct PointOutcome {
     pub(super) number: usize,
     pub(super) parameters: Vec<Setting>,
@@ -65,7 +65,7 @@ impl PointOutcome {
 }
 
 impl PointOutcome {
-    /// What a journal keeps of it.
+    /// Its row in a journal.
     pub(super) fn kept(&self) -> JournalRow {
         let (values, estimated_error, warning, error) = match &self.values {
             Ok(found) => {
@@ -196,13 +196,13 @@ fn solve(
     found(assessed, spec, options)
 }
 
-/// What is kept of a result.
+/// The stored part of a result.
 pub(super) fn found(assessed: Assessment, spec: &SweepSpec, options: &CompileOptions) -> Result<PointResults, String> {
     let estimated_error = assessed.estimated_error;
     let beyond = mesh::beyond(options.tol, estimated_error).map(|message| format!("{}: {message}", mesh::WARNING));
     let warnings: Vec<String> = beyond.into_iter().chain(assessed.warnings).collect();
     let values = values(&assessed.answer, &spec.analysis)?;
-    // what is told of it stands in the warning; files of JSON have no infinity
+    // its warning contains it; files of JSON have no infinity
     let estimated_error = estimated_error.filter(|error| error.is_finite());
     Ok(PointResults { values, estimated_error, warning: warnings.join("; ") })
 }

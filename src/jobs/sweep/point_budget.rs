@@ -1,11 +1,11 @@
-//! What the points of a sweep may use.
+//! Budget of the points of a sweep.
 
 use super::point_error::Failed;
 use crate::budget::{self, Budget, Stopped};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{PoisonError, RwLock};
 
-/// What each point may use: all that its sweep may, as long as there is something left of what its owner may.
+/// Budget of one point: the sweep's allowance, capped by what remains of the owner's quota.
 #[derive(Debug, Default)]
 pub(super) struct PointBudget {
     budget: Option<Budget>,
@@ -27,8 +27,8 @@ impl PointBudget {
         self.budget.as_ref().map_or(Ok(()), |budget| budget.take(bytes))
     }
 
-    /// Runs a job with them. A fault inside is the error of that job: it must not take other points with it. What finds no room beside others
-    /// is tried again alone.
+    /// Runs a job with them. A fault inside is the error of that job: it must not take other points with it. A point
+    /// that does not fit into memory beside others is retried alone.
     pub(super) fn guarded<T>(&self, job: impl Fn() -> Result<T, String>) -> Result<T, Failed> {
         let Some(budget) = &self.budget else { return caught(|| Ok(job()?)) };
         let attempt = || {
@@ -47,7 +47,7 @@ impl PointBudget {
     }
 }
 
-/// What needs more than its owner has in all is refused for its own sake, whenever it is tried.
+/// A point that needs more than its owner's whole quota fails for that reason, whenever it is tried.
 fn of_itself(why: Failed, used: usize) -> Failed {
     match why {
         Failed::Owner(Stopped::OwnerBytes { most, more, .. }) if used.saturating_add(more) > most => {
@@ -64,7 +64,7 @@ fn caught<T>(job: impl FnOnce() -> Result<T, Failed>) -> Result<T, Failed> {
 
 #[cfg(test)]
 mod tests {
-    //! Who needs more than there is in all is an error of its own; who needs more than is left beside others has it alone.
+    //! A point that needs more than the whole quota is an error; one that needs more than the remainder runs alone.
     use super::*;
     use crate::budget::{Allowance, OwnerQuota};
     use std::sync::{Arc, Barrier};

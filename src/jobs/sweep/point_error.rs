@@ -6,9 +6,9 @@ use std::fmt;
 /// Why a point has no result.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Failed {
-    /// It has none, whoever computes it.
+    /// It has no result with any executor.
     Point(String),
-    /// What its owner may use is used up: it may have one another time.
+    /// The quota of its owner is used up; a later run may succeed.
     Owner(Stopped),
 }
 

@@ -10,7 +10,7 @@ use std::collections::HashSet;
 /// Parameters whose correlations are asked for.
 const CORRELATED_MOST: usize = 200;
 
-/// What to draw. [`SampleGenerator::new`] checks it.
+/// Specification of the samples. [`SampleGenerator::new`] checks it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sampling {
     /// Parameters that vary.
@@ -28,10 +28,10 @@ pub struct Sampling {
 /// Samples that can be drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleGenerator {
-    /// What was asked for.
+    /// The specification.
     pub asked: Sampling,
     cube: Cube,
-    /// Cholesky's factor of the correlations; none where there are none.
+    /// Cholesky's factor of the correlations; `None` without correlations.
     factor: Option<DMatrix<f64>>,
 }
 

@@ -1,4 +1,4 @@
-//! The points of a sweep in pieces: as many at once as are laid out side by side.
+//! Scheduling of a sweep: its points are divided into pieces of as many as a batch holds.
 
 use super::axis;
 use super::batched::{self, BatchedSweep};
@@ -16,8 +16,9 @@ use crate::netlist::{Bundle, NetlistSource};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Runs points of a sweep by a crew. `each` is told of every one as soon as it is done, from any thread, and says whether to go on; `take` is
-/// given those of a piece once all of it are done. Whether all were run.
+/// Runs points of a sweep by a crew. `each` is called for every one as soon as it is finished, from any thread, and
+/// returns whether to continue. `take` receives those of a piece once the whole piece is finished. Whether all were
+/// run.
 ///
 /// # Errors
 /// [`SweepError::TooLarge`] where the points need more memory than the budget of this thread has, and [`SweepError::Owner`] where its owner's is
@@ -72,7 +73,8 @@ pub(super) fn run(
     full.into_inner().map_or(Ok(more), Err)
 }
 
-/// How many of `points` are a piece: no thread goes without while another has many. A row does not depend on who is beside it.
+/// How many of `points` are a piece: no thread goes without while another has many. A row does not depend on the other
+/// points of its batch.
 fn at_once(spec: &SweepSpec, points: usize, threads: usize) -> usize {
     match spec.analysis {
         SweepAnalysis::Transient { .. } => transient::CHUNK,
@@ -113,7 +115,7 @@ impl<'a> PointGroup<'a> {
     }
 }
 
-/// What points with the same options have in common.
+/// Data that points with the same options share.
 struct Variants<'a> {
     spec: &'a SweepSpec,
     source: &'a NetlistSource,

@@ -1,4 +1,5 @@
-//! What the rows of a shard say of themselves, so that only the shards of one sweep are put together, and all of them.
+//! Column that identifies the sweep and the shard of a row, so that a merge accepts only the complete set of shards of
+//! one sweep.
 
 use super::error::SweepError;
 use super::journal;
@@ -25,7 +26,7 @@ impl SweepPart {
     /// The part of a sweep that a specification asks for.
     ///
     /// # Errors
-    /// [`SweepError::BadSpec`] for a grid that is none.
+    /// [`SweepError::BadSpec`] for an invalid grid.
     pub fn of(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<Self, SweepError> {
         let whole = SweepSpec { shard: Shard::default(), ..spec.clone() };
         let shard = format!("{}/{}", spec.shard.index, spec.shard.count);

@@ -1,10 +1,10 @@
 //! The meshes that the points of a sweep share.
 //!
-//! To search a mesh costs some ten times what the analysis costs, and variants of one drawing need much the same. So meshes
-//! are searched at one point of the grid, the middle one, for a share of the tolerance that leaves room for the others; each
-//! point then takes the first of these meshes on which the estimate of its own error holds, and where none does (or where
-//! the drawing has other beams) searches its own, as a point alone does. Which mesh a point gets depends on the
-//! grid and on the point alone, not on other points, on shards or on threads.
+//! To search a mesh costs some ten times what the analysis costs, and variants of one drawing need much the same. So
+//! meshes are searched at the middle point of the grid, for fractions of the tolerance that leave a margin for the
+//! others. Each point uses the first of these meshes on which the estimate of its own error holds. Where none does, or
+//! where the structure has other beams, it searches its own mesh like a single analysis. Which mesh a point gets
+//! depends on the grid and on the point alone, not on other points, on shards or on threads.
 
 use super::axis::at;
 use super::spec::{SweepAnalysis, SweepSpec};

@@ -1,4 +1,4 @@
-//! What to sweep: the points of a grid and their parameters.
+//! Specification of a sweep: the points of a grid and their parameters.
 
 use super::axis::{SweepParameter, VOLTS, Varied, varied};
 use super::error::{SweepError, bad};
@@ -11,14 +11,14 @@ use std::collections::{BTreeMap, HashSet};
 /// Points of a shard, at most: their numbers are laid out.
 const MAX_POINTS: usize = 100_000_000;
 
-/// What to sweep.
+/// Specification of a sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepSpec {
     /// The full grid of these is run; the last one varies fastest. Empty: one point, as the netlist stands.
     pub parameters: Vec<SweepParameter>,
     /// Samples that are drawn at every point of the grid, and vary faster than it.
     pub samples: Option<SampleGenerator>,
-    /// What to compute at each point.
+    /// Analysis at each point.
     pub analysis: SweepAnalysis,
     /// Which part of the grid to run.
     pub shard: Shard,
@@ -26,7 +26,7 @@ pub struct SweepSpec {
     pub threads: Option<usize>,
 }
 
-/// What to compute at each point.
+/// Analysis at each point.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SweepAnalysis {
     /// Static equilibrium.
@@ -63,7 +63,7 @@ pub enum SweepAnalysis {
 }
 
 impl SweepAnalysis {
-    /// Voltages at which ports are held; none where there are none to hold.
+    /// Voltages at which ports are held; `None` where the analysis holds none.
     fn voltages(&self) -> Option<&Vec<(String, f64)>> {
         match self {
             Self::Static { voltages, .. } | Self::Modes { voltages, .. } | Self::Transient { voltages, .. } => {
@@ -82,7 +82,7 @@ impl SweepAnalysis {
         }
     }
 
-    /// What it asks of a mesh; none for a transient.
+    /// Its mesh request; `None` for a transient.
     pub(super) fn request(&self) -> Option<MeshRequest<'_>> {
         match self {
             Self::Static { voltages, .. } => Some(MeshRequest::Static { voltages }),
@@ -203,7 +203,7 @@ impl SweepSpec {
         self.names().filter_map(|name| if let Varied::Voltage(port) = varied(name) { Some(port) } else { None })
     }
 
-    /// Refuses voltages that are none, or are said twice.
+    /// Rejects invalid or repeated voltages.
     fn check_ports(&self) -> Result<(), SweepError> {
         let held = self.analysis.voltages();
         let names: HashSet<&str> = held.into_iter().flatten().map(|(name, _)| name.as_str()).collect();

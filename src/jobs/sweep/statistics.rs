@@ -30,7 +30,7 @@ pub enum Relation {
     AtLeast,
 }
 
-/// What a result, or a parameter, must keep to: `yoke.y>-1.1u`.
+/// Limit of a result, or a parameter: `yoke.y>-1.1u`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct YieldLimit {
     /// Name of the column.

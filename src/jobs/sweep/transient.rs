@@ -1,11 +1,11 @@
-//! The points of a sweep of transients: some dozens at a time, side by side.
+//! Batched sweeps of transients: some dozens of points at a time.
 //!
-//! To find the mesh of a transient costs more than to run it. So meshes are found at the corners of the grid and in its middle
-//! (`probes`); all points take what is the finest of them beam by beam, and are told the largest of their estimates. A
+//! To find the mesh of a transient costs more than to run it. So meshes are searched at the corners of the grid and in
+//! its middle (`probes`). All points use the finest of them beam by beam, and report the largest of their estimates. A
 //! point whose drawing has other beams finds its own.
 //!
-//! What tolerance the steps have to follow, and how far they may be off then, is found in the middle of the grid, at the cost of some two runs, and told
-//! at every point where it is beyond the tolerance.
+//! The step tolerance and the step error are determined in the middle of the grid, at the cost of about two runs. Every
+//! point reports a step error beyond the tolerance.
 
 use super::axis::{SweepParameter, at};
 use super::point::{PointOutcome, PointResults, PointValue, brief};
@@ -45,7 +45,7 @@ struct SweepMesh {
     steps: Steps,
 }
 
-/// What the steps of a run follow, and how far they may be off.
+/// Step tolerance of a run, and its estimated error.
 #[derive(Debug, Clone, Copy)]
 struct Steps {
     /// Their tolerance [1].
@@ -60,11 +60,11 @@ struct Steps {
 struct MeshedPoint {
     compiled: CompiledModel,
     steps: Steps,
-    /// What its run leaves out.
+    /// Warnings about effects that its run omits.
     reported: Vec<String>,
 }
 
-/// What all points have in common.
+/// Data that all points share.
 pub(super) struct TransientSweep<'a> {
     spec: &'a SweepSpec,
     source: &'a NetlistSource,
@@ -77,7 +77,8 @@ impl<'a> TransientSweep<'a> {
         Self { spec, source, options, mesh: OnceLock::new() }
     }
 
-    /// Runs some points; `finished` is told of each, whether it has a result, and says whether to go on. None where it said no.
+    /// Runs some points. `finished` is called for each with whether it has a result, and returns whether to continue.
+    /// None where it said no.
     pub(super) fn run(
         &self,
         numbers: &[usize],
@@ -245,8 +246,9 @@ fn alone(point: &MeshedPoint, options: &TransientOptions<'_>) -> Result<RunEnd, 
 /// Share of the samples beyond a probe on either side.
 const RARE: f64 = 1e-3;
 
-/// The middle of the grid and its corners: of each axis of numbers the least and the largest, else the first and the last; of what goes
-/// together the points where one of them is at an end; of what is drawn the values beyond which one in a thousand lies.
+/// The middle of the grid and its corners. A numeric axis contributes its least and largest value, another its first
+/// and last. Linked axes contribute the points where one of them is at an end, and random parameters their 0.1 %
+/// quantiles.
 fn probes(spec: &SweepSpec) -> Vec<Vec<(String, Setting)>> {
     let ends: Vec<Vec<Vec<(String, Setting)>>> = spec.groups().map(ends).chain(drawn(spec)).collect();
     let middle = middle(spec);

@@ -27,7 +27,7 @@ impl Values {
         }
     }
 
-    /// True where there are none.
+    /// True without points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -90,7 +90,7 @@ impl PartialEq for Values {
 
 #[cfg(test)]
 mod tests {
-    //! What is counted out is what a list of it would be.
+    //! A range gives the same values as the equivalent list.
     use super::*;
 
     #[test]
