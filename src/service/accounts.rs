@@ -1,5 +1,5 @@
-//! What each client has of a server: its sessions, their unknowns, bytes of requests, and what its computations draw on. The limits
-//! whose names begin with `client_` bound them.
+//! Accounts of clients: sessions, their unknowns, bytes of requests, and the quota of computations. The limits whose
+//! names begin with `client_` bound them.
 
 use super::limits::Limits;
 use super::status;
@@ -18,7 +18,7 @@ pub(super) struct Accounts {
     open: Mutex<BTreeMap<String, Arc<Account>>>,
 }
 
-/// What one client may have; 0 is any.
+/// Limits of one client; 0: unlimited.
 #[derive(Debug, Clone, Copy)]
 struct Bounds {
     sessions: usize,
@@ -32,7 +32,7 @@ struct Bounds {
     connections: usize,
 }
 
-/// What one client has.
+/// Account of one client.
 #[derive(Debug)]
 pub(super) struct Account {
     name: String,
@@ -47,7 +47,7 @@ pub(super) struct Account {
     connections: AtomicUsize,
     /// Bytes of its requests, by the lengths that they announce.
     requests: AtomicUsize,
-    /// What its computations draw on, where that is bounded.
+    /// Quota of its computations, where it is bounded.
     pub(super) purse: Option<Arc<OwnerQuota>>,
 }
 
@@ -125,7 +125,7 @@ impl Accounts {
 }
 
 impl Account {
-    /// What the client is called.
+    /// Name of the client.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
@@ -261,7 +261,7 @@ impl SessionLease {
         Ok(())
     }
 
-    /// What the client's computations draw on, where that is bounded.
+    /// Quota of the client's computations, where it is bounded.
     pub(super) fn purse(&self) -> Option<Arc<OwnerQuota>> {
         self.account.purse.clone()
     }

@@ -28,9 +28,9 @@ pub enum Address {
     "\"{text}\" is no server address: {detail}; expected unix:///path, host:port (127.0.0.1:50051) or https://host:port"
 )]
 pub struct AddressError {
-    /// What was given.
+    /// The given text.
     pub text: String,
-    /// What is wrong with it.
+    /// The fault.
     pub detail: String,
 }
 

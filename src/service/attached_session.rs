@@ -21,7 +21,7 @@ pub(super) struct AttachedSession {
     owned: bool,
 }
 
-/// What a request comes down to.
+/// Action for a request.
 pub(super) enum RequestAction {
     /// To be asked of this session.
     Ask(Arc<Session>, StreamRequest),
@@ -37,7 +37,7 @@ impl AttachedSession {
         Self { shared: Arc::clone(shared), session: None, number: 0, owned: false }
     }
 
-    /// What a request comes down to. One that opens has a session when this returns.
+    /// Action for a request. One that opens has a session when this returns.
     pub(super) fn next(&mut self, request: proto::DeviceRequest) -> RequestAction {
         self.shared.metrics.trials.fetch_add(1, Ordering::Relaxed);
         let question = match request.kind {
@@ -87,7 +87,7 @@ impl AttachedSession {
         match session {
             Ok(session) => {
                 self.leave();
-                // first: what an earlier stream accepts from here on is refused, and not told
+                // first: accepts of an earlier stream are rejected from here on, without a reply
                 self.number = session.usage.hold();
                 let opened = session.opened();
                 self.session = Some(session);

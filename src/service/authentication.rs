@@ -1,4 +1,4 @@
-//! What a server asks of who comes from elsewhere: TLS, a certificate, a token.
+//! Authentication of TCP clients: TLS, certificates, tokens.
 //!
 //! A Unix socket asks for nothing: its mode lets in its owner alone.
 
@@ -53,12 +53,12 @@ pub enum GuardError {
     Refused {
         /// The certificate.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         reason: String,
     },
 }
 
-/// What a server would find in its files: a line for each, in words.
+/// Summary of a server's files: a line for each.
 ///
 /// # Errors
 /// [`GuardError`].
@@ -93,14 +93,14 @@ pub fn look_at(files: &GuardFiles) -> Result<Vec<String>, GuardError> {
     Ok(found)
 }
 
-/// What is asked of clients.
+/// Authentication that clients need.
 #[derive(Default)]
 pub(super) struct Guard {
     files: GuardFiles,
     read: RwLock<Arc<LoadedFiles>>,
 }
 
-/// What the files held when they were read last.
+/// Content of the files at their last read.
 #[derive(Default)]
 struct LoadedFiles {
     tls: Option<Arc<ServerConfig>>,
@@ -168,7 +168,7 @@ impl Guard {
         now.tls.is_some() && (now.certified || now.tokens.is_some())
     }
 
-    /// Who is there, if it speaks as this address does.
+    /// The peer, if it uses the protocol of this address.
     pub(super) fn hear(&self, presence: &Peer) -> Result<PeerIdentity, Status> {
         match presence.who() {
             PeerIdentity::Plain => Err(Status::unauthenticated("this address speaks TLS: connect with https://")),
@@ -176,7 +176,7 @@ impl Guard {
         }
     }
 
-    /// Who asks, if that is known to the server.
+    /// The client of a call, if the server knows it.
     pub(super) fn admit(&self, presence: &Peer, headers: &HeaderMap) -> Result<PeerIdentity, Status> {
         match self.hear(presence)? {
             PeerIdentity::Local => Ok(PeerIdentity::Local),
@@ -189,7 +189,8 @@ impl Guard {
 
     /// Finds out how a client speaks. Without TLS here, as it likes.
     ///
-    /// A client that speaks plain HTTP/2 to TLS is let in, to be told so by every call.
+    /// A client that uses plain HTTP/2 on a TLS address is accepted, so that every call can return an error that says
+    /// so.
     pub(super) async fn greet(&self, socket: TcpStream) -> io::Result<(NegotiatedSocket, PeerIdentity)> {
         let Some(tls) = self.now().tls.clone() else {
             return Ok((NegotiatedSocket::Plain(socket), PeerIdentity::Unknown));

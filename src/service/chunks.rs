@@ -42,7 +42,7 @@ impl<T> MessageSink<T> {
         Self { place: Some(place), ..self }
     }
 
-    /// Sends, or notices that nobody reads any more.
+    /// Sends an item, or detects that the receiver is gone.
     pub(super) fn send(&mut self, item: Result<T, Status>) {
         let (sender, shared) = (&self.sender, &self.shared);
         let item = match sender.try_send(item) {
@@ -80,7 +80,7 @@ impl<T> MessageSink<T> {
         });
     }
 
-    /// Those who wait for a place have their turn before it goes on.
+    /// Lets waiting tasks run before it continues.
     pub(super) fn give_way(&mut self) {
         if self.shared.work.waiting() > 0
             && let Some(place) = self.place.take()

@@ -155,7 +155,7 @@ impl Connections {
 /// Parts of the time of silence; a question is asked after each but the last of a second such time.
 const QUESTIONS: u32 = 6;
 
-/// How long a connection may take to let go of its place.
+/// Longest time for a connection to release its permit.
 const LETTING_GO: Duration = Duration::from_secs(1);
 
 /// One accepted connection.

@@ -1,4 +1,4 @@
-//! What a client shows to a server that asks for it, and which servers it trusts.
+//! Credentials of a client, and the servers that it trusts.
 
 use super::address::Address;
 use std::fmt;
@@ -21,17 +21,17 @@ pub struct Access {
 /// Environment variables of a client: authority, token file, certificate, key.
 pub const VARIABLES: [&str; 4] = ["BIMORPH_CA", "BIMORPH_TOKEN_FILE", "BIMORPH_CLIENT_CERT", "BIMORPH_CLIENT_KEY"];
 
-/// Why a client cannot show what it was told to.
+/// Errors of a client's credentials.
 #[derive(Debug, Error)]
 pub enum AccessError {
     /// A file cannot be read, or holds something else.
     #[error("{what} {path}: {reason}", path = path.display())]
     File {
-        /// What it should hold.
+        /// The expected content.
         what: &'static str,
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         reason: String,
     },
     /// `https://` without anyone to trust.
@@ -52,14 +52,15 @@ pub enum AccessError {
 }
 
 impl Access {
-    /// What the environment says: `BIMORPH_CA`, `BIMORPH_TOKEN_FILE`, `BIMORPH_CLIENT_CERT`, `BIMORPH_CLIENT_KEY`.
+    /// Credentials from the environment: `BIMORPH_CA`, `BIMORPH_TOKEN_FILE`, `BIMORPH_CLIENT_CERT`,
+    /// `BIMORPH_CLIENT_KEY`.
     pub fn from_environment() -> Self {
         let [authority, token_file, certificate, key] =
             VARIABLES.map(|name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from));
         Self { authority, token_file, certificate, key }
     }
 
-    /// The variables that tell another process the same.
+    /// The variables that pass them to another process.
     pub fn to_environment(&self) -> Vec<(&'static str, PathBuf)> {
         let files = [&self.authority, &self.token_file, &self.certificate, &self.key];
         VARIABLES.into_iter().zip(files).filter_map(|(name, file)| Some((name, file.clone()?))).collect()

@@ -1,5 +1,5 @@
-//! What one client has of a server where nobody says: where clients are known by tokens or certificates, a fraction of what all have, so
-//! that one of them cannot use up what all share.
+//! Default quotas of one client. Where clients are identified by tokens or certificates, each gets a fraction of the
+//! server's limits, so that one client cannot use up the total.
 
 use super::limits::Limits;
 use super::settings::Settings;

@@ -5,7 +5,7 @@ use super::limits::Limits;
 /// Files beside those of connections, jobs and sessions: listeners, timers, standard streams, the log, the folder of states.
 const OWN: usize = 48;
 
-/// Files that this process may have open at once (RLIMIT_NOFILE, its soft limit), where the system tells it (Linux).
+/// Files that this process may have open at once (RLIMIT_NOFILE, its soft limit), where the system provides it (Linux).
 pub fn most_open() -> Option<usize> {
     let text = std::fs::read_to_string("/proc/self/limits").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("Max open files"))?;

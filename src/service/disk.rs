@@ -1,5 +1,5 @@
-//! What is done to files so that they outlive the machine: bytes are written and waited for before anything names them or is said of
-//! them. All of it goes through here, in whose tests the order can be looked at.
+//! Durable file operations: bytes are synced before a name refers to them or a reply reports them. All of them go
+//! through this type, so that tests can check their order.
 
 use crate::jobs::sweep::journal::{Journal, JournalError, JournalRow};
 use std::fs::{self, File, OpenOptions};
@@ -16,7 +16,7 @@ pub(super) struct Disk {
     pub(super) done: std::sync::Mutex<Vec<DiskOperation>>,
 }
 
-/// What was done.
+/// A recorded operation.
 #[cfg(test)]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum DiskOperation {
@@ -40,7 +40,7 @@ impl Disk {
     /// Writes a file, over what it held before. When this returns its bytes outlive the machine; a new name does not yet.
     ///
     /// # Errors
-    /// What the system said.
+    /// The system's error.
     pub(super) fn write(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
         let mut file = private().open(path)?;
         file.write_all(bytes)?;
@@ -59,7 +59,7 @@ impl Disk {
     /// its first line: without it nothing behind it would be read. A new name does not yet.
     ///
     /// # Errors
-    /// What the system said.
+    /// The system's error.
     pub(super) fn journal(&self, path: &Path, sweep: &str) -> Result<(Journal, Vec<JournalRow>), JournalError> {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
         drop(private().open(path).map_err(failed)?);
@@ -74,7 +74,7 @@ impl Disk {
     /// Adds lines to a journal, all or none. When this returns they outlive the machine.
     ///
     /// # Errors
-    /// What the system said.
+    /// The system's error.
     pub(super) fn append(&self, journal: &Journal, lines: &[u8]) -> Result<(), JournalError> {
         journal.keep_all(lines, self.sync)?;
         #[cfg(test)]
@@ -90,7 +90,7 @@ impl Disk {
     /// Gives a file another name, in the place of what has it.
     ///
     /// # Errors
-    /// What the system said.
+    /// The system's error.
     pub(super) fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         fs::rename(from, to)?;
         #[cfg(test)]
@@ -101,7 +101,7 @@ impl Disk {
     /// When this returns the names of a folder outlive the machine.
     ///
     /// # Errors
-    /// What the system said.
+    /// The system's error.
     pub(super) fn keep_names(&self, folder: &Path) -> io::Result<()> {
         if self.sync {
             File::open(folder)?.sync_all()?;
@@ -117,7 +117,7 @@ impl Disk {
     }
 }
 
-/// Opens for writing what nobody else may read.
+/// Options to create a file that only its owner can read.
 pub(super) fn private() -> OpenOptions {
     let mut options = OpenOptions::new();
     options.write(true).create(true).truncate(false).mode(0o600);

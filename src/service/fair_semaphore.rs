@@ -10,18 +10,18 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::oneshot;
 
 tokio::task_local! {
-    /// Whom the task at hand works for.
+    /// Owner of the current task.
     pub(super) static CLIENT: TaskOwner;
 }
 
-/// Whom a task works for.
+/// Owner of a task.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TaskOwner {
     /// The connection; 0 for the server's own.
     pub(super) number: u64,
-    /// What it is called; all of one name are one.
+    /// Its name; equal names are one client.
     pub(super) name: Arc<str>,
-    /// What the client has of this server.
+    /// The client's account on this server.
     pub(super) account: Option<Arc<Account>>,
 }
 
@@ -32,12 +32,12 @@ impl TaskOwner {
     }
 }
 
-/// Whom this task works for; the server itself where nobody is known.
+/// Owner of the current task; the server itself where no client is known.
 pub(super) fn client() -> TaskOwner {
     CLIENT.try_with(TaskOwner::clone).unwrap_or_default()
 }
 
-/// Who waits for a place: a client, and which of its connections (or jobs).
+/// A waiting task: its client, and its connection or job.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Waiter {
     pub(super) client: Arc<str>,
@@ -53,7 +53,7 @@ pub(super) struct FairSemaphore {
 }
 
 type PermitSender = oneshot::Sender<Permit>;
-/// Those that wait, by whom; the one whose turn is next in front.
+/// Waiting entries by owner; the next one comes first.
 type FairQueue<K, T> = VecDeque<(K, T)>;
 
 #[derive(Debug)]
@@ -106,7 +106,7 @@ impl SemaphoreState {
         of(own, &party.number).push_back(sender);
     }
 
-    /// The next in turn, and who: of any client, or of that one.
+    /// The next waiting task and its owner: of any client, or of the given one.
     fn next(&mut self, only: Option<&str>) -> Option<(Waiter, PermitSender)> {
         loop {
             let at = only.map_or(Some(0), |only| self.waiting.iter().position(|(client, _)| **client == *only))?;
@@ -131,7 +131,7 @@ impl SemaphoreState {
     }
 }
 
-/// The entry of a key, made where there is none.
+/// The entry of a key, inserted if missing.
 fn of<'a, K: PartialEq + Clone, T: Default>(queue: &'a mut FairQueue<K, T>, key: &K) -> &'a mut T {
     let at = queue.iter().position(|(other, _)| other == key).unwrap_or_else(|| {
         queue.push_back((key.clone(), T::default()));

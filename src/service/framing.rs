@@ -24,7 +24,7 @@ pub(super) struct Framing {
 }
 
 impl Framing {
-    /// More of the stream has come. `announce` is told the length of each message as soon as it is known.
+    /// More of the stream has come. `announce` receives the length of each message as soon as it is known.
     ///
     /// # Errors
     /// Those of `announce`, after which nothing more may come.

@@ -1,5 +1,5 @@
-//! Names that nobody can guess: who knows the id of a session or a sweep may use it, and only its client was told. Clients name their
-//! requests so as well.
+//! Unguessable ids: the id of a session or a sweep authorizes its use, and only its client receives it. Clients name
+//! their requests so as well.
 
 use std::fs::File;
 use std::io::Read;

@@ -1,5 +1,6 @@
-//! The service without a network: the same calls on the same models, in the process that asks. Messages are those of the
-//! protocol as bytes, so that whoever speaks it to a server speaks it here, and gets the same bits and the same errors.
+//! The service without a network: the same calls on the same models, in the process that asks. Messages are those of
+//! the protocol as bytes. A program that uses the protocol on a server uses it here, with bit-identical results and the
+//! same errors.
 
 use super::attached_session::{AttachedSession, RequestAction};
 use super::connection::Connections;
@@ -24,7 +25,7 @@ use tokio::runtime::{Builder, Handle, Runtime};
 use tokio_stream::{Stream, StreamExt};
 use tonic::{Request, Response, Status};
 
-/// Whoever waits is asked this often whether it still does.
+/// Interval at which a waiting caller is checked for cancellation.
 const LOOK: Duration = Duration::from_millis(50);
 /// No bound on what a process asks of itself, but still a number that may be added up.
 const NONE: usize = 1_000_000_000_000_000;
@@ -42,13 +43,13 @@ pub struct ReplyMessages {
     stream: Pin<Box<dyn Stream<Item = Result<Vec<u8>, Status>> + Send>>,
 }
 
-/// The questions of one device: what the Trial stream is to a server.
+/// Trial channel of one device: the counterpart of the Trial stream of a server.
 pub struct DeviceChannel {
     joined: AttachedSession,
     shared: Arc<ServerState>,
 }
 
-/// What a process allows itself: memory and patience are its own, programs run in their sandbox.
+/// Limits in process: memory and time are those of the process, and programs run in their sandbox.
 fn limits() -> Limits {
     let ever = Duration::from_secs(1_000_000_000);
     Limits {
@@ -176,7 +177,7 @@ where
     Box::pin(answers.into_inner().map(|answer| answer.map(|answer| answer.encode_to_vec())))
 }
 
-/// Whoever waits here must be on a thread that may wait.
+/// The caller must be on a thread that may block.
 pub(super) fn not_asynchronous() -> Result<(), Status> {
     let text = "the service in process was called from asynchronous code; call it on a thread of its own";
     Handle::try_current().map_or(Ok(()), |_| Err(Status::failed_precondition(text)))
@@ -222,7 +223,7 @@ impl DeviceChannel {
     /// The reply to one question; none to an accept that asks for none.
     ///
     /// # Errors
-    /// INVALID_ARGUMENT for bytes that are no question. What a device refuses is a reply.
+    /// INVALID_ARGUMENT for bytes that are no question. An error of the device is a reply.
     pub fn ask(&mut self, request: &[u8]) -> Result<Option<Vec<u8>>, Status> {
         let request = decoded::<proto::DeviceRequest>(request)?.into_inner();
         let kind = self.reply(request);

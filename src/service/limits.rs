@@ -1,4 +1,4 @@
-//! What one server allows: a table, from which come the fields, their defaults, and what everybody is told of them.
+//! Limits of one server: a table that defines the fields, their defaults, and their description for clients.
 
 use super::proto;
 use super::settings::syntax::{
@@ -11,9 +11,9 @@ use std::time::Duration;
 pub struct Limit {
     /// Name, as `--limit NAME=VALUE`, the environment and files have it.
     pub name: &'static str,
-    /// What is written for its value: `N`, `BYTES`, `SECONDS`.
+    /// Placeholder for its value in help: `N`, `BYTES`, `SECONDS`.
     pub place: &'static str,
-    /// What it means, in one sentence or two.
+    /// Meaning, in one sentence or two.
     pub help: &'static str,
     pub(super) read: fn(&mut Limits, &str) -> Result<(), &'static str>,
     pub(super) write: fn(&Limits) -> String,
@@ -87,8 +87,8 @@ limits! {
     /// The same of all sessions of one client; 0: any.
     client_session_memory: BytesOrNone = 0;
 
-    /// Most sessions of one client open at once; 0: any. A client is the owner of a token, or of a certificate; all who come by a Unix
-    /// socket are one, and all who show nothing.
+    /// Most sessions of one client open at once; 0: any. A client is the owner of a token or a certificate. All
+    /// connections by a Unix socket count as one client, and so do all without credentials.
     client_sessions: CountOrNone = 0;
 
     /// Most unknowns of the models of all open sessions of one client, together; 0: any.
@@ -114,7 +114,8 @@ limits! {
     /// Most jobs of one client kept, running or finished; with a folder `state_dir` most that run or wait, and 64 times as many in all. 0: any.
     client_sweeps: CountOrNone = 0;
 
-    /// A finished job in the folder `state_dir` that nobody asks for is forgotten after so long; without such a folder, after `idle`.
+    /// Time without a request after which a finished job in the folder `state_dir` is removed; without such a folder
+    /// `idle` applies.
     sweeps_idle: PositiveSeconds = Duration::from_secs(7 * 24 * 3600);
 
     /// Most samples times signals of one transient.
@@ -172,9 +173,9 @@ limits! {
     /// A connection that has not said by then what it speaks is closed.
     handshake: PositiveSeconds = Duration::from_secs(10);
 
-    /// After so long without a word on a TCP connection the system asks the other end whether it is there, and closes the connection after
-    /// five questions a sixth of this apart without an answer: a machine that lost its power or its network gives its place back. A
-    /// program that is paused is there.
+    /// Time of silence on a TCP connection after which the system probes the other end. It closes the connection after
+    /// five unanswered probes, a sixth of this time apart, so that a machine without power or network releases its
+    /// slot. A program that is paused is there.
     keepalive: PositiveSeconds = Duration::from_secs(60);
 
     /// Most connections at once. A further one takes the place of the one without calls that was idle for longest; with
@@ -203,7 +204,7 @@ impl Limits {
     /// Sets a limit by name: a whole number, bytes with an optional k, M or G (times 1024), or seconds.
     ///
     /// # Errors
-    /// A name that is none, with the names there are, or a value that is not positive.
+    /// An unknown name, with the known ones, or a value that is not positive.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
         let limit = LIMITS.iter().find(|limit| limit.name == name).ok_or_else(|| {
             let names: Vec<&str> = LIMITS.iter().map(|limit| limit.name).collect();
@@ -217,7 +218,7 @@ impl Limits {
         (limit.write)(self)
     }
 
-    /// The limits as Info tells them.
+    /// The limits as a message of Info.
     pub(super) fn to_wire(&self) -> proto::Limits {
         proto::Limits {
             message_bytes: self.message_bytes as u64,

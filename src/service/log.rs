@@ -1,7 +1,7 @@
 //! Log lines that never wait: a thread of its own writes them to standard error.
 //!
-//! Standard error may be a pipe that nobody reads, or whose reader is gone. Neither may stop the service: lines go through a
-//! queue of bounded length, those that find it full are counted and dropped, and failed writes are forgotten.
+//! Standard error may be a pipe without a reader. Neither may stop the service: lines go through a queue of bounded
+//! length, those that find it full are counted and dropped, and failed writes are forgotten.
 
 use std::io::{self, Write};
 use std::sync::OnceLock;
@@ -29,7 +29,7 @@ pub fn line(text: &str) {
     LogLines.put(format!("{text}\n").into_bytes());
 }
 
-/// Lines that nobody read in time.
+/// Lines dropped because they were not read in time.
 pub(super) fn dropped() -> u64 {
     LOST.load(Ordering::Relaxed)
 }

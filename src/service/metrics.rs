@@ -1,4 +1,4 @@
-//! What a server counts, as Prometheus reads it (text format 0.0.4), and whether it is ready for more.
+//! Metrics of a server in Prometheus' text format 0.0.4, and readiness.
 
 use std::fmt::Write;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -53,7 +53,7 @@ pub struct Metric {
     pub name: &'static str,
     /// "gauge", "counter" or "histogram".
     pub kind: &'static str,
-    /// What it means, with its unit.
+    /// Meaning, with its unit.
     pub help: &'static str,
 }
 
@@ -61,7 +61,7 @@ const fn metric(name: &'static str, kind: &'static str, help: &'static str) -> M
     Metric { name, kind, help }
 }
 
-/// Every metric, in the order in which they are told.
+/// Every metric, in the order of the report.
 pub const METRICS: [Metric; 17] = [
     metric("bimorph_info", "gauge", "1, with the version of the server."),
     metric("bimorph_start_time_seconds", "gauge", "When the server started, since 1970 [s]."),

@@ -24,7 +24,7 @@ pub(super) struct NamedModel {
     pub(super) description: proto::ModelDescription,
     bundle: Bundle,
     options: CompileOptions,
-    /// What its compilation laid out, which is at least what it holds [byte].
+    /// Memory allocated during its compilation, an upper bound of its size [byte].
     bytes: usize,
 }
 
@@ -33,7 +33,7 @@ impl NamedModel {
         &self.description.id
     }
 
-    /// What it was compiled from, as it travels.
+    /// The request that it was compiled from, as a message.
     pub(super) fn source(&self) -> proto::CompileRequest {
         proto::CompileRequest {
             bundle: Some(bundle_to_wire(&self.bundle)),

@@ -1,4 +1,4 @@
-//! What is known of a connection from outside, and who is there.
+//! Peer of a connection: its address, and the client at its end.
 
 use super::accounts::CountLease;
 use std::fmt;
@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 
 static NUMBERS: AtomicU64 = AtomicU64::new(1);
 
-/// What is known of a connection from outside.
+/// Peer of a connection.
 #[derive(Debug)]
 pub(super) struct Peer {
     pub(super) number: u64,
@@ -43,12 +43,12 @@ impl Peer {
         })
     }
 
-    /// Tells connections apart; never 0.
+    /// Number of the connection; never 0.
     pub(super) fn number(&self) -> u64 {
         self.number
     }
 
-    /// Who is there, as far as the connection itself says.
+    /// The client, as far as the connection itself identifies it.
     pub(super) fn who(&self) -> PeerIdentity {
         self.who.get().cloned().unwrap_or(PeerIdentity::Unknown)
     }
@@ -77,14 +77,14 @@ impl Peer {
     }
 }
 
-/// Who is at the other end.
+/// Identity of a client.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum PeerIdentity {
     /// The owner of this server, over a Unix socket.
     Local,
     /// Anybody.
     Unknown,
-    /// Somebody who speaks plain HTTP/2 where TLS is spoken.
+    /// A client that uses plain HTTP/2 on a TLS address.
     Plain,
     /// The owner of a certificate, by its SHA-256.
     Certified([u8; 32]),

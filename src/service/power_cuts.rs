@@ -13,13 +13,13 @@ use std::sync::Arc;
 const ID: &str = "0123456789abcdef0123456789abcdef";
 const MODEL: &str = "00000000000000000000000000000001";
 
-/// What becomes of bytes that were not waited for.
+/// State of bytes that were not synced before the failure.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum UnsyncedBytes {
     Gone,
     /// The first half is there.
     Torn,
-    /// There is room for them, which nobody filled.
+    /// The file has its length, but blank content.
     Blank,
     /// The second half came first.
     Holed,
@@ -30,7 +30,7 @@ impl UnsyncedBytes {
     pub(super) const ALL: [Self; 5] = [Self::Gone, Self::Torn, Self::Blank, Self::Holed, Self::Whole];
 }
 
-/// A file: what is on the disk for sure, and what was written since.
+/// A file: its synced content, and the writes since.
 #[derive(Debug, Clone, Default)]
 struct Inode {
     sure: Vec<u8>,
@@ -65,7 +65,7 @@ pub(super) struct Machine {
 }
 
 impl Machine {
-    /// What was done until the power went.
+    /// Operations up to the power failure.
     pub(super) fn after(done: &[DiskOperation]) -> Self {
         let mut machine = Self::default();
         done.iter().for_each(|one| machine.run(one));
@@ -102,7 +102,7 @@ impl Machine {
         }
     }
 
-    /// What is found when the power is back, in a folder of its own.
+    /// Content of the disk after the power failure, in a folder of its own.
     pub(super) fn found(&self, from: &Path, bytes: UnsyncedBytes, new_names: bool) -> tempfile::TempDir {
         let folder = tempfile::tempdir().expect("a folder");
         for (path, file) in if new_names { &self.names } else { &self.sure } {

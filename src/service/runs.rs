@@ -28,7 +28,7 @@ const UNWATCHED: usize = 8;
 /// Rows are sent at least this often.
 const LIVELINESS: Duration = Duration::from_millis(200);
 
-/// What all lanes share.
+/// Data that all lanes share.
 struct RunContext {
     times: Vec<f64>,
     values: Option<Rows>,
@@ -217,7 +217,8 @@ impl RunLane {
 }
 
 impl Session {
-    /// Works on the device for a short while. What the budget stops leaves its states as they are; a fault closes the session.
+    /// Works on the device for a short while. A stop by the budget leaves its states unchanged; a fault closes the
+    /// session.
     fn burst<T>(&self, budget: &Budget, job: impl FnOnce(&mut dyn Device) -> T) -> Result<T, Status> {
         let mut device = self.lock()?;
         self.usage.touch();

@@ -1,4 +1,4 @@
-//! What a server may be told, and why it does not run.
+//! Options of a server, and reasons why it does not start.
 
 use super::address::Address;
 use super::authentication::{GuardError, GuardFiles};
@@ -12,15 +12,15 @@ use std::sync::Arc;
 use thiserror::Error;
 use tokio::sync::Notify;
 
-/// What a server may be told.
+/// Options of a server.
 pub struct ServeOptions {
     /// Addresses to listen on; at least one. See [`Address`].
     pub listen: Vec<Address>,
-    /// What is asked of who comes over TCP.
+    /// Authentication of TCP clients.
     pub guard: GuardFiles,
     /// Allow TCP addresses that other machines can reach without TLS, or without tokens and certificates of clients.
     pub insecure: bool,
-    /// What clients may ask for.
+    /// Limits of clients.
     pub limits: Limits,
     /// Address of metrics and readiness (HTTP/1.1, TCP): `/metrics`, `/ready`, `/live`; none: nowhere.
     pub metrics: Option<Address>,
@@ -30,7 +30,7 @@ pub struct ServeOptions {
     pub state_dir: Option<PathBuf>,
     /// Do not wait for the disk: states outlive the server, not the machine.
     pub state_unsynced: bool,
-    /// What all this comes from, for `Info`; none: the limits alone are told.
+    /// Sources of the options, for `Info`; `None`: only the limits are reported.
     pub settings: Option<Settings>,
     /// Whether [`super::until_signal::run_until_signal`] also ends when standard input does: a program that starts a server for itself holds the
     /// other end of a pipe, which the system closes however that program ends.
@@ -41,7 +41,7 @@ pub struct ServeOptions {
     pub ready: Ready,
 }
 
-/// Told the addresses of a server as bound.
+/// Receives the bound addresses of a server.
 pub type Ready = Box<dyn FnOnce(&[Address]) + Send>;
 
 /// Makes the device of a session.
@@ -118,7 +118,7 @@ pub enum ServeError {
     Bind {
         /// The address.
         address: Address,
-        /// What it said.
+        /// The system's error.
         reason: std::io::Error,
     },
     /// No asynchronous runtime.
@@ -130,7 +130,7 @@ pub enum ServeError {
 }
 
 impl Settings {
-    /// What a server needs to run so.
+    /// The options to run a server with these settings.
     pub fn options(self) -> ServeOptions {
         ServeOptions {
             listen: self.listen.clone(),

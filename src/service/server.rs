@@ -35,7 +35,7 @@ use tonic_health::server::HealthReporter;
 
 /// Bytes that a client may send ahead of what was read, over all streams of its connection.
 const CONNECTION_WINDOW: u32 = 256 << 10;
-/// The name under which the health service tells whether a server is ready for more.
+/// Name of the readiness state in the health service.
 const READY: &str = "ready";
 /// Time between two looks whether it is.
 const LOOK: Duration = Duration::from_millis(250);
@@ -207,7 +207,7 @@ async fn open_all(
     Ok((listeners, Some(overseer), bound))
 }
 
-/// What all calls share. Within a runtime.
+/// State that all calls share. Within a runtime.
 pub(super) fn share(
     limits: Limits,
     reported: Vec<ServerSetting>,
@@ -233,7 +233,7 @@ pub(super) fn share(
     })
 }
 
-/// Tells by the health service whether this server is ready for more.
+/// Updates the readiness of this server in the health service.
 async fn watch_over(health: HealthReporter, overseen: MonitoringState) {
     let mut ticks = tokio::time::interval(LOOK);
     let mut reported = None;
@@ -252,7 +252,7 @@ async fn watch_over(health: HealthReporter, overseen: MonitoringState) {
     }
 }
 
-/// What is done beside the calls, for as long as the server runs.
+/// Periodic tasks beside the calls, for as long as the server runs.
 async fn keep_house(shared: Arc<ServerState>) {
     tokio::join!(expire(Arc::clone(&shared)), check_clients(shared));
 }

@@ -1,4 +1,4 @@
-//! One open device with its states: who may ask it, and what of it is kept.
+//! One open device with its states: access to it, and its storage.
 
 use super::accounts::SessionLease;
 use super::convert::device as wire;
@@ -34,21 +34,21 @@ pub(super) struct Session {
     inline: bool,
     /// Questions that go to a thread before the next try.
     slow: AtomicU32,
-    /// Held by who works on the device for long.
+    /// Held during long work on the device.
     turn: Arc<Semaphore>,
     pub(super) usage: Usage,
-    /// What a run of this session that is under way may use.
+    /// Budget of the current run of this session.
     run: Mutex<Option<Budget>>,
     closed: AtomicBool,
-    /// Its place in the account of who opened it, where that is bounded.
+    /// Its lease in the account of the client that opened it, where that is bounded.
     pub(super) seat: Mutex<Option<SessionLease>>,
-    /// What its trials draw on.
+    /// Quota of its trials.
     purse: Option<Arc<OwnerQuota>>,
     /// Where its accepted states are kept, if they are to outlive the server.
     keeper: Option<Arc<Mutex<SessionWriter>>>,
     /// The last accepted state that is kept; 0: none yet.
     accepted: AtomicU64,
-    /// An accepted state that could not be kept, of which nobody has heard; 0: none.
+    /// An accepted state that could not be stored, and was not reported yet; 0: none.
     due: AtomicU64,
 }
 
@@ -61,8 +61,8 @@ const SLICE: Duration = Duration::from_millis(5);
 const AFTER_SLOW: u32 = 64;
 
 impl Session {
-    /// A session with a device that is not open yet; with a keeper its accepted states are kept. Nobody finds it before it is
-    /// among [`super::sessions::SessionRegistry`].
+    /// A session with a device that is not open yet; with a keeper its accepted states are kept. It is unreachable
+    /// until it is in [`super::sessions::SessionRegistry`].
     pub(super) fn new(
         id: String,
         keeper: Option<SessionWriter>,
@@ -229,8 +229,8 @@ impl Session {
         Some(answer.unwrap_or_else(|error| ReplyKind::Fault(wire::fault_to_wire(&error))))
     }
 
-    /// Accepts a state and keeps it. Only the stream that joined last does: what the network held back of an earlier one must
-    /// not undo what was accepted since.
+    /// Accepts a state and keeps it. Only the last attached stream may accept: delayed messages of an earlier one must
+    /// not undo later accepts.
     fn accept(&self, device: &mut dyn Device, accept: &proto::Accept, stream: u64) -> Option<ReplyKind> {
         let proto::Accept { token, answer } = *accept;
         if !self.usage.is_last(stream) {
@@ -306,12 +306,12 @@ impl Session {
         Ok(self.device.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Waits for this session's turn, without a thread: who works on its device for long holds it.
+    /// Waits for exclusive access to the session, without a thread; long work on its device holds it.
     pub(super) async fn acquire(&self) -> Result<OwnedSemaphorePermit, Status> {
         Arc::clone(&self.turn).acquire_owned().await.map_err(|_| status::fault())
     }
 
-    /// What the last open said; an empty description before any.
+    /// Description from the last open; empty before the first.
     pub(super) fn opened(&self) -> proto::OpenResponse {
         let device = self.description.lock().unwrap_or_else(PoisonError::into_inner).clone();
         proto::OpenResponse {
@@ -331,7 +331,7 @@ impl Session {
         drop(self.seat.lock().unwrap_or_else(PoisonError::into_inner).take());
     }
 
-    /// Closes after a panic: its states may be half made. What is kept of it stays, and sleeps until somebody asks for it.
+    /// Closes after a panic: its states may be half made. Its stored states stay, and are restored on request.
     pub(super) fn fault(&self) {
         tracing::error!(session = self.id, model = self.model.id(), "internal fault: the session is closed");
         self.end();

@@ -1,7 +1,7 @@
 //! Sessions that outlive streams, and the server where states are kept: how they begin, wake, and end.
 //!
-//! A session is made as a whole before anyone can find it: what stops on the way, by its budget or by a fault, leaves nothing
-//! behind, and one that was asleep sleeps on.
+//! A session becomes reachable only when it is complete. A restore that stops, by its budget or by a fault, leaves
+//! nothing behind, and the stored session stays stored.
 
 use super::convert::{model as text, options as options_wire};
 use super::models::{NamedModel, check_size};
@@ -13,7 +13,7 @@ use super::store::writer::SessionWriter;
 use std::sync::Arc;
 use tonic::Status;
 
-/// What is kept of a session that is being made: removed unless that is done.
+/// Stored files of a session under construction: removed unless it is completed.
 struct RestoreGuard<'a> {
     store: Option<&'a SessionStore>,
     id: &'a str,
@@ -71,8 +71,8 @@ impl ServerState {
         self.desk.run(move || shared.wake(&store, &id)).await
     }
 
-    /// Goes on with what is kept of a session that sleeps. Nobody waits for this: whoever is first with the same states wakes it,
-    /// and a session that was closed or has gone on meanwhile is looked for again.
+    /// Goes on with what is kept of a session that sleeps. Non-blocking: the first caller with matching states restores
+    /// the session. If it was closed or continued meanwhile, the lookup is repeated.
     fn wake(&self, store: &Arc<SessionStore>, id: &str) -> Result<Arc<Session>, Status> {
         loop {
             let Some(asleep) = store.asleep(id) else { return self.sessions.get(id) };

@@ -11,7 +11,7 @@ use std::sync::PoisonError;
 use tonic::Status;
 
 impl Session {
-    /// Takes the bytes of a device with so many ports from the account of who opened it.
+    /// Charges the memory of a device with so many ports to the account of the client that opened it.
     pub(super) fn take_memory(&self, ports: usize) -> Result<(), Status> {
         let mut seat = self.seat.lock().unwrap_or_else(PoisonError::into_inner);
         seat.as_mut().map_or(Ok(()), |seat| seat.open(ports))

@@ -1,5 +1,5 @@
-//! What a server is told: a table, and the places where it is said, each before the next: options of the command, the
-//! environment (`BIMORPH_SERVE_NAME`), a file, and what holds when nobody says anything.
+//! Settings of a server: a table, and their sources in decreasing precedence: options of the command, the environment
+//! (`BIMORPH_SERVE_NAME`), a file, and defaults.
 
 pub mod syntax;
 
@@ -21,9 +21,9 @@ pub const ENVIRONMENT: &str = "BIMORPH_SERVE_";
 pub struct ServerOption {
     /// Name in files; with `-` for `_` an option of the command; in capitals after [`ENVIRONMENT`] a variable.
     pub name: &'static str,
-    /// What is written for its value: `FILE`, `ADDRESS`; empty: yes or no.
+    /// Placeholder for its value in help: `FILE`, `ADDRESS`; empty: yes or no.
     pub place: &'static str,
-    /// What it means, in one sentence or two.
+    /// Meaning, in one sentence or two.
     pub help: &'static str,
     read: fn(&mut Settings, &str) -> Result<(), &'static str>,
     write: fn(&Settings) -> String,
@@ -31,13 +31,13 @@ pub struct ServerOption {
 
 macro_rules! settings {
     ($($(#[doc = $help:literal])+ $field:ident: $kind:ident = $default:expr;)+) => {
-        /// Everything that a server is told. `Default` is the only place where the values stand.
+        /// All settings of a server. `Default` is the only place where the values stand.
         #[derive(Debug, Clone, PartialEq)]
         pub struct Settings {
             $($(#[doc = $help])+ pub $field: <$kind as ValueSyntax>::Held,)+
             /// The limits.
             pub limits: Limits,
-            /// Who said what is not as nobody says.
+            /// Source of each non-default setting.
             sources: BTreeMap<&'static str, SettingSource>,
         }
 
@@ -74,7 +74,7 @@ settings! {
     /// Tokens, a line for each client, TOKEN or NAME TOKEN: every call over TCP must show one.
     token_file: PathOrNone = None;
 
-    /// Where metrics and readiness are told by plain HTTP: /metrics (Prometheus), /ready, /live. Nobody is asked for a token there.
+    /// Address of metrics and readiness by plain HTTP: /metrics (Prometheus), /ready, /live. It requires no token.
     metrics: AddressOrNone = None;
 
     /// Log as JSON, an object a line, with the id, the name and the client of each request.
@@ -86,11 +86,11 @@ settings! {
     /// Do not wait for the disk when a state is kept: it outlives the end of the server, not that of the machine.
     state_unsynced: YesOrNo = false;
 
-    /// Allow addresses that other machines can reach, whoever may come and whoever may listen.
+    /// Allow addresses that other machines can reach without TLS and authentication.
     insecure: YesOrNo = false;
 }
 
-/// Who said how a setting is.
+/// Source of a setting's value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SettingSource {
     /// A file.
@@ -118,9 +118,9 @@ pub enum SettingError {
     Value {
         /// Where it is said.
         place: String,
-        /// What it takes.
+        /// The expected value.
         expected: String,
-        /// What it was given.
+        /// The given value.
         got: String,
     },
     /// A file that cannot be read, or is no TOML.
@@ -128,7 +128,7 @@ pub enum SettingError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         reason: String,
     },
 }
@@ -146,7 +146,8 @@ pub fn variable(name: &str) -> String {
 }
 
 impl Settings {
-    /// Sets one by its name. What a stronger source has said stays; what is said here must be right all the same.
+    /// Sets one by its name. A value from a source of higher precedence stays; the given value must be valid all the
+    /// same.
     ///
     /// # Errors
     /// [`SettingError`], which names `place`.
@@ -181,8 +182,8 @@ impl Settings {
         self.sources.contains_key(name)
     }
 
-    /// Takes what variables say, those whose names begin with [`ENVIRONMENT`]. Kubernetes tells every container of a service called
-    /// `bimorph-serve` in variables that begin so, too: those are passed over.
+    /// Takes what variables say, those whose names begin with [`ENVIRONMENT`]. Kubernetes sets variables with this
+    /// prefix in containers of a service called `bimorph-serve`: those are skipped.
     ///
     /// # Errors
     /// [`SettingError`].
@@ -258,7 +259,7 @@ impl Settings {
         (setting.write)(self)
     }
 
-    /// Every setting as it is written, and who said so. Paths are told as given or not.
+    /// Every setting as text, and its source. Paths are reported only as given or not.
     pub(super) fn reported(&self) -> Vec<proto::ServerSetting> {
         let settings = SETTINGS.iter().map(|setting| {
             let value = (setting.write)(self);
@@ -282,7 +283,7 @@ impl Settings {
     }
 }
 
-/// Whether a variable is one of those by which Kubernetes tells where a service is: `…_SERVICE_HOST`, `…_SERVICE_PORT` and those of
+/// Whether Kubernetes sets the variable for the address of a service: `…_SERVICE_HOST`, `…_SERVICE_PORT` and those of
 /// its ports, `…_PORT` and those of a container link.
 fn is_of_a_service(name: &str, text: &str) -> bool {
     name == "service_host"

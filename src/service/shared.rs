@@ -1,4 +1,4 @@
-//! What all calls of a server share.
+//! State that all calls of a server share.
 
 use super::accounts::{Accounts, CountLease};
 use super::connection::Connections;
@@ -17,16 +17,16 @@ use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::{Response, Status};
 
-/// What all calls of a server share.
+/// State that all calls of a server share.
 pub(super) struct ServerState {
     pub(super) limits: Limits,
-    /// Everything that this server was told, for Info.
+    /// All settings of this server, for Info.
     pub(super) reported: Vec<proto::ServerSetting>,
     pub(super) make: MakeDevice,
     pub(super) models: ModelCache,
     pub(super) sessions: SessionRegistry,
     pub(super) jobs: JobRegistry,
-    /// What each client has.
+    /// Account of each client.
     pub(super) accounts: Arc<Accounts>,
     pub(super) connections: Arc<Connections>,
     pub(super) metrics: Arc<Metrics>,

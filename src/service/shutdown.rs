@@ -8,7 +8,7 @@ use std::pin::Pin;
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 
-/// How long streams that were told to end may take to say so to their clients before connections are cut.
+/// Time for streams to send their final status on shutdown before connections are cut.
 pub(super) const GRACE: Duration = Duration::from_millis(300);
 
 /// Something to wait for, whatever it is.

@@ -45,7 +45,7 @@ impl Session {
     /// # Errors
     /// RESOURCE_EXHAUSTED.
     pub(super) fn bound_small_signals(&self, count: usize, noise: bool, limits: &Limits) -> Result<(), Status> {
-        /// What an answer takes beside its numbers.
+        /// Size of a reply besides its numbers.
         const HEAD: usize = 64;
         let (ports, signals) = {
             let opened = self.description.lock().unwrap_or_else(PoisonError::into_inner);

@@ -60,7 +60,8 @@ fn word(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     rest.split_at_checked(usize::from(*length))
 }
 
-/// FNV-1a, 128 bits (Fowler, Noll, Vo): against accidents, not against forgery, which would harm only who forges.
+/// FNV-1a, 128 bits (Fowler, Noll, Vo): against accidents, not against forgery, which harms only the forger's own
+/// session.
 pub(super) fn checksum(bytes: &[u8]) -> u128 {
     let mut sum = Fnv::default();
     sum.bytes(bytes);

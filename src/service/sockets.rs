@@ -87,7 +87,7 @@ impl Listener {
                     }
                 }
                 Ok(Some((AcceptedSocket::Tcp(socket), place))) => {
-                    // a handshake waits for its client, and nobody else does
+                    // a handshake waits for its client without blocking others
                     let (connections, guard, accepted) =
                         (Arc::clone(&connections), Arc::clone(&guard), accepted.clone());
                     tokio::spawn(async move {
@@ -121,7 +121,7 @@ impl Listener {
     }
 }
 
-/// A socket's file, removed when the server lets go of it, unless another server has replaced it.
+/// A socket's file, removed when the server closes it, unless another server has replaced it.
 pub(super) struct SocketFile {
     path: PathBuf,
     device: u64,

@@ -156,7 +156,7 @@ fn cut(mut text: String, most: usize) -> String {
     text
 }
 
-/// What `tonic` begins with where bytes are no message of the protocol, or none are there, and calls a fault of the server.
+/// Prefixes of `tonic`'s errors for undecodable or missing messages, which it reports as faults of the server.
 const UNDECODABLE: [&str; 4] = [
     "failed to decode Protobuf message",
     "Missing request message",

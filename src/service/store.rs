@@ -1,11 +1,12 @@
 //! States that outlive the server: a folder with the accepted states of every session that a unary call opened.
 //!
-//! Each session has two files, `sessions/ID.0` and `ID.1`, written in turn: when one is being written, the other holds what
-//! was accepted before, so that whatever moment the server ends at, one of them is whole. A file holds the last two accepted
-//! states, as a client may not have heard of the last one. Beside them `models/ID` holds each netlist with its options, from
-//! which the model is compiled again; `jobs` has files of its own (`jobs::folder`). Nobody but the owner can read any of it.
+//! Each session has two files, `sessions/ID.0` and `ID.1`, written in turn: when one is being written, the other holds
+//! what was accepted before, so that whatever moment the server ends at, one of them is whole. A file holds the last
+//! two accepted states, as a client may not have heard of the last one. Beside them `models/ID` holds each netlist with
+//! its options, from which the model is compiled again; `jobs` has files of its own (`jobs::folder`). Only the owner
+//! can read any of it.
 //!
-//! What is here is bounded: two files a session, and `state_bytes` in all, jobs among them.
+//! The folder is bounded: two files a session, and `state_bytes` in all, jobs among them.
 
 pub(super) mod record;
 pub mod scan;
@@ -104,7 +105,7 @@ impl SessionStore {
         self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Held by who writes or removes models.
+    /// Held while models are written or removed.
     fn hold(&self) -> MutexGuard<'_, ()> {
         self.files.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -155,7 +156,7 @@ impl SessionStore {
         &self.room
     }
 
-    /// Forgets sessions that nobody asked for in `time`; how many.
+    /// Removes sessions without a request in `time`; returns their number.
     pub(super) fn expire(&self, time: Duration) -> usize {
         let is_old = |entry: &StoredSession| entry.asleep.is_some_and(|since| since.elapsed() >= time);
         let old: Vec<String> = self.entries().iter().filter(|(_, e)| is_old(e)).map(|(id, _)| id.clone()).collect();
@@ -163,7 +164,7 @@ impl SessionStore {
         old.iter().filter(|id| self.forget_where(id, is_old)).count()
     }
 
-    /// What is kept of a session: the newer of its files that is whole.
+    /// The stored state of a session: the newer of its valid files.
     pub(super) fn load(&self, id: &str, model: &str) -> Option<SessionRecord> {
         let read = |slot| {
             let bytes = fs::read(self.session(id, model, slot)).ok()?;
@@ -268,7 +269,7 @@ fn size(path: &Path) -> usize {
 
 #[cfg(test)]
 mod tests {
-    //! What was kept is found again, and a file that is not whole gives way to the one before it.
+    //! Stored states are found again, and a damaged file yields to the one before it.
     use super::writer::SessionWriter;
     use super::*;
     use std::sync::Arc;

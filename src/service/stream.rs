@@ -1,9 +1,10 @@
 //! The Trial stream: a state machine that answers each request where it arrives.
 //!
 //! A trial of a small model takes microseconds, less than handing it to another task. So the reply stream polls the
-//! request stream and computes in between; nothing is spawned and nothing crosses a channel. What takes longer after all
-//! is stopped there and asked again on a blocking thread, as are models above
-//! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns), one at a time, which keeps replies in order.
+//! request stream and computes in between; nothing is spawned and nothing crosses a channel. A trial that takes longer
+//! is stopped there and repeated on a blocking thread. Models above
+//! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns) start there. Trials run one at a time, so that
+//! replies stay in order.
 
 use super::attached_session::{AttachedSession, RequestAction};
 use super::fair_semaphore::{CLIENT, TaskOwner, client};
@@ -24,7 +25,7 @@ use tonic::{Status, Streaming};
 /// Requests without a reply (accepts) answered before other tasks get their turn.
 const BURST: usize = 64;
 
-/// What is awaited.
+/// The awaited reply.
 type PendingReply<T> = Pin<Box<dyn Future<Output = T> + Send>>;
 
 /// The replies of one stream.

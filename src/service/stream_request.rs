@@ -1,8 +1,8 @@
-//! What a stream asks of its session.
+//! Requests of a stream to its session.
 
 use super::proto;
 
-/// What a stream asks of its session.
+/// Requests of a stream to its session.
 pub(super) enum StreamRequest {
     Open(proto::OpenRequest),
     Trial(proto::TrialRequest),

@@ -10,7 +10,7 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::rustls::{self, RootCertStore};
 
-/// What both ends call HTTP/2 in their greeting.
+/// Protocol name of HTTP/2 in the TLS handshake.
 pub(super) const ALPN: &[u8] = b"h2";
 
 /// The provider of everything cryptographic.
@@ -22,11 +22,11 @@ pub(super) fn provider() -> Arc<CryptoProvider> {
 #[derive(Debug, Error)]
 #[error("{what} {path}: {reason}", path = path.display())]
 pub struct PemError {
-    /// What it should hold.
+    /// The expected content.
     pub what: &'static str,
     /// The file.
     pub path: PathBuf,
-    /// What is wrong.
+    /// The fault.
     pub reason: String,
 }
 
@@ -37,7 +37,7 @@ pub(super) struct CertificateFiles {
 }
 
 impl CertificateFiles {
-    /// Reads both; whether they belong together is found out by who uses them.
+    /// Reads both; whether they match is checked on use.
     pub(super) fn read(certificate: &Path, key: &Path) -> Result<Self, PemError> {
         let chain = certificates("certificate", certificate)?;
         let wrong = |reason: String| PemError { what: "key", path: key.to_owned(), reason };
@@ -144,7 +144,7 @@ pub(super) fn inner<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<
 
 #[cfg(test)]
 mod tests {
-    //! The times of a certificate are those that `openssl x509 -dates` tells of tests/tls; what is cut short has none.
+    //! The times of a certificate are those that `openssl x509 -dates` prints for tests/tls; a truncated one has none.
     use super::*;
 
     #[test]

@@ -1,4 +1,4 @@
-//! Who may ask: the tokens of a file, kept as their SHA-256 and compared in constant time.
+//! Authorization by token: the tokens of a file, stored as their SHA-256 and compared in constant time.
 
 use super::credentials::read;
 use ring::digest::{SHA256, digest};
@@ -25,7 +25,7 @@ pub struct TokenError {
     pub path: PathBuf,
     /// Its line, from 1; none: the file as a whole.
     pub line: Option<usize>,
-    /// What is wrong, and what was expected.
+    /// The fault and the expected content.
     pub reason: String,
 }
 

@@ -1,4 +1,4 @@
-//! A server on threads of its own, until it is told to stop by a signal or the end of its standard input.
+//! A server on threads of its own, until a signal or the end of its standard input stops it.
 
 use super::log::{self, LogLines};
 use super::serve_options::{ServeError, ServeOptions};
@@ -17,11 +17,10 @@ const LAST_WORDS: Duration = Duration::from_millis(200);
 /// SIGXFSZ, on Linux and on BSDs.
 const FILE_TOO_LARGE: i32 = 25;
 
-/// [`run`] on threads of its own, until SIGINT or SIGTERM, or the end of standard input where
-/// [`ServeOptions::while_stdin`] says so: what `bimorph serve` calls. A second signal stops at once. SIGHUP reads
-/// tokens and certificates again.
-/// What happens is logged on standard error: warnings and faults, or what the environment variable `BIMORPH_LOG` says
-/// (`info`, `debug`, …).
+/// [`run`] on threads of its own, until SIGINT or SIGTERM, or the end of standard input with
+/// [`ServeOptions::while_stdin`]: the function behind `bimorph serve`. A second signal stops at once. SIGHUP reads
+/// tokens and certificates again. Events are logged on standard error: warnings and faults, or the level of the
+/// environment variable `BIMORPH_LOG` (`info`, `debug`, …).
 ///
 /// # Errors
 /// [`ServeError`].
@@ -39,7 +38,7 @@ pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
     let outcome = runtime.block_on(async {
         let mut interrupt = signal(SignalKind::interrupt()).map_err(ServeError::Runtime)?;
         let mut terminate = signal(SignalKind::terminate()).map_err(ServeError::Runtime)?;
-        // a file that may not grow is an error of who writes it, as a full disk is, and not the end of the server
+        // a file-size limit is an error of the writer, like a full disk, and does not end the server
         let _too_large = signal(SignalKind::from_raw(FILE_TOO_LARGE));
         let hangup = signal(SignalKind::hangup()).map_err(ServeError::Runtime)?;
         tokio::spawn(reload_on(hangup, Arc::clone(&options.reload)));
@@ -61,7 +60,7 @@ pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
             _ = terminate.recv() => Ok(()),
         }
     });
-    // A computation that nobody waits for any more must not hold the process.
+    // An abandoned computation must not hold the process.
     runtime.shutdown_background();
     log::flush(LAST_WORDS);
     outcome

@@ -45,7 +45,7 @@ impl Usage {
         self.joined.load(Ordering::SeqCst) == stream
     }
 
-    /// A stream lets go of it.
+    /// A stream detaches.
     pub(super) fn release(&self) {
         self.touch();
         self.streams.fetch_sub(1, Ordering::Relaxed);

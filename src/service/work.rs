@@ -1,8 +1,9 @@
 //! Computations that take their time: off the event loop, a few at once, each under a budget.
 //!
-//! A computation first has [`SLICE`] in a place for short ones. What is not done by then is stopped and computed anew in a place for
-//! long ones, which changes nothing but its time: computations are pure until they end. So a call of a millisecond waits for slices of
-//! others, not for their minutes. A connection with a computation that is known to be long has no slices meanwhile.
+//! A computation first has [`SLICE`] in a place for short ones. A longer one is stopped there and repeated with a
+//! permit for long ones. This changes only its time, since computations are pure until they end. So a call of a
+//! millisecond waits for slices of others, not for their minutes. A connection with a computation that is known to be
+//! long has no slices meanwhile.
 
 use super::fair_semaphore::{CLIENT, FairSemaphore, Permit, Waiter, client};
 use super::limits::Limits;
@@ -44,10 +45,10 @@ struct LongComputation {
     number: u64,
 }
 
-/// What came of a computation.
+/// Outcome of a computation.
 struct ComputationOutcome<T> {
     answer: Result<T, Status>,
-    /// Whether it was stopped for want of time.
+    /// Whether it was stopped by its time limit.
     is_late: bool,
     /// Processor time of one that was.
     cpu: Option<Duration>,
@@ -119,8 +120,8 @@ impl ComputePermits {
         Budget::new(of_client(self.allowance.clone()))
     }
 
-    /// Runs `job` on a thread of its own. It is stopped when its time is over, when the server stops, and when nobody
-    /// waits for it any more, which drops this future. It may be stopped and run anew, so it must be pure until it ends.
+    /// Runs `job` on a thread of its own. It is stopped by its time limit, by the shutdown of the server, and when the
+    /// caller drops this future. It may be stopped and run anew, so it must be pure until it ends.
     pub(super) async fn run<T: Send + 'static>(
         &self,
         job: impl Fn() -> Result<T, Status> + Send + Sync + 'static,
@@ -202,7 +203,7 @@ pub(super) fn of_client(allowance: Allowance) -> Allowance {
     Allowance { purse: client().account.and_then(|account| account.purse.clone()), ..allowance }
 }
 
-/// What one computation may use.
+/// Allowance of one computation.
 pub(super) fn allowance(limits: &Limits) -> Allowance {
     Allowance {
         bytes: limits.memory,
@@ -213,7 +214,7 @@ pub(super) fn allowance(limits: &Limits) -> Allowance {
     }
 }
 
-/// Stops a computation that nobody waits for any more.
+/// Stops a computation when its caller is gone.
 pub(super) struct CancelOnDrop(pub(super) Budget);
 
 impl Drop for CancelOnDrop {

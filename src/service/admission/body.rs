@@ -1,4 +1,4 @@
-//! The bodies of requests and answers, as they pass the gate: what comes in is counted, and how an answer ends is noted.
+//! Bodies of requests and replies in admission: request bytes are counted, and the end of a reply is recorded.
 
 use super::counters::AdmittedCall;
 use crate::service::accounts::Account;
@@ -60,7 +60,7 @@ impl http_body::Body for RequestBody {
             }
             match Pin::new(&mut this.body).poll_frame(cx) {
                 Poll::Ready(Some(Ok(frame))) => {
-                    // who asks for health has one pause for all of it
+                    // health calls share one pause limit in all
                     if !this.call.is_health() {
                         this.pause = None;
                     }

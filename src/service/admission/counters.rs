@@ -1,4 +1,4 @@
-//! The gate through which calls come in: counts of them and of what their requests hold, and who may ask.
+//! Counters of admission: calls in progress, bytes of their requests, and the check of tokens.
 
 use crate::service::accounts::{Account, Accounts, CountLease};
 use crate::service::authentication::Guard;
@@ -30,7 +30,7 @@ pub(in crate::service) struct AdmissionCounters {
     pub(in crate::service) guard: Arc<Guard>,
     pub(in crate::service) accounts: Arc<Accounts>,
     pub(in crate::service) metrics: Arc<Metrics>,
-    /// What requests of this server are called, before their number.
+    /// Prefix of the ids of requests, before their number.
     pub(in crate::service) name: String,
     pub(in crate::service) requests: AtomicU64,
 }
@@ -40,7 +40,7 @@ pub(in crate::service) const REQUEST_ID: &str = "x-request-id";
 /// Longest name that is taken from a client.
 const LONGEST_ID: usize = 64;
 
-/// A service without tokens: who watches over servers has none.
+/// A service without tokens, since monitoring has none.
 pub(in crate::service) const OPEN: &str = "grpc.health.v1.Health";
 /// Calls of it at once of each kind: `Check`, and `Watch`, which goes on.
 const HEALTH_CALLS: usize = 64;
@@ -105,7 +105,7 @@ impl AdmissionCounters {
             counted: OnceLock::new(),
             place: metrics::place(path),
             started: Instant::now(),
-            // of who goes away before the end
+            // for a call that is dropped before its end
             code: AtomicI32::new(Code::Cancelled as i32),
         };
         // a connection that asks for health alone is idle, and makes room for others
@@ -228,7 +228,7 @@ impl AdmittedCall {
         Ok(())
     }
 
-    /// What has come, and what was announced, is not held any more.
+    /// Releases the received and announced bytes.
     pub(in crate::service) fn release(&self) {
         let announced = std::mem::take(&mut *self.announced.lock().unwrap_or_else(PoisonError::into_inner));
         if let (bytes, Some(account)) = announced {

@@ -1,10 +1,10 @@
-//! What comes in before anyone looks at it: how many calls there are, what their requests hold, and how long one may pause.
+//! Admission control: counts calls and request bytes, and bounds pauses, before a handler runs.
 //!
-//! A client may announce a large message and send little of it, begin many and finish none, or ask for more at once than
-//! the server can hold. So every call enters here: it counts among the calls of the server and of its connection, its
-//! bytes count from the first (those of a stream until each message is whole, those of a unary request until it is
-//! answered), and a message that was begun must go on. Who may not ask is refused here; whether the server is well may be
-//! asked by everybody, in a few small places of its own, so that nobody is in the way of others by asking that.
+//! A client may announce a large message and send little of it, begin many and finish none, or ask for more at once
+//! than the server can hold. Every call therefore enters here. It counts among the calls of the server and of its
+//! connection. Its bytes count from the first: those of a stream until each message is complete, those of a unary
+//! request until its reply. A message must not pause for long. Unauthorized calls are rejected here. Health calls need
+//! no authorization and use a few small permits of their own, so that they cannot block other calls.
 
 use super::body::{RequestBody, ResponseBody};
 use super::counters::{AdmissionCounters, OPEN, REQUEST_ID};

@@ -28,7 +28,7 @@ pub struct Client {
     pub(super) link: ServerLink,
 }
 
-/// What went wrong on the way, or on the server.
+/// Error on the connection or on the server.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("server {address}: {message}")]
 pub struct ClientError {
@@ -36,7 +36,7 @@ pub struct ClientError {
     pub address: String,
     /// gRPC status code as text: "InvalidArgument", "Unavailable", ….
     pub code: String,
-    /// What happened; for a netlist, the rendered diagnostics.
+    /// The message; for a netlist, the rendered diagnostics.
     pub message: String,
 }
 
@@ -56,13 +56,13 @@ pub struct RemoteTransient {
     pub voltages: Vec<(String, f64)>,
     /// Model whose static equilibrium is the initial state; none: at rest as drawn.
     pub release: Option<String>,
-    /// What integrates.
+    /// The integrator.
     pub method: Integrator,
     /// Length of equal steps [s]; none: steps follow `tol`.
     pub step: Option<f64>,
     /// Crossings to find: (signal name, level in the signal's unit).
     pub events: Vec<(String, f64)>,
-    /// What ends the run before its time is up.
+    /// Condition that ends the run early.
     pub until: Option<Until>,
 }
 
@@ -86,7 +86,7 @@ impl Client {
         Ok(Self { address: uri.to_owned(), access: access.clone(), link })
     }
 
-    /// Connects anew: what a network has made silent stays so.
+    /// Opens a new connection; a connection without traffic may stay silent for ever.
     pub(super) fn reconnect(&mut self) -> Result<(), ClientError> {
         self.link = ServerLink::connect(&self.address, &self.access, self.link.deadline)
             .map_err(|status| self.error(&status))?;
@@ -162,7 +162,7 @@ impl Client {
         self.call(rpc.pull_in(request)).map(results::pull_in_from_wire)
     }
 
-    /// Motion in time; `watch` is told how far it has come and may stop it.
+    /// Transient analysis; `watch` receives the progress and may cancel it.
     ///
     /// # Errors
     /// [`ClientError`]; code "Cancelled" when `watch` said stop.
@@ -214,7 +214,7 @@ impl Client {
         Err(self.error(&Status::unavailable("the stream ended before the run did")))
     }
 
-    /// What a reply that was checked says.
+    /// Content of a checked reply.
     fn checked(&self, found: Result<(), String>) -> Result<(), ClientError> {
         found.map_err(|what| self.error(&unexpected(&what)))
     }

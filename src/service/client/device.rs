@@ -20,7 +20,7 @@ use tonic::{Code, Status};
 /// Pause between two attempts to reach a server that went away.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Requests that may wait for the next call to carry them: accepts, which nobody waits for.
+/// Requests that may wait to be sent with the next call: accepts, whose replies are not awaited.
 const QUEUE: usize = 64;
 
 /// A [`Device`] whose model is held by a server. Every call returns within the deadline.
@@ -35,16 +35,16 @@ pub struct RemoteDevice {
     options: CompileOptions,
     deadline: Duration,
     model: String,
-    /// What the server warned of when it compiled the model.
+    /// Warnings of the server from the compilation of the model.
     warnings: Vec<Diagnostic>,
-    /// Declared before `link`: a stream is let go before the runtime that drives it.
+    /// Declared before `link`: a stream is dropped before the runtime that drives it.
     pub(super) stream: Option<OpenTrialStream>,
     pub(super) link: Option<ServerLink>,
     /// Why the link was lost, for calls that come after.
     lost: Option<String>,
-    /// What it was opened with.
+    /// The request that opened it.
     asked: OpenRequest,
-    /// What is asked again of a server that comes back; none: nothing is.
+    /// Requests to repeat to a restarted server; `None`: nothing is repeated.
     replay: Option<Replay>,
     /// When the call at hand must have ended.
     until: Instant,
@@ -103,7 +103,7 @@ impl RemoteDevice {
         self
     }
 
-    /// What the server warned of when it compiled the model, its mesh in a circuit with it.
+    /// Warnings of the server from the compilation of the model, its mesh in a circuit included.
     pub fn warnings(&self) -> &[Diagnostic] {
         &self.warnings
     }
@@ -198,7 +198,7 @@ impl RemoteDevice {
         self.link.iter().for_each(|link| link.end_by(self.until));
     }
 
-    /// What a reply that was checked says; one that is none of those asked for loses the connection.
+    /// Content of a checked reply; an unexpected reply loses the connection.
     fn checked(&mut self, found: Result<(), String>) -> Result<(), DeviceError> {
         found.map_err(|what| self.lose(&unexpected(&what)))
     }
@@ -231,7 +231,7 @@ impl RemoteDevice {
         }
     }
 
-    /// Lets go of a link whose replies can no longer be matched with requests.
+    /// Drops a link whose replies can no longer be matched with requests.
     pub(super) fn lose(&mut self, status: &Status) -> DeviceError {
         self.stream = None;
         self.link = None;

@@ -1,6 +1,7 @@
-//! An event loop that is driven by who waits for it: an answer comes from the socket to the thread that asked, and no other has to
-//! wake it. Where there is another core for the server, who asks looks for the answer for a while before it sleeps: to be woken costs more
-//! than a small model's step. While nobody asks a thread of its own drives it, so that a network that fails is noticed.
+//! An event loop driven by the waiting thread: a reply goes from the socket to the thread that sent the request,
+//! without another wake-up. Where there is another core for the server, the waiting thread polls for the reply for a
+//! while before it sleeps, since a wake-up costs more than the step of a small model. Between requests a thread of its
+//! own drives the loop, so that network failures are detected.
 
 use crate::service::in_process::wanted;
 use std::future::Future;
@@ -12,11 +13,11 @@ use tokio::runtime::{Builder, EnterGuard, Runtime};
 use tokio::sync::Notify;
 use tonic::Status;
 
-/// The thread takes over when nobody has asked for so long.
+/// Idle time after which the thread takes over.
 const LINGER: Duration = Duration::from_millis(5);
 /// Turns of the loop in which what was sent reaches the socket: from the queue to the stream, from there to the connection.
 const FLUSH: usize = 4;
-/// An answer is looked for so long before who asked for it sleeps.
+/// Time of polling for a reply before the waiting thread sleeps.
 const LOOK: Duration = Duration::from_micros(200);
 
 /// The loop.
@@ -24,9 +25,10 @@ pub(super) struct DrivenRuntime {
     /// There until it is dropped.
     runtime: Option<Runtime>,
     state: Mutex<LoopState>,
-    /// What its thread waits for where it does not drive it: that it is over. That nobody asks any more it finds by looking.
+    /// Signals the thread, while it does not drive the loop, that the runtime ends. It detects the idle state by
+    /// polling.
     over: Condvar,
-    /// What it waits for where it does.
+    /// Signals the thread while it drives the loop.
     asked: Notify,
     /// The last answer was there soon, on a machine with more than one core: the next may be, too.
     soon: AtomicBool,
@@ -63,7 +65,7 @@ impl DrivenRuntime {
         Ok(new)
     }
 
-    /// Its thread ends. Who asks still drives it.
+    /// Its thread ends. A waiting request still drives it.
     pub(super) fn end(&self) {
         self.state().over = true;
         self.over.notify_one();
@@ -125,7 +127,7 @@ impl DrivenRuntime {
         self.wait(turns, &|| true)
     }
 
-    /// Drives it while nobody asks.
+    /// Drives the loop between requests.
     fn attend(&self) {
         let Some(runtime) = &self.runtime else { return };
         while self.rests() {
@@ -133,7 +135,7 @@ impl DrivenRuntime {
         }
     }
 
-    /// Waits until nobody has asked for a while; false where it is over.
+    /// Waits until the loop has been idle for a while; false where the runtime has ended.
     fn rests(&self) -> bool {
         let mut state = self.state();
         while !state.over {

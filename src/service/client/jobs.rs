@@ -21,7 +21,7 @@ const PAGE: i32 = 100;
 /// How a job is submitted. `Default`: one of its own, which runs on.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Submission {
-    /// Who asks for the same has the same job.
+    /// Identical requests share one job.
     pub share: bool,
     /// It is cancelled when all connections of its client have been closed for so long; none: never.
     pub release_after: Option<Duration>,
@@ -30,7 +30,7 @@ pub struct Submission {
 /// Where a job stands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JobStatus {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// "waiting", "running", "done", "cancelled" or "failed".
     pub state: &'static str,
@@ -44,7 +44,7 @@ pub struct JobStatus {
     pub submitted: i64,
     /// Root file of its netlist.
     pub netlist: String,
-    /// Of a shard: what the column `part` of its table says.
+    /// Of a shard: the content of its table's column `part`.
     pub part: String,
     /// Whether it outlives the server.
     pub kept: bool,
@@ -84,7 +84,7 @@ impl JobStatus {
     }
 }
 
-/// What has come of a job so far.
+/// Rows of a job received so far.
 #[derive(Debug, Default)]
 struct JobRows {
     parameters: Vec<String>,
@@ -179,9 +179,9 @@ impl Client {
         })
     }
 
-    /// Waits for the rows of a job; its table, in grid order, and how it ended: where it ended early, the table has the rows that there are.
-    /// `progress` is told of rows as they come and may let go of it, which the job does not notice. A connection that fails meanwhile is made
-    /// anew, and the rows go on where they were.
+    /// Waits for the rows of a job; its table, in grid order, and how it ended: where it ended early, the table has the
+    /// rows that there are. `progress` is called for rows as they arrive and may detach, which does not affect the job.
+    /// A connection that fails meanwhile is made anew, and the rows go on where they were.
     ///
     /// # Errors
     /// [`ClientError`]; code "Cancelled" when `progress` said stop, "Unavailable" or "DeadlineExceeded" when the server was not
@@ -215,7 +215,7 @@ impl Client {
         let first_row = all.rows.len() as u64;
         let request = proto::FetchJobRequest { name: name.to_owned(), first_row, only_finished: false };
         let mut stream = self.call(self.link.rpc.clone().fetch_job(request))?;
-        // those that this stream told
+        // those announced on this stream
         let mut columns: Vec<proto::JobColumns> = Vec::new();
         while let Some(chunk) = self.next(&mut stream)? {
             *heard = true;

@@ -1,7 +1,9 @@
-//! Questions to one device on a server, as bytes: what [`DeviceChannel`](crate::service::in_process::DeviceChannel) are in process. For programs
-//! in other languages, whose own gRPC is slower.
+//! Trial requests to one device on a server, as bytes: the counterpart of
+//! [`DeviceChannel`](crate::service::in_process::DeviceChannel) in process. For programs in other languages, whose own
+//! gRPC is slower.
 //!
-//! Connections are driven by who asks, and by a thread of their own while nobody does ([`super::driven_runtime`]).
+//! The waiting thread drives a connection, and a thread of its own drives it between requests
+//! ([`super::driven_runtime`]).
 
 use super::driven_runtime::DrivenRuntime;
 use super::link::{is_broken, reason, unexpected};
@@ -24,7 +26,7 @@ use tonic::metadata::{Ascii, MetadataValue};
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Request, Status, Streaming};
 
-/// Requests on their way: accepts, which nobody waits for, and a question.
+/// Requests in progress: accepts, whose replies are not awaited, and one trial.
 const QUEUE: usize = 64;
 /// A server is asked this often whether it is there, while anything is under way; and has so long to say so.
 const PING: Duration = Duration::from_millis(2000);
@@ -80,7 +82,7 @@ impl TrialConnections {
             let mut rpc = BimorphClient::new(self.channel(uri, number)?).max_decoding_message_size(usize::MAX);
             Ok((self.runtime.wait(rpc.trial(request), &still)?, requests))
         };
-        // a connection that broke while nobody asked shows at the next question; this one may be asked again
+        // a connection that broke while idle fails at the next request, which may be repeated
         let begun = begin().or_else(|status| {
             if !is_broken(&status) {
                 return Err(status);
@@ -122,7 +124,7 @@ impl TrialChannel {
     /// end, the next question still gets its own.
     ///
     /// # Errors
-    /// UNAVAILABLE, DEADLINE_EXCEEDED, CANCELLED. What a device refuses is a reply.
+    /// UNAVAILABLE, DEADLINE_EXCEEDED, CANCELLED. An error of the device is a reply.
     pub fn ask(
         &mut self,
         request: &[u8],
@@ -145,7 +147,7 @@ impl TrialChannel {
             }
         }
         let sent = async { requests.reserve().await.map_err(|_| Status::unknown("")) };
-        // a place first: what is dropped on the way to it was not sent
+        // reserve a slot first: a request dropped before it was not sent
         match runtime.wait(sent, &still) {
             Ok(place) => place.send(request),
             // the stream has ended, and says why
@@ -177,7 +179,7 @@ fn ended() -> Status {
     Status::unavailable("the stream has ended")
 }
 
-/// A status as it is told: what broke is UNAVAILABLE, and what took too long says so.
+/// A status as reported: UNAVAILABLE for a broken connection, with a message for a timeout.
 fn said(status: &Status, asked: Instant, patience: Duration) -> Status {
     if status.code() == tonic::Code::Cancelled && asked.elapsed() >= patience {
         return Status::deadline_exceeded(format!("no answer within {} s", patience.as_secs_f64()));

@@ -182,7 +182,7 @@ fn is_late(status: &Status) -> bool {
     status.code() == Code::DeadlineExceeded && status.message().starts_with(LATE)
 }
 
-/// The status of a reply that is none of those that were asked for.
+/// The status for a reply of an unexpected kind.
 pub(super) fn unexpected(what: &str) -> Status {
     Status::internal(format!("unexpected reply: {what}; the server is faulty, of another version, or none of Bimorph"))
 }
@@ -192,7 +192,7 @@ pub(super) fn is_broken(status: &Status) -> bool {
     std::error::Error::source(status).is_some()
 }
 
-/// What happened, in words: a netlist's diagnostics as they are, anything else with its kind.
+/// The message: a netlist's diagnostics as they are, anything else with its code.
 pub(super) fn reason(status: &Status) -> String {
     reply_checks::text(&said(status))
 }

@@ -1,4 +1,4 @@
-//! What a device has to ask again of a server that came back without its states.
+//! Requests that a device has to repeat to a server that restarted without its states.
 //!
 //! A trial is a pure function of its request, and its token a hash of that: the trials that led to a state, asked again in their order, lead to the
 //! same state under the same token. So a client needs no more than the requests between the model at rest and the states that it may still
@@ -72,7 +72,8 @@ mod tests {
         proto::TrialRequest { parent, dt, ..proto::TrialRequest::default() }
     }
 
-    /// The way to a state leads over the operating point, which nobody accepts, and over accepted states; what was tried beside them is forgotten.
+    /// The path to a state consists of the operating point, which is never accepted explicitly, and accepted states;
+    /// other trials are dropped.
     #[test]
     fn the_way_leads_over_parents() {
         let mut replay = Replay::default();

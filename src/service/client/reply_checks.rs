@@ -80,14 +80,14 @@ fn numbers(what: &str, values: &[f64], expected: usize) -> Result<(), String> {
     finite(what, values)
 }
 
-/// What a compilation describes.
+/// Description of a compiled model.
 pub(super) fn model(described: &proto::ModelDescription) -> Result<(), String> {
     name("id of the model", &described.id)?;
     described.ports.iter().try_for_each(|port| name("port", port))?;
     described.nodes.iter().try_for_each(|node| name("node", node))
 }
 
-/// What an open describes: the ports and signals that were asked for, in their order.
+/// Description of an opened device: the requested ports and signals, in their order.
 pub(super) fn opened(request: &OpenRequest, device: &proto::DeviceDescription) -> Result<(), String> {
     if !request.ports.is_empty() && request.ports != device.ports {
         return Err(format!(
@@ -125,7 +125,7 @@ pub(super) fn trial(request: &Trial<'_>, (p, s): (usize, usize), reply: &proto::
             };
             return if within { Ok(()) } else { Err(expected()) };
         }
-        // a failure has its reason alone, and what is unknown is refused by who reads it
+        // a failure has its reason alone, and the reader rejects unknown kinds
         _ => return Ok(()),
     }
     if reply.token == 0 {
@@ -233,7 +233,7 @@ pub(super) fn samples(last: f64, signals: usize, samples: &proto::Samples) -> Re
 
 #[cfg(test)]
 mod tests {
-    //! What was asked for passes, and everything else is named.
+    //! Requested replies pass, and all others are named in an error.
     use super::*;
 
     const STEP: Trial<'_> = Trial { mode: Mode::Transient, parent: None, t: 1e-6, dt: 1e-6, voltages: &[0.0, 0.0] };

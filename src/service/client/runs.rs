@@ -16,7 +16,7 @@ impl RemoteDevice {
     /// on with a state of a run on another server.
     ///
     /// # Errors
-    /// [`DeviceError`]; a step that has no answer is none, see [`Ran::error`].
+    /// [`DeviceError`]; a step without a result is not an error of the call, see [`Ran::error`].
     pub fn run(&mut self, start: &Start<'_>, course: &DriveSchedule<'_>) -> Result<Ran, DeviceError> {
         let request = |session: String| proto::RunRequest {
             lanes: vec![proto::RunLane {

@@ -88,7 +88,7 @@ impl Service<Uri> for Connect {
     }
 }
 
-/// What TLS found wrong, in words that say what to do; none for another error.
+/// Fault reported by TLS, with a remedy; `None` for another error.
 pub(super) fn refused(error: &(dyn std::error::Error + 'static)) -> Option<String> {
     let error = inner(error)?;
     Some(match error {

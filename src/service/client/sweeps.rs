@@ -7,8 +7,9 @@ use crate::jobs::sweep::{SweepProgress, SweepSpec, SweepTable};
 use crate::netlist::Bundle;
 
 impl Client {
-    /// A sweep; `progress` is told how far it has come and may stop it. A connection that fails meanwhile is made anew. The server forgets it
-    /// afterwards, whatever came; one that is to outlive its client is a job ([`Self::submit`], [`Self::follow`]).
+    /// Runs a sweep; `progress` receives the progress and may cancel it. A connection that fails meanwhile is made
+    /// anew. The server forgets it afterwards, whatever came; one that is to outlive its client is a job
+    /// ([`Self::submit`], [`Self::follow`]).
     ///
     /// # Errors
     /// [`ClientError`]; code "Cancelled" when `progress` said stop, "Unavailable" or "DeadlineExceeded" when the server was not

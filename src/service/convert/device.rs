@@ -128,7 +128,7 @@ pub fn reply_from_wire(wire: proto::TrialReply, reply: &mut TrialReply) -> Resul
     Ok(())
 }
 
-/// What to open.
+/// The request to open a device.
 pub fn open_from_wire(wire: &proto::OpenRequest) -> OpenRequest {
     let noise = wire.noise.map(|noise| Agitation { seed: noise.seed, band: noise.band_hz });
     OpenRequest { ports: wire.ports.clone(), signals: wire.signals.clone(), noise }

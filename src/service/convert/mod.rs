@@ -20,7 +20,7 @@ use std::collections::HashSet;
 pub struct Violation {
     /// Path of the field ("options.tol"), or place in a netlist ("bank.net:12:7").
     pub field: String,
-    /// What is wrong, and what was expected.
+    /// The fault and the expected value.
     pub description: String,
 }
 

@@ -29,7 +29,7 @@ pub fn bundle_from_wire(bundle: Option<proto::Bundle>) -> Result<Bundle, Violati
 /// The netlist of a layout that was sent.
 ///
 /// # Errors
-/// A layout or a process that is none, or that nothing comes of.
+/// An invalid layout or process, or a layout without a model.
 pub(crate) fn convert(request: &proto::ConvertRequest) -> Result<proto::ConvertResponse, Violation> {
     let given = |text: &str| (!text.is_empty()).then(|| text.to_owned());
     let (process, cell) = (given(&request.process), given(&request.cell));
@@ -116,7 +116,7 @@ pub fn diagnostics_to_wire(diagnostics: &Diagnostics) -> Vec<proto::Diagnostic> 
 
 #[cfg(test)]
 mod tests {
-    //! What means nothing is refused by field.
+    //! Invalid values are rejected by field.
     use super::*;
 
     #[test]

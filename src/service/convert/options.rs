@@ -1,7 +1,7 @@
 //! The options of a model on the wire: the field of an option has the number that the table gives it.
 //!
-//! Messages are taken apart into numbered fields and put together from them, so that an option is told to the wire by its
-//! line in the table and its field in the `.proto` file alone.
+//! Messages are split into numbered fields and assembled from them, so that an option needs only its line in the table
+//! and its field in the `.proto` file.
 
 use super::Violation;
 use super::model::{setting_from_wire, setting_to_wire};
@@ -114,7 +114,7 @@ fn take(option: &ModelOption, mut bytes: &[u8]) -> Result<Option<OptionValue>, p
 
 #[cfg(test)]
 mod tests {
-    //! What a client sends arrives as the same options; what means nothing is refused by field.
+    //! Options arrive as they were sent; invalid values are rejected by field.
     use super::*;
     use crate::netlist::Setting;
     use crate::options::{Formulation, Junctions, Scheme};

@@ -24,7 +24,7 @@ pub fn unpack(bytes: &[u8]) -> impl Iterator<Item = f64> {
 /// How many doubles there are.
 ///
 /// # Errors
-/// Bytes that are none, and numbers that are not finite.
+/// An incomplete number, and numbers that are not finite.
 fn counted(field: &str, bytes: &[u8]) -> Result<usize, Violation> {
     if !bytes.len().is_multiple_of(WIDTH) {
         return Err(Violation::new(field, format!("expected doubles of {WIDTH} bytes, got {} bytes", bytes.len())));
@@ -94,7 +94,7 @@ impl Rows {
 /// Places of the wanted signals among those of a session.
 ///
 /// # Errors
-/// A name that is none of them.
+/// An unknown name.
 pub fn places(wanted: &[String], opened: &proto::DeviceDescription) -> Result<Vec<usize>, Violation> {
     let place = |name: &String| {
         opened.signals.iter().position(|signal| signal.name == *name).ok_or_else(|| {
@@ -107,7 +107,7 @@ pub fn places(wanted: &[String], opened: &proto::DeviceDescription) -> Result<Ve
 
 #[cfg(test)]
 mod tests {
-    //! Doubles keep their bits, and what is none is named by its place.
+    //! Doubles keep their bits, and an invalid one is named by its position.
     use super::*;
 
     #[test]

@@ -1,11 +1,11 @@
-//! Samples of parameters that vary by chance.
+//! Samples of random parameters.
 
 use super::{Violation, number, required};
 use crate::jobs::sweep::{Design, Distribution, SampleGenerator, Sampling, Vary};
 use crate::service::proto;
 use proto::sweep_vary::Distribution as Wire;
 
-/// What was asked for, as it travels.
+/// The request as a message.
 pub(super) fn to_wire(asked: &Sampling) -> proto::SweepSamples {
     let vary = |vary: &Vary| proto::SweepVary {
         name: vary.name.clone(),

@@ -1,4 +1,4 @@
-//! Sweeps: what to run, and the table.
+//! Sweeps: requests and tables.
 
 use super::model::{setting_from_wire, setting_to_wire};
 use super::{Violation, named, number, options, required, samples, voltages};
@@ -241,7 +241,7 @@ mod tests {
         assert_eq!(points(&[4_000_000_000; 600]), usize::MAX);
     }
 
-    /// What a single call refuses is refused of a sweep, by its field.
+    /// A sweep rejects, by field, all values that a single call rejects.
     #[test]
     fn ranges_are_those_of_single_calls() {
         let field = |analysis| {

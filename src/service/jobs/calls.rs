@@ -45,7 +45,7 @@ impl BimorphService {
             check_size(&task.bundle, &shared.limits)?;
             let job = shared.jobs.submit(asked.clone(), task, &request, &shared.limits)?;
             if shared.shutdown.draining.is_cancelled() {
-                // it came after those that run were told
+                // it was accepted after the running jobs were suspended
                 job.stop(JobStopReason::Suspended);
             }
             Ok(job)
@@ -108,8 +108,8 @@ impl BimorphService {
     }
 }
 
-/// What waits for the disk and computes nothing: in nobody's turn and on nobody's account, so that who has used up what is his may stop what
-/// runs.
+/// Runs disk operations without computation. They take no permit and are charged to no account, so that a client with
+/// an exhausted quota can still stop its jobs.
 pub(super) async fn aside<T: Send + 'static>(
     job: impl FnOnce() -> Result<T, Status> + Send + 'static,
 ) -> Result<T, Status> {

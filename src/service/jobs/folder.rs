@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What the first file of a job begins with.
+/// Magic bytes of the first file of a job.
 const HEAD: &[u8; 16] = b"bimorph jobs 1\r\n";
 
 /// How a job ended.
@@ -34,10 +34,10 @@ pub(super) struct JobOutcome {
     pub(super) bytes: u64,
 }
 
-/// What was asked, and the request as it came.
+/// The parsed request, and its bytes as received.
 type StoredRequest = (JobOrigin, Vec<u8>);
 
-/// What a folder has of a job.
+/// Files of a job in a folder.
 pub(super) struct StoredJob {
     pub(super) id: String,
     pub(super) asked: JobOrigin,
@@ -62,7 +62,7 @@ pub(super) struct JobFile {
 /// Begins the files of a new job. When this returns it is on the disk.
 ///
 /// # Errors
-/// What the system said, or the bound; then nothing of it is left.
+/// The system's error, or the exceeded limit; then none of its files is left.
 pub(super) fn begin(store: &Arc<SessionStore>, id: &str, asked: &JobOrigin, request: &[u8]) -> io::Result<JobFile> {
     let file = JobFile::of(store, id, &asked.sweep);
     let head = head(asked, request)?;
@@ -95,7 +95,7 @@ pub(super) fn ids(store: &SessionStore) -> io::Result<BTreeSet<String>> {
     Ok(ids)
 }
 
-/// What a folder has of a job. What was left of one that was never answered is removed.
+/// Files of a job in a folder. Files of a job that was never confirmed are removed.
 pub(super) fn find(store: &Arc<SessionStore>, id: &str) -> Option<StoredJob> {
     let file = JobFile::of(store, id, "");
     let counted = ["job", "rows", "end", "new"].iter().map(|end| file.size(end)).sum::<u64>();
@@ -155,7 +155,7 @@ impl JobFile {
         fs::metadata(self.path(end)).map_or(0, |found| found.len())
     }
 
-    /// What was asked, and how it ended; none where it was never answered.
+    /// The request and the outcome; `None` if the job was never confirmed.
     fn read(&self) -> io::Result<Option<(StoredRequest, Option<JobOutcome>)>> {
         let there = |end: &str| match fs::read(self.path(end)) {
             Ok(bytes) => Ok(Some(bytes)),
@@ -192,11 +192,11 @@ impl JobFile {
         self.size("rows")
     }
 
-    /// Opens its journal, which is made where there is none; the rows that it has. A last row that is cut off was given to nobody, and is
-    /// not there.
+    /// Opens its journal, creating it if missing, and returns its rows. A truncated last row was never sent, and is
+    /// dropped.
     ///
     /// # Errors
-    /// What the system said.
+    /// The system's error.
     pub(super) fn open(&mut self) -> io::Result<Vec<JournalRow>> {
         let path = self.path("rows");
         let before = self.size("rows");
@@ -222,15 +222,16 @@ impl JobFile {
     /// The rows of a job that has ended. Changes nothing.
     ///
     /// # Errors
-    /// What the system said.
+    /// The system's error.
     pub(super) fn read_rows(&self) -> io::Result<Vec<JournalRow>> {
         Journal::read(&self.path("rows"), &self.sweep).map_err(io_error)
     }
 
-    /// Adds rows to the open journal. When this returns they are on the disk, or, where nobody waits for the disk, with the system.
+    /// Adds rows to the open journal. When this returns they are on the disk, or, with syncing disabled, with the
+    /// system.
     ///
     /// # Errors
-    /// What the system said, or the bound; then none of them is there.
+    /// The system's error, or the exceeded limit; then none of them is stored.
     pub(super) fn append(&self, rows: &[JournalRow]) -> io::Result<()> {
         let lines = journal::lines(rows)?;
         self.take(lines.len())?;
@@ -238,10 +239,11 @@ impl JobFile {
         self.store.disk().append(journal, &lines).map_err(io_error).inspect_err(|_| self.give_back(lines.len()))
     }
 
-    /// Keeps how it ended. When this returns it is on the disk. Its few bytes may go beyond the bound: what is full must be able to end.
+    /// Keeps how it ended. When this returns it is on the disk. Its few bytes may exceed the limit, so that a job on a
+    /// full disk can end.
     ///
     /// # Errors
-    /// What the system said.
+    /// The system's error.
     pub(super) fn end(&self, end: &JobOutcome) -> io::Result<()> {
         let end =
             JobOutcome { bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), Journal::bytes), ..end.clone() };

@@ -1,4 +1,4 @@
-//! Whose job it is, as far as connections tell: those by which it was asked for.
+//! Connections that hold a job: those that requested it.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
@@ -31,8 +31,8 @@ impl JobHolders {
         self.gone = None;
     }
 
-    /// For how long all of them have been closed, as far as those tell that are open; none: one is open. A process that asks itself always
-    /// is there.
+    /// Time since the last of them was closed, given the open connections; `None` while one is open. A process that
+    /// asks itself always is there.
     pub(super) fn are_gone(&mut self, open: &BTreeSet<u64>) -> Option<Duration> {
         if self.connections.iter().any(|number| *number == 0 || open.contains(number)) {
             self.gone = None;

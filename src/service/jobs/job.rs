@@ -1,7 +1,7 @@
 //! One job: what it found so far, where it stands, and its files.
 //!
-//! A row is finished when it is on the disk, where there is one: it is told of, counted and given out then, and not before. Rows that come while
-//! the disk is waited for go there together.
+//! A row is finished when it is on the disk, if there is one. Only then is it reported, counted and sent. Rows that
+//! come while the disk is waited for go there together.
 
 use super::super::{proto, status};
 use super::folder::{JobFile, JobOutcome};
@@ -103,7 +103,7 @@ impl Job {
         self.kept
     }
 
-    /// Whether it goes on, or has ended with all of its rows, and is not told to stop.
+    /// Whether it is running, or has ended with all of its rows, and is not being stopped.
     pub(super) fn lives(&self) -> bool {
         match self.standing.borrow().state {
             State::Done => !matches!(self.stop.get(), Some(JobStopReason::Deleted)),
@@ -137,7 +137,7 @@ impl Job {
     /// Cancels it where its client is gone for longer than it asked for; a process that asks itself never is.
     pub(super) fn look_for_client(&self, open: &BTreeSet<u64>) {
         let Some(release) = self.asked.release().filter(|_| !self.has_ended()) else { return };
-        // who reads its rows, or watches it, is there
+        // a reader or a watcher keeps it
         if self.is_watched() {
             held(&self.holders).are_there();
         } else if held(&self.holders).are_gone(open).is_some_and(|time| time >= release) {
@@ -147,7 +147,7 @@ impl Job {
 
     /// Stops it; the first reason holds.
     pub(super) fn stop(&self, why: JobStopReason) {
-        // before its points are stopped: what comes of them from here on is not theirs
+        // set before its points are stopped: their later results are not its rows
         let _ = self.stop.set(why);
         self.budget.cancel();
         self.stopped.cancel();
@@ -156,7 +156,7 @@ impl Job {
     /// Keeps on the disk that it was cancelled, for a server that ends before its points have.
     ///
     /// # Errors
-    /// What the system said.
+    /// The system's error.
     pub(super) fn keep_cancelled(&self) -> io::Result<()> {
         let file = held(&self.file);
         let standing = self.standing();
@@ -272,9 +272,9 @@ impl Job {
         self.end(self.ending(&standing, failure.code(), failure.message().to_owned()));
     }
 
-    /// It has ended so. What it was told of is on the disk before, as far as there is room for it.
+    /// It has ended so. Its reported rows are on the disk by then, as far as there is space.
     pub(super) fn end(&self, end: JobOutcome) {
-        // held until it is told, so that nobody keeps another end after this one
+        // held until it is reported, so that no other outcome is stored after this one
         let mut file = held(&self.file);
         if let Some(file) = file.as_mut() {
             if let Err(error) = file.end(&end) {
@@ -311,7 +311,7 @@ impl Job {
         let _ = self.watch().wait_for(over).await;
     }
 
-    /// Lets go of its files, which another server may take up.
+    /// Releases its files, which another server may take over.
     pub(super) fn release(&self) {
         drop(held(&self.file).take());
     }

@@ -1,4 +1,4 @@
-//! What a client asked for, and by which name.
+//! Request of a job, and its name.
 
 use super::super::convert::{self, Violation};
 use super::super::fair_semaphore::client;
@@ -15,19 +15,19 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 /// Longest name that a client gives to its request [byte].
 const LONGEST_REQUEST: usize = 64;
 
-/// Longest name of a netlist that is told again and again [character].
+/// Longest stored title of a netlist [character].
 const LONGEST_TITLE: usize = 200;
 
-/// What is known of a job from its first moment: what a folder keeps of it beside the request itself.
+/// Origin of a job, known from its first moment: the stored data beside the request itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct JobOrigin {
-    /// Who asked: the name of a client.
+    /// Owner: the name of a client.
     pub(super) owner: String,
-    /// What the client calls its request; empty: nothing.
+    /// The client's name for its request; empty: none.
     pub(super) request: String,
-    /// What it asked for, as a hash.
+    /// Hash of the request.
     pub(super) content: String,
-    /// Whether who asks for the same has the same job.
+    /// Whether identical requests share one job.
     pub(super) share: bool,
     /// After how long without its client it is cancelled [s]; 0: never.
     pub(super) release_after_s: f64,
@@ -39,7 +39,7 @@ pub(super) struct JobOrigin {
     pub(super) version: String,
     /// Name of the sweep in its journal.
     pub(super) sweep: String,
-    /// Of a shard: what the column `part` says.
+    /// Of a shard: the content of the column `part`.
     pub(super) part: String,
     /// Id of the model.
     pub(super) model: String,
@@ -53,7 +53,7 @@ impl JobOrigin {
     /// By the client at hand.
     ///
     /// # Errors
-    /// A name, or a time, that is none.
+    /// An invalid name or time.
     pub(super) fn by(request: &proto::SubmitJobRequest) -> Result<Self, Violation> {
         let name = &request.request_id;
         if name.len() > LONGEST_REQUEST || !name.bytes().all(|byte| byte.is_ascii_graphic()) {
@@ -107,7 +107,7 @@ impl JobOrigin {
             self.request.clone_from(&self.content);
         }
         self.sweep = journal::name(spec, bundle, options);
-        // a grid that is none has none, and is refused
+        // an invalid grid has none, and is rejected
         let part = (spec.shard.count > 1).then(|| SweepPart::of(spec, bundle, options).ok()).flatten();
         self.part = part.map(|part| part.to_string()).unwrap_or_default();
         self.netlist = bundle.root.chars().take(LONGEST_TITLE).collect();

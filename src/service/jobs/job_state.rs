@@ -36,7 +36,7 @@ pub(super) enum JobStopReason {
 }
 
 impl JobStopReason {
-    /// As clients are told.
+    /// The state as reported to clients.
     pub(super) fn reported(&self) -> Status {
         match self {
             Self::Cancelled | Self::Deleted => Status::cancelled("cancelled"),

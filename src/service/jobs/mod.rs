@@ -1,8 +1,9 @@
-//! Jobs: what runs while clients come and go.
+//! Jobs: analyses that outlive their connections.
 //!
-//! `job_origin` is what a client wanted, and by which name; a `job` has `rows`, which it keeps in a `folder` that outlives the server (`reading`
-//! has them from there again), a `job_state`, of which clients are told over the `wire`, and `holders`; the `registry` holds all jobs and hands
-//! them out in `pages`, `running` lets them take turns, and `calls`, `legacy_calls` and `streams` are what clients see of them.
+//! `job_origin` is the request and its name. A `job` has `rows`, stored in a `folder` that outlives the server and read
+//! back by `reading`, a `job_state` and `holders`; `wire` converts it to messages. The `registry` holds all jobs and
+//! lists them in `pages`, and `running` schedules them. `calls`, `legacy_calls` and `streams` are the interface for
+//! clients.
 
 mod calls;
 mod folder;

@@ -1,9 +1,9 @@
-//! Jobs in pages. A token is the place of the last job of its page among all that were ever submitted: it stays right when jobs come and go,
-//! and one that was made up shows nothing but jobs that its client may list anyway.
+//! Jobs in pages. A token is the position of the last job of its page among all jobs ever submitted. It stays valid
+//! when jobs come and go, and a forged token shows only jobs that its client may list anyway.
 
 use super::super::convert::Violation;
 
-/// Jobs of a page that nobody gave a size.
+/// Default size of a page.
 const PAGE: usize = 100;
 /// Most jobs of a page.
 const LARGEST: usize = 1000;
@@ -44,7 +44,7 @@ pub(super) fn token(sequence: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    //! What a page was given as a token is one, and nothing else is.
+    //! Tokens of pages are valid, and all other texts are rejected.
     use super::*;
 
     #[test]

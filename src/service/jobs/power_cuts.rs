@@ -1,5 +1,5 @@
-//! A machine may lose its power at any moment of a job: a job that was answered is there, with every row that was given out, and one
-//! that was told to have ended has ended.
+//! A machine may lose its power at any moment of a job. A confirmed job is still there with every row that was sent,
+//! and a job reported as ended has ended.
 
 use super::super::power_cuts::{Machine, UnsyncedBytes};
 use super::super::store::SessionStore;
@@ -34,7 +34,7 @@ fn row(point: usize) -> JournalRow {
     JournalRow { point, values, estimated_error: Some(1e-4), warning: "w".repeat(30 * point), error: None }
 }
 
-/// What was answered.
+/// Confirmed operations.
 #[derive(Debug, Clone, Copy)]
 enum Answered {
     Job,
@@ -80,7 +80,7 @@ fn nothing_that_a_job_gave_out_is_lost_with_the_power() {
                 // an end that is there says how many rows there are, and so they are
                 let all = end.filter(|end| end.bytes == file.row_bytes()).map(|_| file.read_rows().expect(&case));
                 let there = file.open().unwrap_or_else(|error| panic!("{error}: {case}"));
-                // those that were given out, in their order, and behind them others of which nobody was told; each once, and as it was
+                // the sent rows in their order, then unsent ones; each once, and unchanged
                 let points: Vec<usize> = there.iter().map(|kept| kept.point).collect();
                 let reported = rows.unwrap_or(0);
                 assert!(points.iter().take(reported).copied().eq(0..reported), "{points:?} of {reported} rows: {case}");

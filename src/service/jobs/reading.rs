@@ -66,7 +66,7 @@ impl Job {
         Ok(rows.get_or_insert_default().chunk(&self.spec, reading, end))
     }
 
-    /// Lets go of rows that are on the disk as well, where nobody reads them. Waits for who does.
+    /// Drops rows from memory that are on the disk as well, while they have no reader. Waits for a reader to finish.
     pub(super) fn unload(&self) {
         let file = held(&self.file);
         if file.is_some() && self.has_ended() && !self.is_watched() {
@@ -75,7 +75,7 @@ impl Job {
         }
     }
 
-    /// The whole table, of a job that has all of its rows: one for all who read it at a time.
+    /// The whole table of a complete job; concurrent readers share one.
     ///
     /// # Errors
     /// As they are read.

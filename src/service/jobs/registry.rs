@@ -29,7 +29,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tonic::{Code, Status};
 
-/// What a job computes.
+/// Computation of a job.
 pub(super) struct SweepTask {
     pub(super) spec: SweepSpec,
     pub(super) bundle: Bundle,
@@ -40,7 +40,7 @@ impl SweepTask {
     /// As it was asked for.
     ///
     /// # Errors
-    /// What of it means nothing.
+    /// The invalid part of the request.
     pub(super) fn of(request: proto::SubmitJobRequest) -> Result<Self, Violation> {
         let proto::SubmitJobRequest { bundle, options, task, .. } = request;
         let spec = task.map(|proto::submit_job_request::Task::Sweep(spec)| spec);
@@ -55,7 +55,7 @@ impl SweepTask {
 /// The jobs of a server.
 pub(in super::super) struct JobRegistry {
     kept: Mutex<BTreeMap<String, Arc<Job>>>,
-    /// Held by who takes in a job, until it is on the disk.
+    /// Held while a job is accepted, until it is on the disk.
     taking_in: Mutex<()>,
     sequence: AtomicU64,
     ids: Ids,
@@ -86,7 +86,8 @@ impl JobRegistry {
         self.kept().len()
     }
 
-    /// Starts a job, which is on the disk when this returns. What the same client asked for before, by the same name, is not started again.
+    /// Starts a job, which is on the disk when this returns. A repeated request of the same client under the same name
+    /// starts no second job.
     ///
     /// # Errors
     /// INVALID_ARGUMENT, or RESOURCE_EXHAUSTED where there is no room.
@@ -166,7 +167,7 @@ impl JobRegistry {
         let SweepTask { spec, bundle, options } = SweepTask::of(request).map_err(|violation| violation.description)?;
         let purse = accounts.of(&asked.owner).purse.clone();
         let budget = Budget::new(Allowance { purse, ..allowance(limits) });
-        // what it was told of is there, whole: its rows are read again when somebody asks for them
+        // reported rows are stored completely and are read again on request
         let whole = |end: &JobOutcome| end.code != Code::Ok as i32 || end.rows == asked.points;
         let are_there = |end: &JobOutcome| {
             let found = file.read_rows().map_or(0, |rows| rows.len() as u64);
@@ -254,7 +255,7 @@ impl JobRegistry {
         jobs.iter().filter(|job| !job.has_ended()).for_each(|job| job.stop(JobStopReason::Suspended));
     }
 
-    /// Comes back when all that were suspended have stopped, and lets go of the folder.
+    /// Returns when all suspended jobs have stopped, and releases the folder.
     pub(in super::super) async fn release(&self, patience: Duration) {
         let jobs: Vec<_> = self.kept().values().cloned().collect();
         let quiet = async {
@@ -277,7 +278,7 @@ impl JobRegistry {
         }
     }
 
-    /// Forgets finished jobs that nobody asked for during the time that the limits give; how many. Waits for the disk.
+    /// Drops finished jobs without a request during the time limit; returns their number. Waits for the disk.
     pub(in super::super) fn expire(&self, limits: &Limits) -> usize {
         let time = if self.store.is_some() { limits.sweeps_idle } else { limits.idle };
         let is_old = |job: &&Arc<Job>| job.is_over() && job.idle() >= time && !job.is_watched();
@@ -295,7 +296,7 @@ fn goes_on(asked: &JobOrigin, bundle: &Bundle, limits: &Limits) -> Result<(), St
             format!("version {} began it and this is {own}, whose numbers may differ; submit it again", asked.version);
         return Err(Status::failed_precondition(text));
     }
-    // programs are not run where none are allowed, whoever allowed them before
+    // programs are not run where they are disabled, even if the job was accepted before
     check_size(bundle, limits)
 }
 

@@ -38,7 +38,7 @@ struct FinishedRow {
 pub(super) struct RowCursor {
     /// The next row.
     pub(super) next: u64,
-    /// Columns that it was told of, and their numbers on the stream.
+    /// Announced columns, and their numbers on the stream.
     reported: BTreeMap<u32, u32>,
     /// Whether there was a message.
     pub(super) begun: bool,
@@ -161,7 +161,7 @@ impl FinishedRow {
 
 #[cfg(test)]
 mod tests {
-    //! Rows come out as they went in, whatever their columns, in messages that go on from any row.
+    //! Rows keep their content for any columns, in messages that can resume at any row.
     use super::*;
     use crate::jobs::sweep::{Shard, SweepAnalysis};
 

@@ -31,7 +31,7 @@ struct JobPermits<'a> {
     pool: &'a ThreadPool,
     party: Waiter,
     stopped: &'a CancellationToken,
-    /// Told of each piece that is begun.
+    /// Called for each piece that begins.
     begin: &'a (dyn Fn() + Sync),
 }
 
@@ -42,8 +42,8 @@ impl JobExecutors {
         Self { turns: FairSemaphore::new(places), places, pool: OnceLock::new(), runtime: Handle::current() }
     }
 
-    /// Computes what a job has no row of yet. A thread of its own waits for its turns, not one of those on which calls are answered: jobs
-    /// that wait, however many, are in nobody's way.
+    /// Computes what a job has no row of yet. A thread of its own waits for permits, not one of those that handle
+    /// calls: waiting jobs block nothing, however many there are.
     pub(super) fn start(self: &Arc<Self>, job: &Arc<Job>, bundle: Bundle, options: CompileOptions) {
         let (crews, running) = (Arc::clone(self), Arc::clone(job));
         let run = move || {
@@ -109,7 +109,7 @@ impl Executor for JobPermits<'_> {
 
 #[cfg(test)]
 mod tests {
-    //! Clients take turns by pieces, counted: who has much to do keeps nobody waiting who has little.
+    //! Permits rotate among clients by counted pieces: a client with many pieces does not delay one with few.
     use super::*;
     use std::sync::Mutex;
 
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!(order.len(), 90);
     }
 
-    /// A crew that is told to stop begins nothing more, also while it waits for its turn.
+    /// A stopped executor begins nothing more, also while it waits for a permit.
     #[test]
     fn a_crew_that_is_stopped_comes_back() {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).build().expect("a runtime");

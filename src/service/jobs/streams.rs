@@ -34,7 +34,7 @@ pub(in super::super) type SweepStream = ReplyStream<proto::SweepStatus>;
 /// Rows as they come.
 pub(in super::super) type RowStream = ReplyStream<proto::JobRows>;
 
-/// What comes next of a job that is watched.
+/// Next event of a watched job.
 enum JobChange {
     Told,
     Quiet,
@@ -61,12 +61,12 @@ fn unwatched(job: &Arc<Job>, standing: watch::Receiver<JobState>) {
     drop(standing);
     if job.has_ended() {
         let job = Arc::clone(job);
-        // it may wait for who reads a disk
+        // it may block on a reader of the disk
         tokio::task::spawn_blocking(move || job.unload());
     }
 }
 
-/// Why there is nothing more, if anybody is still to be told.
+/// Sends the reason for the end of a stream, if a receiver is left.
 fn say_last<T>(sender: &mpsc::Sender<Result<T, Status>>, why: Option<Status>) {
     if let Some(why) = why {
         let _ = sender.try_send(Err(why));

@@ -1,11 +1,11 @@
-//! A job as clients are told of it.
+//! A job as a message.
 
 use super::super::proto;
 use super::job_origin::JobOrigin;
 use super::job_state::JobState;
 use crate::jobs::sweep::SweepSpec;
 
-/// A job, which outlives the server or not. What clients are told again and again is without the options, which may be long.
+/// A job, which outlives the server or not. Repeated status messages omit the options, which may be long.
 pub(super) fn job(
     id: &str,
     asked: &JobOrigin,
@@ -35,7 +35,7 @@ pub(super) fn job(
     proto::Job { name: format!("jobs/{id}"), metadata: Some(metadata), done: end.is_some(), result }
 }
 
-/// What the rows of a job come from, but for the options.
+/// Provenance of a job's rows, without the options.
 pub(super) fn provenance(asked: &JobOrigin, spec: &SweepSpec) -> proto::Provenance {
     proto::Provenance {
         version: asked.version.clone(),

@@ -1,6 +1,6 @@
-//! What those ask who watch over a server, by plain HTTP/1.1 at an address of its own: `/metrics`, `/ready`, `/live`.
+//! Monitoring endpoints over plain HTTP/1.1 at an address of their own: `/metrics`, `/ready`, `/live`.
 //!
-//! Nothing secret is told, so nobody is asked for a token. A connection answers once and closes; few are open at once.
+//! They report nothing secret and require no token. A connection answers once and closes; few are open at once.
 
 use super::report::{MonitoringState, busy, text};
 use crate::service::address::Address;

@@ -1,4 +1,4 @@
-//! What an overseer is told: every metric as Prometheus reads it, and whether a server is ready for more.
+//! Content of the monitoring endpoints: every metric in Prometheus' format, and readiness.
 
 use crate::service::admission::counters::AdmissionCounters;
 use crate::service::log;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::UNIX_EPOCH;
 
-/// What an overseer may ask for.
+/// Data of the monitoring endpoints.
 #[derive(Clone)]
 pub(in crate::service) struct MonitoringState {
     pub(in crate::service) shared: Arc<ServerState>,
@@ -88,7 +88,7 @@ pub(in crate::service) fn text(shared: &ServerState, gate: &AdmissionCounters) -
     out
 }
 
-/// Resident memory [byte], as Linux tells it; 0 elsewhere.
+/// Resident memory [byte] on Linux; 0 elsewhere.
 fn resident() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));

@@ -1,4 +1,4 @@
-//! How what a server is told is written: whole numbers, bytes, times, files, addresses.
+//! Syntax of the settings of a server: whole numbers, bytes, times, files, addresses.
 
 use crate::service::address::Address;
 use std::marker::PhantomData;
@@ -7,15 +7,15 @@ use std::time::Duration;
 
 /// A way of writing a value.
 pub trait ValueSyntax {
-    /// What is held.
+    /// Type of the value.
     type Held;
-    /// What is written in place of the value in help: `N`, `BYTES`.
+    /// Placeholder for the value in help: `N`, `BYTES`.
     const METAVAR: &'static str;
 
     /// Reads it.
     ///
     /// # Errors
-    /// What was expected.
+    /// The expected syntax.
     fn read(text: &str) -> Result<Self::Held, &'static str>;
 
     /// Writes it so that it reads back; empty: nothing.
@@ -46,9 +46,9 @@ impl ValueSyntax for PositiveCount {
     }
 }
 
-/// What may also be none, written as 0.
+/// Syntax whose value may also be absent, written as 0.
 pub trait OptionalSyntax: ValueSyntax {
-    /// What is expected where it may.
+    /// The expected syntax where it may.
     const OR_NONE: &'static str;
 }
 

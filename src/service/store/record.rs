@@ -1,13 +1,13 @@
-//! What is kept of a session, as bytes that tell whether they are whole.
+//! Stored state of a session, as bytes with a checksum.
 
 use crate::service::snapshots::checksum;
 
-/// What a file begins with.
+/// Magic bytes of a file.
 pub(in crate::service) const HEAD: &[u8; 16] = b"bimorph states 2";
 /// Head, checksum, sequence number, token, lease, length.
 const BEFORE: usize = 16 + 16 + 4 * 8;
 
-/// What is kept of a session.
+/// Stored state of a session.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::service) struct SessionRecord {
     pub(in crate::service) sequence: u64,

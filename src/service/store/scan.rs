@@ -1,4 +1,4 @@
-//! What is in a folder of states, found without a change to it.
+//! Content of a folder of states, read without changing it.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -15,7 +15,7 @@ pub enum StoreError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         reason: io::Error,
     },
     /// Another server uses it.
@@ -26,7 +26,7 @@ pub enum StoreError {
     },
 }
 
-/// What a server would find in a folder of states, in words. Nothing is made there or removed, whoever asks.
+/// Summary of a folder of states, in words. It creates and removes nothing.
 ///
 /// # Errors
 /// [`StoreError`].
@@ -67,7 +67,7 @@ fn probe(folder: &Path) -> io::Result<()> {
     fs::remove_file(path)
 }
 
-/// What is in a folder.
+/// Content of a folder.
 #[derive(Default)]
 pub(in crate::service) struct StoreScan {
     /// Sessions with their models.

@@ -1,4 +1,4 @@
-//! What is kept of one session: two files in turn, each with a checksum, of which one is whole at any moment.
+//! Storage of one session: two files in turn, each with a checksum, one of which is always valid.
 
 use super::SessionStore;
 use super::record::SessionRecord;
@@ -24,7 +24,7 @@ impl SessionWriter {
     /// Of a new session of a model.
     ///
     /// # Errors
-    /// What the system said, or the bound.
+    /// The system's error, or the exceeded limit.
     pub(in crate::service) fn new(
         store: &Arc<SessionStore>,
         id: &str,
@@ -44,11 +44,11 @@ impl SessionWriter {
         Self { store: Arc::clone(store), id: id.to_owned(), model: model.to_owned(), sequence, accepted, lease_ms }
     }
 
-    /// Keeps `sealed`, whose last accepted state is `accepted`. When this returns it is on the disk, or, where nobody waits
-    /// for the disk, with the system.
+    /// Keeps `sealed`, whose last accepted state is `accepted`. When this returns it is on the disk, or, with syncing
+    /// disabled, with the system.
     ///
     /// # Errors
-    /// What the system said, or the bound; what was kept before is still there.
+    /// The system's error, or the exceeded limit; the state stored before is still there.
     pub(in crate::service) fn keep(&mut self, accepted: u64, sealed: &[u8]) -> io::Result<()> {
         let sequence = self.sequence + 1;
         let path = self.store.session(&self.id, &self.model, sequence % 2);
@@ -73,7 +73,7 @@ impl SessionWriter {
         written.inspect_err(|_| self.lease_ms = before)
     }
 
-    /// What is kept waits for somebody to ask for it.
+    /// The stored state waits for a request.
     pub(in crate::service) fn sleep(&self) {
         self.store.sleep(&self.id);
     }
@@ -84,13 +84,15 @@ impl SessionWriter {
     }
 }
 
-/// Removes what is kept of a session that is closed: whoever keeps at this moment is waited for, and then finds it closed.
+/// Removes the stored state of a closed session. A concurrent write finishes first, and later ones find the session
+/// closed.
 pub(in crate::service) fn forget(keeper: &Mutex<SessionWriter>) {
     keeper.lock().unwrap_or_else(PoisonError::into_inner).forget();
 }
 
-/// A state as bytes, with those that a client may go back to: the one it was tried from, and the one accepted `before`. A client
-/// that was not told of an accept takes its step again, or another one, from the state that it knows.
+/// A state as bytes, with those that a client may go back to: the one it was tried from, and the one accepted `before`.
+/// A client that did not receive the reply to an accept repeats its step, or takes another one, from the last state
+/// that it knows.
 pub(in crate::service) fn with_those_before(
     device: &dyn Device,
     token: Token,
