@@ -132,8 +132,8 @@ fn statistics(pair: &CompanionRuns<'_>, first: usize, result: &TransientResult) 
 mod tests {
     use super::*;
 
-    /// A sine of 50 periods about 2, in windows of ten periods each: mean 2 and no spread, rms 1/√2; a line from 0 to 1 has the means 0.1,
-    /// 0.3 … 0.9, whose standard error is √0.1/√5, so that the interval is 2.776·0.1414.
+    /// A sine of 50 periods about 2, in windows of ten periods each: mean 2 without spread, rms 1/√2. A line from 0 to
+    /// 1 has the means 0.1, 0.3 … 0.9, with the standard error √0.1/√5, so that the interval is 2.776·0.1414.
     #[test]
     fn statistics_by_hand() {
         let t: Vec<f64> = (0..1000).map(|k| f64::from(k) / 1000.0).collect();

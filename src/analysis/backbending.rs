@@ -1,4 +1,4 @@
-//! What a mechanism is after it was heated too far once: its hot arms shortened, see [`crate::domains::backbending`].
+//! State of a mechanism after a single overheating: its hot arms are shortened, see [`crate::domains::backbending`].
 use super::statics::operating_point;
 use super::{AnalysisError, PortVoltages};
 use crate::compile::CompiledModel;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 const STEPS: usize = 8;
 /// Corrections of the plastic strains in one step.
 const CORRECTIONS: usize = 60;
-/// The stress keeps within this share of the cold strength: far below what any mesh is off by.
+/// Tolerance of the stress, relative to the cold strength: far below the error of any mesh.
 const TOLERANCE: f64 = 1e-9;
 
 /// Permanent strains of beams by name [1]; negative: shorter.
@@ -28,7 +28,7 @@ pub struct BackbentMechanism {
     pub compiled: CompiledModel,
     /// Permanent strain of each beam that can yield [1], by name; negative: shorter.
     pub strains: Strains,
-    /// Yield stress over Young's modulus of each [1]: what their strains are small against.
+    /// Yield stress over Young's modulus of each [1]: the scale of its strains.
     pub bearable: Vec<f64>,
 }
 

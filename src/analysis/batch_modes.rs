@@ -1,7 +1,7 @@
 //! Modes about the drawn geometry of many variants of one mechanism: in lanes where that is possible.
 //!
-//! All variants begin with the modes of one of them. One that differs from it in more than numbers, or that anything acts on, or whose
-//! lane does not settle, has no modes here: [`super::modes`] finds them, or says why there are none.
+//! All variants begin with the modes of one of them. A variant that differs from it in more than numbers, has any load,
+//! or whose lane does not converge, gets `None`. [`super::modes`] then finds its modes or reports the error.
 
 use super::PortVoltages;
 use super::modes::{GUARDS, ModesResult, about_equilibrium, unloaded};

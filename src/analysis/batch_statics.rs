@@ -1,7 +1,7 @@
 //! Equilibria of many variants of one mechanism: in lanes where that is possible, with the bits of each alone.
 //!
-//! A variant that differs from the first in more than numbers, or with anything on its way, has no equilibrium here: [`super::statics`] finds it,
-//! or says why there is none.
+//! A variant that differs from the first in more than numbers, or meets an event on its path, gets `None`.
+//! [`super::statics`] then finds its equilibrium or reports the error.
 
 use super::PortVoltages;
 use super::contact_range::within_contact_range;

@@ -1,5 +1,5 @@
-//! The end of a motion in time for many variants of one mechanism: side by side in lanes where that is possible, one by one
-//! where not, with the same bits.
+//! Final states of transients for many variants of one mechanism: in lanes where possible, one by one elsewhere, with
+//! bit-identical results.
 //!
 //! A variant has a lane where Rodas4 integrates it in the bodies' own coordinates from rest, and it differs from the others
 //! in numbers alone. Errors come from a run alone, which says why.
@@ -22,19 +22,20 @@ use crate::solve::time::method::Motion;
 
 use super::integrator::Integrator;
 
-/// What a run ends with.
+/// Final state of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunEnd {
     /// Value of each signal at the end, in the order asked for.
     pub values: Vec<f64>,
     /// Accepted steps.
     pub steps: u64,
-    /// What the numbers do not say by themselves.
+    /// Warnings about the result.
     pub warnings: Vec<String>,
 }
 
-/// Runs the variants that lanes can have in lanes, and gives what each ends with; none for one that has to be run alone. `finished` is
-/// told whenever one more has ended, and says whether to go on; the rest is none then.
+/// Runs the variants that lanes can have in lanes, and gives what each ends with; none for one that has to be run
+/// alone. `finished` is called after each variant and returns whether to continue; the remaining ones are `None`
+/// otherwise.
 ///
 /// # Errors
 /// [`AnalysisError::BadRequest`] for options that mean nothing.
@@ -102,7 +103,7 @@ pub fn ends(
     Ok((ends, work))
 }
 
-/// What a run of one variant stands on.
+/// Setup of a run of one variant.
 struct Setup {
     signals: Vec<Signal>,
     sources: Vec<f64>,

@@ -1,6 +1,6 @@
 //! Error against work, and work against size: how the methods, formulations, model orders and solvers compare on a mechanism.
 //!
-//! | part | what varies | what it is measured against |
+//! | part | variable | reference |
 //! |---|---|---|
 //! | precision | integration method, tolerance, formulation | the same model, integrated far more tightly |
 //! | order | the band that the model resolves, formulation | the finest model of the list |

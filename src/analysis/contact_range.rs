@@ -1,5 +1,5 @@
-//! No result from beyond the law of contact: a part pressed further into another than the law knows is refused by name. Combs have
-//! no contact at the ends of their fingers: what goes through is told.
+//! No result from beyond the law of contact: a part pressed further into another than the law knows is refused by name.
+//! Combs have no contact at the ends of their fingers: fingers beyond them cause a warning.
 
 use super::AnalysisError;
 use crate::compile::CompiledModel;
@@ -22,7 +22,7 @@ pub(crate) fn within_contact_range(compiled: &CompiledModel, q: &[Pose]) -> Resu
     }
 }
 
-/// What to say of that comb.
+/// Warning about that comb.
 pub(crate) fn comb_beyond_told(compiled: &CompiledModel, q: &[Pose]) -> Option<String> {
     let (name, [way, room]) = comb_beyond(compiled, q)?;
     Some(format!(

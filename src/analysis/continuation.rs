@@ -10,7 +10,7 @@ use crate::solve::continuation::{Branch, Continuation, ContinuationOptions, Path
 use crate::solve::family::LoadFamily;
 use serde::Serialize;
 
-/// What grows along the path.
+/// Parameter of a path.
 #[derive(Debug, Clone)]
 pub enum PathInput<'a> {
     /// Voltage of a port, by name.
@@ -21,10 +21,10 @@ pub enum PathInput<'a> {
     Loads,
 }
 
-/// What to trace.
+/// Request for a path.
 #[derive(Debug, Clone)]
 pub struct ContinuationRequest<'a> {
-    /// What grows.
+    /// Parameter of the path.
     pub growing: PathInput<'a>,
     /// Its first value [V, the parameter's unit, or 1]. The path starts at the equilibrium there.
     pub from: f64,
@@ -34,7 +34,7 @@ pub struct ContinuationRequest<'a> {
     pub voltages: Vec<(String, f64)>,
     /// Signals wanted along the path, see [`Signal::find`].
     pub signals: Vec<String>,
-    /// What to do where the path loses its stability at a bifurcation.
+    /// Treatment of a bifurcation at which the path loses its stability.
     pub branch: Branch,
     /// Most points.
     pub points: usize,
@@ -73,9 +73,10 @@ pub struct ContinuationResult {
     pub unknowns: usize,
     /// Newton iterations.
     pub iterations: usize,
-    /// The gap along beams that leaves out most for want of pieces, and the largest share of its distance on the way.
+    /// The gap along beams with the largest error from too few pieces, and the largest fraction of its distance on the
+    /// path.
     #[serde(skip)]
-    /// What is to be known of the path.
+    /// Warnings about the path.
     pub warnings: Vec<String>,
 }
 
@@ -176,7 +177,8 @@ pub fn trace(
     })
 }
 
-/// What is to be known of the equilibrium where a path starts, the first point at which a comb is beyond its range, and the hottest.
+/// Warnings about the equilibrium where a path starts, the first point at which a comb is beyond its range, and the
+/// hottest point.
 fn path_notes(
     compiled: &CompiledModel,
     start: &OperatingPoint,
@@ -201,7 +203,7 @@ fn path_notes(
         .collect()
 }
 
-/// What is to be known of a path whose points have these values.
+/// Warnings about a path whose points have these values.
 fn event_notes(traced: &TracedPath, value: impl Fn(f64) -> f64) -> Vec<String> {
     let at = |point: &usize| value(traced.points[*point].s);
     let rough = traced.rough.iter().map(|point| {

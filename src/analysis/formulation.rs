@@ -1,11 +1,11 @@
-//! What a formulation makes of bodies and joints: which directions it locks, and tree and loops; and which one suits.
+//! Effect of a formulation on bodies and joints (locked directions, tree and loops), and the choice of a formulation.
 //!
-//! **What `auto` takes.** Where joints are elastic in every direction, a step in joint coordinates takes as long as one of the
-//! bodies or longer, and both take the same steps (docs/rcr.md has the measurements): compliant. Where the drawing's joints only turn and close
-//! no loops, as rigid plates on flexure pivots under a scheme of the paper, the bodies' own coordinates need stiff springs in
-//! the directions that do not move, and steps that follow them; the recursion needs neither, and its explicit steps cost a
-//! few evaluations without any factorization: rcr with rk45, as long as they are few. In circuits and services, whose steps
-//! the caller sets, compliant.
+//! **Choice of `auto`.** With joints that are elastic in every direction, a step in joint coordinates costs as much as
+//! one of the bodies or more, and both take the same steps (docs/rcr.md has the measurements): compliant. Now consider
+//! joints that only rotate and close no loops, as rigid plates on flexure pivots under a scheme of the paper. The
+//! bodies' own coordinates then need stiff springs in the rigid directions, and short steps. The recursion needs
+//! neither, and its explicit steps cost a few evaluations without any factorization: rcr with rk45, as long as the
+//! steps are few. In circuits and services, whose steps the caller sets, compliant.
 
 use super::AnalysisError;
 use super::integrator::Integrator;
@@ -20,11 +20,11 @@ use std::borrow::Cow;
 
 pub use crate::options::Formulation;
 
-/// Radians that the fastest motion of joints may turn in a run for explicit steps to be few: a step is stable up to about
-/// three, so a thousand steps, what the bodies take for such a motion at a tolerance of 1e-3.
+/// Largest phase [rad] of the fastest joint motion in a run with explicit steps. A step is stable up to about three, so
+/// that this means a thousand steps, as many as the bodies' coordinates take for such a motion at a tolerance of 1e-3.
 const FEW: f64 = 3e3;
 
-/// What `auto` takes.
+/// Choice of `auto`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChosenFormulation {
     /// Compliant or rcr.
@@ -34,7 +34,7 @@ pub struct ChosenFormulation {
 }
 
 impl Formulation {
-    /// What `auto` takes for a run of `stop` [s], or where steps are the caller's (none).
+    /// Choice of `auto` for a run of `stop` [s], or for steps of the caller (`None`).
     pub fn suited(compiled: &CompiledModel, stop: Option<f64>) -> ChosenFormulation {
         let system = &compiled.parts.system;
         let model = &system.model;

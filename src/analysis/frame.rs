@@ -26,7 +26,7 @@ pub use motion::frame_transient;
 const MAX_ITERATIONS: usize = 100;
 /// Iterations after which a correction that does not shrink is rounding, where gaps pull.
 const FEW: usize = 20;
-/// A change below this share of the displacements is none.
+/// Changes below this fraction of the displacements count as zero.
 const SETTLED: f64 = 1e-12;
 
 /// The frame of a compiled netlist: one element for each beam, as SUGAR has it, or by the band when one was given.

@@ -16,7 +16,7 @@ use crate::solve::time::radau5::Radau5;
 use crate::solve::time::rodas4::Rodas4;
 use crate::solve::time::tableau::{MIDPOINT, SDIRK4, TR_BDF2};
 
-/// What integrates a motion in time.
+/// Integrator of a motion in time.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Integrator {
@@ -103,8 +103,9 @@ impl Integrator {
         }
     }
 
-    /// Advances `motion` over bodies from the start of the ramp to its end; `h` is the first step to try [s]. Methods without an
-    /// error estimate go by step doubling under [`Control::Tolerance`]. The work is told even where it ends in an error.
+    /// Advances `motion` over bodies from the start of the ramp to its end; `h` is the first step to try [s]. Methods
+    /// without an error estimate go by step doubling under [`Control::Tolerance`]. The work is reported also where it
+    /// ends in an error.
     #[allow(clippy::too_many_arguments)]
     pub fn advance(
         self,
@@ -167,7 +168,7 @@ pub enum IntegrationRule {
 }
 
 impl IntegrationRule {
-    /// Goes through a run.
+    /// Runs an integration.
     pub fn advance<E: Staged>(
         self,
         equations: &mut E,
@@ -191,7 +192,7 @@ pub struct IntegrationRun<'a, 'b, X> {
     pub motion: &'a mut Motion<X>,
     /// First step to try [s].
     pub h: f64,
-    /// What sets the length of steps.
+    /// Criterion for the length of steps.
     pub control: Control,
     /// Sees each accepted step.
     pub observe: Observer<'b, X>,

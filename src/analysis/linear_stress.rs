@@ -1,16 +1,17 @@
-//! What a linear model leaves out where its parts carry stress.
+//! Stress stiffening that a linear model omits.
 //!
-//! Small displacements about the drawing have the stiffness K of unstressed parts. What stress and heat add, K_σ, belongs to a
-//! vibration, and modes have it; equilibria and runs in time do not. How much that matters is seen by solving
-//! (K + K_σ)·x' = K·x for the deflection x: with K_σ the same forces would bring x' (second-order theory; Timoshenko and Gere 1961, §1.11).
+//! Small displacements about the drawing have the stiffness K of unstressed parts. The contribution of stress and heat,
+//! K_σ, belongs to a vibration, and modes include it; equilibria and runs in time do not. How much that matters is seen
+//! by solving (K + K_σ)·x' = K·x for the deflection x: with K_σ the same forces would bring x' (second-order theory;
+//! Timoshenko and Gere 1961, §1.11).
 
 use super::statics::OperatingPoint;
 use crate::compile::CompiledModel;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 
-/// How far the deflection `x` of a linear model is off for want of the stiffness that the stress at `point` brings, as a share of the
-/// largest that is told; infinite beyond the buckling load. None where the model is not linear.
+/// Error of the deflection `x` of a linear model without the stress stiffening at `point`, as a fraction of the largest
+/// reported one; infinite beyond the buckling load. None where the model is not linear.
 pub(super) fn left_out(compiled: &CompiledModel, point: &OperatingPoint, x: &[Pose]) -> Option<f64> {
     let system = &compiled.parts.system;
     let model = &system.model;

@@ -1,7 +1,8 @@
 //! Parts that nothing connects to ground: an equilibrium leaves them where they are drawn, and their rigid-body modes are at 0 Hz.
 //!
-//! The stiffness of such a part is singular along its three rigid-body motions. The equilibrium holds one of its bodies with a stiffness of
-//! its own ([`Model::factor_holding`](crate::multibody::Model::factor_holding)): where the loads on the part balance each other, no force goes through it, and every strain is exact.
+//! The stiffness of such a part is singular along its three rigid-body motions. The equilibrium holds one of its bodies
+//! with an artificial stiffness ([`Model::factor_holding`](crate::multibody::Model::factor_holding)). Where the loads
+//! on the part balance each other, this stiffness transmits no force, and every strain is exact.
 
 use crate::domains::{Drive, System};
 use crate::multibody::factor::ZeroPivot;

@@ -1,4 +1,4 @@
-//! The verbs that every front shares: the command, the service and sweeps call these and nothing below.
+//! The analyses that all front ends share: the command, the service and sweeps call these and nothing below.
 
 pub mod after_contact;
 pub mod backbending;
@@ -32,7 +32,7 @@ pub use crate::readout::signal;
 use serde::Serialize;
 use thiserror::Error;
 
-/// Told how far a long analysis has come, as a fraction 0…1; answers whether to go on.
+/// Receives the progress of a long analysis, as a fraction 0…1; returns whether to continue.
 pub type ProgressCallback<'a> = &'a mut dyn FnMut(f64) -> bool;
 
 /// Why an analysis has no result.
@@ -44,7 +44,7 @@ pub enum AnalysisError {
     BadRequest {
         /// Which option.
         what: String,
-        /// What is wrong with it and what would be accepted.
+        /// The fault and the accepted values.
         detail: String,
     },
     /// No equilibrium was found.
@@ -87,7 +87,7 @@ pub enum AnalysisError {
     /// An iteration did not settle.
     #[error("not converged: {detail}")]
     NotConverged {
-        /// What and how far.
+        /// The violated limit and its size.
         detail: String,
     },
     /// [`Watch`] said stop.

@@ -25,8 +25,8 @@ pub struct ModesResult {
     pub frequencies_hz: Vec<f64>,
     /// For each mode, the displacement of every mechanical node (largest translation 1), in netlist order.
     pub shapes: Vec<Vec<(String, NodeMotion)>>,
-    /// For each mode, the residual ‖(K + λM)⁻¹(Kx − λMx)‖ in the mass norm, about the relative error of its shape; the
-    /// frequency is off by the square [1].
+    /// For each mode, the residual ‖(K + λM)⁻¹(Kx − λMx)‖ in the mass norm, approximately the relative error of its
+    /// shape; the error of the frequency is its square [1].
     pub residuals: Vec<f64>,
     /// For each mode, the estimated relative error of its frequency by the number of segments [1]; none where no estimate can be made, as
     /// for the baselines. About the drawing it is signed. About a loaded equilibrium it includes the error of that, and is a size where it
@@ -40,10 +40,10 @@ pub struct ModesResult {
     /// ends with and about the drawing.
     #[serde(skip)]
     pub per_deflection: Vec<f64>,
-    /// What the numbers do not say by themselves.
+    /// Warnings about the result.
     pub warnings: Vec<String>,
-    /// Largest estimated relative error by the mesh, of every frequency and of the equilibrium that they are about [1]; none without an
-    /// estimate, and where nobody has fitted the mesh to them.
+    /// Largest estimated relative error from the mesh, of every frequency and of their equilibrium [1]; `None` without
+    /// an estimate, and where the mesh was not fitted to them.
     pub estimated_error: Option<f64>,
 }
 
@@ -55,7 +55,7 @@ const FAR: f64 = 0.02;
 const ALIKE: f64 = 0.5;
 /// Estimates of this size and more say only that the mesh is far too coarse for one.
 const BELIEVED: f64 = 1.0;
-/// An estimate is not told where rounding in the stiffness may be more.
+/// No estimate is reported where rounding in the stiffness may exceed it.
 const ROUNDED: f64 = 1e-4;
 
 /// The `count` lowest modes about the static equilibrium at these voltages.
@@ -202,8 +202,8 @@ fn shapeless(compiled: &CompiledModel, count: usize, voltages: &PortVoltages) ->
     Ok((ModesResult { per_deflection, ..result }, q, found.shapes))
 }
 
-/// What there is to tell of `count` modes about `q`, of which some more may have been found; those are taken away. With the estimated errors
-/// of them all, and what is to be warned of besides.
+/// Result of `count` modes about `q`; any further modes are removed. With the estimated errors of them all, and what is
+/// to be warned of besides.
 fn assess(
     compiled: &CompiledModel,
     count: usize,
@@ -287,7 +287,7 @@ fn deflection(compiled: &CompiledModel, q: &[Pose]) -> f64 {
     compiled.parts.nodes.iter().map(moved).fold(0.0, f64::max)
 }
 
-/// What modes do not say by themselves: that there are fewer, that the equilibrium is far from the drawing or unstable.
+/// Warnings about modes: fewer than requested, or an equilibrium that is far from the drawing or unstable.
 fn notes(compiled: &CompiledModel, count: usize, q: &[Pose], (lambda, rounding): (&[f64], f64)) -> Vec<String> {
     let mut warnings = Vec::new();
     if lambda.len() < count {
@@ -305,7 +305,7 @@ fn notes(compiled: &CompiledModel, count: usize, q: &[Pose], (lambda, rounding):
             "these modes are about a largely deflected equilibrium: {moved:.3} µm away from the drawing, {share:.0} % of its size"
         ));
     }
-    // about zero as far as rounding in the stiffness tells
+    // zero within the rounding of the stiffness
     let least = lambda.iter().find(|l| **l > 0.0).map_or(0.0, |l| rounding * l);
     let unstable = lambda.iter().filter(|l| **l < -least).count();
     if unstable > 0 {

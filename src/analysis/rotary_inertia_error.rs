@@ -1,18 +1,21 @@
-//! How far frequencies are off for want of rotary inertia.
+//! Frequency error from missing rotary inertia.
 //!
-//! Bodies along a beam have none unless it is asked for (docs/junctions.md): the sections of a wide beam turn for nothing. With
-//! J = Σ ∫ ρ·t·w³/12·θ² dx of a mode of mass 1, θ its rotation along the beams, Rayleigh's quotient of the mode is ω²/(1 + J) with it
-//! (Lord Rayleigh, *The Theory of Sound*, 1877, § 186), so that the frequency told is too high by about √(1 + J) − 1.
+//! Bodies along a beam have none unless it is asked for (docs/junctions.md): the sections of a wide beam turn for
+//! nothing. Let J = Σ ∫ ρ·t·w³/12·θ² dx for a mode of mass 1, with θ its rotation along the beams. Rayleigh's quotient
+//! with rotary inertia is ω²/(1 + J) (Lord Rayleigh, *The Theory of Sound*, 1877, § 186). The reported frequency is
+//! therefore too high by about √(1 + J) − 1.
 
 use crate::compile::CompiledModel;
 use crate::domains::MaterialPoint;
 use crate::multibody::planar::Pose;
 use crate::structure::Beam;
 
-/// What models are worth by themselves [1]: junctions stand within about this of plane stress (docs/junctions.md), and less is not told.
+/// Accuracy of the models themselves [1]: junctions agree with plane stress within about this (docs/junctions.md), and
+/// smaller effects are not reported.
 pub(super) const WORTH: f64 = 7e-3;
 
-/// What to say of `modes` (xᵀMx = 1) where rotary inertia would take more off a frequency than the tolerance and than what models are worth.
+/// Warning about `modes` (xᵀMx = 1) whose frequency error from missing rotary inertia exceeds the tolerance and the
+/// accuracy of the models.
 pub(super) fn rotary_inertia_note(compiled: &CompiledModel, modes: &[Vec<Pose>]) -> Option<String> {
     let options = &compiled.options;
     let all = modes.iter().map(|x| too_high(compiled, x));
@@ -26,7 +29,7 @@ pub(super) fn rotary_inertia_note(compiled: &CompiledModel, modes: &[Vec<Pose>])
     })
 }
 
-/// By how much the frequency of a mode (xᵀMx = 1) comes out too high [1].
+/// Relative excess of the frequency of a mode (xᵀMx = 1) without rotary inertia [1].
 pub(super) fn too_high(compiled: &CompiledModel, x: &[Pose]) -> f64 {
     let options = &compiled.options;
     // a user of --as-sugar asks for SUGAR's mass matrix, which has none either

@@ -1,9 +1,9 @@
 //! Whether a motion balances where it could not rest.
 //!
-//! A straight beam that is heated beyond its buckling load stays straight in an ideal computation: nothing pushes it aside.
-//! The signs of the pivots of the tangent stiffness tell (Sylvester): each negative one is a direction that runs away. Such a
-//! direction is no fault while the motion goes along it, as in a snap or a pull-in; it is one while the motion has no share
-//! in it.
+//! A straight beam that is heated beyond its buckling load stays straight in an ideal computation: nothing pushes it
+//! aside. The signs of the pivots of the tangent stiffness show it (Sylvester): each negative one is an unstable
+//! direction. Such a direction is no fault while the motion goes along it, as in a snap or a pull-in; it is one while
+//! the motion has no share in it.
 
 use crate::domains::{Drive, System};
 use crate::multibody::forces::add_inertia;
@@ -66,7 +66,7 @@ impl StabilityMonitor {
         }
     }
 
-    /// What to tell of the run.
+    /// Warning about the run.
     pub(crate) fn warning(&self) -> Option<String> {
         let UnstableEquilibrium { since, directions, body } = self.found.as_ref()?;
         let many = if *directions == 1 {

@@ -39,7 +39,7 @@ pub struct StaticResult {
     pub estimated_error: Option<f64>,
     /// Newton iterations over all load steps.
     pub iterations: usize,
-    /// What the numbers do not say by themselves, as sentences.
+    /// Warnings about the result, as sentences.
     pub warnings: Vec<String>,
 }
 
@@ -112,7 +112,7 @@ pub fn static_with_curves(
     Ok((result_at(compiled, &point), beam_motions(compiled, &point.q)))
 }
 
-/// What there is to tell of an equilibrium.
+/// Result at an equilibrium.
 pub(crate) fn result_at(compiled: &CompiledModel, point: &OperatingPoint) -> StaticResult {
     let system = &compiled.parts.system;
     let electrics = &system.electrics;
@@ -140,7 +140,7 @@ pub(crate) fn result_at(compiled: &CompiledModel, point: &OperatingPoint) -> Sta
     }
 }
 
-/// What source voltages and temperature rises say without any mechanics.
+/// Source voltages and temperature rises, without any mechanics.
 pub(crate) struct ElectricalSolution {
     pub(crate) temperatures_k: Vec<(String, f64)>,
     pub(crate) currents_a: Vec<(String, f64)>,
@@ -178,7 +178,7 @@ pub(crate) struct OperatingPoint {
 }
 
 impl OperatingPoint {
-    /// What drives it.
+    /// Its drive.
     pub(crate) fn drive(&self, compiled: &CompiledModel) -> Drive {
         let electrics = &compiled.parts.system.electrics;
         let (mut rise, mut drive) = (self.rise.clone(), electrics.drive());
@@ -211,7 +211,7 @@ pub(crate) fn operating_point(
     settle(compiled, q, sources, (&rest, [0.0, 1.0]), options)
 }
 
-/// The equilibrium next to `q`; that reached from rest where there is none, and then true.
+/// The equilibrium next to `q`. If there is none, the equilibrium reached from rest, and then true.
 pub(crate) fn operating_point_near(
     compiled: &CompiledModel,
     voltages: &PortVoltages,
@@ -278,7 +278,7 @@ pub(super) fn settled(
 /// Largest voltage of a port [V], as of those that are searched.
 const MAX_VOLTS: f64 = 1e9;
 
-/// What to say of beams that the current makes hotter than any solid bears.
+/// Warning about beams that the current heats beyond the strength of any solid.
 pub(crate) fn too_hot(compiled: &CompiledModel, point: &OperatingPoint) -> Option<String> {
     let (heaters, beams) = (&compiled.parts.heaters, &compiled.structure.beams);
     let (beam, rise) = (heaters.iter().zip(&point.rise)).max_by(|a, b| a.1.total_cmp(b.1))?;

@@ -10,8 +10,9 @@
 //! than in proportion to the tolerance. There are five runs at most, none of which takes more than some seconds; the samples of a run that
 //! does are sent as they come, and it is not made again.
 //!
-//! What has no such estimate is compared with a companion run (`companion.rs`): other methods, equal steps, frames that turn, and models whose parts may
-//! touch, where the error is propagated up to the first contact only.
+//! Runs without such an estimate are compared with a companion run (`companion.rs`). These are other methods, equal
+//! steps, rotating frames, and models whose parts may touch, where the error is propagated up to the first contact
+//! only.
 
 mod companion;
 mod run;
@@ -45,7 +46,7 @@ const HOPELESS: f64 = 0.3;
 /// `model` is what moves; `sample` receives the samples of the run that is reported, and `watch` the progress of each run in turn.
 ///
 /// # Errors
-/// Those of the run; another run that fails is none, and leaves the run without what it would have brought.
+/// Errors of the run; a failed companion run only removes its contribution.
 pub fn with_step_error<T>(
     options: &TransientOptions<'_>,
     model: &CompiledModel,

@@ -1,5 +1,5 @@
-//! What a circuit is warned of by the states that it accepts, each kind once, and again when it is ten times more: what no trial refuses, and no
-//! waveform shows.
+//! Warnings to a circuit about accepted states, each kind once, and again when it is ten times larger. They concern
+//! effects that no trial rejects and no waveform shows.
 
 use super::growth::held_by_charge;
 use super::higher_modes::Split;
@@ -16,9 +16,9 @@ use crate::readout::ports::PortResponse;
 const HELD: &str = "W048";
 
 impl DeviceSession {
-    /// What this state warns of and none before it did, or not a tenth as much: fingers of combs that go through their other side, beams hotter than
-    /// any solid bears, a motion that rings out of step and, in equilibria, gaps along beams in too few segments and what a linear
-    /// model leaves out.
+    /// New warnings of this state, or warnings ten times larger than before. They concern combs whose fingers pass
+    /// their other side, beams hotter than any solid bears, and phase errors of a free oscillation. In equilibria they
+    /// also concern gaps along beams with too few segments, and omissions of a linear model.
     pub(super) fn warns(&mut self, compiled: &CompiledModel, state: &Snapshot) -> Vec<Diagnostic> {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
@@ -80,7 +80,7 @@ impl DeviceSession {
         signals.chain(self.ports.answers.iter().map(|answer| *answer == PortResponse::Current)).collect()
     }
 
-    /// What a value, or the current of a charge behind all values, is called.
+    /// Name of a value, or of the current of a charge after all values.
     fn seen_name(&self, n: usize, compiled: &CompiledModel) -> String {
         let (signals, ports) = (self.signals.len(), self.ports.len());
         let port = |n: usize| match self.opened.ports.get(n) {
@@ -94,7 +94,7 @@ impl DeviceSession {
         }
     }
 
-    /// A warning, where it was not given before, or where it told of less than a tenth of this.
+    /// The warning, if it is new or ten times larger than before.
     fn grown(&mut self, warning: Diagnostic, size: f64) -> Option<Diagnostic> {
         match self.warned.iter_mut().find(|(code, _)| *code == warning.code) {
             Some((_, reported)) if size < 10.0 * *reported => return None,

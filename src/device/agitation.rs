@@ -1,4 +1,4 @@
-//! Thermal agitation in time: what warm gas and dampers push, as a force that a seed decides.
+//! Thermal agitation in time: the random force of gas and dampers at temperature, determined by a seed.
 //!
 //! Time is cut into cells of τ = 1/(2·band). In each the random force of [`crate::multibody::agitation`] is constant, with the
 //! variance 2·k_B·T·C/τ, so that its one-sided spectral density is
@@ -18,7 +18,7 @@ use crate::multibody::planar::Pose;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// Band of what is not told, in lowest natural frequencies [1].
+/// Default band, in lowest natural frequencies [1].
 const BAND: f64 = 20.0;
 /// Highest band [Hz]: beyond what any mechanism feels.
 const HIGHEST: f64 = 1e12;
@@ -51,7 +51,7 @@ impl ThermalForce {
     /// Of a model whose surroundings are at `temperature` [K].
     ///
     /// # Errors
-    /// [`DeviceError::BadRequest`] for a band that is none, or that has to be given.
+    /// [`DeviceError::BadRequest`] for an invalid band, or a missing one.
     pub(super) fn new(asked: &Agitation, compiled: &CompiledModel, temperature: f64) -> Result<Self, DeviceError> {
         let refused = |expected: &str, got: String| DeviceError::BadRequest {
             what: "noise band",
@@ -76,7 +76,7 @@ impl ThermalForce {
         Ok(Self { seed: asked.seed, cell, size, force: still.clone(), mean: still, over: None })
     }
 
-    /// The mean force over the last step that [`ThermalForce::over`] was told.
+    /// The mean force over the last step passed to [`ThermalForce::over`].
     pub(super) fn mean(&self) -> &[Pose] {
         &self.mean
     }
@@ -89,7 +89,7 @@ impl ThermalForce {
         if self.over == Some((start, dt)) {
             return Ok(());
         }
-        // times are sums of steps: what a rounding is over the end of a cell is none of the next
+        // times are sums of steps: an excess over the end of a cell by rounding does not enter the next cell
         let rounding = 1e-9;
         let (from, to) = (start / self.cell, (start + dt) / self.cell);
         if to - from > MAX_CELLS * (1.0 + rounding) {

@@ -1,4 +1,4 @@
-//! The contract of a device: what is asked, what is answered, and what may be refused.
+//! The contract of a device: requests, replies, and errors.
 
 use crate::netlist::Diagnostic;
 use crate::readout::{PortKind, ReadoutError};
@@ -9,7 +9,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Token(pub u64);
 
-/// What a trial is for.
+/// Kind of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Mode {
     /// Static equilibrium at these voltages, from the parent's branch (or from rest without a parent).
@@ -29,7 +29,7 @@ pub struct Trial<'a> {
     pub t: f64,
     /// Length of the step [s]; positive in [`Mode::Transient`], ignored otherwise.
     pub dt: f64,
-    /// What is given to the ports at `t` [V, N, W, …: [`PortKind::given`]], in the order of [`Description::ports`].
+    /// Input of the ports at `t` [V, N, W, …: [`PortKind::given`]], in the order of [`Description::ports`].
     pub voltages: &'a [f64],
 }
 
@@ -67,7 +67,7 @@ pub struct TrialReply {
     pub doutputs_dv: Vec<f64>,
     /// Longest next step the device's tolerance is likely to bear [s]; infinite when it does not care.
     pub dt_next: f64,
-    /// A static trial passed a fold: the part pulled in (or let go) on the way to these voltages.
+    /// A static trial passed a fold: the part pulled in (or opened) on the way to these voltages.
     pub jumped: bool,
 }
 
@@ -85,7 +85,7 @@ pub struct SmallSignal {
 pub struct PortInfo {
     /// Name from the netlist, or of the quantity.
     pub name: String,
-    /// What is given to it and what it answers.
+    /// Its input and output.
     pub kind: PortKind,
 }
 
@@ -99,7 +99,7 @@ pub struct SignalInfo {
     pub unit: String,
 }
 
-/// What an opened device offers.
+/// Description of an opened device.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Description {
     /// Ports, in the order of every voltage and current vector.
@@ -110,7 +110,7 @@ pub struct Description {
     pub unknowns: usize,
 }
 
-/// What to open: which ports, in which order, and which signals.
+/// Request to open a device: ports in their order, and signals.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OpenRequest {
     /// Port names in the caller's order, see [`ports`]; empty: all electrical ones, in netlist order. A port left out is held
@@ -122,7 +122,7 @@ pub struct OpenRequest {
     pub noise: Option<Agitation>,
 }
 
-/// What can go wrong with a request itself. A trial that finds no answer is not an error but [`Status::Fail`].
+/// Errors of a request. A trial that finds no answer is not an error but [`Status::Fail`].
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum DeviceError {
@@ -142,7 +142,7 @@ pub enum DeviceError {
     UnknownSignal {
         /// The name asked for.
         name: String,
-        /// What would be understood.
+        /// Suggested names.
         hint: String,
     },
     /// A token that names no state held here.
@@ -153,9 +153,9 @@ pub enum DeviceError {
     BadRequest {
         /// Which field.
         what: &'static str,
-        /// What was expected.
+        /// The expected value.
         expected: String,
-        /// What came.
+        /// The given value.
         got: String,
     },
     /// The device was used before [`Device::open`].
@@ -166,7 +166,7 @@ pub enum DeviceError {
     Remote {
         /// Address as given.
         address: String,
-        /// What happened.
+        /// The reason.
         reason: String,
     },
 }
@@ -200,8 +200,8 @@ pub trait Device: Send {
     /// Says that the circuit accepted this state. Advisory: only frees memory, never changes an answer.
     fn accept(&mut self, token: Token);
 
-    /// What an accepted state warns of, each kind once in an epoch. Advisory: never changes an answer. Empty where a device
-    /// does not know.
+    /// Warnings of an accepted state, each kind once in an epoch. Advisory: never changes an answer. Empty where a
+    /// device does not know.
     fn warns(&mut self, token: Token) -> Vec<Diagnostic> {
         let _ = token;
         Vec::new()
@@ -244,8 +244,8 @@ pub trait Device: Send {
     /// anew, its states stay as they are. A device that holds no half computed storage does nothing.
     fn recover(&mut self) {}
 
-    /// What is open and its states, as bytes from which a device of the same model goes on with the same bits. `only`: those
-    /// states alone.
+    /// The open ports and signals and their states, as bytes from which a device of the same model continues bit by
+    /// bit. `only`: those states alone.
     ///
     /// # Errors
     /// [`DeviceError::NotOpen`], [`DeviceError::UnknownToken`], [`DeviceError::BadRequest`] where a device cannot do it.
@@ -279,7 +279,7 @@ pub struct Agitation {
     pub band: Option<f64>,
 }
 
-/// What is wrong with the bytes of a snapshot.
+/// Error of an invalid snapshot.
 pub(super) fn refused(expected: &str, got: &str) -> DeviceError {
     DeviceError::BadRequest { what: "snapshot", expected: expected.into(), got: got.into() }
 }

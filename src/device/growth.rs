@@ -5,9 +5,10 @@
 //! e^(λh) over a step h. With λh above a few the voltage within the step, a straight line, is no longer that of the charge, and the plate comes
 //! to stand elsewhere. So steps are bounded by 1/λ.
 //!
-//! Along the response s of the motion to a voltage, which the growing motion dominates, λ is the positive root of
-//! (sᵀMs)·λ² + (sᵀDs)·λ + sᵀKs = 0, with the stiffness K at fixed voltages, the mass M and the damping D. A negative sᵀKs proves K
-//! indefinite, without a factorization. Rayleigh's quotient errs by the square of what s has of other motions.
+//! Let s be the response of the motion to a voltage, dominated by the growing motion. Then λ is the positive root of
+//! (sᵀMs)·λ² + (sᵀDs)·λ + sᵀKs = 0, with the stiffness K at fixed voltages, the mass M and the damping D. A negative
+//! sᵀKs proves K indefinite, without a factorization. Rayleigh's quotient errs by the square of what s has of other
+//! motions.
 
 use crate::domains::{Drive, System};
 use crate::multibody::forces;
@@ -20,7 +21,7 @@ const MAX: f64 = 3.0;
 /// Length of the difference that stands for K·s, as a share of the model's length scale [1].
 const DIFFERENCE: f64 = 1e-5;
 
-/// What the last trials found.
+/// Growth rates of the last trials.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Growth {
     /// Rate at the state of the last trial [1/s]; 0 where it is stable.
@@ -31,7 +32,7 @@ pub(super) struct Growth {
     grown: f64,
 }
 
-/// What a step's growth asks of the circuit.
+/// Step bound for the circuit from the growth rate of a step.
 pub(super) enum Bound {
     /// The longest next step [s].
     Next(f64),
@@ -46,8 +47,8 @@ impl Growth {
         if rate * step > MAX { Bound::This(NEXT / rate) } else { Bound::Next(NEXT / rate) }
     }
 
-    /// After the state of the last trial was accepted: time constant [s] of the motion that the charge alone has held for so long that no transit
-    /// takes it, from one stable state to another, which grows by e^15 or so.
+    /// After the last trial was accepted: time constant [s] of a motion that the charge alone has held for a long time.
+    /// A transit from one stable state to another is shorter, with a growth of e^15 or so.
     pub(super) fn held(&mut self) -> Option<f64> {
         /// Growth beyond any transit [1].
         const HELD: f64 = 40.0;
@@ -102,7 +103,7 @@ pub(super) fn rate_along(
     if damping + root > 0.0 { -2.0 * stiffness / (damping + root) } else { 0.0 }
 }
 
-/// What to say of a port whose charge alone holds the motion.
+/// Warning about a port whose charge alone holds the motion.
 pub(super) fn held_by_charge(seconds: f64) -> String {
     format!(
         "only the charge holds the mechanism here: at a fixed voltage its motion would grow e-fold in {seconds:.2e} s, and the circuit's \

@@ -9,7 +9,7 @@ const ALIKE: f64 = 0.25;
 /// The same where the points are so far apart that a turning point is known to no better [1].
 const MIN_ALIKE: f64 = 0.4;
 
-/// What brings a motion out of phase.
+/// Phase error of a motion.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Phase {
     /// Relative error of its frequency [1].

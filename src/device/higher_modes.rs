@@ -5,8 +5,9 @@
 //! ```text
 //! η̇ = φᵀ·M·v,   φᵀ·M·φ = 1,   current of a port (∂Q/∂q·φ)·η̇
 //! ```
-//! Half cycles of η̇ are counted as those of signals are ([`super::half_cycles`]). The frequency of a mode is off by the mesh and by the steps of the
-//! integrator, and the phase that adds up until the mode has died away makes an error of at most twice its amplitude.
+//! Half cycles of η̇ are counted as those of signals are ([`super::half_cycles`]). The frequency of a mode has errors
+//! from the mesh and from the steps of the integrator. The phase error accumulates until the mode has decayed, and
+//! causes an error of at most twice its amplitude.
 
 use super::half_cycles::{Phase, Waveform};
 use crate::compile::HigherMode;

@@ -1,4 +1,4 @@
-//! The electrical view of a model: what a circuit simulator drives inside its Newton loop.
+//! The electrical view of a model, which a circuit simulator drives inside its Newton loop.
 //!
 //! [`Device`] is the contract. The same trait serves the plug-in in process ([`local`]), the gRPC service, and Python.
 //!
@@ -10,9 +10,9 @@
 //! i = [`TrialReply::currents`] + d/dt [`TrialReply::charges`]; the caller differentiates the charges, because only it
 //! knows the steps that were accepted.
 //!
-//! Not every port is electrical ([`PortKind`]). To a mechanical or thermal one a force or heat is given in the place of a
-//! voltage, and it answers with a motion or a temperature in the place of a current; it has no charge. What is said of
-//! voltages and currents here holds for what is given and answered.
+//! Not every port is electrical ([`PortKind`]). To a mechanical or thermal one a force or heat is given in the place of
+//! a voltage, and it answers with a motion or a temperature in the place of a current; it has no charge. Statements
+//! about voltages and currents here apply to inputs and outputs of such ports.
 
 mod accepted_warnings;
 pub mod agitation;

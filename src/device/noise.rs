@@ -1,4 +1,4 @@
-//! Noise of ports and signals: what drag, dampers and resistors add to every answer by being warm.
+//! Noise of ports and signals: the thermal noise of drag, dampers and resistors in every output.
 //!
 //! Drag and dampers push the mechanism with forces of the spectral density 4·k_B·T·C ([`crate::multibody::agitation`]), and a
 //! beam that carries current has Johnson's 4·k_B·T/R across it, T with its own rise. With hᵢ what a unit force on each body
@@ -6,9 +6,10 @@
 //! ```text
 //! S_ij = 4·k_B·T·hᵢᵀ·C·h̄_j + 4·k_B·[T·G_ij + Σ_k rise_k·R_k·I_ki·I_kj]     [answered²/Hz]
 //! ```
-//! G being the conductance between electrical ports and I_ki the current in beam k for a volt at port i. hᵢ is found from one
-//! solution for each answer, not for each damper: hᵢ = Z⁻ᵀ·lᵢ, where lᵢ is what answer i sees of a displacement (the adjoint of the
-//! response; a frame that turns makes Z differ from its transpose by the sign of the rate).
+//! G is the conductance between electrical ports, and I_ki the current in beam k for a volt at port i. hᵢ follows from
+//! one solution for each output, not for each damper: hᵢ = Z⁻ᵀ·lᵢ, where lᵢ is the gradient of output i over
+//! displacements (the adjoint of the response). In a rotating frame Z differs from its transpose by the sign of the
+//! rate.
 //!
 //! An answer is that with nothing else changed: the current of a port whose voltage is held, the motion of one whose force
 //! is. Left out: fluctuations of temperature, and what Johnson's noise heats.
@@ -84,7 +85,7 @@ impl DeviceSession {
         Ok(())
     }
 
-    /// What answer `i` sees.
+    /// Gradient of output `i`.
     fn seen_by(&self, compiled: &CompiledModel, system: &System, state: &Snapshot, i: usize) -> OutputGradient {
         let mut seen = OutputGradient::nothing(system.bodies());
         let signal = match i.checked_sub(self.ports.len()) {
@@ -119,7 +120,7 @@ impl DeviceSession {
         seen
     }
 
-    /// What the charge of source `source` sees of a displacement: minus the force of a volt there.
+    /// Gradient of the charge of source `source` over displacements: minus the force of a volt there.
     fn charge_seen(&self, system: &System, state: &Snapshot, source: usize) -> Vec<Pose> {
         let mut change = system.electrics.drive();
         change.load = 0.0;

@@ -1,4 +1,4 @@
-//! What an answer sees of displacements, and what surrounds a mechanism.
+//! Gradients of outputs over displacements, and the environment of a mechanism.
 
 use crate::compile::CompiledModel;
 use crate::multibody::planar::Pose;
@@ -14,7 +14,7 @@ pub(super) fn surroundings(compiled: &CompiledModel) -> f64 {
     ambient.into_iter().find(|t| *t > 0.0).unwrap_or(ROOM)
 }
 
-/// What an answer sees of a displacement of each body, and of its rate of change: the same at every frequency.
+/// Gradient of an output over the displacement of each body, and over its rate: the same at every frequency.
 #[derive(Debug, Clone)]
 pub(super) struct OutputGradient {
     pub(super) place: Vec<Pose>,

@@ -1,9 +1,10 @@
-//! How far a motion that rings is off by now, for want of segments.
+//! Phase error of a free oscillation from too few segments.
 //!
-//! A mesh that is off by e in the lowest frequency brings a free motion out of step by π·e with each half of its cycle, until it has died
-//! away: at most 2Q·e, which is also what it makes of a steady swing at resonance. What swings by s of its range r is then off by
-//! that phase times s/2r. Halves are told by turning points of what the circuit sees; those that do not last about as long as half a cycle of
-//! the mode count nothing, as what a slow drive moves is not out of step.
+//! A relative error e of the lowest frequency shifts the phase of a free motion by π·e with each half cycle, until it
+//! has decayed: at most 2Q·e. This is also the phase error of a steady oscillation at resonance. A component of
+//! amplitude s in a signal of range r then has an error of that phase times s/2r. Half cycles are counted by turning
+//! points of the circuit's values. Those whose duration differs from about half a cycle of the mode are ignored, since
+//! the motion of a slow drive has no phase error.
 //!
 //! A current is a result as its charge is, over a range of its own: a slow stroke may make nearly all of a charge and nearly nothing of its current.
 //! So the rates of charges from point to point are followed, too, and what higher modes bring to them ([`super::higher_modes`]).
@@ -12,10 +13,11 @@ use super::half_cycles::{Phase, Waveform};
 use super::higher_modes::{HigherModes, OfMode, Split};
 use crate::compile::LowestMode;
 
-/// Part of half a cycle below which two points tell no rate of a charge [1]: at corners of a source they are roundings apart.
+/// Fraction of half a cycle below which two points give no rate of a charge [1]: at corners of a source they are
+/// separated by rounding.
 const MIN_STEP: f64 = 1e-4;
 
-/// By how much an error is larger than the last one that was told, to be told again [1].
+/// Growth of an error since the last warning that causes another one [1].
 const GROWS: f64 = 3.0;
 
 /// An accepted state as the circuit sees it.
@@ -27,7 +29,7 @@ pub(super) struct AcceptedState<'a> {
     pub(super) values: &'a [f64],
 }
 
-/// The motion of one transient, as far as its accepted points tell.
+/// The motion of one transient, from its accepted points.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PhaseErrorMonitor {
     /// Time of the last point [s].
@@ -36,12 +38,12 @@ pub(super) struct PhaseErrorMonitor {
     courses: Vec<Waveform>,
     /// Rates of the charges among the values, in their places [1/s]; the others stay 0.
     rates: Vec<f64>,
-    /// Values and time [s] at the last point that told rates.
+    /// Values and time [s] at the last point with rates.
     rated: (Vec<f64>, f64),
     /// The last errors of rates [1].
     errors: Vec<f64>,
     higher: HigherModes,
-    /// What is told next, in tolerances [1].
+    /// Last phase error warned about, in units of `tol`.
     reported: f64,
 }
 
@@ -59,7 +61,8 @@ pub(super) struct Worst {
 }
 
 impl PhaseErrorMonitor {
-    /// After a point since the equilibrium, with `charges` among its values: what is furthest off of the values and currents that turn there.
+    /// Processes a point, with `charges` among its values. Returns the largest error among the values and currents that
+    /// turn there.
     pub(super) fn observe(
         &mut self,
         mode: &LowestMode,
@@ -114,7 +117,8 @@ impl PhaseErrorMonitor {
         worst
     }
 
-    /// The same in words, with the number, where that is beyond the tolerance for the first time, and three times more than when it was told last.
+    /// The warning with the number of the value, where the error exceeds the tolerance for the first time, or three
+    /// times the last warning.
     pub(super) fn tell(
         &mut self,
         mode: &LowestMode,
@@ -158,7 +162,8 @@ mod tests {
 
     const MODE: LowestMode = LowestMode { frequency_hz: 1e3, quality: f64::INFINITY, error: 1e-4 };
 
-    /// What [`PhaseErrorMonitor`] says of a course up to `end` [s], and how far off a motion with another frequency really is.
+    /// Largest error of [`PhaseErrorMonitor`] for a waveform up to `end` [s], and the true error of a motion with
+    /// another frequency.
     fn worst(mode: &LowestMode, end: f64, course: impl Fn(f64) -> f64) -> f64 {
         let mut ringing = PhaseErrorMonitor::default();
         (0..)
@@ -168,7 +173,8 @@ mod tests {
             .fold(0.0, f64::max)
     }
 
-    /// A free swing of a hundred cycles: what is told is what a frequency that is off by so much makes of it, ω·t·e of the amplitude.
+    /// A free oscillation of a hundred cycles: the reported error is that of the frequency error, ω·t·e of the
+    /// amplitude.
     #[test]
     fn a_free_swing_is_out_of_step_by_its_phase() {
         let reported = worst(&MODE, 0.1, |t| (TAU * 1e3 * t).cos());
@@ -179,7 +185,7 @@ mod tests {
         assert!((reported / real - 1.0).abs() < 0.05, "{reported} against {real}");
     }
 
-    /// What dies away is out of step by what is left of it, and a steady swing at resonance by 2Q·e.
+    /// A decaying oscillation has the phase error of its remaining amplitude, and a steady one at resonance 2Q·e.
     #[test]
     fn damping_bounds_it() {
         let quality = 20.0;
@@ -192,7 +198,8 @@ mod tests {
         assert!((steady / (MODE.error * quality) - 1.0).abs() < 0.05, "{steady}");
     }
 
-    /// A ringing of a hundredth of a charge's slow stroke is off by its phase in the current, where it is all there is: 100 times as much as in the charge.
+    /// An oscillation of a hundredth of a charge's slow stroke has an error of its phase in the current, which it
+    /// dominates: 100 times as much as in the charge.
     #[test]
     fn currents_have_a_range_of_their_own() {
         let charge = |t: f64| 50.0 * t + 0.01 * (TAU * 1e3 * t).sin();
@@ -209,7 +216,7 @@ mod tests {
         assert!(alone < 0.02 * error, "{alone}");
     }
 
-    /// A slow drive, a fast one and a ramp are not out of step.
+    /// A slow drive, a fast one and a ramp have no phase error.
     #[test]
     fn what_is_driven_elsewhere_is_in_step() {
         for frequency in [1.0, 300.0, 2e3, 5e3] {
@@ -218,9 +225,9 @@ mod tests {
         assert_eq!(worst(&MODE, 0.1, |t| t), 0.0);
     }
 
-    /// A current in which a mode of ten times the lowest frequency makes a quarter of the range, as much off in frequency as leaves it half a radian out of
-    /// phase at the end: the error is that of the two sines, and it is found with the number of the current; steps of the integrator
-    /// that are long for that mode bring more.
+    /// In this current a mode of ten times the lowest frequency makes a quarter of the range, with a frequency error
+    /// that leads to half a radian at the end. The error is that of the two sines, and the current is identified.
+    /// Integrator steps that are long for that mode increase it.
     #[test]
     fn a_higher_mode_brings_its_phase() {
         let lowest = LowestMode { frequency_hz: 1e3, quality: f64::INFINITY, error: 0.0 };
@@ -244,7 +251,7 @@ mod tests {
         let expected = 2.0 * (0.25f64).sin() / (high - low);
         let found = reported(1e-7);
         assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
-        // a step over a radian is off by step_error(1)
+        // a step over a radian has the error step_error(1)
         let steps = TAU * 1e4 * end * step_error(1.0);
         let more = reported(1.0 / (TAU * 1e4)) / found;
         assert!((more / (1.0 + steps / 0.5) - 1.0).abs() < 0.2, "{more} {steps}");

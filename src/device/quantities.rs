@@ -1,5 +1,5 @@
-//! What a designer looks at: any quantity of a state by name, whether it was opened as a signal or not, and what a state is
-//! like as a whole. Without derivatives, and without a trace.
+//! Inspection: any quantity of a state by name, whether it was opened as a signal or not, and quantities of the state
+//! as a whole. Without derivatives, and without a trace.
 
 use super::DeviceError;
 use super::session::DeviceSession;

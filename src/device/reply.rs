@@ -1,5 +1,5 @@
-//! What a trial answers: currents, charges, outputs and their partials from the state that it came to, and how long a step the
-//! circuit may take next.
+//! Reply to a trial: currents, charges, outputs and their partials at the resulting state, and the bound of the
+//! circuit's next step.
 
 use super::session::DeviceSession;
 use super::states::Snapshot;
@@ -14,9 +14,10 @@ use crate::readout::signal::{Signal, SignalView};
 pub(super) const STEP_SHARE: f64 = 1e-2;
 /// Share of the length scale that the integrator takes for nothing, in units of its tolerance [1].
 const FLOOR: f64 = 1e-4;
-/// A temperature that no circuit tells from another [K].
+/// Temperature difference that is negligible for a circuit [K].
 const SAME_TEMPERATURE: f64 = 1e-6;
-/// A voltage that no circuit tells from another, and its share of the voltage at the port: what ngspice iterates to [V, 1].
+/// Voltage difference that is negligible for a circuit, and its fraction of the voltage at the port: the tolerances of
+/// ngspice's iteration [V, 1].
 const SAME_VOLTAGE: [f64; 2] = [1e-6, 1e-6];
 
 impl DeviceSession {
@@ -141,7 +142,7 @@ impl DeviceSession {
         }
     }
 
-    /// What the circuit sees of a state, and how long a step it may take from there [s].
+    /// Values of a state for the circuit, and the bound of the step from there [s].
     fn seen(
         &self,
         compiled: &CompiledModel,

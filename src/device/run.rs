@@ -22,7 +22,7 @@ pub struct Run {
     trials: usize,
 }
 
-/// What came of a step.
+/// Outcome of a step.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Stepped {
     /// It was taken.
@@ -121,11 +121,11 @@ pub struct Start<'a> {
     pub state: Option<Token>,
     /// Its time [s].
     pub t: f64,
-    /// What the ports have there (p).
+    /// Input of the ports there (p).
     pub given: &'a [f64],
 }
 
-/// What a device is led along, and what is wanted of it.
+/// Inputs over time of a run, and its outputs.
 #[derive(Debug, Clone, Copy)]
 pub struct DriveSchedule<'a> {
     /// Times at the ends of the steps [s], ascending (n).
@@ -138,7 +138,7 @@ pub struct DriveSchedule<'a> {
     pub ports: bool,
 }
 
-/// What came of a run. s wanted signals, p ports; row by row.
+/// Result of a run. s requested signals, p ports; row by row.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Ran {
     /// Steps taken.
@@ -151,7 +151,7 @@ pub struct Ran {
     pub currents: Vec<f64>,
     /// Charges after each step (steps×p), where wanted.
     pub charges: Vec<f64>,
-    /// The reply to the last step; none where there is none.
+    /// The reply to the last step; `None` without a step.
     pub last: Option<TrialReply>,
     /// Why the step numbered `steps` has no answer; none: all were taken.
     pub error: Option<String>,

@@ -1,4 +1,4 @@
-//! What a volt and an ampere stand for at a port that is not electrical.
+//! Scales of a volt and an ampere at a non-electrical port.
 //!
 //! ngspice's tolerances are made for volts and microamperes: `vntol` is 1 µV and `abstol` 1 pA. A micrometre is shown as a
 //! volt and a newton as an ampere, so that displacements are solved to a picometre and forces to a piconewton, and a spring
@@ -12,7 +12,7 @@ use super::PortKind;
 /// Factors of a port.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PortScale {
-    /// What one volt or ampere of the circuit gives, in the port's own unit.
+    /// Input for one volt or ampere of the circuit, in the port's own unit.
     pub given: f64,
     /// Volts or amperes of the circuit for one unit of what the port answers.
     pub answered: f64,

@@ -1,4 +1,4 @@
-//! What is open of a device: its ports, its signals, its states, and the storage that every trial reuses.
+//! Session of a device: its ports, its signals, its states, and the storage that every trial reuses.
 
 use super::agitation::ThermalForce;
 use super::contact_steps::ContactSteps;
@@ -24,10 +24,10 @@ use crate::solve::time::formulated::Formulated;
 use crate::solve::time::method::Motion;
 use std::sync::Arc;
 
-/// What is open: the choice of ports and signals, the states, and the storage that every trial reuses.
+/// An open session: the choice of ports and signals, the states, and the storage that every trial reuses.
 #[derive(Debug)]
 pub(super) struct DeviceSession {
-    /// What it was opened with.
+    /// The request that opened it.
     pub(super) opened: OpenRequest,
     pub(super) ports: OpenedPorts,
     pub(super) signals: Vec<Signal>,
@@ -38,7 +38,7 @@ pub(super) struct DeviceSession {
     pub(super) shaken: Option<ThermalForce>,
     /// Carries ∂motion/∂(final voltage), one for each opened port.
     pub(super) stepper: Adaptive<Formulated>,
-    /// What weighs the errors of its steps.
+    /// Weights of its step errors.
     pub(super) weights: NormWeights,
     pub(super) motion: Motion,
     pub(super) rise: Vec<f64>,
@@ -50,10 +50,10 @@ pub(super) struct DeviceSession {
     pub(super) zeros: Vec<Pose>,
     pub(super) linear: Option<(Token, BlockMatrix<f64, 3>)>,
     pub(super) harmonic: Harmonic,
-    /// What each answer sees of a displacement, about the state that was asked for its noise last.
+    /// Gradient of each output over displacements, about the last state whose noise was requested.
     pub(super) seen: Option<(Token, Vec<OutputGradient>)>,
     pub(super) response: Vec<ComplexPose>,
-    /// Codes of the warnings that were given, and how much each told of.
+    /// Codes of previous warnings, and the size of each.
     pub(super) warned: Vec<(String, f64)>,
     /// How what was accepted rings.
     pub(super) ringing: PhaseErrorMonitor,

@@ -1,4 +1,4 @@
-//! The states of a session as bytes, and back: what was opened, and every state that is held, in order of last use.
+//! The states of a session as bytes, and back: the open request, and every stored state in order of last use.
 //!
 //! Little-endian words; numbers as the bits of their doubles, so that a device that goes on from them gives the same bits as
 //! the one that they came from. Reading trusts nothing: lengths are bounded by the bytes that are there, and sizes by the
@@ -10,7 +10,7 @@ use super::step_history::StepHistory;
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;
 
-/// What the bytes begin with: a name and the version of this format.
+/// Magic bytes: a name and the version of this format.
 const HEAD: [u8; 8] = *b"bimorph\x02";
 
 /// Writes what is open and its states.
@@ -85,7 +85,7 @@ impl SnapshotWriter {
     }
 }
 
-/// What is left to read; none at any place where the bytes are not what they should be.
+/// Remaining bytes; every read returns `None` for invalid bytes.
 struct SnapshotReader<'a>(&'a [u8]);
 
 impl SnapshotReader<'_> {

@@ -30,9 +30,9 @@ pub struct Snapshot {
     pub next_step: f64,
     /// Time since the equilibrium that the motion began from [s].
     pub elapsed: f64,
-    /// What the circuit has seen.
+    /// Values that the circuit has received.
     pub shown: StepHistory,
-    /// What a formulation carries from step to step beside the bodies' motion.
+    /// State of a formulation between steps, beside the bodies' motion.
     pub carried: Vec<Motion>,
 }
 

@@ -1,25 +1,28 @@
-//! What a circuit sees of a device: the charges of its ports and its signals, at the circuit's own points and on straight
-//! lines between them. The next step is bounded by how far these bend, not by what moves unseen: the device takes internal
-//! steps of its own for that.
+//! Values of a device as a circuit sees them: the charges of its ports and its signals, at the circuit's own points and
+//! on straight lines between them. The next step is bounded by how far these bend, not by what moves unseen: the device
+//! takes internal steps of its own for that.
 //!
 //! Over three points with steps h₁ and h₂ the second divided difference is
 //! ```text
 //! d = ((y₂ − y₁)/h₂ − (y₁ − y₀)/h₁)/(h₁ + h₂),
 //! ```
-//! and a parabola with that d leaves the line over the next step H by |d|·H²/4 in the middle. Where a curve turns from one
-//! side to the other d vanishes; there its own change d′ counts, |d′|·H³/4, and more of it where the circuit gives a force for a displacement or
-//! differentiates a charge: steps that become longer and shorter twice a cycle would pump what a spring of the circuit holds (a parametric
-//! resonance), and a current that is off by the square of its step would breathe with them. A ringing that is faster than the steps shows in d by its height: where that may be seen, the steps become short
+//! and a parabola with that d leaves the line over the next step H by |d|·H²/4 in the middle. At an inflection d
+//! vanishes, and its change d′ counts instead: |d′|·H³/4. Its weight is larger where the circuit gives a force for a
+//! displacement or differentiates a charge. Steps whose length varies twice a cycle would pump energy into a spring of
+//! the circuit (a parametric resonance), and a current with an error of the square of its step would vary with them. A
+//! ringing that is faster than the steps shows in d by its height: where that may be seen, the steps become short
 //! enough to follow it.
 
 use serde::{Deserialize, Serialize};
 
-/// Share of its range by which a quantity may leave the line as either term tells, in units of the compilation's tolerance
-/// [1]: 0.2 % at the default, 28 points for a cycle of a full swing, which then stays within 0.5 %.
+/// Fraction of its range by which a quantity may depart from the line for either term, in units of the compilation's
+/// tolerance [1]. At the default it is 0.2 %, or 28 points for a cycle of full amplitude, which then stays within 0.5
+/// %.
 const BEND_FRACTION: f64 = 2.0;
 
-/// The same of a charge [1]. Nobody looks at it but at its change: with even steps the trapezoidal rule keeps that within 0.2 % of its range,
-/// with 28 points a cycle. (Without them an oscillator that its own current drives takes 43 points a cycle where it takes 36.)
+/// The same of a charge [1]. Only its change matters: with even steps the trapezoidal rule keeps that within 0.2 % of
+/// its range, with 28 points a cycle. (Without them an oscillator that its own current drives takes 43 points a cycle
+/// where it takes 36.)
 const BEND_FRACTION_OF_CHARGES: f64 = 3.6;
 
 /// How the circuit's steps follow a quantity.
@@ -33,7 +36,7 @@ pub enum SteppingRule {
     Differentiated,
 }
 
-/// What was seen up to a state, part of that state.
+/// History up to a state, part of that state.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepHistory {
     /// Values at this state.
@@ -105,7 +108,7 @@ impl StepHistory {
         [&self.now, &self.slopes, &self.bends, &self.steps, &self.low, &self.high]
     }
 
-    /// What [`StepHistory::numbers`] gave; none for lists that do not fit together.
+    /// Inverse of [`StepHistory::numbers`]; `None` for inconsistent lists.
     pub fn from_numbers(parts: [Vec<f64>; Self::PARTS]) -> Option<Self> {
         let [now, slopes, bends, steps, low, high] = parts;
         let fits = |list: &[f64]| list.is_empty() || list.len() == now.len();
@@ -140,8 +143,8 @@ impl StepHistory {
 mod tests {
     use super::*;
 
-    /// Followed at its own bound a sine keeps to straight lines within 5·tol of its range, also where it turns from one side
-    /// to the other, and no closer than needed: at most 30 points a cycle at a tolerance of 1e-3.
+    /// Followed at its own bound, a sine stays within 5·tol of its range of straight lines, also at inflections,
+    /// without excess points: at most 30 points a cycle at a tolerance of 1e-3.
     #[test]
     fn a_sine_is_followed_within_its_share() {
         let tol = 1e-3;
@@ -162,7 +165,7 @@ mod tests {
         assert!((20.0..30.0).contains(&(f64::from(points) / cycles)), "{}", f64::from(points) / cycles);
     }
 
-    /// What stands still, and what bends by less than its floor, bounds nothing that matters.
+    /// A constant quantity, and one that bends by less than its floor, gives no relevant bound.
     #[test]
     fn noise_below_the_floor_does_not_hold_the_circuit() {
         let mut shown = StepHistory::start(vec![293.0, 0.0]);

@@ -105,9 +105,8 @@ mod tests {
     use crate::multibody::forces;
     use crate::netlist::Bundle;
 
-    /// On the step matrix of the bank, from static (h large) to inertial (h small), every solver finds the solution of the
-    /// recursion: the residual of every row is at rounding, 1e-12 of the terms that it adds up
-    /// (1e-10 with exchanges).
+    /// On the step matrix of the bank, from static (h large) to inertial (h small), every solver finds the solution of
+    /// the recursion. The residual of every row is at rounding, 1e-12 of the terms that it sums (1e-10 with exchanges).
     #[test]
     fn all_solvers_agree_on_step_matrices() {
         let bundle = Bundle::read(std::path::Path::new("examples/bank/bank.net"), &[]).unwrap();

@@ -8,8 +8,8 @@
 //! ℓ is the system's length scale. Each Newton step costs one factorization of ∂r/∂q and two solves (block elimination).
 //! The tangent keeps its sense against the one before. Between two points
 //! * s′ changes sign at a fold (limit point), found by the secant rule of Illinois on s′(τ);
-//! * the number of negative pivots changes without a fold at a bifurcation, found by bisection; there the null vector φ of
-//!   the tangent is the way out, and the first point of the new branch is looked for in the plane ⟨φ, q − q₀⟩ = τ.
+//! * at a bifurcation, found by bisection, the number of negative pivots changes without a fold. The null vector φ of
+//!   the tangent is the direction of the new branch, and its first point is searched in the plane ⟨φ, q − q₀⟩ = τ.
 //!
 //! References: E. Riks, Int. J. Solids Structures 15 (1979) 529; H. B. Keller, "Numerical solution of bifurcation and
 //! nonlinear eigenvalue problems" (1977); W. Wagner, P. Wriggers, Eng. Comput. 5 (1988) 103, for switching along φ.
@@ -76,7 +76,7 @@ impl Continuation {
             let Some((next, cost)) = self.advance(family, &here, &mut step) else { break PathEnd::Lost };
             if next.s >= self.options.target {
                 match self.land(family, &here, &next, self.options.target) {
-                    // what is critical beyond the last s is none of this path
+                    // a critical point beyond the last s is not on this path
                     Some(last) if last.negative == here.negative && here.ds * next.ds > 0.0 => {
                         traced.points.push(last);
                         break PathEnd::Arrived;

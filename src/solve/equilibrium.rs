@@ -75,7 +75,7 @@ impl EquilibriumOptions {
     }
 }
 
-/// What a search along a path found.
+/// Result of a search along a path.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Path {
     /// Newton iterations.
@@ -117,7 +117,7 @@ enum Corrected {
 }
 
 impl Path {
-    /// Fraction of the path at the first loss of stability; none when there was none.
+    /// Fraction of the path at the first loss of stability; `None` without one.
     pub fn fold(&self) -> Option<f64> {
         self.passed.first().map(|passed| passed.share)
     }
@@ -271,8 +271,8 @@ impl Equilibrium {
         Corrected::No
     }
 
-    /// True where the distance of electrodes changes by more than half of it in one step: a tangent that goes through the fold may come
-    /// upon the closed branch by chance.
+    /// True where the distance of electrodes changes by more than half of it in one step: a tangent step through the
+    /// fold may reach the closed branch accidentally.
     fn leaps(&self, system: &System, from: &[Pose]) -> bool {
         let far = |(gap, volts): (usize, &f64)| {
             if *volts == 0.0 || !system.members[gap].is_electrostatic() {

@@ -1,4 +1,4 @@
-//! What advances or balances a system.
+//! Solvers: they advance or balance a system.
 //!
 //! | folder | what it holds |
 //! |---|---|
@@ -47,9 +47,9 @@ pub enum SolveError {
     Lost {
         /// Fraction of the load path that was reached [1].
         share: f64,
-        /// Losses of stability before, as words; empty where there are none.
+        /// Previous losses of stability, as text; empty without any.
         passed: String,
-        /// Why there is none beyond.
+        /// Reason why there is no equilibrium beyond.
         reason: String,
         /// Beams whose segments bent so far there that shorter ones are needed, by index.
         coarse: Vec<usize>,
@@ -97,7 +97,7 @@ pub enum SolveError {
     },
 }
 
-/// What kept an integrator from taking a step.
+/// Reason why an integrator failed to take a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum WhyFailed {

@@ -1,9 +1,10 @@
-//! What is asked for and what comes out: default analyses by their tolerance alone, each against one of a tenth of the tightest.
+//! Requested against obtained accuracy: default analyses by their tolerance alone, each against one of a tenth of the
+//! tightest.
 //!
-//! Every point is the analysis as a command makes it: from the drawing, with the mesh that it chooses, and with what it tells of its
-//! own error. The static equilibrium is that under the loads and voltages of the run, and the modes are those about where the run
-//! goes to. Errors are those of the worst node relative to its own displacement (or a thirtieth of the largest), of the worst mode, and of
-//! runs as elsewhere ([`relative_error`]).
+//! Every point is the analysis as a command runs it: from the structure, with the mesh that it chooses, and with its
+//! own error estimate. The static equilibrium is that under the loads and voltages of the run, and the modes are those
+//! about where the run goes to. Errors are those of the worst node relative to its own displacement (or a thirtieth of
+//! the largest), of the worst mode, and of runs as elsewhere ([`relative_error`]).
 
 use super::error::SMALL;
 use super::error::relative_error;
@@ -29,14 +30,14 @@ const TIGHTER: f64 = 0.1;
 /// Analyses.
 pub(super) const ANALYSES: [&str; 3] = ["static", "modes", "tran"];
 
-/// What an analysis gives.
+/// Output of an analysis.
 enum AnalysisOutput {
     Nodes(Vec<(String, NodeMotion)>),
     Frequencies(Vec<f64>),
     Run(Box<TransientResult>),
 }
 
-/// One analysis: what it gives, what it tells of its error, and its work.
+/// One analysis: its output, its error estimate, and its work.
 struct CompletedAnalysis {
     found: AnalysisOutput,
     told: Option<f64>,

@@ -1,8 +1,8 @@
 //! The error of a run: how far its signals are from those of a reference.
 //!
-//! In charts signals of one unit are taken together: the root mean square of their differences over all output times, over the largest
-//! amplitude (half of the range) among them in the reference. Of several units the largest error counts. What a run tells of itself
-//! ([`largest_error`]) is of each signal alone.
+//! In charts signals of one unit are taken together: the root mean square of their differences over all output times,
+//! over the largest amplitude (half of the range) among them in the reference. Of several units the largest error
+//! counts. The error estimate of a run ([`largest_error`]) is that of each signal alone.
 
 use crate::analysis::transient::TransientResult;
 
@@ -31,8 +31,8 @@ pub fn relative_error(reference: &TransientResult, found: &TransientResult) -> f
     worst
 }
 
-/// The largest error of a signal of `found`, relative to its own amplitude in `reference`, to a thirtieth of the largest of its unit, or to
-/// what `least` says of the unit, whichever is most: what swings less than that is measured by it.
+/// The largest error of a signal of `found`. Its scale is the largest of three: its own amplitude in `reference`, a
+/// thirtieth of the largest amplitude of its unit, and the minimum that `least` gives for the unit.
 pub fn largest_error(reference: &TransientResult, found: &TransientResult, least: &dyn Fn(&str) -> f64) -> f64 {
     let largest = |unit: &str| {
         let swings = reference.signals.iter().filter(|s| s.1 == unit).map(|s| half_range(&s.2));
@@ -95,7 +95,7 @@ mod tests {
         assert!((relative_error(&reference, &found) - 0.0058).abs() < 1e-4);
     }
 
-    /// What stands still but for rounding is measured by what counts as motion.
+    /// The error of a signal that moves by rounding only has the smallest relevant motion as its scale.
     #[test]
     fn rounding_is_no_motion() {
         let reference = run(&[("m", &[1e-23, -1e-23]), ("K", &[0.0, 1.0])]);

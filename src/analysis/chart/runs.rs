@@ -12,14 +12,14 @@ use crate::analysis::{AnalysisError, ProgressCallback};
 use crate::solve::baseline::SolverKind;
 use std::time::Instant;
 
-/// What integrates references.
+/// Integrator of references.
 const REFERENCE: Integrator = Integrator::Radau5;
-/// What checks them.
+/// Integrator that checks them.
 const SECOND: Integrator = Integrator::Rodas4;
 /// How much tighter than the tightest tolerance of the list a reference is.
 const TIGHTER: f64 = 1e-2;
 
-/// Counts runs, and tells the watch.
+/// Counts runs, and reports progress.
 pub(super) struct ChartProgress<'a> {
     pub(super) watch: ProgressCallback<'a>,
     pub(super) done: f64,
@@ -27,13 +27,13 @@ pub(super) struct ChartProgress<'a> {
 }
 
 impl ChartProgress<'_> {
-    /// Tells how far the present run has come; answers whether to go on.
+    /// Reports the progress of the current run; returns whether to continue.
     pub(super) fn run(&mut self, fraction: f64) -> bool {
         (self.watch)(((self.done + fraction) / self.total).min(1.0))
     }
 }
 
-/// What all runs of a chart share.
+/// Data shared by all runs of a chart.
 pub(super) struct RunSeries<'a> {
     pub(super) spec: &'a ChartSpec,
     pub(super) stop: f64,
@@ -81,7 +81,7 @@ impl RunSeries<'_> {
         Ok((result?, begun.elapsed().as_secs_f64()))
     }
 
-    /// A run and its repeats: the result, or the reason why there is none.
+    /// A run and its repeats: the result, or the reason for its failure.
     ///
     /// # Errors
     /// `Cancelled` only.

@@ -1,4 +1,4 @@
-//! What a chart of formulations is asked, and what it holds.
+//! Specification of a chart of formulations, and its result.
 
 use super::super::AnalysisError;
 use super::super::integrator::Integrator;
@@ -24,7 +24,7 @@ pub enum Formulation {
 impl Formulation {
     /// All of them, the product's own first.
     pub const ALL: [Self; 4] = [Self::Compliant, Self::Frame, Self::Rcr, Self::RcrElastic];
-    /// What is charted unless said otherwise.
+    /// Default selection.
     pub const DEFAULT: [Self; 3] = [Self::Compliant, Self::Frame, Self::Rcr];
 
     /// Its name on the command line and in results.
@@ -37,7 +37,7 @@ impl Formulation {
         }
     }
 
-    /// What a model in it is compiled as; none: as the compliant one.
+    /// Formulation of its compiled model; `None`: that of the compliant one.
     pub(super) fn compiled_as(self) -> Option<Compiled> {
         match self {
             Self::Compliant | Self::Frame => None,
@@ -71,14 +71,14 @@ pub enum ChartPart {
     Order,
     /// Solvers on models of growing order.
     Solvers,
-    /// Default analyses by tolerance: what is asked for and what comes out.
+    /// Default analyses by tolerance: requested against obtained accuracy.
     Defaults,
 }
 
 impl ChartPart {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Precision, Self::Order, Self::Solvers, Self::Defaults];
-    /// What is charted unless said otherwise.
+    /// Default selection.
     pub const DEFAULT: [Self; 3] = [Self::Precision, Self::Order, Self::Solvers];
 
     /// Its name on the command line and in results.
@@ -92,7 +92,7 @@ impl ChartPart {
     }
 }
 
-/// What a chart is asked for.
+/// Specification of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChartSpec {
     /// Parts wanted.
@@ -105,7 +105,7 @@ pub struct ChartSpec {
     pub points: usize,
     /// Voltages held during a run, by port name [V].
     pub voltages: Vec<(String, f64)>,
-    /// A parameter of the netlist that is let go at t = 0, from the equilibrium at its value.
+    /// A parameter of the netlist that is released at t = 0, from the equilibrium at its value.
     pub release: Option<String>,
     /// Formulations.
     pub formulations: Vec<Formulation>,
@@ -126,7 +126,7 @@ pub struct ChartSpec {
 pub struct RunMeasurement {
     /// Relative error [1]; none where nothing is compared.
     pub error: Option<f64>,
-    /// Default part: the error that the analysis itself tells [1].
+    /// Default part: the error estimate of the analysis itself [1].
     pub told: Option<f64>,
     /// Wall-clock time: of the whole run, or of one step in the solver part [s].
     pub seconds: f64,
@@ -182,7 +182,7 @@ pub struct Chart {
     pub stop: f64,
     /// Signals whose error counts.
     pub signals: Vec<String>,
-    /// How far the reference of the precision part is off, as far as a second one tells [1].
+    /// Estimated error of the reference of the precision part, from a second reference [1].
     pub reference_error: Option<f64>,
     /// All points, in the order of the parts and of the lists asked for.
     pub points: Vec<ChartPoint>,

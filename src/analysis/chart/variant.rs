@@ -1,4 +1,4 @@
-//! The mechanism of a chart at one model order, held and let go.
+//! The mechanism of a chart on one mesh, before and after release.
 
 use super::spec::{ChartError, Formulation};
 use crate::analysis::AnalysisError;
@@ -63,7 +63,7 @@ impl FormulationModels {
         Ok(Self { bodies, joints: formulations.iter().filter_map(compiled).collect() })
     }
 
-    /// The model in a formulation, or why there is none.
+    /// The model in a formulation, or the reason why it does not exist.
     pub(super) fn of(&self, formulation: Formulation) -> Result<&ChartVariant, &str> {
         match self.joints.iter().find(|(one, _)| *one == formulation) {
             Some((_, model)) => model.as_ref().map_err(String::as_str),
@@ -75,7 +75,7 @@ impl FormulationModels {
 /// The same netlist with one parameter at 0.
 ///
 /// # Errors
-/// `BadRequest` for a parameter that is none, or no number; those of [`compile`].
+/// `BadRequest` for an unknown or non-numeric parameter; errors of [`compile`].
 pub fn released(bundle: &Bundle, initial: &CompiledModel, name: &str) -> Result<CompiledModel, ChartError> {
     if !initial.parameters.iter().any(|(p, value)| p == name && matches!(value, Setting::Number(_))) {
         let known: Vec<&str> = initial.parameters.iter().map(|(p, _)| p.as_str()).collect();

@@ -24,7 +24,7 @@ pub(super) const MAX_ADDED: usize = 4000;
 const MAX_DOUBLED: i32 = 40;
 /// Nearer than this share of its frequency to an undamped resonance a value says nothing: rounding moves the resonance by as much.
 pub(super) const UNBOUNDED: f64 = 1e-9;
-/// A step that is shorter than this share of the others is none.
+/// Steps shorter than this fraction of the others are omitted.
 const WHOLE: f64 = 1e-6;
 /// Two frequencies nearer than this share are one.
 const FREQUENCY_TOLERANCE: f64 = 1e-12;

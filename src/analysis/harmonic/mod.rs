@@ -1,11 +1,12 @@
-//! Frequency response without a circuit: what a small sinusoid at one place does to all that is asked for, about the operating point.
+//! Frequency response without a circuit: the response of all requested signals to a small sinusoid at one input, about
+//! the operating point.
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `named` | what drives and what is seen, by name |
+//! | `named` | inputs and outputs by name |
 //! | `exact` | the response of the whole model at a complex frequency |
 //! | `modal` | the same as a sum over modes, with static correction |
-//! | `options` | what is asked for |
+//! | `options` | the request |
 //! | `root`, `roots` | poles and zeros |
 //! | [`grid`] | the frequencies |
 //!
@@ -42,7 +43,7 @@ const COMPARED: usize = 60;
 /// Share of the sum of its parts below which a value is a zero of the curve.
 const ZERO: f64 = 0.01;
 
-/// What a signal answers.
+/// Response of a signal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignalResponse {
     /// Its name.
@@ -60,7 +61,7 @@ pub struct SignalResponse {
 /// A frequency response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HarmonicResult {
-    /// What was driven.
+    /// The input.
     pub drive: String,
     /// Its unit.
     pub drive_unit: String,
@@ -80,7 +81,7 @@ pub struct HarmonicResult {
     pub unknowns: usize,
     /// Largest estimated relative error by the mesh, of a value or of the frequency at which it stands; none without an estimate.
     pub estimated_error: Option<f64>,
-    /// What the numbers do not say by themselves.
+    /// Warnings about the result.
     pub warnings: Vec<String>,
 }
 
@@ -189,7 +190,7 @@ pub fn harmonic(
     })
 }
 
-/// What the operating point does not say by itself.
+/// Warnings about the operating point.
 fn warnings(exact: &ExactResponse<'_>) -> Vec<String> {
     let mut warnings = Vec::new();
     let model = &exact.system().model;

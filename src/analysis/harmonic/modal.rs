@@ -3,8 +3,8 @@
 //! ```text
 //! q(s) = Σ_j φ_j·η_j + Σ_c f_c(s)·z_c,     (s² + s·D + Λ)·η = Σ_c f_c(s)·φᵀb_c,     z_c = K⁻¹b_c − Σ_j φ_j·(φ_jᵀb_c)/λ_j
 //! ```
-//! φ are the lowest undamped modes with φᵀMφ = 1, D = φᵀCφ, b_c the parts of the push of the drive and f_c(s) how each depends on s.
-//! z, the static correction, is what the modes that are left out yield at rest.
+//! φ are the lowest undamped modes with φᵀMφ = 1, D = φᵀCφ. b_c are the parts of the input vector, and f_c(s) their
+//! dependence on s. The static correction z is the static response of the omitted modes.
 //!
 //! Reference: R. R. Craig, A. J. Kurdila, "Fundamentals of Structural Dynamics" (2006), §11.4.
 
@@ -119,9 +119,9 @@ pub(crate) struct ModalSum {
     pub(super) laws: Vec<FrequencyDependence>,
     /// φᵀb, modes × parts.
     pub(super) push: DMatrix<f64>,
-    /// What rows see of a mode, rows × modes.
+    /// Output factors of the modes, rows × modes.
     pub(super) seen: DMatrix<f64>,
-    /// What rows see of the rest, rows × parts.
+    /// Output factors of the static correction, rows × parts.
     pub(super) rest: DMatrix<f64>,
     /// The same without what is rounding.
     added: DMatrix<f64>,
@@ -221,8 +221,9 @@ impl ModalSum {
         if self.rates[row] { s.norm() * level + self.conducted[row].abs() } else { level }
     }
 
-    /// What a row could see at most, were the mode that it sees best the one that is pushed most and nearest to its resonance: below a share
-    /// [`UNSEEN`] of that a value is rounding, as across the axis of a symmetric part.
+    /// Upper bound of a row: the product of its largest output factor and the largest input factor, at the nearest
+    /// resonance. Values below the fraction [`UNSEEN`] of it are rounding, for example across the axis of a symmetric
+    /// part.
     pub(crate) fn most(&self, s: Complex<f64>, row: usize) -> f64 {
         let nearest = (0..self.lambda.len())
             .map(|j| 1.0 / (s * s + s * self.damping[(j, j)] + self.lambda[j]).norm())
@@ -242,15 +243,15 @@ impl ModalSum {
         self.laws.iter().enumerate().map(part).sum()
     }
 
-    /// What it sees of the mode that it sees best, times the push of the mode that is pushed most.
+    /// Product of the largest output factor and the largest input factor.
     fn both(&self, s: Complex<f64>, row: usize) -> f64 {
         let modes = 0..self.lambda.len();
         let seen = modes.clone().map(|j| self.seen[(row, j)].abs()).fold(0.0, f64::max);
         seen * modes.map(|j| self.pushed(s, j)).fold(0.0, f64::max)
     }
 
-    /// What a mode brings to a row at rest, for the push at its own frequency: its peak is so high times its quality. Not a number for one that
-    /// there is not.
+    /// Static contribution of a mode to a row, for the input at the mode's own frequency. Its peak is this times its
+    /// quality factor. Not a number for one that there is not.
     pub(crate) fn share(&self, row: usize, mode: usize) -> Complex<f64> {
         let Some(lambda) = self.lambda.get(mode) else { return Complex::from(f64::NAN) };
         let s = Complex::new(0.0, lambda.max(0.0).sqrt());
@@ -265,7 +266,8 @@ impl ModalSum {
         self.both(Complex::new(0.0, lambda.max(0.0).sqrt()), row) / lambda
     }
 
-    /// What all but some modes of one frequency bring to a row at that frequency, added up, with the rest; in the unit of a share.
+    /// Contribution of all other modes and of the static correction to a row, at the frequency of the given modes; in
+    /// the unit of [`ModalSum::share`].
     pub(crate) fn beside(&self, row: usize, modes: &Range<usize>) -> f64 {
         let Some(&lambda) = self.lambda.get(modes.start) else { return 0.0 };
         let s = Complex::new(0.0, lambda.max(0.0).sqrt());

@@ -1,4 +1,4 @@
-//! What drives and what is seen, by name.
+//! Inputs and outputs by name.
 
 use crate::analysis::AnalysisError;
 use crate::compile::CompiledModel;
@@ -6,7 +6,7 @@ use crate::readout::ReadoutError;
 use crate::readout::ports::{OpenedPorts, PortResponse};
 use crate::readout::signal::Signal;
 
-/// What is seen.
+/// Output of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ResponseRow {
     /// A signal.

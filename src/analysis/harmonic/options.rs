@@ -1,4 +1,4 @@
-//! What is asked of a frequency response, and what of it cannot be computed.
+//! Request of a frequency response, and its errors.
 
 use super::grid::{self, Spacing};
 use crate::analysis::AnalysisError;
@@ -8,12 +8,12 @@ use crate::options::analysis::{AC_FROM, AC_MODES, AC_POINTS, AC_TO};
 /// Frequencies times signals at most: each value is a complex number in doubles.
 pub const MAX_VALUES: usize = 50_000_000;
 
-/// What is asked for.
+/// Request.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct HarmonicOptions {
-    /// What is driven: `NODE.fx`, `NODE.fy`, `NODE.m`, a port, `BEAM.T`, `frame.ax`, `frame.ay`, `frame.wz`.
+    /// Input: `NODE.fx`, `NODE.fy`, `NODE.m`, a port, `BEAM.T`, `frame.ax`, `frame.ay`, `frame.wz`.
     pub drive: String,
-    /// Signals wanted, `PORT.i` among them; none: what the driven place itself answers.
+    /// Output signals, `PORT.i` among them; empty: the output at the driven place itself.
     pub signals: Vec<String>,
     /// Lowest frequency [Hz].
     pub from: f64,

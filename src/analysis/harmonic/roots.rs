@@ -205,7 +205,8 @@ fn guesses(sum: &ModalSum, row: usize, to: f64) -> Vec<Complex<f64>> {
     eigenvalues(&a, &e).into_iter().map(|s| s * all).collect()
 }
 
-/// Finite eigenvalues of A − s·E, E perhaps singular: s = σ + 1/μ with μ those of (A − σE)⁻¹·E, for a σ that is none of them.
+/// Finite eigenvalues of A − s·E, with E possibly singular: s = σ + 1/μ, with μ those of (A − σE)⁻¹·E, for a σ that is
+/// not an eigenvalue.
 fn eigenvalues(a: &DMatrix<f64>, e: &DMatrix<f64>) -> Vec<Complex<f64>> {
     let size = a.nrows();
     for sigma in SHIFTS {

@@ -1,8 +1,8 @@
-//! What a run in joint coordinates has to say beside its signals.
+//! Report of a run in joint coordinates beside its signals.
 
 use serde::Serialize;
 
-/// What a run in joint coordinates has to say beside its signals.
+/// Report of a run in joint coordinates beside its signals.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct JointReport {
     /// Generalized coordinates n of the tree.

@@ -1,4 +1,4 @@
-//! What a mechanism loses whose joints only turn: axial directions that the beams give way in.
+//! Effect of joints that only rotate: the lost axial compliance of beams.
 
 use super::super::formulation::Formulation;
 use super::super::statics::{OperatingPoint, operating_point};

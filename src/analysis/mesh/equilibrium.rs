@@ -2,9 +2,10 @@
 //!
 //! Next to where the equilibrium ends the stiffness that is left is compared, too ([`super::softening`]).
 //!
-//! The error of a displacement is relative to the displacement of its node, or to a thirtieth of the largest of the mechanism where a node
-//! hardly moves; that of a rotation likewise, and no smaller than what turns the size of the mechanism by a thirtieth of the largest
-//! displacement. The finer mesh starts from the state of the coarser one, so that both are on one branch.
+//! The error of a displacement is relative to the displacement of its node, or to a thirtieth of the largest of the
+//! mechanism if that is more. The scale of a rotation is analogous; its minimum is the rotation that moves the extent
+//! of the mechanism by a thirtieth of the largest displacement. The finer mesh starts from the state of the coarser
+//! one, so that both are on one branch.
 
 pub(super) use super::super::chart::error::SMALL;
 use super::super::gap_shape;
@@ -213,8 +214,8 @@ impl<'a> EquilibriumSearch<'a> {
         of(&order.segments).zip(twice).is_none_or(|(here, twice)| softening::agree(here, twice))
     }
 
-    /// The mesh that came out, with its equilibrium, and a mesh on which that has buckled. Where nothing says on which side of its limit that is,
-    /// nothing tells its error.
+    /// The resulting mesh with its equilibrium, and a mesh on which that has buckled. Where the side of the limit is
+    /// unknown, there is no error estimate.
     fn ended(mut self, mut order: Mesh) -> Result<(Mesh, OperatingPoint, Option<Vec<usize>>), AnalysisError> {
         let mut found = self.points.iter().position(|looked| looked.segments == order.segments);
         if found.is_none() {
@@ -242,7 +243,7 @@ impl<'a> EquilibriumSearch<'a> {
     }
 }
 
-/// What is compared.
+/// Compared outputs.
 fn outputs(model: &CompiledModel, point: &OperatingPoint) -> Vec<Output> {
     let system = &model.parts.system;
     let q = &point.q;
@@ -295,8 +296,8 @@ pub fn static_fitted(
     Ok((fitted, result, curves))
 }
 
-/// What an equilibrium of a circuit is warned of, each with its size: an error that grows [1], or 1. Beside what [`static_warnings`] warns of,
-/// the mesh along its gaps, which was chosen without any voltage.
+/// Warnings about an equilibrium of a circuit, each with its size: an error that grows [1], or 1. Beside what
+/// [`static_warnings`] warns of, the mesh along its gaps, which was chosen without any voltage.
 pub(crate) fn operating_point_warnings(fitted: &CompiledModel, point: &OperatingPoint) -> Vec<(Diagnostic, f64)> {
     let share = stress_left_out(fitted, point);
     let worst = gap_shape::left_out(fitted, point);
@@ -306,18 +307,19 @@ pub(crate) fn operating_point_warnings(fitted: &CompiledModel, point: &Operating
     stress.into_iter().chain(segments).chain(others).collect()
 }
 
-/// What a state in motion is warned of that an equilibrium is, too, where it is seen at once.
+/// Warnings about a state in motion that can be evaluated at once, as for an equilibrium.
 pub(crate) fn transient_warnings(fitted: &CompiledModel, point: &OperatingPoint) -> Vec<Diagnostic> {
     of_fingers(fitted, point).into_iter().chain(of_heat(fitted, point)).collect()
 }
 
-/// What an equilibrium is warned of beside its mesh: what a linear model leaves out, and combs and temperatures beyond their range.
+/// Warnings about an equilibrium beside its mesh: stress stiffening omitted by a linear model, and combs and
+/// temperatures beyond their range.
 pub(super) fn static_warnings(fitted: &CompiledModel, point: &OperatingPoint) -> Vec<Diagnostic> {
     let stress = of_stress(fitted, stress_left_out(fitted, point));
     stress.into_iter().chain(transient_warnings(fitted, point)).chain(near_buckling(point)).collect()
 }
 
-/// What a linear model leaves out of the deflection [1].
+/// Fraction of the deflection that a linear model omits [1].
 fn stress_left_out(fitted: &CompiledModel, point: &OperatingPoint) -> Option<f64> {
     if fitted.options.linear { left_out(fitted, point, &point.q) } else { None }
 }

@@ -1,15 +1,16 @@
 //! The mesh for a transient: the modes that it excites, each as exactly as the length of the run asks for.
 //!
-//! A run starts away from the equilibrium that it goes to by d = K⁻¹·r, r the forces out of balance at its start: those of the load that
-//! was let go, or of a step of the voltages.
-//! The part of d along mode i swings with the amplitude A_i (of the largest displacement, or of what a signal that is asked for swings, where that
-//! is more), and the error δ_i of its frequency
-//! turns its phase by ω_i·δ_i·T by the end of the run, or within the time 2/γ in which it dies out with the damping γ = xᵀCx:
+//! A run starts at the distance d = K⁻¹·r from its equilibrium, with r the unbalanced forces at its start: those of a
+//! released load, or of a step of the voltages. The part of d along mode i oscillates with the amplitude A_i, relative
+//! to the largest displacement or to the amplitude of a requested signal, whichever gives more. The error δ_i of its
+//! frequency shifts its phase by ω_i·δ_i·T by the end of the run. With the damping γ = xᵀCx, the time is at most 2/γ,
+//! in which the mode decays:
 //! ```text
 //! rms error of the run over its amplitude ≈ A_i·δ_i·ω_i·min(T, 2/γ)/√3
 //! ```
-//! Each mode is asked to keep that below the tolerance. Modes are looked at until what is left of d is negligible. What heat
-//! drives comes with its time constant τ: of it a mode swings with 1/√(1 + (ωτ)²), the rest follows slowly.
+//! Each mode is asked to keep that below the tolerance. Modes are looked at until what is left of d is negligible. A
+//! heater acts with its time constant τ: a mode oscillates with 1/√(1 + (ωτ)²) of its effect, and the rest follows
+//! slowly.
 
 use super::super::loose_parts;
 use super::super::modes::modes;
@@ -40,10 +41,10 @@ const FIRST_MODES: usize = 6;
 const MAX_MODES: usize = 48;
 /// Share of the tolerance below which an amplitude is negligible.
 const NEGLIGIBLE: f64 = 0.3;
-/// Share that each mode may be off by of what is in none of them, and of what the lack of rotary inertia makes where that is much: no
-/// mesh mends these.
+/// Fraction of the mesh-independent error that each mode may add: the residual outside the modes, and missing rotary
+/// inertia where that is large.
 const UNRESOLVED_SHARE: f64 = 0.3;
-/// What a waveform is off by that is another one.
+/// Error assigned to a waveform unrelated to the reference.
 const UNRELATED_ERROR: f64 = 0.3;
 /// Smallest error that is asked of a frequency.
 const MIN_FREQUENCY_ERROR: f64 = 1e-8;
@@ -53,11 +54,11 @@ struct ExcitedMode {
     frequency: f64,
     amplitude: f64,
     decay: f64,
-    /// By how much its frequency is too high for want of rotary inertia [1].
+    /// Relative excess of its frequency without rotary inertia [1].
     rotary: f64,
 }
 
-/// The mesh for a run, with the estimate of what the modes are off by; and how far what is in none of them may be off at most.
+/// The mesh for a run with its estimated modal error, and an upper bound of the error of the motion outside the modes.
 pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> Result<(Mesh, f64), AnalysisError> {
     if moving.structure.beams.is_empty() {
         return Ok((Mesh { estimated_error: Some(0.0), ..moving.order.clone() }, 0.0));
@@ -98,7 +99,7 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
             count = (2 * count).min(MAX_MODES);
             continue;
         }
-        // what is in none of the modes may be off by all that it swings
+        // the motion outside the modes may have an error of its whole amplitude
         let left = if left > NEGLIGIBLE * tol { 2f64.sqrt() * left } else { 0.0 };
         // no mesh holds the tolerance where these do not
         let beside = left.max(turned(&modes, options.stop));
@@ -114,7 +115,8 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
             let estimated_error = mesh_estimate(&moving.options, &still.segments, &swings, &mut analyse);
             return Ok((merged(&still, &Mesh { estimated_error, ..still.clone() }), left));
         }
-        // the estimates of frequencies have been found too small: a part of the tolerance is theirs, and what is told is the estimate
+        // measured frequency errors exceeded their estimates: the modes get a part of the tolerance, and the estimate
+        // is reported
         let sharper = tolerances.iter().map(|t| (lowest_modes::SAFETY * t).max(MIN_FREQUENCY_ERROR)).collect();
         let aim = MeshTarget { band: 1.01 * modes[highest].frequency, tolerances: sharper, rigid: false };
         let order = mesh_search::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
@@ -128,18 +130,18 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
     }
 }
 
-/// What a run on its mesh is warned of beside it: equal steps that its motion outruns, and rotary inertia left out.
+/// Warnings about a run on its mesh: equal steps longer than its motion allows, and missing rotary inertia.
 pub(super) fn motion_warnings(moving: &CompiledModel, options: &TransientOptions<'_>) -> Vec<Diagnostic> {
     let Ok((modes, _)) = excited(moving, options, &moving.order.segments, FIRST_MODES) else { return Vec::new() };
     let missed = options.step.and_then(|step| Some(of_steps(step, outrun(moving, step, &modes)?)));
     missed.into_iter().chain(of_rotary(moving, phase_error(&modes, options.stop))).collect()
 }
 
-/// By how much of its amplitude a run is off for want of rotary inertia.
+/// Error of a run without rotary inertia, relative to its amplitude.
 fn phase_error(modes: &[ExcitedMode], stop: f64) -> f64 {
     let late = |mode: &ExcitedMode| {
         let lasts = stop.min(2.0 / mode.decay.max(f64::MIN_POSITIVE));
-        // a wave that has lost its phase is off by what it swings
+        // a wave of unknown phase has an error of its amplitude
         mode.amplitude * (mode.rotary * TAU * mode.frequency * lasts / 3f64.sqrt()).min(2f64.sqrt())
     };
     modes.iter().map(late).fold(0.0, f64::max)

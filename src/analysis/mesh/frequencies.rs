@@ -15,10 +15,11 @@ use crate::refine::mesh_search::Mesh;
 /// Modes beyond which none are compared with those of a finer mesh: their own estimates stand.
 const MAX_COMPARED: usize = 64;
 
-/// Tolerance below which the estimate of modes with calibrated junctions is compared with twice the segments: what it does not know, the mass of
-/// half a segment on the wrong side of a junction's spring, falls with the first power of the segments and was found up to 1e-5.
+/// Tolerance below which the mode estimate with calibrated junctions is compared with twice the segments. The estimate
+/// excludes one effect: half a segment's mass lies on the wrong side of a junction's spring. This error is inversely
+/// proportional to the number of segments, and was measured up to 1e-5.
 const FINEST_KNOWN: f64 = 3e-5;
-/// What is left of an error of the first order over what the comparison, which takes it for one of the second, says.
+/// Remaining error of the first order over the estimate of the comparison, which assumes the second order.
 const FIRST_ORDER: f64 = 1.5;
 
 /// The modes on the mesh for them, which comes with it, each with the estimate of its own error, and the displacement of points along every beam.
@@ -196,7 +197,7 @@ pub(super) fn worst(mut errors: impl Iterator<Item = Option<f64>>) -> Option<f64
     errors.try_fold(0.0, |worst: f64, error| Some(worst.max(error?.abs())))
 }
 
-/// What is compared of modes.
+/// Compared outputs of modes.
 pub(super) fn frequency_outputs(found: &ModesResult, count: usize) -> Vec<Output> {
     let highest = found.frequencies_hz.last().copied().unwrap_or(0.0);
     // rigid motions have no frequency of their own

@@ -1,8 +1,8 @@
 //! Buckling that a mesh hides: a straight part that is stable on this mesh and has buckled on a finer one.
 //!
-//! A mesh of cubic segments bears too much: a column clamped at both ends by 49 % in one segment and by 2.6 % in two, one with a guided end by 1.3 % and
-//! 0.8 %. Displacements say nothing, since those of the straight part agree on all meshes. What says it is the stiffness that is left beside
-//! that of the same geometry without stress,
+//! A mesh of cubic segments bears too much: a column clamped at both ends by 49 % in one segment and by 2.6 % in two,
+//! one with a guided end by 1.3 % and 0.8 %. Displacements say nothing, since those of the straight part agree on all
+//! meshes. The indicator is the remaining stiffness relative to that of the same geometry without stress,
 //! ```text
 //! μ = min over x of xᵀ·K·x / xᵀ·K₀·x,      μ < c exactly where K − c·K₀ has a negative pivot (Sylvester),
 //! ```
@@ -25,7 +25,7 @@ const NEAR: f64 = 0.02;
 /// Iterations for the softest motion, whose μ is at least 15 times below that of others where it is asked for.
 const ROUNDS: usize = 6;
 
-/// What finer meshes say of an equilibrium.
+/// Stability of an equilibrium on finer meshes.
 #[derive(Debug, Clone)]
 pub(super) enum Hidden {
     /// It is stable there, too.

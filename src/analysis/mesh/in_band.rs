@@ -1,19 +1,19 @@
 //! The mesh for a frequency response: it is compared with that of twice the segments at frequencies over the band, and so are the
 //! frequencies of the modes within it.
 //!
-//! What is off by e is either a value or the frequency at which it stands. Next to a sharp resonance a small error of its frequency
-//! changes the value there at once, and next to a zero of the curve the value itself is nothing; so the error of a value H is taken
-//! relative to
+//! An error e affects either a value or the frequency at which it occurs. Next to a sharp resonance a small error of
+//! its frequency changes the value there strongly, and next to a zero of the curve the value itself vanishes. The error
+//! of a value H is therefore relative to
 //! ```text
 //! |H| + |dH/d ln f|
 //! ```
-//! which is e for a curve that is e too high, and e too for one that is shifted by the share e. Frequencies next to a resonance of the
-//! first mesh are left out: what is there is known from the frequency of the mode, and from what it brings to the signal, which is compared
-//! as well, relative to itself where its peak stands above what the others bring there: a mode next to a zero is a peak and a zero of its own only
-//! where the two are told apart. Modes within a hundredth of one another
-//! are taken together, as they may be mixed in any way.
+//! which is e for a curve that is e too high, and e too for one that is shifted by the share e. Frequencies next to a
+//! resonance of the first mesh are omitted. The frequency of the mode and its contribution to the signal determine the
+//! values there. The contribution is compared as well, relative to itself where its peak exceeds the contributions of
+//! the other modes. A mode next to a zero has a peak and a zero of its own only where the two are distinct. Modes
+//! within a hundredth of one another are taken together, as they may be mixed in any way.
 //!
-//! The responses that are compared are sums over the modes to twice the band with static correction: what such a sum leaves out is the
+//! The compared responses are sums over the modes to twice the band with static correction: the truncation error is the
 //! same on both meshes. With too many modes in the band they are exact, and no modes are compared.
 
 use super::super::harmonic::exact::ExactResponse;
@@ -203,7 +203,7 @@ impl ComparisonGrid {
         Ok(outputs)
     }
 
-    /// What the modes within the band bring to a row, those that are alike together.
+    /// Contributions of the modes within the band to a row, with equal modes combined.
     fn shares(&self, sum: &ModalSum, row: usize, rounding: f64) -> Vec<Output> {
         let groups = self.groups.get().map_or(&[][..], Vec::as_slice);
         let shares: Vec<Complex<f64>> =

@@ -26,10 +26,11 @@ const FOLLOWED: usize = 12;
 /// Modes that the mesh holds.
 const HELD: usize = 3;
 
-/// The model for a circuit, on a mesh that holds the tolerance for the equilibrium under the loads of the drawing, without any voltage, and for
-/// the three lowest modes about it; no coarser anywhere than it was. Where segments or a band are given the mesh stays; where that mesh would be too
-/// fine it is one that holds ten, a hundred or a thousand times the tolerance. A warning says where one of the two may be off by more than the
-/// tolerance. What voltages do is not known here.
+/// The model for a circuit, on a mesh that holds the tolerance for the equilibrium under the loads of the drawing,
+/// without any voltage, and for the three lowest modes about it; no coarser anywhere than it was. Where segments or a
+/// band are given the mesh stays; where that mesh would be too fine it is one that holds ten, a hundred or a thousand
+/// times the tolerance. A warning reports an error of one of the two beyond the tolerance. Effects of voltages are
+/// unknown here.
 pub fn in_circuit(compiled: &CompiledModel) -> CompiledModel {
     let turning = with_section_inertia(compiled);
     let compiled = turning.as_deref().unwrap_or(compiled);
@@ -54,14 +55,14 @@ pub fn in_circuit(compiled: &CompiledModel) -> CompiledModel {
     match (sought, compared) {
         (Some(error), _) => warned(fitted, "the equilibrium without voltages or one of the lowest modes", Some(error)),
         (None, Some(Some((what, error)))) => warned(fitted, what, Some(error)),
-        // there is neither: whoever asks for one is told why
+        // neither exists: the analysis itself will report the error
         (None, Some(None)) => fitted,
         // nothing that is fine enough to be compared with may be laid out
         (None, None) => warned(fitted, "the equilibrium and the lowest modes", None),
     }
 }
 
-/// With a warning of what may be off by more than the tolerance, or by nobody knows how much.
+/// Adds a warning if the estimated error exceeds `tol` or is unknown.
 fn warned(mut fitted: CompiledModel, what: &str, error: Option<f64>) -> CompiledModel {
     let help = "give the model `segments` or a `band`; `bimorph cosim --check` compares whole runs";
     let reported = beyond(fitted.options.tol, error);
@@ -72,7 +73,7 @@ fn warned(mut fitted: CompiledModel, what: &str, error: Option<f64>) -> Compiled
     fitted
 }
 
-/// The model on twice the segments of every beam, for steps by another tolerance: what a run is compared with.
+/// The model on twice the segments of every beam, for steps with another tolerance: the reference of a run.
 ///
 /// # Errors
 /// [`AnalysisError::NotConverged`] where there is no such mesh.
@@ -109,7 +110,7 @@ fn sought(compiled: &CompiledModel) -> Option<CompiledModel> {
 
 /// Which of the two is further off on this mesh, and by how much; none where neither is known.
 fn worse(compiled: &CompiledModel) -> Option<(&'static str, f64)> {
-    // an equilibrium whose error nothing tells may be off by anything
+    // an equilibrium without an estimate has an unknown error
     let still = equilibrium::assess(compiled, &[]).ok().map(|(_, error)| error.unwrap_or(f64::INFINITY));
     [("the equilibrium without voltages", still), ("the lowest mode", compiled.lowest.map(|lowest| lowest.error))]
         .into_iter()

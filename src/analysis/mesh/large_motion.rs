@@ -1,17 +1,18 @@
-//! The mesh for a transient that swings far: where stiffness changes on the way, the states at its ends and the modes about them do not tell
-//! what becomes of it in between.
+//! The mesh for a transient with large motion. Where stiffness changes during the motion, the initial and final states
+//! and the modes about them do not determine the error in between.
 //!
-//! A beam that a step of load throws to twice its rest is stiffer there than anywhere it rests, and one that heat carries through buckling is
-//! softer. So such a run is made on its mesh and on one of half the segments (where they are no even numbers, on one of twice as many), at ten
-//! times the tolerance of the steps, and the difference of the two is measured signal by signal ([`largest_error`]). By
-//! Richardson's rule it is the error of the finer one where the order of convergence is 1, as it is taken to be until it is measured, and three
-//! times that where it is 2. Where it is beyond the tolerance segments are doubled, until the tolerance holds. A coarser mesh on the way that should hold it as well is run and
-//! compared; if it does, it is taken. What is told of a mesh is always of one that was run.
+//! A beam that a step of load throws to twice its rest is stiffer there than anywhere it rests, and one that heat
+//! carries through buckling is softer. Such a run is made on its mesh and on one of half the segments (with odd
+//! numbers, on one of twice as many), at ten times the tolerance of the steps. The difference of the two is measured
+//! signal by signal ([`largest_error`]). By Richardson's rule it is the error of the finer one where the order of
+//! convergence is 1, as it is taken to be until it is measured, and three times that where it is 2. Where it is beyond
+//! the tolerance segments are doubled, until the tolerance holds. A coarser mesh on the way that should hold it as well
+//! is run and compared; if it does, it is taken. The reported error always belongs to a mesh that was actually run.
 //!
 //! A run to a state in which parts touch is compared up to its first contact: impacts on two meshes have nothing else in common than their means.
 //!
-//! Where stiffness stays, but more of the run than the tolerance is in none of the modes that its mesh was laid out for, a bound would be all
-//! that could be told: that run is made twice, too, and what the two differ by is told instead.
+//! If stiffness stays constant, but the motion outside the modes of the mesh exceeds the tolerance, only a bound could
+//! be reported. Such a run is made twice, too, and the difference of the two is reported instead.
 
 use super::super::AnalysisError;
 use super::super::chart::error::largest_error;
@@ -27,7 +28,8 @@ use crate::readout::signal::Signal;
 use crate::refine::doubling;
 use crate::refine::mesh_search::Mesh;
 
-/// Share of the way by which what a run would do with the stiffness of its end may differ from what it does, for its modes to tell its mesh.
+/// Largest difference between the run and its linear prediction with the final stiffness, as a fraction of the travel,
+/// for which its modes determine the mesh.
 const STRAIGHT: f64 = 0.03;
 /// How much looser than the run its steps are here.
 const STEP_TOLERANCE_RATIO: f64 = 10.0;
@@ -48,11 +50,12 @@ const MAX_SEGMENTS: usize = 4000;
 /// Share of the tolerance that the estimate may use, and of that what a mesh that was not run is laid out for.
 const SAFETY: f64 = 0.6;
 const AIM: f64 = 0.7;
-/// The order of convergence as long as it is not measured, and the highest that is believed: what stretches has 2, but among coarse meshes, and
-/// where the run is near buckling, it is less, or seems to be more.
+/// The order of convergence until it is measured, and the highest accepted one. Stretching has 2; among coarse meshes
+/// and near buckling the measured order is lower, or seems higher.
 const ORDERS: (f64, f64) = (1.0, 2.0);
 
-/// The mesh for a run, from that for its ends and modes; what is in none of the modes may be off by `left` of the amplitude.
+/// The mesh for a run, from that for its initial and final states and modes; the error of the motion outside the modes
+/// is at most `left` of the amplitude.
 pub(super) fn order(
     moving: &CompiledModel,
     options: &TransientOptions<'_>,
@@ -73,7 +76,7 @@ pub(super) fn order(
     if !closes && !bends(moving, options, &order)? {
         let found = (left > moving.options.tol).then(|| compared(moving, options, &order.segments)).flatten();
         return Ok(match found {
-            // both runs have what the modes are off by, too
+            // both runs include the error of the modes, too
             Some(error) if error <= goal => Mesh { estimated_error: Some(error), ..order },
             error => at_least(error.map_or(left, |error| error.min(left))),
         });
@@ -85,7 +88,7 @@ pub(super) fn order(
     };
     let first =
         pair(moving, &order.segments).and_then(|(from, to)| Some((sample_run(moving, options, &from)?, from, to)));
-    // what fails says so when it is run; nothing tells of what is not compared
+    // a failure is reported when the run is made; a result without a comparison has no estimate
     let Some((mut coarse, mut from, mut segments)) = first else { return Ok(on(&order.segments, None)) };
     let (mut before, mut convergence) = (None, ORDERS.0);
     let mut last = on(&order.segments, None);
@@ -130,8 +133,7 @@ pub(super) fn ends_in_contact(moving: &CompiledModel, options: &TransientOptions
     asked && system.can_touch() && operating_point(moving, &options.voltages).is_ok_and(touches)
 }
 
-/// A mesh, and the one beside it that tells what a run on it is off by: half its segments; of an odd number there is no half, then twice as
-/// many. The coarser first.
+/// A mesh, and the one compared with it: half its segments, or twice as many for odd numbers. The coarser first.
 fn pair(moving: &CompiledModel, segments: &[usize]) -> Option<(Vec<usize>, Vec<usize>)> {
     if segments.iter().all(|n| n % 2 == 0) {
         Some((segments.iter().map(|n| n / 2).collect(), segments.to_vec()))
@@ -140,7 +142,7 @@ fn pair(moving: &CompiledModel, segments: &[usize]) -> Option<(Vec<usize>, Vec<u
     }
 }
 
-/// What the run on this mesh is off by, of the amplitude; none where the runs fail.
+/// Estimated error of the run on this mesh, relative to the amplitude; `None` where the runs fail.
 fn compared(moving: &CompiledModel, options: &TransientOptions<'_>, segments: &[usize]) -> Option<f64> {
     let (from, to) = pair(moving, segments)?;
     let difference = apart(moving, options, &sample_run(moving, options, &from)?, &sample_run(moving, options, &to)?)?;
@@ -160,7 +162,7 @@ fn twice(moving: &CompiledModel, segments: &[usize]) -> Option<Vec<usize>> {
     doubling::twice(&moving.options, &order).map(|order| order.segments)
 }
 
-/// Whether stiffness changes on the way: what the run would do with the stiffness of its end is not what it does.
+/// Whether stiffness changes during the motion: the run differs from its linear prediction with the final stiffness.
 fn bends(moving: &CompiledModel, options: &TransientOptions<'_>, order: &Mesh) -> Result<bool, AnalysisError> {
     let model = meshed(moving, &order.segments)?;
     let rest = OperatingPoint::rest(&model, &options.voltages)?;

@@ -1,7 +1,7 @@
-//! The mesh for a request: every front asks here before it runs an analysis, so that the same request has the same mesh, and
-//! the same numbers, everywhere.
+//! Mesh search for a request. Every front end calls it before an analysis, so that the same request has the same mesh,
+//! and the same numbers, everywhere.
 //!
-//! | request | what decides | file |
+//! | request | criterion | file |
 //! |---|---|---|
 //! | static | the deformed state, compared with that of twice the segments | `equilibrium` |
 //! | modes | the highest mode asked for; about a loaded state, that state and its frequencies too | `frequencies` |
@@ -13,8 +13,9 @@
 //! | transient whose stiffness changes on the way, or with a part in none of the modes | the run itself, compared with that of half the segments | `large_motion` |
 //! | transient that closes a gap | the run up to its first contact, compared with that of half the segments | `large_motion` |
 //!
-//! Who gives a number of segments gets them, and the estimate of their error. Who gives a band gets the mesh for that band at
-//! least. The estimate is in [`CompiledModel::order`]; where it is missing or beyond the tolerance, a warning is added.
+//! A given number of segments is used as it is, with the estimate of its error. A given band requires at least the mesh
+//! for that band. The estimate is in [`CompiledModel::order`]; where it is missing or beyond the tolerance, a warning
+//! is added.
 
 mod doubled_mesh;
 mod equilibrium;
@@ -63,7 +64,7 @@ pub use permanent_strain::static_backbent;
 pub(crate) use warnings::WARNING;
 pub use warnings::{beyond, warnings};
 
-/// What a mesh is for.
+/// Request for a mesh.
 #[derive(Debug, Clone, Copy)]
 pub enum MeshRequest<'a> {
     /// The static equilibrium at these voltages.
@@ -90,7 +91,7 @@ pub enum MeshRequest<'a> {
 /// The model on the mesh for a request.
 ///
 /// # Errors
-/// What the analysis itself has against the model: see [`AnalysisError`].
+/// Errors of the analysis itself: see [`AnalysisError`].
 pub fn fitted(compiled: &CompiledModel, request: &MeshRequest<'_>) -> Result<CompiledModel, AnalysisError> {
     on(compiled, order(compiled, request)?)
 }
@@ -115,7 +116,7 @@ pub fn fitted_in_time(
     moving: &CompiledModel,
     options: &TransientOptions<'_>,
 ) -> Result<(CompiledModel, Option<CompiledModel>), AnalysisError> {
-    // a name that is none is told before a mesh is sought; points along beams depend on the mesh
+    // reject unknown signal names before the mesh search; points along beams depend on the mesh
     for name in options.signals.iter().filter(|name| !name.contains('[')) {
         Signal::find(moving, name)?;
     }
@@ -130,8 +131,8 @@ pub fn fitted_in_time(
     Ok((moving, start))
 }
 
-/// What a run leaves out: the stiffness of stress in a linear model, and combs and temperatures beyond their range, as far as that is
-/// seen where the run goes to.
+/// Warnings about a run: stress stiffening omitted by a linear model, and combs and temperatures beyond their range,
+/// evaluated at the final state.
 pub(crate) fn run_warnings(
     moving: &CompiledModel,
     start: Option<&CompiledModel>,
@@ -146,7 +147,7 @@ pub(crate) fn run_warnings(
     reported.chain(there.and_then(|end| of_heat(moving, end))).collect()
 }
 
-/// What stress would change in the way that a linear run goes: from its first state to where it would rest.
+/// Effect of stress on a linear run, from its first state to its final equilibrium.
 fn left_out_in_time(moving: &CompiledModel, start: Option<&CompiledModel>, voltages: &PortVoltages) -> Option<f64> {
     let end = operating_point(moving, voltages).ok()?;
     let begin = match start {

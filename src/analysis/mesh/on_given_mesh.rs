@@ -20,7 +20,7 @@ use crate::netlist::Diagnostic;
 use crate::refine::doubling::{self, Output};
 use crate::refine::lowest_modes;
 
-/// What an analysis found.
+/// Result of an analysis.
 #[derive(Debug, Clone)]
 pub(crate) enum AnalysisResult {
     /// Of [`MeshRequest::Static`].
@@ -38,7 +38,7 @@ pub(crate) struct Assessment {
     pub(crate) answer: AnalysisResult,
     /// Largest estimated relative error by the mesh [1]; none without an estimate.
     pub(crate) estimated_error: Option<f64>,
-    /// What else is to be warned of, each with its code.
+    /// Further warnings, each with its code.
     pub(crate) warnings: Vec<String>,
     /// A search for this variant's own mesh would have stopped here.
     pub(crate) holds: bool,
@@ -47,7 +47,7 @@ pub(crate) struct Assessment {
 /// The result of a request on the mesh of `compiled`.
 ///
 /// # Errors
-/// What the analysis has against the model.
+/// Errors of the analysis.
 pub(crate) fn assess(compiled: &CompiledModel, request: &MeshRequest<'_>) -> Result<Assessment, AnalysisError> {
     match *request {
         MeshRequest::Static { voltages } => assess_static(compiled, voltages),
@@ -59,7 +59,7 @@ pub(crate) fn assess(compiled: &CompiledModel, request: &MeshRequest<'_>) -> Res
 /// The result of a request on a mesh of its own.
 ///
 /// # Errors
-/// What the analysis has against the model.
+/// Errors of the analysis.
 pub(crate) fn refine_and_assess(
     compiled: &CompiledModel,
     request: &MeshRequest<'_>,
@@ -105,7 +105,7 @@ fn assess_static(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<As
 /// The result where the equilibrium on the mesh of `compiled` is known, and that of twice the segments.
 ///
 /// # Errors
-/// What the analysis has against the model.
+/// Errors of the analysis.
 pub(crate) fn assess_found_static(
     compiled: &CompiledModel,
     voltages: &PortVoltages,
@@ -131,7 +131,7 @@ fn assess_modes(compiled: &CompiledModel, count: usize, voltages: &PortVoltages)
 /// The same where the modes on the mesh of `compiled` are known.
 ///
 /// # Errors
-/// What the analysis has against the model.
+/// Errors of the analysis.
 pub(crate) fn assess_found_modes(
     compiled: &CompiledModel,
     found: ModesResult,

@@ -1,7 +1,7 @@
 //! The mesh for an equilibrium path: its folds, bifurcations and end are compared with those of twice the segments.
 //!
-//! A branch and its mirror image are one as far as a mesh is concerned: where the finer mesh comes out on the other one, it is traced
-//! once more the other way.
+//! A branch and its mirror image count as one: where the finer mesh follows the other one, it is traced once more in
+//! the opposite direction.
 
 use super::super::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, PathInput, trace};
 use super::super::linear_stress::left_out;
@@ -57,7 +57,7 @@ fn path_from(
     let of_mesh = search.known.into_iter().find(|(known, _)| *known == order.segments);
     let lost = || AnalysisError::NotConverged { detail: "no mesh has a path".into() };
     let (_, result) = of_mesh.ok_or_else(lost)?;
-    // where it ends for want of points, or elsewhere on twice the segments, its end is not compared
+    // a path that ends by its limit of points, or elsewhere on twice the segments, is not compared at its end
     let compared = ENDS.contains(&result.end);
     let order = Mesh { estimated_error: order.estimated_error.filter(|e| compared && e.is_finite()), ..order };
     let mut fitted = on(compiled, order)?;
@@ -116,7 +116,7 @@ impl PathSearch<'_, '_> {
         found
     }
 
-    /// What is compared.
+    /// Compared outputs.
     fn outputs(&self, found: &ContinuationResult) -> Vec<Output> {
         let way = self.request.from.abs().max(self.request.to.abs());
         let output =
@@ -146,7 +146,7 @@ impl PathSearch<'_, '_> {
                 None => none,
             }));
         };
-        // who asks for a path to 1 mN wants the bifurcation at 1 µN, too
+        // a path to 1 mN must resolve a bifurcation at 1 µN, too
         let critical = || found.folds.iter().chain(&found.bifurcations);
         let least = CROSSING[0] * critical().map(|c| c.value.abs()).fold(CROSSING[1] / CROSSING[0] * way, f64::max);
         for list in [&found.folds, &found.bifurcations] {
@@ -172,7 +172,7 @@ fn apart(first: &[Output], other: &[Output]) -> f64 {
     first.iter().zip(other).map(one).fold(0.0, f64::max)
 }
 
-/// What stress would change at the end of the path of a linear model.
+/// Effect of stress at the end of the path of a linear model.
 fn left_out_at_end(fitted: &CompiledModel, request: &ContinuationRequest<'_>) -> Option<f64> {
     let mut volts: Vec<(String, f64)> = request.voltages.clone();
     let share = |model: &CompiledModel, volts: &PortVoltages| {

@@ -57,7 +57,8 @@ fn backbent_fitted(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<
     }
 }
 
-/// What is compared: strains, to themselves, or to a share of the largest one or of what the arm bears.
+/// Compared outputs: strains, relative to themselves, to a fraction of the largest one, or to the yield strain of the
+/// arm.
 fn outputs(found: &BackbentMechanism) -> Vec<Output> {
     let largest = found.strains.iter().fold(0.0, |m: f64, (_, strain)| m.max(strain.abs()));
     let one = |((_, strain), bearable): (&(String, f64), &f64)| Output {

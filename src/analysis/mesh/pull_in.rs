@@ -15,7 +15,7 @@ use crate::refine::mesh_search::Mesh;
 /// Share of the pull-in voltage that stands for the fold itself, next to which nothing has an equilibrium for sure.
 const NEXT: f64 = 0.98;
 
-/// What is compared of pull-in.
+/// Compared outputs of pull-in.
 pub(super) fn pull_in_outputs(found: &PullInResult) -> Vec<Output> {
     let output = |volts: f64| Output { value: volts, scale: volts.abs().max(f64::MIN_POSITIVE) };
     vec![output(found.pull_in_v), found.release_v.map_or(Output { value: f64::NAN, scale: 1.0 }, output)]
@@ -42,7 +42,7 @@ pub fn pull_in_fitted(
     Ok((fitted, result))
 }
 
-/// What a pull-in is warned of beside its mesh: what a linear model leaves out at its voltage.
+/// Warnings about a pull-in beside its mesh: stress stiffening omitted by a linear model at its voltage.
 pub(super) fn pull_in_warnings(fitted: &CompiledModel, result: &PullInResult) -> Vec<Diagnostic> {
     let before = || operating_point(fitted, &[(result.port.clone(), NEXT * result.pull_in_v)]).ok();
     let point = if fitted.options.linear { before() } else { None };

@@ -1,7 +1,8 @@
-//! What the signals of a run see of small motions about a state.
+//! Amplitudes of a run's signals for small motions about a state.
 //!
-//! A part that hardly moves beside another is all that a signal on it shows. So each signal is measured by its own swing, or by
-//! [`SMALL`] of the largest of its unit where that is more: what swings less than that beside another is a small part of a picture.
+//! A part that hardly moves beside another is all that a signal on it shows. The scale of each signal is therefore its
+//! own amplitude, or [`SMALL`] of the largest of its unit where that is more: smaller motions are a small part of a
+//! picture.
 
 use super::super::chart::error::SMALL;
 use super::super::statics::OperatingPoint;

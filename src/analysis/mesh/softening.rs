@@ -1,17 +1,22 @@
 //! How near an equilibrium is to where it ends: to a bifurcation or a fold, past which the part rests elsewhere.
 //!
-//! A coarse mesh bears a little more than the structure does. Just beyond a buckling load a straight part is stable on it, and on twice the
-//! segments, too, with the same displacements: nothing that is compared tells. What tells is the stiffness that is left,
+//! A coarse mesh bears a little more than the structure does. Just beyond a buckling load a straight part is stable on
+//! it, and on twice the segments, too, with the same displacements, so that a comparison of displacements shows
+//! nothing. The indicator is the remaining stiffness,
 //! ```text
 //! k = xᵀ·K·x / max |x_j|²,      λ = min over x of xᵀ·K·x / xᵀ·M·x,      K at the equilibrium, M the masses of the bodies,
 //! ```
-//! in the softest motion x, that of the lowest frequency √λ: it goes to zero there. On a mesh that bears too much by ε of the load, where the part buckles at a
-//! share δ less than this load, it goes with ε + δ; on twice the segments ε falls to a sixteenth or, where it comes of stretching, to a quarter. While the
-//! side of the limit is not known, ε > |δ|, the two are further apart than [`KNOWN`] times the smaller.
+//! in the softest motion x, that of the lowest frequency √λ: it goes to zero there. Let a mesh overestimate the
+//! buckling load by ε, and let the part buckle at a fraction δ below the present load. The remaining stiffness is then
+//! proportional to ε + δ. On twice the segments ε falls to a sixteenth or, where it is caused by stretching, to a
+//! quarter. While the side of the limit is not known, ε > |δ|, the two are further apart than [`KNOWN`] times the
+//! smaller.
 //!
-//! Looked at is what has less than half of its stiffness left: xᵀ·K·x < ½·xᵀ·K₀·x for some x, with K₀ at rest, which the pivots of K − ½·K₀ tell
-//! (Sylvester), and λ < ½·λ₀, since a beam that has only turned is soft where it was stiff; or, since tension may have made stiff what voltages soften,
-//! the same with K₀ where it is, without them. A part whose lowest frequency is that of something else, soft or heavy, is not seen.
+//! Equilibria with less than half of their stiffness are examined: xᵀ·K·x < ½·xᵀ·K₀·x for some x, with K₀ at rest, by
+//! the pivots of K − ½·K₀ (Sylvester). The criterion also requires λ < ½·λ₀, since a rotated beam is soft in a
+//! direction that was stiff. Tension may stiffen a part that voltages soften. Therefore the same criterion applies with
+//! K₀ at the present state without voltages. A part whose lowest frequency is that of something else, soft or heavy, is
+//! not seen.
 
 use super::super::statics::OperatingPoint;
 use crate::compile::CompiledModel;
@@ -21,8 +26,9 @@ use crate::multibody::planar::Pose;
 
 /// Share of the stiffness at rest below which it is looked at from mesh to mesh [1]. The coarsest mesh of a clamped beam bears an eighth too much.
 const SOFT: f64 = 0.5;
-/// Share of what is left that may differ between a mesh and twice its segments [1]: what falls slowly with them is not taken for what
-/// has settled (a column in one piece has 1.25 times the stiffness on two segments that it has on four, and none on eight).
+/// Fraction by which the remaining stiffness may differ between a mesh and twice its segments [1]. Slow convergence
+/// must not count as converged: a column in one piece has 1.25 times the stiffness on two segments that it has on four,
+/// and none on eight.
 const KNOWN: f64 = 0.2;
 /// Inverse iterations at most, and the change of λ at which they end [1].
 const ROUNDS: (usize, f64) = (30, 1e-3);
@@ -50,13 +56,14 @@ pub(super) fn left_of_soft(compiled: &CompiledModel, point: &OperatingPoint) -> 
     })
 }
 
-/// The stiffness that is left at an equilibrium [N/m]; none where it cannot be told.
+/// The remaining stiffness at an equilibrium [N/m]; `None` where it is unknown.
 pub(super) fn left(compiled: &CompiledModel, point: &OperatingPoint) -> Option<f64> {
     let [here, ..] = drives(compiled, point);
     lowest(compiled, &point.q, &here).map(|lowest| lowest.left)
 }
 
-/// What drives an equilibrium, what is there at rest, without loads and voltages, and the first without voltages.
+/// Drives of an equilibrium: the actual one, the one at rest without loads and voltages, and the first without
+/// voltages.
 fn drives(compiled: &CompiledModel, point: &OperatingPoint) -> [Drive; 3] {
     let electrics = &compiled.parts.system.electrics;
     let here = point.drive(compiled);
@@ -69,7 +76,8 @@ pub(super) fn agree(coarse: Option<f64>, fine: Option<f64>) -> bool {
     coarse.zip(fine).is_none_or(|(coarse, fine)| (coarse - fine).abs() <= KNOWN * fine)
 }
 
-/// What of the stiffness is left, or how far beyond a fold an equilibrium is, is compared by this at a tolerance: beyond it where two meshes do not agree.
+/// Scale for comparing the remaining stiffness, or the distance beyond a fold, at a tolerance: a larger difference
+/// means that two meshes disagree.
 pub(super) fn scale(left: f64, tol: f64) -> f64 {
     // a comparison divides by ¾ of the scale and allows ¾ of the tolerance
     KNOWN * left.abs() / (0.75 * 0.75 * tol)

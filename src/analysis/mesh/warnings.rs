@@ -1,4 +1,4 @@
-//! What fitting a model to a request warns of.
+//! Warnings from fitting a model to a request.
 
 use super::super::contact_range::comb_beyond_told;
 use super::super::rotary_inertia_error;
@@ -23,7 +23,7 @@ const BUCKLING: &str = "W046";
 /// Code of the warning that rotary inertia is left out.
 const ROTARY: &str = "W045";
 
-/// What fitting a model to a request warns of, as sentences for who has no other way to see them.
+/// Warnings from fitting a model to a request, as sentences for callers without another channel.
 pub fn warnings(fitted: &CompiledModel) -> impl Iterator<Item = String> {
     fitted
         .warnings
@@ -33,7 +33,7 @@ pub fn warnings(fitted: &CompiledModel) -> impl Iterator<Item = String> {
         .map(|d| d.message.clone())
 }
 
-/// What to say of an estimate that is beyond the tolerance, or missing.
+/// Warning about an estimate beyond the tolerance, or a missing one.
 pub fn beyond(tol: f64, estimated_error: Option<f64>) -> Option<String> {
     match estimated_error {
         Some(error) if error <= 1.05 * tol => None,
@@ -45,7 +45,7 @@ pub fn beyond(tol: f64, estimated_error: Option<f64>) -> Option<String> {
     }
 }
 
-/// What a linear model leaves out, where that is more than the tolerance.
+/// Warning about omitted stress stiffening of a linear model, where its effect exceeds the tolerance.
 pub(super) fn of_stress(compiled: &CompiledModel, share: Option<f64>) -> Option<Diagnostic> {
     let share = share.filter(|share| *share > compiled.options.tol)?;
     let message = if share.is_finite() {
@@ -75,7 +75,7 @@ pub(super) fn of_steps(step: f64, (frequency, share): (f64, f64)) -> Diagnostic 
     Diagnostic::warning(STEPS, message, &help)
 }
 
-/// Where the rotary inertia that wide beams lack makes a run's waveform this far off.
+/// Warning about a waveform error of this size from missing rotary inertia of wide beams.
 pub(super) fn of_rotary(compiled: &CompiledModel, error: f64) -> Option<Diagnostic> {
     if error <= compiled.options.tol.max(rotary_inertia_error::WORTH) {
         return None;

@@ -11,7 +11,7 @@ const UPWARDS: f64 = 0.5;
 /// Releases that differ by less than this fraction are one [1].
 const RELEASE_TOLERANCE: f64 = 1e-6;
 
-/// What holds a part down.
+/// Release of a closed part.
 pub(super) struct ReleaseVoltages {
     /// Voltage at which the last of the closed gaps opens [V]; none: it is closed without any.
     pub(super) release_v: Option<f64>,

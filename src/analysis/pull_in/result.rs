@@ -1,4 +1,4 @@
-//! What a search for pull-in finds.
+//! Result of a search for pull-in.
 
 use serde::Serialize;
 
@@ -9,8 +9,8 @@ pub struct PullInResult {
     pub port: String,
     /// Voltage at which the open branch loses its stability on the way up, and a gap closes [V].
     pub pull_in_v: f64,
-    /// Voltage at which the last of the closed gaps lets go on the way down [V]; none when it stays closed at 0 V, or when
-    /// nothing holds the part after pull-in.
+    /// Voltage at which the last of the closed gaps opens on the way down [V]; `None` when it stays closed at 0 V, or
+    /// when the part has no closed equilibrium after pull-in.
     pub release_v: Option<f64>,
     /// Voltages between pull-in and the largest one at which the closed part snaps further [V]: `release_v` is that beyond the last.
     pub snaps_v: Vec<f64>,
@@ -21,7 +21,7 @@ pub struct PullInResult {
     /// Largest estimated relative error by the mesh [1]; none without an estimate.
     #[serde(skip)]
     pub estimated_error: Option<f64>,
-    /// What the numbers do not say by themselves, as sentences.
+    /// Warnings about the result, as sentences.
     #[serde(skip)]
     pub warnings: Vec<String>,
 }

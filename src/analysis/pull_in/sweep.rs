@@ -25,7 +25,7 @@ const MAX_NAMED: usize = 4;
 /// Points of one piece of a branch.
 const MAX_POINTS: usize = 20_000;
 
-/// What became of a part beyond pull-in.
+/// State of a part beyond pull-in.
 pub(super) enum PostPullIn {
     /// It rests on contact: voltage of the limit point, and an equilibrium beyond.
     Rests { fold: f64, volts: f64, q: Vec<Pose> },
@@ -215,8 +215,8 @@ impl<'a> VoltageSweep<'a> {
         Ok(Continuation::new(system, options).trace(&mut family, q, &mut |_| true)?)
     }
 
-    /// The voltage that moves the part by a tenth of the length scale, or takes a third of a stiffness away, whichever is
-    /// smaller: what steps are measured in [V]. `max` where it does neither.
+    /// The voltage that moves the part by a tenth of the length scale, or removes a third of a stiffness, whichever is
+    /// smaller: the unit of steps [V]. `max` where it does neither.
     fn unit(&self, q: &[Pose], max: f64) -> Result<f64, AnalysisError> {
         let system = self.system;
         let electrics = &system.electrics;

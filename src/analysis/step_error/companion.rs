@@ -1,11 +1,13 @@
 //! A run compared with a companion at ten times the tolerance, or in steps of twice the length: of methods that do not propagate their
 //! error, of equal steps, and of parts that touch.
 //!
-//! Were the error proportional to the tolerance, a ninth of the difference would be the error of the finer run; found are ratios of the two
-//! errors from 1 to 12, so half of it is reported, and of methods of second order, whose ratios are about two, all of it.
+//! If the error were proportional to the tolerance, a ninth of the difference would be the error of the finer run.
+//! Measured ratios of the two errors lie between 1 and 12, so that half of it is reported. For methods of second order,
+//! whose ratios are about two, all of it is reported.
 //!
-//! Where the error is beyond what the mesh leaves of the tolerance, and the run is short, it is made again at a tenth of the tolerance, with
-//! the run before as its companion: of a method of order four or more that costs it less than twice the steps.
+//! Where the error exceeds the part of the tolerance that the mesh leaves, and the run is short, it is repeated at a
+//! tenth of the tolerance, with the previous run as its companion. For a method of order four or more this costs less
+//! than twice the steps.
 //!
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
 //! is continued in proportion to time, as phases go.

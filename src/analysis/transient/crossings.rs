@@ -66,7 +66,7 @@ pub(super) struct Crossings<'a> {
     within: Motion,
     rise: Vec<f64>,
     until: Option<Until>,
-    /// What was found, in order of time.
+    /// Events, in order of time.
     pub(super) events: Vec<CrossingEvent>,
 }
 

@@ -10,12 +10,12 @@ use crate::solve::time::method::Motion;
 
 /// Ends of steps at which signals are compared, at most.
 const ENOUGH: f64 = 1000.0;
-/// What swings by less than this fraction of the model's length scale, or of 1 rad or 1 K, is rounding [1].
+/// Motion below this fraction of the model's length scale, or of 1 rad or 1 K, is rounding [1].
 const NEGLIGIBLE_MOTION: f64 = 1e-9;
 /// Error of a signal, of its range, from which on it is not predictable.
 const LOST: f64 = 0.3;
-/// Growth of an error from the second to the last quarter of the time until it is lost: phases add up at most as a power of time, and
-/// their error grows there by less; neighbouring motions of a chaotic one part by more.
+/// Growth of an error from the second to the last quarter of the time until phase is lost. Phase errors grow at most as
+/// a power of time, and stay below this; neighbouring chaotic motions diverge by more.
 const CHAOTIC: f64 = 30.0;
 
 /// When a signal is lost.
@@ -28,7 +28,7 @@ pub(in crate::analysis) struct SignalLoss {
     pub(in crate::analysis) chaotic: bool,
 }
 
-/// What a run reports of its steps.
+/// Step error of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::analysis) struct StepErrorEstimate {
     /// Root mean square error of the worst signal, of its amplitude [1].
@@ -50,7 +50,7 @@ pub(super) struct ErrorLog<'a> {
     t: Vec<f64>,
     values: Vec<Vec<f64>>,
     errors: Vec<Vec<f64>>,
-    /// Something touches: what comes after is not estimated.
+    /// Parts touch: the error after that is not estimated.
     touched: bool,
 }
 
@@ -146,7 +146,7 @@ impl<'a> ErrorLog<'a> {
     }
 }
 
-/// An error over the amplitude: a signal whose phase is lost is off by twice the amplitude at most.
+/// An error relative to the amplitude: a signal of unknown phase has an error of twice the amplitude at most.
 fn relative(error: f64, amplitude: f64) -> f64 {
     if error == 0.0 { 0.0 } else { (error / amplitude).min(2.0) }
 }

@@ -1,4 +1,4 @@
-//! What a transient may be told, and what of it cannot be obeyed.
+//! Options of a transient, and their errors.
 
 use super::super::AnalysisError;
 use super::super::integrator::Integrator;
@@ -7,7 +7,7 @@ use crate::options::analysis::TRAN_POINTS;
 use crate::solve::baseline::SolverKind;
 use crate::solve::time::adaptive::Control;
 
-/// What ends a run before its time is up.
+/// Condition that ends a run early.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Until {
     /// The contact force of a gap or stop begins to act.
@@ -28,7 +28,7 @@ impl std::fmt::Display for Until {
     }
 }
 
-/// What a transient may be told.
+/// Options of a transient.
 #[derive(Debug, Clone)]
 pub struct TransientOptions<'a> {
     /// End time [s].
@@ -43,26 +43,26 @@ pub struct TransientOptions<'a> {
     pub voltages: Vec<(String, f64)>,
     /// A variant of the same netlist whose static equilibrium is the initial state; none: at rest as drawn.
     pub release: Option<&'a CompiledModel>,
-    /// What integrates.
+    /// Integrator.
     pub method: Integrator,
     /// Length of equal steps [s]; none: steps follow `tol`.
     pub step: Option<f64>,
     /// Crossings to find: (signal name, level in the signal's unit).
     pub events: Vec<(String, f64)>,
-    /// What ends the run before `stop`.
+    /// Condition that ends the run before `stop`.
     pub until: Option<Until>,
-    /// What solves the linear systems of the method. The result is the same to rounding; all but the recursion are
+    /// Solver of the linear systems of the method. The result is the same to rounding; all but the recursion are
     /// baselines, and Radau5 and rk45 have none.
     pub solver: SolverKind,
     /// Whether the run estimates how far its steps are off, see [`TransientResult::step_error`](super::TransientResult::step_error): Rodas4 with
     /// steps that follow the tolerance, in a frame that does not turn. The motion is bit-identical.
     pub estimate: bool,
-    /// Whether the result holds the samples, default true; without, only who is told them as they come has them.
+    /// Whether the result stores the samples, default true; otherwise only the callback receives them.
     pub keep: bool,
 }
 
 impl Default for TransientOptions<'_> {
-    /// From rest to 1 s; whoever asks says more.
+    /// From rest to 1 s by default.
     fn default() -> Self {
         Self {
             stop: 1.0,
@@ -116,7 +116,7 @@ pub(crate) fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError>
 }
 
 impl TransientOptions<'_> {
-    /// What the length of the steps follows.
+    /// Control of the step length.
     pub(in crate::analysis) fn control(&self) -> Control {
         self.step.map_or(Control::Tolerance(STEP_SHARE * self.tol), Control::Fixed)
     }

@@ -22,7 +22,7 @@ use crate::solve::time::method::{Motion, SolverCounters};
 /// Times of a run at which its stability is looked at, the end included.
 pub(in crate::analysis) const STABILITY_CHECKS: usize = 16;
 
-/// What carries a motion from the start of a ramp to its end.
+/// Propagates a motion from the start of a ramp to its end.
 pub(in crate::analysis) trait Propagator {
     /// Takes the start to where the formulation can go on from.
     ///
@@ -175,8 +175,8 @@ fn lost(SignalLoss { signal, t, chaotic }: SignalLoss) -> String {
     }
 }
 
-/// Where a run begins, how much warmer its heaters are there [K], and what there is to tell of that: at rest as drawn, or in the
-/// equilibrium of what is released.
+/// Initial state of a run, temperature rises of its heaters [K], and warnings: at rest as drawn, or in the equilibrium
+/// of a released load.
 fn start(
     compiled: &CompiledModel,
     options: &TransientOptions<'_>,

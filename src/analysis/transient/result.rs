@@ -1,4 +1,4 @@
-//! What a transient gives: sampled signals, crossings of levels, and the work that it took.
+//! Result of a transient: sampled signals, crossings of levels, and the work.
 
 use crate::solve::time::event::Direction;
 use serde::Serialize;
@@ -80,6 +80,6 @@ pub struct TransientResult {
     pub after_contact: Vec<Statistics>,
     /// Crossings asked for and contacts of gaps, in order of time.
     pub events: Vec<CrossingEvent>,
-    /// What the numbers do not say by themselves.
+    /// Warnings about the result.
     pub warnings: Vec<String>,
 }

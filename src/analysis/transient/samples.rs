@@ -7,7 +7,7 @@ use crate::readout::signal::{Signal, SignalView};
 use crate::solve::dense::interpolate;
 use crate::solve::time::method::Motion;
 
-/// Takes the samples of a run, keeps them if asked to, and tells each as it comes.
+/// Samples a run, stores the samples if requested, and passes each to the callback.
 pub(super) struct SampleRecorder<'a> {
     compiled: &'a CompiledModel,
     options: &'a TransientOptions<'a>,

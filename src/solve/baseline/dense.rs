@@ -1,8 +1,8 @@
 //! Dense LU with partial pivoting, by faer: a baseline.
 //!
-//! What a general-purpose program does with a small system: blocked, vectorized, backward stable for any regular matrix,
-//! and blind to where the zeros are. Its exchanges compare newtons with newton metres: rows of moments, which are
-//! small in SI, come out with a few digits less than from a symmetric elimination, which does not depend on units.
+//! The method of a general-purpose program for a small system: blocked, vectorized, backward stable for any regular
+//! matrix, without use of sparsity. Its exchanges compare newtons with newton metres. Rows of moments, which are small
+//! in SI, therefore have a few digits less than from a symmetric elimination, which does not depend on units.
 //!
 //! Cost: 2n³/3 for a factorization of n scalar unknowns, 2n² for a solve; n² numbers.
 //!

@@ -63,8 +63,8 @@ mod tests {
     use crate::multibody::BodyId;
     use crate::solve::linear::Recursion;
 
-    /// A body of 1 kg on a spring of 4π² N/m, let go at 1 m: after a period of 1 s it is back, with an error of
-    /// 2π·(ωh)²/12 of phase, and the energy is the one it began with, to rounding.
+    /// A body of 1 kg on a spring of 4π² N/m, released at 1 m. After a period of 1 s it is back, with a phase error of
+    /// 2π·(ωh)²/12, and the energy is the initial one, to rounding.
     #[test]
     fn an_oscillator_keeps_its_energy_and_its_phase() {
         let (mut system, _) = LinearSystem::new(vec![("m".into(), None)], &[(BodyId::Ground, BodyId::Free(0))]);

@@ -1,8 +1,9 @@
 //! Sparse L·D·Lᵀ by faer, with its own ordering: a baseline.
 //!
-//! What a general sparse package does: the approximate minimum degree ordering of the scalar graph and the symbolic
-//! factorization once for a model, the numbers again for each matrix. It knows nothing of bodies, and starts from the
-//! couplings alone, without the fill that the recursion's order brings. There is no pivoting, as in the recursion.
+//! The method of a general sparse package: the approximate minimum degree ordering of the scalar graph and the symbolic
+//! factorization once for a model, the numeric factorization for each matrix. It knows nothing of bodies, and starts
+//! from the couplings alone, without the fill that the recursion's order brings. There is no pivoting, as in the
+//! recursion.
 //!
 //! Cost: that of the factor's fill, O(n + m) on the graphs where the recursion is.
 //!

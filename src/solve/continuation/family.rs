@@ -24,7 +24,7 @@ pub enum NotAFamily {
     Network,
 }
 
-/// What differs between the ends.
+/// Data of one end of a family.
 #[derive(Debug, Clone)]
 struct FamilyEnd {
     loads: Vec<DeadLoad>,

@@ -44,7 +44,7 @@ pub struct ContinuationOptions {
     pub points: usize,
     /// The path ends where s falls below this, default −1.
     pub lowest: f64,
-    /// What to do at bifurcations.
+    /// Treatment of bifurcations.
     pub branch: Branch,
 }
 

@@ -13,7 +13,7 @@ pub struct PathPoint {
     pub negative: usize,
 }
 
-/// What happened at a point.
+/// Event at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PathEvent {
     /// s turns back.
@@ -45,7 +45,7 @@ pub enum PathEnd {
 pub struct TracedPath {
     /// Its points; folds and bifurcations are among them.
     pub points: Vec<PathPoint>,
-    /// What happened, with the index of its point.
+    /// Events, with the indices of their points.
     pub events: Vec<(PathEvent, usize)>,
     /// Points of events that were not located to rounding: the path was lost between its points there.
     pub rough: Vec<usize>,

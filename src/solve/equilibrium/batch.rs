@@ -1,4 +1,4 @@
-//! Equilibria of variants of one mechanism side by side, with the bits of each alone.
+//! Batch of equilibria for variants of one mechanism, bit-identical to single ones.
 //!
 //! A lane goes the whole path in one step, as [`super::Equilibrium::follow`] does where nothing happens on it: a tangent, and Newton's
 //! method until it settles on a stable equilibrium. Where something does happen (a fold, a free motion, a step that is too large) the lane is
@@ -20,7 +20,7 @@ use kernels::{EquilibriumKernel, EquilibriumPass};
 pub struct BatchPath<'a> {
     /// The mechanism.
     pub system: &'a System,
-    /// What acts on it.
+    /// Its load path.
     pub path: &'a dyn LoadPath,
     /// Where it is at the start.
     pub q: &'a [Pose],

@@ -91,7 +91,7 @@ impl Equilibrium {
             let towards = known.then(|| self.judge(system, q));
             self.lean(q, towards.as_ref().map_or(0.0, |towards| towards.sign));
             match self.fall(system, path, to, q, done) {
-                // a segment far from its chord stretches without strain: its energy is none of a beam
+                // a segment far from its chord stretches without strain: its energy is not that of a beam
                 Ok(()) if Self::beyond_beams(system, q).is_none() => {
                     let EscapeDirection { kind, direction, .. } = towards.unwrap_or_else(EscapeDirection::unknown);
                     done.passed.push(StabilityLoss { kind, share: s, direction });
@@ -109,7 +109,7 @@ impl Equilibrium {
         Err(error)
     }
 
-    /// Refuses a state beyond losses of stability whose segments are none of beams.
+    /// Rejects a state beyond losses of stability whose segments do not represent beams.
     pub(super) fn check_beams(&mut self, system: &System, s: f64, done: &Path, q: &[Pose]) -> Result<(), SolveError> {
         if done.passed.is_empty() || Self::beyond_beams(system, q).is_none() {
             return Ok(());

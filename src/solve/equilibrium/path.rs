@@ -17,8 +17,8 @@ pub trait LoadPath {
     fn is_still(&self) -> bool {
         false
     }
-    /// The next value of s beyond `s` at which a step has to end: 1, or where an electrode's voltage vanishes before that. What it holds closed
-    /// opens there, and at the opposite voltage the same contact is an equilibrium again.
+    /// The next value of s beyond `s` at which a step has to end: 1, or where an electrode's voltage vanishes before
+    /// that. A contact held closed opens there, and at the opposite voltage the same contact is an equilibrium again.
     fn station(&self, s: f64) -> f64 {
         let _ = s;
         1.0
@@ -28,14 +28,15 @@ pub trait LoadPath {
 /// The smallest share of a way from rest at which sources are taken [1]: nothing at all would have no slope.
 const LEAST: f64 = 1e-30;
 
-/// What is left of a way to a station that is taken for none [1].
+/// Remaining distance to a station that counts as zero [1].
 const SMALLEST: f64 = 1e-12;
 
 /// Source voltages and dead loads that go from one value to another, heaters at their steady temperature.
 ///
-/// Loads go linearly. Voltages from rest go with the root of the share, so that heat and attraction, which follow their square, grow evenly
-/// with the loads and a tangent tells from the start where they lead; from other voltages they go linearly. So they do across gaps while loads
-/// come: attraction, the square of them, then lags behind a load that opens a gap, and does not close what such a load holds open.
+/// Loads go linearly. Voltages from rest follow the square root of the fraction. Heat and attraction, which follow
+/// their square, then grow in proportion to the loads, and a tangent predicts the path from the start. Voltages from
+/// another state follow it linearly. So they do across gaps while loads come: attraction, the square of them, then lags
+/// behind a load that opens a gap, and does not close what such a load holds open.
 #[derive(Debug, Clone)]
 pub struct SourcePath<'a> {
     electrics: &'a Electrics,

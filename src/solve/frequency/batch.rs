@@ -1,6 +1,6 @@
-//! The lowest modes of variants of one mechanism side by side, from the modes of one of them.
+//! Batch of the lowest modes of variants of one mechanism, from the modes of one of them.
 //!
-//! Every variant begins with the same shapes, whoever its neighbours are, so that a lane has the same bits in any company:
+//! Every variant begins with the same shapes, so that a lane has the same bits with any neighbours:
 //!
 //! 1. inverse iteration of all shapes with K, and the best modes in their span (Rayleigh–Ritz);
 //! 2. for each mode wanted, inverse iteration with K − σM, σ a little below its λ, twice;
@@ -110,7 +110,7 @@ impl LaneModes {
         self.run(ModesPass::Factor(which));
     }
 
-    /// What a lane has found.
+    /// Result of a lane.
     fn modes(&self, lane: usize, wanted: usize) -> Option<Modes> {
         let of = |numbers: &[Lane8]| numbers.iter().map(|x| x.lane(lane)).collect::<Vec<f64>>();
         let lambda = of(&self.lambda);
@@ -122,7 +122,7 @@ impl LaneModes {
         }
         let pose = |p: &LanePose| Pose::new(p[0].lane(lane), p[1].lane(lane), p[2].lane(lane));
         let shapes = self.x.iter().map(|x| x.iter().map(pose).collect()).collect();
-        // the factor is off by less than what its modes keep for a residual
+        // the error of the factor is less than the residual that its modes keep
         let rounding = residuals.iter().fold(0.0, |m: f64, r| m.max(*r));
         Some(Modes { lambda, shapes, residuals, missed: false, rounding })
     }

@@ -27,11 +27,11 @@ use nalgebra::{DMatrix, SymmetricEigen};
 const DENSE: usize = 60;
 /// Modes that are settled beyond those asked for: they keep the last wanted one apart from what follows.
 const GUARD_MODES: usize = 2;
-/// A factor whose solves are off by more than this share is corrected in every solve.
+/// A factor whose solves have a larger relative error is corrected in every solve.
 const ROUGH: f64 = 1e-9;
 /// Residual at which an iteration stops [1].
 const GOAL: f64 = 1e-11;
-/// Residual of a mode that can be relied on: its frequency is off by the square [1].
+/// Residual of a reliable mode: the error of its frequency is the square [1].
 pub const RELIABLE: f64 = 1e-8;
 
 /// Modes with their residuals.
@@ -58,7 +58,7 @@ struct Operator<'a, 'b> {
     root: &'a [Pose],
     /// Solves correct themselves.
     corrected: bool,
-    /// What was solved for last.
+    /// The last right side.
     x: Vec<Pose>,
 }
 
@@ -167,7 +167,7 @@ fn factored(system: &System, stiffness: &BlockMatrix<f64, 3>) -> Result<(BlockMa
     let mut k = stiffness.clone();
     model.project_matrix(&mut k);
     let mut factor = k.clone();
-    // what rounding leaves of the stiffness of a loose part is none
+    // a remainder of rounding in the stiffness of a loose part is not a stiffness
     if model.loose().next().is_none() && factor.factor(&model.pattern).is_ok() {
         return Ok((factor, 0.0));
     }

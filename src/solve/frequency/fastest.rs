@@ -1,8 +1,8 @@
 //! The highest natural frequency in joint coordinates, which sets the steps of an explicit method.
 //!
-//! Power iteration on x → −q̈(εx): the recursion tells the accelerations of a small displacement under the springs alone,
-//! and they fulfil the loops. The quotient of the norms grows towards ω²; sixty iterations come within a few percent, which
-//! is enough to foretell the number of steps.
+//! Power iteration on x → −q̈(εx): the recursion gives the accelerations of a small displacement under the springs
+//! alone, and they satisfy the loops. The quotient of the norms grows towards ω²; sixty iterations come within a few
+//! percent, which is enough to foretell the number of steps.
 
 use crate::multibody::forces::RestStrain;
 use crate::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
@@ -12,7 +12,7 @@ const SMALL: f64 = 1e-7;
 /// Iterations.
 const ROUNDS: usize = 60;
 
-/// What moves fastest about the drawn place.
+/// The fastest motion about the drawn configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fastest {
     /// Angular frequency [rad/s].

@@ -23,7 +23,7 @@ pub struct Harmonic {
     pub(super) matrix: BlockMatrix<Complex<f64>, 3>,
     factor: BlockMatrix<Complex<f64>, 3>,
     pub(super) damping: BlockMatrix<f64, 3>,
-    /// What contact loses about the state, linearized at rest; none where nothing does.
+    /// Linearized contact loss about the state at rest; `None` without loss.
     loss: Option<LossDerivatives>,
     rest: Vec<ComplexPose>,
 }

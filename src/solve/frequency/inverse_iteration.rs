@@ -4,8 +4,9 @@
 //! ```text
 //! ‖(K + |λ|·M)⁻¹·(K·x − λ·M·x)‖ in the mass norm, λ = xᵀKx, xᵀMx = 1
 //! ```
-//! A share e of mode j in x adds e·|λ_j − λ|/(λ_j + |λ|): the residual is about the relative error of the shape, with modes
-//! far below and far above counted alike. K·x is summed in extended precision; the frequency is off by the square.
+//! A share e of mode j in x adds e·|λ_j − λ|/(λ_j + |λ|): the residual is about the relative error of the shape, with
+//! modes far below and far above counted alike. K·x is summed in extended precision; the error of the frequency is the
+//! square.
 //!
 //! Reference: K.-J. Bathe, "Finite Element Procedures" (2014), §11.6.
 
@@ -17,7 +18,7 @@ use crate::multibody::{BlockMatrix, Model};
 
 /// Rounds at most.
 const MAX_ROUNDS: usize = 30;
-/// Error of a solve that only tells how large a residual is [1].
+/// Error of a solve that is used only to measure a residual [1].
 const MEASURED: f64 = 1e-3;
 
 /// Modes with their residuals.
@@ -106,7 +107,7 @@ fn measure(
         let size = lambda.abs().max(least);
         if known.as_ref().is_none_or(|(s, _)| !(0.5 * s..=2.0 * s).contains(&size)) {
             let mut factor = shifted(model, stiffness, -size);
-            // about an unstable place it may be singular by chance; then no residual can be told
+            // near an unstable configuration it may be singular; then the residual is unknown
             known = factor.factor(&model.pattern).is_ok().then_some((size, factor));
         }
         let Some((_, factor)) = &known else { return (lambda, f64::NAN) };

@@ -1,9 +1,10 @@
 //! The largest eigenvalues of a symmetric operator that can only be applied.
 //!
-//! Lanczos with full reorthogonalization, twice, and without restarts: the operator is an inverse, whose large eigenvalues
-//! stand far apart, so that a few more vectors than wanted eigenvalues are enough. Where the vectors close a subspace a new
-//! direction is begun, which also finds equal eigenvalues in the end. The number of vectors is bounded; what has not
-//! settled by then is told by its residual, and is still a good start for an iteration of a block.
+//! Lanczos with full reorthogonalization, twice, and without restarts: the operator is an inverse, whose large
+//! eigenvalues stand far apart, so that a few more vectors than wanted eigenvalues are enough. Where the vectors close
+//! a subspace a new direction is begun, which also finds equal eigenvalues in the end. The number of vectors is
+//! bounded. The residual of a mode that has not converged by then is reported, and its shape is still a good start for
+//! a block iteration.
 //!
 //! Reference: B. N. Parlett, "The symmetric eigenvalue problem" (1998), chapter 13.
 
@@ -127,7 +128,7 @@ fn fresh(
     w
 }
 
-/// The combinations of basis vectors that `shapes` tell.
+/// The combinations of basis vectors given by `shapes`.
 fn combined(basis: &[f64], n: usize, shapes: &[Vec<f64>]) -> DMatrix<f64> {
     let mut vectors = DMatrix::zeros(n, shapes.len());
     for (mut column, shape) in vectors.column_iter_mut().zip(shapes) {

@@ -1,8 +1,9 @@
 //! Solves of (K − σM)·x = b that are right to rounding, also where the assembled K is not.
 //!
-//! A mechanism of very stiff and very soft parts loses the soft ones in the entries of K. The factor at hand then only
-//! approximates: each solve is corrected by its own residual, which is taken joint by joint in double-double numbers, with
-//! x as a sum of two f64 as well. The error shrinks with every correction by the share that rounding has in the factor.
+//! In a mechanism of very stiff and very soft parts, rounding in the entries of K hides the soft ones. The factor is
+//! then approximate: each solve is corrected by its own residual, which is computed joint by joint in double-double
+//! numbers, with x as a sum of two f64 as well. The error shrinks with every correction by the share that rounding has
+//! in the factor.
 //!
 //! Reference: C. B. Moler, "Iterative refinement in floating point", J. ACM 14 (1967); J. Demmel et al., "Error bounds from
 //! extra-precise iterative refinement", ACM Trans. Math. Software 32 (2006).
@@ -23,7 +24,7 @@ pub const ROUNDING: f64 = 1e-15;
 pub struct Refined<'a> {
     model: &'a Model,
     joints: PreciseTangent,
-    /// What gaps, contacts and loads add, in elimination order: row, column, block.
+    /// Contributions of gaps, contacts and loads, in elimination order: row, column, block.
     bodies: Vec<(usize, usize, Block)>,
     x: Vec<DoublePose>,
     product: Vec<DoublePose>,

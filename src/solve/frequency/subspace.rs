@@ -2,7 +2,7 @@
 //!
 //! Each iteration is one solve with the block factor for every vector and a small dense eigenproblem in their span
 //! (Rayleigh–Ritz). A mode gains the factor (λ/λ_p₊₁)² in its frequency with every iteration, p the number of vectors.
-//! Equal frequencies come out as often as they occur. Cost: O(p·n + p²·n) an iteration.
+//! Repeated frequencies are returned with their multiplicity. Cost: O(p·n + p²·n) an iteration.
 //!
 //! Reference: K.-J. Bathe, "Finite Element Procedures" (2014), §11.6.
 
@@ -106,7 +106,7 @@ pub fn columns(vectors: &[Vec<Pose>]) -> DMatrix<f64> {
 /// Eigenvalues, ascending, and vectors of A·v = μ·B·v with B definite, vᵀBv = 1. None where B is not.
 pub fn ritz(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = a.nrows();
-    // vectors of unit length: what is left of B tells how dependent they are
+    // vectors of unit length: the remainder of B shows how dependent they are
     let scale: Vec<f64> = (0..n).map(|i| 1.0 / b[(i, i)].sqrt()).collect();
     if scale.iter().any(|s| !s.is_finite()) {
         return None;

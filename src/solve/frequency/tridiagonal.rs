@@ -37,7 +37,7 @@ fn rotated(diagonal: &[f64], beside: &[f64], mut vectors: Vec<Vec<f64>>) -> (Vec
     (d, vectors)
 }
 
-/// One step on rows `first` to `end`, whose last entry beside the diagonal is none.
+/// One step on rows `first` to `end`, whose last off-diagonal entry is unused.
 fn sweep(d: &mut [f64], e: &mut [f64], (first, end): (usize, usize), vectors: &mut [Vec<f64>]) {
     let half = (d[first + 1] - d[first]) / (2.0 * e[first]);
     let mut g = d[end] - d[first] + e[first] / (half + (half * half + 1.0).sqrt().copysign(half));

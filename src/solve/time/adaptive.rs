@@ -1,8 +1,9 @@
 //! Drives any [`Method`] over any equations from their start to their end: with error control, in as few steps as the tolerance
 //! allows, or in equal steps.
 //!
-//! What an error is beside a motion the equations say ([`Equations::share`]). The next step is 0.9·err^(−1/p) times the last, between 0.2
-//! and 5 times, where the estimated error falls with the p-th power of the step (Hairer & Wanner 1996, §IV.8).
+//! The scale of an error is given by the equations ([`Equations::share`]). The next step is 0.9·err^(−1/p) times the
+//! last, between 0.2 and 5 times, where the estimated error falls with the p-th power of the step (Hairer & Wanner
+//! 1996, §IV.8).
 
 use super::method::{Method, Motion, SolverCounters, StepFailure};
 use super::pace::{self, StepController};
@@ -33,9 +34,9 @@ pub struct Adaptive<M = Rodas4, X = Pose> {
     pub method: M,
     steps: u64,
     rejected: u64,
-    /// What the equations counted.
+    /// Counters of the equations.
     spent: SolverCounters,
-    /// What the method counted.
+    /// Counters of the method.
     done: SolverCounters,
     before: Motion<X>,
     error: Motion<X>,

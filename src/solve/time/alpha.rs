@@ -12,9 +12,9 @@
 //! ```text
 //! a₀ = A(0, q₀ + β·h²·a₀, v₀ + γ·h·a₀)
 //! ```
-//! which is that of the forces for motions slower than the first step, and none for those much faster: A itself would throw light
-//! bodies that are let go to rates which only the damping of the method takes back. It is zero where there is no inertia.
-//! There is no error estimate of its own; see [`super::doubling`].
+//! which is that of the forces for motions slower than the first step, and zero for those much faster. A itself would
+//! accelerate light released bodies to rates that only the damping of the method removes. It is zero where there is no
+//! inertia. There is no error estimate of its own; see [`super::doubling`].
 //!
 //! Reference: J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371–375; M. Arnold, O. Brüls, Multibody System Dynamics 18 (2007)
 //! 185–202 (the form with two accelerations); N. M. Newmark, J. Eng. Mech. 85 (1959) 67–94.

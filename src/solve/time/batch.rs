@@ -1,10 +1,10 @@
-//! Drives runs of many variants side by side with Rodas4, each with its own steps.
+//! Batch driver: runs of many variants with Rodas4, each with its own steps.
 //!
-//! A step of all lanes is taken at once, of the length that each lane's own error control wants; a lane that rejects its step
-//! goes back alone. Whoever is done leaves its lane to the next of the queue. So what a variant computes is what it
-//! would alone ([`super::adaptive`], the same bits), whoever its neighbours are. What the lanes do not settle (a matrix that
-//! cannot be factored until the end, steps that vanish, an observer that says stop) is left to a run alone, which finds the same
-//! and says why.
+//! A step of all lanes is taken at once, of the length that each lane's own error control wants; a lane that rejects
+//! its step goes back alone. A finished variant leaves its lane to the next of the queue. The result of a variant is
+//! therefore bit-identical to a single run ([`super::adaptive`]), with any neighbours. Failures in a lane (a singular
+//! matrix, vanishing steps, a stop by the observer) are left to a single run, which finds the same and reports the
+//! reason.
 
 use super::method::Motion;
 use super::pace::StepController;
@@ -87,8 +87,8 @@ pub struct LaneWork {
     pub rejected: u64,
 }
 
-/// Advances every variant that `next` gives with its number, and tells `done` how it ended. The lanes are laid out for the
-/// mechanism of `first`; variants that differ from it in more than numbers end as [`Ended::Unlike`] at once.
+/// Advances every variant that `next` gives with its number, and calls `done` with its outcome. The lanes are laid out
+/// for the mechanism of `first`; variants that differ from it in more than numbers end as [`Ended::Unlike`] at once.
 pub fn advance<'a>(
     first: &System,
     next: &mut dyn FnMut() -> Option<(usize, BatchRun<'a>)>,

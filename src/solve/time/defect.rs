@@ -72,7 +72,7 @@ impl Impulses {
         self.both[k] += early + rho * (weight * h);
     }
 
-    /// What solve `number` takes in for unknown `k`.
+    /// Input of solve `number` for unknown `k`.
     pub(super) fn of(&self, number: usize, k: usize) -> Pose {
         match number {
             IMPULSES => self.both[k],
@@ -205,7 +205,8 @@ mod tests {
         }
     }
 
-    /// A step over a small angle is off by 7.3e-4 of its fifth power; one over a large angle leaves nothing right.
+    /// The error of a step over a small angle is 7.3e-4 of its fifth power; a step over a large angle is wrong
+    /// entirely.
     #[test]
     fn steps_are_off_by_the_fifth_power() {
         for z in [0.1, 0.2] {

@@ -23,7 +23,7 @@ pub struct Dirk<X = Pose> {
     tableau: &'static Tableau,
     /// Rates (q) and accelerations (v) of the stages.
     stages: Vec<Motion<X>>,
-    /// What a stage has without its own acceleration.
+    /// Part of a stage without its own acceleration.
     base: Motion<X>,
     /// The place of the last stage.
     at: Motion<X>,

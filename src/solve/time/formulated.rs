@@ -34,7 +34,7 @@ impl Formulated {
         }
     }
 
-    /// The same, to be filled in by whoever finds an equilibrium.
+    /// As above, to be filled after an equilibrium search.
     pub fn sensitivity_mut(&mut self) -> &mut [Motion] {
         match self {
             Self::Bodies(m) => &mut m.sensitivity,
@@ -42,8 +42,8 @@ impl Formulated {
         }
     }
 
-    /// A motion begins that depends on no voltage yet. `state` is what [`Formulated::state`] told at its beginning; empty
-    /// where the bodies' motion is all that is known.
+    /// A motion begins that depends on no voltage yet. `state` is the result of [`Formulated::state`] at its beginning;
+    /// empty where only the bodies' motion is known.
     pub fn begin(&mut self, state: &[Motion]) {
         match self {
             Self::Bodies(m) => m.sensitivity.iter_mut().for_each(Motion::clear),
@@ -56,7 +56,7 @@ impl Formulated {
         }
     }
 
-    /// What the next step depends on beside the bodies' motion.
+    /// State for the next step beside the bodies' motion.
     pub fn state(&self) -> &[Motion] {
         match self {
             Self::Bodies(_) => &[],

@@ -1,7 +1,8 @@
 //! Coriolis' force on a mechanism whose frame turns, and Euler's as far as it depends on the place.
 //!
-//! A body of mass m feels, on the side of the residual, 2mΩ·e×v and the place's share mΩ̇·e×q, with e×v = (−v_y, v_x). Both are
-//! skew: they would make the step's symmetric matrix W unsymmetric, so they stay out of it. What an implicit stage needs,
+//! A body of mass m feels, on the side of the residual, 2mΩ·e×v and the place's share mΩ̇·e×q, with e×v = (−v_y, v_x).
+//! Both are skew: they would make the step's symmetric matrix W unsymmetric, so they stay out of it. An implicit stage
+//! needs the term
 //! ```text
 //! (W + G)·u = f,     G = (2mΩ/(γh) + mΩ̇)·e×
 //! ```
@@ -38,7 +39,7 @@ impl Gyration {
         self.rate == 0.0 && self.turning == 0.0
     }
 
-    /// What the matrix of a stage would hold of it, per mass: `gh` is γh [s].
+    /// Its contribution to the matrix of a stage, per mass: `gh` is γh [s].
     fn of_stage(&self, gh: f64) -> f64 {
         self.rate / gh + self.turning
     }

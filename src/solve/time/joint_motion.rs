@@ -26,7 +26,7 @@ pub struct JointMotion<'a, F> {
     change: Vec<f64>,
     /// Evaluations that took the path for singular configurations.
     pub singular: u64,
-    /// What the last of them met.
+    /// Diagnostics of the last of them.
     pub met: Singularity,
     /// Largest gap of a loop after a projection [m].
     pub gap: f64,

@@ -8,11 +8,11 @@
 //! W·Uq = −R(q_i, v_i, z_i, t_i) − γ_i·h·∂R/∂t + M·(r₁/(γh) + r₂) + C·r₁          W = M/(γh)² + C/(γh) + K
 //! Uv = Uq/(γh) − r₁                 Uz = Uv/(γh) − r₂
 //! ```
-//! with M, C and K at the start of the step. K holds the springs of the tree's joints, the stiffness that forces and inertia
-//! bring to them ([`geometric`]), and the exact tangent of closures and gaps. What rates bring is left out: it is small where
-//! joints turn little in a step.
+//! with M, C and K at the start of the step. K holds the springs of the tree's joints, the stiffness that forces and
+//! inertia bring to them ([`geometric`]), and the exact tangent of closures and gaps. The contribution of rates is
+//! omitted: it is small where joints rotate little in a step.
 //!
-//! To whoever drives it the motion is that of the bodies, as with every other method; coordinates are what it carries.
+//! To its caller the motion is that of the bodies, as with every other method; coordinates are internal.
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 (RODAS) and §VI.3 (the direct
 //! approach to differential-algebraic systems).

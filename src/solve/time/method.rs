@@ -1,5 +1,5 @@
-//! What every integrator is: a method that takes one step from a motion and tells how wrong the step may be.
-//! [`super::adaptive`] drives any of them, chosen at compile time.
+//! Integrators: methods that take one step from a motion and estimate its error. [`super::adaptive`] drives any of
+//! them, chosen at compile time.
 
 use crate::equations::Equations;
 pub use crate::equations::{Motion, SolverCounters, StepFailure};
@@ -9,7 +9,7 @@ pub trait Method<E: Equations> {
     /// The power of the step length with which the estimated error falls.
     fn error_order(&self) -> f64;
 
-    /// Prepares for a motion that begins at time 0: what was kept of an earlier one is forgotten.
+    /// Prepares for a motion that begins at time 0: data of an earlier one are dropped.
     ///
     /// # Errors
     /// [`StepFailure`] where there is no beginning.
@@ -43,12 +43,12 @@ pub trait Method<E: Equations> {
         let _ = (equations, t, h, ends, carried);
     }
 
-    /// What goes from step to step besides the motion: put back when a step is rejected.
+    /// State between steps beside the motion: restored when a step is rejected.
     fn carried(&mut self) -> &mut [Motion<E::Unknown>] {
         &mut []
     }
 
-    /// Work so far that the equations do not count themselves; steps are counted by whoever accepts them.
+    /// Work so far that the equations do not count themselves; the caller counts accepted steps.
     fn work(&self) -> SolverCounters {
         SolverCounters::default()
     }

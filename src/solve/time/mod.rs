@@ -3,7 +3,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | [`method`] | what every integrator is: one step, its estimated error, its work |
+//! | [`method`] | the trait of integrators: one step, its estimated error, its work |
 //! | [`adaptive`] | drives any of them: error control, or equal steps |
 //! | `pace` | how long the next step is |
 //! | [`doubling`] | error control by step doubling for methods without an estimate |

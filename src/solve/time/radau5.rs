@@ -1,8 +1,8 @@
 //! Radau IIA with three stages: order 5, L-stable, stiffly accurate, with an embedded estimate of order 3.
 //!
-//! The stages Z_i = Y_i − y₀ of y = (q, v) satisfy A⁻¹/h·Z = f(y₀ + Z). With T⁻¹A⁻¹T block diagonal (one real eigenvalue λ,
-//! one pair μ, μ̄) and W = T⁻¹Z a simplified Newton iteration, with the tangent K at the start of the step, splits into a real
-//! and a complex system, each reduced to displacements by hand:
+//! The stages Z_i = Y_i − y₀ of y = (q, v) satisfy A⁻¹/h·Z = f(y₀ + Z). With T⁻¹A⁻¹T block diagonal (one real
+//! eigenvalue λ, one pair μ, μ̄) and W = T⁻¹Z, a simplified Newton iteration with the tangent K at the start of the
+//! step splits into two systems. One is real and one complex, and each is reduced to displacements by hand:
 //! ```text
 //! (λI − J)·(Δq, Δv) = (a, M⁻¹b):      (λ²·M + λ·C + K)·Δq = b + (λ·M + C)·a,      Δv = λ·Δq − a
 //! ```

@@ -1,8 +1,8 @@
 //! Rodas4: a stiffly accurate Rosenbrock method of order 4 with an embedded estimate of order 3.
 //!
-//! For M·q̈ + C·q̇ + r(q, t) = 0 with y = (q, v) each of its six stages solves (W)·U = right-hand side with one matrix per
-//! step, W = M/(γh)² + C/(γh) + K(q_n): the velocity half is eliminated by hand, and W stays symmetric, so one block
-//! factorization and six solves make a step. Nothing iterates and nothing is allocated.
+//! For M·q̈ + C·q̇ + r(q, t) = 0 with y = (q, v) each of its six stages solves (W)·U = right-hand side with one matrix
+//! per step, W = M/(γh)² + C/(γh) + K(q_n). The velocity half is eliminated by hand and W stays symmetric, so that a
+//! step takes one block factorization and six solves. Nothing iterates and nothing is allocated.
 //! ```text
 //! r₁ = v_i + Σ c_ij/h·Uq_j                                 v-row of stage i
 //! r₂ = −r(q_i, t_i) − C·v_i + M·Σ c_ij/h·Uv_j + γ_i·h·∂F/∂t
@@ -247,8 +247,9 @@ mod tests {
         }
     }
 
-    /// The sensitivity of a single step is the derivative of its result (central difference of 1 mV, 1e-7 relative); over
-    /// many steps it leaves out how later Jacobians depend on the voltage, an effect of the size of the step's own error.
+    /// The sensitivity of a single step is the derivative of its result (central difference of 1 mV, 1e-7 relative).
+    /// Over many steps it neglects the dependence of later Jacobians on the voltage, an effect of the size of the
+    /// step's own error.
     #[test]
     fn sensitivities() {
         for (steps, tolerance) in [(1, 1e-7), (200, 1e-4)] {

@@ -54,7 +54,7 @@ impl LaneEquilibrium {
         self.tangent.negative::<W>(simd).store(&mut self.negative);
     }
 
-    /// What the change of free strains brings, in `force`.
+    /// Effect of a change of free strains, in `force`.
     #[inline(always)]
     fn change<W: SimdReal>(&mut self, simd: W::Simd) {
         self.force.fill(ZERO_POSE);

@@ -1,4 +1,4 @@
-//! What equilibria of variants side by side are found with.
+//! Storage for a batch of equilibria.
 
 use crate::domains::System;
 use crate::multibody::batch::joint::LanePlaced;

@@ -147,7 +147,8 @@ impl RitzMatrices {
         }
     }
 
-    /// Replaces the shapes by the combinations that the vectors say, of length 1 in the mass. What `room` holds is lost.
+    /// Replaces the shapes by the combinations that the vectors say, of length 1 in the mass. The content of `room` is
+    /// overwritten.
     #[inline(always)]
     pub(super) fn combine<W: SimdReal>(
         &self,

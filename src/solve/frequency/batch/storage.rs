@@ -1,4 +1,4 @@
-//! What modes of variants side by side are found with.
+//! Storage for a batch of modes.
 
 use super::ritz::{MAX_ROWS, RitzMatrices};
 use crate::domains::System;

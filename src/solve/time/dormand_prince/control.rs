@@ -46,7 +46,7 @@ pub enum IntegrationError<E> {
         t: f64,
         /// Its length [s].
         h: f64,
-        /// What the formulation said.
+        /// Error of the formulation.
         source: E,
     },
     /// Steps became too small.

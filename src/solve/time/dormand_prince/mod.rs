@@ -1,8 +1,8 @@
 //! The explicit Runge–Kutta pair of Dormand and Prince, order 5 with an embedded order 4, for q̈ = a(t, q, q̇).
 //!
-//! A step knows nothing of bodies or joints: whoever can tell accelerations can have it. [`super::explicit`] makes it one of the methods
-//! that the common driver takes; mechanisms without a system, which want tolerances down to 1e-13, are driven by
-//! [`DormandPrince::integrate`] ([`SecondOrder`]). With y = (q, q̇) a step is
+//! A step depends on no bodies or joints: any caller with accelerations can use it. [`super::explicit`] makes it one of
+//! the methods that the common driver takes; mechanisms without a system, which want tolerances down to 1e-13, are
+//! driven by [`DormandPrince::integrate`] ([`SecondOrder`]). With y = (q, q̇) a step is
 //! ```text
 //! y_i = y + h·Σ_{j<i} a_ij·k_j      k_i = (q̇_i, a(t + c_i·h, q_i, q̇_i))        i = 1 … 7
 //! y'  = y_7                         error = h·Σ e_i·k_i

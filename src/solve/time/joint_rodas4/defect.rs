@@ -71,7 +71,7 @@ impl<'s> Propagates<'s> for JointRodas4 {
     }
 }
 
-/// What a solve found, and its rate: that of what went in is left.
+/// Result of a solve, and its rate; only the rate of the input is omitted.
 fn advanced(found: Pose, of: &Pose, gh: f64) -> (Pose, Pose) {
     (found, (found - of) / gh)
 }

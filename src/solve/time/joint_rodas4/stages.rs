@@ -1,6 +1,6 @@
-//! What the six stages keep of one motion in joint coordinates, or of its derivative: the increments of the coordinates, and
-//! the motions of the bodies that belong to each. Everything else is a sum of these, see [`super::tableau`], taken for eight bodies
-//! side by side.
+//! Data that the six stages keep of one motion in joint coordinates, or of its derivative: the increments of the
+//! coordinates, and the corresponding motions of the bodies. Everything else is a sum of these, see [`super::tableau`],
+//! computed for eight bodies per vector.
 
 use super::tableau::TABLEAU;
 use crate::multibody::batch::{Kernel, LanePose, SimdReal, ZERO_POSE, add_scaled, everywhere, load, store};
@@ -29,9 +29,9 @@ pub(super) struct JointStages {
     acceleration: Vec<LanePose>,
     /// Where the stage at hand takes the forces; after the last one the end of the step.
     pub(super) argument: Vec<LaneJointStates>,
-    /// Motion of the bodies with r₁/(γh) + r₂: what inertia acts on.
+    /// Motion of the bodies with r₁/(γh) + r₂: the argument of inertia.
     push: Vec<LanePose>,
-    /// Motion of the bodies with r₁: what damping acts on, where it was asked for.
+    /// Motion of the bodies with r₁: the argument of damping, where needed.
     drift: Vec<LanePose>,
     /// Room for motions of the bodies.
     room: [Vec<Pose>; 2],
@@ -66,7 +66,8 @@ impl JointStages {
         }
     }
 
-    /// The argument becomes the motion with coordinates and rates `now` and accelerations `push.q`. Tells whether that is what it was.
+    /// The argument becomes the motion with coordinates and rates `now` and accelerations `push.q`. Returns whether it
+    /// is unchanged.
     pub(super) fn begin_first(&mut self, now: &Motion, push: &Motion) -> bool {
         for (j, ((q, v), z)) in now.q.iter().zip(&now.v).zip(&push.q).enumerate() {
             let (tile, lane) = place_of(j);
@@ -77,8 +78,8 @@ impl JointStages {
         same
     }
 
-    /// Where stage `i` of a step of length `h` [s] from coordinates and rates `now` and accelerations `push.q` takes the
-    /// forces. Tells whether that is where the step before ended.
+    /// Where stage `i` of a step of length `h` [s] from coordinates and rates `now` and accelerations `push.q` takes
+    /// the forces. Returns whether the step before ended there.
     pub(super) fn begin(&mut self, i: usize, h: f64, now: &Motion, push: &Motion) -> bool {
         if i == 0 {
             return self.begin_first(now, push);
@@ -87,18 +88,18 @@ impl JointStages {
         false
     }
 
-    /// What inertia acts on in stage `i`, and damping where something `drags`.
+    /// Arguments of inertia in stage `i`, and of damping where something `drags`.
     pub(super) fn move_bodies(&mut self, i: usize, h: f64, drags: bool) {
         everywhere(Sums { stages: self, task: StageSum::Move(i, drags), h });
     }
 
-    /// What inertia of body `j` acts on.
+    /// Argument of inertia of body `j`.
     #[inline(always)]
     pub(super) fn push(&self, j: usize) -> Pose {
         get(&self.push, j)
     }
 
-    /// What damping of body `j` acts on.
+    /// Argument of damping of body `j`.
     #[inline(always)]
     pub(super) fn drift(&self, j: usize) -> Pose {
         get(&self.drift, j)
@@ -157,9 +158,9 @@ fn set(to: &mut [LanePose], j: usize, pose: &Pose) {
 enum StageSum {
     /// The argument of a stage.
     Begin(usize),
-    /// What inertia acts on in a stage, and damping.
+    /// Arguments of inertia in a stage, and of damping.
     Move(usize, bool),
-    /// What damping acts on.
+    /// Argument of damping.
     Drift(usize),
     /// The end of the step.
     Finish,

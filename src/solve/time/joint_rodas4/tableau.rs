@@ -1,9 +1,9 @@
 //! The coefficients of Rodas4 over increments of the coordinates alone.
 //!
-//! With u_k the increments of the coordinates, Uv_i = u_i/(γh) − r₁ and Uz_i = Uv_i/(γh) − r₂ are themselves sums of the u_k,
-//! of the rates v and the accelerations z at the start of the step. So every stage needs of the stages before it their u_k
-//! only: a third of what it would have to read otherwise, and the motions of the bodies that inertia acts on follow from the
-//! motions that the solves have left for each u_k.
+//! With u_k the increments of the coordinates, Uv_i = u_i/(γh) − r₁ and Uz_i = Uv_i/(γh) − r₂ are themselves sums of
+//! the u_k, of the rates v and the accelerations z at the start of the step. So every stage reads only the u_k of the
+//! stages before it: a third of the data otherwise required. The arguments of inertia follow from the motions that the
+//! solves have stored for each u_k.
 //! ```text
 //! rate of a stage           p_i·v + Σ V_ik·u_k/h
 //! acceleration of a stage   t_i·z + a_i·v/h + Σ Z_ik·u_k/h²
@@ -30,9 +30,9 @@ pub(super) struct JointTableau {
     pub(super) acceleration_rate: [f64; 6],
     /// R: r₁ by increments.
     pub(super) lag: TableauRows,
-    /// S: what inertia acts on by increments.
+    /// S: argument of inertia by increments.
     pub(super) push: TableauRows,
-    /// s: what inertia acts on by the rate at the start.
+    /// s: argument of inertia by the rate at the start.
     pub(super) push_rate: [f64; 6],
 }
 

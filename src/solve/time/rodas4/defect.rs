@@ -37,7 +37,7 @@ impl DefectEstimate {
         }
     }
 
-    /// What the first stage holds before r is added to it, and after.
+    /// Content of the first stage before r is added to it, and after.
     pub(super) fn before_forces(&mut self, force: &[Pose]) {
         self.start.copy_from_slice(force);
     }
@@ -104,8 +104,9 @@ impl DefectEstimate {
         }
     }
 
-    /// The acceleration at the start of the step; that of a cubic through the ends in directions without mass, and with one so small that
-    /// they follow their springs within the step, where a residue of the springs' balance would be an acceleration.
+    /// The acceleration at the start of the step. In directions without mass it is that of a cubic through both ends.
+    /// The same applies to masses so small that they follow their springs within the step, where a residual of the
+    /// force balance would be an acceleration.
     fn accelerate(&mut self, system: &System, h: f64, before: &Motion, after: &Motion) {
         let model = &system.model;
         let start = &mut self.start;

@@ -1,7 +1,7 @@
-//! Rodas4 over variants side by side: a step of each, with its own length, in the vector instructions of the processor.
+//! Batched Rodas4: a step of each variant, with its own length, in the vector instructions of the processor.
 //!
-//! Everything that all bodies and joints go through is done for all lanes at once, in the order of [`super`] and of
-//! `stages`; gaps and dead loads act on few bodies and have branches of their own, and go variant by variant.
+//! Operations over all bodies and joints run for all lanes at once, in the order of [`super`] and of `stages`. Gaps and
+//! dead loads act on few bodies and have branches of their own, and run variant by variant.
 
 mod acted;
 mod heat;

@@ -1,8 +1,8 @@
-//! What the six stages keep of every body, and the sweep over the bodies between one solve and the next.
+//! Data that the six stages keep of every body, and the sweep over the bodies between one solve and the next.
 //!
-//! On large models a step is as fast as the memory that it reads and writes. So everything that a body needs of itself
-//! alone between the solve of one stage and the forces of the next is done in one sweep, and the increments of a tile of
-//! bodies lie together, so that the sweep reads one run of memory however many stages came before.
+//! On large models a step is as fast as the memory that it reads and writes. All operations of a body between the solve
+//! of one stage and the forces of the next are therefore done in one sweep. The increments of a tile of bodies are
+//! contiguous, so that the sweep reads one run of memory for any number of previous stages.
 //!
 //! Signs: forces are summed as they stand in M·q̈ + C·q̇ + r = 0, so the solve finds minus the increment.
 
@@ -28,8 +28,8 @@ type TileIncrements = [[BodyIncrement; TILE]; 5];
 /// The stages of one motion.
 #[derive(Debug, Clone)]
 pub(super) struct Stages {
-    /// What the stage at hand adds to the forces; then the sum of both, held directions removed; after the solve minus the
-    /// increment of the displacements.
+    /// Contribution of the current stage to the forces. Then the sum of both, with held directions removed. After the
+    /// solve it is minus the increment of the displacements.
     pub(super) force: Vec<Pose>,
     /// ∂r/∂t at the start of the step.
     pub(super) forcing: Vec<Pose>,

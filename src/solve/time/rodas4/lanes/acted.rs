@@ -1,4 +1,5 @@
-//! What acts on few bodies of a variant and has branches of its own: gaps and dead loads, variant by variant.
+//! Elements that act on few bodies of a variant and have branches of their own: gaps and dead loads, variant by
+//! variant.
 
 use super::super::tableau::{C, GAMMA};
 use super::storage::{IN_PLACE, Lane, LaneRodas4};
@@ -7,7 +8,7 @@ use crate::multibody::batch::{LANES, LanePose};
 use crate::multibody::planar::Pose;
 
 impl LaneRodas4 {
-    /// What gaps and dead loads add to the forces of stage `i`, and in the first stage to the tangent.
+    /// Contributions of gaps and dead loads to the forces of stage `i`, and in the first stage to the tangent.
     pub(super) fn act(&mut self, lanes: &[Option<Lane<'_>>; LANES], i: usize) {
         let Self { motion, at, force, w, acted, acted_blocks, drives, q, r, tangent, losses, rates, .. } = self;
         let ([r1_of, rate_of], r1, increments, h) = (rates, &self.r1, &self.increments, &self.h);

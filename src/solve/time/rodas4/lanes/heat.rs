@@ -20,11 +20,11 @@ struct LaneHeater {
     /// Rise at the start, and at last [K].
     start: Lane8,
     steady: Lane8,
-    /// Time constant [s]; 1 where there is none.
+    /// Time constant [s]; 1 without one.
     time_constant: Lane8,
 }
 
-/// What a time is to a time constant, in each variant: [`Lag`].
+/// Exponentials of a time over a time constant, in each variant: [`Lag`].
 #[derive(Debug, Clone, Copy)]
 struct LaneLag {
     /// [s]; 0: none.

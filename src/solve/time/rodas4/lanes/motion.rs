@@ -1,4 +1,4 @@
-//! The motion of variants side by side, and its measure.
+//! Motion of a batch of variants, and its norm.
 
 use crate::multibody::batch::{LANES, Lane8, LaneModel, LanePose, Real, SimdReal, ZERO_POSE, load};
 use crate::multibody::planar::Pose;

@@ -1,4 +1,4 @@
-//! What a step of variants side by side works on.
+//! Storage of a batched step.
 
 use super::heat::LaneHeat;
 use super::motion::{LaneMotion, Norms};
@@ -13,7 +13,7 @@ use crate::multibody::{BlockMatrix, Pattern};
 /// From this stage on the motion itself carries the argument.
 pub(super) const IN_PLACE: usize = 4;
 
-/// What a lane runs.
+/// Run of a lane.
 #[derive(Debug, Clone)]
 pub struct Lane<'a> {
     /// The variant.
@@ -68,7 +68,7 @@ pub struct LaneRodas4 {
     pub(super) q: Vec<Pose>,
     pub(super) r: Vec<Pose>,
     pub(super) tangent: BlockMatrix<f64, 3>,
-    /// What contact loses, lane by lane; empty where parts cannot touch.
+    /// Contact losses, lane by lane; empty where parts cannot touch.
     pub(super) losses: Vec<LossDerivatives>,
     /// r₁ and rates of one lane.
     pub(super) rates: [Vec<Pose>; 2],
