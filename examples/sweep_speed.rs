@@ -3,10 +3,10 @@
 //!
 //!     taskset -c 0 cargo run --release --no-default-features --example sweep_speed [POINTS] [transient|static|modes|parts]
 //!
-//! *alone*: every point as a call of its own, read, searched a mesh for and analysed. *given mesh*: the same on the a priori
-//! mesh, without any estimate. *sweep*: `jobs::sweep`, with the estimate of every point. Transients are on two segments a beam in all
-//! ways; *lanes* is the integration alone, *sweep* has the reading and the estimate too. Their ends are compared bit by bit.
-//! *parts*, on its own: what a point is made of, `part,us`.
+//! *alone*: every point as a call of its own, read, searched a mesh for and analysed. *given mesh*: the same on the a
+//! priori mesh, without any estimate. *sweep*: `jobs::sweep`, with the estimate of every point. Transients are on two
+//! segments a beam in all ways; *lanes* is the integration alone, *sweep* has the reading and the estimate too. Their
+//! ends are compared bit by bit. *parts*, on its own: the parts of a point's cost, `part,us`.
 
 use bimorph::analysis::batch_transient;
 use bimorph::analysis::mesh::{MeshRequest, fitted};
@@ -147,7 +147,7 @@ fn rate(count: usize, work: impl FnOnce()) -> f64 {
     count as f64 / (used() - before)
 }
 
-/// What one point is made of, each part done `points` times.
+/// Parts of the cost of one point, each repeated `points` times.
 fn parts(points: usize) {
     let voltages = vec![("heat".to_owned(), 2.2)];
     let (spec, bundle) = grid(9, SweepAnalysis::Modes { count: 3, voltages: Vec::new() });

@@ -262,7 +262,7 @@ fn scales() -> Vec<Chart> {
     }]
 }
 
-/// What draws one picture.
+/// Function that draws one picture.
 type Draw = fn() -> Vec<Chart>;
 
 fn main() -> std::io::Result<()> {

@@ -106,8 +106,8 @@ pub(crate) unsafe fn terminals(conn: *mut *mut ConnectionData, layout: &HostLayo
     }
 }
 
-/// By which of its functions the host wants the device loaded. It tells a code model the kind of the analysis, too, but
-/// that may be the kind of the one before: `.noise`, `.pz`, `.tf` and `.sens` do not set it.
+/// By which of its functions the host wants the device loaded. The host also passes the kind of the analysis to a code
+/// model. It may be that of the previous one, since `.noise`, `.pz`, `.tf` and `.sens` do not set it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Wanted {
     /// Currents at these voltages.
@@ -142,7 +142,7 @@ impl ModelCall<'_> {
         }
     }
 
-    /// What names the instance: its connections stay at one address as long as it lives.
+    /// Key of the instance: its connections stay at one address for its lifetime.
     pub(crate) fn key(&self) -> usize {
         self.tail.conn as usize
     }
@@ -164,8 +164,8 @@ impl ModelCall<'_> {
         (!vector.is_null()).then(|| unsafe { vector.add(memory.first) })
     }
 
-    /// What is asked, or why it cannot be told. The circuit's step and the difference of the two times are the same up to
-    /// the rounding of the times.
+    /// The request, or the reason why it is unknown. The circuit's step and the difference of the two times are the
+    /// same up to the rounding of the times.
     pub(crate) fn question(&self) -> Result<EvaluationRequest, &'static str> {
         let (c, delta) = (self.arguments, self.circuit.delta());
         if self.wanted == Wanted::Small {
@@ -237,8 +237,9 @@ impl ModelCall<'_> {
         unsafe { self.port(PORTS, n).add(port_data::INPUT).cast() }
     }
 
-    /// Port voltages, or currents where these are given. The host's are not right where it takes the load for a small signal, and it does not know those that
-    /// a transient starts from (`uic`); what is read instead is given to it, too, now and for the first step.
+    /// Port voltages, or currents where these are given. The host's values are wrong where it takes the load for a
+    /// small signal, and it does not know the initial values of a transient (`uic`). The values read instead are also
+    /// written back to it, now and for the first step.
     pub(crate) fn voltages(&self, into: &mut Vec<f64>) {
         into.clear();
         let given = self.wanted == Wanted::Large && self.circuit.given();

@@ -1,10 +1,10 @@
-//! What ngspice asks of an instance, and what it is told.
+//! Evaluation requests of ngspice to an instance, and their outcomes.
 
 use crate::companion::DifferentiationRule;
 use crate::history::Base;
 use bimorph::device::{Token, TrialReply};
 
-/// What ngspice asks.
+/// Evaluation request of ngspice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum EvaluationRequest {
     /// Operating point or sweep: equilibrium.
@@ -25,7 +25,7 @@ pub enum EvaluationRequest {
     },
 }
 
-/// What becomes of a question.
+/// Outcome of an evaluation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EvaluationOutcome {
     /// The instance holds the answer.
@@ -49,7 +49,7 @@ pub struct Evaluation {
     pub conductances: Vec<f64>,
     /// Charges [C] (p).
     pub charges: Vec<f64>,
-    /// What the next step's charges will be differentiated from, if this point is accepted.
+    /// Base for differentiating the next step's charges, if this point is accepted.
     pub base: Base,
     /// By how much a current changes with its charge over this step [1/s]; 0 for equilibrium.
     pub slope: f64,

@@ -11,8 +11,9 @@ use bimorph::device::Agitation;
 use std::ffi::{c_int, c_void};
 use std::path::{Path, PathBuf};
 
-/// Opens each instance of each model, and reserves its state memory as the host's own devices do: by its count of states. What
-/// `cm_analog_alloc` would add later is missing in one vector under `.options maxord=1`, which the host then overruns.
+/// Opens each instance of each model, and reserves its state memory as the host's own devices do: by its count of
+/// states. One vector lacks the memory that `cm_analog_alloc` would add later under `.options maxord=1`, and the host
+/// then overruns it.
 ///
 /// # Safety
 /// `model` heads the host's list of models; each is set up. `circuit` is the host's, and `states` its count of states so far.
@@ -60,8 +61,8 @@ fn open(name: &str, card: &mut ModelCard, ports: &[bool], directory: Option<&Pat
         .map_err(|e| format!("\"{}\": {e}", card.file))
 }
 
-/// Folders of the files that hold the `.model` line of a model, as whoever started ngspice found them. Models of a subcircuit's instance
-/// are called `INSTANCE:MODEL`.
+/// Folders of the files with the `.model` line of a model, as found by the program that started ngspice. Models of a
+/// subcircuit's instance are called `INSTANCE:MODEL`.
 fn folders_of(model: &str) -> Vec<PathBuf> {
     let own = model.rsplit(':').next().unwrap_or(model);
     let known = std::env::var("BIMORPH_MODEL_FOLDERS").unwrap_or_default();
@@ -75,7 +76,7 @@ fn seed_of(seed: u64, name: &str) -> u64 {
     seed.to_le_bytes().into_iter().chain(name.bytes()).fold(0xcbf2_9ce4_8422_2325, mix)
 }
 
-/// The deck's directory: from whoever started ngspice, or from the host.
+/// The deck's directory: from the program that started ngspice, or from the host.
 ///
 /// # Safety
 /// `conn` points to the connections of an instance that the host has set up in `circuit`.

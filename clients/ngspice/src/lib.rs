@@ -9,12 +9,13 @@
 //! ```
 //!
 //! # Layout
-//! What ngspice's memory looks like: `abi` the structures, [`layout`] which host this is, `table` what the plug-in
-//! declares, `exports` the symbols, `host` the host's functions, `call` one call's data,
-//! `circuit` what it is part of, `query_table` what can be asked of it by name. Between the two sides stand
-//! `callbacks`, `instance_setup` and `respond`, with the `registry` of instances. What does not know ngspice: [`model_card`],
-//! [`settings`], [`deck_options`] and `names` the `.model` line, [`opener`] from line to device, [`instance`] questions and outcomes,
-//! [`companion`] charges to currents, [`bimorph::device::scale`] volts to micrometres, [`history`] what an accepted point leaves behind.
+//! Modules that know ngspice's memory: `abi` has the structures, [`layout`] detects the host, `table` has the
+//! declarations of the plug-in, and `exports` the symbols. `host` has the host's functions, `call` the data of one
+//! call, `circuit` its circuit, and `query_table` the quantities that can be queried by name. Between the two sides
+//! stand `callbacks`, `instance_setup` and `respond`, with the `registry` of instances. Modules independent of ngspice:
+//! [`model_card`], [`settings`], [`deck_options`] and `names` read the `.model` line, and [`opener`] opens the device.
+//! [`instance`] has requests and outcomes, [`companion`] converts charges to currents, [`bimorph::device::scale`] volts
+//! to micrometres, and [`history`] stores accepted points.
 //!
 //! This is the only crate of the project with `unsafe` code; each block says why it holds.
 

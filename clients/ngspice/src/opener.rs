@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use thiserror::Error;
 
-/// Why no device came out of a `.model` line.
+/// Errors of opening the device of a `.model` line.
 #[derive(Debug, Error)]
 pub enum OpenError {
     /// The netlist cannot be read.
@@ -24,7 +24,7 @@ pub enum OpenError {
         file: String,
         /// Every path that was tried.
         tried: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// There are several in the folders where the line may stand.
@@ -51,7 +51,7 @@ pub enum OpenError {
         /// Diagnostics with file, line and column.
         source: CompileError,
     },
-    /// There is none on twice the segments.
+    /// There is no model on twice the segments.
     #[error("netlist \"{file}\" on twice the segments: {source}")]
     Finer {
         /// As spelled on the line.
@@ -193,7 +193,7 @@ fn read(file: &str, folders: &[PathBuf], directory: Option<&Path>) -> Result<Bun
     }
 }
 
-/// Models kept for instances and analyses to share; the one that nobody asked for longest makes room.
+/// Models cached for instances and analyses to share; the least recently used one is evicted.
 const MAX_MODELS: usize = 16;
 
 struct SharedModel {

@@ -1,4 +1,4 @@
-//! What an instance shows when it is looked at: numbers of the instance and its ports, its monitors, and any signal of its netlist.
+//! Queries of an instance: numbers of the instance and its ports, its monitors, and any signal of its netlist.
 
 use crate::instance::Instance;
 use bimorph::device::{PortKind, quantities::WHOLE};
@@ -10,7 +10,7 @@ const NUMBERS: [&str; 4] = ["unknowns", "points", "trials", "refused"];
 const OF_A_PORT: [&str; 4] = ["v", "i", "q", "dq"];
 
 impl Instance {
-    /// What `show` lists.
+    /// Quantities in `show`.
     pub(crate) fn shown(&self) -> Vec<String> {
         let numbers = NUMBERS.iter().map(|name| (*name).to_owned());
         let whole = self.quantities().into_iter().filter(|name| WHOLE.iter().any(|(whole, _)| whole == name));
@@ -20,12 +20,12 @@ impl Instance {
         numbers.chain(whole).chain(ports).chain(monitors).collect()
     }
 
-    /// What can be asked for besides: every signal. Of a model on a server monitors alone can be seen.
+    /// Further quantities for queries: every signal. Of a model on a server monitors alone can be seen.
     pub(crate) fn quantities(&self) -> Vec<String> {
         self.device.names()
     }
 
-    /// Value of a quantity in the last state, in its own unit; none where there is none, or no state yet.
+    /// Value of a quantity in the last state, in its own unit; `None` for an unknown one, or without a state.
     pub(crate) fn look(&mut self, name: &str) -> Option<f64> {
         match name {
             "unknowns" => return Some(self.description().unknowns as f64),

@@ -1,4 +1,4 @@
-//! What `show a1` and `@a1[…]` know: instance parameters that can be asked and not set, made from the netlists of the circuit.
+//! Instance parameters for `show a1` and `@a1[…]`: read-only, made from the netlists of the circuit.
 //!
 //! ngspice reads the table of a device's instance parameters anew whenever it looks a name up, so the table is made at setup, when
 //! the models are known. All instances share one: it holds the names of every netlist of the circuit, and an instance that does not

@@ -56,7 +56,7 @@ pub(crate) struct Registry {
     pub(crate) stopped: bool,
     /// Key of the instance being asked.
     pub(crate) asked: usize,
-    /// What can be asked of instances by name; none before the first setup.
+    /// Instance parameters by name; `None` before the first setup.
     pub(crate) names: Option<LookNames>,
 }
 

@@ -1,19 +1,20 @@
-//! Warnings on standard error, each once in a process: what a deck's run says of the drawings behind it, and of what its parts came to.
+//! Warnings on standard error, each once in a process: warnings of a deck's netlists, and of the states of its parts.
 
 use crate::trace;
 use bimorph::netlist::Diagnostic;
 use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 
-/// Lines that a process tells, at most.
+/// Most lines that a process prints.
 const MAX_LINES: usize = 200;
-/// Those about one kind of warning of one instance: analyses after one another say much the same, and what grows is told at three times as much.
+/// Most lines about one kind of warning of one instance. Successive analyses repeat much the same warnings, and a
+/// growing one is printed again at three times its size.
 const MAX_ALIKE: usize = 6;
 
-/// What was told of whom, by code.
+/// Printed warnings, by instance and code.
 static REPORTED: Mutex<Vec<(String, String, String)>> = Mutex::new(Vec::new());
 
-/// Warnings of a netlist. Those that its circuit is left out are none where the deck has it.
+/// Warnings of a netlist. Warnings about an omitted circuit are dropped where the deck includes it.
 pub(crate) fn of_netlist(file: &str, has_circuit: bool, warnings: &[Diagnostic]) {
     let of_circuit = |code: &str| has_circuit && ["W013", "W021", "W022"].contains(&code);
     warnings.iter().filter(|w| !of_circuit(&w.code)).for_each(|warning| report(file, warning, MAX_LINES));

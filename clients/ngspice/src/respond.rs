@@ -109,10 +109,10 @@ pub(crate) fn moves(entry: &mut RegisteredInstance, circuit: HostCircuit) -> boo
 
 /// Puts into the record what the accepted solution differs from the one that the device was asked at.
 ///
-/// Newton's iteration ends when two solutions lie close together, and the device was asked at the first. Up to there its
-/// currents went on straight, along their derivatives, and so did the charge that the circuit delivered. The next step has
-/// to begin from that charge: what is left out at each point would be lost or gained for good, and always with the same
-/// sign where a charge curves one way.
+/// Newton's iteration ends when two solutions lie close together, and the device was asked at the first. Up to there
+/// its currents went on straight, along their derivatives, and so did the charge that the circuit delivered. The next
+/// step must begin from that charge. The difference at each point would otherwise be lost or gained for good, and
+/// always with the same sign where a charge curves one way.
 pub(crate) fn settle(entry: &mut RegisteredInstance, circuit: HostCircuit) {
     // SAFETY: nodes of the circuit, as the host set them up.
     let asked_here = (entry.nodes.iter().zip(&entry.voltages))

@@ -58,8 +58,9 @@ fn every_dc_line_begins_from_rest() {
     }
 }
 
-/// Monitors of a sweep are those of the equilibrium, whatever `reltol`: at 1 V after 0.5 V ngspice writes the iterate before the last, which was
-/// 6e-4 off; the plate's own equation holds to 3e-5, the difference of the contact law beyond the gap.
+/// Monitors of a sweep are those of the equilibrium, for any `reltol`. At 1 V after 0.5 V ngspice writes the iterate
+/// before the last, whose error was 6e-4. The plate's own equation holds to 3e-5, the difference of the contact law
+/// beyond the gap.
 #[test]
 fn monitors_of_sweeps_are_converged() {
     for reltol in ["1e-3", "1e-2"] {
@@ -79,8 +80,8 @@ fn monitors_of_sweeps_are_converged() {
     }
 }
 
-/// Every order of integration runs to the end, the lowest by backward Euler, with several parts and code models of ngspice's own beside them;
-/// at 0.05 µs steps of a pulse that takes 20 µs orders 1 and 2 lie 1 % of the swing apart.
+/// Every order of integration runs to the end, the lowest by backward Euler, with several parts and code models of
+/// ngspice's own in the circuit. At 0.05 µs steps of a pulse of 20 µs, orders 1 and 2 differ by 1 % of the amplitude.
 #[test]
 fn every_order_of_integration_runs() {
     for (version, ngspice) in versions() {

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 /// Longest wait of the device for an answer [s].
 const DEADLINE: u64 = 2;
-/// What a run takes beside: its start, its end, and a loaded machine.
+/// Further time of a run: its start, its end, and a loaded machine.
 const AROUND: Duration = Duration::from_secs(8);
 
 /// Each lie, and what is said of it.
@@ -75,7 +75,7 @@ fn lies_end_a_run_and_are_named() {
     for (lie, what) in LIES {
         let (error, took) = reported(lie);
         println!("{lie:16} {:5.1} s  {}", took.as_secs_f64(), error.chars().take(160).collect::<String>());
-        // a device that has no equilibrium says so itself: that is an answer, whoever gives it
+        // a device without an equilibrium is a valid reply, from any server
         let named = error.contains("instance a1") && (lie == "fails" || error.contains("server unix:"));
         let clean = !error.chars().any(|c| c.is_control() && c != '\n' && c != '\t') && error.len() < 70_000;
         if !named || !clean || !error.contains(what) || took > Duration::from_secs(DEADLINE) + AROUND {

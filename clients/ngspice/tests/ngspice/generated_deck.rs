@@ -38,9 +38,10 @@ fn stands_at(volts: f64) -> f64 {
     (0..200).fold(0.0f64, |x, _| 0.5 * 8.854e-12 * 1e-8 * volts * volts / (2e-6 - x).powi(2)) * 1e6
 }
 
-/// A plate behind a divider of two resistors of 1 MΩ with 1 pF: its voltage is half of the source's and its displacement that of
-/// the plate's own equation; in small signals the divider has its pole at 1/(2π·R/2·(C + C_plate)), below 1 % beside it because the
-/// motion adds to the plate's share, which is 4.4 % of C; and a step has the same waveforms, to 1e-9, as the deck that a person writes.
+/// A plate behind a divider of two resistors of 1 MΩ with 1 pF. Its voltage is half of the source's, and its
+/// displacement that of the plate's own equation. In small signals the divider has its pole at 1/(2π·R/2·(C +
+/// C_plate)). The motion adds to the plate's fraction, 4.4 % of C, which shifts it by less than 1 %. A step has the
+/// same waveforms, to 1e-9, as a deck written by hand.
 #[test]
 fn a_divider_and_a_plate() {
     let netlist = format!(
@@ -89,9 +90,9 @@ fn a_divider_and_a_plate() {
     }
 }
 
-/// Sources and amplifiers have SUGAR's signs: a current source takes its current out of the first node, an op-amp with 1 kΩ and 3 kΩ
-/// makes −3 V of 1 V (to the 4e-6 that its gain of 1e6 leaves), a `vcvs` of gain −1.5 makes 4.5 V of that, and an inductor carries what
-/// flows to the plate at no voltage.
+/// Sources and amplifiers have SUGAR's signs. A current source takes its current out of the first node. An op-amp with
+/// 1 kΩ and 3 kΩ makes −3 V of 1 V (to the 4e-6 that its gain of 1e6 leaves), and a `vcvs` of gain −1.5 makes 4.5 V of
+/// that. An inductor carries the current of the plate at no voltage.
 #[test]
 fn amplifiers_drive_the_plate() {
     let netlist = format!(

@@ -1,4 +1,4 @@
-//! What a designer looks at: `show a1` and `@a1[…]`, without monitors, on every ngspice at hand.
+//! Inspection by a designer: `show a1` and `@a1[…]`, without monitors, on every ngspice at hand.
 
 use crate::support::{deck, real, run_text, versions};
 use bimorph::cosim::{self, CosimOptions};

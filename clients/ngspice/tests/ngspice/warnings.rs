@@ -1,10 +1,11 @@
-//! What decks are warned of when their states are accepted.
+//! Warnings of decks about accepted states.
 
 use crate::support::{all_decks, run, versions};
 use bimorph::cosim::{self, CosimOptions};
 use std::path::Path;
 
-/// The bank's heaters at a voltage that melts them and drives the comb through its other side, and what was told, in order.
+/// The bank's heaters at a voltage that melts them and drives the comb through its other side; returns the warnings in
+/// order.
 fn reported(ngspice: &Path, source: &str, analysis: &str) -> Vec<String> {
     let folder = all_decks();
     let (deck, log) = (folder.path().join("hot.cir"), folder.path().join("log"));
@@ -20,8 +21,8 @@ fn reported(ngspice: &Path, source: &str, analysis: &str) -> Vec<String> {
     trace.lines().filter_map(warning).collect()
 }
 
-/// Heat that nothing bears (W037) and fingers that go through the other side of their comb (W024) are told by an operating point, a sweep
-/// and a transient, each once; a deck in its range is told nothing.
+/// Heat beyond the strength of any solid (W037) and fingers beyond the other side of their comb (W024) are reported by
+/// an operating point, a sweep and a transient, each once. A deck within its range has no warnings.
 #[test]
 fn states_beyond_their_range_are_told_once() {
     for (version, ngspice) in versions() {
@@ -35,8 +36,9 @@ fn states_beyond_their_range_are_told_once() {
     }
 }
 
-/// A cantilever that a force pulse leaves ringing without loss, for 137 cycles: told when its mesh brings it out of step by the tolerance, and
-/// whenever that is three times as much, up to six times; on the mesh that the tolerance asks for it is told nothing.
+/// A cantilever that a force pulse leaves oscillating without loss, for 137 cycles. A warning appears when the phase
+/// error of its mesh reaches the tolerance, and again whenever it is three times larger, up to six times. On the mesh
+/// for the tolerance there is none.
 #[test]
 fn what_rings_out_of_step_is_told() {
     let net = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=200u w=2u]\n";
