@@ -54,8 +54,8 @@ fn trials_are_pure() {
     }
 }
 
-/// Looking at a state gives the values that its trial answered, for opened signals and for all others, and leaves no trace; a name
-/// that is none is an error.
+/// Inspection of a state gives the values of its trial, for opened signals and for all others, and changes nothing; an
+/// unknown name is an error.
 #[test]
 fn a_look_is_what_the_trial_answered() {
     for formulation in FORMULATIONS {

@@ -125,8 +125,8 @@ fn nodes_with_coordinates() {
     assert_eq!((s.loads[0].force, s.loads[0].moment), ([10e-6, 0.0], 1e-12));
 }
 
-/// `constraint` holds two nodes in one rigid body where they are drawn, as SUGAR 3's multipliers do: the end of the link goes along
-/// with the force on its other end. Called like a function it is told how it is written.
+/// `constraint` holds two nodes in one rigid body where they are drawn, as SUGAR 3's multipliers do: the end of the
+/// link goes along with the force on its other end. A call like a function is reported with the right form.
 #[test]
 fn constraints_are_rigid_links() {
     let text = |model: &str| {
@@ -146,7 +146,7 @@ fn constraints_are_rigid_links() {
     assert_eq!((called.code.as_str(), called.help.as_str()), ("E055", "write `element {…; model=\"force\"}`"));
 }
 
-/// Files are used once, and found by their name; a file that is not there, and one of SUGAR 2, are told.
+/// Files are used once, and found by their name; a missing file, and one of SUGAR 2, are reported.
 #[test]
 fn files() {
     let root = "use(\"layers.net\")\nuse 'layers.net'\nanchor {node \"a\"; material=p1}\nbeam2d {node \"a\", node \"b\"; material=p1, l=10u, w=1u}\n";
@@ -269,8 +269,8 @@ fn the_order_is_always_the_same() {
     }
 }
 
-/// Every angle is in degrees, those of arcs and arms too; coordinates of a node that is there already hold where it had none and are
-/// told where they differ; a string is no number of a material, and misspelt entries are told.
+/// Every angle is in degrees, those of arcs and arms too. Coordinates of an existing node hold where it had none, and
+/// differing ones are reported. A string is no number of a material, and misspelt entries are reported.
 #[test]
 fn angles_coordinates_and_materials() {
     let arc = |alpha: f64| {

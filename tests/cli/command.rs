@@ -9,7 +9,7 @@ pub(crate) struct Bench {
     folder: TempDir,
 }
 
-/// What a run left.
+/// Output of a run.
 pub(crate) struct Ran {
     pub(crate) status: i32,
     pub(crate) stdout: String,

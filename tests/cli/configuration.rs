@@ -1,4 +1,5 @@
-//! What a server is told: options before the environment before a file; `Info` shows it, and docs/service.md has every setting.
+//! Settings of a server: options before the environment before a file; `Info` reports them, and docs/service.md has
+//! every setting.
 
 use crate::command::Bench;
 use crate::serve_process::Server;
@@ -11,7 +12,7 @@ use tonic::transport::Endpoint;
 
 const FILE: &str = "listen = [\"127.0.0.1:0\"]\ntoken_file = \"keys/tokens\"\n\n[limits]\nsessions = 3\nmodels = 4\nmemory = \"64M\"\nidle = 1.5\n";
 
-/// The settings of a server as `Info` tells them: value and source by name.
+/// The settings of a server from `Info`: value and source by name.
 fn reported(address: &str) -> BTreeMap<String, (String, String)> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
     let info = runtime.block_on(async {
@@ -22,8 +23,8 @@ fn reported(address: &str) -> BTreeMap<String, (String, String)> {
     info.settings.into_iter().map(|setting| (setting.name, (setting.value, setting.source))).collect()
 }
 
-/// Each voice is heard where a stronger one is silent; paths of a file start from its folder; and `Info` shows every setting of
-/// the table, which says who said so.
+/// A source applies where those of higher precedence are silent. Paths of a file start from its folder. `Info` shows
+/// every setting of the table with its source.
 #[test]
 fn options_before_the_environment_before_a_file() {
     let bench = Bench::new(&[]);
@@ -53,8 +54,8 @@ fn options_before_the_environment_before_a_file() {
     }
 }
 
-/// What can be written as a default can be written: a server that runs no programs says so. Variables by which Kubernetes tells every
-/// container of a service called `bimorph-serve` are no settings, but `BIMORPH_SERVE_PORT=1` is a mistake.
+/// Every default can also be given explicitly, for example by a server that runs no programs. Variables that Kubernetes
+/// sets in containers of a service called `bimorph-serve` are no settings, but `BIMORPH_SERVE_PORT=1` is an error.
 #[test]
 fn defaults_and_variables_of_kubernetes_are_taken() {
     let bench = Bench::new(&[]);
@@ -86,7 +87,7 @@ fn the_example_is_read() {
     assert!(settings.tls_cert.is_some_and(|path| path.ends_with("examples/serve/server.pem")));
 }
 
-/// What means nothing is refused with its place and what was expected, before anything is listened on.
+/// Invalid settings are rejected with their place and the expected value, before the server listens.
 #[test]
 fn mistakes_are_named_by_place() {
     let bench = Bench::new(&[

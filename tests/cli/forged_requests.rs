@@ -1,5 +1,5 @@
-//! Requests that no client of ours sends: other kinds of content, and states with numbers that are none. The command refuses them with what
-//! the protocol says, and answers the next one.
+//! Requests that no client of ours sends: other kinds of content, and states with invalid numbers. The command refuses
+//! them with what the protocol says, and answers the next one.
 
 use crate::command::Bench;
 use crate::monitoring::block_on;
@@ -98,7 +98,7 @@ fn state(snapshot: &[u8]) -> usize {
     at + 32
 }
 
-/// Whoever has the bytes of a state can put any number into them, with the sum that goes with it. Each word of it that is NaN or below all
+/// The bytes of a state can be given any number, with the matching checksum. Each word of it that is NaN or below all
 /// numbers is refused; the snapshot itself goes on, with the bits of its session.
 #[test]
 fn states_with_numbers_that_are_none_are_refused() {

@@ -1,4 +1,4 @@
-//! Disks that are full: what was accepted stays, what cannot be kept is told, and bytes are counted as files have them.
+//! Full disks: accepted states stay, a state that cannot be stored is reported, and bytes are counted as in the files.
 
 use crate::command::{Bench, CANTILEVER, PLATE};
 use crate::monitoring::{block_on, get, value};
@@ -14,8 +14,9 @@ fn bytes(folder: &Path) -> u64 {
     entries.map(|entry| if entry.path().is_dir() { bytes(&entry.path()) } else { size(entry) }).sum()
 }
 
-/// From a moment on files may not grow beyond some bytes, as on a full disk: an accept is refused, the state before is there, also
-/// after a kill, and when there is room again the same step is taken once. What a failed write left is counted, and goes with the session.
+/// From a given moment files may not grow beyond some bytes, as on a full disk. An accept is then rejected, and the
+/// state before is there, also after a kill. With free space again the same step is taken once. The remains of a failed
+/// write are counted, and removed with the session.
 #[test]
 fn a_disk_that_is_full() {
     block_on(async {

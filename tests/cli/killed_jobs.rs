@@ -26,7 +26,7 @@ fn spec() -> SweepSpec {
     SweepSpec { parameters, samples: None, analysis, shard: Shard::default(), threads: None }
 }
 
-/// What a client knows of a job.
+/// Data of a job that a client has received.
 #[derive(Default)]
 struct Known {
     name: Option<String>,

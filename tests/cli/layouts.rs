@@ -24,7 +24,7 @@ fn there_and_back() {
     }
 }
 
-/// What cannot be is refused with one message and without a file.
+/// Impossible requests are rejected with one message and without a file.
 #[test]
 fn refusals() {
     let bench = Bench::new(&[("c.net", CANTILEVER), ("broken.gds", "\0\u{6}\0\u{2}"), ("empty.cif", "E")]);

@@ -1,4 +1,4 @@
-//! What those see who watch over a server: metrics, readiness, health, logs with the ids of requests.
+//! Monitoring of a server: metrics, readiness, health, logs with the ids of requests.
 
 use crate::command::{Bench, PLATE};
 use crate::serve_process::Server;
@@ -59,8 +59,8 @@ pub(crate) fn block_on<T>(future: impl Future<Output = T>) -> T {
     tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime").block_on(future)
 }
 
-/// Every metric is told, with its kind; calls are counted by name and code; open sessions fill the server, which is then not ready
-/// by HTTP and by the health service, and ready again when one is closed.
+/// Every metric is reported, with its kind, and calls are counted by name and code. Open sessions fill the server,
+/// which is then not ready by HTTP and by the health service, and ready again when one is closed.
 #[test]
 fn metrics_and_readiness() {
     let bench = Bench::new(&[]);
@@ -135,7 +135,7 @@ fn logs_name_their_requests() {
     }
 }
 
-/// What is no host and port is refused.
+/// An address without host and port is rejected.
 #[test]
 fn metrics_need_a_port() {
     let bench = Bench::new(&[]);

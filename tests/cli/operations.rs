@@ -1,5 +1,4 @@
-//! What goes wrong around a server while it runs: clients that say nothing, files that are changed or damaged, and one client that takes
-//! all that it can.
+//! Faults around a running server: silent clients, changed or damaged files, and one client that takes all resources.
 
 use crate::command::{Bench, PLATE};
 use crate::monitoring::{block_on, get, start};
@@ -83,7 +82,7 @@ fn hangup_ends_no_server() {
     assert!(!bench.path("s").exists());
 }
 
-/// Two hundred connections that say nothing do not keep the metrics from those who ask.
+/// Two hundred silent connections do not block the metrics for others.
 #[test]
 fn silent_connections_to_the_metrics_make_room() {
     let bench = Bench::new(&[]);
@@ -321,7 +320,7 @@ fn one_client_leaves_the_others_their_part() {
         };
         assert_eq!((jobs, refused.code()), (8, Code::ResourceExhausted), "{refused}");
         bob.submit_job(endless(99)).await.expect("bob has room");
-        // what holds where nobody says it is told
+        // defaults are reported
         let settings = bob.info(proto::InfoRequest {}).await.expect("reported").into_inner().settings;
         let reported = settings.iter().find(|setting| setting.name == "client_sessions").expect("reported");
         assert_eq!((reported.value.as_str(), reported.source.as_str()), ("64", "default"));

@@ -1,5 +1,5 @@
-//! What a folder of states gives back after a kill, whatever happened before it: every state that a client may go back to, however
-//! old, and no model that is half written.
+//! Content of a folder of states after a kill, for any previous events: every state that a client may go back to, of
+//! any age, and no model that is half written.
 
 use crate::command::PLATE;
 use crate::monitoring::block_on;
@@ -11,8 +11,8 @@ use std::fs::{self, File};
 use std::time::{Duration, SystemTime};
 use tonic::Code;
 
-/// A client that was not told of an accept takes its step again, or another one, from the state that it knows: that one is kept
-/// however it came to be the one before.
+/// A client that did not receive the reply to an accept repeats its step, or takes another one, from the last state
+/// that it knows. That state is stored on every path to it.
 #[test]
 fn the_state_before_is_kept_on_every_route() {
     block_on(async {
@@ -40,7 +40,7 @@ fn the_state_before_is_kept_on_every_route() {
     });
 }
 
-/// A server that was down for long has what it was told to keep: the time without use counts from its start.
+/// A server that was down for long has all states within their lifetime: the time without use counts from its start.
 #[test]
 fn states_outlive_a_weekend() {
     block_on(async {
@@ -111,7 +111,8 @@ fn a_fork_needs_no_model_that_is_named() {
     });
 }
 
-/// The same of a job that was not finished: what it lacks is computed where programs are allowed again, and it is told why not until then.
+/// As above for an unfinished job: its missing points are computed where programs are allowed again, and it reports the
+/// reason until then.
 #[test]
 fn programs_are_not_run_to_go_on() {
     let text = "-- a cantilever\np1 = material {Youngsmodulus=160e9, density=2300, h=2u}\nanchor {node 'a'; material=p1}\n\

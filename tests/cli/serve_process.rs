@@ -27,7 +27,7 @@ impl Server {
         server
     }
 
-    /// What it says on the next line that holds `head`, after it.
+    /// The rest of the next output line that contains `head`.
     pub(crate) fn line(&mut self, head: &str) -> String {
         let mut all = String::new();
         loop {

@@ -32,8 +32,9 @@ pub(crate) fn kill_after(id: u32, life: Duration) {
     });
 }
 
-/// A run through so many killed servers has the bits of one without kills: what was answered as kept is there again, with the
-/// state before it, and each step is in the run once. Told: kills that came between a step and the answer to its accept.
+/// A run through so many killed servers has the bits of one without kills: confirmed states are there again, with the
+/// state before, and each step is in the run once. Prints the number of kills between a step and the reply to its
+/// accept.
 async fn killed(kills: usize) {
     let bench = Bench::new(&[]);
     let options = format!("--listen unix://{} --state-dir states", bench.path("s").display());
@@ -73,7 +74,7 @@ async fn killed(kills: usize) {
         let (again, opened) = Stream::start(&mut wire, attach()).await.expect("it is kept");
         stream = again;
         if opened.accepted != parent {
-            // accepted, and killed before it was told: the step is taken again, to the same state
+            // accepted, and killed before the reply: the step is repeated, with the same state
             between += 1;
             let (reply, _) = stream.step(done.len(), parent).await.expect("the state before is kept as well");
             assert_eq!(reply.token, opened.accepted);
@@ -112,7 +113,7 @@ fn soak_kills() {
     run(100);
 }
 
-/// Steps of a kept session with and without waiting for the disk, beside one that is not kept: `make soak` tells them.
+/// Steps of a stored session with and without syncing, beside one that is not stored: `make soak` prints them.
 #[test]
 #[ignore = "a measurement; make soak"]
 fn soak_cost_of_keeping() {

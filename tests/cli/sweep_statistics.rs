@@ -69,7 +69,7 @@ fn tables_and_pictures() {
     assert!(!bench.path("grid.svg.journal").exists());
 }
 
-/// What is no limit, a limit on no column, and a file of another kind are rejected before anything is computed.
+/// An invalid limit, a limit on an unknown column, and a file of another kind are rejected before anything is computed.
 #[test]
 fn rejected() {
     let bench = Bench::new(&[("c.net", CANTILEVER)]);

@@ -1,4 +1,4 @@
-//! Who comes over TCP: `serve --tls-cert --tls-key --tls-client-ca --token-file`, over real sockets.
+//! TCP clients: `serve --tls-cert --tls-key --tls-client-ca --token-file`, over real sockets.
 //!
 //! The certificates are those of tests/tls: of one authority for this machine, an expired one, and one of a stranger.
 
@@ -68,8 +68,9 @@ fn refused(address: &str, access: &Access, code: &str, said: &str) {
     assert!(message.contains(said), "expected \"{said}\", got \"{message}\"");
 }
 
-/// A token over TLS: served with the right one; none and a wrong one are UNAUTHENTICATED; whether the server is well may be
-/// asked without. What speaks plainly to TLS is told so, and TLS to a plain address too.
+/// A token over TLS: served with the right one; none and a wrong one are UNAUTHENTICATED; whether the server is well
+/// may be asked without. A plain client on a TLS address receives an error that says so, and a TLS client on a plain
+/// address too.
 #[test]
 fn tokens_over_tls() {
     let bench = bench();
@@ -189,8 +190,8 @@ fn what_is_not_enough_is_refused() {
     refused("192.0.2.1:9", &access(&bench, Some("alice")), "InvalidArgument", "not sent unencrypted");
 }
 
-/// The doctor looks at what a file of settings names: good ones are told, an expired certificate and a folder that cannot be made
-/// are errors with a remedy.
+/// The doctor checks the files of settings: valid ones are reported, an expired certificate and a folder that cannot be
+/// made are errors with a remedy.
 #[test]
 fn the_doctor_looks_at_settings() {
     let bench = bench();
@@ -217,7 +218,7 @@ fn the_doctor_looks_at_settings() {
     }
 }
 
-/// A token file that others can read is told when a server starts, and one that they cannot is not.
+/// A token file that others can read causes a warning at the start of a server, and a private one does not.
 #[test]
 fn a_token_file_that_others_can_read() {
     use std::fs::{Permissions, set_permissions};
@@ -232,7 +233,7 @@ fn a_token_file_that_others_can_read() {
     }
 }
 
-/// A client that begins a handshake and says no more holds nobody up, and loses its connection in time.
+/// A client that begins a handshake and stays silent blocks no other client, and loses its connection in time.
 #[test]
 fn an_unfinished_handshake_ends() {
     let bench = bench();

@@ -1,5 +1,6 @@
-//! Files do not name each other in circles: what two of them need stands in a third. A file names another by `use` and by paths in its
-//! code; a re-export counts as the file that it comes from. Tests inside a file may look anywhere.
+//! Files do not name each other in circles: code that two of them need belongs to a third. A file names another by
+//! `use` and by paths in its code; a re-export counts as the file that it comes from. Tests inside a file may look
+//! anywhere.
 
 use crate::files;
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,7 +13,7 @@ const KNOWN: &[(&str, usize)] = &[];
 /// A module, as the parts of its path from the crate's root.
 type Module = Vec<String>;
 
-/// What every module says: its text, and what it passes on of others by name.
+/// Source of every module: its text, and its re-exports by name.
 struct Source {
     texts: BTreeMap<Module, String>,
     passed_on: BTreeMap<(Module, String), Module>,

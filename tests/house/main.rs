@@ -1,4 +1,4 @@
-//! What the source itself holds to: floors, no circles of files, sizes, unique names of types.
+//! Rules of the source itself: layers, no circles of files, sizes, unique names of types, words.
 
 mod circles;
 mod layering;

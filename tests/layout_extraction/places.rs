@@ -1,5 +1,5 @@
-//! Messages about a layout name layer and place in the drawing, never a line of the netlist that was made of it; a body that may be held by
-//! mistake is told of.
+//! Messages about a layout name layer and place in the drawing, never a line of the netlist that was made of it. A body
+//! that may be held by mistake is reported.
 
 use bimorph::input::from_bytes;
 use bimorph::netlist::load;

@@ -1,5 +1,5 @@
-//! What is drawn is what is computed: where lumped springs sit, which way beams bow, whose heat is whose, and what does not depend
-//! on the order of lines or on other parts of the drawing.
+//! The computed model is the drawn one: positions of lumped springs, directions of bowed beams, owners of heat, and
+//! independence of the order of lines and of other parts.
 
 use super::{balance, close, linear, node};
 use bimorph::analysis::frame::{frame, frame_statics};
@@ -84,8 +84,9 @@ fn junctions_know_no_order() {
     }
 }
 
-/// A hinge holds its node to 1e-6 of what pulls at it, beside beams and springs of any stiffness: 1000 N/m on a lever of 25 µm and
-/// 1 µg at 50 µm, f = √(k·s²/(m·q² + J))/(2π), with and without a beam elsewhere that is softer than the spring; and on any mesh.
+/// A hinge holds its node to 1e-6 of the forces on it, beside beams and springs of any stiffness. 1000 N/m on a lever
+/// of 25 µm and 1 µg at 50 µm, f = √(k·s²/(m·q² + J))/(2π), with and without a beam elsewhere that is softer than the
+/// spring; and on any mesh.
 #[test]
 fn hinges_hold_whatever_else_is_drawn() {
     let lever = "hinge * [p] []\nlink2d * [p s] [l=25u]\nlink2d * [s q] [l=25u]\nmass2d * [q] [m=1e-9 J=1e-22]

@@ -16,7 +16,7 @@ anchor p [z] []
 f2d * [b] [F=1u oz=deg(45)]
 ";
 
-/// Beams with a plate, bent far by a load that is let go.
+/// Beams with a plate, bent far by a load that is released.
 const BRANCHES: &str = "param F=0
 process p = [Youngsmodulus=165e9 density=2300 h=2u]
 anchor p [a] []
@@ -28,7 +28,7 @@ mass2d * [c] [m=1e-12 J=1e-20]
 f2d * [c] [F=F oz=deg(45)]
 ";
 
-/// A run of `bundle`, let go from the load `F` where there is one; with the model that it ran on.
+/// A run of `bundle`, released from the load `F` if there is one; with the model that it ran on.
 fn run(
     bundle: &Bundle,
     force: Option<f64>,
@@ -57,9 +57,9 @@ fn warned(model: &CompiledModel) -> bool {
     model.warnings.items.iter().any(|d| d.code == "W040")
 }
 
-/// What is in none of the modes is compared where its bound would be beyond the tolerance: the undamped quarter stage let go from 20 µN, of
-/// which 1.3e-3 is in no mode, holds 1e-3 and 1e-4, and is told within a factor of ten of its error (before: 1.3e-3 at both). The
-/// reference has 24 segments a beam.
+/// Motion outside the modes is compared where its bound would exceed the tolerance. The undamped quarter stage released
+/// from 20 µN, of which 1.3e-3 is in no mode, holds 1e-3 and 1e-4. Its estimate is within a factor of ten of its error
+/// (before: 1.3e-3 at both). The reference has 24 segments a beam.
 #[test]
 fn what_no_mode_holds_is_compared() {
     let bundle = Bundle::read(Path::new("examples/quarter_stage/quarter_stage.net"), &[]).unwrap();
@@ -78,8 +78,8 @@ fn what_no_mode_holds_is_compared() {
     }
 }
 
-/// No mesh is sought that cannot help: the bridge's waves at 1e-2 are beyond every mesh, which is told, and its mesh stays below 1000 unknowns
-/// (before: 12,180, and 41 s for 50 µs).
+/// No useless mesh is searched: the bridge's waves at 1e-2 are beyond every mesh, which is reported, and its mesh stays
+/// below 1000 unknowns (before: 12,180, and 41 s for 50 µs).
 #[test]
 fn no_mesh_is_sought_that_cannot_help() {
     let bundle = Bundle::from_text("bridge.net", BRIDGE);
@@ -97,8 +97,8 @@ fn no_mesh_is_sought_that_cannot_help() {
     assert!(model.unknowns() < 1000, "{}", model.unknowns());
 }
 
-/// A rate is measured by its own swing: velocities of a plate that is let go hold 1e-2 on fewer than 300 unknowns and are told within it (before:
-/// 7968, told 0.85).
+/// The scale of a rate is its own amplitude: velocities of a released plate hold 1e-2 on fewer than 300 unknowns with
+/// an estimate within it (before: 7968, estimate 0.85).
 #[test]
 fn rates_have_their_own_swing() {
     let bundle = Bundle::from_text("branches.net", BRANCHES);

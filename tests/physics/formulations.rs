@@ -99,8 +99,9 @@ fn counts_of_the_paper() {
     assert_eq!((linkage.coordinates, linkage.constraints), (101, 38));
 }
 
-/// A bank of three under a suddenly applied 20 µN: as the axial and shear springs of the compliant model grow, its motion
-/// comes to that of joints that only turn, ten times closer for ten times the stiffness (between 6 and 16 times).
+/// A bank of three under a suddenly applied 20 µN. As the axial and shear springs of the compliant model grow, its
+/// motion approaches that of joints that only rotate, ten times closer for ten times the stiffness (between 6 and 16
+/// times).
 #[test]
 fn stiff_springs_become_rotary_joints() {
     let compiled = undamped(&format!("{ROW}{BANK}"), 2e-5);
@@ -172,8 +173,8 @@ fn rotary_bank_keeps_its_energy() {
     assert!((after / before - 1.0).abs() < 1e-6, "{before:e} -> {after:e}");
 }
 
-/// What joint coordinates cannot do is refused with a way out: inner bodies of elastic beams turn without inertia, explicit
-/// steps to 10 s would be 1e8 and more, and small displacements are not theirs.
+/// Models beyond joint coordinates are rejected with a remedy: inner bodies of elastic beams rotate without inertia,
+/// explicit steps to 10 s would be 1e8 and more, and small displacements are not supported.
 #[test]
 fn refusals_name_the_way_out() {
     let compiled = undamped(&format!("{ROW}{BANK}"), 2e-5);

@@ -1,4 +1,5 @@
-//! A run whose stiffness changes on the way holds the tolerance of its mesh, or is told beyond it: contracts of `analysis::mesh` for transients.
+//! A run with changing stiffness holds the tolerance of its mesh, or reports an error beyond it: contracts of
+//! `analysis::mesh` for transients.
 
 use bimorph::analysis::chart::error::relative_error;
 use bimorph::analysis::mesh::{MeshRequest, fitted, fitted_in_time};
@@ -92,7 +93,7 @@ fn sweeps_of_such_runs_hold_it_too() {
     assert!((found - end).abs() <= 1e-2 * most, "{found:e} {end:e}");
 }
 
-/// Segments that are given are told what they are worth in such a run.
+/// Given segments have an error estimate in such a run.
 #[test]
 fn given_segments_are_told() {
     let with =
@@ -106,8 +107,8 @@ fn given_segments_are_told() {
     }
 }
 
-/// What a mode is told to be off by about a loaded state is no less than what that state makes of it: a clamped beam under a force that bends it far.
-/// The reference has 64 segments.
+/// The estimated error of a mode about a loaded state is no less than the effect of that state's error: a clamped beam
+/// under a force that bends it far. The reference has 64 segments.
 #[test]
 fn modes_about_a_load_are_told() {
     let text = "process p = [Youngsmodulus=165e9 density=2300 h=20u]

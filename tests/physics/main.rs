@@ -1,4 +1,4 @@
-//! What the models compute, against closed forms and published or independently computed numbers.
+//! Results of the models, against closed forms and published or independently computed numbers.
 
 mod backbending;
 mod baselines;
@@ -62,7 +62,7 @@ pub(crate) const ARM: &str = "
     ]
 ";
 
-/// Compiles [`POLY`] followed by `text`, beams meeting in points: what closed forms and SUGAR describe.
+/// Compiles [`POLY`] followed by `text`, with beams that meet in points, as closed forms and SUGAR assume.
 pub(crate) fn model(text: &str, options: &CompileOptions) -> CompiledModel {
     let bundle = Bundle::from_text("model.net", &format!("{POLY}{text}"));
     compile(&bundle, &CompileOptions { junctions: Junctions::Centreline, ..options.clone() })

@@ -56,8 +56,8 @@ fn quarter_stage_statics() {
     }
 }
 
-/// Let go from there, without damping, its x crosses zero at 3.42, 9.46, 16.28 and 22.43 µs (independent frame, HHT): within
-/// 0.5 %.
+/// Released from there, without damping, its x crosses zero at 3.42, 9.46, 16.28 and 22.43 µs (independent frame, HHT):
+/// within 0.5 %.
 #[test]
 fn quarter_stage_release() {
     let options = CompileOptions { undamped: true, ..CompileOptions::default() };

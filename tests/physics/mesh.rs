@@ -1,5 +1,5 @@
-//! The mesh that a request gets holds the tolerance that stands beside it, and says how far off it may be: contracts of
-//! `analysis::mesh`, on default options.
+//! The mesh of a request holds the printed tolerance, and reports its error: contracts of `analysis::mesh`, on default
+//! options.
 
 use super::{close, node};
 use bimorph::analysis::mesh::{MeshRequest, fitted, fitted_in_time, in_circuit};
@@ -12,7 +12,7 @@ use std::path::Path;
 
 const SILICON: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nparam F=0\nanchor p [a] []\n";
 
-/// Beams that meet in points and at ideal clamps: what closed forms describe.
+/// Beams that meet in points and at ideal clamps, as closed forms assume.
 fn drawn(text: &str, options: CompileOptions) -> CompiledModel {
     let options = CompileOptions { junctions: Junctions::Centreline, ..options };
     compile(&Bundle::from_text("mesh.net", &format!("{SILICON}{text}")), &options).unwrap()
@@ -115,7 +115,7 @@ fn modes_about_a_loaded_state() {
     }
 }
 
-/// What two runs of one signal are apart: root mean square over half the range.
+/// Difference of two runs of one signal: root mean square over half the range.
 fn apart(a: &TransientResult, b: &TransientResult) -> f64 {
     let (x, y) = (&a.signals[0].2, &b.signals[0].2);
     let range = y.iter().copied().fold(f64::MIN, f64::max) - y.iter().copied().fold(f64::MAX, f64::min);
@@ -123,8 +123,9 @@ fn apart(a: &TransientResult, b: &TransientResult) -> f64 {
     (sum / x.len() as f64).sqrt() / (0.5 * range)
 }
 
-/// Runs hold the tolerance over their whole length, by default options: the comb resonator of examples/ under a step of 20 V for
-/// 300 µs, within 1e-2 and 1e-3 of a run of 1e-5, in both formulations (the version before: 3e-3 at every tolerance).
+/// Runs hold the tolerance over their whole length, by default options. The comb resonator of examples/ under a step of
+/// 20 V for 300 µs is within 1e-2 and 1e-3 of a run of 1e-5, in both formulations (the version before: 3e-3 at every
+/// tolerance).
 #[test]
 fn transients_hold_over_their_length() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/comb_resonator/comb_resonator.net");
@@ -154,8 +155,9 @@ fn transients_hold_over_their_length() {
     }
 }
 
-/// Modes of a corner under its residual stress, whose junction stands at the end of ever shorter segments: a tight tolerance is held, each
-/// frequency converges, and what the mesh is told to be off is what a mesh eight times as fine changes, within a factor of two.
+/// Modes of a corner under its residual stress, whose junction stands at the end of ever shorter segments. A tight
+/// tolerance is held, and each frequency converges. The estimated error of the mesh is the change on a mesh eight times
+/// as fine, within a factor of two.
 #[test]
 fn modes_about_stress_converge_at_junctions() {
     let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u stress=100M]\nanchor p [a] []\nbeam2d p [a b] [l=20u w=5u]\n\
@@ -186,8 +188,9 @@ fn modes_about_stress_converge_at_junctions() {
     assert!(error <= 1e-6 && error < 2.0 * reported, "{error:e}, told {reported:e}");
 }
 
-/// The mesh of circuits becomes finer with the tolerance up to 3,000 unknowns; where more would be needed it is no coarser, and W040 says how far
-/// off it may be. (Beyond that it had been the one as drawn: 219 unknowns at 3e-6 where there were 2,151 at 1e-5.)
+/// The mesh of circuits becomes finer with the tolerance up to 3,000 unknowns. Where more would be needed it is no
+/// coarser, and W040 reports its error. (Beyond that it had been the one as drawn: 219 unknowns at 3e-6 where there
+/// were 2,151 at 1e-5.)
 #[test]
 fn meshes_of_circuits_have_no_cliff() {
     let bundle =
@@ -204,8 +207,9 @@ fn meshes_of_circuits_have_no_cliff() {
     }
 }
 
-/// A circuit knows how far off the lowest frequency of its mesh is, in both formulations: what a motion that rings is told by. Within a factor
-/// of three of the error against 32 segments a beam. (With `rcr`, whose scheme has no estimate of its own, nothing was told.)
+/// A circuit has an error estimate of the lowest frequency of its mesh, in both formulations: the base of phase errors.
+/// Within a factor of three of the error against 32 segments a beam. (With `rcr`, whose scheme has no estimate of its
+/// own, there was none.)
 #[test]
 fn circuits_know_the_error_of_their_lowest_mode() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");

@@ -15,7 +15,8 @@ fn options<'a>(stop: f64, release: Option<&'a CompiledModel>) -> TransientOption
     TransientOptions { stop, signals: vec!["m.x".into()], points: 201, release, ..TransientOptions::default() }
 }
 
-/// Where m = 1e-10 kg on k = 1 N/m with c = 1e-6 N·s/m is, `t` [s] after it was let go at 1 µm [m]: e^{−δt}(cos ωt + δ/ω·sin ωt), δ = c/2m.
+/// Position of m = 1e-10 kg on k = 1 N/m with c = 1e-6 N·s/m at the time `t` [s] after its release at 1 µm [m]:
+/// e^{−δt}(cos ωt + δ/ω·sin ωt), δ = c/2m.
 pub(crate) fn released(t: f64) -> f64 {
     let (decay, omega) = (5e3, (1e10f64 - 25e6).sqrt());
     1e-6 * (-decay * t).exp() * ((omega * t).cos() + decay / omega * (omega * t).sin())
@@ -94,8 +95,9 @@ fn dynamic_pull_in() {
     assert!(above > 1.85e-6, "{above:e}");
 }
 
-/// What drag holds back and no mass relaxes as 1 − e^(−t/τ), τ = c/k = 10 µs: its steps follow the tolerance, to 1.0 of it rms. (It begins with a
-/// rate that no mass carries, which the output before the end of the first step does not know: 1.4e-2 there at a tolerance of 1e-3.)
+/// A coordinate with drag and no mass relaxes as 1 − e^(−t/τ), τ = c/k = 10 µs: its steps follow the tolerance, to 1.0
+/// of it rms. (It begins with a rate that no mass carries, which the output before the end of the first step does not
+/// know: 1.4e-2 there at a tolerance of 1e-3.)
 #[test]
 fn drag_without_mass() {
     let light = "anchor * [f] [l=1u w=1u h=1u]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\ndamper2d * [f m] [bx=1e-5]\nf2d * [m] [F=1u]";
@@ -109,7 +111,7 @@ fn drag_without_mass() {
     }
 }
 
-/// A companion that takes the same steps tells nothing of them: no estimate, and a warning.
+/// A companion with the same steps gives no estimate, and causes a warning.
 #[test]
 fn one_step_compared_with_itself() {
     let start = model(&OSCILLATOR.replace("F=0", "F=1u"), &CompileOptions::default());
@@ -146,7 +148,7 @@ fn loose_steps_tell_enough() {
     assert!((1.0 / 1.5..1.5).contains(&(reported / error)), "{reported:e} reported, {error:e}");
 }
 
-/// A parameter that moves drawn nodes is no load to let go.
+/// A parameter that moves drawn nodes is not a load to release.
 #[test]
 fn released_geometry_is_refused() {
     let text = |l: &str| {

@@ -1,4 +1,4 @@
-//! Next to folds, past them, and where nothing moves: what is told beside the numbers.
+//! Reports next to folds, past them, and without motion.
 
 use super::{close, model, node};
 use bimorph::analysis::AnalysisError;
@@ -19,8 +19,9 @@ fn stressed(more: &str, s: f64, options: &CompileOptions) -> CompiledModel {
     model(&format!("{BEAM}{more}"), &options)
 }
 
-/// The frequency goes to zero as the fourth root of what is left of the voltage: the estimate beside it, or the tolerance, holds 2e-5 below
-/// pull-in too (17.8401 V; reference 48 segments a beam), where the deflection alone said 3.6e-4 of a frequency that was 4.6 % off.
+/// The frequency goes to zero as the fourth root of the remaining voltage. The estimate beside it, or the tolerance,
+/// holds 2e-5 below pull-in too (17.8401 V; reference 48 segments a beam). The deflection alone gave 3.6e-4 for a
+/// frequency with an error of 4.6 %.
 #[test]
 fn modes_next_to_pull_in() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/switch/switch.net");
@@ -107,7 +108,8 @@ fn a_path_that_ends_at_rest() {
     assert!(found.unknowns < 120, "{}", found.unknowns);
 }
 
-/// What a part has done before any voltage is told beside its pull-in: compressed by 80 MPa (critical: 54) it has buckled to one of two sides.
+/// Events before any voltage are reported with pull-in: compressed by 80 MPa (critical: 54) the part has buckled to one
+/// of two sides.
 #[test]
 fn pull_in_of_a_buckled_part_is_told() {
     let plate =
@@ -120,8 +122,8 @@ fn pull_in_of_a_buckled_part_is_told() {
     assert!(!reported(0.0).contains("buckled"), "{}", reported(0.0));
 }
 
-/// A jump on a finer mesh is told although the first mesh did not make it: a column under 1.0012 of Euler's load (217.13 µN by
-/// π²EI/(4·L²) of its guided end).
+/// A jump on a finer mesh is reported although the first mesh has none: a column under 1.0012 of Euler's load (217.13
+/// µN by π²EI/(4·L²) of its guided end).
 #[test]
 fn a_jump_on_a_finer_mesh_is_told() {
     let text = "anchor p1 [a] []\nbeam2d p1 [a m] [l=100u w=2u]\nbeam2d p1 [m b] [l=100u w=2u]\nguide2d * [b] []\n\
@@ -143,8 +145,9 @@ fn modes_of_a_buckled_part_as_drawn() {
     }
 }
 
-/// A linear model's share is that of the number it prints: a column under 40 µN and a thousandth of it from the side moves by 60.6 nm
-/// without the stress and by (S/F)·(tan kL/k − L) = 227.95 nm with it, 2.76 times as far off as what is printed.
+/// The error of a linear model is relative to the number it prints. A column under 40 µN and a thousandth of it from
+/// the side moves by 60.6 nm without the stress and by (S/F)·(tan kL/k − L) = 227.95 nm with it: the difference is 2.76
+/// times the printed number.
 #[test]
 fn a_linear_model_tells_what_it_leaves_out() {
     let text = "anchor p1 [a] []\nbeam2d p1 [a b] [l=100u w=2u]\nf2d * [b] [F=40u oz=pi]\nf2d * [b] [F=40n oz=pi/2]\n";
@@ -175,8 +178,8 @@ fn voltages_are_bounded_and_given_once() {
     let _ = static_fitted(&compiled, &[("drive".into(), 1e9)]);
 }
 
-/// A port that acts on no gap is refused, and those that do are named; a heater is none of them, since what it warms may be pushed to where
-/// another voltage closes a gap: of it the search itself says that nothing pulls in.
+/// A port without a gap is rejected, and those with gaps are named. A heater is accepted, since its heat may push a
+/// part to where another voltage closes a gap: the search itself then reports that nothing pulls in.
 #[test]
 fn ports_that_pull_nothing() {
     let parts = "process hot = [Youngsmodulus=165e9 density=2300 h=2u thermalexpansion=2.33e-6 sheetresistance=20 thermcond=41]\n\
@@ -193,9 +196,10 @@ fn ports_that_pull_nothing() {
     assert!(matches!(said("heat"), AnalysisError::NoEquilibrium { .. }), "{}", said("heat"));
 }
 
-/// Just beyond a buckling load nothing is told to stay straight: a coarse mesh bears more than the beam, twice its segments hardly less, and both
-/// agreed on no deflection, within 3e-9. At 1 % to 1e-4 beyond it the deflection is that of 64 segments, to the tolerance or to what is told;
-/// nearer, where no mesh decides it, nothing is confirmed. The frequency about it goes with the root of what is beyond.
+/// Just beyond a buckling load no result reports a straight column. A coarse mesh has a higher load than the beam,
+/// twice its segments hardly less, and both agreed on no deflection, within 3e-9. At 1 % to 1e-4 beyond it the
+/// deflection is that of 64 segments, to the tolerance or to the estimate; nearer, where no mesh decides it, nothing is
+/// confirmed. The frequency about it goes with the root of what is beyond.
 #[test]
 fn beyond_a_buckling_load_nothing_stays_straight() {
     let fine = CompileOptions { segments: Some(64), ..CompileOptions::default() };
@@ -272,8 +276,9 @@ fn a_column_in_one_piece_buckles() {
     }
 }
 
-/// A stretched bridge between two electrodes at one voltage pulls in by 0.2 % beyond its bifurcation, though tension has made it far stiffer than at rest; one
-/// that is pressed nearly to buckling does not pull in 7e-4 before its fold, though its first meshes would.
+/// A stretched bridge between two electrodes at one voltage pulls in by 0.2 % beyond its bifurcation, though tension
+/// has made it far stiffer than at rest. One that is compressed nearly to buckling does not pull in 7e-4 before its
+/// fold, though its first meshes would.
 #[test]
 fn bridges_pull_in_where_they_do() {
     let parts =

@@ -34,8 +34,9 @@ const WITHOUT_MASS: &str = "
     guide2d * [m] []
     f2d * [m] [F=F]";
 
-/// An undamped oscillator over 10 and 200 periods: the reported error is the true one within a factor of 3, and that is within the
-/// tolerance, of a mass on a spring and of one behind a node without mass, which follows its springs. Closed form.
+/// An undamped oscillator over 10 and 200 periods. The reported error is the true one within a factor of 3, and that is
+/// within the tolerance. The cases are a mass on a spring, and one behind a node without mass, which follows its
+/// springs. Closed form.
 #[test]
 fn errors_of_an_oscillator() {
     let one = "param F=0\nanchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\nf2d * [m] [F=F]";

@@ -16,8 +16,9 @@ const UNIT_LENGTH: f64 = 200e-6;
 const CLAMPED_FREE: [f64; 3] = [1.875104068711961, 4.694091132974174, 7.854757438237612];
 const CLAMPED_CLAMPED: [f64; 3] = [4.730040744862704, 7.853204624095838, 10.99560783800167];
 
-/// The bank of three bimorphs whose ten modes were converged with 32 cubic elements a beam: 205 µm arms 12 µm apart,
-/// pitch 40 µm, a yoke of 24 µm that reaches 120 µm beyond the third; E = 169 GPa, ρ = 2330 kg/m³, 2 µm thick.
+/// The bank of three bimorphs whose ten modes were converged with 32 cubic elements a beam. Its arms are 205 µm long
+/// and 12 µm apart, at a pitch of 40 µm, and the yoke of 24 µm extends 120 µm beyond the third. E = 169 GPa, ρ = 2330
+/// kg/m³, 2 µm thick.
 pub(crate) const BANK: &str = "
 process fine = [ Poisson=0.22 Youngsmodulus=169e9 density=2330 viscosity=0 fluid=2e-6 permittivity=8.854e-12
   sheetresistance=20 stress=0 straingradient=0 thermalexpansion=2.33e-6 ambienttemperature=293 thermcond=41 h=2u ]
@@ -186,9 +187,9 @@ fn the_estimate_is_effective() {
     }
 }
 
-/// Other schemes on a beam of sixteen segments: their errors are those measured with an independent prototype (modes 1–3 of
-/// the clamped-free beam: A0 5.9 %, A2 0.51 %, C1 0.0034 %, D1 0.013 %, B 0.74 %, Es 0.0014 %), to its two digits, and the
-/// estimate, which knows no analytic beam, tells them within a tenth where they are above a thousandth.
+/// Other schemes on a beam of sixteen segments. Their errors are those measured with an independent prototype, to its
+/// two digits (modes 1–3 of the clamped-free beam: A0 5.9 %, A2 0.51 %, C1 0.0034 %, D1 0.013 %, B 0.74 %, Es 0.0014
+/// %). The estimate, which uses no analytic beam, agrees within a tenth where they are above a thousandth.
 #[test]
 fn every_scheme_has_its_error_and_knows_it() {
     let known = [
@@ -258,8 +259,8 @@ fn coupled_joints() {
     assert!(Formulation::Rcr.linkage(&beam(Scheme::D1, 6, true, 2e-6).parts.system).is_ok());
 }
 
-/// A thick cantilever (200 × 40 µm): with shear and rotary inertia E4 comes to the Timoshenko frame of 64 cubic elements in
-/// the square of h, and the estimate tells the difference; without them the first mode is 2 to 4 % higher.
+/// A thick cantilever (200 × 40 µm). With shear and rotary inertia E4 converges to the Timoshenko frame of 64 cubic
+/// elements in the square of h, and the estimate gives the difference. Without them the first mode is 2 to 4 % higher.
 #[test]
 fn thick_beams() {
     let text = "anchor p1 [a] [l=5u w=5u]\nbeam2d p1 [a b] [l=200u w=40u]";
@@ -319,9 +320,9 @@ fn rigid_beams() {
     assert!(plain.order.segments.iter().all(|n| *n > 0) && plain.order.estimated_error.is_none());
 }
 
-/// About a loaded equilibrium each mode has its estimate too, from the tangent there. It takes that tangent as exact, which
-/// it is not under axial force: on a clamped beam pulled until its first frequency has risen by half the estimates of two
-/// modes are 0.3 to 1.3 times their distance to 32 segments.
+/// About a loaded equilibrium each mode has its estimate too, from the tangent there. It treats that tangent as exact,
+/// which is wrong under axial force. On a clamped beam with tension that raises its first frequency by half, the
+/// estimates of two modes are 0.3 to 1.3 times their distance to 32 segments.
 #[test]
 fn estimates_under_load() {
     let text = "anchor p1 [a] [l=5u w=5u]\nbeam2d p1 [a b] [l=200u w=2u stress=100e6]\nanchor p1 [b] [l=5u w=5u]";

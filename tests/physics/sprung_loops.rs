@@ -177,8 +177,9 @@ fn factor_agrees_with_dense_elimination() {
     }
 }
 
-/// With the stiffness that forces bring the tangent over the coordinates is exact: Newton's method on a frame bent by 20 µN
-/// doubles its digits, which it does not without, and ends where the bodies' own coordinates do (1e-9 of the displacement).
+/// With geometric stiffness the tangent over the coordinates is exact. Newton's method on a frame bent by 20 µN
+/// converges quadratically, which it does not without. It ends where the bodies' own coordinates do (1e-9 of the
+/// displacement).
 #[test]
 fn newton_over_coordinates_is_quadratic() {
     let loaded = format!("{FRAME}\nf2d * [s] [F=20u oz=1.1]\n");
@@ -247,8 +248,9 @@ fn a_scheme_without_rotary_inertia_is_refused() {
     }
 }
 
-/// At calibrated junctions Es has no estimate of its own; its mesh is that of the tolerance all the same: at most 1.3 times the unknowns of
-/// E4, and the lowest frequency of the quarter stage (72,404 Hz; `--segments 32`) within it. (It had eight times as many.)
+/// At calibrated junctions Es has no estimate of its own, and its mesh follows the tolerance all the same. It has at
+/// most 1.3 times the unknowns of E4, and the lowest frequency of the quarter stage (72,404 Hz; `--segments 32`) is
+/// within it. (It had eight times as many.)
 #[test]
 fn es_takes_as_many_segments_as_the_tolerance_wants() {
     let bundle = Bundle::read(Path::new("examples/quarter_stage/quarter_stage.net"), &[]).unwrap();

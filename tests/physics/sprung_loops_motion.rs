@@ -13,9 +13,10 @@ use bimorph::solve::time::method::{Method, Motion};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Rigid plates on flexure pivots, swung some 170 µm by a force: with joints that only turn (scheme a2), `auto` steps explicitly in
-/// joint coordinates, and at 1e-2 ends nearer to a compliant run at 1e-6 than a compliant one at 1e-4 does, with a seventh of its
-/// steps and of its evaluations. Where flexures are elastic in every direction it takes the bodies' own coordinates.
+/// Rigid plates on flexure pivots, displaced some 170 µm by a force, with joints that only rotate (scheme a2). `auto`
+/// steps explicitly in joint coordinates, and at 1e-2 ends nearer to a compliant run at 1e-6 than a compliant one at
+/// 1e-4 does. It takes a seventh of its steps and of its evaluations. Where flexures are elastic in every direction it
+/// takes the bodies' own coordinates.
 #[test]
 fn plates_on_pivots_step_explicitly() {
     let bundle = Bundle::read(Path::new("examples/pivots/pivots.net"), &[]).unwrap();
@@ -66,9 +67,9 @@ fn run(compiled: &CompiledModel, volts: &[(&str, f64)], stop: f64, signal: &str)
     transient(compiled, &options, &mut |_, _| (), &mut |_| true).unwrap_or_else(|e| panic!("{signal}: {e}"))
 }
 
-/// A cantilever let go from a micrometre, undamped, with 1, 4 and 12 segments and at three tolerances: the end is where the
-/// bodies' own coordinates have it, within the tolerance, in as many steps within a fifth. Without rotary inertia (scheme E4)
-/// the formulation is refused.
+/// A cantilever released from a micrometre, undamped, with 1, 4 and 12 segments and at three tolerances. The final
+/// state is that of the bodies' own coordinates, within the tolerance, and the steps agree within a fifth. Without
+/// rotary inertia (scheme E4) the formulation is refused.
 #[test]
 fn a_cantilever_swings_alike() {
     let beam = |force: f64, formulation, scheme, segments, tol| {
@@ -109,8 +110,8 @@ fn a_cantilever_swings_alike() {
     assert!(matches!(Tree::elastic(&bare.parts.system.model), Err(UnsupportedModel::NoInertia { .. })));
 }
 
-/// On scenes as they are drawn, heated or loaded at once, both formulations move alike: within the tolerance of the larger
-/// excursion, in as many steps within a tenth, with as many unknowns, no constraint and no singular evaluation.
+/// On example models as drawn, heated or loaded at once, both formulations move alike: within the tolerance of the
+/// larger excursion, in as many steps within a tenth, with as many unknowns, no constraint and no singular evaluation.
 #[test]
 fn formulations_move_alike() {
     type Case<'a> = (&'a str, &'a [(&'a str, f64)], &'a [(&'a str, f64)], f64, &'a str);

@@ -1,4 +1,4 @@
-//! What is not right is told: errors of steps in time, what a linear model leaves out, snaps, and loads that nothing bears.
+//! Warnings: errors of steps in time, omissions of a linear model, snaps, and excessive loads.
 
 use super::{close, node};
 use bimorph::analysis::mesh::fitted_in_time;
@@ -29,7 +29,7 @@ fn example(name: &str) -> Bundle {
     Bundle::read(Path::new(&path), &[]).unwrap()
 }
 
-/// A run with what is told of its steps.
+/// A run with its step error and warnings.
 fn reported(model: &CompiledModel, start: &CompiledModel, options: &TransientOptions<'_>) -> TransientResult {
     let options = TransientOptions { release: Some(start), ..options.clone() };
     let mut run =
@@ -39,9 +39,9 @@ fn reported(model: &CompiledModel, start: &CompiledModel, options: &TransientOpt
     with_step_error(&options, model, &mut run, &mut |_, _| (), &mut |_| true).unwrap().0
 }
 
-/// The single bimorph let go from 7 µm swings so far that its modes exchange energy, and control of each step does not hold the
-/// tolerance over a run of 50 µs. What is told is the error within a factor of four, and a warning stands where it is beyond the
-/// tolerance. Against steps a thousand times more exact.
+/// The single bimorph released from 7 µm moves so far that its modes exchange energy, and control of each step does not
+/// hold the tolerance over a run of 50 µs. The estimate is the error within a factor of four, and a warning appears
+/// where it is beyond the tolerance. Against steps a thousand times more exact.
 #[test]
 fn steps_in_time_tell_their_error() {
     let options = CompileOptions { set: with(20e-6), segments: Some(4), ..CompileOptions::default() };
@@ -62,9 +62,9 @@ fn steps_in_time_tell_their_error() {
     }
 }
 
-/// A cantilever pressed along its axis with half of Euler's load, and pushed aside: with the stiffness that compression takes its tip
-/// moves 3(tan u − u)/u³ times as far, u = l√(P/EI) (Timoshenko and Gere 1961, §1.11), which the linear model leaves out and says.
-/// Beyond Euler's load it says so too, and its modes have the stiffness that it leaves out.
+/// A cantilever compressed along its axis with half of Euler's load, and pushed aside. With stress stiffening its tip
+/// moves 3(tan u − u)/u³ times as far, u = l√(P/EI) (Timoshenko and Gere 1961, §1.11). The linear model omits this and
+/// says so. Beyond Euler's load it says so too, and its modes have the stiffness that it leaves out.
 #[test]
 fn a_linear_model_says_what_stress_would_do() {
     let (l, w, h, e) = (200e-6, 2e-6, 2e-6, 165e9);
@@ -102,9 +102,9 @@ fn a_linear_model_says_what_stress_would_do() {
     assert!((0.68..0.74).contains(&softer), "{softer}");
 }
 
-/// The shallow arch beyond the load at which it snaps through (5.43 µN) rests on the far branch, says that it jumped and not that it pulled
-/// in, and every mode there swings; just below it has not jumped. Let go from there it does not come back: it snaps back at 0.408 µN
-/// only, so that at rest under 1 µN the two branches are 6 µm apart.
+/// The shallow arch beyond the load at which it snaps through (5.43 µN) rests on the far branch, says that it jumped
+/// and not that it pulled in, and every mode there swings; just below it has not jumped. Released from there it does
+/// not come back: it snaps back at 0.408 µN only, so that at rest under 1 µN the two branches are 6 µm apart.
 #[test]
 fn a_snapped_arch_is_on_the_far_branch() {
     let rests = |f: f64| {
@@ -122,7 +122,7 @@ fn a_snapped_arch_is_on_the_far_branch() {
     assert!(jumped && after < -7e-6, "{after:e}");
 }
 
-/// A load that is far too large is told as that, and not as a part that nothing holds: the cantilever stands firmly.
+/// An excessive load is reported as that, and not as an unsupported part: the cantilever has a firm support.
 #[test]
 fn too_large_a_load_is_no_loose_part() {
     let text = "beam2d p [a b] [l=100u w=2u]\nf2d * [b] [F=F oz=pi/2]";
@@ -132,7 +132,7 @@ fn too_large_a_load_is_no_loose_part() {
     assert!(error.to_string().contains("the load is"), "{error}");
 }
 
-/// One segment has two modes; who asks for three gets two, with an estimate and a word.
+/// One segment has two modes; a request for three gets two, with an estimate and a warning.
 #[test]
 fn fewer_modes_than_asked_for_are_told() {
     let text = "beam2d p [a b] [l=100u w=2u]";
@@ -142,8 +142,8 @@ fn fewer_modes_than_asked_for_are_told() {
     assert!(found.warnings.iter().any(|w| w.starts_with("only 2 of 3 modes")), "{:?}", found.warnings);
 }
 
-/// Equal steps far longer than the motion that a run begins with damp it away, in a companion of twice the step as well: an oscillator of
-/// 15.9 kHz let go from 1 µm, in steps of 100 µs (ω·h = 10) and of 1 µs, over 2 ms.
+/// Equal steps far longer than the initial motion damp it away, in a companion of twice the step as well. An oscillator
+/// of 15.9 kHz is released from 1 µm, in steps of 100 µs (ω·h = 10) and of 1 µs, over 2 ms.
 #[test]
 fn steps_that_outrun_the_motion_are_told() {
     let text = "param F=1u\nanchor * [f] []\nspring2d * [f m] [kx=1]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nf2d * [m] [F=F]";

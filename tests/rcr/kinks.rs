@@ -63,8 +63,8 @@ fn straight_arms() {
     }
 }
 
-/// Numbers that are not finite go through the path for singular configurations and come out as such. (An explicit step that
-/// had become unstable once ended the program there.)
+/// NaN and infinities pass through the path for singular configurations unchanged. (An explicit step that had become
+/// unstable once ended the program there.)
 #[test]
 fn what_is_not_finite_stays_so() {
     for kinks in [[0.0; 3], [0.1; 3]] {

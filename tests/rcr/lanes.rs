@@ -21,7 +21,7 @@ fn ladder(cells: usize, width: f64) -> Linkage {
     Linkage::new(&m.model().0)
 }
 
-/// Variants of one mechanism side by side give the bits that each gives alone, in any instruction set: nothing is fused and
+/// Batched variants of one mechanism are bit-identical to single ones, in any instruction set: nothing is fused and
 /// nothing is reordered.
 #[test]
 fn a_lane_has_the_bits_of_its_variant() {

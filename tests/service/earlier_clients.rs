@@ -4,7 +4,7 @@ use bimorph::service::in_process::InProcessServer;
 use bimorph::service::proto;
 use tonic::Code;
 
-/// What older clients send, byte by byte as version 0.1 encoded it, and what they were answered, is understood and the same.
+/// Requests of older clients, byte by byte as version 0.1 encoded them, are accepted, and the replies are unchanged.
 #[test]
 fn bytes_of_older_clients_are_understood() {
     fn field(number: u8, bytes: &[u8]) -> Vec<u8> {

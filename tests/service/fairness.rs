@@ -1,4 +1,4 @@
-//! What one client computes keeps no other client waiting, whatever it computes. Against the command itself.
+//! Computations of one client keep no other client waiting. Against the command itself.
 #![cfg(target_os = "linux")]
 
 use super::quotas::Known;

@@ -22,7 +22,7 @@ fn liar(_: Arc<CompiledModel>) -> Box<dyn Device> {
     Box::new(Liar { lie: String::new(), ports: 2, signals: 0 })
 }
 
-/// What a truthful one would say.
+/// The reply of a truthful server.
 fn truth(reply: &mut TrialReply, (p, s): (usize, usize), token: u64) {
     *reply = TrialReply {
         token: Some(Token(token)),
@@ -93,7 +93,7 @@ impl Device for Liar {
     }
 }
 
-/// The error of the first of a thousand steps that has one, of a device that is told to lie so.
+/// The first error among a thousand steps, of a device with this fault.
 fn caught(server: &Running, lie: &str) -> String {
     let mut device = server.device();
     let request = OpenRequest { signals: vec![lie.to_owned()], ..OpenRequest::default() };

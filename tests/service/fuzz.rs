@@ -1,8 +1,8 @@
 //! Any bytes as messages and as snapshots: each call ends, with a status that is no fault of the server's, and the server goes on.
 //!
-//! Messages are sound ones of every call, changed at random: bits turned, bytes exchanged, stretches lost, doubled and mixed, numbers made
-//! extreme. Snapshots are those of a session, changed in the same ways, and sealed anew as whoever forges them would. A few run with every
-//! test; `make fuzz` runs them for minutes.
+//! Messages are sound ones of every call, changed at random: bits turned, bytes exchanged, stretches lost, doubled and
+//! mixed, numbers made extreme. Snapshots are those of a session, changed in the same ways, with a recomputed checksum
+//! as in a forgery. A few run with every test; `make fuzz` runs them for minutes.
 
 use super::attached::{Attached, trial};
 use super::test_server::{DEADLINE, Running, compiled, start_with};
@@ -233,7 +233,7 @@ fn snapshots(seed: u64, mut done: impl FnMut(usize) -> bool) {
                     let session = restored.into_inner().session;
                     let mut stream = Attached::to(&mut client, &session).await;
                     let answer = stream.ask(trial(2, 1e-7, 1.2));
-                    // a fault says that the state is none, or no longer there
+                    // a fault means that the state is invalid, or no longer there
                     if let Kind::Trial(reply) = tokio::time::timeout(DEADLINE, answer).await.expect(&reported)
                         && reply.status() == proto::trial_reply::Status::Ok
                     {
@@ -261,7 +261,7 @@ fn a_few_snapshots() {
     snapshots(1, |count| count >= QUICK[1]);
 }
 
-/// For `FUZZ_MINUTES` [min], each time with others: the seed is the time, and is told with what fails.
+/// For `FUZZ_MINUTES` [min], each time with others: the seed is the time, and is printed on failure.
 fn for_minutes() -> (u64, impl FnMut(usize) -> bool) {
     let minutes: f64 = std::env::var("FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0);
     let end = Instant::now() + Duration::from_secs_f64(60.0 * minutes);

@@ -55,7 +55,7 @@ fn it_says_what_a_server_says() {
             replies.push(reply);
             stream.say(Ask::Accept(proto::Accept { token: parent, answer: false })).await;
         }
-        // a thread that may not wait is told so
+        // a thread that may not block receives an error
         let waits = inside.call("Static", &statics.encode_to_vec(), &|| true).expect_err("asynchronous code");
         assert_eq!(waits.code(), Code::FailedPrecondition);
         (there, refused, opened.device, replies)
@@ -82,7 +82,7 @@ fn dt(step: u32) -> f64 {
     if step == 0 { 0.0 } else { 1e-6 }
 }
 
-/// What is not wanted any more stops; names and bytes that mean nothing are refused; a session ends with its questions.
+/// Cancelled calls stop; invalid names and bytes are rejected; a session ends with its channel.
 #[test]
 fn it_stops_and_refuses() {
     let inside = InProcessServer::new().expect("a thread");

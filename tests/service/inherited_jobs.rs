@@ -126,7 +126,7 @@ fn a_damaged_end_hides_no_job() {
     }
 }
 
-/// The time in which nobody asks for a job begins with the server: one that was stopped for a month, or whose clock was wrong, takes nothing away.
+/// The time without a request of a job begins with the server: a stop for a month, or a wrong clock, removes nothing.
 #[test]
 fn a_server_that_was_stopped_for_long_forgets_nothing() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -23,12 +23,12 @@ impl Numbers {
     }
 }
 
-/// What becomes of a connection.
+/// Fault of a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fate {
-    /// Nothing passes any more, and nobody is told.
+    /// No data pass any more, and neither end is notified.
     Silent,
-    /// Both ends are told that the other broke it off.
+    /// Both ends receive a reset.
     Reset,
     /// It ends, politely, within what was being sent.
     Half,
@@ -40,7 +40,7 @@ const FATES: [Fate; 4] = [Fate::Silent, Fate::Reset, Fate::Half, Fate::Late];
 /// Bytes that others exchange before what was held back arrives.
 const HELD_BACK: u64 = 1500;
 
-/// What becomes of one connection, and after how many bytes of which end: of the client (0) or the server (1).
+/// Fault of one connection, and after how many bytes of which end: of the client (0) or the server (1).
 #[derive(Debug, Clone, Copy)]
 struct Plan {
     fate: Fate,
@@ -68,7 +68,7 @@ struct Shared {
 }
 
 impl Cut {
-    /// A way to `server` whose connections fail after at most so many bytes, by chance that the seed decides.
+    /// A proxy to `server` whose connections fail after at most so many bytes, at random by the seed.
     pub(crate) fn to(server: SocketAddr, seed: u64, most: u64) -> Self {
         let shared = Arc::new(Shared {
             chance: Mutex::new(Numbers(seed)),
@@ -99,7 +99,7 @@ impl Cut {
         Self { address, shared, over, thread: Some(thread) }
     }
 
-    /// Where clients go, as they are told.
+    /// Address for clients.
     pub(crate) fn uri(&self) -> String {
         format!("http://{}", self.address)
     }
@@ -153,7 +153,7 @@ async fn carry(mut client: TcpStream, server: SocketAddr, shared: Arc<Shared>, m
             read = server.read(from_server) => (1, read),
             _ = over.wait_for(|over| *over) => return,
         };
-        // who goes away is missed at the other end
+        // the other end detects a closed connection
         let Ok(bytes @ 1..) = read else { return };
         let words = if end == 0 { &from_client[..bytes] } else { &from_server[..bytes] };
         passed[end] += bytes as u64;

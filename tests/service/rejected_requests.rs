@@ -1,4 +1,4 @@
-//! What cannot be served is refused with the right code, and says which field, and the server goes on.
+//! Impossible requests are rejected with the right code, and name the field, and the server continues.
 
 use super::echo::PANIC;
 use super::test_server::{DEADLINE, block_on, bundle, compiled, start};

@@ -200,7 +200,7 @@ fn a_step_without_an_answer_ends_a_run() {
     });
 }
 
-/// What does not fit is refused by field before anything is computed.
+/// Inconsistent requests are rejected by field before anything is computed.
 #[test]
 fn what_does_not_fit_is_refused() {
     let server = start_with("127.0.0.1:0", Limits { transient_values: 9, ..Limits::default() }, fussy);
@@ -304,7 +304,7 @@ fn the_next_question_to_a_session_ends_its_run() {
         let short = client.run(request(3)).await.expect("runs").into_inner();
         assert_eq!(ended(short).await, None);
         assert_eq!(ended(long).await, Some(Code::Cancelled));
-        // one that has ended is in nobody's way
+        // one that has ended blocks nothing
         let mut long = client.run(request(1_000_000)).await.expect("runs").into_inner();
         long.message().await.expect("goes on").expect("rows");
         Attached::to(&mut client, &id).await.trial(0, 1.0, 1.0).await;

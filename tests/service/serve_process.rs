@@ -1,4 +1,4 @@
-//! `bimorph serve` in a process of its own, with a stranger who asks for `Info` while it is attacked.
+//! `bimorph serve` in a process of its own, with another client that calls `Info` while it is attacked.
 
 use super::test_server::DEADLINE;
 use bimorph::service::proto;
@@ -13,12 +13,12 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tonic::transport::{Channel, Endpoint};
 
-/// What no attack may make it hold [kB].
+/// Largest memory under any attack [kB].
 const MAX_MEMORY_KB: u64 = 1 << 20;
 /// Processor time that it may still use when its callers are gone [s].
 const MAX_AFTER_S: f64 = 3.0;
-/// The stranger's longest wait. The aim is 250 ms for 99 of 100; machines that run tests are loaded, so that much is told
-/// and what a frozen event loop would make of it is refused.
+/// The stranger's longest wait. The aim is 250 ms for 99 of 100. Machines that run tests are loaded, so that this is
+/// printed, and only the wait of a frozen event loop fails the test.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
 /// A client of the attacked server.
@@ -137,7 +137,7 @@ pub(crate) fn netlist(text: &str) -> Option<proto::Bundle> {
     Some(proto::Bundle { root: "a.net".into(), files: [("a.net".to_owned(), text.to_owned())].into() })
 }
 
-/// Who reads what the server logs.
+/// Reader of the server's log.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Reader {
     Reads,
@@ -160,7 +160,7 @@ impl Victim {
         Self::attacked_before(Reader::Reads, name, attack);
     }
 
-    /// The same with a certain reader of the log, who is told everything unless it reads.
+    /// As above with a given reader of the log, which receives everything unless it is inactive.
     pub(crate) fn attacked_before(reader: Reader, name: &str, attack: impl AsyncFnOnce(&mut Wire)) {
         let mut victim = Self::start(reader);
         let stop = Arc::new(AtomicBool::new(false));
@@ -196,7 +196,7 @@ impl Victim {
         assert!(worst < LONGEST_WAIT, "{name}: {worst:?}");
     }
 
-    /// A server with these options more, and nobody who attacks it.
+    /// A server with these further options, without an attack.
     pub(crate) fn started(options: &[&str]) -> Self {
         Self::start_with(Reader::Reads, options)
     }
@@ -268,7 +268,7 @@ impl Victim {
         &self.address
     }
 
-    /// What it holds now [kB].
+    /// Its present memory [kB].
     pub(crate) fn memory_kb(&self) -> u64 {
         self.status_kb("VmRSS:")
     }
@@ -292,7 +292,7 @@ impl Victim {
         line.split_whitespace().next().and_then(|kb| kb.parse().ok()).expect("a number")
     }
 
-    /// Told once, it stops by itself; how long that takes.
+    /// One signal stops it; returns the time that it takes.
     fn stop(&mut self) -> Duration {
         let start = Instant::now();
         let id = self.process.id().to_string();
@@ -315,7 +315,7 @@ impl Drop for Victim {
     }
 }
 
-/// Asks for `Info` until it is told to stop; how long each took.
+/// Calls `Info` until it is stopped; returns the time of each call.
 fn stranger(address: &str, stop: &AtomicBool) -> Vec<Duration> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
     runtime.block_on(async {

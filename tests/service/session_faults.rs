@@ -1,5 +1,5 @@
-//! Through a network that fails at any moment no accepted state is lost, none is there twice, and no call waits longer than it was
-//! told to.
+//! Through a network that fails at any moment no accepted state is lost, none is there twice, and no call exceeds its
+//! timeout.
 
 use super::attached::{refusal, trial};
 use super::network_faults::Cut;
@@ -45,7 +45,7 @@ pub(crate) fn socket(server: &Running) -> SocketAddr {
     server.address.uri().trim_start_matches("http://").parse().expect("an address")
 }
 
-/// What the network lost: an answer that does not come, or a stream that has ended.
+/// Loss by the network: a missing reply, or an ended stream.
 #[derive(Debug)]
 struct Lost;
 
@@ -97,8 +97,8 @@ impl Line {
     }
 }
 
-/// A kept session through so many failures: what was answered as accepted is there again, each step is in the run once, and the run
-/// has the bits of one that nothing disturbed.
+/// A stored session through so many failures: confirmed accepts are there again, each step is in the run once, and the
+/// run has the bits of an undisturbed one.
 fn kept(failures: u64, seed: u64) {
     let folder = tempfile::tempdir().expect("a folder");
     let server = start_kept(folder.path(), Limits { analyses: 4, ..Limits::default() }, LOCAL);
@@ -120,7 +120,7 @@ fn kept(failures: u64, seed: u64) {
             while cut.failed() < failures || done.len() < STEPS {
                 let Ok(reply) = line.step(done.len(), parent).await else { break };
                 if accepted != parent {
-                    // accepted, and cut off before it was told: the same step gives the same state
+                    // accepted, and cut off before the reply: the same step gives the same state
                     assert_eq!(reply.token, accepted);
                     unheard += 1;
                 }
@@ -141,7 +141,7 @@ fn kept(failures: u64, seed: u64) {
     });
 }
 
-/// What a circuit does: steps from the start, again after each failure, until all of them are answered.
+/// Role of a circuit: steps from the start, again after each failure, until all of them are answered.
 fn circuit(uri: &str, expected: &[TrialReply], tell: &mpsc::Sender<()>) {
     let request = OpenRequest { ports: vec![], signals: vec!["m.x".into()], noise: None };
     loop {
@@ -245,7 +245,7 @@ fn soak_a_network_that_fails() {
     }
 }
 
-/// A stream that the network held back accepts nothing after another one has joined: what was accepted since stays, here and on
+/// A stream that the network delayed accepts nothing after another one has attached: later accepts stay, here and on
 /// the disk.
 #[test]
 fn what_was_held_back_undoes_nothing() {

@@ -1,4 +1,4 @@
-//! A server that is told to stop stops, whatever its clients do.
+//! A server stops on request, for any state of its clients.
 
 use super::test_server::{Running, block_on, compiled, start};
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
@@ -15,13 +15,13 @@ fn hasty() -> Running {
 
 const AT_REST: Trial<'_> = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[1.0, 0.0] };
 
-/// With nobody connected, at once.
+/// Without a connection, at once.
 #[test]
 fn an_idle_server_stops() {
     hasty().stop().expect("a clean stop");
 }
 
-/// An open stream that stays silent is told UNAVAILABLE when the drain time is over.
+/// A silent open stream receives UNAVAILABLE when the drain time is over.
 #[test]
 fn open_streams_are_told() {
     let mut server = hasty();
@@ -57,7 +57,7 @@ fn mute_clients_are_cut() {
     server.stop().expect("a clean stop");
     for socket in [&mut silent, &mut half] {
         let mut rest = Vec::new();
-        // An end or a reset: either way the server has let go.
+        // An end or a reset: either way the server has closed.
         let _ = socket.read_to_end(&mut rest);
     }
 }

@@ -1,4 +1,5 @@
-//! Jobs in a folder: what was told of is there after a restart, damage is a job's own error, and a full disk ends a job and not the server.
+//! Jobs in a folder: reported rows are there after a restart, damage is a job's own error, and a full disk ends a job
+//! and not the server.
 
 use super::jobs::{MANY, Wire, fetch, gaps, meta, request, rest};
 use super::session_faults::LOCAL;
@@ -104,8 +105,8 @@ fn jobs_outlive_the_server() {
     assert_eq!(std::fs::read_dir(folder.path().join("jobs")).expect("a folder").count(), 0, "nothing is left");
 }
 
-/// However its journal was cut, a job has the rows that are whole, computes the others, and is done with all of them, each once; and a
-/// job whose end was kept with more rows than are there is not taken for done.
+/// After any truncation of its journal, a job has the complete rows, computes the others, and ends with all of them,
+/// each once. A job whose outcome has more rows than exist does not count as complete.
 #[test]
 fn a_journal_that_was_cut_goes_on() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -159,7 +160,7 @@ fn a_journal_that_was_cut_goes_on() {
     });
 }
 
-/// Jobs that have ended in a folder are in nobody's way, and have their rows whenever they are asked for, though no memory holds them.
+/// Ended jobs in a folder block nothing, and their rows are available on request, though not in memory.
 #[test]
 fn ended_jobs_make_room() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! What is kept of a session outlives panics, wakes that are stopped, and whatever happens while one wakes.
+//! Stored sessions survive panics, aborted restores, and any event during a restore.
 
 use super::attached::{Attached, refusal, trial};
 use super::test_server::{Running, block_on, compiled, start_kept};
@@ -25,11 +25,11 @@ const PANIC: f64 = 666.0;
 /// Length of a step [s].
 const DT: f64 = 1e-7;
 
-/// What stops those who load states.
+/// Blocks loads of states.
 #[derive(Default)]
 struct Gate {
     shut: AtomicBool,
-    /// Who waits at it.
+    /// Number of waiting loads.
     inside: AtomicUsize,
 }
 
@@ -129,7 +129,7 @@ fn asleep(folder: &Path, make: MakeDevice) -> (String, u64) {
     })
 }
 
-/// A server with a kept session that sleeps, and a gate that stops who wakes it.
+/// A server with a stored session, and a gate that blocks its restore.
 struct Asleep {
     server: Running,
     folder: TempDir,
@@ -147,7 +147,7 @@ impl Asleep {
         Self { server, folder, gate, session, token }
     }
 
-    /// Somebody who wakes it, and stands at the gate.
+    /// A client that restores it, and waits at the gate.
     async fn waking(&self, client: &mut BimorphClient<Channel>) -> Attached {
         self.gate.shut.store(true, Ordering::SeqCst);
         let waking = Attached::ask_to_join(client, &self.session).await;
@@ -159,7 +159,7 @@ impl Asleep {
         self.gate.shut.store(false, Ordering::SeqCst);
     }
 
-    /// What is left of sessions and of models.
+    /// Numbers of remaining sessions and models.
     fn left(&self) -> [usize; 2] {
         ["sessions", "models"].map(|name| std::fs::read_dir(self.folder.path().join(name)).expect("a folder").count())
     }
@@ -276,7 +276,8 @@ fn two_who_wake_one_session() {
     });
 }
 
-/// A session whose time without use ends while it wakes is gone: who wakes it is told so, and nothing of it is left.
+/// A session whose lifetime ends during its restore is gone: the restoring client receives an error, and nothing of the
+/// session is left.
 #[test]
 fn what_wakes_too_late() {
     static GATE: Gate = Gate::open();
@@ -310,7 +311,7 @@ fn closing_what_wakes() {
     });
 }
 
-/// An accept without an answer that cannot be kept is told by the next reply of its stream, whatever that was asked.
+/// A failure to store an accept without a reply is reported by the next reply of its stream, to any request.
 #[test]
 fn an_accept_that_is_not_kept_is_told() {
     static GATE: Gate = Gate::open();

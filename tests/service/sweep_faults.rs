@@ -16,8 +16,8 @@ use tonic::Code;
 /// Bytes within which a connection fails: often before a submission is answered.
 const WITHIN: u64 = 1000;
 
-/// Sweeps through so many failures each: a table is the whole one with each point once, or there is none; and a submission whose answer was
-/// lost starts no second sweep, for which there is no room.
+/// Sweeps through so many failures each. A table is complete with each point once, or there is no table. A submission
+/// whose reply was lost starts no second sweep, for which there is no space.
 fn sweeps(rounds: u64, failures: u64) {
     let parameters = vec!["gap=1.5u:2.5u:60".parse().expect("an axis")];
     let analysis = SweepAnalysis::PullIn { port: Some("drive".into()), max: 30.0 };

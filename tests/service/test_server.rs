@@ -1,4 +1,4 @@
-//! A server on a thread of its own, stopped when the test lets go of it.
+//! A server on a thread of its own, stopped when the test drops it.
 
 use super::echo::echo;
 use bimorph::compile::CompileOptions;
@@ -71,13 +71,13 @@ fn start_as(options: ServeOptions, make: MakeDevice) -> Running {
 }
 
 impl Running {
-    /// Tells it to stop and waits until it has.
+    /// Stops it and waits for its end.
     pub(crate) fn stop(&mut self) -> Result<(), ServeError> {
         drop(self.stop.take());
         self.thread.take().map_or(Ok(()), |thread| thread.join().expect("the server does not panic"))
     }
 
-    /// Tells it to stop.
+    /// Requests it to stop.
     pub(crate) fn tell(&mut self) {
         drop(self.stop.take());
     }

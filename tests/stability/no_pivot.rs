@@ -51,7 +51,7 @@ impl Case {
     }
 }
 
-/// Largest difference against the largest acceleration; infinite where a number is none.
+/// Largest difference against the largest acceleration; infinite for NaN.
 fn apart(a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64, n: usize) -> f64 {
     let unit = |i: usize| if i % 3 == 2 { LEVER } else { 1.0 };
     let largest = (0..n).map(|i| (b(i) * unit(i)).abs()).fold(0.0, f64::max);

@@ -1,4 +1,4 @@
-//! Mechanisms of any size, as code: what the scaling tests and benches measure.
+//! Mechanisms of any size, as code: models of the scaling tests and benches.
 //!
 //! A [`Topology`] names no formulation: bodies with centre, mass and inertia, and joints with place and angle. It can be read
 //! as rods with flexible joints between them ([`Topology::model`]) or as rods on pins ([`Topology::pinned`]). All are of 2 µm polysilicon

@@ -1,4 +1,4 @@
-//! Variants side by side: a lane has the bits of its variant alone.
+//! Batched transients: a lane has the bits of its variant alone.
 
 use bimorph::analysis::transient::first_step;
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
@@ -46,7 +46,7 @@ fn alone(compiled: &CompiledModel, volts: &[f64], stop: f64, tol: f64) -> Option
     ended.ok().map(|_| (steps, motion))
 }
 
-/// The same runs side by side.
+/// The same runs in a batch.
 fn together(variants: &[CompiledModel], volts: &[f64], stop: f64, tol: f64) -> Vec<Option<Ran>> {
     let electrics: Vec<_> = variants.iter().map(|v| &v.parts.system.electrics).collect();
     let sources: Vec<Vec<f64>> = (electrics.iter())
@@ -86,9 +86,9 @@ fn bits(ran: &Ran) -> Vec<u64> {
     steps.iter().flat_map(|&(s, h)| [s, h]).chain(motion).map(f64::to_bits).collect()
 }
 
-/// Side by side a run has the steps and the bits that it has alone, whatever its neighbours are: variants that take many steps
-/// beside some that take few, contact, dampers, supports, heat, a comb, loads, one that cannot be stepped at all (a mass of
-/// 1e-300 kg), and one of another topology, which is left to a run alone. Eleven variants in eight lanes.
+/// In a batch a run has the steps and the bits of a single run, for any neighbours. The cases are variants with many
+/// steps beside some with few, contact, dampers, supports, heat, a comb, and loads. One cannot be stepped at all (a
+/// mass of 1e-300 kg), and one of another topology is left to a single run. Eleven variants in eight lanes.
 #[test]
 fn a_lane_has_the_bits_of_its_variant_alone() {
     let bank = std::fs::read_to_string("examples/bank/bank.net").expect("the bank");

@@ -1,4 +1,4 @@
-//! Equilibria and modes of variants side by side: bits of a variant alone, or its modes to rounding, in any company.
+//! Batched equilibria and modes: bit-identical to a single variant, or its modes to rounding, for any neighbours.
 
 use super::{BEAMS, swept};
 use bimorph::analysis::mesh::{self, MeshRequest};
@@ -60,8 +60,9 @@ fn together(variants: &[CompiledModel], volts: f64, at_once: usize) -> Vec<Optio
         .collect()
 }
 
-/// An equilibrium in a lane has the bits and the iterations of the variant alone: under forces, under heat with hinges and guides, and
-/// across a comb; a plate that closes too far for one step is given up, and leaves its neighbours as they are.
+/// An equilibrium in a lane has the bits and the iterations of the variant alone: under forces, under heat with hinges
+/// and guides, and across a comb. A plate that closes too far for one step is abandoned, without effect on its
+/// neighbours.
 #[test]
 fn equilibria_are_those_alone() {
     let heated = "param w=2u

@@ -1,5 +1,5 @@
-//! Sweeps of variants: what they share (a mesh, the reading of the netlist, the steps of a run) changes no promise about any
-//! one of them.
+//! Sweeps of variants: shared data (a mesh, the parsed netlist, the steps of a run) change no guarantee about any one
+//! of them.
 
 mod batch_transients;
 mod batched;
@@ -55,7 +55,7 @@ fn rows_are_within_the_tolerance_of_a_finer_mesh() {
             let scales = [finest[0].abs(), finest[1].hypot(finest[2]), finest[1].hypot(finest[2])];
             for (k, (x, r)) in numbers(row).iter().zip(numbers(reference)).enumerate() {
                 let (last, scale) = (finest[k], scales[k]);
-                // Richardson: what is left falls with the second order
+                // Richardson: the remainder falls with the second order
                 let f = last + (last - r) / 3.0;
                 assert!((f - last).abs() < 0.5 * tol * scale, "the reference is not converged: {r} {last}");
                 assert!((x - f).abs() <= tol * scale, "{tol}: {x} {f} {:?}", row.parameters);
@@ -74,8 +74,8 @@ fn rows_are_within_the_tolerance_of_a_finer_mesh() {
     );
 }
 
-/// Which mesh a point takes does not depend on who else is in its shard: shards put together are the whole table, also where
-/// a part of the grid needs a finer mesh (forces up to F·l²/EI = 40) or has other beams.
+/// The mesh of a point does not depend on the other points of its shard. Shards put together are the whole table, also
+/// where a part of the grid needs a finer mesh (forces up to F·l²/EI = 40) or has other beams.
 #[test]
 fn shards_are_the_whole() {
     let text = format!("param more=0\n{BEAMS}if more\n[ tail beam2d p [t e] [l=20u w=1.5u oz=0] ]\n");
@@ -166,14 +166,14 @@ fn sweeps_of_transients_are_runs_alone() {
         .collect();
     rows.sort_by_key(|row| row.point);
     assert_eq!(rows, whole.rows);
-    // a width that is none: its own error, and nobody else's
+    // an invalid width: its own error, and no other's
     let broken = swept(&text, &["w=-1u,2u", "F=1u,2u"], transients, &options, Shard::default());
     assert_eq!(broken.failed(), 2, "{}", broken.to_csv());
 }
 
-/// What a linear model leaves out is told for each row, as `static` and `pullin` tell it: on the
-/// shared mesh, on one of the row's own, and on given segments. A cantilever pressed with up to half of Euler's load; one
-/// pulled in one piece.
+/// Omissions of a linear model are reported for each row, as `static` and `pullin` report them: on the shared mesh, on
+/// one of the row's own, and on given segments. A cantilever pressed with up to half of Euler's load; one pulled in one
+/// piece.
 #[test]
 fn rows_tell_what_the_commands_tell() {
     let pressed = "param F=1u\nprocess p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\n\
@@ -202,8 +202,9 @@ fn rows_tell_what_the_commands_tell() {
     assert_eq!(reported, [false, true], "{:?}", table.rows);
 }
 
-/// Rows of transients tell how far the steps may be off in the middle of the grid, where that is beyond the tolerance: a part let go far
-/// that exchanges energy between its modes for milliseconds, and not one that has only begun to move.
+/// Rows of transients report the step error in the middle of the grid, where it is beyond the tolerance. This applies
+/// to a part released far that exchanges energy between its modes for milliseconds, and not to one that has only begun
+/// to move.
 #[test]
 fn rows_tell_how_far_their_steps_are_off() {
     let text = BEAMS;

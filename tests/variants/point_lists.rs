@@ -101,7 +101,7 @@ fn corners_have_scatter() {
     assert!(table.rows.iter().all(|row| row.values.is_ok()));
 }
 
-/// What no option is or has, and lists that do not fit together, are refused before anything runs.
+/// Unknown options and values, and inconsistent lists, are rejected before anything runs.
 #[test]
 fn slips_are_refused() {
     let axis = |text: &str| refusal(vec![text.parse().expect("an axis")]);
