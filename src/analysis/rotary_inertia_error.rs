@@ -22,7 +22,7 @@ pub(super) fn rotary_inertia_note(compiled: &CompiledModel, modes: &[Vec<Pose>])
     let (mode, over) = all.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
     (over > options.tol.max(WORTH)).then(|| {
         format!(
-            "the sections of wide beams turn without inertia: mode {}, most of all, comes out too high by about {:.1} %; take --rotary-inertia",
+            "rotary inertia of wide beams is neglected: mode {} has the largest error, its frequency is too high by about {:.1} %; use --rotary-inertia",
             mode + 1,
             100.0 * over
         )

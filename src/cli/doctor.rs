@@ -72,7 +72,7 @@ impl DoctorCommand {
         let options = settings.options();
         let found =
             authentication::look_at(&options.guard).map_err(|error| error.to_string()).map(|found| match found {
-                found if found.is_empty() => "nobody is asked for anything".to_owned(),
+                found if found.is_empty() => "clients need no credentials".to_owned(),
                 found => found.join("; "),
             });
         line("access", &found, "docs/service.md says what a server asks of its clients, and of its files")?;

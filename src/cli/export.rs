@@ -260,10 +260,12 @@ fn mesh_error(compiled: &CompiledModel) -> Option<f64> {
 fn mesh(compiled: &CompiledModel) -> String {
     match mesh_error(compiled) {
         Some(error) if compiled.options.band.is_none() && compiled.options.segments.is_none() => format!(
-            "the equilibrium and the lowest frequencies of the full model: off by {error:.1e} at most, by its mesh; --band HZ holds all below it"
+            "the equilibrium and the lowest frequencies of the full model: estimated error {error:.1e} at most, from its mesh; --band HZ covers all below it"
         ),
-        Some(error) => format!("frequencies of the full model: off by {error:.1e} at most in the band, by its mesh"),
-        None => "frequencies of the full model: nothing tells how far its mesh is off; --band HZ does".to_owned(),
+        Some(error) => {
+            format!("frequencies of the full model: estimated error {error:.1e} at most in the band, from its mesh")
+        }
+        None => "frequencies of the full model: the error of its mesh is unknown; --band HZ estimates it".to_owned(),
     }
 }
 

@@ -169,7 +169,7 @@ impl ModelArgs {
 /// Warning on every result of the linear frame.
 fn baseline() -> Diagnostic {
     let message =
-        "the linear frame is a baseline: small displacements, no stops, and nothing tells how far its elements are off";
+        "the linear frame is a baseline: small displacements, no stops, and no estimate of the error of its elements";
     let help = "--segments N or --band HZ for more elements; --solver recursion has an estimate";
     Diagnostic::warning("W043", message.into(), help)
 }

@@ -134,20 +134,20 @@ impl PhaseErrorMonitor {
         self.reported = GROWS * error / tol;
         let frequency = match higher {
             None => format!(
-                "the mesh may be off by {:.1e} in the lowest frequency, {:.4e} Hz,",
+                "the mesh has an estimated error of {:.1e} in the lowest frequency, {:.4e} Hz,",
                 mode.error.abs(),
                 mode.frequency_hz
             ),
             Some(of) => format!(
-                "the mesh may be off by {:.1e} and the steps by {:.1e} in the frequency of a higher mode, {:.4e} Hz,",
+                "the mesh and the steps have estimated errors of {:.1e} and {:.1e} in the frequency of a higher mode, {:.4e} Hz,",
                 split.modes[of.mode].error.abs(),
                 of.steps,
                 split.modes[of.mode].frequency_hz
             ),
         };
         let text = format!(
-            "{frequency} and a motion that rings gets out of step: after {cycles:.1} \
-             cycles it may be off by {error:.1e} of its range, more than the tolerance {tol:e}"
+            "{frequency} which shifts the phase of a free oscillation: after {cycles:.1} \
+             cycles its estimated error is {error:.1e} of its range, more than the tolerance {tol:e}"
         );
         Some((text, n))
     }

@@ -286,7 +286,7 @@ fn compare(
     for role in roles {
         let drawn = layers.get(&role).unwrap_or(&none);
         let name = name_of(role, process);
-        let ours = merge(&format!("{name}, as its labels tell it"), again.get(&role).unwrap_or(&none), drawn)?;
+        let ours = merge(&format!("{name}, as given by its labels"), again.get(&role).unwrap_or(&none), drawn)?;
         let (more, less) = (regions::difference(drawn, &ours), regions::difference(&ours, drawn));
         let more = Unrecognised::of(&name, &more, unit, "drawn, but in no part of the mechanism");
         let less = Unrecognised::of(&name, &less, unit, "in the mechanism, but not drawn");

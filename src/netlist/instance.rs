@@ -46,7 +46,7 @@ impl<'p> Elaborator<'p> {
                         "W007",
                         name.span,
                         message,
-                        "give each its own name, so that results can be told apart",
+                        "give each its own name, so that results can be distinguished",
                     );
                 }
                 local

@@ -23,7 +23,7 @@ fn fitting(limits: &Limits, most: usize) -> usize {
 /// # Errors
 /// How many fit, and what to do.
 pub fn check(limits: &Limits) -> Result<String, String> {
-    let Some(most) = most_open() else { return Ok("the system does not tell how many files may be open".to_owned()) };
+    let Some(most) = most_open() else { return Ok("the system does not report how many files may be open".to_owned()) };
     let (asked, fit) = (limits.connections, fitting(limits, most));
     if asked <= fit {
         return Ok(format!("{asked} connections fit into {most} open files"));

@@ -87,7 +87,7 @@ fn write(lines: &Receiver<LogItem>) {
         let dropped = DROPPED.swap(0, Ordering::Relaxed);
         let mut out = io::stderr();
         if dropped > 0 {
-            let _ = writeln!(out, "… {dropped} lines of this log were dropped: nobody read them in time");
+            let _ = writeln!(out, "… {dropped} lines of this log were dropped: they were not read in time");
         }
         let _ = out.write_all(&text);
     }

@@ -78,7 +78,11 @@ pub const METRICS: [Metric; 17] = [
     metric("bimorph_waiting", "gauge", "Computations that wait for a place, by what they are."),
     metric("bimorph_kept_sessions", "gauge", "Sessions in the folder of states."),
     metric("bimorph_kept_bytes", "gauge", "Bytes in the folder of states [byte]."),
-    metric("bimorph_log_lines_dropped_total", "counter", "Lines of the log that nobody read in time."),
+    metric(
+        "bimorph_log_lines_dropped_total",
+        "counter",
+        "Lines of the log that were dropped because they were not read in time.",
+    ),
     metric("process_resident_memory_bytes", "gauge", "Resident memory [byte]."),
 ];
 

@@ -160,7 +160,7 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: BoxedWai
         signal.cancel();
     }
     if ended.is_none() {
-        tracing::warn!("some clients did not let go; their connections are cut");
+        tracing::warn!("some clients did not disconnect; their connections are cut");
         ended = tokio::time::timeout(GRACE, &mut serving).await.ok();
     }
     shared.jobs.release(GRACE).await;

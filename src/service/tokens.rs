@@ -72,7 +72,7 @@ impl Tokens {
             }
         }
         if known.is_empty() {
-            return Err(wrong(None, "expected at least one token; nobody could ask".to_owned()));
+            return Err(wrong(None, "expected at least one token; without one no client can authenticate".to_owned()));
         }
         Ok(Self { known })
     }

@@ -124,7 +124,11 @@ fn one_step_compared_with_itself() {
     };
     let (result, ()) = with_step_error(&options, &compiled, &mut run, &mut |_, _| {}, &mut |_| true).unwrap();
     assert_eq!(result.step_error, None);
-    assert!(result.warnings.iter().any(|w| w.contains("nothing tells how far the steps")), "{:?}", result.warnings);
+    assert!(
+        result.warnings.iter().any(|w| w.contains("the error of the steps in time is unknown")),
+        "{:?}",
+        result.warnings
+    );
 }
 
 /// Loose steps (0.15, after a first run at 0.3) report their error over 160 periods within a factor of 1.5. Closed form.

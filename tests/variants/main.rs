@@ -215,7 +215,7 @@ fn rows_tell_how_far_their_steps_are_off() {
         swept(text, &["F=50u,100u,200u"], transients, &options, Shard::default())
     };
     let reported = |table: &SweepTable| -> Vec<bool> {
-        table.rows.iter().map(|row| row.warning.contains("the steps in time may be off by")).collect()
+        table.rows.iter().map(|row| row.warning.contains("the estimated error of the steps in time is")).collect()
     };
     let long = run(2e-3);
     assert_eq!(reported(&long), [true; 3], "{:?}", long.rows);

@@ -172,7 +172,7 @@ impl ModelCall<'_> {
             let arguments = (c.anal_type == analysis::AC).then_some(c.frequency);
             return match arguments.or_else(|| self.circuit.omega()) {
                 Some(omega) => Ok(EvaluationRequest::SmallSignal { omega }),
-                None => Err("this ngspice does not tell code models the frequency in this analysis; use .ac"),
+                None => Err("this ngspice does not give code models the frequency in this analysis; use .ac"),
             };
         }
         if c.anal_type != analysis::TRAN || !self.circuit.transient() {

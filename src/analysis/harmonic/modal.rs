@@ -95,7 +95,7 @@ fn massless() -> AnalysisError {
 
 fn unsettled(count: usize) -> AnalysisError {
     let detail =
-        format!("the {count} lowest modes at the operating point cannot be told apart from rounding; ask for fewer");
+        format!("the {count} lowest modes at the operating point cannot be distinguished from rounding; request fewer");
     AnalysisError::NotConverged { detail }
 }
 

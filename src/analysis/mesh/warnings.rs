@@ -38,10 +38,10 @@ pub fn beyond(tol: f64, estimated_error: Option<f64>) -> Option<String> {
     match estimated_error {
         Some(error) if error <= 1.05 * tol => None,
         Some(error) if error.is_finite() => {
-            Some(format!("the mesh may be off by {error:.1e}, more than the tolerance {tol:e}"))
+            Some(format!("the estimated error of the mesh is {error:.1e}, more than the tolerance {tol:e}"))
         }
         // on twice the segments something is there that was not, or the other way round
-        _ => Some(format!("nothing tells how far the mesh is off: the tolerance {tol:e} is not confirmed")),
+        _ => Some(format!("the error of the mesh is unknown: the tolerance {tol:e} is not confirmed")),
     }
 }
 
@@ -80,9 +80,8 @@ pub(super) fn of_rotary(compiled: &CompiledModel, error: f64) -> Option<Diagnost
     if error <= compiled.options.tol.max(rotary_inertia_error::WORTH) {
         return None;
     }
-    let message = format!(
-        "the sections of wide beams turn without inertia: the motion may be off by {error:.1e} of its amplitude"
-    );
+    let message =
+        format!("rotary inertia of wide beams is neglected: the estimated error is {error:.1e} of the amplitude");
     Some(Diagnostic::warning(ROTARY, message, "take --rotary-inertia"))
 }
 

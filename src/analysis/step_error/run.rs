@@ -40,7 +40,7 @@ pub(super) fn loose(options: &TransientOptions<'_>) -> f64 {
 
 /// Warning about steps without an estimate.
 pub(crate) fn unknown(options: &TransientOptions<'_>) -> String {
-    format!("nothing tells how far the steps in time are off: the tolerance {:e} is not confirmed", options.tol)
+    format!("the error of the steps in time is unknown: the tolerance {:e} is not confirmed", options.tol)
 }
 
 /// Warning about steps whose estimate exceeds the tolerance; `place` says of what it is the estimate.
@@ -50,7 +50,7 @@ pub(crate) fn beyond(options: &TransientOptions<'_>, error: f64, place: &str) ->
     }
     let way = if options.step.is_some() { "take a shorter --step" } else { "take a smaller --tol" };
     Some(format!(
-        "the steps in time may be off by {error:.1e} of the amplitude {place}, more than the tolerance {:e}; {way}",
+        "the estimated error of the steps in time is {error:.1e} of the amplitude {place}, more than the tolerance {:e}; {way}",
         options.tol
     ))
 }

@@ -170,7 +170,7 @@ fn lost(SignalLoss { signal, t, chaotic }: SignalLoss) -> String {
             "{signal} is not predictable after {t:.2e} s: neighbouring motions part exponentially there, at any tolerance; only its statistics hold"
         ),
         false => format!(
-            "the phase of {signal} is lost after {t:.2e} s: by the steps it is off by more than 0.3 of its range; take a smaller --tol"
+            "the phase of {signal} is lost after {t:.2e} s: its step error exceeds 0.3 of its range; use a smaller --tol"
         ),
     }
 }

@@ -31,7 +31,7 @@ impl LuaState {
         budget::lay_out(ELEMENT_BYTES + NAME_COPIES * full.len());
         if given && !self.names.insert(full.to_owned()) {
             let message = format!("there is an element `{full}` already");
-            self.sink.warning("W007", span, message, "give each its own name, so that results can be told apart");
+            self.sink.warning("W007", span, message, "give each its own name, so that results can be distinguished");
         }
     }
 }

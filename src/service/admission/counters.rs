@@ -123,7 +123,8 @@ impl AdmissionCounters {
         call: &AdmittedCall,
         headers: &http::HeaderMap,
     ) -> Result<Arc<Account>, Status> {
-        let presence = call.presence.as_ref().ok_or_else(|| Status::unauthenticated("nobody is known to ask"))?;
+        let presence =
+            call.presence.as_ref().ok_or_else(|| Status::unauthenticated("the client of this call is unknown"))?;
         let (most, name) = if call.is_health() { (HEALTH_CALLS, "health") } else { (self.most_calls, "calls") };
         if call.count().load(Ordering::Relaxed) > most {
             return Err(status::limit(name, most, "one more; end some"));
