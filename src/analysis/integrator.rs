@@ -186,7 +186,7 @@ impl IntegrationRule {
     }
 }
 
-/// What is the same for every method.
+/// Data of a run that do not depend on the method.
 pub struct IntegrationRun<'a, 'b, X> {
     /// Where it begins; becomes where it ends.
     pub motion: &'a mut Motion<X>,

@@ -6,7 +6,7 @@
 //! ```text
 //! S_ij = 4·k_B·T·hᵢᵀ·C·h̄_j + 4·k_B·[T·G_ij + Σ_k rise_k·R_k·I_ki·I_kj]     [answered²/Hz]
 //! ```
-//! G is the conductance between electrical ports, and I_ki the current in beam k for a volt at port i. hᵢ follows from
+//! G is the conductance between electrical ports, and I_ki the current in beam k for a volt at port i. The vector hᵢ follows from
 //! one solution for each output, not for each damper: hᵢ = Z⁻ᵀ·lᵢ, where lᵢ is the gradient of output i over
 //! displacements (the adjoint of the response). In a rotating frame Z differs from its transpose by the sign of the
 //! rate.

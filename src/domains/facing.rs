@@ -3,8 +3,8 @@
 //! The gap is g(s) = g₀ + w(s), with w the cubic (Hermite) interpolation of the relative displacement and rotation of the
 //! two pairs of ends: z = (w₁, φ₁, w₂, φ₂). Parallel beams get exactly SUGAR's nodal forces and moments, pl/2 and pl²/12
 //! (its `gap2d`); tilted ones differ in second order, because here forces, stiffness and charge come from one potential.
-//! With [`FacingStretch::chord`] they do not: as SUGAR has it, the gap is then measured along the straight lines between the ends, while
-//! its pressure acts through the cubics, so that the forces are the derivatives of no energy.
+//! With [`FacingStretch::chord`] they do not. As in SUGAR, the gap is then measured along the straight lines between the
+//! ends, while its pressure acts through the cubics, so that the forces do not derive from an energy.
 //! α is SUGAR's fringe factor 1 + 1.12·g₀/h. Quadrature of the field is Gauss–Legendre, of the contact pressure Gauss–Lobatto,
 //! whose points include the ends, where tilted beams touch first ([`super::quadrature`]): six and nine points on a gap of one
 //! stretch, three and five on each of several.

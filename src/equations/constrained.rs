@@ -8,8 +8,8 @@
 //! stiffness there, and reduces with M + γ·C + β·K in the place of M
 //! ([`crate::multibody::joint_coordinates::constrained_loops::AddedInertia`]). No matrix is assembled, and an iteration
 //! costs O(n + m). That matrix, unlike the equation, neglects the dependence of inertia and reactions on the
-//! configuration: the iteration is linear, with Anderson acceleration (`anderson.rs`). θ is the ratio of the last two
-//! corrections, and it ends when what is left, δ·θ/(1 − θ), is below the tolerance.
+//! configuration: the iteration is linear, with Anderson acceleration (`anderson.rs`). With θ the ratio of the last two
+//! corrections, it ends when the remainder, δ·θ/(1 − θ), is below the tolerance.
 //!
 //! **How large an error is.** With ‖e‖ the root mean square over the coordinates against their sizes, √(‖e_q‖² + h²‖e_v‖²) must stay below
 //! tol·(‖q‖ + 1e-4). Each step is taken to the loops at its end; where heat moves them, how far that is counts too, since the stages do

@@ -128,7 +128,7 @@ fn no_answered_state_is_lost_with_the_power() {
         options: None,
     };
     let mut keeper = SessionWriter::new(&store, ID, MODEL, &source).expect("there is room");
-    let done = || store.disk().done.lock().expect("nobody panicked").clone();
+    let done = || store.disk().done.lock().expect("no panic").clone();
     let mut answered = vec![(0, done().len())];
     for state in 1..=5_u64 {
         // longer and shorter ones in turn

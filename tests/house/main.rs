@@ -4,6 +4,7 @@ mod circles;
 mod layering;
 mod names;
 mod sizes;
+mod words;
 
 use std::fs;
 use std::path::{Path, PathBuf};

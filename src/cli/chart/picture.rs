@@ -120,10 +120,10 @@ fn panel(chart: &Chart, part: ChartPart, work: CostMeasure) -> Option<LogPanel> 
         ChartPart::Defaults => {
             let loosest = points.iter().map(|p| p.tol).fold(0.0, f64::max);
             LogPanel {
-                title: "Defaults: asked for, come out".into(),
-                x_name: "tolerance asked for".into(),
+                title: "Defaults: requested, obtained".into(),
+                x_name: "requested tolerance".into(),
                 y_name: "true relative error".into(),
-                slopes: vec![Slope { name: "asked for".into(), through: [loosest, loosest], exponent: 1.0 }],
+                slopes: vec![Slope { name: "requested".into(), through: [loosest, loosest], exponent: 1.0 }],
                 curves,
                 floor: None,
             }
@@ -143,7 +143,7 @@ fn cost(chart: &Chart) -> Option<LogPanel> {
     }
     (!curves.is_empty()).then(|| LogPanel {
         title: "Defaults: what it costs".into(),
-        x_name: "tolerance asked for".into(),
+        x_name: "requested tolerance".into(),
         y_name: "time of a command [s]".into(),
         curves,
         floor: None,

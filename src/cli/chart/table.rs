@@ -83,7 +83,7 @@ pub(crate) fn caption(part: ChartPart) -> &'static str {
         }
         ChartPart::Solvers => "One step of Rodas4 by solver; work: multiplications of its factorization and solves",
         ChartPart::Defaults => {
-            "Default analyses by tolerance, against a tenth of the tightest: asked for, come out, told, and the time"
+            "Default analyses by tolerance, against a tenth of the tightest: requested, obtained and estimated error, and the time"
         }
     }
 }

@@ -47,7 +47,7 @@ enum Answered {
 fn nothing_that_a_job_gave_out_is_lost_with_the_power() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = Arc::new(SessionStore::open(folder.path(), true, 1 << 20).expect("opens"));
-    let done = || store.disk().done.lock().expect("nobody panicked").clone();
+    let done = || store.disk().done.lock().expect("no panic").clone();
     let mut answered = Vec::new();
     let mut file = folder::begin(&store, ID, &asked(), REQUEST).expect("there is room");
     assert!(file.open().expect("opens").is_empty());

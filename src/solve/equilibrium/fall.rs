@@ -1,8 +1,8 @@
 //! The fall from where a branch loses its stability to the next stable equilibrium: a trust region on the potential energy.
 //!
-//! Each step solves (K + μW)·d = −r, with W a diagonal of units (translations in mean segment lengths, rotations in radians). μ grows until
-//! the matrix is positive definite, the step is no longer than the trust region and the energy falls as predicted; it shrinks after each
-//! accepted step, so that the last steps are Newton's. Without the test of energy, iterations cycle in stiff curved valleys and jump
+//! Each step solves (K + μW)·d = −r, with W a diagonal of units (translations in mean segment lengths, rotations in radians). The damping μ
+//! grows until the matrix is positive definite, the step is no longer than the trust region and the energy falls as predicted. It shrinks
+//! after each accepted step, so that the last steps are Newton's. Without the test of energy, iterations cycle in stiff curved valleys and jump
 //! in and out of stiff contacts.
 //!
 //! References: A. R. Conn, N. I. M. Gould, P. L. Toint, "Trust-Region Methods" (2000), ch. 6; C. T. Kelley, D. E. Keyes, "Convergence
