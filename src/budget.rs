@@ -1,13 +1,13 @@
 //! Limits of a computation: bytes, unknowns, processor time, wall time; and its cancellation.
 //!
-//! A budget belongs to a thread for the time of [`within`], so that solvers ask it where their loops turn and no signature
-//! carries it. Without one (the command, the plug-in, a library user) every question is a load of a thread-local and
-//! nothing is refused. [`check`] stands in every inner loop that a request can make long; [`lay_out`] and [`unknowns`] stand
-//! before what a request can make large.
+//! A budget belongs to a thread for the time of [`within`], so that solvers ask it where their loops turn and no
+//! signature carries it. Without one (the command, the plug-in, a library user) every check is a load of a thread-local
+//! and nothing is refused. [`check`] stands in every inner loop that a request can make long; [`lay_out`] and
+//! [`unknowns`] stand before what a request can make large.
 //!
 //! A stopped computation unwinds to its [`within`] like a panic, but without one: no hook runs and nothing is logged
-//! (`std::panic::resume_unwind`; Salsa stops its queries this way). Whatever was half computed is dropped on the way. A
-//! value that outlives a stopped computation, as the storage of a device does, must be made anew:
+//! (`std::panic::resume_unwind`; Salsa stops its queries this way). Partial results are dropped. A value that outlives
+//! a stopped computation, as the storage of a device does, must be made anew:
 //! [`Device::recover`](crate::device::Device::recover).
 
 mod allowance;
@@ -37,7 +37,7 @@ pub struct Budget(Arc<BudgetState>);
 struct BudgetState {
     allowance: Allowance,
     used: AtomicUsize,
-    /// 0 while it may go on; shared with budgets that are parts of one another.
+    /// 0 while it may continue; shared with budgets that are parts of one another.
     order: Arc<AtomicU8>,
 }
 
@@ -105,7 +105,7 @@ impl Budget {
     }
 }
 
-/// The budget of a thread, and when it was last looked at.
+/// The budget of a thread, and the time of its last check.
 struct ThreadBudget {
     budget: Budget,
     checks: Cell<u32>,
@@ -135,7 +135,7 @@ struct StopPayload(Stopped);
 /// Runs `job` under a budget.
 ///
 /// # Errors
-/// Why it was stopped. A panic of the job goes on as one.
+/// Why it was stopped. A panic of the job continues as a panic.
 pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped> {
     let held = ThreadBudget {
         budget: budget.clone(),
@@ -209,7 +209,7 @@ pub fn unknowns(got: usize) {
     }
 }
 
-/// Stops here if so many modes of a model are beyond the budget. Its `unknowns` are asked for only where it could be.
+/// Stops here if so many modes of a model are beyond the budget. Its `unknowns` are evaluated only where it could be.
 pub fn modes(count: usize, unknowns: impl FnOnce() -> usize) {
     let allowance = HELD.with(|held| held.borrow().as_ref().map(|held| held.budget.0.allowance.clone()));
     if let Some(Err(why)) = allowance.map(|allowance| allowance.modes(count, unknowns)) {
@@ -338,7 +338,7 @@ mod tests {
         assert_eq!(spun, Err(Stopped::Cpu { seconds: 0 }));
     }
 
-    /// A panic inside goes on as a panic, and the budget of the outer computation is held again after an inner one.
+    /// A panic inside continues as a panic, and the budget of the outer computation is held again after an inner one.
     #[test]
     fn panics_pass_and_budgets_nest() {
         let outer = allowed(|a| a.unknowns = 5);

@@ -150,7 +150,7 @@ pub fn draw(source: &NetlistSource, options: &CompileOptions) -> Result<ParsedSt
 }
 
 impl ParsedStructure {
-    /// The model on the mesh that the options ask for.
+    /// The model on the mesh that the options specify.
     ///
     /// # Errors
     /// See [`CompileError`].
@@ -199,7 +199,7 @@ fn beyond_table(structure: &Structure, options: &CompileOptions, parts: &Assembl
     Some(Diagnostic::warning("W017", message, help))
 }
 
-/// Bodies and joints, with the imperfection asked for.
+/// Bodies and joints, with the requested imperfection.
 fn laid_out(
     structure: &Structure,
     options: &CompileOptions,

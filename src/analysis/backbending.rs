@@ -11,7 +11,7 @@ use crate::solve::SolveError;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
-/// Steps in which the voltages are raised: plastic strain depends on the way.
+/// Steps in which the voltages are raised, since plastic strain depends on the path.
 const STEPS: usize = 8;
 /// Corrections of the plastic strains in one step.
 const CORRECTIONS: usize = 60;

@@ -25,7 +25,7 @@ use super::integrator::Integrator;
 /// Final state of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunEnd {
-    /// Value of each signal at the end, in the order asked for.
+    /// Final value of each signal, in the requested order.
     pub values: Vec<f64>,
     /// Accepted steps.
     pub steps: u64,
@@ -129,7 +129,7 @@ impl Setup {
     }
 }
 
-/// Sees to the end of a run, its stability on the way, and the range of the law of contact.
+/// Checks the end of a run, its stability during the motion, and the range of the law of contact.
 struct RunFinisher<'a> {
     compiled: &'a CompiledModel,
     setup: &'a Setup,
@@ -161,7 +161,7 @@ impl<'a> RunFinisher<'a> {
         }
     }
 
-    /// Looks at the stability that are due at the end of a step.
+    /// Number of stability checks due at the end of a step.
     fn due(&self, s: f64, h: f64) -> usize {
         ((s + h) / self.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize
     }

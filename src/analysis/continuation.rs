@@ -1,4 +1,4 @@
-//! Equilibrium paths: how a mechanism's equilibria go on while one load, voltage, temperature or stress grows, past folds
+//! Equilibrium paths: the equilibria of a mechanism under a growing load, voltage, temperature or stress, past folds
 //! and through bifurcations.
 use super::contact_range::{comb_beyond_told, within_contact_range};
 use super::statics::{OperatingPoint, beam_motions, node_motions, notes_at, operating_point, source_vector, too_hot};

@@ -68,9 +68,9 @@ impl Formulation {
         }
     }
 
-    /// The formulation and the method of a run: `auto` decided, with the reason, everything else as it was asked for. A method
-    /// other than the default, equal steps and a baseline's solver are those of the bodies; so is the equilibrium that a
-    /// release starts from.
+    /// The formulation and the method of a run: `auto` resolved, with the reason, everything else as requested. A
+    /// method other than the default, equal steps and a baseline's solver are those of the bodies; so is the
+    /// equilibrium that a release starts from.
     pub fn of_run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> (ChosenFormulation, Integrator) {
         let method = options.method;
         let asked = compiled.options.formulation;

@@ -45,7 +45,7 @@ pub enum Integrator {
 }
 
 impl Integrator {
-    /// Factor by which generalized-α damps infinitely fast motions when nothing is said.
+    /// Default factor by which generalized-α damps infinitely fast motions.
     pub const RHO: f64 = 0.8;
 
     /// Names in the order of the variants.

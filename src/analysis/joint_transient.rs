@@ -1,10 +1,11 @@
 //! Motion in time in joint coordinates: the recursion of the paper, loops closed after each step.
 //!
-//! Accelerations come from [`crate::multibody::joint_coordinates::constrained_loops`] in O(n + m). Dormand and Prince's pair advances them explicitly, or an
-//! implicit method does, whose stages the same recursion solves ([`crate::equations::constrained`]). An explicit step is about
-//! 1/ω long, ω the highest natural frequency of the model, whatever the tolerance: joints that only turn have a moderate
-//! one, elastic axial directions a very high one. The number of explicit steps is foretold, and refused when it is beyond
-//! [`MAX_STEPS`]: implicit steps follow the motion that is asked for.
+//! Accelerations come from [`crate::multibody::joint_coordinates::constrained_loops`] in O(n + m). Dormand and Prince's
+//! pair advances them explicitly, or an implicit method does, whose stages the same recursion solves
+//! ([`crate::equations::constrained`]). An explicit step is about 1/ω long, ω the highest natural frequency of the
+//! model, whatever the tolerance: joints that only turn have a moderate one, elastic axial directions a very high one.
+//! The number of explicit steps is predicted, and a run beyond [`MAX_STEPS`] is rejected; implicit steps follow the
+//! requested motion.
 //!
 //! A release starts from the equilibrium of the same mechanism: the compliant model with its locked directions [`RIGID`]
 //! times as stiff, mapped to joint coordinates and projected onto the loops.
@@ -96,7 +97,7 @@ fn open(gap: f64, most: f64) -> Option<String> {
     })
 }
 
-/// The method asked for, which has to be one for any equations.
+/// The requested method, which must work for any equations.
 fn rule(formulation: Formulation, options: &TransientOptions<'_>) -> Result<IntegrationRule, AnalysisError> {
     let method = options.method;
     method.rule().ok_or_else(|| AnalysisError::BadRequest {

@@ -90,7 +90,7 @@ pub enum AnalysisError {
         /// The violated limit and its size.
         detail: String,
     },
-    /// [`Watch`] said stop.
+    /// [`ProgressCallback`] stopped it.
     #[error("cancelled")]
     Cancelled,
 }

@@ -47,11 +47,11 @@ pub struct ModesResult {
     pub estimated_error: Option<f64>,
 }
 
-/// Modes beyond those asked for, which keep the last of these apart from what follows.
+/// Additional modes, which separate the last requested ones from the next.
 pub(super) const GUARDS: usize = 2;
-/// Deflection, as a share of the drawing's size, from which modes are said to be about another shape.
+/// Deflection, as a fraction of the drawing's size, from which a note says that modes are about another shape.
 const FAR: f64 = 0.02;
-/// Below this share of a mode in its reference nothing is said about its error.
+/// Below this overlap of a mode with its reference its error is unknown.
 const ALIKE: f64 = 0.5;
 /// Estimates of this size and more say only that the mesh is far too coarse for one.
 const BELIEVED: f64 = 1.0;
@@ -317,7 +317,8 @@ fn notes(compiled: &CompiledModel, count: usize, q: &[Pose], (lambda, rounding):
     warnings
 }
 
-/// Displacements of the nodes and, where they are asked for, along the beams in a mode, the largest translation of a node scaled to 1.
+/// Displacements of the nodes and, on request, along the beams in a mode, the largest translation of a node scaled to
+/// 1.
 fn shape(compiled: &CompiledModel, q: &[Pose], x: &[Pose], along: bool) -> (NodeMotions, BeamMotions) {
     let zeros = vec![Pose::zeros(); q.len()];
     let (state, change) =

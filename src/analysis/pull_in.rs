@@ -1,12 +1,12 @@
 //! Pull-in and release voltages.
 //!
 //! The branch of equilibria is followed by arc length, from 0 V upwards, to where it loses its stability: a fold, or a
-//! bifurcation of what is drawn symmetrical. A little beyond, the part falls to what holds it. Where a gap has closed
-//! that was open, this was pull-in; where none has, the branch goes on from there. The closed branch is followed up to
-//! the largest voltage: where it loses its stability the part snaps further, and another branch holds it down. Beyond
-//! the last one, the closed branch is followed downwards in the same way. After each limit point the part falls again,
-//! and the search continues while one of the closed gaps is still in contact (a beam that peels off piece by piece).
-//! Voltages are measured in what moves this part, so that no step depends on the largest voltage asked for.
+//! bifurcation of what is drawn symmetrical. A little beyond, the part falls to what holds it. If an open gap has
+//! closed, this was pull-in; otherwise the branch continues from there. The closed branch is followed up to the largest
+//! voltage: where it loses its stability the part snaps further, and another branch holds it down. Beyond the last one,
+//! the closed branch is followed downwards in the same way. After each limit point the part falls again, and the search
+//! continues while one of the closed gaps is still in contact (a beam that peels off piece by piece). The unit of
+//! voltages is the voltage that moves this part, so that no step depends on the largest requested voltage.
 
 mod held;
 mod result;

@@ -1,8 +1,8 @@
 //! Frequency error from missing rotary inertia.
 //!
-//! Bodies along a beam have none unless it is asked for (docs/junctions.md): the sections of a wide beam turn for
-//! nothing. Let J = Σ ∫ ρ·t·w³/12·θ² dx for a mode of mass 1, with θ its rotation along the beams. Rayleigh's quotient
-//! with rotary inertia is ω²/(1 + J) (Lord Rayleigh, *The Theory of Sound*, 1877, § 186). The reported frequency is
+//! Bodies along a beam have none by default (docs/junctions.md): the sections of a wide beam rotate without inertia.
+//! Let J = Σ ∫ ρ·t·w³/12·θ² dx for a mode of mass 1, with θ its rotation along the beams. Rayleigh's quotient with
+//! rotary inertia is ω²/(1 + J) (Lord Rayleigh, *The Theory of Sound*, 1877, § 186). The reported frequency is
 //! therefore too high by about √(1 + J) − 1.
 
 use crate::compile::CompiledModel;
@@ -32,7 +32,7 @@ pub(super) fn rotary_inertia_note(compiled: &CompiledModel, modes: &[Vec<Pose>])
 /// Relative excess of the frequency of a mode (xᵀMx = 1) without rotary inertia [1].
 pub(super) fn too_high(compiled: &CompiledModel, x: &[Pose]) -> f64 {
     let options = &compiled.options;
-    // a user of --as-sugar asks for SUGAR's mass matrix, which has none either
+    // --as-sugar requests SUGAR's mass matrix, which has none either
     if options.rotary_inertia || options.as_sugar { 0.0 } else { (1.0 + share(compiled, x)).sqrt() - 1.0 }
 }
 

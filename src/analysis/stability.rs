@@ -10,7 +10,7 @@ use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};
 
-/// Share of displacement or rate in an unstable direction from which the motion is said to go along it [1].
+/// Fraction of displacement or rate in an unstable direction from which the motion counts as unstable [1].
 const MOVING: f64 = 1e-2;
 /// Inverse iterations towards the softest direction.
 const ROUNDS: usize = 4;
@@ -26,7 +26,7 @@ pub(crate) struct UnstableEquilibrium {
     pub(crate) body: String,
 }
 
-/// Looks at some states of a run.
+/// Checks the stability of some states of a run.
 #[derive(Debug)]
 pub(crate) struct StabilityMonitor {
     tangent: BlockMatrix<f64, 3>,
@@ -42,7 +42,7 @@ impl StabilityMonitor {
         Self { tangent: BlockMatrix::new(&system.model.pattern), rest, found: None, lasts: false }
     }
 
-    /// Looks at a state at time `t` [s].
+    /// Checks a state at time `t` [s].
     pub(crate) fn check(&mut self, system: &System, drive: &Drive, t: f64, (q, v): (&[Pose], &[Pose])) {
         let model = &system.model;
         self.stiffness(system, drive, q, 0.0);

@@ -25,11 +25,11 @@ pub struct StaticResult {
     pub currents_a: Vec<(String, f64)>,
     /// Charge on each port [C], by name.
     pub charges_c: Vec<(String, f64)>,
-    /// True when the part jumped on the way, past a fold or a bifurcation, and voltage closed a gap.
+    /// True when the part jumped before, past a fold or a bifurcation, and voltage closed a gap.
     pub pulled_in: bool,
     /// True when it jumped: it pulled in, snapped through or buckled.
     pub jumped: bool,
-    /// Losses of stability on the way from rest, in their order; `jumped` where there are any.
+    /// Losses of stability from rest, in their order; `jumped` where there are any.
     pub passed: Vec<StabilityLoss>,
     /// Motions that nothing resists noticeably and no load excites; they are held where they are.
     pub free_motions: Vec<String>,

@@ -1,4 +1,4 @@
-//! How far the steps of a run in time are off, and a run within the tolerance.
+//! Error of the steps of a run in time, and a run within the tolerance.
 //!
 //! Control of each step bounds what a step adds, not what becomes of it: phases add up, and parts that swing far exchange energy. So a run
 //! carries the error of its motion along (`crate::solve::time::defect`), and reports the root mean square error of the worst signal, of its
@@ -42,8 +42,9 @@ const RUNS: usize = 5;
 /// Error of two runs from which on a third is not made: nothing is predictable.
 const HOPELESS: f64 = 0.3;
 
-/// Makes the run that `options` ask for, with [`TransientResult::step_error`], and a warning where that is beyond the tolerance.
-/// `model` is what moves; `sample` receives the samples of the run that is reported, and `watch` the progress of each run in turn.
+/// Makes the run that `options` specify, with [`TransientResult::step_error`], and a warning where that is beyond the
+/// tolerance. `model` is what moves; `sample` receives the samples of the run that is reported, and `watch` the
+/// progress of each run in turn.
 ///
 /// # Errors
 /// Errors of the run; a failed companion run only removes its contribution.

@@ -28,7 +28,8 @@ impl Default for Allowance {
 }
 
 impl Allowance {
-    /// Whether so many modes of a model may be sought. Its `unknowns` are asked for only where those of the largest would be too many.
+    /// Whether so many modes of a model may be sought. Its `unknowns` are evaluated only where those of the largest
+    /// would be too many.
     pub(super) fn modes(&self, count: usize, unknowns: impl FnOnce() -> usize) -> Result<(), Stopped> {
         let most = self.mode_work;
         let work = |unknowns: usize| unknowns.saturating_mul(count.saturating_mul(count));
@@ -39,7 +40,7 @@ impl Allowance {
         if got > most { Err(Stopped::ModeWork { most, got }) } else { Ok(()) }
     }
 
-    /// Whether processor time is looked at.
+    /// Whether processor time is limited.
     pub(super) fn counts_cpu(&self) -> bool {
         self.cpu.is_some() || self.purse.is_some()
     }

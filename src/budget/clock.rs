@@ -1,8 +1,8 @@
-//! When clocks are looked at, and the one that counts processor time.
+//! Intervals of clock readings, and the clock of processor time.
 
 use std::time::Duration;
 
-/// Checks between two looks at the clock; a look costs some 30 ns.
+/// Checks between two clock readings; a reading costs some 30 ns.
 pub(super) const CHECKS_PER_LOOK: u32 = 16;
 /// Interval between reads of the thread's processor time, which the system provides in a file.
 pub(super) const CPU_INTERVAL: Duration = Duration::from_millis(100);

@@ -5,7 +5,7 @@ use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use std::path::PathBuf;
 
-/// For `https://` and servers that ask for a token.
+/// For `https://` and servers that require a token.
 #[derive(Debug, Args)]
 pub(crate) struct AccessArgs {
     /// Authorities to trust at https:// addresses, PEM
@@ -16,7 +16,7 @@ pub(crate) struct AccessArgs {
     #[arg(long, value_name = "FILE", value_parser = path(), env = "BIMORPH_TOKEN_FILE")]
     token_file: Option<PathBuf>,
 
-    /// Own certificate, for servers that ask for one, PEM
+    /// Own certificate, for servers that require one, PEM
     #[arg(long, value_name = "FILE", value_parser = path(), env = "BIMORPH_CLIENT_CERT")]
     client_cert: Option<PathBuf>,
 

@@ -30,7 +30,7 @@ enum Action {
     Attach(Attach),
     /// Stop a job; its rows stay
     Cancel(JobArgs),
-    /// Stop a job, if it goes on, and let the server forget it
+    /// Stop a job, if it is running, and remove it from the server
     Delete(JobArgs),
 }
 

@@ -13,7 +13,7 @@ pub(super) fn every(compiled: &CompiledModel) -> Vec<String> {
     nodes.flat_map(|node| [format!("{}.x", node.name), format!("{}.y", node.name)]).collect()
 }
 
-/// x and y of the node that is displaced most anywhere on the way, by the signals of [`every`] one.
+/// x and y of the node with the largest displacement on the path, by the signals of [`every`] one.
 pub(super) fn busiest(signals: &[(String, String, Vec<f64>)]) -> Vec<String> {
     let far = |pair: &[(String, String, Vec<f64>)]| {
         let at = pair[0].2.iter().zip(&pair[1].2);

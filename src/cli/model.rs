@@ -200,7 +200,7 @@ pub(crate) struct Context<'a> {
     /// Every option, under its name on the wire.
     #[serde(flatten)]
     options: Keys<'a>,
-    /// Largest estimated relative error by the mesh, of what was asked for; null without an estimate.
+    /// Largest estimated relative error of the requested results from the mesh; null without an estimate.
     estimated_error: Option<f64>,
     /// Warnings of the netlist.
     warnings: Vec<&'a str>,

@@ -41,7 +41,7 @@ impl Chosen {
     }
 }
 
-/// The arguments' names, which live as long as the program.
+/// The arguments' names, static for the program.
 static FLAGS: LazyLock<Vec<String>> = LazyLock::new(|| MODEL.iter().map(|option| option.about.flag()).collect());
 
 /// Help of an option, with other options named as on the command line.

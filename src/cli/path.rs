@@ -1,4 +1,4 @@
-//! `bimorph path`: how equilibria go on while one thing grows.
+//! `bimorph path`: equilibria along a growing parameter.
 
 use super::failure::Failure;
 use super::model::{Context, JsonMap, ModelArgs, warn_of, warn_of_mesh};
@@ -23,10 +23,10 @@ use std::fmt::Write;
 
 /// The path of equilibria while a load, voltage, temperature or stress grows: past folds, into buckling.
 ///
-/// The path is followed by arc length, so that it goes on where the load must fall: snap-through, and behind pull-in. Where
-/// it loses its stability at a bifurcation it goes on along the branch that leaves there. JSON: "values" of what grows and
-/// "signals" along the path; "negative": eigenvalues below 0 (0: stable under fixed loads and voltages); "folds" and
-/// "bifurcations": value and index of the point; "last": displacement of every node at the end.
+/// The path is followed by arc length, so that it continues where the load must fall: snap-through, and behind pull-in.
+/// Where it loses its stability at a bifurcation it continues along the branch that leaves there. JSON: "values" of
+/// what grows and "signals" along the path; "negative": eigenvalues below 0 (0: stable under fixed loads and voltages);
+/// "folds" and "bifurcations": value and index of the point; "last": displacement of every node at the end.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph path column.net --along F=0:260u --signals middle.y --out column.png\n  \
     bimorph path arch.net --along F=0:10u --signals 'p(20).y' --json\n  \

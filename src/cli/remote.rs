@@ -78,7 +78,7 @@ impl RemoteSweepArgs {
         Ok((client, name))
     }
 
-    /// The table of a job. The server forgets it afterwards, unless others may have it.
+    /// The table of a job. The server removes it afterwards, unless others may have it.
     pub(super) fn forget(&self, client: &mut Client, name: &str) {
         if !self.share {
             // that it is gone already is no error

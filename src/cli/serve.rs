@@ -53,7 +53,7 @@ pub(crate) struct SettingSources {
     given: Vec<(String, String, String)>,
 }
 
-/// The arguments' names, which live as long as the program.
+/// The arguments' names, static for the program.
 static FLAGS: LazyLock<Vec<String>> = LazyLock::new(|| SETTINGS.iter().map(ServerOption::flag).collect());
 
 /// Options for limits that are often changed.
@@ -68,7 +68,7 @@ impl SettingSources {
         Self { config, given: Vec::new() }
     }
 
-    /// Everything that was said, the strongest voice first heard.
+    /// All settings, in order of precedence.
     pub(crate) fn settings(&self) -> Result<Settings, Failure> {
         let mut settings = Settings::default();
         for (name, text, place) in &self.given {

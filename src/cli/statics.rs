@@ -134,7 +134,7 @@ impl StaticCommand {
     }
 }
 
-/// One row: every quantity of the operating point in a column of its own, or those that are asked for.
+/// One row: every quantity of the operating point in a column of its own, or the requested ones.
 fn table(title: &str, result: &StaticResult, names: &[String]) -> Result<Table, Failure> {
     let mut table = Table::new(title, "Operating Point");
     let asked = |column: &str| names.is_empty() || names.iter().any(|name| name == column);
@@ -186,7 +186,7 @@ pub(crate) fn beams(curves: &BeamMotions) -> Vec<Vec<NodeDisplacement>> {
     curves.iter().map(|curve| curve.iter().map(|m| [m.x, m.y, m.rz]).collect()).collect()
 }
 
-/// The signals asked for, one a line.
+/// The requested signals, one a line.
 fn chosen(result: &StaticResult, names: &[String]) -> Result<String, Failure> {
     let listed = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
     let one = |signal: &String| {

@@ -30,8 +30,8 @@ use std::sync::OnceLock;
 /// With --out FILE.csv every finished point is stored in FILE.csv.journal until the table is written. After Ctrl-C, a
 /// kill or a full disk the same command with --resume continues, and the table has the bytes of one uninterrupted run.
 ///
-/// With --to the sweep is a job of a server, which goes on after Ctrl-C, and when the connection is lost: `bimorph jobs` lists it, attaches to it,
-/// and cancels it.
+/// With --to the sweep is a job of a server. It continues after Ctrl-C, and when the connection is lost: `bimorph jobs`
+/// lists it, attaches to it, and cancels it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --port heat=2.2 --signals yoke.y --out w.csv\n  \
@@ -112,7 +112,7 @@ pub(crate) struct SweepCommand {
     #[arg(long, value_name = "LIMIT")]
     limits: Vec<YieldLimit>,
 
-    /// Go on with the points in FILE.csv.journal, if there are any
+    /// Continue with the points in FILE.csv.journal, if there are any
     #[arg(long, requires = "out", conflicts_with = "to")]
     resume: bool,
 }
@@ -148,7 +148,7 @@ impl SweepCommand {
         sweep_output::nothing(&table)
     }
 
-    /// The sweep on a server, as a job that goes on when this process does not.
+    /// The sweep on a server, as a job that survives this process.
     fn there(&self, uri: &str, spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<(), Failure> {
         let (mut client, name) = self.remote.submit(uri, spec, bundle, options)?;
         if self.remote.detach {

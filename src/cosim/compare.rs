@@ -156,7 +156,7 @@ fn range(samples: &ColumnSamples, name: &str, unit: &str) -> f64 {
         }
         _ => largest,
     };
-    // ngspice calls whatever is looked at by `@` a voltage
+    // ngspice reports every quantity read by `@` as a voltage
     let least = MIN_RANGE.iter().find(|(u, _)| *u == unit && !name.contains('@')).map_or(0.0, |(_, least)| *least);
     span.max(least)
 }

@@ -8,7 +8,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CosimError {
-    /// The caller did not want it to go on.
+    /// The caller cancelled it.
     #[error("cancelled")]
     Cancelled,
     /// ngspice is not installed.
@@ -57,7 +57,7 @@ pub enum CosimError {
         /// ngspice's output, when it was captured.
         output: String,
     },
-    /// The deck asks for nothing.
+    /// The deck requests no analysis.
     #[error("{deck}: no simulation was run; add .print, .plot or .control lines, or ask for a raw file")]
     NothingRun {
         /// The deck.

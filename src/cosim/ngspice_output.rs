@@ -15,11 +15,11 @@ pub(super) struct RunOutput {
     pub(super) output: String,
 }
 
-/// How often a run looks whether it is still wanted.
+/// Interval at which a run checks for cancellation.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Forwards ngspice's messages or captures them, and detects the ones that report a failure. Ends ngspice when it shall
-/// not go on.
+/// Forwards ngspice's messages or captures them, and detects the ones that report a failure. Ends ngspice on
+/// cancellation.
 pub(super) fn listen(mut child: Child, capture: bool, keep_going: &dyn Fn() -> bool) -> std::io::Result<RunOutput> {
     let stdout = child.stdout.take().map(|mut out| {
         std::thread::spawn(move || {

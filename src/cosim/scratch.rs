@@ -28,7 +28,7 @@ pub(super) struct InitializationFile<'a> {
     pub(super) includes: Option<&'a Path>,
 }
 
-/// The user's initialisation file, as ngspice looks it up.
+/// The user's initialisation file, by ngspice's rules.
 pub(super) fn user_settings() -> Option<PathBuf> {
     let home = std::env::var_os("HOME").map(PathBuf::from);
     let places = [Some(PathBuf::from(".")), home].into_iter().flatten();

@@ -35,7 +35,7 @@ pub(super) struct ThermalForce {
     size: f64,
     /// Force of one cell.
     force: Vec<Pose>,
-    /// Mean force over the step that begins and lasts so: Newton's iteration asks for one step several times.
+    /// Mean force over the step that begins and lasts so: Newton's iteration requests one step several times.
     mean: Vec<Pose>,
     over: Option<(f64, f64)>,
 }

@@ -20,7 +20,7 @@ const NEAR: f64 = 3.0;
 pub(super) struct ContactSteps {
     /// The accepted state and the length [s] that they are of.
     of: Option<(Token, u64)>,
-    /// Where they end [s]; empty where nothing touches on the way, or the motion failed.
+    /// Where they end [s]; empty where nothing touches during the step, or the motion failed.
     pub(super) ends: Vec<f64>,
     /// The step that would come next [s].
     pub(super) next: f64,

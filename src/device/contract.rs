@@ -18,7 +18,7 @@ pub enum Mode {
     Transient,
 }
 
-/// One question of the circuit.
+/// One evaluation request of the circuit.
 #[derive(Debug, Clone, Copy)]
 pub struct Trial<'a> {
     /// Static or transient.
@@ -132,7 +132,7 @@ pub enum DeviceError {
          frame.ax|ay|wz"
     )]
     UnknownPort {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The names there are.
         available: Vec<String>,
@@ -140,7 +140,7 @@ pub enum DeviceError {
     /// No signal of that name.
     #[error("no signal named \"{name}\"; {hint}")]
     UnknownSignal {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// Suggested names.
         hint: String,
@@ -185,13 +185,13 @@ impl From<ReadoutError> for DeviceError {
 
 /// The electrical contract. See the module for its rules.
 pub trait Device: Send {
-    /// Starts an epoch: chooses ports and signals and forgets every state. Returns what was opened.
+    /// Starts an epoch: chooses ports and signals and drops every state. Returns what was opened.
     ///
     /// # Errors
     /// [`DeviceError::UnknownPort`], [`DeviceError::UnknownSignal`], [`DeviceError::Remote`].
     fn open(&mut self, request: &OpenRequest) -> Result<Description, DeviceError>;
 
-    /// Answers one question; see [`Trial`] and [`TrialReply`].
+    /// Evaluates one trial; see [`Trial`] and [`TrialReply`].
     ///
     /// # Errors
     /// [`DeviceError::UnknownToken`] when the parent is not held, [`DeviceError::BadRequest`], [`DeviceError::Remote`].
@@ -213,7 +213,8 @@ pub trait Device: Send {
     /// [`DeviceError::UnknownToken`], [`DeviceError::Remote`].
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError>;
 
-    /// Names that [`Device::look`] knows: those of [`quantities::WHOLE`] and every signal. None where a device cannot be looked at.
+    /// Names that [`Device::look`] knows: those of [`quantities::WHOLE`] and every signal. Empty where a device cannot
+    /// be inspected.
     fn names(&self) -> Vec<String> {
         Vec::new()
     }
@@ -240,7 +241,7 @@ pub trait Device: Send {
         Ok(())
     }
 
-    /// Makes the device fit to go on after a call that was stopped in the middle ([`crate::budget`]): its storage is made
+    /// Makes the device usable after a call that was stopped in the middle ([`crate::budget`]): its storage is made
     /// anew, its states stay as they are. A device that holds no half computed storage does nothing.
     fn recover(&mut self) {}
 

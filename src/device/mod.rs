@@ -2,7 +2,7 @@
 //!
 //! [`Device`] is the contract. The same trait serves the plug-in in process ([`local`]), the gRPC service, and Python.
 //!
-//! States are immutable and live behind a [`Token`]. A [`Device::trial`] is a pure function of its request: the same
+//! States are immutable and are named by a [`Token`]. A [`Device::trial`] is a pure function of its request: the same
 //! request gives the same token and the same bits, and leaves no trace that another trial could see. Nothing has to be
 //! rolled back when the circuit rejects a step: it simply asks again from the same parent.
 //!

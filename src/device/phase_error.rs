@@ -47,7 +47,7 @@ pub(super) struct PhaseErrorMonitor {
     reported: f64,
 }
 
-/// The worst of what is off.
+/// The largest phase error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Worst {
     /// Error, of its range [1].

@@ -1,4 +1,5 @@
-//! Many steps of one device: each goes from the state before to a time and port values, in as many pieces as the device asks for.
+//! Many steps of one device: each goes from the previous state to a time and port values, in as many pieces as the
+//! device requires.
 //!
 //! The steps are those that a caller takes one by one, with the same arithmetic: a run has the same bits.
 

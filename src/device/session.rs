@@ -34,7 +34,7 @@ pub(super) struct DeviceSession {
     pub(super) states: States,
     pub(super) first_step: f64,
     pub(super) equilibrium: Equilibrium,
-    /// Thermal agitation, if it was asked for.
+    /// Thermal agitation, if requested.
     pub(super) shaken: Option<ThermalForce>,
     /// Carries ∂motion/∂(final voltage), one for each opened port.
     pub(super) stepper: Adaptive<Formulated>,

@@ -1,8 +1,7 @@
 //! The states of a session as bytes, and back: the open request, and every stored state in order of last use.
 //!
-//! Little-endian words; numbers as the bits of their doubles, so that a device that goes on from them gives the same bits as
-//! the one that they came from. Reading trusts nothing: lengths are bounded by the bytes that are there, and sizes by the
-//! model's.
+//! Little-endian words; numbers as the bits of their doubles, so that a restored device is bit-identical to the
+//! original. Reading trusts nothing: lengths are bounded by the bytes that are there, and sizes by the model's.
 
 use super::contract::{Agitation, DeviceError, OpenRequest, Token, refused};
 use super::states::{Snapshot, States};
@@ -234,7 +233,7 @@ mod tests {
             for bit in [0, 7] {
                 let mut wrong = bytes.clone();
                 wrong[at] ^= 1 << bit;
-                // it may be a state, but it neither panics nor lays out more than there is
+                // it may be a state, but it neither panics nor allocates more than its bytes
                 let _ = read(&wrong);
             }
         }

@@ -16,7 +16,7 @@ use crate::multibody::planar::Pose;
 use crate::solve::path::SourcePath;
 use crate::solve::time::adaptive::{Advance, Control};
 
-/// Internal steps in one circuit step before the device asks for a shorter one.
+/// Internal steps in one circuit step before the device requires a shorter one.
 const MAX_INTERNAL_STEPS: usize = 512;
 /// Longest circuit step proposed, in internal steps, whatever the circuit sees: a step that has to be taken again shall
 /// not cost too much, and a change of pace from one step to the next stay below [`MAX_INTERNAL_STEPS`].

@@ -30,11 +30,11 @@ pub struct JointBuilder {
     known: Vec<StiffenedBeam>,
 }
 
-/// Beams that are remembered.
+/// Most cached beams.
 const MAX_CACHED_BEAMS: usize = 16;
 
-/// Lays a beam: adds its inner bodies, masses and joints. Returns the equally spaced points along it, the drawn ends
-/// included.
+/// Discretizes a beam: adds its inner bodies, masses and joints. Returns the equally spaced points along it, the drawn
+/// ends included.
 pub fn lay(
     beam: &Beam,
     segments: usize,

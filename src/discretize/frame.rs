@@ -7,8 +7,8 @@
 //! With `shear` the element is Timoshenko's: shear flexibility with Φ = 12EI/(κGA·h²), κ = 5/6, in stiffness and mass, and the
 //! rotary inertia of the section, which wide beams show. SUGAR has neither.
 //!
-//! Rigid links, plates, supports, springs and loads are those of the drawing. A node that lies at r from the reference point
-//! of its rigid group moves as u = q + θ × r. Combs and gaps are left out, or laid for their share in the stiffness.
+//! Rigid links, plates, supports, springs and loads are those of the drawing. A node that lies at r from the reference
+//! point of its rigid group moves as u = q + θ × r. Combs and gaps are omitted, or included with their stiffness.
 //!
 //! Reference: J. S. Przemieniecki, "Theory of Matrix Structural Analysis" (1968), §5.6 and §11.3, for the element; J. V.
 //! Clark et al., "Addressing the needs of complex MEMS design", MEMS 2002, for SUGAR.

@@ -31,7 +31,7 @@ use std::f64::consts::PI;
 
 /// Share of a beam that its two offsets may take together.
 const MAX_OFFSET_FRACTION: f64 = 0.9;
-/// Kinds of beams whose settled ends are remembered.
+/// Most cached kinds of beams with settled ends.
 const MAX_CACHED_ENDS: usize = 16;
 
 /// One beam as its junction sees it.
@@ -240,7 +240,7 @@ fn step(
     }
 }
 
-/// Pairs of branches that go on in line, the straightest first; a branch is in one pair at most.
+/// Pairs of branches that continue in line, the straightest first; a branch is in one pair at most.
 fn in_line(branches: &[JunctionBeam]) -> Vec<(usize, usize)> {
     let mut found: Vec<(f64, usize, usize)> = Vec::new();
     for i in 0..branches.len() {

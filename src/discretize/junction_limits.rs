@@ -9,7 +9,7 @@ const RATIO: f64 = 8.0;
 /// Lean of a stem up to which the table goes, and sharpest turn of a corner [rad].
 const LEAN: f64 = std::f64::consts::FRAC_PI_4;
 const MAX_TABLE_TURN: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
-/// Beams that turn by less than this go on as one, as the chords of an arc do [rad].
+/// Beams that turn by less than this count as one, as the chords of an arc do [rad].
 const STRAIGHT: f64 = std::f64::consts::FRAC_PI_6;
 /// Rounding of ratios and angles [1].
 const ROUNDING: f64 = 1e-6;

@@ -4,10 +4,10 @@
 //! from the node outwards. It adds no body: its compliance goes in series with the first segment's joint, which lies half a
 //! segment away. With d the distance from edge to joint, loads at the edge are N, V, M + d·V.
 //!
-//! A junction that is stiffer than what its offset leaves out has a spring of negative compliance. In series with a segment of
-//! a long mesh that does no harm; with a segment shorter than the spring stands for, nothing would be left. So the edge
-//! is moved outwards, rod by rod ([`JunctionEnd::settle`]), until rod and spring together give way under every load: the compliance of
-//! the whole stays what it was, and no segment beside it matters.
+//! A junction that is stiffer than what its offset leaves out has a spring of negative compliance. In series with a
+//! segment of a long mesh that does no harm; with a segment shorter than the spring stands for, nothing would be left.
+//! The edge is therefore moved outwards, rod by rod ([`JunctionEnd::settle`]), until rod and spring together are
+//! compliant under every load. The compliance of the whole stays the same for segments of any length.
 //!
 //! Source of the numbers: [`super::junction_table`].
 
@@ -42,7 +42,7 @@ impl JunctionEnd {
         self.spring += Matrix3::new(uu, ug, up, ug, gg, gp, up, gp, pp) * unit;
     }
 
-    /// Moves the edge outwards until the spring gives way under every load, by at most `most` [m].
+    /// Moves the edge outwards until the spring is compliant under every load, by at most `most` [m].
     ///
     /// A rod of length ℓ between the old and the new edge becomes rigid, and its compliance P = [ℓ/EA, 0, 0; 0, ℓ³/3EI
     /// + ℓ/κGA, ℓ²/2EI; 0, ℓ²/2EI, ℓ/EI] is added to the spring's, seen from the new edge. Compliance that is still
@@ -177,8 +177,8 @@ mod tests {
         assert_eq!(row, table::CORNER[4][6]);
     }
 
-    /// A spring that is settled gives way under every load, and what it stands for has not changed: the compliance of spring and
-    /// beam together is the same, whatever length of the beam became rigid.
+    /// A settled spring is compliant under every load, and the compliance of spring and beam together is unchanged for
+    /// any length of the beam that became rigid.
     #[test]
     fn settled_springs_give_way_and_change_nothing() {
         let material = Material {

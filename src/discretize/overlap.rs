@@ -26,7 +26,7 @@ pub struct Strip {
     pub weight: f64,
 }
 
-/// Turn below which two branches go on in line and leave no outer corner [rad].
+/// Turn below which two branches continue in line and leave no outer corner [rad].
 pub const IN_LINE: f64 = 50.0 * PI / 180.0;
 /// Sharpest turn whose outer corner is filled [rad].
 const MAX_FILLED_TURN: f64 = 2.1;
@@ -40,7 +40,7 @@ pub fn turn(a: f64, b: f64) -> f64 {
     PI - between
 }
 
-/// Junctions that a thread remembers.
+/// Most junctions cached by a thread.
 const MAX_CACHED_JUNCTIONS: usize = 512;
 /// Strips that are looked up without memory of their own.
 const FEW: usize = 8;
@@ -198,7 +198,7 @@ impl Quad {
     }
 }
 
-/// A side of a quadrilateral: where it begins, and how it goes on.
+/// A side of a quadrilateral: its start and its direction.
 struct QuadSide {
     from: Vector2<f64>,
     along: Vector2<f64>,

@@ -261,7 +261,7 @@ fn rods(bar: &Bar, places: &[f64]) -> Vec<BeamSegment> {
             let from = if k == 0 { 0.0 } else { places[k - 1] };
             let to = if k == count { bar.length } else { places[k] };
             let (length, middle) = (to - from, 0.5 * (from + to));
-            // the outer ones hang on the ends
+            // the outer ones are attached to the ends
             let at = if k == count { bar.length } else { middle * f64::from(u8::from(k > 0)) };
             let (mass, off) = (length * bar.line_mass, middle - at);
             let second = mass * (length * length / 12.0 + off * off + bar.rotary);

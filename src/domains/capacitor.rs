@@ -31,8 +31,8 @@ pub enum Capacitor {
     },
     /// Parallel plates, C = ε·A/d with d = g₀ − u (Nathanson 1967).
     ///
-    /// Below `closest` the field is frozen: C goes on along its tangent, so that nothing is divided by a vanishing gap
-    /// while an iteration oversteps. Contact holds real plates further apart than that.
+    /// Below `closest` the field is frozen: C continues along its tangent, so that nothing is divided by a vanishing
+    /// gap while an iteration oversteps. Contact holds real plates further apart than that.
     Plates {
         /// ε·A [F·m].
         strength: f64,

@@ -5,8 +5,9 @@
 //! ```text
 //! forces ∂Π/∂q      tangent ∂²Π/∂q²      change of the forces with what drives it ∂²Π/∂q∂u      charge −∂Π/∂u
 //! ```
-//! Constant damping belongs to the mechanism: a domain hands its dampers over when it is laid ([`super::from_structure::FromStructure::dampers`]), and
-//! every integrator, frequency response and noise has them. Other forces that depend on rates are added by [`Domain::add_loss`]. Only heat has states of its own
+//! Constant damping belongs to the mechanism: a domain returns its dampers when it is built
+//! ([`super::from_structure::FromStructure::dampers`]), and every integrator, frequency response and noise has them.
+//! Other forces that depend on rates are added by [`Domain::add_loss`]. Only heat has states of its own
 //! ([`super::lag`]): temperatures follow voltages alone, so that they come before the mechanism and not with it.
 //!
 //! Nothing here is called through a pointer: [`super::member::Member`] is one of the registered domains, chosen by a `match`.

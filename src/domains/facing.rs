@@ -103,7 +103,7 @@ impl FacingStretch {
         }
     }
 
-    /// Least distance that the law of contact knows [m]; the field goes on along its tangent below.
+    /// Least distance of the law of contact [m]; below it the field continues along its tangent.
     pub fn least(&self) -> f64 {
         Contact { touch: self.touch, area: 0.0 }.least()
     }

@@ -59,7 +59,7 @@ pub trait FromStructure: Domain<Given = f64> + Sized {
     fn moved(self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self;
 }
 
-/// A member that was laid.
+/// A member in its place.
 #[derive(Debug, Clone)]
 pub struct PlacedMember<'a, M> {
     /// Full element name.

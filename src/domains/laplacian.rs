@@ -12,7 +12,7 @@ use crate::multibody::Pattern;
 use crate::multibody::layout::EliminationLayout;
 use std::sync::Arc;
 
-/// Nodes between two looks at the budget.
+/// Nodes between two checks of the budget.
 const NODES_PER_CHECK: usize = 1024;
 
 /// A network, taken apart.
@@ -28,7 +28,7 @@ pub(super) struct Laplacian {
 
 impl Laplacian {
     /// Of `size` nodes whose potentials are not known, joined by conductors (a, b, conductance above 0); none: a node whose potential is
-    /// 0. None where a node hangs on nothing, or numbers are beyond what doubles hold.
+    /// 0. `None` where a node has no conductor, or numbers are beyond the range of doubles.
     pub(super) fn new(
         size: usize,
         conductors: impl Iterator<Item = (Option<usize>, Option<usize>, f64)>,
@@ -132,7 +132,7 @@ mod tests {
         assert!(flow.iter().all(|v| (v * 2e-15 - 1.0).abs() < 1e-14), "{flow:?}");
     }
 
-    /// A flow into nothing but known potentials changes nothing; a node that hangs on nothing has no potential.
+    /// A flow into known potentials alone changes nothing; a node without a conductor has no potential.
     #[test]
     fn extremes() {
         Laplacian::new(0, std::iter::empty()).unwrap().solve(&mut []);

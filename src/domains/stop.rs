@@ -1,4 +1,4 @@
-//! A stop: nothing until a part has gone its way, then the contact of a rigid stop or the spring of one that gives way.
+//! A stop: no force within the travel of a part, then the contact of a rigid stop or the spring of a compliant one.
 //!
 //! Over the penetration p beyond the way a rigid stop bears with the pressure of [`super::contact`] on its area; one of
 //! stiffness k with

@@ -41,7 +41,7 @@ impl Anderson {
         }
     }
 
-    /// Forgets everything: another equation.
+    /// Drops the history, for another equation.
     pub(super) fn restart(&mut self) {
         (self.kept, self.begun) = (0, false);
     }

@@ -1,6 +1,7 @@
 //! Joint coordinates whose loops are constraints, reduced inside the recursion ([`crate::multibody::joint_coordinates::constrained_loops`]).
 //!
-//! Accelerations are one reduction. A stage of an implicit method asks for accelerations that the motion they lead to has,
+//! Accelerations are one reduction. A stage of an implicit method solves for the accelerations of the motion that they
+//! lead to,
 //! ```text
 //! a = A(t, q + β·a, q̇ + γ·a),      A: accelerations by the recursion, loops reduced on the way
 //! ```
@@ -127,7 +128,7 @@ impl<'a, L: Loads> Constrained<'a, L> {
         }
     }
 
-    /// Places the bodies and lays what acts on them.
+    /// Places the bodies and evaluates their loads.
     fn act(&mut self, t: f64) {
         let Motion { q, v } = &self.at;
         self.loads.prescribe(t, &mut self.reduction);

@@ -10,7 +10,7 @@ use crate::multibody::planar::Pose;
 /// A system on a tree. Immutable; shared by sessions.
 #[derive(Debug, Clone)]
 pub struct Joints {
-    /// Which body hangs on which.
+    /// Tree of bodies.
     pub tree: Tree,
     /// The system with the tree's joints taken out.
     pub closures: System,

@@ -111,7 +111,7 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
         for iteration in 0..MAX_ITERATIONS {
             let mut matrix = self.matrix.take().unwrap_or_else(|| BlockMatrix::new(pattern));
             self.assemble(equation, x, &mut matrix);
-            // a matrix that breaks down on the way means that the iteration has left the neighbourhood of the step
+            // a matrix that breaks down here means that the iteration has left the neighbourhood of the step
             let factored = self.solver.factor(pattern, &mut matrix).map_err(|p| match iteration {
                 0 => StepFailure::Singular(p),
                 _ => StepFailure::Diverged { iterations: iteration, body: p.body, direction: p.direction },

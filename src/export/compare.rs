@@ -21,7 +21,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Modes looked at first, and at most.
+/// Modes computed first, and at most.
 const FIRST_MODES: usize = 8;
 const MAX_MODES: usize = 128;
 /// Frequencies in a decade.
@@ -36,7 +36,7 @@ const UNSEEN: f64 = 1e-7;
 const SHOWS: f64 = 0.1;
 /// Share of what is there at its resonance from which a mode counts for the band.
 const COUPLED: f64 = 0.01;
-/// Damping over frequency up to which a mode counts as undamped, and the half width about a resonance that is looked at there.
+/// Damping over frequency up to which a mode counts as undamped, and the half width of the grid about its resonance.
 const UNDAMPED: f64 = 1e-9;
 const NARROW: f64 = 1e-4;
 /// Directions of the static correction for each push, and how many are tried one after the other.
@@ -76,7 +76,7 @@ pub struct ModelFit {
     pub jumped: bool,
 }
 
-/// The reduced model that a request asks for.
+/// The reduced model of a request.
 ///
 /// # Errors
 /// See [`ExportError`].

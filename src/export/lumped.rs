@@ -28,7 +28,7 @@ pub use model::{Coordinate, Law, LumpedGap, LumpedModel, LumpedOutput};
 use nalgebra::{DMatrix, DVector};
 use sliding::{FREE_RATE, along, axis, coordinates, dampers, springs};
 
-/// The lumped model of a request; its operating point, modes and errors are not looked at.
+/// The lumped model of a request; its operating point, modes and errors are not used.
 ///
 /// # Errors
 /// [`ExportError::NotLumped`] where a part can turn, a spring is not linear, or something heats.

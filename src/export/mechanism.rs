@@ -44,7 +44,7 @@ pub struct LinearizedMechanism<'a> {
     pub(super) pushes: Vec<InputExcitation>,
 }
 
-/// The ports of a request by name: those asked for, or every electrical one.
+/// The ports of a request by name: the requested ones, or every electrical one.
 ///
 /// # Errors
 /// [`ExportError::NoPorts`].

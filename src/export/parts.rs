@@ -12,7 +12,7 @@ pub(super) struct SubcircuitText {
 }
 
 impl SubcircuitText {
-    /// Parts that go on after `text`.
+    /// Parts that follow `text`.
     pub(super) fn after(text: String) -> Self {
         Self { text, counts: [0; 3] }
     }

@@ -97,8 +97,8 @@ pub fn run(
     run_on(spec, bundle, options, Vec::new(), None, progress)
 }
 
-/// The same, going on from the points that are `known` from before. `keep`, if there is one, is given each point that is new as soon as
-/// it is done, from any thread, and answers whether to go on.
+/// The same, going on from the points that are `known` from before. `keep`, if there is one, receives each new point as
+/// soon as it is finished, from any thread, and returns whether to continue.
 ///
 /// # Errors
 /// As [`run`].
@@ -137,8 +137,8 @@ pub fn run_on(
     Ok(table::assemble(spec.names().map(str::to_owned).collect(), all))
 }
 
-/// Runs the points `numbers` of a sweep by a crew; `keep` is given each as soon as it is done, from any thread, and answers whether to go on.
-/// Whether all were run.
+/// Runs the points `numbers` of a sweep by an executor; `keep` receives each as soon as it is finished, from any
+/// thread, and returns whether to continue. Whether all were run.
 ///
 /// # Errors
 /// As [`run`].

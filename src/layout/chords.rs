@@ -1,6 +1,6 @@
 //! How wide a region is across a line: distances from a point to the nearest edges.
 //!
-//! Edges lie in the buckets of a uniform grid, some few in each, so that a question costs what is near it.
+//! Edges lie in the buckets of a uniform grid, some few in each, so that a query costs only nearby edges.
 
 use super::drawing::Polygon;
 

@@ -34,7 +34,7 @@ pub struct CrossingContours {
     pub at: GridPoint,
 }
 
-/// Looks at polygons before a set operation on all of them.
+/// Checks polygons before a set operation on all of them.
 ///
 /// # Errors
 /// [`CrossingContours`] beyond [`MAX_CUTS`], or where slanted edges cut one another too often each.

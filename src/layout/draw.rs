@@ -178,7 +178,7 @@ impl<'a> Draw<'a> {
         }
     }
 
-    /// How far a beam that leaves its node along `d` goes on behind it, for its edges to meet those of the others.
+    /// Extension of a beam that leaves its node along `d` behind it, for its edges to meet those of the others.
     fn corner(&self, node: &str, d: [f64; 2], half: f64) -> f64 {
         let others = self.ends.get(node).into_iter().flatten();
         let needed = others.map(|other| {

@@ -39,7 +39,7 @@ pub(crate) const HELD: f64 = 1e-3;
 /// Lever at which a stiffness against displacement holds a rotation where nothing resists any [m]: a micrometre, the size of parts.
 const LEVER: f64 = 1e-6;
 
-/// Bodies eliminated between two looks at the budget, some ten microseconds.
+/// Bodies eliminated between two checks of the budget, some ten microseconds.
 const BODIES_PER_CHECK: usize = 64;
 
 impl<T: Scalar, const N: usize> BlockMatrix<T, N> {

@@ -56,7 +56,7 @@ impl State {
 }
 
 impl Model {
-    /// Lays a model out in elimination order. `bodies` come in any order; `Free(k)` in joints, dampers and `couplings`
+    /// Builds a model in elimination order. `bodies` come in any order; `Free(k)` in joints, dampers and `couplings`
     /// (further pairs that forces will couple) means `bodies[k]`. Also returns where each given body went.
     pub fn new(
         bodies: Vec<Body>,

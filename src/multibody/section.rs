@@ -113,7 +113,7 @@ impl PairSlot {
 /// Sections that room is made for at first.
 const ROOM: usize = 64;
 
-/// Lays joints down with one section for all that are alike in everything but place and rest offset.
+/// Stores joints with one section for all that differ only by position and rest offset.
 pub(crate) struct Sections {
     pub(crate) all: Vec<JointSection>,
     /// The last section of each hash.
@@ -143,7 +143,7 @@ impl Sections {
             expansion: joint.expansion,
             locked: joint.locked,
         };
-        // neighbours along a beam are alike: look at the last one first
+        // neighbours along a beam are alike: compare with the last one first
         let section = match self.all.last() {
             Some(last) if *last == section => (self.all.len() - 1) as u32,
             _ => self.find(section),

@@ -11,7 +11,7 @@ pub(crate) struct Ident {
     pub(crate) span: TextSpan,
 }
 
-/// Where a variable lives: in the netlist itself or in the subnet instance at hand.
+/// Scope of a variable: the netlist itself or the current subnet instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Slot {
     pub(crate) global: bool,

@@ -7,7 +7,7 @@ use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Marks that an error was already put into the [`DiagnosticSink`]: nothing more needs to be said about it.
+/// Marks that an error was already put into the [`DiagnosticSink`], so that no further message is needed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Reported;
 
@@ -86,7 +86,7 @@ impl DiagnosticSink {
         }
     }
 
-    /// Whether messages still look for what was meant, which takes a look at every known name.
+    /// Whether messages still search for similar names, which visits every known name.
     pub(crate) fn suggests(&self) -> bool {
         self.items.len() - self.warnings.get(PRINT).map_or(0, |n| MAX_MESSAGES.min(*n)) < MAX_SUGGESTIONS
     }

@@ -5,7 +5,7 @@ use super::source::TextSpan;
 use super::token::{Lexeme, TokenKind};
 use crate::budget;
 
-/// Tokens between two looks at the budget.
+/// Tokens between two checks of the budget.
 const CHUNK: usize = 1024;
 /// Memory of a token with its share of the syntax tree, approximately [byte].
 const TOKEN_BYTES: usize = 96;

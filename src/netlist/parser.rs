@@ -57,7 +57,7 @@ pub(super) struct Parser<'a> {
     pub(super) program: Program,
 }
 
-/// A syntax error was reported; the caller skips to where reading can go on.
+/// A syntax error was reported; the caller skips to where parsing can continue.
 pub(super) type Parsed<T> = Result<T, Reported>;
 
 impl<'a> Parser<'a> {
@@ -226,8 +226,8 @@ impl<'a> Parser<'a> {
         self.text.get(..span.start as usize).map_or(0, |before| before.matches('\n').count() + 1)
     }
 
-    /// Skips what is left of a statement with an error: to a word that can only begin a statement, or to the first
-    /// word of a line that looks like one, or to the end of the enclosing block.
+    /// Skips the rest of a statement with an error: to a word that can only begin a statement, to the first word of a
+    /// line that resembles one, or to the end of the enclosing block.
     fn recover(&mut self, before: usize) {
         let opened = |kind: TokenKind| i64::from(kind == TokenKind::OpenList) - i64::from(kind == TokenKind::CloseList);
         let mut open: i64 = self.tokens[before..self.at].iter().map(|t| opened(t.kind)).sum();

@@ -37,7 +37,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Warns of a list on an element's line that looks like more parameters and is a block of definitions.
+    /// Warns of a list on an element's line that resembles parameters and is a block of definitions.
     fn stray_list(&mut self) {
         let open = self.peek();
         let entry = (self.ahead(1).kind, self.ahead(2).kind) == (TokenKind::Identifier, TokenKind::Equals);

@@ -102,7 +102,7 @@ fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut Diagn
     }
 }
 
-/// A bundle in SUGAR 2, whatever it looks like.
+/// A bundle in SUGAR 2, for any content.
 pub(crate) fn read(bundle: &Bundle) -> Box<dyn FrontEnd> {
     Box::new(Sugar2::new(bundle))
 }

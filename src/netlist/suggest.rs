@@ -17,7 +17,7 @@ pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
         3..=5 => 2,
         _ => 3,
     };
-    // names of much other length are far without a look at their letters
+    // names of much different length are far without a comparison of their letters
     let near = known.into_iter().filter(|k| *k != name && k.len().abs_diff(name.len()) <= 4 * limit);
     let scored = near.map(|k| {
         crate::budget::check();

@@ -47,7 +47,7 @@ pub(crate) enum TokenKind {
 pub(crate) struct Lexeme {
     pub(crate) kind: TokenKind,
     pub(crate) span: TextSpan,
-    /// True for the first token of a line: where reading can go on after an error.
+    /// True for the first token of a line, where parsing can continue after an error.
     pub(crate) starts_line: bool,
 }
 

@@ -1,4 +1,5 @@
-//! Options, said once: names, units, defaults, ranges and help for the command, the wire, decks, sweeps, Python and docs/.
+//! Options, defined once: names, units, defaults, ranges and help for the command, the protocol, decks, sweeps, Python
+//! and docs/.
 //!
 //! | file | what it holds |
 //! |---|---|

@@ -9,7 +9,7 @@ pub enum ReadoutError {
     /// No signal of that name.
     #[error("signal \"{name}\": {hint}")]
     UnknownSignal {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// Suggested names.
         hint: String,
@@ -17,7 +17,7 @@ pub enum ReadoutError {
     /// No port of that name.
     #[error("no port named \"{name}\"; the netlist has {available:?}")]
     UnknownPort {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The names there are.
         available: Vec<String>,

@@ -1,6 +1,6 @@
-//! One mesh looked at: the modes of its model within the band, and their estimated errors.
+//! Evaluation of one mesh: the modes of its model within the band, and their estimated errors.
 //!
-//! Each look starts the iteration of the modes from the shapes of the mesh looked at before, carried over.
+//! Each evaluation starts the iteration of the modes from the shapes of the previous mesh, transferred.
 
 use super::mesh_target::MeshTarget;
 use super::mode_errors::{ModeErrors, of_modes};

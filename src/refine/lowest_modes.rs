@@ -1,8 +1,9 @@
 //! The mesh for the lowest modes, by their number.
 //!
-//! The highest mode asked for sets the band: where the number of modes below a frequency, which is the number of negative
-//! pivots of K − ω²M (Sylvester), reaches the number asked for. Found by bisection on a first mesh, then [`mesh_search`](super::mesh_search) chooses the mesh for that
-//! band, and the band is looked up again on it until the modes asked for lie within.
+//! The highest requested mode sets the band: the frequency at which the number of modes below it, which is the number
+//! of negative pivots of K − ω²M (Sylvester), reaches the requested number. It is found by bisection on a first mesh.
+//! Then [`mesh_search`](super::mesh_search) chooses the mesh for that band, and the band is determined again on it
+//! until the requested modes lie within.
 
 use super::band_modes::mechanics;
 use super::mesh_search;
@@ -17,7 +18,7 @@ use std::f64::consts::TAU;
 
 /// Meshes of which the band is looked up, at most.
 const MAX_PASSES: usize = 12;
-/// Share by which the band lies above the highest mode that is asked for.
+/// Fraction by which the band lies above the highest requested mode.
 const ABOVE: f64 = 0.01;
 /// Share of the tolerance that the estimate may use: it has been found smaller than the error, by up to a factor of 2.9 where short wide beams
 /// weigh in (docs/accuracy.md).

@@ -8,7 +8,7 @@
 //! | [`axial`] | the axial force that each beam carries |
 //! | [`mesh_search`] | the mesh for every mode in a band |
 //! | `mesh_target` | the target of a mesh, and the chosen mesh |
-//! | `band_modes` | one mesh looked at: its modes in the band and their errors |
+//! | `band_modes` | evaluation of one mesh: its modes in the band and their errors |
 //! | `rigid_beams` | beams whose strain does not matter |
 //! | [`lowest_modes`] | the mesh for the lowest modes, by their number |
 //! | [`doubling`] | the mesh for whatever an analysis gives: compared with one of twice the segments |

@@ -100,8 +100,8 @@ fn acted_on(structure: &Structure) -> Vec<NodeId> {
     nodes
 }
 
-/// How far the drawn structure gives way where it is acted on: fᵀK⁻¹f for a unit force or moment in each direction at each
-/// of these nodes, and for a unit tension in each beam that heat or stress lengthens. Empty where nothing acts; none where
+/// Compliance of the structure at its loads: fᵀK⁻¹f for a unit force or moment in each direction at each of these
+/// nodes, and for a unit tension in each beam that heat or stress lengthens. Empty where nothing acts; none where
 /// something does on a structure that floats.
 fn compliances(structure: &Structure, acted: &[NodeId], parts: &Assembly) -> Option<Vec<f64>> {
     let (system, model) = (&parts.system, &parts.system.model);

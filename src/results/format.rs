@@ -30,7 +30,7 @@ pub struct UnknownFormat {
 }
 
 impl ResultFormat {
-    /// The format that the extension of `path` asks for.
+    /// The format of the extension of `path`.
     ///
     /// # Errors
     /// [`UnknownFormat`] for any other extension, or none.

@@ -21,7 +21,7 @@ use tonic::{Response, Status};
 pub(super) type TransientStream = CancellingStream<ReceiverStream<Result<proto::TransientEvent, Status>>>;
 
 impl BimorphService {
-    /// Looks up a model, then computes on it.
+    /// Finds a model, then computes on it.
     async fn analyse<T: Send + 'static>(
         &self,
         id: &str,
@@ -160,7 +160,7 @@ impl BimorphService {
             let _sending = sending;
             let job = || {
                 let release = release.as_ref().map(|model| &*model.compiled);
-                // the mesh, too, holds the tolerance that the run asks for
+                // the mesh, too, holds the tolerance of the run
                 let sharper = (tol < model.compiled.options.tol).then(|| {
                     let mut sharper = CompiledModel::clone(&model.compiled);
                     sharper.options.tol = tol;

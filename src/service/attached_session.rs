@@ -1,4 +1,4 @@
-//! The session that a stream of questions is about: opened by it, or joined.
+//! The session of a trial stream: opened by it, or attached.
 
 use super::proto;
 use super::reply_size::answerable;
@@ -82,7 +82,7 @@ impl AttachedSession {
         Ok(())
     }
 
-    /// Goes on with a session, in the place of the one before.
+    /// Continues with a session, in the place of the one before.
     pub(super) fn join(&mut self, session: Result<Arc<Session>, Status>) -> ReplyKind {
         match session {
             Ok(session) => {

@@ -1,6 +1,6 @@
 //! Authentication of TCP clients: TLS, certificates, tokens.
 //!
-//! A Unix socket asks for nothing: its mode lets in its owner alone.
+//! A Unix socket requires nothing: its mode admits its owner alone.
 
 use super::peer::{Peer, PeerIdentity};
 use super::tls::{ALPN, CertificateFiles, PemError, authorities, certificates, provider, validity};

@@ -25,7 +25,7 @@ pub(super) struct MessageSink<T> {
     sender: mpsc::Sender<Result<T, Status>>,
     shared: Arc<ServerState>,
     runtime: Handle,
-    /// Where the computation runs; given back while a reader is slow, so that others go on.
+    /// Permit of the computation; released while a reader is slow, so that others continue.
     place: Option<Permit>,
     pub(super) open: bool,
 }
@@ -91,7 +91,7 @@ impl<T> MessageSink<T> {
         }
     }
 
-    /// A second way to the same reader, for what must be said after the first is gone.
+    /// A second sender to the same reader, for messages after the first is gone.
     pub(super) fn also(&self) -> Self {
         Self {
             sender: self.sender.clone(),

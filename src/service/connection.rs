@@ -27,7 +27,7 @@ use tokio_rustls::server::TlsStream;
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 use tonic::transport::server::Connected;
 
-/// Bytes that a client has sent when it has said that it speaks HTTP/2: the preface and the head of its settings.
+/// Bytes that a client has sent when it has begun HTTP/2: the preface and the head of its settings.
 const GREETING: usize = 24 + 9;
 
 enum ClientSocket {
@@ -152,7 +152,7 @@ impl Connections {
     }
 }
 
-/// Parts of the time of silence; a question is asked after each but the last of a second such time.
+/// Parts of the time of silence; a probe is sent after each but the last of a second such time.
 const QUESTIONS: u32 = 6;
 
 /// Longest time for a connection to release its permit.

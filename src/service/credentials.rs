@@ -12,7 +12,7 @@ pub struct Access {
     pub authority: Option<PathBuf>,
     /// A file with the token to show: the last word of its first line that is no comment.
     pub token_file: Option<PathBuf>,
-    /// The client's own certificate and those up to its authority (PEM), for servers that ask for one.
+    /// The client's own certificate and those up to its authority (PEM), for servers that require one.
     pub certificate: Option<PathBuf>,
     /// The key of that certificate (PEM).
     pub key: Option<PathBuf>,
@@ -66,7 +66,7 @@ impl Access {
         VARIABLES.into_iter().zip(files).filter_map(|(name, file)| Some((name, file.clone()?))).collect()
     }
 
-    /// The token to show at `address`. None is shown at a Unix socket, which asks for none.
+    /// The token to show at `address`. None is shown at a Unix socket, which requires none.
     ///
     /// # Errors
     /// [`AccessError::File`]; [`AccessError::Unencrypted`] where others could read it on its way.

@@ -55,7 +55,7 @@ impl Settings {
 
 #[cfg(test)]
 mod tests {
-    //! Clients that are known have fractions, unless something else is said; others have what they had.
+    //! Identified clients have fractions, unless a setting differs; others have the whole.
     use super::super::settings::SettingSource;
     use super::*;
 

@@ -154,7 +154,7 @@ impl InProcessServer {
         Ok(ReplyMessages { runtime, stream })
     }
 
-    /// The questions of one device, whose session ends with them unless they join one.
+    /// The trial channel of one device, whose session ends with it unless it attaches to one.
     pub fn questions(&self) -> DeviceChannel {
         DeviceChannel { joined: AttachedSession::none(&self.calls.0), shared: Arc::clone(&self.calls.0) }
     }
@@ -220,10 +220,10 @@ impl ReplyMessages {
 }
 
 impl DeviceChannel {
-    /// The reply to one question; none to an accept that asks for none.
+    /// The reply to one request; `None` for an accept without a reply.
     ///
     /// # Errors
-    /// INVALID_ARGUMENT for bytes that are no question. An error of the device is a reply.
+    /// INVALID_ARGUMENT for bytes that are no request. An error of the device is a reply.
     pub fn ask(&mut self, request: &[u8]) -> Result<Option<Vec<u8>>, Status> {
         let request = decoded::<proto::DeviceRequest>(request)?.into_inner();
         let kind = self.reply(request);

@@ -65,11 +65,11 @@ limits! {
     /// own for each trial, which costs some ten microseconds but lets other streams run meanwhile.
     inline_unknowns: PositiveCount = 2_000;
 
-    /// Most compiled models kept; the one unused for longest is forgotten first, and none that an open session or a computation
-    /// of another client has.
+    /// Most compiled models cached. The least recently used one is evicted first, but none that an open session or a
+    /// computation of another client uses.
     models: PositiveCount = 64;
 
-    /// Most models of one client kept, whose own are forgotten first; 0: any.
+    /// Most models of one client cached, whose own are evicted first; 0: any.
     client_models: CountOrNone = 0;
 
     /// Most bytes of all models kept, counted by what their compilation laid out.
@@ -167,10 +167,10 @@ limits! {
     /// The same of all connections of one client; 0: any.
     client_held_bytes: BytesOrNone = 0;
 
-    /// Longest pause inside a request: a message that was begun must go on, or the call ends with `DEADLINE_EXCEEDED`.
+    /// Longest pause inside a request: a begun message must continue, or the call ends with `DEADLINE_EXCEEDED`.
     request_pause: PositiveSeconds = Duration::from_secs(20);
 
-    /// A connection that has not said by then what it speaks is closed.
+    /// Time after which a connection without a completed handshake is closed.
     handshake: PositiveSeconds = Duration::from_secs(10);
 
     /// Time of silence on a TCP connection after which the system probes the other end. It closes the connection after
@@ -188,15 +188,16 @@ limits! {
     /// Longest unary call; then `DEADLINE_EXCEEDED`.
     request_timeout: PositiveSeconds = Duration::from_secs(120);
 
-    /// A session without a stream and without a lease, or a finished job that is not kept on a disk, untouched for this long is forgotten.
+    /// Time without use after which a session without a stream and without a lease, or a finished job that is not
+    /// stored on a disk, is removed.
     idle: PositiveSeconds = Duration::from_secs(600);
 
-    /// A session on an open stream untouched for this long is forgotten: a circuit may be paused for lunch, but a
-    /// client that vanished without a word must not stay for ever. Also the longest lease.
+    /// Time without use after which a session on an open stream is removed: a circuit may be paused for lunch, but the
+    /// session of a vanished client must not stay for ever. Also the longest lease.
     stream_idle: PositiveSeconds = Duration::from_secs(12 * 3600);
 
-    /// After the signal to stop, open streams may go on for this long; then they end with `UNAVAILABLE`, and
-    /// connections that do not close are cut.
+    /// Time for open streams to continue after the signal to stop. Then they end with `UNAVAILABLE`, and connections
+    /// that do not close are cut.
     drain: PositiveSeconds = Duration::from_secs(5);
 }
 

@@ -1,7 +1,7 @@
 //! Log lines that never wait: a thread of its own writes them to standard error.
 //!
-//! Standard error may be a pipe without a reader. Neither may stop the service: lines go through a queue of bounded
-//! length, those that find it full are counted and dropped, and failed writes are forgotten.
+//! Standard error may be a pipe without a reader. Neither may stop the service. Lines go through a queue of bounded
+//! length, those beyond it are counted and dropped, and failed writes are ignored.
 
 use std::io::{self, Write};
 use std::sync::OnceLock;

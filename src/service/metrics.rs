@@ -94,7 +94,7 @@ pub(super) struct Metrics {
     pub(super) classes: Vec<[AtomicU64; CLASSES.len()]>,
     /// Microseconds.
     pub(super) took: Vec<AtomicU64>,
-    /// Questions on Trial streams.
+    /// Requests on Trial streams.
     pub(super) trials: AtomicU64,
 }
 

@@ -61,9 +61,9 @@ struct ModelTable {
 /// A model that is kept.
 struct CachedModel {
     model: Arc<NamedModel>,
-    /// When it was last asked for, as a count of requests.
+    /// Time of its last request, as a count of requests.
     used: u64,
-    /// Clients that asked for it.
+    /// Clients that requested it.
     clients: BTreeSet<Arc<str>>,
 }
 
@@ -79,7 +79,7 @@ impl ModelTable {
         self.models.values().map(|entry| entry.model.bytes).sum()
     }
 
-    /// The model unused for longest of those that may be forgotten.
+    /// The least recently used model among those that may be evicted.
     fn oldest(&self, may: impl Fn(&CachedModel) -> bool) -> Option<String> {
         let found = self.models.iter().filter(|(_, entry)| may(entry));
         found.min_by_key(|(_, entry)| entry.used).map(|(id, _)| id.clone())
@@ -101,7 +101,7 @@ impl ModelTable {
             let own = |entry: &CachedModel| entry.clients.contains(client);
             let free = self.oldest(|entry| own(entry) && !entry.is_in_use());
             let Some(id) = free.or_else(|| self.oldest(own)) else { break };
-            // it stays for others that asked for it
+            // it stays for others that requested it
             let left = self.models.get_mut(&id).is_none_or(|entry| {
                 entry.clients.remove(client);
                 entry.clients.is_empty()
@@ -113,7 +113,7 @@ impl ModelTable {
         while !self.models.is_empty()
             && (self.models.len() >= limits.models || self.bytes().saturating_add(bytes) > limits.model_memory)
         {
-            // a session goes on without the name of its model, but only its own client may take that away
+            // a session continues without the name of its model, but only its own client may remove that
             let own = |entry: &CachedModel| entry.clients.iter().all(|other| **other == *client);
             let free = self.oldest(|entry| !entry.is_in_use());
             let Some(id) = free.or_else(|| self.oldest(own)) else {
@@ -180,7 +180,7 @@ impl ModelCache {
         if unknowns > limits.unknowns {
             return Err(status::limit("unknowns", limits.unknowns, unknowns));
         }
-        // the meshes that were looked at are gone
+        // intermediate meshes are gone
         let larger = in_circuit.unknowns().div_ceil(compiled.unknowns().max(1));
         let bytes = bytes.saturating_mul(1 + larger);
         let model = Arc::new(NamedModel { compiled, in_circuit, description, bundle, options, bytes });
@@ -200,7 +200,7 @@ impl ModelCache {
     }
 }
 
-/// Refuses a netlist that is too large before anything looks at it.
+/// Rejects a netlist that is too large before it is parsed.
 pub(super) fn check_size(bundle: &Bundle, limits: &Limits) -> Result<(), Status> {
     let bytes = bundle_bytes(bundle);
     if bytes > limits.netlist_bytes {

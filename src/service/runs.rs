@@ -23,7 +23,7 @@ pub(super) type RunStream = CancellingStream<ReceiverStream<Result<proto::RunEve
 
 /// Others of the session wait for so long at most, but for a step.
 const BURST: Duration = Duration::from_millis(10);
-/// Steps between two looks at the clock.
+/// Steps between two checks of the clock.
 const UNWATCHED: usize = 8;
 /// Rows are sent at least this often.
 const LIVELINESS: Duration = Duration::from_millis(200);

@@ -101,7 +101,7 @@ pub enum ServeError {
     /// Certificates, keys or tokens cannot be used.
     #[error(transparent)]
     Guard(#[from] GuardError),
-    /// A live server already has this Unix socket.
+    /// A running server already has this Unix socket.
     #[error("{address} is in use by a running server; stop it or choose another path")]
     InUse {
         /// The address.

@@ -37,7 +37,7 @@ use tonic_health::server::HealthReporter;
 const CONNECTION_WINDOW: u32 = 256 << 10;
 /// Name of the readiness state in the health service.
 const READY: &str = "ready";
-/// Time between two looks whether it is.
+/// Interval of readiness checks.
 const LOOK: Duration = Duration::from_millis(250);
 
 /// Serves until `shutdown` resolves, then drains for [`Limits::drain`] and cuts what is left.
@@ -170,7 +170,7 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: BoxedWai
     ended.unwrap_or(Ok(())).map_err(|error| transport(&error))
 }
 
-/// Reads tokens and certificates again, whenever that is asked for.
+/// Reads tokens and certificates again, on request.
 async fn reread(guard: Arc<Guard>, reload: Arc<Notify>) {
     loop {
         reload.notified().await;
@@ -183,7 +183,7 @@ async fn reread(guard: Arc<Guard>, reload: Arc<Notify>) {
     }
 }
 
-/// Goes on with the jobs in the folder, where there is one.
+/// Continues the jobs in the folder, if there is one.
 fn wake(shared: &ServerState, folder: Option<PathBuf>) -> Result<(), StoreError> {
     let woken = shared.jobs.wake(&shared.accounts, &shared.limits);
     woken.map_err(|reason| StoreError::Folder { path: folder.unwrap_or_default(), reason })
@@ -266,7 +266,7 @@ async fn check_clients(shared: Arc<ServerState>) {
     }
 }
 
-/// Forgets what was not used for [`Limits::idle`], for as long as the server runs.
+/// Drops objects unused for [`Limits::idle`], for as long as the server runs.
 async fn expire(shared: Arc<ServerState>) {
     let idle = shared.limits.idle;
     let mut ticks = tokio::time::interval(

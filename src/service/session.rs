@@ -32,7 +32,7 @@ pub(super) struct Session {
     pub(super) description: Mutex<proto::DeviceDescription>,
     /// Whether a trial is likely to be short enough to run where its request arrives.
     inline: bool,
-    /// Questions that go to a thread before the next try.
+    /// Requests that go to a thread before the next inline attempt.
     slow: AtomicU32,
     /// Held during long work on the device.
     turn: Arc<Semaphore>,
@@ -52,12 +52,12 @@ pub(super) struct Session {
     due: AtomicU64,
 }
 
-/// A question that needs a thread.
+/// A request that needs a thread.
 pub(super) struct NeedsThread;
 
 /// Longest computation where requests arrive.
 const SLICE: Duration = Duration::from_millis(5);
-/// After one that took longer, so many questions go to a thread at once.
+/// After a long one, so many requests go to a thread at once.
 const AFTER_SLOW: u32 = 64;
 
 impl Session {
@@ -97,7 +97,7 @@ impl Session {
         before.iter().for_each(Budget::cancel);
     }
 
-    /// Ends a run that is under way where its next steps would push out the state that is asked for.
+    /// Ends a run in progress where its next steps would evict the requested state.
     fn end_run_for(&self, question: &StreamRequest) {
         if matches!(question, StreamRequest::Trial(_)) {
             self.run_under_way().take().iter().for_each(Budget::cancel);
@@ -124,8 +124,8 @@ impl Session {
         &self.model
     }
 
-    /// Answers one question; none for an accept. Waits for the device. A fault inside closes this session and no other;
-    /// what the budget stops is refused, and the session goes on.
+    /// Handles one request; `None` for an accept. Waits for the device. A fault inside closes this session and no
+    /// other. A stop by the budget is an error, and the session continues.
     pub(super) fn answer(&self, question: &StreamRequest, budget: &Budget) -> Option<ReplyKind> {
         self.end_run_for(question);
         let device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
@@ -253,7 +253,7 @@ impl Session {
             return Ok(());
         }
         let kept = self.keep(device, Some(Token(due)));
-        // a state that is not held any more never will be kept: this is said once
+        // a state that is not held any more can never be stored: this is reported once
         if kept.as_ref().map_or_else(|status| status.code() == Code::NotFound, |_| true) {
             self.due.store(0, Ordering::Relaxed);
         }
@@ -359,7 +359,7 @@ impl Session {
     }
 }
 
-/// A status as a fault on a stream that goes on.
+/// A status as a fault on a stream that continues.
 pub(super) fn refused(status: &Status) -> ReplyKind {
     let kind = proto::fault::Kind::Refused(proto::Refused { code: status.code() as i32 });
     ReplyKind::Fault(proto::Fault { kind: Some(kind), message: status.message().to_owned() })

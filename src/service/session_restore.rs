@@ -71,8 +71,8 @@ impl ServerState {
         self.desk.run(move || shared.wake(&store, &id)).await
     }
 
-    /// Goes on with what is kept of a session that sleeps. Non-blocking: the first caller with matching states restores
-    /// the session. If it was closed or continued meanwhile, the lookup is repeated.
+    /// Restores a stored session. Non-blocking: the first caller with matching states restores the session. If it was
+    /// closed or continued meanwhile, the lookup is repeated.
     fn wake(&self, store: &Arc<SessionStore>, id: &str) -> Result<Arc<Session>, Status> {
         loop {
             let Some(asleep) = store.asleep(id) else { return self.sessions.get(id) };

@@ -1,4 +1,4 @@
-//! Those sessions that are open: how many there are, and when one is forgotten.
+//! The open sessions: their number, and their expiry.
 
 use super::ids::Ids;
 use super::limits::Limits;
@@ -60,13 +60,13 @@ impl SessionRegistry {
         found.cloned().ok_or_else(|| status::not_found("session", id))
     }
 
-    /// Forgets a session, if there is one; what is kept of it goes soon after.
+    /// Closes a session, if there is one; its stored files are removed soon after.
     pub(super) fn close(&self, id: &str) -> Option<Arc<Session>> {
         let session = self.open().remove(id);
         session.inspect(|session| session.close())
     }
 
-    /// Forgets sessions that were not used for long; how many.
+    /// Removes sessions that were unused for long; returns their number.
     pub(super) fn expire(&self, limits: &Limits) -> usize {
         let mut open = self.open();
         // what is kept of one that is closed already is not its own any more

@@ -80,7 +80,8 @@ settings! {
     /// Log as JSON, an object a line, with the id, the name and the client of each request.
     log_json: YesOrNo = false;
 
-    /// Folder for accepted states of sessions and for jobs, which then outlive the server: a client goes on where it was.
+    /// Folder for accepted states of sessions and for jobs, which then outlive the server: a client continues where it
+    /// was.
     state_dir: PathOrNone = None;
 
     /// Do not wait for the disk when a state is kept: it outlives the end of the server, not that of the machine.
@@ -101,14 +102,14 @@ pub enum SettingSource {
     Option,
 }
 
-/// A setting that cannot be as it was said.
+/// An invalid setting.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SettingError {
     /// There is no such setting.
     #[error("{place}: there is no such setting; expected one of {known}")]
     Unknown {
-        /// Where it is said.
+        /// Its place.
         place: String,
         /// Those there are.
         known: String,
@@ -116,7 +117,7 @@ pub enum SettingError {
     /// It cannot have that value.
     #[error("{place}: expected {expected}, got \"{got}\"")]
     Value {
-        /// Where it is said.
+        /// Its place.
         place: String,
         /// The expected value.
         expected: String,
@@ -167,7 +168,7 @@ impl Settings {
         (limit.read)(&mut settings.limits, text).map_err(|expected| value(place, expected))
     }
 
-    /// Whether a setting takes what `source` says; then it is remembered.
+    /// Whether a value from `source` takes effect; then the source is stored.
     fn yields(&mut self, name: &'static str, source: SettingSource) -> bool {
         let strongest = self.sources.entry(name).or_insert(source);
         if source < *strongest {
@@ -177,7 +178,7 @@ impl Settings {
         true
     }
 
-    /// Whether anybody said what a setting is.
+    /// Whether any source gives a value.
     pub(super) fn is_set(&self, name: &str) -> bool {
         self.sources.contains_key(name)
     }

@@ -14,7 +14,7 @@ pub(super) const GRACE: Duration = Duration::from_millis(300);
 /// Something to wait for, whatever it is.
 pub(super) type BoxedWait<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
 
-/// The three signals, shared by everything that lives as long as the server.
+/// The three signals, shared by everything with the lifetime of the server.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Shutdown {
     pub(super) draining: CancellationToken,

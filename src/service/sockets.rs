@@ -137,7 +137,7 @@ impl Drop for SocketFile {
     }
 }
 
-/// Removes the socket of a server that is gone; refuses to touch a live one or anything else.
+/// Removes the socket of a server that has ended; refuses to touch a live one or any other file.
 fn clear_stale(address: &Address, path: &Path) -> Result<(), ServeError> {
     let refused = |reason| ServeError::Bind { address: address.clone(), reason };
     match fs::symlink_metadata(path) {

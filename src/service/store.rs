@@ -47,11 +47,11 @@ pub(super) struct SessionStore {
 #[derive(Debug)]
 struct StoredSession {
     model: String,
-    /// Since when it waits for somebody to ask for it; none: it is in use.
+    /// Since when it waits for a request; `None`: it is in use.
     asleep: Option<Instant>,
 }
 
-/// A session that waits for somebody to ask for it.
+/// A session that waits for a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct WaitingSession {
     /// The id of its model.
@@ -110,7 +110,7 @@ impl SessionStore {
         self.files.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether a session waits for somebody to ask for it.
+    /// Whether a session waits for a request.
     pub(super) fn asleep(&self, id: &str) -> Option<WaitingSession> {
         let entries = self.entries();
         let StoredSession { model, asleep } = entries.get(id)?;
@@ -129,7 +129,7 @@ impl SessionStore {
         Some(admit().inspect(|_| entry.asleep = None))
     }
 
-    /// A session waits from now on for somebody to ask for it.
+    /// A session waits for a request from now on.
     pub(super) fn sleep(&self, id: &str) {
         if let Some(entry) = self.entries().get_mut(id) {
             entry.asleep = Some(Instant::now());
@@ -160,7 +160,7 @@ impl SessionStore {
     pub(super) fn expire(&self, time: Duration) -> usize {
         let is_old = |entry: &StoredSession| entry.asleep.is_some_and(|since| since.elapsed() >= time);
         let old: Vec<String> = self.entries().iter().filter(|(_, e)| is_old(e)).map(|(id, _)| id.clone()).collect();
-        // somebody may ask for one of them just now
+        // a client may request one of them just now
         old.iter().filter(|id| self.forget_where(id, is_old)).count()
     }
 

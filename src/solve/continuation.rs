@@ -33,7 +33,7 @@ use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use family::LoadFamily;
 
-/// Step below which the path goes on although its point at a given s was not found [1].
+/// Step below which the path continues although its point at a given s was not found [1].
 const NEAREST: f64 = 1e-10;
 
 impl Continuation {
@@ -49,7 +49,8 @@ impl Continuation {
         }
     }
 
-    /// Traces the path from the equilibrium `q` at s = 0 until the last s asked for. `watch` hears of each point's s and may stop.
+    /// Traces the path from the equilibrium `q` at s = 0 until the last requested s. `watch` hears of each point's s
+    /// and may stop.
     ///
     /// # Errors
     /// [`SolveError::Singular`] where a body moves freely at the start; [`SolveError::Lost`] where `q` is no equilibrium.
@@ -88,7 +89,8 @@ impl Continuation {
                     _ => {}
                 }
             }
-            // the same contact is an equilibrium at the opposite voltage: only one that is still there without any goes on to that
+            // the same contact is an equilibrium at the opposite voltage: only one that is still there without any
+            // voltage continues to it
             if let Some(still) = family.field_free_point()
                 && (here.s - still) * (next.s - still) < 0.0
                 && step > NEAREST

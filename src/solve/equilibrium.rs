@@ -1,12 +1,13 @@
 //! Static equilibrium r(q, drive(s)) = 0 along a path of loads, s from 0 to 1.
 //!
-//! Each step predicts along the tangent, then corrects by Newton. It is accepted only when the corrector converges, ends on
-//! a stable equilibrium (no negative pivot), and corrects at most half of what it predicted: a Newton iteration that
-//! wandered to another branch corrects more. Nor may it change the distance of electrodes under voltage by more than half. Otherwise the
-//! step is halved. Where steps vanish beside the present load the branch loses its stability: at a limit point (pull-in, release,
-//! snap-through) or at a bifurcation (`loss`). A little beyond, at 1.02 of that load, the system falls to the next stable
-//! equilibrium (`fall`), and the path goes on from there with steps of a quarter of the present load. Falling at once under a
-//! load far beyond leads to states that a slowly growing load does not reach.
+//! Each step predicts along the tangent, then corrects by Newton. It is accepted only when the corrector converges,
+//! ends on a stable equilibrium (no negative pivot), and corrects at most half of what it predicted: a Newton iteration
+//! that wandered to another branch corrects more. Nor may it change the distance of electrodes under voltage by more
+//! than half. Otherwise the step is halved. Where steps vanish beside the present load the branch loses its stability:
+//! at a limit point (pull-in, release, snap-through) or at a bifurcation (`loss`). A little beyond, at 1.02 of that
+//! load, the system falls to the next stable equilibrium (`fall`), and the path continues from there with steps of a
+//! quarter of the present load. Falling at once under a load far beyond leads to states that a slowly growing load does
+//! not reach.
 //!
 //! Reference: E. Riks, "An incremental approach to the solution of snapping and buckling problems", Int. J. Solids
 //! Structures 15 (1979), for limit points.

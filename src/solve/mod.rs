@@ -5,7 +5,7 @@
 //! | [`equilibrium`] | static equilibrium along a path of loads: Newton, load stepping, folds and jumps |
 //! | [`continuation`] | equilibrium paths by arc length: folds, bifurcations, branches |
 //! | [`frequency`] | natural frequencies, and the response at one frequency |
-//! | [`time`] | motion: integrators, what drives them, and what happens on the way |
+//! | [`time`] | motion: integrators, their drivers, and events |
 //! | [`baseline`] | other solvers and models, to compare with |
 
 pub mod baseline;

@@ -54,7 +54,7 @@ pub(crate) mod kind {
     pub(crate) const IF_VECTOR: c_int = 0x8000;
     /// SPICE: may be read, and `.sens` leaves it alone.
     pub(crate) const IF_ASK: c_int = 0x0020_1000;
-    /// SPICE: `show` leaves it out unless all is asked for.
+    /// SPICE: `show` omits it unless everything is requested.
     pub(crate) const IF_UNINTERESTING: c_int = 0x0200_0000;
     /// SPICE: may be read and set, and `.sens` leaves it alone.
     pub(crate) const IF_ASK_SET: c_int = 0x0020_3000;

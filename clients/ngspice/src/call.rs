@@ -32,7 +32,7 @@ pub(crate) unsafe fn text(at: *const c_char) -> Option<String> {
 /// The instances of a list of models, in the host's order.
 ///
 /// # Safety
-/// `model` heads the host's list of models, which stays as it is as long as the iterator lives.
+/// `model` heads the host's list of models, which stays unchanged for the lifetime of the iterator.
 pub(crate) unsafe fn instances<'a>(model: *mut ModelHead) -> impl Iterator<Item = (&'a ModelHead, &'a InstanceHead)> {
     // SAFETY: by contract; the list ends in null.
     let models = std::iter::successors(unsafe { model.as_ref() }, |m| unsafe { m.next.as_ref() });
@@ -106,8 +106,8 @@ pub(crate) unsafe fn terminals(conn: *mut *mut ConnectionData, layout: &HostLayo
     }
 }
 
-/// By which of its functions the host wants the device loaded. The host also passes the kind of the analysis to a code
-/// model. It may be that of the previous one, since `.noise`, `.pz`, `.tf` and `.sens` do not set it.
+/// The function by which the host loads the device. The host also passes the kind of the analysis to a code model. It
+/// may be that of the previous one, since `.noise`, `.pz`, `.tf` and `.sens` do not set it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Wanted {
     /// Currents at these voltages.

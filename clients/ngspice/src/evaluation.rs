@@ -36,7 +36,7 @@ pub enum EvaluationOutcome {
     Stop(String),
 }
 
-/// Currents, conductances and monitors as ngspice wants them. p ports, s monitors; matrices row-major.
+/// Currents, conductances and monitors for ngspice. p ports, s monitors; matrices row-major.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Evaluation {
     /// State reached.

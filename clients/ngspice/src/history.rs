@@ -146,7 +146,8 @@ mod tests {
         Base { step: 1e-9 * seed, charges, currents: vec![7e-6, -1e-6], peaks: vec![8e-6, 1e-6] }
     }
 
-    /// Over points a rounding of the time apart the current goes on as it was, by every rule, and so it does after them.
+    /// Over points a rounding of the time apart the current stays unchanged, by every rule, and continues so after
+    /// them.
     #[test]
     fn steps_of_rounding_are_crossed() {
         let q = |t: f64| vec![1e-13 + 2e-15 * t / 1e-6];

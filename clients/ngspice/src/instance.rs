@@ -1,7 +1,7 @@
 //! One `A` device: maps ngspice's calls to requests of its [`Device`], and decides the treatment of failed evaluations.
 //!
 //! Nothing here knows ngspice's memory; `crate::call` copies between the two. State that must follow accepted and
-//! rejected steps lives in a [`History`], which the host rolls back; what stays here is only a cache or a count.
+//! rejected steps is in a [`History`], which the host rolls back; the rest here is only a cache or a count.
 
 use crate::alternation::Alternation;
 use crate::companion::DifferentiationRule;
@@ -31,7 +31,7 @@ pub struct Instance {
     small: SmallSignal,
     small_key: Option<(Token, u64)>,
     accepted: Option<Token>,
-    /// The last equilibrium whose warnings were asked for.
+    /// The last equilibrium whose warnings were read.
     looked: Option<Token>,
     step_bound: f64,
     refusals: FailedEvaluations,
@@ -44,7 +44,7 @@ pub struct Instance {
 pub(crate) struct InstanceCounters {
     /// Points that the circuit accepted.
     pub(crate) points: u64,
-    /// Questions for currents.
+    /// Evaluations of currents.
     pub(crate) trials: u64,
     /// Those without an answer.
     pub(crate) refused: u64,
@@ -141,7 +141,7 @@ impl Instance {
         &self.description
     }
 
-    /// The last answer to a static or transient question.
+    /// The last static or transient evaluation.
     pub fn answer(&self) -> &Evaluation {
         &self.answer
     }
@@ -292,7 +292,7 @@ impl Instance {
         format!("no equilibrium at {}: {why}{hint}", ports.join(", "))
     }
 
-    /// Turns the reply into what ngspice wants; charges into currents where time passes.
+    /// Converts the reply for ngspice; charges become currents in a transient.
     fn fill(&mut self, time: Option<(DifferentiationRule, f64, f64)>, previous: &History) {
         let (reply, answer) = (&self.reply, &mut self.answer);
         let ports = reply.charges.len();

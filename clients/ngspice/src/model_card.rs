@@ -112,7 +112,7 @@ pub enum CardError {
 /// Longest wait for a server's answer unless `deadline` says otherwise [s].
 pub const DEADLINE: f64 = 5.0;
 
-/// The agitation that a line asks for. A band of 0 means unset.
+/// The agitation that a line specifies. A band of 0 means unset.
 fn agitation(raw: &RawCard) -> Result<Agitation, CardError> {
     let seed = raw.seed.unwrap_or(1.0);
     if !((0.0..=2f64.powi(53)).contains(&seed) && seed.fract() == 0.0) {

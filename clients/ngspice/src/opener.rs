@@ -72,7 +72,7 @@ pub enum OpenError {
     /// The device refuses the ports or monitors, or its server cannot be reached.
     #[error(transparent)]
     Device(#[from] DeviceError),
-    /// `remote` is asked for in a build that has no client.
+    /// `remote` is given in a build without a client.
     #[cfg(not(feature = "remote"))]
     #[error("remote=\"{0}\": this build of the plug-in steps models in process only (it was built without \"remote\")")]
     NoRemote(String),
@@ -227,7 +227,7 @@ fn compiled(file: &str, bundle: Bundle, options: &CompileOptions) -> Result<Arc<
 mod tests {
     use super::*;
 
-    /// A missing netlist is named as spelled, with every place that was looked at.
+    /// A missing netlist is named as spelled, with every searched place.
     #[test]
     fn missing_file_names_every_place() {
         let message = read("none.net", &[], Some(Path::new("/nowhere"))).unwrap_err().to_string();

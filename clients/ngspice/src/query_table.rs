@@ -1,8 +1,8 @@
 //! Instance parameters for `show a1` and `@a1[…]`: read-only, made from the netlists of the circuit.
 //!
-//! ngspice reads the table of a device's instance parameters anew whenever it looks a name up, so the table is made at setup, when
-//! the models are known. All instances share one: it holds the names of every netlist of the circuit, and an instance that does not
-//! have one says so.
+//! ngspice reads the table of a device's instance parameters anew at every lookup, so that the table is made at setup,
+//! when the models are known. All instances share one: it holds the names of every netlist of the circuit, and an
+//! instance that does not have one says so.
 
 use crate::abi::{SpiceParameter, kind};
 use crate::registry::Registry;
@@ -40,8 +40,8 @@ impl LookNames {
 
     /// The names of every instance; what they have in common first. None where they are those there were.
     ///
-    /// The host keeps no copy, but it may hold an address while it looks a name up: a table that was handed out is never freed.
-    /// There is a new one for another set of names alone.
+    /// The host keeps no copy, but it may hold an address during a lookup: a published table is never freed. There is a
+    /// new one for another set of names alone.
     pub(crate) fn renew(&mut self, registry: &Registry) -> Option<ParameterTable> {
         let mut seen = HashSet::new();
         let (mut own, mut spelled, mut shown) = (Vec::new(), Vec::new(), Vec::new());

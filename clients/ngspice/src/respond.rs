@@ -1,4 +1,4 @@
-//! One call of the model: read what ngspice asks, ask the device, write the answer and what is to be remembered.
+//! One call of the model: read the request of ngspice, evaluate the device, write the result and the history.
 
 use crate::call::{MONITORS, ModelCall, PORTS};
 use crate::circuit::HostCircuit;

@@ -261,7 +261,7 @@ impl DeviceTable {
     /// Exchanges the instance parameters.
     ///
     /// # Safety
-    /// The host has called the plug-in and waits for it; it reads these two words when it looks a name up.
+    /// The host has called the plug-in and waits for it; it reads these two words during a lookup.
     pub(crate) unsafe fn set_instance_parameters(&self, parameters: &query_table::ParameterTable) {
         // SAFETY: by contract; what they point to stays for good.
         unsafe {
@@ -304,7 +304,7 @@ impl DeviceTable {
             self.put(at + 144, callbacks::convergence_test as *const c_void);
             self.put(at + 200, callbacks::distortion as *const c_void);
             self.put(at + 208, callbacks::noise as *const c_void);
-            // Behind the table of a host without KLU, which never looks there.
+            // After the table of a host without KLU, which never reads there.
             let bind = layout.sizes() + 16;
             self.put(bind, callbacks::bind as *const c_void);
             self.put(bind + 8, callbacks::bind_complex as *const c_void);

@@ -61,7 +61,7 @@ impl RunSeries<'_> {
         (method, tol): (Integrator, f64),
         progress: &mut ChartProgress<'_>,
     ) -> Result<(TransientResult, f64), AnalysisError> {
-        // references are asked for by a method that joint coordinates may not have: then Rodas4
+        // a reference method may be unavailable in joint coordinates: then Rodas4
         let method = formulation.methods(&[method]).last().copied().unwrap_or(method);
         let options = self.options(model, method, tol);
         let begun = Instant::now();

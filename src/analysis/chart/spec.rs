@@ -46,8 +46,8 @@ impl Formulation {
         }
     }
 
-    /// The methods that it can be integrated by, of those asked for; joint coordinates always have Rodas4, and
-    /// where every direction is elastic those that reduce constraints; a frame has none.
+    /// The requested methods that can integrate it. Joint coordinates always have Rodas4, and where every direction is
+    /// elastic those that reduce constraints; a frame has none.
     pub(super) fn methods(self, asked: &[Integrator]) -> Vec<Integrator> {
         match self {
             Self::Compliant => asked.to_vec(),
@@ -184,7 +184,7 @@ pub struct Chart {
     pub signals: Vec<String>,
     /// Estimated error of the reference of the precision part, from a second reference [1].
     pub reference_error: Option<f64>,
-    /// All points, in the order of the parts and of the lists asked for.
+    /// All points, in the order of the parts and of the requested lists.
     pub points: Vec<ChartPoint>,
 }
 

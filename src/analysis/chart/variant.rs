@@ -46,7 +46,7 @@ pub(super) struct FormulationModels {
 }
 
 impl FormulationModels {
-    /// Compiles `bundle` for one band, once for each formulation that lays it out in its own way.
+    /// Compiles `bundle` for one band, once for each formulation that discretizes it differently.
     pub(super) fn new(
         bundle: &Bundle,
         options: &CompileOptions,

@@ -36,7 +36,7 @@ pub(crate) struct ExactResponse<'a> {
 }
 
 impl<'a> ExactResponse<'a> {
-    /// Finds the operating point and what was asked for.
+    /// Finds the operating point and the requested outputs.
     ///
     /// # Errors
     /// See [`AnalysisError`].

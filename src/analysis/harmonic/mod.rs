@@ -67,7 +67,7 @@ pub struct HarmonicResult {
     pub drive_unit: String,
     /// Frequencies, ascending [Hz].
     pub frequencies_hz: Vec<f64>,
-    /// The signals in the order asked for.
+    /// The signals in the requested order.
     pub signals: Vec<SignalResponse>,
     /// Poles within the band; none where they were not looked for.
     pub poles: Option<Vec<Root>>,

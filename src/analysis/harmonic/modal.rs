@@ -23,7 +23,7 @@ use crate::solve::subspace;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::ops::Range;
 
-/// Modes beyond those asked for that an iteration of a block takes along, and the change of λ at which it ends [1].
+/// Additional modes in a block iteration, and the change of λ at which it ends [1].
 const GUARDS: usize = 6;
 const SETTLED: f64 = 1e-14;
 /// Share of what a row could see below which it sees nothing.

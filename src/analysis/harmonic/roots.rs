@@ -1,8 +1,9 @@
 //! Poles and zeros of the response.
 //!
-//! First guesses come from the sum over modes, as eigenvalues of a small matrix: poles of its state equations, zeros of the pencil
-//! that asks for a motion which a row does not see (Rosenbrock). Then each is found on the whole model to rounding: a pole by Rayleigh
-//! quotient iteration ([`crate::solve::frequency::pole`]), a zero by the secant rule on the exact response.
+//! First guesses come from the sum over modes, as eigenvalues of a small matrix: poles of its state equations, and
+//! zeros of the pencil for a motion without output in a row (Rosenbrock). Then each is found on the whole model to
+//! rounding: a pole by Rayleigh quotient iteration ([`crate::solve::frequency::pole`]), a zero by the secant rule on
+//! the exact response.
 //!
 //! Reference: A. Emami-Naeini, P. Van Dooren, "Computation of zeros of linear multivariable systems", Automatica 18 (1982).
 

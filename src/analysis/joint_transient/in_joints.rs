@@ -15,7 +15,7 @@ use crate::solve::time::adaptive::{Advance, Control, Observer, failed};
 use crate::solve::time::defect::SeeError;
 use crate::solve::time::method::{Motion, SolverCounters};
 
-/// Joint coordinates on the way.
+/// Joint coordinates during the motion.
 pub(super) struct JointPropagator<'a> {
     pub(super) formulation: Formulation,
     pub(super) system: &'a System,

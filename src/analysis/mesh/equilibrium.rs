@@ -205,7 +205,7 @@ impl<'a> EquilibriumSearch<'a> {
         Ok((model, point))
     }
 
-    /// Whether this mesh and twice its segments, where that was looked at, are on one side of their limit.
+    /// Whether this mesh and twice its segments, where compared, are on one side of their limit.
     fn is_sure(&self, order: &Mesh) -> bool {
         let of = |segments: &[usize]| {
             self.points.iter().find(|looked| looked.segments == segments).map(|looked| looked.left)

@@ -1,4 +1,4 @@
-//! The mesh for a transient: the modes that it excites, each as exactly as the length of the run asks for.
+//! The mesh for a transient: the modes that it excites, each with the accuracy that the length of the run requires.
 //!
 //! A run starts at the distance d = K⁻¹·r from its equilibrium, with r the unbalanced forces at its start: those of a
 //! released load, or of a step of the voltages. The part of d along mode i oscillates with the amplitude A_i, relative
@@ -8,7 +8,7 @@
 //! ```text
 //! rms error of the run over its amplitude ≈ A_i·δ_i·ω_i·min(T, 2/γ)/√3
 //! ```
-//! Each mode is asked to keep that below the tolerance. Modes are looked at until what is left of d is negligible. A
+//! Each mode is asked to keep that below the tolerance. Modes are added until the remainder of d is negligible. A
 //! heater acts with its time constant τ: a mode oscillates with 1/√(1 + (ωτ)²) of its effect, and the rest follows
 //! slowly.
 
@@ -36,7 +36,7 @@ use crate::refine::mesh_search::{self, Mesh, MeshTarget};
 use crate::solve::eigen::lowest_modes;
 use std::f64::consts::TAU;
 
-/// Modes looked at first, and at most.
+/// Modes computed first, and at most.
 const FIRST_MODES: usize = 6;
 const MAX_MODES: usize = 48;
 /// Share of the tolerance below which an amplitude is negligible.
@@ -276,8 +276,9 @@ fn excited(
     Ok((modes, (reach(&model, &way) / size / lags(last)).max(largest(&rest))))
 }
 
-/// K⁻¹·r with the forces r that are out of balance where the run starts, under the drive that it goes on with; none for a part that
-/// floats. For small motions this is the way to where the run goes to; for large ones the shortening of what bends is no stretch in it.
+/// K⁻¹·r with the unbalanced forces r at the start of the run, under its further drive; `None` for a floating part. For
+/// small motions this is the way to where the run goes to; for large ones the shortening of what bends is no stretch in
+/// it.
 fn pushed(
     model: &CompiledModel,
     from: &OperatingPoint,

@@ -1,4 +1,4 @@
-//! The mesh for modes: the highest one asked for decides, and about a loaded state that state and its frequencies too.
+//! The mesh for modes: the highest requested one decides, and about a loaded state that state and its frequencies too.
 
 use super::super::modes::{ModesResult, about_equilibrium, modes_with_curves};
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
@@ -96,7 +96,7 @@ fn about_drawing(
     let ComparedMeshes { compiled, count, .. } = *compared;
     let fine = is_fine(compiled);
     let (order, found) = own_estimate(compiled, order, count, &[])?;
-    // two modes next to each other may change places from the mesh that was looked at to this one
+    // two neighbouring modes may change places from the compared mesh to this one
     let holds = order.estimated_error.is_some_and(|error| error <= compiled.options.tol);
     let known = if given { order.estimated_error.is_some() } else { holds && !fine };
     if known || count > MAX_COMPARED {

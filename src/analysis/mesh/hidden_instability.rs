@@ -22,7 +22,7 @@ use crate::multibody::unstressed::add_unstressed_tangent;
 const SUSPECT: [f64; 2] = [0.35, 0.1];
 /// μ of twice the segments below which four times are asked, and the load is within about 1 % of buckling [1].
 const NEAR: f64 = 0.02;
-/// Iterations for the softest motion, whose μ is at least 15 times below that of others where it is asked for.
+/// Iterations for the softest motion, whose μ is at least 15 times below that of others where needed.
 const ROUNDS: usize = 6;
 
 /// Stability of an equilibrium on finer meshes.

@@ -168,7 +168,7 @@ impl ComparisonGrid {
             let highest = found.lambda.last().copied().unwrap_or(0.0);
             self.groups.get_or_init(|| groups(inside, highest));
         }
-        // what is rounding at the tolerance asks for no mesh
+        // rounding at the tolerance requires no mesh
         let rounding = modal::UNSEEN.max(SHAPES / model.options.tol);
         if let Some(sum) = &sum {
             (0..exact.rows.len()).for_each(|row| outputs.extend(self.shares(sum, row, rounding)));

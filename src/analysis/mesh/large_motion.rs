@@ -6,8 +6,8 @@
 //! numbers, on one of twice as many), at ten times the tolerance of the steps. The difference of the two is measured
 //! signal by signal ([`largest_error`]). By Richardson's rule it is the error of the finer one where the order of
 //! convergence is 1, as it is taken to be until it is measured, and three times that where it is 2. Where it is beyond
-//! the tolerance segments are doubled, until the tolerance holds. A coarser mesh on the way that should hold it as well
-//! is run and compared; if it does, it is taken. The reported error always belongs to a mesh that was actually run.
+//! the tolerance segments are doubled, until the tolerance holds. A coarser intermediate mesh that should hold it as
+//! well is run and compared; if it does, it is used. The reported error always belongs to a mesh that was actually run.
 //!
 //! A run to a state in which parts touch is compared up to its first contact: impacts on two meshes have nothing else in common than their means.
 //!

@@ -4,13 +4,13 @@
 //! | request | criterion | file |
 //! |---|---|---|
 //! | static | the deformed state, compared with that of twice the segments | `equilibrium` |
-//! | modes | the highest mode asked for; about a loaded state, that state and its frequencies too | `frequencies` |
+//! | modes | the highest requested mode; about a loaded state, that state and its frequencies too | `frequencies` |
 //! | strains that stay | those of heated beams that yield, compared with those of twice the segments | `permanent_strain` |
 //! | pull-in | both voltages, compared with those of twice the segments | `pull_in` |
 //! | path | its folds, bifurcations and end, compared with those of twice the segments | `path` |
 //! | frequency response | the response itself and the modes within the band, compared with those of twice the segments | `in_band` |
 //! | transient | the states it starts from and goes to, and the modes that the difference of the two excites | `excited_modes` |
-//! | transient whose stiffness changes on the way, or with a part in none of the modes | the run itself, compared with that of half the segments | `large_motion` |
+//! | transient with changing stiffness, or with a part in none of the modes | the run itself, compared with that of half the segments | `large_motion` |
 //! | transient that closes a gap | the run up to its first contact, compared with that of half the segments | `large_motion` |
 //!
 //! A given number of segments is used as it is, with the estimate of its error. A given band requires at least the mesh

@@ -1,4 +1,4 @@
-//! Which mode of a mesh is which of a mesh of twice the segments, and how far its frequency is off.
+//! Pairing of the modes of a mesh with those of twice the segments, and their frequency errors.
 //!
 //! Modes are paired by the modal assurance criterion over points that both meshes have: the nodes of one mesh along each beam, with the mass of
 //! the beam shared between them, and the nodes that bear masses. In the order of frequencies alone, two modes that change places from

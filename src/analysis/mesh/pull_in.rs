@@ -50,7 +50,7 @@ pub(super) fn pull_in_warnings(fitted: &CompiledModel, result: &PullInResult) ->
     of_stress(fitted, share).into_iter().collect()
 }
 
-/// The mesh for pull-in, and the results of every mesh that was looked at.
+/// The mesh for pull-in, and the results of every compared mesh.
 pub(super) fn for_pull_in(
     compiled: &CompiledModel,
     port: Option<&str>,

@@ -20,7 +20,7 @@ pub(super) fn on(compiled: &CompiledModel, order: Mesh) -> Result<CompiledModel,
     Ok(fitted)
 }
 
-/// The model on another mesh, of which nothing is said.
+/// The model on another mesh, without warnings.
 pub(super) fn remeshed(compiled: &CompiledModel, order: Mesh) -> Result<CompiledModel, AnalysisError> {
     Ok(if order.segments == compiled.order.segments {
         CompiledModel { order, ..compiled.clone() }

@@ -23,7 +23,7 @@ pub(super) struct SignalAmplitudes<'a> {
 }
 
 impl<'a> SignalAmplitudes<'a> {
-    /// Of the signals that `options` ask for; what a coarse mesh does not have, a point far along a beam, is left out.
+    /// Of the signals in `options`; a point along a beam that a coarse mesh lacks is omitted.
     pub(super) fn new(model: &'a CompiledModel, options: &TransientOptions<'_>, about: &'a OperatingPoint) -> Self {
         Self {
             model,

@@ -24,7 +24,8 @@ use crate::domains::Drive;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 
-/// Share of the stiffness at rest below which it is looked at from mesh to mesh [1]. The coarsest mesh of a clamped beam bears an eighth too much.
+/// Fraction of the stiffness at rest below which it is compared from mesh to mesh [1]. The coarsest mesh of a clamped
+/// beam bears an eighth too much.
 const SOFT: f64 = 0.5;
 /// Fraction by which the remaining stiffness may differ between a mesh and twice its segments [1]. Slow convergence
 /// must not count as converged: a column in one piece has 1.25 times the stiffness on two segments that it has on four,

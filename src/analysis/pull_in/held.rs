@@ -1,4 +1,4 @@
-//! The closed branch: up to the largest voltage, with the further snaps on the way, and down from the last of them to release.
+//! The closed branch: up to the largest voltage, through further snaps, and down from the last of them to release.
 
 use super::super::AnalysisError;
 use super::super::contact_range::within_contact_range;
@@ -6,7 +6,7 @@ use super::sweep::{MAX_LIMIT_POINTS, PAST, VoltageSweep, last, named};
 use crate::multibody::planar::Pose;
 use crate::solve::continuation::PathEnd;
 
-/// Longest step of the voltage on the way up, as a fraction of the voltage: pressed parts move little.
+/// Longest upward step of the voltage, as a fraction of the voltage: pressed parts move little.
 const UPWARDS: f64 = 0.5;
 /// Releases that differ by less than this fraction are one [1].
 const RELEASE_TOLERANCE: f64 = 1e-6;

@@ -7,10 +7,10 @@ use serde::Serialize;
 pub struct PullInResult {
     /// The port or netlist source whose voltage was swept.
     pub port: String,
-    /// Voltage at which the open branch loses its stability on the way up, and a gap closes [V].
+    /// Voltage at which the open branch loses its stability with rising voltage, and a gap closes [V].
     pub pull_in_v: f64,
-    /// Voltage at which the last of the closed gaps opens on the way down [V]; `None` when it stays closed at 0 V, or
-    /// when the part has no closed equilibrium after pull-in.
+    /// Voltage at which the last of the closed gaps opens with falling voltage [V]; `None` when it stays closed at 0 V,
+    /// or when the part has no closed equilibrium after pull-in.
     pub release_v: Option<f64>,
     /// Voltages between pull-in and the largest one at which the closed part snaps further [V]: `release_v` is that beyond the last.
     pub snaps_v: Vec<f64>,

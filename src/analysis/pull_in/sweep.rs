@@ -18,7 +18,7 @@ pub(super) const PAST: f64 = 1e-3;
 const BISECTIONS: usize = 40;
 /// Relative accuracy of a voltage found so [1].
 const SHARP: f64 = 1e-8;
-/// Limit points on the way up, or on the way down, at most.
+/// Most limit points with rising voltage, or with falling voltage.
 pub(super) const MAX_LIMIT_POINTS: usize = 200;
 /// Jumps that are named.
 const MAX_NAMED: usize = 4;
@@ -148,7 +148,7 @@ impl<'a> VoltageSweep<'a> {
         AnalysisError::NoEquilibrium { detail, coarse: Vec::new() }
     }
 
-    /// Sentences about jumps on the way and about the closed branch.
+    /// Sentences about jumps during the sweep and about the closed branch.
     pub(super) fn warnings(&self) -> Vec<String> {
         let passed = match self.passed.as_slice() {
             [] => None,

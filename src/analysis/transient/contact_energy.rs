@@ -1,8 +1,8 @@
 //! The energy of a run whose parts touch, which no impact may raise.
 //!
-//! Under constant voltages and loads the kinetic energy and the potential of a mechanism together do not grow. Steps that are too long for an
-//! impact can make them grow without bound. So they are compared with those at the start: at each step of equal steps, and else at the
-//! looks of [`super::record`].
+//! Under constant voltages and loads the kinetic energy and the potential of a mechanism together do not grow. Steps
+//! that are too long for an impact can make them grow without bound. They are therefore compared with those at the
+//! start: at each step of equal steps, and otherwise at the stability checks of [`super::record`].
 
 use super::super::AnalysisError;
 use super::options::TransientOptions;

@@ -1,4 +1,4 @@
-//! Crossings of levels within the steps of a run: those asked for, and the contact of every gap that has one.
+//! Crossings of levels within the steps of a run: the requested ones, and the contact of every gap that has one.
 
 use super::super::AnalysisError;
 use super::options::{TransientOptions, Until};
@@ -20,7 +20,7 @@ struct WatchedSignal {
     detector: Detector,
 }
 
-/// The crossings asked for, and the contact of every gap that has one.
+/// The requested crossings, and the contact of every gap that has one.
 fn watched(compiled: &CompiledModel, options: &TransientOptions<'_>) -> Result<Vec<WatchedSignal>, AnalysisError> {
     let watch = |name: String, signal, level, contact| WatchedSignal {
         name,
@@ -48,7 +48,7 @@ fn watched(compiled: &CompiledModel, options: &TransientOptions<'_>) -> Result<V
     Ok(asked.chain(ending).chain(touching).collect::<Result<_, ReadoutError>>()?)
 }
 
-/// True for the event that a run goes on until.
+/// True for the event that ends a run.
 fn ends(until: &Until, event: &CrossingEvent) -> bool {
     match until {
         Until::Contact => event.contact && event.direction == Direction::Down,

@@ -54,8 +54,9 @@ pub struct TransientOptions<'a> {
     /// Solver of the linear systems of the method. The result is the same to rounding; all but the recursion are
     /// baselines, and Radau5 and rk45 have none.
     pub solver: SolverKind,
-    /// Whether the run estimates how far its steps are off, see [`TransientResult::step_error`](super::TransientResult::step_error): Rodas4 with
-    /// steps that follow the tolerance, in a frame that does not turn. The motion is bit-identical.
+    /// Whether the run estimates the error of its steps, see
+    /// [`TransientResult::step_error`](super::TransientResult::step_error): Rodas4 with steps that follow the
+    /// tolerance, in a frame that does not rotate. The motion is bit-identical.
     pub estimate: bool,
     /// Whether the result stores the samples, default true; otherwise only the callback receives them.
     pub keep: bool,

@@ -1,4 +1,4 @@
-//! A run from its start to its end, and what is taken of it on the way: samples, crossings, and looks at its stability.
+//! A run from its start to its end, with its samples, crossings, and stability checks.
 
 use super::super::contact_range::within_contact_range;
 use super::super::stability::StabilityMonitor;
@@ -19,12 +19,12 @@ use crate::solve::time::adaptive::{Advance, Observer};
 use crate::solve::time::defect::SeeError;
 use crate::solve::time::method::{Motion, SolverCounters};
 
-/// Times of a run at which its stability is looked at, the end included.
+/// Times of a run at which its stability is checked, the end included.
 pub(in crate::analysis) const STABILITY_CHECKS: usize = 16;
 
 /// Propagates a motion from the start of a ramp to its end.
 pub(in crate::analysis) trait Propagator {
-    /// Takes the start to where the formulation can go on from.
+    /// Moves the start to a state from which the formulation can continue.
     ///
     /// # Errors
     /// See [`AnalysisError`].
@@ -46,7 +46,7 @@ pub(in crate::analysis) trait Propagator {
     ) -> Result<(Advance, SolverCounters), AnalysisError>;
 }
 
-/// Lets `carrier` go from the start to the end of a run, and takes samples and events on the way.
+/// Advances `carrier` from the start to the end of a run, and takes samples and events.
 pub(in crate::analysis) fn record(
     compiled: &CompiledModel,
     options: &TransientOptions<'_>,

@@ -61,7 +61,7 @@ pub struct Statistics {
 pub struct TransientResult {
     /// Times [s].
     pub t: Vec<f64>,
-    /// Samples of each signal, in the order asked for: (name, unit, values).
+    /// Samples of each signal, in the requested order: (name, unit, values).
     pub signals: Vec<(String, String, Vec<f64>)>,
     /// Work done.
     pub counters: Counters,
@@ -78,7 +78,7 @@ pub struct TransientResult {
     pub reliable_until: Option<f64>,
     /// Statistics of each signal after that.
     pub after_contact: Vec<Statistics>,
-    /// Crossings asked for and contacts of gaps, in order of time.
+    /// Requested crossings and contacts of gaps, in order of time.
     pub events: Vec<CrossingEvent>,
     /// Warnings about the result.
     pub warnings: Vec<String>,

@@ -6,7 +6,8 @@ use crate::sets::Sets;
 /// A node that a source touches, reached from the one before it.
 pub(super) struct TreeStep {
     pub(super) node: usize,
-    /// The source that it hangs on, 1 where it is at its plus and −1 where at its minus, and the node at the other end; none: ground.
+    /// The source to its parent, 1 where it is at its plus and −1 where at its minus, and the node at the other end;
+    /// `None`: ground.
     pub(super) by: Option<(usize, f64, Option<usize>)>,
 }
 
@@ -17,7 +18,7 @@ pub(super) struct KnownPotentials {
     pub(super) row: Vec<Option<usize>>,
     /// Number of unknowns.
     pub(super) free: usize,
-    /// Nodes that sources touch, each after the one that it hangs on.
+    /// Nodes that sources touch, each after its parent.
     pub(super) order: Vec<TreeStep>,
     /// For each node that a source touches the sources between it and where its unknown is, with signs, in `sources`.
     offsets: Vec<(usize, usize)>,

@@ -106,7 +106,7 @@ impl<'a> BatchedSweep<'a> {
         Self { spec, source, options, family, lanes: OnceLock::new() }
     }
 
-    /// Runs some points; `finished` is called for each, and returns whether to continue. None where it said no.
+    /// Runs some points; `finished` is called for each, and returns whether to continue. `None` if it returned false.
     pub(super) fn run(
         &self,
         numbers: &[usize],

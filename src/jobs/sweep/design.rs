@@ -1,7 +1,7 @@
 //! Points of the unit cube, one for each sample, a coordinate for each parameter that varies.
 //!
-//! A point depends on the design, the seed, its number and how many there are, and on nothing else: shards, threads and runs that go
-//! on later draw the same ones.
+//! A point depends on the design, the seed, its number and their count, and on nothing else: shards, threads and
+//! resumed runs draw the same ones.
 
 use super::error::{SweepError, bad};
 use rand_chacha::ChaCha8Rng;

@@ -17,7 +17,7 @@ pub enum SweepError {
         /// The given value.
         got: String,
     },
-    /// The progress callback said stop.
+    /// The progress callback stopped it.
     #[error("cancelled after {done} of {points} points")]
     Cancelled {
         /// Points finished.

@@ -98,7 +98,7 @@ pub fn name(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Stri
     let mut state = Fnv::default();
     state.text(env!("CARGO_PKG_VERSION"));
     state.model(bundle, options);
-    // the threads change nothing; samples are named by what was asked for
+    // the threads change nothing; samples are named by their specification
     let asked = spec.samples.as_ref().map(|samples| &samples.asked);
     state.text(&format!("{asked:?} {:?} {:?}", spec.analysis, spec.shard));
     for axis in &spec.parameters {
@@ -121,7 +121,7 @@ impl Journal {
     /// be read.
     ///
     /// # Errors
-    /// [`JournalError`]: a file is there and `resume` is not said, it is of another sweep, or the file system refuses.
+    /// [`JournalError`]: a file exists without `resume`, it is of another sweep, or the file system refuses.
     pub fn open(path: &Path, name: &str, resume: bool) -> Result<(Self, Vec<JournalRow>), JournalError> {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
         let mut file = File::options().read(true).append(true).create(true).open(path).map_err(failed)?;
@@ -297,7 +297,7 @@ mod tests {
             let lines = ends.iter().filter(|end| **end <= cut).count();
             assert_eq!(known.len(), lines.saturating_sub(1), "{cut}");
             known.iter().take(4).enumerate().for_each(|(k, found)| assert_eq!(*found, kept(k)));
-            // and goes on where the last whole line ends
+            // and continues where the last whole line ends
             journal.keep(&kept(7)).unwrap();
             drop(journal);
             let (_, again) = Journal::open(&path, "sweep", true).unwrap();

@@ -7,7 +7,7 @@ use crate::netlist::Setting;
 use nalgebra::DMatrix;
 use std::collections::HashSet;
 
-/// Parameters whose correlations are asked for.
+/// Most correlated parameters.
 const CORRELATED_MOST: usize = 200;
 
 /// Specification of the samples. [`SampleGenerator::new`] checks it.
@@ -107,7 +107,7 @@ fn factor(asked: &Sampling) -> Result<DMatrix<f64>, SweepError> {
 
 #[cfg(test)]
 mod tests {
-    //! Samples have the moments that were asked for.
+    //! Samples have the specified moments.
     use super::*;
 
     #[test]

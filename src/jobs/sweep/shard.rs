@@ -23,7 +23,7 @@ pub struct SweepPart {
 }
 
 impl SweepPart {
-    /// The part of a sweep that a specification asks for.
+    /// The shard of a specification.
     ///
     /// # Errors
     /// [`SweepError::BadSpec`] for an invalid grid.

@@ -29,7 +29,7 @@ use std::sync::{Arc, OnceLock};
 
 /// Points that are laid out at once.
 pub(super) const CHUNK: usize = 64;
-/// Corners that are all looked at; where there are more, the ends of each axis with the others in the middle.
+/// Most corners that are all run; where there are more, the ends of each axis with the others in the middle.
 const MAX_CORNERS: usize = 8;
 
 /// Where steps are judged that all points share.
@@ -78,7 +78,7 @@ impl<'a> TransientSweep<'a> {
     }
 
     /// Runs some points. `finished` is called for each with whether it has a result, and returns whether to continue.
-    /// None where it said no.
+    /// `None` if it returned false.
     pub(super) fn run(
         &self,
         numbers: &[usize],

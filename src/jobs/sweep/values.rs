@@ -81,7 +81,7 @@ impl From<Vec<Setting>> for Values {
     }
 }
 
-/// The same values are the same, however they are said.
+/// Equal values are equal in any notation.
 impl PartialEq for Values {
     fn eq(&self, other: &Self) -> bool {
         self.len() == other.len() && self.iter().eq(other.iter())

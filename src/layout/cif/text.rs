@@ -13,7 +13,7 @@ pub(super) struct CifReader<'a> {
     text: &'a [u8],
     file: &'a str,
     at: usize,
-    /// Where a place was last asked for, and its line.
+    /// Position of the last query, and its line.
     placed: (usize, usize),
 }
 

@@ -152,7 +152,7 @@ pub(super) fn distance(outline: &[[f64; 2]], p: [f64; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    //! The same as a look at all edges; a plane with many holes.
+    //! The same as a search of all edges; a plane with many holes.
     use super::*;
 
     /// A plane of n × n holes of 4 by 4 in steps of 10.
@@ -186,7 +186,8 @@ mod tests {
         assert!(over.len() == 5 && over.iter().zip(&stretches).all(near), "{over:?}");
     }
 
-    /// Whatever a plane has elsewhere, a question meets few of its edges: on a ray, those of a row of holes; at a cell, those near it.
+    /// For any other content of a plane, a query meets few of its edges: on a ray, those of a row of holes; at a cell,
+    /// those near it.
     #[test]
     fn questions_meet_few_edges() {
         let areas = AreaIndex::of([&perforated(200)]);

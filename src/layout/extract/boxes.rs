@@ -88,7 +88,7 @@ fn spread(x: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    //! The tree finds exactly the boxes that a look at all of them finds.
+    //! The tree finds exactly the boxes that a search of all of them finds.
     use super::*;
 
     #[test]

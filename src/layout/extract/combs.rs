@@ -32,7 +32,7 @@ pub(super) struct Finger {
     /// Numbers of the points after which and before which it stands on its contour, and points to put there.
     cut: [u32; 2],
     ends: [GridPoint; 2],
-    /// A part of its own: it hangs on nothing.
+    /// An isolated part.
     loose: bool,
 }
 
@@ -51,7 +51,7 @@ pub(super) struct FingerArray {
     pub(super) overlap: f64,
     /// Area of each part's fingers; none where another comb has them already.
     pub(super) masses: [Moments; 2],
-    /// Parts that would be fingers of it and hang on nothing.
+    /// Isolated parts in the shape of its fingers.
     pub(super) loose: Vec<usize>,
 }
 
@@ -124,7 +124,7 @@ fn fingers(k: usize, part: &Part) -> Vec<Finger> {
             continue;
         }
         let root = [tip[0] - long * along[0], tip[1] - long * along[1]];
-        // a side that goes on beyond the root is cut there
+        // a side that extends beyond the root is cut there
         let ends = [0, 1].map(|i| {
             let p = axis.points[corners[i] as usize];
             let on = reach[i] - long;
@@ -273,7 +273,7 @@ pub(super) fn without(part: &Part, fingers: &[&Finger]) -> Polygon {
         for p in contour {
             if !drop[point] {
                 kept.push(*p);
-                // the cut of a side that goes on stands beside its corner
+                // the cut of an extended side is next to its corner
                 if let Some(end) = ends[point].filter(|end| end != p) {
                     let before = fingers.iter().any(|f| f.cut[1] as usize == point);
                     kept.insert(kept.len() - usize::from(before), end);

@@ -2,7 +2,7 @@
 //!
 //! The areas of the axis tile a part, and each consists of two convex quadrangles. A hole is clipped by them (I. E.
 //! Sutherland, G. W. Hodgman, CACM 17, 1974), so that each limb or joint loses exactly its share of the hole. Pieces of
-//! outlines that cutting lays on a border run there and back: moments and further cuts do not see them.
+//! outlines that cutting places on a border run there and back: they do not affect moments and further cuts.
 
 use super::boxes::{self, Boxes, Extent};
 use super::cells::Owner;

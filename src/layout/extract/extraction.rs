@@ -71,7 +71,7 @@ pub struct LayerResult {
     pub unrecognised: f64,
     /// Number of etch holes that were filled, and their area [m²]; it is no part of `drawn`.
     pub holes: (usize, f64),
-    /// Number of parts that hang together.
+    /// Number of connected parts.
     pub parts: usize,
 }
 
@@ -134,7 +134,7 @@ pub struct Arc {
     pub layer: usize,
     /// Nodes at its start and end.
     pub nodes: [usize; 2],
-    /// By how much it turns on the way [rad], positive to its left.
+    /// Its angle from start to end [rad], positive to its left.
     pub angle: f64,
     /// Width [m].
     pub width: f64,

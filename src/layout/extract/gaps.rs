@@ -50,7 +50,7 @@ pub(super) enum Gap {
 }
 
 impl Gap {
-    /// The places where it pulls, in the order in which nodes are asked for.
+    /// The places of its pulls, in the order of their nodes.
     pub(super) fn pulls(&self) -> impl Iterator<Item = &Pull> {
         let (some, more): (&[Pull], &[Pull]) = match self {
             Self::Plates { pulls, .. } => (pulls, &[]),

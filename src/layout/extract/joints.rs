@@ -77,7 +77,7 @@ pub(super) fn joints(skeleton: &Skeleton<'_>, mut limbs: Vec<Limb>) -> LimbGraph
     for (k, limb) in limbs.iter().enumerate() {
         limb.edges.iter().for_each(|e| of_limb[*e as usize] = k);
     }
-    // vertices between limbs hang together by the edges in no limb
+    // vertices between limbs are connected by the edges in no limb
     let mut sets = crate::sets::Sets::new(axis.vertices.len());
     let mut inner = vec![usize::MAX; axis.vertices.len()];
     for (e, edge) in axis.edges.iter().enumerate().filter(|(e, _)| skeleton.alive[*e]) {
@@ -168,7 +168,7 @@ fn kind(skeleton: &Skeleton<'_>, limbs: &[Limb], joint: &LimbJoint) -> JointRole
     simple.unwrap_or_else(|| body(skeleton, limbs, joint))
 }
 
-/// How far the sides of a limb that stands on a body stand from its nearest corner; 0 where one of them goes on as its edge.
+/// Distance of the sides of a limb on a body from its nearest corner; 0 where one of them continues as its edge.
 pub(super) fn from_corner(axis: &Medial, limb: &Limb, end: usize) -> f64 {
     let lead = Lead::of(limb, end);
     let room = limb.sides[end].into_iter().enumerate().map(|(k, side)| {

@@ -1,4 +1,4 @@
-//! One layer: merged, taken apart into parts that hang together, and put into the result.
+//! One layer: merged, divided into connected parts, and put into the result.
 
 use super::anchors::{self, AnchorRule};
 use super::combs::{self, Finger};

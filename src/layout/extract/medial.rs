@@ -208,7 +208,7 @@ impl Medial {
     }
 }
 
-/// Which edges lie inside: those that a side says so of, and those between two corners that hang together with them.
+/// Inner edges: those decided by a side, and those between two corners that are connected with them.
 fn spread(
     places: &[[f64; 2]],
     found: &[([u32; 2], [BoundarySite; 2], Option<bool>)],

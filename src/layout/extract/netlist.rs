@@ -161,7 +161,7 @@ impl NetlistWriter<'_> {
         }
     }
 
-    /// Places what does not hang together with the first node.
+    /// Places nodes that are not connected with the first one.
     fn places(&self, scope: &Scope, name: &dyn Fn(usize) -> String, indent: &str, out: &mut String) {
         let mut shown: BTreeSet<usize> = scope.items.iter().flat_map(|item| self.extraction.nodes_of(item)).collect();
         shown.extend(scope.instances.iter().flat_map(|i| i.terminals.iter().copied()));

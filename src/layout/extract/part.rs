@@ -1,4 +1,4 @@
-//! A part of a layer that hangs together, and what is known of its shape.
+//! A connected part of a layer, and the data of its shape.
 
 use super::holes::Hole;
 use super::joints::LimbGraph;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// Result of the axis analysis of a shape.
 pub(super) type AxisAnalysis = (Arc<Medial>, Arc<LimbGraph>);
 
-/// A part that hangs together.
+/// A connected part.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     /// Its outline.

@@ -20,9 +20,10 @@ use super::skeleton::Skeleton;
 use crate::sets::Sets;
 use std::f64::consts::FRAC_PI_2;
 
-/// By how much the limbs of a plate are stiffer, in a row, than each limb that it hangs on [1].
+/// Ratio of the stiffness of a plate's limbs, in series, to that of each supporting limb [1].
 const STIFF: f64 = 30.0;
-/// By how much a free plate that its inertia bends gives way, over four times its limbs as a cantilever [1]: 5/384 over 1/3.
+/// Compliance of a free plate bent by its inertia, over four times that of its limbs as a cantilever [1]: 5/384 over
+/// 1/3.
 const BENT: f64 = 0.16;
 /// Limbs of one plate are given up together down to this share of the most compliant one [1].
 const ALIKE: f64 = 0.5;
@@ -34,7 +35,7 @@ const ROOT: f64 = 0.44;
 /// Contribution of the holes to that rotation, times E·w²·thickness [1]: fitted, as [`FLUSH`] and [`FAR`], to plane
 /// stress of the plates that `scripts/random-plates` draws.
 const TURN: f64 = 0.37;
-/// By how much an edge gives way more at a corner [1], and how far from it that is felt, in widths of the limb [1].
+/// Relative excess of an edge's compliance at a corner [1], and its range, in widths of the limb [1].
 const FLUSH: [f64; 2] = [1.1, 0.25];
 /// Shift of a half-plane under an even pressure on a width w, times π·E/2 over the pressure times w: ln(D/w) and this [1], for a plate of
 /// area D² (S. Timoshenko, J. N. Goodier, Theory of Elasticity, §36).
@@ -90,7 +91,7 @@ pub(super) fn perforated(
     parts
 }
 
-/// By how much the edge of a plate gives way under a limb that stands on it, times E·thickness: shift, turn.
+/// Compliance of the edge of a plate under a limb, times E·thickness: shift, rotation.
 fn edge(axis: &Medial, joint: &LimbJoint, limb: &Limb, end: usize, stiffness: f64) -> [f64; 2] {
     let (width, d) = (limb.width[end], limb.direction());
     let room = joints::from_corner(axis, limb, end);
@@ -103,7 +104,7 @@ fn edge(axis: &Medial, joint: &LimbJoint, limb: &Limb, end: usize, stiffness: f6
     [(shift * corner + slender) / stiffness, TURN * corner / (width * width)]
 }
 
-/// Where a limb ends in a body, less than half of whose area lies on the way there; `deep`: it is led into an elastic one.
+/// The root of a limb in a body, less than half of whose area lies before it; `deep`: it extends into an elastic one.
 fn root(mouth: [f64; 2], limb: &Limb, end: usize, area: f64, deep: bool) -> [f64; 2] {
     let (e, w) = (limb.ends[end], limb.width[end]);
     let u = if end == 1 { limb.direction() } else { limb.direction().map(|x| -x) };
@@ -126,7 +127,8 @@ fn plates(axis: &Medial, parts: &LimbGraph, cut: &HoleCutouts, origin: [f64; 2],
         for k in (0..rigid.len()).filter(|k| rigid[*k]) {
             sets.join(parts.at[k][0], parts.at[k][1]);
         }
-        // of each plate: cube root of the compliance of all its limbs in a row, the largest of them, the least of those that it hangs on
+        // of each plate: cube root of the compliance of all its limbs in series, the largest of them, the least of the
+        // supporting ones
         let mut plates = vec![(0.0, 0.0_f64, f64::INFINITY, f64::INFINITY); parts.joints.len()];
         for k in 0..rigid.len() {
             for j in parts.at[k].map(|j| sets.first(j)) {
@@ -163,13 +165,13 @@ fn plates(axis: &Medial, parts: &LimbGraph, cut: &HoleCutouts, origin: [f64; 2],
     }
 }
 
-/// By how much a limb gives way across, about: bending and shear [1].
+/// Approximate transverse compliance of a limb: bending and shear [1].
 fn compliance(limb: &Limb, porosity: f64) -> f64 {
     let slender = slender(limb);
     (slender.powi(3) + slender) / holes::stiffness(porosity)
 }
 
-/// Length over width [1]: by how much it gives way along, times E·thickness.
+/// Length over width [1]: axial compliance times E·thickness.
 fn slender(limb: &Limb) -> f64 {
     limb.length() / (0.5 * (limb.width[0] + limb.width[1]))
 }

@@ -1,10 +1,10 @@
 //! Cells that repeat as subnets.
 //!
-//! A placed cell stands for the elements all of whose nodes lie in its box. Two placed cells whose elements are the
-//! same, each seen from its own frame, are instances of one subnet: they hang together with the rest by nodes alone,
-//! whatever the parts are that the polygons make. The nodes that something outside touches, in any of them, are the
-//! subnet's nodes. Cells that differ stay flat, and their inner cells are examined. Nothing is extracted twice and
-//! nothing is changed: the model is that of the flat netlist.
+//! A placed cell stands for the elements all of whose nodes lie in its box. Two placed cells with equal elements, each
+//! in its own frame, are instances of one subnet. Nodes alone connect them with the rest, for any parts that the
+//! polygons form. The nodes that something outside touches, in any of them, are the subnet's nodes. Cells that differ
+//! stay flat, and their inner cells are examined. Nothing is extracted twice and nothing is changed: the model is that
+//! of the flat netlist.
 
 use super::Extraction;
 use super::boxes::Boxes;
@@ -154,8 +154,8 @@ impl Finder<'_> {
         Scope { frame, items, instances }
     }
 
-    /// Placed cells of one name by what is in them; of those that have nothing of their own, the inner ones are `next`. Once nothing is
-    /// `left` to look at, the others stay flat.
+    /// Placed cells of one name by what is in them; of those that have nothing of their own, the inner ones are `next`.
+    /// Once nothing is `left` to examine, the others stay flat.
     fn alike(
         &mut self,
         all: &ElementIndex,

@@ -123,7 +123,7 @@ impl<'a> Skeleton<'a> {
     }
 
     fn cut_corners(&mut self) {
-        // where three edges met, a limb goes on when two of them were cut
+        // where three edges met, a limb continues when two of them were cut
         let met = self.degree.clone();
         for v in 0..self.degree.len() as u32 {
             if self.degree(v) == 1 && self.vertex(v).r < CORNER {

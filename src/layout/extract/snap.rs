@@ -31,7 +31,7 @@ fn lead_through(polygons: &[Polygon], wanted: impl Fn(f64) -> bool) -> Option<Ve
         |(p, q): &(GridPoint, GridPoint)| (f64::from(q[0]) - f64::from(p[0])).hypot(f64::from(q[1]) - f64::from(p[1]));
     let count = edges().count();
     let chunk = 4.0 * edges().map(|e| length(&e)).sum::<f64>() / count.max(1) as f64;
-    // long edges at an angle have large boxes: they are looked at piece by piece
+    // long edges at an angle have large boxes: they are tested piece by piece
     let (mut owners, mut extents): (Vec<u32>, Vec<Extent>) = (Vec::new(), Vec::new());
     for (k, edge) in edges().enumerate() {
         let (p, q) = (float(edge.0), float(edge.1));

@@ -7,7 +7,7 @@ use crate::layout::drawing::LARGEST_COORDINATE;
 
 /// The finest unit [m].
 const FINEST: f64 = 1e-12;
-/// Decimals of the file's unit that are looked at before a coordinate counts as off the grid.
+/// Decimals of the file's unit that are read before a coordinate counts as off the grid.
 const DECIMALS: u32 = 4;
 
 impl Library {

@@ -110,7 +110,7 @@ impl LaneModel {
         Some(laid)
     }
 
-    /// True for a model that differs from those laid here in numbers alone.
+    /// True for a model that differs from those in the batch in numbers alone.
     pub fn fits(&self, model: &Model) -> bool {
         let bodies = |(held, body): (&SupportProjector, &Body)| held.is_some() == body.free.is_some();
         // joints of one section here must be alike in the other model too

@@ -9,7 +9,7 @@ use super::super::value::{LayerValues, Value, short};
 use super::meaning::meaning;
 use crate::structure::NodeId;
 
-/// A length beyond this is a forgotten suffix rather than a part of a microsystem [m].
+/// A length beyond this is a missing suffix rather than a part of a microsystem [m].
 const LONGEST: f64 = 0.1;
 
 /// One parameter as given.
@@ -166,7 +166,7 @@ impl ElementSite<'_, '_> {
         self.sink.error("E060", span, message, help)
     }
 
-    /// Warns of lengths that can only be a forgotten suffix.
+    /// Warns of lengths that can only be a missing suffix.
     fn check_size(&mut self, name: &str, x: f64) {
         if x > LONGEST && meaning(name).ends_with("[m]") {
             let span = self.span_of(name);

@@ -43,7 +43,7 @@ impl ElementSite<'_, '_> {
         }
         let noted = self.drawing.noted();
         let material = self.read_material()?;
-        // what is to be said of a layer is said of every element
+        // a message about a layer applies to every element
         if self.drawing.noted() == noted {
             let _ = instance.arguments.layer.material.set(material.clone());
         }

@@ -127,8 +127,8 @@ fn stray_parameters(model: &ElementModel, instance: &ElementInstance<'_>, sink: 
     }
 }
 
-/// Warns of a parameter that a subnet does not take when its name looks like a slip of one that it does take and that
-/// was not given. All others are ignored, as SUGAR does.
+/// Warns of a parameter that a subnet does not take when its name resembles one that it does take and that was not
+/// given. All others are ignored, as SUGAR does.
 pub(crate) fn stray_actuals<'a>(
     subnet: &str,
     given: &[Argument<'_>],

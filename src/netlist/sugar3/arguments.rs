@@ -41,7 +41,7 @@ pub(super) struct Fault {
     pub(super) help: &'static str,
 }
 
-/// Items of one call or material: each element looks through them.
+/// Items of one call or material, since each element searches them.
 const MAX_ITEMS: usize = 1000;
 
 /// Words of a call that are no parameters.

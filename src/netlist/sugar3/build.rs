@@ -7,7 +7,7 @@ use crate::budget;
 /// Elements and nodes that one netlist may build.
 const MAX_ELEMENTS: usize = 300_000;
 
-/// A message was put into the sink, and the netlist cannot go on.
+/// A message was put into the sink, and the netlist cannot continue.
 pub(super) fn abort(state: &LuaState) -> mlua::Error {
     state.reported.set(true);
     mlua::Error::runtime("reported")

@@ -40,7 +40,7 @@ pub(super) fn install(lua: &Lua, shared: &SharedState) -> mlua::Result<()> {
     }
     mathematics(lua, shared, &globals)?;
     language(lua, shared, &globals)?;
-    // globals without a value are asked from outside, and remembered
+    // globals without a value are taken from the settings, and cached
     let watch = lua.create_table()?;
     let state = Rc::clone(shared);
     watch.raw_set(

@@ -164,7 +164,7 @@ fn split_place(state: &LuaState, text: &str) -> (TextSpan, String) {
     parsed().unwrap_or((TextSpan::NOWHERE, text.to_owned()))
 }
 
-/// Reports settings that the netlist never asked for.
+/// Reports settings that the netlist never reads.
 fn unasked(state: &mut LuaState, set: &[(String, Setting)]) {
     let known: Vec<String> = state.parameters.values().map(|(name, _)| name.clone()).collect();
     for (name, _) in set.iter().filter(|(name, _)| !known.contains(name)) {

@@ -11,7 +11,7 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-/// Instructions between two looks.
+/// Instructions between two checks.
 const EVERY: u32 = 100;
 /// Instructions without anything drawn, and more for each byte of text and each element.
 const INSTRUCTIONS: usize = 2_000_000;
@@ -21,8 +21,8 @@ const INSTRUCTIONS_PER_ELEMENT: usize = 2_000;
 const MEMORY: usize = 8 << 20;
 const MEMORY_PER_BYTE: usize = 16;
 const MEMORY_PER_ELEMENT: usize = 4 << 10;
-/// Time without anything drawn after which processor time is looked at, and what may pass of it then. One instruction may copy a
-/// string as long as the memory, so that instructions alone do not bound time.
+/// Time without new elements after which processor time is checked, and the time allowed then. One instruction may copy
+/// a string as long as the memory, so that instructions alone do not bound time.
 const PATIENCE: Duration = Duration::from_millis(25);
 /// Interval between reads of the processor time, which the system provides in a file.
 const CLOCK_INTERVAL: Duration = Duration::from_millis(5);

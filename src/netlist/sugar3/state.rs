@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Where names of one scope live: the netlist itself, or one subnet instance.
+/// Scope of names: the netlist itself, or one subnet instance.
 #[derive(Debug)]
 pub(super) struct NameScope {
     pub(super) nodes: HashMap<String, NodeId>,
@@ -123,7 +123,7 @@ impl LuaState {
         Some(setting)
     }
 
-    /// A global that gets its first value: the default of a parameter, if it was asked for before.
+    /// A global that gets its first value: the default of a parameter, if it was read before.
     pub(super) fn assign(&mut self, name: &str, value: &Value) {
         let Some(&order) = self.asked.get(name) else { return };
         let setting = match (number(value), value) {

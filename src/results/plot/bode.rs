@@ -1,7 +1,8 @@
 //! Bode pictures: magnitudes over frequency, a panel for each unit, and phases below them.
 //!
-//! H. W. Bode, "Network Analysis and Feedback Amplifier Design" (1945): magnitude on a logarithmic axis, phase in degrees, over the logarithm of
-//! the frequency. Phases go on where they pass half a turn; values without a bound are gaps of a curve.
+//! H. W. Bode, "Network Analysis and Feedback Amplifier Design" (1945): magnitude on a logarithmic axis, phase in
+//! degrees, over the logarithm of the frequency. Phases are continuous past half a turn; unbounded values are gaps of a
+//! curve.
 
 use super::PALETTE;
 use super::axis::axis;
@@ -186,7 +187,7 @@ fn curve(
     }
 }
 
-/// Phases [°] that go on where they pass half a turn, from between −180 and 180.
+/// Phases [°], continuous past half a turn, from between −180 and 180.
 fn unwrapped(values: &[[f64; 2]]) -> Vec<f64> {
     let mut last: Option<f64> = None;
     let one = |[re, im]: &[f64; 2]| {
@@ -208,7 +209,7 @@ fn unwrapped(values: &[[f64; 2]]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    //! Phases go on past half a turn; what has no bound is a gap; the picture has a panel for each unit.
+    //! Phases are continuous past half a turn; unbounded values are gaps; the picture has a panel for each unit.
     use super::*;
 
     #[test]

@@ -259,7 +259,7 @@ mod tests {
         assert!(svg.contains("&lt;a&gt;") && !svg.contains("NaN"));
     }
 
-    /// A legend that is wider than its panel goes on in the next line.
+    /// A legend that is wider than its panel continues in the next line.
     #[test]
     fn long_legends_wrap() {
         let curves = (0..7)

@@ -1,4 +1,4 @@
-//! Curves in a plane: a load against a displacement, or the track of a point, drawn to one scale where that is asked for.
+//! Curves in a plane: a load against a displacement, or the track of a point, on request to one scale.
 
 use super::PALETTE;
 use super::axis::{Axis, axis, quantity};

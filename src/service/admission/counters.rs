@@ -17,7 +17,7 @@ use tonic::{Code, Status};
 /// Counts for all services of a server.
 pub(in crate::service) struct AdmissionCounters {
     pub(in crate::service) calls: AtomicUsize,
-    /// Calls of health: those that are answered at once, and those that go on.
+    /// Calls of health: those answered at once, and streams.
     pub(in crate::service) health: [AtomicUsize; 2],
     pub(in crate::service) held: AtomicUsize,
     pub(in crate::service) most_calls: usize,
@@ -42,7 +42,7 @@ const LONGEST_ID: usize = 64;
 
 /// A service without tokens, since monitoring has none.
 pub(in crate::service) const OPEN: &str = "grpc.health.v1.Health";
-/// Calls of it at once of each kind: `Check`, and `Watch`, which goes on.
+/// Calls of it at once of each kind: `Check`, and the stream `Watch`.
 const HEALTH_CALLS: usize = 64;
 /// Bytes of a request of it.
 const HEALTH_BYTES: usize = 1 << 10;
@@ -108,7 +108,7 @@ impl AdmissionCounters {
             // for a call that is dropped before its end
             code: AtomicI32::new(Code::Cancelled as i32),
         };
-        // a connection that asks for health alone is idle, and makes room for others
+        // a connection with health calls alone is idle, and yields to others
         if let (Some(presence), None) = (&call.presence, call.health) {
             presence.begin();
         }
@@ -117,7 +117,7 @@ impl AdmissionCounters {
         call
     }
 
-    /// Whether a call may go on, and whose it is.
+    /// Whether a call is admitted, and its account.
     pub(in crate::service) fn admit(
         &self,
         call: &AdmittedCall,
@@ -165,7 +165,7 @@ impl AdmittedCall {
         self.health.map_or(&self.gate.calls, |kind| &self.gate.health[kind])
     }
 
-    /// Whether it asks for the health of this server.
+    /// Whether it is a health call.
     pub(in crate::service) fn is_health(&self) -> bool {
         self.health.is_some()
     }

@@ -1,7 +1,7 @@
 //! Admission control: counts calls and request bytes, and bounds pauses, before a handler runs.
 //!
-//! A client may announce a large message and send little of it, begin many and finish none, or ask for more at once
-//! than the server can hold. Every call therefore enters here. It counts among the calls of the server and of its
+//! A client may announce a large message and send little of it, begin many and finish none, or send more at once than
+//! the server can hold. Every call therefore enters here. It counts among the calls of the server and of its
 //! connection. Its bytes count from the first: those of a stream until each message is complete, those of a unary
 //! request until its reply. A message must not pause for long. Unauthorized calls are rejected here. Health calls need
 //! no authorization and use a few small permits of their own, so that they cannot block other calls.

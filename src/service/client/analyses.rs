@@ -165,7 +165,7 @@ impl Client {
     /// Transient analysis; `watch` receives the progress and may cancel it.
     ///
     /// # Errors
-    /// [`ClientError`]; code "Cancelled" when `watch` said stop.
+    /// [`ClientError`]; code "Cancelled" when `watch` stopped it.
     pub fn transient(
         &mut self,
         model: &str,

@@ -25,8 +25,8 @@ const QUEUE: usize = 64;
 
 /// A [`Device`] whose model is held by a server. Every call returns within the deadline.
 ///
-/// After a lost connection or a late answer the device is closed (states live on the server); [`Device::open`] connects
-/// again and starts a new epoch. One that is [`RemoteDevice::resuming`] looks for its server again before that.
+/// After a lost connection or a late reply the device is closed (its states are on the server); [`Device::open`]
+/// connects again and starts a new epoch. A [`RemoteDevice::resuming`] one reconnects to its server first.
 #[derive(Debug)]
 pub struct RemoteDevice {
     address: String,
@@ -95,8 +95,8 @@ impl RemoteDevice {
         Ok(device)
     }
 
-    /// The same device, which goes on with a server that is reached again within the deadline: it asks the trials that led to its states once
-    /// more. They have the same tokens and bits there.
+    /// The same device with resumption: if a server is reached again within the deadline, it repeats the trials that
+    /// led to its states. They have the same tokens and bits there.
     #[must_use]
     pub fn resuming(mut self) -> Self {
         self.replay = Some(Replay::default());
@@ -270,7 +270,7 @@ impl Device for RemoteDevice {
             self.start().map_err(|status| self.lose(&status))?;
         }
         let mut reply = self.open_here();
-        // A stream left from an earlier run may have died meanwhile, and a server forgets models: once more, anew.
+        // A stream of an earlier run may have ended meanwhile, and a server drops models: repeat once on a new stream.
         let stale = match &reply {
             Ok(reply) => is_not_found(reply),
             Err(_) => !fresh,

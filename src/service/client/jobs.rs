@@ -1,4 +1,5 @@
-//! Jobs on a server: they run there whether or not anybody is connected, and their rows are asked for from the first that is missing.
+//! Jobs on a server: they run there with and without a connected client, and their rows are fetched from the first
+//! missing one.
 
 use super::analyses::{Client, ClientError};
 use crate::compile::CompileOptions;
@@ -162,8 +163,8 @@ impl Client {
         self.persist(|client, _| client.call(client.link.rpc.clone().cancel_job(request.clone()))).map(drop)
     }
 
-    /// Stops a job, if it goes on, and lets the server forget it. Where the connection fails, it is made anew and the server asked once
-    /// more; a job that it then does not have counts as forgotten, as it may be the answer alone that was lost.
+    /// Stops a job, if it is running, and removes it from the server. If the connection fails, the request is repeated
+    /// on a new one. A job that is unknown then counts as removed, since only the reply may have been lost.
     ///
     /// # Errors
     /// [`ClientError`].
@@ -181,11 +182,11 @@ impl Client {
 
     /// Waits for the rows of a job; its table, in grid order, and how it ended: where it ended early, the table has the
     /// rows that there are. `progress` is called for rows as they arrive and may detach, which does not affect the job.
-    /// A connection that fails meanwhile is made anew, and the rows go on where they were.
+    /// A connection that fails meanwhile is replaced, and the rows continue.
     ///
     /// # Errors
-    /// [`ClientError`]; code "Cancelled" when `progress` said stop, "Unavailable" or "DeadlineExceeded" when the server was not
-    /// reached again.
+    /// [`ClientError`]; code "Cancelled" when `progress` stopped it, "Unavailable" or "DeadlineExceeded" when the
+    /// server was not reached again.
     pub fn follow(
         &mut self,
         name: &str,

@@ -120,8 +120,8 @@ impl Drop for TrialConnections {
 }
 
 impl TrialChannel {
-    /// The reply to a question, within `patience`; none to an accept that asks for none. Where the answer is not waited for to its
-    /// end, the next question still gets its own.
+    /// The reply to a request, within `patience`; `None` for an accept without a reply. After an abandoned request the
+    /// next one still gets its own reply.
     ///
     /// # Errors
     /// UNAVAILABLE, DEADLINE_EXCEEDED, CANCELLED. An error of the device is a reply.
@@ -138,7 +138,7 @@ impl TrialChannel {
         let still = || waits() && asked.elapsed() < patience;
         let Self { runtime, requests, replies, owed } = self;
         if *owed == 0 {
-            // a reply without a request would be taken for that to this question
+            // a reply without a request would be taken for that to this one
             match pin!(replies.message()).poll(&mut Context::from_waker(Waker::noop())) {
                 Poll::Ready(Ok(Some(_))) => return Err(unexpected("no request is open")),
                 Poll::Ready(Err(status)) => return Err(said(&status, asked, patience)),

@@ -22,7 +22,7 @@ use tonic::{Code, Request, Status};
 /// Largest reply accepted [byte], as the server's default limit.
 const MESSAGE_BYTES: usize = 64 << 20;
 
-/// The calls of a server, with what it asks for.
+/// The calls of a server, with its token.
 pub(super) type Rpc = BimorphClient<InterceptedService<Channel, CallToken>>;
 
 /// The token that goes with every call.
@@ -101,8 +101,8 @@ impl ServerLink {
         answer.map_err(|status| if left.is_some() && is_late(&status) { late(self.deadline) } else { status })
     }
 
-    /// Compiles a netlist on the server. A netlist with errors comes back with all of them: a status has no room for
-    /// that, so they are asked for.
+    /// Compiles a netlist on the server. A netlist with errors returns all of them: a status has no space for that, so
+    /// that they are requested.
     pub(super) fn compile(&self, bundle: &Bundle, options: &CompileOptions) -> Result<proto::ModelDescription, Status> {
         let (wire_bundle, wire_options) = (Some(bundle_to_wire(bundle)), Some(options_to_wire(options)));
         let request = proto::CompileRequest { bundle: wire_bundle.clone(), options: wire_options.clone() };

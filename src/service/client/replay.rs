@@ -7,7 +7,7 @@
 use crate::service::proto;
 use std::collections::HashMap;
 
-/// Requests that are remembered, at most: a hundred megabytes. Beyond that nothing is asked again.
+/// Most stored requests: a hundred megabytes. Beyond that nothing is asked again.
 const MAX_REQUESTS: usize = 1 << 20;
 
 /// The requests that led to the states of a device.

@@ -1,5 +1,5 @@
-//! Replies of a server are checked once, on receipt: a server may be of another version, faulty, or hostile. Shapes, kinds, order and
-//! numbers are those that were asked for, and no text controls a terminal.
+//! Replies of a server are checked once, on receipt: a server may be of another version, faulty, or hostile. Shapes,
+//! kinds, order and numbers must be the requested ones, and no text controls a terminal.
 
 use crate::device::{DeviceError, Mode, OpenRequest, Trial};
 use crate::netlist::Diagnostic;
@@ -8,7 +8,7 @@ use proto::trial_reply::Status as WireStatus;
 
 /// Longest text of a server that is shown [byte].
 const LONGEST: usize = 64 << 10;
-/// Shortest next step that a device may ask for, in units of the step that was taken [1].
+/// Shortest next step that a device may require, in units of the previous step [1].
 const SHORTEST: f64 = 1e-12;
 
 /// Text of a server: line breaks and tabs stay, other control characters are written out, and what is very long is cut.

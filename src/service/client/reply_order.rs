@@ -2,7 +2,7 @@
 
 use crate::device::{Mode, Status, Token, Trial, TrialReply};
 
-/// Trials in a row that may ask for a shorter step. Each asks for less than it was given, and devices for much less.
+/// Trials in a row that may require a shorter step. Each requires less than it was given, and devices much less.
 const SHORTENED: usize = 500;
 
 /// The trials of a stream so far.
@@ -10,7 +10,7 @@ const SHORTENED: usize = 500;
 pub(super) struct TrialOrder {
     /// The last trial with a state, and the name of that.
     last: Option<(PendingTrial, Token)>,
-    /// Trials in a row that asked for a shorter step.
+    /// Trials in a row that required a shorter step.
     shortened: usize,
 }
 

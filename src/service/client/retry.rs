@@ -1,4 +1,4 @@
-//! Questions that are asked again where the network fails.
+//! Calls that are repeated where the network fails.
 
 use super::analyses::{Client, ClientError};
 use std::time::Duration;
@@ -9,8 +9,8 @@ const ATTEMPTS: u32 = 6;
 const PAUSE: Duration = Duration::from_millis(100);
 
 impl Client {
-    /// Asks again, on a new connection, where the network fails. `ask` says whether it heard that things go on. For questions alone that
-    /// may be asked twice.
+    /// Asks again, on a new connection, where the network fails. `ask` returns whether it received progress. For
+    /// idempotent calls alone.
     pub(super) fn persist<T>(
         &mut self,
         mut ask: impl FnMut(&Self, &mut bool) -> Result<T, ClientError>,

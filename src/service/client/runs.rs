@@ -11,9 +11,9 @@ use crate::service::proto;
 use tonic::{Code, Status, Streaming};
 
 impl RemoteDevice {
-    /// Steps from a state along a course, as [`crate::device::run::steps`] does in process, with the same bits. The deadline bounds the time
-    /// between two messages of the server, which sends one each second or more often. A device that is [`RemoteDevice::resuming`] cannot go
-    /// on with a state of a run on another server.
+    /// Steps from a state along a course, as [`crate::device::run::steps`] does in process, with the same bits. The
+    /// deadline bounds the time between two messages of the server, which sends one each second or more often. A
+    /// [`RemoteDevice::resuming`] device cannot continue from a state of a run on another server.
     ///
     /// # Errors
     /// [`DeviceError`]; a step without a result is not an error of the call, see [`Ran::error`].
@@ -131,7 +131,7 @@ fn end_fits(end: &proto::RunEnd, came: usize, steps: usize) -> Result<(), String
 
 #[cfg(test)]
 mod tests {
-    //! Rows and ends that were asked for pass, and everything else is named.
+    //! Requested rows and ends pass, and all others are named in an error.
     use super::*;
 
     fn rows(first: u64, count: u32, outputs: &[f64]) -> proto::RunRows {

@@ -78,7 +78,7 @@ impl Service<Uri> for Connect {
             tcp.set_nodelay(true)?;
             let secured = async {
                 let mut secured = TlsConnector::from(config).connect(name, tcp).await?;
-                // with TLS 1.3 the client is done before the server has looked at its certificate
+                // with TLS 1.3 the client is done before the server has checked its certificate
                 let _ = tokio::time::timeout(FIRST_WORDS, secured.fill_buf()).await.unwrap_or(Ok(&[]))?;
                 Ok(secured)
             };

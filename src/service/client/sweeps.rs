@@ -8,12 +8,12 @@ use crate::netlist::Bundle;
 
 impl Client {
     /// Runs a sweep; `progress` receives the progress and may cancel it. A connection that fails meanwhile is made
-    /// anew. The server forgets it afterwards, whatever came; one that is to outlive its client is a job
+    /// anew. The server removes it afterwards, for any result; a sweep that is to outlive its client is a job
     /// ([`Self::submit`], [`Self::follow`]).
     ///
     /// # Errors
-    /// [`ClientError`]; code "Cancelled" when `progress` said stop, "Unavailable" or "DeadlineExceeded" when the server was not
-    /// reached again.
+    /// [`ClientError`]; code "Cancelled" when `progress` stopped it, "Unavailable" or "DeadlineExceeded" when the
+    /// server was not reached again.
     pub fn sweep(
         &mut self,
         spec: &SweepSpec,

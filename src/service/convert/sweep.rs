@@ -51,7 +51,7 @@ pub fn spec_to_wire(spec: &SweepSpec) -> proto::SweepSpec {
     }
 }
 
-/// Outputs that are asked for at each point.
+/// Requested outputs at each point.
 pub fn outputs(spec: &proto::SweepSpec) -> usize {
     match &spec.analysis {
         Some(Analysis::Static(asked)) => asked.outputs.len(),
@@ -60,7 +60,7 @@ pub fn outputs(spec: &proto::SweepSpec) -> usize {
     }
 }
 
-/// Modes that are asked for at each point.
+/// Requested modes at each point.
 pub fn modes(spec: &proto::SweepSpec) -> usize {
     match &spec.analysis {
         Some(Analysis::Modes(asked)) => modes_of(asked),
@@ -84,7 +84,7 @@ pub fn grid_points(spec: &proto::SweepSpec) -> usize {
     spec.parameters.iter().fold(samples, |points, axis| points.saturating_mul(values(axis).max(1)))
 }
 
-/// A checked specification. Lays out every axis: [`grid_points`] says before how long they are.
+/// A checked specification. Allocates every axis: [`grid_points`] gives their lengths before.
 ///
 /// # Errors
 /// Anything missing, empty, or not finite.

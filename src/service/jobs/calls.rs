@@ -97,7 +97,7 @@ impl BimorphService {
         Ok(Response::new(proto::DeleteJobResponse {}))
     }
 
-    /// Stops and forgets a job.
+    /// Stops and removes a job.
     pub(super) async fn delete(&self, job: Arc<Job>) -> Result<(), Status> {
         let shared = Arc::clone(&self.0);
         let delete = move || {

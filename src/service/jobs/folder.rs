@@ -1,6 +1,7 @@
-//! Jobs that outlive the server: a folder with three files for each, `jobs/ID.job` what was asked, `jobs/ID.rows` the journal of its rows,
-//! and `jobs/ID.end` how it ended. A job is there when its first file is; whatever moment the server ends at, a row that was given out is in
-//! the journal, and a job without its last file goes on. All of it counts among the bytes of the folder of states.
+//! Jobs that outlive the server: a folder with three files for each, `jobs/ID.job` what was asked, `jobs/ID.rows` the
+//! journal of its rows, and `jobs/ID.end` how it ended. A job exists once its first file does. A row that was sent is
+//! in the journal, at any end of the server, and a job without its last file continues. All of it counts among the
+//! bytes of the folder of states.
 
 use super::super::snapshots::checksum;
 use super::super::store::SessionStore;
@@ -105,7 +106,7 @@ pub(super) fn find(store: &Arc<SessionStore>, id: &str) -> Option<StoredJob> {
             let file = JobFile { sweep: asked.sweep.clone(), ..file };
             return Some(StoredJob { id: id.to_owned(), asked, request, end, file });
         }
-        // there is nothing that could go on
+        // there is nothing to continue
         Ok(None) => file.remove(),
         Err(error) => tracing::warn!(job = id, %error, "it cannot be read, and is left alone"),
     }
@@ -165,7 +166,7 @@ impl JobFile {
         let Some(bytes) = there("job")? else { return Ok(None) };
         let strange = || io::Error::new(io::ErrorKind::InvalidData, "it is damaged, or of another version");
         let head = read_head(&bytes).ok_or_else(strange)?;
-        // one that is damaged is as if it had never been: the job goes on
+        // a damaged one counts as missing: the job continues
         let end = there("end")?.and_then(|bytes| {
             let end: Option<JobOutcome> = opened(&bytes).and_then(|object| serde_json::from_slice(&object).ok());
             if end.is_none() {

@@ -3,10 +3,10 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
-/// Connections of its client that a job remembers; of more, the last.
+/// Most connections of its client that a job stores; of more, the last.
 const MAX_CONNECTIONS: usize = 1024;
 
-/// Connections by which a job was asked for.
+/// Connections that requested a job.
 #[derive(Debug, Default)]
 pub(super) struct JobHolders {
     connections: VecDeque<u64>,
@@ -15,7 +15,7 @@ pub(super) struct JobHolders {
 }
 
 impl JobHolders {
-    /// It was asked for by one.
+    /// It was requested by one.
     pub(super) fn take(&mut self, connection: u64) {
         self.gone = None;
         if !self.connections.contains(&connection) {

@@ -112,7 +112,7 @@ impl Job {
         }
     }
 
-    /// Whether this server has no more use for it: it has ended, and not because another one should go on with it.
+    /// Whether this server has no more use for it: it has ended, and is not left for another one to continue.
     pub(super) fn is_over(&self) -> bool {
         let standing = self.standing.borrow();
         standing.end.is_some() && !standing.refused
@@ -123,18 +123,18 @@ impl Job {
         self.standing.borrow().end.is_some()
     }
 
-    /// Somebody asks for it, by a connection.
+    /// A client requests it, by a connection.
     pub(super) fn touch(&self, connection: u64) {
         *held(&self.used) = Instant::now();
         held(&self.holders).take(connection);
     }
 
-    /// Since it was last asked for.
+    /// Time since it was last requested.
     pub(super) fn idle(&self) -> Duration {
         held(&self.used).elapsed()
     }
 
-    /// Cancels it where its client is gone for longer than it asked for; a process that asks itself never is.
+    /// Cancels it where its client is gone for longer than its limit; a request in process has no limit.
     pub(super) fn look_for_client(&self, open: &BTreeSet<u64>) {
         let Some(release) = self.asked.release().filter(|_| !self.has_ended()) else { return };
         // a reader or a watcher keeps it
@@ -181,7 +181,7 @@ impl Job {
         });
     }
 
-    /// A point is done; whether to go on.
+    /// A point is finished; returns whether to continue.
     pub(super) fn found(self: &Arc<Self>, kept: JournalRow, runtime: &Handle) -> bool {
         if self.stop.get().is_some() {
             return false;
@@ -291,7 +291,7 @@ impl Job {
         self.unload();
     }
 
-    /// This server does not go on with it. That is not kept: another one may.
+    /// This server does not continue it. That is not kept: another one may.
     pub(super) fn refuse(&self, why: &Status) {
         let end = self.ending(&self.standing(), why.code(), why.message().to_owned());
         if let Some(file) = held(&self.file).as_mut() {

@@ -95,7 +95,7 @@ impl JobOrigin {
             hash.text(&self.version);
         }
         hash.bytes(&self.release_after_s.to_bits().to_le_bytes());
-        // values are the same however they are said
+        // equal values are equal in any notation
         let listed = |axis: &SweepParameter| SweepParameter {
             values: axis.values.iter().collect::<Vec<_>>().into(),
             ..axis.clone()
@@ -114,7 +114,8 @@ impl JobOrigin {
         self
     }
 
-    /// Whether another request of the same client means the same job: none, or whether it asks for the same.
+    /// Whether another request of the same client refers to the same job: `None` if not, else whether its content is
+    /// the same.
     pub(super) fn is(&self, other: &Self) -> Option<bool> {
         let named = !self.request.is_empty() && (&self.request, &self.owner) == (&other.request, &other.owner);
         named.then_some((self.share, &self.content) == (other.share, &other.content))

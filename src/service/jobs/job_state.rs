@@ -14,11 +14,11 @@ pub(super) struct JobState {
     pub(super) rows: u64,
     pub(super) failed: u64,
     pub(super) end: Option<JobOutcome>,
-    /// It has ended for this server alone: another one may go on with it.
+    /// It has ended for this server alone: another one may continue it.
     pub(super) refused: bool,
     /// Deleted.
     pub(super) gone: bool,
-    /// The next server goes on with it.
+    /// The next server continues it.
     pub(super) suspended: bool,
 }
 

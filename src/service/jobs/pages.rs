@@ -8,7 +8,7 @@ const PAGE: usize = 100;
 /// Most jobs of a page.
 const LARGEST: usize = 1000;
 
-/// A page that was asked for.
+/// A requested page.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Page {
     /// Most jobs on it.
@@ -18,7 +18,7 @@ pub(super) struct Page {
 }
 
 impl Page {
-    /// As it was asked for.
+    /// The request, checked.
     ///
     /// # Errors
     /// A negative size, or a token that no answer had.

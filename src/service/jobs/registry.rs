@@ -1,4 +1,4 @@
-//! The jobs of a server: those that run, and those that have ended and may still be asked for.
+//! The jobs of a server: running ones, and ended ones that may still be requested.
 
 use super::super::accounts::Accounts;
 use super::super::connection::Connections;
@@ -37,7 +37,7 @@ pub(super) struct SweepTask {
 }
 
 impl SweepTask {
-    /// As it was asked for.
+    /// The request, checked.
     ///
     /// # Errors
     /// The invalid part of the request.
@@ -143,7 +143,7 @@ impl JobRegistry {
         Ok(job)
     }
 
-    /// Takes in what the folder has, and goes on with what has not ended.
+    /// Reads the folder, and continues unfinished jobs.
     ///
     /// # Errors
     /// A folder that cannot be read.
@@ -209,7 +209,7 @@ impl JobRegistry {
         Ok(())
     }
 
-    /// The job of that id, asked for by the connection at hand.
+    /// The job of that id, requested by the current connection.
     ///
     /// # Errors
     /// NOT_FOUND.
@@ -243,13 +243,13 @@ impl JobRegistry {
         kept.map_err(|error| status::not_kept("the job is stopped; that it is cancelled is", &error))
     }
 
-    /// Stops and forgets a job.
+    /// Stops and removes a job.
     pub(super) fn delete(&self, job: &Job) {
         self.kept().remove(&job.id);
         job.delete();
     }
 
-    /// Stops all that run: those in a folder go on with the next server.
+    /// Stops all running jobs: those in a folder continue with the next server.
     pub(in super::super) fn suspend(&self) {
         let jobs: Vec<_> = self.kept().values().cloned().collect();
         jobs.iter().filter(|job| !job.has_ended()).for_each(|job| job.stop(JobStopReason::Suspended));
@@ -269,7 +269,7 @@ impl JobRegistry {
         jobs.iter().for_each(|job| job.release());
     }
 
-    /// Cancels jobs whose clients are gone for longer than they asked for.
+    /// Cancels jobs whose clients are gone for longer than their limit.
     pub(in super::super) fn check_clients(&self, connections: &Connections) {
         let jobs: Vec<_> = self.kept().values().filter(|job| job.asked.release().is_some()).cloned().collect();
         if !jobs.is_empty() {
@@ -288,7 +288,7 @@ impl JobRegistry {
     }
 }
 
-/// Whether this server may go on with a job that another one began.
+/// Whether this server may continue a job that another one began.
 fn goes_on(asked: &JobOrigin, bundle: &Bundle, limits: &Limits) -> Result<(), Status> {
     let own = env!("CARGO_PKG_VERSION");
     if asked.version != own {
@@ -321,7 +321,7 @@ fn room(kept: &BTreeMap<String, Arc<Job>>, owner: &str, limits: &Limits) -> Resu
     }
 }
 
-/// Among those that are kept, the one that its client asked for by the same name.
+/// The stored job that its client requested by the same name.
 fn already(kept: &BTreeMap<String, Arc<Job>>, asked: &JobOrigin) -> Result<Option<Arc<Job>>, Status> {
     let mut same = kept.values().filter_map(|job| job.asked.is(asked).map(|same| (job, same)));
     if asked.share {

@@ -56,7 +56,7 @@ async fn next<T>(
     }
 }
 
-/// One less looks at a job: rows of one that has ended need not stay in memory.
+/// One watcher less of a job: rows of one that has ended need not stay in memory.
 fn unwatched(job: &Arc<Job>, standing: watch::Receiver<JobState>) {
     drop(standing);
     if job.has_ended() {

@@ -81,7 +81,7 @@ pub(in crate::service) struct StoreScan {
 }
 
 impl StoreScan {
-    /// Looks around.
+    /// Reads the folder.
     pub(in crate::service) fn of(folder: &Path) -> io::Result<Self> {
         let mut found = Self::default();
         for entry in fs::read_dir(folder.join("sessions"))? {

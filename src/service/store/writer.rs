@@ -35,7 +35,7 @@ impl SessionWriter {
         Ok(Self::of(store, id, model, 0, 0, 0))
     }
 
-    /// Of one that goes on; it sleeps until [`SessionStore::wake`].
+    /// Of one that continues; it is stored until [`SessionStore::wake`].
     pub(in crate::service) fn after(store: &Arc<SessionStore>, id: &str, model: &str, kept: &SessionRecord) -> Self {
         Self::of(store, id, model, kept.sequence, kept.accepted, kept.lease_ms)
     }

@@ -1,10 +1,10 @@
 //! Dense Gaussian elimination without exchanges: a baseline.
 //!
-//! It does what a solution written out symbolically does (AUTOLEV's constraint solution, which the paper compares with):
-//! rows are eliminated in the order in which they stand, whatever their numbers turn out to be. On the definite matrices of
-//! implicit steps that is stable, and this baseline differs from the others in cost alone; on indefinite ones, those of
-//! constraints kept as equations among them, a small pivot spoils it and nothing is said. No use is made of zeros or of
-//! symmetry.
+//! It does what a solution written out symbolically does (AUTOLEV's constraint solution, which the paper compares
+//! with): rows are eliminated in the order in which they stand, whatever their numbers turn out to be. On the definite
+//! matrices of implicit steps that is stable, and this baseline differs from the others in cost alone. On indefinite
+//! ones, as those of constraints kept as equations, a small pivot invalidates the result without an error. No use is
+//! made of zeros or of symmetry.
 //!
 //! Cost: 2n³/3 for a factorization of n scalar unknowns, 2n² for a solve; n² numbers.
 //!

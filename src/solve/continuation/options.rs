@@ -30,8 +30,8 @@ pub struct ContinuationOptions {
     /// Largest change of a gap in one step, as a share of what is left of it, default 0.2: no step leads across a gap to
     /// another branch. Smaller: more points.
     pub closing: f64,
-    /// Largest distance of a point from where the tangent led, in steps, default 0.5. Tangents as straight as `straightness`
-    /// asks for lead within 0.1; what is further off lies on another branch.
+    /// Largest distance of a point from where the tangent led, in steps, default 0.5. Tangents with the requested
+    /// `straightness` lead within 0.1; points further away lie on another branch.
     pub aside: f64,
     /// End where stability is lost, at a fold or a bifurcation; default false.
     pub stop_at_loss: bool,

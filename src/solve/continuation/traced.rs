@@ -25,18 +25,18 @@ pub enum PathEvent {
 /// Why a path ends.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum PathEnd {
-    /// It came to the last s asked for.
+    /// It reached the last requested s.
     #[default]
     Arrived,
-    /// s fell below the lowest one asked for.
+    /// s fell below the lowest requested one.
     TurnedBack,
     /// It lost its stability, and was to end there.
     Unstable,
-    /// It has as many points as asked for.
+    /// It has as many points as requested.
     Full,
     /// The next point was not found even with the smallest step.
     Lost,
-    /// [`Continuation::trace`](super::Continuation::trace)'s watch said stop.
+    /// The progress callback of [`Continuation::trace`](super::Continuation::trace) stopped it.
     Stopped,
 }
 

@@ -149,7 +149,7 @@ impl LaneEquilibrium {
                 let reach = reaches[lane].max(1e-6 * scale);
                 let stalled = correction <= STALLED * reach && correction > 0.1 * last[lane];
                 last[lane] = correction;
-                // where parts touch, what has come to a stand has to balance, too: alone it goes on
+                // where parts touch, a stalled iteration has to balance, too: a single one continues
                 if stalled && correction > options.tolerance * reach {
                     let touching = !system.members.is_empty()
                         && system.contact_scale(&self.lane(&self.trial, lane), &drives[lane].volts) > 0.0;

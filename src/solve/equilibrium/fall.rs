@@ -27,7 +27,7 @@ const UNTESTED: f64 = 1e-6;
 const SETTLED: f64 = 1e-9;
 /// First μ and the μ that counts as none, as fractions of the median stiffness.
 const MIN_SHIFT: [f64; 2] = [1e-14, 1e-15];
-/// A μ that rounding of the stiffness may ask for next to a loss of stability, in first μ.
+/// A μ that rounding of the stiffness may require next to a loss of stability, in first μ.
 const NEUTRAL: f64 = 10.0;
 /// A μ that no finite stiffness needs, in median stiffnesses.
 pub(super) const MAX_SHIFT: f64 = 1e20;

@@ -9,11 +9,12 @@ use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
 use std::sync::Arc;
 
-/// A body that gives way so many times as far as others hangs on next to nothing.
+/// Compliance ratio above which a body counts as unsupported.
 const UNSUPPORTED_COMPLIANCE_RATIO: f64 = 1e8;
 /// Rotation of the end of a segment from its chord beyond which its law means nothing [rad].
 const TURNED: f64 = 1.0;
-/// Rotation of an end of a segment from its chord, and between its ends, beyond which a refusal asks for shorter segments [rad].
+/// Rotation of an end of a segment from its chord, and between its ends, beyond which a refusal suggests shorter
+/// segments [rad].
 const COARSE: [f64; 2] = [0.7, 1.0];
 /// Axial strain beyond which a segment is no beam [1].
 const CRUSHED: f64 = 0.3;
@@ -191,7 +192,7 @@ impl Equilibrium {
         turned.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, turn)| *turn > WOUND)
     }
 
-    /// Names the body that gives way most under a force on every body, if it does so far more than most.
+    /// Names the body of largest compliance under a force on every body, if it exceeds most by far.
     fn unheld(&mut self, system: &System, q: &[Pose]) -> Option<String> {
         let model = &system.model;
         system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
@@ -206,7 +207,7 @@ impl Equilibrium {
         let mut sorted = moved.clone();
         sorted.sort_by(f64::total_cmp);
         let typical = sorted[sorted.len() / 2].max(f64::MIN_POSITIVE);
-        // the middle body may hang on the same threads: then all are soft, and the stiffest is what to compare with
+        // the middle body may have the same slender supports: then all are soft, and the stiffest is the reference
         let stiff = sorted[sorted.len() / 20].max(f64::MIN_POSITIVE);
         let softest = (0..moved.len()).max_by(|&a, &b| moved[a].total_cmp(&moved[b])).unwrap_or(0);
         let over = moved[softest] / typical.min(stiff);

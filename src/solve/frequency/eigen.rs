@@ -25,7 +25,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Models of at most this many coordinates are solved densely.
 const DENSE: usize = 60;
-/// Modes that are settled beyond those asked for: they keep the last wanted one apart from what follows.
+/// Additional settled modes, which separate the last requested one from the next.
 const GUARD_MODES: usize = 2;
 /// A factor whose solves have a larger relative error is corrected in every solve.
 const ROUGH: f64 = 1e-9;

@@ -24,7 +24,7 @@ pub struct Pairs {
 
 /// A step that leaves less than this share of the largest eigenvalue has closed a subspace.
 pub(super) const CLOSED: f64 = 1e-14;
-/// Vectors beyond the wanted ones before the first look at what has settled, and between two looks at least.
+/// Vectors beyond the wanted ones before the first convergence check, and between two checks at least.
 const FIRST_LOOK: usize = 6;
 const NEXT_LOOK: usize = 3;
 /// Vectors that memory is taken for at first beyond the wanted ones.

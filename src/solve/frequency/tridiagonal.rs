@@ -5,7 +5,7 @@
 /// Steps for one eigenvalue at most; two or three are usual.
 const MAX_STEPS: usize = 60;
 
-/// All eigenvalues, in no order, and for each its vector of length 1. `beside` is the diagonal next to the main one.
+/// All eigenvalues, unordered, and for each its vector of length 1. `beside` is the diagonal next to the main one.
 pub(super) fn eigen(diagonal: &[f64], beside: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
     let n = diagonal.len();
     rotated(diagonal, beside, (0..n).map(|i| (0..n).map(|k| if i == k { 1.0 } else { 0.0 }).collect()).collect())

@@ -20,11 +20,11 @@ pub enum Advance {
     Done,
     /// The allowed number of steps was used up at this time [s].
     OutOfSteps(f64),
-    /// The observer said stop.
+    /// The observer stopped it.
     Stopped,
 }
 
-/// Sees each accepted step: start time, length, motion before and after; answers whether to go on.
+/// Receives each accepted step: start time, length, motion before and after; returns whether to continue.
 pub type Observer<'a, X = Pose> = &'a mut dyn FnMut(f64, f64, &Motion<X>, &Motion<X>) -> bool;
 
 /// A method with control of its steps, and the storage for it.

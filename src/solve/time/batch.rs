@@ -1,7 +1,7 @@
 //! Batch driver: runs of many variants with Rodas4, each with its own steps.
 //!
-//! A step of all lanes is taken at once, of the length that each lane's own error control wants; a lane that rejects
-//! its step goes back alone. A finished variant leaves its lane to the next of the queue. The result of a variant is
+//! A step of all lanes is taken at once, with the length from each lane's own error control; a lane that rejects its
+//! step goes back alone. A finished variant leaves its lane to the next of the queue. The result of a variant is
 //! therefore bit-identical to a single run ([`super::adaptive`]), with any neighbours. Failures in a lane (a singular
 //! matrix, vanishing steps, a stop by the observer) are left to a single run, which finds the same and reports the
 //! reason.
@@ -36,7 +36,7 @@ pub struct BatchRun<'a> {
 pub trait Watcher {
     /// True where the motions before and after the step from `s` to `s` + `h` [s] are to be seen.
     fn wants(&self, s: f64, h: f64) -> bool;
-    /// A step that was wanted; answers whether to go on.
+    /// Receives an accepted step; returns whether to continue.
     fn observe(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> bool;
 }
 

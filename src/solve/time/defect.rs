@@ -37,7 +37,7 @@ pub(super) const POWERS: [f64; 6] = [
     0.122_870_811_723_12,
 ];
 
-/// |R(iz)·exp(−iz) − 1|: by how much a step is off that turns a motion by the angle `z` [rad], of its amplitude [1].
+/// |R(iz)·exp(−iz) − 1|: relative error of a step that rotates a motion by the angle `z` [rad] [1].
 pub fn step_error(z: f64) -> f64 {
     let w = Complex::new(1.0, -GAMMA * z).inv();
     let r = POWERS.iter().rev().fold(Complex::new(0.0, 0.0), |sum, a| (sum + a) * w);

@@ -5,9 +5,9 @@
 //! v_i = v₀ + h·Σ_{j<i} a_ij·k_j + h·a_ii·k_i      q_i = q₀ + h·Σ_{j<i} a_ij·v_j + h·a_ii·v_i
 //! error = h·Σ e_i·(v_i, k_i), taken through (I − γ·J)⁻¹      γ = h·a_ii
 //! ```
-//! so that each stage is one equation for k_i, with γ and β = γ² ([`Stage`]); one with a_ii = 0 is an evaluation. Where Rodas4
-//! needs the Jacobian in its formula, here it only speeds the iteration up, so the order does not hang on it: joint coordinates
-//! with an approximate one take the same tableaus.
+//! so that each stage is one equation for k_i, with γ and β = γ² ([`Stage`]); one with a_ii = 0 is an evaluation. Where
+//! Rodas4 needs the Jacobian in its formula, here it only accelerates the iteration, so that the order does not depend
+//! on it: joint coordinates with an approximate one use the same tableaus.
 //!
 //! A direction without inertia has no acceleration: its k is what the differences of its rates are, and no equation has it, since its
 //! displacement follows from the springs and its rate from the displacements of the stages.

@@ -16,10 +16,10 @@ pub enum Direction {
     Down,
 }
 
-/// Places in a step where signs are looked at, besides its start.
+/// Points of a step where signs are checked, besides its start.
 const PLACES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
-/// Remembers the sign of one quantity from step to step.
+/// Stores the sign of one quantity from step to step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Detector {
     above: Option<bool>,
@@ -31,8 +31,8 @@ impl Detector {
         Self { above: (value != 0.0).then_some(value > 0.0) }
     }
 
-    /// Looks through one step: `value(x)` is the quantity at the share x of it. Each crossing goes to `found` as the share
-    /// where it happens and its direction, in order.
+    /// Searches one step: `value(x)` is the quantity at the fraction x of it. Each crossing goes to `found` as the
+    /// share where it happens and its direction, in order.
     pub fn step(&mut self, mut value: impl FnMut(f64) -> f64, mut found: impl FnMut(f64, Direction)) {
         let mut from = 0.0;
         for to in PLACES {

@@ -14,7 +14,7 @@ use crate::domains::inputs::FrameMotion;
 use crate::multibody::planar::Pose;
 use crate::multibody::{Body, Model};
 
-/// Terms of the series at most; what wants more wants shorter steps.
+/// Most terms of the series; a larger number requires shorter steps.
 const MAX_TERMS: usize = 12;
 /// Share of the solution at which the series ends [1].
 const NEGLIGIBLE: f64 = 1e-16;

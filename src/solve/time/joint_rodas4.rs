@@ -111,12 +111,12 @@ impl JointRodas4 {
         }
     }
 
-    /// Coordinates, rates and accelerations, to go on from with [`JointRodas4::resume`].
+    /// Coordinates, rates and accelerations, for [`JointRodas4::resume`].
     pub fn state(&self) -> &[Motion] {
         &self.carried[..2]
     }
 
-    /// Goes on from a state: the next start takes it as it is.
+    /// Continues from a state: the next start takes it as it is.
     pub fn resume(&mut self, state: &[Motion]) {
         for (to, from) in self.carried.iter_mut().zip(state) {
             to.copy(from);
@@ -124,7 +124,7 @@ impl JointRodas4 {
         self.resumed = true;
     }
 
-    /// Forgets what the motion depends on.
+    /// Drops the sensitivities of the motion.
     pub fn forget_sensitivities(&mut self) {
         self.carried[2..].iter_mut().chain(&mut self.sensitivity).for_each(Motion::clear);
     }

@@ -48,8 +48,8 @@ impl StepController {
         (self.t, self.rejected) = (self.after(step), 0);
     }
 
-    /// A step with this error is not taken; `lost` is the share of it to try where there is no error to go by. False: no shorter one is
-    /// worth trying.
+    /// A step with this error is not taken; `lost` is the share of it to try where there is no error to go by. False: a
+    /// shorter one is useless.
     pub(super) fn reject(&mut self, step: f64, error: f64, lost: f64) -> bool {
         let share = if error.is_finite() { (SAFETY * error.powf(self.exponent)).clamp(0.1, 0.8) } else { lost };
         self.h = step * share;

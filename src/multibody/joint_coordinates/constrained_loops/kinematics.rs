@@ -1,7 +1,7 @@
 //! Outward pass: from joint coordinates and their rates to the pose and rate of every body.
 //!
-//! A joint's coordinates are its strains (e_u, g, p). With the mean frame ψ = β + θ_p + s·p/2 of the joint and the opening
-//! w = (u, g), u = e_u − [g p] Q [g p]ᵀ, a body hangs on its parent by
+//! A joint's coordinates are its strains (e_u, g, p). With the mean frame ψ = β + θ_p + s·p/2 of the joint and the
+//! opening w = (u, g), u = e_u − [g p] Q [g p]ᵀ, the pose of a body relative to its parent is
 //! ```text
 //! θ = θ_p + s·p
 //! x = x_p + (R_p − 1)·arm_p + s·R(ψ)·w − (R − 1)·arm

@@ -80,7 +80,7 @@ pub(super) struct ClosureShape<T> {
 }
 
 impl<T: Real> MechanismConstants<T> {
-    /// Lays out one variant per lane; all have the same tree and loops. Fewer variants than lanes are repeated.
+    /// Builds one variant per lane; all have the same tree and loops. Fewer variants than lanes are repeated.
     pub(super) fn new(variants: &[&Linkage], plan: Plan) -> Self {
         let linkage = variants[0];
         let count = linkage.links.len();

@@ -11,7 +11,7 @@
 //! | `plane_vector` | vectors of the plane |
 //! | `schedule` | symbolic phase: front of each body, constraint rows passing it, arena offsets |
 //! | `mechanism` | constant data: geometry and inertia over lanes, and the schedule |
-//! | `poses` | where bodies are, how they move, and how they hang on each other |
+//! | `poses` | poses and rates of bodies, and offsets from their parents |
 //! | `data` | variable data: input of a reduction beside the mechanism, and its workspace |
 //! | `kinematics` | outward: poses, rates, joint axes, velocity parts |
 //! | `closures` | the rows of loop closures and their velocity parts |

@@ -1,4 +1,4 @@
-//! Where bodies are, how they move, and how each hangs on its parent, over lanes.
+//! Poses and rates of bodies, and their offsets from their parents, over lanes.
 
 use super::mechanism::MechanismConstants;
 use super::plane_vector::{LinkageVector, minus, turned};
@@ -26,7 +26,7 @@ pub struct ParentOffset<T> {
     pub bias: LinkageVector<T>,
 }
 
-/// Where all bodies are and how they hang together.
+/// Poses and rates of all bodies, and their offsets.
 #[derive(Debug, Clone)]
 pub struct MechanismKinematics<T> {
     pub placed: Vec<BodyKinematics<T>>,

@@ -1,7 +1,7 @@
 //! Recursive coordinate reduction: accelerations in O(n + m).
 //!
 //! 1. outward: poses, rates and velocity parts (`kinematics`), rows of the closures (`closures`);
-//! 2. inward, leaf → root: each body's joint coordinates leave its front (`front`), loops on the way;
+//! 2. inward, leaf → root: each body's joint coordinates are eliminated from its front (`front`), with its loops;
 //! 3. outward, root → leaf: accelerations.
 //!
 //! No matrix is assembled: a body's front is its articulated inertia, its couplings to the few bodies that a loop ties it

@@ -46,7 +46,7 @@ pub trait Traversed: Real {
 
 /// The passes over all bodies. All traversals give bit-identical results.
 pub trait Traversal<T: Traversed>: Sized + Clone + Debug + Send + Sync + 'static {
-    /// Lays the way out; none where one after the other is as good.
+    /// Builds the traversal; `None` where one after the other is as good.
     fn new(linkage: &Linkage, reduction: &Reduction<T>) -> Option<Box<Self>>;
 
     /// Places all bodies.

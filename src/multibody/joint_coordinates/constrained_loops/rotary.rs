@@ -4,7 +4,7 @@
 //! loops. The axial direction (type 4) is rigid too; heat and residual stress prescribe its offset, a gap function.
 //!
 //! **Counts.** The paper counts every joint as a coordinate and cuts loops through bodies, three constraints for each.
-//! A tree here hangs on the joints, so a loop is cut at a joint instead: two constraints, and its rotation no
+//! A tree here consists of joints, so that a loop is cut at a joint instead: two constraints, and its rotation is no
 //! coordinate. [`CoordinateCounts`] gives the paper's numbers; n − m, the number of degrees of freedom, is the same.
 //! With every beam in two segments (its question 1), a bank has 12 joints per bimorph: hot arm, tip bar, cold arm,
 //! flexure, link, and its part of yoke and tether. The quarter stage of ten has n = 10·12 + 3 = 123, including the
@@ -19,7 +19,7 @@ use nalgebra::Matrix3;
 /// Coordinates and constraints as the paper counts them: loops cut through bodies, the last body free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CoordinateCounts {
-    /// Generalized coordinates: directions of joints that move, and three for each part that hangs together.
+    /// Generalized coordinates: moving directions of joints, and three for each connected part.
     pub coordinates: usize,
     /// Closed loops, those through ground included.
     pub loops: usize,
@@ -28,7 +28,7 @@ pub struct CoordinateCounts {
 }
 
 impl JointSection {
-    /// Takes the couplings of its directions away and keeps what each gives way by alone: where the others are rigid, a
+    /// Removes the couplings of its directions and keeps the compliance of each alone: where the others are rigid, a
     /// spring half a segment away must not stiffen the rotation.
     fn uncouple(&mut self) {
         let [uu, ug, up, gg, gp, pp] = self.stiffness.0;
@@ -45,7 +45,7 @@ impl JointSection {
         self.stiffness.0[5] > 0.0 && (self.locked[1] || self.second != [0.0; 3])
     }
 
-    /// True for a joint that turns and gives way in no other direction.
+    /// True for a joint that rotates and is rigid in all other directions.
     pub fn only_turns(&self) -> bool {
         self.locked == [true, true, false]
     }

@@ -2,8 +2,8 @@
 //! bodies, and all arena offsets.
 //!
 //! Constraint rows enter at the body of their closure that is eliminated first. There and at every body they pass, each
-//! joint coordinate takes one row with it (a dependent coordinate, in the words of the reduction), and the rest goes on to
-//! the next body that it touches. A row that reaches no body any more is redundant by count.
+//! joint coordinate takes one row with it (a dependent coordinate, in the words of the reduction), and the rest moves
+//! to the next body that it touches. A row that reaches no body any more is redundant by count.
 //!
 //! It is read at every reduction, so its indices are 32 bits wide.
 

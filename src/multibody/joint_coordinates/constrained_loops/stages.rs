@@ -1,7 +1,7 @@
 //! The same reduction for a stage of an implicit method: contributions of damping and stiffness to the inertia.
 //!
-//! A stage looks for accelerations q̈ that the forces at q + β·q̈, q̇ + γ·q̈ give. Newton's method takes the forces' change
-//! along, so that the inertia M becomes
+//! A stage solves for accelerations q̈ that the forces at q + β·q̈, q̇ + γ·q̈ give. Newton's method takes the forces'
+//! change along, so that the inertia M becomes
 //! ```text
 //! W = M + γ·C + β·K
 //! ```
@@ -136,7 +136,7 @@ impl Reduction<f64> {
         met
     }
 
-    /// Lays what is added where the turns find it.
+    /// Stores the added inertia for the elimination of each body.
     fn lay(&mut self, added: &AddedInertia) {
         let own = added.joints.iter().zip(&added.bodies.diagonal);
         self.work.added.extend(own.map(|(&joint, block)| StageInertia {

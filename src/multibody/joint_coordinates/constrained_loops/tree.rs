@@ -1,8 +1,9 @@
 //! The spanning tree and the loops of a model: relative joint coordinates and closures.
 //!
-//! The tree follows the elimination order of the body graph, which [`crate::multibody::order`] lays leaf → root. A body
-//! hangs on one that is eliminated later, or on ground; a body whose neighbours have all gone before it (the shuttle of a
-//! bank) is a root that moves freely and brings three coordinates of its own. The joints that are left over close loops.
+//! The tree follows the elimination order of the body graph, which [`crate::multibody::order`] computes leaf → root. A
+//! body's parent is one that is eliminated later, or ground. A body whose neighbours are all eliminated before it (the
+//! shuttle of a bank) is a root that moves freely and has three coordinates of its own. The joints that are left over
+//! close loops.
 //!
 //! A joint has three directions (axial u, shear g, rotation p, see [`crate::multibody::planar`]), each free, elastic or
 //! locked. On the tree the directions that are not locked are the n generalized coordinates, with the strains of the joint
@@ -24,7 +25,7 @@ pub enum LinkageParent {
     Free,
 }
 
-/// A body with the joint that it hangs on.
+/// A body with the joint to its parent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkageBody {
     /// Its parent.

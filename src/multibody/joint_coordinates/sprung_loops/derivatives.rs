@@ -6,7 +6,7 @@ use super::poses::{LaneJointStates, place_of};
 use super::tree::{Tree, TreeParent};
 use crate::multibody::planar::Pose;
 
-/// A body on the way: pose, rate and acceleration, and how it is turned.
+/// Intermediate state of a body: pose, rate and acceleration, and its rotation.
 #[derive(Debug, Clone, Copy)]
 struct ChangingBody {
     moved: [Triple<Dual>; 3],
@@ -24,7 +24,7 @@ const GROUND: ChangingBody = ChangingBody {
 pub struct Changes {
     places: Vec<ChangingBody>,
     maps: Vec<MotionMap<Dual>>,
-    /// Sums of wrenches on the way to the root.
+    /// Sums of wrenches towards the root.
     sums: Vec<Triple<Dual>>,
 }
 

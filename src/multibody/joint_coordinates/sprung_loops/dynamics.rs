@@ -26,8 +26,8 @@ impl TreeJoint {
 }
 
 impl TreeKinematics {
-    /// Minus the force over the coordinates that wrenches on the bodies and the tree's springs leave: `wrench` becomes its sum over everything
-    /// that hangs on each body.
+    /// Minus the force over the coordinates from wrenches on the bodies and the tree's springs. `wrench` becomes its
+    /// sum over the subtree of each body.
     #[inline]
     pub fn resist(&self, tree: &Tree, stresses: &Stresses, wrench: &mut [Pose], out: &mut [Four]) {
         Arch::new().dispatch(Resist { placed: self, tree, stresses, wrench, out });

@@ -1,7 +1,7 @@
 //! The stiffness that a force brings: second derivatives of a body's place, times the wrench on it.
 //!
 //! At an equilibrium Π(s) has the second derivative K + Jᵀ·Π_body″·J + Σ_c f_c·∂²x_c/∂(θ_m, s)², with f_c the force on
-//! everything that hangs on body c. The last sum has four variables a joint, and its coefficients are those of the bias of
+//! the subtree of body c. The last sum has four variables a joint, and its coefficients are those of the bias of
 //! [`super::kinematics`], which is the same second derivative.
 
 use super::kinematics::{MotionMap, dot};
@@ -27,8 +27,9 @@ impl Geometric {
         Self { own: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), cross: [0.0; 3], turn: 0.0 };
 }
 
-/// Fills in `out` at coordinates `q`, where the bodies have been placed; `force` holds the wrench on everything that hangs on
-/// each body, as [`TreeKinematics::resist`] leaves it. Arms and openings are taken from the maps: nothing is turned again.
+/// Fills in `out` at coordinates `q`, where the bodies have been placed; `force` holds the wrench on the subtree of
+/// each body, as [`TreeKinematics::resist`] leaves it. Arms and openings are taken from the maps: nothing is turned
+/// again.
 pub fn fill(tree: &Tree, placed: &TreeKinematics, q: impl Fn(usize) -> Pose, force: &[Pose], out: &mut [Geometric]) {
     for (j, link) in tree.links.iter().enumerate() {
         out[j] =

@@ -1,4 +1,4 @@
-//! How a body hangs on its parent: pose, rate and acceleration less the parent's, and the map of motion.
+//! Kinematics of a body relative to its parent: pose, rate and acceleration, and the map of motion.
 //!
 //! With m the parent, c the body, σ the sign of the joint, d = u·e₁(ψ) + g·e₂(ψ) the opening at the joint, ψ = β + (θ_m + θ_c)/2,
 //! u = e_u − [g p]Q[g p]ᵀ, r the turned arms, and t(·) a right angle's turn:

@@ -25,7 +25,7 @@ struct LaneClosures {
 pub struct Loops(Vec<LaneClosures>);
 
 impl Loops {
-    /// Lays out `joints` of `model`.
+    /// Builds the kernels of `joints` of `model`.
     pub fn new(model: &Model, joints: &[PackedJoint]) -> Self {
         Self(joints.chunks(LANES).map(|joints| LaneClosures::new(model, joints)).collect())
     }

@@ -8,8 +8,8 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | [`tree`] | which body hangs on which, directions that move; closures |
-//! | [`kinematics`] | how a body hangs on its parent, and the maps of motion |
+//! | [`tree`] | parents of bodies, moving directions; closures |
+//! | [`kinematics`] | kinematics of a body relative to its parent, and the maps of motion |
 //! | [`poses`] | poses, rates and accelerations, root → leaf, eight bodies per vector |
 //! | [`dual`] | a value with its derivative |
 //! | [`derivatives`] | the change of where bodies are, over those |

@@ -1,8 +1,8 @@
 //! Poses, rates and accelerations of the bodies from the coordinates, root → leaf, eight bodies per vector.
 //!
-//! Bodies stand in tiles of eight as they are eliminated. First the rotations are summed along the tree, one body after the
-//! other; then each body of a tile finds in a lane of its own how it hangs on its parent ([`super::kinematics`]); then displacements are
-//! summed. Lanes beyond the last body hold nothing.
+//! Bodies stand in tiles of eight as they are eliminated. First the rotations are summed along the tree, one body after
+//! the other. Then each body of a tile computes its offset from its parent in a lane of its own
+//! ([`super::kinematics`]). Finally displacements are summed. Lanes beyond the last body hold nothing.
 
 use super::kinematics::{
     JointGeometry, JointState, MotionMap, RelativeOffset, RotationState, TreeVector, offset_from_parent,
@@ -71,7 +71,7 @@ pub(crate) const fn tiles(count: usize) -> usize {
     count.div_ceil(LANES)
 }
 
-/// Eight bodies on the way.
+/// Eight bodies in progress.
 #[derive(Debug, Clone, Copy)]
 struct BodyTile {
     /// Rotation; then sine and cosine of half of it.
@@ -183,7 +183,7 @@ impl TreeKinematics {
         }
     }
 
-    /// How each body of a tile hangs on its parent.
+    /// Offset of each body of a tile from its parent.
     #[inline(always)]
     fn attach_to_parents<W: SimdReal>(&mut self, simd: W::Simd, tree: &Tree, t: usize, given: &LaneJointStates) {
         let (mut half, mut spin) = (REST.half, REST.spin);

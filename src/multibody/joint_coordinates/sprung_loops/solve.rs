@@ -1,6 +1,6 @@
 //! Solves with the factors of a form over joint coordinates: wrenches leaf → root, motions root → leaf.
 //!
-//! With L_r = C_r·H⁻¹ and a body's own right side x + Sᵀ·f, f the wrench on everything that hangs on it, its parent takes over
+//! With L_r = C_r·H⁻¹ and a body's own right side x + Sᵀ·f, f the wrench on its subtree, its parent takes over
 //! ```text
 //! Xᵀ·f − L_p·(x + Sᵀ·f) = P·f − L_p·x                P = Xᵀ − L_p·Sᵀ
 //! ```

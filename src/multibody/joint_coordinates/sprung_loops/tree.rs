@@ -1,12 +1,12 @@
-//! The spanning tree of a model: which body hangs on which, and which directions of the joints between them move.
+//! The spanning tree of a model: parents of bodies, and moving directions of the joints between them.
 //!
 //! The tree follows the elimination order of the body graph, leaf → root. A body's parent is ground or a body that is
 //! eliminated later. A body whose neighbours are all eliminated before it (the shuttle of a bank) is a root with three
-//! coordinates of its own. Of the joints that a body could hang by, the tree takes the one with the most locked
-//! directions, then the one that moves most bodies together; the others close loops. **A closure keeps all its
-//! springs**, so that a loop of elastic beams brings no constraint: its springs are one more term of the recursion, as
-//! a gap is. The couplings of tree and closures are those of the graph, and so the pattern of the factor is that of the
-//! model in absolute coordinates.
+//! coordinates of its own. Of the joints of a body, the tree takes the one with the most locked directions, then the
+//! one that moves most bodies together; the others close loops. **A closure keeps all its springs**, so that a loop of
+//! elastic beams brings no constraint: its springs are one more term of the recursion, as a gap is. The couplings of
+//! tree and closures are those of the graph, and so the pattern of the factor is that of the model in absolute
+//! coordinates.
 //!
 //! Coordinates are the strains of the joints, (e_u, g, p) of [`planar`](crate::multibody::planar), in one slot of three for
 //! each body; a locked direction keeps its slot, with the value 0. The slot of a root holds its displacement and rotation.
@@ -91,7 +91,7 @@ pub(super) struct Upward {
 /// Why a model has no tree whose loops close by springs.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum UnsupportedModel {
-    /// Small displacements about the drawn geometry were asked for.
+    /// Small displacements about the drawn geometry were requested.
     #[error("joint coordinates are not small displacements; leave out --linear or take compliant")]
     Linear,
     /// A body rotates without inertia: the residual rotation of a step would leak, with the rotating axes, into

@@ -22,7 +22,7 @@ pub struct LaneEquilibrium {
     pub(super) force: Vec<LanePose>,
     pub(super) residual: Vec<LanePose>,
     pub(super) prediction: Vec<LanePose>,
-    /// Not zero for lanes that go on.
+    /// Not zero for lanes that continue.
     pub(super) goes: Lane8,
     pub(super) negative: Lane8,
     pub(super) vanished: [bool; LANES],

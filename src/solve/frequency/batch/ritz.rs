@@ -1,7 +1,7 @@
 //! Rayleigh–Ritz over lanes: A·v = λ·B·v for small matrices with B definite, by Cholesky and Jacobi.
 //!
-//! Shapes are near modes already, so that the matrices are near diagonal, and sweeps of rotations settle quadratically. There are
-//! always as many of them: a lane does not wait for another, nor does it go on for one.
+//! Shapes are near modes already, so that the matrices are near diagonal, and sweeps of rotations settle quadratically.
+//! Their number is fixed: a lane neither waits for another nor continues for one.
 //!
 //! Reference: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), §8.5.
 

@@ -79,9 +79,10 @@ const MAX_REJECTED: usize = 60;
 const BETA: f64 = 0.04;
 
 impl DormandPrince {
-    /// Integrates `(q, v)` from `span.0` to `span.1` [s]. `h` is the first step to try (0: found from the accelerations)
-    /// and receives the one that would come next. `observe` sees each accepted step and answers whether to go on; `None`
-    /// is returned when the end was reached, and the time where `observe` stopped otherwise.
+    /// Integrates `(q, v)` from `span.0` to `span.1` [s]. `h` is the first step to try (0: found from the
+    /// accelerations) and receives the one that would come next. `observe` receives each accepted step and returns
+    /// whether to continue. `None` is returned when the end was reached, and the time where `observe` stopped
+    /// otherwise.
     ///
     /// # Errors
     /// See [`IntegrationError`]; `(q, v)` is then the end of the last accepted step.

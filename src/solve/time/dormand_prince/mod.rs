@@ -1,8 +1,8 @@
 //! The explicit Runge–Kutta pair of Dormand and Prince, order 5 with an embedded order 4, for q̈ = a(t, q, q̇).
 //!
 //! A step depends on no bodies or joints: any caller with accelerations can use it. [`super::explicit`] makes it one of
-//! the methods that the common driver takes; mechanisms without a system, which want tolerances down to 1e-13, are
-//! driven by [`DormandPrince::integrate`] ([`SecondOrder`]). With y = (q, q̇) a step is
+//! the methods of the common driver. Mechanisms without a system, with tolerances down to 1e-13, use
+//! [`DormandPrince::integrate`] ([`SecondOrder`]). With y = (q, q̇) a step is
 //! ```text
 //! y_i = y + h·Σ_{j<i} a_ij·k_j      k_i = (q̇_i, a(t + c_i·h, q_i, q̇_i))        i = 1 … 7
 //! y'  = y_7                         error = h·Σ e_i·k_i
@@ -209,7 +209,7 @@ impl<X: Unknown> DormandPrince<X> {
         std::mem::swap(&mut self.carry, &mut self.at);
     }
 
-    /// Forgets what rounding has cut off: the next step starts from another point.
+    /// Drops the rounding remainder: the next step starts from another point.
     pub fn forget(&mut self) {
         self.carry.clear();
     }

@@ -122,8 +122,8 @@ fn projection_keeps_a_constraint() {
     assert!(energy.abs() < 9.81 * 1e-4, "{energy:e}");
 }
 
-/// Where the formulation has no accelerations, the error names the time and what it said, and the motion stands at the
-/// last accepted step.
+/// Without accelerations of the formulation, the error names the time and the cause, and the motion stands at the last
+/// accepted step.
 #[test]
 fn no_accelerations() {
     let (mut q, mut v, mut h) = (start().0, start().1, 0.0);

@@ -1,7 +1,7 @@
 //! Equal subtrees of one mechanism, reduced together with one subtree per lane.
 //!
-//! Subtrees that are equal in structure (`subtrees`) are laid into packs of eight (`packing`), one to a lane, and all packs
-//! into one linkage over lanes, with the bodies that they share with the rest at its end. That linkage runs through the same
+//! Structurally equal subtrees (`subtrees`) are placed into packs of eight (`packing`), one to a lane. All packs form
+//! one linkage over lanes, with the bodies that they share with the rest at its end. That linkage runs through the same
 //! recursion as lanes of variants:
 //!
 //! - outward, the shared bodies' poses are copied into it, and its subtrees are placed;
@@ -10,7 +10,7 @@
 //!   and all results are bit-identical to the recursion without packs;
 //! - outward, the shared bodies' accelerations are copied into it, and its own go back.
 //!
-//! Poses and rates stay in the lanes until someone asks for them. A pack that is not full repeats its last subtree.
+//! Poses and rates stay in the lanes until they are requested. A pack that is not full repeats its last subtree.
 
 mod exchange;
 mod packing;

@@ -1,4 +1,4 @@
-//! Lays the schedule out: one sweep over the bodies in elimination order.
+//! Computes the schedule: one sweep over the bodies in elimination order.
 
 use super::slots::Slots;
 use super::{ClosureEntry, EliminationKind, EliminationStep, NONE, PackedElimination, Plan, Schedule};
@@ -43,7 +43,7 @@ struct SymbolicSweep<'a> {
     support: Vec<Vec<usize>>,
     nodes: Slots,
     blocks: Slots,
-    /// Joints laid so far that are no pins.
+    /// Joints other than pins so far.
     joint: u32,
     schedule: Schedule,
 }

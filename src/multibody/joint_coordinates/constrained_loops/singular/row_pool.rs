@@ -30,8 +30,8 @@ pub(in crate::multibody::joint_coordinates::constrained_loops) struct RowPool {
     pub(super) kept: Vec<u32>,
     pub(super) sizes: Vec<f64>,
     pub(super) spare: Vec<f64>,
-    /// How each coordinate is found on the way out, x = (rhs − row·others)/pivot: rows of all bodies, in the order in which
-    /// the coordinates were taken out.
+    /// Back-substitution of each coordinate, x = (rhs − row·others)/pivot: rows of all bodies, in the order of
+    /// elimination.
     taken: Vec<f64>,
     /// Where those of each body start.
     taken_start: Vec<usize>,

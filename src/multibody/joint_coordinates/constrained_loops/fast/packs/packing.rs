@@ -1,4 +1,4 @@
-//! How equal subtrees are laid into packs, once for a mechanism.
+//! Placement of equal subtrees into packs, once for a mechanism.
 
 use super::subtrees::equal;
 use super::{FirstOfSubtree, PackContribution, PackedReal, Packing, Packs, RemainingStep, SubtreePack, WIDTH};

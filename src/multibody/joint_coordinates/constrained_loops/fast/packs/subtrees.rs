@@ -1,12 +1,12 @@
 //! Structurally equal subtrees of one mechanism, for packs.
 //!
-//! A subtree here is one of the elimination tree: a body with all bodies whose elimination changes its front. Everything that
-//! a subtree's bodies couple to lies in it, or in the front of its root, the **shared** bodies. Joints, closures and fill all
-//! obey this, so nothing else has to be looked at.
+//! A subtree here is one of the elimination tree: a body with all bodies whose elimination changes its front.
+//! Everything that a subtree's bodies couple to lies in it, or in the front of its root, the **shared** bodies. Joints,
+//! closures and fill all obey this, so nothing else has to be checked.
 //!
-//! Two subtrees are equal when their bodies, in elimination order, have the same kinds of joints and closures and the same
-//! fronts, counted from the subtree; only geometry, masses and stiffnesses may differ. Bodies are numbered by what they are
-//! and by what hangs in them, leaf → root, so a mechanism is compared in one sweep.
+//! Two subtrees are equal when their bodies, in elimination order, have the same kinds of joints and closures and the
+//! same fronts, counted from the subtree; only geometry, masses and stiffnesses may differ. Bodies are numbered by
+//! their kind and by their subtrees, leaf → root, so that a mechanism is compared in one sweep.
 
 use crate::multibody::joint_coordinates::constrained_loops::schedule::{ClosureEntry, NONE, Schedule};
 use crate::multibody::joint_coordinates::constrained_loops::tree::{Closure, Linkage, LinkageParent};
