@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import pickle
 import signal
@@ -206,6 +207,89 @@ def test_a_session_of_a_batch_that_fails_stops_alone(model: bimorph.Model) -> No
         assert np.isfinite(run.signals["m.x"][[0, 2]]).all()
         with pytest.raises(bimorph.InvalidRequest, match="different times"):
             batch.step({}, 1e-6)
+
+
+def states(batch: bimorph.Batch) -> list[tuple[float, int]]:
+    """Time and name of the accepted state of each session."""
+    return [(session.t, session.accepted.token if session.accepted else 0) for session in batch.sessions]
+
+
+@pytest.mark.usefixtures("interrupts")
+@pytest.mark.parametrize("part", [1 << 20, 300_000])
+def test_an_interrupted_batch_keeps_every_state(model: bimorph.Model, monkeypatch: pytest.MonkeyPatch, part: int) -> None:
+    """Ctrl-C in a run of a batch, whose lanes are at different steps, leaves every session in the state before, also where one request has few
+    of the lanes. The next run has the bits of an undisturbed one."""
+    times, volts = course(60)
+    with bimorph.Batch.of([model] * 5, ["m.x"]) as batch:
+        batch.operating_point({"drive": 1.0})
+        expected = batch.run(times, {"drive": volts}).signals["m.x"].tolist()
+    monkeypatch.setattr("bimorph.runs._PART", part)
+    with bimorph.Batch.of([model] * 5, ["m.x"], timeout=20.0) as batch:
+        batch.operating_point({"drive": 1.0})
+        before = states(batch)
+        long = 1e-7 * np.arange(1, 300_001)
+        for delay in (0.05, 0.3, 0.9):
+            threading.Timer(delay, signal.raise_signal, [signal.SIGINT]).start()
+            with pytest.raises(KeyboardInterrupt):
+                for _ in range(100):
+                    batch.run(long, {"drive": 1.5})
+            assert states(batch) == before
+        assert batch.run(times, {"drive": volts}).signals["m.x"].tolist() == expected
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_a_batch_that_fails_keeps_every_state(model: bimorph.Model, monkeypatch: pytest.MonkeyPatch, workers: int) -> None:
+    """A session that is closed on the server, or here, ends a run, a step and an operating point of the batch; all sessions keep their states,
+    those whose lanes had ended too."""
+    monkeypatch.setattr("bimorph.batch.workers", lambda channel, lanes: workers)
+    times, volts = course(60)
+    with bimorph.Batch.of([model] * 5, ["m.x"]) as batch:
+        batch.operating_point({"drive": np.arange(5.0)})
+        batch.run(times, {"drive": volts})
+        before = states(batch)
+        lost = batch.sessions[3]
+        model._channel.call("Close", bimorph.v1.device_pb2.CloseRequest(session=lost._session))
+        with pytest.raises(bimorph.BimorphError):
+            batch.run(times[-1] + times, {"drive": volts})
+        assert states(batch) == before
+        with pytest.raises(bimorph.BimorphError):
+            batch.operating_point({"drive": 2.0})
+        assert states(batch) == before
+        lost.close()
+        for call in (lambda: batch.run(times[-1] + times, {"drive": volts}), lambda: batch.step({}, 1e-6), lambda: batch.operating_point({"drive": 2.0})):
+            with pytest.raises(bimorph.BimorphError, match="closed"):
+                call()
+            assert states(batch) == before
+        for session in batch.sessions[:3]:
+            session.step({"drive": 1.0}, 1e-6)
+
+
+def test_a_batch_of_kept_sessions_is_accepted_as_a_whole(client: bimorph.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the third of five kept sessions cannot accept, those before accept their old states again: no session has moved, here or on the server."""
+    model = client.compile(bimorph.Netlist.text(PLATE, "plate.net"))
+    with contextlib.ExitStack() as stack:
+        sessions = [stack.enter_context(model.session(["m.x"], kept=True)) for _ in range(5)]
+        batch = bimorph.Batch(sessions)
+        batch.operating_point({"drive": 1.0})
+        asked: list[tuple[int, int]] = []
+        for session in sessions:
+            session.kept = True
+
+        def tell(self: bimorph.Session, reply: bimorph.TrialReply) -> None:
+            asked.append((sessions.index(self), reply.token))
+            if len(asked) == 3:
+                raise bimorph.Unavailable("the third")
+
+        before = states(batch)
+        monkeypatch.setattr(bimorph.Session, "_tell_accepted", tell)
+        with pytest.raises(bimorph.Unavailable, match="the third"):
+            batch.run([1e-6, 2e-6], {"drive": 2.0})
+        assert states(batch) == before
+        assert [k for k, _ in asked] == [0, 1, 2, 0, 1, 2]
+        assert [token for _, token in asked[3:]] == [token for _, token in before[:3]]
+        monkeypatch.undo()
+        for session in sessions:
+            session.kept = False
 
 
 def test_variants_are_a_batch(client: bimorph.Client) -> None:

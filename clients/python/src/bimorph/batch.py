@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import contextlib
 import contextvars
-from collections.abc import Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .acceptance import State, accept_together
 from .arguments import MAX_STEP, instance, items, mapping, number
 from .errors import InvalidRequest
 from .model import Model
 from .runs import Array, Given, Lane, advance, checked_signals, checked_times, numbers, port_values, workers
 from .session import Session
 from .stopping import Stopping, current
+
+_LOOK = 0.1
+"""Longest wait between two checks for signals [s]."""
 
 
 @dataclass(frozen=True)
@@ -113,41 +117,50 @@ class Batch:
         return np.array([session.t for session in self.sessions])
 
     def operating_point(self, voltages: Given) -> None:
-        """Static equilibrium of each session at these port voltages [V], at t = 0: a number for all, or one for each session."""
+        """Static equilibrium of each session at these port voltages [V], accepted, at t = 0: a number for all, or one for each session.
+
+        It is taken as a whole: where one equilibrium is not found, or the call is interrupted, every session keeps its state.
+        """
         count = len(self.sessions)
         held = {}
         for port, value in mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}').items():
             held[port] = numbers(f"voltages[{port!r}]", value)
             if held[port].shape not in ((), (count,)):
                 raise InvalidRequest(f"voltages[{port!r}]: expected a number, or one for each of {count} sessions, got shape {held[port].shape}")
-        for k, session in enumerate(self.sessions):
-            session.operating_point({port: float(value if value.ndim == 0 else value[k]) for port, value in held.items()})
+        with self._locked():
+            states: list[State] = []
+            for k, session in enumerate(self.sessions):
+                given = {port: float(value if value.ndim == 0 else value[k]) for port, value in held.items()}
+                reply = replace(session.trial(given), t=0.0)
+                states.append((session, reply, dict(reply.voltages)))
+            accept_together(states)
 
     def run(self, times: ArrayLike, voltages: Given, signals: Sequence[str] | None = None) -> BatchRun:
         """Steps every session to each of these times [s] in turn. ``voltages`` are for each port a number, one for each time, or an array of a
         row for each session. A session that cannot take a step stops there, and the others go on.
+
+        The batch is taken as a whole: interrupted, or where a session cannot be reached, every session keeps its state (with more than a million
+        port values for a session: all stand at the end of the same part of the times).
         """
-        count = len(self.sessions)
-        t = checked_times(times, float(self.t.max()))
-        wanted = checked_signals(signals, self.signals)
-        mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
-        varied = any(np.ndim(value) == 2 for value in voltages.values())
-        alike = not varied and all(session._voltages == self.sessions[0]._voltages for session in self.sessions)
-        shared = port_values(self.sessions[0], voltages, len(t)) if alike else None
-        lanes = [
-            Lane.of(
-                session,
-                shared if shared is not None else port_values(session, voltages, len(t), k, count),
-                len(t),
-                len(wanted),
-                True,
-            )
-            for k, session in enumerate(self.sessions)
-        ]
-        with contextlib.ExitStack() as locks:
-            for session in self.sessions:
-                locks.enter_context(session._lock)
-            self._advance(lanes, t, wanted)
+        with self._locked():
+            count = len(self.sessions)
+            t = checked_times(times, float(self.t.max()))
+            wanted = checked_signals(signals, self.signals)
+            mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
+            varied = any(np.ndim(value) == 2 for value in voltages.values())
+            alike = not varied and all(session._voltages == self.sessions[0]._voltages for session in self.sessions)
+            shared = port_values(self.sessions[0], voltages, len(t)) if alike else None
+            lanes = [
+                Lane.of(
+                    session,
+                    shared if shared is not None else port_values(session, voltages, len(t), k, count),
+                    len(t),
+                    len(wanted),
+                    True,
+                )
+                for k, session in enumerate(self.sessions)
+            ]
+            advance(lanes, t, wanted, True, divide=self._divide)
         return _gathered(lanes, t, wanted)
 
     def step(self, voltages: Given, dt: float) -> BatchRun:
@@ -161,15 +174,24 @@ class Batch:
         spread = {p: np.reshape(v, (count, 1)) if np.shape(v) == (count,) else v for p, v in voltages.items()}
         return self.run([float(now[0]) + dt], spread)
 
-    def _advance(self, lanes: list[Lane], t: Array, wanted: list[str]) -> None:
-        channel = self.sessions[0]._channel
-        parts = workers(channel, len(lanes))
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        """No other thread uses one of the sessions meanwhile."""
+        with contextlib.ExitStack() as locks:
+            # in one order, so that two batches with the same sessions do not wait for each other
+            for session in sorted(self.sessions, key=id):
+                locks.enter_context(session._lock)
+            yield
+
+    def _divide(self, lanes: Sequence[Lane], request: Callable[[Sequence[Lane]], None]) -> None:
+        """Divides lanes among threads. Returns, or raises, when all of them have ended."""
+        parts = workers(self.sessions[0]._channel, len(lanes))
         if parts == 1:
-            advance(lanes, t, wanted, True)
+            request(lanes)
             return
         if self._pool is None:
             self._pool = ThreadPoolExecutor(parts, thread_name_prefix="bimorph-batch")
-        outer, own = current.get(), [Stopping() for _ in range(parts)]
+        pool, outer, own = self._pool, current.get(), [Stopping() for _ in range(parts)]
 
         def stop() -> None:
             for stopping in own:
@@ -181,12 +203,18 @@ class Batch:
 
         def part(k: int) -> None:
             current.set(own[k])
-            advance(lanes[ends[k] : ends[k + 1]], t, wanted, True)
+            request(lanes[ends[k] : ends[k + 1]])
 
-        jobs: list[Future[Any]] = [self._pool.submit(contextvars.copy_context().run, part, k) for k in range(parts)]
+        jobs: list[Future[Any]] = []
         try:
-            for job in jobs:
-                job.result()
+            for k in range(parts):
+                jobs.append(pool.submit(contextvars.copy_context().run, part, k))
+            ended: set[Future[Any]] = set()
+            while len(ended) < parts:
+                # a signal that another thread has received is handled between two waits
+                ended = wait(jobs, _LOOK, FIRST_EXCEPTION).done
+                for job in ended:
+                    job.result()
         except BaseException:
             stop()
             for job in jobs:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import showing
+from .acceptance import State, accept_together
 from .arguments import mapping, names, one_of, wrong_type
 from .channel import Channel
 from .errors import InvalidRequest, StepFailed, Unavailable, shown
@@ -105,13 +106,13 @@ class Lane:
         width = len(session.ports) if ports else 0
         return cls(session, values, np.empty((steps, signals)), np.empty((steps, width)), np.empty((steps, width)))
 
-    def settle(self, times: Array) -> None:
-        """The session goes on from the last step."""
+    def state(self, times: Array) -> State | None:
+        """State after the last step; None before any."""
         if self.last is None:
-            return
+            return None
         row = self.values[min(self.done, len(self.values)) - 1].tolist()
         reply = self.session._named(self.last, float(times[self.done - 1]), row)
-        self.session._accept(reply, dict(reply.voltages))
+        return self.session, reply, dict(reply.voltages)
 
 
 class Runs:
@@ -159,20 +160,36 @@ def advance(
     signals: Sequence[str],
     ports: bool,
     progress: Callable[[float], object] | None = None,
+    divide: Callable[[Sequence[Lane], Callable[[Sequence[Lane]], None]], None] | None = None,
 ) -> None:
-    """Runs sessions of one channel along the same times, and lets each go on from its last step. Each lane has its results."""
-    width = max((len(lane.session.ports) for lane in lanes), default=1) * len(lanes)
-    part = max(_PART // max(width, 1), 1)
-    for first in range(0, len(times), part):
+    """Runs sessions of one channel along the same times; each lane has its results.
+
+    All sessions take the states after their last steps at once, when every request has ended. Where this raises, all of them keep the states
+    that they had: of a run with more than :data:`_PART` port values of a session, those after the same part of the times. ``divide`` calls its second
+    argument with the lanes, by default once; it may do so in several threads.
+    """
+    width = max((len(lane.session.ports) for lane in lanes), default=1)
+    size = max(_PART // max(width, 1), 1)
+    for first in range(0, len(times), size):
         check()
         here = [lane for lane in lanes if not lane.error]
         if not here:
             return
         for lane in here:
-            lane.session._own()
-        _advance(here, times, slice(first, first + part), signals, ports, progress)
-        for lane in here:
-            lane.settle(times)
+            lane.session._usable()
+        part = slice(first, min(first + size, len(times)))
+        together = max(_PART // max(width * (part.stop - part.start), 1), 1)
+
+        def request(some: Sequence[Lane], part: slice = part, together: int = together) -> None:
+            for k in range(0, len(some), together):
+                check()
+                _advance(some[k : k + together], times, part, signals, ports, progress)
+
+        if divide is None:
+            request(here)
+        else:
+            divide(here, request)
+        accept_together([state for lane in here if (state := lane.state(times)) is not None])
 
 
 def _advance(

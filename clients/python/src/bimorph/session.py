@@ -320,6 +320,12 @@ class Session(Runs):
         if self._pid != os.getpid():
             raise BimorphError("a session does not survive a fork; open one in this process")
 
+    def _usable(self) -> None:
+        """Raises the reason why this session cannot be used, if there is one."""
+        self._own()
+        if self._line.over is not None:
+            raise self._line.over
+
     def _ask(self, request: Any) -> Any:
         with self._lock:
             self._own()
