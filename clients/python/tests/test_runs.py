@@ -209,6 +209,34 @@ def test_a_session_of_a_batch_that_fails_stops_alone(model: bimorph.Model) -> No
             batch.step({}, 1e-6)
 
 
+def test_runs_are_shown_as_other_results(plate: bimorph.Model) -> None:
+    """Runs of a session and of a batch are frames, labelled arrays, pictures and tables of a notebook, with units; a session that stopped says why."""
+    times, volts = np.array([1e-6, 2e-6, 1.0]), np.full((3, 3), 2.0)
+    volts[1, 2] = 1e12
+    with plate.session(["m.x", "m.vx"]) as session, bimorph.Batch.of([plate] * 3, ["m.x", "m.vx"]) as batch:
+        run, runs = session.run(times, {"drive": 2.0}), batch.run(times, {"drive": volts})
+    assert "<th>m.vx [m/s]</th>" in run._repr_html_() and run._repr_html_().count("<tr>") == 4
+    assert runs._repr_html_().count("<tr>") == 4 and runs.failures[1].reason.split()[0] in runs._repr_html_()
+    pytest.importorskip("pandas")
+    assert run.to_pandas().attrs["units"] == runs.to_pandas().attrs["units"] == {"t": "s", "m.x": "m", "m.vx": "m/s"}
+    frame = runs.to_pandas()
+    assert frame.index.names == ["session", "t"] and frame.shape == (9, 2)
+    assert frame.loc[(2, 2e-6), "m.x"] == runs.signals["m.x"][2, 1] and np.isnan(frame.loc[(1, 1.0), "m.x"])
+    pytest.importorskip("xarray")
+    labelled, several = run.to_xarray(), runs.to_xarray()
+    assert labelled["m.x"].values.tolist() == run.signals["m.x"].tolist() and labelled["m.vx"].attrs["units"] == "m/s"
+    assert several["m.x"].dims == ("session", "t") and several.t.attrs["units"] == "s" and several["m.x"].attrs["units"] == "m"
+    assert float(several["m.x"].sel(session=2, t=2e-6)) == runs.signals["m.x"][2, 1]
+    pytest.importorskip("matplotlib").use("Agg")
+    from matplotlib import pyplot
+
+    assert [line.get_ydata().tolist() for line in run.plot().get_lines()] == [values.tolist() for values in run.signals.values()]
+    drawn = runs.plot()
+    assert len(drawn.get_lines()) == 6 and drawn.get_xlabel() == "t [s]"
+    assert [text.get_text() for text in drawn.get_legend().get_texts()] == ["m.x [m]", "m.vx [m/s]"]
+    pyplot.close("all")
+
+
 def states(batch: bimorph.Batch) -> list[tuple[float, int]]:
     """Time and name of the accepted state of each session."""
     return [(session.t, session.accepted.token if session.accepted else 0) for session in batch.sessions]

@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import labelled, plots, showing
 from .acceptance import State, accept_together
 from .arguments import MAX_STEP, instance, items, mapping, number
 from .errors import InvalidRequest
@@ -20,6 +21,11 @@ from .model import Model
 from .runs import Array, Given, Lane, advance, checked_signals, checked_times, numbers, port_values, workers
 from .session import Session
 from .stopping import Stopping, current
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
 
 _LOOK = 0.1
 """Longest wait between two checks for signals [s]."""
@@ -54,10 +60,35 @@ class BatchRun:
     failures: dict[int, Failure]
     """By session, where it has stopped before the last time."""
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """A column for each signal, by session, from 0, and time [s]; ``attrs["units"]`` has the units."""
+        columns = {name: values.ravel() for name, values in self.signals.items()}
+        return showing.frame_of_sessions(columns, self._count(), self.t, {"t": "s", **self.units})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The signals over ``session``, from 0, and ``t`` [s], each with its unit in ``attrs["units"]``."""
+        return labelled.of_sessions(self.t, self.signals, self.units)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws every signal over time: a colour for each signal, and a line for each session."""
+        return plots.batch(self, ax)
+
+    def _repr_html_(self) -> str:
+        head = ["session", "steps", *(f"{name} [{unit}]" for name, unit in self.units.items()), ""]
+        failures = [self.failures.get(k) for k in range(self._count())]
+        rows = (
+            [k, steps, *(float(values[k, steps - 1]) if steps else None for values in self.signals.values()), failure.reason if failure else ""]
+            for k, failure in enumerate(failures)
+            for steps in [failure.index if failure else len(self.t)]
+        )
+        return showing.table(head, rows, "signals after the last step of each session")
+
+    def _count(self) -> int:
+        return len(next(iter((self.currents or self.signals).values()), ()))
+
     def __repr__(self) -> str:
         lost = f", {len(self.failures)} stopped early" if self.failures else ""
-        rows = len(next(iter((self.currents or self.signals).values()), ()))
-        return f"<BatchRun of {rows} sessions, {len(self.t)} steps: {', '.join(self.signals) or 'no signals'}{lost}>"
+        return f"<BatchRun of {self._count()} sessions, {len(self.t)} steps: {', '.join(self.signals) or 'no signals'}{lost}>"
 
 
 class Batch:

@@ -26,6 +26,15 @@ def dataset(
     return found
 
 
+def of_sessions(t: Any, columns: Mapping[str, Any], units: Mapping[str, str]) -> xarray.Dataset:
+    """Arrays over sessions and times [s], each with its unit."""
+    xr = _xarray()
+    variables = {name: (("session", "t"), np.asarray(values), {"units": units[name]}) for name, values in columns.items()}
+    count = max((len(values) for values in columns.values()), default=0)
+    found: xarray.Dataset = xr.Dataset(variables, coords={"session": np.arange(count), "t": ("t", np.asarray(t), {"units": "s"})})
+    return found
+
+
 def of_table(table: Table) -> xarray.Dataset:
     """A sweep over a full grid with an axis for each parameter; any other over its points, with parameters as coordinates."""
     xr = _xarray()

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arguments import text
 from .errors import InvalidRequest
@@ -14,8 +16,11 @@ from .showing import axes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .results import FrequencyResponse, ModesResult, PullInResult, StaticResult, TransientResult
+    from .batch import BatchRun
+    from .results import FrequencyResponse, ModesResult, PullInResult, StaticResult
     from .table import Table
+
+Array = NDArray[np.float64]
 
 _LONGEST = 40
 """Names that stand on an axis."""
@@ -74,13 +79,27 @@ def response(result: FrequencyResponse, ax: Axes | None) -> Axes:
     return ax
 
 
-def transient(result: TransientResult, ax: Axes | None) -> Axes:
+def over_time(t: Array, signals: Mapping[str, Array], units: Mapping[str, str], ax: Axes | None) -> Axes:
     """Every signal over time, in its unit."""
     ax = axes(ax)
-    for name, values in result.signals.items():
-        ax.plot(result.t, values, label=f"{name} [{result.units[name]}]")
+    for name, values in signals.items():
+        ax.plot(t, values, label=f"{name} [{units[name]}]")
     ax.set_xlabel("t [s]")
-    ax.legend()
+    if signals:
+        ax.legend()
+    return ax
+
+
+def batch(result: BatchRun, ax: Axes | None) -> Axes:
+    """Every signal of every session over time: a colour for each signal, and a line for each session."""
+    ax = axes(ax)
+    for k, (name, values) in enumerate(result.signals.items()):
+        lines = ax.plot(result.t, values.T, color=f"C{k % 10}", linewidth=0.8)
+        if lines:
+            lines[0].set_label(f"{name} [{result.units[name]}]")
+    ax.set_xlabel("t [s]")
+    if result.signals:
+        ax.legend()
     return ax
 
 

@@ -324,7 +324,7 @@ class TransientResult:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws every signal over time, in its unit."""
-        return plots.transient(self, ax)
+        return plots.over_time(self.t, self.signals, self.units, ax)
 
     def _repr_html_(self) -> str:
         head = ["t [s]", *(f"{name} [{unit}]" for name, unit in self.units.items())]

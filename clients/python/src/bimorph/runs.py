@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import showing
+from . import labelled, plots, showing
 from .acceptance import State, accept_together
 from .arguments import mapping, names, one_of, wrong_type
 from .channel import Channel
@@ -25,6 +25,8 @@ from .v1 import device_pb2, run_pb2
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
+    from matplotlib.axes import Axes
 
     from .session import Session
 
@@ -62,8 +64,21 @@ class Run:
         return f"<Run of {len(self.t)} steps: {', '.join(self.signals) or 'no signals'}>"
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A column for each signal, by time [s]."""
-        return showing.frame(self.signals, ("t", self.t))
+        """A column for each signal, by time [s]; ``attrs["units"]`` has the units."""
+        return showing.frame(self.signals, ("t", self.t), {"t": "s", **self.units})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same, each signal with its unit in ``attrs["units"]``."""
+        return labelled.dataset(("t", self.t, "s"), self.signals, self.units, {})
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws every signal over time, in its unit."""
+        return plots.over_time(self.t, self.signals, self.units, ax)
+
+    def _repr_html_(self) -> str:
+        head = ["t [s]", *(f"{name} [{unit}]" for name, unit in self.units.items())]
+        rows = zip(self.t.tolist(), *(values.tolist() for values in self.signals.values()))
+        return showing.table(head, rows, f"{self.trials} trials")
 
 
 class RunFailed(StepFailed):

@@ -6,6 +6,8 @@ import html
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .arguments import wrong_type
 
 if TYPE_CHECKING:
@@ -27,6 +29,12 @@ def frame(columns: Mapping[str, Any], index: tuple[str, Any] | None = None, unit
     if units:
         found.attrs["units"] = dict(units)
     return found
+
+
+def frame_of_sessions(columns: Mapping[str, Any], count: int, t: Any, units: Mapping[str, str]) -> pandas.DataFrame:
+    """A table of pandas by session, from 0, and time [s]."""
+    found = frame({"session": np.repeat(np.arange(count), len(t)), "t": np.tile(t, count), **columns}, None, units)
+    return found.set_index(["session", "t"])
 
 
 def arrow(columns: Mapping[str, Sequence[Any]], units: Mapping[str, str], about: Mapping[str, str]) -> pyarrow.Table:
