@@ -117,6 +117,11 @@ def test_a_step_that_fails_names_itself(model: bimorph.Model) -> None:
         ([1e-6], {"drive": "3"}, None, r"voltages\['drive'\]: expected numbers"),
         ([1e-6], {"drive": [1.0, 2.0]}, None, r"voltages\['drive'\]: expected a number, or one for each of 1 times"),
         ([1e-6], {"drive": float("inf")}, None, r"voltages\['drive'\]: expected finite"),
+        ([1e-6], {"drive": [[1.0], [1.0, 2.0]]}, None, r"voltages\['drive'\]: expected numbers .in rows of equal length., got \[\[1.0\], \[1.0, 2.0\]\]"),
+        ([1e-6], {"drive": np.ma.array([1.0], mask=[True])}, None, r"voltages\['drive'\]: expected numbers without masked values"),
+        (np.ma.array([1e-6, 2e-6], mask=[False, True]), {}, None, "times: expected numbers without masked values"),
+        ([[1e-6], [1e-6, 2e-6]], {}, None, "times: expected numbers .in rows"),
+        ([1e-6], {3: 1.0}, None, "voltages: name of a port: expected a text"),
         ([1e-6], {}, "m.x", "signals: expected a list of names"),
         ([1e-6], {}, ["m.y"], r"signals\[0\]: 'm.y' is not among the signals of the session"),
         ([1e-6], {}, [3], r"signals\[0\]: expected a name"),
@@ -128,6 +133,9 @@ def test_what_does_not_fit_is_named(plate: bimorph.Model, times: Any, voltages: 
         session.operating_point({"drive": 1.0})
         with pytest.raises(bimorph.InvalidRequest, match=message):
             session.run(times, voltages, signals)
+        assert session.t == 0.0
+        with pytest.raises(bimorph.InvalidRequest, match=message):
+            bimorph.Batch([session]).run(times, voltages, signals)
         assert session.t == 0.0
 
 
@@ -205,7 +213,7 @@ def test_a_session_of_a_batch_that_fails_stops_alone(model: bimorph.Model) -> No
         assert run.failures[1].reason
         assert np.isnan(run.signals["m.x"][1]).tolist() == [False, False, True, True]
         assert np.isfinite(run.signals["m.x"][[0, 2]]).all()
-        with pytest.raises(bimorph.InvalidRequest, match="different times"):
+        with pytest.raises(bimorph.InvalidRequest, match="dt: expected sessions with one time, got 2e-06 s to 1 s"):
             batch.step({}, 1e-6)
 
 

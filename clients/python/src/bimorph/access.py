@@ -47,26 +47,26 @@ class Access:
         if not (self.token or self.token_file) or address.startswith("unix:"):
             return None
         if not is_secure(address) and not _is_here(target(address)):
-            raise InvalidRequest(f"a token is not sent unencrypted to another machine: write https:// before {address}")
+            raise InvalidRequest(f"token: expected an address that begins with https://, got {address}; a token is not sent unencrypted to another machine")
         return (("authorization", f"Bearer {self.token or self._read()}"),)
 
     def _read(self) -> str:
         assert self.token_file is not None
-        for line in _text("token file", self.token_file).decode(errors="replace").splitlines():
+        for line in _text("token_file", self.token_file).decode(errors="replace").splitlines():
             words = line.split()
             if words and not words[0].startswith("#"):
                 return words[-1]
-        raise InvalidRequest(f"token file {self.token_file}: expected a token, got none")
+        raise InvalidRequest(f"token_file: expected a file with a token, got the empty file {self.token_file}")
 
     def certificates(self) -> tuple[bytes, bytes | None, bytes | None]:
         """Authority, key and certificate of a connection with TLS."""
         if self.ca is None:
-            raise InvalidRequest("https:// needs the certificates of an authority to trust: ca=FILE or BIMORPH_CA")
+            raise InvalidRequest("ca: expected a file with the certificates of an authority to trust for https://, got none; give ca=FILE or set BIMORPH_CA")
         if (self.client_cert is None) != (self.client_key is None):
-            raise InvalidRequest("a client certificate and its key go together: client_cert and client_key")
-        key = None if self.client_key is None else _text("key", self.client_key)
-        own = None if self.client_cert is None else _text("certificate", self.client_cert)
-        return _text("authority", self.ca), key, own
+            raise InvalidRequest(f"{'client_key' if self.client_key is None else 'client_cert'}: expected a file, as the other one of client_cert and client_key is given, got none")
+        key = None if self.client_key is None else _text("client_key", self.client_key)
+        own = None if self.client_cert is None else _text("client_cert", self.client_cert)
+        return _text("ca", self.ca), key, own
 
 
 def is_secure(address: str) -> bool:
@@ -93,4 +93,4 @@ def _text(what: str, path: str) -> bytes:
     try:
         return Path(path).read_bytes()
     except OSError as error:
-        raise InvalidRequest(f"{what} {path}: {error.strerror}") from None
+        raise InvalidRequest(f"{what}: expected a file that can be read, got {path}: {error.strerror}") from None

@@ -182,6 +182,12 @@ def items(name: str, value: Any, what: str) -> list[Any]:
     return found
 
 
+def unmasked(name: str, value: Any) -> None:
+    """Raises :class:`InvalidRequest` for an array with masked values: NumPy would take the numbers behind the mask."""
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise wrong(name, "numbers without masked values (.filled(number) or .compressed() gives them)", value)
+
+
 def names(name: str, value: Any) -> list[str]:
     """A list of names."""
     return [text(f"{name}[{k}]", item, "a name as text") for k, item in enumerate(items(name, value, "a list of names"))]

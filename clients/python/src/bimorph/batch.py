@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 
 from . import labelled, plots, showing
 from .acceptance import State, accept_together
-from .arguments import MAX_STEP, instance, items, mapping, number
+from .arguments import MAX_STEP, instance, items, number
 from .errors import InvalidRequest
 from .model import Model
-from .runs import Array, Given, Lane, advance, checked_signals, checked_times, numbers, port_values, workers
+from .runs import Array, Given, Lane, advance, arrays, checked_signals, checked_times, port_values, workers
 from .session import Session
 from .stopping import Stopping, current
 
@@ -102,17 +102,17 @@ class Batch:
         self.sessions: tuple[Session, ...] = tuple(items("sessions", sessions, "a list of sessions"))
         """In the order of the rows of every result."""
         if not self.sessions:
-            raise InvalidRequest("sessions: expected at least one")
+            raise InvalidRequest("sessions: expected at least one session, got none")
         for k, session in enumerate(self.sessions):
             instance(f"sessions[{k}]", session, Session, "a Session")
         first = self.sessions[0]
         for k, session in enumerate(self.sessions):
             if session.ports != first.ports or session.signals != first.signals:
-                raise InvalidRequest(f"sessions[{k}]: expected ports {list(first.ports)} and signals {list(first.signals)}, as the first has")
+                raise InvalidRequest(f"sessions[{k}]: expected ports {list(first.ports)} and signals {list(first.signals)}, as sessions[0] has, got {list(session.ports)} and {list(session.signals)}")
             if session._channel.address != first._channel.address:
-                raise InvalidRequest(f"sessions[{k}]: expected one on {first._channel.address}, as the first is")
+                raise InvalidRequest(f"sessions[{k}]: expected a session on {first._channel.address}, as sessions[0] is, got one on {session._channel.address}")
             if session in self.sessions[:k]:
-                raise InvalidRequest(f"sessions[{k}]: a session is there twice")
+                raise InvalidRequest(f"sessions[{k}]: expected each session once, got that of sessions[{self.sessions.index(session)}] again")
         self._pool: ThreadPoolExecutor | None = None
 
     @classmethod
@@ -120,7 +120,10 @@ class Batch:
         """Opens a session of each model: variants, or one model several times. Arguments as of :meth:`Model.session`."""
         sessions: list[Session] = []
         try:
-            for k, model in enumerate(items("models", models, "a list of models")):
+            given = items("models", models, "a list of models")
+            if not given:
+                raise InvalidRequest("models: expected at least one model, got none")
+            for k, model in enumerate(given):
                 instance(f"models[{k}]", model, Model, "a Model")
                 sessions.append(model.session(signals, ports, timeout))
             return cls(sessions)
@@ -153,11 +156,10 @@ class Batch:
         It is taken as a whole: where one equilibrium is not found, or the call is interrupted, every session keeps its state.
         """
         count = len(self.sessions)
-        held = {}
-        for port, value in mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}').items():
-            held[port] = numbers(f"voltages[{port!r}]", value)
-            if held[port].shape not in ((), (count,)):
-                raise InvalidRequest(f"voltages[{port!r}]: expected a number, or one for each of {count} sessions, got shape {held[port].shape}")
+        held = arrays(voltages)
+        for port, value in held.items():
+            if value.shape not in ((), (count,)):
+                raise InvalidRequest(f"voltages[{port!r}]: expected a number, or one for each of {count} sessions, got an array of shape {value.shape}")
         with self._locked():
             states: list[State] = []
             for k, session in enumerate(self.sessions):
@@ -177,8 +179,8 @@ class Batch:
             count = len(self.sessions)
             t = checked_times(times, float(self.t.max()))
             wanted = checked_signals(signals, self.signals)
-            mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
-            varied = any(np.ndim(value) == 2 for value in voltages.values())
+            voltages = arrays(voltages)
+            varied = any(value.ndim == 2 for value in voltages.values())
             alike = not varied and all(session._voltages == self.sessions[0]._voltages for session in self.sessions)
             shared = port_values(self.sessions[0], voltages, len(t)) if alike else None
             lanes = [
@@ -199,10 +201,9 @@ class Batch:
         dt = number("dt", dt, "a time in seconds", above=0.0, most=MAX_STEP)
         now = self.t
         if (now != now[0]).any():
-            raise InvalidRequest("the sessions stand at different times: run them to one time first")
+            raise InvalidRequest(f"dt: expected sessions with one time, got {now.min():g} s to {now.max():g} s; run them to one time first")
         count = len(self.sessions)
-        mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
-        spread = {p: np.reshape(v, (count, 1)) if np.shape(v) == (count,) else v for p, v in voltages.items()}
+        spread = {port: value.reshape(count, 1) if value.shape == (count,) else value for port, value in arrays(voltages).items()}
         return self.run([float(now[0]) + dt], spread)
 
     @contextlib.contextmanager

@@ -58,6 +58,12 @@ class InvalidType(InvalidRequest, TypeError):
     """An argument of another type than expected."""
 
 
+class UnknownColumn(InvalidRequest, KeyError):
+    """A name that is no column of a table."""
+
+    __str__ = BimorphError.__str__
+
+
 class NetlistError(InvalidRequest):
     """A netlist with errors; its text is the rendered diagnostics."""
 

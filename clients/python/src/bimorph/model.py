@@ -219,8 +219,10 @@ class Model:
             arguments.instance("release", release, Model, "None or a model, as compile() gives it of the netlist with its load")
         arguments.function("progress", progress)
         if inputs is not None:
-            if release is not None or tol or until is not None:
-                raise ValueError("a run along inputs begins in their equilibrium, with the model's own tolerance: no release, tol or until")
+            for name, given in (("until", until), ("release", release), ("tol", tol or None)):
+                if given is not None:
+                    why = "a run along inputs lasts to stop, and begins in the equilibrium of its inputs, with the tolerance of the model"
+                    raise InvalidRequest(f"{name}: expected none together with inputs, got {arguments.shown(given)}; {why}")
             waves: dict[str, Waveform] = {**{port: ([0.0], [volts]) for port, volts in held.items()}, **checked(inputs)}
 
             def driven(model: Model, progress: Callable[[float], object] | None = None) -> TransientResult:
@@ -320,7 +322,7 @@ class Model:
         if noise_band is not None:
             noise_band = arguments.number("noise_band", noise_band, "None or a band in Hz", above=0.0)
             if seed is None:
-                raise InvalidRequest("noise_band: expected a seed with it, got none")
+                raise InvalidRequest(f"noise_band: expected a seed together with it, got noise_band={noise_band:g} alone")
         self._describe()
         noise = None if seed is None else device_pb2.Agitation(seed=seed, band_hz=noise_band)
         if kept:

@@ -135,10 +135,10 @@ def sweep(table: Table, name: str | None, ax: Axes | None) -> Axes:
 def _result(table: Table, name: str | None) -> str:
     if name is None:
         if not table.results:
-            raise InvalidRequest("name: the table has no results to draw")
+            raise InvalidRequest("name: expected a table with results, got one without")
         return table.results[0]
     if text("name", name, "the name of a result") not in table.results:
-        raise InvalidRequest(f"name: no result {name!r}; there are {', '.join(table.results)}")
+        raise InvalidRequest(f"name: expected the name of a result, got {name!r}; there are {', '.join(table.results)}")
     return name
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import labelled, plots, showing
 from .acceptance import State, accept_together
-from .arguments import mapping, names, one_of, wrong_type
+from .arguments import mapping, names, one_of, text, unmasked, wrong_type
 from .channel import Channel
 from .errors import InvalidRequest, StepFailed, Unavailable, shown
 from .local import ADDRESS
@@ -365,7 +365,7 @@ def checked_times(times: ArrayLike, after: float) -> Array:
     """
     found = numbers("times", times)
     if found.ndim != 1 or found.size == 0:
-        raise InvalidRequest(f"times: expected a list of times [s], got an array of shape {found.shape}")
+        raise InvalidRequest(f"times: expected a list of times [s], got {'a number' if found.ndim == 0 else f'an array of shape {found.shape}'}")
     if found[0] <= after:
         raise InvalidRequest(f"times[0]: expected a time after that of the session, {after:g} s, got {found[0]:g} s")
     late = np.flatnonzero(np.diff(found) <= 0)
@@ -390,27 +390,37 @@ def numbers(what: str, given: ArrayLike) -> Array:
 
     Raises :class:`InvalidRequest`.
     """
+    unmasked(what, given)
     try:
         raw = np.asarray(given)
         found = np.asarray(raw, dtype=np.float64) if raw.dtype.kind in "fiu" else None
     except (TypeError, ValueError):
         found = None
     if found is None:
-        raise wrong_type(what, "numbers", given)
+        raise wrong_type(what, "numbers (in rows of equal length)", given)
     if not np.isfinite(found).all():
         raise InvalidRequest(f"{what}: expected finite numbers, got {found[~np.isfinite(found)][0]}")
     return found
 
 
+def arrays(voltages: Given) -> dict[str, Array]:
+    """Port values by name, as arrays of finite numbers.
+
+    Raises :class:`InvalidRequest`.
+    """
+    given = mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
+    return {text("voltages: name of a port", port, "a text"): numbers(f"voltages[{port!r}]", value) for port, value in given.items()}
+
+
 def port_values(session: Any, voltages: Given, steps: int, lane: int | None = None, lanes: int = 1) -> Array:
     """Port values of a session at each time, or one row where none changes. Of one of several lanes an array may have a row for each."""
-    mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
+    voltages = arrays(voltages)
     unknown = [name for name in voltages if name not in session.ports]
     if unknown:
         raise InvalidRequest(f"voltages: no port named {unknown[0]!r}; the session has {', '.join(session.ports) or 'none'}")
     columns: list[Array] = []
     for port in session.ports:
-        given = numbers(f"voltages[{port!r}]", voltages.get(port, session._voltages[port]))
+        given = voltages[port] if port in voltages else np.array(session._voltages[port])
         if lane is not None and given.ndim == 2 and given.shape[0] == lanes:
             given = given[lane]
         if given.ndim == 0 or given.shape == (1,):

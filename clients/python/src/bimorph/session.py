@@ -216,7 +216,7 @@ class Session(Runs):
         omega = number("omega", omega, "an angular frequency in rad/s", least=0.0)
         state = self.accepted if reply is None else instance("reply", reply, TrialReply, "a TrialReply of this session or None")
         if state is None:
-            raise ValueError("there is no accepted state; call operating_point first")
+            raise InvalidRequest("reply: expected a reply, or an accepted state, got neither; call operating_point or step first")
         request = device_pb2.SmallSignalRequest(token=state.token, omega=omega, noise=noise)
         asked = self._ask(device_pb2.DeviceRequest(linearize=request))
         answer: device_pb2.SmallSignal = self._checked.kind(asked, "linearized")
@@ -227,7 +227,7 @@ class Session(Runs):
     def read(self, signal: str) -> float:
         """Value of an opened signal in the accepted state, in its unit."""
         if self.accepted is None:
-            raise ValueError("there is no accepted state; call operating_point or step first")
+            raise InvalidRequest("signal: expected an accepted state to read it in, got none; call operating_point or step first")
         return self.accepted.outputs[one_of("signal", signal, self.signals, "signals of the session")]
 
     def motion(self, node: str) -> NodeMotion:

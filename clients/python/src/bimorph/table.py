@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import labelled, plots, showing
 from .arguments import text
-from .errors import NoResult
+from .errors import InvalidRequest, NoResult, UnknownColumn
 from .files import to_parquet
 from .sweep_statistics import PERCENTILES, Histogram, Limit, SweepStatistics, histogram_of, statistics_of
 
@@ -53,17 +53,17 @@ class Table:
 
     def column(self, name: str) -> list[float | str | None]:
         """One column; None where a point has no such value. A result may be named with its unit, ``f1 [Hz]``, as it must be where a
-        parameter has its name. Raises :class:`KeyError` for a name that is no column, or two."""
+        parameter has its name. Raises :class:`InvalidRequest`, which is a :class:`KeyError` too, for a name that is no column, or two."""
         text("name", name, "the name of a column")
         headings = {self._heading(result): result for result in self.results}
         if name in headings:
             return [row.results.get(headings[name]) for row in self.rows]
         if name in self.parameters and name in self.results:
-            raise KeyError(f"{name!r} is a parameter and a result: the result is {self._heading(name)!r}, the parameter is in `rows`")
+            raise UnknownColumn(f"name: expected the name of one column, got {name!r} of a parameter and a result; the result is {self._heading(name)!r}, the parameter is in `rows`")
         if name in self.parameters:
             return [row.parameters[name] for row in self.rows]
         if name not in self.results:
-            raise KeyError(f"name: no column {name!r}; there are {', '.join([*self.parameters, *self.results])}")
+            raise UnknownColumn(f"name: expected the name of a column, got {name!r}; there are {', '.join([*self.parameters, *self.results])}")
         return [row.results.get(name) for row in self.rows]
 
     def _heading(self, result: str) -> str:
@@ -121,7 +121,7 @@ class Table:
         last = ("estimated_error", "warning", "error")
         taken = [name for name in self.parameters if name in ("point", *last)]
         if taken:
-            raise ValueError(f"parameter {taken[0]!r} has the name of another column: rename it, or read `rows`")
+            raise InvalidRequest(f"parameters: expected none with the name of another column, got {taken[0]!r}; rename it, or read `rows`")
         columns: dict[str, list[Any]] = {name: [row.parameters[name] for row in self.rows] for name in self.parameters}
         for name in self.results:
             called = self._heading(name) if name in self.parameters else name

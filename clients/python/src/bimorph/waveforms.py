@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import integer, mapping, number, text, wrong_type
+from .arguments import integer, mapping, number, text, unmasked, wrong_type
 from .errors import InvalidRequest, StepFailed
 from .results import TransientResult
 from .runs import Lane, advance, port_values
@@ -39,17 +39,20 @@ def checked(inputs: Mapping[str, Waveform]) -> dict[str, tuple[NDArray[np.float6
             raise wrong_type(where, "(times, values); hold a constant one by voltages={...};", wave)
         times, levels = (_numbers(where, part) for part in wave)
         if times.ndim != 1 or times.shape != levels.shape or times.size == 0:
-            raise InvalidRequest(f"{where}: expected as many times as values, got {times.shape} and {levels.shape}")
+            raise InvalidRequest(f"{where}: expected a list of times and as many values, got arrays of the shapes {times.shape} and {levels.shape}")
         if not (np.isfinite(times).all() and np.isfinite(levels).all()):
-            raise InvalidRequest(f"{where}: times and values must be finite")
+            name, part = ("times", times) if not np.isfinite(times).all() else ("values", levels)
+            at = int(np.argmin(np.isfinite(part)))
+            raise InvalidRequest(f"{where}: expected finite {name}, got {part[at]} at place {at}")
         if (np.diff(times) <= 0).any():
             late = int(np.argmax(np.diff(times) <= 0))
-            raise InvalidRequest(f"{where}: times must ascend, got {times[late]:g} s before {times[late + 1]:g} s")
+            raise InvalidRequest(f"{where}: expected times that ascend, got {times[late]:g} s before {times[late + 1]:g} s")
         found[port] = (times, levels)
     return found
 
 
 def _numbers(where: str, values: Any) -> NDArray[np.float64]:
+    unmasked(where, values)
     try:
         found = np.asarray(values)
     except (TypeError, ValueError):
