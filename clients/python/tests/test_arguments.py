@@ -216,6 +216,10 @@ def models(model: bimorph.Model, session: bimorph.Session) -> dict[str, Case]:
                 "estimate": flag,
                 "release": nothing,
                 "until": nothing,
+                "events": empty_list,
+                "method": nothing,
+                "rho": nothing,
+                "step": either(nothing, number(1e-9, 1.0)),
                 "progress": OPTIONAL_FUNCTION,
             },
         ),
@@ -491,7 +495,7 @@ def test_bad_arguments_are_rejected_by_name(cases: dict[str, Case]) -> None:
 MADE_BY_CALLS = {
     *("Conversion", "Diagnostic", "FrequencyResponse", "Model", "ModesResult", "NodeMotion", "Options", "Piece", "PullInResult", "Root"),
     *("Row", "Session", "Snapshot", "StaticResult", "Statistics", "Sweep", "SweepStatus", "Table", "Ticket", "TransientResult", "TrialReply"),
-    *("BatchRun", "ColumnStatistics", "Failure", "Fraction", "Histogram", "Run", "SweepStatistics"),
+    *("BatchRun", "ColumnStatistics", "Crossing", "StabilityLoss", "Failure", "Fraction", "Histogram", "Run", "SweepStatistics"),
     *("Violation", "aio", "local"),
 }
 """Public names without arguments of a user: what calls give, the package for asyncio, which passes its arguments on, and `local()`."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from .arguments import number, text, wrong, wrong_type
-from .results import Statistics
+from .arguments import items, number, text, wrong, wrong_type
+from .results import Crossing, Statistics
 from .v1 import analysis_pb2
 
 Until = str | tuple[str, float]
@@ -28,6 +29,23 @@ def until_to_wire(until: Until | None) -> Any:
             value = number("until", level, f"{expected} with a finite level,")
             return analysis_pb2.Until(crossing=analysis_pb2.Named(name=text("until", name, "the name of a signal"), value=value))
     raise wrong("until", expected, until)
+
+
+def events_to_wire(events: Sequence[tuple[str, float]]) -> list[Any]:
+    """Crossings to find."""
+    expected = "a signal with the level that it crosses, as (\"tip.y\", -1e-6)"
+    found = []
+    for k, event in enumerate(items("events", events, f"a list of events, each {expected}")):
+        where = f"events[{k}]"
+        if not isinstance(event, (tuple, list)) or len(event) != 2:
+            raise wrong_type(where, expected, event)
+        found.append(analysis_pb2.Named(name=text(where, event[0], expected), value=number(where, event[1], f"{expected} with a finite level,")))
+    return found
+
+
+def crossing(one: Any) -> Crossing:
+    """A crossing, as it comes from the server."""
+    return Crossing(one.signal, one.level, one.t, one.up, one.contact)
 
 
 def statistics(one: Any) -> Statistics:

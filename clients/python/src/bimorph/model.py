@@ -12,12 +12,12 @@ import numpy as np
 from . import arguments
 from .aloud import of_mesh, said
 from .channel import Channel
-from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable
-from .events import Until, statistics, until_to_wire
+from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable, shown
+from .events import Until, crossing, events_to_wire, statistics, until_to_wire
 from .messages import Voltages, by_name, diagnostic, estimate_of, named, setting_value
 from .naming import by_argument, each
 from .response import SPACINGS, response_of
-from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, StaticResult, TransientResult
+from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, StabilityLoss, StaticResult, TransientResult
 from .session import Session, opened_just_now
 from .stopping import apart
 from .ticket import Snapshot
@@ -25,6 +25,11 @@ from .together import together
 from .v1 import analysis_pb2, device_pb2, model_pb2
 from .verified import Checked
 from .waveforms import Waveform, checked, drive, told
+
+METHODS = ("rodas4", "avf", "midpoint", "tr-bdf2", "generalized-alpha", "newmark", "radau5", "rk45", "sdirk4")
+"""Integrators of a transient."""
+Method = Literal["rodas4", "avf", "midpoint", "tr-bdf2", "generalized-alpha", "newmark", "radau5", "rk45", "sdirk4"]
+
 
 class Model:
     """A compiled netlist on a server. Make one with :meth:`Client.compile`.
@@ -108,6 +113,7 @@ class Model:
             jumped=answer.jumped,
             warnings=said(answer.warnings),
             free_motions=tuple(answer.free_motions),
+            passed=tuple(_loss(one) for one in answer.passed),
         )
 
     def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
@@ -194,6 +200,10 @@ class Model:
         estimate: bool = True,
         release: Model | None = None,
         until: Until | None = None,
+        events: Sequence[tuple[str, float]] = (),
+        method: Method | None = None,
+        rho: float | None = None,
+        step: float | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> TransientResult:
         """Motion from 0 to ``stop`` [s] with port voltages held [V], at ``points`` equally spaced times.
@@ -201,7 +211,11 @@ class Model:
         ``release`` is a variant of the same netlist whose static equilibrium is the initial state; without it the part
         starts at rest as drawn. ``tol`` is the relative error of a step [1], 0: the model's; the mesh holds the
         smaller of the two. ``until`` ends the run at an event: ``"contact"`` where parts begin to touch, ``"release"`` where they part,
-        ``("yoke.y", -1e-6)`` where a signal crosses a level in its unit. ``progress`` is called with the fraction done.
+        ``("yoke.y", -1e-6)`` where a signal crosses a level in its unit. ``events`` are such pairs that do not end the run: the times of all
+        crossings, and of contacts, are in the ``events`` of the result. ``progress`` is called with the fraction done.
+
+        ``method`` is the integrator, by default ``"rodas4"``, and ``rho`` the spectral radius of ``"generalized-alpha"`` at infinite frequency.
+        With ``step`` [s] all steps have this length and do not follow ``tol``.
 
         ``inputs`` are waveforms of ports, ``{"heat": (times, volts)}``: straight lines between corners, constant before and after. The
         run then begins in the static equilibrium at 0, and its steps end at every corner. How far mesh and steps may be off is seen from
@@ -217,9 +231,17 @@ class Model:
         estimate = arguments.flag("estimate", estimate)
         if release is not None:
             arguments.instance("release", release, Model, "None or a model, as compile() gives it of the netlist with its load")
+        crossings = events_to_wire(events)
+        integrator = None if method is None else arguments.choice("method", method, METHODS)
+        if rho is not None:
+            rho = arguments.number("rho", rho, "None or a spectral radius", least=0.0, most=1.0)
+            if integrator != "generalized-alpha":
+                raise InvalidRequest(f'rho: expected None, as method is not "generalized-alpha", got {rho:g}')
+        step = None if step is None else arguments.number("step", step, "None or a time in seconds", above=0.0)
         arguments.function("progress", progress)
         if inputs is not None:
-            for name, given in (("until", until), ("release", release), ("tol", tol or None)):
+            excluded = {"until": until, "release": release, "tol": tol or None, "events": crossings or None, "method": integrator, "step": step}
+            for name, given in excluded.items():
                 if given is not None:
                     why = "a run along inputs lasts to stop, and begins in the equilibrium of its inputs, with the tolerance of the model"
                     raise InvalidRequest(f"{name}: expected none together with inputs, got {arguments.shown(given)}; {why}")
@@ -245,6 +267,10 @@ class Model:
             voltages=named(voltages),
             release_model=release.id if release else "",
             until=until_to_wire(until),
+            events=crossings,
+            method=integrator or "",
+            rho=rho,
+            step_s=step or 0.0,
         )
         for model in (self, release):
             if model is not None:
@@ -252,7 +278,9 @@ class Model:
         t: list[float] = []
         columns: list[list[float]] = [[] for _ in signals]
         replies = self._checked("transient")
-        crossed = ((re.escape(f'signal "{until[0]}"'), "until"),) if isinstance(until, tuple) and until[0] not in signals else ()
+        levels = [("until", until[0])] if isinstance(until, tuple) else []
+        levels += [(f"events[{k}]", one.name) for k, one in enumerate(crossings)]
+        crossed = [(re.escape(f'signal "{signal}"'), name) for name, signal in levels if signal not in signals]
         for event in each("Transient", self._channel.stream("Transient", request), *crossed):
             if progress is not None:
                 progress(event.progress)
@@ -277,6 +305,7 @@ class Model:
                     stopped_at=end.stopped_at if end.HasField("stopped_at") else None,
                     reliable_until=end.reliable_until if end.HasField("reliable_until") else None,
                     after_contact=tuple(statistics(one) for one in end.after_contact),
+                    events=tuple(crossing(one) for one in end.events),
                 )
         raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
 
@@ -348,3 +377,9 @@ class Model:
     def _describe(self) -> None:
         """Makes sure that the server has this model."""
         self._call("Describe", model_pb2.DescribeRequest(model=self.id))
+
+
+def _loss(wire: Any) -> StabilityLoss:
+    """A loss of stability, as it comes from the server."""
+    kind: Literal["limit-point", "bifurcation"] = "bifurcation" if wire.kind == analysis_pb2.PassedLoss.BIFURCATION else "limit-point"
+    return StabilityLoss(kind, wire.share, shown(wire.direction))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,18 @@ class NodeMotion:
 
 
 @dataclass(frozen=True)
+class StabilityLoss:
+    """Point of the loading path from rest at which the equilibrium loses its stability."""
+
+    kind: Literal["limit-point", "bifurcation"]
+    """``"limit-point"``: the branch turns back, as at pull-in and snap-through. ``"bifurcation"``: another branch crosses, as at buckling."""
+    fraction: float
+    """Fraction of the load [1]."""
+    direction: str
+    """Where the part moves: the beam that bends and its side, seen along its drawn direction, or a body."""
+
+
+@dataclass(frozen=True)
 class StaticResult:
     """A static equilibrium."""
 
@@ -61,6 +73,8 @@ class StaticResult:
     """What the numbers do not say by themselves."""
     free_motions: tuple[str, ...] = ()
     """Motions that nothing resists noticeably and no load excites; they are held where they are."""
+    passed: tuple[StabilityLoss, ...] = ()
+    """Losses of stability between rest and the load, in their order."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """Displacement [m] and rotation [rad] of every node; ``attrs["units"]`` has the units."""
@@ -82,7 +96,8 @@ class StaticResult:
         rows = ((name, node.x, node.y, node.rz) for name, node in self.nodes.items())
         way = "pulled in on the way" if self.pulled_in else "snapped through or buckled on the way" if self.jumped else ""
         held = [f"held where it is drawn: {motion}" for motion in self.free_motions]
-        note = showing.note(self.estimated_error, [*filter(None, [way]), *held, *self.warnings])
+        losses = [f"{loss.kind} at {loss.fraction:.4g} of the load ({loss.direction})" for loss in self.passed]
+        note = showing.note(self.estimated_error, [*filter(None, [way]), *losses, *held, *self.warnings])
         return showing.table(["node", "x [m]", "y [m]", "rz [rad]"], rows, note)
 
 
@@ -259,6 +274,22 @@ class PullInResult:
 
 
 @dataclass(frozen=True)
+class Crossing:
+    """A signal that crosses a level, or a gap that closes or opens."""
+
+    signal: str
+    """Name of the signal; of a gap, its ``GAP.gap``."""
+    level: float
+    """Level, in the unit of the signal."""
+    t: float
+    """Time [s]."""
+    up: bool
+    """Whether the signal crosses from below."""
+    contact: bool
+    """Whether a contact force begins (``up`` False) or ends (``up`` True) to act."""
+
+
+@dataclass(frozen=True)
 class Statistics:
     """Statistics of a signal over the part of a run whose single values do not hold."""
 
@@ -308,6 +339,8 @@ class TransientResult:
     """Time up to which the tolerance holds [s], in a run whose parts touch; None: to the end."""
     after_contact: tuple[Statistics, ...] = ()
     """Statistics of each signal after that."""
+    events: tuple[Crossing, ...] = ()
+    """Crossings of ``events``, and contacts of gaps that begin and end, in order of time."""
 
     def __repr__(self) -> str:
         names = ", ".join(f"{name} [{unit}]" for name, unit in self.units.items())

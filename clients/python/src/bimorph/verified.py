@@ -107,6 +107,7 @@ class Checked:
         ):
             self.names(what, (named.name for named in values))
             self.numbers(what, [named.value for named in values], len(values))
+        self.numbers("passed", [loss.share for loss in answer.passed], len(answer.passed))
 
     def modes(self, answer: Any) -> None:
         """Modes: frequencies in their order, and a shape of each over all nodes."""
