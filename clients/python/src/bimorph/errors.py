@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -150,13 +151,39 @@ def shown(text: str) -> str:
     return "".join(c if c in "\n\t" or c.isprintable() else repr(c)[1:-1] for c in text)
 
 
+_FAILURES: list[tuple[str, str]] = [
+    (
+        r"failed to connect to all addresses|connect failed|connection refused|no such file or directory|failed to connect to remote host",
+        "no server answers at this address{cause}; start one there, or check the address",
+    ),
+    (r"errors? resolving|domain name not found|name or service not known|\bdns\b", "the name of the host is unknown; check the address"),
+    (
+        r"stream removed|socket closed|connection broke|h2 protocol|connection reset|broken pipe|goaway|ping timeout|keepalive|end of file",
+        "the connection is lost, as the server has ended or the network has failed; connect again when the server runs (a kept session: resume())",
+    ),
+    (r"deadline exceeded", "no answer within the timeout of the call; give a longer timeout, or check the server"),
+    (r"shutting down", "the server is shutting down; connect again when it runs (a kept session: resume())"),
+]
+"""What a failure of the network says, in words of gRPC or of the system, and the sentence for it."""
+_CAUSE = re.compile(r"ssl[^;:]*handshake[^;:]*|certificate[^;:]*|connection refused|no such file or directory|permission denied|no route to host|timed out", re.IGNORECASE)
+
+
+def _failure(text: str) -> str:
+    """A failure of the network in one sentence: what has happened, and the remedy. Other texts are as they are."""
+    for pattern, sentence in _FAILURES:
+        if re.search(pattern, text, re.IGNORECASE):
+            cause = _CAUSE.search(text)
+            return sentence.format(cause=f" ({cause[0].strip().lower()})" if cause else "")
+    return text
+
+
 def _of_code(code: grpc.StatusCode, text: str, details: bytes, address: str) -> BimorphError:
     text = shown(text)
     if code == grpc.StatusCode.INVALID_ARGUMENT:
         return InvalidRequest(text, violations(details))
     kind = _BY_CODE.get(code, BimorphError)
     if kind is Unavailable:
-        text = f"server {address}: {text}"
+        text = f"server {address}: {_failure(text)}"
     elif kind is BimorphError:
         text = f"{code.name.lower()}: {text}"
     return kind(text)

@@ -108,7 +108,7 @@ class Line:
                 replies = self._sent.popleft().replies
                 if replies is not None:
                     replies.put(reply)
-            over = Unavailable(f"server {self._address}: the stream has ended")
+            over = Unavailable(f"server {self._address}: the stream of the session has ended; open another session (a kept one: resume())")
         except grpc.RpcError as error:
             over = from_rpc(error, self._address)
         self.over = self.over or over
@@ -139,7 +139,7 @@ class NativeLine:
         """The reply to a question."""
         reply = self._said(request)
         if reply is None:
-            raise self.over or BimorphError("the session is closed; open another one")
+            raise self.over or BimorphError("the stream of the session has ended; open another session")
         return device_pb2.DeviceReply.FromString(reply)
 
     def tell(self, request: Any) -> None:

@@ -91,7 +91,7 @@ class LocalLine:
             raise self.over
         reply = self._channel._guarded(lambda: self._native.ask(request.SerializeToString()))
         if reply is None:
-            raise self.over or BimorphError("the session is closed; open another one")
+            raise self.over or BimorphError("the stream of the session has ended; open another session")
         return device_pb2.DeviceReply.FromString(reply)
 
     def tell(self, request: Any) -> None:

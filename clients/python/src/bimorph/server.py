@@ -90,6 +90,10 @@ class Server:
         held = self._running
         if held is None:
             raise _not_started()
+        ended = held.process.poll() if held.owner == os.getpid() else None
+        if ended is not None:
+            how = f"by signal {-ended}" if ended < 0 else f"with exit status {ended}"
+            raise Unavailable(f"server {held.address}: its process has ended {how}; start() starts it again")
         return held
 
     def __enter__(self) -> Server:
@@ -106,7 +110,7 @@ class Server:
 
 
 def _not_started() -> BimorphError:
-    return BimorphError("the server does not run: start() it, or use it in a `with` block")
+    return BimorphError("the server does not run; start() it, or use it in a `with` block")
 
 
 def serve(binary: str | os.PathLike[str] | None = None) -> Server:

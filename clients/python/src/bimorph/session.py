@@ -14,6 +14,7 @@ from typing import Any
 from .arguments import MAX_STEP, given_to, instance, number, one_of, text
 from .channel import Channel
 from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, from_fault, shown
+from .local import ADDRESS
 from .naming import by_argument
 from .results import NodeMotion
 from .runs import Runs
@@ -54,6 +55,7 @@ class Session(Runs):
         self._model = model
         self._session = session
         self._joined = bool(session)
+        self._closed = False
         self._timeout = timeout
         self._pid = os.getpid()
         # A step is taken as a whole.
@@ -214,6 +216,7 @@ class Session(Runs):
 
     def _small_signal(self, omega: float, reply: TrialReply | None, *, noise: bool) -> device_pb2.SmallSignal:
         omega = number("omega", omega, "an angular frequency in rad/s", least=0.0)
+        self._open()
         state = self.accepted if reply is None else instance("reply", reply, TrialReply, "a TrialReply of this session or None")
         if state is None:
             raise InvalidRequest("reply: expected a reply, or an accepted state, got neither; call operating_point or step first")
@@ -239,6 +242,7 @@ class Session(Runs):
     def snapshot(self) -> Snapshot:
         """The accepted state, to go on from later, in another process, or on another server."""
         with self._lock:
+            self._open()
             token = self.accepted.token if self.accepted else 0
             request = device_pb2.SnapshotRequest(session=self._session, token=token)
             states = self._channel.call("Snapshot", request).snapshot
@@ -247,6 +251,7 @@ class Session(Runs):
     def fork(self) -> Session:
         """Another session that goes on from here by itself; close it as well."""
         with self._lock:
+            self._open()
             with apart():
                 opened = self._channel.call("Fork", device_pb2.ForkRequest(session=self._session))
             other = opened_just_now(self._channel, self._model, self._timeout, opened.session)
@@ -257,7 +262,8 @@ class Session(Runs):
         """Where this session stands, to go on from with :meth:`Client.resume`, also in another process."""
         with self._lock:
             if not self._joined:
-                raise BimorphError("only a session of Model.session(kept=True) outlives its connection")
+                self._open()
+                raise BimorphError("this session does not outlive its connection; open one with Model.session(kept=True)")
             return Ticket(self._model, self._session, self.accepted, self.t, dict(self._voltages))
 
     def resume(self) -> Session:
@@ -278,7 +284,8 @@ class Session(Runs):
     def close(self) -> None:
         """Ends the stream; the server forgets the states. Later calls raise."""
         if self._pid == os.getpid():
-            self._line.close(BimorphError("the session is closed; open another one"))
+            self._closed = True
+            self._line.close(self._ended())
             if self._joined:
                 self._joined = False
                 with contextlib.suppress(BimorphError), apart():
@@ -315,6 +322,16 @@ class Session(Runs):
             need_dt=need,
             voltages=dict(zip(self.ports, vector)),
         )
+
+    def _ended(self) -> BimorphError:
+        where = "in this process" if self._channel.address == ADDRESS else f"on server {self._channel.address}"
+        return BimorphError(f"this session of model {self._model[:8]} {where} is closed; open another one with Model.session()")
+
+    def _open(self) -> None:
+        """Raises :class:`BimorphError` where this object was closed."""
+        self._own()
+        if self._closed:
+            raise self._ended()
 
     def _own(self) -> None:
         if self._pid != os.getpid():
