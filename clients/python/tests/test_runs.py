@@ -200,6 +200,43 @@ def test_a_batch_has_the_bits_of_its_sessions(model: bimorph.Model) -> None:
             assert session.run([times[-1] + 1e-6], {"drive": float(k)}).signals["m.x"].tolist() == more.signals["m.x"][k].tolist()
 
 
+def test_arrays_of_a_batch(model: bimorph.Model) -> None:
+    """A batch of one takes a number, one for each time, and one row; of three sessions, three numbers of a run of two times are rejected with the
+    shapes that fit. A single session takes no arrays for one number."""
+    times, volts = [1e-6, 2e-6], [1.0, 3.0]
+    with bimorph.Batch.of([model], ["m.x"]) as one:
+        found = []
+        for held, given in ((2.0, volts), ([2.0], [volts]), (np.array([2.0]), np.array([volts]))):
+            one.operating_point({"drive": held})
+            found.append(one.run(times, {"drive": given}).signals["m.x"].tolist())
+        assert np.shape(found[0]) == (1, 2)
+        # an equilibrium is followed from the accepted state: the same to rounding
+        assert np.allclose(found[1], found[0], rtol=1e-9, atol=0.0) and np.allclose(found[2], found[0], rtol=1e-9, atol=0.0)
+        assert one.step({"drive": [1.0]}, 1e-6).signals["m.x"].shape == (1, 1)
+    with bimorph.Batch.of([model] * 3, ["m.x"]) as three:
+        rows = three.run(times, {"drive": [[1.0], [2.0], [3.0]]}).signals["m.x"]
+        assert rows.shape == (3, 2) and np.unique(rows[:, 1]).size == 3
+        with pytest.raises(bimorph.InvalidRequest, match=r"voltages\['drive'\]: .*shape \(3, 1\) or \(3, 2\)\), got an array of shape \(3,\)"):
+            three.run([3e-6, 4e-6], {"drive": [1.0, 2.0, 3.0]})
+        with pytest.raises(bimorph.InvalidRequest, match=r"voltages\['drive'\]: expected a number, or one for each of 3 sessions, got an array of shape \(1,\)"):
+            three.operating_point({"drive": [1.0]})
+    with model.session(["m.x"]) as session:
+        for call in (lambda: session.operating_point({"drive": [2.0]}), lambda: session.step({"drive": np.array([2.0])}, 1e-6)):
+            with pytest.raises(bimorph.InvalidType, match=r"voltages\['drive'\]: expected a finite number, got "):
+                call()
+
+
+def test_an_operating_point_follows_the_accepted_state(model: bimorph.Model) -> None:
+    """Raised to 3 V the plate is open; lowered to 3 V from 8 V it is closed, as pull-in is at 5.17 V; the time is 0 again."""
+    with model.session(["m.x"]) as session:
+        opened = session.operating_point({"drive": 3.0})
+        session.step({}, 1e-6)
+        closed = session.operating_point({"drive": 8.0})
+        lowered = session.operating_point({"drive": 3.0})
+        assert opened.outputs["m.x"] < 0.5e-6 < 1.9e-6 < lowered.outputs["m.x"] and closed.jumped
+        assert session.t == 0.0
+
+
 def test_a_session_of_a_batch_that_fails_stops_alone(model: bimorph.Model) -> None:
     """Its later values are NaN, and ``failures`` says where and why; the others go on."""
     times = np.array([1e-6, 2e-6, 1.0, 1.000001])

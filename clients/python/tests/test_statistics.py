@@ -41,6 +41,28 @@ def test_moments_and_percentiles() -> None:
     assert math.isnan(table([None]).statistics().columns["f1"].mean)
 
 
+def test_points_without_a_number_are_left_out_and_counted() -> None:
+    """A missing result and NaN are in `missing`, in no moment, percentile or histogram, and outside of limits on either side."""
+    found = table([1.0, None, 3.0, math.nan]).statistics(["f1>0", "f1<10"])
+    one = found.columns["f1"]
+    assert (one.count, one.missing, one.mean, one.minimum, one.maximum, one.percentiles[50.0]) == (2, 2, 2.0, 1.0, 3.0, 2.0)
+    assert [fraction.passed for _, fraction in found.limits] == [2, 2] and found.passed.passed == 2
+    assert table([1.0, None, 3.0, math.nan]).histogram("f1").counts.sum() == 2
+    assert repr(found) == "<SweepStatistics of f1: 4 points, 2 of them without a result, yield 50.00% (15.00% to 85.00%)>"
+    assert "<th>without</th>" in found._repr_html_()
+
+
+def test_undecided_points_are_shown() -> None:
+    """A result of 5 ± 1 % is undecided at a limit of 5.04, one of 6 ± 1 % is not; the number is in the text and the table, and 0 is not shown."""
+    rows = [bimorph.Row(k, {}, {"f1": value}, "", error) for k, (value, error) in enumerate([(5.0, 0.01), (6.0, 0.01), (5.0, None)])]
+    several = bimorph.Table([], ["f1"], {"f1": "Hz"}, rows)
+    found = several.statistics("f1>5.04")
+    assert found.undecided == 1 and found.passed.passed == 1
+    for text in (repr(found), found._repr_html_()):
+        assert "1 closer to a limit than their estimated error" in text
+    assert several.statistics("f1>1").undecided == 0 and "closer" not in repr(several.statistics("f1>1"))
+
+
 def test_yield() -> None:
     """Limits are open or closed as written, with the suffixes of netlists; a point without a result is beyond each. The interval of 8 in 10 is that of
     Wilson's formula: 0.4901625 to 0.9433178."""

@@ -151,9 +151,12 @@ class Batch:
         return np.array([session.t for session in self.sessions])
 
     def operating_point(self, voltages: Given) -> None:
-        """Static equilibrium of each session at these port voltages [V], accepted, at t = 0: a number for all, or one for each session.
+        """Accepts the static equilibrium of each session at these port voltages [V], and sets the time to 0 s. ``voltages`` has for each port
+        a number, or an array with one for each session.
 
         It is taken as a whole: where one equilibrium is not found, or the call is interrupted, every session keeps its state.
+
+        Raises :class:`StepFailed` where one is not found.
         """
         count = len(self.sessions)
         held = arrays(voltages)
@@ -169,11 +172,13 @@ class Batch:
             accept_together(states)
 
     def run(self, times: ArrayLike, voltages: Given, signals: Sequence[str] | None = None) -> BatchRun:
-        """Steps every session to each of these times [s] in turn. ``voltages`` are for each port a number, one for each time, or an array of a
-        row for each session. A session that cannot take a step stops there, and the others go on.
+        """Steps every session to each of these times [s] in turn.
 
-        The batch is taken as a whole: interrupted, or where a session cannot be reached, every session keeps its state (with more than a million
-        port values for a session: all stand at the end of the same part of the times).
+        ``voltages`` has for each port a number, an array with one for each time, or an array with a row for each session. A row has one number,
+        or one for each time. A session that cannot take a step stops there, and the others continue.
+
+        The batch is taken as a whole: if the call is interrupted or a session cannot be reached, every session keeps its state (beyond 2²⁰ port
+        values for a session: all have the state at the end of the same part of the times).
         """
         with self._locked():
             count = len(self.sessions)

@@ -134,13 +134,15 @@ class Runs:
     """What a session has of runs."""
 
     def run(self: Any, times: ArrayLike, voltages: Given, signals: Sequence[str] | None = None) -> Run:
-        """Steps to each of these times [s] in turn, in one call: ``voltages`` are a number for each port, or one for each time; ports that
-        are not named keep what they have. Between two times they go linearly, as in :meth:`step`, and the results have its bits.
+        """Takes a step to each of these times [s] in turn, in one call.
 
-        ``signals`` are those wanted of the opened ones, by default all. A run is taken as a whole: interrupted, it leaves the session
-        where it was (one of more than a million port values: at the end of a part of it).
+        ``voltages`` has for each port a number, or an array with one for each time; ports that are not named keep their values. Between two times they
+        change linearly. Every number of the result is bit-identical to that of :meth:`step` with the same voltages and ``dt``.
 
-        Raises :class:`RunFailed` for a step that the device cannot take; its ``run`` has the steps before, after which the session stands.
+        ``signals`` selects some of the opened ones, by default all. A run is taken as a whole: if it is interrupted or raises an error, the session keeps
+        its accepted state (beyond 2²⁰ port values: the state at the end of a part of the run).
+
+        Raises :class:`RunFailed` for a step that the device cannot take. Its ``run`` has the steps before; the state after them is accepted.
         """
         with self._lock:
             t = checked_times(times, self.t)
@@ -428,7 +430,7 @@ def port_values(session: Any, voltages: Given, steps: int, lane: int | None = No
         elif given.shape == (steps,):
             columns.append(given)
         else:
-            of_lanes = "" if lane is None else f", or an array of {lanes} rows"
+            of_lanes = "" if lane is None else f", or a row for each of {lanes} sessions (an array of shape ({lanes}, 1) or ({lanes}, {steps}))"
             raise InvalidRequest(
                 f"voltages[{port!r}]: expected a number, or one for each of {steps} times{of_lanes}, got an array of shape {given.shape}"
             )

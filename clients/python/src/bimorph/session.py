@@ -163,7 +163,13 @@ class Session(Runs):
         self._line.tell(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)))
 
     def operating_point(self, voltages: Mapping[str, float]) -> TrialReply:
-        """Static equilibrium at these port voltages [V], accepted, at t = 0."""
+        """Accepts the static equilibrium at these port voltages [V] and sets the time to 0 s.
+
+        Ports that are not named keep their values. The equilibrium is followed from the accepted state, or from the model at rest: between release
+        and pull-in a part that is closed stays closed, and ``jumped`` of the reply is True where it passed a limit point.
+
+        Raises :class:`StepFailed` where none is found; the session keeps its state.
+        """
         with self._lock:
             reply = replace(self.trial(voltages), t=0.0)
             self.accept(reply)

@@ -1,6 +1,6 @@
 """Statistics of a sweep: moments, percentiles, the fraction of points within limits, and histograms.
 
-A point without a result is outside of every limit on that result, and in no moment, percentile or histogram.
+A point without a result, or with NaN, is outside of every limit on that result. It is left out of moments, percentiles and histograms, and counted.
 """
 
 from __future__ import annotations
@@ -90,17 +90,17 @@ class ColumnStatistics:
     """Statistics of a result over the points that have it."""
 
     name: str
-    """Result."""
+    """Name of the result."""
     unit: str
     """Its unit."""
     count: int
-    """Points that have it."""
+    """Points with a number."""
     missing: int
-    """Points without it."""
+    """Points without a result, or with NaN; they are left out of the numbers below."""
     mean: float
-    """Mean; NaN without points, as all that follows."""
+    """Mean. Where no point has a number, this and the numbers below are NaN."""
     deviation: float
-    """Standard deviation of a sample, with count - 1; NaN of one point."""
+    """Standard deviation of a sample, with count - 1; NaN for a single point."""
     minimum: float
     """Smallest value."""
     maximum: float
@@ -109,9 +109,13 @@ class ColumnStatistics:
     """Values by percentage, interpolated linearly between ordered values (Hyndman and Fan, 1996, type 7)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SweepStatistics:
-    """Statistics of every result of a sweep, and how many points keep to limits."""
+    """Statistics of every result of a sweep, and the number of points within limits.
+
+    Points without a result, or with NaN, are left out of the moments and percentiles of a column and counted in its ``missing``. They are outside of
+    every limit on that result.
+    """
 
     points: int
     """Points of the table."""
@@ -122,18 +126,29 @@ class SweepStatistics:
     passed: Fraction
     """Points that keep to all of them: the yield. Without limits: those with a result."""
     undecided: int = 0
-    """Points with a result that is closer to a limit than its estimated error."""
+    """Points with a result that is closer to a limit than its estimated error: they count as ``passed`` or not by the computed value."""
+
+    def __repr__(self) -> str:
+        low, high = self.passed.interval
+        missing = max((one.missing for one in self.columns.values()), default=0)
+        parts = [f"{self.points} points", f"{missing} of them without a result" if missing else ""]
+        parts += [f"yield {self.passed.value:.2%} ({low:.2%} to {high:.2%})", self._undecided()]
+        return f"<SweepStatistics of {', '.join(self.columns) or 'nothing'}: {', '.join(filter(None, parts))}>"
+
+    def _undecided(self) -> str:
+        return f"{self.undecided} closer to a limit than their estimated error" if self.undecided else ""
 
     def _repr_html_(self) -> str:
         rows = [
-            (f"{one.name} [{one.unit}]", one.count, one.mean, one.deviation, one.minimum, *one.percentiles.values(), one.maximum)
+            (f"{one.name} [{one.unit}]", one.count, one.missing, one.mean, one.deviation, one.minimum, *one.percentiles.values(), one.maximum)
             for one in self.columns.values()
         ]
         percentages = [f"{percentage:g} %" for percentage in next((list(one.percentiles) for one in self.columns.values()), [])]
         low, high = self.passed.interval
         kept = [f"{limit}: {fraction.value:.2%}" for limit, fraction in self.limits]
-        note = " · ".join([*kept, f"yield {self.passed.value:.2%}, 95 % interval of independent samples {low:.2%} to {high:.2%}"])
-        return html(["result", "points", "mean", "standard deviation", "minimum", *percentages, "maximum"], rows, note)
+        interval = f"yield {self.passed.value:.2%}, 95 % interval of independent samples {low:.2%} to {high:.2%}"
+        note = " · ".join(filter(None, [*kept, interval, self._undecided()]))
+        return html(["result", "points", "without", "mean", "standard deviation", "minimum", *percentages, "maximum"], rows, note)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,6 +256,7 @@ def _percentage(where: str, given: Any) -> float:
 
 def _column(table: Table, name: str, percentages: Sequence[float]) -> ColumnStatistics:
     values = np.array([row.results[name] for row in table.rows if name in row.results], dtype=np.float64)
+    values = values[~np.isnan(values)]
     n = len(values)
     return ColumnStatistics(
         name,
