@@ -38,7 +38,7 @@ def module() -> Any:
     if loaded is not None:
         return loaded
     if isinstance(error, ModuleNotFoundError):
-        raise BimorphError("this package has no models in process: install one that `make wheel` made, or use bimorph.serve()")
+        raise BimorphError("this package has no models in process; install a wheel of `make wheel`, or use bimorph.serve()")
     raise BimorphError(f"the models in process of this package cannot be loaded ({error}); use bimorph.serve()") from error
 
 
