@@ -33,32 +33,32 @@ _LOOK = 0.1
 
 @dataclass(frozen=True)
 class Failure:
-    """Where a session of a batch has stopped."""
+    """Step at which a session of a batch stopped."""
 
     index: int
-    """Number of the step that it could not take, from 0."""
+    """Number of the failed step, from 0."""
     t: float
-    """Time at its end [s]."""
+    """Time at the end of that step [s]."""
     reason: str
-    """Why."""
+    """Reason of the failure."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BatchRun:
-    """The steps that a batch took: a row for each session, a column for each time."""
+    """Steps of a batch: arrays with a row for each session and a column for each time."""
 
     t: Array
     """Times at the ends of the steps [s] (n)."""
     signals: dict[str, Array]
-    """Each signal, in its unit (sessions×n); NaN where a session did not come."""
+    """Each signal, in its unit (sessions×n); NaN after the last step of a session."""
     units: dict[str, str]
     """Unit of each signal."""
     currents: dict[str, Array]
-    """Current into each port [A], or what ports of other kinds answer (sessions×n)."""
+    """Conduction current into each port [A], or the response of a port of another kind (sessions×n)."""
     charges: dict[str, Array]
     """Charge on each port [C] (sessions×n)."""
     failures: dict[int, Failure]
-    """By session, where it has stopped before the last time."""
+    """Failed step by session, for sessions that stopped before the last time."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """A column for each signal, by session, from 0, and time [s]; ``attrs["units"]`` has the units."""
@@ -94,13 +94,13 @@ class BatchRun:
 class Batch:
     """Sessions with the same ports and signals, stepped together; use it in a ``with`` block, which closes them.
 
-    One call takes the steps of all of them: in this process on every core, on a server in few requests. Each has the bits that it has
-    alone.
+    One call steps all of them: in this process on all cores, on a server in few requests. The results of each session are bit-identical to
+    those of the session alone.
     """
 
     def __init__(self, sessions: Sequence[Session]) -> None:
         self.sessions: tuple[Session, ...] = tuple(items("sessions", sessions, "a list of sessions"))
-        """In the order of the rows of every result."""
+        """Sessions, in the order of the rows of results."""
         if not self.sessions:
             raise InvalidRequest("sessions: expected at least one session, got none")
         for k, session in enumerate(self.sessions):
@@ -117,7 +117,7 @@ class Batch:
 
     @classmethod
     def of(cls, models: Sequence[Model], signals: Sequence[str] = (), ports: Sequence[str] = (), timeout: float = 60.0) -> Batch:
-        """Opens a session of each model: variants, or one model several times. Arguments as of :meth:`Model.session`."""
+        """Opens one session for each model: variants, or one model several times. Arguments as of :meth:`Model.session`."""
         sessions: list[Session] = []
         try:
             given = items("models", models, "a list of models")
@@ -213,7 +213,7 @@ class Batch:
 
     @contextlib.contextmanager
     def _locked(self) -> Iterator[None]:
-        """No other thread uses one of the sessions meanwhile."""
+        """Excludes other threads from the sessions."""
         with contextlib.ExitStack() as locks:
             # in one order, so that two batches with the same sessions do not wait for each other
             for session in sorted(self.sessions, key=id):

@@ -1,4 +1,4 @@
-"""Events of a run in time, and what follows a contact."""
+"""Events of a transient, and statistics after a contact."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Until = str | tuple[str, float]
 
 
 def until_to_wire(until: Until | None) -> Any:
-    """The event that ends a run; None: none does."""
+    """Message of the event that ends a run; None without one."""
     expected = '"contact", "release" or (signal, level)'
     if until is None:
         return None
@@ -32,7 +32,7 @@ def until_to_wire(until: Until | None) -> Any:
 
 
 def events_to_wire(events: Sequence[tuple[str, float]]) -> list[Any]:
-    """Crossings to find."""
+    """Messages of the crossings to find."""
     expected = "a signal with the level that it crosses, as (\"tip.y\", -1e-6)"
     found = []
     for k, event in enumerate(items("events", events, f"a list of events, each {expected}")):
@@ -44,10 +44,10 @@ def events_to_wire(events: Sequence[tuple[str, float]]) -> list[Any]:
 
 
 def crossing(one: Any) -> Crossing:
-    """A crossing, as it comes from the server."""
+    """A crossing from its message."""
     return Crossing(one.signal, one.level, one.t, one.up, one.contact)
 
 
 def statistics(one: Any) -> Statistics:
-    """Statistics of a signal, as they come from the server."""
+    """Statistics of a signal from their message."""
     return Statistics(one.signal, one.from_s, one.to_s, one.mean, one.mean_error, one.rms, one.low, one.high)

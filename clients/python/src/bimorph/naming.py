@@ -1,4 +1,4 @@
-"""Arguments that a server rejects, by the names that they have here: the protocol calls some of them otherwise."""
+"""Names of arguments in errors of the server, whose protocol uses other names for some of them."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _RULES: dict[str, tuple[tuple[str, str], ...]] = {
     "Compile": ((r"options\.band_hz:", "band"),),
     "GetJob": (("no job", "sweep"),),
 }
-"""By method of the protocol: how a message begins, and the argument that it is about."""
+"""By method of the protocol: the beginning of a message, and its argument."""
 
 
 @contextlib.contextmanager
 def by_argument(method: str, *more: tuple[str, str]) -> Iterator[None]:
-    """Errors of calls of this method within the block begin with the name of the argument."""
+    """Within the block, errors of calls of this method begin with the name of the argument."""
     try:
         yield
         return
@@ -43,6 +43,6 @@ def by_argument(method: str, *more: tuple[str, str]) -> Iterator[None]:
 
 
 def each(method: str, replies: Iterator[T], *more: tuple[str, str]) -> Iterator[T]:
-    """The replies of a call that has many, with errors as of :func:`by_argument`."""
+    """Replies of a streaming call, with errors as in :func:`by_argument`."""
     with by_argument(method, *more):
         yield from replies

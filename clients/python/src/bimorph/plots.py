@@ -1,4 +1,4 @@
-"""Pictures of results, by matplotlib, which is imported when one is drawn."""
+"""Plots of results by matplotlib, which is imported at first use."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _LONGEST = 40
-"""Names that stand on an axis."""
+"""Most names on an axis."""
 
 
 def static(result: StaticResult, ax: Axes | None) -> Axes:
@@ -56,7 +56,7 @@ def modes(result: ModesResult, ax: Axes | None) -> Axes:
 
 
 def pull_in(result: PullInResult, ax: Axes | None) -> Axes:
-    """State of the gap over the voltage: it closes on the way up and opens on the way down."""
+    """State of the gap over the voltage, with pull-in on the way up and release on the way down."""
     ax = axes(ax)
     top = 1.2 * result.pull_in_v
     ax.plot([0.0, result.pull_in_v, result.pull_in_v, top], [0, 0, 1, 1], label="up")
@@ -104,7 +104,7 @@ def batch(result: BatchRun, ax: Axes | None) -> Axes:
 
 
 def sweep(table: Table, name: str | None, ax: Axes | None) -> Axes:
-    """A result over the last parameter of numbers, a line for each value of the others; over no parameter, or random samples, its histogram."""
+    """A result over the last numeric parameter, with a line for each value of the others. Without a parameter, and for random samples, the histogram."""
     name = _result(table, name)
     ax = axes(ax)
     label = f"{name} [{table.units[name]}]"
@@ -123,8 +123,8 @@ def sweep(table: Table, name: str | None, ax: Axes | None) -> Axes:
     rest = [one for one in table.parameters if one != numbers[-1]]
     for others, points in lines.items():
         points.sort()
-        said = ", ".join(f"{one} = {value if isinstance(value, str) else format(value, 'g')}" for one, value in zip(rest, others))
-        ax.plot(*zip(*points), "o-", markersize=3, label=said or None)
+        label_of_line = ", ".join(f"{one} = {value if isinstance(value, str) else format(value, 'g')}" for one, value in zip(rest, others))
+        ax.plot(*zip(*points), "o-", markersize=3, label=label_of_line or None)
     ax.set_xlabel(numbers[-1])
     ax.set_ylabel(label)
     if 1 < len(lines) <= 12:
@@ -143,7 +143,7 @@ def _result(table: Table, name: str | None) -> str:
 
 
 def _is_random(table: Table, parameter: str) -> bool:
-    """Whether samples were drawn: values that are all different and not in order."""
+    """Whether the values are random samples: all different and not in order."""
     values = [row.parameters[parameter] for row in table.rows]
     ordered = sorted(values, key=float)
     return len(values) > 3 and len(set(values)) == len(values) and values not in (ordered, ordered[::-1])

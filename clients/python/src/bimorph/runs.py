@@ -1,4 +1,4 @@
-"""Many steps in one call: of one session, and of many that are stepped along the same times."""
+"""Runs: many steps of one or several sessions in one call."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Given = Mapping[str, "ArrayLike"]
-"""What the ports are given [V, or the unit of the port's kind], by name: a number, or one for each time."""
+"""Port values by name [V, or the unit of the port's kind]: a number, or one for each time."""
 
 _AHEAD = 4
-"""Most events that are read ahead of the caller."""
+"""Most messages that are read ahead of the caller."""
 _PART = 1 << 20
-"""Most port values of one request: longer runs are made of several."""
+"""Most port values of one request; longer runs take several requests."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """The steps of a session that one call took."""
+    """Steps of a session that one call took."""
 
     t: Array
     """Times at the ends of the steps [s]."""
@@ -51,11 +51,11 @@ class Run:
     units: dict[str, str]
     """Unit of each signal."""
     currents: dict[str, Array]
-    """Current into each port after each step [A], or what ports of other kinds answer."""
+    """Conduction current into each port after each step [A], or the response of a port of another kind."""
     charges: dict[str, Array]
     """Charge on each port after each step [C]."""
     trials: int
-    """Trials that the steps took: a device may ask for shorter ones."""
+    """Device evaluations: the device may divide a step into shorter ones."""
 
     def __len__(self) -> int:
         return len(self.t)
@@ -68,7 +68,7 @@ class Run:
         return showing.frame(self.signals, ("t", self.t), {"t": "s", **self.units})
 
     def to_xarray(self) -> xarray.Dataset:
-        """The same, each signal with its unit in ``attrs["units"]``."""
+        """The signals of :meth:`to_pandas`, each with its unit in ``attrs["units"]``."""
         return labelled.dataset(("t", self.t, "s"), self.signals, self.units, {})
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -82,16 +82,16 @@ class Run:
 
 
 class RunFailed(StepFailed):
-    """A step of a run that the device cannot take. The session stands at the end of the step before."""
+    """A step of a run that the device cannot take. The state after the step before is accepted."""
 
     def __init__(self, message: str, index: int, t: float, run: Run) -> None:
         super().__init__(message)
         self.index = index
-        """Number of the step, from 0."""
+        """Number of the failed step, from 0."""
         self.t = t
-        """Time at its end [s]."""
+        """Time at the end of that step [s]."""
         self.run = run
-        """The steps before it."""
+        """The run up to that step."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (type(self), (str(self), self.index, self.t, self.run))
@@ -99,7 +99,7 @@ class RunFailed(StepFailed):
 
 @dataclass(eq=False)
 class Lane:
-    """A session on its way along the times of a run."""
+    """A session in a run, and its results."""
 
     session: Session
     values: Array
@@ -108,16 +108,16 @@ class Lane:
     currents: Array
     charges: Array
     done: int = 0
-    """Steps that are there."""
+    """Steps received."""
     trials: int = 0
     error: str = ""
-    """Why the next step has no answer; empty: it has."""
+    """Reason why the next step failed; empty without a failure."""
     last: Any = field(default=None)
-    """The reply to the last step, as it travels."""
+    """Message of the reply to the last step."""
 
     @classmethod
     def of(cls, session: Session, values: Array, steps: int, signals: int, ports: bool) -> Lane:
-        """At its start."""
+        """A lane before its first step."""
         width = len(session.ports) if ports else 0
         return cls(session, values, np.empty((steps, signals)), np.empty((steps, width)), np.empty((steps, width)))
 
@@ -131,7 +131,7 @@ class Lane:
 
 
 class Runs:
-    """What a session has of runs."""
+    """Runs of a session, as a base class."""
 
     def run(self: Any, times: ArrayLike, voltages: Given, signals: Sequence[str] | None = None) -> Run:
         """Takes a step to each of these times [s] in turn, in one call.
@@ -153,7 +153,7 @@ class Runs:
 
 
 def finished(lane: Lane, times: Array, wanted: Sequence[str]) -> Run:
-    """What a lane has come to.
+    """The run of a lane that has ended.
 
     Raises :class:`RunFailed`.
     """
@@ -255,7 +255,7 @@ def _lane(lanes: Sequence[Lane], number: int, open_lanes: set[int]) -> Lane:
 
 
 def _take(lane: Lane, rows: Any, here: Array, start: int, signals: int, ports: bool) -> None:
-    """Steps that came."""
+    """Stores the steps of a message."""
     checked, first, count = lane.session._checked, rows.first, rows.count
     begin = start + first
     in_order = begin == lane.done and first + count <= len(here)
@@ -276,7 +276,7 @@ def _take(lane: Lane, rows: Any, here: Array, start: int, signals: int, ports: b
 
 
 def _end(lane: Lane, end: Any, here: Array, start: int) -> None:
-    """The end of a lane."""
+    """Stores the end of a lane."""
     checked, session, came = lane.session._checked, lane.session, lane.done - start
     whole = end.steps == came and (came == len(here)) == (not end.error)
     checked.require(whole, f"end: expected that of {came} of {len(here)} steps, got one of {end.steps}")
@@ -291,7 +291,7 @@ def _end(lane: Lane, end: Any, here: Array, start: int) -> None:
 
 @contextlib.contextmanager
 def _heard(channel: Channel, request: Any, timeout: float) -> Iterator[Iterator[Any]]:
-    """The events of a run, of which one comes within each ``timeout`` [s]; left early, the run is stopped."""
+    """Messages of a run, with at most ``timeout`` [s] between two of them. Leaving the block stops the run."""
     outer, own = current.get(), Stopping()
     if outer is not None:
         outer.begun(own.stop)
@@ -304,7 +304,7 @@ def _heard(channel: Channel, request: Any, timeout: float) -> Iterator[Iterator[
         return
     before = current.set(own)
     try:
-        # what stops it is found when it begins
+        # the stream reads its stop handle at its start
         with contextlib.closing(channel.stream("Run", request)) as events:  # type: ignore[type-var]
             yield events
     finally:
@@ -312,7 +312,7 @@ def _heard(channel: Channel, request: Any, timeout: float) -> Iterator[Iterator[
 
 
 class _Reader:
-    """Reads the events of a run on a thread of its own: an interrupt of the caller never meets a lock of gRPC, which would stay locked."""
+    """Reads the messages of a run in a thread, so that an interrupt of the caller cannot leave a lock of gRPC locked."""
 
     def __init__(self, channel: Channel, request: Any, stopping: Stopping) -> None:
         self._channel, self._request, self._stopping = channel, request, stopping
@@ -336,7 +336,7 @@ class _Reader:
             self._events.put(error)
 
     def events(self, timeout: float) -> Iterator[Any]:
-        """Each within ``timeout`` [s] after the one before."""
+        """Messages, each within ``timeout`` [s] after the one before."""
         while True:
             try:
                 event = self._events.get(timeout=None if timeout == math.inf else timeout)
@@ -350,7 +350,7 @@ class _Reader:
             yield event
 
     def leave(self) -> None:
-        """Stops what is under way."""
+        """Stops the run."""
         self._left = True
         self._stopping.stop()
         self._room.put(None)
@@ -361,7 +361,7 @@ def _packed(values: Array) -> bytes:
 
 
 def checked_times(times: ArrayLike, after: float) -> Array:
-    """Times of a run that begins after a time [s].
+    """Checked times of a run that begins at ``after`` [s].
 
     Raises :class:`InvalidRequest`.
     """
@@ -378,7 +378,7 @@ def checked_times(times: ArrayLike, after: float) -> Array:
 
 
 def checked_signals(wanted: Sequence[str] | None, opened: Mapping[str, str]) -> list[str]:
-    """Names of opened signals; all of them where none is wanted by name.
+    """Checked names of opened signals; by default all.
 
     Raises :class:`InvalidRequest`.
     """
@@ -415,7 +415,7 @@ def arrays(voltages: Given) -> dict[str, Array]:
 
 
 def port_values(session: Any, voltages: Given, steps: int, lane: int | None = None, lanes: int = 1) -> Array:
-    """Port values of a session at each time, or one row where none changes. Of one of several lanes an array may have a row for each."""
+    """Port values of a session at each time (n×p), or one row if all are constant. For a lane of a batch, arrays may have a row for each lane."""
     voltages = arrays(voltages)
     unknown = [name for name in voltages if name not in session.ports]
     if unknown:
@@ -439,7 +439,7 @@ def port_values(session: Any, voltages: Given, steps: int, lane: int | None = No
 
 
 def workers(channel: Channel, lanes: int) -> int:
-    """Calls among which lanes are divided: in this process as many as it has cores, on a server few, as it has other clients."""
+    """Number of concurrent requests: in process the number of cores, on a server at most 4."""
     cores = os.process_cpu_count() if hasattr(os, "process_cpu_count") else os.cpu_count()
     most = (cores or 1) if channel.address == ADDRESS else min(cores or 1, 4)
     return max(min(most, lanes), 1)

@@ -42,14 +42,14 @@ PERCENTILES = (5.0, 50.0, 95.0)
 
 @dataclass(frozen=True)
 class Limit:
-    """What a result must keep to: ``yoke.y > -1.1u``."""
+    """A limit of a result, such as ``yoke.y > -1.1u``."""
 
     name: str
-    """Result, or parameter."""
+    """Name of a result or parameter."""
     relation: str
-    """``<``, ``<=``, ``>`` or ``>=``."""
+    """Relation of the result to the limit: ``<``, ``<=``, ``>`` or ``>=``."""
     value: float
-    """In the unit of the result."""
+    """Value of the limit, in the unit of the result."""
 
     def __post_init__(self) -> None:
         text("name", self.name, "the name of a result or a parameter")
@@ -120,11 +120,11 @@ class SweepStatistics:
     points: int
     """Points of the table."""
     columns: dict[str, ColumnStatistics]
-    """By result."""
+    """Statistics by name of the result."""
     limits: tuple[tuple[Limit, Fraction], ...]
-    """Each limit, with the fraction of points that keep to it."""
+    """Each limit, with the fraction of points within it."""
     passed: Fraction
-    """Points that keep to all of them: the yield. Without limits: those with a result."""
+    """Fraction of points within all limits: the yield. Without limits, the fraction of points with a result."""
     undecided: int = 0
     """Points with a result that is closer to a limit than its estimated error: they count as ``passed`` or not by the computed value."""
 
@@ -153,16 +153,16 @@ class SweepStatistics:
 
 @dataclass(frozen=True, eq=False)
 class Histogram:
-    """How often a result lies between edges."""
+    """Histogram of a result."""
 
     name: str
-    """Result."""
+    """Name of the result."""
     unit: str
-    """Its unit."""
+    """Unit of the result."""
     counts: NDArray[np.int64]
     """Points in each bin."""
     edges: NDArray[np.float64]
-    """Edges of the bins, one more; a value on an inner edge is in the bin above, the largest in the last."""
+    """Edges of the bins (bins + 1). A value on an inner edge is in the bin above, the largest value in the last bin."""
 
 
 def limit_of(given: Any, where: str = "limits") -> Limit:
@@ -175,7 +175,7 @@ def limit_of(given: Any, where: str = "limits") -> Limit:
     exponent = _SUFFIXES.get("meg" if suffix.lower() == "meg" else suffix)
     if found is None or exponent is None:
         raise wrong(where, expected, given)
-    # the nearest number to the decimal one, as netlists have it
+    # rounded once, as in netlists
     mantissa, _, power = found["value"].lower().partition("e")
     bound = float(f"{mantissa}e{int(power or 0) + exponent}")
     if not math.isfinite(bound):
