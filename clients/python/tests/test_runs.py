@@ -291,7 +291,7 @@ def states(batch: bimorph.Batch) -> list[tuple[float, int]]:
 @pytest.mark.parametrize("part", [1 << 20, 300_000])
 def test_an_interrupted_batch_keeps_every_state(model: bimorph.Model, monkeypatch: pytest.MonkeyPatch, part: int) -> None:
     """Ctrl-C in a run of a batch, whose lanes are at different steps, leaves every session in the state before, also where one request has few
-    of the lanes. The next run has the bits of an undisturbed one."""
+    of the lanes, and where it is pressed twice. The next run has the bits of an undisturbed one."""
     times, volts = course(60)
     with bimorph.Batch.of([model] * 5, ["m.x"]) as batch:
         batch.operating_point({"drive": 1.0})
@@ -301,11 +301,14 @@ def test_an_interrupted_batch_keeps_every_state(model: bimorph.Model, monkeypatc
         batch.operating_point({"drive": 1.0})
         before = states(batch)
         long = 1e-7 * np.arange(1, 300_001)
-        for delay in (0.05, 0.3, 0.9):
-            threading.Timer(delay, signal.raise_signal, [signal.SIGINT]).start()
+        for delays in ([0.05], [0.3], [0.5, 0.5001]):
+            for delay in delays:
+                threading.Timer(delay, signal.raise_signal, [signal.SIGINT]).start()
             with pytest.raises(KeyboardInterrupt):
                 for _ in range(100):
                     batch.run(long, {"drive": 1.5})
+            with contextlib.suppress(KeyboardInterrupt):
+                time.sleep(0.05 * len(delays))
             assert states(batch) == before
         assert batch.run(times, {"drive": volts}).signals["m.x"].tolist() == expected
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import contextvars
+import queue
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -238,26 +239,39 @@ class Batch:
             outer.begun(stop)
         ends = np.linspace(0, len(lanes), parts + 1).astype(int).tolist()
 
-        def part(k: int) -> None:
-            current.set(own[k])
-            request(lanes[ends[k] : ends[k + 1]])
+        results: list[BaseException | None] = []
+        wake: queue.SimpleQueue[None] = queue.SimpleQueue()
 
-        jobs: list[Future[Any]] = []
+        def part(k: int) -> None:
+            error: BaseException | None = None
+            try:
+                current.set(own[k])
+                request(lanes[ends[k] : ends[k + 1]])
+            except BaseException as raised:
+                error = raised
+            results.append(error)
+            wake.put(None)
+
+        def look() -> None:
+            # a queue, as a condition breaks where two interrupts meet in its wait; a signal of another thread is handled between two waits
+            with contextlib.suppress(queue.Empty):
+                wake.get(timeout=_LOOK)
+
+        begun = 0
         try:
             for k in range(parts):
-                jobs.append(pool.submit(contextvars.copy_context().run, part, k))
-            ended: set[Future[Any]] = set()
-            while len(ended) < parts:
-                # a signal that another thread has received is handled between two waits
-                ended = wait(jobs, _LOOK, FIRST_EXCEPTION).done
-                for job in ended:
-                    job.result()
+                pool.submit(contextvars.copy_context().run, part, k)
+                begun += 1
+            while len(results) < parts and all(error is None for error in results):
+                look()
+            for error in results:
+                if error is not None:
+                    raise error
         except BaseException:
             stop()
-            for job in jobs:
-                job.cancel()
-                with contextlib.suppress(BaseException):
-                    job.result()
+            while len(results) < begun:
+                with contextlib.suppress(KeyboardInterrupt):
+                    look()
             raise
 
     def close(self) -> None:
