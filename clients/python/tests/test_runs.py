@@ -313,6 +313,27 @@ def test_an_interrupted_batch_keeps_every_state(model: bimorph.Model, monkeypatc
         assert batch.run(times, {"drive": volts}).signals["m.x"].tolist() == expected
 
 
+@pytest.mark.usefixtures("interrupts")
+def test_a_long_batch_stops_at_the_end_of_a_part(model: bimorph.Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run of more port values of a session than one request takes goes in parts. After Ctrl-C all sessions have the state at the end of the same
+    part, and the rest of the run has the bits of an undisturbed one."""
+    times = 1e-7 * np.arange(1, 40_001)
+    with bimorph.Batch.of([model] * 3, ["m.x"]) as batch:
+        batch.operating_point({"drive": [1.0, 1.5, 2.0]})
+        expected = batch.run(times, {}).signals["m.x"]
+    monkeypatch.setattr("bimorph.runs._PART", 1000)
+    with bimorph.Batch.of([model] * 3, ["m.x"], timeout=20.0) as batch:
+        batch.operating_point({"drive": [1.0, 1.5, 2.0]})
+        threading.Timer(0.15, signal.raise_signal, [signal.SIGINT]).start()
+        with contextlib.suppress(KeyboardInterrupt):
+            batch.run(times, {})
+            time.sleep(0.5)
+        done = round(float(batch.t[0]) / 1e-7)
+        assert (batch.t == batch.t[0]).all() and done % 1000 == 0
+        if done < len(times):
+            assert batch.run(times[done:], {}).signals["m.x"].tolist() == expected[:, done:].tolist()
+
+
 @pytest.mark.parametrize("workers", [1, 3])
 def test_a_batch_that_fails_keeps_every_state(model: bimorph.Model, monkeypatch: pytest.MonkeyPatch, workers: int) -> None:
     """A session that is closed on the server, or here, ends a run, a step and an operating point of the batch; all sessions keep their states,
