@@ -22,8 +22,8 @@ test:
 
 soak:
 	@scripts/setup build
-	cargo test --release --test service -- --ignored --nocapture --test-threads=1 soak:: cuts::soak cut_sweeps::soak
-	cargo test --release --test cli -- --ignored --nocapture --test-threads=1 damage::soak kept::soak killed_clients::soak killed_jobs::soak
+	cargo test --release --test service -- --ignored --nocapture --test-threads=1 soak:: session_faults::soak sweep_faults::soak
+	cargo test --release --test cli -- --ignored --nocapture --test-threads=1 damage::soak stored_sessions::soak killed_clients::soak killed_jobs::soak
 
 fuzz:
 	@scripts/setup build

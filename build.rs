@@ -1,7 +1,4 @@
-//! Generates the protocol's Rust code from `proto/`, with a compiler written in Rust: no `protoc` is needed; and has the linker make the
-//! command smaller, where it can.
-//!
-//! Without the feature `remote` there is no protocol, and the code generator is not even a dependency.
+//! Has the linker make the command smaller, where it can.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -21,8 +18,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let known = SMALLER.iter().filter(|argument| works(argument, &out).unwrap_or(false));
         known.for_each(|argument| println!("cargo::rustc-link-arg-bins={argument}"));
     }
-    #[cfg(feature = "remote")]
-    protocol(&out)?;
     Ok(())
 }
 
@@ -43,20 +38,4 @@ fn works(argument: &str, out: &Path) -> std::io::Result<bool> {
     rustc.arg(format!("-Clink-arg={argument}")).arg("-o").arg(&program).arg(&text);
     let quiet = |command: &mut Command| command.stdout(Stdio::null()).stderr(Stdio::null()).status();
     Ok(quiet(&mut rustc)?.success() && quiet(&mut Command::new(&program))?.success())
-}
-
-/// The messages and both ends of the protocol, and its description for clients that ask for it.
-#[cfg(feature = "remote")]
-fn protocol(out: &Path) -> Result<(), Box<dyn std::error::Error>> {
-    println!("cargo::rerun-if-changed=proto");
-    let mut compiler = protox::Compiler::new(["proto"])?;
-    compiler.include_source_info(true).include_imports(true).open_file("bimorph/v1/service.proto")?;
-    std::fs::write(out.join("bimorph_v1.bin"), compiler.encode_file_descriptor_set())?;
-    tonic_prost_build::configure()
-        .build_client(true)
-        .build_server(cfg!(feature = "server"))
-        .btree_map(".")
-        .extern_path(".google.rpc", "::tonic_types::pb")
-        .compile_fds(compiler.file_descriptor_set())?;
-    Ok(())
 }

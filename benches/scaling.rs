@@ -1,7 +1,7 @@
-//! Time against size, from 10² to 10⁶ coordinates, for the kernels and the Rodas4 step of every topology with flexible joints,
-//! and for the accelerations of the same on pins by recursive coordinate reduction, explicit and as one iteration of an
-//! implicit stage: nanoseconds per body at each size, and the
-//! least-squares exponent of time against size, over all sizes and over those that outgrow the caches (from 10⁴ on).
+//! Time against size, from 10² to 10⁶ coordinates. The kernels and the Rodas4 step run on every topology with flexible
+//! joints. Recursive coordinate reduction runs on the same topologies with pins, explicit and as one iteration of an
+//! implicit stage. The output is nanoseconds per body at each size. It also has the least-squares exponent of time
+//! against size, over all sizes and over those that exceed the caches (from 10⁴ on).
 //!
 //!     taskset -c 0 cargo bench --no-default-features --bench scaling [-- TOPOLOGY …]
 //!
@@ -14,8 +14,8 @@ mod topologies;
 use bimorph::domains::{Drive, Ramp, System};
 use bimorph::equations::constrained::Constrained;
 use bimorph::equations::{Bodies, Control, Equations, Stage, Staged};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction};
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::rcr::{Linkage, Reduction};
 use bimorph::multibody::{BlockMatrix, BodyId, Model, forces};
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
@@ -81,9 +81,9 @@ fn measure(name: &str, coordinates: usize) -> (usize, [f64; 8]) {
     (n, [residual, tangent, both, factor, solve, step, reduction, implicit])
 }
 
-/// Bodies displaced by some 10 nm and turned so far that their joints move by 20 nm at most. A yoke that a thousand arms
-/// hold turns little then; turned as far as a rod, it would tear its far joints open by micrometres, the step would end in
-/// turns of 10⁴⁰ rad, and the time would be that of their sines.
+/// Bodies displaced by some 10 nm and turned so far that their joints move by 20 nm at most. A yoke on a thousand arms
+/// then rotates little. Rotated as far as a rod, it would open its far joints by micrometres, the step would end in
+/// rotations of 10⁴⁰ rad, and the time would be that of their sines.
 fn displaced(model: &Model) -> Vec<Pose> {
     let mut lever = vec![topologies::ROD / 2.0; model.bodies.len()];
     for joint in &model.joints {

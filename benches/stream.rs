@@ -1,5 +1,6 @@
-//! One Trial over the stream: the cost of the wire alone (the device echoes), and a transient Trial of a lumped plate in
-//! process and over the wire; and steps of the plate as Python takes them ([`TrialConnections`]): a trial, and its accept, which nobody waits for.
+//! One Trial over the stream: the cost of the protocol alone (the device echoes), and a transient Trial of a lumped
+//! plate in process and over the stream. It also has steps of the plate as Python takes them ([`TrialConnections`]): a
+//! trial and its accept, whose reply is not awaited.
 //!
 //! Client and server each run on one thread, as a plug-in and `bimorph serve` do. For figures that can be compared, keep
 //! both on one core, where no thread waits for another core to wake: `taskset -c 0 cargo bench --bench stream`.

@@ -3,20 +3,21 @@
 //!
 //!     taskset -c 0 cargo run --release --no-default-features --example compliant_speed
 //!
-//! The compliant formulation: three coordinates a body and flexible joints. What stands beside the peers' evaluation of
-//! accelerations is a solve with its residual; beside a full Newton iteration, that and a tangent with its factorization. The same in
-//! joint coordinates, loops closed by springs; `straight` is a bank whose arms are straight, as they are drawn.
+//! The compliant formulation: three coordinates a body and flexible joints. The peers' evaluation of accelerations is
+//! compared with a solve and its residual. A full Newton iteration is compared with that plus a tangent and its
+//! factorization. The same in joint coordinates, loops closed by springs; `straight` is a bank whose arms are straight,
+//! as they are drawn.
 
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
 use bimorph::domains::{Drive, System};
 use bimorph::equations::Joints;
+use bimorph::multibody::joint_coordinates::sprung_loops::JointMatrix;
+use bimorph::multibody::joint_coordinates::sprung_loops::columns::Four;
+use bimorph::multibody::joint_coordinates::sprung_loops::dynamics::Stresses;
+use bimorph::multibody::joint_coordinates::sprung_loops::poses::{LaneJointStates, TreeKinematics};
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::relative::JointMatrix;
-use bimorph::multibody::relative::columns::Four;
-use bimorph::multibody::relative::dynamics::Stresses;
-use bimorph::multibody::relative::placed::{LaneJointStates, TreeKinematics};
 use bimorph::multibody::{BlockMatrix, forces};
 use std::hint::black_box;
 use std::time::Instant;
@@ -109,7 +110,7 @@ fn median(mut call: impl FnMut()) -> f64 {
     times[times.len() / 2]
 }
 
-/// Time that this thread has spent on a processor [ns] where the system tells, else wall time.
+/// Processor time of this thread [ns] where the system provides it, else wall time.
 struct Clock {
     on_cpu: Option<f64>,
     wall: Instant,

@@ -1,4 +1,4 @@
-//! Steps, work and time of both formulations on scenes as they are drawn, one line each, in one run:
+//! Steps, work and time of both formulations on the example models as drawn, one line each, in one run:
 //! `scene,formulation,tol,bodies,coordinates,loops,steps,rejected,ms,deviation`.
 //!
 //!     taskset -c 0 cargo run --release --no-default-features --example formulations
@@ -8,17 +8,17 @@
 //!
 //! `rcr, stiff along for SHARE`: joints that hold no more than that of the strain energy along their axes, all together, are rigid there.
 //!
-//! Then plates on flexure pivots, joints that only turn (scheme a2): whole runs, explicit in joint coordinates, and the distance
-//! of the end of the row from a compliant run at 1e-7 in the same joints. The last lines are compliant with joints elastic in every
-//! direction (e4): what they differ by from those that only turn is part of their deviation.
+//! Then plates on flexure pivots, joints that only turn (scheme a2): whole runs, explicit in joint coordinates, and the
+//! distance of the end of the row from a compliant run at 1e-7 in the same joints. The last lines are compliant with
+//! joints elastic in every direction (e4): their difference from joints that only rotate is part of their deviation.
 
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Formulation, Scheme, compile};
 use bimorph::domains::{Drive, Ramp, System};
 use bimorph::equations::{Bodies, Joints};
+use bimorph::multibody::joint_coordinates::sprung_loops::Tree;
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::relative::Tree;
 use bimorph::multibody::{BlockMatrix, BodyId};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
@@ -32,7 +32,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A scene: file, parameters, parameters of the start, port voltages, duration [s].
+/// A model: file, parameters, parameters of the start, port voltages, duration [s].
 type Scene<'a> = (&'a str, &'a [(&'a str, f64)], &'a [(&'a str, f64)], &'a [f64], f64);
 
 fn main() {

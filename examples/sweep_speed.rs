@@ -3,19 +3,19 @@
 //!
 //!     taskset -c 0 cargo run --release --no-default-features --example sweep_speed [POINTS] [transient|static|modes|parts]
 //!
-//! *alone*: every point as a call of its own, read, searched a mesh for and analysed. *given mesh*: the same on the a priori
-//! mesh, without any estimate. *sweep*: `jobs::sweep`, with the estimate of every point. Transients are on two segments a beam in all
-//! ways; *lanes* is the integration alone, *sweep* has the reading and the estimate too. Their ends are compared bit by bit.
-//! *parts*, on its own: what a point is made of, `part,us`.
+//! *alone*: every point as a call of its own, read, searched a mesh for and analysed. *given mesh*: the same on the a
+//! priori mesh, without any estimate. *sweep*: `jobs::sweep`, with the estimate of every point. Transients are on two
+//! segments a beam in all ways; *lanes* is the integration alone, *sweep* has the reading and the estimate too. Their
+//! ends are compared bit by bit. *parts*, on its own: the parts of a point's cost, `part,us`.
 
+use bimorph::analysis::batch_transient;
 use bimorph::analysis::mesh::{MeshRequest, fitted};
-use bimorph::analysis::side_by_side;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::analysis::{modes::modes, statics::static_equilibrium};
 use bimorph::compile::{CompileOptions, CompiledModel, compile, draw};
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepSpec};
 use bimorph::netlist::{Bundle, NetlistSource};
-use bimorph::refine::model_order::Mesh;
+use bimorph::refine::mesh_search::Mesh;
 use std::hint::black_box;
 use std::path::Path;
 
@@ -85,7 +85,7 @@ fn transients(points: usize) {
     let each = |rate: f64| 1e6 * variants.len() as f64 / (rate * steps as f64);
     eprintln!("transient: {steps} steps; {:.2} µs a step alone", each(alone));
     let mut found = None;
-    let lanes = rate(variants.len(), || found = side_by_side::ends(&all, &run, &mut || true).ok());
+    let lanes = rate(variants.len(), || found = batch_transient::ends(&all, &run, &mut || true).ok());
     let (ends, work) = found.expect("runs");
     for (end, last) in ends.iter().zip(&last) {
         assert_eq!(end.as_ref().map(|end| end.values[0].to_bits()), Some(last.to_bits()));
@@ -147,7 +147,7 @@ fn rate(count: usize, work: impl FnOnce()) -> f64 {
     count as f64 / (used() - before)
 }
 
-/// What one point is made of, each part done `points` times.
+/// Parts of the cost of one point, each repeated `points` times.
 fn parts(points: usize) {
     let voltages = vec![("heat".to_owned(), 2.2)];
     let (spec, bundle) = grid(9, SweepAnalysis::Modes { count: 3, voltages: Vec::new() });

@@ -1,16 +1,17 @@
 //! Accelerations of pin-jointed chains, banks and ladders by recursive coordinate reduction: nanoseconds per body or loop.
 //!
-//! Prints `name,topology,count,ns` lines: `serial` for one mechanism, whose equal subtrees go side by side, `single` for the
-//! same with every body on its own, `lanes` for eight variants side by side (per variant). A chain counts bodies, a bank (arms
-//! of two rods to ground) and a ladder count loops; `straight` is the bank as it is drawn, by the path for singular configurations. Best of several runs of the whole evaluation: positions, rates, velocity
-//! parts, reduction and accelerations.
+//! Prints `name,topology,count,ns` lines: `serial` for one mechanism with equal subtrees in packs, `single` for the
+//! same with every body on its own, `lanes` for a batch of eight variants (per variant). A chain counts bodies, a bank
+//! (arms of two rods to ground) and a ladder count loops; `straight` is the bank as it is drawn, by the path for
+//! singular configurations. Best of several runs of the whole evaluation: positions, rates, velocity parts, reduction
+//! and accelerations.
 //!
 //! `cargo run --release --no-default-features --example topology_speed [COUNT…]`
 
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
-use bimorph::multibody::rcr::{Lanes, Linkage, Real, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Lanes, Linkage, Real, Reduction, ReductionTask};
 use std::hint::black_box;
 use std::time::Instant;
 use topologies::Topology;

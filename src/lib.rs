@@ -1,39 +1,34 @@
 //! Bimorph: behavioural device models of electro-mechanical microsystems, for circuits.
 //!
+//! This crate is the facade of the workspace: it passes on the public interface of the crates below `crates/`, and holds the command.
+//!
 //! # Layout
-//! Data flows one way. A [`netlist`] describes what was drawn ([`layout`] reads masks); it becomes a [`structure`] (materials, beams, plates,
-//! anchors, gaps, combs, ports, all in SI). [`options`] is the one table of what a model may be told. `discretize` turns beams into rigid bodies and flexible joints;
-//! `multibody` holds those bodies and the O(n+m) recursion over them; `domains` are the forces and rest offsets that
-//! heat and voltage cause. `solve` advances or balances a model, [`refine`] chooses how fine it must be, [`readout`] finds signals and ports by name, [`analysis`]
-//! holds the verbs every front shares, and [`device`] is the electrical view that a circuit simulator drives. [`results`]
-//! writes tables and pictures, [`export`] a model for other simulators.
-//! [`compile`](mod@compile) walks that path once, from netlist text to a ready model.
+//! Data flows one way. A [`netlist`] describes what was drawn ([`layout`] reads masks); it becomes a [`structure`]
+//! (materials, beams, plates, anchors, gaps, combs, ports, all in SI). [`options`] is the one table of the options of a
+//! model. `discretize` turns beams into rigid bodies and flexible joints; `multibody` holds those bodies and the O(n+m)
+//! recursion over them; `domains` are the forces and rest offsets that heat and voltage cause. `solve` advances or
+//! balances a model, [`refine`] chooses the mesh, and [`readout`] finds signals and ports by name. [`analysis`] holds
+//! the analyses that all front ends share, and [`device`] is the electrical view for a circuit simulator. [`results`]
+//! writes tables and pictures, [`export`] a model for other simulators. [`compile`](mod@compile) walks that path once,
+//! from netlist text to a ready model.
 //!
 //! [`budget`] bounds what a computation may use, and stops it.
 //!
 //! Everything inside is SI: metres, kilograms, seconds, volts, kelvin, radians. Units are parsed once, in the netlist.
 
-pub mod analysis;
-pub mod budget;
-pub mod compile;
-pub mod content;
-pub mod cosim;
-pub mod device;
-pub mod discretize;
-pub mod domains;
-pub mod equations;
-pub mod export;
-pub mod front;
-pub mod jobs;
-pub mod layout;
-pub mod multibody;
-pub mod netlist;
-pub mod options;
-pub mod readout;
-pub mod refine;
-pub mod results;
+pub use bimorph_analysis::{self as analysis, readout};
+pub use bimorph_base::budget;
+pub use bimorph_cosim as cosim;
+pub use bimorph_device as device;
+pub use bimorph_domains as domains;
+pub use bimorph_export as export;
+pub use bimorph_jobs::{self as jobs, content};
+pub use bimorph_layout::{self as layout, input};
+pub use bimorph_model::{compile, discretize, options, refine};
+pub use bimorph_multibody as multibody;
+pub use bimorph_netlist as netlist;
+pub use bimorph_results as results;
 #[cfg(feature = "remote")]
-pub mod service;
-mod sets;
-pub mod solve;
-pub mod structure;
+pub use bimorph_service as service;
+pub use bimorph_solve::{self as solve, equations};
+pub use bimorph_structure as structure;

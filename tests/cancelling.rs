@@ -1,4 +1,5 @@
-//! Whatever is computed stops soon after it is told to: every kind of analysis on a large model, cancelled in the middle.
+//! Every computation stops soon after its cancellation: every kind of analysis on a large model, cancelled in the
+//! middle.
 
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::{TransientOptions, transient};

@@ -54,8 +54,8 @@ fn trials_are_pure() {
     }
 }
 
-/// Looking at a state gives the values that its trial answered, for opened signals and for all others, and leaves no trace; a name
-/// that is none is an error.
+/// Inspection of a state gives the values of its trial, for opened signals and for all others, and changes nothing; an
+/// unknown name is an error.
 #[test]
 fn a_look_is_what_the_trial_answered() {
     for formulation in FORMULATIONS {
@@ -85,21 +85,21 @@ fn a_look_is_what_the_trial_answered() {
 fn accept_is_advisory() {
     for formulation in FORMULATIONS {
         let compiled = compiled(formulation);
-        let (mut silent, mut told) = (opened(&compiled), opened(&compiled));
+        let (mut silent, mut reported) = (opened(&compiled), opened(&compiled));
         let mut parents = [None, None];
         for step in 0..20 {
             let v = [1.0 + 0.05 * f64::from(step), 4.0];
             let mut replies = Vec::new();
-            for (device, parent) in [&mut silent, &mut told].into_iter().zip(parents) {
+            for (device, parent) in [&mut silent, &mut reported].into_iter().zip(parents) {
                 let mode = if step == 0 { Mode::Static } else { Mode::Transient };
                 ask(device, mode, parent, 1.3e-7, &[v[0], 7.0]);
                 replies.push(ask(device, mode, parent, 1e-7, &v));
             }
             assert_eq!(replies[0], replies[1]);
             parents = [replies[0].token, replies[1].token];
-            told.accept(replies[1].token.unwrap());
+            reported.accept(replies[1].token.unwrap());
         }
-        assert!(told.state_bytes() < silent.state_bytes());
+        assert!(reported.state_bytes() < silent.state_bytes());
     }
 }
 

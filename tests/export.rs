@@ -107,8 +107,9 @@ fn an_undamped_mechanism() {
     assert!(deviation(&compiled, &request, &fitted) < 1e-3);
 }
 
-/// Chevron legs side by side have modes that lie within 1 % of each other and do not show at their resonances. All of those in the band are kept where
-/// those that show are not enough: 14 modes do. (Without them 120 modes were off by 0.86.)
+/// Parallel chevron legs have modes that lie within 1 % of each other and do not show at their resonances. All of those
+/// in the band are kept where those that show are not enough: 14 modes do. (Without them 120 modes had an error of
+/// 0.86.)
 #[test]
 fn modes_that_hide_each_other_are_kept() {
     let text = "
@@ -148,7 +149,7 @@ fn a_linear_model() {
     assert!(fitted.error <= 1e-4 && off < 1e-3, "{off:e}");
 }
 
-/// More modes than named are not kept, and the error is told, not hidden.
+/// No more modes than requested are kept, and the error is reported.
 #[test]
 fn a_count_is_kept() {
     let compiled = compiled("examples/bank/bank.net", CompileOptions::default());

@@ -256,7 +256,7 @@ fn run(corpus: Vec<String>, seed: u64, mut done: impl FnMut(usize) -> bool) {
     assert!(loaded > 0, "no text loads: nothing is tried");
 }
 
-/// Of this thread, where the system tells it; else nothing passes.
+/// Of this thread, where the system provides it; otherwise zero.
 fn processor_time() -> Duration {
     let text = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     Duration::from_nanos(text.split_whitespace().next().and_then(|word| word.parse().ok()).unwrap_or(0))
@@ -299,7 +299,7 @@ fn a_few_sugar3() {
     run(sugar3(), 1, |count| count >= QUICK);
 }
 
-/// For `FUZZ_MINUTES` [min], each time with other texts: the seed is the time, and is told with what fails.
+/// For `FUZZ_MINUTES` [min], each time with other texts: the seed is the time, and is printed on failure.
 fn for_minutes(corpus: Vec<String>) {
     let minutes: f64 = std::env::var("FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0);
     let end = Instant::now() + Duration::from_secs_f64(60.0 * minutes);

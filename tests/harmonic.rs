@@ -1,5 +1,6 @@
-//! Frequency response: closed forms of lumped systems, the sum over all modes, the device of a circuit, the static limit, the line of the
-//! mass, phase at resonance, poles and zeros; and what is refused. The told error of the mesh is that of a finer one.
+//! Frequency response: closed forms of lumped systems, the sum over all modes, the device of a circuit, the static
+//! limit, the line of the mass, phase at resonance, poles and zeros; and what is refused. The reported error of the
+//! mesh is that of a finer one.
 
 use bimorph::analysis::AnalysisError;
 use bimorph::analysis::harmonic::grid::Spacing;
@@ -52,8 +53,9 @@ fn value(result: &HarmonicResult, signal: usize, k: usize) -> Complex<f64> {
     Complex::new(re, im)
 }
 
-/// 1/(k − mω² + icω) for a force, its rate, and −m times it for an acceleration of the frame, at every frequency to rounding; the static
-/// limit 1/k; the line of the mass, −1/(mω²), far above; −90° and Q/k at the resonance, whose Q, width and frequency are told.
+/// 1/(k − mω² + icω) for a force, its rate, and −m times it for an acceleration of the frame, at every frequency to
+/// rounding. The limits are 1/k, and the mass line, −1/(mω²), far above. At the resonance the phase is −90° and the
+/// magnitude Q/k; Q, width and frequency are reported.
 #[test]
 fn one_mass_on_a_spring() {
     let (k, m, c) = (1.0, 1e-10, 2e-7);
@@ -94,8 +96,9 @@ fn one_mass_on_a_spring() {
     }
 }
 
-/// Two masses: poles at ω² = (3 ∓ √5)/2·k/m, the zero of the driven mass where the other one alone swings, ω² = k/m, and none seen from the
-/// other. Nothing damps them: they are told as undamped, no point lies on them, and a grid that has one there gives no value and says so.
+/// Two masses: poles at ω² = (3 ∓ √5)/2·k/m, the zero of the driven mass where the other one alone swings, ω² = k/m,
+/// and none seen from the other. Without damping they are reported as undamped and no point lies on them. A grid with a
+/// point there gives no value and a warning.
 #[test]
 fn two_masses_have_a_zero() {
     let compiled = plain(TWO);
@@ -122,8 +125,9 @@ fn two_masses_have_a_zero() {
     assert!(on_it.warnings.iter().any(|w| w.contains("no bound")), "{:?}", on_it.warnings);
 }
 
-/// The sum over all modes of an L of beams, whose Q goes to 8343, is the exact response to 1e-9 at every frequency, damped or not, for a force, a moment and an
-/// acceleration, seen as displacements, rotations and rates; and with few modes it tells by how much it is not.
+/// The sum over all modes of an L of beams, whose Q goes to 8343, is the exact response to 1e-9 at every frequency,
+/// damped or not. The inputs are a force, a moment and an acceleration, and the outputs displacements, rotations and
+/// rates. With few modes the error is reported.
 #[test]
 fn modes_add_up() {
     let mut worst = [0.0f64; 2];
@@ -149,8 +153,8 @@ fn modes_add_up() {
                 }
             }
             let few = run(&compiled, &HarmonicOptions { modes: Some(2), ..all });
-            let told = few.modal_error.unwrap();
-            assert!(few.modes == Some(2) && told > 1e-6, "{told}");
+            let reported = few.modal_error.unwrap();
+            assert!(few.modes == Some(2) && reported > 1e-6, "{reported}");
         }
     }
     println!("sum over modes, largest difference: damped {:.1e}, undamped {:.1e}", worst[0], worst[1]);
@@ -176,9 +180,9 @@ fn static_limit() {
     }
 }
 
-/// What a circuit gets from the device in `.ac` is the same, in both formulations: at a port under bias, for forces, heat and the motion of
-/// the frame. The device does not correct the rounding of its stiffness, which moves resonances by some 3.5e-12; at Q of some hundreds
-/// that is 2e-9 beside them.
+/// The device of a circuit has the same response in `.ac`, in both formulations: at a port under bias, for forces, heat
+/// and the motion of the frame. The device does not correct the rounding of its stiffness, which moves resonances by
+/// some 3.5e-12; at Q of some hundreds that is 2e-9 beside them.
 #[test]
 fn the_device_of_a_circuit_agrees() {
     let text = include_str!("netlists/shuttle.net");
@@ -238,16 +242,16 @@ fn heat_lags() {
     );
 }
 
-/// The mesh holds the tolerance, and the told error is about that against a mesh that is ten times finer, in the measure that is
-/// told: a value, or the frequency at which it stands.
+/// The mesh holds the tolerance. The reported error is about that against a mesh that is ten times finer, in the
+/// reported measure: a value, or the frequency at which it occurs.
 #[test]
 fn the_told_error_is_the_mesh() {
     for tol in [1e-2, 1e-3, 1e-4] {
         let drawn = model(ELBOW, CompileOptions { tol, ..CompileOptions::default() });
         let options = HarmonicOptions { even: true, points: 41, ..asked("b.fx", &["b.x", "b.y"], 1e3, 2e6) };
         let (fitted, result) = harmonic_fitted(&drawn, &options, &mut |_| true).unwrap();
-        let told = result.estimated_error.unwrap();
-        assert!(told <= tol, "{tol}: {told}");
+        let reported = result.estimated_error.unwrap();
+        assert!(reported <= tol, "{tol}: {reported}");
         let finer = model(ELBOW, CompileOptions { segments: Some(96), ..CompileOptions::default() });
         let reference = run(&finer, &options);
         let shifted = |f: f64| HarmonicOptions { from: options.from * f, to: options.to * f, ..options.clone() };
@@ -260,13 +264,17 @@ fn the_told_error_is_the_mesh() {
                 worst = worst.max((value(&result, s, j) - here).norm() / size);
             }
         }
-        assert!(worst <= 1.3 * told && told <= 10.0 * worst.max(1e-6), "{tol}: told {told:.1e}, is {worst:.1e}");
+        assert!(
+            worst <= 1.3 * reported && reported <= 10.0 * worst.max(1e-6),
+            "{tol}: told {reported:.1e}, is {worst:.1e}"
+        );
         assert!(fitted.order.segments.iter().sum::<usize>() < 96);
     }
 }
 
-/// A mode that a force hardly excites, next to a zero, is a peak above what the others bring: its height is within the tolerance, and the zero, where
-/// the beams swing as if the plate were held, is told (before: 1 % off at 1e-3, zeros at 1e-4 alone). The reference has 96 segments a beam.
+/// A mode with little excitation, next to a zero, is a peak above the contributions of the others, and its height is
+/// within the tolerance. The zero, where the beams oscillate as if the plate were held, is reported (before: 1 % error
+/// at 1e-3, zeros at 1e-4 alone). The reference has 96 segments a beam.
 #[test]
 fn weak_peaks_and_their_zeros() {
     let text = "process p = [Youngsmodulus=160e9 density=2330 h=20u viscosity=1.8e-5 fluid=2u]\nplate2d p [s] [l=100u w=100u]\n\
@@ -314,7 +322,7 @@ fn a_part_that_floats() {
     assert!(poles.iter().any(|p| (p.frequency_hz() * TAU / 2e10f64.sqrt() - 1.0).abs() < 1e-9), "{poles:?}");
 }
 
-/// What cannot be computed is refused before anything is laid out, with what would be understood.
+/// Impossible requests are rejected before any allocation, with the accepted values.
 #[test]
 fn refused() {
     let compiled = plain(ONE);

@@ -1,9 +1,10 @@
-//! A netlist drawn as masks gives the same mechanism back, in both formats; a drawing that was changed gives the changed one, and
-//! what is only in the drawing is told with its area. Sources: the examples of this repository, sizes by hand.
+//! A netlist drawn as masks gives the same mechanism back, in both formats. A changed drawing gives the changed
+//! mechanism, and areas only in the drawing are reported with their size. Sources: the examples of this repository,
+//! sizes by hand.
 
 use bimorph::analysis::modes::modes;
 use bimorph::compile::{CompileOptions, compile};
-use bimorph::front::from_bytes;
+use bimorph::input::from_bytes;
 use bimorph::layout::drawing::Polygon;
 use bimorph::layout::mask::{MaskError, mask};
 use bimorph::layout::{self, LayoutFormat, Process, convert};
@@ -200,8 +201,8 @@ fn what_cuts_itself_too_often_is_refused() {
     assert!(read(cif(bars(20))).is_ok());
 }
 
-/// A rigid body of any outline is a lumped mass in a drawing of ours, and keeps mass, inertia and the drag of its gas film: A = 1e-8 m²,
-/// Ip = 2e-17 m⁴, 2 µm of 2300 kg/m³ over 2 µm of air.
+/// A rigid body of any outline is a lumped mass in a drawing of ours, and keeps mass, inertia and the drag of its gas
+/// film. A = 1e-8 m², Ip = 2e-17 m⁴, 2 µm of 2300 kg/m³ over 2 µm of air.
 #[test]
 fn a_body_keeps_its_mass_and_its_drag() {
     let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u viscosity=1.78e-5 fluid=2u]\nanchor p [root] []\n\
@@ -257,7 +258,7 @@ fn mirrored_gaps_come_back() {
         modes(&compiled, 6, &volts).unwrap().frequencies_hz
     };
     let (before, after) = (modes(text), modes(&again));
-    // those of the two that are alike but for their voltage differ by more than what is asked for
+    // those of the two that differ only by their voltage differ by more than the tolerance
     assert!(before[1] / before[0] > 1.001, "{before:?}");
     for (f, g) in before.iter().zip(&after) {
         assert!((f / g - 1.0).abs() < 1e-9, "{before:?} became {after:?}\n{again}");

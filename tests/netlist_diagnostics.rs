@@ -348,7 +348,8 @@ fn resistances_without_a_conductance_are_refused() {
     assert!(all(&format!("{PROCESS}{heated}")).items.iter().any(|d| d.code == "E060"), "{}", all(heated));
 }
 
-/// What an impact loses is bounded: a restitution from 0.01 to 1 and a speed from 1e-9 to 1e6 m/s, and a value next to a bound is printed in full.
+/// Impact losses are bounded: a restitution from 0.01 to 1 and a speed from 1e-9 to 1e6 m/s. A value next to a bound is
+/// printed in full.
 #[test]
 fn impacts_are_bounded() {
     let stop = |value: &str| format!("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u]\nstop2d * [b] [gap=1u {value}]\n");

@@ -33,7 +33,7 @@ fn every_element() {
 #[test]
 fn every_message() {
     let mut used = BTreeSet::new();
-    let mut folders = vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src/netlist")];
+    let mut folders = vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("crates/netlist/src")];
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).expect("the source") {
             let path = entry.expect("an entry").path();
@@ -46,7 +46,11 @@ fn every_message() {
     }
     let mut listed = BTreeSet::new();
     codes(&page(), ' ', &mut listed);
-    codes(&fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/src/compile.rs")).expect("text"), '"', &mut used);
+    codes(
+        &fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/crates/model/src/compile.rs")).expect("text"),
+        '"',
+        &mut used,
+    );
     assert!(used.len() > 40);
     assert_eq!(used, listed);
 }

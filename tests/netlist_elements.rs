@@ -1,4 +1,4 @@
-//! What each element adds to the structure, with numbers worked out by hand from its equations in docs/netlist.md.
+//! Additions of each element to the structure, with numbers worked out by hand from its equations in docs/netlist.md.
 
 use bimorph::netlist::{Bundle, load};
 use bimorph::structure::{GapVoltage, NodeId, Structure};
@@ -129,7 +129,7 @@ fn loads() {
     same(s.loads[2].moment, 5e-9);
 }
 
-/// A force or moment that the plane cannot hold is told.
+/// A force or moment out of the plane is reported.
 #[test]
 fn loads_out_of_plane() {
     let base = "anchor p1 [a] []\nbeam2d p1 [a b] [l=1u w=1u]\n";

@@ -87,7 +87,7 @@ fn self_contained() {
     assert_eq!(parameters(&bundle).len(), 1);
 }
 
-/// A missing file is told where it is named; what it may have defined is told once a name.
+/// A missing file is reported where it is named; its possible definitions are reported once a name.
 #[test]
 fn missing_file() {
     let text = "uses lost.net\nanchor dev [a] []\nbeam2d dev [a b] [l=1u w=1u]\nanchor odd [b] []";
@@ -118,7 +118,7 @@ fn errors_name_the_file() {
     assert!(found.render(false).contains(" --> x.net:2:9"), "{found}");
 }
 
-/// A netlist that includes itself, under its own or another spelling, is told so.
+/// A netlist that includes itself, under its own or another spelling, is reported.
 #[test]
 fn includes_itself() {
     let folder = folder(&[("root.net", "uses root.net\nparam a=1")]);
@@ -178,8 +178,9 @@ fn other_encodings() {
     assert_eq!(parameters(&Bundle::read(&path, &[]).expect("readable")).len(), 1);
 }
 
-/// `uses degrees.net` turns `ox oy oz` of its own file to degrees, wherever it stands; other angles and other files stay in radians. What a subnet
-/// is handed as `oz` comes in its file's own unit. A file of that name is read as any other.
+/// `uses degrees.net` turns `ox oy oz` of its own file to degrees, wherever it stands; other angles and other files
+/// stay in radians. The argument `oz` of a subnet is in the unit of its own file. A file of that name is read as any
+/// other.
 #[test]
 fn angles_in_degrees() {
     let layer = "process p1 = [Youngsmodulus=160e9 density=2000 h=2u]\n";

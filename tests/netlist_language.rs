@@ -176,7 +176,7 @@ fn subnet_parameters() {
     assert_eq!((beams[1].width, beams[1].thickness), (7e-6, 3e-6));
 }
 
-/// What is given to an instance reaches no inner element unless the subnet hands it on.
+/// A parameter of an instance reaches no inner element unless the subnet passes it on.
 #[test]
 fn subnet_parameters_stay_outside() {
     let text = format!(
@@ -293,7 +293,7 @@ fn recursion() {
     assert!((structure.nodes[tip.0].position[0] - 20e-6).abs() < 1e-17);
 }
 
-/// What a netlist prints comes out as a message of its own, once for each time it runs.
+/// A print of a netlist is a message of its own, once for each time it runs.
 #[test]
 fn print() {
     let warnings = loaded("for k=1:2 [ call print('k=', k, ' ', 1.5u, ' ', 12345678) ]").warnings;

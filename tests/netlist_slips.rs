@@ -1,5 +1,5 @@
-//! Slips of the pen that leave a netlist readable: what is written twice, misspelt, overwritten, or without effect is told, with its
-//! place; what cannot be is refused.
+//! Slips of the pen that leave a netlist readable: repeated, misspelt, overwritten or unused names are reported with
+//! their place; impossible ones are errors.
 
 use bimorph::analysis::mesh::static_fitted;
 use bimorph::compile::{CompileOptions, compile};
@@ -39,8 +39,8 @@ fn drawn(text: &str) -> Structure {
     load(&Bundle::from_text("t.net", text), &[]).unwrap_or_else(|d| panic!("{d}")).structure
 }
 
-/// A parameter, a formal or a node that stands twice in one list is told where it stands again; of parameters the first holds, of
-/// angles too. A second list of definitions is no part of the element, and is told.
+/// A parameter, a formal or a node that occurs twice in one list is reported at its second place. Of parameters the
+/// first is used, of angles too. A second list of definitions is no part of the element, and is reported.
 #[test]
 fn what_stands_twice() {
     let twice = format!("{HEAD}beam2d p1 [a b] [l=100u w=2u l=50u oz=pi/2]\n");
@@ -56,7 +56,7 @@ fn what_stands_twice() {
     assert!(told_with(&format!("{HEAD}{BEAM}[x=1 beam2d p1 [b c] [l=x*1u w=1u]]\n"), &[]).is_empty());
 }
 
-/// A definition that replaces a parameter set from outside is told; one made of it, or to the same value, is not.
+/// A definition that replaces a parameter set from outside is reported; one made of it, or to the same value, is not.
 #[test]
 fn settings_are_not_overwritten_in_silence() {
     let set = [("w".to_owned(), Setting::Number(3e-6))];
@@ -66,8 +66,8 @@ fn settings_are_not_overwritten_in_silence() {
     assert!(with("w=2*w").is_empty() && with("w=3u").is_empty());
 }
 
-/// Entries of a layer that nothing reads and that look like others are told; formals of subnets and parameters of elements are
-/// read. A layer's own `T` is that of its beams.
+/// Unused entries of a layer that resemble others are reported; formals of subnets and parameters of elements are used.
+/// A layer's own `T` is that of its beams.
 #[test]
 fn entries_of_layers() {
     for (slip, meant) in [("Stress", "stress"), ("strss", "stress"), ("viscocity", "viscosity"), ("Density", "density")]
@@ -123,7 +123,8 @@ fn exponents_beyond_any_number() {
     assert!(found.iter().any(|d| d.code == "E050"), "{found:?}");
 }
 
-/// What a loop builds again has names of its own: `anonN(2)` and so on, with all that is in it; and so signals and results of each.
+/// Elements built again in a loop have names of their own, `anonN(2)` and so on, with all their parts; so do signals
+/// and results of each.
 #[test]
 fn loops_name_what_they_build() {
     let text = format!(
@@ -136,7 +137,8 @@ fn loops_name_what_they_build() {
     assert_eq!(structure.beams[1].name, "anon4(2).anon2");
 }
 
-/// So many prints and warnings of one kind as there may be, others are still told; the last line says how many were left out.
+/// Beyond the maximum number of prints and warnings of one kind, others are still reported; the last line gives the
+/// number of omitted ones.
 #[test]
 fn many_warnings_hide_no_other() {
     let many = "for k=1:150 [ call print(k) ]\n".to_owned()
@@ -148,32 +150,32 @@ fn many_warnings_hide_no_other() {
     assert_eq!((last.code.as_str(), last.message.as_str()), ("W016", "left out: 50 more of W002, 10 more of W004"));
 }
 
-/// Angles of arms and curves that look like degrees are told as those of `oz` are.
+/// Angles of arms and curves that seem to be degrees are reported like those of `oz`.
 #[test]
 fn degrees_of_arms() {
     let text = format!("{HEAD}rigidlinkbeam p1 [a b] [l=100u w=2u]\nbeam3dlink p1 [a c] [l=100u w=2u L1=20u oz1=90]\n");
     assert!(told_with(&text, &[]).iter().any(|d| d.code == "W003" && d.line == 4), "{:?}", told_with(&text, &[]));
 }
 
-/// Junctions beyond their table are told once, with how many there are: cut offsets, ratios of widths, beams shorter than wide; plain
-/// anchors, corners and arcs are not.
+/// Junctions beyond their table are reported once, with their number: cut offsets, ratios of widths, beams shorter than
+/// wide. Plain anchors, corners and arcs are not.
 #[test]
 fn junctions_beyond_their_table() {
-    let told = |text: &str| -> Vec<String> {
+    let reported = |text: &str| -> Vec<String> {
         let compiled =
             compile(&Bundle::from_text("t.net", &format!("{HEAD}{text}")), &CompileOptions::default()).unwrap();
         compiled.warnings.items.into_iter().filter(|d| d.code == "W017").map(|d| d.message).collect()
     };
     let bridge =
         "beam2d p1 [a b] [l=50u w=20u]\nneck beam2d p1 [b c] [l=12u w=2u oz=pi/2]\nbeam2d p1 [c d] [l=50u w=20u]\n";
-    let found = told(bridge);
+    let found = reported(bridge);
     assert!(found.len() == 1 && found[0].contains("`neck`") && found[0].contains("nine tenths"), "{found:?}");
-    assert!(told("beam2d p1 [a b] [l=2u w=50u]")[0].contains("shorter than wide"));
+    assert!(reported("beam2d p1 [a b] [l=2u w=50u]")[0].contains("shorter than wide"));
     let plain = "beam2d p1 [a b] [l=20u w=10u]\nbeam2d p1 [b c] [l=50u w=5u oz=pi/2]\narc2d p1 [c d] [radius=10u alpha=pi w=8u]\n";
-    assert_eq!(told(plain), [""; 0]);
+    assert_eq!(reported(plain), [""; 0]);
 }
 
-/// A comb whose fingers have gone through its other side is told with its way: 5 µN at 0.1 N/m are 50 µm of 15 µm.
+/// A comb whose fingers have passed its other side is reported with its travel: 5 µN at 0.1 N/m are 50 µm of 15 µm.
 #[test]
 fn fingers_that_go_through() {
     let text = |force: &str| {
@@ -182,15 +184,15 @@ fn fingers_that_go_through() {
             dr comb2d p1 [m s] [N=100 gap=2u l=5u L=20u V=0]\n"
         )
     };
-    let told = |force: &str| {
+    let reported = |force: &str| {
         let compiled = compile(&Bundle::from_text("t.net", &text(force)), &CompileOptions::default()).unwrap();
         let found = static_fitted(&compiled, &[]).unwrap().0.warnings.items;
         found.into_iter().filter(|d| d.code == "W024").map(|d| d.message).collect::<Vec<_>>()
     };
-    let found = told("5u");
+    let found = reported("5u");
     assert!(
         found.len() == 1 && ["`dr`", "50.000 µm", "15.000 µm"].iter().all(|part| found[0].contains(part)),
         "{found:?}"
     );
-    assert_eq!(told("1u"), [""; 0]);
+    assert_eq!(reported("1u"), [""; 0]);
 }

@@ -125,8 +125,8 @@ fn nodes_with_coordinates() {
     assert_eq!((s.loads[0].force, s.loads[0].moment), ([10e-6, 0.0], 1e-12));
 }
 
-/// `constraint` holds two nodes in one rigid body where they are drawn, as SUGAR 3's multipliers do: the end of the link goes along
-/// with the force on its other end. Called like a function it is told how it is written.
+/// `constraint` holds two nodes in one rigid body where they are drawn, as SUGAR 3's multipliers do: the end of the
+/// link goes along with the force on its other end. A call like a function is reported with the right form.
 #[test]
 fn constraints_are_rigid_links() {
     let text = |model: &str| {
@@ -146,7 +146,7 @@ fn constraints_are_rigid_links() {
     assert_eq!((called.code.as_str(), called.help.as_str()), ("E055", "write `element {…; model=\"force\"}`"));
 }
 
-/// Files are used once, and found by their name; a file that is not there, and one of SUGAR 2, are told.
+/// Files are used once, and found by their name; a missing file, and one of SUGAR 2, are reported.
 #[test]
 fn files() {
     let root = "use(\"layers.net\")\nuse 'layers.net'\nanchor {node \"a\"; material=p1}\nbeam2d {node \"a\", node \"b\"; material=p1, l=10u, w=1u}\n";
@@ -269,8 +269,8 @@ fn the_order_is_always_the_same() {
     }
 }
 
-/// Every angle is in degrees, those of arcs and arms too; coordinates of a node that is there already hold where it had none and are
-/// told where they differ; a string is no number of a material, and misspelt entries are told.
+/// Every angle is in degrees, those of arcs and arms too. Coordinates of an existing node hold where it had none, and
+/// differing ones are reported. A string is no number of a material, and misspelt entries are reported.
 #[test]
 fn angles_coordinates_and_materials() {
     let arc = |alpha: f64| {
@@ -288,13 +288,13 @@ fn angles_coordinates_and_materials() {
         loaded.warnings.items.into_iter().map(|d| (d.code, d.line, d.message)).collect::<Vec<_>>()
     };
     let again = "node {0, 60u; name=\"B\"}\n";
-    let told = warned(&format!("{LAYER}{nodes}{again}beam2d {{O, B; material=p1, w=2u}}\n"));
-    assert_eq!(told.len(), 1, "{told:?}");
-    assert!(told[0].0 == "W011" && told[0].1 == 6 && told[0].2.contains("`B`"), "{told:?}");
+    let reported = warned(&format!("{LAYER}{nodes}{again}beam2d {{O, B; material=p1, w=2u}}\n"));
+    assert_eq!(reported.len(), 1, "{reported:?}");
+    assert!(reported[0].0 == "W011" && reported[0].1 == 6 && reported[0].2.contains("`B`"), "{reported:?}");
     let cantilever = "anchor {node \"A\"; material=q}\nbeam2d {node \"A\", node \"B\"; material=q, l=100u, w=2u}\n";
     let text = format!("{LAYER}q = material {{parent=p1, stress=\"100M\"}}\n{cantilever}");
     let found = refused(&text);
     assert!(found.code == "E050" && found.message.contains("`stress`"), "{found:?}");
-    let told = warned(&format!("{LAYER}q = material {{parent=p1, strss=1}}\n{cantilever}"));
-    assert!(told.len() == 1 && told[0].0 == "W004" && told[0].2.contains("`strss`"), "{told:?}");
+    let reported = warned(&format!("{LAYER}q = material {{parent=p1, strss=1}}\n{cantilever}"));
+    assert!(reported.len() == 1 && reported[0].0 == "W004" && reported[0].2.contains("`strss`"), "{reported:?}");
 }

@@ -1,5 +1,5 @@
-//! Noise of a device: what is warm and takes energy gives it back. Checked against the fluctuation–dissipation theorem, which
-//! holds for any linear system in equilibrium (Callen and Welton 1951), and against closed forms.
+//! Noise of a device: every warm dissipative element is a source. Checked against the fluctuation–dissipation theorem,
+//! which holds for any linear system in equilibrium (Callen and Welton 1951), and against closed forms.
 
 use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Junctions, compile};
 use bimorph::device::local::LocalDevice;

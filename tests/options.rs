@@ -1,7 +1,7 @@
-//! Every front takes every option of a model, under its name, in its unit, with its default and within its range.
+//! Every front end has every option of a model, under its name, in its unit, with its default and within its range.
 //!
-//! What is written from the table (docs/options.md, fields in proto/, the keywords of the Python client) is compared with it;
-//! `BIMORPH_WRITE=1 cargo test --test options` writes it anew.
+//! The files generated from the table (docs/options.md, fields in proto/, the keywords of the Python client) are
+//! compared with it; `BIMORPH_WRITE=1 cargo test --test options` regenerates them.
 
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::TransientOptions;
@@ -35,7 +35,7 @@ fn wrapped(text: &str, head: &str, width: usize) -> String {
     lines.iter().map(|line| format!("{head}{line}\n")).collect()
 }
 
-/// What an option means, with its range and default, in one sentence each.
+/// Meaning of an option, with its range and default, in one sentence each.
 fn sentences(about: &OptionDescription) -> String {
     let unit = if matches!(about.unit, "" | "1") { String::new() } else { format!(" [{}]", about.unit) };
     match about.range {
@@ -79,7 +79,7 @@ fn fields() -> String {
     let mut text = String::new();
     for ModelOption { about, number, .. } in MODEL.iter() {
         let kind = match about.range {
-            // presence tells a default that is true from a false that was sent
+            // presence distinguishes a default that is true from a false that was sent
             Range::Flag if about.default == OptionValue::Flag(true) => "optional bool",
             Range::Flag => "bool",
             Range::Count(..) => "optional uint32",
@@ -94,7 +94,7 @@ fn fields() -> String {
 
 fn python() -> String {
     let mut text = String::from(
-        "\"\"\"Options of a model. Written from src/options/model.rs by ``BIMORPH_WRITE=1 cargo test --test options``.\"\"\"\n\n\
+        "\"\"\"Options of a model. Written from crates/model/src/options/model.rs by ``BIMORPH_WRITE=1 cargo test --test options``.\"\"\"\n\n\
          from __future__ import annotations\n\nfrom typing import Literal, TypedDict\n\n\n\
          class Options(TypedDict, total=False):\n    \"\"\"Keywords of ``compile`` and ``sweep``; those left out, or None, have their defaults.\"\"\"\n",
     );
@@ -127,10 +127,10 @@ fn section<'a>(text: &'a str, markers: Option<[&str; 2]>) -> [&'a str; 3] {
     [&text[..start], &text[start..end], &text[end..]]
 }
 
-/// What is written from the table is what the table says.
+/// The generated files agree with the table.
 #[test]
 fn files_are_as_written_from_the_table() {
-    let proto = ["written from the table in src/options/model.rs.", "// end of the options"];
+    let proto = ["written from the table in crates/model/src/options/model.rs.", "// end of the options"];
     for (path, markers, want) in [
         ("docs/options.md", Some(["<!-- options -->", "<!-- end of options -->"]), rows()),
         ("docs/options.md", Some(["<!-- analyses -->", "<!-- end of analyses -->"]), analysis_rows()),
@@ -181,8 +181,9 @@ fn written(value: &OptionValue) -> Option<String> {
     }
 }
 
-/// The one comparison of all fronts: names, units, defaults and ranges of every option in the command, a deck, on the wire, in
-/// Python and in docs/. The command and the deck answer for themselves; the wire, Python and docs/ by what is written there.
+/// The one comparison of all front ends: names, units, defaults and ranges of every option in the command, a deck, the
+/// protocol, Python and docs/. The command and the deck answer for themselves; the wire, Python and docs/ by what is
+/// written there.
 #[test]
 fn every_front_takes_the_same_options() {
     let (_, help, _) = bimorph(&["static".into(), "--help".into()]);
@@ -213,13 +214,13 @@ fn every_front_takes_the_same_options() {
         assert_eq!(status, Some(0), "{flag} {inside}: {err}");
         if name != "segments" {
             let document: serde_json::Value = serde_json::from_str(&out).expect("a document");
-            let told = match &inside {
+            let reported = match &inside {
                 OptionValue::Number(x) => document[about.wire].as_f64() == Some(*x),
                 OptionValue::Flag(flag) => document[about.wire].as_bool() == Some(*flag),
                 OptionValue::Name(name) => document[about.wire].as_str() == Some(name),
                 _ => false,
             };
-            assert!(told, "{flag}: {out}");
+            assert!(reported, "{flag}: {out}");
         }
         if let Some(beyond) = &beyond {
             let (status, _, err) = command(beyond);

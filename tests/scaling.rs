@@ -16,14 +16,14 @@ fn system(model: Model) -> System {
     System::of_model(model, 2e-6)
 }
 
-/// What a model costs: bodies, joints, blocks below the diagonal, block products of a factorization and of a solve.
+/// Size of a model: bodies, joints, blocks below the diagonal, block products of a factorization and of a solve.
 fn counters(model: &Model) -> [usize; 5] {
     let p = &model.pattern;
     [model.bodies.len(), model.joints.len(), p.off_blocks(), p.multiplications(), p.solve_multiplications()]
 }
 
-/// What one more unit brings, for each topology: bodies, joints, blocks, products of a factorization and of a solve; and
-/// the widest front. Exact: every unit costs the same, whether it is the third or the hundred thousandth.
+/// Increment per unit of each topology: bodies, joints, blocks, products of a factorization and of a solve; and the
+/// widest front. Exact: every unit costs the same, whether it is the third or the hundred thousandth.
 #[rustfmt::skip]
 const PER_UNIT: [([usize; 5], usize); 6] = [
     ([1, 1, 1, 2, 3], 1),
@@ -34,7 +34,7 @@ const PER_UNIT: [([usize; 5], usize); 6] = [
     ([88, 104, 88, 176, 264], 1),
 ];
 
-/// From 10² to 10⁶ coordinates the counters of every topology are straight lines: each further unit brings the same
+/// From 10² to 10⁶ coordinates the counters of every topology are straight lines. Each further unit adds the same
 /// number of blocks and of block products, exactly, and the widest front does not grow.
 #[test]
 fn the_work_is_linear_from_a_hundred_to_a_million_coordinates() {

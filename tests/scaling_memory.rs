@@ -1,4 +1,4 @@
-//! What a mechanism of any size costs in memory, and what its steps allocate.
+//! Memory of a mechanism of any size, and allocations of its steps.
 
 #[path = "topologies/mod.rs"]
 mod topologies;
@@ -6,7 +6,7 @@ mod topologies;
 use bimorph::domains::System;
 use bimorph::equations::constrained::Constrained;
 use bimorph::equations::{Control, Equations};
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use bimorph::solve::dirk::Dirk;
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
@@ -104,7 +104,7 @@ fn an_implicit_step_in_joint_coordinates_allocates_nothing() {
     }
 }
 
-/// The recursion allocates nothing in any configuration and for any task, with equal subtrees side by side or without.
+/// The recursion allocates nothing in any configuration and for any task, with packs of equal subtrees or without.
 #[test]
 fn the_recursion_allocates_nothing() {
     let _alone = alone();

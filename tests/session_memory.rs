@@ -1,4 +1,4 @@
-//! What a session costs in memory.
+//! Memory of a session.
 
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::device::local::LocalDevice;

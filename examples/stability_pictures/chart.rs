@@ -5,7 +5,7 @@ use std::fmt::Write;
 /// One axis.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Axis {
-    /// What it shows, with its unit.
+    /// Label, with its unit.
     pub(crate) label: &'static str,
     /// Decades instead of equal steps.
     pub(crate) log: bool,
@@ -100,7 +100,7 @@ impl Scale {
     }
 }
 
-/// Charts side by side.
+/// Charts in a row.
 pub(crate) fn picture(charts: &[Chart]) -> String {
     let width = WIDTH * charts.len() as f64;
     let mut out = format!(

@@ -223,7 +223,7 @@ fn long_steps() -> Vec<Chart> {
     let us = |track: Vec<[f64; 2]>| scaled(&track, 1e6, 1.0);
     vec![
         Chart {
-            title: "Stiff bank let go, steps of 0.1 µs",
+            title: "Stiff bank released, steps of 0.1 µs",
             x: linear("time [µs]"),
             y: between(linear("energy over the first"), 0.0, 1.6),
             series: vec![
@@ -262,7 +262,7 @@ fn scales() -> Vec<Chart> {
     }]
 }
 
-/// What draws one picture.
+/// Function that draws one picture.
 type Draw = fn() -> Vec<Chart>;
 
 fn main() -> std::io::Result<()> {

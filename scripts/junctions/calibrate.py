@@ -1,4 +1,4 @@
-"""Solves the unit junctions and writes their springs to src/discretize/junction_table.rs.
+"""Solves the unit junctions and writes their springs to crates/model/src/discretize/junction_table.rs.
 
 Run it by `scripts/junctions/calibrate`, which makes the virtual environment.
 """
@@ -13,7 +13,7 @@ import unit_junction
 RATIOS = [2.0**k for k in (-3, -2, -1, -0.5, 0, 0.5, 1, 2, 3)]
 TURNS = [0, 15, 30, 45, 60, 75, 90, 105, 120]
 TILTS = [0, 15, 30, 45]
-OUT = pathlib.Path(__file__).parents[2] / "src/discretize/junction_table.rs"
+OUT = pathlib.Path(__file__).parents[2] / "crates/model/src/discretize/junction_table.rs"
 
 # under a reflection about the branch, shear force and moment change sign, the normal force does not
 MIRROR = np.array([1, -1, -1, 1, 1, 1])

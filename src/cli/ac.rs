@@ -1,4 +1,4 @@
-//! `bimorph ac`: what a small sinusoid does at every frequency.
+//! `bimorph ac`: the response to a small sinusoid at every frequency.
 
 use super::ac_report::{picture, table, text};
 use super::failure::Failure;
@@ -15,11 +15,11 @@ use serde::Serialize;
 
 /// Frequency response about the operating point: magnitude and phase of what a small sinusoid at one place does.
 ///
-/// Drive: NODE.fx, NODE.fy [N], NODE.m [N·m], a port of the netlist [V], BEAM.T (heat) [W], frame.ax, frame.ay [m/s²], frame.wz [rad/s].
-/// Signals: those of `tran` over the unit of the drive, and PORT.i [A], the current into a port.
-/// JSON: "frequencies_hz"; "signals": by name "re" and "im", null where an undamped resonance has no bound; "units" by name;
-/// "at_rest" by name; "poles" and, by name, "zeros": "re", "im" [rad/s], "frequency_hz", "quality" (null: undamped), "width_hz";
-/// "points_added" about resonances and zeros; "modes" and "modal_error" with --by-modes.
+/// Drive: NODE.fx, NODE.fy [N], NODE.m [N·m], a port of the netlist [V], BEAM.T (heat) [W], frame.ax, frame.ay [m/s²],
+/// frame.wz [rad/s]. Signals: those of `tran` over the unit of the drive, and PORT.i [A], the current into a port. Rows
+/// keep their own scale, which makes elimination with rows of very different weight stable. See A. J. Cox, N. J.
+/// Higham, "Stability of Householder QR factorization for weighted least squares problems", 1998. See also C. C. Paige,
+/// "Computer solution and perturbation analysis of generalized linear least squares problems", Math.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph ac stage.net --drive c.fx --signals c.x,c.y --from 10k --to 1M --out stage.png\n  \
@@ -31,11 +31,11 @@ pub(crate) struct AcCommand {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// What is driven: NODE.fx, NODE.fy, NODE.m, a port, BEAM.T, frame.ax, frame.ay or frame.wz
+    /// Input: NODE.fx, NODE.fy, NODE.m, a port, BEAM.T, frame.ax, frame.ay or frame.wz
     #[arg(long, short = 'd', value_name = "NAME")]
     drive: String,
 
-    /// Signals wanted, PORT.i among them: a,b or repeated [default: what the driven place itself answers]
+    /// Output signals, PORT.i among them: a,b or repeated [default: the output at the driven place itself]
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 

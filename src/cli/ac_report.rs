@@ -1,4 +1,4 @@
-//! What `bimorph ac` says of a response: table, picture, and text with resonances and zeros.
+//! Output of `bimorph ac`: table, picture, and text with resonances and zeros.
 
 use super::failure::Failure;
 use super::report;
@@ -117,8 +117,9 @@ fn on_top(result: &HarmonicResult, signal: usize, hertz: f64, width: f64) -> Opt
     ((grid[k] - hertz).abs() <= ON_TOP * width).then(|| result.signals[signal].values[k])
 }
 
-/// Whether what a signal shows grows towards an undamped resonance at `hertz`: told by the two frequencies of the grid next to it on one side, the
-/// nearer of which would show several times as much. What does not see a mode, behind an anchor or at its node, shows the same at both.
+/// Whether a signal grows towards an undamped resonance at `hertz`. The criterion is the two frequencies of the grid
+/// next to it on one side: the value at the nearer one would be several times larger. A signal that a mode does not
+/// affect, behind an anchor or at its node, has the same value at both.
 fn grows(result: &HarmonicResult, signal: usize, hertz: f64) -> bool {
     let (grid, values) = (&result.frequencies_hz, &result.signals[signal].values);
     let finite = |k: &usize| size(values[*k]).is_finite() && grid[*k] != hertz;

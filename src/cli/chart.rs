@@ -22,10 +22,11 @@ use std::path::{Path, PathBuf};
 
 /// Error against work for methods, tolerances, formulations and model orders; time of a step against size for solvers.
 ///
-/// Works on any netlist. Three parts: "precision" integrates one model by every method and tolerance and compares with a far
-/// tighter run; "order" compares models of growing order with the finest one; "solvers" measures one step of Rodas4 with each
-/// solver on them; "defaults", when asked for, makes the analyses of default commands at each tolerance. Errors are root mean squares over the signals relative to their amplitude. Errors and counters are the same
-/// on every run; times are wall-clock times of this machine.
+/// Works on any netlist. Three parts run by default. "precision" integrates one model by every method and tolerance and
+/// compares with a far tighter run. "order" compares models of growing order with the finest one. "solvers" measures
+/// one step of Rodas4 with each solver on them. "defaults", on request, runs the analyses of default commands at each
+/// tolerance. Errors are root mean squares over the signals relative to their amplitude. Errors and counters are the
+/// same on every run; times are wall-clock times of this machine.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph chart bank.net --signals yoke.y --port heat=2.2 --stop 100u --out bank.png --out bank.csv\n  \
@@ -58,7 +59,8 @@ pub(crate) struct ChartCommand {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// Parts wanted: precision, order, solvers, defaults (what is asked for and what comes out) [default: precision,order,solvers]
+    /// Parts wanted: precision, order, solvers, defaults (requested against obtained accuracy) [default:
+    /// precision,order,solvers]
     #[arg(long, value_name = "NAMES")]
     parts: Vec<String>,
 
@@ -87,7 +89,7 @@ pub(crate) struct ChartCommand {
     #[arg(long, default_value_t = 3)]
     repeat: usize,
 
-    /// What stands for work in pictures: time, or counts, which are the same on every machine
+    /// Measure of work in pictures: time, or counts, which are the same on every machine
     #[arg(long, value_enum, default_value_t)]
     work: CostMeasure,
 
@@ -111,7 +113,7 @@ struct ChartDocument<'a> {
     context: Context<'a>,
 }
 
-/// What makes a chart cheaper.
+/// Ways to reduce the cost of a chart.
 const CHEAPER: &str = "fewer --tols or --methods, or a shorter --stop, cost less";
 
 /// Methods that are charted when none are named: all but the explicit one, which needs millions of steps on stiff parts.

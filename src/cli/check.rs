@@ -3,6 +3,7 @@
 use super::failure::Failure;
 use super::model::{Context, JsonMap, ModelArgs};
 use super::output;
+use bimorph::analysis::formulation;
 use bimorph::compile::{CompiledModel, Formulation};
 use bimorph::domains::elements;
 use bimorph::netlist::Setting;
@@ -13,8 +14,8 @@ use std::fmt::Write;
 
 /// Parse and elaborate a netlist, and report every error and warning.
 ///
-/// Exit status 1 on any error. Tells the model's unknowns, and with --band their estimated error; JSON has "segments" by
-/// beam (0: rigid).
+/// Exit status 1 on any error. Prints the model's unknowns, and with --band their estimated error; JSON has "segments"
+/// by beam (0: rigid).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph check bank.net\n  bimorph check bank.net --set w=2.1u --json")]
 pub(crate) struct CheckCommand {
@@ -97,7 +98,7 @@ impl CheckCommand {
     }
 }
 
-/// What the formulation makes of the model, in a line; nothing for the bodies' own coordinates.
+/// Effect of the formulation on the model, in a line; empty for the bodies' own coordinates.
 fn formulation(compiled: &CompiledModel) -> String {
     let name = compiled.options.formulation.name();
     match &compiled.joints {
@@ -109,7 +110,7 @@ fn formulation(compiled: &CompiledModel) -> String {
         ),
         Some(Err(unfit)) => format!("formulation {name}: not by springs: {unfit}\n"),
         None if compiled.options.formulation == Formulation::Auto => {
-            let suited = Formulation::suited(compiled, None);
+            let suited = formulation::suited(compiled, None);
             format!("formulation auto takes {}: {}\n", suited.formulation.name(), suited.why)
         }
         None => String::new(),

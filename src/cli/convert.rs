@@ -14,9 +14,10 @@ use std::path::PathBuf;
 
 /// Make a netlist of a layout: CIF or GDSII.
 ///
-/// A drawing that `bimorph layout` made is read by its labels, checked against its polygons; any other by its geometry: limbs become beams,
-/// wide parts bodies, what the process says holds them anchors. What was not understood is listed with its area and place, and drawn red
-/// in the picture. Every other command takes layouts too, with the same --process and --cell.
+/// A drawing that `bimorph layout` made is read by its labels, checked against its polygons; any other by its geometry:
+/// limbs become beams, wide parts bodies, what the process says holds them anchors. Unrecognised areas are listed with
+/// size and position, and drawn red in the picture. Every other command takes layouts too, with the same --process and
+/// --cell.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph convert resonator.gds -o resonator.net --picture resonator.png\n  \
     bimorph convert chip.gds --cell tuning_fork --process soi -o fork.net\n  bimorph modes resonator.gds --count 3")]
@@ -68,7 +69,7 @@ impl ConvertCommand {
         }
         let (drawing, source) = front_telling(&self.file, &self.layout.asked())?;
         let Some(converted) = &source.converted else { return Ok(()) };
-        // What comes out must be a netlist that loads: anything else is a fault of the conversion, and told before it is written.
+        // The resulting netlist must load. Anything else is a fault of the conversion, reported before it is written.
         let loaded = netlist::load(&source.bundle, &[]).map_err(bimorph::compile::CompileError::Netlist)?;
         let report = self.report(&drawing.top, &converted.process, &converted.report);
         if let Some(path) = &self.picture {

@@ -1,7 +1,7 @@
 //! `bimorph cosim`: a circuit with mechanisms in it.
 
-use super::access::AccessArgs;
 use super::cosim_netlist::{NetlistArgs, is_netlist};
+use super::credentials::AccessArgs;
 use super::failure::Failure;
 use super::output::{check_folder, write};
 use super::plot::{chart_of, longest};
@@ -42,7 +42,8 @@ pub(crate) struct CosimCommand {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Repeat the run with half the steps, a tenth of the tolerances (reltol, and tol of every model) and twice the segments, and tell the difference
+    /// Repeat the run with half the steps, a tenth of the tolerances (reltol, and tol of every model) and twice the
+    /// segments, and print the difference
     #[arg(long)]
     check: bool,
 

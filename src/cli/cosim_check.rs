@@ -1,4 +1,4 @@
-//! What `bimorph cosim --check` prints: how far a run and its finer repetition lie apart.
+//! Output of `bimorph cosim --check`: the difference between a run and its finer repetition.
 
 use super::failure::Failure;
 use super::output::print;
@@ -65,7 +65,7 @@ fn table(plot: &PlotComparison) -> String {
     format!("\n{}, {points} points against {finer}\n{table}{}", plot.name, oscillators(plot))
 }
 
-/// What oscillates, whose phase counts for nothing.
+/// Oscillating vectors, whose phase is ignored.
 fn oscillators(plot: &PlotComparison) -> String {
     let row = |v: &VectorComparison| {
         let Oscillation { frequency: [f, _], amplitude: [a, _], difference } = v.oscillation?;

@@ -4,8 +4,8 @@ use super::failure::Failure;
 use super::options::Chosen;
 use super::output::{check_folder, write_page};
 use super::value;
-use bimorph::cosim::around::{DeckSpec, around};
-use bimorph::cosim::finer;
+use bimorph::cosim::deck::{DeckSpec, around};
+use bimorph::cosim::refined_deck;
 use bimorph::netlist::{self, Bundle, DroppedInclude, Setting};
 use clap::Args;
 use std::io::{self, IsTerminal};
@@ -34,7 +34,7 @@ pub(crate) struct NetlistArgs {
     #[arg(long, value_name = "SWEEP", value_parser = levels)]
     dc: Option<String>,
 
-    /// What a source or a port gives over time, as SPICE writes it: 'NAME=PULSE(0 4 1u 1u)'. Repeatable
+    /// Waveform of a source or a port, in SPICE syntax: 'NAME=PULSE(0 4 1u 1u)'. Repeatable
     #[arg(long, value_name = "NAME=WAVE", value_parser = wave)]
     drive: Vec<(String, String)>,
 
@@ -159,7 +159,7 @@ fn analysis(text: &str, form: &str, fit: impl Fn(&[&str]) -> bool) -> Result<Str
 fn times(text: &str) -> Result<String, String> {
     analysis(text, "STEP STOP [START [LONGEST]] [uic]", |words| {
         let uic = words.last().is_some_and(|word| word.eq_ignore_ascii_case("uic"));
-        let positive = |k: usize| words.get(k).and_then(|word| finer::number(word)).is_none_or(|t| t > 0.0);
+        let positive = |k: usize| words.get(k).and_then(|word| refined_deck::number(word)).is_none_or(|t| t > 0.0);
         (2..=4).contains(&(words.len() - usize::from(uic))) && positive(0) && positive(1)
     })
 }
@@ -167,7 +167,7 @@ fn times(text: &str) -> Result<String, String> {
 fn frequencies(text: &str) -> Result<String, String> {
     let kinds = ["dec", "oct", "lin"];
     analysis(text, "dec POINTS FROM TO", |words| {
-        let number = |k: usize| finer::number(words[k]);
+        let number = |k: usize| refined_deck::number(words[k]);
         words.len() == 4
             && kinds.iter().any(|kind| words[0].eq_ignore_ascii_case(kind))
             && number(1).is_none_or(|points| points >= 1.0)
@@ -178,7 +178,7 @@ fn frequencies(text: &str) -> Result<String, String> {
 
 fn levels(text: &str) -> Result<String, String> {
     analysis(text, "v_NAME FROM TO STEP, STEP towards TO and not 0", |words| {
-        let leads = |words: &[&str]| match [words[1], words[2], words[3]].map(finer::number) {
+        let leads = |words: &[&str]| match [words[1], words[2], words[3]].map(refined_deck::number) {
             [Some(from), Some(to), Some(step)] => step != 0.0 && (to - from) * step >= 0.0,
             _ => true,
         };

@@ -1,4 +1,4 @@
-//! `bimorph doctor`: what works on this machine, and what to do about the rest.
+//! `bimorph doctor`: checks of this machine, with remedies.
 
 use super::failure::Failure;
 use super::output::print;
@@ -12,7 +12,7 @@ use bimorph::service::address::Address;
 use bimorph::service::client::Client;
 use bimorph::service::server::{self, ServeOptions};
 use bimorph::service::settings::Settings;
-use bimorph::service::{descriptors, guard, survey};
+use bimorph::service::{authentication, descriptors, store::scan};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -21,8 +21,8 @@ use std::time::Duration;
 
 /// Check what is installed and what works: the core, ngspice, the plug-in, a server, the Python client.
 ///
-/// Exit status 0 when the core works; the other lines say what is missing and what to do. Of a server that is told its settings
-/// by a file or the environment (BIMORPH_SERVE_NAME), certificate, key, tokens and folder of states must be good, too.
+/// Exit status 0 when the core works; the other lines say what is missing and what to do. If a file or the environment
+/// (BIMORPH_SERVE_NAME) has settings of a server, its certificate, key, tokens and folder of states must be valid, too.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph doctor\n  bimorph doctor --config /etc/bimorph/serve.toml")]
 pub(crate) struct DoctorCommand {
@@ -63,21 +63,22 @@ impl DoctorCommand {
         self.settings()
     }
 
-    /// What a server with these settings would find.
+    /// Checks the files that a server with these settings would open.
     fn settings(&self) -> Result<(), Failure> {
         let settings = SettingSources::of(self.config.clone()).settings()?;
         if settings == Settings::default() {
             return Ok(());
         }
         let options = settings.options();
-        let found = guard::look_at(&options.guard).map_err(|error| error.to_string()).map(|found| match found {
-            found if found.is_empty() => "nobody is asked for anything".to_owned(),
-            found => found.join("; "),
-        });
+        let found =
+            authentication::look_at(&options.guard).map_err(|error| error.to_string()).map(|found| match found {
+                found if found.is_empty() => "clients need no credentials".to_owned(),
+                found => found.join("; "),
+            });
         line("access", &found, "docs/service.md says what a server asks of its clients, and of its files")?;
         let mut good = found.is_ok();
         if let Some(folder) = &options.state_dir {
-            let found = survey::look_at(folder).map_err(|error| error.to_string());
+            let found = scan::look_at(folder).map_err(|error| error.to_string());
             good &= found.is_ok();
             line("states", &found, "name a folder of this server's own in state_dir, which its user can write")?;
         }

@@ -1,4 +1,4 @@
-//! The mechanism in motion: what `tran --draw` writes.
+//! The mechanism in motion, for `tran --draw`.
 
 use super::failure::Failure;
 use super::output::{self, check_folder, write_page};

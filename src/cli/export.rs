@@ -19,9 +19,10 @@ use std::sync::Arc;
 
 /// The model as a SPICE subcircuit or a Verilog-A module, for simulators without the plug-in.
 ///
-/// What is written is the linear model about the operating point: its modes, the static correction for all others, damping, lags of
-/// heaters, electrical, mechanical and thermal ports with the scales of the plug-in. It is compared with the exact
-/// small-signal answer up to --to, and has as many modes as --within takes. The mesh is that of a deck with the same options.
+/// The output is the linear model about the operating point: its modes, the static correction for all others, damping,
+/// lags of heaters, and electrical, mechanical and thermal ports with the scales of the plug-in. It is compared with
+/// the exact small-signal answer up to --to, and has as many modes as --within takes. The mesh is that of a deck with
+/// the same options.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  bimorph export bank.net --spice --port heat=1 --port sense=10 --signals yoke.y:1M --out bank.lib\n  \
@@ -143,7 +144,7 @@ impl ExportCommand {
         print(&(json + "\n"))
     }
 
-    /// What the file does not say by its numbers.
+    /// Limitations of the file that its numbers do not show.
     fn warnings(&self, compiled: &CompiledModel, fitted: &ModelFit) -> Vec<String> {
         let mut warnings: Vec<String> = beyond(compiled.options.tol, mesh_error(compiled)).into_iter().collect();
         if fitted.error > self.within {
@@ -255,18 +256,20 @@ fn mesh_error(compiled: &CompiledModel) -> Option<f64> {
     if compiled.structure.beams.is_empty() { Some(0.0) } else { compiled.order.estimated_error.or_else(lowest) }
 }
 
-/// How far the full model itself may be off by its mesh.
+/// Estimated error of the full model from its mesh.
 fn mesh(compiled: &CompiledModel) -> String {
     match mesh_error(compiled) {
         Some(error) if compiled.options.band.is_none() && compiled.options.segments.is_none() => format!(
-            "the equilibrium and the lowest frequencies of the full model: off by {error:.1e} at most, by its mesh; --band HZ holds all below it"
+            "the equilibrium and the lowest frequencies of the full model: estimated error {error:.1e} at most, from its mesh; --band HZ covers all below it"
         ),
-        Some(error) => format!("frequencies of the full model: off by {error:.1e} at most in the band, by its mesh"),
-        None => "frequencies of the full model: nothing tells how far its mesh is off; --band HZ does".to_owned(),
+        Some(error) => {
+            format!("frequencies of the full model: estimated error {error:.1e} at most in the band, from its mesh")
+        }
+        None => "frequencies of the full model: the error of its mesh is unknown; --band HZ estimates it".to_owned(),
     }
 }
 
-/// What was written, for a person.
+/// Summary of the written file, for people.
 fn summary(fitted: &ModelFit, pins: &Pins, name: &str) -> String {
     let model = &fitted.model;
     let row = |(j, mode): (usize, &bimorph::export::linear::ReducedMode)| {

@@ -5,9 +5,9 @@ use bimorph::analysis::AnalysisError;
 use bimorph::analysis::chart::ChartError;
 use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
-use bimorph::cosim::around::DeckError;
+use bimorph::cosim::deck::DeckError;
 use bimorph::export::ExportError;
-use bimorph::front::FrontError;
+use bimorph::input::FrontError;
 use bimorph::jobs::sweep::SweepError;
 use bimorph::jobs::sweep::journal::JournalError;
 use bimorph::layout::LayoutError;
@@ -94,7 +94,7 @@ pub(crate) enum Failure {
     Address(#[from] AddressError),
 }
 
-/// An option is out of range in the same words, whoever noticed.
+/// An option out of range gives the same message from every source.
 impl From<CompileError> for Failure {
     fn from(error: CompileError) -> Self {
         match error {
@@ -104,7 +104,7 @@ impl From<CompileError> for Failure {
     }
 }
 
-/// A file that cannot be read fails in the same words whatever it is; an interruption is none.
+/// All unreadable files give the same message; an interruption is not a failure.
 impl From<FrontError> for Failure {
     fn from(error: FrontError) -> Self {
         match error {
@@ -167,7 +167,7 @@ impl Failure {
     }
 }
 
-/// What ngspice said before it failed, where it was kept and the message alone does not tell.
+/// Output of ngspice before it failed, where it was captured and the message alone is insufficient.
 fn last_words(error: &CosimError) -> Option<String> {
     let (CosimError::Failed { output, .. } | CosimError::Stopped { output, .. }) = error else { return None };
     let lines: Vec<&str> = output.lines().filter(|line| !line.trim().is_empty()).collect();

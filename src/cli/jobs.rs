@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::output::print;
 use super::remote::{ConnectionArgs, failure, follow};
-use super::{delivery, progress};
+use super::{progress, sweep_output};
 use bimorph::service::client::JobStatus;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -30,7 +30,7 @@ enum Action {
     Attach(Attach),
     /// Stop a job; its rows stay
     Cancel(JobArgs),
-    /// Stop a job, if it goes on, and let the server forget it
+    /// Stop a job, if it is running, and remove it from the server
     Delete(JobArgs),
 }
 
@@ -76,18 +76,18 @@ impl JobsCommand {
 
 impl Attach {
     fn run(&self) -> Result<(), Failure> {
-        delivery::check(self.out.as_ref())?;
+        sweep_output::check(self.out.as_ref())?;
         let JobArgs { name, at } = &self.job;
         let bar = progress::bar("sweep");
         let followed = follow(&mut at.reach.client(&at.to)?, &at.to, name, &bar);
         bar.finish_and_clear();
         let (table, job) = followed?;
         let part = (!job.part.is_empty()).then_some(job.part.as_str());
-        delivery::deliver(self.out.as_deref(), &table, part)?;
-        stderr_line!("{}", delivery::summary(&table, ""));
+        sweep_output::deliver(self.out.as_deref(), &table, part)?;
+        stderr_line!("{}", sweep_output::summary(&table, ""));
         match failure(&at.to, &job) {
             Some(failure) => Err(failure),
-            None => delivery::nothing(&table),
+            None => sweep_output::nothing(&table),
         }
     }
 }

@@ -14,9 +14,10 @@ use std::path::PathBuf;
 
 /// Draw a netlist as a layout: GDSII or CIF.
 ///
-/// Beams, plates, anchors, combs and facing beams become polygons on the masks of --process (polymumps unless given): the layer as thick
-/// as they are. Names of nodes are labels where the nodes are; labels on the layer 255/0 (BIMORPH in CIF) hold what outlines cannot
-/// tell, so that `bimorph convert` gives the same mechanism back. docs/layout.md describes them.
+/// Beams, plates, anchors, combs and facing beams become polygons on the masks of --process (polymumps unless given):
+/// the layer as thick as they are. Names of nodes are labels at the nodes. Labels on the layer 255/0 (BIMORPH in CIF)
+/// hold data that outlines cannot express, so that `bimorph convert` gives the same mechanism back. docs/layout.md
+/// describes them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph layout bank.net --out bank.gds\n  \
     bimorph layout bank.net --set wh=2.2u --out bank.cif --process polymumps")]
@@ -42,7 +43,7 @@ impl LayoutCommand {
         output::check_folder(&self.out)?;
         let process = match self.model.asked().process()? {
             Some(process) => process,
-            None => Process::builtin(DEFAULT_PROCESS).map_err(bimorph::front::FrontError::from)?,
+            None => Process::builtin(DEFAULT_PROCESS).map_err(bimorph::input::FrontError::from)?,
         };
         let drawn = self.model.draw()?;
         let mask = mask(&drawn.structure, &process, format, &name)?;

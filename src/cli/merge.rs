@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::merge_error::{LAST, MergeError};
 use super::output::{check_folder, print};
-use bimorph::jobs::sweep::part::{COLUMN, SweepPart, SweepPartError};
+use bimorph::jobs::sweep::shard::{COLUMN, SweepPart, SweepPartError};
 use bimorph::results::{atomic, csv::field};
 use clap::Args;
 use std::collections::BTreeMap;
@@ -12,8 +12,8 @@ use std::path::PathBuf;
 
 /// Put the tables of a sweep's shards together: the bytes of the sweep in one run.
 ///
-/// Rows come in grid order. A point that is in two tables or in none is an error, and so are tables of different sweeps, which the
-/// column "part" of their rows tells: it is left out of the whole.
+/// Rows come in grid order. A point that is in two tables or in none is an error. Tables of different sweeps, as
+/// identified by the column "part" of their rows, are an error too; the merged table omits that column.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/2 --out part0.csv\n  \
@@ -35,7 +35,7 @@ struct ShardRow {
     fields: csv::StringRecord,
 }
 
-/// What tables have in common, as far as it is known.
+/// Columns that all tables share, as far as known.
 #[derive(Default)]
 struct CommonColumns {
     parameters: Vec<String>,

@@ -1,6 +1,6 @@
 //! Why tables are not the shards of one sweep.
 
-use bimorph::jobs::sweep::part::COLUMN;
+use bimorph::jobs::sweep::shard::COLUMN;
 use std::path::PathBuf;
 use thiserror::Error;
 

@@ -8,9 +8,6 @@ mod stderr;
 
 mod ac;
 mod ac_report;
-mod access;
-mod busiest;
-mod chance;
 mod chart;
 mod check;
 mod convert;
@@ -18,13 +15,14 @@ mod convert_picture;
 mod cosim;
 mod cosim_check;
 mod cosim_netlist;
-mod delivery;
+mod credentials;
 mod doctor;
 mod draw_motion;
 mod export;
 mod failure;
 mod interrupt;
 mod jobs;
+mod largest_motion;
 mod layout;
 mod merge;
 mod merge_error;
@@ -36,6 +34,7 @@ mod path;
 mod plot;
 mod progress;
 mod pull_in;
+mod random_parameters;
 mod remote;
 mod report;
 mod serve;
@@ -43,6 +42,7 @@ mod solver;
 mod statics;
 mod sweep;
 mod sweep_files;
+mod sweep_output;
 mod tran;
 mod tran_report;
 mod value;
@@ -52,8 +52,8 @@ use std::process::ExitCode;
 
 /// Behavioural device models of electro-mechanical microsystems.
 ///
-/// A SUGAR netlist goes in; motion, modes, pull-in voltages and waveforms come out. Numbers take netlist suffixes
-/// (1.5u, 30n, 2M; m is milli, M is mega) and are SI: metres, seconds, volts, newtons, hertz.
+/// Input: a SUGAR netlist. Output: motion, modes, pull-in voltages and waveforms. Numbers take netlist suffixes (1.5u,
+/// 30n, 2M; m is milli, M is mega) and are SI: metres, seconds, volts, newtons, hertz.
 #[derive(Debug, Parser)]
 #[command(name = "bimorph", version, max_term_width = 100)]
 #[command(after_help = "Exit status: 0 done, 1 error (one message on standard error), 2 wrong usage, 130 interrupted.")]

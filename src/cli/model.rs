@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::options::Chosen;
 use super::{interrupt, progress, value};
 use bimorph::compile::{CompileOptions, CompiledModel, Junctions, ParsedStructure, compile, draw};
-use bimorph::front::{self, InputBundle, LayoutChoice};
+use bimorph::input::{self, InputBundle, LayoutChoice};
 use bimorph::layout::LayoutFormat;
 use bimorph::layout::drawing::FlatLayout;
 use bimorph::netlist::{Bundle, Diagnostic, DroppedInclude, Setting};
@@ -39,7 +39,8 @@ pub(crate) struct ModelArgs {
 /// How a layout is to be read.
 #[derive(Debug, Args)]
 pub(crate) struct LayoutArgs {
-    /// Layouts only: what their layers are; a process inside (polymumps, soi) or a process file (.toml, docs/layout.md)
+    /// Layouts only: definition of the layers; a built-in process (polymumps, soi) or a process file (.toml,
+    /// docs/layout.md)
     #[arg(long, value_name = "NAME|FILE")]
     process: Option<String>,
 
@@ -58,7 +59,7 @@ impl LayoutArgs {
 pub(crate) fn front_telling(path: &Path, asked: &LayoutChoice) -> Result<(FlatLayout, InputBundle), Failure> {
     interrupt::listen();
     let bar = progress::bar("reading");
-    let read = front::drawing_and_source(path, asked, &mut progress::watch(&bar, ""));
+    let read = input::drawing_and_source(path, asked, &mut progress::watch(&bar, ""));
     bar.finish_and_clear();
     Ok(read?)
 }
@@ -73,7 +74,7 @@ impl ModelArgs {
         interrupt::listen();
         let warn = &mut |dropped: DroppedInclude| stderr_line!("warning: {dropped}");
         let bar = progress::bar("reading");
-        let read = front::read(&self.file, &self.include, asked, warn, &mut progress::watch(&bar, ""));
+        let read = input::read(&self.file, &self.include, asked, warn, &mut progress::watch(&bar, ""));
         bar.finish_and_clear();
         let source = read?;
         if let Some(converted) = &source.converted {
@@ -95,7 +96,7 @@ impl ModelArgs {
         self.layout.asked()
     }
 
-    /// What was drawn, with warnings on standard error. A process is then that of what is to be drawn, for netlists too.
+    /// The structure, with warnings on standard error. A process is then that of what is to be drawn, for netlists too.
     pub(crate) fn draw(&self) -> Result<ParsedStructure, Failure> {
         let asked = if LayoutFormat::of(&self.file.display().to_string()).is_some() {
             self.asked()
@@ -141,21 +142,21 @@ impl ModelArgs {
         Ok(compiled)
     }
 
-    /// What the model was made from, for JSON.
+    /// Input of the model, for JSON.
     pub(crate) fn context<'a>(&'a self, compiled: &'a CompiledModel) -> Context<'a> {
         self.context_of(compiled, compiled)
     }
 
     /// The same of a run in which `compiled` moves and `drawn` is what the netlist says.
     pub(crate) fn context_of<'a>(&'a self, drawn: &'a CompiledModel, compiled: &'a CompiledModel) -> Context<'a> {
-        let mut told: Vec<&Diagnostic> = compiled.warnings.items.iter().collect();
-        told.extend(drawn.warnings.items.iter().filter(|d| !compiled.warnings.items.contains(d)));
+        let mut reported: Vec<&Diagnostic> = compiled.warnings.items.iter().collect();
+        reported.extend(drawn.warnings.items.iter().filter(|d| !compiled.warnings.items.contains(d)));
         Context {
             file: self.file.display().to_string(),
             parameters: OrderedMap(&drawn.parameters),
             options: Keys(&drawn.options),
             estimated_error: compiled.order.estimated_error,
-            warnings: told.into_iter().map(|d| d.message.as_str()).collect(),
+            warnings: reported.into_iter().map(|d| d.message.as_str()).collect(),
         }
     }
 
@@ -165,10 +166,10 @@ impl ModelArgs {
     }
 }
 
-/// What every result of the linear frame is warned of.
+/// Warning on every result of the linear frame.
 fn baseline() -> Diagnostic {
     let message =
-        "the linear frame is a baseline: small displacements, no stops, and nothing tells how far its elements are off";
+        "the linear frame is a baseline: small displacements, no stops, and no estimate of the error of its elements";
     let help = "--segments N or --band HZ for more elements; --solver recursion has an estimate";
     Diagnostic::warning("W043", message.into(), help)
 }
@@ -199,7 +200,7 @@ pub(crate) struct Context<'a> {
     /// Every option, under its name on the wire.
     #[serde(flatten)]
     options: Keys<'a>,
-    /// Largest estimated relative error by the mesh, of what was asked for; null without an estimate.
+    /// Largest estimated relative error of the requested results from the mesh; null without an estimate.
     estimated_error: Option<f64>,
     /// Warnings of the netlist.
     warnings: Vec<&'a str>,
@@ -220,7 +221,7 @@ pub(crate) fn warn_of(warnings: &[String]) {
     }
 }
 
-/// The options of a model as keys of a document, but the number of segments: `check` tells it of each beam.
+/// The options of a model as keys of a document, without the number of segments, which `check` lists by beam.
 #[derive(Debug)]
 struct Keys<'a>(&'a CompileOptions);
 

@@ -27,9 +27,9 @@ const MAX_SHAPES: usize = 12;
 
 /// Natural frequencies and mode shapes about the operating point, without damping.
 ///
-/// JSON: "frequencies_hz" ascending [Hz]; "shapes": for each mode the displacement of every node, the largest
-/// translation being 1; "residuals": about the relative error of each shape; "estimated_errors": relative, by the number of segments, one for
-/// each mode, signed about the drawing, null where there is none; "deflection_m": how far the equilibrium that they are about is from the drawing.
+/// JSON: "frequencies_hz". "signals": by name "re" and "im", null where an undamped resonance has no bound. "units" and
+/// "at_rest": by name. "poles" and, by name, "zeros": "re", "im" [rad/s], "frequency_hz", "quality" (null: undamped),
+/// "width_hz". "points_added": points about resonances and zeros. "modes" and "modal_error": with --by-modes.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph modes bank.net --count 10 --band 1.3M\n  \
                         bimorph modes bank.net --port sense=40 --json      about the equilibrium at 40 V\n  \
@@ -46,7 +46,7 @@ pub(crate) struct ModesCommand {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// What computes it: the product's own model, or the baseline to compare with [default: recursion; frame with --as-sugar]
+    /// Solver: the product's own model, or the baseline to compare with [default: recursion; frame with --as-sugar]
     #[arg(long, value_enum)]
     solver: Option<ModelChoice>,
 
@@ -129,7 +129,7 @@ impl ModesCommand {
     }
 }
 
-/// What the modes are about, where that is not the drawing.
+/// Reference state of the modes, where it is not the drawing.
 fn about(deflection: f64) -> String {
     if deflection > 0.0 {
         format!("about the equilibrium, {} away from the drawing\n", quantity(deflection, "m"))

@@ -41,10 +41,10 @@ impl Chosen {
     }
 }
 
-/// The arguments' names, which live as long as the program.
+/// The arguments' names, static for the program.
 static FLAGS: LazyLock<Vec<String>> = LazyLock::new(|| MODEL.iter().map(|option| option.about.flag()).collect());
 
-/// What the command shows of an option: other options named as the command writes them.
+/// Help of an option, with other options named as on the command line.
 fn help(about: &OptionDescription) -> String {
     let mut text = about.about();
     if let Range::Names(names) = about.range

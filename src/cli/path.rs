@@ -1,9 +1,9 @@
-//! `bimorph path`: how equilibria go on while one thing grows.
+//! `bimorph path`: equilibria along a growing parameter.
 
 use super::failure::Failure;
 use super::model::{Context, JsonMap, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
-use super::{busiest, progress, report, statics, value};
+use super::{largest_motion, progress, report, statics, value};
 use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, PathInput, trace};
 use bimorph::analysis::mesh::path_fitted;
 use bimorph::analysis::statics::NodeMotion;
@@ -23,10 +23,10 @@ use std::fmt::Write;
 
 /// The path of equilibria while a load, voltage, temperature or stress grows: past folds, into buckling.
 ///
-/// The path is followed by arc length, so that it goes on where the load must fall: snap-through, and behind pull-in. Where
-/// it loses its stability at a bifurcation it goes on along the branch that leaves there. JSON: "values" of what grows and
-/// "signals" along the path; "negative": eigenvalues below 0 (0: stable under fixed loads and voltages); "folds" and
-/// "bifurcations": value and index of the point; "last": displacement of every node at the end.
+/// The path is followed by arc length, so that it continues where the load must fall: snap-through, and behind pull-in.
+/// Where it loses its stability at a bifurcation it continues along the branch that leaves there. JSON: "values" of
+/// what grows and "signals" along the path; "negative": eigenvalues below 0 (0: stable under fixed loads and voltages);
+/// "folds" and "bifurcations": value and index of the point; "last": displacement of every node at the end.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph path column.net --along F=0:260u --signals middle.y --out column.png\n  \
     bimorph path arch.net --along F=0:10u --signals 'p(20).y' --json\n  \
@@ -36,7 +36,8 @@ pub(crate) struct PathCommand {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// What grows: a port [V], a netlist parameter that sets loads, temperatures or stresses, or `loads`, a factor on all
+    /// Path parameter: a port [V], a netlist parameter that sets loads, temperatures or stresses, or `loads`, a factor
+    /// on all
     #[arg(long, value_name = "NAME=FROM:TO", value_parser = way)]
     along: PathRange,
 
@@ -110,7 +111,7 @@ struct PathDocument<'a> {
     context: Context<'a>,
 }
 
-/// What makes a path cheaper.
+/// Ways to reduce the cost of a path.
 const CHEAPER: &str = "a shorter --along, a larger --tol or fewer --points cost less";
 
 impl PathCommand {
@@ -140,9 +141,9 @@ impl PathCommand {
         };
         let bar = progress::bar("path");
         if request.signals.is_empty() {
-            request.signals = busiest::every(first);
+            request.signals = largest_motion::every(first);
             let found = trace(first, &request, &mut progress::watch(&bar, CHEAPER))?;
-            request.signals = busiest::busiest(&found.signals);
+            request.signals = largest_motion::busiest(&found.signals);
         }
         let result = path_fitted(first, &request, &mut progress::watch(&bar, CHEAPER));
         bar.finish_and_clear();
@@ -204,7 +205,7 @@ impl PathCommand {
         Ok(Some([at(self.along.from)?, at(self.along.to)?]))
     }
 
-    /// The unit of what grows, where what it changes tells.
+    /// The unit of the path parameter, where its effects determine it.
     fn unit(&self, drawn: &CompiledModel, ends: Option<&[CompiledModel; 2]>) -> &'static str {
         let Some([first, last]) = ends else {
             return if drawn.structure.port(&self.along.name).is_some() { "V" } else { "" };

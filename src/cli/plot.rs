@@ -5,7 +5,7 @@ use super::output::{check_folder, write};
 use super::{interrupt, statics, value};
 use bimorph::analysis::mesh::static_fitted;
 use bimorph::compile::{CompileOptions, compile};
-use bimorph::front::{self, LayoutChoice};
+use bimorph::input::{self, LayoutChoice};
 use bimorph::netlist::Setting;
 use bimorph::results::format::ResultFormat;
 use bimorph::results::plot::chart::{self, Panel, PanelChart, Series};
@@ -95,7 +95,7 @@ impl PlotCommand {
     }
 
     fn mechanism(&self, netlist: &Path) -> Result<Picture, Failure> {
-        let bundle = front::read(netlist, &[], &LayoutChoice::default(), &mut |_| (), &mut |_| true)?.bundle;
+        let bundle = input::read(netlist, &[], &LayoutChoice::default(), &mut |_| (), &mut |_| true)?.bundle;
         let compiled = compile(&bundle, &CompileOptions { set: self.set.clone(), ..CompileOptions::default() })?;
         let (compiled, result, curves) = static_fitted(&compiled, &self.ports)?;
         let volts: Vec<String> = self.ports.iter().map(|(name, v)| format!("{name} = {v} V")).collect();

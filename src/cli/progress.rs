@@ -35,7 +35,8 @@ const LONG: f64 = 20.0;
 /// Where no person watches, a line is written this often [s].
 const LINES: f64 = 30.0;
 
-/// The watch of a run in time, with the options that make it cheaper, if any: moves the bar, prints the forecast of a long run, and says whether to go on.
+/// The progress callback of a run in time, with the options that make it cheaper, if any: moves the bar, prints the
+/// forecast of a long run, and returns whether to continue.
 pub(crate) fn watch<'a>(bar: &'a ProgressBar, advice: &'a str) -> impl FnMut(f64) -> bool + 'a {
     let begun = Instant::now();
     let (mut forecast, mut line) = (Forecast::default(), LINES);

@@ -1,6 +1,6 @@
 //! A server that computes sweeps as jobs.
 
-use super::access::AccessArgs;
+use super::credentials::AccessArgs;
 use super::failure::Failure;
 use super::{interrupt, value};
 use bimorph::compile::CompileOptions;
@@ -24,11 +24,12 @@ pub(crate) struct ConnectionArgs {
 /// How a sweep is computed on a server.
 #[derive(Debug, Args)]
 pub(crate) struct RemoteSweepArgs {
-    /// Run on a server: unix:///path, host:port or https://host:port. Ctrl-C lets go of it, and it goes on (`bimorph jobs`)
+    /// Run on a server: unix:///path, host:port or https://host:port. Ctrl-C disconnects; the run continues there
+    /// (`bimorph jobs`)
     #[arg(long, value_name = "URI")]
     pub(super) to: Option<String>,
 
-    /// Tell the name of the job and do not wait for it: `bimorph jobs attach NAME` has its table
+    /// Print the name of the job and do not wait for it: `bimorph jobs attach NAME` has its table
     #[arg(long, requires = "to", conflicts_with = "out")]
     pub(super) detach: bool,
 
@@ -70,14 +71,14 @@ impl RemoteSweepArgs {
             seconds => seconds.map(Duration::from_secs_f64),
         };
         let mut client = self.reach.client(uri)?;
-        // from here on whoever is interrupted is told what the job is called
+        // from here on an interruption prints the name of the job
         interrupt::asked();
         let how = Submission { share: self.share, release_after };
         let name = client.submit(spec, bundle, options, how)?;
         Ok((client, name))
     }
 
-    /// The table of a job. The server forgets it afterwards, unless others may have it.
+    /// The table of a job. The server removes it afterwards, unless others may have it.
     pub(super) fn forget(&self, client: &mut Client, name: &str) {
         if !self.share {
             // that it is gone already is no error
@@ -86,7 +87,7 @@ impl RemoteSweepArgs {
     }
 }
 
-/// Waits for the rows of a job: whoever is interrupted, or loses the server, is told how to go on.
+/// Waits for the rows of a job; an interruption or a lost connection prints how to continue.
 pub(super) fn follow(
     client: &mut Client,
     uri: &str,

@@ -35,7 +35,7 @@ pub(crate) fn columns(header: &[&str], rows: &[Vec<String>]) -> String {
     text
 }
 
-/// The last line of a report: what the numbers rest on.
+/// The last line of a report: mesh, unknowns and error estimate.
 pub(crate) fn footing(compiled: &CompiledModel, unknowns: usize) -> String {
     format!("{unknowns} unknowns, {}", options(compiled))
 }

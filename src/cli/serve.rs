@@ -14,7 +14,7 @@ use std::sync::LazyLock;
 ///
 /// Prints one line "listening on ADDRESS" for each address on standard error once it accepts connections. Health and
 /// reflection services are always on. An address that other machines can reach takes TLS, and tokens or certificates of
-/// clients. What options do not say is taken from the environment (BIMORPH_SERVE_NAME), then from the file of --config.
+/// clients. Missing options are taken from the environment (BIMORPH_SERVE_NAME), then from the file of --config.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph serve --listen unix:///tmp/bimorph.sock\n  \
                         bimorph serve --listen 127.0.0.1:50051 --listen unix:///run/bimorph.sock\n  \
@@ -22,7 +22,7 @@ use std::sync::LazyLock;
                         bimorph serve --config /etc/bimorph/serve.toml")]
 pub(crate) struct ServeCommand {
     #[command(flatten)]
-    told: SettingSources,
+    reported: SettingSources,
 
     /// Stop when standard input ends, as it does when the program that started this server ends
     #[arg(long)]
@@ -31,7 +31,7 @@ pub(crate) struct ServeCommand {
 
 impl ServeCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
-        let options = self.told.settings()?.options();
+        let options = self.reported.settings()?.options();
         let calls = options.listen.len();
         let ready = move |addresses: &[Address]| {
             for (k, address) in addresses.iter().enumerate() {
@@ -45,7 +45,7 @@ impl ServeCommand {
     }
 }
 
-/// What the options of a server say, in the order in which files, the environment and options are asked.
+/// Settings of a server by source, in the order file, environment, options.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SettingSources {
     config: Option<PathBuf>,
@@ -53,7 +53,7 @@ pub(crate) struct SettingSources {
     given: Vec<(String, String, String)>,
 }
 
-/// The arguments' names, which live as long as the program.
+/// The arguments' names, static for the program.
 static FLAGS: LazyLock<Vec<String>> = LazyLock::new(|| SETTINGS.iter().map(ServerOption::flag).collect());
 
 /// Options for limits that are often changed.
@@ -63,12 +63,12 @@ const SHORT: [(&str, &str, &str); 2] = [
 ];
 
 impl SettingSources {
-    /// What a file and the environment say, without options.
+    /// Settings from a file and the environment, without options.
     pub(crate) fn of(config: Option<PathBuf>) -> Self {
         Self { config, given: Vec::new() }
     }
 
-    /// Everything that was said, the strongest voice first heard.
+    /// All settings, in order of precedence.
     pub(crate) fn settings(&self) -> Result<Settings, Failure> {
         let mut settings = Settings::default();
         for (name, text, place) in &self.given {
@@ -120,9 +120,9 @@ impl SettingSources {
 
 impl FromArgMatches for SettingSources {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
-        let mut told = Self::default();
-        told.take(matches)?;
-        Ok(told)
+        let mut reported = Self::default();
+        reported.take(matches)?;
+        Ok(reported)
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {

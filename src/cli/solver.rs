@@ -1,4 +1,4 @@
-//! `--solver`: what solves the equations.
+//! `--solver`: the solver of the equations.
 
 use bimorph::solve::baseline::SolverKind;
 use clap::ValueEnum;

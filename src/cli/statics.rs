@@ -26,8 +26,9 @@ use std::fmt::Write;
 /// The equilibrium is the one reached from rest by raising all loads and voltages together. JSON: "nodes" holds x [m],
 /// y [m] and rz [rad] from the drawn place; "temperatures_k", "currents_a", "charges_c" and "permanent_strains" by name.
 ///
-/// The estimated error is of the displacement of each node as a vector, of a thirtieth of the largest where a node moves less. A small
-/// component, or a small rotation beside large displacements, may be off by more of itself: take a smaller tolerance for it.
+/// The estimated error is of the displacement of each node as a vector, of a thirtieth of the largest where a node
+/// moves less. The relative error of a small component, or of a small rotation beside large displacements, may be
+/// larger: use a smaller tolerance for it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph static bank.net --port heat=2.2\n  \
                         bimorph static stage.net --set F=100u --json\n  \
@@ -49,7 +50,7 @@ pub(crate) struct StaticCommand {
     #[arg(long, value_name = "NAME=VOLTS", value_parser = value::volts)]
     backbend: Vec<(String, f64)>,
 
-    /// What computes it: the product's own model, or the baseline to compare with
+    /// Solver: the product's own model, or the baseline to compare with
     #[arg(long, value_enum, default_value_t)]
     solver: ModelChoice,
 
@@ -133,7 +134,7 @@ impl StaticCommand {
     }
 }
 
-/// One row: every quantity of the operating point in a column of its own, or those that are asked for.
+/// One row: every quantity of the operating point in a column of its own, or the requested ones.
 fn table(title: &str, result: &StaticResult, names: &[String]) -> Result<Table, Failure> {
     let mut table = Table::new(title, "Operating Point");
     let asked = |column: &str| names.is_empty() || names.iter().any(|name| name == column);
@@ -185,7 +186,7 @@ pub(crate) fn beams(curves: &BeamMotions) -> Vec<Vec<NodeDisplacement>> {
     curves.iter().map(|curve| curve.iter().map(|m| [m.x, m.y, m.rz]).collect()).collect()
 }
 
-/// The signals asked for, one a line.
+/// The requested signals, one a line.
 fn chosen(result: &StaticResult, names: &[String]) -> Result<String, Failure> {
     let listed = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
     let one = |signal: &String| {

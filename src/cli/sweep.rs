@@ -1,14 +1,14 @@
 //! `bimorph sweep`: many variants.
 
-use super::chance::SamplingArgs;
 use super::failure::Failure;
 use super::model::ModelArgs;
 use super::output::print;
+use super::random_parameters::SamplingArgs;
 use super::remote::{RemoteSweepArgs, failure, follow};
-use super::{delivery, interrupt, progress, sweep_files, value};
+use super::{interrupt, progress, sweep_files, sweep_output, value};
 use bimorph::compile::CompileOptions;
 use bimorph::jobs::sweep::journal::{self, Journal, JournalRow};
-use bimorph::jobs::sweep::part::SweepPart;
+use bimorph::jobs::sweep::shard::SweepPart;
 use bimorph::jobs::sweep::statistics::{SweepStatistics, YieldLimit};
 use bimorph::jobs::sweep::{
     self, Shard, SweepAnalysis, SweepError, SweepParameter, SweepProgress, SweepSpec, SweepTable,
@@ -27,11 +27,11 @@ use std::sync::OnceLock;
 /// has its reason in the column "error". The shards of a sweep put together (`bimorph merge`) are the whole sweep; each of their rows says
 /// in a last column "part" of which sweep it is.
 ///
-/// With --out FILE.csv every point is kept in FILE.csv.journal as soon as it is done, until the table is written: after Ctrl-C, a kill or a
-/// full disk the same command with --resume goes on where it stopped, and the table has the bytes that one run would have.
+/// With --out FILE.csv every finished point is stored in FILE.csv.journal until the table is written. After Ctrl-C, a
+/// kill or a full disk the same command with --resume continues, and the table has the bytes of one uninterrupted run.
 ///
-/// With --to the sweep is a job of a server, which goes on after Ctrl-C, and when the connection is lost: `bimorph jobs` lists it, attaches to it,
-/// and cancels it.
+/// With --to the sweep is a job of a server. It continues after Ctrl-C, and when the connection is lost: `bimorph jobs`
+/// lists it, attaches to it, and cancels it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --port heat=2.2 --signals yoke.y --out w.csv\n  \
@@ -63,7 +63,7 @@ pub(crate) struct SweepCommand {
     #[command(flatten)]
     chance: SamplingArgs,
 
-    /// What to compute at each point
+    /// Analysis at each point
     #[arg(long, value_enum, default_value_t = SweepAnalysisChoice::Static)]
     analysis: SweepAnalysisChoice,
 
@@ -112,7 +112,7 @@ pub(crate) struct SweepCommand {
     #[arg(long, value_name = "LIMIT")]
     limits: Vec<YieldLimit>,
 
-    /// Go on with the points in FILE.csv.journal, if there are any
+    /// Continue with the points in FILE.csv.journal, if there are any
     #[arg(long, requires = "out", conflicts_with = "to")]
     resume: bool,
 }
@@ -145,10 +145,10 @@ impl SweepCommand {
         if let Some(journal) = journal.filter(|_| written) {
             journal.finish()?;
         }
-        delivery::nothing(&table)
+        sweep_output::nothing(&table)
     }
 
-    /// The sweep on a server, as a job that goes on when this process does not.
+    /// The sweep on a server, as a job that survives this process.
     fn there(&self, uri: &str, spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<(), Failure> {
         let (mut client, name) = self.remote.submit(uri, spec, bundle, options)?;
         if self.remote.detach {
@@ -159,7 +159,9 @@ impl SweepCommand {
         bar.finish_and_clear();
         let (table, job) = followed?;
         if let Some(failure) = failure(uri, &job) {
-            stderr_line!("the rows that it has stay on the server: `bimorph jobs delete {name} --to {uri}` forgets them");
+            stderr_line!(
+                "the rows that it has stay on the server: `bimorph jobs delete {name} --to {uri}` forgets them"
+            );
             return Err(failure);
         }
         // the version in it is that of the server
@@ -172,7 +174,7 @@ impl SweepCommand {
         }
         self.remote.forget(&mut client, &name);
         written?;
-        delivery::nothing(&table)
+        sweep_output::nothing(&table)
     }
 
     /// Writes the table and says what it has; whether there was anything to write.
@@ -181,7 +183,7 @@ impl SweepCommand {
         let shown = (spec.samples.is_some(), self.limits.as_slice());
         let written = sweep_files::deliver(&self.out, &self.model.title(), table, part, shown)?;
         let shard = part.map(|_| format!(" (shard {index}/{count})")).unwrap_or_default();
-        stderr_line!("{}", delivery::summary(table, &shard));
+        stderr_line!("{}", sweep_output::summary(table, &shard));
         // where no point has a result there is no column to compare
         if !self.limits.is_empty() && table.failed() < table.rows.len() {
             stderr_line!("{}", sweep_files::report(&SweepStatistics::of(table, &self.limits)?, spec.samples.is_some()));
@@ -217,7 +219,9 @@ impl SweepCommand {
         }
         match table {
             Err(SweepError::Cancelled { done, points }) => {
-                bar.suspend(|| stderr_line!("{done} of {points} points are in {}: go on with --resume", path.display()));
+                bar.suspend(|| {
+                    stderr_line!("{done} of {points} points are in {}: go on with --resume", path.display())
+                });
                 Err(Failure::Interrupted)
             }
             table => Ok((table?, Some(journal))),

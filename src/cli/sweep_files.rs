@@ -1,8 +1,8 @@
-//! What a sweep is written to: its table as CSV or Parquet, and its picture. Statistics and yields go to standard error.
+//! Output files of a sweep: its table as CSV or Parquet, and its picture. Statistics and yields go to standard error.
 
-use super::delivery;
 use super::failure::Failure;
 use super::output::{check_folder, write_picture};
+use super::sweep_output;
 use bimorph::jobs::sweep::statistics::{self, ColumnStatistics, Fraction, SweepStatistics, YieldLimit};
 use bimorph::jobs::sweep::{SweepAnalysis, SweepSpec, SweepTable};
 use bimorph::netlist::Setting;
@@ -79,20 +79,20 @@ pub(super) fn deliver(
     (is_random, limits): (bool, &[YieldLimit]),
 ) -> Result<bool, Failure> {
     if files.is_empty() {
-        return delivery::deliver(None, table, part);
+        return sweep_output::deliver(None, table, part);
     }
     for file in files {
         if is_of(file, "parquet") {
-            if !delivery::is_result(table, part) {
+            if !sweep_output::is_result(table, part) {
                 return Ok(false);
             }
             atomic::write(file, |out| parquet::write(&columns(table, part), out))
                 .map_err(|source| Failure::Write { path: file.clone(), source })?;
         } else if is_table(file) {
-            if !delivery::deliver(Some(file), table, part)? {
+            if !sweep_output::deliver(Some(file), table, part)? {
                 return Ok(false);
             }
-        } else if delivery::is_result(table, part) {
+        } else if sweep_output::is_result(table, part) {
             write_picture(file, ResultFormat::from_path(file)?, &picture(title, table, is_random, limits))?;
         } else {
             return Ok(false);

@@ -6,8 +6,9 @@ use super::output::OutputArgs;
 use super::solver::SolverChoice;
 use super::tran_report::{TransientDocument, picture, table, text};
 use super::{draw_motion, progress, value};
-use bimorph::analysis::Watch;
+use bimorph::analysis::ProgressCallback;
 use bimorph::analysis::chart::released;
+use bimorph::analysis::formulation;
 use bimorph::analysis::frame::{frame, frame_transient};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
@@ -15,7 +16,7 @@ use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
 use bimorph::compile::{CompiledModel, Formulation};
-use bimorph::multibody::relative::UnsupportedModel;
+use bimorph::multibody::joint_coordinates::sprung_loops::UnsupportedModel;
 use bimorph::options::OptionValue;
 use bimorph::options::analysis::{TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use clap::Args;
@@ -23,13 +24,14 @@ use std::path::PathBuf;
 
 /// Motion in time, from rest or from a released equilibrium.
 ///
-/// A run whose steps turn out to be off by more than its mesh leaves of --tol is made again with sharper ones, where that takes some seconds at most.
+/// If the steps of a run prove to have a larger error than its mesh leaves of --tol, the run is repeated with sharper
+/// ones, where that takes some seconds at most.
 ///
-/// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C], GAP.gap [m], GAP.C [F], GAP.F [N].
-/// JSON: "t" [s]; "signals": samples by name in SI; "units" by name; "method"; "counters": the work done; "events":
-/// crossings of --event levels and contacts of gaps, each with its time "t" [s] and "direction" up or down; "formulation",
-/// "estimated_error" by the mesh, "step_error" by the steps, of the amplitude; "stopped_at" [s] with --until; "reliable_until" [s], up to when
-/// the tolerance holds after contact (null: to the end), and "after_contact", the statistics of each signal from there on; and for rcr "joint_coordinates": n, m, evaluations near singular configurations, largest gap of a loop [m].
+/// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C], GAP.gap
+/// [m], GAP.C [F], GAP.F [N]. JSON: "frequencies_hz": ascending [Hz]. "shapes": for each mode the displacement of every
+/// node, the largest translation being 1. "residuals": approximate relative error of each shape. "estimated_errors":
+/// relative errors by the number of segments, one for each mode, signed about the drawing, null where unknown.
+/// "deflection_m": distance of their equilibrium from the drawing.
 #[derive(Debug, Args)]
 #[command(after_help = "Methods, with their orders; steps follow --tol, or are equal with --step:\n  \
     rodas4 (4)             the default: one factorization a step; fast motions die out\n  \
@@ -79,7 +81,7 @@ pub(crate) struct TransientCommand {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// What integrates [default: rodas4; in joint coordinates whose loops do not close by springs rk45]
+    /// Integration method [default: rodas4; in joint coordinates whose loops do not close by springs rk45]
     #[arg(long, value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(Integrator::NAMES))]
     method: Option<String>,
 
@@ -91,7 +93,7 @@ pub(crate) struct TransientCommand {
     #[arg(long, value_parser = value::number, allow_negative_numbers = true)]
     rho: Option<f64>,
 
-    /// Tell when a signal crosses a level, in the signal's SI unit. Repeatable
+    /// Print when a signal crosses a level, in the signal's SI unit. Repeatable
     #[arg(long = "event", value_name = "NAME=LEVEL", value_parser = value::volts)]
     events: Vec<(String, f64)>,
 
@@ -103,7 +105,7 @@ pub(crate) struct TransientCommand {
     #[arg(long, value_name = "FILE")]
     draw: Option<PathBuf>,
 
-    /// What solves the equations; all but the recursion are baselines to compare with
+    /// Solver of the equations; all but the recursion are baselines to compare with
     #[arg(long, value_enum, default_value_t)]
     solver: SolverChoice,
 
@@ -149,7 +151,7 @@ impl TransientCommand {
             keep: true,
         };
         let decides = formulation == Formulation::Auto && self.method.is_none() && self.solver != SolverChoice::Frame;
-        let suited = decides.then(|| Formulation::of_run(compiled, &options));
+        let suited = decides.then(|| formulation::of_run(compiled, &options));
         let (formulation, method) = match &suited {
             Some((suited, method)) => (suited.formulation, *method),
             None => (formulation, method),
@@ -223,7 +225,7 @@ impl TransientCommand {
         Ok(())
     }
 
-    /// What moves, and what it is released from, on the mesh for the run.
+    /// The moving model and the model that it is released from, on the mesh for the run.
     fn fitted(
         &self,
         drawn: &CompiledModel,
@@ -265,14 +267,15 @@ impl TransientCommand {
                 frame(compiled).and_then(|frame| frame_transient(compiled, &frame, options, watch)).map(|r| (r, None))
             }
             _ => {
-                let mut run =
-                    |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
-                        if matches!(formulation, Formulation::Rcr | Formulation::RcrElastic) {
-                            joint_transient(compiled, formulation, options, sample, watch).map(|(r, j)| (r, Some(j)))
-                        } else {
-                            transient(compiled, options, sample, watch).map(|r| (r, None))
-                        }
-                    };
+                let mut run = |options: &TransientOptions<'_>,
+                               sample: &mut dyn FnMut(f64, &[f64]),
+                               watch: ProgressCallback<'_>| {
+                    if matches!(formulation, Formulation::Rcr | Formulation::RcrElastic) {
+                        joint_transient(compiled, formulation, options, sample, watch).map(|(r, j)| (r, Some(j)))
+                    } else {
+                        transient(compiled, options, sample, watch).map(|r| (r, None))
+                    }
+                };
                 with_step_error(options, compiled, &mut run, &mut |_, _| (), watch)
             }
         };

@@ -1,4 +1,4 @@
-//! What `bimorph tran` says of a motion: document, table, picture and text.
+//! Output of `bimorph tran`: document, table, picture and text.
 
 use super::failure::Failure;
 use super::model::{Context, JsonMap};
@@ -23,7 +23,7 @@ pub(super) struct TransientDocument<'a> {
     pub(super) counters: Counters,
     pub(super) events: &'a [CrossingEvent],
     pub(super) joint_coordinates: Option<JointReport>,
-    /// What formulation auto took, and why.
+    /// The formulation that auto chose, and the reason.
     pub(super) formulation_taken: Option<String>,
     pub(super) unknowns: usize,
     pub(super) step_error: Option<f64>,
@@ -123,7 +123,7 @@ pub(super) fn text(
             j.accelerations, j.singular_evaluations, j.coordinates, j.constraints, j.largest_gap_m
         ),
     };
-    let off = result.step_error.map_or_else(|| ", not compared".to_owned(), |e| format!(", off by about {e:.1e}"));
+    let off = result.step_error.map_or_else(|| ", not compared".to_owned(), |e| format!(", estimated error {e:.1e}"));
     format!(
         "{}\n{events}{} samples, {} steps ({} rejected){off}, {work}; {}",
         report::columns(&["signal", "lowest sample", "highest sample", "at the end"], &rows),

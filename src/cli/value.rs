@@ -25,7 +25,7 @@ pub(crate) fn volts(text: &str) -> Result<(String, f64), String> {
     Ok((name, number(&value)?))
 }
 
-/// What a run goes on until: `contact`, `release` or `SIGNAL=VALUE`.
+/// End condition of a run: `contact`, `release` or `SIGNAL=VALUE`.
 pub(crate) fn until(text: &str) -> Result<Until, String> {
     match text {
         "contact" => Ok(Until::Contact),

@@ -1,6 +1,6 @@
 //! Each analysis prints the JSON that is documented, in SI, against closed forms.
 
-use crate::bench::{Bench, CANTILEVER, PLATE, number};
+use crate::command::{Bench, CANTILEVER, PLATE, number};
 use approx::assert_relative_eq;
 
 /// `check` counts what is there and fails nowhere.
@@ -36,10 +36,10 @@ fn auto_says_what_it_takes() {
         );
     }
     assert!(bench.run(&format!("{words} --scheme a2")).stdout.contains("formulation auto took rcr"));
-    let told = bench.run("check pivots.net --formulation auto").stdout;
-    assert!(told.contains("formulation auto takes compliant: joints are elastic in every direction"), "{told}");
-    let told = bench.run("check pivots.net --formulation rcr --segments 1").stdout;
-    assert!(told.contains("formulation rcr: 24 coordinates, 0 loops closed by springs, scheme es"), "{told}");
+    let reported = bench.run("check pivots.net --formulation auto").stdout;
+    assert!(reported.contains("formulation auto takes compliant: joints are elastic in every direction"), "{reported}");
+    let reported = bench.run("check pivots.net --formulation rcr --segments 1").stdout;
+    assert!(reported.contains("formulation rcr: 24 coordinates, 0 loops closed by springs, scheme es"), "{reported}");
 }
 
 /// The tip of a cantilever moves by F·l³/(3·E·I) and turns by F·l²/(2·E·I); every option is in the document.
@@ -55,7 +55,7 @@ fn static_equilibrium() {
     assert_eq!(number(&found["tol"]), 1e-4);
     assert!(found["unknowns"].as_u64() > Some(0) && found["iterations"].as_u64() > Some(0));
 
-    // unless it is told otherwise, a beam gives way to shear, 3.1e-4 of the deflection, and its clamped edge cannot contract
+    // by default a beam has shear compliance, 3.1e-4 of the deflection, and its clamped edge cannot contract
     let stout = number(&bench.json("static c.net --linear --set F=2u")["nodes"]["b"]["y"]);
     let slender = number(&found["nodes"]["b"]["y"]);
     assert!(stout > slender * (1.0 - 1e-3) && stout < slender * (1.0 + 1e-3), "{stout:e} {slender:e}");
@@ -174,8 +174,9 @@ fn a_sweep_goes_on_past_a_bad_point() {
     assert!(ran.stdout.lines().last().is_some_and(|line| line.starts_with("1,1e-4,")), "{}", ran.stdout);
 }
 
-/// `ac` of a force on a mass on a spring: 1/(k − mω²) in the document, with its unit and its value at rest, the undamped pole, no zero; exact and by
-/// modes alike; the report names the resonance, and the current into the port of a plate is its capacitance's.
+/// `ac` of a force on a mass on a spring: 1/(k − mω²) in the document, with its unit and its static value, the undamped
+/// pole, and no zero, exact and by modes alike. The report names the resonance, and the current into the port of a
+/// plate is that of its capacitance.
 #[test]
 fn frequency_response() {
     let bench = Bench::new(&[("p.net", PLATE)]);
@@ -206,7 +207,7 @@ fn frequency_response() {
     assert!(number(re).abs() < 1e-9 * number(im) && number(im) > 0.0);
 }
 
-/// What `ac` cannot do is told in one line, and leaves nothing behind.
+/// Requests beyond `ac` are reported in one line, and leave no files.
 #[test]
 fn frequency_responses_that_are_refused() {
     let bench = Bench::new(&[("p.net", PLATE)]);
@@ -229,15 +230,16 @@ fn frequency_responses_that_are_refused() {
     }
 }
 
-/// A resonance that a signal does not see has no height there, and is not said to have no bound: of two cantilevers on one anchor the tip of one
-/// answers to a force on the other nowhere, and to one on itself without bound where nothing damps it.
+/// A resonance that a signal does not contain has no peak there, and is not reported as unbounded. The tip of one of
+/// two cantilevers on one anchor has no response to a force on the other. Its response to a force on itself is
+/// unbounded where nothing damps it.
 #[test]
 fn resonances_behind_an_anchor_are_not_seen() {
     let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbig beam2d p [a b] [l=200u w=2u]\n\
                 small beam2d p [a d] [l=100u w=2u oz=pi]\n";
     let bench = Bench::new(&[("two.net", text)]);
-    let told = bench.run("ac two.net --drive d.fy --signals d.y --from 1k --to 400k --junctions centreline").stdout;
-    let rows: Vec<&str> = told.lines().filter(|line| line.contains("undamped")).collect();
-    assert_eq!(rows.len(), 2, "{told}");
-    assert!(rows[0].contains("not seen") && rows[1].contains("no bound"), "{told}");
+    let reported = bench.run("ac two.net --drive d.fy --signals d.y --from 1k --to 400k --junctions centreline").stdout;
+    let rows: Vec<&str> = reported.lines().filter(|line| line.contains("undamped")).collect();
+    assert_eq!(rows.len(), 2, "{reported}");
+    assert!(rows[0].contains("not seen") && rows[1].contains("no bound"), "{reported}");
 }

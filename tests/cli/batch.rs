@@ -1,6 +1,6 @@
 //! Sweeps as jobs: samples of what varies, points that outlive the process, shards put together.
 
-use crate::bench::Bench;
+use crate::command::Bench;
 use std::time::{Duration, Instant};
 
 /// A cantilever under a force, with parameters to vary.
@@ -48,7 +48,7 @@ fn monte_carlo() {
     assert_eq!(w[..3], w[3..]);
 }
 
-/// What cannot be drawn is refused with a way out.
+/// Invalid samples are rejected with a remedy.
 #[test]
 fn slips() {
     let bench = Bench::new(&[("c.net", CANTILEVER), ("x.csv", "a,b\n1,2\n"), ("cut.csv", "point,w,\"b.y [m]\n")]);

@@ -1,6 +1,6 @@
 //! `bimorph chart`, and the baselines behind `--solver`.
 
-use crate::bench::{Bench, CANTILEVER, number};
+use crate::command::{Bench, CANTILEVER, number};
 use serde_json::Value;
 
 const CHART: &str = "chart c.net --set F=1u --release F --stop 8u --points 41 --signals b.y --undamped \
@@ -107,7 +107,7 @@ fn charts_repeat() {
 /// A run that cannot be made is a point with its reason and no numbers; the others stand.
 #[test]
 fn a_failure_is_a_point_with_its_reason() {
-    // the middle node has no mass: an explicit method cannot tell its acceleration
+    // the middle node has no mass: an explicit method cannot compute its acceleration
     let text = "anchor * [f] [l=1u w=1u h=1u]\nspring2d * [f a] [kx=1]\nspring2d * [a m] [kx=1]\n\
                 guide2d * [a] []\nguide2d * [m] []\nmass2d * [m] [m=1e-10]\nparam F=0\nf2d * [m] [F=F]\n";
     let bench = Bench::new(&[("m.net", text)]);

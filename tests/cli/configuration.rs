@@ -1,7 +1,8 @@
-//! What a server is told: options before the environment before a file; `Info` shows it, and docs/service.md has every setting.
+//! Settings of a server: options before the environment before a file; `Info` reports them, and docs/service.md has
+//! every setting.
 
-use crate::bench::Bench;
-use crate::serving::Server;
+use crate::command::Bench;
+use crate::serve_process::Server;
 use bimorph::service::limits::{LIMITS, Limits};
 use bimorph::service::proto;
 use bimorph::service::settings::{SETTINGS, Settings, variable};
@@ -11,8 +12,8 @@ use tonic::transport::Endpoint;
 
 const FILE: &str = "listen = [\"127.0.0.1:0\"]\ntoken_file = \"keys/tokens\"\n\n[limits]\nsessions = 3\nmodels = 4\nmemory = \"64M\"\nidle = 1.5\n";
 
-/// The settings of a server as `Info` tells them: value and source by name.
-fn told(address: &str) -> BTreeMap<String, (String, String)> {
+/// The settings of a server from `Info`: value and source by name.
+fn reported(address: &str) -> BTreeMap<String, (String, String)> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
     let info = runtime.block_on(async {
         let endpoint = Endpoint::from_shared(address.to_owned()).expect("a uri");
@@ -22,8 +23,8 @@ fn told(address: &str) -> BTreeMap<String, (String, String)> {
     info.settings.into_iter().map(|setting| (setting.name, (setting.value, setting.source))).collect()
 }
 
-/// Each voice is heard where a stronger one is silent; paths of a file start from its folder; and `Info` shows every setting of
-/// the table, which says who said so.
+/// A source applies where those of higher precedence are silent. Paths of a file start from its folder. `Info` shows
+/// every setting of the table with its source.
 #[test]
 fn options_before_the_environment_before_a_file() {
     let bench = Bench::new(&[]);
@@ -36,9 +37,9 @@ fn options_before_the_environment_before_a_file() {
     command.env("BIMORPH_SERVE_CONFIG", "etc/serve.toml").env("BIMORPH_SERVE_MODELS", "5");
     command.env("BIMORPH_SERVE_SESSIONS", "7").env("BIMORPH_SERVE_LISTEN", "127.0.0.1:1").env("BIMORPH_SERVE_IDLE", "");
     let server = Server::spawn(command);
-    let told = told(&server.address);
+    let reported = reported(&server.address);
     let names: Vec<&str> = SETTINGS.iter().map(|s| s.name).chain(LIMITS.iter().map(|l| l.name)).collect();
-    assert_eq!(told.len(), names.len());
+    assert_eq!(reported.len(), names.len());
     for (name, value, source) in [
         ("listen", socket.as_str(), "option"),
         ("models", "6", "option"),
@@ -49,12 +50,12 @@ fn options_before_the_environment_before_a_file() {
         ("tls_cert", "", "default"),
         ("message_bytes", "64M", "default"),
     ] {
-        assert_eq!(told[name], (value.to_owned(), source.to_owned()), "{name}");
+        assert_eq!(reported[name], (value.to_owned(), source.to_owned()), "{name}");
     }
 }
 
-/// What can be written as a default can be written: a server that runs no programs says so. Variables by which Kubernetes tells every
-/// container of a service called `bimorph-serve` are no settings, but `BIMORPH_SERVE_PORT=1` is a mistake.
+/// Every default can also be given explicitly, for example by a server that runs no programs. Variables that Kubernetes
+/// sets in containers of a service called `bimorph-serve` are no settings, but `BIMORPH_SERVE_PORT=1` is an error.
 #[test]
 fn defaults_and_variables_of_kubernetes_are_taken() {
     let bench = Bench::new(&[]);
@@ -70,7 +71,7 @@ fn defaults_and_variables_of_kubernetes_are_taken() {
         inside.env(format!("BIMORPH_SERVE_{name}"), text);
     }
     let server = Server::spawn(inside);
-    assert_eq!(told(&format!("http://{}", server.address))["program_bytes"], ("0".to_owned(), "option".to_owned()));
+    assert_eq!(reported(&format!("http://{}", server.address))["program_bytes"], ("0".to_owned(), "option".to_owned()));
     let ran = command().env("BIMORPH_SERVE_PORT", "1").output().expect("it runs");
     let stderr = String::from_utf8_lossy(&ran.stderr);
     assert!(stderr.contains("BIMORPH_SERVE_PORT: there is no such setting"), "{stderr}");
@@ -86,7 +87,7 @@ fn the_example_is_read() {
     assert!(settings.tls_cert.is_some_and(|path| path.ends_with("examples/serve/server.pem")));
 }
 
-/// What means nothing is refused with its place and what was expected, before anything is listened on.
+/// Invalid settings are rejected with their place and the expected value, before the server listens.
 #[test]
 fn mistakes_are_named_by_place() {
     let bench = Bench::new(&[

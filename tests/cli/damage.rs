@@ -1,11 +1,11 @@
 //! Files that a disk has changed by one bit, and commands that are killed: no number is wrong, and nothing is lost but the record that the bit is
 //! in.
 
-use crate::bench::{Bench, CANTILEVER, PLATE};
-use crate::kept::{Numbers, kill_after};
-use crate::overseen::block_on;
-use crate::serving::Server;
+use crate::command::{Bench, CANTILEVER, PLATE};
+use crate::monitoring::block_on;
+use crate::serve_process::Server;
 use crate::stepping::{Stream, client, compiled};
+use crate::stored_sessions::{Numbers, kill_after};
 use bimorph::netlist::Bundle;
 use bimorph::service::convert::model::bundle_to_wire;
 use bimorph::service::proto;
@@ -44,8 +44,8 @@ fn flip_one(path: &Path, numbers: &mut Numbers) -> bool {
     fs::write(path, bytes).is_ok()
 }
 
-/// A command that is killed again and again at any moment, its journal with one bit changed after every other kill: it goes on each time, computes
-/// at most the damaged points again, and its table has the bytes of one run.
+/// A command is killed repeatedly at any moment, and its journal has one bit changed after every other kill. It
+/// continues each time, recomputes at most the damaged points, and its table has the bytes of one run.
 fn kills_of_the_command(kills: usize) {
     let bench = Bench::new(&[("c.net", CANTILEVER)]);
     let words = format!("sweep c.net --segments 40 --param F=1u:2u:{POINTS} --signals b.y --threads 2");
@@ -83,7 +83,7 @@ fn kills_of_the_command(kills: usize) {
     );
 }
 
-/// What a server had before it was killed.
+/// State of a server before the kill.
 struct Before {
     session: String,
     replies: Vec<proto::TrialReply>,
@@ -137,7 +137,7 @@ async fn made(wire: &mut BimorphClient<Channel>) -> Before {
     Before { session, replies, job, rows }
 }
 
-/// What is left of a session and a job after a bit was changed; each has its numbers, or is refused as damaged.
+/// State of a session and a job after a bit was changed; each has its numbers, or is rejected as damaged.
 #[derive(Debug, Default, PartialEq)]
 struct Left {
     /// Steps that the session goes on after; none: it is refused.
@@ -162,7 +162,7 @@ async fn left(wire: &mut BimorphClient<Channel>, before: &Before) -> Left {
             }
             found.steps = Some(at + 1);
         }
-        // of a netlist that is damaged, its errors are told, or that it is another one
+        // a damaged netlist has errors, or is reported as another one
         Err(status) => {
             let refused = [Code::DataLoss, Code::NotFound, Code::InvalidArgument, Code::FailedPrecondition];
             assert!(refused.contains(&status.code()), "{status}");

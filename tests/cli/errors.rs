@@ -1,6 +1,6 @@
 //! Bad input gives one clear message on standard error, exit status 1, nothing on standard output and no file.
 
-use crate::bench::{Bench, CANTILEVER, PLATE};
+use crate::command::{Bench, CANTILEVER, PLATE};
 
 /// Runs a command that must fail and returns its message.
 fn fails(bench: &Bench, words: &str) -> String {
@@ -43,7 +43,7 @@ fn a_netlist_with_a_slip() {
     assert!(message.contains("bad.net:4") && message.contains("positive"), "{message}");
 }
 
-/// What an analysis would ignore is refused, not swallowed.
+/// Options that an analysis would ignore are rejected.
 #[test]
 fn options_of_another_analysis() {
     let bench = Bench::new(&[("plate.net", PLATE), ("beam.net", CANTILEVER)]);

@@ -1,6 +1,6 @@
-//! `bimorph export`: what the files hold, and what is refused.
+//! `bimorph export`: contents of the files, and rejected requests.
 
-use crate::bench::{Bench, CANTILEVER, PLATE, number};
+use crate::command::{Bench, CANTILEVER, PLATE, number};
 use std::collections::BTreeSet;
 
 /// A heated chevron with a comb and a plate: every kind of port.
@@ -26,8 +26,8 @@ fn bench() -> Bench {
     Bench::new(&[("chevron.net", CHEVRON), ("plate.net", PLATE), ("c.net", CANTILEVER)])
 }
 
-/// The same request gives the same bytes, on standard output and in a file; the document tells the pins and an error that is within
-/// what was asked for.
+/// The same request gives the same bytes, on standard output and in a file; the document has the pins and an error
+/// within the requested tolerance.
 #[test]
 fn the_same_bytes_every_time() {
     let bench = bench();
@@ -126,8 +126,8 @@ fn the_nonlinear_form() {
     assert_eq!(module.stdout.matches('(').count(), module.stdout.matches(')').count());
 }
 
-/// Where no voltage couples motion and circuit, that is told, and what is left is the circuit's part: R = 2400 Ω of two beams of 60
-/// squares of 20 Ω.
+/// Where no voltage couples motion and circuit, a warning says so, and the circuit's part remains: R = 2400 Ω of two
+/// beams of 60 squares of 20 Ω.
 #[test]
 fn no_motion_is_told() {
     let ran = bench().run("export chevron.net --spice");
@@ -137,18 +137,18 @@ fn no_motion_is_told() {
     assert!((r / 2400.0 - 1.0).abs() < 1e-9, "{r}");
 }
 
-/// A bias at which the plate has pulled in is told, on the terminal and in the file.
+/// A bias at which the plate has pulled in is reported, on the terminal and in the file.
 #[test]
 fn a_jump_is_told() {
     let bench = bench();
     let ran = bench.run("export plate.net --spice --port drive=12");
     assert_eq!(ran.status, 0, "{}", ran.stderr);
-    let told = "the part pulled in, snapped or buckled on the way to this operating point";
-    assert!(ran.stderr.contains(told) && ran.stdout.contains(&format!("* warning: {told}")), "{}", ran.stderr);
-    assert!(!bench.run("export plate.net --spice --port drive=1").stderr.contains(told));
+    let reported = "the part pulled in, snapped or buckled on the way to this operating point";
+    assert!(ran.stderr.contains(reported) && ran.stdout.contains(&format!("* warning: {reported}")), "{}", ran.stderr);
+    assert!(!bench.run("export plate.net --spice --port drive=1").stderr.contains(reported));
 }
 
-/// What cannot be written is refused with one message that names it and a way out.
+/// Impossible exports are rejected with one message that names the reason and a remedy.
 #[test]
 fn refusals() {
     let bench = bench();

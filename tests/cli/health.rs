@@ -1,9 +1,9 @@
-//! Whether a server is well may be asked by everybody, and by nobody so that others are in want: `grpc.health.v1` without a token.
+//! Health checks need no token and cannot exhaust other calls: `grpc.health.v1`.
 
-use crate::bench::Bench;
-use crate::overseen::{block_on, channel, get, start, value};
-use crate::secure::{self, access, asked, certified};
-use crate::serving::Server;
+use crate::command::Bench;
+use crate::monitoring::{block_on, channel, get, start, value};
+use crate::serve_process::Server;
+use crate::tls_and_tokens::{self, access, asked, certified};
 use bimorph::service::proto;
 use proto::bimorph_client::BimorphClient;
 use proto::device_request::Kind as Ask;
@@ -32,10 +32,10 @@ async fn watch(channel: &Channel) -> Result<Streaming<HealthCheckResponse>, Code
     Ok(stream)
 }
 
-/// As many connections as there may be, with a watch each and no token: who has a token gets a place.
+/// With the maximum number of connections, each with a watch and no token, a client with a token gets a permit.
 #[test]
 fn watches_lock_nobody_out() {
-    let bench = secure::bench();
+    let bench = tls_and_tokens::bench();
     let server = Server::start(&bench, "--listen 127.0.0.1:0 --token-file tokens --max-connections 4");
     block_on(async {
         let mut watches = Vec::new();
@@ -65,17 +65,17 @@ fn health_has_small_places_of_its_own() {
         assert_eq!(check(&channel, &"x".repeat(2000)).await, Err(Code::ResourceExhausted));
         BimorphClient::new(channel.clone()).info(proto::InfoRequest {}).await.expect("the one call that may be");
     });
-    // what is asked of health is told as that
+    // health calls appear in the metrics by that name
     let (_, text) = get(&metrics, "/metrics");
     assert_eq!(value(&text, "bimorph_calls_total{call=\"Health/Check\",code=\"Ok\"}"), 1.0);
     assert!(!text.contains("call=\"Check\""), "{text}");
 }
 
-/// Who speaks plainly where TLS is spoken is told so, whatever it asks.
+/// A plain client on a TLS address receives an error that says so, for any call.
 #[test]
 fn health_is_not_told_plainly_where_tls_is_spoken() {
-    let bench = secure::bench();
-    let authority = secure::tls("authority.pem");
+    let bench = tls_and_tokens::bench();
+    let authority = tls_and_tokens::tls("authority.pem");
     let server = Server::start(&bench, &format!("{} --tls-client-ca {}", certified("server"), authority.display()));
     block_on(async {
         let channel = channel(server.address.trim_start_matches("https://")).await;
@@ -121,7 +121,7 @@ fn a_silent_connection_is_asked_whether_it_is_there() {
         let line = lines.find(|words| words[1].ends_with(&port(theirs)) && words[2].ends_with(&port(ours)));
         line.expect("the other end of it")[5].to_owned()
     };
-    // until it is accepted nobody has set one
+    // it is not set until it is accepted
     let looks = (0..5000).map(|_| {
         std::thread::sleep(Duration::from_millis(1));
         timer()

@@ -1,7 +1,8 @@
-//! `bimorph sweep --to` and `bimorph jobs`: the bytes of the same sweep in this process, whoever waits for it, and whoever lets go.
+//! `bimorph sweep --to` and `bimorph jobs`: the bytes of the same sweep in this process, with any client waiting or
+//! disconnecting.
 
-use crate::bench::{Bench, PLATE};
-use crate::serving::Server;
+use crate::command::{Bench, PLATE};
+use crate::serve_process::Server;
 use std::process::{Command, Stdio};
 
 const SWEEP: &str = "sweep plate.net --analysis pullin --max 30 --param gap=1.5u:2.5u";
@@ -49,7 +50,8 @@ fn tables_are_those_of_this_process() {
     assert!(bench.run(&format!("{SWEEP}:5 {to} --release-after 0")).stderr.contains("from 1 ms"));
 }
 
-/// Ctrl-C lets go of a sweep and says how to go on; it goes on until it is cancelled, and what it has is a table all the same.
+/// Ctrl-C detaches from a sweep and prints how to continue. The sweep runs until it is cancelled, and its finished
+/// points form a table all the same.
 #[test]
 fn ctrl_c_lets_go_of_a_sweep() {
     let bench = Bench::new(&[("plate.net", PLATE)]);

@@ -1,9 +1,9 @@
-//! Clients that are killed at any moment, in the middle of a step too: the server goes on, what was accepted is there, each step is
-//! in the run once, and sessions that nobody can come back to are gone.
+//! Clients that are killed at any moment, in the middle of a step too. The server continues, accepted states are there,
+//! each step is in the run once, and unreachable sessions are gone.
 
-use crate::bench::Bench;
-use crate::overseen::{block_on, get, start, value};
-use crate::serving::Server;
+use crate::command::Bench;
+use crate::monitoring::{block_on, get, start, value};
+use crate::serve_process::Server;
 use crate::stepping::{Stream, client, compiled};
 use bimorph::service::proto;
 use proto::device_request::Kind as Ask;
@@ -15,7 +15,7 @@ use std::time::Duration;
 const ADDRESS: &str = "KILLED_ADDRESS";
 const SESSION: &str = "KILLED_SESSION";
 const MODEL: &str = "KILLED_MODEL";
-/// Looks at the server until it has let go of who is gone.
+/// Most checks until the server has released the resources of a killed client.
 const LOOKS: usize = 5000;
 
 fn open(model: &str) -> Ask {
@@ -43,7 +43,7 @@ fn one_client() {
     });
 }
 
-/// Runs a client until it has heard of so many states, kills it, and tells all that it has heard of.
+/// Runs a client until it has received so many states, kills it, and returns all received states.
 fn killed(address: &str, session: Option<&str>, model: &str, after: usize) -> Vec<u64> {
     let mut command = Command::new(std::env::current_exe().expect("this program"));
     command.args(["killed_clients::one_client", "--exact", "--ignored", "--nocapture"]);
@@ -105,7 +105,7 @@ fn run(clients: usize) {
             let attach = Ask::Attach(proto::Attach { session: id.clone() });
             let (mut stream, opened) = Stream::start(&mut wire, attach).await.expect("it is there");
             let mut parent = *heard.last().expect("states");
-            // accepted, and killed before it was told
+            // accepted, and killed before the reply
             between += usize::from(opened.accepted != parent);
             assert!([parent, expected[heard.len()].token].contains(&opened.accepted), "{}", opened.accepted);
             for (step, expected) in expected.iter().enumerate().skip(heard.len()).take(3) {

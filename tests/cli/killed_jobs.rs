@@ -1,10 +1,10 @@
 //! Jobs of a server that is killed at any moment: no row that was given is lost or changed, none is there twice, and the table is that of the
 //! same sweep in process.
 
-use crate::bench::{Bench, PLATE};
-use crate::kept::{Numbers, kill_after};
-use crate::serving::Server;
+use crate::command::{Bench, PLATE};
+use crate::serve_process::Server;
 use crate::stepping::client;
+use crate::stored_sessions::{Numbers, kill_after};
 use bimorph::compile::CompileOptions;
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepSpec};
 use bimorph::netlist::Bundle;
@@ -26,7 +26,7 @@ fn spec() -> SweepSpec {
     SweepSpec { parameters, samples: None, analysis, shard: Shard::default(), threads: None }
 }
 
-/// What a client knows of a job.
+/// Data of a job that a client has received.
 #[derive(Default)]
 struct Known {
     name: Option<String>,

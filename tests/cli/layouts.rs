@@ -1,6 +1,6 @@
 //! `layout` and `convert` from outside: files, reports, and layouts where netlists go.
 
-use crate::bench::{Bench, CANTILEVER};
+use crate::command::{Bench, CANTILEVER};
 
 /// A netlist becomes a layout, the layout a netlist and a picture, and every analysis takes it as it is.
 #[test]
@@ -24,7 +24,7 @@ fn there_and_back() {
     }
 }
 
-/// What cannot be is refused with one message and without a file.
+/// Impossible requests are rejected with one message and without a file.
 #[test]
 fn refusals() {
     let bench = Bench::new(&[("c.net", CANTILEVER), ("broken.gds", "\0\u{6}\0\u{2}"), ("empty.cif", "E")]);

@@ -2,27 +2,27 @@
 
 mod analyses;
 mod batch;
-mod bench;
 mod chart;
+mod command;
 mod configuration;
 mod damage;
 mod errors;
 mod export;
 #[cfg(target_os = "linux")]
-mod forged;
-mod full;
+mod forged_requests;
+mod full_disks;
 mod health;
 mod jobs;
-mod kept;
 mod killed_clients;
 mod killed_jobs;
 mod layouts;
+mod monitoring;
 mod operations;
 mod outputs;
-mod overseen;
-mod secure;
+mod restored_states;
+mod serve_process;
 mod service;
-mod serving;
 mod stepping;
-mod survivors;
-mod yields;
+mod stored_sessions;
+mod sweep_statistics;
+mod tls_and_tokens;

@@ -1,11 +1,10 @@
-//! What goes wrong around a server while it runs: clients that say nothing, files that are changed or damaged, and one client that takes
-//! all that it can.
+//! Faults around a running server: silent clients, changed or damaged files, and one client that takes all resources.
 
-use crate::bench::{Bench, PLATE};
-use crate::overseen::{block_on, get, start};
-use crate::secure::{TOKEN, access, bench as guarded, tls};
-use crate::serving::Server;
+use crate::command::{Bench, PLATE};
+use crate::monitoring::{block_on, get, start};
+use crate::serve_process::Server;
 use crate::stepping::{Stream, client, compiled};
+use crate::tls_and_tokens::{TOKEN, access, bench as guarded, tls};
 use bimorph::netlist::Bundle;
 use bimorph::service::client::Client;
 use bimorph::service::convert::model::bundle_to_wire;
@@ -83,7 +82,7 @@ fn hangup_ends_no_server() {
     assert!(!bench.path("s").exists());
 }
 
-/// Two hundred connections that say nothing do not keep the metrics from those who ask.
+/// Two hundred silent connections do not block the metrics for others.
 #[test]
 fn silent_connections_to_the_metrics_make_room() {
     let bench = Bench::new(&[]);
@@ -124,8 +123,8 @@ fn connections_fit_into_open_files() {
     });
     drop(silent);
     let doctor = within("doctor --config serve.toml").output().expect("runs");
-    let told = String::from_utf8_lossy(&doctor.stdout).into_owned();
-    assert!(told.contains("missing  files    connections: 512 do not fit into 64 open files"), "{told}");
+    let reported = String::from_utf8_lossy(&doctor.stdout).into_owned();
+    assert!(reported.contains("missing  files    connections: 512 do not fit into 64 open files"), "{reported}");
     let whole = bench.run("doctor --config serve.toml");
     assert!(whole.stdout.contains("ok       files"), "{}", whole.stdout);
 }
@@ -321,10 +320,10 @@ fn one_client_leaves_the_others_their_part() {
         };
         assert_eq!((jobs, refused.code()), (8, Code::ResourceExhausted), "{refused}");
         bob.submit_job(endless(99)).await.expect("bob has room");
-        // what holds where nobody says it is told
-        let settings = bob.info(proto::InfoRequest {}).await.expect("told").into_inner().settings;
-        let told = settings.iter().find(|setting| setting.name == "client_sessions").expect("told");
-        assert_eq!((told.value.as_str(), told.source.as_str()), ("64", "default"));
+        // defaults are reported
+        let settings = bob.info(proto::InfoRequest {}).await.expect("reported").into_inner().settings;
+        let reported = settings.iter().find(|setting| setting.name == "client_sessions").expect("reported");
+        assert_eq!((reported.value.as_str(), reported.source.as_str()), ("64", "default"));
     });
 }
 

@@ -1,6 +1,6 @@
 //! `--out` writes what its extension says, whole; standard output takes what is left.
 
-use crate::bench::{Bench, CANTILEVER};
+use crate::command::{Bench, CANTILEVER};
 use bimorph::results::raw;
 use std::process::Stdio;
 

@@ -1,8 +1,8 @@
 //! `serve`, `sweep --to` and `doctor`.
 #![cfg(unix)]
 
-use crate::bench::{Bench, CANTILEVER};
-use crate::serving::Server;
+use crate::command::{Bench, CANTILEVER};
+use crate::serve_process::Server;
 
 /// A sweep through a server gives the bytes of the same sweep here; the server ends cleanly when it is interrupted.
 #[test]

@@ -1,7 +1,7 @@
 //! A session that is stepped: each step is tried and accepted.
 
-use crate::bench::{Bench, PLATE};
-use crate::serving::Server;
+use crate::command::{Bench, PLATE};
+use crate::serve_process::Server;
 use bimorph::netlist::Bundle;
 use bimorph::service::convert::model::bundle_to_wire;
 use bimorph::service::proto;
@@ -16,7 +16,7 @@ use tonic::{Code, Status, Streaming};
 /// Length of a step [s].
 const DT: f64 = 1e-7;
 
-/// What the circuit gives in a step [V].
+/// Voltages of the circuit in a step [V].
 fn voltages(step: usize) -> Vec<f64> {
     vec![1.0 + (step % 7) as f64]
 }
@@ -103,7 +103,7 @@ impl Killed {
         Self { bench, options, server, wire }
     }
 
-    /// What it says on the next line that holds `head`, after it.
+    /// The rest of the next output line that contains `head`.
     pub(crate) fn line(&mut self, head: &str) -> String {
         self.server.line(head)
     }

@@ -1,63 +1,90 @@
-//! Modules stand in layers: a module names modules of lower layers, never one of its own layer or above. Tests inside a file may look anywhere.
+//! Crates stand in layers: a crate depends on the crates that are listed for it here and in its `lib.rs`, and on no other. The compiler keeps
+//! what the manifests say; this keeps the manifests, and the order of modules within crates. Tests inside a file may look anywhere.
 
 use crate::files;
 use std::fs;
 use std::path::Path;
 
-const FLOORS: [&[&str]; 14] = [
-    &["budget", "sets"],
-    &["structure", "multibody"],
-    &["domains"],
-    &["netlist", "layout", "results"],
-    &["options", "equations", "front"],
-    &["content", "discretize", "solve"],
-    &["refine"],
-    &["compile"],
-    &["readout"],
-    &["analysis"],
-    &["device"],
-    &["jobs", "cosim", "export"],
-    &["service"],
-    &["cli", "main"],
+/// Crates from the bottom up, each with the crates that it may depend on.
+const CRATES: [(&str, &[&str]); 15] = [
+    ("base", &[]),
+    ("structure", &["base"]),
+    ("multibody", &["base"]),
+    ("domains", &["base", "structure", "multibody"]),
+    ("solve", &["base", "multibody", "domains"]),
+    ("netlist", &["base", "structure", "domains"]),
+    ("layout", &["base", "structure", "domains", "netlist"]),
+    ("results", &["structure"]),
+    ("model", &["base", "structure", "multibody", "domains", "solve", "netlist"]),
+    ("analysis", &["base", "structure", "multibody", "domains", "solve", "netlist", "model"]),
+    ("device", &["base", "multibody", "domains", "solve", "netlist", "model", "analysis"]),
+    ("export", &["base", "multibody", "domains", "solve", "model", "analysis", "device"]),
+    ("jobs", &["base", "structure", "netlist", "model", "analysis"]),
+    ("cosim", &["structure", "results"]),
+    ("service", &["base", "solve", "netlist", "layout", "model", "analysis", "device", "jobs"]),
 ];
 
-/// Words that belong to one floor and those above it.
-const RESERVED: [(&str, usize); 4] = [("tonic::", 12), ("tokio::", 12), ("prost::", 12), ("clap::", 13)];
+/// Modules of one crate from the bottom up: a module names modules before it alone. `*` is all that is not listed.
+const MODULES: [(&str, &[&str]); 3] = [
+    ("model", &["options", "discretize", "refine", "compile"]),
+    ("solve", &["equations", "*"]),
+    ("analysis", &["readout", "*"]),
+];
 
-fn floor(module: &str) -> Option<usize> {
-    FLOORS.iter().position(|floor| floor.contains(&module))
+#[test]
+fn manifests_name_the_layers_below() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
+    let mut found: Vec<String> =
+        fs::read_dir(&root).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    let mut listed: Vec<&str> = CRATES.iter().map(|(name, _)| *name).collect();
+    (found.sort(), listed.sort_unstable());
+    assert_eq!(found, listed);
+    for (place, (name, below)) in CRATES.iter().enumerate() {
+        let manifest = fs::read_to_string(root.join(name).join("Cargo.toml")).unwrap();
+        let dependencies = manifest.split("[dependencies]").nth(1).unwrap().split("\n[").next().unwrap();
+        let own = |line: &str| line.strip_prefix("bimorph-").map(|rest| rest.split(' ').next().unwrap().to_owned());
+        let depends: Vec<String> = dependencies.lines().filter_map(own).collect();
+        assert_eq!(depends, *below, "crates/{name}/Cargo.toml");
+        let lower = |other: &&&str| CRATES[..place].iter().any(|(lower, _)| *lower == **other);
+        assert!(below.iter().all(|other| lower(&other)), "{name} depends on a crate above it");
+        let lib = fs::read_to_string(root.join(name).join("src/lib.rs")).unwrap();
+        assert!(lib.contains("**Architecture invariant.**"), "crates/{name}/src/lib.rs does not state its invariant");
+    }
 }
 
 #[test]
-fn no_layer_names_a_layer_above_it() {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+fn no_module_names_a_module_above_it() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
     let mut faults = Vec::new();
-    for path in files(&source) {
-        let place = path.strip_prefix(&source).unwrap();
-        let module = place.iter().next().unwrap().to_str().unwrap().trim_end_matches(".rs");
-        if module == "lib" {
-            continue;
-        }
-        let own = floor(module).unwrap_or_else(|| panic!("{module} stands on no floor: give it one"));
-        let text = fs::read_to_string(&path).unwrap();
-        let text = text.split("#[cfg(test)]").next().unwrap();
-        let code: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
-        for line in &code {
-            for (_, rest) in line.match_indices("crate::").map(|(at, word)| line.split_at(at + word.len())) {
-                let named: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-                if named != module && floor(&named).is_some_and(|other| other >= own) {
-                    faults.push(format!("{}: {}", place.display(), line.trim()));
+    for (name, modules) in MODULES {
+        let source = root.join(name).join("src");
+        let layer = |module: &str| modules.iter().position(|listed| *listed == module).unwrap_or(modules.len() - 1);
+        for path in files(&source) {
+            let place = path.strip_prefix(&source).unwrap();
+            let module = place.iter().next().unwrap().to_str().unwrap().trim_end_matches(".rs");
+            let text = fs::read_to_string(&path).unwrap();
+            let text = text.split("#[cfg(test)]").next().unwrap();
+            for line in text.lines().filter(|line| module != "lib" && !line.trim_start().starts_with("//")) {
+                for (_, rest) in line.match_indices("crate::").map(|(at, word)| line.split_at(at + word.len())) {
+                    let named: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                    if layer(&named) > layer(module) {
+                        faults.push(format!("{name}: {}: {}", place.display(), line.trim()));
+                    }
                 }
             }
-            for (word, lowest) in RESERVED {
-                if own < lowest && line.contains(word) {
-                    faults.push(format!("{}: {}", place.display(), line.trim()));
-                }
-            }
-        }
-        if module == "multibody" && code.iter().any(|line| line.to_lowercase().contains("volt")) {
-            faults.push(format!("{}: bodies and joints know no volts", place.display()));
         }
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn bodies_and_joints_have_no_voltages() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/multibody/src");
+    for path in files(&source) {
+        let text = fs::read_to_string(&path).unwrap();
+        let code =
+            text.split("#[cfg(test)]").next().unwrap().lines().filter(|line| !line.trim_start().starts_with("//"));
+        let faults: Vec<&str> = code.filter(|line| line.to_lowercase().contains("volt")).collect();
+        assert!(faults.is_empty(), "{}: {faults:?}", path.display());
+    }
 }

@@ -140,8 +140,8 @@ fn arcs_and_tapers() {
     }
 }
 
-/// A plate with etch holes is a rigid body with what the holes leave of its mass: 36 holes of 16 µm² in 6400 µm² by hand, less the beam, which is
-/// led 0.44 of its 2 µm into the elastic edge.
+/// A plate with etch holes is a rigid body with the mass that the holes leave: 36 holes of 16 µm² in 6400 µm² by hand,
+/// less the beam, which extends 0.44 of its 2 µm into the elastic edge.
 #[test]
 fn etch_holes_are_taken_off_a_plate() {
     let mut sheet = Sheet::new(0.0, [0.0; 2]);

@@ -30,8 +30,8 @@ fn chevron(left: &str, right: &str) -> Sheet {
     sheet
 }
 
-/// A heated chevron drawn without labels of ours is the one of docs/netlist.md: its apex moves at 2 V as that of the netlist by hand, within
-/// 0.5 %: pads are cut off at their edges, and the corner at the apex is rounded to 1 nm.
+/// A heated chevron drawn without labels of ours is the one of docs/netlist.md. Its apex moves at 2 V as that of the
+/// netlist by hand, within 0.5 %: pads are cut off at their edges, and the corner at the apex is rounded to 1 nm.
 #[test]
 fn a_heated_chevron() {
     let found = extracted(chevron("heat", "GND").drawing());
@@ -135,8 +135,8 @@ fn ground_has_many_names() {
     }
 }
 
-/// A label on a part that moves, on its own layer, names a node of it and not the wiring or the pad of another layer beneath; where wiring
-/// alone lies under the label, or the label is on the wiring's layer, it names the wiring.
+/// A label on a moving part, on its own layer, names a node of it and not the wiring or the pad of another layer
+/// beneath. Where wiring alone lies under the label, or the label is on the wiring's layer, it names the wiring.
 #[test]
 fn a_label_on_what_moves_is_not_of_the_wiring_beneath() {
     let mut sheet = Sheet::new(0.0, [0.0; 2]);
@@ -179,8 +179,8 @@ fn a_perforated_plane_joins_what_it_overlaps() {
     assert_eq!(pads, [("plane", 195), ("alone", 1)]);
 }
 
-/// A bond pad twice as long as wide that stands alone is held like a square one, also at its ends, and its label names the net of the pad
-/// that wiring joins with it; it was said to float away.
+/// A bond pad twice as long as wide that stands alone is held like a square one, also at its ends. Its label names the
+/// net of the pad that wiring joins with it; before, it was reported as floating.
 #[test]
 fn a_long_bond_pad() {
     let mut sheet = Sheet::new(0.0, [0.0; 2]);
@@ -199,7 +199,7 @@ fn a_long_bond_pad() {
     assert!(text.contains("beam2det p1") && text.contains("heat port * "), "{text}");
 }
 
-/// Of labels that name nothing the first twenty are told, and how many more there are.
+/// Of labels without an object the first twenty are reported, and the number of the others.
 #[test]
 fn few_labels_are_told() {
     let mut sheet = chevron("a", "b");

@@ -83,8 +83,9 @@ fn fine(found: &Extraction, count: usize) -> Vec<f64> {
     modes(&compiled.unwrap_or_else(|e| panic!("{e}\n{}", netlist(found))), count, &[]).unwrap().frequencies_hz
 }
 
-/// A ladder whose springs meet it at the height of holes, a square plate with springs on all sides and in a corner, a long plate, and a
-/// ladder on one spring: modes 1 to 3 within 2 % of plane stress, mass within 1e-6, drawn with a mask or as rails and rungs, at 0° and 33°.
+/// A ladder whose springs meet it at the height of holes, a square plate with springs on all sides and in a corner, a
+/// long plate, and a ladder on one spring. Modes 1 to 3 are within 2 % of plane stress, and the mass within 1e-6. They
+/// are drawn with a mask or as rails and rungs, at 0° and 33°.
 #[test]
 fn springs_anywhere_on_perforated_plates() {
     let plate = |hole, count, springs: &[(usize, f64, f64, f64)]| Plate { hole, count, springs: springs.to_vec() };
@@ -134,9 +135,9 @@ fn a_spring_at_any_height() {
     }
 }
 
-/// Twenty-four random plates convert, weigh what is drawn within 1e-6, and turned by an angle of their own have the same three lowest modes
-/// within 3e-3: corners are rounded to 1 nm, which changes the width of a spring of 0.5 µm by up to 2e-3. `scripts/random-plates` does it for
-/// 500, of more shapes.
+/// Twenty-four random plates convert, and their mass is the drawn one within 1e-6. Rotated by an angle of their own,
+/// they have the same three lowest modes within 3e-3. Corners are rounded to 1 nm, which changes the width of a spring
+/// of 0.5 µm by up to 2e-3. `scripts/random-plates` does it for 500, of more shapes.
 #[test]
 fn random_plates_weigh_what_is_drawn() {
     // a linear congruential generator (Knuth's MMIX)
@@ -170,7 +171,8 @@ fn random_plates_weigh_what_is_drawn() {
     }
 }
 
-/// What is compliant stays so: a ladder of 30 holes on an anchor is a beam with holes, and so is one of three, though it is short.
+/// Compliant perforated parts stay compliant: a ladder of 30 holes on an anchor is a beam with holes, and so is one of
+/// three, though it is short.
 #[test]
 fn ladders_on_anchors_bend() {
     for rows in [3, 30] {

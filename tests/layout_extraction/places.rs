@@ -1,7 +1,7 @@
-//! Messages about a layout name layer and place in the drawing, never a line of the netlist that was made of it; a body that may be held by
-//! mistake is told of.
+//! Messages about a layout name layer and place in the drawing, never a line of the netlist that was made of it. A body
+//! that may be held by mistake is reported.
 
-use bimorph::front::from_bytes;
+use bimorph::input::from_bytes;
 use bimorph::netlist::load;
 
 /// A body of 20 µm by 20 µm about the origin on four legs, 15 µm by 0.5 µm, to pads of 5 µm by 5 µm; units of 10 nm.
@@ -45,9 +45,9 @@ fn a_body_that_an_undercut_holds() {
         source.converted.unwrap().report
     };
     let held = convert("undercut = 2e-6");
-    let told: Vec<&String> = held.notes.iter().filter(|n| n.contains("undercut")).collect();
+    let reported: Vec<&String> = held.notes.iter().filter(|n| n.contains("undercut")).collect();
     assert!(
-        told.len() == 1 && told[0].contains("the body at (0, 0) µm is held") && told[0].contains("4 limbs"),
+        reported.len() == 1 && reported[0].contains("the body at (0, 0) µm is held") && reported[0].contains("4 limbs"),
         "{held:?}"
     );
     assert_eq!((held.counts["bodies"], held.counts["anchors"]), (0, 8));

@@ -59,7 +59,7 @@ fn what_differs_stays_flat() {
     assert_eq!(text.matches(" arm_cell * [").count(), 2, "{text}");
 }
 
-/// What comes out, drawn and read again, is the mechanism: modes within 1e-9.
+/// The result, drawn and read again, is the same mechanism: modes within 1e-9.
 #[test]
 fn subnets_are_drawn_and_read_again() {
     let text = as_flat(&drawing("C 2 T 0 0; C 2 R 0 1 T 60000 0;"));
@@ -73,7 +73,8 @@ fn subnets_are_drawn_and_read_again() {
     }
 }
 
-/// A text far away in a cell does not belong to its box: cells side by side are subnets all the same. A label at no node names nothing.
+/// A text far away in a cell does not belong to its box: adjacent cells are subnets all the same. A label at no node
+/// names nothing.
 #[test]
 fn a_text_far_away_is_no_part_of_a_cell() {
     let marked = CELLS.replace("9 arm;", "9 arm; 94 MARK 900000 900000 POLY1;");
@@ -82,8 +83,8 @@ fn a_text_far_away_is_no_part_of_a_cell() {
     assert_eq!(text.matches(" arm_cell * [").count(), 3, "{text}");
 }
 
-/// Cells that all lie over each other, by a mark of metal far away in each, stay flat, in memory that is counted and does not grow with
-/// their number times what lies in each: 1600 cells over up to 3200 elements were some 10⁶ rows.
+/// Cells that all overlap, because of a distant mark of metal in each, stay flat. Their memory is counted and does not
+/// grow with their number times the content of each: 1600 cells over up to 3200 elements were some 10⁶ rows.
 #[test]
 fn cells_that_lie_over_each_other_stay_flat() {
     let place = |k: i32| format!("C 1 T {} {}; ", 12_000 * (k % 40), 2500 * (k / 40));

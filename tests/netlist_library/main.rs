@@ -1,5 +1,5 @@
-//! The planar models beside SUGAR's own: what each does, from closed forms and from the equations in docs/netlist.md, and what is
-//! told of members that leave the plane.
+//! The planar models beside SUGAR's own: their effects, from closed forms and from the equations in docs/netlist.md,
+//! and the warnings about members that leave the plane.
 
 mod arcs;
 
@@ -65,7 +65,7 @@ fn predisplaced_beams_lie_as_drawn() {
     assert_eq!(found[0].0, "E061", "{found:?}");
 }
 
-/// A trapezoid bends by F·l³/(3·E·I) with I of its section, and weighs ρ·A·l; SUGAR's third is told.
+/// A trapezoid bends by F·l³/(3·E·I) with I of its section, and its mass is ρ·A·l; SUGAR's third is reported.
 #[test]
 fn trapezoidal_sections() {
     let text = "trapezoidalbeam p1 [a b] [l=100u wbottom=6u wtop=2u h=4u]\nf3d * [b] [F=1u oz=pi/2]";
@@ -213,7 +213,8 @@ fn sources_of_small_signals() {
     assert_eq!(small, [(0.0, Some([2.0, PI / 2.0])), (5.0, Some([1.0, 0.0])), (5.0, None)]);
 }
 
-/// Out of the plane: between anchors nothing is left, a stout post is rigid and told with its stiffness, anything else is refused.
+/// Out of the plane: between anchors no member remains, a stout post is rigid and reported with its stiffness, and all
+/// others are rejected.
 #[test]
 fn members_out_of_the_plane() {
     let beam = "beam2d p1 [a z] [l=10u w=1u]\n";
@@ -274,7 +275,7 @@ fn loads_per_length() {
     assert_eq!(refused("beam2d p1 [a b] [l=1u w=1u]\np3d * [a b] [l=1u P='y+1']")[0].0, "E050");
 }
 
-/// What only places its nodes: a beam of no section, a tracer.
+/// Elements that only place nodes: a beam without section, a tracer.
 #[test]
 fn placing_beams() {
     let s = drawn(
@@ -296,15 +297,15 @@ fn angles_are_parameters_too() {
     near(s.beams[0].angle, 1.5, 1e-12);
 }
 
-/// What is no netlist is told in words, and help names no other thing.
+/// Files that are no netlist are reported in words, and the help names no other kind.
 #[test]
 fn told_in_words() {
-    let told =
+    let reported =
         |name: &str, text: &str| load(&Bundle::from_text(name, text), &[]).expect_err("an error").items.remove(0);
-    let script = told("run.m", "% a sweep\nnet = cho_load('a.net');\n");
+    let script = reported("run.m", "% a sweep\nnet = cho_load('a.net');\n");
     assert_eq!((script.code.as_str(), script.line), ("E006", 2));
     assert_eq!(script.message, "`run.m` is a MATLAB file, not a netlist");
-    let library = told("cell.m", "% a cell\nsubnet cell [a b] [l=*] [ beam2d p7 [a b] [l=l w=width] ]\n");
+    let library = reported("cell.m", "% a cell\nsubnet cell [a b] [l=*] [ beam2d p7 [a b] [l=l w=width] ]\n");
     assert_eq!((library.code.as_str(), library.line), ("E007", 2));
     assert_eq!(library.message, "`cell.m` is a library: it has 1 subnet and draws nothing");
     let found = refused("slider1 p1 [a b] [l=1u]\n");

@@ -51,9 +51,9 @@ fn bank_with(options: CompileOptions) -> CompiledModel {
         .unwrap()
 }
 
-/// The bank bends down while it is hot. Heated beyond the strength of its hot arms and cooled again it rests bent up, by
-/// 6.9 µm for each µm of shortening (independent frame solver, small displacements) within 3 %, and heated to where the
-/// arms hold it comes back to where it was drawn.
+/// The bank bends down while it is hot. After heating beyond the strength of its hot arms and cooling, it rests bent
+/// up, by 6.9 µm for each µm of shortening within 3 % (independent frame solver, small displacements). Heated to the
+/// temperature that the arms bear, it returns to the drawn position.
 #[test]
 fn a_bank_rests_bent_the_other_way() {
     let bank = bank();
@@ -71,8 +71,8 @@ fn a_bank_rests_bent_the_other_way() {
     assert_eq!(rest(&held.compiled), rest(&bank));
 }
 
-/// The same through the front that users use, on the mesh that it takes for itself: at three tolerances the yoke rests where the same
-/// bank rests on eight times the segments within the tolerance, and the estimate says so.
+/// As above through the public interface, on the mesh that it chooses. At three tolerances the yoke rests where the
+/// same bank rests on eight times the segments within the tolerance, and the estimate agrees.
 #[test]
 fn what_has_yielded_stays_on_every_mesh() {
     let at = |tol: f64, segments: Option<usize>| {
@@ -84,13 +84,13 @@ fn what_has_yielded_stays_on_every_mesh() {
     let (exact, _) = at(1e-3, Some(24));
     assert!(exact > 1e-7, "{exact}");
     for tol in [1e-2, 1e-3, 1e-4] {
-        let (y, told) = at(tol, None);
-        assert!(told.is_some_and(|told| told <= tol), "{tol}: {told:?}");
+        let (y, reported) = at(tol, None);
+        assert!(reported.is_some_and(|reported| reported <= tol), "{tol}: {reported:?}");
         close(y, exact, tol);
     }
 }
 
-/// A mechanism without strengths is told so.
+/// A mechanism without strengths causes a message that says so.
 #[test]
 fn nothing_can_yield() {
     let text = BAR

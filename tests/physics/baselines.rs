@@ -157,8 +157,8 @@ fn frame_modes_agree_with_the_segments() {
     }
 }
 
-/// A cantilever let go, both models far finer than the motion needs: the frame swings as the product's own linear model does,
-/// to 2e-3 of the amplitude over five periods (1e-3 is the tolerance of each).
+/// A released cantilever, both models far finer than the motion needs: the frame oscillates as the product's own linear
+/// model does, to 2e-3 of the amplitude over five periods (1e-3 is the tolerance of each).
 #[test]
 fn frame_motion_agrees_with_the_linear_model() {
     let text = "param F=1u\nanchor p1 [a] [l=10u w=10u]\nbeam2d p1 [a b] [l=100u w=2u]\nf2d * [b] [F=F oz=pi/2]";
@@ -185,8 +185,9 @@ fn frame_motion_agrees_with_the_linear_model() {
     }
 }
 
-/// What a frame prints of statics is within the tolerance beside it: a part that hangs on a thread, some 1e-11 as stiff as what bears it,
-/// is where twenty times as thick a thread has it within 1e-3; one on a thread that rounding hides is refused at 1e-6.
+/// Printed results of frame statics are within the printed tolerance. A part on a slender beam, some 1e-11 as stiff as
+/// its support, is where a beam of twenty times the thickness has it within 1e-3. At 1e-6, where rounding hides the
+/// beam, it is rejected.
 #[test]
 fn what_rounding_hides_is_refused() {
     let at = |thread: &str, tol: f64| {

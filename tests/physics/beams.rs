@@ -134,8 +134,8 @@ fn a_free_beam_has_three_rigid_modes() {
     close(found[4], 7.853204624095838f64.powi(2) * unit, 1e-3);
 }
 
-/// A part that hangs on beams too soft to see (2 nm × 2 nm, as drawing aids in old decks are) is held where it is, and the
-/// result says so, with the net load on it where there is one; the rest has its displacement, F·l³/(3·E·I).
+/// A part on beams that are too soft to resolve (2 nm × 2 nm, like drawing aids in old decks) stays in place, and the
+/// result says so, with the net load on it, if any. The rest has its displacement, F·l³/(3·E·I).
 #[test]
 fn a_part_on_threads_is_held_and_told() {
     let text = |force: &str| {

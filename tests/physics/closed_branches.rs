@@ -179,7 +179,7 @@ fn a_second_snap_holds_longer() {
     close(found.snaps_v[0], snap, 2e-3);
     close(found.release_v.unwrap(), both, 5e-3);
     close(found.release_before_snaps_v.unwrap(), only_first, 2e-2);
-    // below the second snap there is none to hold longer
+    // below the second snap no branch is held longer
     let found = pull_in(&compiled, None, 0.99 * snap).unwrap();
     assert!(found.snaps_v.is_empty() && found.release_before_snaps_v.is_none());
     close(found.release_v.unwrap(), only_first, 2e-2);

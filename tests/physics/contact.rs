@@ -85,7 +85,8 @@ fn a_thousand_plates_rest_on_contact() {
     assert!(deepest < 0.98 * TOUCH, "the voltages never pressed: {deepest:e}");
 }
 
-/// What is pressed beyond the range of the law is refused with the name of the gap: a plate of 1 µm² pushed by 0.1 N, 100 GPa.
+/// A contact beyond the range of the law is rejected with the name of the gap: a plate of 1 µm² pushed by 0.1 N, 100
+/// GPa.
 #[test]
 fn beyond_the_law_there_is_no_number() {
     let text = "
@@ -137,8 +138,8 @@ pub(crate) fn random_part(case: usize, random: &mut Numbers) -> CompiledModel {
     model(&text, &CompileOptions::default())
 }
 
-/// Two hundred random parts pull in and let go at the same voltages whatever the largest voltage asked for, from just above
-/// pull-in to 1000 V, and let go below where they pull in.
+/// Two hundred random parts pull in and open at the same voltages for any largest voltage, from just above pull-in to
+/// 1000 V, and open below pull-in.
 #[test]
 fn pull_in_does_not_depend_on_the_largest_voltage() {
     let mut random = Numbers(11);
@@ -166,7 +167,7 @@ fn pull_in_does_not_depend_on_the_largest_voltage() {
     }
 }
 
-/// Plates pull in at Nathanson's voltage, and let go where kx = εAV²/2(g − x)² at the touching distance.
+/// Plates pull in at Nathanson's voltage, and open where kx = εAV²/2(g − x)² at the touching distance.
 #[test]
 fn plates_pull_in_and_let_go() {
     let mut random = Numbers(5);
@@ -179,8 +180,8 @@ fn plates_pull_in_and_let_go() {
     }
 }
 
-/// A plate with a stop at 1 µm, half of its gap, pulls in at Nathanson's voltage for each --max, and lets go where
-/// V² = 2kx(g − x)²/εA at x = 1 µm: 4.7527 V.
+/// A plate with a stop at 1 µm, half of its gap, pulls in at Nathanson's voltage for each --max, and opens where V² =
+/// 2kx(g − x)²/εA at x = 1 µm: 4.7527 V.
 #[test]
 fn plate_with_a_stop() {
     let compiled = stopped_plate("anchor * [s] []\nplategap2d * [m s] [A=1e-8 gap=1.1u]\nR * [m s] [R=1]");
@@ -191,9 +192,9 @@ fn plate_with_a_stop() {
     }
 }
 
-/// A hundred bounces of an undamped plate at 8 V (dynamic pull-in is 4.75 V), default tolerance: ½mv² + ½kx² − ½CV² in flight
-/// stays within 1e-3 of what a fall releases, and the plate does not rebound beyond its start by more than that lifts it; at 1e-2
-/// within ten times that.
+/// A hundred bounces of an undamped plate at 8 V (dynamic pull-in is 4.75 V), default tolerance. In flight, ½mv² + ½kx²
+/// − ½CV² stays within 1e-3 of the energy released by a fall. The plate does not rebound beyond its start by more than
+/// the corresponding height; at 1e-2 within ten times that.
 #[test]
 fn a_hundred_bounces_gain_no_energy() {
     let (mass, k, area, gap, volts) = (1e-10, 1.0, 1e-8, 2e-6, 8.0);
@@ -222,8 +223,9 @@ fn a_hundred_bounces_gain_no_energy() {
     }
 }
 
-/// A mass on a spring between stops at +1 and −2 µm under ±10 µN at k = 1 N/m: rigid stops hold it within 5 nm, where the law has
-/// p·A = F − kx; a stop of 50 N/m gives way by (F − kx)/50, and 1 nm of setting in; within the stops there is no force.
+/// A mass on a spring between stops at +1 and −2 µm under ±10 µN at k = 1 N/m. Rigid stops hold it within 5 nm, where
+/// the law has p·A = F − kx. A stop of 50 N/m is displaced by (F − kx)/50, plus 1 nm of contact. Within the stops there
+/// is no force.
 #[test]
 fn stops_hold() {
     let at = |force: f64, stop: &str| {
@@ -248,7 +250,8 @@ fn stops_hold() {
     }
 }
 
-/// A plate with a rigid stop after 1 µm, half of its gap, pulls in and lets go as with a stop drawn as a gap: 5.1741 and 4.7527 V.
+/// A plate with a rigid stop after 1 µm, half of its gap, pulls in and opens as with a stop drawn as a gap: 5.1741 and
+/// 4.7527 V.
 #[test]
 fn a_stop_ends_pull_in() {
     let found = pull_in(&stopped_plate("s stop2d * [m] [gap=1u]"), None, 200.0).unwrap();

@@ -52,9 +52,10 @@ fn before_contact(device: &mut LocalDevice) -> (Token, f64) {
     (now.unwrap(), closed)
 }
 
-/// From a point before an impact to 5, 50 and 500 ns after it, 21 voltages within 1e-5 of 8 V give charges on a smooth curve: a parabola
-/// through them leaves less than 1e-3 of their range, and its slope at 8 V is the partial that the trial reports within 1 %. With steps of its own in each trial
-/// the rest was 0.2 of the range 50 ns after the impact, and more than the range 500 ns after it.
+/// From a point before an impact to 5, 50 and 500 ns after it, 21 voltages within 1e-5 of 8 V give charges on a smooth
+/// curve. A parabola through them leaves less than 1e-3 of their range, and its slope at 8 V is the partial that the
+/// trial reports within 1 %. With steps of its own in each trial the rest was 0.2 of the range 50 ns after the impact,
+/// and more than the range 500 ns after it.
 #[test]
 fn charge_is_smooth_across_an_impact() {
     let mut device = plate();

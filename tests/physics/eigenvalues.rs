@@ -30,8 +30,8 @@ fn widths_apart_keep_their_digits() {
     }
 }
 
-/// Beams a thousand times apart in width, cut small: rounding leaves nothing of the soft stiffness, and no frequency is
-/// told.
+/// Beams whose widths differ by a factor of a thousand, on a fine mesh: rounding exceeds the soft stiffness, and no
+/// frequency is reported.
 #[test]
 fn what_rounding_hides_is_refused() {
     let text = "anchor p1 [a] []\nbeam2d p1 [a b] [l=80u w=0.02u h=0.02u]\nbeam2d p1 [b c] [l=150u w=100u]\n\
@@ -73,8 +73,9 @@ fn stout_pieces_have_modes() {
     assert_eq!(result.frequencies_hz.len(), 3);
 }
 
-/// A clamped beam under residual stress, so that N·L²/EI is −20 (half of the buckling load) and +200: the estimate has the sign and,
-/// within a factor of 2 where its terms nearly cancel, the size of what six segments are off against sixty.
+/// A clamped beam under residual stress, so that N·L²/EI is −20 (half of the buckling load) and +200. The estimate has
+/// the sign and the size of the difference between six segments and sixty, within a factor of 2 where its terms nearly
+/// cancel.
 #[test]
 fn estimates_hold_under_stress() {
     let text =
@@ -85,14 +86,15 @@ fn estimates_hold_under_stress() {
         let (few, many) = (found(&text(stress), 6, 3).unwrap(), found(&text(stress), 60, 3).unwrap());
         for mode in 0..3 {
             let off = few.frequencies_hz[mode] / many.frequencies_hz[mode] - 1.0;
-            let told = few.errors[mode].unwrap();
-            assert!((0.5..2.0).contains(&(told / off)), "{k} mode {mode}: told {told:e}, off {off:e}");
+            let reported = few.errors[mode].unwrap();
+            assert!((0.5..2.0).contains(&(reported / off)), "{k} mode {mode}: told {reported:e}, off {off:e}");
         }
     }
 }
 
-/// Small displacements keep what stress does to vibrations: with and without `linear` a clamped beam at half of its buckling load
-/// has the same first frequency, far below that without stress; beyond the load the linear model says that it is unstable.
+/// Small displacements keep the effect of stress on vibrations. With and without `linear` a clamped beam at half of its
+/// buckling load has the same first frequency, far below that without stress. Beyond the load the linear model reports
+/// that it is unstable.
 #[test]
 fn linear_models_keep_the_stiffness_of_stress() {
     let first = |stress: f64, linear: bool| {
@@ -118,8 +120,9 @@ fn modes_say_what_they_are_about() {
     assert!(few.frequencies_hz.len() < 20 && few.warnings[0].contains("of 20 modes"), "{:?}", few.warnings);
 }
 
-/// A clamped beam heated at once to six times its buckling load stays straight in an ideal computation, and the run says so; with an
-/// imperfection of a ten-thousandth it comes to the branch, where the static equilibrium is, and says nothing.
+/// A clamped beam heated at once to six times its buckling load stays straight in an ideal computation, and the run
+/// says so. With an imperfection of a ten-thousandth it reaches the branch of the static equilibrium, without a
+/// message.
 #[test]
 fn a_balanced_motion_is_told_and_an_imperfection_takes_the_branch() {
     let text = "h1 beam2det p1 [a m] [l=150u w=2u R=1000 tau=5u]\nh2 beam2det p1 [m b] [l=150u w=2u R=1000 tau=5u]\n\
@@ -137,13 +140,16 @@ fn a_balanced_motion_is_told_and_an_imperfection_takes_the_branch() {
         let result = transient(&compiled, &asked, &mut |_, _| (), &mut |_| true).unwrap();
         (result.signals[0].2.last().copied().unwrap(), result.warnings, compiled)
     };
-    let (straight, told, ideal) = run(None);
-    assert!(straight.abs() < 1e-9 && told.len() == 1 && told[0].contains("unstable"), "{straight:e} {told:?}");
+    let (straight, reported, ideal) = run(None);
+    assert!(
+        straight.abs() < 1e-9 && reported.len() == 1 && reported[0].contains("unstable"),
+        "{straight:e} {reported:?}"
+    );
     let rests = static_equilibrium(&ideal, &volts).unwrap().nodes;
     let branch = rests.iter().find(|(name, _)| name == "m").unwrap().1.y.abs();
     for side in [1.0, -1.0] {
-        let (bent, told, _) = run(Some(side * 1e-4));
-        assert!(told.is_empty(), "{told:?}");
+        let (bent, reported, _) = run(Some(side * 1e-4));
+        assert!(reported.is_empty(), "{reported:?}");
         close(bent, side * branch, 0.05);
     }
 }
@@ -161,7 +167,7 @@ fn as_sugar_is_about_the_drawing() {
     assert!(first(20e6, plain.clone()) > 1.05 * first(0.0, plain));
 }
 
-/// What has no mass has no modes, and says so; it has an equilibrium and a motion all the same.
+/// A model without mass has no modes, and says so; it has an equilibrium and a motion all the same.
 #[test]
 fn nothing_with_mass() {
     let text = "process p = [Youngsmodulus=165e9 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=100u w=2u]\nf2d * [b] [F=1u oz=pi/2]";

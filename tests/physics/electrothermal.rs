@@ -20,7 +20,7 @@ fn clamped_heater() {
     }
 }
 
-/// A bar of 50 and 150 µm on both sides of a rigid block, whose sides a wire makes one conductor, is one bar of 200 µm: the rise
+/// A bar of 50 and 150 µm on both sides of a rigid block, whose sides a wire connects, is one bar of 200 µm. The rise
 /// at 3 V, averaged by length, is V²/(12ρk), and the current V/R. Without the wire no current would flow.
 #[test]
 fn a_wire_leads_current_and_heat_through_a_rigid_body() {

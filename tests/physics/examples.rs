@@ -1,4 +1,4 @@
-//! The scenes in examples/: each netlist as it is shipped, against the figures that it is there to show.
+//! The models in examples/: each netlist as shipped, against the figures that it demonstrates.
 
 use crate::{balance, close, node};
 use bimorph::analysis::modes::modes;
@@ -59,8 +59,8 @@ fn quarter_stage() {
     close(node(&balance(&scene(file, &[("F", 1e-4)], &linear), &[]), "c").x, 7.13e-6, 5e-4);
 }
 
-/// Let go from 100 µN, the quarter stage crosses x = 0 at 3.42, 9.46, 16.28 and 22.43 µs (corotational frame, HHT), within
-/// 0.5 %.
+/// Released from 100 µN, the quarter stage crosses x = 0 at 3.42, 9.46, 16.28 and 22.43 µs (corotational frame, HHT),
+/// within 0.5 %.
 #[test]
 fn quarter_stage_release() {
     let file = "quarter_stage/quarter_stage.net";
@@ -103,8 +103,8 @@ fn rotary_stage() {
     close(other.rz, turned("counter", &band(4e7)).rz, 1e-3);
 }
 
-/// The comb resonator rings as W. C. Tang, T.-C. H. Nguyen, R. T. Howe (1989) give it, 2π·f = √(k/(M_p + M_t/4 + 12·M_b/35))
-/// with k = 2·E·h·w³/l³, within 0.5 % (the trusses are taken for half as fast as the shuttle), and its comb displaces
+/// The comb resonator oscillates as W. C. Tang, T.-C. H. Nguyen, R. T. Howe (1989) give it, 2π·f = √(k/(M_p + M_t/4 +
+/// 12·M_b/35)) with k = 2·E·h·w³/l³, within 0.5 %. The trusses count as half as fast as the shuttle. Its comb displaces
 /// it by N·ε·h·V²/(2·g·k) within 0.2 %.
 #[test]
 fn comb_resonator() {

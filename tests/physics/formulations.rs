@@ -2,14 +2,14 @@
 
 use crate::model;
 use bimorph::analysis::AnalysisError;
-use bimorph::analysis::formulation::Formulation;
+use bimorph::analysis::formulation::{Formulation, linkage};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::domains::Ramp;
 use bimorph::equations::loads::JointLoads;
-use bimorph::multibody::rcr::Reduction;
+use bimorph::multibody::joint_coordinates::constrained_loops::Reduction;
 use bimorph::netlist::Setting;
 use bimorph::solve::dormand_prince::{DormandPrince, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
@@ -94,13 +94,14 @@ fn counts_of_the_paper() {
     let counts = rotary.counts();
     assert_eq!(rotary.joints.len(), 12 * 10);
     assert_eq!((counts.coordinates, counts.loops, counts.constraints), (123, 20, 60));
-    let linkage = Formulation::Rcr.linkage(&compiled.parts.system).unwrap();
+    let linkage = linkage(Formulation::Rcr, &compiled.parts.system).unwrap();
     assert_eq!(linkage.coordinates - linkage.constraints, 123 - 60);
     assert_eq!((linkage.coordinates, linkage.constraints), (101, 38));
 }
 
-/// A bank of three under a suddenly applied 20 µN: as the axial and shear springs of the compliant model grow, its motion
-/// comes to that of joints that only turn, ten times closer for ten times the stiffness (between 6 and 16 times).
+/// A bank of three under a suddenly applied 20 µN. As the axial and shear springs of the compliant model grow, its
+/// motion approaches that of joints that only rotate, ten times closer for ten times the stiffness (between 6 and 16
+/// times).
 #[test]
 fn stiff_springs_become_rotary_joints() {
     let compiled = undamped(&format!("{ROW}{BANK}"), 2e-5);
@@ -150,7 +151,7 @@ fn elastic_joints_are_the_same_model() {
 fn rotary_bank_keeps_its_energy() {
     let compiled = undamped(&format!("{ROW}{BANK}"), 0.0);
     let system = &compiled.parts.system;
-    let linkage = Formulation::Rcr.linkage(system).unwrap();
+    let linkage = linkage(Formulation::Rcr, system).unwrap();
     let n = linkage.coordinates;
     let ramp = Ramp::new(&system.electrics, &[], &[], &[], 2e-6);
     let drive = system.electrics.drive();
@@ -172,8 +173,8 @@ fn rotary_bank_keeps_its_energy() {
     assert!((after / before - 1.0).abs() < 1e-6, "{before:e} -> {after:e}");
 }
 
-/// What joint coordinates cannot do is refused with a way out: inner bodies of elastic beams turn without inertia, explicit
-/// steps to 10 s would be 1e8 and more, and small displacements are not theirs.
+/// Models beyond joint coordinates are rejected with a remedy: inner bodies of elastic beams rotate without inertia,
+/// explicit steps to 10 s would be 1e8 and more, and small displacements are not supported.
 #[test]
 fn refusals_name_the_way_out() {
     let compiled = undamped(&format!("{ROW}{BANK}"), 2e-5);

@@ -79,8 +79,9 @@ fn bars_on_pins_run() {
     }
 }
 
-/// A toggle of two pinned bars at ±α with a mass at its apex: δ = F·l/(2·E·A·sin² α) under a force, ω² = 2·E·A·sin² α/(l·m) (linear truss theory),
-/// whether the apex is a bare pin, has a mass without inertia, or two supports hold the feet twice.
+/// A toggle of two pinned bars at ±α with a mass at its apex: δ = F·l/(2·E·A·sin² α) under a force, ω² = 2·E·A·sin²
+/// α/(l·m) (linear truss theory). This holds where the apex is a bare pin, has a mass without inertia, or two supports
+/// hold the feet twice.
 #[test]
 fn trusses_on_pins() {
     let text = |mass: &str| {
@@ -138,7 +139,8 @@ const BESIDE: &str = "
     pos * [a c] [x=20u y=50u]
     beam2d p1 [c d] [l=120u w=2u oz=0.4]";
 
-/// A part without an anchor changes nothing of the others, and is told; pulled at both ends by F it is longer by F·l/(E·A) (Hooke).
+/// A part without an anchor changes nothing of the others, and is reported; pulled at both ends by F it is longer by
+/// F·l/(E·A) (Hooke).
 #[test]
 fn loose_parts_stay_where_they_are_drawn() {
     let alone = BESIDE.split("pos").next().unwrap();

@@ -98,7 +98,7 @@ fn facing_beams() {
     let tip = node(&balance(&compiled, &[]), "b").y;
     close(tip, -line * 1e-16 / (8.0 * ei), 1e-3);
     let found = pull_in(&compiled, None, 200.0).unwrap();
-    // the tip lets go below the voltage at which it snapped, however close to the fold the fall began
+    // the tip opens below the voltage at which it snapped, however close to the fold the fall began
     let release = found.release_v.unwrap();
     assert!(0.0 < release && release < 0.8 * found.pull_in_v, "{found:?}");
 }
@@ -162,9 +162,10 @@ fn charge_of_a_frame() {
     close(charge.1, wanted.1, 1e-9);
 }
 
-/// Where SUGAR's modes under voltage differ from ours, its derivative does: a cantilever whose plate stands 1.5 µm from its electrode at 10 V
-/// has its lowest mode at 22801.18 Hz as forces and stiffness of one potential have it, and at SUGAR's 22793.556 Hz (its demo beamgap2e,
-/// symmetric part of its matrices) when forces are differenced over a nanometre to one side, as its `MF_gap2d` does.
+/// SUGAR's modes under voltage differ from ours because of its derivative. A cantilever whose plate stands 1.5 µm from
+/// its electrode at 10 V has its lowest mode at 22801.18 Hz with forces and stiffness of one potential. With forces
+/// differenced over a nanometre to one side, as in SUGAR's `MF_gap2d`, it is at 22793.556 Hz (demo beamgap2e, symmetric
+/// part of its matrices).
 #[test]
 fn differences_of_a_nanometre() {
     let text = "process s = [ Poisson=0.3 Youngsmodulus=165e9 density=2300 viscosity=1.78e-5 fluid=2e-6 permittivity=8.854e-12 h=2u ]
@@ -226,8 +227,8 @@ fn differences_of_a_nanometre() {
     close(whole.symmetric_eigenvalues().min().sqrt() / TAU, 22793.5560464522, 1e-9);
 }
 
-/// The frame tells no unstable equilibrium: at 20 V, and a load of 4 µN that holds the gap open, Newton's method from the drawing goes to the
-/// one between the stable branch (−3.391 µm) and the electrode.
+/// The frame does not detect unstable equilibria. At 20 V, with a load of 4 µN that holds the gap open, Newton's method
+/// from the drawing converges to the one between the stable branch (−3.391 µm) and the electrode.
 #[test]
 fn a_frame_tells_no_unstable_equilibrium() {
     let text = format!("{PLATE}\nf2d * [m] [F=-4u]");

@@ -9,7 +9,7 @@ use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::multibody::BlockMatrix;
 use bimorph::multibody::planar::Pose;
 use bimorph::netlist::Bundle;
-use bimorph::refine::model_order::Mesh;
+use bimorph::refine::mesh_search::Mesh;
 use nalgebra::Vector2;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -40,9 +40,10 @@ fn compiled(text: &str, options: &CompileOptions) -> CompiledModel {
     compile(&Bundle::from_text("gap.net", text), &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Pull-in of one beam drawn in 1 to 16 pieces, and under one gap over four of them, agrees with a collocation solution of the beam's own
-/// equation (Chebyshev, 32 points; clamped with von Kármán's stretching, 11.758272 V; free, 1.629519 V) within the tolerance, and the estimate
-/// covers the error. (That equation is for small slopes: of the order (gap/length)², 1e-5.) Nothing is warned of.
+/// Pull-in of one beam drawn in 1 to 16 pieces, and under one gap over four of them, agrees with a collocation solution
+/// of the beam's own equation within the tolerance, and the estimate covers the error. The solution uses Chebyshev, 32
+/// points; clamped with von Kármán's stretching 11.758272 V, free 1.629519 V. (That equation is for small slopes: of
+/// the order (gap/length)², 1e-5.) Nothing is warned of.
 #[test]
 fn pieces_drawn_by_hand_do_not_matter() {
     for (clamped, wanted) in [(true, 11.758_272_2), (false, 1.629_518_5)] {
@@ -59,8 +60,9 @@ fn pieces_drawn_by_hand_do_not_matter() {
     }
 }
 
-/// With given segments the estimate covers the error of the gap: one piece of 2, 4 and 8 segments against 11.758158 V, to which 32 and more
-/// converge, and by 8 to 20 times less with each doubling (fourth order: 16).
+/// With given segments the estimate covers the error of the gap. One piece of 2, 4 and 8 segments is compared with
+/// 11.758158 V, to which 32 and more converge; the error falls by a factor of 8 to 20 with each doubling (fourth order:
+/// 16).
 #[test]
 fn the_estimate_has_the_error_of_the_gap() {
     let mut before = f64::INFINITY;
@@ -161,8 +163,9 @@ fn facing_beams_bend_alike() {
     close(tip(&two, 24.0), tip(one, 12.0), 1e-3);
 }
 
-/// In a circuit, whose mesh knows no voltage, W042 reports the error of the tip's deflection within a factor 3: the free beam on 1, 2 and 4
-/// segments at 0.9 V and 1.55 V (pull-in 1.63 V) against 32, wherever that error is beyond the tolerance of 1e-4.
+/// In a circuit, whose mesh knows no voltage, W042 reports the error of the tip's deflection within a factor 3. The
+/// free beam on 1, 2 and 4 segments at 0.9 V and 1.55 V (pull-in 1.63 V) is compared with 32, wherever that error is
+/// beyond the tolerance of 1e-4.
 #[test]
 fn circuits_report_the_error_of_their_segments() {
     let at = |segments: usize, volts: f64| {

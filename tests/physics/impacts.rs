@@ -1,4 +1,5 @@
-//! Impacts in time: what contact loses, methods that gain energy, discrete gradients, ends of runs, and what holds after contact.
+//! Impacts in time: contact losses, methods that gain energy, discrete gradients, ends of runs, and validity after
+//! contact.
 
 use crate::contact::{Numbers, random_part};
 use crate::model;
@@ -118,8 +119,9 @@ fn methods_that_gain_energy_are_refused() {
     assert!(result.is_ok(), "{result:?}");
 }
 
-/// The discrete gradient gains no energy in contact, in steps of 5 to 80 ns across impacts of some 30 ns, elastic and with loss: kinetic energy
-/// and k·x²/2 − εAV²/(2(g − x)) stay below that at the start, within 1e-9 of the depth of the fall.
+/// The discrete gradient gains no energy in contact, in steps of 5 to 80 ns across impacts of some 30 ns, elastic and
+/// with loss. Kinetic energy and k·x²/2 − εAV²/(2(g − x)) stay below that at the start, within 1e-9 of the depth of the
+/// fall.
 #[test]
 fn discrete_gradients_gain_no_energy() {
     let (mass, k, area, gap, volts) = (1e-10, 1.0, 1e-8, 2e-6, 8.0);
@@ -149,8 +151,8 @@ fn a_plate_comes_to_rest() {
     assert!(last < 1e-3, "{last:e}");
 }
 
-/// A run ends at its event: first contact, first release, or a level on the way, at the time that the whole run tells; one that it does not
-/// reach is reported.
+/// A run ends at its event: first contact, first release, or a level during the motion, at the time of the whole run.
+/// An event that it does not reach is reported.
 #[test]
 fn runs_end_at_their_events() {
     let compiled = plate("");
@@ -177,17 +179,18 @@ fn runs_end_at_their_events() {
 /// contact, with means: of 100 elastic bounces no two runs have the same.
 #[test]
 fn claims_after_contact() {
-    let told = |impact: &str, stop: f64| {
+    let reported = |impact: &str, stop: f64| {
         let compiled = plate(impact);
         let options = TransientOptions { stop, ..closing(Integrator::Rodas4, None) };
-        let mut go = |o: &TransientOptions<'_>, s: &mut dyn FnMut(f64, &[f64]), w: bimorph::analysis::Watch<'_>| {
-            transient(&compiled, o, s, w).map(|r| (r, ()))
-        };
+        let mut go =
+            |o: &TransientOptions<'_>, s: &mut dyn FnMut(f64, &[f64]), w: bimorph::analysis::ProgressCallback<'_>| {
+                transient(&compiled, o, s, w).map(|r| (r, ()))
+            };
         with_step_error(&options, &compiled, &mut go, &mut |_, _| (), &mut |_| true).unwrap().0
     };
-    let held = told("", 200e-6);
+    let held = reported("", 200e-6);
     assert!(held.reliable_until.is_none() && held.after_contact.is_empty(), "{:?}", held.warnings);
-    let lost = told("restitution=1", 4e-3);
+    let lost = reported("restitution=1", 4e-3);
     let contact = lost.events.iter().find(|e| e.contact).unwrap().t;
     let until = lost.reliable_until.expect("elastic bounces do not hold");
     assert!(until >= contact && until < 4e-3, "{until:e}");
@@ -282,8 +285,9 @@ fn a_tip_without_inertia_meets_a_stop() {
     );
 }
 
-/// A point without mass on a spring of 50 N/m meets a stop ahead of a mass of 1e-10 kg that 3 µN push: by every method that may be used in contact the mass rests
-/// at (F + k_t·w)/(k + k_t) in the end, with w = 2 µm the way of the point, within 1e-3.
+/// A point without mass on a spring of 50 N/m meets a stop ahead of a mass of 1e-10 kg that 3 µN push. By every method
+/// permitted in contact the mass finally rests at (F + k_t·w)/(k + k_t), with w = 2 µm the travel of the point, within
+/// 1e-3.
 #[test]
 fn a_point_without_mass_meets_a_stop() {
     let text = "
@@ -351,8 +355,8 @@ fn a_plate_closes_at_any_angle() {
     }
 }
 
-/// Equal steps that are too long for an impact give energy by any method but avf: the run ends with an error that names what helps. A mass that is let go 2 µm away from
-/// rest came back 3 µm high, at a restitution of 0.5.
+/// Equal steps that are too long for an impact give energy by any method but avf: the run ends with an error that names
+/// what helps. A mass released 2 µm from rest came back 3 µm high, at a restitution of 0.5.
 #[test]
 fn energy_from_long_steps_is_refused() {
     let text = |load: &str| {

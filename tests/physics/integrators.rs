@@ -189,11 +189,12 @@ fn one_motion() {
     assert_eq!(pinned, known);
 }
 
-/// Steps of 2 µs are too long for methods that damp nothing: on the undamped bank Newmark's rule and generalized-α with ρ = 1, which are
-/// one method, gain more than a hundredth of the energy, the midpoint rule more than a tenth, then no step can be taken any more, all
-/// within a millisecond; the error names time, step and body. (Generalized-α with ρ = 1 gained 79 % when it held the mean of the forces at
-/// both ends to zero where there is no inertia, and Newmark's rule when it began with M⁻¹ of the forces: noise that nothing damps.)
-/// Generalized-α with ρ = 0.8 goes through at 1 µs, and loses energy.
+/// Steps of 2 µs are too long for methods without damping. On the undamped bank Newmark's rule and generalized-α with ρ
+/// = 1, which are one method, gain more than a hundredth of the energy, and the midpoint rule more than a tenth. Then
+/// no step can be taken any more, all within a millisecond. The error names time, step and body. (Generalized-α with ρ
+/// = 1 gained 79 % when it held the mean of the forces at both ends to zero where there is no inertia, and Newmark's
+/// rule when it began with M⁻¹ of the forces: noise that nothing damps.) Generalized-α with ρ = 0.8 completes at 1 µs,
+/// and loses energy.
 #[test]
 fn long_steps() {
     let bank = released_bank();
@@ -226,8 +227,9 @@ fn explicit_needs_inertia() {
     assert!(error.to_string().contains("rotary_inertia"), "{error}");
 }
 
-/// A plate on a spring (ω = 1e5 rad/s), released, passes its middle at (k + ½)π/ω, down and up in turn, within 1e-7 of a
-/// period; over 8 V, above its pull-in, it comes into contact, 0.1 µm before the gap is closed, after it has passed 1 µm.
+/// A plate on a spring (ω = 1e5 rad/s), released, passes its middle at (k + ½)π/ω, down and up in turn, within 1e-7 of
+/// a period. Over 8 V, above its pull-in, it comes into contact, 0.1 µm before the gap is closed, after it has passed 1
+/// µm.
 #[test]
 fn events() {
     let text = "param F=0\nanchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []
@@ -257,8 +259,8 @@ fn events() {
         ..TransientOptions::default()
     };
     let found = transient(&compiled, &asked, &mut |_, _| {}, &mut |_| true).unwrap().events;
-    let told: Vec<_> = found.iter().map(|e| (e.contact, e.direction, e.level)).take(2).collect();
-    assert_eq!(told, [(false, Direction::Up, 1e-6), (true, Direction::Down, 1e-7)], "{found:?}");
+    let reported: Vec<_> = found.iter().map(|e| (e.contact, e.direction, e.level)).take(2).collect();
+    assert_eq!(reported, [(false, Direction::Up, 1e-6), (true, Direction::Down, 1e-7)], "{found:?}");
     assert!(found[0].t < found[1].t && found[1].signal.ends_with(".gap"));
 }
 
@@ -300,8 +302,9 @@ fn table() {
     }
 }
 
-/// A cantilever that is let go at its tip stays within where it was by every method, at the times between steps as well. Generalized-α began with
-/// M⁻¹ of the forces, which threw the light body at the tip 250 times as far; in equal steps it failed.
+/// A cantilever released at its tip stays within its initial deflection by every method, at the times between steps as
+/// well. Generalized-α began with M⁻¹ of the forces, which threw the light body at the tip 250 times as far; in equal
+/// steps it failed.
 #[test]
 fn what_is_let_go_is_not_thrown() {
     let text = "param F=1u\nanchor p1 [r] []\nb beam2d p1 [r t] [l=100u w=2u]\nf2d * [t] [F=F oz=pi/2]\n";

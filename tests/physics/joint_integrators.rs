@@ -3,7 +3,7 @@
 
 use crate::{ARM, model};
 use bimorph::analysis::AnalysisError;
-use bimorph::analysis::formulation::{Formulation, coordinate_scales};
+use bimorph::analysis::formulation::{Formulation, coordinate_scales, linkage};
 use bimorph::analysis::integrator::{IntegrationRun, Integrator};
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
@@ -58,7 +58,7 @@ fn apart(a: &TransientResult, b: &TransientResult) -> f64 {
 /// The bank in joint coordinates after `stop` in equal steps of `h`, from rates that its loops allow: coordinates.
 fn struck(compiled: &CompiledModel, method: Integrator, stop: f64, h: f64) -> (Vec<f64>, u64) {
     let system = &compiled.parts.system;
-    let linkage = Formulation::Rcr.linkage(system).unwrap();
+    let linkage = linkage(Formulation::Rcr, system).unwrap();
     let n = linkage.coordinates;
     let ramp = Ramp::new(&system.electrics, &[], &[], &[], stop);
     let scale = coordinate_scales(&linkage, system.length_scale);
@@ -91,8 +91,8 @@ fn orders() {
     }
 }
 
-/// The rotary bank let go from 20 µN: every implicit method finds the motion that explicit steps find, and the work that
-/// each takes is pinned. SDIRK4 at the same tolerance comes closest.
+/// The rotary bank released from 20 µN: every implicit method finds the motion of explicit steps, and the work of each
+/// is pinned. SDIRK4 at the same tolerance comes closest.
 #[test]
 fn one_motion() {
     let (held, free) = (undamped(BANK, 2e-5, false), undamped(BANK, 0.0, false));
@@ -110,9 +110,10 @@ fn one_motion() {
     assert_eq!(pinned, [(1222, 23, 4978), (1008, 2, 10094), (1272, 21, 7758), (1272, 21, 7759), (1278, 41, 7915)]);
 }
 
-/// With every direction elastic, axial motions are a thousand times faster than what the yoke does. Implicit steps pass
-/// over them: equal ones of 50 ns, twenty times what explicit steps can be, find the yoke's motion within 2e-3 at a seventh of
-/// the evaluations or less, by either order; explicit and implicit under error control, and the bodies' own coordinates, agree within 5e-4.
+/// With every direction elastic, axial motions are a thousand times faster than what the yoke does. Implicit steps
+/// exceed them. Equal ones of 50 ns, twenty times the explicit limit, give the yoke's motion within 2e-3 at a seventh
+/// of the evaluations or less, by either order. Explicit and implicit under error control, and the bodies' own
+/// coordinates, agree within 5e-4.
 #[test]
 fn stiff_directions_cost_no_steps() {
     let compiled = undamped(BANK, 2e-5, true);
@@ -132,9 +133,9 @@ fn stiff_directions_cost_no_steps() {
     }
 }
 
-/// A plate on a spring (k = 1 N/m, m = 1e-10 kg, A = 1e-8 m², g = 2 µm) over 8 V, above its pull-in: stages in joint
-/// coordinates take the softening of the gap and the stiff contact along, so that the plate passes 1 µm and comes into
-/// contact, 0.1 µm before the gap is closed, within 1e-4 of when it does in the bodies' own coordinates.
+/// A plate on a spring (k = 1 N/m, m = 1e-10 kg, A = 1e-8 m², g = 2 µm) over 8 V, above its pull-in. Stages in joint
+/// coordinates include the softening of the gap and the stiff contact. The plate passes 1 µm and comes into contact,
+/// 0.1 µm before the gap is closed, within 1e-4 of the times in the bodies' own coordinates.
 #[test]
 fn pull_in_and_contact() {
     let text = "
@@ -167,10 +168,10 @@ fn pull_in_and_contact() {
     }
 }
 
-/// A bimorph whose hot arm is heated, its joints' lengths prescribed by the heat (time constant 2 µs): every implicit
-/// method closes the loop at the lengths of the end of its step, and finds the motion that explicit steps find within five
-/// times the tolerance. (Stages do not see the lengths change; without counting how far they move the end of a step, one
-/// step went through all of it.)
+/// A bimorph whose hot arm is heated, with joint lengths prescribed by the heat (time constant 2 µs). Every implicit
+/// method closes the loop at the lengths of the end of its step, and gives the motion of explicit steps within five
+/// times the tolerance. (Stages do not see the lengths change; without counting how far they move the end of a step,
+/// one step went through all of it.)
 #[test]
 fn heated_lengths() {
     let text = "

@@ -15,10 +15,11 @@ fn with(text: &str, junctions: Junctions) -> CompiledModel {
     compile(&bundle, &CompileOptions { junctions, ..linear() }).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Calibrated junctions are the default; on six layouts that the calibration never saw, mode 1 is within 2 % and modes 1–7
-/// within 4 % of plane stress (CalculiX 2.20 CPS8, thin, six elements across the narrowest beam: scripts/junctions/validate),
-/// and within the 0.7 % that is reached today. The paddle's block is thirty times as wide as its threads, which is beyond the table of
-/// steps: bending holds 0.1 % there, with the rotary inertia that its command says is missing, and stretching 1.4 %.
+/// Calibrated junctions are the default. On six layouts outside the calibration, mode 1 is within 2 % and modes 1–7
+/// within 4 % of plane stress (CalculiX 2.20 CPS8, thin, six elements across the narrowest beam:
+/// scripts/junctions/validate). They are also within the 0.7 % reached today. The paddle's block is thirty times as
+/// wide as its threads, which is beyond the table of steps: bending holds 0.1 % there, with the rotary inertia that its
+/// command says is missing, and stretching 1.4 %.
 #[test]
 fn six_layouts_in_plane_stress() {
     for (name, reference) in LAYOUTS {
@@ -49,8 +50,9 @@ fn six_layouts_in_plane_stress() {
     }
 }
 
-/// A model without rotary inertia says by how much that is missed, from its modes alone: the paddle's mode 2 comes out 8.7 % too high
-/// (`six_layouts_in_plane_stress` has the other), which is told within a tenth. Of narrow beams nothing is told, nor with the option.
+/// A model without rotary inertia reports its frequency error from its modes alone. The paddle's mode 2 is 8.7 % too
+/// high (`six_layouts_in_plane_stress` has the other), which is reported within a tenth. Narrow beams cause no warning,
+/// nor does the option.
 #[test]
 fn rotary_inertia_left_out_is_told() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/netlists/junctions/paddle.net");
@@ -63,8 +65,8 @@ fn rotary_inertia_left_out_is_told() {
     let ((without, said), (with, silent)) = (found(false), found(true));
     let said = said.expect("a warning");
     assert!(said.contains("mode 2"), "{said}");
-    let told: f64 = said.split("about ").nth(1).and_then(|s| s.split(' ').next()).unwrap().parse().unwrap();
-    close(1e-2 * told, without / with - 1.0, 0.1);
+    let reported: f64 = said.split("about ").nth(1).and_then(|s| s.split(' ').next()).unwrap().parse().unwrap();
+    close(1e-2 * reported, without / with - 1.0, 0.1);
     assert_eq!(silent, None);
     let narrow = with_text_modes(
         "anchor p1 [a] []
@@ -73,13 +75,14 @@ beam2d p1 [a b] [l=100u w=2u]",
     assert!(narrow.iter().all(|w| !w.contains("inertia")), "{narrow:?}");
 }
 
-/// What modes of a text warn of.
+/// Warnings about the modes of a text.
 fn with_text_modes(text: &str) -> Vec<String> {
     modes(&with(text, Junctions::Calibrated), 3, &[]).unwrap().warnings
 }
 
-/// A junction is the same beside any segment: a T of three 4 µm wide beams under 1 µN along its bar gives way by the same with 4
-/// to 400 segments a beam (to 1e-8; linear statics are exact for any number), and its first mode converges from below.
+/// A junction is the same beside any segment. A T of three 4 µm wide beams under 1 µN along its bar deflects equally
+/// with 4 to 400 segments a beam (to 1e-8; linear statics are exact for any number), and its first mode converges from
+/// below.
 #[test]
 fn junctions_know_no_mesh() {
     let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nanchor p [b] []\n
@@ -135,8 +138,8 @@ fn in_line_is_no_junction() {
     }
 }
 
-/// A beam that folds back over another, at a turn of 178° beyond the table: what is drawn twice takes no body's mass away, so that there are
-/// modes with any number of segments, and they converge.
+/// A beam that folds back over another, at a turn of 178° beyond the table. The doubly drawn area gives no body a
+/// negative mass, so that there are modes with any number of segments, and they converge.
 #[test]
 fn folds_have_modes_on_any_mesh() {
     let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=100u w=4u]\n\

@@ -1,17 +1,18 @@
-//! What the models compute, against closed forms and published or independently computed numbers.
+//! Results of the models, against closed forms and published or independently computed numbers.
 
 mod backbending;
 mod baselines;
 mod beams;
 mod closed_branches;
 mod contact;
+mod contact_speed;
 mod contact_steps;
 mod dashpot;
-mod drawn;
+mod drawing_semantics;
 mod eigenvalues;
 mod electrothermal;
 mod examples;
-mod excited;
+mod excited_modes;
 mod formulations;
 mod free_coordinates;
 mod gaps;
@@ -20,24 +21,26 @@ mod impacts;
 mod integrators;
 mod joint_integrators;
 mod junctions;
+mod large_motion;
+mod mechanisms;
 mod mesh;
 mod mode_errors;
 mod motion;
-mod near_folds;
+mod near_limit_points;
 mod orientation;
 mod paths;
-mod relative;
-mod relative_motion;
 mod responses;
+mod rodas4;
 mod run_errors;
-mod scenes;
 mod schemes;
 mod sharp_bends;
 mod small_parts;
+mod solvers;
+mod sprung_loops;
+mod sprung_loops_motion;
 mod stability_losses;
-mod swung;
-mod told;
 mod vm236;
+mod warnings;
 
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
 use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
@@ -62,7 +65,7 @@ pub(crate) const ARM: &str = "
     ]
 ";
 
-/// Compiles [`POLY`] followed by `text`, beams meeting in points: what closed forms and SUGAR describe.
+/// Compiles [`POLY`] followed by `text`, with beams that meet in points, as closed forms and SUGAR assume.
 pub(crate) fn model(text: &str, options: &CompileOptions) -> CompiledModel {
     let bundle = Bundle::from_text("model.net", &format!("{POLY}{text}"));
     compile(&bundle, &CompileOptions { junctions: Junctions::Centreline, ..options.clone() })

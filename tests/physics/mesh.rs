@@ -1,5 +1,5 @@
-//! The mesh that a request gets holds the tolerance that stands beside it, and says how far off it may be: contracts of
-//! `analysis::mesh`, on default options.
+//! The mesh of a request holds the printed tolerance, and reports its error: contracts of `analysis::mesh`, on default
+//! options.
 
 use super::{close, node};
 use bimorph::analysis::mesh::{MeshRequest, fitted, fitted_in_time, in_circuit};
@@ -12,7 +12,7 @@ use std::path::Path;
 
 const SILICON: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nparam F=0\nanchor p [a] []\n";
 
-/// Beams that meet in points and at ideal clamps: what closed forms describe.
+/// Beams that meet in points and at ideal clamps, as closed forms assume.
 fn drawn(text: &str, options: CompileOptions) -> CompiledModel {
     let options = CompileOptions { junctions: Junctions::Centreline, ..options };
     compile(&Bundle::from_text("mesh.net", &format!("{SILICON}{text}")), &options).unwrap()
@@ -39,11 +39,11 @@ fn elastica_within_the_tolerance() {
             let tip = node(&static_equilibrium(&model, &[]).unwrap(), "t");
             let size = across.hypot(along) * 1e-3;
             let error = (tip.y - across * 1e-3).abs().max((tip.x - along * 1e-3).abs()) / size;
-            let told = model.order.estimated_error.unwrap();
-            println!("{load} {tol:e}: {error:.1e}, estimated {told:.1e}, {} unknowns", model.unknowns());
-            assert!(error <= tol && told <= tol, "{load} {tol:e}: {error:e} {told:e}");
+            let reported = model.order.estimated_error.unwrap();
+            println!("{load} {tol:e}: {error:.1e}, estimated {reported:.1e}, {} unknowns", model.unknowns());
+            assert!(error <= tol && reported <= tol, "{load} {tol:e}: {error:e} {reported:e}");
             // below 1e-7 the equilibrium's own tolerance shows
-            assert!(error < 3.0 * told + 1e-7, "{load} {tol:e}: {error:e} {told:e}");
+            assert!(error < 3.0 * reported + 1e-7, "{load} {tol:e}: {error:e} {reported:e}");
             assert!(model.warnings.items.is_empty(), "{:?}", model.warnings.items);
         }
     }
@@ -74,8 +74,8 @@ fn modes_by_their_number() {
     let fine = modes(&fitted(&fine, &MeshRequest::Modes { count: 3, voltages: &[] }).unwrap(), 3, &[]).unwrap();
     for k in 0..3 {
         let error = found.frequencies_hz[k] / fine.frequencies_hz[k] - 1.0;
-        let told = found.errors[k].unwrap();
-        assert!(error.abs() <= 1e-3 && (1.0 / 3.0..3.0).contains(&(told / error)), "{k}: {error:e} {told:e}");
+        let reported = found.errors[k].unwrap();
+        assert!(error.abs() <= 1e-3 && (1.0 / 3.0..3.0).contains(&(reported / error)), "{k}: {error:e} {reported:e}");
     }
 }
 
@@ -89,10 +89,10 @@ fn segments_of_the_user_are_told() {
     assert_eq!(model.order.segments, [1]);
     let tip = node(&static_equilibrium(&model, &[]).unwrap(), "t");
     let error = (tip.y / 0.669964181278e-3 - 1.0).abs().max((tip.x / 0.328941242247e-3 + 1.0).abs());
-    let told = model.order.estimated_error.unwrap();
-    assert!((1.0 / 3.0..3.0).contains(&(told / error)), "{told:e} {error:e}");
+    let reported = model.order.estimated_error.unwrap();
+    assert!((1.0 / 3.0..3.0).contains(&(reported / error)), "{reported:e} {error:e}");
     let warned: Vec<&str> = model.warnings.items.iter().map(|d| d.code.as_str()).collect();
-    assert_eq!(warned, ["W040"], "{told}");
+    assert_eq!(warned, ["W040"], "{reported}");
 }
 
 /// Modes about a heated and about a stressed state hold the tolerance there: those of 1e-3 within it of those of 1e-5.
@@ -107,15 +107,15 @@ fn modes_about_a_loaded_state() {
             let model = fitted(&model, &MeshRequest::Modes { count: 4, voltages: &[] }).unwrap();
             (modes(&model, 4, &[]).unwrap().frequencies_hz, model.order.estimated_error.unwrap())
         };
-        let ((found, told), (fine, _)) = (at(1e-3), at(1e-5));
+        let ((found, reported), (fine, _)) = (at(1e-3), at(1e-5));
         for (found, fine) in found.iter().zip(&fine) {
             close(*found, *fine, 1e-3);
         }
-        assert!(told <= 1.05e-3, "{told:e}");
+        assert!(reported <= 1.05e-3, "{reported:e}");
     }
 }
 
-/// What two runs of one signal are apart: root mean square over half the range.
+/// Difference of two runs of one signal: root mean square over half the range.
 fn apart(a: &TransientResult, b: &TransientResult) -> f64 {
     let (x, y) = (&a.signals[0].2, &b.signals[0].2);
     let range = y.iter().copied().fold(f64::MIN, f64::max) - y.iter().copied().fold(f64::MAX, f64::min);
@@ -123,8 +123,9 @@ fn apart(a: &TransientResult, b: &TransientResult) -> f64 {
     (sum / x.len() as f64).sqrt() / (0.5 * range)
 }
 
-/// Runs hold the tolerance over their whole length, by default options: the comb resonator of examples/ under a step of 20 V for
-/// 300 µs, within 1e-2 and 1e-3 of a run of 1e-5, in both formulations (the version before: 3e-3 at every tolerance).
+/// Runs hold the tolerance over their whole length, by default options. The comb resonator of examples/ under a step of
+/// 20 V for 300 µs is within 1e-2 and 1e-3 of a run of 1e-5, in both formulations (the version before: 3e-3 at every
+/// tolerance).
 #[test]
 fn transients_hold_over_their_length() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/comb_resonator/comb_resonator.net");
@@ -147,15 +148,16 @@ fn transients_hold_over_their_length() {
     for formulation in [Formulation::Compliant, Formulation::Rcr] {
         for tol in [1e-2, 1e-3] {
             let found = run(tol, formulation);
-            let (error, told) = (apart(&found, &reference), found.estimated_error.unwrap());
-            println!("{formulation:?} {tol:e}: {error:.1e}, estimated {told:.1e}, {} unknowns", found.unknowns);
-            assert!(error <= tol && told <= 1.05 * tol, "{formulation:?} {tol:e}: {error:e} {told:e}");
+            let (error, reported) = (apart(&found, &reference), found.estimated_error.unwrap());
+            println!("{formulation:?} {tol:e}: {error:.1e}, estimated {reported:.1e}, {} unknowns", found.unknowns);
+            assert!(error <= tol && reported <= 1.05 * tol, "{formulation:?} {tol:e}: {error:e} {reported:e}");
         }
     }
 }
 
-/// Modes of a corner under its residual stress, whose junction stands at the end of ever shorter segments: a tight tolerance is held, each
-/// frequency converges, and what the mesh is told to be off is what a mesh eight times as fine changes, within a factor of two.
+/// Modes of a corner under its residual stress, whose junction stands at the end of ever shorter segments. A tight
+/// tolerance is held, and each frequency converges. The estimated error of the mesh is the change on a mesh eight times
+/// as fine, within a factor of two.
 #[test]
 fn modes_about_stress_converge_at_junctions() {
     let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u stress=100M]\nanchor p [a] []\nbeam2d p [a b] [l=20u w=5u]\n\
@@ -175,19 +177,20 @@ fn modes_about_stress_converge_at_junctions() {
         &MeshRequest::Modes { count: 3, voltages: &[] },
     );
     let model = model.unwrap();
-    let told = model.order.estimated_error.unwrap();
-    assert!(told <= 1e-6 && model.unknowns() < 100_000, "{told:e}, {} unknowns", model.unknowns());
+    let reported = model.order.estimated_error.unwrap();
+    assert!(reported <= 1e-6 && model.unknowns() < 100_000, "{reported:e}, {} unknowns", model.unknowns());
     assert!(model.warnings.items.is_empty(), "{:?}", model.warnings.items);
     let found = modes(&model, 3, &[]).unwrap().frequencies_hz;
     let finer: Vec<usize> = model.order.segments.iter().map(|n| 8 * n).collect();
-    let finer = model.with_order(bimorph::refine::model_order::Mesh { segments: finer, ..model.order.clone() });
+    let finer = model.with_order(bimorph::refine::mesh_search::Mesh { segments: finer, ..model.order.clone() });
     let finer = modes(&finer.unwrap(), 3, &[]).unwrap().frequencies_hz;
     let error = found.iter().zip(&finer).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
-    assert!(error <= 1e-6 && error < 2.0 * told, "{error:e}, told {told:e}");
+    assert!(error <= 1e-6 && error < 2.0 * reported, "{error:e}, told {reported:e}");
 }
 
-/// The mesh of circuits becomes finer with the tolerance up to 3,000 unknowns; where more would be needed it is no coarser, and W040 says how far
-/// off it may be. (Beyond that it had been the one as drawn: 219 unknowns at 3e-6 where there were 2,151 at 1e-5.)
+/// The mesh of circuits becomes finer with the tolerance up to 3,000 unknowns. Where more would be needed it is no
+/// coarser, and W040 reports its error. (Beyond that it had been the one as drawn: 219 unknowns at 3e-6 where there
+/// were 2,151 at 1e-5.)
 #[test]
 fn meshes_of_circuits_have_no_cliff() {
     let bundle =
@@ -196,16 +199,17 @@ fn meshes_of_circuits_have_no_cliff() {
     let mut before = 0;
     for (tol, holds) in [(1e-3, true), (1e-5, true), (1e-6, false)] {
         let found = in_circuit(&compile(&bundle, &CompileOptions { tol, ..CompileOptions::default() }).unwrap());
-        let told = found.warnings.items.iter().find(|warning| warning.code == "W040");
-        println!("{tol}: {} unknowns, {told:?}", found.unknowns());
+        let reported = found.warnings.items.iter().find(|warning| warning.code == "W040");
+        println!("{tol}: {} unknowns, {reported:?}", found.unknowns());
         assert!((before..=3000).contains(&found.unknowns()), "{tol}: {} after {before}", found.unknowns());
-        assert_eq!(told.is_none(), holds, "{tol}: {told:?}");
+        assert_eq!(reported.is_none(), holds, "{tol}: {reported:?}");
         before = found.unknowns();
     }
 }
 
-/// A circuit knows how far off the lowest frequency of its mesh is, in both formulations: what a motion that rings is told by. Within a factor
-/// of three of the error against 32 segments a beam. (With `rcr`, whose scheme has no estimate of its own, nothing was told.)
+/// A circuit has an error estimate of the lowest frequency of its mesh, in both formulations: the base of phase errors.
+/// Within a factor of three of the error against 32 segments a beam. (With `rcr`, whose scheme has no estimate of its
+/// own, there was none.)
 #[test]
 fn circuits_know_the_error_of_their_lowest_mode() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
@@ -216,7 +220,10 @@ fn circuits_know_the_error_of_their_lowest_mode() {
             in_circuit(&compile(&bundle, &options).unwrap()).lowest.unwrap()
         };
         let (found, exact) = (at(None), at(Some(32)));
-        let (told, off) = (found.error.abs(), (found.frequency_hz / exact.frequency_hz - 1.0).abs());
-        assert!(off < 3.0 * told + 1e-5 && told < 3.0 * off + 1e-5, "{formulation:?}: {off:e}, told {told:e}");
+        let (reported, off) = (found.error.abs(), (found.frequency_hz / exact.frequency_hz - 1.0).abs());
+        assert!(
+            off < 3.0 * reported + 1e-5 && reported < 3.0 * off + 1e-5,
+            "{formulation:?}: {off:e}, told {reported:e}"
+        );
     }
 }

@@ -5,7 +5,8 @@ use bimorph::analysis::mesh::modes_fitted;
 use bimorph::analysis::modes::modes;
 use bimorph::compile::CompileOptions;
 
-/// A slender and a stout beam under forces: the modes of the first are some hundred times as far off as those of the second on equal meshes.
+/// A slender and a stout beam under forces: the modes of the first have some hundred times the errors of those of the
+/// second on equal meshes.
 const UNLIKE: &str = "
     anchor p1 [a] []
     beam2d p1 [a b] [l=200u w=2u]
@@ -15,9 +16,9 @@ const UNLIKE: &str = "
     beam2d p1 [d e] [l=30u w=8u oz=pi/2]
     f2d * [e] [F=50u]";
 
-/// Under forces each estimate is the distance from 40 segments a beam within a factor 3 on a mesh that is given, and no smaller than a
-/// third of it on the one for the tolerance, where that of the state adds to it. Estimates of one table differ by more than ten. (One
-/// for all was the largest: 5e4 times what the best mode is off.)
+/// Under forces each estimate is the distance from 40 segments a beam within a factor 3 on a given mesh. On the mesh
+/// for the tolerance, where the error of the state is added, it is no smaller than a third of that distance. Estimates
+/// of one table differ by more than ten. (One for all was the largest: 5e4 times what the best mode is off.)
 #[test]
 fn each_mode_has_its_own_estimate_about_a_loaded_state() {
     const COUNT: usize = 8;
@@ -38,8 +39,9 @@ fn each_mode_has_its_own_estimate_about_a_loaded_state() {
     }
 }
 
-/// Two modes that change places between a mesh and its double keep their own errors: a long bent beam on one segment, whose second
-/// mode is 1.6 % too high there, next to a beam whose length puts its first mode between the two (both from cubic shapes; the pairs by shape).
+/// Two modes that change places between a mesh and its double keep their own errors. A long bent beam on one segment,
+/// whose second mode is 1.6 % too high there, is next to a beam whose length puts its first mode between the two (both
+/// from cubic shapes; the pairs by shape).
 #[test]
 fn modes_that_change_places_are_paired_by_shape() {
     let text = |length: f64| {

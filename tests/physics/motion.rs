@@ -15,7 +15,8 @@ fn options<'a>(stop: f64, release: Option<&'a CompiledModel>) -> TransientOption
     TransientOptions { stop, signals: vec!["m.x".into()], points: 201, release, ..TransientOptions::default() }
 }
 
-/// Where m = 1e-10 kg on k = 1 N/m with c = 1e-6 N·s/m is, `t` [s] after it was let go at 1 µm [m]: e^{−δt}(cos ωt + δ/ω·sin ωt), δ = c/2m.
+/// Position of m = 1e-10 kg on k = 1 N/m with c = 1e-6 N·s/m at the time `t` [s] after its release at 1 µm [m]:
+/// e^{−δt}(cos ωt + δ/ω·sin ωt), δ = c/2m.
 pub(crate) fn released(t: f64) -> f64 {
     let (decay, omega) = (5e3, (1e10f64 - 25e6).sqrt());
     1e-6 * (-decay * t).exp() * ((omega * t).cos() + decay / omega * (omega * t).sin())
@@ -94,8 +95,9 @@ fn dynamic_pull_in() {
     assert!(above > 1.85e-6, "{above:e}");
 }
 
-/// What drag holds back and no mass relaxes as 1 − e^(−t/τ), τ = c/k = 10 µs: its steps follow the tolerance, to 1.0 of it rms. (It begins with a
-/// rate that no mass carries, which the output before the end of the first step does not know: 1.4e-2 there at a tolerance of 1e-3.)
+/// A coordinate with drag and no mass relaxes as 1 − e^(−t/τ), τ = c/k = 10 µs: its steps follow the tolerance, to 1.0
+/// of it rms. (It begins with a rate that no mass carries, which the output before the end of the first step does not
+/// know: 1.4e-2 there at a tolerance of 1e-3.)
 #[test]
 fn drag_without_mass() {
     let light = "anchor * [f] [l=1u w=1u h=1u]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\ndamper2d * [f m] [bx=1e-5]\nf2d * [m] [F=1u]";
@@ -109,19 +111,24 @@ fn drag_without_mass() {
     }
 }
 
-/// A companion that takes the same steps tells nothing of them: no estimate, and a warning.
+/// A companion with the same steps gives no estimate, and causes a warning.
 #[test]
 fn one_step_compared_with_itself() {
     let start = model(&OSCILLATOR.replace("F=0", "F=1u"), &CompileOptions::default());
     let compiled = model(OSCILLATOR, &CompileOptions::default());
     let options = TransientOptions { step: Some(6e-4), ..options(6.3e-4, Some(&start)) };
-    let mut run =
-        |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: bimorph::analysis::Watch<'_>| {
-            Ok((transient(&compiled, options, sample, watch)?, ()))
-        };
+    let mut run = |options: &TransientOptions<'_>,
+                   sample: &mut dyn FnMut(f64, &[f64]),
+                   watch: bimorph::analysis::ProgressCallback<'_>| {
+        Ok((transient(&compiled, options, sample, watch)?, ()))
+    };
     let (result, ()) = with_step_error(&options, &compiled, &mut run, &mut |_, _| {}, &mut |_| true).unwrap();
     assert_eq!(result.step_error, None);
-    assert!(result.warnings.iter().any(|w| w.contains("nothing tells how far the steps")), "{:?}", result.warnings);
+    assert!(
+        result.warnings.iter().any(|w| w.contains("the error of the steps in time is unknown")),
+        "{:?}",
+        result.warnings
+    );
 }
 
 /// Loose steps (0.15, after a first run at 0.3) report their error over 160 periods within a factor of 1.5. Closed form.
@@ -132,19 +139,20 @@ fn loose_steps_tell_enough() {
     let compiled = model(&text, &CompileOptions::default());
     let options = TransientOptions { tol: 0.15, points: 1001, ..options(1e-2, Some(&start)) };
     let mut samples = Vec::new();
-    let mut run =
-        |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: bimorph::analysis::Watch<'_>| {
-            Ok((transient(&compiled, options, sample, watch)?, ()))
-        };
+    let mut run = |options: &TransientOptions<'_>,
+                   sample: &mut dyn FnMut(f64, &[f64]),
+                   watch: bimorph::analysis::ProgressCallback<'_>| {
+        Ok((transient(&compiled, options, sample, watch)?, ()))
+    };
     let mut see = |t: f64, values: &[f64]| samples.push((t, values[0]));
     let (result, ()) = with_step_error(&options, &compiled, &mut run, &mut see, &mut |_| true).unwrap();
     let off = |(t, x): &(f64, f64)| (x - 1e-6 * (1e5 * t).cos()).powi(2);
     let error = (samples.iter().map(off).sum::<f64>() / samples.len() as f64).sqrt() / 1e-6;
-    let told = result.step_error.unwrap();
-    assert!((1.0 / 1.5..1.5).contains(&(told / error)), "{told:e} reported, {error:e}");
+    let reported = result.step_error.unwrap();
+    assert!((1.0 / 1.5..1.5).contains(&(reported / error)), "{reported:e} reported, {error:e}");
 }
 
-/// A parameter that moves drawn nodes is no load to let go.
+/// A parameter that moves drawn nodes is not a load to release.
 #[test]
 fn released_geometry_is_refused() {
     let text = |l: &str| {

@@ -52,7 +52,7 @@ fn drive(volts: f64) -> Vec<(String, f64)> {
     vec![("drive".to_owned(), volts)]
 }
 
-/// What statics say of a node at a voltage: its motion along the direction and across it [m], and the charge [C].
+/// Static results of a node at a voltage: its motion along the direction and across it [m], and the charge [C].
 fn statics(compiled: &CompiledModel, angle: f64, name: &str, volts: f64) -> [f64; 3] {
     let result = static_equilibrium(compiled, &drive(volts)).unwrap_or_else(|e| panic!("{angle}° {volts} V: {e}"));
     let at = crate::node(&result, name);

@@ -54,9 +54,10 @@ fn modulus(value: f64) -> f64 {
     low
 }
 
-/// The straight column bifurcates at Euler's 4·π²·E·I/l² (which 1 − P/EA lowers by the strain, 3e-4) within 0.1 %, goes on
-/// along the branch asked for, and bends by l·k/K(k) with K(k) = (π/2)·√(P/P_E) (elastica of a quarter of it; Timoshenko &
-/// Gere, "Theory of elastic stability", §2.7) within 0.2 % at 1.2 times the load. Straight on, it is unstable.
+/// The straight column bifurcates at Euler's 4·π²·E·I/l² (which 1 − P/EA lowers by the strain, 3e-4) within 0.1 %, and
+/// continues on the requested branch. It bends by l·k/K(k) with K(k) = (π/2)·√(P/P_E) (elastica of a quarter of it;
+/// Timoshenko & Gere, "Theory of elastic stability", §2.7) within 0.2 % at 1.2 times the load. Straight on, it is
+/// unstable.
 #[test]
 fn column() {
     let file = "column/column.net";
@@ -91,9 +92,9 @@ fn ends_before_a_bifurcation() {
     }
 }
 
-/// The mesh of a path holds the tolerance without being told how fine it must be: Euler's load and the bend at 1.2 times that, each against
-/// the same on 128 segments; the estimate is within the tolerance and no smaller than a third of the error. `--linear`, which cannot
-/// buckle, says so.
+/// The mesh of a path holds the tolerance by default. Euler's load and the bend at 1.2 times that are compared with the
+/// same on 128 segments; the estimate is within the tolerance and no smaller than a third of the error. `--linear`,
+/// which cannot buckle, says so.
 #[test]
 fn the_mesh_of_a_path_holds_the_tolerance() {
     let to = 1.2 * EULER;
@@ -115,11 +116,11 @@ fn the_mesh_of_a_path_holds_the_tolerance() {
     let exact = both(&found(&CompileOptions { segments: Some(128), ..CompileOptions::default() }).1);
     for tol in [1e-2, 1e-3, 1e-4] {
         let (fitted, path) = found(&CompileOptions { tol, ..CompileOptions::default() });
-        let told = fitted.order.estimated_error.unwrap();
+        let reported = fitted.order.estimated_error.unwrap();
         let error = both(&path).iter().zip(exact).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
-        assert!(error <= tol && told <= tol && 3.0 * told >= error, "{tol}: off by {error}, told {told}");
+        assert!(error <= tol && reported <= tol && 3.0 * reported >= error, "{tol}: off by {error}, told {reported}");
     }
-    // a path that ends for want of points ends nowhere in particular: nothing is told of its error
+    // a path that ends by its limit of points has no particular end: there is no error estimate
     let last = scene("column/column.net", &[("F", to)], &CompileOptions::default());
     let request = ContinuationRequest {
         growing: PathInput::Parameter(&last),
@@ -139,8 +140,9 @@ fn the_mesh_of_a_path_holds_the_tolerance() {
     assert!(linear.warnings.items.iter().any(|d| d.message.contains("would buckle")), "{:?}", linear.warnings);
 }
 
-/// Two segments find Euler's load of a column pinned at both ends, π²·E·I/l², within 1 % (its half is a cantilever of one
-/// segment), that of a cantilever within 0.1 %; clamped at both ends they give 40·E·I/l², 1.3 % above it, as two cubic elements do.
+/// Two segments find Euler's load of a column pinned at both ends, π²·E·I/l², within 1 % (its half is a cantilever of
+/// one segment), and that of a cantilever within 0.1 %. Clamped at both ends they give 40·E·I/l², 1.3 % above it, as
+/// two cubic elements do.
 #[test]
 fn columns_of_two_segments() {
     let cut = |segments: usize| CompileOptions { segments: Some(segments), ..CompileOptions::default() };
@@ -195,9 +197,10 @@ fn clamped_beam_buckles_by_heat() {
     close(*path.signals[0].2.last().unwrap(), 2.0 * L / PI * critical.sqrt(), 5e-3);
 }
 
-/// The clamped shallow arch snaps through at 5.4336 µN and 2.409 µm and back at 0.4080 µN and 6.575 µm (exact solution of
-/// the shallow-arch equation, closed form over the axial force): loads within 1 % of the larger, places within 1 %.
-/// Without a hold on its top it leaves the even path earlier, sways, and comes back to it on the other side.
+/// The clamped shallow arch snaps through at 5.4336 µN and 2.409 µm and back at 0.4080 µN and 6.575 µm. Loads are
+/// within 1 % of the larger, and places within 1 % of the exact solution of the shallow-arch equation (closed form over
+/// the axial force). Without a hold on its top it leaves the even path earlier, sways, and comes back to it on the
+/// other side.
 #[test]
 fn arch_snaps_through() {
     let file = "arch/arch.net";
@@ -316,7 +319,8 @@ fn residual_stress_tunes_a_beam() {
 }
 
 /// A clamped beam stretches as it bends: 100 µN in its middle move it by 4.4389 µm, not by the 18.94 µm of small
-/// displacements (exact solution of the beam under its own tension, closed form over the tension), within 0.5 %.
+/// displacements, within 0.5 %. The reference is the exact solution of the beam under its own tension (closed form over
+/// the tension).
 #[test]
 fn a_clamped_beam_stiffens() {
     let text = "

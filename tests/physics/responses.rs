@@ -1,4 +1,5 @@
-//! Meshes of frequency responses: what a row sees of modes that nothing pushes, or that it does not see, is rounding and asks for no mesh.
+//! Meshes of frequency responses: the response of a row to unexcited or unobservable modes is rounding and requires no
+//! mesh.
 
 use bimorph::analysis::harmonic::HarmonicOptions;
 use bimorph::analysis::mesh::harmonic_fitted;

@@ -34,8 +34,9 @@ const WITHOUT_MASS: &str = "
     guide2d * [m] []
     f2d * [m] [F=F]";
 
-/// An undamped oscillator over 10 and 200 periods: the reported error is the true one within a factor of 3, and that is within the
-/// tolerance, of a mass on a spring and of one behind a node without mass, which follows its springs. Closed form.
+/// An undamped oscillator over 10 and 200 periods. The reported error is the true one within a factor of 3, and that is
+/// within the tolerance. The cases are a mass on a spring, and one behind a node without mass, which follows its
+/// springs. Closed form.
 #[test]
 fn errors_of_an_oscillator() {
     let one = "param F=0\nanchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\nf2d * [m] [F=F]";
@@ -55,13 +56,16 @@ fn errors_of_an_oscillator() {
             for signal in 0..signals.len() {
                 let amplitude = if signal == 0 { 1e-6 } else { 0.5e-6 };
                 let error = off(&found, signal, |t| amplitude * (1e5 * t).cos());
-                let told = found.step_error.unwrap();
+                let reported = found.step_error.unwrap();
                 println!(
-                    "{signals:?} {periods} {tol:e}: {error:.2e}, reported {told:.2e}, {} steps",
+                    "{signals:?} {periods} {tol:e}: {error:.2e}, reported {reported:.2e}, {} steps",
                     found.counters.steps
                 );
-                assert!((1.0 / 3.0..3.0).contains(&(told / error)), "{periods} {tol:e}: {error:e}, reported {told:e}");
-                assert!(error <= tol && told <= tol, "{periods} {tol:e}: {error:e}, reported {told:e}");
+                assert!(
+                    (1.0 / 3.0..3.0).contains(&(reported / error)),
+                    "{periods} {tol:e}: {error:e}, reported {reported:e}"
+                );
+                assert!(error <= tol && reported <= tol, "{periods} {tol:e}: {error:e}, reported {reported:e}");
             }
         }
     }
@@ -99,11 +103,11 @@ fn estimates_leave_the_motion_alone() {
             let (alone, found) = (run(tol, false), run(tol, true));
             assert_eq!(alone.signals, found.signals);
             assert_eq!((alone.counters, alone.step_error), (found.counters, None));
-            let (error, told) = (largest_error(&exact, &found, &|_| 0.0), found.step_error.unwrap());
-            println!("{formulation:?} {tol:e}: {error:.2e}, reported {told:.2e}");
+            let (error, reported) = (largest_error(&exact, &found, &|_| 0.0), found.step_error.unwrap());
+            println!("{formulation:?} {tol:e}: {error:.2e}, reported {reported:.2e}");
             assert!(
-                (1.0 / 3.0..3.0).contains(&(told / error)),
-                "{formulation:?} {tol:e}: {error:e}, reported {told:e}"
+                (1.0 / 3.0..3.0).contains(&(reported / error)),
+                "{formulation:?} {tol:e}: {error:e}, reported {reported:e}"
             );
         }
     }
@@ -125,7 +129,7 @@ fn a_lost_phase_is_reported() {
         ..TransientOptions::default()
     };
     let found = transient(&compiled, &options, &mut |_, _| {}, &mut |_| true).unwrap();
-    let told = found.step_error.unwrap();
-    assert!((0.5..=2.0).contains(&told), "{told}");
+    let reported = found.step_error.unwrap();
+    assert!((0.5..=2.0).contains(&reported), "{reported}");
     assert!(found.warnings.iter().any(|w| w.starts_with("the phase of m.x is lost after")), "{:?}", found.warnings);
 }

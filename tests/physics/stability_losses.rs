@@ -17,10 +17,11 @@ fn segments(n: usize) -> CompileOptions {
     CompileOptions { segments: Some(n), ..CompileOptions::default() }
 }
 
-/// The elastica far beyond Euler's load, which lies at 0.53, 0.24 and 0.11 of these loads: end angle, load over Euler's load, distances of the tip from
-/// the clamp along and across the column over its length, from S. P. Timoshenko, J. M. Gere, "Theory of Elastic Stability" (1961), table 2-3. The load
-/// acts along the column's axis, so that the loss is a bifurcation at Euler's load π²EI/4L². The column goes to the left of its drawn
-/// direction.
+/// The elastica far beyond Euler's load, which is 0.53, 0.24 and 0.11 of these loads. The compared values are the end
+/// angle, the load over Euler's load, and the distances of the tip from the clamp along and across the column over its
+/// length. They are from S. P. Timoshenko, J. M. Gere, "Theory of Elastic Stability" (1961), table 2-3. The load acts
+/// along the column's axis, so that the loss is a bifurcation at Euler's load π²EI/4L². The column goes to the left of
+/// its drawn direction.
 #[test]
 fn a_column_far_beyond_eulers_load_is_the_elastica() {
     let (length, width) = (200e-6, 1e-6);
@@ -144,8 +145,9 @@ fn states_do_not_depend_on_the_direction_of_the_drawing() {
     }
 }
 
-/// A column with a guided end 0.4 % above Euler's load 4π²EI/L² has buckled, and a slender beam that hangs beside it, at its foot or at its head, does not
-/// hide that; 5 % below, it stands straight in both cases. What buckles at most 1 % above the load says so.
+/// A column with a guided end 0.4 % above Euler's load 4π²EI/L² has buckled, and a slender beam that hangs beside it,
+/// at its foot or at its head, does not hide that; 5 % below, it stands straight in both cases. A column that buckles
+/// at most 1 % above the load says so.
 #[test]
 fn a_slender_beam_hides_no_buckling() {
     let (length, width) = (120e-6, 2.2e-6);

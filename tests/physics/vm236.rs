@@ -37,8 +37,9 @@ fn vm236(n: usize) -> CompiledModel {
     model(&text, &CompileOptions::default())
 }
 
-/// VM236: pull-in within 0.5 % of 17.838 V and release within 1 % of 11.213 V, what 32 and 64 elements give, for 4 to 64 gap
-/// elements; ANSYS prints 18 and 11.06 V, and an independent solution of this model with a rigid stop has 17.842 and 11.23 V.
+/// VM236: pull-in within 0.5 % of 17.838 V and release within 1 % of 11.213 V, the values of 32 and 64 elements, for 4
+/// to 64 gap elements. ANSYS prints 18 and 11.06 V, and an independent solution of this model with a rigid stop has
+/// 17.842 and 11.23 V.
 #[test]
 fn vm236_pull_in_and_release() {
     for n in [4, 5, 6, 8, 11, 16, 32, 64] {
@@ -88,7 +89,8 @@ fn vm236_hysteresis_in_one_path() {
     close(node(&balance(&compiled, &[("drive", 18.0)]), "a(8)").y, -0.6004e-6, 3e-3);
 }
 
-/// The scene examples/switch as `path` follows it from 0 to 20 V: folds at 17.84 and 11.21 V, stable on both outer branches.
+/// The model examples/switch as `path` follows it from 0 to 20 V: folds at 17.84 and 11.21 V, stable on both outer
+/// branches.
 #[test]
 fn the_switch_shows_its_hysteresis() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/switch/switch.net");
@@ -112,8 +114,8 @@ fn the_switch_shows_its_hysteresis() {
     assert!(path.negative[first + 1..second].iter().all(|n| *n == 1));
 }
 
-/// A step that fails is taken again, shorter: the switch at 20 V closes within 0.7 µs at a tolerance of 1e-2, where a step's
-/// error that was not a number was once accepted, and its parts stay within the range of contact.
+/// A failed step is repeated with a shorter length. The switch at 20 V closes within 0.7 µs at a tolerance of 1e-2,
+/// where a step with an error of NaN was once accepted, and its parts stay within the range of contact.
 #[test]
 fn a_switch_closes_at_a_coarse_tolerance() {
     let compiled = vm236(16);
@@ -132,15 +134,17 @@ fn a_switch_closes_at_a_coarse_tolerance() {
     assert!(closed.is_some_and(|t| t < 0.7e-6), "{closed:?}");
 }
 
-/// The switch closes at 19 V in 0.64263 µs (an independent code on 16 cubic elements, transverse motion alone), within 1e-3, and stays on the
-/// electrode from 10 to 20 µs: the tolerance holds to the end, in less than 20,000 steps. Bounces that lost nothing took a million.
+/// The switch closes at 19 V in 0.64263 µs within 1e-3 (an independent code on 16 cubic elements, transverse motion
+/// alone), and stays on the electrode from 10 to 20 µs. The tolerance holds to the end, in less than 20,000 steps.
+/// Bounces that lost nothing took a million.
 #[test]
 fn the_switch_closes_in_time() {
     let (drawn, options) = (vm236(16), closing(20e-6));
     let (moving, _) = fitted_in_time(&drawn, &options).unwrap();
-    let mut go = |o: &TransientOptions<'_>, s: &mut dyn FnMut(f64, &[f64]), w: bimorph::analysis::Watch<'_>| {
-        transient(&moving, o, s, w).map(|r| (r, ()))
-    };
+    let mut go =
+        |o: &TransientOptions<'_>, s: &mut dyn FnMut(f64, &[f64]), w: bimorph::analysis::ProgressCallback<'_>| {
+            transient(&moving, o, s, w).map(|r| (r, ()))
+        };
     let run = with_step_error(&options, &moving, &mut go, &mut |_, _| (), &mut |_| true).unwrap().0;
     let first = run.events.iter().find(|event| event.contact).unwrap();
     close(first.t, 0.64263e-6, 1e-3);

@@ -45,9 +45,9 @@ fn a_turning_frame_pushes_outwards() {
     }
 }
 
-/// While the rate of the frame goes up and down again and a force pushes, the mass follows
-/// m·(q̈ + 2Ω e×q̇ + Ω̇ e×r − Ω²r) + c·q̇ + k·q = F and J·(θ̈ + Ω̇) + … = 0: to 1e-5 of its reach against the classical Runge-Kutta
-/// method with steps of 20 ns.
+/// While the rate of the frame rises and falls and a force pushes, the mass follows m·(q̈ + 2Ω e×q̇ + Ω̇ e×r − Ω²r) +
+/// c·q̇ + k·q = F and J·(θ̈ + Ω̇) + … = 0. The error is 1e-5 of its reach against the classical Runge-Kutta method with
+/// steps of 20 ns.
 #[test]
 fn coriolis_and_euler_push_a_mass() {
     let mut device = gyroscope(&["m.x", "frame.wz"], &["m.y", "m.rz", "m.vx"]);
@@ -92,8 +92,9 @@ fn coriolis_and_euler_push_a_mass() {
     }
 }
 
-/// In small signals about a steady rate the two modes are coupled: the exact answer of two degrees of freedom, 1e-9, far from
-/// the resonances, between them and on them, at rates at which Coriolis' force is many times that of the dampers.
+/// In small signals about a steady rate the two modes are coupled. The result is the exact solution of two degrees of
+/// freedom, 1e-9, far from the resonances, between them and on them, at rates at which Coriolis' force is many times
+/// that of the dampers.
 #[test]
 fn small_signals_of_a_gyroscope() {
     let mut device = gyroscope(&["m.x", "m.y", "frame.wz"], &[]);

@@ -70,13 +70,13 @@ fn given(formulation: Formulation, share: f64) -> Vec<f64> {
     ports(formulation).iter().map(|(.., size)| share * size).collect()
 }
 
-/// What was opened is described with its kinds.
+/// The description of opened ports includes their kinds.
 #[test]
 fn kinds_are_told() {
     let mut device = LocalDevice::new(compiled(SHUTTLE, Formulation::Compliant));
     let ports = PORTS.iter().map(|(name, ..)| (*name).to_owned()).collect();
-    let told = device.open(&OpenRequest { ports, signals: vec![], noise: None }).unwrap();
-    for (port, (name, kind, _)) in told.ports.iter().zip(PORTS) {
+    let reported = device.open(&OpenRequest { ports, signals: vec![], noise: None }).unwrap();
+    for (port, (name, kind, _)) in reported.ports.iter().zip(PORTS) {
         assert_eq!((port.name.as_str(), port.kind), (name, kind));
     }
 }
@@ -117,10 +117,10 @@ fn largest(ports: &[(&str, PortKind, f64)], partial: &[f64], rows: impl Iterator
     rows.map(of_row).fold(0.0, f64::max)
 }
 
-/// Central differences of what is answered, of charges and of outputs agree with the partials over every port: to 1e-6 of the
-/// row's largest share for a single internal step, where they are exact. When a trial takes several, at a tolerance of 1e-5 for
-/// their own error, to 1e-3 of the largest share in all motions of the same unit: how long steps are changes with what is
-/// given, within a tolerance that is one of the motion as a whole.
+/// Central differences of what is answered, of charges and of outputs agree with the partials over every port: to 1e-6
+/// of the row's largest share for a single internal step, where they are exact. When a trial takes several steps, at a
+/// tolerance of 1e-5 for their own error, the agreement is 1e-3 of the largest contribution in all motions of the same
+/// unit. The step lengths change with the input, within a tolerance of the motion as a whole.
 #[test]
 fn partials_match_finite_differences() {
     for formulation in FORMULATIONS {
@@ -184,9 +184,10 @@ fn partials_match_finite_differences() {
     }
 }
 
-/// Reciprocity: what a force at one place moves at another, the other moves here, to 1e-9, at rest under load, at DC and at
-/// frequencies on both sides of the first mode (Maxwell 1864, Betti 1872). Charge and force at an electrical port likewise:
-/// ∂q/∂F = −∂x/∂V with the sign of a port that is given a force, ∂q/∂F = ∂x/∂V.
+/// Reciprocity: the motion at one place under a force at another equals the motion at the other under the force at the
+/// first. It holds to 1e-9, at rest under load, at DC and at frequencies on both sides of the first mode (Maxwell 1864,
+/// Betti 1872). Charge and force at an electrical port likewise: ∂q/∂F = −∂x/∂V with the sign of a port that is given a
+/// force, ∂q/∂F = ∂x/∂V.
 #[test]
 fn ports_are_reciprocal() {
     let ports = ["s.x", "c.y", "c.rz", "shake", "s.y"];
@@ -224,7 +225,7 @@ fn ports_are_reciprocal() {
     }
 }
 
-/// What cannot be a port is refused with the reason.
+/// Impossible ports are rejected with the reason.
 #[test]
 fn impossible_ports_are_refused() {
     let mut device = LocalDevice::new(compiled(SHUTTLE, Formulation::Compliant));

@@ -43,8 +43,8 @@ fn forces_and_accelerations_move_a_mass() {
     }
 }
 
-/// An arch that a port pushes through snaps to where the same dead load takes it. Before, its equilibrium was lost: what a port gives was no part of
-/// the potential in which a fall descends.
+/// An arch that a port pushes through snaps to where the same dead load takes it. Before, its equilibrium was lost: the
+/// force of a port was no part of the potential in which a fall descends.
 #[test]
 fn an_arch_snaps_under_a_port_as_under_a_load() {
     let text = |load: &str| {

@@ -68,7 +68,7 @@ def test_pulse(bench):
 
 
 def test_motional_current(bench):
-    """The current of a comb at 40 V is 40·(N·ε·h/g)·velocity of its rotor: charge and motion tell the same story."""
+    """The current of a comb at 40 V is 40·(N·ε·h/g)·velocity of its rotor: charge and motion agree."""
     run = bench.run(
         deck("PULSE(0 2 20u 1u 1u 300u 1m)", ".tran 1u 400u 0 0.5u").replace('"yoke.y:1e6"', '"rotor.y:1e6"')
     )

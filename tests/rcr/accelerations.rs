@@ -1,9 +1,9 @@
 //! Accelerations against dense pivoted elimination.
 
-use crate::dense;
+use crate::dense_reference;
 use crate::mechanism::{Mechanism, PIN, Stream, WELD};
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use nalgebra::Matrix2;
 
 /// A random tree of `count` bodies with `loops` further joints of random kinds.
@@ -51,11 +51,11 @@ fn compare(m: &Mechanism, seed: u64) -> Option<(f64, f64)> {
     let mut a = vec![0.0; linkage.coordinates];
     reduction.reduce(ReductionTask::Accelerations, &mut a);
     let (fast, near) = (reduction.accelerations.clone(), reduction.nearness);
-    let judge = dense::accelerations(&model, &dense::joints(&model), &reduction, &force)?;
+    let judge = dense_reference::accelerations(&model, &dense_reference::joints(&model), &reduction, &force)?;
     reduction.reduce_singular(ReductionTask::Accelerations, &mut a);
-    let general = dense::difference(&reduction.accelerations, &judge, 1.0);
+    let general = dense_reference::difference(&reduction.accelerations, &judge, 1.0);
     assert!(general < 1e-12, "general path: {general:e}, nearness {near:e}");
-    Some((dense::difference(&fast, &judge, 1.0), near))
+    Some((dense_reference::difference(&fast, &judge, 1.0), near))
 }
 
 /// Open trees of every kind of joint, second-order axial strain included: 1e-12 of dense pivoted elimination.

@@ -2,7 +2,7 @@
 
 use crate::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, LinkageParent, Reduction};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, LinkageParent, Reduction};
 use bimorph::solve::dormand_prince::{DormandPrince, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 use std::f64::consts::FRAC_PI_2;

@@ -2,7 +2,7 @@
 
 use crate::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask, Singularity};
 
 /// A shuttle on arms of two links; `kinks` are the angles between the links, `turn` the direction of the first arm.
 fn star(kinks: &[f64], turn: f64) -> Mechanism {
@@ -63,8 +63,8 @@ fn straight_arms() {
     }
 }
 
-/// Numbers that are not finite go through the path for singular configurations and come out as such. (An explicit step that
-/// had become unstable once ended the program there.)
+/// NaN and infinities pass through the path for singular configurations unchanged. (An explicit step that had become
+/// unstable once ended the program there.)
 #[test]
 fn what_is_not_finite_stays_so() {
     for kinks in [[0.0; 3], [0.1; 3]] {

@@ -2,7 +2,7 @@
 
 use crate::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Lanes, Linkage, Real, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Lanes, Linkage, Real, Reduction, ReductionTask};
 
 /// A ladder of `cells` cells whose rungs are `width` wide.
 fn ladder(cells: usize, width: f64) -> Linkage {
@@ -21,7 +21,7 @@ fn ladder(cells: usize, width: f64) -> Linkage {
     Linkage::new(&m.model().0)
 }
 
-/// Variants of one mechanism side by side give the bits that each gives alone, in any instruction set: nothing is fused and
+/// Batched variants of one mechanism are bit-identical to single ones, in any instruction set: nothing is fused and
 /// nothing is reordered.
 #[test]
 fn a_lane_has_the_bits_of_its_variant() {

@@ -2,7 +2,7 @@
 
 mod accelerations;
 mod benchmarks;
-mod dense;
+mod dense_reference;
 mod kinks;
 mod lanes;
 mod mechanism;

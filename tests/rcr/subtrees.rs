@@ -1,11 +1,11 @@
-//! What is there for speed alone (runs of pins, small fronts in closed form, equal subtrees side by side) against the plain
-//! recursion, body by body.
+//! Optimizations (runs of pins, small fronts in closed form, packs of equal subtrees) against the plain recursion, body
+//! by body.
 
 #[path = "../topologies/mod.rs"]
 mod topologies;
 
 use crate::mechanism::{Mechanism, PIN, Stream, WELD};
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use bimorph::multibody::{BodyId, Model};
 
 fn bits(of: &[f64]) -> Vec<u64> {
@@ -18,8 +18,9 @@ fn shown(r: &Reduction<f64>, count: usize) -> Vec<u64> {
     bodies.flatten().chain([r.nearness]).map(f64::to_bits).collect()
 }
 
-/// Compares the recursion with packs, with every body on its own, and without anything that is there for speed alone, at a
-/// random configuration, rates, forces and torques; `size` of the coordinates. Returns how many bodies go side by side.
+/// Compares the recursion with packs, with every body on its own, and without anything that is there for speed alone,
+/// at a random configuration, rates, forces and torques; `size` of the coordinates. Returns the number of bodies in
+/// packs.
 fn same_bits(model: &Model, seed: u64, size: f64) -> usize {
     let linkage = &Linkage::new(model);
     let (n, count) = (linkage.coordinates, linkage.links.len());
@@ -76,7 +77,7 @@ fn seen(
     seen
 }
 
-/// A hub on 3 to 20 arms: every arm but the one that carries the hub goes side by side, less what does not fill a pack.
+/// A hub on 3 to 20 arms: every arm but the one that carries the hub is in a pack, less the remainder of a full pack.
 #[test]
 fn arms_of_a_hub() {
     for count in 3..20 {
@@ -86,8 +87,8 @@ fn arms_of_a_hub() {
     }
 }
 
-/// Bimorphs on yokes, yokes on stages, stages on a rotor, on pins and with flexible joints: every bit is that of each body on
-/// its own, and of twenty bimorphs on a yoke three bodies in four go side by side.
+/// Bimorphs on yokes, yokes on stages, stages on a rotor, on pins and with flexible joints. Every bit is that of each
+/// body on its own, and of twenty bimorphs on a yoke three bodies in four are in packs.
 #[test]
 fn bimorphs_on_yokes() {
     for (name, units) in [("bank", 5), ("bank", 20), ("quarter", 6), ("rotary", 2), ("arms", 9)] {
@@ -100,7 +101,7 @@ fn bimorphs_on_yokes() {
     }
 }
 
-/// A mechanism without equal subtrees has no body side by side.
+/// A mechanism without equal subtrees has no body in a pack.
 #[test]
 fn nothing_equal() {
     for model in [topologies::chain(50).pinned(), topologies::ladder(10, 1).pinned()] {
@@ -108,8 +109,8 @@ fn nothing_equal() {
     }
 }
 
-/// As drawn, loops of straight arms and rails are singular: what is not finite there is so on every way, and zeros have the
-/// same sign.
+/// As drawn, loops of straight arms and rails are singular: results that are not finite there are so with every
+/// traversal, and zeros have the same sign.
 #[test]
 fn singular_as_drawn() {
     for (name, units) in [("ladder", 6), ("arms", 9), ("bank", 5)] {
@@ -117,8 +118,9 @@ fn singular_as_drawn() {
     }
 }
 
-/// Hangs `copies` of a random subtree on bodies of a trunk, which is drawn at `places`: up to four bodies with joints of any
-/// kind, with loops inside, to ground and to the trunk. What is random of it besides its size comes from `shape`.
+/// Hangs `copies` of a random subtree on bodies of a trunk, which is drawn at `places`: up to four bodies with joints
+/// of any kind, with loops inside, to ground and to the trunk. Its random properties besides its size come from
+/// `shape`.
 fn hang(m: &mut Mechanism, trunk: &[(BodyId, [f64; 2])], copies: usize, shape: u64, s: &mut Stream) {
     let kinds = [PIN, PIN, [false; 3], [true, false, true], [true, false, false]];
     for _ in 0..copies {

@@ -20,7 +20,7 @@ impl Attached {
         Self::join(client, session).await.unwrap_or_else(|code| panic!("{code:?}")).0
     }
 
-    /// Joins a session: what is said of it, or the code of the refusal.
+    /// Attaches to a session: its description, or the code of the error.
     pub(crate) async fn join(
         client: &mut BimorphClient<Channel>,
         session: &str,

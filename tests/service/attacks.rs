@@ -1,9 +1,9 @@
-//! One request, or one careless client, neither ends nor freezes the server: each attack runs against `bimorph serve` in a
-//! process of its own while a stranger asks for `Info` all the time. After it the server is alive, has never held a
-//! gigabyte, answers the attack with the right code, rests, and stops when it is told to.
+//! One request, or one careless client, neither ends nor freezes the server: each attack runs against `bimorph serve`
+//! in a process of its own while a stranger asks for `Info` all the time. After it the server is alive, has never held
+//! a gigabyte, answers the attack with the right code, is idle, and stops on request.
 #![cfg(target_os = "linux")]
 
-use super::victim::{Reader, Victim, Wire, netlist};
+use super::serve_process::{Reader, Victim, Wire, netlist};
 use bimorph::service::proto;
 use proto::device_request::Kind as Ask;
 use std::fmt::Write as _;
@@ -168,12 +168,12 @@ fn number(x: f64) -> Option<proto::setting::Value> {
     Some(proto::setting::Value::Number(x))
 }
 
-/// Static, modes, pull-in and a transient that nobody waits for any more give back their places and their processor.
+/// Abandoned static, mode, pull-in and transient analyses release their permits and their processor.
 #[test]
 fn abandoned_analyses() {
     Victim::attacked("abandoned analyses", async |wire| {
         let (text, options) = chain(20_000);
-        // let go from a load: a run at rest would end in a few steps
+        // released from a load: a run at rest would end in a few steps
         let held = compiled(wire, (text.replace("param F=0", "param F=1n"), options.clone())).await;
         let model = compiled(wire, (text, options)).await;
         let large = proto::ModesRequest { model: model.clone(), count: 1000, voltages: vec![] };
@@ -198,7 +198,8 @@ fn abandoned_analyses() {
     });
 }
 
-/// A hundred frequencies of a large model by the unary call, while a stream of the same session waits: nobody else does.
+/// A hundred frequencies of a large model by the unary call, while a stream of the same session waits: no other client
+/// does.
 #[test]
 fn long_linearize() {
     Victim::attacked("a long Linearize", async |wire| {
@@ -231,7 +232,7 @@ fn long_linearize() {
     });
 }
 
-/// A thousand result streams that nobody reads.
+/// A thousand result streams without a reader.
 #[test]
 fn unread_results() {
     Victim::attacked("1 000 unread result streams", async |wire| {
@@ -294,7 +295,7 @@ fn half_messages() {
     });
 }
 
-/// A trial over an enormous step and thousands of trials at once on one connection: the event loop is nobody's.
+/// A trial over an enormous step and thousands of trials at once on one connection: the event loop stays free.
 #[test]
 fn long_trials() {
     Victim::attacked("64 streams of long trials", async |wire| {
@@ -372,7 +373,7 @@ fn many_spectra() {
     });
 }
 
-/// A log that nobody reads, or whose reader is gone, stops nothing.
+/// A log without a reader, or whose reader is gone, stops nothing.
 #[test]
 fn unread_logs() {
     for (reader, name) in [(Reader::Stalls, "a log that nobody reads"), (Reader::Leaves, "a log whose reader is gone")]

@@ -1,6 +1,6 @@
 //! Every call answers over a real socket.
 
-use super::running::{PLATE, block_on, compiled, start, wire_bundle};
+use super::test_server::{PLATE, block_on, compiled, start, wire_bundle};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use proto::device_reply::Kind as Reply;
@@ -17,7 +17,7 @@ fn trial(parent: u64, t: f64, voltages: &[f64]) -> Ask {
     Ask::Trial(proto::TrialRequest { mode: mode.into(), parent, t, dt: 1e-6, voltages: voltages.to_vec() })
 }
 
-/// Info tells the version and the limits in force.
+/// Info reports the version and the limits in force.
 #[test]
 fn info_tells_version_and_limits() {
     let server = start("127.0.0.1:0", Limits { sessions: 7, ..Limits::default() });

@@ -1,12 +1,12 @@
 //! Any bytes as messages and as snapshots: each call ends, with a status that is no fault of the server's, and the server goes on.
 //!
-//! Messages are sound ones of every call, changed at random: bits turned, bytes exchanged, stretches lost, doubled and mixed, numbers made
-//! extreme. Snapshots are those of a session, changed in the same ways, and sealed anew as whoever forges them would. A few run with every
-//! test; `make fuzz` runs them for minutes.
+//! Messages are sound ones of every call, changed at random: bits turned, bytes exchanged, stretches lost, doubled and
+//! mixed, numbers made extreme. Snapshots are those of a session, changed in the same ways, with a recomputed checksum
+//! as in a forgery. A few run with every test; `make fuzz` runs them for minutes.
 
 use super::attached::{Attached, trial};
-use super::running::{DEADLINE, Running, compiled, start_with};
-use super::sound::sound;
+use super::test_server::{DEADLINE, Running, compiled, start_with};
+use super::valid_requests::sound;
 use bimorph::content::Fnv;
 use bimorph::device::local::LocalDevice;
 use bimorph::service::limits::Limits;
@@ -175,14 +175,14 @@ fn messages(seed: u64, mut done: impl FnMut(usize) -> bool) {
                 let at = maker.below(all.len());
                 maker.change(&mut all[at], &other);
             }
-            let told = all.clone();
+            let reported = all.clone();
             match tokio::time::timeout(DEADLINE, answered(&channel, call, all)).await {
                 Ok(Ok(_)) => fine += 1,
                 Ok(Err(status)) => {
                     let fault = matches!(status.code(), Code::Unknown | Code::DataLoss | Code::Internal);
-                    assert!(!fault, "seed {seed}, call {count}, {call}: {status:?}\n{told:?}");
+                    assert!(!fault, "seed {seed}, call {count}, {call}: {status:?}\n{reported:?}");
                 }
-                Err(_) => panic!("seed {seed}, call {count}, {call} has no end:\n{told:?}"),
+                Err(_) => panic!("seed {seed}, call {count}, {call} has no end:\n{reported:?}"),
             }
             count += 1;
             if count.is_multiple_of(100) {
@@ -220,28 +220,28 @@ fn snapshots(seed: u64, mut done: impl FnMut(usize) -> bool) {
                 sealed.value().to_le_bytes().to_vec()
             };
             let snapshot = [&sound[..HEAD], &sum, &body].concat();
-            let told = format!("seed {seed}, snapshot {count}: {snapshot:?}");
+            let reported = format!("seed {seed}, snapshot {count}: {snapshot:?}");
             let request = proto::RestoreRequest { model: model.clone(), snapshot };
-            match tokio::time::timeout(DEADLINE, client.restore(request)).await.expect(&told) {
+            match tokio::time::timeout(DEADLINE, client.restore(request)).await.expect(&reported) {
                 Err(status) => {
                     let refused =
                         [Code::InvalidArgument, Code::FailedPrecondition, Code::ResourceExhausted, Code::NotFound];
-                    assert!(refused.contains(&status.code()), "{status:?} {told}");
+                    assert!(refused.contains(&status.code()), "{status:?} {reported}");
                 }
                 Ok(restored) => {
                     opened += 1;
                     let session = restored.into_inner().session;
                     let mut stream = Attached::to(&mut client, &session).await;
                     let answer = stream.ask(trial(2, 1e-7, 1.2));
-                    // a fault says that the state is none, or no longer there
-                    if let Kind::Trial(reply) = tokio::time::timeout(DEADLINE, answer).await.expect(&told)
+                    // a fault means that the state is invalid, or no longer there
+                    if let Kind::Trial(reply) = tokio::time::timeout(DEADLINE, answer).await.expect(&reported)
                         && reply.status() == proto::trial_reply::Status::Ok
                     {
                         let mut numbers = reply.currents.iter().chain(&reply.charges).chain(&reply.di_dv);
-                        assert!(numbers.all(|x| x.is_finite()), "{reply:?} {told}");
+                        assert!(numbers.all(|x| x.is_finite()), "{reply:?} {reported}");
                     }
                     drop(stream);
-                    client.close(proto::CloseRequest { session }).await.expect(&told);
+                    client.close(proto::CloseRequest { session }).await.expect(&reported);
                 }
             }
             count += 1;
@@ -261,7 +261,7 @@ fn a_few_snapshots() {
     snapshots(1, |count| count >= QUICK[1]);
 }
 
-/// For `FUZZ_MINUTES` [min], each time with others: the seed is the time, and is told with what fails.
+/// For `FUZZ_MINUTES` [min], each time with others: the seed is the time, and is printed on failure.
 fn for_minutes() -> (u64, impl FnMut(usize) -> bool) {
     let minutes: f64 = std::env::var("FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0);
     let end = Instant::now() + Duration::from_secs_f64(60.0 * minutes);

@@ -1,8 +1,8 @@
 //! Jobs: rows come as they are finished and from any one on, clients see their own, and what was cancelled stays.
 
-use super::cuts::LOCAL;
 use super::quotas;
-use super::running::{block_on, bundle, start_with};
+use super::session_faults::LOCAL;
+use super::test_server::{block_on, bundle, start_with};
 use bimorph::compile::CompileOptions;
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepSpec};
 use bimorph::netlist::Bundle;
@@ -131,8 +131,9 @@ fn rows_come_as_they_are_finished() {
     });
 }
 
-/// A job that is done says so and has every point; the rows in the order of their points are those of the same sweep in process, and
-/// the older calls have the same table. What they come from is told: the hashes are those of a journal and of a model.
+/// A job that is done says so and has every point; the rows in the order of their points are those of the same sweep in
+/// process, and the older calls have the same table. Their provenance is reported: the hashes are those of a journal
+/// and of a model.
 #[test]
 fn rows_are_those_of_the_sweep_in_process() {
     let server = start_with("127.0.0.1:0", Limits::default(), LOCAL);
@@ -150,7 +151,7 @@ fn rows_are_those_of_the_sweep_in_process() {
             assert!(meta(&job).rows >= before, "counts never go back");
             last = Some(job);
         }
-        let last = last.expect("told");
+        let last = last.expect("reported");
         assert_eq!(last.result, Some(proto::job::Result::Response(proto::JobResponse { rows: 40, failed: 0 })));
         let mut stream = fetch(&mut wire, &job.name, 0).await.expect("a stream");
         let (mut rows, ended) = rest(&mut stream, 0).await.expect("ends");
@@ -178,8 +179,8 @@ fn rows_are_those_of_the_sweep_in_process() {
     });
 }
 
-/// Clients see their own jobs, by pages, the last one first; a name that nobody was told, or a token of no answer, is refused; and who has
-/// the name has the job.
+/// Clients list their own jobs, by pages, the last one first. An unknown name, or an invalid token, is rejected; the
+/// name of a job grants access to it.
 #[test]
 fn clients_list_their_own_jobs() {
     let (_folder, server) = quotas::server(Limits { client_sweeps: 5, ..Limits::default() });
@@ -251,13 +252,13 @@ fn a_large_job_does_not_hold_up_a_small_one() {
         while let Some(job) = watched.message().await.expect("goes on") {
             last = Some(job);
         }
-        assert_eq!(meta(&last.expect("told")).state(), State::Done);
+        assert_eq!(meta(&last.expect("reported")).state(), State::Done);
         assert_eq!(meta(alice.get_job(large).await.expect("is here").get_ref()).state(), State::Running);
     });
 }
 
-/// The same request again is the same job, another one under its name is refused, and names are those of one client. With `share` who asks
-/// for the same has the same job, unless it was cancelled.
+/// The same request again is the same job, another one under its name is refused, and names are those of one client.
+/// With `share` an identical request gets the same job, unless it was cancelled.
 #[test]
 fn requests_have_names() {
     let (_folder, server) = quotas::server(Limits::default());
@@ -288,8 +289,8 @@ fn requests_have_names() {
     });
 }
 
-/// A job that asked for it is cancelled when its client is gone; one that did not goes on; and who asks for one by another connection
-/// keeps it.
+/// A job with that option is cancelled when its client is gone; one without it continues; and a request by another
+/// connection keeps it.
 #[test]
 fn a_job_is_released_when_its_client_is_lost() {
     let server = start_with("127.0.0.1:0", Limits::default(), LOCAL);

@@ -1,7 +1,7 @@
 //! How long a session is kept without use, by the server that was asked and by the one after it.
 
 use super::attached::Attached;
-use super::running::{block_on, compiled, start_kept};
+use super::test_server::{block_on, compiled, start_kept};
 use bimorph::compile::CompiledModel;
 use bimorph::device::Device;
 use bimorph::device::local::LocalDevice;
@@ -39,8 +39,9 @@ fn is_left(folder: &Path, session: &str) -> bool {
     files.map(|file| file.expect("a file").file_name()).any(|name| name.to_string_lossy().starts_with(session))
 }
 
-/// A lease outlives the server as the states do: of two sessions that wake after a restart, the one without is forgotten after `idle`, and
-/// then the other is still there, with the state that was accepted. A lease that was taken back is none.
+/// A lease outlives the server as the states do: of two sessions that wake after a restart, the one without is
+/// forgotten after `idle`, and then the other is still there, with the state that was accepted. A lease that was
+/// withdrawn has no effect.
 #[test]
 fn a_lease_outlives_the_server() {
     let folder = tempfile::tempdir().expect("a folder");

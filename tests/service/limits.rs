@@ -1,6 +1,6 @@
 //! Each limit is answered with RESOURCE_EXHAUSTED and its name; what was idle too long is forgotten.
 
-use super::running::{DEADLINE, block_on, bundle, compiled, start, start_with, wire_bundle};
+use super::test_server::{DEADLINE, block_on, bundle, compiled, start, start_with, wire_bundle};
 use bimorph::compile::CompileOptions;
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};

@@ -1,6 +1,6 @@
 //! Where a server listens: private sockets, no stolen paths, no open networks by accident.
 
-use super::running::{Running, start};
+use super::test_server::{Running, start};
 use bimorph::device::{Device, OpenRequest};
 use bimorph::service::address::Address;
 use bimorph::service::limits::Limits;
@@ -15,7 +15,7 @@ fn unix(path: &Path) -> Running {
 /// Tries to listen and stops at once when it can.
 fn attempt(address: &str, insecure: bool) -> Result<(), ServeError> {
     let options = ServeOptions { listen: vec![address.parse().expect("an address")], insecure, ..Default::default() };
-    super::running::block_on(run(options, std::future::ready(())))
+    super::test_server::block_on(run(options, std::future::ready(())))
 }
 
 /// A Unix socket has mode 0600, serves, and is gone when the server has stopped.

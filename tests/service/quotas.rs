@@ -1,9 +1,9 @@
-//! What one client may have is bounded, told with what is used, and costs no other client anything.
+//! Resources of one client are bounded, reported with their use, and cost no other client anything.
 
 use super::attached::trial;
-use super::cuts::LOCAL;
 use super::jobs::{MANY, request};
-use super::running::{Running, block_on, start_guarded, wire_bundle};
+use super::session_faults::LOCAL;
+use super::test_server::{Running, block_on, start_guarded, wire_bundle};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use proto::bimorph_client::BimorphClient;
@@ -120,7 +120,7 @@ fn unknowns_of_one_client() {
     });
 }
 
-/// What the computations of one client lay out is bounded; what was refused is not held.
+/// Memory of the computations of one client is bounded; rejected requests hold none.
 #[test]
 fn bytes_of_one_client() {
     let (_folder, server) = server(Limits { client_bytes: 100, ..Limits::default() });
@@ -183,8 +183,8 @@ fn processor_time_of_one_client() {
     });
 }
 
-/// A job whose client has used up its processor time ends with the rows that it has: what it could not compute is no row, and who has nothing left
-/// can still cancel and delete.
+/// A job whose client has used up its processor time ends with the rows that it has. Points that it could not compute
+/// have no row, and a client without quota can still cancel and delete.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_job_of_a_client_without_processor_time() {
@@ -198,7 +198,7 @@ fn a_job_of_a_client_without_processor_time() {
         while let Some(job) = watched.message().await.expect("goes on") {
             last = Some(job);
         }
-        let last = last.expect("told");
+        let last = last.expect("reported");
         let metadata = last.metadata.expect("metadata");
         let Some(proto::job::Result::Error(why)) = last.result else { panic!("it is not done: {metadata:?}") };
         assert!(why.code == Code::ResourceExhausted as i32 && why.message.starts_with("client_cpu: "), "{why:?}");

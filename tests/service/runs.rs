@@ -2,8 +2,8 @@
 //! in the way of others than a burst.
 
 use super::attached::Attached;
-use super::cuts::LOCAL;
-use super::running::{Running, block_on, bundle, compiled, start_with};
+use super::session_faults::LOCAL;
+use super::test_server::{Running, block_on, bundle, compiled, start_with};
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::run::{DriveSchedule, Ran, Start, steps};
@@ -224,7 +224,7 @@ fn no_message_follows_the_end_of_a_run() {
     });
 }
 
-/// What does not fit is refused by field before anything is computed.
+/// Inconsistent requests are rejected by field before anything is computed.
 #[test]
 fn what_does_not_fit_is_refused() {
     let server = start_with("127.0.0.1:0", Limits { transient_values: 9, ..Limits::default() }, fussy);
@@ -328,7 +328,7 @@ fn the_next_question_to_a_session_ends_its_run() {
         let short = client.run(request(3)).await.expect("runs").into_inner();
         assert_eq!(ended(short).await, None);
         assert_eq!(ended(long).await, Some(Code::Cancelled));
-        // one that has ended is in nobody's way
+        // one that has ended blocks nothing
         let mut long = client.run(request(1_000_000)).await.expect("runs").into_inner();
         long.message().await.expect("goes on").expect("rows");
         Attached::to(&mut client, &id).await.trial(0, 1.0, 1.0).await;

@@ -1,6 +1,6 @@
 //! A model on a server and the same model in process give the same bits: trials, small signals, analyses and sweeps.
 
-use super::running::{DEADLINE, PLATE, Running, bundle, start_with};
+use super::test_server::{DEADLINE, PLATE, Running, bundle, start_with};
 use bimorph::analysis::harmonic::HarmonicOptions;
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::mesh::fitted_in_time;
@@ -192,10 +192,10 @@ fn analyses_have_the_same_bits() {
     assert!(ended.stopped_at.is_some());
     let there = client.transient(&model, &RemoteTransient { until, ..remote.clone() }, &mut |_| true);
     assert_eq!(there.expect("runs"), ended);
-    let mut told = 0.0;
+    let mut reported = 0.0;
     let there = client.transient(&model, &remote, &mut |fraction| {
-        assert!(fraction >= told);
-        told = fraction;
+        assert!(fraction >= reported);
+        reported = fraction;
         true
     });
     assert_eq!(there.expect("runs"), local);
@@ -228,13 +228,13 @@ fn sweeps_have_the_same_bits() {
     let mut parts: Vec<_> = parts.into_iter().collect();
     parts.sort_by_key(|row| row.point);
     assert_eq!(parts, whole.rows);
-    let mut told = 0;
+    let mut reported = 0;
     let remote = client.sweep(&spec(None, Shard::default()), &netlist, &options, &mut |progress| {
-        told = progress.done;
+        reported = progress.done;
         true
     });
     assert_eq!(remote.expect("a table"), whole);
-    assert_eq!(told, 6);
+    assert_eq!(reported, 6);
     // so many points that none is the last when the first message comes
     let long =
         SweepSpec { parameters: vec!["k=0.5:4:200000".parse().expect("an axis")], ..spec(None, Shard::default()) };

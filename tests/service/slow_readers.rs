@@ -1,6 +1,7 @@
-//! Who reads the rows of a sweep slowly gets all of them once, holds nobody up, and is told when they are not all.
+//! A slow reader of the rows of a sweep gets each of them once, blocks nothing, and receives an error when they are
+//! incomplete.
 
-use super::running::{Running, block_on, start_with};
+use super::test_server::{Running, block_on, start_with};
 use bimorph::device::local::LocalDevice;
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
@@ -84,7 +85,8 @@ fn a_slow_reader_gets_every_row_once() {
     });
 }
 
-/// A reader that stops in the middle does not hold a server that is told to stop, and what it then reads ends with an error.
+/// A reader that stops in the middle does not prevent the server from stopping, and the rest of its stream ends with an
+/// error.
 #[test]
 fn rows_that_are_not_all_do_not_end_well() {
     let mut server = server();

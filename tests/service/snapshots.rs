@@ -2,7 +2,7 @@
 //! from one of another model.
 
 use super::attached::Attached;
-use super::running::{Running, block_on, compiled, start_with, wire_bundle};
+use super::test_server::{Running, block_on, compiled, start_with, wire_bundle};
 use bimorph::device::local::LocalDevice;
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
@@ -107,7 +107,7 @@ fn other_snapshots_are_refused() {
     });
 }
 
-/// What a session of another server may answer is bounded here as what is opened here.
+/// Requests to a session of another server have the same limits here as those to a session opened here.
 #[test]
 fn a_restored_session_is_within_limits() {
     let (here, there) = (server(Limits::default()), server(Limits { signals: 1, ..Limits::default() }));

@@ -1,7 +1,7 @@
 //! Many sessions for long: `make soak` runs these; they take minutes and measure.
 #![cfg(target_os = "linux")]
 
-use super::victim::{Victim, Wire};
+use super::serve_process::{Victim, Wire};
 use bimorph::netlist::Bundle;
 use bimorph::service::convert::model::bundle_to_wire;
 use bimorph::service::proto;

@@ -1,8 +1,8 @@
 //! The bank of the paper: thermal bimorphs in a row whose tips push a yoke, as rods and pins with springs.
 //!
-//! A bimorph has twelve pins: five along the hot arm (four rods between its anchor and the bar at its tip), four along the
-//! cold arm (a wide rod, then a flexure of two rods to its anchor), two at the link to the yoke and one in the yoke. Ten of
-//! them are coordinates, two close loops; as drawn, both arms are straight.
+//! A bimorph has twelve pins. Five are along the hot arm (four rods between its anchor and the bar at its tip), and
+//! four along the cold arm (a wide rod, then a flexure of two rods to its anchor). Two are at the link to the yoke and
+//! one is in the yoke. Ten of them are coordinates, two close loops; as drawn, both arms are straight.
 
 use super::mechanism::{Mechanism, PIN};
 use bimorph::multibody::BodyId;
@@ -23,7 +23,7 @@ pub(crate) const COORDINATES: usize = 10;
 pub(crate) struct Bank {
     /// Bodies and joints.
     pub(crate) mechanism: Mechanism,
-    /// What each body hangs on, and the pin's place [m].
+    /// Parents of each body, with the position of the pin [m].
     pub(crate) hangs: Vec<(BodyId, [f64; 2])>,
     /// Pins that close loops: two bodies and the place [m].
     pub(crate) closes: Vec<(BodyId, BodyId, [f64; 2])>,

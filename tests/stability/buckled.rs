@@ -1,4 +1,4 @@
-//! Arms one percent below and above their Euler load: the signs of the pivots tell stable from unstable.
+//! Arms one percent below and above their Euler load: the signs of the pivots distinguish stable from unstable.
 
 use super::frame::cantilever;
 use bimorph::domains::System;
@@ -22,7 +22,7 @@ fn column(share: f64) -> (System, usize) {
     (system, place[k])
 }
 
-/// What Newton's iteration alone makes of a share of Euler's load, from the straight column.
+/// Result of Newton's iteration alone at a fraction of Euler's load, from the straight column.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Found {
     /// Largest displacement sideways [m].
@@ -71,8 +71,9 @@ pub(crate) fn path(branch: Branch) -> Vec<(f64, f64, usize)> {
     traced.points.iter().map(|p| (1.1 * p.s, p.q[tip].y, p.negative)).collect()
 }
 
-/// One percent below Euler's load and one above it Newton's iteration ends on the straight column with forces balanced to
-/// rounding; only a negative pivot tells the second, unstable one. The search with signs never calls it an equilibrium: it falls to the bent one.
+/// One percent below Euler's load and one above it Newton's iteration ends on the straight column with forces balanced
+/// to rounding; only a negative pivot identifies the second, unstable one. The search with signs never calls it an
+/// equilibrium: it falls to the bent one.
 #[test]
 fn signs() {
     let (below, above) = (newton(0.99), newton(1.01));

@@ -3,7 +3,7 @@
 
 use super::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, LinkageParent, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, LinkageParent, Reduction, ReductionTask};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 

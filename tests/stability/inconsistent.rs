@@ -1,7 +1,7 @@
 //! Initial states off the loops, and loops that close twice.
 
 use super::mechanism::Mechanism;
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask, Singularity};
 use bimorph::multibody::{BodyId, Model};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::{JointMotion, NotFinite};
@@ -18,7 +18,7 @@ fn parallel(bars: usize) -> (Model, Vec<usize>) {
     m.model()
 }
 
-/// What a projection of a state with errors of `size` [rad, m] found: gap before [m], gap after [m], rate of the gap after
+/// Result of projecting a state with errors of `size` [rad, m]: gap before [m], gap after [m], rate of the gap after
 /// [m/s].
 pub(crate) fn projected(size: f64) -> [f64; 3] {
     let (model, _) = parallel(2);
@@ -121,7 +121,7 @@ pub(crate) fn local(bars: usize) -> f64 {
     all.fold(0.0, |m: f64, x| if x.is_nan() || m.is_nan() { f64::NAN } else { m.max(x.abs()) })
 }
 
-/// Gaps up to 0.07 m are closed to rounding, rates too; what was left is told.
+/// Gaps up to 0.07 m are closed to rounding, rates too; the remainder is reported.
 #[test]
 fn projection() {
     for size in [1e-9, 1e-6, 1e-3, 1e-1] {

@@ -5,7 +5,7 @@ use super::mechanism::Stream;
 use super::symbolic::{Chosen, Symbolic};
 use bimorph::multibody::Model;
 use bimorph::multibody::forces::RestStrain;
-use bimorph::multibody::rcr::{Linkage, LinkageParent, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, LinkageParent, Reduction, ReductionTask};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 
@@ -51,7 +51,7 @@ impl Case {
     }
 }
 
-/// Largest difference against the largest acceleration; infinite where a number is none.
+/// Largest difference against the largest acceleration; infinite for NaN.
 fn apart(a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64, n: usize) -> f64 {
     let unit = |i: usize| if i % 3 == 2 { LEVER } else { 1.0 };
     let largest = (0..n).map(|i| (b(i) * unit(i)).abs()).fold(0.0, f64::max);

@@ -2,7 +2,7 @@
 
 use super::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::{JointMotion, NotFinite};
 
@@ -137,8 +137,8 @@ pub(crate) fn drifts(end: f64) -> (Drift, Drift) {
     (without, run(&of, end, &mut JointMotion::new(&of.linkage, loads)))
 }
 
-/// Over 120 ms (four times the benchmark) at a tolerance of 1e-6 the loops of a mechanism that is never projected open by
-/// more than 1e-5 m and its energy drifts ten times as far; projected, they stay closed to rounding.
+/// Over 120 ms (four times the benchmark) at a tolerance of 1e-6 the loops of a mechanism without projection open by
+/// more than 1e-5 m and its energy drifts ten times as far. With projection they stay closed to rounding.
 #[test]
 fn drift() {
     let (without, with) = drifts(0.12);

@@ -67,9 +67,9 @@ pub(crate) fn explicit(force: f64, h: f64, count: usize) -> Vec<[f64; 2]> {
     energies(Integrator::Rk45, force, h, count)
 }
 
-/// A bank bent by 50 µN and let go, steps of 0.1 µs, 200 µs: the midpoint rule gains a fifth of its energy and then finds no step, and
-/// so does Newmark's in steps of 0.3 µs, with more than twice the energy; the average vector field keeps it to 1e-5; Rodas4 loses some
-/// and stays bounded.
+/// A bank bent by 50 µN and released, steps of 0.1 µs, 200 µs. The midpoint rule gains a fifth of its energy and then
+/// finds no step, and so does Newmark's in steps of 0.3 µs, with more than twice the energy. The average vector field
+/// keeps it to 1e-5; Rodas4 loses some and stays bounded.
 #[test]
 fn implicit_methods() {
     let (force, h, count) = (50e-6, 0.1e-6, 2000);

@@ -1,7 +1,7 @@
 //! Arms that come straight: a star of six two-link arms between a shuttle and ground, against 60-digit references.
 
 use super::mechanism::Mechanism;
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask, Singularity};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask, Singularity};
 use bimorph::multibody::{BodyId, Model};
 use nalgebra::{DMatrix, DVector};
 
@@ -111,14 +111,14 @@ fn dense(model: &Model, force: &[[f64; 3]], hub: usize) -> [f64; 3] {
     [x[3 * hub], x[3 * hub + 1], x[3 * hub + 2]]
 }
 
-/// Largest relative error of the three components; infinite where a number is none.
+/// Largest relative error of the three components; infinite for NaN.
 pub(crate) fn error(got: [f64; 3], want: [f64; 3]) -> f64 {
     (0..3)
         .map(|i| ((got[i] - want[i]) / want[i]).abs())
         .fold(0.0, |m: f64, x| if x.is_nan() { f64::INFINITY } else { m.max(x) })
 }
 
-/// A shuttle with `count` straight arms: what was met, and the shortest time of five reductions [s].
+/// A shuttle with `count` straight arms: its diagnostics, and the shortest time of five reductions [s].
 pub(crate) fn crowded(count: usize) -> (Singularity, f64) {
     let (_, _, linkage, mut r) = loaded(&vec![1e-7; count]);
     let mut out = vec![0.0; linkage.coordinates];

@@ -1,5 +1,5 @@
-//! What a symbolic multibody program computes: constraint equations solved for speeds chosen in advance, by elimination in
-//! the order in which they are written, and never a look at a number.
+//! Method of a symbolic multibody program: constraint equations solved for speeds chosen in advance, by elimination in
+//! the order in which they are written, without regard to numbers.
 //!
 //! In the coordinates q of the description, bodies accelerate with a = B·q̈ + c. The loops' rows J·q̈ = γ are solved for the
 //! dependent q̈_d = W·q̈_i + w, and Wᵀ·M·W·q̈_i = Wᵀ·(g − M·w) is what is left (T. R. Kane, D. A. Levinson, "Dynamics:

@@ -2,8 +2,8 @@
 //! penalty of a fixed number does not.
 
 use super::mechanism::Stream;
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use bimorph::multibody::planar::{JointFrame, Pose};
-use bimorph::multibody::rcr::{Linkage, Reduction, ReductionTask};
 use bimorph::multibody::{BlockMatrix, Body, BodyId, Joint, Model, forces};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector3};
 

@@ -1,4 +1,4 @@
-//! Mechanisms of any size, as code: what the scaling tests and benches measure.
+//! Mechanisms of any size, as code: models of the scaling tests and benches.
 //!
 //! A [`Topology`] names no formulation: bodies with centre, mass and inertia, and joints with place and angle. It can be read
 //! as rods with flexible joints between them ([`Topology::model`]) or as rods on pins ([`Topology::pinned`]). All are of 2 µm polysilicon
@@ -17,8 +17,8 @@
 
 use bimorph::equations::loads::Loads;
 use bimorph::multibody::forces::RestStrain;
+use bimorph::multibody::joint_coordinates::constrained_loops::{AddedInertia, Linkage, Reduction};
 use bimorph::multibody::planar::JointFrame;
-use bimorph::multibody::rcr::{AddedInertia, Linkage, Reduction};
 use bimorph::multibody::{Body, BodyId, BodyName, Drag, Joint, Model};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;

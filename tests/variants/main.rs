@@ -1,10 +1,10 @@
-//! Sweeps of variants: what they share (a mesh, the reading of the netlist, the steps of a run) changes no promise about any
-//! one of them.
+//! Sweeps of variants: shared data (a mesh, the parsed netlist, the steps of a run) change no guarantee about any one
+//! of them.
 
-mod lanes;
-mod listed;
+mod batch_transients;
+mod batched;
+mod point_lists;
 mod ports;
-mod together;
 
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, compile};
@@ -55,13 +55,13 @@ fn rows_are_within_the_tolerance_of_a_finer_mesh() {
             let scales = [finest[0].abs(), finest[1].hypot(finest[2]), finest[1].hypot(finest[2])];
             for (k, (x, r)) in numbers(row).iter().zip(numbers(reference)).enumerate() {
                 let (last, scale) = (finest[k], scales[k]);
-                // Richardson: what is left falls with the second order
+                // Richardson: the remainder falls with the second order
                 let f = last + (last - r) / 3.0;
                 assert!((f - last).abs() < 0.5 * tol * scale, "the reference is not converged: {r} {last}");
                 assert!((x - f).abs() <= tol * scale, "{tol}: {x} {f} {:?}", row.parameters);
             }
-            let told = row.estimated_error.expect("an estimate");
-            assert_eq!(row.warning.is_empty(), told <= 1.05 * tol, "{told} {}", row.warning);
+            let reported = row.estimated_error.expect("an estimate");
+            assert_eq!(row.warning.is_empty(), reported <= 1.05 * tol, "{reported} {}", row.warning);
         }
     }
     let coarse = CompileOptions { tol: 1e-4, segments: Some(2), ..CompileOptions::default() };
@@ -74,8 +74,8 @@ fn rows_are_within_the_tolerance_of_a_finer_mesh() {
     );
 }
 
-/// Which mesh a point takes does not depend on who else is in its shard: shards put together are the whole table, also where
-/// a part of the grid needs a finer mesh (forces up to F·l²/EI = 40) or has other beams.
+/// The mesh of a point does not depend on the other points of its shard. Shards put together are the whole table, also
+/// where a part of the grid needs a finer mesh (forces up to F·l²/EI = 40) or has other beams.
 #[test]
 fn shards_are_the_whole() {
     let text = format!("param more=0\n{BEAMS}if more\n[ tail beam2d p [t e] [l=20u w=1.5u oz=0] ]\n");
@@ -105,7 +105,7 @@ fn frequencies_hold_their_tolerance() {
             let (f, r) = (f.expect("a frequency"), r.expect("a frequency"));
             assert!((f / r - 1.0).abs() <= options.tol, "{f} {r} {:?}", row.parameters);
         }
-        assert!(row.estimated_error.is_some_and(|told| told <= options.tol), "{row:?}");
+        assert!(row.estimated_error.is_some_and(|reported| reported <= options.tol), "{row:?}");
     }
 }
 
@@ -166,14 +166,14 @@ fn sweeps_of_transients_are_runs_alone() {
         .collect();
     rows.sort_by_key(|row| row.point);
     assert_eq!(rows, whole.rows);
-    // a width that is none: its own error, and nobody else's
+    // an invalid width: its own error, and no other's
     let broken = swept(&text, &["w=-1u,2u", "F=1u,2u"], transients, &options, Shard::default());
     assert_eq!(broken.failed(), 2, "{}", broken.to_csv());
 }
 
-/// What a linear model leaves out is told for each row, as `static` and `pullin` tell it: on the
-/// shared mesh, on one of the row's own, and on given segments. A cantilever pressed with up to half of Euler's load; one
-/// pulled in one piece.
+/// Omissions of a linear model are reported for each row, as `static` and `pullin` report them: on the shared mesh, on
+/// one of the row's own, and on given segments. A cantilever pressed with up to half of Euler's load; one pulled in one
+/// piece.
 #[test]
 fn rows_tell_what_the_commands_tell() {
     let pressed = "param F=1u\nprocess p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\n\
@@ -183,26 +183,28 @@ fn rows_tell_what_the_commands_tell() {
     for segments in [None, Some(3)] {
         let options = CompileOptions { linear: true, segments, ..CompileOptions::default() };
         let table = swept(pressed, &["F=0:6.7u:3"], statics.clone(), &options, Shard::default());
-        let told: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("W041: the linear model")).collect();
-        assert_eq!(told, [false, true, true], "{:?}", table.rows);
+        let reported: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("W041: the linear model")).collect();
+        assert_eq!(reported, [false, true, true], "{:?}", table.rows);
     }
     // beyond Euler's load modes grow; a part that is pulled in, and one that stays closed
     let buckled = SweepAnalysis::Modes { count: 1, voltages: Vec::new() };
     let linear = CompileOptions { linear: true, ..CompileOptions::default() };
     let table = swept(pressed, &["F=1u,40u"], buckled, &linear, Shard::default());
-    let told: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("the equilibrium is unstable")).collect();
-    assert_eq!(told, [false, true], "{:?}", table.rows);
+    let reported: Vec<bool> =
+        table.rows.iter().map(|row| row.warning.contains("the equilibrium is unstable")).collect();
+    assert_eq!(reported, [false, true], "{:?}", table.rows);
     let plate = "param V=1\nanchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\n\
                  anchor * [e] [l=1u w=1u h=1u]\ngap plategap2d * [m e] [A=1e-8 gap=2u]\neground * [e] []\nVsrc * [m e] [V=V]\n";
     let outputs = vec!["m.x".to_owned()];
     let still = SweepAnalysis::Static { outputs, voltages: Vec::new() };
     let table = swept(plate, &["V=1,9"], still, &CompileOptions::default(), Shard::default());
-    let told: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("pulled in on the way")).collect();
-    assert_eq!(told, [false, true], "{:?}", table.rows);
+    let reported: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("pulled in on the way")).collect();
+    assert_eq!(reported, [false, true], "{:?}", table.rows);
 }
 
-/// Rows of transients tell how far the steps may be off in the middle of the grid, where that is beyond the tolerance: a part let go far
-/// that exchanges energy between its modes for milliseconds, and not one that has only begun to move.
+/// Rows of transients report the step error in the middle of the grid, where it is beyond the tolerance. This applies
+/// to a part released far that exchanges energy between its modes for milliseconds, and not to one that has only begun
+/// to move.
 #[test]
 fn rows_tell_how_far_their_steps_are_off() {
     let text = BEAMS;
@@ -212,12 +214,12 @@ fn rows_tell_how_far_their_steps_are_off() {
         let transients = SweepAnalysis::Transient { stop, outputs: outputs.clone(), voltages: Vec::new() };
         swept(text, &["F=50u,100u,200u"], transients, &options, Shard::default())
     };
-    let told = |table: &SweepTable| -> Vec<bool> {
-        table.rows.iter().map(|row| row.warning.contains("the steps in time may be off by")).collect()
+    let reported = |table: &SweepTable| -> Vec<bool> {
+        table.rows.iter().map(|row| row.warning.contains("the estimated error of the steps in time is")).collect()
     };
     let long = run(2e-3);
-    assert_eq!(told(&long), [true; 3], "{:?}", long.rows);
+    assert_eq!(reported(&long), [true; 3], "{:?}", long.rows);
     assert!(long.rows[0].warning.contains("in the middle of the grid"));
     let short = run(2e-6);
-    assert_eq!(told(&short), [false; 3], "{:?}", short.rows);
+    assert_eq!(reported(&short), [false; 3], "{:?}", short.rows);
 }

@@ -54,7 +54,7 @@ pub(crate) mod kind {
     pub(crate) const IF_VECTOR: c_int = 0x8000;
     /// SPICE: may be read, and `.sens` leaves it alone.
     pub(crate) const IF_ASK: c_int = 0x0020_1000;
-    /// SPICE: `show` leaves it out unless all is asked for.
+    /// SPICE: `show` omits it unless everything is requested.
     pub(crate) const IF_UNINTERESTING: c_int = 0x0200_0000;
     /// SPICE: may be read and set, and `.sens` leaves it alone.
     pub(crate) const IF_ASK_SET: c_int = 0x0020_3000;
@@ -109,7 +109,7 @@ pub(crate) union ParameterValue {
     pub(crate) string: *const c_char,
 }
 
-/// What a call says about the circuit. From 47 on two more doubles follow.
+/// Circuit data of a call. From 47 on two more doubles follow.
 #[repr(C)]
 pub(crate) struct CircuitArguments {
     pub(crate) init: c_int,
@@ -122,7 +122,7 @@ pub(crate) struct CircuitArguments {
     pub(crate) t: [f64; 8],
 }
 
-/// What follows [`CircuitArguments`] in a call.
+/// Data after [`CircuitArguments`] in a call.
 #[repr(C)]
 pub(crate) struct Tail {
     pub(crate) num_conn: c_int,
@@ -266,7 +266,7 @@ pub(crate) struct ParameterInfo43 {
     pub(crate) rest: ParameterInfoTail,
 }
 
-/// What both forms of a parameter declaration end with.
+/// End of both forms of a parameter declaration.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub(crate) struct ParameterInfoTail {

@@ -22,10 +22,10 @@ const GROWS: f64 = 3.0;
 /// Ratio of a step to the one before it below which a point has no derivative [1].
 const MIN_RATIO: f64 = 1e-3;
 
-/// What the accepted points of an instance show of its currents.
+/// Alternation of an instance's currents at its accepted points.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Alternation {
-    /// Length of the last step [s]; 0 where there is none since an equilibrium.
+    /// Length of the last step [s]; 0 without a step since an equilibrium.
     step: f64,
     ports: Vec<PortAlternation>,
 }
@@ -42,7 +42,7 @@ struct PortAlternation {
     range: [f64; 2],
     /// Points in a row at which the difference changed its sign by as much.
     points: u32,
-    /// What was reported, of its range [1].
+    /// Largest reported alternation, relative to its range [1].
     reported: f64,
 }
 
@@ -114,7 +114,7 @@ impl Alternation {
 mod tests {
     use super::*;
 
-    /// Reports of a charge q(t) at these times, its current off by `wrong` with the other sign at each step.
+    /// Reports for a charge q(t) at these times, with an error `wrong` of its current that alternates in sign.
     fn reports(q: impl Fn(f64) -> f64, i: impl Fn(f64) -> f64, wrong: f64, step: impl Fn(u32) -> f64) -> usize {
         let (mut found, mut t) = (Alternation::default(), 0.0);
         let base = |current: f64| Base { currents: vec![current], ..Base::default() };

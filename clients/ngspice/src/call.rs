@@ -2,8 +2,8 @@
 
 use crate::abi::{self, Complex, ConnectionData, InstanceHead, ModelHead, Tail, analysis, port, port_data};
 use crate::circuit::HostCircuit;
+use crate::evaluation::EvaluationRequest;
 use crate::layout::HostLayout;
-use crate::question::EvaluationRequest;
 use std::ffi::{CStr, c_char, c_int, c_void};
 
 /// Ports that are driven.
@@ -32,7 +32,7 @@ pub(crate) unsafe fn text(at: *const c_char) -> Option<String> {
 /// The instances of a list of models, in the host's order.
 ///
 /// # Safety
-/// `model` heads the host's list of models, which stays as it is as long as the iterator lives.
+/// `model` heads the host's list of models, which stays unchanged for the lifetime of the iterator.
 pub(crate) unsafe fn instances<'a>(model: *mut ModelHead) -> impl Iterator<Item = (&'a ModelHead, &'a InstanceHead)> {
     // SAFETY: by contract; the list ends in null.
     let models = std::iter::successors(unsafe { model.as_ref() }, |m| unsafe { m.next.as_ref() });
@@ -106,8 +106,8 @@ pub(crate) unsafe fn terminals(conn: *mut *mut ConnectionData, layout: &HostLayo
     }
 }
 
-/// By which of its functions the host wants the device loaded. It tells a code model the kind of the analysis, too, but
-/// that may be the kind of the one before: `.noise`, `.pz`, `.tf` and `.sens` do not set it.
+/// The function by which the host loads the device. The host also passes the kind of the analysis to a code model. It
+/// may be that of the previous one, since `.noise`, `.pz`, `.tf` and `.sens` do not set it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Wanted {
     /// Currents at these voltages.
@@ -118,7 +118,7 @@ pub(crate) enum Wanted {
 
 /// One call of the model by the host.
 pub(crate) struct ModelCall<'a> {
-    told: &'a abi::CircuitArguments,
+    arguments: &'a abi::CircuitArguments,
     tail: &'a Tail,
     circuit: HostCircuit,
     wanted: Wanted,
@@ -134,15 +134,15 @@ impl ModelCall<'_> {
     pub(crate) unsafe fn new(data: *mut c_void, layout: &HostLayout, circuit: HostCircuit, wanted: Wanted) -> Self {
         // SAFETY: by contract.
         unsafe {
-            let told = &*data.cast::<abi::CircuitArguments>();
+            let arguments = &*data.cast::<abi::CircuitArguments>();
             let tail = &*data.cast::<u8>().add(layout.call_tail()).cast::<Tail>();
             let as_39 = partial_at_80(tail.conn);
             let partial = port_data::PARTIAL_39 + if as_39 { 0 } else { 8 };
-            Self { told, tail, circuit, wanted, partial, matrix: layout.port_matrix(as_39) }
+            Self { arguments, tail, circuit, wanted, partial, matrix: layout.port_matrix(as_39) }
         }
     }
 
-    /// What names the instance: its connections stay at one address as long as it lives.
+    /// Key of the instance: its connections stay at one address for its lifetime.
     pub(crate) fn key(&self) -> usize {
         self.tail.conn as usize
     }
@@ -164,15 +164,15 @@ impl ModelCall<'_> {
         (!vector.is_null()).then(|| unsafe { vector.add(memory.first) })
     }
 
-    /// What is asked, or why it cannot be told. The circuit's step and the difference of the two times are the same up to
-    /// the rounding of the times.
+    /// The request, or the reason why it is unknown. The circuit's step and the difference of the two times are the
+    /// same up to the rounding of the times.
     pub(crate) fn question(&self) -> Result<EvaluationRequest, &'static str> {
-        let (c, delta) = (self.told, self.circuit.delta());
+        let (c, delta) = (self.arguments, self.circuit.delta());
         if self.wanted == Wanted::Small {
-            let told = (c.anal_type == analysis::AC).then_some(c.frequency);
-            return match told.or_else(|| self.circuit.omega()) {
+            let arguments = (c.anal_type == analysis::AC).then_some(c.frequency);
+            return match arguments.or_else(|| self.circuit.omega()) {
                 Some(omega) => Ok(EvaluationRequest::SmallSignal { omega }),
-                None => Err("this ngspice does not tell code models the frequency in this analysis; use .ac"),
+                None => Err("this ngspice does not give code models the frequency in this analysis; use .ac"),
             };
         }
         if c.anal_type != analysis::TRAN || !self.circuit.transient() {
@@ -190,12 +190,12 @@ impl ModelCall<'_> {
 
     /// Currents are wanted, but the host loads as for a small signal: without inputs, and without right-hand sides.
     fn large_as_small(&self) -> bool {
-        self.wanted == Wanted::Large && self.told.anal_type == analysis::AC
+        self.wanted == Wanted::Large && self.arguments.anal_type == analysis::AC
     }
 
     /// Admittances are wanted, but the host loads as for currents: without imaginary parts.
     fn small_as_large(&self) -> bool {
-        self.wanted == Wanted::Small && self.told.anal_type != analysis::AC
+        self.wanted == Wanted::Small && self.arguments.anal_type != analysis::AC
     }
 
     /// Number of ports of a connection.
@@ -237,8 +237,9 @@ impl ModelCall<'_> {
         unsafe { self.port(PORTS, n).add(port_data::INPUT).cast() }
     }
 
-    /// Port voltages, or currents where these are given. The host's are not right where it takes the load for a small signal, and it does not know those that
-    /// a transient starts from (`uic`); what is read instead is given to it, too, now and for the first step.
+    /// Port voltages, or currents where these are given. The host's values are wrong where it takes the load for a
+    /// small signal, and it does not know the initial values of a transient (`uic`). The values read instead are also
+    /// written back to it, now and for the first step.
     pub(crate) fn voltages(&self, into: &mut Vec<f64>) {
         into.clear();
         let given = self.wanted == Wanted::Large && self.circuit.given();

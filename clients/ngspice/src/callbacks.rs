@@ -6,12 +6,12 @@
 use crate::abi::{self, ModelHead, code};
 use crate::call::{self, ModelCall, Wanted};
 use crate::circuit::HostCircuit;
-use crate::opening::open_all;
-use crate::question::EvaluationOutcome;
+use crate::evaluation::EvaluationOutcome;
+use crate::instance_setup::open_all;
 use crate::registry::{close, registry};
 use crate::respond::{moves, respond, settle};
 use crate::table::{DEVICE, LAYOUT};
-use crate::{host, noise, panics, told, trace};
+use crate::{host, noise, panics, reported, trace};
 use std::ffi::{c_int, c_void};
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,7 +21,7 @@ fn guarded(body: impl FnOnce() -> c_int) -> c_int {
     catch_unwind(AssertUnwindSafe(body)).unwrap_or(code::PANIC)
 }
 
-/// Leaves the reason of a stop where `BIMORPH_FAILURE` says, for whoever started ngspice.
+/// Writes the reason of a stop to the file that `BIMORPH_FAILURE` names, for the program that started ngspice.
 fn record_failure(text: &str) {
     if let Some(path) = std::env::var_os("BIMORPH_FAILURE") {
         let _ = std::fs::write(path, text);
@@ -40,7 +40,7 @@ pub(crate) unsafe extern "C" fn model_delete(model: *mut ModelHead) -> c_int {
     guarded(|| unsafe { host::model_delete(model) })
 }
 
-/// Reads an instance parameter: what `show` and `@a1[…]` show.
+/// Reads an instance parameter for `show` and `@a1[…]`.
 pub(crate) unsafe extern "C" fn ask(
     _circuit: *mut c_void,
     instance: *mut abi::InstanceHead,
@@ -70,10 +70,10 @@ pub(crate) unsafe extern "C" fn model_ask(
     guarded(|| unsafe { host::model_ask(circuit, model, index, value) })
 }
 
-/// Tests convergence. Derivatives are exact here, so the host's own test of voltages and currents is enough; its test of
-/// integrals would cost one more iteration at every point. It comes where those have converged: of an equilibrium this is
-/// the last that is heard. What ngspice then writes is the solution before the last one, so that monitors of an equilibrium would
-/// carry `reltol`: they are iterated until they stand still.
+/// Tests convergence. Derivatives are exact here, so the host's own test of voltages and currents is enough; its test
+/// of integrals would cost one more iteration at every point. It comes where those have converged: of an equilibrium
+/// this is the last that is heard. ngspice then writes the solution before the last one, so that monitors of an
+/// equilibrium would have an error of `reltol`. They are therefore iterated until they stop changing.
 pub(crate) unsafe extern "C" fn convergence_test(model: *mut ModelHead, circuit: *mut c_void) -> c_int {
     guarded(|| {
         let Some(layout) = LAYOUT.get() else { return code::PANIC };
@@ -89,7 +89,7 @@ pub(crate) unsafe extern "C" fn convergence_test(model: *mut ModelHead, circuit:
         for (_, instance) in unsafe { call::instances(model) } {
             if let Some(entry) = registry.find(instance.conn as usize) {
                 let warnings = entry.instance.settled(entry.sweeping);
-                told::of_instance(entry.instance.name(), &warnings);
+                reported::of_instance(entry.instance.name(), &warnings);
             }
         }
         code::OK
@@ -303,7 +303,7 @@ pub(crate) unsafe extern "C" fn accept(circuit: *mut c_void, model: *mut ModelHe
             if let Some(entry) = registry.find(instance.conn as usize) {
                 settle(entry, circuit);
                 let warnings = entry.instance.accept();
-                told::of_instance(entry.instance.name(), &warnings);
+                reported::of_instance(entry.instance.name(), &warnings);
             }
         }
         code::OK

@@ -1,8 +1,7 @@
-//! What is read of ngspice's circuit (`CKTcircuit`): the step, what is being analysed, the two solutions of Newton's
-//! iteration.
+//! Reader of ngspice's circuit (`CKTcircuit`): the step, the analysis, the two solutions of Newton's iteration.
 //!
-//! Code models are told the kind of an analysis by whoever set it last, and `.noise`, `.pz`, `.tf` and `.sens` do not set
-//! it. The circuit's own mode is right at every call.
+//! Code models receive the kind of the analysis that set it last, and `.noise`, `.pz`, `.tf` and `.sens` do not set it.
+//! The circuit's own mode is right at every call.
 
 use crate::companion::DifferentiationRule;
 use crate::layout::{Generation, HostLayout};
@@ -68,7 +67,7 @@ impl HostCircuit {
         Self { base: at as usize, layout: *layout }
     }
 
-    /// What stands at an offset.
+    /// The value at an offset.
     fn read<T: Copy>(self, offset: usize) -> T {
         // SAFETY: by the contract of `new` the circuit is there; it is larger than every offset used here from 39 to 47.
         unsafe { ((self.base + offset) as *const T).read() }
@@ -89,8 +88,8 @@ impl HostCircuit {
         }
     }
 
-    /// The mode word. ngspice 45 and 46 cannot be told apart, and 46 has it one word further on: there the word that can
-    /// be a mode counts.
+    /// The mode word. ngspice 45 and 46 cannot be distinguished, and 46 has it one word further on: there the word with
+    /// a valid mode counts.
     fn mode_offset(self) -> usize {
         let valid = |word: u64| {
             word & !bit::ALL == 0 && (word & bit::KINDS).is_power_of_two() && (word & bit::STAGES).is_power_of_two()

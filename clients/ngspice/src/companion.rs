@@ -8,12 +8,13 @@
 //! Gear's method     i = (1 + κ)·(q − q₁)/h + κ·(q₂ − q₁)/h₁,     κ = h/(h + h₁)          (BDF2, also where `maxord` is higher)
 //! ```
 //!
-//! **It has to be ngspice's rule, step by step.** A node between this charge and a capacitor keeps its charge because both sum the same current in
-//! the same way; with any other rule of the same order, damped or undamped, what is left over at each step adds up: an island of a plate and a capacitor
-//! lost nine tenths of its charge in a hundred cycles. So ngspice drops to first order where it does, at the first step and after each breakpoint,
-//! and `method` and `xmu` count here, too. The trapezoidal rule turns a tank of an inductor and a charge by an angle, whatever the lengths of
-//! the steps: a swing keeps its height. What a current remembers wrongly it keeps, with the other sign at each step, as in any capacitor of
-//! ngspice; `xmu` below ½ lets it fade.
+//! **It must be ngspice's rule, step by step.** A node between this charge and a capacitor keeps its charge because
+//! both integrate the same current in the same way. With any other rule of the same order, damped or undamped, the
+//! residuals of the steps add up: an island of a plate and a capacitor lost nine tenths of its charge in a hundred
+//! cycles. So ngspice drops to first order where it does, at the first step and after each breakpoint, and `method` and
+//! `xmu` count here, too. The trapezoidal rule turns a tank of an inductor and a charge by an angle, whatever the
+//! lengths of the steps: a swing keeps its height. An error of a current persists with alternating sign, as in any
+//! capacitor of ngspice; `xmu` below ½ damps it.
 //!
 //! **Steps of rounding.** Around a source's corner ngspice takes steps of 10⁻¹⁸ s, over which a charge changes by no more than its own rounding, and by
 //! which no conductance may be divided. Where [`hidden`] says so the current is the last one, plus what the charge departs from that line over the
@@ -60,7 +61,7 @@ pub struct Companion {
 }
 
 impl Companion {
-    /// For a step `h` [s] by a rule, after a step of `before` [s]; 0 where there was none since the slope changed.
+    /// For a step `h` [s] by a rule, after a step of `before` [s]; 0 without a step since the last change of slope.
     pub fn new(rule: DifferentiationRule, h: f64, before: f64) -> Self {
         match rule {
             DifferentiationRule::Trapezoidal(mu) => {
@@ -113,7 +114,7 @@ mod tests {
         }
     }
 
-    /// A constant charge drives no current. What was wrong before stays as long as the deck's `xmu` lets it.
+    /// A constant charge drives no current. A previous error persists as long as the deck's `xmu` permits.
     #[test]
     fn a_constant_charge_drives_no_current() {
         for rule in [DifferentiationRule::First, DifferentiationRule::Trapezoidal(0.5), DifferentiationRule::Gear] {
@@ -127,8 +128,8 @@ mod tests {
         assert!(after(0.5, 10) == 1.0 && after(0.45, 12).abs() < 0.1);
     }
 
-    /// A step of a few roundings of the time hides the slope of a comb of 0.2 pC and 0.1 nA, one of a picosecond at 1 s that of no pulse of 1 mA;
-    /// neither does the first step, nor an empty charge.
+    /// A step of a few roundings of the time hides the slope of a comb of 0.2 pC and 0.1 nA. A step of a picosecond at
+    /// 1 s does not hide a pulse of 1 mA. The first step and an empty charge hide nothing.
     #[test]
     fn steps_of_rounding_are_too_short() {
         assert!(hidden((64e-6, 1e-18), 2e-13, 1e-10) && !hidden((64e-6, 1e-12), 2e-13, 1e-10));

@@ -20,9 +20,9 @@ pub enum DeckValue {
 pub struct Declared {
     /// Its name.
     pub name: &'static str,
-    /// What it reads where the line does not say it.
+    /// Value where the line omits it.
     pub default: DeckValue,
-    /// What it means, with its unit.
+    /// Meaning, with its unit.
     pub text: String,
 }
 

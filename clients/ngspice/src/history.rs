@@ -1,9 +1,9 @@
-//! What an instance remembers of an accepted point, kept in memory that ngspice itself rolls back.
+//! History of an instance at an accepted point, in memory that ngspice itself rolls back.
 //!
 //! ngspice hands out state memory per instance and rotates it with the accepted points, so a rejected step needs no
 //! undoing. That memory is not trustworthy by itself: before the first operating point it holds anything, and node
-//! damping blends the doubles of two states into numbers that never were. Each record therefore carries a check over
-//! its own bits; a record that does not check is none.
+//! damping blends the doubles of two states into numbers that never were. Each record therefore has a checksum over its
+//! own bits; a record with a wrong one is ignored.
 //!
 //! Doubles: check, token, step; then p charges at this point, at the last two bases, p currents at the last, and p largest currents.
 
@@ -15,20 +15,20 @@ use bimorph::device::Token;
 pub struct History {
     /// State of the device; none where the memory holds no record.
     pub token: Option<Token>,
-    /// What charges are differentiated from.
+    /// Base for differentiating charges.
     pub base: Base,
     /// Charge of each port [C].
     pub charges: Vec<f64>,
 }
 
-/// The last two points far enough apart to tell a slope, the last one first, see [`crate::companion`].
+/// The last two points far enough apart to give a slope, the last one first, see [`crate::companion`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Base {
-    /// Time between them [s]; 0 where there is none since an operating point, or since the slope changed.
+    /// Time between them [s]; 0 without a step since an operating point, or since the slope changed.
     pub step: f64,
     /// Charges at each [C].
     pub charges: [Vec<f64>; 2],
-    /// What the charges' change makes of currents at the last one [A].
+    /// Currents from the change of charges at the last one [A].
     pub currents: Vec<f64>,
     /// The largest of those so far [A].
     pub peaks: Vec<f64>,
@@ -113,7 +113,7 @@ pub fn write(memory: &mut [f64], epoch: u64, token: Token, charges: &[f64], base
     memory[0] = check(epoch, &memory[1..]);
 }
 
-/// Reads a record into `history`; without a valid one its token is none and its charges are zero.
+/// Reads a record into `history`; without a valid one, its token is `None` and its charges are zero.
 pub fn read(memory: &[f64], epoch: u64, history: &mut History) {
     let ports = (memory.len() - HEAD) / 5;
     let valid = memory[0].to_bits() == check(epoch, &memory[1..]).to_bits();
@@ -146,7 +146,8 @@ mod tests {
         Base { step: 1e-9 * seed, charges, currents: vec![7e-6, -1e-6], peaks: vec![8e-6, 1e-6] }
     }
 
-    /// Over points a rounding of the time apart the current goes on as it was, by every rule, and so it does after them.
+    /// Over points a rounding of the time apart the current stays unchanged, by every rule, and continues so after
+    /// them.
     #[test]
     fn steps_of_rounding_are_crossed() {
         let q = |t: f64| vec![1e-13 + 2e-15 * t / 1e-6];
@@ -195,7 +196,7 @@ mod tests {
         memory
     }
 
-    /// What was written is read back.
+    /// A written record is read back unchanged.
     #[test]
     fn round_trip() {
         let mut history = History::default();

@@ -7,7 +7,7 @@ use std::ffi::{CString, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// The host's table of function pointers; null until it has been handed over.
+/// The host's table of function pointers; null until the host passes it.
 #[repr(transparent)]
 pub(crate) struct Core(UnsafeCell<*const *const c_void>);
 
@@ -84,7 +84,7 @@ pub(crate) unsafe fn load(model: *mut ModelHead, circuit: *mut c_void) -> c_int 
     unsafe { CORE.function::<OverModel>(slot::LOAD)(model, circuit) }
 }
 
-/// Tells the host that a double of this point's memory is an integral, so that its truncation error bounds the steps.
+/// Declares a double of this point's memory as an integral to the host, so that its truncation error bounds the steps.
 /// The double is overwritten. False where the host does not take it now.
 ///
 /// # Safety
@@ -113,8 +113,8 @@ pub(crate) unsafe fn message(text: &str) {
     }
 }
 
-/// Whether the host is ngspice 42 to 44: there the function in [`HostLayout::telling_slot`] tells a circuit, from 45 on the
-/// folder of the deck or null. Asked once, since a host does not change.
+/// Whether the host is ngspice 42 to 44. There the function in [`HostLayout::telling_slot`] returns a circuit, from 45
+/// on the folder of the deck or null. Asked once, since a host does not change.
 ///
 /// # Safety
 /// To be called from within a call of the host, with its layout and the circuit it passed.
@@ -123,10 +123,11 @@ pub(crate) unsafe fn until_44(layout: &HostLayout, circuit: *mut c_void) -> bool
     let Some(slot) = layout.telling_slot() else { return layout.generation < Generation::Since43 };
     *ANSWER.get_or_init(|| {
         // SAFETY: in each of these hosts the function takes nothing and answers a pointer it owns, or null.
-        let told = unsafe { CORE.function::<unsafe extern "C" fn() -> *mut c_void>(slot)() };
-        // Another circuit than this one is none whose bytes name a folder.
-        // SAFETY: a circuit, whose first pointers hold zero bytes, or a text.
-        told == circuit || unsafe { crate::call::text(told.cast()) }.is_some_and(|text| !Path::new(&text).is_dir())
+        let reported = unsafe { CORE.function::<unsafe extern "C" fn() -> *mut c_void>(slot)() };
+        // Another circuit than this one is excluded by checking whether its bytes name a folder. SAFETY: a circuit,
+        // whose first pointers hold zero bytes, or a text.
+        reported == circuit
+            || unsafe { crate::call::text(reported.cast()) }.is_some_and(|text| !Path::new(&text).is_dir())
     })
 }
 

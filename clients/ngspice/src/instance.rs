@@ -1,13 +1,13 @@
-//! One `A` device: asks its [`Device`] what ngspice's calls ask, and decides what becomes of an answer that is none.
+//! One `A` device: maps ngspice's calls to requests of its [`Device`], and decides the treatment of failed evaluations.
 //!
 //! Nothing here knows ngspice's memory; `crate::call` copies between the two. State that must follow accepted and
-//! rejected steps lives in a [`History`], which the host rolls back; what stays here is only a cache or a count.
+//! rejected steps is in a [`History`], which the host rolls back; the rest here is only a cache or a count.
 
 use crate::alternation::Alternation;
 use crate::companion::DifferentiationRule;
+use crate::evaluation::{Evaluation, EvaluationOutcome, EvaluationRequest};
+use crate::failed_evaluations::FailedEvaluations;
 use crate::history::History;
-use crate::question::{Evaluation, EvaluationOutcome, EvaluationRequest};
-use crate::refusals::FailedEvaluations;
 use crate::settings::{Monitor, PortName};
 use bimorph::device::scale::PortScale;
 use bimorph::device::{
@@ -24,14 +24,14 @@ pub struct Instance {
     description: Description,
     /// Of each port.
     pub(crate) scales: Vec<PortScale>,
-    /// What is given to each port, in its own unit.
+    /// Input of each port, in its own unit.
     pub(crate) given: Vec<f64>,
     pub(crate) reply: TrialReply,
     answer: Evaluation,
     small: SmallSignal,
     small_key: Option<(Token, u64)>,
     accepted: Option<Token>,
-    /// The last equilibrium whose warnings were asked for.
+    /// The last equilibrium whose warnings were read.
     looked: Option<Token>,
     step_bound: f64,
     refusals: FailedEvaluations,
@@ -39,23 +39,23 @@ pub struct Instance {
     pub(crate) counts: InstanceCounters,
 }
 
-/// What an instance has been asked since it was opened.
+/// Counters of an instance's evaluations since it was opened.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct InstanceCounters {
     /// Points that the circuit accepted.
     pub(crate) points: u64,
-    /// Questions for currents.
+    /// Evaluations of currents.
     pub(crate) trials: u64,
     /// Those without an answer.
     pub(crate) refused: u64,
 }
 
 impl Instance {
-    /// Opens `device` for an instance. `branches` tells for each port whether it is one whose current is given (`%hd`). No
-    /// `names` stand for every port of the netlist.
+    /// Opens `device` for an instance. `branches` is true for each port with a current as its input (`%hd`). No `names`
+    /// stand for every port of the netlist.
     ///
     /// # Errors
-    /// What the device refuses, a wrong number of ports, or a connection that does not suit a port.
+    /// Errors of the device, a wrong number of ports, or a connection that does not suit a port.
     pub fn open(
         name: &str,
         mut device: Box<dyn Device>,
@@ -136,23 +136,23 @@ impl Instance {
         &self.name
     }
 
-    /// What was opened.
+    /// Description of the opened device.
     pub fn description(&self) -> &Description {
         &self.description
     }
 
-    /// The last answer to a static or transient question.
+    /// The last static or transient evaluation.
     pub fn answer(&self) -> &Evaluation {
         &self.answer
     }
 
-    /// What the last small-signal answer says of port `row` over the ports.
+    /// Last small-signal admittances of port `row` over the ports.
     pub fn admittances(&self, row: usize) -> impl Iterator<Item = [f64; 2]> {
         let ports = self.scales.len();
         self.over_ports(self.scales[row].answered, &self.small.admittance[row * ports..(row + 1) * ports])
     }
 
-    /// What it says of monitor `row`.
+    /// Last small-signal response of monitor `row`.
     pub fn monitor_responses(&self, row: usize) -> impl Iterator<Item = [f64; 2]> {
         let ports = self.scales.len();
         self.over_ports(self.monitors[row].scale, &self.small.outputs[row * ports..(row + 1) * ports])
@@ -191,7 +191,7 @@ impl Instance {
         }
     }
 
-    /// Tells the device that the circuit accepted its last state, and what that warns of.
+    /// Accepts the device's last state for the circuit, and returns its warnings.
     pub fn accept(&mut self) -> Vec<Diagnostic> {
         let Some(token) = self.answer.token.filter(|t| self.accepted != Some(*t)) else { return Vec::new() };
         let mut warnings = self.device.warns(token);
@@ -203,7 +203,7 @@ impl Instance {
         warnings
     }
 
-    /// What its last equilibrium warns of, where the circuit has converged there, in a sweep or at an operating point.
+    /// Warnings about its last equilibrium, where the circuit has converged there, in a sweep or at an operating point.
     pub fn settled(&mut self, sweeping: bool) -> Vec<Diagnostic> {
         // a test of convergence comes again where another part has not settled
         let still = self.answer.token.filter(|_| self.answer.step == 0.0 && self.looked != self.answer.token);
@@ -292,7 +292,7 @@ impl Instance {
         format!("no equilibrium at {}: {why}{hint}", ports.join(", "))
     }
 
-    /// Turns the reply into what ngspice wants; charges into currents where time passes.
+    /// Converts the reply for ngspice; charges become currents in a transient.
     fn fill(&mut self, time: Option<(DifferentiationRule, f64, f64)>, previous: &History) {
         let (reply, answer) = (&self.reply, &mut self.answer);
         let ports = reply.charges.len();

@@ -2,7 +2,7 @@
 //!
 //! A host registers a code model before it hands out its function table. While registering, it stores two pointers to
 //! its own constants (size of an instance, size of a model) into the device table, at the offsets at which *it* has
-//! these fields. The offset tells the build flags, the size tells the generation:
+//! these fields. The offset identifies the build flags, and the size the generation:
 //!
 //! | | 39…41 | 42…46 | 47 |
 //! |---|---|---|---|
@@ -12,7 +12,7 @@
 
 use thiserror::Error;
 
-/// Words in the device table that is handed out; larger than any host's.
+/// Words in the device table of the plug-in; larger than any host's.
 pub const TABLE_WORDS: usize = 64;
 
 /// The first word that is left empty for the host.
@@ -64,8 +64,8 @@ pub enum HostLayoutError {
 }
 
 impl HostLayout {
-    /// Finds the layout from the device table after registration. `size_at` reads the number a word points to;
-    /// `version` is the host's major version where the user gave one, which tells 42 from 43.
+    /// Finds the layout from the device table after registration. `size_at` reads the number a word points to.
+    /// `version` is the host's major version where the user gave one, which distinguishes 42 from 43.
     ///
     /// # Errors
     /// [`HostLayoutError`] for a host that is not known.
@@ -115,14 +115,14 @@ impl HostLayout {
         }
     }
 
-    /// Slot of the function that tells the circuit in ngspice 42 to 44, and the deck's directory from 45 on; none where
-    /// the generation tells all there is to know.
+    /// Slot of the function that returns the circuit in ngspice 42 to 44, and the deck's directory from 45 on; `None`
+    /// where the generation alone is sufficient.
     pub fn telling_slot(&self) -> Option<usize> {
         (self.generation == Generation::Since43).then_some(49)
     }
 
     /// First of the three slots by which a host with KLU binds matrix entries; none for hosts that have no KLU.
-    /// `until_44`: what [`Self::telling_slot`] tells.
+    /// `until_44`: result of the function in [`Self::telling_slot`].
     pub fn bind_slot(&self, until_44: bool) -> Option<usize> {
         match self.generation {
             Generation::Since39 => None,
@@ -148,8 +148,8 @@ impl HostLayout {
         self.generation >= Generation::Since43
     }
 
-    /// Slot of the host's function that tells the deck's directory. `partial_at_80`: the host keeps a port's partials
-    /// where ngspice 39 does; `until_44`: what [`Self::telling_slot`] tells.
+    /// Slot of the host's function that returns the deck's directory. `partial_at_80`: the host keeps a port's partials
+    /// where ngspice 39 does; `until_44`: result of the function in [`Self::telling_slot`].
     pub fn deck_path_slot(&self, partial_at_80: bool, until_44: bool) -> usize {
         match self.generation {
             Generation::Since39 if partial_at_80 => 45,

@@ -9,12 +9,13 @@
 //! ```
 //!
 //! # Layout
-//! What ngspice's memory looks like: `abi` the structures, [`layout`] which host this is, `table` what the plug-in
-//! declares, `exports` the symbols, `host` the host's functions, `call` one call's data,
-//! `circuit` what it is part of, `look_table` what can be asked of it by name. Between the two sides stand
-//! `callbacks`, `opening` and `respond`, with the `registry` of instances. What does not know ngspice: [`model_card`],
-//! [`settings`], [`deck_options`] and `names` the `.model` line, [`opener`] from line to device, [`instance`] questions and outcomes,
-//! [`companion`] charges to currents, [`bimorph::device::scale`] volts to micrometres, [`history`] what an accepted point leaves behind.
+//! Modules that know ngspice's memory: `abi` has the structures, [`layout`] detects the host, `table` has the
+//! declarations of the plug-in, and `exports` the symbols. `host` has the host's functions, `call` the data of one
+//! call, `circuit` its circuit, and `query_table` the quantities that can be queried by name. Between the two sides
+//! stand `callbacks`, `instance_setup` and `respond`, with the `registry` of instances. Modules independent of ngspice:
+//! [`model_card`], [`settings`], [`deck_options`] and `names` read the `.model` line, and [`opener`] opens the device.
+//! [`instance`] has requests and outcomes, [`companion`] converts charges to currents, [`bimorph::device::scale`] volts
+//! to micrometres, and [`history`] stores accepted points.
 //!
 //! This is the only crate of the project with `unsafe` code; each block says why it holds.
 
@@ -28,27 +29,27 @@ mod callbacks;
 mod circuit;
 pub mod companion;
 pub mod deck_options;
+pub mod evaluation;
 mod exports;
+mod failed_evaluations;
 pub mod history;
 mod host;
 pub mod instance;
+mod instance_setup;
 pub mod layout;
-mod look;
-mod look_table;
 pub mod model_card;
 mod names;
 mod noise;
 pub mod opener;
-mod opening;
 mod panics;
 mod parameters;
-pub mod question;
-mod refusals;
+mod queries;
+mod query_table;
 mod registry;
+mod reported;
 mod respond;
 pub mod settings;
 mod table;
-mod told;
 mod trace;
 
 pub use opener::{Opener, set_opener};

@@ -1,4 +1,4 @@
-//! The `.model` line of a device: what was given, checked and with its defaults.
+//! The `.model` line of a device: parameters, checked and with defaults.
 
 use crate::deck_options::{self, DeckValue};
 use crate::settings::{self, Monitor, PortName};
@@ -30,7 +30,7 @@ pub struct RawCard {
     pub seed: Option<f64>,
     /// `noise_band` [Hz]
     pub noise_band: Option<f64>,
-    /// The options of the model, in the order of [`MODEL`]; those that were left out are none.
+    /// The options of the model, in the order of [`MODEL`]; omitted ones are `None`.
     pub options: Vec<Option<DeckValue>>,
 }
 
@@ -57,7 +57,7 @@ pub struct ModelCard {
     pub noise: Option<Agitation>,
 }
 
-/// What is wrong with a `.model` line.
+/// Errors of a `.model` line.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CardError {
     /// No netlist was named.
@@ -112,7 +112,7 @@ pub enum CardError {
 /// Longest wait for a server's answer unless `deadline` says otherwise [s].
 pub const DEADLINE: f64 = 5.0;
 
-/// The agitation that a line asks for. A band of 0 is none.
+/// The agitation that a line specifies. A band of 0 means unset.
 fn agitation(raw: &RawCard) -> Result<Agitation, CardError> {
     let seed = raw.seed.unwrap_or(1.0);
     if !((0.0..=2f64.powi(53)).contains(&seed) && seed.fract() == 0.0) {
@@ -262,7 +262,7 @@ mod tests {
         assert_eq!(card.check_counts(2, 0), Err(CardError::Count { what: "monitors", names: 1, nodes: 0 }));
     }
 
-    /// What cannot be used is refused with its value.
+    /// Invalid values are rejected by value.
     #[test]
     fn refusals() {
         assert_eq!(ModelCard::new(&RawCard::default(), None), Err(CardError::NoFile));

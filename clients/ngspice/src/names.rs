@@ -24,8 +24,8 @@ fn alike<'a>(wanted: &str, candidates: impl Iterator<Item = &'a str>) -> Option<
     close.find(|other| *other != first).map(|other| [first, other])
 }
 
-/// Names of ports, monitors and settings on a line that cannot be told apart in small letters, as ngspice 39 passes them on: what the line says, and
-/// two of the netlist's names.
+/// Names of ports, monitors and settings on a line that differ only by case, since ngspice 39 passes them in lower
+/// case: the text of the line, and two of the netlist's names.
 pub(crate) fn ambiguous(card: &ModelCard, structure: &Structure, parameters: &[&str]) -> Option<(String, [String; 2])> {
     let ports = || structure.ports.iter().map(|p| p.name.as_str());
     let found = |wanted: &str, pair: [&str; 2]| (wanted.to_owned(), pair.map(str::to_owned));
@@ -98,7 +98,7 @@ pub(crate) fn respell_settings<'a>(card: &mut ModelCard, parameters: impl Iterat
     }
 }
 
-/// What is at `path`, or else the only thing whose path differs from it in case alone.
+/// The file at `path`, or else the only one whose path differs from it in case alone.
 pub(crate) fn existing(path: &Path) -> Option<PathBuf> {
     if path.exists() {
         return Some(path.to_owned());
@@ -158,18 +158,18 @@ mod tests {
         assert_eq!(set, ["Width", "w"]);
     }
 
-    /// Names that differ in case alone are told where the line has small letters, which may stand for either.
+    /// Names that differ in case alone are reported where the line is in lower case, which may mean either.
     #[test]
     fn names_that_differ_in_case_alone() {
         let text = NETLIST
             .replace("mass2d * [Yoke]", "mass2d * [yoke] [m=1e-10]\nspring2d * [F yoke] [kx=1]\nmass2d * [Yoke]");
         let loaded = load(&Bundle::from_text("n", &text), &[]).unwrap_or_else(|d| panic!("{d}"));
-        let told = |monitor: &str| {
+        let split = |monitor: &str| {
             let raw = RawCard { file: Some("n".into()), monitors: vec![monitor.to_owned()], ..RawCard::default() };
             ambiguous(&ModelCard::new(&raw, None).unwrap(), &loaded.structure, &[])
         };
-        assert_eq!(told("yoke.x").map(|(name, _)| name), Some("yoke".to_owned()));
-        assert_eq!((told("Yoke.x"), told("f.x")), (None, None));
+        assert_eq!(split("yoke.x").map(|(name, _)| name), Some("yoke".to_owned()));
+        assert_eq!((split("Yoke.x"), split("f.x")), (None, None));
     }
 
     /// A lower-cased path finds its file, but not where two files differ in case alone.

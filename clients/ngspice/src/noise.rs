@@ -1,9 +1,9 @@
-//! `.noise`: what the part adds to the noise at the circuit's output.
+//! `.noise`: contribution of the part to the noise at the circuit's output.
 //!
-//! ngspice solves the circuit's adjoint at each frequency, which gives the effect on the output of a current into each node and
-//! of a voltage in each branch, and asks every kind of device for its share. The table that the plug-in hands over is its
-//! own, so this works on every version, although code models as such have noise from 47 on only, and there without
-//! correlation. With g the adjoint at the ports and monitors and S their spectral densities
+//! ngspice solves the circuit's adjoint at each frequency, which gives the effect on the output of a current into each
+//! node and of a voltage in each branch, and asks every kind of device for its share. The table that the plug-in
+//! registers is its own, so that this works on every version. Code models as such have noise from 47 on only, and there
+//! without correlation. With g the adjoint at the ports and monitors and S their spectral densities
 //! ([`bimorph::device::Device::noise`]), the share is gᵀ·S·ḡ: ports that swing together are taken together.
 
 use crate::abi::ModelHead;
@@ -15,14 +15,15 @@ use crate::registry::{RegisteredInstance, registry};
 use bimorph::device::{DeviceError, Token};
 use std::ffi::{c_int, c_void};
 
-/// What the host asks for: the density at a frequency, and not the sums at the end.
+/// Request of the host: the density at a frequency, not the sums at the end.
 const DENSITY: c_int = 1;
 /// In the middle of an analysis: not at its begin or end.
 const CALCULATE: c_int = 2;
 
 /// Densities below this are nothing [V²/Hz or A²/Hz]: the host takes no logarithms of less.
 const LEAST: f64 = 1e-38;
-/// Slopes of a density over the frequency, both in logarithms, that are none; and as close to −1.
+/// Slopes of a density over the frequency, both in logarithms, below which they count as zero; and the same distance
+/// from −1.
 const FLAT: f64 = 1e-10;
 
 /// The host's data of a noise analysis, in part: the same from SPICE 3 on.
@@ -56,7 +57,7 @@ fn integral(before: [f64; 2], now: [f64; 2]) -> f64 {
 /// Adds the share of these models' instances to `density` and to the integrals.
 ///
 /// # Errors
-/// What the user is told.
+/// The message for the user.
 ///
 /// # Safety
 /// The arguments are those with which the host called the plug-in, in its layout.
@@ -102,13 +103,13 @@ pub(crate) unsafe fn add(
 
 /// The share of one instance in the density at the output.
 fn share(entry: &mut RegisteredInstance, gains: &[[f64; 2]], frequency: f64) -> Result<f64, String> {
-    let told = |why: &dyn std::fmt::Display, name: &str| format!("instance {name}: {why}");
+    let reported = |why: &dyn std::fmt::Display, name: &str| format!("instance {name}: {why}");
     let name = entry.instance.name().to_owned();
     let Some(token) = entry.balanced else {
-        return Err(told(&"noise needs an operating point first", &name));
+        return Err(reported(&"noise needs an operating point first", &name));
     };
     let omega = 2.0 * std::f64::consts::PI * frequency;
-    entry.instance.noise(token, omega, gains).map_err(|why| told(&why, &name))
+    entry.instance.noise(token, omega, gains).map_err(|why| reported(&why, &name))
 }
 
 impl Instance {

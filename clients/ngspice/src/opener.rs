@@ -1,12 +1,12 @@
 //! From a `.model` line to a device: find the netlist, compile it once, step it here or on a server.
 
 use crate::model_card::ModelCard;
-use crate::{names, told};
+use crate::{names, reported};
 use bimorph::analysis::{AnalysisError, mesh};
 use bimorph::compile::{CompileError, CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError};
-use bimorph::front::{self, FrontError, LayoutChoice};
+use bimorph::input::{self, FrontError, LayoutChoice};
 use bimorph::layout::LayoutError;
 use bimorph::layout::convert::ConvertError;
 use bimorph::netlist::{self, Bundle};
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use thiserror::Error;
 
-/// Why no device came out of a `.model` line.
+/// Errors of opening the device of a `.model` line.
 #[derive(Debug, Error)]
 pub enum OpenError {
     /// The netlist cannot be read.
@@ -24,7 +24,7 @@ pub enum OpenError {
         file: String,
         /// Every path that was tried.
         tried: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// There are several in the folders where the line may stand.
@@ -51,7 +51,7 @@ pub enum OpenError {
         /// Diagnostics with file, line and column.
         source: CompileError,
     },
-    /// There is none on twice the segments.
+    /// There is no model on twice the segments.
     #[error("netlist \"{file}\" on twice the segments: {source}")]
     Finer {
         /// As spelled on the line.
@@ -72,7 +72,7 @@ pub enum OpenError {
     /// The device refuses the ports or monitors, or its server cannot be reached.
     #[error(transparent)]
     Device(#[from] DeviceError),
-    /// `remote` is asked for in a build that has no client.
+    /// `remote` is given in a build without a client.
     #[cfg(not(feature = "remote"))]
     #[error("remote=\"{0}\": this build of the plug-in steps models in process only (it was built without \"remote\")")]
     NoRemote(String),
@@ -121,13 +121,13 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
         return Err(OpenError::Ambiguous { name, pair, file: card.file.clone() });
     }
     names::respell(card, &structure);
-    told::of_netlist(&card.file, card.options.without_circuit, &loaded.warnings.items);
+    reported::of_netlist(&card.file, card.options.without_circuit, &loaded.warnings.items);
     let own = match (&card.remote, card.share < 1.0) {
         (Some(address), false) => return connect(address, &bundle, card),
         _ => compiled(&card.file, bundle.clone(), &card.options)?,
     };
     if card.share == 1.0 {
-        told::of_netlist(&card.file, card.options.without_circuit, &own.warnings.items);
+        reported::of_netlist(&card.file, card.options.without_circuit, &own.warnings.items);
         return Ok(Box::new(LocalDevice::new(own)));
     }
     let tol = card.share * card.options.tol;
@@ -150,7 +150,7 @@ fn connect(address: &str, bundle: &Bundle, card: &ModelCard) -> Result<Box<dyn D
     let respelled = socket.map(|path| format!("unix://{}", path.display()));
     let address = respelled.as_deref().unwrap_or(address);
     let device = RemoteDevice::connect(address, bundle, &card.options, card.deadline)?.resuming();
-    told::of_netlist(&card.file, card.options.without_circuit, device.warnings());
+    reported::of_netlist(&card.file, card.options.without_circuit, device.warnings());
     Ok(Box::new(device))
 }
 
@@ -183,7 +183,7 @@ fn read(file: &str, folders: &[PathBuf], directory: Option<&Path>) -> Result<Bun
         tried: candidates.iter().map(|p| format!("\"{}\"", p.display())).collect::<Vec<_>>().join(", "),
         source,
     };
-    match front::read(&path, &[], &LayoutChoice::default(), &mut |_| (), &mut |_| true) {
+    match input::read(&path, &[], &LayoutChoice::default(), &mut |_| (), &mut |_| true) {
         Ok(source) => Ok(source.bundle),
         Err(FrontError::Read { source, .. }) => Err(unread(source)),
         Err(FrontError::Convert(ConvertError::Layout(LayoutError::Read { reason, .. }))) => {
@@ -193,7 +193,7 @@ fn read(file: &str, folders: &[PathBuf], directory: Option<&Path>) -> Result<Bun
     }
 }
 
-/// Models kept for instances and analyses to share; the one that nobody asked for longest makes room.
+/// Models cached for instances and analyses to share; the least recently used one is evicted.
 const MAX_MODELS: usize = 16;
 
 struct SharedModel {
@@ -227,7 +227,7 @@ fn compiled(file: &str, bundle: Bundle, options: &CompileOptions) -> Result<Arc<
 mod tests {
     use super::*;
 
-    /// A missing netlist is named as spelled, with every place that was looked at.
+    /// A missing netlist is named as spelled, with every searched place.
     #[test]
     fn missing_file_names_every_place() {
         let message = read("none.net", &[], Some(Path::new("/nowhere"))).unwrap_err().to_string();

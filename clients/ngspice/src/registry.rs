@@ -4,7 +4,7 @@ use crate::call::{Reserved, Wanted};
 use crate::circuit::HostCircuit;
 use crate::history::History;
 use crate::instance::Instance;
-use crate::look_table::LookNames;
+use crate::query_table::LookNames;
 use crate::trace;
 use bimorph::device::Token;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -34,7 +34,7 @@ pub(crate) struct RegisteredInstance {
     pub(crate) balanced: Option<Token>,
     /// Where the last answer's record stands: an address in the host's state memory, good until the point is accepted.
     pub(crate) record: usize,
-    /// Whether the last equilibrium that was asked for was a point of a sweep.
+    /// Whether the last evaluated equilibrium was a point of a sweep.
     pub(crate) sweeping: bool,
     /// The job of that sweep.
     pub(crate) job: usize,
@@ -56,7 +56,7 @@ pub(crate) struct Registry {
     pub(crate) stopped: bool,
     /// Key of the instance being asked.
     pub(crate) asked: usize,
-    /// What can be asked of instances by name; none before the first setup.
+    /// Instance parameters by name; `None` before the first setup.
     pub(crate) names: Option<LookNames>,
 }
 
@@ -70,7 +70,7 @@ static REGISTRY: Mutex<Registry> = Mutex::new(Registry {
     names: None,
 });
 
-/// The registry, for as long as the guard lives: never while the host may call back.
+/// The registry, for the lifetime of the guard: never while the host may call back.
 pub(crate) fn registry() -> MutexGuard<'static, Registry> {
     REGISTRY.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -122,7 +122,7 @@ impl Registry {
         self.find(key)?.instance.look(&name)
     }
 
-    /// The instance whose connections stand at `key`: that address stays the same as long as it lives.
+    /// The instance whose connections are at `key`: that address stays the same for its lifetime.
     pub(crate) fn find(&mut self, key: usize) -> Option<&mut RegisteredInstance> {
         self.entries.iter_mut().find(|e| e.key == key)
     }

@@ -1,10 +1,10 @@
-//! One call of the model: read what ngspice asks, ask the device, write the answer and what is to be remembered.
+//! One call of the model: read the request of ngspice, evaluate the device, write the result and the history.
 
 use crate::call::{MONITORS, ModelCall, PORTS};
 use crate::circuit::HostCircuit;
+use crate::evaluation::{EvaluationOutcome, EvaluationRequest};
 use crate::history;
 use crate::instance::Instance;
-use crate::question::{EvaluationOutcome, EvaluationRequest};
 use crate::registry::{RegisteredInstance, Registry};
 use crate::{host, trace};
 use bimorph::device::Status;
@@ -90,7 +90,7 @@ fn write_answer(call: &ModelCall<'_>, entry: &mut RegisteredInstance, memory: *m
 
 /// Change of a monitor from one iteration to the next at which an equilibrium has converged, relative to its value [1]. Newton's iteration
 /// converges quadratically, so one or two more iterations than ngspice's own reach it.
-const STILL: f64 = 1e-6;
+const SETTLED_CHANGE: f64 = 1e-6;
 /// Iterations for that beyond ngspice's own, at most.
 const MAX_FURTHER: u32 = 4;
 
@@ -99,7 +99,7 @@ pub(crate) fn moves(entry: &mut RegisteredInstance, circuit: HostCircuit) -> boo
     let moved = |nodes: &[i32; 2]| {
         // SAFETY: nodes of the circuit, as the host set them up.
         let (new, old) = unsafe { (circuit.solved(*nodes), circuit.loaded_at(*nodes)) };
-        (new - old).abs() > STILL * new.abs().max(old.abs())
+        (new - old).abs() > SETTLED_CHANGE * new.abs().max(old.abs())
     };
     let at_rest = entry.instance.answer().token.is_some() && entry.instance.answer().step == 0.0;
     let still_moves = at_rest && entry.further < MAX_FURTHER && entry.shown.iter().any(moved);
@@ -109,10 +109,10 @@ pub(crate) fn moves(entry: &mut RegisteredInstance, circuit: HostCircuit) -> boo
 
 /// Puts into the record what the accepted solution differs from the one that the device was asked at.
 ///
-/// Newton's iteration ends when two solutions lie close together, and the device was asked at the first. Up to there its
-/// currents went on straight, along their derivatives, and so did the charge that the circuit delivered. The next step has
-/// to begin from that charge: what is left out at each point would be lost or gained for good, and always with the same
-/// sign where a charge curves one way.
+/// Newton's iteration ends when two solutions lie close together, and the device was asked at the first. Up to there
+/// its currents went on straight, along their derivatives, and so did the charge that the circuit delivered. The next
+/// step must begin from that charge. The difference at each point would otherwise be lost or gained for good, and
+/// always with the same sign where a charge curves one way.
 pub(crate) fn settle(entry: &mut RegisteredInstance, circuit: HostCircuit) {
     // SAFETY: nodes of the circuit, as the host set them up.
     let asked_here = (entry.nodes.iter().zip(&entry.voltages))

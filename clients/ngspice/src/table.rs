@@ -10,8 +10,8 @@ use crate::abi::{
 use crate::callbacks;
 use crate::deck_options::{DeckValue, Declared, declared};
 use crate::layout::{HostLayout, HostLayoutError, TABLE_WORDS};
-use crate::look_table;
 use crate::model_card::DEADLINE;
+use crate::query_table;
 use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::sync::OnceLock;
@@ -23,9 +23,9 @@ pub(crate) struct Declaration {
     kind: c_int,
     /// How SPICE does.
     data_type: c_int,
-    /// What ngspice shows where the line leaves it out; none: no text, an empty list. From 43 on it refuses a line that
-    /// leaves out a number or a boolean without one; that a parameter was left out can still be told, so the plug-in itself
-    /// never reads these.
+    /// Value in ngspice's listings where the line omits the parameter; `None`: no text, an empty list. From 43 on
+    /// ngspice rejects a line that omits a number or a boolean without a default. The plug-in can still detect the
+    /// omission, so that it never reads these.
     default: Option<ParameterValue>,
     text: CString,
 }
@@ -89,7 +89,7 @@ struct Declarations {
     parameters42: Vec<ParameterInfo42>,
     parameters43: Vec<ParameterInfo43>,
     count: c_int,
-    /// What the others point to.
+    /// Storage that the others point to.
     _parameters: Vec<Declaration>,
 }
 
@@ -127,7 +127,7 @@ fn declarations() -> &'static Declarations {
             upper: 0,
             null_allowed: 1,
         };
-        // What points into it stays where it is when the vector itself is moved.
+        // Pointers into it stay valid when the vector itself is moved.
         let parameters = parameters();
         Declarations {
             spice: parameters
@@ -232,7 +232,7 @@ impl DeviceTable {
     /// The host is loading the plug-in, or waits in a call for it.
     unsafe fn put<T>(&self, byte: usize, value: T) {
         debug_assert!(byte + size_of::<T>() <= TABLE_WORDS * 8);
-        // SAFETY: in bounds and aligned; by contract nobody else uses the table now.
+        // SAFETY: in bounds and aligned; by contract no other code uses the table now.
         unsafe { self.0.get().cast::<u8>().add(byte).cast::<T>().write(value) }
     }
 
@@ -261,8 +261,8 @@ impl DeviceTable {
     /// Exchanges the instance parameters.
     ///
     /// # Safety
-    /// The host has called the plug-in and waits for it; it reads these two words when it looks a name up.
-    pub(crate) unsafe fn set_instance_parameters(&self, parameters: &look_table::ParameterTable) {
+    /// The host has called the plug-in and waits for it; it reads these two words during a lookup.
+    pub(crate) unsafe fn set_instance_parameters(&self, parameters: &query_table::ParameterTable) {
         // SAFETY: by contract; what they point to stays for good.
         unsafe {
             self.put(40, std::ptr::from_ref(parameters.count));
@@ -278,7 +278,7 @@ impl DeviceTable {
     /// # Safety
     /// The host has registered this table and is still loading the plug-in.
     pub(crate) unsafe fn complete(&self, version: Option<u32>) -> Result<HostLayout, HostLayoutError> {
-        // SAFETY: by contract nobody else uses the table now; what the host wrote are addresses of its own integers.
+        // SAFETY: by contract no other code uses the table now; the host wrote addresses of its own integers.
         let layout = unsafe { HostLayout::detect(&*self.0.get(), |at| *(at as *const c_int), version)? };
         let declarations = declarations();
         let at = layout.functions();
@@ -304,7 +304,7 @@ impl DeviceTable {
             self.put(at + 144, callbacks::convergence_test as *const c_void);
             self.put(at + 200, callbacks::distortion as *const c_void);
             self.put(at + 208, callbacks::noise as *const c_void);
-            // Behind the table of a host without KLU, which never looks there.
+            // After the table of a host without KLU, which never reads there.
             let bind = layout.sizes() + 16;
             self.put(bind, callbacks::bind as *const c_void);
             self.put(bind + 8, callbacks::bind_complex as *const c_void);

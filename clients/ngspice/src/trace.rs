@@ -1,4 +1,4 @@
-//! The trace that `BIMORPH_LOG=path` asks for. Without it the plug-in writes nothing but errors.
+//! The trace to the file in `BIMORPH_LOG=path`. Without it the plug-in writes nothing but errors.
 
 use std::fmt::Arguments;
 use std::fs::File;

@@ -52,10 +52,10 @@ def test_a_waveform_tells_how_far_it_is_off(client: bimorph.Client) -> None:
     coarse, fine = run(1), run(32)
     error = float(np.sqrt(np.mean((coarse.signals["b.y"] - fine.signals["b.y"]) ** 2)) / np.ptp(fine.signals["b.y"]))
     assert coarse.estimated_error is not None and fine.estimated_error is not None
-    assert error / 3 < coarse.estimated_error and coarse.estimated_error > 1e-3 and "may be off by" in coarse.warnings[0]
+    assert error / 3 < coarse.estimated_error and coarse.estimated_error > 1e-3 and "estimated error of mesh and steps" in coarse.warnings[0]
     assert fine.estimated_error <= 1e-3 and not fine.warnings
     alone = run(1, estimate=False)
-    assert alone.estimated_error is None and "nothing tells" in alone.warnings[0]
+    assert alone.estimated_error is None and "no error estimate" in alone.warnings[0]
 
 
 def test_waveforms_are_checked(plate: bimorph.Model) -> None:
@@ -63,6 +63,14 @@ def test_waveforms_are_checked(plate: bimorph.Model) -> None:
     for wave, word in [(([0.0, 1.0], [1.0]), "as many"), (([0.0, 0.0], [1.0, 2.0]), "ascend"), (([0.0], [np.nan]), "finite")]:
         with pytest.raises(ValueError, match=f"'drive'.*{word}"):
             plate.transient(1e-5, ["m.x"], inputs={"drive": wave})
+    masked = np.ma.array([1.0, 2.0], mask=[False, True])
+    for wave, word in [(([0.0, 1.0], masked), "without masked"), (([[0.0], [0.0, 1.0]], [1.0, 2.0]), "lists of numbers"), (([0.0, 1.0], [1.0, np.inf]), "values, got inf at place 1")]:
+        with pytest.raises(bimorph.InvalidRequest, match=f"^inputs: input 'drive'.*{word}"):
+            plate.transient(1e-5, ["m.x"], inputs={"drive": wave})
+    wave = {"drive": ([0.0, 1e-6], [0.0, 1.0])}
+    for name, given in (("until", "contact"), ("until", ("m.x", 1e-9)), ("release", plate), ("tol", 1e-4)):
+        with pytest.raises(bimorph.InvalidRequest, match=f"^{name}: expected none together with inputs, got "):
+            plate.transient(1e-5, ["m.x"], inputs=wave, **{name: given})  # type: ignore[arg-type]
     with pytest.raises(bimorph.InvalidRequest, match="no port named 'drove'"):
         plate.transient(1e-5, ["m.x"], inputs={"drove": ([0.0], [1.0])})
     with pytest.raises(ValueError, match="stop: expected a time"):

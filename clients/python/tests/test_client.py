@@ -76,10 +76,10 @@ def test_what_is_beyond_is_said_aloud(client: bimorph.Client) -> None:
     with pytest.warns(bimorph.NetlistWarning, match="W012"):
         client.compile(bimorph.Netlist.text(net + "anchor p [c] []\nbeam2d p [d e] [l=200u w=2u]\nbeam2d p [c f] [l=9u w=2u]\n"))
     coarse = client.compile(bimorph.Netlist.text(net), segments=1)
-    with pytest.warns(bimorph.AccuracyWarning, match="may be off") as told:
+    with pytest.warns(bimorph.AccuracyWarning, match="estimated error") as told:
         coarse.static()
     assert told[0].filename == __file__
-    with pytest.warns(bimorph.AccuracyWarning, match="may be off") as told:
+    with pytest.warns(bimorph.AccuracyWarning, match="estimated error") as told:
         coarse.session().close()
     assert told[0].filename == __file__
     with warnings.catch_warnings():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import subprocess
 import sys
 import threading
@@ -223,3 +224,93 @@ def test_shared_sweeps(client: bimorph.Client) -> None:
         submitted.callback(released.delete)
         assert len({own.id, shared.id, released.id}) == 3
         assert client.submit(NET, values, bimorph.Modes(1), share=True).id == shared.id
+
+
+RAW = re.compile(r"last error|connect failed|Stream removed|h2 protocol|grpc|StatusCode|<_|addr:|ipv4:|traceback", re.IGNORECASE)
+"""Words of gRPC and of its status codes."""
+
+
+@pytest.mark.parametrize("is_native", [True, False])
+@pytest.mark.parametrize("ending", ["kill", "terminate", "close"])
+def test_messages_after_the_end_of_a_server(program: str, monkeypatch: pytest.MonkeyPatch, ending: str, is_native: bool) -> None:
+    """Whichever call finds it gone: one sentence with what has happened, the server and a remedy, without words of gRPC."""
+    if is_native and native.found() is None:
+        pytest.skip("the module that is not Python is not installed")
+    if not is_native:
+        monkeypatch.setattr(native, "found", lambda: None)
+    server = bimorph.Server(program).start()
+    address, client = server.address, server.client()
+    model = client.compile(NET)
+    session, kept = model.session(["m.x"], timeout=5.0), model.session(kept=True, timeout=1.0)
+    batch = bimorph.Batch.of([model] * 2)
+    sweep = client.submit(NET, {"k": [1.0]}, bimorph.Modes(1))
+    sweep.wait()
+    if ending == "close":
+        server.close()
+    else:
+        getattr(server.process, ending)()
+        server.process.wait()
+        with pytest.raises(bimorph.Unavailable, match=r"its process has ended (by signal 9|with exit status 0); start\(\) starts it again"):
+            server.client()
+    client._channel.reconnect = 0.5
+    kept._timeout = 0.5
+    calls: list[Callable[[], Any]] = [
+        lambda: session.step({"drive": 1.0}, 1e-6),
+        lambda: session.step({"drive": 1.0}, 1e-6),
+        lambda: session.run([1e-6], {"drive": 1.0}),
+        session.snapshot,
+        session.fork,
+        kept.resume,
+        lambda: batch.run([1e-6], {}),
+        lambda: batch.operating_point({}),
+        lambda: model.modes(1),
+        lambda: model.transient(1e-6, ["m.x"], points=3),
+        model.session,
+        lambda: client.compile(NET),
+        sweep.wait,
+        sweep.status,
+        client.version,
+    ]
+    for call in calls:
+        with pytest.raises(bimorph.Unavailable) as caught:
+            call()
+        text = str(caught.value)
+        assert text.startswith(f"server {address}: ") and not RAW.search(text), text
+        assert re.search(r"; (start one there, or check the address|connect again when|open another session)", text), text
+    server.close()
+
+
+def test_messages_of_a_closed_session(plate: bimorph.Model) -> None:
+    """Every call of a session that was closed says so, names the model and the server, and how to open another one."""
+    session = plate.session(["m.x"])
+    session.operating_point({"drive": 1.0})
+    session.close()
+    calls: list[Callable[[], Any]] = [
+        lambda: session.step({"drive": 1.0}, 1e-6),
+        lambda: session.trial({"drive": 1.0}),
+        lambda: session.run([1e-6], {}),
+        lambda: session.operating_point({}),
+        lambda: session.linearize(1e3),
+        session.snapshot,
+        session.fork,
+        session.ticket,
+        lambda: bimorph.Batch([session]).run([1e-6], {}),
+    ]
+    for call in calls:
+        with pytest.raises(bimorph.BimorphError, match=r"^this session of model \w{8} on server unix:.* is closed; open another one with Model.session\(\)$"):
+            call()
+
+
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        ("unix:///nosuch/s", "no server answers at this address (no such file or directory); start one there, or check the address"),
+        ("localhost:1", "no server answers at this address (connection refused); start one there, or check the address"),
+        ("nosuch.invalid:1", "the name of the host is unknown; check the address"),
+    ],
+)
+def test_messages_of_an_address_without_a_server(address: str, message: str) -> None:
+    """The reason of the system, and the remedy."""
+    with pytest.raises(bimorph.Unavailable) as caught:
+        bimorph.Client(address, timeout=10.0).version()
+    assert str(caught.value) == f"server {address}: {message}"

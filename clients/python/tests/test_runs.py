@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import pickle
 import signal
@@ -116,6 +117,11 @@ def test_a_step_that_fails_names_itself(model: bimorph.Model) -> None:
         ([1e-6], {"drive": "3"}, None, r"voltages\['drive'\]: expected numbers"),
         ([1e-6], {"drive": [1.0, 2.0]}, None, r"voltages\['drive'\]: expected a number, or one for each of 1 times"),
         ([1e-6], {"drive": float("inf")}, None, r"voltages\['drive'\]: expected finite"),
+        ([1e-6], {"drive": [[1.0], [1.0, 2.0]]}, None, r"voltages\['drive'\]: expected numbers .in rows of equal length., got \[\[1.0\], \[1.0, 2.0\]\]"),
+        ([1e-6], {"drive": np.ma.array([1.0], mask=[True])}, None, r"voltages\['drive'\]: expected numbers without masked values"),
+        (np.ma.array([1e-6, 2e-6], mask=[False, True]), {}, None, "times: expected numbers without masked values"),
+        ([[1e-6], [1e-6, 2e-6]], {}, None, "times: expected numbers .in rows"),
+        ([1e-6], {3: 1.0}, None, "voltages: name of a port: expected a text"),
         ([1e-6], {}, "m.x", "signals: expected a list of names"),
         ([1e-6], {}, ["m.y"], r"signals\[0\]: 'm.y' is not among the signals of the session"),
         ([1e-6], {}, [3], r"signals\[0\]: expected a name"),
@@ -127,6 +133,9 @@ def test_what_does_not_fit_is_named(plate: bimorph.Model, times: Any, voltages: 
         session.operating_point({"drive": 1.0})
         with pytest.raises(bimorph.InvalidRequest, match=message):
             session.run(times, voltages, signals)
+        assert session.t == 0.0
+        with pytest.raises(bimorph.InvalidRequest, match=message):
+            bimorph.Batch([session]).run(times, voltages, signals)
         assert session.t == 0.0
 
 
@@ -191,6 +200,43 @@ def test_a_batch_has_the_bits_of_its_sessions(model: bimorph.Model) -> None:
             assert session.run([times[-1] + 1e-6], {"drive": float(k)}).signals["m.x"].tolist() == more.signals["m.x"][k].tolist()
 
 
+def test_arrays_of_a_batch(model: bimorph.Model) -> None:
+    """A batch of one takes a number, one for each time, and one row; of three sessions, three numbers of a run of two times are rejected with the
+    shapes that fit. A single session takes no arrays for one number."""
+    times, volts = [1e-6, 2e-6], [1.0, 3.0]
+    with bimorph.Batch.of([model], ["m.x"]) as one:
+        found = []
+        for held, given in ((2.0, volts), ([2.0], [volts]), (np.array([2.0]), np.array([volts]))):
+            one.operating_point({"drive": held})
+            found.append(one.run(times, {"drive": given}).signals["m.x"].tolist())
+        assert np.shape(found[0]) == (1, 2)
+        # an equilibrium is followed from the accepted state: the same to rounding
+        assert np.allclose(found[1], found[0], rtol=1e-9, atol=0.0) and np.allclose(found[2], found[0], rtol=1e-9, atol=0.0)
+        assert one.step({"drive": [1.0]}, 1e-6).signals["m.x"].shape == (1, 1)
+    with bimorph.Batch.of([model] * 3, ["m.x"]) as three:
+        rows = three.run(times, {"drive": [[1.0], [2.0], [3.0]]}).signals["m.x"]
+        assert rows.shape == (3, 2) and np.unique(rows[:, 1]).size == 3
+        with pytest.raises(bimorph.InvalidRequest, match=r"voltages\['drive'\]: .*shape \(3, 1\) or \(3, 2\)\), got an array of shape \(3,\)"):
+            three.run([3e-6, 4e-6], {"drive": [1.0, 2.0, 3.0]})
+        with pytest.raises(bimorph.InvalidRequest, match=r"voltages\['drive'\]: expected a number, or one for each of 3 sessions, got an array of shape \(1,\)"):
+            three.operating_point({"drive": [1.0]})
+    with model.session(["m.x"]) as session:
+        for call in (lambda: session.operating_point({"drive": [2.0]}), lambda: session.step({"drive": np.array([2.0])}, 1e-6)):
+            with pytest.raises(bimorph.InvalidType, match=r"voltages\['drive'\]: expected a finite number, got "):
+                call()
+
+
+def test_an_operating_point_follows_the_accepted_state(model: bimorph.Model) -> None:
+    """Raised to 3 V the plate is open; lowered to 3 V from 8 V it is closed, as pull-in is at 5.17 V; the time is 0 again."""
+    with model.session(["m.x"]) as session:
+        opened = session.operating_point({"drive": 3.0})
+        session.step({}, 1e-6)
+        closed = session.operating_point({"drive": 8.0})
+        lowered = session.operating_point({"drive": 3.0})
+        assert opened.outputs["m.x"] < 0.5e-6 < 1.9e-6 < lowered.outputs["m.x"] and closed.jumped
+        assert session.t == 0.0
+
+
 def test_a_session_of_a_batch_that_fails_stops_alone(model: bimorph.Model) -> None:
     """Its later values are NaN, and ``failures`` says where and why; the others go on."""
     times = np.array([1e-6, 2e-6, 1.0, 1.000001])
@@ -204,8 +250,143 @@ def test_a_session_of_a_batch_that_fails_stops_alone(model: bimorph.Model) -> No
         assert run.failures[1].reason
         assert np.isnan(run.signals["m.x"][1]).tolist() == [False, False, True, True]
         assert np.isfinite(run.signals["m.x"][[0, 2]]).all()
-        with pytest.raises(bimorph.InvalidRequest, match="different times"):
+        with pytest.raises(bimorph.InvalidRequest, match="dt: expected sessions with one time, got 2e-06 s to 1 s"):
             batch.step({}, 1e-6)
+
+
+def test_runs_are_shown_as_other_results(plate: bimorph.Model) -> None:
+    """Runs of a session and of a batch are frames, labelled arrays, pictures and tables of a notebook, with units; a session that stopped says why."""
+    times, volts = np.array([1e-6, 2e-6, 1.0]), np.full((3, 3), 2.0)
+    volts[1, 2] = 1e12
+    with plate.session(["m.x", "m.vx"]) as session, bimorph.Batch.of([plate] * 3, ["m.x", "m.vx"]) as batch:
+        run, runs = session.run(times, {"drive": 2.0}), batch.run(times, {"drive": volts})
+    assert "<th>m.vx [m/s]</th>" in run._repr_html_() and run._repr_html_().count("<tr>") == 4
+    assert runs._repr_html_().count("<tr>") == 4 and runs.failures[1].reason.split()[0] in runs._repr_html_()
+    pytest.importorskip("pandas")
+    assert run.to_pandas().attrs["units"] == runs.to_pandas().attrs["units"] == {"t": "s", "m.x": "m", "m.vx": "m/s"}
+    frame = runs.to_pandas()
+    assert frame.index.names == ["session", "t"] and frame.shape == (9, 2)
+    assert frame.loc[(2, 2e-6), "m.x"] == runs.signals["m.x"][2, 1] and np.isnan(frame.loc[(1, 1.0), "m.x"])
+    pytest.importorskip("xarray")
+    labelled, several = run.to_xarray(), runs.to_xarray()
+    assert labelled["m.x"].values.tolist() == run.signals["m.x"].tolist() and labelled["m.vx"].attrs["units"] == "m/s"
+    assert several["m.x"].dims == ("session", "t") and several.t.attrs["units"] == "s" and several["m.x"].attrs["units"] == "m"
+    assert float(several["m.x"].sel(session=2, t=2e-6)) == runs.signals["m.x"][2, 1]
+    pytest.importorskip("matplotlib").use("Agg")
+    from matplotlib import pyplot
+
+    assert [line.get_ydata().tolist() for line in run.plot().get_lines()] == [values.tolist() for values in run.signals.values()]
+    drawn = runs.plot()
+    assert len(drawn.get_lines()) == 6 and drawn.get_xlabel() == "t [s]"
+    assert [text.get_text() for text in drawn.get_legend().get_texts()] == ["m.x [m]", "m.vx [m/s]"]
+    pyplot.close("all")
+
+
+def states(batch: bimorph.Batch) -> list[tuple[float, int]]:
+    """Time and name of the accepted state of each session."""
+    return [(session.t, session.accepted.token if session.accepted else 0) for session in batch.sessions]
+
+
+@pytest.mark.usefixtures("interrupts")
+@pytest.mark.parametrize("part", [1 << 20, 300_000])
+def test_an_interrupted_batch_keeps_every_state(model: bimorph.Model, monkeypatch: pytest.MonkeyPatch, part: int) -> None:
+    """Ctrl-C in a run of a batch, whose lanes are at different steps, leaves every session in the state before, also where one request has few
+    of the lanes, and where it is pressed twice. The next run has the bits of an undisturbed one."""
+    times, volts = course(60)
+    with bimorph.Batch.of([model] * 5, ["m.x"]) as batch:
+        batch.operating_point({"drive": 1.0})
+        expected = batch.run(times, {"drive": volts}).signals["m.x"].tolist()
+    monkeypatch.setattr("bimorph.runs._PART", part)
+    with bimorph.Batch.of([model] * 5, ["m.x"], timeout=20.0) as batch:
+        batch.operating_point({"drive": 1.0})
+        before = states(batch)
+        long = 1e-7 * np.arange(1, 300_001)
+        for delays in ([0.05], [0.3], [0.5, 0.5001]):
+            for delay in delays:
+                threading.Timer(delay, signal.raise_signal, [signal.SIGINT]).start()
+            with pytest.raises(KeyboardInterrupt):
+                for _ in range(100):
+                    batch.run(long, {"drive": 1.5})
+            with contextlib.suppress(KeyboardInterrupt):
+                time.sleep(0.05 * len(delays))
+            assert states(batch) == before
+        assert batch.run(times, {"drive": volts}).signals["m.x"].tolist() == expected
+
+
+@pytest.mark.usefixtures("interrupts")
+def test_a_long_batch_stops_at_the_end_of_a_part(model: bimorph.Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run of more port values of a session than one request takes goes in parts. After Ctrl-C all sessions have the state at the end of the same
+    part, and the rest of the run has the bits of an undisturbed one."""
+    times = 1e-7 * np.arange(1, 40_001)
+    with bimorph.Batch.of([model] * 3, ["m.x"]) as batch:
+        batch.operating_point({"drive": [1.0, 1.5, 2.0]})
+        expected = batch.run(times, {}).signals["m.x"]
+    monkeypatch.setattr("bimorph.runs._PART", 1000)
+    with bimorph.Batch.of([model] * 3, ["m.x"], timeout=20.0) as batch:
+        batch.operating_point({"drive": [1.0, 1.5, 2.0]})
+        threading.Timer(0.15, signal.raise_signal, [signal.SIGINT]).start()
+        with contextlib.suppress(KeyboardInterrupt):
+            batch.run(times, {})
+            time.sleep(0.5)
+        done = round(float(batch.t[0]) / 1e-7)
+        assert (batch.t == batch.t[0]).all() and done % 1000 == 0
+        if done < len(times):
+            assert batch.run(times[done:], {}).signals["m.x"].tolist() == expected[:, done:].tolist()
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_a_batch_that_fails_keeps_every_state(model: bimorph.Model, monkeypatch: pytest.MonkeyPatch, workers: int) -> None:
+    """A session that is closed on the server, or here, ends a run, a step and an operating point of the batch; all sessions keep their states,
+    those whose lanes had ended too."""
+    monkeypatch.setattr("bimorph.batch.workers", lambda channel, lanes: workers)
+    times, volts = course(60)
+    with bimorph.Batch.of([model] * 5, ["m.x"]) as batch:
+        batch.operating_point({"drive": np.arange(5.0)})
+        batch.run(times, {"drive": volts})
+        before = states(batch)
+        lost = batch.sessions[3]
+        model._channel.call("Close", bimorph.v1.device_pb2.CloseRequest(session=lost._session))
+        with pytest.raises(bimorph.BimorphError):
+            batch.run(times[-1] + times, {"drive": volts})
+        assert states(batch) == before
+        with pytest.raises(bimorph.BimorphError):
+            batch.operating_point({"drive": 2.0})
+        assert states(batch) == before
+        lost.close()
+        for call in (lambda: batch.run(times[-1] + times, {"drive": volts}), lambda: batch.step({}, 1e-6), lambda: batch.operating_point({"drive": 2.0})):
+            with pytest.raises(bimorph.BimorphError, match="closed"):
+                call()
+            assert states(batch) == before
+        for session in batch.sessions[:3]:
+            session.step({"drive": 1.0}, 1e-6)
+
+
+def test_a_batch_of_kept_sessions_is_accepted_as_a_whole(client: bimorph.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the third of five kept sessions cannot accept, those before accept their old states again: no session has moved, here or on the server."""
+    model = client.compile(bimorph.Netlist.text(PLATE, "plate.net"))
+    with contextlib.ExitStack() as stack:
+        sessions = [stack.enter_context(model.session(["m.x"], kept=True)) for _ in range(5)]
+        batch = bimorph.Batch(sessions)
+        batch.operating_point({"drive": 1.0})
+        asked: list[tuple[int, int]] = []
+        for session in sessions:
+            session.kept = True
+
+        def tell(self: bimorph.Session, reply: bimorph.TrialReply) -> None:
+            asked.append((sessions.index(self), reply.token))
+            if len(asked) == 3:
+                raise bimorph.Unavailable("the third")
+
+        before = states(batch)
+        monkeypatch.setattr(bimorph.Session, "_tell_accepted", tell)
+        with pytest.raises(bimorph.Unavailable, match="the third"):
+            batch.run([1e-6, 2e-6], {"drive": 2.0})
+        assert states(batch) == before
+        assert [k for k, _ in asked] == [0, 1, 2, 0, 1, 2]
+        assert [token for _, token in asked[3:]] == [token for _, token in before[:3]]
+        monkeypatch.undo()
+        for session in sessions:
+            session.kept = False
 
 
 def test_variants_are_a_batch(client: bimorph.Client) -> None:

@@ -41,6 +41,28 @@ def test_moments_and_percentiles() -> None:
     assert math.isnan(table([None]).statistics().columns["f1"].mean)
 
 
+def test_points_without_a_number_are_left_out_and_counted() -> None:
+    """A missing result and NaN are in `missing`, in no moment, percentile or histogram, and outside of limits on either side."""
+    found = table([1.0, None, 3.0, math.nan]).statistics(["f1>0", "f1<10"])
+    one = found.columns["f1"]
+    assert (one.count, one.missing, one.mean, one.minimum, one.maximum, one.percentiles[50.0]) == (2, 2, 2.0, 1.0, 3.0, 2.0)
+    assert [fraction.passed for _, fraction in found.limits] == [2, 2] and found.passed.passed == 2
+    assert table([1.0, None, 3.0, math.nan]).histogram("f1").counts.sum() == 2
+    assert repr(found) == "<SweepStatistics of f1: 4 points, 2 of them without a result, yield 50.00% (15.00% to 85.00%)>"
+    assert "<th>without</th>" in found._repr_html_()
+
+
+def test_undecided_points_are_shown() -> None:
+    """A result of 5 ± 1 % is undecided at a limit of 5.04, one of 6 ± 1 % is not; the number is in the text and the table, and 0 is not shown."""
+    rows = [bimorph.Row(k, {}, {"f1": value}, "", error) for k, (value, error) in enumerate([(5.0, 0.01), (6.0, 0.01), (5.0, None)])]
+    several = bimorph.Table([], ["f1"], {"f1": "Hz"}, rows)
+    found = several.statistics("f1>5.04")
+    assert found.undecided == 1 and found.passed.passed == 1
+    for text in (repr(found), found._repr_html_()):
+        assert "1 closer to a limit than their estimated error" in text
+    assert several.statistics("f1>1").undecided == 0 and "closer" not in repr(several.statistics("f1>1"))
+
+
 def test_yield() -> None:
     """Limits are open or closed as written, with the suffixes of netlists; a point without a result is beyond each. The interval of 8 in 10 is that of
     Wilson's formula: 0.4901625 to 0.9433178."""
@@ -50,13 +72,13 @@ def test_yield() -> None:
     assert found.passed.interval == pytest.approx((0.4901625, 0.9433178), abs=1e-7)
     assert found.passed.passed == 8 and "yield 80.00%" in found._repr_html_()
     assert table([0.0, 1.0]).statistics("k<=0").passed.passed == 1
-    for written, value in [("y>-1.1u", -1.1e-6), ("f<90k", 9e4), ("f<1meg", 1e6), ("f<=2.5e3", 2500.0), ("q>-.5p", -5e-13), ("x<3m", 3e-3)]:
+    for written, value in [("y>-1.1u", -1.1e-6), ("f<90k", 9e4), ("f<90M", 9e7), ("f<90m", 9e-2), ("f<1meg", 1e6), ("f<1MEG", 1e6), ("a<2a", 2e-18), ("f<=2.5e3", 2500.0), ("q>-.5p", -5e-13), ("x<3m", 3e-3)]:
         name, limit = written[0], bimorph.Table(["k"], [written[0]], {written[0]: "1"}, []).statistics(written).limits[0][0]
         assert (limit.name, limit.value) == (name, value)
-    for written in ("f1", "f1>", ">3", "f1=3", "f1>3x", "f1>nan"):
+    for written in ("f1", "f1>", ">3", "f1=3", "f1>3x", "f1>3K", "f1>3U", "f1>nan", "f1>1e400", "f1>1e308k", "f1>1e" + "9" * 5000, ",,", "f1>1,,"):
         with pytest.raises(bimorph.InvalidRequest, match="limits.0.: expected a limit"):
             table([1.0]).statistics(written)
-    with pytest.raises(bimorph.InvalidRequest, match="no column 'f2'; there are k, f1"):
+    with pytest.raises(bimorph.InvalidRequest, match="limits: expected the name of a column, got 'f2'; there are k, f1"):
         table([1.0]).statistics("f2>0")
 
 
@@ -65,6 +87,28 @@ def test_histogram() -> None:
     found = table([0.0, 1.0, 1.0, 2.0, 4.0, None]).histogram("f1", bins=4)
     assert found.counts.tolist() == [1, 2, 1, 1] and found.edges.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0] and found.unit == "Hz"
     assert table([None]).histogram("f1").counts.sum() == 0
+
+
+def test_histograms_of_nearly_equal_values() -> None:
+    """Values that differ by a few roundings have as many bins as there are numbers between them; more bins are rejected by name, and so is an
+    unknown column. Equal values are in one bin about them, and "auto" has the bins of numpy."""
+    near = [1.0 + k * 2.0**-52 for k in range(9)]
+    found = table([float(x) for x in near]).histogram("f1")
+    assert found.counts.sum() == 9 and (np.diff(found.edges) > 0.0).all()
+    with pytest.raises(bimorph.InvalidRequest, match="bins: expected at most 4 bins, as the values of 'f1' differ by 1.78e-15 only, got 1000"):
+        table([float(x) for x in near]).histogram("f1", bins=1000)
+    for value in (2.1e-8, 0.0, -3e17, 1e308):
+        equal = table([value] * 3).histogram("f1")
+        assert equal.counts.tolist() == [3] and equal.edges[0] < value < equal.edges[1]
+    values = np.random.default_rng(3).normal(size=500)
+    assert table(values.tolist()).histogram("f1").edges.tolist() == np.histogram(values, "auto")[1].tolist()
+    assert len(table([*values.tolist(), 1e12]).histogram("f1").counts) == 100_000
+    with pytest.raises(bimorph.InvalidRequest, match="name: expected a column with a finite range, got 'f1' from -1.7e[+]308"):
+        table([-1.7e308, 1.7e308]).histogram("f1")
+    for call in (lambda: table([1.0]).histogram("f2"), lambda: table([1.0]).column("f2")):
+        with pytest.raises(ValueError, match="^name: expected the name of a column, got 'f2'; there are k, f1$") as caught:
+            call()
+        assert isinstance(caught.value, KeyError)
 
 
 def test_samples_of_a_sweep(client: bimorph.Client) -> None:

@@ -6,7 +6,7 @@ use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::loglog::{self, LogChart, LogCurve, LogPanel, Slope};
 use clap::ValueEnum;
 
-/// What stands for work.
+/// Measure of work.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum CostMeasure {
     /// Wall-clock time
@@ -120,10 +120,10 @@ fn panel(chart: &Chart, part: ChartPart, work: CostMeasure) -> Option<LogPanel> 
         ChartPart::Defaults => {
             let loosest = points.iter().map(|p| p.tol).fold(0.0, f64::max);
             LogPanel {
-                title: "Defaults: asked for, come out".into(),
-                x_name: "tolerance asked for".into(),
+                title: "Defaults: requested, obtained".into(),
+                x_name: "requested tolerance".into(),
                 y_name: "true relative error".into(),
-                slopes: vec![Slope { name: "asked for".into(), through: [loosest, loosest], exponent: 1.0 }],
+                slopes: vec![Slope { name: "requested".into(), through: [loosest, loosest], exponent: 1.0 }],
                 curves,
                 floor: None,
             }
@@ -131,7 +131,7 @@ fn panel(chart: &Chart, part: ChartPart, work: CostMeasure) -> Option<LogPanel> 
     })
 }
 
-/// What the tolerance of a default analysis costs.
+/// Cost of a default analysis against its tolerance.
 fn cost(chart: &Chart) -> Option<LogPanel> {
     let mut curves: Vec<LogCurve> = Vec::new();
     for (p, m) in chart.points.iter().filter(|p| p.part == ChartPart::Defaults).filter_map(|p| Some((p, p.measured?))) {
@@ -143,7 +143,7 @@ fn cost(chart: &Chart) -> Option<LogPanel> {
     }
     (!curves.is_empty()).then(|| LogPanel {
         title: "Defaults: what it costs".into(),
-        x_name: "tolerance asked for".into(),
+        x_name: "requested tolerance".into(),
         y_name: "time of a command [s]".into(),
         curves,
         floor: None,

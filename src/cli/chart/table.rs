@@ -30,10 +30,10 @@ pub(crate) fn csv(chart: &Chart) -> String {
             Some(m) => {
                 let error = m.error.map(|e| format!("{e:e}")).unwrap_or_default();
                 let products = m.multiplications.map(|n| n.to_string()).unwrap_or_default();
-                let told = m.told.map(|e| format!("{e:e}")).unwrap_or_default();
+                let reported = m.told.map(|e| format!("{e:e}")).unwrap_or_default();
                 let _ = write!(
                     text,
-                    "{error},{:e},{},{},{},{},{},{products},{told},",
+                    "{error},{:e},{},{},{},{},{},{products},{reported},",
                     m.seconds, m.steps, m.rejected, m.factorizations, m.solves, m.forces
                 );
             }
@@ -47,7 +47,7 @@ pub(crate) fn csv(chart: &Chart) -> String {
 /// Heads of the columns for people.
 pub(crate) const HEADS: [&str; 8] = ["run", "tolerance", "band", "unknowns", "error", "told", "time", "work"];
 
-/// The cells of a point for people: short, in engineering units; a failure is told instead of numbers.
+/// The cells of a point for people: short, in engineering units; a failure is printed instead of numbers.
 pub(crate) fn cells(p: &ChartPoint) -> Vec<String> {
     let run = match p.part {
         ChartPart::Precision => format!("{} {}", p.formulation.name(), p.method),
@@ -72,7 +72,7 @@ pub(crate) fn cells(p: &ChartPoint) -> Vec<String> {
     cells
 }
 
-/// What a part's table shows, in one line.
+/// Caption of a part's table, in one line.
 pub(crate) fn caption(part: ChartPart) -> &'static str {
     match part {
         ChartPart::Precision => {
@@ -83,7 +83,7 @@ pub(crate) fn caption(part: ChartPart) -> &'static str {
         }
         ChartPart::Solvers => "One step of Rodas4 by solver; work: multiplications of its factorization and solves",
         ChartPart::Defaults => {
-            "Default analyses by tolerance, against a tenth of the tightest: asked for, come out, told, and the time"
+            "Default analyses by tolerance, against a tenth of the tightest: requested, obtained and estimated error, and the time"
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A host in miniature: what ngspice 39 shows a code model, laid out by hand, with one instance of p ports.
+//! A host in miniature: the memory of ngspice 39 as a code model sees it, built by hand, with one instance of p ports.
 
 use std::ffi::{c_char, c_int, c_void};
 use std::sync::atomic::{AtomicPtr, Ordering};

@@ -1,4 +1,4 @@
-//! What the plug-in costs around a device: one call by the host with a device that does nothing. Target: 0.3 µs.
+//! Overhead of the plug-in around a device: one call by the host with a device that does nothing. Target: 0.3 µs.
 
 mod host;
 

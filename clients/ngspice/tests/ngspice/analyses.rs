@@ -63,7 +63,7 @@ fn number(output: &str) -> Option<f64> {
 /// Where the table of docs/ngspice.md stands.
 const MARKS: [&str; 2] = ["<!-- analyses after each other -->\n", "<!-- end -->\n"];
 
-/// The table of the documentation from the cells of each version: what holds on all, or on which.
+/// The table of the documentation from the cells of each version: results on all versions, or by version.
 fn documented(outcomes: &[(u32, Vec<Vec<char>>)]) -> String {
     let names: Vec<&str> = ANALYSES.iter().map(|(name, ..)| *name).collect();
     let mut table = format!("| first ↓ second → | {} |\n|---|{}\n", names.join(" | "), "---|".repeat(names.len()));
@@ -157,8 +157,8 @@ fn every_analysis_after_every_other() {
     assert_eq!(table, now, "docs/ngspice.md is of another state; BIMORPH_WRITE=1 writes the table");
 }
 
-/// A sweep begins from rest, whatever the analysis before it left: below pull-in (5.17 V) at 4 V the plate stands where it does without
-/// the operating point at 6 V, or the sweep above pull-in, that came first in the same run.
+/// A sweep begins from rest, for any analysis before it. Below pull-in (5.17 V) at 4 V the plate stands at the same
+/// place with and without a previous operating point at 6 V, or a sweep above pull-in, in the same run.
 #[test]
 fn a_sweep_begins_from_rest() {
     let at_4_v = |lines: &str, ngspice: &Path| {

@@ -128,7 +128,7 @@ fn noise_after_a_transient_runs() {
     assert!(report.output.contains("length(frequency) = 6"), "{}", report.output);
 }
 
-/// What one circuit's devices ask for does not reach into another circuit of the same ngspice: after a part that bears
+/// A bound from the devices of one circuit does not affect another circuit of the same ngspice. After a part that bears
 /// 50 ns steps, a part that bears any takes as many points as before it.
 #[test]
 fn circuits_do_not_share_bounds() {

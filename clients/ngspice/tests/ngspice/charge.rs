@@ -12,8 +12,9 @@ fn deck(step: &str, reltol: f64) -> String {
     )
 }
 
-/// 564.6 fC delivered are held within 1e-4, at ngspice's own tolerance and at tighter ones, for steps from 0.1 to 5 µs; the
-/// plate is then at Q²/(2εAk) = 1.8002 µm, far beyond the third of its gap at which a voltage would have pulled it in.
+/// The delivered 564.6 fC are held within 1e-4, at ngspice's own tolerance and at tighter ones, for steps from 0.1 to 5
+/// µs. The plate is then at Q²/(2εAk) = 1.8002 µm, far beyond the third of its gap at which a voltage would have pulled
+/// it in.
 #[test]
 fn charge_held_is_charge_delivered() {
     for (version, ngspice) in versions() {
@@ -67,8 +68,8 @@ fn an_island_keeps_its_charge_for_long() {
     assert!(off < 1e-8, "{off:e}");
 }
 
-/// A ring oscillator that nothing clocks, of two plates and the switches that they move: how often it came round in `stop`
-/// seconds, and the largest departure of the plates' common charge from what was there at the first points, over that.
+/// A ring oscillator without a clock, of two plates and the switches that they move. Returns its number of cycles in
+/// `stop` seconds, and the largest relative departure of the plates' common charge from that at the first points.
 fn ring(ngspice: &Path, stop: f64) -> (usize, f64) {
     let text = std::fs::read_to_string(deck_file("ring_oscillator.cir")).unwrap();
     assert!(text.contains(".tran 1u 1m uic"));
@@ -107,7 +108,8 @@ fn swing(t: &[f64], v: &[f64], from: f64, to: f64) -> f64 {
     high - low
 }
 
-/// What is left of the swing of an inductor and a plate after so many seconds at default options, with other parts beside them, and points.
+/// Remaining amplitude of an inductor and a plate after so many seconds at default options, with other parts in the
+/// circuit, and the number of points.
 fn tank(ngspice: &Path, beside: &str, stop: f64) -> (f64, usize) {
     let text = format!(
         "* a tank\nL1 a 0 10\n.ic v(a)=1\nA1 %gd [a 0] %v [x] plate\n\

@@ -1,4 +1,4 @@
-//! A run repeated with half the steps and a tenth of the tolerances tells how far off it is.
+//! A run repeated with half the steps and a tenth of the tolerances gives its error.
 
 use crate::support::{all_decks, deck, versions};
 use bimorph::cosim::check::{CosimCheck, check};
@@ -11,9 +11,10 @@ fn checked(folder: &Path, text: &str, ngspice: &Path) -> Result<CosimCheck, Cosi
     check(&CosimOptions { deck, ngspice: Some(ngspice.to_owned()), ..CosimOptions::default() }, &|| true)
 }
 
-/// What is told of a circuit of coarse steps is its error: a resistor of 1 kΩ and a capacitor of 1 nF swing with 1 mH at 159 kHz,
-/// v = 1 V·e^(−at)·(cos bt + a/b·sin bt), a = 1/2RC, b² = 1/LC − a². The largest error of the run over 40 µs and the difference that
-/// is told agree within a factor of two; the part beside it, whose motion is solved to its own tolerance, differs by less than 1e-3.
+/// The reported difference of a circuit with coarse steps is its error. A resistor of 1 kΩ and a capacitor of 1 nF
+/// oscillate with 1 mH at 159 kHz, v = 1 V·e^(−at)·(cos bt + a/b·sin bt), a = 1/2RC, b² = 1/LC − a². The largest error
+/// of the run over 40 µs and the reported difference agree within a factor of two. The part in the circuit, whose
+/// motion is solved to its own tolerance, differs by less than 1e-3.
 #[test]
 fn the_difference_is_the_error() {
     for (version, ngspice) in versions() {
@@ -34,19 +35,19 @@ fn the_difference_is_the_error() {
         let (low, high) = v.iter().fold((0.0f64, 0.0f64), |r, v| (r.0.min(*v), r.1.max(*v)));
         let error = t.iter().zip(v).map(|(t, v)| (v - exact(*t)).abs()).fold(0.0, f64::max) / (high - low);
         let of = |name: &str| found.plots[0].vectors.iter().find(|v| v.name == name).unwrap();
-        let (told, part) = (of("v(r)").largest, of("v(x)").largest);
+        let (reported, part) = (of("v(r)").largest, of("v(x)").largest);
         println!(
-            "ngspice {version}: {told:.2e} told, {error:.2e} off; the part {part:.1e}; {:?}",
+            "ngspice {version}: {reported:.2e} told, {error:.2e} off; the part {part:.1e}; {:?}",
             found.plots[0].points
         );
         assert!(found.plots[0].points[1] > 2 * found.plots[0].points[0] - 20, "{:?}", found.plots[0].points);
-        assert!(told > 0.5 * error && told < 2.0 * error, "ngspice {version}: {told} told, {error} off");
+        assert!(reported > 0.5 * error && reported < 2.0 * error, "ngspice {version}: {reported} told, {error} off");
         assert!(part < 1e-3, "ngspice {version}: {part}");
     }
 }
 
-/// What a `.control` section computes is compared too: every plot of its loops, and every number it prints or measures. A file that
-/// it writes is that of the run as it is, and the deck itself stays as it was.
+/// Results of a `.control` section are compared too: every plot of its loops, and every number it prints or measures. A
+/// file that it writes is that of the run as it is, and the deck itself stays as it was.
 #[test]
 fn control_sections_are_compared() {
     for (version, ngspice) in versions() {

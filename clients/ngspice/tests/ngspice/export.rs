@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A scene with its operating point, and what is connected to it.
+/// A model with its operating point, and its connections.
 struct Scene {
     file: &'static str,
     /// Electrical ports with their voltages at the operating point [V].
@@ -148,7 +148,7 @@ impl Scene {
         deck
     }
 
-    /// What is read of either side: currents of sources, voltages across ports with forces, signals.
+    /// Outputs of either side: currents of sources, voltages across ports with forces, signals.
     fn read(&self, side: usize) -> Vec<(String, String)> {
         let electrical = self.electrical.len();
         let ports = self.ports().into_iter().enumerate().map(|(k, name)| {
@@ -169,8 +169,9 @@ impl Scene {
     }
 }
 
-/// In `.ac`, from a thousandth of the first mode to just below the second one that ports and signals see, every port and signal over
-/// every port is that of the full model, to 1e-3 of its own value at every frequency; a sweep across the first resonance too.
+/// Every port and signal over every port agrees with the full model in `.ac`, to 1e-3 of its own value at every
+/// frequency. The band is from a thousandth of the first mode to just below the second visible one. A sweep across the
+/// first resonance agrees too.
 #[test]
 fn small_signals_are_those_of_the_full_model() {
     for scene in [BANK, COMB] {

@@ -2,27 +2,27 @@
 
 mod analyses;
 mod analytic;
-mod around;
 mod charge;
+mod charge_held;
 mod check;
 mod currents;
+mod deck_lines;
 mod export;
+#[cfg(feature = "remote")]
+mod faulty_replies;
+#[cfg(feature = "remote")]
+mod faulty_server;
+mod generated_deck;
 mod harmonic;
-mod held;
-#[cfg(feature = "remote")]
-mod liar;
-mod lines;
-mod look;
-#[cfg(feature = "remote")]
-mod lying;
 mod measure;
 mod models;
 mod noise;
 mod ports;
+mod queries;
 #[cfg(feature = "remote")]
 mod remote;
 mod steps;
 mod support;
 mod syntax;
 mod versions;
-mod warned;
+mod warnings;

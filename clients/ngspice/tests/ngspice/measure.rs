@@ -45,8 +45,9 @@ fn a_step_is_measured() {
         // nanometres on 1 N/m are nanonewtons; the pull is largest where the plate is nearest
         assert!((of("pull") / (of("settled") * 1e-9) - 1.0).abs() < 1e-3, "ngspice {version}: {}", of("pull"));
         let checked = check(&options("plate_measure.cir", &ngspice), &|| true).unwrap_or_else(|e| panic!("{e}"));
-        let told = checked.printed.iter().find(|p| p.name == "over").unwrap_or_else(|| panic!("{:?}", checked.printed));
-        assert!(told.values[0] == of("over") && told.difference < 1e-3, "ngspice {version}: {told:?}");
+        let reported =
+            checked.printed.iter().find(|p| p.name == "over").unwrap_or_else(|| panic!("{:?}", checked.printed));
+        assert!(reported.values[0] == of("over") && reported.difference < 1e-3, "ngspice {version}: {reported:?}");
         assert!(checked.plots.iter().any(|p| p.name.starts_with("Transient")), "ngspice {version}");
     }
 }

@@ -112,7 +112,7 @@ fn runs_are_repeatable() {
     assert_eq!(a.plots, b.plots);
 }
 
-/// A sweep follows its branch: downwards the plate stays pulled in where upwards it is not, and lets go in the end. An
+/// A sweep follows its branch: downwards the plate stays pulled in where upwards it is not, and finally opens. An
 /// operating point in the same run starts from rest whatever the sweep left behind.
 #[test]
 fn sweeps_follow_their_branch() {

@@ -42,7 +42,7 @@ fn a_damped_mass() {
     }
 }
 
-/// What a deck gives as noise at its output, and over all frequencies.
+/// Noise of a deck at its output, and over all frequencies.
 fn noise(text: &str, ngspice: &std::path::Path) -> (Vec<f64>, f64) {
     let run = run_text(text, ngspice).unwrap_or_else(|e| panic!("{}: {e}", ngspice.display()));
     let density = real(run.plot("Noise Spectral"), "onoise_spectrum").to_vec();

@@ -8,8 +8,8 @@ fn options(name: &str, ngspice: &Path) -> CosimOptions {
     CosimOptions { deck: deck(name), ngspice: Some(ngspice.to_owned()), ..CosimOptions::default() }
 }
 
-/// After a step of 1 g the mass settles at x = −m·a/k = −9.80665 nm and the middle of the half bridge at 1 V·x/g, and on the
-/// way both follow the closed form of the damped oscillator: 1e-4 of the end value.
+/// After a step of 1 g the mass settles at x = −m·a/k = −9.80665 nm and the middle of the half bridge at 1 V·x/g.
+/// During the motion both follow the closed form of the damped oscillator: 1e-4 of the end value.
 #[test]
 fn an_accelerometer_shows_one_g() {
     let (m, k, b, gap, a): (f64, f64, f64, f64, f64) = (1e-9, 1.0, 4.4e-5, 2e-6, 9.80665);
@@ -104,9 +104,9 @@ fn peaks(t: &[f64], x: &[f64]) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// A resistor where velocity is across, and a capacitor where displacement is across, damp as c = 1/R and c = 1e6·C:
-/// Q = √(km)/c = 20 by the decrement π·√(1/Q² − 1/4Q⁴)…, 1e-3; a resistor where displacement is across is a spring, and
-/// the frequency that of k + 1e6/R, 1e-4.
+/// A resistor on a velocity port, and a capacitor on a displacement port, damp as c = 1/R and c = 1e6·C. Q = √(km)/c =
+/// 20 by the decrement π·√(1/Q² − 1/4Q⁴)…, 1e-3. A resistor on a displacement port is a spring, and the frequency that
+/// of k + 1e6/R, 1e-4.
 #[test]
 fn circuit_elements_are_dampers_and_springs() {
     let (m, k): (f64, f64) = (1e-10, 1.0);

@@ -2,9 +2,9 @@
 
 use crate::support::{all_decks, deck, deviation, real, run, skipped};
 use bimorph::cosim::{CosimError, CosimOptions};
-use bimorph::service::access::Access;
 use bimorph::service::address::Address;
-use bimorph::service::guard::GuardFiles;
+use bimorph::service::authentication::GuardFiles;
+use bimorph::service::credentials::Access;
 use bimorph::service::server::{self, ServeOptions};
 use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -60,7 +60,7 @@ impl Drop for Serving {
     }
 }
 
-/// What a line between client and server does after so many bytes of replies.
+/// Fault of a connection between client and server after so many bytes of replies.
 #[derive(Clone, Copy, PartialEq)]
 enum Fate {
     /// The connection breaks and nothing listens any more, as when the server is killed.
@@ -121,8 +121,8 @@ fn a_server_gives_the_same_bits() {
     }
 }
 
-/// A server with TLS and tokens (certificates of tests/tls): what the environment shows gives the bytes of the process, and
-/// without a token the run ends with the server's words.
+/// A server with TLS and tokens (certificates of tests/tls): with credentials from the environment the bytes are those
+/// of the process, and without a token the run ends with the server's message.
 #[test]
 fn a_deck_over_tls() {
     if skipped() {
@@ -150,9 +150,9 @@ fn a_deck_over_tls() {
     assert!(reason.contains("asks for a token"), "{reason}");
 }
 
-/// The bank's deck in each formulation: on a server the waveforms are those of the process to the last bit, and two
-/// formulations agree within 1e-3 of the range of each waveform: 7e-4 of the current, which shows fast motion 150 times as much
-/// as `v(y)` does, on 705 unknowns (1.7e-5 on a mesh of 132, which has less of it).
+/// The bank's deck in each formulation. On a server the waveforms are those of the process to the last bit. Two
+/// formulations agree within 1e-3 of the range of each waveform: 7e-4 of the current, which has 150 times as much fast
+/// motion as `v(y)`, on 705 unknowns. On a mesh of 132, which has less of it, they agree to 1.7e-5.
 #[test]
 fn formulations_agree_on_the_bank() {
     if skipped() {

@@ -1,4 +1,4 @@
-//! What the tests that run ngspice share: finding it, running a deck, reading what came out.
+//! Functions shared by the tests that run ngspice: finding it, running a deck, reading its output.
 
 use bimorph::cosim::{self, CosimError, CosimOptions};
 use bimorph::results::table::{ColumnSamples, Table};
@@ -39,7 +39,7 @@ pub(crate) fn versions() -> Vec<(u32, PathBuf)> {
     found
 }
 
-/// A folder with every deck and netlist of the project's tests and samples, side by side.
+/// A folder with every deck and netlist of the project's tests and samples.
 pub(crate) fn all_decks() -> tempfile::TempDir {
     let all = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

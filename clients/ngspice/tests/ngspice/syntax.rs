@@ -22,7 +22,7 @@ fn refused(parameters: &str, instance: &str) -> Option<String> {
 
 const PLAIN: &str = "A1 %gd [d 0 s 0] %v [x] m";
 
-/// What users write is accepted: quotes, case, lists, settings, several forms of ports.
+/// Common forms are accepted: quotes, case, lists, settings, several forms of ports.
 #[test]
 fn accepted_forms() {
     if skipped() {
@@ -43,7 +43,7 @@ fn accepted_forms() {
     }
 }
 
-/// What cannot be used is refused before the analysis starts, with the instance, the model, and what is wrong.
+/// Invalid input is rejected before the analysis starts, with the instance, the model, and the fault.
 #[test]
 fn refusals() {
     if skipped() {
@@ -83,7 +83,7 @@ fn no_deck() {
     assert!(matches!(cosim::run(&options, &|| true), Err(CosimError::Deck { .. })));
 }
 
-/// A deck whose analyses print nothing and whose raw file nobody asks for is not run by ngspice: an error, not silence.
+/// ngspice does not run a deck whose analyses print nothing without a raw file: an error, not silence.
 #[test]
 fn nothing_to_run() {
     if skipped() {

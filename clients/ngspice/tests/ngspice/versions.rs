@@ -180,7 +180,7 @@ fn klu_agrees_with_sparse() {
                     let y = resolved(q, &other.samples.magnitudes());
                     assert_eq!(column.name, other.name);
                     assert_eq!(x.len(), y.len(), "{name} on {version}: {} of {}", column.name, p.plot_name);
-                    // At an operating point no current flows: what is solved there is rounding.
+                    // At an operating point no current flows: the solution there is rounding.
                     let everywhere = sparse.plots.iter().filter_map(|plot| plot.column(&column.name));
                     let size =
                         everywhere.flat_map(|c| c.samples.magnitudes()).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));

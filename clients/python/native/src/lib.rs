@@ -1,11 +1,11 @@
-//! `bimorph._native`: the service in the process of a Python program. Messages of the protocol go in and come out as bytes, and what
-//! a call refuses is a [`Refusal`] with its code, so that the package speaks with it as with a server.
+//! `bimorph._native`: the service in the process of a Python program. Messages of the protocol go in and out as bytes.
+//! A rejected call raises a [`Refusal`] with its code, so that the package uses it like a server.
 //!
-//! Python's lock is let go of while anything is computed. Nothing starts at import; an [`Engine`] has threads, and none of them
-//! survives a fork: the package makes one for each process.
+//! Python's lock is released while anything is computed. Nothing starts at import; an [`Engine`] has threads, and none
+//! of them survives a fork: the package makes one for each process.
 
 use bimorph::service::client;
-use bimorph::service::inside::{DeviceChannel, InProcessServer, ReplyMessages};
+use bimorph::service::in_process::{DeviceChannel, InProcessServer, ReplyMessages};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyOSError};
 use pyo3::prelude::*;
@@ -25,7 +25,7 @@ fn run<T: Send>(py: Python<'_>, job: impl FnOnce() -> Result<T, Status> + Send) 
     done.map_err(|status| refusal(&status))
 }
 
-/// The same of what may last: `job` is told how to ask whether its answer is still wanted.
+/// As above for long calls: `job` receives a function that returns whether its reply is still needed.
 fn wait<T: Send>(
     py: Python<'_>,
     stop: Option<&Stop>,
@@ -116,7 +116,7 @@ impl Stream {
         Ok(next.map(|bytes| PyBytes::new(py, &bytes)))
     }
 
-    /// Ends it: what computes it stops.
+    /// Ends it: its computation stops.
     fn cancel(&self, py: Python<'_>) {
         py.detach(|| *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None);
     }
@@ -186,7 +186,7 @@ impl RemoteLine {
         Ok(reply.map(|bytes| PyBytes::new(py, &bytes)))
     }
 
-    /// Ends the stream. Whoever asks at this moment has its answer first, or its patience ends.
+    /// Ends the stream. A concurrent caller first receives its reply, or its timeout ends.
     fn close(&self, py: Python<'_>) {
         py.detach(|| *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None);
     }

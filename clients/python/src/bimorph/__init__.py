@@ -32,11 +32,13 @@ from .model import Model
 from .netlist import Netlist
 from .options import Options
 from .results import (
+    Crossing,
     FrequencyResponse,
     ModesResult,
     NodeMotion,
     PullInResult,
     Root,
+    StabilityLoss,
     StaticResult,
     Statistics,
     TransientResult,
@@ -59,6 +61,7 @@ __all__ = [
     "Client",
     "ColumnStatistics",
     "Conversion",
+    "Crossing",
     "Diagnostic",
     "Failure",
     "Fraction",
@@ -93,6 +96,7 @@ __all__ = [
     "Server",
     "Session",
     "Snapshot",
+    "StabilityLoss",
     "Static",
     "StaticResult",
     "Statistics",

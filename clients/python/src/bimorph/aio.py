@@ -1,4 +1,4 @@
-"""The package for asyncio: the same names and arguments, to be awaited.
+"""The package for asyncio: the same names and arguments, as coroutines.
 
     client = bimorph.aio.Client("unix:///path")          # or bimorph.aio.local()
     model = await client.compile("plate.net")
@@ -8,9 +8,9 @@
     async with await model.session(["m.x"]) as session:
         reply = await session.step({"drive": 3.0}, dt=1e-7)
 
-Each call has a thread while it lasts, which serves a server and models in process alike. A task that is cancelled stops its call: what
-computes it ends, on the server too, and a session or a sweep that it was to give is closed. What a session computes at once (a piece of a
-step, an equilibrium) comes to its end; a step is taken as a whole or not at all, and ``session.t`` tells whether it was.
+Each call runs in a thread of its own, on servers and in process. Cancelling a task stops its call: the computation ends, on the server
+too, and a session or sweep that the call was opening is closed. A piece of a step and an equilibrium run to their end. A step is taken
+as a whole or not at all; ``session.t`` shows which.
 """
 
 from __future__ import annotations
@@ -41,21 +41,21 @@ C = TypeVar("C", bound="contextlib.AbstractContextManager[Any]")
 B = TypeVar("B", bound="_Block[Any]")
 
 _AHEAD = 256
-"""Most items that an iteration has ahead of who reads them."""
+"""Most items that an iterator reads ahead of its consumer."""
 
 
 def _thread(run: Callable[[], object]) -> None:
-    """Runs in a thread with the context of who calls: a daemon, so that a program that ends does not wait for it."""
+    """Runs in a daemon thread with the caller's context, so that the end of the program does not wait for it."""
     context = contextvars.copy_context()
     threading.Thread(target=context.run, args=(run,), daemon=True).start()
 
 
 def _nothing(result: object) -> None:
-    """Of most results nothing is left elsewhere."""
+    """Default of ``drop``: most results hold no resource."""
 
 
 async def _call(call: Callable[[], T], drop: Callable[[T], object] = _nothing) -> T:
-    """Its result, from a thread; cancelled, it is stopped, and a result that comes all the same is dropped."""
+    """Result of ``call``, run in a thread. On cancellation the call is stopped, and a result that arrives all the same is passed to ``drop``."""
     loop, done, stopping = asyncio.get_running_loop(), asyncio.get_running_loop().create_future(), Stopping()
     lock, left, made = threading.Lock(), threading.Event(), list[T]()
 
@@ -67,7 +67,7 @@ async def _call(call: Callable[[], T], drop: Callable[[T], object] = _nothing) -
         try:
             loop.call_soon_threadsafe(settle, set, value)
         except RuntimeError:
-            pass  # the loop is closed, and nobody waits
+            pass  # the loop is closed
 
     def run() -> None:
         current.set(stopping)
@@ -93,13 +93,13 @@ async def _call(call: Callable[[], T], drop: Callable[[T], object] = _nothing) -
             left.set()
             ready = bool(made)
         if ready:
-            # it was on its way already; one that comes later is dropped where it comes
+            # the result was ready; a later one is dropped by the thread
             _thread(lambda: drop(made[0]))
         raise
 
 
 async def _items(items: Callable[[], Iterator[T]]) -> AsyncIterator[T]:
-    """What a generator gives, from a thread, not far ahead; left early, it is stopped."""
+    """Items of a generator that runs in a thread, read ahead by a bounded number. Leaving the iteration stops the generator."""
     loop, stopping = asyncio.get_running_loop(), Stopping()
     queue: asyncio.Queue[tuple[T | None, BaseException | None]] = asyncio.Queue()
     room = threading.Semaphore(_AHEAD)
@@ -140,7 +140,7 @@ async def _items(items: Callable[[], Iterator[T]]) -> AsyncIterator[T]:
 
 
 def _awaited(method: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[Any, P], Awaitable[T]]:
-    """The method of what is wrapped, to be awaited."""
+    """Method of the wrapped object as a coroutine."""
 
     def call(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> Awaitable[T]:
         return _call(lambda: method(self.sync, *args, **kwargs))
@@ -152,7 +152,7 @@ def _awaited(method: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[Any
 def _awaited_as(
     wrap: Callable[[T], W], method: Callable[Concatenate[S, P], T], drop: Callable[[T], object] = _nothing
 ) -> Callable[Concatenate[Any, P], Awaitable[W]]:
-    """The same, of what is wrapped in turn; ``drop`` ends one that comes when nobody waits for it any more."""
+    """As :func:`_awaited`, with the result wrapped; ``drop`` ends a result that arrives after cancellation."""
 
     async def call(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> W:
         return wrap(await _call(lambda: method(self.sync, *args, **kwargs), drop))
@@ -162,11 +162,11 @@ def _awaited_as(
 
 
 class _Block(Generic[C]):
-    """What is used in an ``async with`` block, which ends as the block of what is wrapped does."""
+    """An object for ``async with``; the end of the block ends the wrapped object."""
 
     def __init__(self, sync: C) -> None:
         self.sync = sync
-        """What it wraps, with the rest of what needs no waiting: ``t``, ``ports``, ``address``, …"""
+        """The wrapped object, for attributes without waiting: ``t``, ``ports``, ``address``, …"""
 
     async def __aenter__(self: B) -> B:
         return self
@@ -201,7 +201,7 @@ class Session(_Block[_session.Session]):
         return self.sync.accepted
 
     async def fork(self) -> Session:
-        """Another session that goes on from here by itself; close it as well."""
+        """Opens another session with the same states; close it as well."""
         return Session(await _call(self.sync.fork, _session.Session.close))
 
     async def resume(self) -> Session:
@@ -219,7 +219,7 @@ class Model:
 
     def __init__(self, sync: _model.Model) -> None:
         self.sync = sync
-        """What it wraps: ``id``, ``ports``, ``nodes``, ``parameters``, ``warnings``."""
+        """The wrapped model: ``id``, ``ports``, ``nodes``, ``parameters``, ``warnings``."""
 
     static = _awaited(_model.Model.static)
     modes = _awaited(_model.Model.modes)
@@ -231,12 +231,12 @@ class Model:
 
 
 class Sweep(_Block[_sweep_handle.Sweep]):
-    """:class:`bimorph.Sweep` for asyncio: iterated over, it gives its rows as they are finished."""
+    """:class:`bimorph.Sweep` for asyncio. Iteration yields its rows in the order in which they finish."""
 
     def __init__(self, sync: _sweep_handle.Sweep) -> None:
         super().__init__(sync)
         self.id = sync.id
-        """Its name on the server."""
+        """Name on the server."""
 
     status = _awaited(_sweep_handle.Sweep.status)
     wait = _awaited(_sweep_handle.Sweep.wait)
@@ -245,11 +245,11 @@ class Sweep(_Block[_sweep_handle.Sweep]):
     delete = _awaited(_sweep_handle.Sweep.delete)
 
     def rows(self, first: int = 0) -> AsyncIterator[Row]:
-        """Its rows as they are finished, from the one numbered ``first`` on."""
+        """Rows in the order in which they finish, from number ``first`` on."""
         return _items(lambda: self.sync.rows(first))
 
     def watch(self) -> AsyncIterator[_sweep_handle.SweepStatus]:
-        """How far it has come, until it ends."""
+        """Its status after each change, until it ends."""
         return _items(self.sync.watch)
 
     def __aiter__(self) -> AsyncIterator[Row]:

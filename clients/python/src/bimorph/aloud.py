@@ -1,4 +1,4 @@
-"""What is said aloud: as warnings of Python, which a test runner shows and ``-W error`` makes errors of."""
+"""Warnings of models and results as Python warnings; ``-W error`` turns them into exceptions."""
 
 import warnings
 from collections.abc import Iterable
@@ -6,36 +6,36 @@ from collections.abc import Iterable
 from .errors import Diagnostic
 
 MESH = "W040"
-"""Code of what is said of a mesh: it concerns sessions, analyses choose their own."""
+"""Code of warnings about the mesh of sessions; analyses choose their own mesh."""
 
 
 class NetlistWarning(UserWarning):
-    """A netlist may not mean what was meant. The text has place, code and a way out."""
+    """A netlist is valid but probably not as intended. The text has place, code and remedy."""
 
 
 class AccuracyWarning(UserWarning):
-    """A number may be off by more than its tolerance, or a model be beyond its range. The text says by how much, or why."""
+    """A result may deviate by more than its tolerance, or the model is outside its range of validity. The text has the estimate or the reason."""
 
 
-def said(texts: Iterable[str], level: int = 3) -> tuple[str, ...]:
-    """Warns of each, where the caller of the caller stands; answers them."""
-    told = tuple(texts)
-    for text in told:
+def issue(texts: Iterable[str], level: int = 3) -> tuple[str, ...]:
+    """Issues a warning for each text, located at the caller's caller; returns the texts."""
+    found = tuple(texts)
+    for text in found:
         warnings.warn(text, AccuracyWarning, stacklevel=level)
-    return told
+    return found
 
 
 def of_netlist(diagnostics: Iterable[Diagnostic], level: int = 3) -> None:
-    """Warns of what a netlist is warned of, apart from its mesh."""
-    for told in diagnostics:
-        if told.severity == "warning" and told.code != MESH:
-            place = f"{told.file}:{told.line}: " if told.line else ""
-            help = f" ({told.help})" if told.help else ""
-            warnings.warn(f"{place}{told.message} [{told.code}]{help}", NetlistWarning, stacklevel=level)
+    """Issues the warnings of a netlist, apart from those about its mesh."""
+    for one in diagnostics:
+        if one.severity == "warning" and one.code != MESH:
+            place = f"{one.file}:{one.line}: " if one.line else ""
+            help = f" ({one.help})" if one.help else ""
+            warnings.warn(f"{place}{one.message} [{one.code}]{help}", NetlistWarning, stacklevel=level)
 
 
 def of_mesh(diagnostics: Iterable[Diagnostic], level: int = 3) -> None:
-    """Warns of what is known of the mesh that a session has."""
-    for told in diagnostics:
-        if told.code == MESH:
-            warnings.warn(f"{told.message} ({told.help})", AccuracyWarning, stacklevel=level)
+    """Issues the warnings about the mesh of a session."""
+    for one in diagnostics:
+        if one.code == MESH:
+            warnings.warn(f"{one.message} ({one.help})", AccuracyWarning, stacklevel=level)

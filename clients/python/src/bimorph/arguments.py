@@ -1,6 +1,6 @@
-"""Arguments of public functions are checked before anything is sent: each by its name, with the expected value and the one given.
+"""Checks of the arguments of public functions, made before anything is sent. An error names the argument, the expected value and the given one.
 
-Numbers of NumPy are converted exactly (a ``float32`` to the ``float64`` of the same value); text, bytes, flags and arrays are not numbers.
+NumPy numbers are converted exactly (a ``float32`` to the ``float64`` of the same value). Text, bytes, flags and arrays are not numbers.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ C = TypeVar("C", bound=Callable[..., object])
 T = TypeVar("T")
 
 MAX_ITEMS = 10_000_000
-"""Most items of an iterable argument: one without an end is rejected."""
+"""Most items of an iterable argument; an endless one is rejected."""
 MAX_STEP = 1e9
 """Longest step of a device [s]."""
 MAX_TIMEOUT = 1e8
-"""Times above this [s] are no bound."""
+"""A longer timeout [s] is taken as infinite."""
 
 
 def shown(value: object) -> str:
-    """A value as it stands in a message: short, on one line."""
+    """A value as text for a message: short, on one line."""
     try:
         text = reprlib.repr(value)
     except Exception:
@@ -39,12 +39,12 @@ def shown(value: object) -> str:
 
 
 def wrong(name: str, expected: str, value: object) -> InvalidRequest:
-    """The error of a value beyond its range."""
+    """Error for a value outside its range."""
     return InvalidRequest(f"{name}: expected {expected}, got {shown(value)}")
 
 
 def wrong_type(name: str, expected: str, value: object) -> InvalidType:
-    """The error of a value of another type."""
+    """Error for a value of another type."""
     return InvalidType(f"{name}: expected {expected}, got {shown(value)}")
 
 
@@ -81,7 +81,7 @@ def _real(name: str, value: Any, what: str) -> float:
 
 
 def integer(name: str, value: Any, least: int = 0, most: int = (1 << 31) - 1) -> int:
-    """An integer in a range; a float is none, even if it is whole."""
+    """An integer in a range; floats are rejected, also whole ones."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Integral):
@@ -95,7 +95,7 @@ def integer(name: str, value: Any, least: int = 0, most: int = (1 << 31) - 1) ->
 
 
 def timeout(name: str, value: Any) -> float:
-    """A time above 0 [s]; infinite: none is set."""
+    """A time above 0 [s]; infinite for no timeout."""
     if isinstance(value, (float, np.floating)) and value == math.inf:
         return math.inf
     found = number(name, value, "a time in seconds", above=0.0)
@@ -110,7 +110,7 @@ def flag(name: str, value: Any) -> bool:
 
 
 def text(name: str, value: Any, what: str = "a text", *, empty: bool = False) -> str:
-    """A text that can be sent."""
+    """A text that has a UTF-8 encoding, without NUL."""
     if not isinstance(value, str):
         raise wrong_type(name, what, value)
     if not (value or empty) or "\0" in value:
@@ -123,7 +123,7 @@ def text(name: str, value: Any, what: str = "a text", *, empty: bool = False) ->
 
 
 def token(name: str, value: Any) -> str:
-    """A token that goes into a header of HTTP."""
+    """A token for an HTTP header."""
     expected = "a token of visible ASCII characters"
     if not isinstance(value, str):
         raise InvalidType(f"{name}: expected {expected}, got an object of type {type(value).__name__}")
@@ -166,7 +166,7 @@ def content(name: str, file: str | os.PathLike[str]) -> bytes:
 
 
 def items(name: str, value: Any, what: str) -> list[Any]:
-    """The items of an iterable: a list, a tuple, an array of one dimension. A text, a mapping and a set are none."""
+    """Items of an iterable: a list, a tuple, an array of one dimension. Text, mappings and sets are rejected."""
     if isinstance(value, (str, bytes, bytearray, memoryview)):
         example = f"; write [{shown(value)}]" if isinstance(value, str) else ""
         kind = "the text" if isinstance(value, str) else "the bytes"
@@ -182,6 +182,12 @@ def items(name: str, value: Any, what: str) -> list[Any]:
     return found
 
 
+def unmasked(name: str, value: Any) -> None:
+    """Raises :class:`InvalidRequest` for an array with masked values: NumPy would take the numbers behind the mask."""
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise wrong(name, "numbers without masked values (.filled(number) or .compressed() gives them)", value)
+
+
 def names(name: str, value: Any) -> list[str]:
     """A list of names."""
     return [text(f"{name}[{k}]", item, "a name as text") for k, item in enumerate(items(name, value, "a list of names"))]
@@ -195,7 +201,7 @@ def mapping(name: str, value: Any, what: str) -> Mapping[Any, Any]:
 
 
 def volts(name: str, value: Any) -> dict[str, float]:
-    """What is given to ports by name; None: nothing."""
+    """Port values by name; None gives no values."""
     if value is None:
         return {}
     expected = 'names of ports with their volts, as {"drive": 3.0}'
@@ -206,7 +212,7 @@ def volts(name: str, value: Any) -> dict[str, float]:
 
 
 def given_to(ports: Mapping[str, float], voltages: Any) -> Mapping[str, float]:
-    """What is given to some of these ports, checked: a dictionary of finite ``float`` as it is."""
+    """Checked values of some of these ports. A dictionary of finite ``float`` is returned unchanged."""
     if type(voltages) is dict and voltages.keys() <= ports.keys():
         if all(type(value) is float and math.isfinite(value) for value in voltages.values()):
             return voltages
@@ -235,7 +241,7 @@ def setting(name: str, value: Any) -> float | str:
 
 
 def settings(name: str, value: Any) -> dict[str, float | str]:
-    """Values of parameters by name; None: none."""
+    """Values of parameters by name; None gives no values."""
     if value is None:
         return {}
     expected = 'names of parameters with their values, as {"w": 2e-6}'

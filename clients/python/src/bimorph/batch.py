@@ -4,88 +4,127 @@ from __future__ import annotations
 
 import contextlib
 import contextvars
-from collections.abc import Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+import queue
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import MAX_STEP, instance, items, mapping, number
+from . import labelled, plots, showing
+from .acceptance import State, accept_together
+from .arguments import MAX_STEP, instance, items, number
 from .errors import InvalidRequest
 from .model import Model
-from .runs import Array, Given, Lane, advance, checked_signals, checked_times, numbers, port_values, workers
+from .runs import Array, Given, Lane, advance, arrays, checked_signals, checked_times, port_values, workers
 from .session import Session
 from .stopping import Stopping, current
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
+
+_LOOK = 0.1
+"""Longest wait between two checks for signals [s]."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Where a session of a batch has stopped."""
+    """Step at which a session of a batch stopped."""
 
     index: int
-    """Number of the step that it could not take, from 0."""
+    """Number of the failed step, from 0."""
     t: float
-    """Time at its end [s]."""
+    """Time at the end of that step [s]."""
     reason: str
-    """Why."""
+    """Reason of the failure."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BatchRun:
-    """The steps that a batch took: a row for each session, a column for each time."""
+    """Steps of a batch: arrays with a row for each session and a column for each time."""
 
     t: Array
     """Times at the ends of the steps [s] (n)."""
     signals: dict[str, Array]
-    """Each signal, in its unit (sessions×n); NaN where a session did not come."""
+    """Each signal, in its unit (sessions×n); NaN after the last step of a session."""
     units: dict[str, str]
     """Unit of each signal."""
     currents: dict[str, Array]
-    """Current into each port [A], or what ports of other kinds answer (sessions×n)."""
+    """Conduction current into each port [A], or the response of a port of another kind (sessions×n)."""
     charges: dict[str, Array]
     """Charge on each port [C] (sessions×n)."""
     failures: dict[int, Failure]
-    """By session, where it has stopped before the last time."""
+    """Failed step by session, for sessions that stopped before the last time."""
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A column for each signal, by session, from 0, and time [s]; ``attrs["units"]`` has the units."""
+        columns = {name: values.ravel() for name, values in self.signals.items()}
+        return showing.frame_of_sessions(columns, self._count(), self.t, {"t": "s", **self.units})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The signals over ``session``, from 0, and ``t`` [s], each with its unit in ``attrs["units"]``."""
+        return labelled.of_sessions(self.t, self.signals, self.units)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws every signal over time: a colour for each signal, and a line for each session."""
+        return plots.batch(self, ax)
+
+    def _repr_html_(self) -> str:
+        head = ["session", "steps", *(f"{name} [{unit}]" for name, unit in self.units.items()), ""]
+        failures = [self.failures.get(k) for k in range(self._count())]
+        rows = (
+            [k, steps, *(float(values[k, steps - 1]) if steps else None for values in self.signals.values()), failure.reason if failure else ""]
+            for k, failure in enumerate(failures)
+            for steps in [failure.index if failure else len(self.t)]
+        )
+        return showing.table(head, rows, "signals after the last step of each session")
+
+    def _count(self) -> int:
+        return len(next(iter((self.currents or self.signals).values()), ()))
 
     def __repr__(self) -> str:
         lost = f", {len(self.failures)} stopped early" if self.failures else ""
-        rows = len(next(iter((self.currents or self.signals).values()), ()))
-        return f"<BatchRun of {rows} sessions, {len(self.t)} steps: {', '.join(self.signals) or 'no signals'}{lost}>"
+        return f"<BatchRun of {self._count()} sessions, {len(self.t)} steps: {', '.join(self.signals) or 'no signals'}{lost}>"
 
 
 class Batch:
     """Sessions with the same ports and signals, stepped together; use it in a ``with`` block, which closes them.
 
-    One call takes the steps of all of them: in this process on every core, on a server in few requests. Each has the bits that it has
-    alone.
+    One call steps all of them: in this process on all cores, on a server in few requests. The results of each session are bit-identical to
+    those of the session alone.
     """
 
     def __init__(self, sessions: Sequence[Session]) -> None:
         self.sessions: tuple[Session, ...] = tuple(items("sessions", sessions, "a list of sessions"))
-        """In the order of the rows of every result."""
+        """Sessions, in the order of the rows of results."""
         if not self.sessions:
-            raise InvalidRequest("sessions: expected at least one")
+            raise InvalidRequest("sessions: expected at least one session, got none")
         for k, session in enumerate(self.sessions):
             instance(f"sessions[{k}]", session, Session, "a Session")
         first = self.sessions[0]
         for k, session in enumerate(self.sessions):
             if session.ports != first.ports or session.signals != first.signals:
-                raise InvalidRequest(f"sessions[{k}]: expected ports {list(first.ports)} and signals {list(first.signals)}, as the first has")
+                raise InvalidRequest(f"sessions[{k}]: expected ports {list(first.ports)} and signals {list(first.signals)}, as sessions[0] has, got {list(session.ports)} and {list(session.signals)}")
             if session._channel.address != first._channel.address:
-                raise InvalidRequest(f"sessions[{k}]: expected one on {first._channel.address}, as the first is")
+                raise InvalidRequest(f"sessions[{k}]: expected a session on {first._channel.address}, as sessions[0] is, got one on {session._channel.address}")
             if session in self.sessions[:k]:
-                raise InvalidRequest(f"sessions[{k}]: a session is there twice")
+                raise InvalidRequest(f"sessions[{k}]: expected each session once, got that of sessions[{self.sessions.index(session)}] again")
         self._pool: ThreadPoolExecutor | None = None
 
     @classmethod
     def of(cls, models: Sequence[Model], signals: Sequence[str] = (), ports: Sequence[str] = (), timeout: float = 60.0) -> Batch:
-        """Opens a session of each model: variants, or one model several times. Arguments as of :meth:`Model.session`."""
+        """Opens one session for each model: variants, or one model several times. Arguments as of :meth:`Model.session`."""
         sessions: list[Session] = []
         try:
-            for k, model in enumerate(items("models", models, "a list of models")):
+            given = items("models", models, "a list of models")
+            if not given:
+                raise InvalidRequest("models: expected at least one model, got none")
+            for k, model in enumerate(given):
                 instance(f"models[{k}]", model, Model, "a Model")
                 sessions.append(model.session(signals, ports, timeout))
             return cls(sessions)
@@ -113,41 +152,54 @@ class Batch:
         return np.array([session.t for session in self.sessions])
 
     def operating_point(self, voltages: Given) -> None:
-        """Static equilibrium of each session at these port voltages [V], at t = 0: a number for all, or one for each session."""
-        count = len(self.sessions)
-        held = {}
-        for port, value in mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}').items():
-            held[port] = numbers(f"voltages[{port!r}]", value)
-            if held[port].shape not in ((), (count,)):
-                raise InvalidRequest(f"voltages[{port!r}]: expected a number, or one for each of {count} sessions, got shape {held[port].shape}")
-        for k, session in enumerate(self.sessions):
-            session.operating_point({port: float(value if value.ndim == 0 else value[k]) for port, value in held.items()})
+        """Accepts the static equilibrium of each session at these port voltages [V], and sets the time to 0 s. ``voltages`` has for each port
+        a number, or an array with one for each session.
 
-    def run(self, times: ArrayLike, voltages: Given, signals: Sequence[str] | None = None) -> BatchRun:
-        """Steps every session to each of these times [s] in turn. ``voltages`` are for each port a number, one for each time, or an array of a
-        row for each session. A session that cannot take a step stops there, and the others go on.
+        It is taken as a whole: where one equilibrium is not found, or the call is interrupted, every session keeps its state.
+
+        Raises :class:`StepFailed` where one is not found.
         """
         count = len(self.sessions)
-        t = checked_times(times, float(self.t.max()))
-        wanted = checked_signals(signals, self.signals)
-        mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
-        varied = any(np.ndim(value) == 2 for value in voltages.values())
-        alike = not varied and all(session._voltages == self.sessions[0]._voltages for session in self.sessions)
-        shared = port_values(self.sessions[0], voltages, len(t)) if alike else None
-        lanes = [
-            Lane.of(
-                session,
-                shared if shared is not None else port_values(session, voltages, len(t), k, count),
-                len(t),
-                len(wanted),
-                True,
-            )
-            for k, session in enumerate(self.sessions)
-        ]
-        with contextlib.ExitStack() as locks:
-            for session in self.sessions:
-                locks.enter_context(session._lock)
-            self._advance(lanes, t, wanted)
+        held = arrays(voltages)
+        for port, value in held.items():
+            if value.shape not in ((), (count,)):
+                raise InvalidRequest(f"voltages[{port!r}]: expected a number, or one for each of {count} sessions, got an array of shape {value.shape}")
+        with self._locked():
+            states: list[State] = []
+            for k, session in enumerate(self.sessions):
+                given = {port: float(value if value.ndim == 0 else value[k]) for port, value in held.items()}
+                reply = replace(session.trial(given), t=0.0)
+                states.append((session, reply, dict(reply.voltages)))
+            accept_together(states)
+
+    def run(self, times: ArrayLike, voltages: Given, signals: Sequence[str] | None = None) -> BatchRun:
+        """Steps every session to each of these times [s] in turn.
+
+        ``voltages`` has for each port a number, an array with one for each time, or an array with a row for each session. A row has one number,
+        or one for each time. A session that cannot take a step stops there, and the others continue.
+
+        The batch is taken as a whole: if the call is interrupted or a session cannot be reached, every session keeps its state (beyond 2²⁰ port
+        values for a session: all have the state at the end of the same part of the times).
+        """
+        with self._locked():
+            count = len(self.sessions)
+            t = checked_times(times, float(self.t.max()))
+            wanted = checked_signals(signals, self.signals)
+            voltages = arrays(voltages)
+            varied = any(value.ndim == 2 for value in voltages.values())
+            alike = not varied and all(session._voltages == self.sessions[0]._voltages for session in self.sessions)
+            shared = port_values(self.sessions[0], voltages, len(t)) if alike else None
+            lanes = [
+                Lane.of(
+                    session,
+                    shared if shared is not None else port_values(session, voltages, len(t), k, count),
+                    len(t),
+                    len(wanted),
+                    True,
+                )
+                for k, session in enumerate(self.sessions)
+            ]
+            advance(lanes, t, wanted, True, divide=self._divide)
         return _gathered(lanes, t, wanted)
 
     def step(self, voltages: Given, dt: float) -> BatchRun:
@@ -155,21 +207,29 @@ class Batch:
         dt = number("dt", dt, "a time in seconds", above=0.0, most=MAX_STEP)
         now = self.t
         if (now != now[0]).any():
-            raise InvalidRequest("the sessions stand at different times: run them to one time first")
+            raise InvalidRequest(f"dt: expected sessions with one time, got {now.min():g} s to {now.max():g} s; run them to one time first")
         count = len(self.sessions)
-        mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
-        spread = {p: np.reshape(v, (count, 1)) if np.shape(v) == (count,) else v for p, v in voltages.items()}
+        spread = {port: value.reshape(count, 1) if value.shape == (count,) else value for port, value in arrays(voltages).items()}
         return self.run([float(now[0]) + dt], spread)
 
-    def _advance(self, lanes: list[Lane], t: Array, wanted: list[str]) -> None:
-        channel = self.sessions[0]._channel
-        parts = workers(channel, len(lanes))
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Excludes other threads from the sessions."""
+        with contextlib.ExitStack() as locks:
+            # in one order, so that two batches with the same sessions do not wait for each other
+            for session in sorted(self.sessions, key=id):
+                locks.enter_context(session._lock)
+            yield
+
+    def _divide(self, lanes: Sequence[Lane], request: Callable[[Sequence[Lane]], None]) -> None:
+        """Divides lanes among threads. Returns, or raises, when all of them have ended."""
+        parts = workers(self.sessions[0]._channel, len(lanes))
         if parts == 1:
-            advance(lanes, t, wanted, True)
+            request(lanes)
             return
         if self._pool is None:
             self._pool = ThreadPoolExecutor(parts, thread_name_prefix="bimorph-batch")
-        outer, own = current.get(), [Stopping() for _ in range(parts)]
+        pool, outer, own = self._pool, current.get(), [Stopping() for _ in range(parts)]
 
         def stop() -> None:
             for stopping in own:
@@ -179,20 +239,39 @@ class Batch:
             outer.begun(stop)
         ends = np.linspace(0, len(lanes), parts + 1).astype(int).tolist()
 
-        def part(k: int) -> None:
-            current.set(own[k])
-            advance(lanes[ends[k] : ends[k + 1]], t, wanted, True)
+        results: list[BaseException | None] = []
+        wake: queue.SimpleQueue[None] = queue.SimpleQueue()
 
-        jobs: list[Future[Any]] = [self._pool.submit(contextvars.copy_context().run, part, k) for k in range(parts)]
+        def part(k: int) -> None:
+            error: BaseException | None = None
+            try:
+                current.set(own[k])
+                request(lanes[ends[k] : ends[k + 1]])
+            except BaseException as raised:
+                error = raised
+            results.append(error)
+            wake.put(None)
+
+        def look() -> None:
+            # a queue, as a condition breaks where two interrupts meet in its wait; a signal of another thread is handled between two waits
+            with contextlib.suppress(queue.Empty):
+                wake.get(timeout=_LOOK)
+
+        begun = 0
         try:
-            for job in jobs:
-                job.result()
+            for k in range(parts):
+                pool.submit(contextvars.copy_context().run, part, k)
+                begun += 1
+            while len(results) < parts and all(error is None for error in results):
+                look()
+            for error in results:
+                if error is not None:
+                    raise error
         except BaseException:
             stop()
-            for job in jobs:
-                job.cancel()
-                with contextlib.suppress(BaseException):
-                    job.result()
+            while len(results) < begun:
+                with contextlib.suppress(KeyboardInterrupt):
+                    look()
             raise
 
     def close(self) -> None:

@@ -1,8 +1,8 @@
-"""One gRPC channel per process and server, shared by all who talk to that server.
+"""One gRPC channel per process and server, shared by all clients of that server.
 
-gRPC does not survive a fork: a child that uses its parent's channel hangs. So a channel is made when it is first used, and in
-another process a new one is made. Clients and models that were sent to a worker process share its channel, however many of
-them come: a server has a bounded number of connections.
+gRPC does not survive a fork: a child that uses its parent's channel hangs. So a channel is opened at first use, again
+in each process. All clients and models that were sent to a worker process share its channel, because a server accepts a bounded number
+of connections.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .v1 import model_pb2, service_pb2_grpc
 T = TypeVar("T")
 
 _ATTEMPTS = 6
-"""Attempts in a row, after which a server is given up that has never answered."""
+"""Attempts in a row before a server that has never replied is given up."""
 
 _PAUSE = 0.1
 """Pause before the second attempt [s]; each further one is twice as long."""
@@ -41,11 +41,11 @@ _LONGEST_PAUSE = 1.0
 _OPTIONS = [
     ("grpc.max_receive_message_length", 64 << 20),
     ("grpc.max_send_message_length", 64 << 20),
-    # A network that fails without a word is noticed by a ping that is not answered, within 4.5 s, whatever is being waited for.
+    # A silent failure of the network is detected by a ping without a reply, within 4.5 s.
     ("grpc.keepalive_time_ms", 2000),
     ("grpc.http2.ping_timeout_ms", 2500),
     ("grpc.http2.max_pings_without_data", 0),
-    # One that works again is used soon.
+    # Reconnect soon after the network works again.
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.min_reconnect_backoff_ms", 1000),
     ("grpc.max_reconnect_backoff_ms", 2000),
@@ -54,12 +54,12 @@ _OPTIONS = [
 ]
 
 
-# For a Unix socket gRPC would send the escaped path as HTTP authority, which the server's HTTP layer refuses.
+# For a Unix socket gRPC would send the escaped path as HTTP authority, which the server's HTTP layer rejects.
 _PLAIN = [*_OPTIONS, ("grpc.default_authority", "localhost")]
 
 
 class _Connection:
-    """The gRPC channels of this process to one server, a second one where the first is full of streams; closed when unused."""
+    """The gRPC channels of this process to one server; a further one is opened when the others are full of streams. Closed when unused."""
 
     def __init__(self, address: str, access: Access) -> None:
         self._pid = os.getpid()
@@ -70,11 +70,11 @@ class _Connection:
         self.compared = False
         """Whether the server's version is known."""
         self.answered = False
-        """Whether the server has answered a call."""
+        """Whether the server has replied to a call."""
         self.places = Places()
-        """Places of streams on each channel."""
+        """Stream slots of each channel."""
         self.native_places = Places()
-        """The same of the connections of the module that is not Python."""
+        """Stream slots of each connection of the native module."""
         # A method ``__del__`` would let another thread find it in ``_connections`` while it closes.
         weakref.finalize(self, _close, self._channels, self._pid)
         self.stub: Any = self.stub_of(0)
@@ -110,7 +110,7 @@ _inherited: list[Any] = []
 
 
 def _forked() -> None:
-    """In a child: nothing of the parent's is used, or even let go of."""
+    """In a forked child: connections of the parent are neither used nor closed."""
     global _connections, _lock
     _inherited.append(list(_connections.values()))
     _connections = weakref.WeakValueDictionary()
@@ -133,20 +133,20 @@ OWN = importlib.metadata.version("bimorph-mems")
 """The version of this package."""
 
 _told: set[tuple[str, str]] = set()
-"""Servers and their versions that this process was warned of."""
+"""Servers and versions for which this process has issued the warning."""
 
 
 class Channel:
-    """The way to one server, connected when first used."""
+    """Calls to one server, connected at first use."""
 
     def __init__(self, address: str, timeout: float, access: Access | None = None) -> None:
         self.address = address
         self.timeout = timeout
         self.reconnect = timeout
-        """How long a server that has answered is asked again where the network fails [s]."""
+        """Longest time of attempts to reach a server that has replied before [s]."""
         self._access = access or Access()
         self.metadata: tuple[tuple[str, str], ...] | None = None
-        """What every call carries; known once the stub is."""
+        """Metadata of every call; set with the stub."""
         self._pid: int | None = None
         self._connection: _Connection | None = None
 
@@ -183,7 +183,7 @@ class Channel:
         return answer
 
     def _compare(self, info: Any) -> None:
-        """Warns once of a server of another version: its numbers may differ, and its states cannot be gone on from."""
+        """Warns once about a server of another version: its results may differ, and its states cannot be restored."""
         if info is None:
             with contextlib.suppress(BimorphError):
                 info = self.call("Info", model_pb2.InfoRequest())
@@ -199,7 +199,7 @@ class Channel:
         warnings.warn(text, stacklevel=4)
 
     def stream(self, method: str, request: Any) -> Iterator[Any]:
-        """A call with many answers; left early, it is cancelled."""
+        """A call with a stream of replies. Leaving the iteration cancels it."""
         place, stub = self.place()
         try:
             call = self.guard(lambda: getattr(stub, method)(request, metadata=self.metadata))
@@ -222,7 +222,7 @@ class Channel:
             place.release()
 
     def place(self) -> tuple[Place, Any]:
-        """The place of a stream, and the stub over whose channel it goes."""
+        """A stream slot, and the stub of its channel."""
         _ = self.stub
         connection = self._connection
         assert connection is not None
@@ -234,22 +234,22 @@ class Channel:
             raise
 
     def native_place(self) -> Place:
-        """The place of a stream on a connection of the module that is not Python."""
+        """A stream slot on a connection of the native module."""
         _ = self.stub
         assert self._connection is not None
         return self._connection.native_places.take()
 
     def line(self, timeout: float) -> Line | NativeLine:
-        """Questions to one device, each with a reply within ``timeout`` [s]."""
+        """Opens a stream of requests to one device, each with a reply within ``timeout`` [s]."""
         if is_secure(self.address) or native.found() is None:
             return Line(self, timeout)
         return NativeLine(self, timeout)
 
     def persist(self, ask: Callable[[], T], within: float | None = None) -> T:
-        """Asks again where the network fails, until ``within`` [s] is over, by default :attr:`reconnect`. A server that has not answered
-        once in this process is given up after six attempts: its address may be wrong.
+        """Repeats a call while the network fails, for ``within`` [s], by default :attr:`reconnect`. A server that has never replied to
+        this process is given up after six attempts: its address may be wrong.
 
-        For questions alone that may be asked twice.
+        Only for calls that may be repeated.
         """
         deadline, failures = time.monotonic() + (self.reconnect if within is None else within), 0
         while True:
@@ -265,9 +265,9 @@ class Channel:
             time.sleep(pause)
 
     def guard(self, call: Callable[[], T]) -> T:
-        """Turns a status into an error of this package.
+        """Converts a gRPC status into an error of this package.
 
-        It is raised outside of the handler: gRPC's own error, which cannot be pickled, must not come along as its context.
+        It is raised outside of the handler: the error of gRPC cannot be pickled and must not be its context.
         """
         try:
             return call()
@@ -278,7 +278,7 @@ class Channel:
         raise failure
 
     def close(self) -> None:
-        """Lets go of the connection of this process; it closes when nobody else uses it."""
+        """Releases the connection of this process, which closes when no other client uses it."""
         self._connection = None
 
     def __getstate__(self) -> dict[str, Any]:

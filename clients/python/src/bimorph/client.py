@@ -36,15 +36,14 @@ if TYPE_CHECKING:
 
 
 class Client:
-    """A server.
+    """Connection to a server.
 
     ``address`` is ``unix:///path``, ``host:port`` or, with TLS, ``https://host:port``; ``local:`` is this process (:func:`local`).
-    ``timeout`` [s] bounds each unary call. The
-    connection is made when it is first needed, again in each process: a client may be used after a fork, and sent to worker
-    processes.
+    ``timeout`` [s] bounds each unary call. The connection is opened at first use, again in each process: a client may be used after a fork, and
+    sent to worker processes.
 
-    ``ca`` is a file (PEM) of the authorities to trust at ``https://``; ``token_file`` holds the token to show, or ``token`` is it;
-    ``client_cert`` and ``client_key`` are for servers that ask for a certificate. Those left out are taken from the environment:
+    ``ca`` is a file (PEM) with the authorities to trust at ``https://``. ``token`` is the token, or ``token_file`` a file with it.
+    ``client_cert`` and ``client_key`` are for servers that require a certificate. Omitted values are taken from the environment:
     ``BIMORPH_CA``, ``BIMORPH_TOKEN_FILE``, ``BIMORPH_CLIENT_CERT``, ``BIMORPH_CLIENT_KEY``.
     """
 
@@ -79,7 +78,7 @@ class Client:
         return str(self._channel.call("Info", model_pb2.InfoRequest()).version)
 
     def settings(self) -> dict[str, str]:
-        """Everything that the server was told, or does by default, by the names of docs/service.md."""
+        """All settings of the server, defaults included, by the names of docs/service.md."""
         return {s.name: s.value for s in self._channel.call("Info", model_pb2.InfoRequest()).settings}
 
     def convert(
@@ -89,10 +88,10 @@ class Client:
         process: str | os.PathLike[str] | None = None,
         cell: str | None = None,
     ) -> Conversion:
-        """Makes a netlist of a layout (.cif or .gds).
+        """Converts a layout (.cif or .gds) into a netlist.
 
-        ``process`` is the name of one that the server has ("polymumps", "soi") or the path of a process file; without it the drawing
-        names its own. ``cell`` is the cell to read where several are called by no other.
+        ``process`` is a process of the server ("polymumps", "soi") or the path of a process file. By default the layout names its process.
+        ``cell`` is the cell to read if several cells are not instances of another one.
         """
         path = Path(arguments.path("layout", layout, "the path of a layout"))
         text = "" if process is None else arguments.path("process", process, "the name of a process or the path of its file")
@@ -125,13 +124,13 @@ class Client:
         include: Iterable[str | os.PathLike[str]] = (),
         **options: Unpack[Options],
     ) -> Model:
-        """Compiles a netlist (a path, or a :class:`Netlist`), or a layout (.cif or .gds), which :meth:`convert` makes a netlist of.
+        """Compiles a netlist (a path, or a :class:`Netlist`), or a layout (.cif or .gds) by :meth:`convert`.
 
-        What the conversion has to tell, areas not understood above all, comes as :class:`LayoutWarning`, what the netlist is warned of as
-        :class:`NetlistWarning`, and what results are warned of as :class:`AccuracyWarning`.
+        Issues :class:`LayoutWarning` for areas that the conversion did not recognise and for its approximations, and :class:`NetlistWarning` for
+        warnings of the netlist.
 
-        ``set`` overrides netlist parameters [SI]. The other keywords are the :class:`Options` of a model, such as ``tol``
-        and ``band``; the server refuses a value beyond its range.
+        ``set`` overrides netlist parameters [SI]. The other keywords are the :class:`Options` of a model, such as ``tol`` and ``band``. A value
+        outside its range is rejected.
 
         Raises :class:`NetlistError` with all diagnostics.
         """
@@ -141,7 +140,7 @@ class Client:
         try:
             answer = self._channel.call("Compile", request)
         except InvalidRequest as error:
-            # A status has no room for many diagnostics; Check gives all of them, as data.
+            # A status has no space for many diagnostics; Check returns all of them as data.
             checked = self._channel.call("Check", model_pb2.CheckRequest(bundle=bundle, options=wire))
             if checked.ok:
                 raise
@@ -165,13 +164,13 @@ class Client:
         **options: Unpack[Options],
     ) -> Table:
         """Runs ``analysis`` on the full grid of ``parameters``, on all cores of the server: netlist parameters [SI], voltages of ports (``"heat.v"``
-        [V]) and options of the model (``"option.tol"``) by name. Names in a tuple go together: ``{("w", "gap"): [(2e-6, 1e-6), (1.8e-6, 1.2e-6)]}``
-        is a list of points, and an axis like any other.
+        [V]) and options of the model (``"option.tol"``) by name. Names in a tuple vary together: ``{("w", "gap"): [(2e-6, 1e-6), (1.8e-6, 1.2e-6)]}``
+        is one axis with a list of points.
 
         ``samples`` are drawn at every point of the grid, which may be empty (``{}``): Monte Carlo.
         ``shard`` (i, n) runs only points whose number modulo n is i. ``progress`` is called with (points done, points).
 
-        Raises :class:`NoResult` where no point of the whole sweep has a result; a point without one beside others is a row with its ``error``.
+        Raises :class:`NoResult` if no point of the whole sweep has a result. Otherwise a point without a result is a row with its ``error``.
         """
         arguments.function("progress", progress)
         with self.submit(
@@ -193,12 +192,12 @@ class Client:
         release_after: float | None = None,
         **options: Unpack[Options],
     ) -> Sweep:
-        """Starts a :meth:`sweep` and comes back at once: ``wait()`` has its table, and its ``id`` finds it again (:meth:`attach`), on a server
-        with a folder for states also when that was started anew.
+        """Starts a :meth:`sweep` and returns at once. ``wait()`` returns its table. :meth:`attach` finds it by its ``id``, after a restart of the
+        server too if that has a folder for states.
 
-        With ``share`` it is the sweep that this client submitted with ``share`` for the same netlist, options, points and ``release_after``,
-        running or done, if the server has one. ``release_after`` [s] lets the
-        server cancel it when it has had no connection of this client for so long; None: it runs on.
+        ``share`` reuses a running or finished sweep that this client submitted with ``share`` for the same netlist, options, points and
+        ``release_after``. ``release_after`` [s] allows the server to cancel the sweep after that time without a connection of this client; None:
+        it continues.
         """
         if release_after is not None:
             release_after = arguments.number("release_after", release_after, "None or a time in seconds", above=0.0)
@@ -208,7 +207,7 @@ class Client:
             bundle=self._bundle(netlist, include),
             options=wire,
             sweep=spec,
-            # an answer that is lost starts no second sweep
+            # a repeated request after a lost reply starts no second sweep
             request_id="" if share else uuid.uuid4().hex,
             share=share,
             release_after_s=release_after or 0.0,
@@ -220,7 +219,7 @@ class Client:
     def attach(self, sweep: str) -> Sweep:
         """A sweep of this server by its ``id``, with or without ``jobs/``.
 
-        Raises :class:`NotFound` for one that the server does not have (any more).
+        Raises :class:`NotFound` if the server does not have it.
         """
         arguments.text("sweep", sweep, "the id of a sweep")
         found = Sweep(self._channel, sweep if "/" in sweep else f"jobs/{sweep}", shared=True)
@@ -229,8 +228,8 @@ class Client:
         return found
 
     def sweeps(self) -> list[SweepStatus]:
-        """The sweeps that this client has on the server, the last one first: the owner of a token or of a certificate sees its own; all who
-        come by a Unix socket are one client, and all who show nothing."""
+        """Sweeps of this client on the server, the last one first. Clients are distinguished by token or certificate. All connections over a Unix
+        socket are one client, and so are all without credentials."""
         found, token = list[SweepStatus](), ""
         while True:
             page = self._channel.call("ListJobs", jobs_pb2.ListJobsRequest(page_token=token))
@@ -244,17 +243,17 @@ class Client:
             netlist = arguments.path("netlist", netlist, "a path or a Netlist")
         if not isinstance(netlist, Netlist) and Path(netlist).suffix.lower() in LAYOUTS:
             converted = self.convert(netlist)
-            for said in converted.told():
-                warnings.warn(f"{netlist}: {said}", LayoutWarning, stacklevel=4)
+            for remark in converted.told():
+                warnings.warn(f"{netlist}: {remark}", LayoutWarning, stacklevel=4)
             netlist = converted.netlist
         read = netlist if isinstance(netlist, Netlist) else Netlist._read("netlist", netlist, include)
         return model_pb2.Bundle(root=read.root, files=dict(read.files))
 
     def resume(self, ticket: Ticket, timeout: float = 60.0) -> Session:
-        """Goes on with a kept session from its :meth:`Session.ticket`, also when the server was started anew.
+        """Continues a kept session from its :meth:`Session.ticket`, also after a restart of the server.
 
-        Raises :class:`NotFound` when the session is not kept (any more), :class:`NoResult` when its states are of another version
-        of the server. Whatever this raises, what is kept stays.
+        Raises :class:`NotFound` if the server does not have the session, and :class:`NoResult` if its states are of another version
+        of the server. A failed call does not change the kept session.
         """
         ticket = arguments.instance("ticket", ticket, Ticket, "a Ticket, as Session.ticket() gives it")
         return resumed(self._channel, ticket, arguments.timeout("timeout", timeout))
@@ -273,11 +272,11 @@ class Client:
 
 
 def local() -> Client:
-    """Models in this process: no server and no network, the same calls, bits and errors as with one. A step of a small model costs
-    some ten microseconds, and analyses let other threads run.
+    """A client of models in this process, without server and network. Calls and errors are those of a server, and results are bit-identical. A step of
+    a small model costs some ten microseconds. Analyses release the interpreter lock.
 
-    A fault in the process is one of the program's; what must go on regardless belongs on a server.
+    A crash of the engine ends this process. Use a server where the caller must survive it.
 
-    Raises :class:`BimorphError` where the package was installed without it (``make wheel``).
+    Raises :class:`BimorphError` if the package was installed without the native module (``make wheel`` includes it).
     """
     return Client(ADDRESS)

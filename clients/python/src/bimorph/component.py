@@ -1,7 +1,7 @@
-"""gdsfactory components to mechanisms: instances with settings, and which of their ports lie in one place.
+"""Conversion of gdsfactory components into mechanisms, from their instances, settings and connected ports.
 
-What is read is ``get_netlist()`` of each component, so that nothing is recognised. The orientation of a cell inside others is that of all
-placements around it; see :func:`bimorph.layout.from_gdsfactory`.
+The source is ``get_netlist()`` of each component, so no geometry is recognised. The orientation of a nested cell is the product of all placements
+around it; see :func:`bimorph.layout.from_gdsfactory`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .layout import Kind, Mechanism
 _POWERS = {"m": -6, "s": -6}
 """Powers of ten of the SI units in which settings are given: micrometres and microseconds."""
 _DRAWING = ("layer", "anchor")
-"""Settings that say on which masks a cell is drawn."""
+"""Settings that select the masks of a cell."""
 _DEEPEST = 100
 
 
@@ -52,13 +52,13 @@ class _Part:
 
 
 class _Nodes:
-    """Which ports "path,port" are one node."""
+    """Sets of ports "path,port" that form one node."""
 
     def __init__(self) -> None:
         self._parent: dict[str, str] = {}
         self._names: dict[str, str] = {}
         self._roots: dict[str, str] = {}
-        """By name in the netlist."""
+        """Nodes of ports by instance name in the netlist."""
 
     def root(self, port: str) -> str:
         while self._parent.setdefault(port, port) != port:
@@ -70,7 +70,7 @@ class _Nodes:
         self._parent[b] = a
 
     def call(self, port: str, name: str) -> None:
-        """Names a node by a port of the whole; all are joined and named before any name is asked for."""
+        """Names a node after a port of the top component. All joins and names precede the first query."""
         root, word = self.root(port), _word(name)
         if root in self._names:
             return
@@ -89,7 +89,7 @@ class _Nodes:
 
 
 def mechanism(component: Any, kinds: Mapping[str, Kind], process: str) -> Mechanism:
-    """The mechanism of a component, or of what its ``get_netlist()`` gives."""
+    """Mechanism of a component, or of the result of its ``get_netlist()``."""
     nodes = _Nodes()
     read, inner = _read(component)
     parts = list(_parts(read, inner, "", _Place(), kinds, nodes, 0))
@@ -114,7 +114,7 @@ def mechanism(component: Any, kinds: Mapping[str, Kind], process: str) -> Mechan
 
 
 def _place(made: Mechanism, groups: _Nodes, first: Mapping[str, tuple[str, _Place]]) -> None:
-    """Places what no port joins with the first part: there a cell's first node is at its origin."""
+    """Places parts without a connection to the first part: the first node of a cell is at its origin."""
     seen: dict[str, str] = {}
     origin: tuple[str, _Place] | None = None
     for node, (_, place) in first.items():
@@ -128,7 +128,7 @@ def _place(made: Mechanism, groups: _Nodes, first: Mapping[str, tuple[str, _Plac
 
 
 def _read(component: Any) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-    """A netlist, and gdsfactory's own instances by name where there are some."""
+    """A netlist, and the instances of gdsfactory by name if available."""
     if isinstance(component, Mapping):
         return component, {}
     from gdsfactory.get_netlist import SmartNamer, function_namer, get_netlist
@@ -141,7 +141,7 @@ def _read(component: Any) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
         inner[called] = inst
         return called
 
-    # more than two ports in one place are one node here, free ones are free ends; settings are not rounded
+    # any number of ports in one place is one node; free ports are free ends; settings are not rounded
     read = get_netlist(
         component,
         on_multi_connect="ignore",
@@ -154,7 +154,7 @@ def _read(component: Any) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
 
 
 def _touch(port1: Any, port2: Any) -> bool:
-    """Whether two ports lie in one place, whatever their widths, layers and directions."""
+    """Whether two ports have the same position, regardless of width, layer and direction."""
     (x1, y1), (x2, y2) = port1.to_itype().center, port2.to_itype().center
     return bool(abs(x2 - x1) < 2 and abs(y2 - y1) < 2)
 
@@ -195,7 +195,7 @@ def _parts(
 
 
 def _copies(name: str, instance: Mapping[str, Any], where: Mapping[str, Any], known: Any) -> Iterator[tuple[str, _Place]]:
-    """The instances of an array, named as its ports are, or the only one."""
+    """Instances of an array, named as in its ports; of another cell, the single one."""
     angle, mirrored = float(where.get("rotation") or 0.0), bool(where.get("mirror"))
     x, y = (float(where.get(axis) or 0.0) for axis in ("x", "y"))
     array = dict(instance.get("array") or {})
@@ -213,7 +213,7 @@ def _copies(name: str, instance: Mapping[str, Any], where: Mapping[str, Any], kn
         else:
             counts = (int(array["num_a"]), int(array["num_b"]))
             pitches = [(float(array[key][0]), float(array[key][1])) for key in ("pitch_a", "pitch_b")]
-        # they are turned with the cell, but not mirrored
+        # they rotate with the cell but are not mirrored
         turned = [_Place(angle=angle).after(_Place(*pitch)) for pitch in pitches]
         steps = [(step.x, step.y) for step in turned]
     for a in range(max(counts[0], 1)):
@@ -234,12 +234,12 @@ def _scaled(part: _Part, key: str, value: Any) -> Any:
 
 
 def _shifted(value: float, powers: int) -> float:
-    """By decimals: 20 µm are 2e-05, not the nearest product."""
+    """Scales by decimal digits: 20 µm is 2e-05 and not the rounded product."""
     return float(Decimal(repr(value)).scaleb(powers))
 
 
 def _metres(micrometres: float) -> float:
-    """To 1 fm: turns leave less."""
+    """Rounds to 1 fm, which exceeds the rounding of rotations."""
     return _shifted(round(micrometres, 9) + 0.0, -6)
 
 
@@ -248,7 +248,7 @@ def _told(key: str, value: Any) -> bool:
 
 
 def _radians(degrees: float) -> float:
-    """Between −π and π; 0 for what rounding left of a full turn."""
+    """Angle between −π and π; 0 for a full turn within rounding."""
     turned = (degrees + 180.0) % 360.0 - 180.0
     return 0.0 if abs(turned) < 1e-9 else math.radians(turned)
 

@@ -1,4 +1,4 @@
-"""What becomes of a layout."""
+"""Results of the conversion of a layout."""
 
 from __future__ import annotations
 
@@ -11,50 +11,50 @@ LAYOUTS = frozenset({".cif", ".gds", ".gdsii", ".gds2", ".sf"})
 
 
 _NAMED = 5
-"""Pieces that are told one by one."""
+"""Most unrecognised pieces that are listed one by one."""
 
 
 class LayoutWarning(UserWarning):
-    """What a layout's conversion has to tell, where only its netlist was asked for."""
+    """Remarks of the conversion of a layout that was compiled directly."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of a drawing that is in no part of the mechanism."""
+    """A piece of a layout that is in no part of the mechanism."""
 
     layer: str
     area_m2: float
-    """[m²]"""
+    """Area [m²]."""
     box_m: tuple[float, float, float, float]
-    """Left, bottom, right and top [m]."""
+    """Left, bottom, right and top of its bounding box [m]."""
     why: str
 
 
 @dataclass(frozen=True)
 class Conversion:
-    """The netlist of a layout, and what was not understood."""
+    """The netlist of a layout, and the areas that were not recognised."""
 
     netlist: Netlist
-    """To compile."""
+    """Netlist for ``compile``."""
     process: str
-    """Name of the process that said what the layers are."""
+    """Name of the process that defined the layers."""
     by: str
     """How it was read: ``labels`` or ``geometry``."""
     drawn_m2: float
     """Area of the layers that move, as drawn [m²]."""
     extracted_m2: float
-    """Of that, in the mechanism [m²]."""
+    """Part of that area in the mechanism [m²]."""
     anchored_m2: float
-    """Held by anchors [m²]."""
+    """Part of that area in anchors [m²]."""
     unrecognised_m2: float
-    """In neither [m²]."""
+    """Part of that area in neither [m²]."""
     unrecognised: tuple[Piece, ...] = field(repr=False)
-    """The pieces of that."""
+    """Pieces of that area."""
     notes: tuple[str, ...] = ()
-    """What was approximated or left out, in words."""
+    """Approximations and omissions, as sentences."""
 
     def told(self) -> list[str]:
-        """What there is to know before its numbers are believed, as sentences."""
+        """Remarks about unrecognised areas, approximations and omissions, as sentences."""
         lost = [
             f"{piece.area_m2 * 1e12:.4g} µm² of layer {piece.layer} not understood at "
             f"{piece.box_m[0] * 1e6:.4g}, {piece.box_m[1] * 1e6:.4g} µm: {piece.why}"

@@ -1,7 +1,8 @@
-"""Errors of the client, and how they come from gRPC statuses."""
+"""Errors of the client, and their conversion from gRPC statuses."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,17 +12,17 @@ from google.rpc import error_details_pb2, status_pb2
 
 
 class BimorphError(Exception):
-    """Anything that went wrong, with the server's words."""
+    """Base class of all errors of this package."""
 
 
 @dataclass(frozen=True)
 class Violation:
-    """A field of a request that cannot be used."""
+    """An invalid field of a request."""
 
     field: str
     """Path of the field, or ``file:line:column`` in a netlist."""
     description: str
-    """What is wrong, and what was expected."""
+    """The error, and the expected value."""
 
 
 @dataclass(frozen=True)
@@ -39,18 +40,18 @@ class Diagnostic:
     """From 1, in characters."""
     message: str
     help: str
-    """A way out; may be empty."""
+    """Remedy; may be empty."""
 
 
 class InvalidRequest(BimorphError, ValueError):
-    """An argument that cannot be used, as found here or by the server; the text begins with its name, and ``violations`` says which fields."""
+    """An invalid argument, detected by the client or by the server. The text begins with the name of the argument; ``violations`` has the fields."""
 
     def __init__(self, message: str, violations: Sequence[Violation] = ()) -> None:
         super().__init__(message)
         self.violations = tuple(violations)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Errors of worker processes arrive as what they were.
+        # Errors of worker processes keep their class.
         return (type(self), (str(self), self.violations))
 
 
@@ -58,8 +59,14 @@ class InvalidType(InvalidRequest, TypeError):
     """An argument of another type than expected."""
 
 
+class UnknownColumn(InvalidRequest, KeyError):
+    """A name that is not a column of a table."""
+
+    __str__ = BimorphError.__str__
+
+
 class NetlistError(InvalidRequest):
-    """A netlist with errors; its text is the rendered diagnostics."""
+    """A netlist with errors. Its text is the rendered diagnostics."""
 
     def __init__(self, message: str, violations: Sequence[Violation], diagnostics: Sequence[Diagnostic]) -> None:
         super().__init__(message, violations)
@@ -70,39 +77,39 @@ class NetlistError(InvalidRequest):
 
 
 class NotFound(BimorphError):
-    """A model, session, sweep or state that the server does not have (any more)."""
+    """A model, session, sweep or state that the server does not have, or has released."""
 
 
 class LimitExceeded(BimorphError):
-    """A request beyond a limit of the server."""
+    """A request that exceeds a limit of the server."""
 
 
 class NoResult(BimorphError):
-    """An analysis without a result: no equilibrium, nothing pulls in, a step that failed, a sweep whose points all failed."""
+    """An analysis without a result: no equilibrium, no pull-in, a failed step, or a sweep with no successful point."""
 
     def __init__(self, message: str, table: Any = None) -> None:
         super().__init__(message)
         self.table = table
-        """Of a sweep whose points all failed, its :class:`Table`, with the reason of each; None otherwise."""
+        """For a sweep with no successful point its :class:`Table`, with the reason of each point; otherwise None."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (type(self), (str(self), self.table))
 
 
 class StepFailed(NoResult):
-    """A device that cannot take a step, however short."""
+    """A step that the device cannot take at any length."""
 
 
 class UnexpectedReply(BimorphError):
-    """A reply that is none of those that were asked for: the server is faulty, of another version, or none of Bimorph."""
+    """A reply that violates the protocol: the server is faulty, of another version, or not a Bimorph server."""
 
 
 class Refused(BimorphError):
-    """A server that asks for a token, or knows another one."""
+    """Rejected credentials: the server requires a token, or another one."""
 
 
 class Unavailable(BimorphError):
-    """No server, a server that stops, or no answer in time."""
+    """No server at the address, a lost connection, or no reply within a timeout."""
 
 
 _BY_CODE: dict[grpc.StatusCode, type[BimorphError]] = {
@@ -116,32 +123,58 @@ _BY_CODE: dict[grpc.StatusCode, type[BimorphError]] = {
 
 
 def from_rpc(error: grpc.RpcError, address: str) -> BimorphError:
-    """The error that a failed call stands for."""
+    """Error for a failed call."""
     details = next((datum.value for datum in error.trailing_metadata() or () if datum.key == "grpc-status-details-bin"), b"")
     return _of_code(error.code(), error.details() or "", details, address)
 
 
 def from_fault(number: int, text: str, address: str) -> BimorphError:
-    """The error that a request stands for which a stream refused with this number of a gRPC code."""
+    """Error for a request that a stream rejected with this gRPC status code."""
     return from_status(number, text, b"", address)
 
 
 def from_status(number: int, text: str, details: bytes, address: str) -> BimorphError:
-    """The error that the number of a gRPC code stands for, with a message and ``google.rpc.Status`` as bytes."""
+    """Error for a gRPC status code, with a message and a serialised ``google.rpc.Status``."""
     code = next((code for code in grpc.StatusCode if code.value[0] == number), grpc.StatusCode.UNKNOWN)
     return _of_code(code, text, details, address)
 
 
 _LONGEST = 65536
-"""Longest text of a server that is shown [character]."""
+"""Longest text of a server that is shown [characters]."""
 
 
 def shown(text: str) -> str:
-    """Text of a server: line breaks and tabs stay, other characters that control a terminal are written out, and what is very long is cut."""
+    """Text of a server, safe for a terminal. Line breaks and tabs stay, other control characters are escaped, and a very long text is cut."""
     text = text if len(text) <= _LONGEST else text[:_LONGEST] + " …"
     if text.isprintable():
         return text
     return "".join(c if c in "\n\t" or c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+_FAILURES: list[tuple[str, str]] = [
+    (
+        r"failed to connect to all addresses|connect failed|connection refused|no such file or directory|failed to connect to remote host",
+        "no server answers at this address{cause}; start one there, or check the address",
+    ),
+    (r"errors? resolving|domain name not found|name or service not known|\bdns\b", "the name of the host is unknown; check the address"),
+    (
+        r"stream removed|socket closed|connection broke|h2 protocol|connection reset|broken pipe|goaway|ping timeout|keepalive|end of file",
+        "the connection is lost, as the server has ended or the network has failed; connect again when the server runs (a kept session: resume())",
+    ),
+    (r"deadline exceeded", "no answer within the timeout of the call; give a longer timeout, or check the server"),
+    (r"shutting down", "the server is shutting down; connect again when it runs (a kept session: resume())"),
+]
+"""Patterns of network failures in texts of gRPC and the system, and the sentence for each."""
+_CAUSE = re.compile(r"ssl[^;:]*handshake[^;:]*|certificate[^;:]*|connection refused|no such file or directory|permission denied|no route to host|timed out", re.IGNORECASE)
+
+
+def _failure(text: str) -> str:
+    """One sentence with failure and remedy for a failure of the network; other texts are returned unchanged."""
+    for pattern, sentence in _FAILURES:
+        if re.search(pattern, text, re.IGNORECASE):
+            cause = _CAUSE.search(text)
+            return sentence.format(cause=f" ({cause[0].strip().lower()})" if cause else "")
+    return text
 
 
 def _of_code(code: grpc.StatusCode, text: str, details: bytes, address: str) -> BimorphError:
@@ -150,7 +183,7 @@ def _of_code(code: grpc.StatusCode, text: str, details: bytes, address: str) -> 
         return InvalidRequest(text, violations(details))
     kind = _BY_CODE.get(code, BimorphError)
     if kind is Unavailable:
-        text = f"server {address}: {text}"
+        text = f"server {address}: {_failure(text)}"
     elif kind is BimorphError:
         text = f"{code.name.lower()}: {text}"
     return kind(text)

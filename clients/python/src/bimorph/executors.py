@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
 
 class Future(Protocol):
-    """A task's result to come."""
+    """Future of a task."""
 
     def result(self) -> Any:
-        """It, or its exception."""
+        """Result of the task, or its exception."""
 
 
 class Executor(Protocol):
-    """What runs tasks: ``concurrent.futures``, ``distributed.Client`` (Dask), mpi4py's, ipyparallel's, …"""
+    """Interface for tasks, as in ``concurrent.futures``, ``distributed.Client`` (Dask), mpi4py's, ipyparallel's, …"""
 
     def submit(self, task: Callable[..., Any], /, *arguments: Any) -> Any:
         """Starts a task."""
@@ -54,13 +54,13 @@ def sweep_on(
     progress: Callable[[int, int], object] | None = None,
     **options: Unpack[Options],
 ) -> Table:
-    """The table of :meth:`Client.sweep`, computed in ``shards`` parts as tasks of ``executor``: the same rows, whoever computes them.
+    """The table of :meth:`Client.sweep`, computed in ``shards`` parts as tasks of ``executor``. The rows do not depend on the executor.
 
-    Each worker process starts a server of its own, which ends with it (the program ``bimorph`` must be there), or all talk to
-    ``server``. A part whose server or connection dies is submitted again as a new task, ``retries`` times; what becomes of a worker that
-    dies is the executor's own: Dask starts it anew, a process pool is broken. ``progress`` is called with (parts done, parts).
+    Each worker process starts its own server, which ends with it (the program ``bimorph`` must be installed there), or all use
+    ``server``. A part whose server or connection fails is submitted again as a new task, ``retries`` times. The executor handles the loss of a
+    worker: Dask restarts it, a process pool breaks. ``progress`` is called with (parts done, parts).
 
-    Raises :class:`BimorphError`, :class:`NoResult` where no point has a result, or what the executor raises.
+    Raises :class:`BimorphError`, :class:`NoResult` if no point has a result, or the exception of the executor.
     """
     if not callable(getattr(executor, "submit", None)):
         raise wrong_type("executor", "an object with a method submit(task, *arguments)", executor)
@@ -72,11 +72,11 @@ def sweep_on(
             raise InvalidRequest(f"netlist: {os.fspath(netlist)} is a layout: make a netlist of it first, client.convert(…).netlist")
         netlist = Netlist._read("netlist", netlist, include)
     bundle, set = netlist, settings("set", set)
-    # an argument that no part can use is rejected here
+    # reject invalid arguments before any part is submitted
     to_wire(parameters, analysis, (0, shards), samples)
     options_to_wire(set, options)
 
-    # Dask names a task by its arguments, and a second one of the same name has the result of the first, also if that is an error.
+    # Dask names a task by its arguments and reuses the result of an equal name, also if that is an error.
     own_name = {"pure": False} if _names_tasks(executor) else {}
 
     def start(number: int) -> Any:
@@ -103,10 +103,10 @@ def sweep_on(
 def together(tables: Sequence[Table]) -> Table:
     """The shards of one sweep as the table of the whole.
 
-    A netlist whose nodes depend on a parameter has results in one shard that another has not: columns stand in the order in which rows
-    have them first, as in a sweep in one run.
+    If the nodes of a netlist depend on a parameter, shards have different columns. Columns are in the order of their first row, as in a sweep
+    in one run.
 
-    Raises :class:`BimorphError` for shards of different sweeps, or a point that is there twice.
+    Raises :class:`BimorphError` for shards of different sweeps, or for a repeated point.
     """
     units: dict[str, str] = {}
     for table in tables:
@@ -119,7 +119,7 @@ def together(tables: Sequence[Table]) -> Table:
     twice = [row.point for row, after in zip(rows, rows[1:]) if row.point == after.point]
     if twice:
         raise BimorphError(f"point {twice[0]} is in two shards")
-    # what stands before the last result of a row in its table is of this row too, or of one that came before
+    # columns before the last result of a row in its table belong to this row or to an earlier one
     ordered: dict[str, None] = {}
     for row, table in pairs:
         last = max((k for k, name in enumerate(table.results) if name in row.results), default=-1)
@@ -139,9 +139,9 @@ def part(
     shard: tuple[int, int],
     options: dict[str, Any],
 ) -> Table:
-    """One shard, where this is called: what :func:`sweep_on` submits."""
+    """Task of :func:`sweep_on`: one shard, computed in the calling process."""
     with Client(server) if server else _own().client() as client:
-        # a part may lack results that others have
+        # a part may lack columns of other parts
         with client.submit(netlist, parameters, analysis, set=set, samples=samples, shard=shard, **options) as running:
             return running._whole()
 
@@ -159,8 +159,8 @@ _inherited: list[Server | None] = []
 
 
 def _own() -> Server:
-    """The server of this process, started when it is first asked for, and again when it died. It ends with the process, while its
-    threads still run."""
+    """The server of this process, started at first use and again after a crash. It stops at the end of the process, while
+    its threads still run."""
     global _server
     with _lock:
         if _server is None:
@@ -169,7 +169,7 @@ def _own() -> Server:
 
 
 def _forked() -> None:
-    """In a child: the server of the parent is neither used nor ended."""
+    """In a forked child: the server of the parent is neither used nor stopped."""
     global _lock, _server
     _inherited.append(_server)
     _lock, _server = threading.Lock(), None

@@ -1,4 +1,4 @@
-"""Tables as files, here or in an object store: through the file systems of Arrow, or of fsspec, where they are installed."""
+"""Tables as local files or in an object store, by the file systems of Arrow or fsspec."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 def to_parquet(table: pyarrow.Table, path: str | os.PathLike[str], filesystem: Any = None) -> None:
     """Writes a Parquet file, as a whole or not at all.
 
-    ``path`` is one of the ``filesystem``; without one it is a path here, or a URI such as ``s3://bucket/mc.parquet``.
+    ``path`` belongs to ``filesystem``; without one it is a local path, or a URI such as ``s3://bucket/mc.parquet``.
 
-    Raises :class:`OSError` where the file system refuses it.
+    Raises :class:`OSError` if the file system rejects it.
     """
     try:
         from pyarrow import fs, parquet
@@ -35,7 +35,7 @@ def to_parquet(table: pyarrow.Table, path: str | os.PathLike[str], filesystem: A
             raise arguments.wrong("path", f"a path, or the URI of a file ({error})", path) from None
     else:
         store = fs.LocalFileSystem()
-    # object stores show a file when it is complete; elsewhere it is renamed then
+    # object stores publish a file when it is complete; elsewhere it is renamed then
     is_here = isinstance(store, (fs.LocalFileSystem, fs.SubTreeFileSystem))
     written = f"{place}.part" if is_here else place
     try:

@@ -1,4 +1,4 @@
-"""Results as arrays of xarray, with units: asked for when somebody wants them."""
+"""Results as xarray datasets with units; xarray is imported at first use."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def dataset(
     axis: tuple[str, Any, str], columns: Mapping[str, Any], units: Mapping[str, str], about: Mapping[str, Any]
 ) -> xarray.Dataset:
-    """Arrays over one axis (name, values, unit), each with its unit; ``about`` goes into the attributes where it is not None."""
+    """Arrays over one axis (name, values, unit), each with its unit; values of ``about`` other than None become attributes."""
     xr = _xarray()
     name, values, unit = axis
     variables = {column: (name, np.asarray(array), {"units": units.get(column, "")}) for column, array in columns.items()}
@@ -26,8 +26,17 @@ def dataset(
     return found
 
 
+def of_sessions(t: Any, columns: Mapping[str, Any], units: Mapping[str, str]) -> xarray.Dataset:
+    """Arrays over sessions and times [s], each with its unit."""
+    xr = _xarray()
+    variables = {name: (("session", "t"), np.asarray(values), {"units": units[name]}) for name, values in columns.items()}
+    count = max((len(values) for values in columns.values()), default=0)
+    found: xarray.Dataset = xr.Dataset(variables, coords={"session": np.arange(count), "t": ("t", np.asarray(t), {"units": "s"})})
+    return found
+
+
 def of_table(table: Table) -> xarray.Dataset:
-    """A sweep over a full grid with an axis for each parameter; any other over its points, with parameters as coordinates."""
+    """Dataset of a sweep: of a full grid with an axis for each parameter, otherwise over points with the parameters as coordinates."""
     xr = _xarray()
     values = {name: list(dict.fromkeys(row.parameters[name] for row in table.rows)) for name in table.parameters}
     sizes = [len(one) for one in values.values()]

@@ -1,7 +1,7 @@
 """Layouts: parametric cells that are subnets, and gdsfactory components made of them.
 
-A cell of this library is drawn by ``bimorph layout`` and modelled by the netlist that it stands for, so that nothing has to be
-recognised. :class:`Cell` objects are put together in a :class:`Mechanism`, whose :meth:`Mechanism.netlist` is compiled like any other::
+A cell of this library is drawn by ``bimorph layout`` and modelled by its subnet, so no geometry has to be
+recognised. :class:`Cell` objects are joined in a :class:`Mechanism`, whose :meth:`Mechanism.netlist` is compiled like any other::
 
     from bimorph import layout
     m = layout.Mechanism()
@@ -10,9 +10,9 @@ recognised. :class:`Cell` objects are put together in a :class:`Mechanism`, whos
     m.add("pad_anchor", layout.anchor(), a="pad")
     model = client.compile(m.netlist())
 
-With gdsfactory installed, :mod:`bimorph.pcells` has the same cells as gdsfactory's, with outlines and ports, and :func:`from_gdsfactory`
-makes a mechanism of a component: instances of cells that this library has, by name, with their settings as parameters, joined where
-their ports lie in one place. gdsfactory's lengths are in micrometres, those of this module in metres.
+With gdsfactory installed, :mod:`bimorph.pcells` has the same cells as gdsfactory cells, with outlines and ports. :func:`from_gdsfactory`
+converts a component into a mechanism: it takes instances of the cells of this library by name, their settings as parameters, and joins
+ports with the same position. Lengths of gdsfactory are in micrometres, those of this module in metres.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ class Kind:
     name: str
     """Name of the subnet."""
     nodes: tuple[str, ...]
-    """Its nodes, which are the ports of the cell."""
+    """Nodes, which are the ports of the cell."""
     parameters: Mapping[str, tuple[float, str]]
     """Default and unit of each parameter; lengths in metres."""
     body: str = field(repr=False)
     """Elements of the subnet; the layer is ``parent``."""
     optional: tuple[str, ...] = ()
-    """Nodes that need not be joined to anything."""
+    """Nodes that may stay unconnected."""
 
     def subnet(self) -> str:
         """The definition in SUGAR's language."""
@@ -70,7 +70,7 @@ class Cell:
     """A cell with its settings."""
 
     kind: Kind
-    """What it is."""
+    """Kind of the cell."""
     settings: Mapping[str, float]
     """Parameters that differ from their defaults [SI]."""
 
@@ -81,7 +81,7 @@ anchor = Kind(
     {"length": (10e-6, "m"), "width": (10e-6, "m")},
     "  anchor parent [a] [l=length w=width]\n",
 )
-"""A pad that holds its node."""
+"""A pad that anchors its node."""
 
 folded_flexure = Kind(
     "folded_flexure",
@@ -115,7 +115,7 @@ folded_flexure = Kind(
 """,
     optional=("left", "right"),
 )
-"""A shuttle on a flexure folded over two trusses: it moves along x. ``c`` is its centre, ``left`` and ``right`` are its edges there."""
+"""A shuttle on a flexure folded over two trusses; it moves along x. ``c`` is its centre, ``left`` and ``right`` are its edges."""
 
 comb = Kind(
     "comb_drive",
@@ -143,8 +143,8 @@ comb = Kind(
   stator body2d parent [fb] [A=fingers*length*finger Ip=fingers*length*finger*(turn/12 + pitch^2*(fingers^2-1)/3)]
 """,
 )
-"""A comb drive: ``fingers`` of the side of ``b`` between one more of the side of ``a``, so that there are twice as many gaps, each side on
-a spine. ``b`` lies on local x ahead of ``a``; both are on the outer edges of their spines."""
+"""A comb drive: ``fingers`` on the side of ``b`` between ``fingers + 1`` on the side of ``a``, hence twice as many gaps as fingers. Each side has
+a spine. ``b`` lies ahead of ``a`` along local x; both are on the outer edges of their spines."""
 
 bimorph = Kind(
     "thermal_bimorph",
@@ -169,7 +169,7 @@ bimorph = Kind(
   link beam2d parent [c o] [l=link w=3u]
 """,
 )
-"""A thermal bimorph: a hot and a cold arm between the pads ``a`` and ``g``; its tip is linked to ``o``."""
+"""A hot-arm/cold-arm electrothermal actuator (not a bilayer): a hot and a cold arm between the pads ``a`` and ``g``; its tip is linked to ``o``."""
 
 serpentine = Kind(
     "serpentine",
@@ -204,16 +204,16 @@ class Mechanism:
     """Cells joined at nodes."""
 
     def __init__(self, process: str = POLY) -> None:
-        """``process`` defines the layer ``p1`` of which everything is made."""
+        """``process`` defines the layer ``p1`` of all parts."""
         self.process = a_text("process", process, "the definition of a process")
         self._kinds: dict[str, Kind] = {}
         self._lines: list[str] = []
         self._names: set[str] = set()
 
     def add(self, name: str, cell: Cell, *, angle: float = 0.0, mirrored: bool = False, **nodes: str) -> None:
-        """Adds an instance, mirrored about its x axis if so told and then turned by ``angle`` [rad].
+        """Adds an instance, mirrored about its x axis if ``mirrored`` and then rotated by ``angle`` [rad].
 
-        ``nodes`` says where each node of the cell is joined; optional ones may be left out.
+        ``nodes`` maps each node of the cell to a node of the mechanism; optional ones may be omitted.
         """
         _check_name("name", name)
         if name in self._names:
@@ -239,7 +239,7 @@ class Mechanism:
         self._lines.append(f"{name} {kind.name} p1 [{joined}] [{' '.join(given)}]")
 
     def place(self, origin: str, node: str, x: float, y: float) -> None:
-        """Places ``node`` at (x, y) [m] from ``origin``, for parts that nothing joins."""
+        """Places ``node`` at (x, y) [m] from ``origin``, for unconnected parts."""
         _check_name("origin", origin)
         _check_name("node", node)
         x, y = number("x", x, "a length in m"), number("y", y, "a length in m")
@@ -250,7 +250,7 @@ class Mechanism:
         self._lines.append(a_text("text", text, "a line of a netlist", empty=True))
 
     def netlist(self, name: str = "mechanism.net") -> Netlist:
-        """The netlist of it."""
+        """Netlist of the mechanism."""
         subnets = "\n".join(kind.subnet() for kind in self._kinds.values())
         a_text("name", name, "the name of a file")
         return Netlist.text(f"{self.process}\n\n{subnets}\n" + "\n".join(self._lines) + "\n", name)
@@ -259,11 +259,10 @@ class Mechanism:
 def from_gdsfactory(component: Any, *, kinds: Mapping[str, Kind] | None = None, process: str = POLY) -> Mechanism:
     """A mechanism from a gdsfactory component made of cells whose names are those of :data:`KINDS` (or ``kinds``).
 
-    ``component`` is a component, or what its ``get_netlist()`` gives. Instances have settings, which are parameters of the subnet
-    (lengths in micrometres, times in microseconds), and ports, which are its nodes: those that lie in one place are one node. Arrays become
-    instances, components between the top and the library are gone through, mirrors and turns are kept, and parts that no port joins are
-    placed by the origins of their cells, where the first node of each is. An instance of any other cell is an error that names it; so
-    are settings that its cell has not.
+    ``component`` is a component, or the result of its ``get_netlist()``. Settings of an instance are parameters of its subnet (lengths in
+    micrometres, times in microseconds). Its ports are nodes; ports with the same position are one node. Arrays become instances, nested
+    components are flattened, and mirrors and rotations are kept. Unconnected parts are placed by the origins of their cells, where the first
+    node of each cell is. An instance of an unknown cell, or with an unknown setting, raises an error with its name.
     """
     from .component import mechanism
 

@@ -1,7 +1,6 @@
-"""Questions to one device, and their replies: over a stream of a server.
+"""Requests to one device and their replies, over a stream of a server.
 
-Where the package was installed with its module that is not Python, :class:`NativeLine` asks; a reply is there in a fraction of the time. Elsewhere
-gRPC's own streams do.
+:class:`NativeLine` uses the native module, whose replies take a fraction of the time. Without it :class:`Line` uses a stream of gRPC.
 """
 
 from __future__ import annotations
@@ -24,17 +23,17 @@ if TYPE_CHECKING:
     from .channel import Channel
 
 _LOOK = 0.2
-"""While a call waits, it looks this often whether the stream is over [s]."""
+"""Period at which a waiting call checks whether the stream has ended [s]."""
 
 
 _UNEXPECTED = "unexpected reply: "
-"""What the module says of a reply that it did not expect begins so."""
+"""Prefix of texts of the native module about unexpected replies."""
 
 
 class Line:
-    """A Trial stream of its own.
+    """A Trial stream over gRPC.
 
-    Each question has a place for its own reply: that of an interrupted call stays there, and is not taken for the next.
+    Each request has its own queue for the reply, so the reply to an interrupted call is not taken for that of the next one.
     """
 
     def __init__(self, channel: Channel, timeout: float) -> None:
@@ -45,24 +44,24 @@ class Line:
         self._requests: queue.SimpleQueue[_Question | None] = queue.SimpleQueue()
         self._sent: collections.deque[_Question] = collections.deque()
         self.over: BimorphError | None = None
-        """Why it is over; None: it is not."""
+        """Reason for the end of the stream; None while it is open."""
         self._place, stub = channel.place()
         self._call = stub.Trial(self._outgoing(), metadata=channel.metadata)
         self._call.add_callback(self._place.release)
         threading.Thread(target=self._receive, args=(self._call,), daemon=True).start()
 
     def ask(self, request: Any) -> Any:
-        """The reply to a question."""
+        """Sends a request and returns its reply."""
         question = _Question(request, queue.SimpleQueue())
         self._put(question)
         return self._answer(question)
 
     def tell(self, request: Any) -> None:
-        """Says what has no reply."""
+        """Sends a request without a reply."""
         self._put(_Question(request, None))
 
     def close(self, why: BimorphError) -> None:
-        """Ends the stream: later questions raise ``why``."""
+        """Ends the stream; later requests raise ``why``."""
         self.over = self.over or why
         self._requests.put(None)
         self._call.cancel()
@@ -83,7 +82,7 @@ class Line:
                 if self.over is not None and question.replies.empty():
                     raise self.over from None
                 if left <= 0.0:
-                    # the server may have done what was asked: a kept session is there, to be resumed
+                    # the server may have processed the request; a kept session can be resumed
                     self.close(Unavailable(f"server {self._address}: no answer within {self.timeout} s"))
                     assert self.over is not None
                     raise self.over from None
@@ -95,7 +94,7 @@ class Line:
             yield question.request
 
     def _receive(self, call: Any) -> None:
-        # The server answers every question but an accept once, in the order in which they were sent.
+        # The server sends one reply to each request except accepts, in the order of the requests.
         over: BimorphError
         try:
             for reply in call:
@@ -108,14 +107,14 @@ class Line:
                 replies = self._sent.popleft().replies
                 if replies is not None:
                     replies.put(reply)
-            over = Unavailable(f"server {self._address}: the stream has ended")
+            over = Unavailable(f"server {self._address}: the stream of the session has ended; open another session (a kept one: resume())")
         except grpc.RpcError as error:
             over = from_rpc(error, self._address)
         self.over = self.over or over
 
 
 class NativeLine:
-    """A Trial stream of its own, on a connection without TLS that all of this process share."""
+    """A Trial stream of the native module, on a connection without TLS that is shared within the process."""
 
     def __init__(self, channel: Channel, timeout: float) -> None:
         """``timeout`` [s] bounds the wait for each reply."""
@@ -123,10 +122,10 @@ class NativeLine:
         self.timeout = timeout
         """Longest wait for a reply [s]."""
         self.over: BimorphError | None = None
-        """Why it is over; None: it is not."""
+        """Reason for the end of the stream; None while it is open."""
         self._refusal = native.module().Refusal
         place = channel.native_place()
-        # what every call carries is known once there is a place
+        # the metadata is set once there is a slot
         shown, connection = dict(channel.metadata or ()).get("authorization"), place.connection
         try:
             self._line = self._guarded(lambda: native.of_process("Servers").line(channel.address, shown, timeout, connection))
@@ -136,18 +135,18 @@ class NativeLine:
         self._release = weakref.finalize(self, place.release)
 
     def ask(self, request: Any) -> Any:
-        """The reply to a question."""
+        """Sends a request and returns its reply."""
         reply = self._said(request)
         if reply is None:
-            raise self.over or BimorphError("the session is closed; open another one")
+            raise self.over or BimorphError("the stream of the session has ended; open another session")
         return device_pb2.DeviceReply.FromString(reply)
 
     def tell(self, request: Any) -> None:
-        """Says what has no reply."""
+        """Sends a request without a reply."""
         self._said(request)
 
     def close(self, why: BimorphError) -> None:
-        """Ends the stream: later questions raise ``why``."""
+        """Ends the stream; later requests raise ``why``."""
         self.over = self.over or why
         self._line.close()
         self._release()
@@ -158,7 +157,7 @@ class NativeLine:
         try:
             return self._guarded(lambda: self._line.ask(request.SerializeToString(), self.timeout))
         except BimorphError as error:
-            # the server may have done what was asked: a kept session is there, to be resumed
+            # the server may have processed the request; a kept session can be resumed
             self.close(error)
             raise
 
@@ -173,7 +172,7 @@ class NativeLine:
 
 
 class _Question(NamedTuple):
-    """A request, and where its reply goes; none: it has no reply."""
+    """A request, and the queue for its reply; None for a request without a reply."""
 
     request: Any
     replies: queue.SimpleQueue[Any] | None

@@ -1,4 +1,4 @@
-"""Models in this process: no server and no network, the same calls, the same bits and the same errors."""
+"""Models in this process, without server and network; calls and errors are those of a server, and results are bit-identical."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .stopping import current
 from .v1 import device_pb2, service_pb2
 
 ADDRESS = "local:"
-"""What a client calls this process."""
+"""Address of this process."""
 
 _METHODS = service_pb2.DESCRIPTOR.services_by_name["Bimorph"].methods_by_name
 
@@ -24,20 +24,20 @@ def _engine() -> Any:
 
 
 class LocalChannel(Channel):
-    """The way to the models of this process."""
+    """Calls to the engine of this process."""
 
     def __init__(self) -> None:
         super().__init__(ADDRESS, float("inf"))
         self._refusal = native.module().Refusal
 
     def call(self, method: str, request: Any) -> Any:
-        """A call with one answer."""
+        """A call with one reply."""
         stop = self._stop()
         answer = self._guarded(lambda: _engine().call(method, request.SerializeToString(), stop))
         return message_factory.GetMessageClass(_METHODS[method].output_type).FromString(answer)
 
     def stream(self, method: str, request: Any) -> Iterator[Any]:
-        """A call with many answers; left early, it is stopped."""
+        """A call with a stream of replies. Leaving the iteration stops it."""
         answers = self._guarded(lambda: _engine().stream(method, request.SerializeToString()))
         kind, stop = message_factory.GetMessageClass(_METHODS[method].output_type), self._stop()
         try:
@@ -47,14 +47,14 @@ class LocalChannel(Channel):
             answers.cancel()
 
     def line(self, timeout: float) -> Any:
-        """Questions to one device."""
+        """Opens a stream of requests to one device."""
         return LocalLine(self)
 
     def close(self) -> None:
-        """Nothing is open here."""
+        """Has no effect: there is no connection."""
 
     def _stop(self) -> Any:
-        """What stops a computation, if anything does."""
+        """Handle that stops a computation; None where no one can be stopped."""
         stopping = current.get()
         if stopping is None:
             return None
@@ -77,7 +77,7 @@ class LocalChannel(Channel):
 
 
 class LocalLine:
-    """Questions to one device of this process."""
+    """Requests to one device of this process."""
 
     def __init__(self, channel: LocalChannel) -> None:
         self._channel = channel
@@ -86,21 +86,21 @@ class LocalLine:
         self.over: BimorphError | None = None
 
     def ask(self, request: Any) -> Any:
-        """The reply to a question."""
+        """Sends a request and returns its reply."""
         if self.over is not None:
             raise self.over
         reply = self._channel._guarded(lambda: self._native.ask(request.SerializeToString()))
         if reply is None:
-            raise self.over or BimorphError("the session is closed; open another one")
+            raise self.over or BimorphError("the stream of the session has ended; open another session")
         return device_pb2.DeviceReply.FromString(reply)
 
     def tell(self, request: Any) -> None:
-        """Says what has no reply."""
+        """Sends a request without a reply."""
         if self.over is not None:
             raise self.over
         self._channel._guarded(lambda: self._native.ask(request.SerializeToString()))
 
     def close(self, why: BimorphError) -> None:
-        """Ends it: later questions raise ``why``."""
+        """Ends the stream; later requests raise ``why``."""
         self.over = self.over or why
         self._native.close()

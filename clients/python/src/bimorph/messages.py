@@ -1,4 +1,4 @@
-"""Values as they travel, and back."""
+"""Conversion of values to and from messages."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Voltages = Mapping[str, float]
 
 
 def estimate_of(answer: Any) -> float | None:
-    """Its error by the mesh [1]; None: there is no estimate."""
+    """Estimated error of a result by the mesh [1]; None without an estimate."""
     return answer.estimated_error if answer.HasField("estimated_error") else None
 
 
 def options_to_wire(settings: Mapping[str, float | str] | None, options: Mapping[str, Any]) -> Any:
-    """Netlist parameters and options of a model."""
+    """Message of the netlist parameters and options of a model."""
     unknown = [name for name in options if name not in WIRE]
     if unknown:
         raise InvalidType(f"{unknown[0]}: no such option; there are {', '.join(WIRE)}")
@@ -39,19 +39,19 @@ def _kinds() -> dict[str, Any]:
 
 
 def setting_value(setting: Any) -> float | str:
-    """Value of a netlist parameter."""
+    """Value of a netlist parameter from its message."""
     value: float | str = setting.number if setting.WhichOneof("value") == "number" else setting.text
     return value
 
 
 def diagnostic(d: Any) -> Diagnostic:
-    """A message about a place in a netlist."""
+    """A diagnostic from its message."""
     severity = "error" if d.severity == model_pb2.Diagnostic.SEVERITY_ERROR else "warning"
     return Diagnostic(d.code, severity, d.file, d.line, d.column, d.message, d.help)
 
 
 def named(voltages: Voltages | None) -> list[Any]:
-    """Port voltages."""
+    """Messages of port voltages."""
     return [analysis_pb2.Named(name=name, value=value) for name, value in arguments.volts("voltages", voltages).items()]
 
 

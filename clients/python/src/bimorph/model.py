@@ -10,26 +10,31 @@ from typing import Any, Literal
 import numpy as np
 
 from . import arguments
-from .aloud import of_mesh, said
+from .aloud import issue, of_mesh
 from .channel import Channel
-from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable
-from .events import Until, statistics, until_to_wire
+from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable, shown
+from .events import Until, crossing, events_to_wire, statistics, until_to_wire
 from .messages import Voltages, by_name, diagnostic, estimate_of, named, setting_value
 from .naming import by_argument, each
 from .response import SPACINGS, response_of
-from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, StaticResult, TransientResult
+from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, StabilityLoss, StaticResult, TransientResult
 from .session import Session, opened_just_now
 from .stopping import apart
 from .ticket import Snapshot
 from .together import together
 from .v1 import analysis_pb2, device_pb2, model_pb2
 from .verified import Checked
-from .waveforms import Waveform, checked, drive, told
+from .waveforms import Waveform, checked, drive, with_error_estimate
+
+METHODS = ("rodas4", "avf", "midpoint", "tr-bdf2", "generalized-alpha", "newmark", "radau5", "rk45", "sdirk4")
+"""Integrators of a transient."""
+Method = Literal["rodas4", "avf", "midpoint", "tr-bdf2", "generalized-alpha", "newmark", "radau5", "rk45", "sdirk4"]
+
 
 class Model:
-    """A compiled netlist on a server. Make one with :meth:`Client.compile`.
+    """A compiled netlist on a server, opened with :meth:`Client.compile`.
 
-    It may be sent to worker processes. A server that has forgotten it, or was started anew, is given the netlist again.
+    It can be sent to worker processes. If the server has released it or was restarted, the netlist is compiled again.
     """
 
     def __init__(self, channel: Channel, description: Any, source: Any) -> None:
@@ -41,7 +46,7 @@ class Model:
         self._description = description
         self._source = source
         self.id: str = description.id
-        """Hash of text and options."""
+        """Hash of netlist and options."""
         self.ports: tuple[str, ...] = tuple(description.ports)
         """Ports, in netlist order."""
         self.nodes: tuple[str, ...] = tuple(description.nodes)
@@ -49,9 +54,9 @@ class Model:
         self.unknowns: int = description.unknowns
         """Mechanical unknowns."""
         self.parameters: dict[str, float | str] = {p.name: setting_value(p) for p in description.parameters}
-        """Netlist parameters with the values they took [SI]."""
+        """Netlist parameters and their values [SI]."""
         self.warnings: tuple[Diagnostic, ...] = tuple(diagnostic(d) for d in description.warnings)
-        """Warnings of the netlist, and of the mesh that a session has (W040)."""
+        """Warnings of the netlist and of the mesh of sessions (W040)."""
 
     def __getstate__(self) -> dict[str, Any]:
         description, source = self._description.SerializeToString(), self._source.SerializeToString()
@@ -63,7 +68,7 @@ class Model:
         self.__init__(state["channel"], description, source)  # type: ignore[misc]
 
     def _call(self, method: str, request: Any) -> Any:
-        """A call about this model, which the server may have forgotten: the same netlist gives the same model."""
+        """A call for this model. The netlist is compiled again if the server has released the model."""
         with by_argument(method):
             try:
                 return self._channel.call(method, request)
@@ -75,12 +80,12 @@ class Model:
         return Checked(self._channel.address, f"{call} of model {self.id[:8]}")
 
     def _tol(self) -> float:
-        """Its tolerance [1]."""
+        """Tolerance of the model [1]."""
         options = self._source.options
         return float(options.tol) if options.HasField("tol") else 1e-3
 
     def _finer(self) -> Model:
-        """The same netlist with a tenth of the tolerance, on a mesh that this refines, or on twice the segments."""
+        """The same netlist with a tenth of the tolerance on a finer mesh, or on twice the segments."""
         source = model_pb2.CompileRequest()
         source.CopyFrom(self._source)
         source.options.tol = 0.1 * self._tol()
@@ -92,7 +97,7 @@ class Model:
         return f"Model({self.id[:8]}…, ports={list(self.ports)}, {self.unknowns} unknowns)"
 
     def static(self, voltages: Voltages | None = None) -> StaticResult:
-        """Static equilibrium reached from rest at these port voltages [V]."""
+        """Static equilibrium at these port voltages [V], followed from rest."""
         request = analysis_pb2.StaticRequest(model=self.id, voltages=named(voltages))
         answer = self._call("Static", request)
         self._checked("static").static(answer)
@@ -106,8 +111,9 @@ class Model:
             iterations=answer.iterations,
             estimated_error=estimate_of(answer),
             jumped=answer.jumped,
-            warnings=said(answer.warnings),
+            warnings=issue(answer.warnings),
             free_motions=tuple(answer.free_motions),
+            passed=tuple(_loss(one) for one in answer.passed),
         )
 
     def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
@@ -126,7 +132,7 @@ class Model:
             answer.unknowns,
             [None if math.isnan(e) else e for e in answer.errors],
             answer.deflection_m,
-            said(answer.warnings),
+            issue(answer.warnings),
             estimate_of(answer),
         )
 
@@ -144,13 +150,13 @@ class Model:
         modes: int = 0,
         voltages: Voltages | None = None,
     ) -> FrequencyResponse:
-        """What a small sinusoid at one place does from ``start`` to ``stop`` [Hz], about the equilibrium at these port voltages [V].
+        """Small-signal frequency response from ``start`` to ``stop`` [Hz], about the equilibrium at these port voltages [V].
 
         ``drive`` is ``NODE.fx``, ``NODE.fy`` [N], ``NODE.m`` [N·m], a port [V], ``BEAM.T`` (heat) [W], ``frame.ax``, ``frame.ay`` [m/s²]
-        or ``frame.wz`` [rad/s]. ``signals`` are those of ``transient``, and ``PORT.i``, the current into a port [A]; none: what the driven
-        place itself answers. ``points`` frequencies have equal quotients (``"log"``), equal differences (``"linear"``), or are so many in a
-        ``"decade"``; more are added about resonances and zeros unless ``even``. ``by_modes`` sums over modes with static correction, the
-        ``modes`` lowest or, with 0, those to twice ``stop``; else each frequency is exact.
+        or ``frame.wz`` [rad/s]. ``signals`` are those of ``transient``, and ``PORT.i``, the current into a port [A]; the default
+        is the driving-point response. ``points`` is the number of frequencies with equal quotients (``"log"``) or equal differences (``"linear"``),
+        or their number in each ``"decade"``. Points are added near resonances and zeros unless ``even``. ``by_modes`` selects modal superposition
+        with static correction, of the ``modes`` lowest modes or, with 0, of those up to twice ``stop``. Otherwise each frequency is solved exactly.
         """
         start = arguments.number("start", start, "a frequency in Hz", above=0.0)
         stop = arguments.number("stop", stop, f"a frequency in Hz from start, {start:g}, on", least=start)
@@ -169,17 +175,17 @@ class Model:
         )
         answer = self._call("FrequencyResponse", request)
         self._checked("ac").response(answer, request.signals)
-        said(answer.warnings)
+        issue(answer.warnings)
         return response_of(answer, drive)
 
     def pull_in(self, max_v: float = 200.0, port: str = "") -> PullInResult:
-        """Pull-in and release voltage [V] of ``port`` (default: the first), looking up to ``max_v`` [V]."""
+        """Pull-in and release voltage [V] of ``port`` (default: the first), searched up to ``max_v`` [V]."""
         port = arguments.text("port", port, "the name of a port", empty=True)
         max_v = arguments.number("max_v", max_v, "a voltage", above=0.0)
         request = analysis_pb2.PullInRequest(model=self.id, port=port, max_v=max_v)
         answer = self._call("PullIn", request)
         release = answer.release_v if answer.HasField("release_v") else None
-        warnings = said(answer.warnings)
+        warnings = issue(answer.warnings)
         return PullInResult(answer.port, answer.pull_in_v, release, estimate_of(answer), not answer.unheld, warnings)
 
     def transient(
@@ -194,18 +200,26 @@ class Model:
         estimate: bool = True,
         release: Model | None = None,
         until: Until | None = None,
+        events: Sequence[tuple[str, float]] = (),
+        method: Method | None = None,
+        rho: float | None = None,
+        step: float | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> TransientResult:
-        """Motion from 0 to ``stop`` [s] with port voltages held [V], at ``points`` equally spaced times.
+        """Motion from 0 to ``stop`` [s] at constant port voltages [V], at ``points`` equally spaced times.
 
-        ``release`` is a variant of the same netlist whose static equilibrium is the initial state; without it the part
-        starts at rest as drawn. ``tol`` is the relative error of a step [1], 0: the model's; the mesh holds the
-        smaller of the two. ``until`` ends the run at an event: ``"contact"`` where parts begin to touch, ``"release"`` where they part,
-        ``("yoke.y", -1e-6)`` where a signal crosses a level in its unit. ``progress`` is called with the fraction done.
+        ``release`` is a variant of the same netlist, whose static equilibrium is the initial state. By default the initial state is the undeformed
+        model at rest. ``tol`` is the relative tolerance of a step [1], by default (0) that of the model; the mesh meets the smaller of the two.
+        ``until`` ends the run at an event: ``"contact"`` where parts begin to touch, ``"release"`` where they separate,
+        ``("yoke.y", -1e-6)`` where a signal crosses a level in its unit. ``events`` are such pairs that do not end the run. The ``events`` of the
+        result have the times of all crossings and contacts. ``progress`` is called with the fraction done.
 
-        ``inputs`` are waveforms of ports, ``{"heat": (times, volts)}``: straight lines between corners, constant before and after. The
-        run then begins in the static equilibrium at 0, and its steps end at every corner. How far mesh and steps may be off is seen from
-        a run on a finer mesh with a tenth of ``tol``, which is computed at the same time and takes several times as long: ``estimate=False`` leaves it out.
+        ``method`` is the integrator, by default ``"rodas4"``, and ``rho`` the spectral radius of ``"generalized-alpha"`` at infinite frequency.
+        With ``step`` [s] all steps have this length and do not follow ``tol``.
+
+        ``inputs`` are piecewise linear waveforms of ports, ``{"heat": (times, volts)}``, constant before and after. The run then begins in the static
+        equilibrium at time 0, and steps end at every corner. The error estimate comes from a second run on a finer mesh with a tenth of the
+        tolerance, which runs at the same time and takes several times as long. ``estimate=False`` omits it.
         """
         stop = arguments.number("stop", stop, "a time in seconds", above=0.0)
         signals = arguments.names("signals", signals)
@@ -217,10 +231,20 @@ class Model:
         estimate = arguments.flag("estimate", estimate)
         if release is not None:
             arguments.instance("release", release, Model, "None or a model, as compile() gives it of the netlist with its load")
+        crossings = events_to_wire(events)
+        integrator = None if method is None else arguments.choice("method", method, METHODS)
+        if rho is not None:
+            rho = arguments.number("rho", rho, "None or a spectral radius", least=0.0, most=1.0)
+            if integrator != "generalized-alpha":
+                raise InvalidRequest(f'rho: expected None, as method is not "generalized-alpha", got {rho:g}')
+        step = None if step is None else arguments.number("step", step, "None or a time in seconds", above=0.0)
         arguments.function("progress", progress)
         if inputs is not None:
-            if release is not None or tol or until is not None:
-                raise ValueError("a run along inputs begins in their equilibrium, with the model's own tolerance: no release, tol or until")
+            excluded = {"until": until, "release": release, "tol": tol or None, "events": crossings or None, "method": integrator, "step": step}
+            for name, given in excluded.items():
+                if given is not None:
+                    why = "a run along inputs lasts to stop, and begins in the equilibrium of its inputs, with the tolerance of the model"
+                    raise InvalidRequest(f"{name}: expected none together with inputs, got {arguments.shown(given)}; {why}")
             waves: dict[str, Waveform] = {**{port: ([0.0], [volts]) for port, volts in held.items()}, **checked(inputs)}
 
             def driven(model: Model, progress: Callable[[float], object] | None = None) -> TransientResult:
@@ -229,10 +253,10 @@ class Model:
 
             if estimate:
                 found, finer = together(lambda: driven(self, progress), lambda: driven(self._finer()))
-                found = told(found, finer, self._tol())
+                found = with_error_estimate(found, finer, self._tol())
             else:
-                found = told(driven(self, progress), None, self._tol())
-            said(found.warnings)
+                found = with_error_estimate(driven(self, progress), None, self._tol())
+            issue(found.warnings)
             return found
         request = analysis_pb2.TransientRequest(
             model=self.id,
@@ -243,6 +267,10 @@ class Model:
             voltages=named(voltages),
             release_model=release.id if release else "",
             until=until_to_wire(until),
+            events=crossings,
+            method=integrator or "",
+            rho=rho,
+            step_s=step or 0.0,
         )
         for model in (self, release):
             if model is not None:
@@ -250,7 +278,9 @@ class Model:
         t: list[float] = []
         columns: list[list[float]] = [[] for _ in signals]
         replies = self._checked("transient")
-        crossed = ((re.escape(f'signal "{until[0]}"'), "until"),) if isinstance(until, tuple) and until[0] not in signals else ()
+        levels = [("until", until[0])] if isinstance(until, tuple) else []
+        levels += [(f"events[{k}]", one.name) for k, one in enumerate(crossings)]
+        crossed = [(re.escape(f'signal "{signal}"'), name) for name, signal in levels if signal not in signals]
         for event in each("Transient", self._channel.stream("Transient", request), *crossed):
             if progress is not None:
                 progress(event.progress)
@@ -270,11 +300,12 @@ class Model:
                     units,
                     *work,
                     estimated_error=estimate_of(end),
-                    warnings=said(end.warnings),
+                    warnings=issue(end.warnings),
                     step_error=end.step_error if end.HasField("step_error") else None,
                     stopped_at=end.stopped_at if end.HasField("stopped_at") else None,
                     reliable_until=end.reliable_until if end.HasField("reliable_until") else None,
                     after_contact=tuple(statistics(one) for one in end.after_contact),
+                    events=tuple(crossing(one) for one in end.events),
                 )
         raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
 
@@ -288,17 +319,18 @@ class Model:
         noise_band: float | None = None,
         kept: bool = False,
     ) -> Session:
-        """Opens a device to be stepped; use it in a ``with`` block.
+        """Opens a session of this model; use it in a ``with`` block.
 
-        ``signals`` are read with every reply. ``ports`` chooses ports and their order: those of the netlist, ``NODE.x``, ``.y``
-        and ``.rz`` (a force or moment is given, the displacement answered), ``NODE.vx``, ``.vy`` and ``.vrz`` (answered with the
-        velocity), ``BEAM.T`` (heat), ``frame.ax``, ``.ay`` and ``.wz`` (acceleration and rate of the
-        frame). Those left out are held at 0 V, or
-        free.
-        ``timeout`` [s] bounds each call. With a ``seed``, warm gas and dampers shake the mechanism in every step, the same way for the
-        same seed; ``noise_band`` [Hz] is the band of their force, by default twenty times the lowest natural frequency. Steps
-        are then taken in pieces of at most two cells of 1/(2·band).
-        A ``kept`` session outlives its connection for a time (:meth:`Session.resume`), and the server, where that keeps states
+        Every reply has the values of ``signals``. ``ports`` selects ports and their order. They are ports of the netlist; ``NODE.x``, ``.y`` and ``.rz``
+        (input force or moment, response displacement); ``NODE.vx``, ``.vy`` and ``.vrz`` (response velocity); ``BEAM.T`` (input heat, response
+        temperature rise); ``frame.ax``, ``.ay`` and ``.wz`` (acceleration and angular rate of the frame). Omitted electrical ports are at 0 V, other
+        ones are free. ``timeout`` [s] bounds each call.
+
+        With a ``seed``, the thermal noise of gas and dampers acts as a random force in every step; equal seeds give equal forces. ``noise_band`` [Hz] is
+        the band of the force, by default twenty times the lowest natural frequency. Steps are then divided into pieces of at most two cells of
+        1/(2·band).
+
+        A ``kept`` session survives the loss of its connection for a time (:meth:`Session.resume`). It survives the server too if that stores states
         (``bimorph serve --state-dir``).
         """
         of_mesh(self.warnings)
@@ -313,14 +345,14 @@ class Model:
         noise_band: float | None = None,
         kept: bool = False,
     ) -> Session:
-        """The same, of which nothing is said."""
+        """As :meth:`session`, without warnings."""
         signals, ports = tuple(arguments.names("signals", signals)), tuple(arguments.names("ports", ports))
         timeout, kept = arguments.timeout("timeout", timeout), arguments.flag("kept", kept)
         seed = None if seed is None else arguments.integer("seed", seed, 0, (1 << 64) - 1)
         if noise_band is not None:
             noise_band = arguments.number("noise_band", noise_band, "None or a band in Hz", above=0.0)
             if seed is None:
-                raise InvalidRequest("noise_band: expected a seed with it, got none")
+                raise InvalidRequest(f"noise_band: expected a seed together with it, got noise_band={noise_band:g} alone")
         self._describe()
         noise = None if seed is None else device_pb2.Agitation(seed=seed, band_hz=noise_band)
         if kept:
@@ -330,9 +362,9 @@ class Model:
         return Session(self._channel, self.id, ports, signals, timeout, noise=noise)
 
     def restore(self, snapshot: Snapshot, timeout: float = 60.0) -> Session:
-        """Opens a device that goes on from a :meth:`Session.snapshot` of this model, with the same bits.
+        """Opens a session that continues from a :meth:`Session.snapshot` of this model, with bit-identical results.
 
-        Raises :class:`NoResult` for a snapshot of another model or another version of the server.
+        Raises :class:`NoResult` for a snapshot of another model or of another version of the server.
         """
         snapshot = arguments.instance("snapshot", snapshot, Snapshot, "a Snapshot, as Session.snapshot() gives it")
         timeout = arguments.timeout("timeout", timeout)
@@ -344,5 +376,11 @@ class Model:
         return session
 
     def _describe(self) -> None:
-        """Makes sure that the server has this model."""
+        """Compiles the model again if the server has released it."""
         self._call("Describe", model_pb2.DescribeRequest(model=self.id))
+
+
+def _loss(wire: Any) -> StabilityLoss:
+    """A loss of stability from its message."""
+    kind: Literal["limit-point", "bifurcation"] = "bifurcation" if wire.kind == analysis_pb2.PassedLoss.BIFURCATION else "limit-point"
+    return StabilityLoss(kind, wire.share, shown(wire.direction))

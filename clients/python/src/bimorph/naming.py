@@ -1,4 +1,4 @@
-"""Arguments that a server rejects, by the names that they have here: the protocol calls some of them otherwise."""
+"""Names of arguments in errors of the server, whose protocol uses other names for some of them."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ _RULES: dict[str, tuple[tuple[str, str], ...]] = {
     "Static": (_PORT,),
     "Modes": (_PORT, ("modes:", "count")),
     "FrequencyResponse": (_PORT, _SIGNAL, ("from:", "start"), ("to:", "stop")),
-    "Transient": (_PORT, _SIGNAL, ("stop_s:", "stop"), ("release_model", "release")),
+    "Transient": (_PORT, _SIGNAL, ("stop_s:", "stop"), ("release_model", "release"), ("step_s:", "step")),
     "Open": ((_PORT[0], "ports"), _SIGNAL, ("noise band:", "noise_band")),
     "SubmitJob": (("release_after_s:", "release_after"), (r"(spec\.)?parameter", "parameters"), (r"(spec\.)?sample", "samples")),
     "Compile": ((r"options\.band_hz:", "band"),),
     "GetJob": (("no job", "sweep"),),
 }
-"""By method of the protocol: how a message begins, and the argument that it is about."""
+"""By method of the protocol: the beginning of a message, and its argument."""
 
 
 @contextlib.contextmanager
 def by_argument(method: str, *more: tuple[str, str]) -> Iterator[None]:
-    """Errors of calls of this method within the block begin with the name of the argument."""
+    """Within the block, errors of calls of this method begin with the name of the argument."""
     try:
         yield
         return
@@ -43,6 +43,6 @@ def by_argument(method: str, *more: tuple[str, str]) -> Iterator[None]:
 
 
 def each(method: str, replies: Iterator[T], *more: tuple[str, str]) -> Iterator[T]:
-    """The replies of a call that has many, with errors as of :func:`by_argument`."""
+    """Replies of a streaming call, with errors as in :func:`by_argument`."""
     with by_argument(method, *more):
         yield from replies

@@ -1,4 +1,4 @@
-"""The module of this package that is not Python, where it was installed with it; and what of it each process has for itself."""
+"""The native module of this package, which is optional, and its objects in each process."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .errors import BimorphError
 
 _lock = threading.Lock()
 _made: dict[tuple[int, str], Any] = {}
-"""By process: what has threads, which no fork takes along. Those of parents are never used, nor let go of."""
+"""Objects with threads, by process, as threads do not survive a fork. Objects of parent processes are neither used nor released."""
 
 
 @functools.cache
 def _loaded() -> tuple[Any, ImportError | None]:
-    """The module, or why it cannot be loaded."""
+    """The module, or the error of its import."""
     try:
         return importlib.import_module("bimorph._native"), None
     except ImportError as error:
@@ -25,25 +25,25 @@ def _loaded() -> tuple[Any, ImportError | None]:
 
 
 def found() -> Any:
-    """The module; None where the package was installed without it, or it cannot be loaded."""
+    """The module; None if it is not installed or cannot be loaded."""
     return _loaded()[0]
 
 
 def module() -> Any:
     """The module.
 
-    Raises :class:`BimorphError` where the package was installed without it, or it cannot be loaded.
+    Raises :class:`BimorphError` if it is not installed or cannot be loaded.
     """
     loaded, error = _loaded()
     if loaded is not None:
         return loaded
     if isinstance(error, ModuleNotFoundError):
-        raise BimorphError("this package has no models in process: install one that `make wheel` made, or use bimorph.serve()")
+        raise BimorphError("this package has no models in process; install a wheel of `make wheel`, or use bimorph.serve()")
     raise BimorphError(f"the models in process of this package cannot be loaded ({error}); use bimorph.serve()") from error
 
 
 def of_process(kind: str) -> Any:
-    """The one object of a class of the module that this process has."""
+    """The object of a class of the module in this process, created at first use."""
     key = (os.getpid(), kind)
     made = _made.get(key)
     if made is None:

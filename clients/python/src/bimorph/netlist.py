@@ -1,4 +1,4 @@
-"""Netlists as they are sent: the text of a file with the text of every file it includes."""
+"""Netlists with their includes: the text of a file and of every file that it includes."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ _MOST = 40
 
 
 class DroppedInclude(UserWarning):
-    """Two different files are included under one name; the first that the text meets is the one that counts."""
+    """Two different files are included under one name; the one included first is used."""
 
 
 @dataclass(frozen=True)
 class Netlist:
-    """A netlist that needs no disk.
+    """A netlist in memory.
 
-    The server opens no files of its own: what is not in ``files`` is reported as a missing include.
+    The server opens no files: an include that is not in ``files`` is reported as missing.
     """
 
     root: str
-    """Name of the root file, as diagnostics show it."""
+    """Name of the root file in diagnostics."""
     files: Mapping[str, str] = field(repr=False)
     """Text of each file by the name under which it is included."""
 
@@ -55,15 +55,15 @@ class Netlist:
     def read(cls, path: str | os.PathLike[str], include: Iterable[str | os.PathLike[str]] = ()) -> Netlist:
         """Reads ``path`` and every file it ``uses``.
 
-        The rule is that of the command: a name is looked up beside the file that includes it, then in the working
-        directory, then in the folders of ``include``. Each spelled name is read once, where the text meets it first; a
-        :class:`DroppedInclude` warning tells when that leaves out a different file.
+        As in the command, a name is searched for beside the file that includes it, then in the working
+        directory, then in the folders of ``include``. Each name is read once, at its first occurrence. A
+        :class:`DroppedInclude` warning is issued if another file of the same name is skipped.
         """
         return cls._read("path", path, include)
 
     @classmethod
     def _read(cls, argument: str, given: str | os.PathLike[str], include: Iterable[str | os.PathLike[str]]) -> Netlist:
-        """The same, where the path is the argument of that name."""
+        """As :meth:`read`, with the name of the argument for errors."""
         path = Path(a_path(argument, given, "the path of a netlist"))
         root = str(path)
         files = {root: content(argument, path).decode("utf-8", errors="replace")}
@@ -80,7 +80,7 @@ class Netlist:
                         text = f"{file} is left out: {name} includes it as {spelled!r}, which is {found[spelled]} already"
                         warnings.warn(text, DroppedInclude, stacklevel=2)
                     continue
-                # one more than allowed on each count, so that the server sees that there are too many
+                # one more than allowed of each, so that the server reports the excess
                 if file is None or len(files) > _MOST + 1 or depth > _DEEPEST or _same(file, path):
                     continue
                 files[spelled], found[spelled] = _text(file), file

@@ -1,4 +1,4 @@
-"""ngspice with the plug-in loaded: decks in, waveforms out. It needs the program ``bimorph`` and ngspice 39 or later."""
+"""Runs decks in ngspice with the plug-in, and reads their waveforms. Requires the program ``bimorph`` and ngspice 39 or later."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Plot:
     """Waveforms of one analysis."""
 
     name: str
-    """As ngspice calls it: "Transient Analysis", "AC Analysis", …"""
+    """Name in ngspice: "Transient Analysis", "AC Analysis", …"""
     vectors: dict[str, NDArray[Any]]
     """Waveforms by name, the independent one first; complex in small-signal analyses. [V, A, s, Hz]"""
 
@@ -36,12 +36,12 @@ class Plot:
 
 @dataclass(frozen=True)
 class Run:
-    """What came of a deck."""
+    """Results of a deck."""
 
     plots: list[Plot]
     """One for each analysis, in the order in which ngspice ran them."""
     output: str = field(repr=False)
-    """What ngspice said."""
+    """Output of ngspice."""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """A waveform of the last analysis."""
@@ -49,12 +49,12 @@ class Run:
 
 
 def run(deck: str | os.PathLike[str], *, remote: str | None = None, timeout: float = 600.0) -> Run:
-    """Runs a deck: a path, or its text (anything with a line break). The files that a text names (netlists, ``.include``, ``.lib``) are found
-    from the working directory.
+    """Runs a deck: a path, or its text (any string with a line break). File names in a text (netlists, ``.include``, ``.lib``) are relative to
+    the working directory.
 
     ``remote`` is the address of a server that steps every device of the deck.
 
-    Raises :class:`BimorphError` with what ngspice or the device said where the run has no result.
+    Raises :class:`BimorphError` with the errors of ngspice and the device if the run has no result.
     """
     text = isinstance(deck, str) and "\n" in deck
     if text:
@@ -87,19 +87,19 @@ _INCLUDED = re.compile(r"""^([ \t]*\.(?:include|inc|lib)[ \t]+)(["']?)([^"'\s]+)
 
 
 def _absolute(text: str) -> str:
-    """The deck lies in another folder than the files that it names."""
+    """Makes file names of a deck absolute, because it is written to another folder."""
 
     def included(found: re.Match[str]) -> str:
-        # `.lib NAME` begins a section too
+        # `.lib NAME` can also begin a section
         path = os.path.abspath(found[3])
         return f'{found[1]}"{path}"' if os.path.isfile(path) else found[0]
 
     return _INCLUDED.sub(included, _FILE.sub(lambda m: m[1] + os.path.abspath(m[2]) + m[3], text))
 
 
-def _reason(said: str) -> str:
-    """The errors among what a program said; without any, its last lines."""
-    lines = [line for line in said.splitlines() if line.strip()]
+def _reason(output: str) -> str:
+    """The error lines in the output of a program; without any, its last lines."""
+    lines = [line for line in output.splitlines() if line.strip()]
     errors = [line for line in lines if re.search(r"error|fatal|singular|too small", line, re.IGNORECASE)]
     return "\n".join((errors or lines)[-8:])
 

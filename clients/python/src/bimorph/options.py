@@ -1,4 +1,4 @@
-"""Options of a model. Written from src/options/model.rs by ``BIMORPH_WRITE=1 cargo test --test options``."""
+"""Options of a model. Written from crates/model/src/options/model.rs by ``BIMORPH_WRITE=1 cargo test --test options``."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The cells of :mod:`bimorph.layout` as gdsfactory's: outlines on masks, and ports where the nodes are.
+"""The cells of :mod:`bimorph.layout` as gdsfactory cells: outlines on masks, and ports at the nodes.
 
-Importing this module needs gdsfactory, which the package itself does not. Lengths are in micrometres, times in microseconds::
+This module requires gdsfactory; the package itself does not. Lengths are in micrometres, times in microseconds::
 
     import gdsfactory as gf
     from bimorph import layout, pcells
@@ -13,8 +13,8 @@ Importing this module needs gdsfactory, which the package itself does not. Lengt
     pad.connect("a", drive["b"])
     model = client.compile(layout.from_gdsfactory(c).netlist())
 
-:data:`CELLS` goes into a PDK (``gf.Pdk(cells=pcells.CELLS)``). The outlines are those that ``bimorph layout`` draws of the same subnets; a
-port stands for a point and has a width of 1 µm, whatever it is on, so that all of them connect.
+:data:`CELLS` goes into a PDK (``gf.Pdk(cells=pcells.CELLS)``). The outlines are those of ``bimorph layout`` for the same subnets. A port
+represents a point and always has a width of 1 µm, so that any two can be connected.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ except ImportError as missing:
     raise ImportError("bimorph.pcells draws gdsfactory components: install gdsfactory to use it") from missing
 
 LAYER = (45, 0)
-"""What moves: POLY1 of the shipped process ``polymumps``."""
+"""Movable layer: POLY1 of the shipped process ``polymumps``."""
 ANCHOR = (43, 0)
-"""What holds it: ANCHOR1 of ``polymumps``."""
+"""Anchor layer: ANCHOR1 of ``polymumps``."""
 
 _PAD = 10.0
 _INSET = 0.1
@@ -41,7 +41,7 @@ Point = tuple[float, float]
 
 
 class _Sheet:
-    """Outlines in the making, drawn as ``bimorph layout`` does: lengths in micrometres, directions in degrees."""
+    """Builder of outlines as in ``bimorph layout``. Lengths are in micrometres, directions in degrees."""
 
     def __init__(self, layer: Layer, anchor: Layer) -> None:
         self.component = gf.Component()
@@ -50,7 +50,7 @@ class _Sheet:
     def bar(
         self, start: Point, degrees: float, length: float, width: float, *, past: Point = (0.0, 0.0), layer: Layer | None = None
     ) -> Point:
-        """A bar from ``start`` on, led on at both ends by ``past``; where it ends without that."""
+        """Draws a bar from ``start``, extended by ``past`` at both ends; returns its end without the extension."""
         c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
         at = [(-past[0], -0.5), (length + past[1], -0.5), (length + past[1], 0.5), (-past[0], 0.5)]
         points = [(start[0] + a * c - b * width * s, start[1] + a * s + b * width * c) for a, b in at]
@@ -58,19 +58,19 @@ class _Sheet:
         return (start[0] + length * c, start[1] + length * s)
 
     def pad(self, start: Point, degrees: float, length: float = _PAD, width: float = _PAD) -> None:
-        """A pad that holds ``start`` and lies ahead of it."""
+        """Draws an anchor pad ahead of ``start``."""
         inset = _INSET * min(length, width)
         self.bar(start, degrees, length, width)
         self.bar(start, degrees, length, width - 2 * inset, past=(-inset, -inset), layer=self._anchor)
 
     def port(self, name: str, at: Point, orientation: float) -> None:
-        """A node."""
+        """Adds a port at a node."""
         self.component.add_port(name, center=at, width=_PORT, orientation=orientation, layer=self._layer, port_type="electrical")
 
 
 @gf.cell
 def anchor_pad(length: float = 10.0, width: float = 10.0, layer: Layer = LAYER, anchor: Layer = ANCHOR) -> gf.Component:
-    """A pad that holds its port ``a``."""
+    """A pad that anchors its port ``a``."""
     sheet = _Sheet(layer, anchor)
     sheet.pad((0.0, 0.0), 0.0, length, width)
     sheet.port("a", (0.0, 0.0), 180)
@@ -98,7 +98,7 @@ def folded_flexure(
     layer: Layer = LAYER,
     anchor: Layer = ANCHOR,
 ) -> gf.Component:
-    """A shuttle on a flexure folded over two trusses: it moves along x."""
+    """A shuttle on a flexure folded over two trusses; it moves along x."""
     sheet = _Sheet(layer, anchor)
     sheet.bar((-half, 0.0), 0.0, 2 * half, 2 * foot)
     for up in (1, -1):
@@ -124,7 +124,7 @@ def comb_drive(
     spine: float = 8.0,
     layer: Layer = LAYER,
 ) -> gf.Component:
-    """A comb drive: ``fingers`` on the side of ``b`` between one more on the side of ``a``."""
+    """A comb drive: ``fingers`` on the side of ``b`` between ``fingers + 1`` on the side of ``a``."""
     sheet = _Sheet(layer, layer)
     pitch = finger + gap
     tall = 2 * fingers * pitch + finger
@@ -153,7 +153,7 @@ def thermal_bimorph(
     layer: Layer = LAYER,
     anchor: Layer = ANCHOR,
 ) -> gf.Component:
-    """A hot and a cold arm between the pads ``a`` and ``g``; its tip is linked to ``o``. ``tau`` [µs] changes no outline."""
+    """A hot and a cold arm between the pads ``a`` and ``g``; its tip is linked to ``o``. ``tau`` [µs] does not affect the outline."""
     sheet = _Sheet(layer, anchor)
     sheet.pad((0.0, 0.0), 180.0)
     tip = sheet.bar((0.0, 0.0), 0.0, length, hot, past=(0.0, bar / 2))
@@ -187,4 +187,4 @@ def serpentine(turns: int = 4, length: float = 100.0, pitch: float = 10.0, width
 CELLS: dict[str, Callable[..., gf.Component]] = {
     cell.__name__: cell for cell in (anchor_pad, plain_beam, folded_flexure, comb_drive, thermal_bimorph, serpentine)
 }
-"""Cells by name, as a PDK takes them."""
+"""Cells by name, for a PDK."""

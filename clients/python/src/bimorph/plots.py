@@ -1,11 +1,13 @@
-"""Pictures of results, by matplotlib, which is imported when one is drawn."""
+"""Plots of results by matplotlib, which is imported at first use."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arguments import text
 from .errors import InvalidRequest
@@ -14,11 +16,14 @@ from .showing import axes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .results import FrequencyResponse, ModesResult, PullInResult, StaticResult, TransientResult
+    from .batch import BatchRun
+    from .results import FrequencyResponse, ModesResult, PullInResult, StaticResult
     from .table import Table
 
+Array = NDArray[np.float64]
+
 _LONGEST = 40
-"""Names that stand on an axis."""
+"""Most names on an axis."""
 
 
 def static(result: StaticResult, ax: Axes | None) -> Axes:
@@ -51,7 +56,7 @@ def modes(result: ModesResult, ax: Axes | None) -> Axes:
 
 
 def pull_in(result: PullInResult, ax: Axes | None) -> Axes:
-    """State of the gap over the voltage: it closes on the way up and opens on the way down."""
+    """State of the gap over the voltage, with pull-in on the way up and release on the way down."""
     ax = axes(ax)
     top = 1.2 * result.pull_in_v
     ax.plot([0.0, result.pull_in_v, result.pull_in_v, top], [0, 0, 1, 1], label="up")
@@ -74,18 +79,32 @@ def response(result: FrequencyResponse, ax: Axes | None) -> Axes:
     return ax
 
 
-def transient(result: TransientResult, ax: Axes | None) -> Axes:
+def over_time(t: Array, signals: Mapping[str, Array], units: Mapping[str, str], ax: Axes | None) -> Axes:
     """Every signal over time, in its unit."""
     ax = axes(ax)
-    for name, values in result.signals.items():
-        ax.plot(result.t, values, label=f"{name} [{result.units[name]}]")
+    for name, values in signals.items():
+        ax.plot(t, values, label=f"{name} [{units[name]}]")
     ax.set_xlabel("t [s]")
-    ax.legend()
+    if signals:
+        ax.legend()
+    return ax
+
+
+def batch(result: BatchRun, ax: Axes | None) -> Axes:
+    """Every signal of every session over time: a colour for each signal, and a line for each session."""
+    ax = axes(ax)
+    for k, (name, values) in enumerate(result.signals.items()):
+        lines = ax.plot(result.t, values.T, color=f"C{k % 10}", linewidth=0.8)
+        if lines:
+            lines[0].set_label(f"{name} [{result.units[name]}]")
+    ax.set_xlabel("t [s]")
+    if result.signals:
+        ax.legend()
     return ax
 
 
 def sweep(table: Table, name: str | None, ax: Axes | None) -> Axes:
-    """A result over the last parameter of numbers, a line for each value of the others; over no parameter, or random samples, its histogram."""
+    """A result over the last numeric parameter, with a line for each value of the others. Without a parameter, and for random samples, the histogram."""
     name = _result(table, name)
     ax = axes(ax)
     label = f"{name} [{table.units[name]}]"
@@ -104,8 +123,8 @@ def sweep(table: Table, name: str | None, ax: Axes | None) -> Axes:
     rest = [one for one in table.parameters if one != numbers[-1]]
     for others, points in lines.items():
         points.sort()
-        said = ", ".join(f"{one} = {value if isinstance(value, str) else format(value, 'g')}" for one, value in zip(rest, others))
-        ax.plot(*zip(*points), "o-", markersize=3, label=said or None)
+        label_of_line = ", ".join(f"{one} = {value if isinstance(value, str) else format(value, 'g')}" for one, value in zip(rest, others))
+        ax.plot(*zip(*points), "o-", markersize=3, label=label_of_line or None)
     ax.set_xlabel(numbers[-1])
     ax.set_ylabel(label)
     if 1 < len(lines) <= 12:
@@ -116,15 +135,15 @@ def sweep(table: Table, name: str | None, ax: Axes | None) -> Axes:
 def _result(table: Table, name: str | None) -> str:
     if name is None:
         if not table.results:
-            raise InvalidRequest("name: the table has no results to draw")
+            raise InvalidRequest("name: expected a table with results, got one without")
         return table.results[0]
     if text("name", name, "the name of a result") not in table.results:
-        raise InvalidRequest(f"name: no result {name!r}; there are {', '.join(table.results)}")
+        raise InvalidRequest(f"name: expected the name of a result, got {name!r}; there are {', '.join(table.results)}")
     return name
 
 
 def _is_random(table: Table, parameter: str) -> bool:
-    """Whether samples were drawn: values that are all different and not in order."""
+    """Whether the values are random samples: all different and not in order."""
     values = [row.parameters[parameter] for row in table.rows]
     ordered = sorted(values, key=float)
     return len(values) > 3 and len(set(values)) == len(values) and values not in (ordered, ordered[::-1])

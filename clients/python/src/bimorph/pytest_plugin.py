@@ -1,4 +1,4 @@
-"""Fixtures for test benches; pytest finds them by itself where this package is installed.
+"""Fixtures for test benches, registered with pytest when this package is installed.
 
 ``bimorph_server`` is a server for the whole run, ``bimorph_client`` a client of it for each test, and ``ngspice`` runs decks with the
 plug-in loaded: ``ngspice(deck)["v(out)"]``.
@@ -18,7 +18,7 @@ from .server import Server, program, serve
 
 @pytest.fixture(scope="session")
 def bimorph_server() -> Iterator[Server]:
-    """A server of this run's own; the tests that ask for it are skipped where the program is not found."""
+    """A server for the test run. Tests that use it are skipped if the program is not found."""
     if program() is None:
         pytest.skip("the program bimorph was not found; set BIMORPH_BIN to its path, or put it on PATH")
     with serve() as server:
@@ -34,7 +34,7 @@ def bimorph_client(bimorph_server: Server) -> Iterator[Client]:
 
 @pytest.fixture(scope="session")
 def ngspice() -> Callable[..., spice.Run]:
-    """:func:`bimorph.ngspice.run`; the tests that ask for it are skipped where ngspice or the program is not found."""
+    """:func:`bimorph.ngspice.run`; tests that use it are skipped if ngspice or the program is not found."""
     for name, found in [("ngspice", shutil.which("ngspice")), ("bimorph", program())]:
         if found is None:
             pytest.skip(f"the program {name} was not found")

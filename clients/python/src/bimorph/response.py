@@ -1,4 +1,4 @@
-"""Frequency responses as they travel."""
+"""Conversion of frequency responses from messages."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .messages import estimate_of
 from .results import FrequencyResponse, Root
 
 SPACINGS: dict[str, Any] = {"log": 0, "decade": 1, "linear": 2}
-"""Ways in which frequencies are spaced, by name."""
+"""Frequency spacings by name."""
 
 
 def response_of(answer: Any, drive: str) -> FrequencyResponse:
-    """The response of an answer that was checked."""
+    """The response from a verified message."""
 
     def roots(wire: Iterable[Any]) -> list[Root]:
         return [Root(complex(root.re, root.im)) for root in wire]

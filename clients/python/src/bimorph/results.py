@@ -1,10 +1,10 @@
-"""What analyses give. All quantities are SI."""
+"""Results of analyses. All quantities are SI."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +25,26 @@ _MODES = {"frequency_hz": "Hz", "residual": "1", "error": "1"}
 
 @dataclass(frozen=True)
 class NodeMotion:
-    """Displacement of a node from its drawn place."""
+    """Displacement of a node from its undeformed position."""
 
     x: float
-    """[m]"""
+    """Displacement along x [m]; in a mode shape [1]."""
     y: float
-    """[m]"""
+    """Displacement along y [m]; in a mode shape [1]."""
     rz: float
     """Rotation about z [rad]; in a mode shape [rad/m]."""
+
+
+@dataclass(frozen=True)
+class StabilityLoss:
+    """Point of the loading path from rest at which the equilibrium loses its stability."""
+
+    kind: Literal["limit-point", "bifurcation"]
+    """``"limit-point"``: the branch turns back, as at pull-in and snap-through. ``"bifurcation"``: another branch crosses, as at buckling."""
+    fraction: float
+    """Fraction of the load [1]."""
+    direction: str
+    """Where the part moves: the beam that bends and its side, seen along its drawn direction, or a body."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +60,7 @@ class StaticResult:
     charges_c: dict[str, float]
     """Charge on each port [C]."""
     pulled_in: bool
-    """Whether the part pulled in on the way."""
+    """Whether the part pulled in between rest and the load."""
     unknowns: int
     """Mechanical unknowns."""
     iterations: int
@@ -56,18 +68,20 @@ class StaticResult:
     estimated_error: float | None = None
     """Largest estimated relative error by the mesh [1]; None without an estimate."""
     jumped: bool = False
-    """Whether it jumped on the way: it pulled in, snapped through or buckled."""
+    """Whether it lost its stability between rest and the load: pull-in, snap-through or buckling."""
     warnings: tuple[str, ...] = ()
-    """What the numbers do not say by themselves."""
+    """Warnings about the result."""
     free_motions: tuple[str, ...] = ()
-    """Motions that nothing resists noticeably and no load excites; they are held where they are."""
+    """Motions without noticeable stiffness and without load; they are fixed at their undeformed position."""
+    passed: tuple[StabilityLoss, ...] = ()
+    """Losses of stability between rest and the load, in their order."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """Displacement [m] and rotation [rad] of every node; ``attrs["units"]`` has the units."""
         return showing.frame(self._columns(), ("node", list(self.nodes)), _MOTION)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The same, by node; each array has its unit in ``attrs["units"]``."""
+        """The columns of :meth:`to_pandas`, by node; each array has its unit in ``attrs["units"]``."""
         about = {"estimated_error": self.estimated_error, "pulled_in": int(self.pulled_in), "jumped": int(self.jumped)}
         return labelled.dataset(("node", list(self.nodes), ""), self._columns(), _MOTION, about)
 
@@ -80,9 +94,10 @@ class StaticResult:
 
     def _repr_html_(self) -> str:
         rows = ((name, node.x, node.y, node.rz) for name, node in self.nodes.items())
-        way = "pulled in on the way" if self.pulled_in else "snapped through or buckled on the way" if self.jumped else ""
-        held = [f"held where it is drawn: {motion}" for motion in self.free_motions]
-        note = showing.note(self.estimated_error, [*filter(None, [way]), *held, *self.warnings])
+        way = "pulled in below the load" if self.pulled_in else "snapped through or buckled below the load" if self.jumped else ""
+        held = [f"fixed at its undeformed position: {motion}" for motion in self.free_motions]
+        losses = [f"{loss.kind} at {loss.fraction:.4g} of the load ({loss.direction})" for loss in self.passed]
+        note = showing.note(self.estimated_error, [*filter(None, [way]), *losses, *held, *self.warnings])
         return showing.table(["node", "x [m]", "y [m]", "rz [rad]"], rows, note)
 
 
@@ -99,13 +114,13 @@ class ModesResult:
     unknowns: int
     """Mechanical unknowns."""
     errors: list[float | None]
-    """Estimated relative error of each frequency by the number of segments [1], signed; None where there is none."""
+    """Estimated relative error of each frequency by the mesh [1], signed; None without an estimate."""
     deflection_m: float = 0.0
-    """Largest displacement of the equilibrium that the modes are about [m]."""
+    """Largest displacement of the operating point [m]."""
     warnings: tuple[str, ...] = ()
-    """What may surprise about these modes."""
+    """Warnings about the result."""
     estimated_error: float | None = None
-    """Largest estimated relative error by the mesh, of every frequency and of the equilibrium that they are about [1]; None without one."""
+    """Largest estimated relative error by the mesh, of all frequencies and of the operating point [1]; None without an estimate."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """Frequency [Hz], residual and estimated error, by number from 1."""
@@ -113,7 +128,7 @@ class ModesResult:
         return showing.frame(columns, ("mode", range(1, len(self.frequencies_hz) + 1)), _MODES)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The same, and the shapes ``x``, ``y`` and ``rz`` by mode and node, each with its unit in ``attrs["units"]``."""
+        """The columns of :meth:`to_pandas`, and the shapes ``x``, ``y`` and ``rz`` by mode and node, each with its unit in ``attrs["units"]``."""
         errors = [math.nan if error is None else error for error in self.errors]
         columns = {"frequency_hz": self.frequencies_hz, "residual": self.residuals, "error": errors}
         modes = ("mode", range(1, len(self.frequencies_hz) + 1), "")
@@ -138,59 +153,59 @@ class ModesResult:
 
 @dataclass(frozen=True)
 class Root:
-    """A pole or a zero, of each conjugate pair that in the upper half plane."""
+    """A pole or a zero. Of a conjugate pair, the one in the upper half plane."""
 
     s: complex
-    """[rad/s]"""
+    """Complex frequency [rad/s]."""
 
     @property
     def frequency_hz(self) -> float:
-        """``|s|/2π`` [Hz]."""
+        """Frequency ``|s|/2π`` [Hz]."""
         return abs(self.s) / math.tau
 
     @property
     def quality(self) -> float | None:
-        """``|s|/(2·|Re s|)`` [1]; None where nothing damps it."""
+        """Quality factor ``|s|/(2·|Re s|)`` [1]; None without damping."""
         return abs(self.s) / (2.0 * abs(self.s.real)) if self.s.real else None
 
     @property
     def width_hz(self) -> float:
-        """Distance of the half-power points of a lightly damped resonance [Hz]."""
+        """−3 dB bandwidth of a lightly damped resonance [Hz]."""
         return abs(self.s.real) / math.pi
 
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """What a small sinusoid at one place does at every frequency."""
+    """Small-signal frequency response."""
 
     drive: str
-    """What was driven."""
+    """Name of the input."""
     drive_unit: str
-    """Its unit."""
+    """Unit of the input."""
     frequencies_hz: NDArray[np.float64]
     """Ascending [Hz]."""
     signals: dict[str, NDArray[np.complex128]]
-    """Each signal for a unit of the drive; NaN where an undamped resonance has no bound."""
+    """Response of each signal per unit of the input; NaN at an undamped resonance."""
     units: dict[str, str]
-    """Unit of each signal over that of the drive."""
+    """Unit of each signal divided by that of the input."""
     at_rest: dict[str, float | None]
-    """Value of each signal at rest; None where nothing holds the mechanism."""
+    """Static response of each signal; None if the mechanism is not held."""
     poles: list[Root] | None
-    """Poles within the band; None where there are too many."""
+    """Poles within the band; None if there are too many."""
     zeros: dict[str, list[Root] | None]
-    """Zeros of each signal within the band; None where they were not looked for."""
+    """Zeros of each signal within the band; None if they were not computed."""
     points_added: int
-    """Frequencies that were added about resonances and zeros."""
+    """Number of frequencies that were added near resonances and zeros."""
     modes: int | None
-    """Modes of a sum over modes; None: exact."""
+    """Number of superposed modes; None for an exact solution."""
     modal_error: float | None
-    """Largest relative deviation of that sum from the exact response; None: it is exact."""
+    """Largest relative deviation of the superposition from the exact response; None for an exact solution."""
     unknowns: int
     """Mechanical unknowns."""
     estimated_error: float | None = None
-    """Largest estimated relative error by the mesh, of a value or of the frequency at which it stands [1]; None without one."""
+    """Largest estimated relative error by the mesh, of the response or of its frequency [1]; None without an estimate."""
     warnings: tuple[str, ...] = field(default=())
-    """What the numbers do not say by themselves."""
+    """Warnings about the result."""
 
     @property
     def magnitude(self) -> dict[str, NDArray[np.float64]]:
@@ -207,7 +222,7 @@ class FrequencyResponse:
         return showing.frame(self.signals, ("frequency_hz", self.frequencies_hz), {"frequency_hz": "Hz", **self.units})
 
     def to_xarray(self) -> xarray.Dataset:
-        """The same, each signal with its unit in ``attrs["units"]``."""
+        """The signals of :meth:`to_pandas`, each with its unit in ``attrs["units"]``."""
         about = {"drive": self.drive, "drive_unit": self.drive_unit, "estimated_error": self.estimated_error}
         return labelled.dataset(("frequency_hz", self.frequencies_hz, "Hz"), self.signals, self.units, about)
 
@@ -223,20 +238,20 @@ class FrequencyResponse:
 
 @dataclass(frozen=True)
 class PullInResult:
-    """Where a gap closes and where it opens again."""
+    """Pull-in and release voltage of a gap."""
 
     port: str
-    """What was raised."""
+    """Port whose voltage was varied."""
     pull_in_v: float
-    """Fold on the way up [V]."""
+    """Pull-in voltage: limit point at rising voltage [V]."""
     release_v: float | None
-    """Where the closed gap lets go [V]; None when it stays stuck."""
+    """Release voltage, at which the last closed gap opens [V]; None if it stays closed."""
     estimated_error: float | None = None
     """Largest estimated relative error by the mesh [1]; None without an estimate."""
     held: bool = True
-    """False where nothing holds the part beyond pull-in: no gap closes on contact."""
+    """False if no contact holds the part beyond pull-in."""
     warnings: tuple[str, ...] = ()
-    """What the numbers do not say by themselves."""
+    """Warnings about the result."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """One row, by port; ``attrs["units"]`` has the units."""
@@ -244,13 +259,13 @@ class PullInResult:
         return showing.frame(columns, ("port", [self.port]), {"pull_in_v": "V", "release_v": "V"})
 
     def to_xarray(self) -> xarray.Dataset:
-        """The same, each number with its unit in ``attrs["units"]``."""
+        """The numbers of :meth:`to_pandas`, each with its unit in ``attrs["units"]``."""
         columns = {"pull_in_v": [self.pull_in_v], "release_v": [math.nan if self.release_v is None else self.release_v]}
         about = {"estimated_error": self.estimated_error, "held": int(self.held)}
         return labelled.dataset(("port", [self.port], ""), columns, {"pull_in_v": "V", "release_v": "V"}, about)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws where the gap closes on the way up, and where it opens on the way down."""
+        """Draws the state of the gap at rising and at falling voltage."""
         return plots.pull_in(self, ax)
 
     def _repr_html_(self) -> str:
@@ -259,21 +274,37 @@ class PullInResult:
 
 
 @dataclass(frozen=True)
+class Crossing:
+    """A signal that crosses a level, or a gap that closes or opens."""
+
+    signal: str
+    """Name of the signal; of a gap, its ``GAP.gap``."""
+    level: float
+    """Level, in the unit of the signal."""
+    t: float
+    """Time [s]."""
+    up: bool
+    """Whether the signal crosses from below."""
+    contact: bool
+    """Whether a contact force begins (``up`` False) or ends (``up`` True) to act."""
+
+
+@dataclass(frozen=True)
 class Statistics:
-    """Statistics of a signal over the part of a run whose single values do not hold."""
+    """Statistics of a signal over the part of a run whose single samples are not reliable."""
 
     signal: str
     """Name of the signal."""
     start: float
-    """From when [s]."""
+    """Start of that part [s]."""
     stop: float
-    """To when [s]."""
+    """End of that part [s]."""
     mean: float
     """Mean, in the signal's unit."""
     mean_error: float
-    """Half of its 95 % confidence interval."""
+    """Half width of the 95 % confidence interval of the mean."""
     rms: float
-    """Root mean square about the mean."""
+    """Standard deviation (root mean square about the mean)."""
     low: float
     """Lowest sample."""
     high: float
@@ -282,7 +313,7 @@ class Statistics:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TransientResult:
-    """Sampled signals."""
+    """Sampled signals of a transient."""
 
     t: NDArray[np.float64]
     """Times [s]."""
@@ -299,15 +330,17 @@ class TransientResult:
     estimated_error: float | None = None
     """Largest estimated relative error by the mesh [1]; None without an estimate."""
     warnings: tuple[str, ...] = ()
-    """What may surprise about the run."""
+    """Warnings about the result."""
     step_error: float | None = None
-    """Estimated root mean square error of the worst signal by the steps in time, of its amplitude [1]; None without an estimate."""
+    """Estimated root mean square error by the time steps, of the worst signal, relative to its amplitude [1]; None without an estimate."""
     stopped_at: float | None = None
-    """When ``until`` ended the run [s]; None where it did not."""
+    """Time at which ``until`` ended the run [s]; None if it did not."""
     reliable_until: float | None = None
-    """Time up to which the tolerance holds [s], in a run whose parts touch; None: to the end."""
+    """In a run with contacts, time up to which samples meet the tolerance [s]; None if all do."""
     after_contact: tuple[Statistics, ...] = ()
-    """Statistics of each signal after that."""
+    """Statistics of each signal after ``reliable_until``."""
+    events: tuple[Crossing, ...] = ()
+    """Crossings of ``events``, and contacts of gaps that begin and end, in order of time."""
 
     def __repr__(self) -> str:
         names = ", ".join(f"{name} [{unit}]" for name, unit in self.units.items())
@@ -318,13 +351,13 @@ class TransientResult:
         return showing.frame(self.signals, ("t", self.t), {"t": "s", **self.units})
 
     def to_xarray(self) -> xarray.Dataset:
-        """The same, each signal with its unit in ``attrs["units"]``."""
+        """The signals of :meth:`to_pandas`, each with its unit in ``attrs["units"]``."""
         about = {"estimated_error": self.estimated_error, "step_error": self.step_error, "reliable_until": self.reliable_until}
         return labelled.dataset(("t", self.t, "s"), self.signals, self.units, about)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws every signal over time, in its unit."""
-        return plots.transient(self, ax)
+        return plots.over_time(self.t, self.signals, self.units, ax)
 
     def _repr_html_(self) -> str:
         head = ["t [s]", *(f"{name} [{unit}]" for name, unit in self.units.items())]

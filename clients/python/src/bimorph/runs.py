@@ -1,4 +1,4 @@
-"""Many steps in one call: of one session, and of many that are stepped along the same times."""
+"""Runs: many steps of one or several sessions in one call."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import showing
-from .arguments import mapping, names, one_of, wrong_type
+from . import labelled, plots, showing
+from .acceptance import State, accept_together
+from .arguments import mapping, names, one_of, text, unmasked, wrong_type
 from .channel import Channel
 from .errors import InvalidRequest, StepFailed, Unavailable, shown
 from .local import ADDRESS
@@ -24,22 +25,24 @@ from .v1 import device_pb2, run_pb2
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
+    from matplotlib.axes import Axes
 
     from .session import Session
 
 Array = NDArray[np.float64]
 Given = Mapping[str, "ArrayLike"]
-"""What the ports are given [V, or the unit of the port's kind], by name: a number, or one for each time."""
+"""Port values by name [V, or the unit of the port's kind]: a number, or one for each time."""
 
 _AHEAD = 4
-"""Most events that are read ahead of the caller."""
+"""Most messages that are read ahead of the caller."""
 _PART = 1 << 20
-"""Most port values of one request: longer runs are made of several."""
+"""Most port values of one request; longer runs take several requests."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """The steps of a session that one call took."""
+    """Steps of a session that one call took."""
 
     t: Array
     """Times at the ends of the steps [s]."""
@@ -48,11 +51,11 @@ class Run:
     units: dict[str, str]
     """Unit of each signal."""
     currents: dict[str, Array]
-    """Current into each port after each step [A], or what ports of other kinds answer."""
+    """Conduction current into each port after each step [A], or the response of a port of another kind."""
     charges: dict[str, Array]
     """Charge on each port after each step [C]."""
     trials: int
-    """Trials that the steps took: a device may ask for shorter ones."""
+    """Device evaluations: the device may divide a step into shorter ones."""
 
     def __len__(self) -> int:
         return len(self.t)
@@ -61,21 +64,34 @@ class Run:
         return f"<Run of {len(self.t)} steps: {', '.join(self.signals) or 'no signals'}>"
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A column for each signal, by time [s]."""
-        return showing.frame(self.signals, ("t", self.t))
+        """A column for each signal, by time [s]; ``attrs["units"]`` has the units."""
+        return showing.frame(self.signals, ("t", self.t), {"t": "s", **self.units})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The signals of :meth:`to_pandas`, each with its unit in ``attrs["units"]``."""
+        return labelled.dataset(("t", self.t, "s"), self.signals, self.units, {})
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws every signal over time, in its unit."""
+        return plots.over_time(self.t, self.signals, self.units, ax)
+
+    def _repr_html_(self) -> str:
+        head = ["t [s]", *(f"{name} [{unit}]" for name, unit in self.units.items())]
+        rows = zip(self.t.tolist(), *(values.tolist() for values in self.signals.values()))
+        return showing.table(head, rows, f"{self.trials} trials")
 
 
 class RunFailed(StepFailed):
-    """A step of a run that the device cannot take. The session stands at the end of the step before."""
+    """A step of a run that the device cannot take. The state after the step before is accepted."""
 
     def __init__(self, message: str, index: int, t: float, run: Run) -> None:
         super().__init__(message)
         self.index = index
-        """Number of the step, from 0."""
+        """Number of the failed step, from 0."""
         self.t = t
-        """Time at its end [s]."""
+        """Time at the end of that step [s]."""
         self.run = run
-        """The steps before it."""
+        """The run up to that step."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (type(self), (str(self), self.index, self.t, self.run))
@@ -83,7 +99,7 @@ class RunFailed(StepFailed):
 
 @dataclass(eq=False)
 class Lane:
-    """A session on its way along the times of a run."""
+    """A session in a run, and its results."""
 
     session: Session
     values: Array
@@ -92,39 +108,41 @@ class Lane:
     currents: Array
     charges: Array
     done: int = 0
-    """Steps that are there."""
+    """Steps received."""
     trials: int = 0
     error: str = ""
-    """Why the next step has no answer; empty: it has."""
+    """Reason why the next step failed; empty without a failure."""
     last: Any = field(default=None)
-    """The reply to the last step, as it travels."""
+    """Message of the reply to the last step."""
 
     @classmethod
     def of(cls, session: Session, values: Array, steps: int, signals: int, ports: bool) -> Lane:
-        """At its start."""
+        """A lane before its first step."""
         width = len(session.ports) if ports else 0
         return cls(session, values, np.empty((steps, signals)), np.empty((steps, width)), np.empty((steps, width)))
 
-    def settle(self, times: Array) -> None:
-        """The session goes on from the last step."""
+    def state(self, times: Array) -> State | None:
+        """State after the last step; None before any."""
         if self.last is None:
-            return
+            return None
         row = self.values[min(self.done, len(self.values)) - 1].tolist()
         reply = self.session._named(self.last, float(times[self.done - 1]), row)
-        self.session._accept(reply, dict(reply.voltages))
+        return self.session, reply, dict(reply.voltages)
 
 
 class Runs:
-    """What a session has of runs."""
+    """Runs of a session, as a base class."""
 
     def run(self: Any, times: ArrayLike, voltages: Given, signals: Sequence[str] | None = None) -> Run:
-        """Steps to each of these times [s] in turn, in one call: ``voltages`` are a number for each port, or one for each time; ports that
-        are not named keep what they have. Between two times they go linearly, as in :meth:`step`, and the results have its bits.
+        """Takes a step to each of these times [s] in turn, in one call.
 
-        ``signals`` are those wanted of the opened ones, by default all. A run is taken as a whole: interrupted, it leaves the session
-        where it was (one of more than a million port values: at the end of a part of it).
+        ``voltages`` has for each port a number, or an array with one for each time; ports that are not named keep their values. Between two times they
+        change linearly. Every number of the result is bit-identical to that of :meth:`step` with the same voltages and ``dt``.
 
-        Raises :class:`RunFailed` for a step that the device cannot take; its ``run`` has the steps before, after which the session stands.
+        ``signals`` selects some of the opened ones, by default all. A run is taken as a whole: if it is interrupted or raises an error, the session keeps
+        its accepted state (beyond 2²⁰ port values: the state at the end of a part of the run).
+
+        Raises :class:`RunFailed` for a step that the device cannot take. Its ``run`` has the steps before; the state after them is accepted.
         """
         with self._lock:
             t = checked_times(times, self.t)
@@ -135,7 +153,7 @@ class Runs:
 
 
 def finished(lane: Lane, times: Array, wanted: Sequence[str]) -> Run:
-    """What a lane has come to.
+    """The run of a lane that has ended.
 
     Raises :class:`RunFailed`.
     """
@@ -159,20 +177,36 @@ def advance(
     signals: Sequence[str],
     ports: bool,
     progress: Callable[[float], object] | None = None,
+    divide: Callable[[Sequence[Lane], Callable[[Sequence[Lane]], None]], None] | None = None,
 ) -> None:
-    """Runs sessions of one channel along the same times, and lets each go on from its last step. Each lane has its results."""
-    width = max((len(lane.session.ports) for lane in lanes), default=1) * len(lanes)
-    part = max(_PART // max(width, 1), 1)
-    for first in range(0, len(times), part):
+    """Runs sessions of one channel along the same times; each lane has its results.
+
+    All sessions take the states after their last steps at once, when every request has ended. Where this raises, all of them keep the states
+    that they had: of a run with more than :data:`_PART` port values of a session, those after the same part of the times. ``divide`` calls its second
+    argument with the lanes, by default once; it may do so in several threads.
+    """
+    width = max((len(lane.session.ports) for lane in lanes), default=1)
+    size = max(_PART // max(width, 1), 1)
+    for first in range(0, len(times), size):
         check()
         here = [lane for lane in lanes if not lane.error]
         if not here:
             return
         for lane in here:
-            lane.session._own()
-        _advance(here, times, slice(first, first + part), signals, ports, progress)
-        for lane in here:
-            lane.settle(times)
+            lane.session._usable()
+        part = slice(first, min(first + size, len(times)))
+        together = max(_PART // max(width * (part.stop - part.start), 1), 1)
+
+        def request(some: Sequence[Lane], part: slice = part, together: int = together) -> None:
+            for k in range(0, len(some), together):
+                check()
+                _advance(some[k : k + together], times, part, signals, ports, progress)
+
+        if divide is None:
+            request(here)
+        else:
+            divide(here, request)
+        accept_together([state for lane in here if (state := lane.state(times)) is not None])
 
 
 def _advance(
@@ -221,7 +255,7 @@ def _lane(lanes: Sequence[Lane], number: int, open_lanes: set[int]) -> Lane:
 
 
 def _take(lane: Lane, rows: Any, here: Array, start: int, signals: int, ports: bool) -> None:
-    """Steps that came."""
+    """Stores the steps of a message."""
     checked, first, count = lane.session._checked, rows.first, rows.count
     begin = start + first
     in_order = begin == lane.done and first + count <= len(here)
@@ -242,7 +276,7 @@ def _take(lane: Lane, rows: Any, here: Array, start: int, signals: int, ports: b
 
 
 def _end(lane: Lane, end: Any, here: Array, start: int) -> None:
-    """The end of a lane."""
+    """Stores the end of a lane."""
     checked, session, came = lane.session._checked, lane.session, lane.done - start
     whole = end.steps == came and (came == len(here)) == (not end.error)
     checked.require(whole, f"end: expected that of {came} of {len(here)} steps, got one of {end.steps}")
@@ -257,7 +291,7 @@ def _end(lane: Lane, end: Any, here: Array, start: int) -> None:
 
 @contextlib.contextmanager
 def _heard(channel: Channel, request: Any, timeout: float) -> Iterator[Iterator[Any]]:
-    """The events of a run, of which one comes within each ``timeout`` [s]; left early, the run is stopped."""
+    """Messages of a run, with at most ``timeout`` [s] between two of them. Leaving the block stops the run."""
     outer, own = current.get(), Stopping()
     if outer is not None:
         outer.begun(own.stop)
@@ -270,7 +304,7 @@ def _heard(channel: Channel, request: Any, timeout: float) -> Iterator[Iterator[
         return
     before = current.set(own)
     try:
-        # what stops it is found when it begins
+        # the stream reads its stop handle at its start
         with contextlib.closing(channel.stream("Run", request)) as events:  # type: ignore[type-var]
             yield events
     finally:
@@ -278,7 +312,7 @@ def _heard(channel: Channel, request: Any, timeout: float) -> Iterator[Iterator[
 
 
 class _Reader:
-    """Reads the events of a run on a thread of its own: an interrupt of the caller never meets a lock of gRPC, which would stay locked."""
+    """Reads the messages of a run in a thread, so that an interrupt of the caller cannot leave a lock of gRPC locked."""
 
     def __init__(self, channel: Channel, request: Any, stopping: Stopping) -> None:
         self._channel, self._request, self._stopping = channel, request, stopping
@@ -302,7 +336,7 @@ class _Reader:
             self._events.put(error)
 
     def events(self, timeout: float) -> Iterator[Any]:
-        """Each within ``timeout`` [s] after the one before."""
+        """Messages, each within ``timeout`` [s] after the one before."""
         while True:
             try:
                 event = self._events.get(timeout=None if timeout == math.inf else timeout)
@@ -316,7 +350,7 @@ class _Reader:
             yield event
 
     def leave(self) -> None:
-        """Stops what is under way."""
+        """Stops the run."""
         self._left = True
         self._stopping.stop()
         self._room.put(None)
@@ -327,13 +361,13 @@ def _packed(values: Array) -> bytes:
 
 
 def checked_times(times: ArrayLike, after: float) -> Array:
-    """Times of a run that begins after a time [s].
+    """Checked times of a run that begins at ``after`` [s].
 
     Raises :class:`InvalidRequest`.
     """
     found = numbers("times", times)
     if found.ndim != 1 or found.size == 0:
-        raise InvalidRequest(f"times: expected a list of times [s], got an array of shape {found.shape}")
+        raise InvalidRequest(f"times: expected a list of times [s], got {'a number' if found.ndim == 0 else f'an array of shape {found.shape}'}")
     if found[0] <= after:
         raise InvalidRequest(f"times[0]: expected a time after that of the session, {after:g} s, got {found[0]:g} s")
     late = np.flatnonzero(np.diff(found) <= 0)
@@ -344,7 +378,7 @@ def checked_times(times: ArrayLike, after: float) -> Array:
 
 
 def checked_signals(wanted: Sequence[str] | None, opened: Mapping[str, str]) -> list[str]:
-    """Names of opened signals; all of them where none is wanted by name.
+    """Checked names of opened signals; by default all.
 
     Raises :class:`InvalidRequest`.
     """
@@ -358,27 +392,37 @@ def numbers(what: str, given: ArrayLike) -> Array:
 
     Raises :class:`InvalidRequest`.
     """
+    unmasked(what, given)
     try:
         raw = np.asarray(given)
         found = np.asarray(raw, dtype=np.float64) if raw.dtype.kind in "fiu" else None
     except (TypeError, ValueError):
         found = None
     if found is None:
-        raise wrong_type(what, "numbers", given)
+        raise wrong_type(what, "numbers (in rows of equal length)", given)
     if not np.isfinite(found).all():
         raise InvalidRequest(f"{what}: expected finite numbers, got {found[~np.isfinite(found)][0]}")
     return found
 
 
+def arrays(voltages: Given) -> dict[str, Array]:
+    """Port values by name, as arrays of finite numbers.
+
+    Raises :class:`InvalidRequest`.
+    """
+    given = mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
+    return {text("voltages: name of a port", port, "a text"): numbers(f"voltages[{port!r}]", value) for port, value in given.items()}
+
+
 def port_values(session: Any, voltages: Given, steps: int, lane: int | None = None, lanes: int = 1) -> Array:
-    """Port values of a session at each time, or one row where none changes. Of one of several lanes an array may have a row for each."""
-    mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
+    """Port values of a session at each time (n×p), or one row if all are constant. For a lane of a batch, arrays may have a row for each lane."""
+    voltages = arrays(voltages)
     unknown = [name for name in voltages if name not in session.ports]
     if unknown:
         raise InvalidRequest(f"voltages: no port named {unknown[0]!r}; the session has {', '.join(session.ports) or 'none'}")
     columns: list[Array] = []
     for port in session.ports:
-        given = numbers(f"voltages[{port!r}]", voltages.get(port, session._voltages[port]))
+        given = voltages[port] if port in voltages else np.array(session._voltages[port])
         if lane is not None and given.ndim == 2 and given.shape[0] == lanes:
             given = given[lane]
         if given.ndim == 0 or given.shape == (1,):
@@ -386,7 +430,7 @@ def port_values(session: Any, voltages: Given, steps: int, lane: int | None = No
         elif given.shape == (steps,):
             columns.append(given)
         else:
-            of_lanes = "" if lane is None else f", or an array of {lanes} rows"
+            of_lanes = "" if lane is None else f", or a row for each of {lanes} sessions (an array of shape ({lanes}, 1) or ({lanes}, {steps}))"
             raise InvalidRequest(
                 f"voltages[{port!r}]: expected a number, or one for each of {steps} times{of_lanes}, got an array of shape {given.shape}"
             )
@@ -395,7 +439,7 @@ def port_values(session: Any, voltages: Given, steps: int, lane: int | None = No
 
 
 def workers(channel: Channel, lanes: int) -> int:
-    """Calls among which lanes are divided: in this process as many as it has cores, on a server few, as it has other clients."""
+    """Number of concurrent requests: in process the number of cores, on a server at most 4."""
     cores = os.process_cpu_count() if hasattr(os, "process_cpu_count") else os.cpu_count()
     most = (cores or 1) if channel.address == ADDRESS else min(cores or 1, 4)
     return max(min(most, lanes), 1)

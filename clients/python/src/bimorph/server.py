@@ -1,4 +1,4 @@
-"""A server of this process: for the time of a ``with`` block, or from :meth:`Server.start` to :meth:`Server.close`."""
+"""A server that belongs to this process, for a ``with`` block or from :meth:`Server.start` to :meth:`Server.close`."""
 
 from __future__ import annotations
 
@@ -23,17 +23,16 @@ _STOP_S = 15.0
 _RECONNECT_S = 5.0
 
 _running: set[Server] = set()
-"""Started servers of this process: those that nobody closed end with the interpreter, while its threads still run."""
+"""Running servers of this process. They are closed at the end of the interpreter, while its threads still run."""
 
 
 class Server:
     """``bimorph serve`` on a temporary Unix socket.
 
-    It belongs to this process: it ends with it, however that ends (also by ``SIGKILL`` or ``os._exit``), holds none of its files, and is not
-    interrupted by Ctrl-C in its terminal. In a forked child, :meth:`close` leaves it alone.
+    It ends with this process, in whichever way that ends (also by ``SIGKILL`` or ``os._exit``). It inherits no files and is not
+    interrupted by Ctrl-C in the terminal. In a forked child :meth:`close` has no effect.
 
-    In a ``with`` block it is closed at the end; where no block fits, as over the cells of a notebook, between :meth:`start` and
-    :meth:`close`, or the end of the interpreter.
+    A ``with`` block closes it at the end. In a notebook, it runs from :meth:`start` to :meth:`close` or to the end of the interpreter.
     """
 
     def __init__(self, binary: str | os.PathLike[str] | None = None) -> None:
@@ -45,20 +44,23 @@ class Server:
 
     @property
     def address(self) -> str:
-        """``unix:///path`` of its socket."""
+        """``unix:///path`` of its socket.
+
+        Raises :class:`BimorphError` if it is not running.
+        """
         return self._held().address
 
     @property
     def process(self) -> subprocess.Popen[str]:
-        """The process; of a server that was closed, the one that it had."""
+        """The process; after :meth:`close` that of the last run."""
         if self._process is None:
             raise _not_started()
         return self._process
 
     def start(self) -> Server:
-        """Starts it, unless it runs already; returns this object.
+        """Starts it unless it is running; returns this object.
 
-        Raises :class:`Unavailable` when the program is not found or does not start; its last words are in the message.
+        Raises :class:`Unavailable` if the program is not found or does not start; the message has its last output.
         """
         with self._lock:
             held = self._running
@@ -72,7 +74,7 @@ class Server:
         return self
 
     def close(self) -> None:
-        """Stops it; it may be started again."""
+        """Stops it; it can be started again."""
         with self._lock:
             held, self._running = self._running, None
             _running.discard(self)
@@ -82,7 +84,7 @@ class Server:
     def client(self, timeout: float = 120.0) -> Client:
         """A client of this server; ``timeout`` [s] bounds each unary call."""
         client = Client(self.address, timeout)
-        # a server that has ended is not there again under its address
+        # a new server has another address: do not wait long for one that has ended
         client._channel.reconnect = _RECONNECT_S
         return client
 
@@ -90,6 +92,10 @@ class Server:
         held = self._running
         if held is None:
             raise _not_started()
+        ended = held.process.poll() if held.owner == os.getpid() else None
+        if ended is not None:
+            how = f"by signal {-ended}" if ended < 0 else f"with exit status {ended}"
+            raise Unavailable(f"server {held.address}: its process has ended {how}; start() starts it again")
         return held
 
     def __enter__(self) -> Server:
@@ -106,26 +112,26 @@ class Server:
 
 
 def _not_started() -> BimorphError:
-    return BimorphError("the server does not run: start() it, or use it in a `with` block")
+    return BimorphError("the server does not run; start() it, or use it in a `with` block")
 
 
 def serve(binary: str | os.PathLike[str] | None = None) -> Server:
     """Starts a :class:`Server`, to be used in a ``with`` block or closed with :meth:`Server.close`.
 
-    Raises :class:`Unavailable` when the program is not found or does not start.
+    Raises :class:`Unavailable` if the program is not found or does not start.
     """
     return Server(binary).start()
 
 
 def program() -> str | None:
-    """Path of the ``bimorph`` program: the environment variable ``BIMORPH_BIN``, else what was installed with this package, else from
+    """Path of the ``bimorph`` program: from the environment variable ``BIMORPH_BIN``, else installed with this package, else from
     ``PATH``."""
     own = os.path.join(sysconfig.get_path("scripts"), "bimorph")
     return os.environ.get("BIMORPH_BIN") or shutil.which(own) or shutil.which("bimorph")
 
 
 class _Running:
-    """A process that serves."""
+    """A process of a server."""
 
     def __init__(self, binary: str | None) -> None:
         if binary is None:
@@ -134,7 +140,7 @@ class _Running:
         self._folder = tempfile.mkdtemp(prefix="bimorph-")
         self.address = f"unix://{self._folder}/s"
         try:
-            # Standard input is a pipe without a writer but this process: it ends when this process does.
+            # Only this process writes to standard input, so the server sees its end when this process ends.
             self.process = subprocess.Popen(
                 [binary, "serve", "--listen", self.address, "--while-stdin"],
                 stdin=subprocess.PIPE,
@@ -153,7 +159,7 @@ class _Running:
         self._listener = threading.Thread(target=_listen, args=(self.process.stderr, ready, lines), daemon=True)
         try:
             self._listener.start()
-            # The end of its output sets `ready` too, a moment before the end of the process shows.
+            # The end of the output sets `ready` too, before `poll` reports the end of the process.
             if not ready.wait(_START_S) or not any(line.startswith("listening on") for line in lines):
                 raise Unavailable(f"binary: {binary} serve did not start: {''.join(lines).strip() or 'it printed nothing'}")
         except BaseException:
@@ -161,7 +167,7 @@ class _Running:
             raise
 
     def close(self) -> None:
-        """Ends the process and removes its folder; in a forked child nothing happens."""
+        """Ends the process and removes its folder; has no effect in a forked child."""
         if os.getpid() != self.owner:
             return
         process = self.process
@@ -183,7 +189,7 @@ class _Running:
 
 
 def _listen(lines: IO[str], ready: threading.Event, last: collections.deque[str]) -> None:
-    """Reads what the server prints, to its end: a full pipe would stop it."""
+    """Reads the output of the server to its end, because a full pipe would block it."""
     for line in lines:
         last.append(line)
         if line.startswith("listening on"):
@@ -202,7 +208,7 @@ def _end() -> None:
 
 
 def _forked() -> None:
-    """In a forked child: its copies of the pipes would keep the servers of its parent alive."""
+    """In a forked child: closes its copies of the pipes, which would keep the servers of the parent alive."""
     _running.clear()
     nothing = os.open(os.devnull, os.O_RDWR)
     for pipe in _pipes:

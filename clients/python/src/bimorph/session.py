@@ -1,4 +1,4 @@
-"""One device, stepped over a stream."""
+"""A session: one device, stepped over a stream."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import Any
 from .arguments import MAX_STEP, given_to, instance, number, one_of, text
 from .channel import Channel
 from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, from_fault, shown
+from .local import ADDRESS
 from .naming import by_argument
 from .results import NodeMotion
 from .runs import Runs
@@ -24,19 +25,19 @@ from .v1 import device_pb2
 from .verified import Checked
 
 _SHORTEST = 1e-9
-"""A step that would have to be shorter than this fraction of what was asked for has failed."""
+"""Shortest piece of a step, as a fraction of the step; a step that requires shorter ones has failed."""
 _PIECES = 4
-"""After so many pieces of a step the server is told that the state before it is in use: of a large model it may hold no more than eight."""
+"""After this number of pieces the accepted state is marked as in use: of a large model the server may hold only eight states."""
 
 
 class Session(Runs):
-    """A device with states of its own. Make one with :meth:`Model.session`, use it in a ``with`` block.
+    """A device with its states, opened with :meth:`Model.session`; use it in a ``with`` block.
 
-    A trial is a pure function of its parent state, its step and its voltages: trying leaves no trace, and the same trial
-    gives the same bits. ``accept`` makes a state the parent of the next trials; ``step`` does both.
+    A trial is a pure function of its parent state, step and voltages: it changes no state, and equal trials give bit-identical
+    replies. ``accept`` makes the state of a reply the parent of the next trials; ``step`` does both.
 
-    Threads may share a session: each call is one whole. A call that fails or is interrupted (Ctrl-C, a time-out of a test runner)
-    leaves the accepted state as it was, and the next call gets its own answer.
+    Threads may share a session: calls run one after the other. A call that fails or is interrupted (Ctrl-C, a timeout of a test runner)
+    leaves the accepted state unchanged, and the next call gets its own reply.
     """
 
     def __init__(
@@ -49,14 +50,15 @@ class Session(Runs):
         session: str = "",
         noise: device_pb2.Agitation | None = None,
     ) -> None:
-        """With ``session`` it joins one that is open on the server, and closes it at its end."""
+        """Opens a session, or attaches to the open ``session`` of the server and closes that at its end."""
         self._channel = channel
         self._model = model
         self._session = session
         self._joined = bool(session)
+        self._closed = False
         self._timeout = timeout
         self._pid = os.getpid()
-        # A step is taken as a whole.
+        # Held for a whole step.
         self._lock = threading.RLock()
         self._line = channel.line(timeout)
         self.t = 0.0
@@ -77,20 +79,20 @@ class Session(Runs):
                 opened = self._checked.kind(self._ask(first), "opened")
             self._checked.opened(opened.device, ports, None if session else signals)
         except BaseException:
-            # the session was there before this object: it stays, to be joined again
+            # do not close a session that this object has not opened
             self.leave()
             raise
         self._session = opened.session
         self.ports: tuple[str, ...] = tuple(opened.device.ports)
-        """Ports, in order."""
+        """Names of the ports, in order."""
         kinds = [_kind(k) for k in opened.device.port_kinds] or ["electrical"] * len(self.ports)
         self.port_kinds: dict[str, str] = dict(zip(self.ports, kinds))
-        """What is given to each port, and answered: "electrical" (V; A), "force" (N; m), "moment" (N·m; rad), "force_rate"
+        """Kind of each port with the units of input and response: "electrical" (V; A), "force" (N; m), "moment" (N·m; rad), "force_rate"
         (N; m/s), "moment_rate" (N·m; rad/s), "thermal" (W; K above ambient), "acceleration" (m/s²; 0), "rate" (rad/s; 0)."""
         self.signals: dict[str, str] = {s.name: s.unit for s in opened.device.signals}
         """Opened signals and their units."""
         self.kept: bool = opened.kept
-        """Whether accepted states outlive the server."""
+        """Whether the server stores accepted states, which then survive its restart."""
         self.unknowns: int = opened.device.unknowns
         """Mechanical unknowns."""
         self._voltages = dict.fromkeys(self.ports, 0.0)
@@ -98,11 +100,11 @@ class Session(Runs):
     def trial(
         self, voltages: Mapping[str, float], dt: float | None = None, *, parent: TrialReply | None = None
     ) -> TrialReply:
-        """What the device answers at these port voltages [V], or what else is given to ports of other kinds; ports not named
-        keep what they have in the accepted state.
+        """Reply of the device at these port voltages [V], or inputs of ports of other kinds. Ports that are not named
+        keep their values in the accepted state.
 
-        With ``dt`` [s]: the state that much later, the voltages going linearly to these. Without: the static equilibrium.
-        ``parent`` is the state to start from, by default the accepted one. A reply with ``need_dt`` asks for a shorter
+        With ``dt`` [s] the reply has the state after a step of that length, along which the voltages change linearly to these. Without, it has the
+        static equilibrium. ``parent`` is the state to start from, by default the accepted one. A reply with ``need_dt`` requires a shorter
         step.
         """
         if dt is not None:
@@ -123,7 +125,7 @@ class Session(Runs):
         wire = self._checked.kind(self._ask(device_pb2.DeviceRequest(trial=trial)), "trial")
         self._checked.trial(wire, len(self.ports), len(self.signals), dt)
         if wire.token:
-            # a state has one name and comes of one trial
+            # a token belongs to one trial
             asked = (mode, token, dt, tuple(vector))
             other = self._last is not None and self._last[0] == wire.token and self._last[1] != asked
             self._checked.require(not other, "it names the state of an earlier trial")
@@ -131,8 +133,10 @@ class Session(Runs):
         return self._named(wire, t, vector)
 
     def accept(self, reply: TrialReply, voltages: Mapping[str, float] | None = None) -> None:
-        """Makes a trial's state the one that later trials start from, and its voltages, or those named here, what ports not named keep.
-        In a kept session it has outlived the server when this returns, and if this raises, the state before is still accepted and the
+        """Makes the state of a reply the accepted one, from which later trials start. ``voltages`` replaces port values of the reply, which
+        ports that are not named keep later.
+
+        In a kept session the state is stored on the server when this returns. If this raises, the state before is still accepted, and the
         same trial gives the same state again."""
         instance("reply", reply, TrialReply, "a TrialReply of this session")
         if reply.need_dt is not None:
@@ -143,11 +147,11 @@ class Session(Runs):
 
     def _accept(self, reply: TrialReply, voltages: dict[str, float]) -> None:
         if self.kept:
-            # There first, with an answer: the server keeps the state before as well.
+            # On the server first, with a reply: it stores the state before as well.
             self._tell_accepted(reply)
             self.accepted, self.t, self._voltages = reply, reply.t, voltages
             return
-        # Here first: the server only frees memory, and an interrupted call must not leave half of this done.
+        # Here first: the server only frees memory, and an interrupt must not leave the two in different states.
         self.accepted, self.t, self._voltages = reply, reply.t, voltages
         self._tell_accepted(reply)
 
@@ -161,15 +165,21 @@ class Session(Runs):
         self._line.tell(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)))
 
     def operating_point(self, voltages: Mapping[str, float]) -> TrialReply:
-        """Static equilibrium at these port voltages [V], accepted, at t = 0."""
+        """Accepts the static equilibrium at these port voltages [V] and sets the time to 0 s.
+
+        Ports that are not named keep their values. The equilibrium is followed from the accepted state, or from the model at rest: between release
+        and pull-in a part that is closed stays closed, and ``jumped`` of the reply is True where it passed a limit point.
+
+        Raises :class:`StepFailed` where none is found; the session keeps its state.
+        """
         with self._lock:
             reply = replace(self.trial(voltages), t=0.0)
             self.accept(reply)
             return reply
 
     def step(self, voltages: Mapping[str, float], dt: float) -> TrialReply:
-        """Goes ``dt`` [s] on, the voltages [V] going linearly to these, in as many pieces as the device asks for. It is taken as a
-        whole or, where this raises, not at all."""
+        """Takes a step of ``dt`` [s], along which the voltages [V] change linearly to these, in as many pieces as the device requires. If this
+        raises, the accepted state is unchanged."""
         with self._lock:
             return self._step(voltages, number("dt", dt, "a time in seconds", above=0.0, most=MAX_STEP))
 
@@ -193,7 +203,7 @@ class Session(Runs):
             h = min(reply.need_dt / dt, h / 2)
             if h < _SHORTEST:
                 at = parent.t if parent else 0.0
-                raise StepFailed(f"the device asks for steps below {h * dt:.3g} s at t = {at:.6g} s")
+                raise StepFailed(f"the device requires steps below {h * dt:.3g} s at t = {at:.6g} s")
 
     def linearize(self, omega: float, reply: TrialReply | None = None) -> dict[str, dict[str, complex]]:
         """Port admittances [S] at angular frequency ``omega`` [rad/s] about a state, by default the accepted one."""
@@ -202,21 +212,22 @@ class Session(Runs):
         return _matrix(self.ports, self.ports, values)
 
     def noise(self, omega: float, reply: TrialReply | None = None) -> dict[str, dict[str, complex]]:
-        """One-sided spectral densities of what ports and signals answer, at angular frequency ``omega`` [rad/s] about a state,
-        by default the accepted one, and their cross-spectra: each with nothing else changed, as the current [A²/Hz] of a port
-        whose voltage is held, or the displacement [m²/Hz] of ``NODE.x``."""
+        """One-sided spectral densities and cross-spectra of port responses and signals at angular frequency ``omega`` [rad/s] about a
+        state, by default the accepted one. The inputs of all ports are constant: the current of a port at constant voltage [A²/Hz], or the
+        displacement ``NODE.x`` [m²/Hz]."""
         answer = self._small_signal(omega, reply, noise=True)
         if answer.admittance_re:
-            raise BimorphError("the server is of an earlier version, which knows no noise")
+            raise BimorphError("the server is of an earlier version without noise analysis; update it")
         values = [complex(re, im) for re, im in zip(answer.noise_re, answer.noise_im)]
         names = (*self.ports, *self.signals)
         return _matrix(names, names, values)
 
     def _small_signal(self, omega: float, reply: TrialReply | None, *, noise: bool) -> device_pb2.SmallSignal:
         omega = number("omega", omega, "an angular frequency in rad/s", least=0.0)
+        self._open()
         state = self.accepted if reply is None else instance("reply", reply, TrialReply, "a TrialReply of this session or None")
         if state is None:
-            raise ValueError("there is no accepted state; call operating_point first")
+            raise InvalidRequest("reply: expected a reply, or an accepted state, got neither; call operating_point or step first")
         request = device_pb2.SmallSignalRequest(token=state.token, omega=omega, noise=noise)
         asked = self._ask(device_pb2.DeviceRequest(linearize=request))
         answer: device_pb2.SmallSignal = self._checked.kind(asked, "linearized")
@@ -227,7 +238,7 @@ class Session(Runs):
     def read(self, signal: str) -> float:
         """Value of an opened signal in the accepted state, in its unit."""
         if self.accepted is None:
-            raise ValueError("there is no accepted state; call operating_point or step first")
+            raise InvalidRequest("signal: expected an accepted state to read it in, got none; call operating_point or step first")
         return self.accepted.outputs[one_of("signal", signal, self.signals, "signals of the session")]
 
     def motion(self, node: str) -> NodeMotion:
@@ -237,16 +248,18 @@ class Session(Runs):
         return NodeMotion(*map(self.read, wanted))
 
     def snapshot(self) -> Snapshot:
-        """The accepted state, to go on from later, in another process, or on another server."""
+        """The accepted state as a value, for :meth:`Model.restore` later, in another process or on another server."""
         with self._lock:
+            self._open()
             token = self.accepted.token if self.accepted else 0
             request = device_pb2.SnapshotRequest(session=self._session, token=token)
             states = self._channel.call("Snapshot", request).snapshot
             return Snapshot(self._model, states, self.accepted, self.t, dict(self._voltages))
 
     def fork(self) -> Session:
-        """Another session that goes on from here by itself; close it as well."""
+        """Opens another session with the same states; close it as well."""
         with self._lock:
+            self._open()
             with apart():
                 opened = self._channel.call("Fork", device_pb2.ForkRequest(session=self._session))
             other = opened_just_now(self._channel, self._model, self._timeout, opened.session)
@@ -254,15 +267,16 @@ class Session(Runs):
             return other
 
     def ticket(self) -> Ticket:
-        """Where this session stands, to go on from with :meth:`Client.resume`, also in another process."""
+        """Ticket of this kept session for :meth:`Client.resume`, also in another process."""
         with self._lock:
             if not self._joined:
-                raise BimorphError("only a session of Model.session(kept=True) outlives its connection")
+                self._open()
+                raise BimorphError("this session does not outlive its connection; open one with Model.session(kept=True)")
             return Ticket(self._model, self._session, self.accepted, self.t, dict(self._voltages))
 
     def resume(self) -> Session:
-        """This session on a new connection, when the old one broke, a call took too long, or the server was started anew; a server that is
-        away is waited for until the timeout. This object is closed, the session is not; if this raises, both are as they were.
+        """Attaches to this kept session over a new connection, after the old one was lost, a call exceeded its timeout, or the server was restarted.
+        Retries until the timeout while the server is unavailable. This object is closed, the session is not. If this raises, neither has changed.
         """
         with self._lock:
             ticket = self.ticket()
@@ -271,14 +285,15 @@ class Session(Runs):
             return other
 
     def leave(self) -> None:
-        """Ends the stream alone: a kept session stays on its server, to be resumed with a :meth:`ticket` taken before."""
+        """Ends the stream only: a kept session stays on its server and can be resumed with a :meth:`ticket` taken before."""
         self._joined = False
         self.close()
 
     def close(self) -> None:
-        """Ends the stream; the server forgets the states. Later calls raise."""
+        """Closes the session on the server, with its states. Later calls raise :class:`BimorphError`."""
         if self._pid == os.getpid():
-            self._line.close(BimorphError("the session is closed; open another one"))
+            self._closed = True
+            self._line.close(self._ended())
             if self._joined:
                 self._joined = False
                 with contextlib.suppress(BimorphError), apart():
@@ -316,9 +331,25 @@ class Session(Runs):
             voltages=dict(zip(self.ports, vector)),
         )
 
+    def _ended(self) -> BimorphError:
+        where = "in this process" if self._channel.address == ADDRESS else f"on server {self._channel.address}"
+        return BimorphError(f"this session of model {self._model[:8]} {where} is closed; open another one with Model.session()")
+
+    def _open(self) -> None:
+        """Raises :class:`BimorphError` where this object was closed."""
+        self._own()
+        if self._closed:
+            raise self._ended()
+
     def _own(self) -> None:
         if self._pid != os.getpid():
             raise BimorphError("a session does not survive a fork; open one in this process")
+
+    def _usable(self) -> None:
+        """Raises the reason why this session cannot be used, if there is one."""
+        self._own()
+        if self._line.over is not None:
+            raise self._line.over
 
     def _ask(self, request: Any) -> Any:
         with self._lock:
@@ -334,7 +365,7 @@ class Session(Runs):
 
 
 def opened_just_now(channel: Channel, model: str, timeout: float, session: str) -> Session:
-    """Joins a session that was opened just now; it is closed where that fails, as nobody knows of it."""
+    """Attaches to a session that was just opened; closes it if that fails."""
     try:
         return Session(channel, model, (), (), timeout, session)
     except BaseException:
@@ -344,7 +375,7 @@ def opened_just_now(channel: Channel, model: str, timeout: float, session: str) 
 
 
 def resumed(channel: Channel, ticket: Ticket, timeout: float) -> Session:
-    """The session of a ticket; a server that is away is waited for until the timeout."""
+    """The session of a ticket; retries until the timeout while the server is unavailable."""
     session = channel.persist(lambda: Session(channel, ticket.model, (), (), timeout, ticket.session), timeout)
     session.accepted, session.t, session._voltages = ticket.accepted, ticket.t, dict(ticket.voltages)
     return session

@@ -1,10 +1,12 @@
-"""Results as tables and pictures: pandas and matplotlib are asked for when somebody wants them."""
+"""Results as tables and plots; pandas and matplotlib are imported at first use."""
 
 from __future__ import annotations
 
 import html
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from .arguments import wrong_type
 
@@ -14,11 +16,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _SHOWN = 20
-"""Rows that a notebook shows of a long table."""
+"""Most rows of a table in a notebook."""
 
 
 def frame(columns: Mapping[str, Any], index: tuple[str, Any] | None = None, units: Mapping[str, str] | None = None) -> pandas.DataFrame:
-    """A table of pandas; ``index`` is its name and values, ``units`` stand in ``attrs["units"]``."""
+    """A table of pandas; ``index`` is its name and values, ``units`` become ``attrs["units"]``."""
     try:
         import pandas
     except ImportError:
@@ -29,13 +31,19 @@ def frame(columns: Mapping[str, Any], index: tuple[str, Any] | None = None, unit
     return found
 
 
+def frame_of_sessions(columns: Mapping[str, Any], count: int, t: Any, units: Mapping[str, str]) -> pandas.DataFrame:
+    """A table of pandas by session, from 0, and time [s]."""
+    found = frame({"session": np.repeat(np.arange(count), len(t)), "t": np.tile(t, count), **columns}, None, units)
+    return found.set_index(["session", "t"])
+
+
 def arrow(columns: Mapping[str, Sequence[Any]], units: Mapping[str, str], about: Mapping[str, str]) -> pyarrow.Table:
-    """A table of Arrow with units in the metadata of fields, and what else there is to say in that of the table."""
+    """A table of Arrow with units in the metadata of its fields, and ``about`` in that of the table."""
     try:
         import pyarrow
     except ImportError:
         raise ImportError("to_arrow() needs pyarrow: pip install pyarrow") from None
-    # a column without a value is of its kind all the same: parts of a sweep have one schema
+    # empty columns have their type too, so that all parts of a sweep have one schema
     kinds = {name: pyarrow.float64() if name in units or all(x is None for x in values) else None for name, values in columns.items()}
     kinds |= {"point": pyarrow.int64(), "warning": pyarrow.string(), "error": pyarrow.string()}
     arrays = {name: pyarrow.array(_alike(values), type=kinds[name]) for name, values in columns.items()}
@@ -45,14 +53,14 @@ def arrow(columns: Mapping[str, Sequence[Any]], units: Mapping[str, str], about:
 
 
 def _alike(values: Sequence[Any]) -> Sequence[Any]:
-    """Numbers as words where some are words: a column of Arrow is of one type."""
+    """Numbers as text if other values are text, because a column of Arrow has one type."""
     if not any(isinstance(value, str) for value in values):
         return values
     return [value if value is None or isinstance(value, str) else repr(value) for value in values]
 
 
 def axes(given: Axes | None) -> Axes:
-    """Where to draw: what was given, or a new figure."""
+    """The given axes, or those of a new figure."""
     if given is not None:
         if not (hasattr(given, "plot") and hasattr(given, "set_xlabel")):
             raise wrong_type("ax", "axes of matplotlib or None", given)
@@ -76,8 +84,8 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], note: str = "")
 
 
 def note(estimated_error: float | None, warnings: Iterable[str]) -> str:
-    """What stands below a table: how far its numbers may be off, and what they do not say."""
-    error = "no estimate of its error" if estimated_error is None else f"estimated error {estimated_error:.1e}"
+    """Note below a table: estimated error and warnings."""
+    error = "no error estimate" if estimated_error is None else f"estimated error {estimated_error:.1e}"
     return " · ".join(filter(None, [error, *warnings]))
 
 

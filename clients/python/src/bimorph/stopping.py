@@ -1,4 +1,4 @@
-"""Calls that somebody else may stop."""
+"""Calls that another thread can stop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .errors import BimorphError
 
 
 class Stopping:
-    """Stops the calls that are begun while it is :data:`current`."""
+    """Stops calls that begin while it is :data:`current`."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -19,21 +19,21 @@ class Stopping:
         self._stopped = False
 
     def begun(self, cancel: Callable[[], object]) -> None:
-        """A call was begun, which ``cancel`` ends."""
+        """Registers a call, which ``cancel`` ends."""
         with self._lock:
             if not self._stopped:
-                # the last one is under way, those before have ended
+                # only the last call is running
                 self._cancels = [cancel]
                 return
         cancel()
 
     @property
     def stopped(self) -> bool:
-        """Whether somebody has stopped it."""
+        """Whether :meth:`stop` was called."""
         return self._stopped
 
     def stop(self) -> None:
-        """Ends what is under way, and whatever is begun later."""
+        """Ends the running call, and each later one at its beginning."""
         with self._lock:
             self._stopped = True
             cancels = self._cancels
@@ -42,11 +42,11 @@ class Stopping:
 
 
 current: contextvars.ContextVar[Stopping | None] = contextvars.ContextVar("bimorph_stopping", default=None)
-"""What stops the calls of this context; None: nothing but themselves."""
+"""Handle that stops the calls of this context; None if there is none."""
 
 
 def check() -> None:
-    """Raises :class:`BimorphError` where the calls of this context were stopped: between the parts of what is computed in many."""
+    """Raises :class:`BimorphError` if the calls of this context were stopped; for use between the parts of a call."""
     stopping = current.get()
     if stopping is not None and stopping.stopped:
         raise BimorphError("cancelled: stopped here")
@@ -54,7 +54,7 @@ def check() -> None:
 
 @contextlib.contextmanager
 def apart() -> Iterator[None]:
-    """Calls that nobody stops: those that make something on a server, whose answer says what is to be closed, and those that close it."""
+    """Calls within the block cannot be stopped: those that open an object on a server, and those that close it."""
     before = current.set(None)
     try:
         yield

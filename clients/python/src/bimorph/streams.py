@@ -1,6 +1,6 @@
-"""Streams that stay open, over as many connections as they need: a server takes only so many on each (``streams_per_connection``).
+"""Distribution of long-lived streams over connections: a server limits the streams of each connection (``streams_per_connection``).
 
-A request beyond that number waits until another stream ends, which a session that is held open need not do.
+A stream beyond that limit waits for the end of another one, which may never come.
 """
 
 from __future__ import annotations
@@ -8,11 +8,11 @@ from __future__ import annotations
 import threading
 
 MAX_STREAMS = 128
-"""Streams of a connection, where the server does not say how many it takes."""
+"""Default of the most streams of a connection."""
 
 
 class Place:
-    """The place of a stream on a connection, given back once."""
+    """A slot for a stream on a connection; it is released once."""
 
     def __init__(self, places: Places, connection: int) -> None:
         self._places: Places | None = places
@@ -20,30 +20,30 @@ class Place:
         """Number of the connection, from 0."""
 
     def release(self) -> None:
-        """Gives it back."""
+        """Releases the slot."""
         places, self._places = self._places, None
         if places is not None:
             places._release(self.connection)
 
 
 class Places:
-    """The places of the connections to one server."""
+    """Stream slots of the connections to one server."""
 
     def __init__(self) -> None:
-        # an object that is collected in `take` gives its place back there
+        # an object that is collected during `take` releases its slot there
         self._lock = threading.RLock()
         self._taken: list[int] = []
         self.limit = MAX_STREAMS
-        """Streams that the server takes on a connection."""
+        """Most streams of a connection."""
 
     def take(self) -> Place:
-        """A place on the first connection that has one. On connection 0 a quarter is left to calls with one answer."""
+        """A slot on the first connection with a free one. On connection 0 a quarter is reserved for unary calls."""
         with self._lock:
             for connection, taken in enumerate([*self._taken, 0]):
                 if taken < (self.limit - max(self.limit // 4, 1) if connection == 0 else self.limit):
                     break
             else:
-                # a server that takes one stream on each connection: the first has calls alone
+                # with a limit of one stream the first connection has only unary calls
                 self._taken.append(0)
                 connection = len(self._taken)
             while len(self._taken) <= connection:

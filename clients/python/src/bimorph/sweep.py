@@ -1,4 +1,4 @@
-"""Sweeps: what to compute on a grid of parameters, and which values vary at random."""
+"""Specification of sweeps: analyses, axes of parameters, and distributions of random samples."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .arguments import choice, integer, items, mapping, names, number, text, vol
 
 
 def _set(owner: object, **fields: Any) -> None:
-    """Fields of a frozen object, as they were checked."""
+    """Sets fields of a frozen object to their checked values."""
     for name, value in fields.items():
         object.__setattr__(owner, name, value)
 
@@ -45,7 +45,7 @@ class PullIn:
     """Pull-in and release voltage at each point: columns ``pull_in`` and ``release`` [V]."""
 
     max_v: float = 200.0
-    """Highest voltage tried [V]."""
+    """Highest voltage of the search [V]."""
     port: str = ""
     """Port or netlist source; empty: the first."""
 
@@ -55,12 +55,12 @@ class PullIn:
 
 @dataclass(frozen=True)
 class Transient:
-    """Motion from rest at each point: signals at its end, in columns of their names."""
+    """Motion from rest at each point, with a column for each signal at the end time."""
 
     stop: float
     """End time [s]."""
     signals: Sequence[str]
-    """Signals wanted: ``NODE.x`` [m], ``NODE.vx`` [m/s], ``BEAM.T`` [K], ``GAP.gap`` [m], …"""
+    """Signals: ``NODE.x`` [m], ``NODE.vx`` [m/s], ``BEAM.T`` [K], ``GAP.gap`` [m], …"""
     voltages: Mapping[str, float] = field(default_factory=dict)
     """Port voltages held during the run [V]."""
 
@@ -77,7 +77,7 @@ Analysis = Static | Modes | PullIn | Transient
 
 @dataclass(frozen=True)
 class Normal:
-    """Gauss' distribution of a parameter."""
+    """Normal distribution of a parameter."""
 
     mean: float
     deviation: float
@@ -89,7 +89,7 @@ class Normal:
 
 @dataclass(frozen=True)
 class Uniform:
-    """Every value from ``low`` to ``high`` alike."""
+    """Uniform distribution of a parameter from ``low`` to ``high``."""
 
     low: float
     high: float
@@ -103,7 +103,7 @@ class Uniform:
 
 @dataclass(frozen=True)
 class LogNormal:
-    """A parameter whose logarithm is normal."""
+    """Log-normal distribution of a parameter."""
 
     median: float
     deviation: float
@@ -115,7 +115,7 @@ class LogNormal:
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples of parameters that vary by chance, drawn at every point of the grid.
+    """Random samples of parameters, drawn at every point of the grid.
 
     >>> Samples({"wh": Normal(2e-6, 5e-8), "pitch": Uniform(49e-6, 50e-6)}, count=1000, seed=7)
     """
@@ -123,11 +123,11 @@ class Samples:
     vary: Mapping[str, Normal | Uniform | LogNormal]
     count: int
     seed: int = 0
-    """The same seed draws the same samples."""
+    """Equal seeds give equal samples."""
     design: Literal["lhs", "random", "sobol"] = "lhs"
     """Latin hypercube, independent points, or a scrambled Sobol sequence (at most 65 536 samples)."""
     correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    """Of two normal or log-normal parameters (of the logarithm there), between -1 and 1."""
+    """Correlation of two normal or log-normal parameters (of the logarithm for the latter), from -1 to 1."""
 
     def __post_init__(self) -> None:
         vary = dict(mapping("vary", self.vary, 'parameters with their distributions, as {"w": Normal(2e-6, 5e-8)}'))
@@ -151,17 +151,17 @@ class Samples:
 
 
 Value = float | str
-"""A value of a parameter [SI]; flags of options are True and False."""
+"""Value of a parameter [SI]; flags of options are True and False."""
 Axes = (
     Mapping[str, Sequence[Value]]
     | Mapping[tuple[str, ...], Sequence[Sequence[Value]]]
     | Mapping[str | tuple[str, ...], Sequence[Value] | Sequence[Sequence[Value]]]
 )
-"""Axes of a grid: the values of a parameter by its name, or the points of several that go together by their names in a tuple."""
+"""Axes of a grid: values by the name of a parameter, or points of several parameters that vary together by a tuple of their names."""
 
 
 def points(parameters: Axes) -> list[tuple[tuple[str, ...], list[tuple[Value, ...]]]]:
-    """Axes as they were checked: names that go together, and their values at each point."""
+    """Checked axes: names that vary together, and their values at each point."""
     axes: list[tuple[tuple[str, ...], list[tuple[Value, ...]]]] = []
     for key, values in mapping("parameters", parameters, 'names with their values, as {"w": [1.8e-6, 2.2e-6]}').items():
         where = f"parameters[{key!r}]" if isinstance(key, (str, tuple)) else "parameters: name of a parameter"
@@ -188,7 +188,7 @@ def _point(where: str, k: int, together: tuple[str, ...], row: tuple[Any, ...]) 
 
 
 def _value(where: str, name: str, value: Any) -> Value:
-    """A number, or a text; of options flags too."""
+    """A number or text; for an option also a flag."""
     if name.startswith("option."):
         if isinstance(value, bool):
             return str(value).lower()
@@ -200,7 +200,7 @@ def _value(where: str, name: str, value: Any) -> Value:
 
 
 def shard_of(shard: Any) -> tuple[int, int]:
-    """A part (i, n) of a sweep."""
+    """Checked part (i, n) of a sweep."""
     expected = "(i, n), the part number i of n, with 0 <= i < n"
     if not isinstance(shard, (tuple, list)):
         raise wrong_type("shard", expected, shard)

@@ -1,4 +1,4 @@
-"""A sweep that runs on a server while clients come and go: a job of the protocol."""
+"""A sweep on a server, which runs independently of its clients: a job of the protocol."""
 
 from __future__ import annotations
 
@@ -25,47 +25,47 @@ _STATES = {
 }
 
 _ATTEMPTS = 6
-"""Streams in a row that break without a word, after which the rows are given up."""
+"""Most streams in a row that break without a message, before fetching rows fails."""
 
 _LEAVE_S = 5.0
-"""At the end of a block, a server that does not answer is given up after this time [s]."""
+"""Longest wait for a server at the end of a ``with`` block [s]."""
 
 
 @dataclass(frozen=True)
 class SweepStatus:
-    """How far a sweep has come."""
+    """Status of a sweep."""
 
     state: str
-    """"waiting" for its first turn, "running", "done", "cancelled" or "failed"."""
+    """"waiting" for its first computation, "running", "done", "cancelled" or "failed"."""
     done: int
-    """Points finished, failed ones among them: so many rows are there."""
+    """Finished points, including failed ones: the number of rows."""
     points: int
     """Points of the sweep."""
     failed: int
     """Points without a result."""
     message: str
-    """Why it ended without all of its rows."""
+    """Reason why it ended without all of its rows."""
     id: str = ""
-    """Its name on the server."""
+    """Name on the server."""
     netlist: str = ""
-    """Root file of its netlist."""
+    """Root file of the netlist."""
     version: str = ""
-    """Version of the program that its rows come from."""
+    """Version of the program that computes its rows."""
     submitted: datetime.datetime | None = None
-    """When it was submitted."""
+    """Time of submission."""
     ended: datetime.datetime | None = None
-    """When it ended; None: it goes on."""
+    """Time of its end; None while it runs."""
     kept: bool = False
-    """Whether it outlives the server."""
+    """Whether the server stores it, so that it survives a restart."""
 
     @property
     def over(self) -> bool:
-        """Whether it has ended, one way or another."""
+        """Whether it has ended: done, cancelled or failed."""
         return self.ended is not None
 
 
 def status_of(job: Any) -> SweepStatus:
-    """As it travels."""
+    """A status from its message."""
     about = job.metadata
     return SweepStatus(
         _STATES.get(about.state, "running"),
@@ -92,7 +92,7 @@ def _time(about: Any, name: str) -> datetime.datetime | None:
 class Sweep:
     """A sweep on a server: :meth:`Client.submit` starts one, :meth:`Client.attach` finds one again by its ``id``, also from another process.
 
-    It runs whether or not anybody waits for it. The end of a ``with`` block ends it and lets the server forget it, unless it is shared
+    It runs independently of its clients. The end of a ``with`` block cancels and deletes it, unless it is shared
     or was attached to.
     """
 
@@ -101,27 +101,27 @@ class Sweep:
         self._shared = shared
         self._is_part = is_part
         self.id = id
-        """Its name on the server."""
+        """Name on the server."""
 
     def __repr__(self) -> str:
         return f"<Sweep {self.id} on {self._channel.address}>"
 
     def status(self) -> SweepStatus:
-        """Where it stands now."""
+        """Its present status."""
         return status_of(self._channel.call("GetJob", jobs_pb2.GetJobRequest(name=self.id)))
 
     def wait(self, progress: Callable[[int, int], object] | None = None) -> Table:
-        """Its table, once it is done; ``progress`` is called with (points done, points). A network that fails meanwhile costs it nothing: the rows
-        go on where they were.
+        """Waits for its end and returns its table. ``progress`` is called with (points done, points). After a failure of the network the rows
+        continue where they were.
 
-        Raises :class:`BimorphError` when it ends without all of its rows, and :class:`NoResult` where no row has a result.
+        Raises :class:`BimorphError` if it ends without all of its rows, and :class:`NoResult` if no row has a result.
         """
         found = self._whole(function("progress", progress))
-        # a part may lack results that other parts have
+        # a part may lack columns of other parts
         return found if self._is_part else with_results(found)
 
     def _whole(self, progress: Callable[[int, int], object] | None = None) -> Table:
-        """Its table, also where no row has a result."""
+        """Its table, also if no row has a result."""
         points = self._persistent_status().points
         rows: list[_Found] = []
         parameters: list[str] = []
@@ -133,11 +133,11 @@ class Sweep:
         return _table(parameters, rows)
 
     def rows(self, first: int = 0) -> Iterator[Row]:
-        """Its rows as they are finished, from the one numbered ``first`` on: rows are numbered in that order, and keep their numbers. No more
-        of them are held than a message has. A network that fails meanwhile costs it nothing.
+        """Yields its rows in the order in which they finish, from number ``first`` on; rows keep their numbers. At most the rows of one message
+        are in memory. After a failure of the network the rows continue where they were.
 
-        Raises :class:`BimorphError` after the last row when it ends without all of them, and where a server has lost rows and computed them
-        again, of which the numbers are then others.
+        Raises :class:`BimorphError` after the last row if it ends without all of them, and if a server has lost rows and computed them
+        again with other numbers.
         """
         return self._rows(integer("first", first))
 
@@ -147,9 +147,9 @@ class Sweep:
                 yield found.row
 
     def table(self) -> Table:
-        """What it found; only of a sweep that is done.
+        """Table of a sweep that is done.
 
-        Raises :class:`NoResult` for one that goes on, and :class:`BimorphError` for one that ended otherwise: :meth:`rows` has what there is.
+        Raises :class:`NoResult` if it is running, and :class:`BimorphError` if it was cancelled or has failed; :meth:`rows` has its finished rows.
         """
         status = self._persistent_status()
         if not status.over:
@@ -157,12 +157,12 @@ class Sweep:
         return self.wait()
 
     def cancel(self) -> None:
-        """Ends it, if it still runs. The rows that it has stay. A network that fails meanwhile is asked again."""
+        """Cancels it if it is running. Its finished rows stay. The call is repeated while the network fails."""
         request = jobs_pb2.CancelJobRequest(name=self.id)
         self._channel.persist(lambda: self._channel.call("CancelJob", request))
 
     def delete(self) -> None:
-        """Ends it, if it still runs, and lets the server forget it. A network that fails meanwhile is asked again."""
+        """Cancels it if it is running, and deletes it on the server. The call is repeated while the network fails."""
         self._delete(None)
 
     def _delete(self, within: float | None) -> None:
@@ -175,7 +175,7 @@ class Sweep:
             try:
                 self._channel.call("DeleteJob", request)
             except NotFound:
-                # only the answer to an earlier try was lost
+                # an earlier attempt succeeded, and only its reply was lost
                 if tries == 1:
                     raise
 
@@ -192,7 +192,7 @@ class Sweep:
                 self._delete(_LEAVE_S)
 
     def watch(self) -> Iterator[SweepStatus]:
-        """How far it has come, until it ends."""
+        """Yields its status after each change, until it ends."""
         for job in self._channel.stream("WatchJob", jobs_pb2.WatchJobRequest(name=self.id)):
             yield status_of(job)
 
@@ -200,7 +200,7 @@ class Sweep:
         return self._channel.persist(lambda: self.status())
 
     def _chunks(self, first: int) -> Iterator[_Chunk]:
-        """Rows as they come, from one on; where the network fails, from the next one on."""
+        """Messages of rows from a number on; after a failure of the network from the next number on."""
         breaks = 0
         known: set[int] = set()
         while True:
@@ -209,7 +209,7 @@ class Sweep:
                     for found in chunk.found:
                         point = found.row.point
                         if point in known:
-                            raise BimorphError(f"point {point} came twice: the server has lost rows and computed them again; ask anew")
+                            raise BimorphError(f"point {point} was received twice, because the server has lost rows and computed them again; fetch the rows again")
                         known.add(point)
                     first += len(chunk.found)
                     breaks = 0
@@ -220,11 +220,11 @@ class Sweep:
             breaks += 1
             if breaks >= _ATTEMPTS:
                 raise failure
-            # where nothing answers, this raises
+            # raises if the server does not reply
             self._persistent_status()
 
     def _fetch(self, first: int) -> Iterator[_Chunk]:
-        """Rows from one on, as one stream has them."""
+        """Messages of rows from a number on, of one stream."""
         parameters: list[str] = []
         columns: list[tuple[tuple[str, str], ...]] = []
         for chunk in self._channel.stream("FetchJob", jobs_pb2.FetchJobRequest(name=self.id, first_row=first)):
@@ -241,14 +241,14 @@ class Sweep:
 
 
 class _Found(NamedTuple):
-    """A row, and the names and units of all of its columns."""
+    """A row, with the names and units of all of its columns."""
 
     row: Row
     columns: tuple[tuple[str, str], ...]
 
 
 class _Chunk(NamedTuple):
-    """Rows that came together."""
+    """Rows of one message."""
 
     parameters: list[str]
     found: list[_Found]
@@ -263,7 +263,7 @@ def _found(row: Any, parameters: list[str], columns: tuple[tuple[str, str], ...]
 
 
 def _table(parameters: list[str], found: list[_Found]) -> Table:
-    """In grid order; columns as the first points have them."""
+    """Table in grid order, with columns in the order of their first row."""
     found.sort(key=lambda one: one.row.point)
     units: dict[str, str] = {}
     for columns in dict.fromkeys(one.columns for one in found):

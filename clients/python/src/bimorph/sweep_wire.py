@@ -1,4 +1,4 @@
-"""Sweeps as they travel."""
+"""Conversion of sweeps to messages."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .v1 import analysis_pb2, model_pb2, sweep_pb2
 
 
 def setting(name: str, value: float | str) -> Any:
-    """A named value as it travels."""
+    """Message of a named value."""
     if isinstance(value, str):
         return model_pb2.Setting(name=name, text=value)
     return model_pb2.Setting(name=name, number=value)
@@ -22,9 +22,9 @@ def to_wire(
     shard: tuple[int, int],
     samples: Samples | None = None,
 ) -> Any:
-    """A specification as it travels.
+    """Message of a specification.
 
-    Raises :class:`InvalidRequest` for one that means nothing.
+    Raises :class:`InvalidRequest` for an invalid one.
     """
     expected = "an analysis: Static, Modes, PullIn or Transient"
     analysis = instance("analysis", analysis, (Static, Modes, PullIn, Transient), expected)

@@ -1,4 +1,4 @@
-"""Where a session stands, as values that can be pickled."""
+"""States of sessions, as values that can be pickled."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ from .trial_reply import TrialReply
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Where a session stands: from here :meth:`Model.restore` goes on with the same bits, also on another server."""
+    """Accepted state of a session. :meth:`Model.restore` continues from it with bit-identical results, also on another server."""
 
     model: str
     """Id of the model."""
     states: bytes = field(repr=False)
-    """The server's bytes."""
+    """Serialised states of the server."""
     accepted: TrialReply | None
     """The accepted state."""
     t: float
-    """Its time [s]."""
+    """Time of the accepted state [s]."""
     voltages: dict[str, float]
     """Accepted port voltages [V]."""
 
 
 @dataclass(frozen=True)
 class Ticket:
-    """Where a kept session stands on its server: :meth:`Client.resume` goes on there, also when the server was started anew."""
+    """Reference to a kept session of a server. :meth:`Client.resume` continues it, also after a restart of the server."""
 
     model: str
     """Id of the model."""
     session: str
-    """Id of the session: who has it may use it."""
+    """Id of the session. Any client that has it can use the session."""
     accepted: TrialReply | None
     """The accepted state."""
     t: float
-    """Its time [s]."""
+    """Time of the accepted state [s]."""
     voltages: dict[str, float]
     """Accepted port voltages [V]."""

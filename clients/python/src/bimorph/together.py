@@ -1,4 +1,4 @@
-"""Two computations at once, of which the second serves the first."""
+"""Two concurrent computations, the second of which is useful only with the first."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ B = TypeVar("B")
 
 
 def together(first: Callable[[], A], second: Callable[[], B]) -> tuple[A, B]:
-    """Both results; the second is computed on a thread of its own and stopped where the first fails or is interrupted."""
+    """Both results. The second call runs in a thread and is stopped if the first fails or is interrupted."""
     stopping, results, errors = Stopping(), list[B](), list[BaseException]()
 
     def run() -> None:

@@ -1,4 +1,4 @@
-"""What a device answers."""
+"""Replies of devices."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class TrialReply:
-    """What a device answers to port voltages. Matrices are by name: ``di_dv["heat"]["sense"]``."""
+    """Reply of a device to port voltages. Matrices are indexed by names: ``di_dv["heat"]["sense"]``."""
 
     token: int
-    """Names the new state; 0 when ``need_dt`` is set."""
+    """Token of the new state; 0 if ``need_dt`` is set."""
     t: float
     """Time of the state [s]."""
     currents: dict[str, float]
@@ -22,14 +22,14 @@ class TrialReply:
     dq_dv: dict[str, dict[str, float]]
     """∂charge/∂voltage [F], with the mechanical response over this step."""
     outputs: dict[str, float]
-    """Opened signals, each in its unit."""
+    """Values of the opened signals, each in its unit."""
     doutputs_dv: dict[str, dict[str, float]]
     """∂output/∂voltage [unit/V]."""
     dt_next: float
-    """Longest next step likely to be accepted [s]; infinite when the device does not care."""
+    """Longest next step that is likely to succeed [s]; infinite without a bound."""
     jumped: bool
-    """A static trial passed a fold: pulled in, or let go."""
+    """Whether a static trial passed a limit point: pull-in, release or snap-through."""
     need_dt: float | None
-    """Set when the step was too long: ask again with at most this [s]. Nothing else holds then."""
+    """Longest step for another trial [s], if the step was too long; None otherwise. With it no other field is valid."""
     voltages: dict[str, float]
-    """What was given to each port [V, or the unit of its kind]."""
+    """Input of each port [V, or the unit of its kind]."""

@@ -1,5 +1,5 @@
-"""Replies of a server are checked once, on receipt: it may be of another version, faulty, or hostile. Shapes, kinds, order and numbers are
-those that were asked for, and no text controls a terminal."""
+"""Checks of the replies of a server, on receipt: it may be of another version, faulty or hostile. Shapes, kinds, order and numbers must match
+the request, and no text may control a terminal."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 from .errors import UnexpectedReply
 
 _SHORTEST = 1e-12
-"""Shortest next step that a device may ask for, in units of the step that was taken [1]."""
+"""Shortest next step of a reply, as a fraction of the step taken [1]."""
 
 
 class Checked:
-    """Checks the replies of one server about one thing."""
+    """Checks of the replies of one server about one session or call."""
 
     def __init__(self, address: str, about: str) -> None:
-        """``about`` names it in the errors: a session, a call."""
+        """``about`` names the session or call in errors."""
         self._where = f"server {address}, {about}"
 
     def require(self, holds: bool, what: str) -> None:
@@ -28,28 +28,28 @@ class Checked:
             )
 
     def kind(self, reply: Any, expected: str) -> Any:
-        """The part of a reply of that kind."""
+        """Checked part of a reply of the given kind."""
         got = reply.WhichOneof("kind")
         self.require(got == expected, f"expected one of kind {expected}, got {got or 'none'}")
         return getattr(reply, expected)
 
     def numbers(self, what: str, values: Sequence[float], count: int) -> None:
-        """So many finite numbers."""
+        """Checks the count of numbers, and that all are finite."""
         self.require(len(values) == count, f"{what}: expected {count} numbers, got {len(values)}")
         if not all(map(math.isfinite, values)):
             at = next(k for k, value in enumerate(values) if not math.isfinite(value))
             self.require(False, f"{what}[{at}]: expected a finite number, got {values[at]}")
 
     def names(self, what: str, names: Iterable[str], asked: Sequence[str] | None = None) -> None:
-        """Names without control characters; those that were asked for, in their order."""
+        """Checks that names have no control characters, and that they are the requested ones in their order."""
         found = list(names)
         for name in found:
             self.require(bool(name) and name.isprintable(), f"{what}: expected a name, got {name!r}")
         if asked:
-            self.require(found == list(asked), f"{what}: expected the {len(asked)} that were asked for, got {len(found)} others")
+            self.require(found == list(asked), f"{what}: expected the {len(asked)} of the request, got {len(found)} others")
 
     def opened(self, device: Any, ports: Sequence[str], signals: Sequence[str] | None) -> None:
-        """What an open describes; no ``signals`` where nothing says which there are."""
+        """Checks the description of an opened device; ``signals`` is None if they are unknown."""
         self.names("ports", device.ports, ports)
         self.require(len(device.port_kinds) in (0, len(device.ports)), "port_kinds: expected one for each port")
         self.names("signals", (signal.name for signal in device.signals), signals)
@@ -57,7 +57,7 @@ class Checked:
             self.require(len(device.signals) == len(signals), f"signals: expected {len(signals)}, got {len(device.signals)}")
 
     def trial(self, wire: Any, p: int, s: int, dt: float | None) -> None:
-        """The reply to a trial of ``dt`` [s], or a static one, of a device with so many ports and signals."""
+        """Checks the reply to a trial of ``dt`` [s], or None for a static one, of a device with p ports and s signals."""
         if wire.status == wire.STATUS_FAIL:
             return
         if wire.status == wire.STATUS_NEED_DT:
@@ -81,7 +81,7 @@ class Checked:
         self.require(wire.dt_next > shortest, f"dt_next: expected a time above {shortest} s, got {wire.dt_next}")
 
     def small_signal(self, answer: Any, p: int, s: int, *, noise: bool) -> None:
-        """A small-signal answer of a device with so many ports and signals."""
+        """Checks a small-signal reply of a device with p ports and s signals."""
         if noise:
             count = (p + s) ** 2 if answer.noise_re or answer.noise_im else 0
             self.numbers("noise_re", answer.noise_re, count)
@@ -96,7 +96,7 @@ class Checked:
             self.numbers(what, values, count)
 
     def static(self, answer: Any) -> None:
-        """A static equilibrium."""
+        """Checks a static equilibrium."""
         for node in answer.nodes:
             self.numbers(node.name, (node.x, node.y, node.rz), 3)
         self.names("nodes", (node.name for node in answer.nodes))
@@ -107,9 +107,10 @@ class Checked:
         ):
             self.names(what, (named.name for named in values))
             self.numbers(what, [named.value for named in values], len(values))
+        self.numbers("passed", [loss.share for loss in answer.passed], len(answer.passed))
 
     def modes(self, answer: Any) -> None:
-        """Modes: frequencies in their order, and a shape of each over all nodes."""
+        """Checks modes: ascending frequencies, and a shape of each over all nodes."""
         found = answer.frequencies_hz
         self.names("nodes", answer.nodes)
         self.numbers("frequencies_hz", found, len(found))
@@ -121,7 +122,7 @@ class Checked:
                 self.numbers(what, values, len(answer.nodes))
 
     def response(self, answer: Any, signals: Sequence[str]) -> None:
-        """A frequency response: a value of each signal at each frequency."""
+        """Checks a frequency response: a value of each signal at each frequency."""
         count = len(answer.frequencies_hz)
         self.numbers("frequencies_hz", answer.frequencies_hz, count)
         self.names("signals", (signal.name for signal in answer.signals), signals)
@@ -129,7 +130,7 @@ class Checked:
             self.require(len(signal.re) == len(signal.im) == count, f"{signal.name}: expected {count} values")
 
     def samples(self, samples: Any, last: float, signals: int) -> None:
-        """Samples that follow those until ``last`` [s]: a value of each signal at each time."""
+        """Checks samples after the time ``last`` [s]: a value of each signal at each time."""
         times = samples.t
         self.numbers("t", times, len(times))
         self.require(all(a <= b for a, b in zip([last, *times], times)), "t: expected times in their order")

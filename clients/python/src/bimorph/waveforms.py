@@ -1,4 +1,4 @@
-"""Inputs of ports over time: what a run in time is driven with."""
+"""Input waveforms of ports in a transient."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import integer, mapping, number, text, wrong_type
+from .arguments import integer, mapping, number, text, unmasked, wrong_type
 from .errors import InvalidRequest, StepFailed
 from .results import TransientResult
 from .runs import Lane, advance, port_values
 from .session import Session
 
 Waveform = tuple[ArrayLike, ArrayLike]
-"""Times [s], ascending, and what is given to the port at them [V, or the unit of its kind]: straight lines between, constant before
+"""Times [s], ascending, and values of the port [V, or the unit of its kind]. The waveform is piecewise linear, and constant before
 and after."""
 
 _SAME = 1e-14
-"""Share of a run below which two times are one."""
+"""Fraction of a run below which two times are equal."""
 _EDGE = 1e-12
-"""Share of a run that an edge must last: well above :data:`_SAME`, so that no corner of it is taken for another."""
+"""Shortest edge as a fraction of a run: well above :data:`_SAME`, so that its corners stay distinct."""
 _STILL = 1e-6
-"""Share of a signal's size below which its changes are rounding."""
+"""Fraction of a signal's size below which its changes are rounding."""
 
 
 def checked(inputs: Mapping[str, Waveform]) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Waveforms as arrays.
+    """Checked waveforms as arrays.
 
-    Raises :class:`ValueError` for one that is none.
+    Raises :class:`InvalidRequest`.
     """
     found = {}
     for port, wave in mapping("inputs", inputs, 'ports with their waveforms, as {"drive": (times, volts)}').items():
@@ -39,17 +39,20 @@ def checked(inputs: Mapping[str, Waveform]) -> dict[str, tuple[NDArray[np.float6
             raise wrong_type(where, "(times, values); hold a constant one by voltages={...};", wave)
         times, levels = (_numbers(where, part) for part in wave)
         if times.ndim != 1 or times.shape != levels.shape or times.size == 0:
-            raise InvalidRequest(f"{where}: expected as many times as values, got {times.shape} and {levels.shape}")
+            raise InvalidRequest(f"{where}: expected a list of times and as many values, got arrays of the shapes {times.shape} and {levels.shape}")
         if not (np.isfinite(times).all() and np.isfinite(levels).all()):
-            raise InvalidRequest(f"{where}: times and values must be finite")
+            name, part = ("times", times) if not np.isfinite(times).all() else ("values", levels)
+            at = int(np.argmin(np.isfinite(part)))
+            raise InvalidRequest(f"{where}: expected finite {name}, got {part[at]} at place {at}")
         if (np.diff(times) <= 0).any():
             late = int(np.argmax(np.diff(times) <= 0))
-            raise InvalidRequest(f"{where}: times must ascend, got {times[late]:g} s before {times[late + 1]:g} s")
+            raise InvalidRequest(f"{where}: expected times that ascend, got {times[late]:g} s before {times[late + 1]:g} s")
         found[port] = (times, levels)
     return found
 
 
 def _numbers(where: str, values: Any) -> NDArray[np.float64]:
+    unmasked(where, values)
     try:
         found = np.asarray(values)
     except (TypeError, ValueError):
@@ -68,8 +71,8 @@ def drive(
 ) -> TransientResult:
     """Steps a session along waveforms from 0 to ``stop`` [s] and reads its signals at ``points`` equally spaced times.
 
-    It begins in the static equilibrium of the inputs at 0. Steps end at every corner of a waveform; within one the device controls
-    its own.
+    The run begins in the static equilibrium of the inputs at time 0. Steps end at every corner of a waveform; the device divides them
+    as necessary.
     """
     number("stop", stop, "a time in seconds", above=0.0)
     integer("points", points, 2)
@@ -90,7 +93,7 @@ def drive(
     if lane.error:
         at = float(later[lane.done])
         raise StepFailed(f"step {lane.done}, to t = {at:.6g} s: {lane.error}")
-    # steps that end at corners alone are left out
+    # omit steps that end at corners only
     wanted = np.searchsorted(later, output[1:])
     signals = {
         name: np.concatenate([[opening.outputs[name]], lane.outputs[wanted, k]]) for k, name in enumerate(names)
@@ -98,15 +101,15 @@ def drive(
     return TransientResult(output, signals, dict(session.signals), len(times) - 1, 0, session.unknowns)
 
 
-def told(found: TransientResult, finer: TransientResult | None, tol: float) -> TransientResult:
-    """The result with how far it may be off: its distance from a finer run, of each unit's amplitude."""
+def with_error_estimate(found: TransientResult, finer: TransientResult | None, tol: float) -> TransientResult:
+    """The result with an error estimate: its distance from a finer run, relative to the amplitude of each unit."""
     if finer is None:
-        said = f"nothing tells how far mesh and steps are off: the tolerance {tol:g} is not confirmed"
-        return replace(found, warnings=(*found.warnings, said))
+        warning = f"no error estimate of mesh and steps is available; the tolerance {tol:g} is not confirmed"
+        return replace(found, warnings=(*found.warnings, warning))
     amplitude: dict[str, float] = {}
     for name, values in finer.signals.items():
         unit = finer.units[name]
-        # what hardly moves is compared with where it stands
+        # a nearly constant signal is compared with its size
         amplitude[unit] = max(amplitude.get(unit, 0.0), float(np.ptp(values)), _STILL * float(np.abs(values).max()))
     errors = [
         float(np.sqrt(np.mean((values - finer.signals[name]) ** 2))) / amplitude[found.units[name]]
@@ -116,13 +119,13 @@ def told(found: TransientResult, finer: TransientResult | None, tol: float) -> T
     error = max(errors, default=0.0)
     warnings = found.warnings
     if error > tol:
-        said = f"mesh and steps may be off by {error:.1e} of the amplitude, more than the tolerance {tol:g}; give band or more segments"
-        warnings = (*warnings, said)
+        warning = f"estimated error of mesh and steps: {error:.1e} of the amplitude, above the tolerance {tol:g}; give band or more segments"
+        warnings = (*warnings, warning)
     return replace(found, estimated_error=error, warnings=warnings)
 
 
 def _long_enough(port: str, times: NDArray[np.float64], stop: float) -> None:
-    """Raises :class:`ValueError` for an edge within the run that is too short to be told from a corner."""
+    """Raises :class:`InvalidRequest` for an edge within the run whose corners are not distinct."""
     for start, end in zip(times, times[1:]):
         if end > 0.0 and start < stop and end - start < _EDGE * stop:
             raise InvalidRequest(
@@ -131,7 +134,7 @@ def _long_enough(port: str, times: NDArray[np.float64], stop: float) -> None:
 
 
 def _apart(times: NDArray[np.float64], stop: float) -> NDArray[np.float64]:
-    """Ascending times; those closer than rounding to the next one are that one."""
+    """Ascending times, without those within rounding of the next one."""
     ordered = np.sort(times)
     keep: NDArray[np.bool_] = np.concatenate([np.diff(ordered) > _SAME * stop, [True]])
     return np.asarray(ordered[keep], dtype=float)

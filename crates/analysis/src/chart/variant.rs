@@ -1,0 +1,89 @@
+//! The mechanism of a chart on one mesh, before and after release.
+
+use super::spec::{ChartError, Formulation};
+use crate::AnalysisError;
+use bimorph_model::compile::{CompileOptions, CompiledModel, compile};
+use bimorph_netlist::{Bundle, Setting};
+
+/// The compiled mechanism, with what a release needs.
+#[derive(Debug, Clone)]
+pub(super) struct ChartVariant {
+    initial: CompiledModel,
+    released: Option<CompiledModel>,
+}
+
+impl ChartVariant {
+    /// Compiles `bundle` for one band.
+    pub(super) fn new(
+        bundle: &Bundle,
+        options: &CompileOptions,
+        band: Option<f64>,
+        release: Option<&str>,
+    ) -> Result<Self, ChartError> {
+        let options = CompileOptions { band, ..options.clone() };
+        let initial = compile(bundle, &options)?;
+        let released = release.map(|name| released(bundle, &initial, name)).transpose()?;
+        Ok(Self { initial, released })
+    }
+
+    /// The mechanism in motion.
+    pub(super) fn moving(&self) -> &CompiledModel {
+        self.released.as_ref().unwrap_or(&self.initial)
+    }
+
+    /// The mechanism whose equilibrium is the beginning; none: rest.
+    pub(super) fn held(&self) -> Option<&CompiledModel> {
+        self.released.as_ref().map(|_| &self.initial)
+    }
+}
+
+/// The mechanism at one model order in every formulation of a chart.
+#[derive(Debug, Clone)]
+pub(super) struct FormulationModels {
+    /// In the bodies' own coordinates.
+    pub(super) bodies: ChartVariant,
+    joints: Vec<(Formulation, Result<ChartVariant, String>)>,
+}
+
+impl FormulationModels {
+    /// Compiles `bundle` for one band, once for each formulation that discretizes it differently.
+    pub(super) fn new(
+        bundle: &Bundle,
+        options: &CompileOptions,
+        band: Option<f64>,
+        release: Option<&str>,
+        formulations: &[Formulation],
+    ) -> Result<Self, ChartError> {
+        let bodies = ChartVariant::new(bundle, options, band, release)?;
+        let compiled = |&one: &Formulation| {
+            let options = CompileOptions { formulation: one.compiled_as()?, ..options.clone() };
+            // what bodies can be made of may not suit joints: points that say so
+            Some((one, ChartVariant::new(bundle, &options, band, release).map_err(|e| e.to_string())))
+        };
+        Ok(Self { bodies, joints: formulations.iter().filter_map(compiled).collect() })
+    }
+
+    /// The model in a formulation, or the reason why it does not exist.
+    pub(super) fn of(&self, formulation: Formulation) -> Result<&ChartVariant, &str> {
+        match self.joints.iter().find(|(one, _)| *one == formulation) {
+            Some((_, model)) => model.as_ref().map_err(String::as_str),
+            None => Ok(&self.bodies),
+        }
+    }
+}
+
+/// The same netlist with one parameter at 0.
+///
+/// # Errors
+/// `BadRequest` for an unknown or non-numeric parameter; errors of [`compile`].
+pub fn released(bundle: &Bundle, initial: &CompiledModel, name: &str) -> Result<CompiledModel, ChartError> {
+    if !initial.parameters.iter().any(|(p, value)| p == name && matches!(value, Setting::Number(_))) {
+        let known: Vec<&str> = initial.parameters.iter().map(|(p, _)| p.as_str()).collect();
+        let detail = format!("no numeric parameter of that name; the netlist has {}", known.join(", "));
+        return Err(AnalysisError::BadRequest { what: format!("release \"{name}\""), detail }.into());
+    }
+    let mut options = initial.options.clone();
+    options.set.retain(|(parameter, _)| parameter != name);
+    options.set.push((name.to_owned(), Setting::Number(0.0)));
+    Ok(compile(bundle, &options)?)
+}

@@ -1,0 +1,46 @@
+//! No result from beyond the law of contact: a part pressed further into another than the law knows is refused by name.
+//! Combs have no contact at the ends of their fingers: fingers beyond them cause a warning.
+
+use super::AnalysisError;
+use bimorph_domains::Domain;
+use bimorph_model::compile::CompiledModel;
+use bimorph_multibody::planar::Pose;
+
+/// Refuses a configuration in which a gap is closed beyond the range of its law, see [`bimorph_domains::contact`].
+///
+/// # Errors
+/// [`AnalysisError::ContactRange`] with the gap.
+pub fn within_contact_range(compiled: &CompiledModel, q: &[Pose]) -> Result<(), AnalysisError> {
+    let system = &compiled.parts.system;
+    match system.overrun(q) {
+        None => Ok(()),
+        Some((gap, left)) => Err(AnalysisError::ContactRange {
+            gap: compiled.parts.gap_names[gap].clone(),
+            left,
+            least: system.touching(gap).map_or(0.0, |[_, least]| least),
+        }),
+    }
+}
+
+/// Warning about that comb.
+pub(crate) fn comb_beyond_told(compiled: &CompiledModel, q: &[Pose]) -> Option<String> {
+    let (name, [way, room]) = comb_beyond(compiled, q)?;
+    Some(format!(
+        "the comb `{name}` closes by {:.3} µm, and its fingers have {:.3} µm to the other side: nothing stops them there",
+        1e6 * way,
+        1e6 * room
+    ))
+}
+
+/// The comb whose fingers go furthest through the other side at `q`: its name, and how far its sides have come together of how
+/// much they can [m].
+pub(crate) fn comb_beyond<'a>(compiled: &'a CompiledModel, q: &[Pose]) -> Option<(&'a str, [f64; 2])> {
+    let system = &compiled.parts.system;
+    // combs are the first gaps, in their order
+    let beyond = compiled.structure.combs.iter().zip(&system.members).filter_map(|(comb, gap)| {
+        let (approach, _) = gap.law()?;
+        let (way, room) = (approach.value(q, system.model.linear), comb.finger[0] - comb.overlap);
+        (comb.finger[0] > 0.0 && way > room * (1.0 + 1e-9)).then_some((comb.name.as_str(), [way, room]))
+    });
+    beyond.max_by(|a, b| (a.1[0] - a.1[1]).total_cmp(&(b.1[0] - b.1[1])))
+}

@@ -1,0 +1,145 @@
+//! Effect of a formulation on bodies and joints (locked directions, tree and loops), and the choice of a formulation.
+//!
+//! **Choice of `auto`.** With joints that are elastic in every direction, a step in joint coordinates costs as much as
+//! one of the bodies or more, and both take the same steps (docs/rcr.md has the measurements): compliant. Now consider
+//! joints that only rotate and close no loops, as rigid plates on flexure pivots under a scheme of the paper. The
+//! bodies' own coordinates then need stiff springs in the rigid directions, and short steps. The recursion needs
+//! neither, and its explicit steps cost a few evaluations without any factorization: rcr with rk45, as long as the
+//! steps are few. In circuits and services, whose steps the caller sets, compliant.
+
+use super::AnalysisError;
+use super::integrator::Integrator;
+use super::transient::options::TransientOptions;
+use bimorph_domains::System;
+use bimorph_model::compile::CompiledModel;
+use bimorph_multibody::joint_coordinates::constrained_loops::{Linkage, LinkageParent};
+use bimorph_multibody::{BodyId, Model};
+use bimorph_solve::baseline::SolverKind;
+use bimorph_solve::fastest::fastest;
+use std::borrow::Cow;
+
+pub use bimorph_model::options::Formulation;
+
+/// Largest phase [rad] of the fastest joint motion in a run with explicit steps. A step is stable up to about three, so
+/// that this means a thousand steps, as many as the bodies' coordinates take for such a motion at a tolerance of 1e-3.
+const FEW: f64 = 3e3;
+
+/// Choice of `auto`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChosenFormulation {
+    /// Compliant or rcr.
+    pub formulation: Formulation,
+    /// Why, in words.
+    pub why: String,
+}
+
+/// Choice of `auto` for a run of `stop` [s], or for steps of the caller (`None`).
+pub fn suited(compiled: &CompiledModel, stop: Option<f64>) -> ChosenFormulation {
+    let system = &compiled.parts.system;
+    let model = &system.model;
+    let compliant = |why: &str| ChosenFormulation { formulation: Formulation::Compliant, why: why.to_owned() };
+    let mut beams = model.sections.iter().filter(|s| s.is_segment());
+    if model.linear {
+        return compliant("small displacements");
+    }
+    if beams.clone().next().is_none() || beams.any(|s| !s.only_turns()) {
+        return compliant("joints are elastic in every direction, where a step in joint coordinates costs more");
+    }
+    let Ok(linkage) = linkage(Formulation::Rcr, system) else { return compliant("joint coordinates do not suit it") };
+    if linkage.constraints > 0 {
+        return compliant("joints that only turn close loops, which may be singular as drawn");
+    }
+    let Some(stop) = stop else {
+        return compliant("joints only turn, but steps are the caller's: explicit ones might be too long");
+    };
+    let scale = coordinate_scales(&linkage, system.length_scale);
+    let omega = fastest(&linkage, &scale, system.electrics.heating.heaters.len()).map_or(0.0, |top| top.omega);
+    if omega * stop > FEW {
+        return compliant("joints only turn, but the fastest is too fast for explicit steps");
+    }
+    let (n, unknowns) = (linkage.coordinates, model.unknowns());
+    ChosenFormulation {
+        formulation: Formulation::Rcr,
+        why: format!(
+            "joints only turn and close no loop: {n} coordinates for {unknowns}, explicit steps with rk45, stable from some {:.0} on",
+            (omega * stop / 3.0).ceil().max(1.0)
+        ),
+    }
+}
+
+/// The formulation and the method of a run: `auto` resolved, with the reason, everything else as requested. A
+/// method other than the default, equal steps and a baseline's solver are those of the bodies; so is the
+/// equilibrium that a release starts from.
+pub fn of_run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> (ChosenFormulation, Integrator) {
+    let method = options.method;
+    let asked = compiled.options.formulation;
+    if asked != Formulation::Auto {
+        return (ChosenFormulation { formulation: asked, why: "as asked".into() }, method);
+    }
+    let plain = method == Integrator::Rodas4
+        && options.step.is_none()
+        && options.solver == SolverKind::Recursion
+        && options.release.is_none();
+    if !plain {
+        let why = "a release, a method, equal steps or a solver was asked for".into();
+        return (ChosenFormulation { formulation: Formulation::Compliant, why }, method);
+    }
+    let chosen = suited(compiled, Some(options.stop));
+    let method = if chosen.formulation == Formulation::Rcr { Integrator::Rk45 } else { method };
+    (chosen, method)
+}
+
+/// The model with the directions locked that this formulation locks.
+pub fn locked_model(formulation: Formulation, model: &Model) -> Cow<'_, Model> {
+    match formulation {
+        Formulation::Rcr => Cow::Owned(model.rotary()),
+        Formulation::Auto | Formulation::Compliant | Formulation::RcrElastic => Cow::Borrowed(model),
+    }
+}
+
+/// Tree and loops of a system in joint coordinates.
+///
+/// # Errors
+/// [`AnalysisError::BadRequest`] where joint coordinates cannot describe it.
+pub fn linkage(formulation: Formulation, system: &System) -> Result<Linkage, AnalysisError> {
+    let refuse =
+        |detail: String| Err(AnalysisError::BadRequest { what: format!("formulation {}", formulation.name()), detail });
+    let model = locked_model(formulation, &system.model);
+    if model.linear {
+        return refuse("joint coordinates are not small displacements; leave out --linear or take compliant".into());
+    }
+    if !model.couplings.is_empty() {
+        return refuse(
+            "joint coordinates know no coupling between joints, which --scheme c1 has; take another scheme, or \
+             compliant"
+                .into(),
+        );
+    }
+    for (k, body) in model.bodies.iter().enumerate() {
+        let touches = |(a, b)| a == BodyId::Free(k) || b == BodyId::Free(k);
+        let mut joints = model.joints.iter().filter(|j| touches(j.bodies()));
+        let elastic = |s: usize| model.sections[s].locked == [false; 3];
+        if body.inertia == 0.0 && body.free.is_none() && joints.all(|j| elastic(j.section())) {
+            return refuse(format!(
+                "body \"{}\" turns without inertia, and all its joints are elastic in every direction; \
+                 take rcr, whose joints only turn, or compliant",
+                body.name
+            ));
+        }
+    }
+    Ok(Linkage::new(&model))
+}
+
+/// Size of each coordinate: `length` [m] for a displacement, an angle that moves a body's end by as much for a rotation.
+pub fn coordinate_scales(linkage: &Linkage, length: f64) -> Vec<f64> {
+    let mut scale = vec![length; linkage.coordinates];
+    for link in &linkage.links {
+        let moving = (0..3).filter(|&i| link.parent == LinkageParent::Free || link.moving[i]);
+        for (next, i) in moving.enumerate() {
+            if i == 2 {
+                scale[link.first + next] = length / link.lever;
+            }
+        }
+    }
+    scale
+}

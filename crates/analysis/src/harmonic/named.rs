@@ -1,0 +1,101 @@
+//! Inputs and outputs by name.
+
+use crate::AnalysisError;
+use crate::readout::ReadoutError;
+use crate::readout::ports::{OpenedPorts, PortResponse};
+use crate::readout::signal::Signal;
+use bimorph_model::compile::CompiledModel;
+
+/// Output of a response.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum ResponseRow {
+    /// A signal.
+    Signal(Signal),
+    /// Current into a port.
+    Current(usize),
+}
+
+/// Forces by the direction in which they act.
+const FORCES: [(&str, &str); 3] = [("fx", "x"), ("fy", "y"), ("m", "rz")];
+
+/// The name that a port has for a drive: `NODE.fx` acts on `NODE.x`.
+fn port_name(compiled: &CompiledModel, drive: &str) -> String {
+    if compiled.structure.port(drive).is_some() {
+        return drive.to_owned();
+    }
+    let force = drive.rsplit_once('.').and_then(|(part, quantity)| {
+        let (_, motion) = FORCES.iter().find(|(force, _)| *force == quantity)?;
+        Some(format!("{part}.{motion}"))
+    });
+    force.unwrap_or_else(|| drive.to_owned())
+}
+
+/// The drive as the only port of the model.
+///
+/// # Errors
+/// [`AnalysisError::BadRequest`] with what would be understood.
+pub(crate) fn drive_port(compiled: &CompiledModel, drive: &str) -> Result<OpenedPorts, AnalysisError> {
+    let refused = |detail: String| AnalysisError::BadRequest { what: format!("drive \"{drive}\""), detail };
+    OpenedPorts::find(compiled, &[port_name(compiled, drive)]).map_err(|error| match error {
+        ReadoutError::UnknownPort { available, .. } => {
+            let ports = match available.as_slice() {
+                [] => "the netlist has no ports".to_owned(),
+                _ => format!("ports are {}", available.join(", ")),
+            };
+            let detail = match Signal::find(compiled, &port_name(compiled, drive)) {
+                Err(ReadoutError::UnknownSignal { hint, .. }) => hint,
+                _ => String::new(),
+            };
+            refused(format!(
+                "expected NODE.fx, NODE.fy or NODE.m (a force or moment), a port, BEAM.T (heat) or frame.ax|ay|wz; {ports}; \
+                 {detail}"
+            ))
+        }
+        ReadoutError::BadPort { expected, got } => refused(format!("expected {expected}, got {got}")),
+        other @ ReadoutError::UnknownSignal { .. } => refused(other.to_string()),
+    })
+}
+
+/// The name of what the place that is driven answers: the current into a port, the motion along a force.
+pub(super) fn own_answer(compiled: &CompiledModel, drive: &str, ports: &OpenedPorts) -> Result<String, AnalysisError> {
+    match ports.answers[0] {
+        PortResponse::Current => Ok(format!("{drive}.i")),
+        PortResponse::Motion(_) | PortResponse::Rise(_) => Ok(port_name(compiled, drive)),
+        PortResponse::Nothing => Err(AnalysisError::BadRequest {
+            what: "signals".into(),
+            detail: format!(
+                "\"{drive}\" moves the frame and answers with nothing itself: name what is to be seen, as NODE.x"
+            ),
+        }),
+    }
+}
+
+/// A signal, or `PORT.i`, the current into a port.
+///
+/// # Errors
+/// [`AnalysisError::BadRequest`] with what would be understood.
+pub(crate) fn row(compiled: &CompiledModel, name: &str) -> Result<ResponseRow, AnalysisError> {
+    bimorph_base::budget::check();
+    if let Some(port) = name.strip_suffix(".i").and_then(|port| compiled.structure.port(port)) {
+        return Ok(ResponseRow::Current(port));
+    }
+    Signal::find(compiled, name).map(ResponseRow::Signal).map_err(|error| {
+        let electrics = &compiled.parts.system.electrics;
+        match AnalysisError::from(error) {
+            AnalysisError::BadRequest { what, detail } if electrics.ports > 0 => {
+                let ports = electrics.names[..electrics.ports].join(", ");
+                AnalysisError::BadRequest { what, detail: format!("{detail}; or PORT.i, with the ports {ports}") }
+            }
+            error => error,
+        }
+    })
+}
+
+/// Unit of a row over that of the drive.
+pub(super) fn unit(row: ResponseRow, drive: &str) -> String {
+    let own = match row {
+        ResponseRow::Signal(signal) => signal.unit(),
+        ResponseRow::Current(_) => "A",
+    };
+    if drive.contains(['/', '·']) { format!("{own}/({drive})") } else { format!("{own}/{drive}") }
+}

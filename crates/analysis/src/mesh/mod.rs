@@ -1,0 +1,169 @@
+//! Mesh search for a request. Every front end calls it before an analysis, so that the same request has the same mesh,
+//! and the same numbers, everywhere.
+//!
+//! | request | criterion | file |
+//! |---|---|---|
+//! | static | the deformed state, compared with that of twice the segments | `equilibrium` |
+//! | modes | the highest requested mode; about a loaded state, that state and its frequencies too | `frequencies` |
+//! | strains that stay | those of heated beams that yield, compared with those of twice the segments | `permanent_strain` |
+//! | pull-in | both voltages, compared with those of twice the segments | `pull_in` |
+//! | path | its folds, bifurcations and end, compared with those of twice the segments | `path` |
+//! | frequency response | the response itself and the modes within the band, compared with those of twice the segments | `in_band` |
+//! | transient | the states it starts from and goes to, and the modes that the difference of the two excites | `excited_modes` |
+//! | transient with changing stiffness, or with a part in none of the modes | the run itself, compared with that of half the segments | `large_motion` |
+//! | transient that closes a gap | the run up to its first contact, compared with that of half the segments | `large_motion` |
+//!
+//! A given number of segments is used as it is, with the estimate of its error. A given band requires at least the mesh
+//! for that band. The estimate is in [`CompiledModel::order`]; where it is missing or beyond the tolerance, a warning
+//! is added.
+
+mod doubled_mesh;
+mod equilibrium;
+mod excited_modes;
+mod frequencies;
+mod hidden_instability;
+mod in_band;
+mod in_circuit;
+mod large_motion;
+mod mode_pairs;
+pub mod on_given_mesh;
+mod path;
+mod permanent_strain;
+mod pull_in;
+mod refined;
+mod remeshed;
+mod section_inertia;
+mod signal_amplitudes;
+mod softening;
+mod warnings;
+
+use super::linear_stress::left_out;
+use super::statics::{OperatingPoint, operating_point};
+use super::transient::TransientOptions;
+use super::{AnalysisError, PortVoltages};
+use crate::readout::signal::Signal;
+use bimorph_model::compile::CompiledModel;
+use bimorph_model::refine::mesh_search::Mesh;
+use bimorph_multibody::planar::Pose;
+use bimorph_netlist::Diagnostic;
+pub use equilibrium::static_fitted;
+use excited_modes::motion_warnings;
+use frequencies::for_modes;
+pub use frequencies::modes_fitted;
+pub use in_band::harmonic_fitted;
+pub use path::path_fitted;
+use pull_in::for_pull_in;
+pub use pull_in::pull_in_fitted;
+use remeshed::on;
+use section_inertia::with_section_inertia;
+use warnings::{of_fingers, of_heat, of_stress};
+
+pub use equilibrium::{operating_point_warnings, transient_warnings};
+pub use in_circuit::{in_circuit, twice};
+pub use permanent_strain::static_backbent;
+pub use warnings::WARNING;
+pub use warnings::{beyond, warnings};
+
+/// Request for a mesh.
+#[derive(Debug, Clone, Copy)]
+pub enum MeshRequest<'a> {
+    /// The static equilibrium at these voltages.
+    Static {
+        /// Port voltages.
+        voltages: &'a PortVoltages,
+    },
+    /// The lowest modes about the equilibrium at these voltages.
+    Modes {
+        /// How many.
+        count: usize,
+        /// Port voltages.
+        voltages: &'a PortVoltages,
+    },
+    /// Pull-in and release.
+    PullIn {
+        /// Port or source; none: the first.
+        port: Option<&'a str>,
+        /// Largest voltage [V].
+        max: f64,
+    },
+}
+
+/// The model on the mesh for a request.
+///
+/// # Errors
+/// Errors of the analysis itself: see [`AnalysisError`].
+pub fn fitted(compiled: &CompiledModel, request: &MeshRequest<'_>) -> Result<CompiledModel, AnalysisError> {
+    on(compiled, order(compiled, request)?)
+}
+
+/// The mesh for a request, with the estimate of its error.
+///
+/// # Errors
+/// See [`fitted`].
+pub fn order(compiled: &CompiledModel, request: &MeshRequest<'_>) -> Result<Mesh, AnalysisError> {
+    Ok(match *request {
+        MeshRequest::Static { voltages } => equilibrium::order(compiled, voltages, compiled.order.segments.clone())?.0,
+        MeshRequest::Modes { count, voltages } => for_modes(compiled, count, voltages)?.0,
+        MeshRequest::PullIn { port, max } => for_pull_in(compiled, port, max)?.0,
+    })
+}
+
+/// A released mechanism and what it was released from, on the mesh for a transient.
+///
+/// # Errors
+/// See [`fitted`].
+pub fn fitted_in_time(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+) -> Result<(CompiledModel, Option<CompiledModel>), AnalysisError> {
+    // reject unknown signal names before the mesh search; points along beams depend on the mesh
+    for name in options.signals.iter().filter(|name| !name.contains('[')) {
+        Signal::find(moving, name)?;
+    }
+    let moving = &*with_section_inertia(moving)?;
+    let order = order_in_time(moving, options)?;
+    let start = options.release.map(|start| on(&*with_section_inertia(start)?, order.clone())).transpose()?;
+    let mut moving = on(moving, order)?;
+    let reported = run_warnings(&moving, start.as_ref(), &options.voltages);
+    moving.warnings.items.extend(reported);
+    let reported = motion_warnings(&moving, options);
+    moving.warnings.items.extend(reported);
+    Ok((moving, start))
+}
+
+/// Warnings about a run: stress stiffening omitted by a linear model, and combs and temperatures beyond their range,
+/// evaluated at the final state.
+pub fn run_warnings(moving: &CompiledModel, start: Option<&CompiledModel>, voltages: &PortVoltages) -> Vec<Diagnostic> {
+    let share = if moving.options.linear { left_out_in_time(moving, start, voltages) } else { None };
+    let drawn = &moving.structure;
+    let some = !(drawn.combs.is_empty() && moving.parts.heaters.is_empty());
+    let end = if some { operating_point(moving, voltages).ok() } else { None };
+    let there = end.as_ref();
+    let reported = of_stress(moving, share).into_iter().chain(there.and_then(|end| of_fingers(moving, end)));
+    reported.chain(there.and_then(|end| of_heat(moving, end))).collect()
+}
+
+/// Effect of stress on a linear run, from its first state to its final equilibrium.
+fn left_out_in_time(moving: &CompiledModel, start: Option<&CompiledModel>, voltages: &PortVoltages) -> Option<f64> {
+    let end = operating_point(moving, voltages).ok()?;
+    let begin = match start {
+        Some(start) => operating_point(start, voltages).ok()?,
+        None => OperatingPoint::rest(moving, voltages).ok()?,
+    };
+    let way: Vec<Pose> = begin.q.iter().zip(&end.q).map(|(a, b)| a - b).collect();
+    let stressed = [left_out(moving, &end, &way)?, left_out(moving, &begin, &way)?];
+    stressed.into_iter().reduce(f64::max)
+}
+
+/// The mesh for a transient, with the estimate of its error.
+///
+/// # Errors
+/// See [`fitted`].
+pub fn order_in_time(moving: &CompiledModel, options: &TransientOptions<'_>) -> Result<Mesh, AnalysisError> {
+    // the modes about a closed gap are those of parts that are pressed together, and say nothing of the way there
+    let (order, left) = match large_motion::ends_in_contact(moving, options) {
+        true => (Mesh { estimated_error: Some(0.0), ..moving.order.clone() }, 0.0),
+        false => excited_modes::order(moving, options)?,
+    };
+    large_motion::order(moving, options, order, left)
+}

@@ -1,0 +1,120 @@
+//! Warnings from fitting a model to a request.
+
+use super::super::contact_range::comb_beyond_told;
+use super::super::rotary_inertia_error;
+use super::super::statics::{OperatingPoint, too_hot};
+use bimorph_model::compile::CompiledModel;
+use bimorph_netlist::Diagnostic;
+
+/// Code of the warning that a mesh does not hold the tolerance.
+pub const WARNING: &str = "W040";
+/// Code of the warning that beams along a gap have too few segments for what a circuit does to them.
+const SEGMENTS: &str = "W042";
+/// Code of the warning that a linear model leaves out what its stress does.
+const STRESS: &str = "W041";
+/// Code of the warning that the fingers of a comb go through its other side.
+const FINGERS: &str = "W024";
+/// Code of the warning that nothing is solid at a temperature.
+const HEAT: &str = "W037";
+/// Code of the warning that the steps of a run are longer than what it begins with.
+const STEPS: &str = "W044";
+/// Code of the warning that an equilibrium is close to buckling.
+const BUCKLING: &str = "W046";
+/// Code of the warning that rotary inertia is left out.
+const ROTARY: &str = "W045";
+
+/// Warnings from fitting a model to a request, as sentences for callers without another channel.
+pub fn warnings(fitted: &CompiledModel) -> impl Iterator<Item = String> {
+    fitted
+        .warnings
+        .items
+        .iter()
+        .filter(|d| [WARNING, STRESS, SEGMENTS, FINGERS, HEAT, STEPS, ROTARY, BUCKLING].contains(&d.code.as_str()))
+        .map(|d| d.message.clone())
+}
+
+/// Warning about an estimate beyond the tolerance, or a missing one.
+pub fn beyond(tol: f64, estimated_error: Option<f64>) -> Option<String> {
+    match estimated_error {
+        Some(error) if error <= 1.05 * tol => None,
+        Some(error) if error.is_finite() => {
+            Some(format!("the estimated error of the mesh is {error:.1e}, more than the tolerance {tol:e}"))
+        }
+        // on twice the segments something is there that was not, or the other way round
+        _ => Some(format!("the error of the mesh is unknown: the tolerance {tol:e} is not confirmed")),
+    }
+}
+
+/// Warning about omitted stress stiffening of a linear model, where its effect exceeds the tolerance.
+pub(super) fn of_stress(compiled: &CompiledModel, share: Option<f64>) -> Option<Diagnostic> {
+    let share = share.filter(|share| *share > compiled.options.tol)?;
+    let message = if share.is_finite() {
+        format!(
+            "the linear model leaves out what stress does to stiffness: it would change the deflection by {share:.1e}"
+        )
+    } else {
+        "the linear model leaves out what stress does to stiffness: the part would buckle".into()
+    };
+    Some(Diagnostic::warning(STRESS, message, "leave --linear away; modes have the stiffness of stress with it too"))
+}
+
+/// Where the fingers of a comb go through its other side at an equilibrium.
+pub(super) fn of_fingers(compiled: &CompiledModel, point: &OperatingPoint) -> Option<Diagnostic> {
+    let message = comb_beyond_told(compiled, &point.q)?;
+    Some(Diagnostic::warning(FINGERS, message, "draw the `stop2d` that holds the part, or longer fingers"))
+}
+
+/// Where equal steps [s] are longer than a radian of a motion that a run begins with, of a frequency [Hz] and a share of the way.
+pub(super) fn of_steps(step: f64, (frequency, share): (f64, f64)) -> Diagnostic {
+    let message = format!(
+        "steps of {step:e} s are longer than a radian of the motion at {frequency:.4e} Hz, which has {:.0} % of the way that the run begins with: \
+         they damp it away or slow it, and no comparison of steps shows that",
+        100.0 * share
+    );
+    let help = format!("take a --step of {:.1e} s or less, or none", 0.2 / (std::f64::consts::TAU * frequency));
+    Diagnostic::warning(STEPS, message, &help)
+}
+
+/// Warning about a waveform error of this size from missing rotary inertia of wide beams.
+pub(super) fn of_rotary(compiled: &CompiledModel, error: f64) -> Option<Diagnostic> {
+    if error <= compiled.options.tol.max(rotary_inertia_error::WORTH) {
+        return None;
+    }
+    let message =
+        format!("rotary inertia of wide beams is neglected: the estimated error is {error:.1e} of the amplitude");
+    Some(Diagnostic::warning(ROTARY, message, "take --rotary-inertia"))
+}
+
+/// Where an equilibrium is so close to buckling that its load decides on less than the accuracy of dimensions.
+pub(super) fn near_buckling(point: &OperatingPoint) -> Option<Diagnostic> {
+    let beam = point.near_buckling.as_ref()?;
+    let message = format!("the load is within 1 % of buckling; softest motion: beam {beam}");
+    Some(Diagnostic::warning(
+        BUCKLING,
+        message,
+        "`bimorph path` shows the branches; --imperfection gives the part a shape that is not ideal",
+    ))
+}
+
+/// Where current makes a beam hotter than any solid bears.
+pub(super) fn of_heat(compiled: &CompiledModel, point: &OperatingPoint) -> Option<Diagnostic> {
+    let message = too_hot(compiled, point)?;
+    Some(Diagnostic::warning(HEAT, message, "volts, not millivolts; `thermcond` in W/m/K, `sheetresistance` in Ω"))
+}
+
+/// Where segments are too long for the field along them, with the gap that leaves out most and the error of the deflection [1].
+pub(super) fn of_segments(compiled: &CompiledModel, worst: &(String, f64)) -> Option<Diagnostic> {
+    let (name, error) = worst;
+    if *error <= compiled.options.tol {
+        return None;
+    }
+    let message = if error.is_finite() {
+        format!(
+            "segments along `{name}`: estimated error of the deflection {error:.1e}, tolerance {:e}",
+            compiled.options.tol
+        )
+    } else {
+        format!("segments along `{name}`: the gap may pull in at this voltage with more of them")
+    };
+    Some(Diagnostic::warning(SEGMENTS, message, "give the model more `segments`"))
+}

@@ -1,0 +1,32 @@
+//! Names that a model does not have.
+
+use thiserror::Error;
+
+/// Why a signal or a port cannot be read.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ReadoutError {
+    /// No signal of that name.
+    #[error("signal \"{name}\": {hint}")]
+    UnknownSignal {
+        /// The requested name.
+        name: String,
+        /// Suggested names.
+        hint: String,
+    },
+    /// No port of that name.
+    #[error("no port named \"{name}\"; the netlist has {available:?}")]
+    UnknownPort {
+        /// The requested name.
+        name: String,
+        /// The names there are.
+        available: Vec<String>,
+    },
+    /// A port that cannot be.
+    #[error("ports: expected {expected}, got {got}")]
+    BadPort {
+        /// The expected form.
+        expected: String,
+        /// The given text.
+        got: String,
+    },
+}

@@ -1,0 +1,18 @@
+//! Quantities that can be read from a model, and places where it can be driven, by name.
+//!
+//! | file | contents |
+//! |---|---|
+//! | [`signal`] | quantities of a state: displacements, rates, temperatures, charges, distances |
+//! | [`ports`] | ports of the netlist, and those that any node, heated beam or the frame offers |
+//! | `small_signal` | the effect of a small change at a port on the forces, and on the quantities read from the motion that follows |
+//!
+//! Analyses and devices stand on it; it knows neither.
+
+mod error;
+mod port_kind;
+pub mod ports;
+pub mod signal;
+pub mod small_signal;
+
+pub use error::ReadoutError;
+pub use port_kind::PortKind;

@@ -1,0 +1,199 @@
+//! Quantities that can be read from a state by name.
+
+use super::ReadoutError;
+use bimorph_domains::MaterialPoint;
+use bimorph_model::compile::CompiledModel;
+use bimorph_multibody::planar::{self, Pose};
+use bimorph_multibody::{BodyId, Model};
+
+/// A quantity of a state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Signal {
+    /// Displacement of a node: direction 0 x, 1 y, 2 rotation.
+    Displacement(MaterialPoint, usize),
+    /// Rate of a node's displacement.
+    Rate(MaterialPoint, usize),
+    /// Mean temperature of heater k [K].
+    Temperature(usize),
+    /// A temperature that the netlist prescribes [K].
+    Prescribed(f64),
+    /// Charge of gap g [C].
+    Charge(usize),
+    /// Distance left in gap g [m].
+    Distance(usize),
+    /// Capacitance of gap g [F].
+    Capacitance(usize),
+    /// Force with which the voltage closes gap g [N].
+    Pull(usize),
+}
+
+/// State, or change of a state, that signals are read from.
+#[derive(Debug, Clone, Copy)]
+pub struct SignalView<'a> {
+    /// Displacements.
+    pub q: &'a [Pose],
+    /// Rates.
+    pub v: &'a [Pose],
+    /// Rise of each heater [K].
+    pub rise: &'a [f64],
+    /// Voltage of each gap [V].
+    pub volts: &'a [f64],
+}
+
+impl Signal {
+    /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, the same of `BEAM[k]`, the k-th point along a beam from 0, `BEAM.T`, `GAP.q`, `GAP.gap`, `GAP.C`,
+    /// `GAP.F`.
+    ///
+    /// # Errors
+    /// [`ReadoutError::UnknownSignal`] with what would be understood.
+    pub fn find(compiled: &CompiledModel, name: &str) -> Result<Self, ReadoutError> {
+        Self::lookup(compiled, name)
+            .ok_or_else(|| ReadoutError::UnknownSignal { name: name.to_owned(), hint: hint(compiled, name) })
+    }
+
+    fn lookup(compiled: &CompiledModel, name: &str) -> Option<Self> {
+        let (part, quantity) = name.rsplit_once('.')?;
+        if let Some((direction, rate)) = direction(quantity) {
+            let point = match compiled.structure.node(part) {
+                Some(node) => compiled.parts.nodes[node.0]?,
+                None => along_beam(compiled, part)?,
+            };
+            return Some(if rate { Self::Rate(point, direction) } else { Self::Displacement(point, direction) });
+        }
+        let gap = || compiled.parts.gap_names.iter().position(|n| n == part);
+        match quantity {
+            "q" => gap().map(Self::Charge),
+            "gap" => gap().map(Self::Distance),
+            "C" => gap().map(Self::Capacitance),
+            "F" => gap().map(Self::Pull),
+            "T" => {
+                let beam = compiled.structure.beams.iter().position(|b| b.name == part)?;
+                match compiled.parts.heaters.iter().position(|&b| b == beam) {
+                    Some(heater) => Some(Self::Temperature(heater)),
+                    None => {
+                        let b = &compiled.structure.beams[beam];
+                        Some(Self::Prescribed(b.temperature.unwrap_or(b.material.ambient_temperature)))
+                    }
+                }
+            }
+            _ => None,
+        }
+    }
+
+    /// Its unit.
+    pub fn unit(&self) -> &'static str {
+        match self {
+            Self::Displacement(_, 2) => "rad",
+            Self::Displacement(..) | Self::Distance(_) => "m",
+            Self::Rate(_, 2) => "rad/s",
+            Self::Rate(..) => "m/s",
+            Self::Temperature(_) | Self::Prescribed(_) => "K",
+            Self::Charge(_) => "C",
+            Self::Capacitance(_) => "F",
+            Self::Pull(_) => "N",
+        }
+    }
+
+    /// Its value in a state.
+    pub fn value(&self, compiled: &CompiledModel, state: &SignalView<'_>) -> f64 {
+        let system = &compiled.parts.system;
+        let linear = system.model.linear;
+        match *self {
+            Self::Displacement(p, 2) => p.rotation(state.q),
+            Self::Displacement(p, d) => p.displacement(state.q, linear)[d],
+            Self::Rate(p, 2) => Model::pose(state.v, p.body).z,
+            Self::Rate(p, d) => point_rate(p, state.q, state.v, linear)[d],
+            Self::Temperature(k) => system.electrics.heating.heaters[k].ambient + state.rise[k],
+            Self::Prescribed(t) => t,
+            Self::Charge(g) => system.capacitance(g, state.q) * state.volts[g],
+            Self::Distance(g) => system.distance(g, state.q),
+            Self::Capacitance(g) => system.capacitance(g, state.q),
+            Self::Pull(g) => system.pull(g, state.q, state.volts[g]),
+        }
+    }
+
+    /// Its change with a change of the state.
+    pub fn slope(&self, compiled: &CompiledModel, state: &SignalView<'_>, change: &SignalView<'_>) -> f64 {
+        let system = &compiled.parts.system;
+        let linear = system.model.linear;
+        match *self {
+            Self::Displacement(p, 2) => p.rotation(change.q),
+            Self::Displacement(p, d) => point_rate(p, state.q, change.q, linear)[d],
+            Self::Rate(p, 2) => Model::pose(change.v, p.body).z,
+            Self::Rate(p, d) => {
+                let (q, v, turned) =
+                    (Model::pose(state.q, p.body), Model::pose(state.v, p.body), Model::pose(change.q, p.body));
+                let (_, bend) = planar::point_turn(&q, p.arm, linear);
+                point_rate(p, state.q, change.v, linear)[d] + bend[d] * turned.z * v.z
+            }
+            Self::Temperature(k) => change.rise[k],
+            Self::Prescribed(_) => 0.0,
+            Self::Charge(g) => {
+                system.capacitance(g, state.q) * change.volts[g]
+                    + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
+            }
+            Self::Distance(g) => system.distance_slope(g, state.q, change.q),
+            Self::Capacitance(g) => system.capacitance_slope(g, state.q, change.q),
+            Self::Pull(g) => system.pull_slope(g, state.q, state.volts[g], change.q, change.volts[g]),
+        }
+    }
+}
+
+/// Every signal of a model by name, in the order of the drawing: of nodes that can move, beams and gaps.
+pub fn names(compiled: &CompiledModel) -> Vec<String> {
+    let moves = |i: usize| compiled.parts.nodes[i].is_some_and(|p| matches!(p.body, BodyId::Free(_)));
+    let nodes = compiled.structure.nodes.iter().enumerate().filter(|(i, _)| moves(*i));
+    let motions = nodes.flat_map(|(_, n)| DIRECTIONS.map(|quantity| format!("{}.{quantity}", n.name)));
+    let temperatures = compiled.structure.beams.iter().map(|b| format!("{}.T", b.name));
+    let gaps = compiled.parts.gap_names.iter();
+    let of_gaps = gaps.flat_map(|gap| ["gap", "q", "C", "F"].map(|quantity| format!("{gap}.{quantity}")));
+    motions.chain(temperatures).chain(of_gaps).collect()
+}
+
+/// Components of the motion of a node: displacements, then rates.
+const DIRECTIONS: [&str; 6] = ["x", "y", "rz", "vx", "vy", "vrz"];
+
+/// Direction and kind (true: rate) of the motion that `x`, `y`, `rz`, `vx`, `vy` and `vrz` stand for.
+fn direction(quantity: &str) -> Option<(usize, bool)> {
+    DIRECTIONS.iter().position(|n| *n == quantity).map(|k| (k % 3, k >= 3))
+}
+
+/// Node, direction and kind (true: rate) of a signal of a node.
+pub(crate) fn node_signal(compiled: &CompiledModel, name: &str) -> Option<(usize, usize, bool)> {
+    let (part, quantity) = name.rsplit_once('.')?;
+    let (direction, rate) = direction(quantity)?;
+    Some((compiled.structure.node(part)?.0, direction, rate))
+}
+
+/// Rate of a material point when its body moves at `v` (or its first-order change when the body's pose changes by `v`).
+fn point_rate(p: MaterialPoint, q: &[Pose], v: &[Pose], linear: bool) -> nalgebra::Vector2<f64> {
+    let (q, v) = (Model::pose(q, p.body), Model::pose(v, p.body));
+    let (turn, _) = planar::point_turn(&q, p.arm, linear);
+    nalgebra::Vector2::new(v.x, v.y) + turn * v.z
+}
+
+/// The point `BEAM[k]`.
+fn along_beam(compiled: &CompiledModel, name: &str) -> Option<MaterialPoint> {
+    let (beam, number) = name.strip_suffix(']')?.rsplit_once('[')?;
+    let beam = compiled.structure.beams.iter().position(|b| b.name == beam)?;
+    compiled.parts.beams[beam].get(number.parse::<usize>().ok()?).copied()
+}
+
+/// Suggestions for a wrong name.
+fn hint(compiled: &CompiledModel, name: &str) -> String {
+    let part = name.rsplit_once('.').map_or(name, |(part, _)| part);
+    let nodes: Vec<&str> = compiled.structure.nodes.iter().filter(|n| n.mechanical).map(|n| n.name.as_str()).collect();
+    if nodes.contains(&part) {
+        return format!("\"{part}\" is a node: ask for {part}.x, .y, .rz, .vx, .vy or .vrz");
+    }
+    let beams = compiled.structure.beams.iter().map(|b| b.name.as_str());
+    let known: Vec<&str> =
+        nodes.into_iter().chain(beams).chain(compiled.parts.gap_names.iter().map(String::as_str)).collect();
+    let close = known.iter().copied().filter(|k| k.contains(part) || part.contains(*k)).take(5);
+    let close: Vec<&str> = close.collect();
+    let shown = if close.is_empty() { known.into_iter().take(8).collect::<Vec<_>>() } else { close };
+    format!(
+        "no node, beam or gap of that name (expected NODE.x|y|rz|vx|vy|vrz, BEAM.T, GAP.q|gap|C|F; there is {})",
+        shown.join(", ")
+    )
+}

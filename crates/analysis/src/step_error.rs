@@ -1,0 +1,209 @@
+//! Error of the steps of a run in time, and a run within the tolerance.
+//!
+//! Control of each step bounds what a step adds, not what becomes of it: phases add up, and parts that swing far exchange energy. So a run
+//! carries the error of its motion along (`bimorph_solve::time::defect`), and reports the root mean square error of the worst signal, of its
+//! amplitude. A run whose error is beyond what the mesh leaves of the tolerance is made again at
+//! ```text
+//! t₂ = t₁·min(max((0.7·room/e₁)^(1/q), 0.01), 0.7)
+//! ```
+//! with q = 0.6 at first, and then as the two runs before say, within 0.35 and 1: ever higher modes carry the error, so it falls by less
+//! than in proportion to the tolerance. There are five runs at most, none of which takes more than some seconds; the samples of a run that
+//! does are sent as they come, and it is not made again.
+//!
+//! Runs without such an estimate are compared with a companion run (`companion.rs`). These are other methods, equal
+//! steps, rotating frames, and models whose parts may touch, where the error is propagated up to the first contact
+//! only.
+
+mod companion;
+mod run;
+mod samples;
+
+use super::integrator::Integrator;
+pub(super) use super::transient::error_log::least;
+use super::transient::{TransientOptions, TransientResult, transient};
+use super::{AnalysisError, ProgressCallback};
+use crate::formulation;
+use bimorph_model::compile::CompiledModel;
+use companion::{companion, compared};
+pub use run::RunFunction;
+use run::{AT_THE_END, COMPANION_TOLERANCE_RATIO, MAX_AGAIN, MAX_STORED_SAMPLES, room};
+pub use run::{beyond, unknown};
+use samples::{BufferedSamples, SelectedSamples, resolved};
+use std::cell::Cell;
+
+/// Fraction of the room that the next run aims at.
+const AIM: f64 = 0.7;
+/// The exponent with which an error is supposed to fall with the tolerance, and the range in which two runs teach another.
+const EXPONENT: f64 = 0.6;
+const EXPONENTS: (f64, f64) = (0.35, 1.0);
+/// Least and largest ratio of the tolerances of two runs.
+const RATIOS: (f64, f64) = (0.01, 0.7);
+/// Runs at most.
+const RUNS: usize = 5;
+/// Error of two runs from which on a third is not made: nothing is predictable.
+const HOPELESS: f64 = 0.3;
+
+/// Makes the run that `options` specify, with [`TransientResult::step_error`], and a warning where that is beyond the
+/// tolerance. `model` is what moves; `sample` receives the samples of the run that is reported, and `watch` the
+/// progress of each run in turn.
+///
+/// # Errors
+/// Errors of the run; a failed companion run only removes its contribution.
+pub fn with_step_error<T>(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    run: RunFunction<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<(TransientResult, T), AnalysisError> {
+    held(options, model, run, sample, watch).map(|(result, more, _)| (result, more))
+}
+
+/// As above, with the tolerance that the steps of the run followed.
+fn held<T>(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    run: RunFunction<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<(TransientResult, T, f64), AnalysisError> {
+    if !propagates(options, model) {
+        let first = companion(options, model.unknowns(), run, watch)?;
+        return compared(options, model, first, run, sample, watch);
+    }
+    let estimated = TransientOptions { estimate: true, ..options.clone() };
+    let made = first(&estimated, model, run, sample, watch)?;
+    let made = sharper(made, &estimated, model, run, watch)?;
+    made.kept.send(sample);
+    let SampledRun { mut result, more, tol, .. } = made;
+    result.warnings.extend(match result.step_error {
+        Some(error) => beyond(options, error, AT_THE_END),
+        None => (!options.signals.is_empty()).then(|| unknown(options)),
+    });
+    Ok((result, more, tol))
+}
+
+/// Whether a run of this model propagates its error.
+fn propagates(options: &TransientOptions<'_>, model: &CompiledModel) -> bool {
+    let system = &model.parts.system;
+    formulation::of_run(model, options).1 == Integrator::Rodas4
+        && options.step.is_none()
+        && options.points >= 2
+        && !options.signals.is_empty()
+        && !system.turns()
+        && (0..system.members.len()).all(|member| system.touching(member).is_none())
+}
+
+/// A run with its samples and the tolerance of its steps.
+struct SampledRun<T> {
+    result: TransientResult,
+    more: T,
+    kept: BufferedSamples,
+    tol: f64,
+    /// Its samples have been sent.
+    long: bool,
+}
+
+/// The first run. Its samples are kept, since it may be made again, until it takes more than some seconds.
+///
+/// # Errors
+/// Those of the run.
+fn first<T>(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    run: RunFunction<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<SampledRun<T>, AnalysisError> {
+    let unknowns = model.unknowns() as f64;
+    let long = Cell::new(options.points * options.signals.len() > MAX_STORED_SAMPLES);
+    let (mut kept, mut picked) = (BufferedSamples::default(), SelectedSamples::new(options));
+    let mut keep = |t: f64, values: &[f64]| {
+        picked.add(values);
+        if long.get() {
+            std::mem::take(&mut kept).send(sample);
+            sample(t, values);
+        } else {
+            kept.keep(t, values);
+        }
+    };
+    let mut steps = 0.0;
+    let mut count = |fraction: f64| {
+        steps += 1.0;
+        long.set(long.get() || steps * unknowns > MAX_AGAIN);
+        watch(fraction)
+    };
+    let (mut result, more) = run(options, &mut keep, &mut count)?;
+    result.step_error = result.step_error.filter(|_| resolved(&picked, &result, options, model));
+    Ok(SampledRun { result, more, kept, tol: options.tol, long: long.get() })
+}
+
+/// Runs at sharper tolerances until one is within what its mesh leaves of the tolerance of `options`.
+///
+/// # Errors
+/// [`AnalysisError::Cancelled`].
+fn sharper<T>(
+    mut made: SampledRun<T>,
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    run: RunFunction<'_, T>,
+    watch: ProgressCallback<'_>,
+) -> Result<SampledRun<T>, AnalysisError> {
+    let room = room(options.tol, made.result.estimated_error);
+    let unknowns = model.unknowns() as f64;
+    let mut exponent = EXPONENT;
+    for _ in 1..RUNS {
+        let ratio = match made.result.step_error {
+            Some(error) if error > room && !made.long => (AIM * room / error).powf(1.0 / exponent),
+            _ => break,
+        };
+        let ratio = ratio.clamp(RATIOS.0, RATIOS.1);
+        // the length of a step goes with the fourth root of its tolerance
+        if made.result.counters.steps as f64 * ratio.powf(-0.25) * unknowns > MAX_AGAIN {
+            break;
+        }
+        let options = TransientOptions { tol: ratio * made.tol, ..options.clone() };
+        let (mut kept, mut picked) = (BufferedSamples::default(), SelectedSamples::new(&options));
+        let mut keep = |t: f64, values: &[f64]| {
+            picked.add(values);
+            kept.keep(t, values);
+        };
+        let (mut result, more) = match run(&options, &mut keep, watch) {
+            Ok(found) => found,
+            Err(AnalysisError::Cancelled) => return Err(AnalysisError::Cancelled),
+            Err(_) => break,
+        };
+        result.step_error = result.step_error.filter(|_| resolved(&picked, &result, &options, model));
+        let errors = made.result.step_error.zip(result.step_error);
+        made = SampledRun { result, more, kept, tol: options.tol, long: false };
+        if let Some((before, after)) = errors {
+            exponent = ((before / after).ln() / -ratio.ln()).clamp(EXPONENTS.0, EXPONENTS.1);
+            if before.min(after) > HOPELESS {
+                break;
+            }
+        }
+    }
+    Ok(made)
+}
+
+/// The estimate alone, for one of several runs that are alike, at `points` output times; and the tolerance that their steps have to follow
+/// for it. None where nothing was compared.
+pub fn step_error(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    watch: ProgressCallback<'_>,
+) -> (Option<f64>, f64) {
+    let mut run = |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: ProgressCallback<'_>| {
+        Ok((transient(model, options, sample, watch)?, ()))
+    };
+    let found = held(options, model, &mut run, &mut |_, _| (), watch);
+    // the others need somewhat coarser or sharper steps: whole tenths
+    let tenths = |tol: f64| {
+        let mut held = options.tol;
+        while held > tol {
+            held /= COMPANION_TOLERANCE_RATIO;
+        }
+        held
+    };
+    found.map_or((None, options.tol), |(result, (), tol)| (result.step_error, tenths(tol)))
+}

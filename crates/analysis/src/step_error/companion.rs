@@ -1,0 +1,219 @@
+//! A run compared with a companion at ten times the tolerance, or in steps of twice the length: of methods that do not propagate their
+//! error, of equal steps, and of parts that touch.
+//!
+//! If the error were proportional to the tolerance, a ninth of the difference would be the error of the finer run.
+//! Measured ratios of the two errors lie between 1 and 12, so that half of it is reported. For methods of second order,
+//! whose ratios are about two, all of it is reported.
+//!
+//! Where the error exceeds the part of the tolerance that the mesh leaves, and the run is short, it is repeated at a
+//! tenth of the tolerance, with the previous run as its companion. For a method of order four or more this costs less
+//! than twice the steps.
+//!
+//! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
+//! is continued in proportion to time, as phases go.
+
+use super::super::after_contact::{CompanionRuns, first_contact, judge};
+use super::super::chart::error::largest_error;
+use super::super::integrator::Integrator;
+use super::super::transient::error_log::least;
+use super::super::transient::{TransientOptions, TransientResult};
+use super::super::{AnalysisError, ProgressCallback};
+use super::run::{
+    AT_THE_END, COMPANION_TOLERANCE_RATIO, MAX_AGAIN, MAX_STORED_SAMPLES, MAX_WORK, RunFunction, beyond, loose, room,
+    unknown,
+};
+use super::samples::{BufferedSamples, SelectedSamples, resolved, stride};
+use crate::formulation;
+use bimorph_model::compile::CompiledModel;
+
+/// Fraction of the difference that is reported.
+const REPORTED_FRACTION: f64 = 0.5;
+/// The same for methods of second order, and explicit ones, whose error falls little with the tolerance.
+const SHARE_OF_SECOND: f64 = 1.0;
+/// Reserve where the companion is hardly looser [1].
+const RESERVE: f64 = 1.2;
+/// Times the steps of a run that one at a tenth of its tolerance takes, of the methods that are run again.
+const MORE: f64 = 2.0;
+/// Largest ratio of the requested tolerance to that of the steps.
+const MAX_SHARPER: f64 = 99.0;
+/// Output times that a companion must reach, at least.
+const MIN_SAMPLES: usize = 16;
+
+/// Makes a run whose first one at a looser tolerance, its companion, came as far as this; returns the tolerance of its steps, too.
+pub(super) fn compared<T>(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    (companion, whole): (Option<TransientResult>, bool),
+    run: RunFunction<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<(TransientResult, T, f64), AnalysisError> {
+    let unknowns = model.unknowns() as f64;
+    let steps = companion.as_ref().map_or(0, |c| c.counters.steps) as f64;
+    // the samples of a long run are sent as they come
+    let again = whole
+        && options.step.is_none()
+        && is_high(formulation::of_run(model, options).1)
+        && MORE * MORE * steps * unknowns <= MAX_AGAIN
+        && options.points * options.signals.len() <= MAX_STORED_SAMPLES;
+    if !again {
+        let mut made = once(options, model, (companion, whole), run, sample, watch)?;
+        made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
+        return Ok((made.result, made.more, options.tol));
+    }
+    let mut now = options.clone();
+    let mut kept = BufferedSamples::default();
+    let mut made = once(&now, model, (companion, whole), run, &mut |t, values| kept.keep(t, values), watch)?;
+    let room = room(options.tol, made.result.estimated_error);
+    while made.result.step_error.is_some_and(|error| error > room)
+        && MORE * made.result.counters.steps as f64 * unknowns <= MAX_AGAIN
+        && now.tol > options.tol / MAX_SHARPER
+    {
+        let sharper = TransientOptions { tol: now.tol / COMPANION_TOLERANCE_RATIO, ..options.clone() };
+        let mut others = BufferedSamples::default();
+        let companion = (Some(made.picked.clone()), true);
+        match once(&sharper, model, companion, run, &mut |t, values| others.keep(t, values), watch) {
+            Ok(found) if found.result.step_error.is_some() => (made, kept, now) = (found, others, sharper),
+            Err(AnalysisError::Cancelled) => return Err(AnalysisError::Cancelled),
+            _ => break,
+        }
+    }
+    kept.send(sample);
+    made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
+    Ok((made.result, made.more, now.tol))
+}
+
+/// A run with its estimate, and what a sharper one is compared with.
+struct EstimatedRun<T> {
+    result: TransientResult,
+    more: T,
+    picked: TransientResult,
+}
+
+/// One run, compared with its companion, which may have come to its end.
+fn once<T>(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    (companion, whole): (Option<TransientResult>, bool),
+    run: RunFunction<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<EstimatedRun<T>, AnalysisError> {
+    let reached = companion.as_ref().map_or(0, sampled);
+    let mut picked = SelectedSamples::new(options);
+    let mut both = |t: f64, values: &[f64]| {
+        picked.add(values);
+        sample(t, values);
+    };
+    let (mut result, more) = run(options, &mut both, watch)?;
+    // what both do not resolve they have in common
+    let resolved = options.step.is_some() || resolved(&picked, &result, options, model);
+    let signals = picked.signals(&result.signals);
+    let picked = TransientResult { signals, counters: result.counters, ..TransientResult::default() };
+    // one that took the same steps proves nothing
+    let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
+    let least = |unit: &str| least(unit, options, model);
+    let contact = first_contact(&result);
+    match companion.as_ref().filter(|c| (whole || reached >= MIN_SAMPLES) && other(c) && resolved) {
+        Some(companion) => {
+            // single values after a contact are judged on their own
+            let last = contact.map_or(usize::MAX, |t| (t / spacing(options)) as usize + 1);
+            let count = reached.min(sampled(&picked)).min(last);
+            let apart = largest_error(&cut(&picked, count), &cut(companion, count), &least);
+            let share = match options.until.is_some() || contact.is_some() {
+                true => 1.0,
+                false => ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64,
+            };
+            let (_, method) = formulation::of_run(model, options);
+            result.step_error = Some(reported_fraction(options, method) * apart / share.min(1.0));
+        }
+        None => result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options))),
+    }
+    if contact.is_some() {
+        let columns = |run: &TransientResult| run.signals.iter().map(|(_, _, c)| c.clone()).collect::<Vec<_>>();
+        let (run, companion) = (columns(&picked), companion.as_ref().map(columns));
+        let pair = CompanionRuns { spacing: spacing(options), run: &run, companion: companion.as_deref() };
+        judge(&pair, options, &least, &mut result);
+    }
+    Ok(EstimatedRun { result, more, picked })
+}
+
+/// Fraction of the difference that is reported. Of a companion that is hardly looser it is more than all, since the error is at best
+/// in proportion to the tolerance.
+fn reported_fraction(options: &TransientOptions<'_>, method: Integrator) -> f64 {
+    let share = if is_high(method) { REPORTED_FRACTION } else { SHARE_OF_SECOND };
+    match options.step {
+        Some(_) => REPORTED_FRACTION,
+        None => share.max(RESERVE / (loose(options) / options.tol - 1.0)),
+    }
+}
+
+/// Distance of the output times that are compared [s].
+fn spacing(options: &TransientOptions<'_>) -> f64 {
+    stride(options) as f64 * options.stop / (options.points - 1) as f64
+}
+
+/// Number of samples of a run.
+fn sampled(run: &TransientResult) -> usize {
+    run.signals.first().map_or(0, |(_, _, column)| column.len())
+}
+
+/// The first samples of a run.
+fn cut(run: &TransientResult, count: usize) -> TransientResult {
+    let cut =
+        |(name, unit, column): &(String, String, Vec<f64>)| (name.clone(), unit.clone(), column[..count].to_vec());
+    TransientResult { signals: run.signals.iter().map(cut).collect(), ..TransientResult::default() }
+}
+
+/// Of a method whose error falls fast with the length of its steps.
+fn is_high(method: Integrator) -> bool {
+    matches!(method, Integrator::Rodas4 | Integrator::Radau5 | Integrator::Sdirk4)
+}
+
+/// The companion of a run as far as it came, none where it failed; and whether it came to the end.
+///
+/// # Errors
+/// [`AnalysisError::Cancelled`].
+pub(super) fn companion<T>(
+    options: &TransientOptions<'_>,
+    unknowns: usize,
+    run: RunFunction<'_, T>,
+    watch: ProgressCallback<'_>,
+) -> Result<(Option<TransientResult>, bool), AnalysisError> {
+    let tol = loose(options);
+    let looser = options.step.is_some() || tol >= 2.0 * options.tol;
+    if options.signals.is_empty() || options.points < 2 || !looser {
+        return Ok((None, false));
+    }
+    let looser = TransientOptions {
+        tol,
+        step: options.step.map(|step| 2.0 * step),
+        events: Vec::new(),
+        keep: false,
+        ..options.clone()
+    };
+    let mut picked = SelectedSamples::new(options);
+    let mut keep = |_: f64, values: &[f64]| picked.add(values);
+    let (mut steps, mut stopped) = (0.0, false);
+    let mut few = |_: f64| {
+        steps += 1.0;
+        stopped = !watch(0.0);
+        !stopped && steps * unknowns as f64 <= MAX_WORK
+    };
+    let ended = run(&looser, &mut keep, &mut few);
+    let counters = ended.as_ref().map_or_else(|_| Default::default(), |(result, _)| result.counters);
+    if stopped {
+        return Err(AnalysisError::Cancelled);
+    }
+    let whole = ended.is_ok();
+    match ended {
+        Ok(_) | Err(AnalysisError::Cancelled) => {
+            let names: Vec<_> = options.signals.iter().map(|name| (name.clone(), String::new(), Vec::new())).collect();
+            Ok((
+                Some(TransientResult { signals: picked.signals(&names), counters, ..TransientResult::default() }),
+                whole,
+            ))
+        }
+        Err(_) => Ok((None, false)),
+    }
+}

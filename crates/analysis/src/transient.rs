@@ -1,0 +1,88 @@
+//! Motion in time, in the formulation of the model.
+
+mod contact_energy;
+mod crossings;
+pub(super) mod error_log;
+pub(super) mod first_step;
+mod folded_segments;
+pub(super) mod options;
+pub(super) mod record;
+pub(super) mod result;
+mod samples;
+
+use super::formulation::{self, Formulation};
+use super::integrator::Integrator;
+use super::joint_transient::joint_transient;
+use super::{AnalysisError, ProgressCallback};
+use bimorph_domains::{Ramp, System};
+use bimorph_model::compile::CompiledModel;
+use bimorph_solve::baseline::{Solver, SolverKind};
+use bimorph_solve::equations::Bodies;
+use bimorph_solve::time::adaptive::{Adaptive, Advance, Observer};
+use bimorph_solve::time::defect::{Estimated, SeeError};
+use bimorph_solve::time::method::{Motion, SolverCounters};
+use bimorph_solve::time::rodas4::Rodas4;
+pub use first_step::first_step;
+pub use options::{TransientOptions, Until};
+use record::{Propagator, record};
+pub use result::{Counters, CrossingEvent, Statistics, TransientResult};
+
+/// The bodies' own coordinates, joints as springs.
+struct Compliant<'a> {
+    system: &'a System,
+    options: &'a TransientOptions<'a>,
+}
+
+impl Propagator for Compliant<'_> {
+    fn advance(
+        &mut self,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        observe: Observer<'_>,
+        errors: Option<SeeError<'_>>,
+    ) -> Result<(Advance, SolverCounters), AnalysisError> {
+        let options = self.options;
+        if options.solver != SolverKind::Recursion && !options.method.takes_solvers() {
+            return Err(AnalysisError::BadRequest {
+                what: "solver".into(),
+                detail: format!(
+                    "{} solves its own systems; the {} solver cannot",
+                    options.method.name(),
+                    options.solver.name()
+                ),
+            });
+        }
+        let solver = Solver::new(options.solver, &self.system.model.pattern)?;
+        let h = first_step(self.system, options.stop);
+        if let Some(see) = errors.filter(|_| options.method == Integrator::Rodas4 && !self.system.turns()) {
+            let method = Estimated::new(Rodas4::with_solver(solver, self.system, &[]), see);
+            let mut stepper = Adaptive::new(self.system.bodies(), method);
+            let (mut bodies, mut h) = (Bodies::new(self.system, ramp), h);
+            let end = stepper.advance(&mut bodies, motion, &mut h, options.control(), usize::MAX, observe)?;
+            return Ok((end, stepper.work()));
+        }
+        let (end, work) = options.method.advance(self.system, solver, ramp, motion, h, options.control(), observe);
+        Ok((end?, work))
+    }
+}
+
+/// Integrates the motion in the formulation of the model. Each finished sample also goes to `sample` (t, values in signal order), for streaming.
+///
+/// # Errors
+/// See [`AnalysisError`].
+pub fn transient(
+    compiled: &CompiledModel,
+    options: &TransientOptions<'_>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<TransientResult, AnalysisError> {
+    let system = &compiled.parts.system;
+    let (suited, method) = formulation::of_run(compiled, options);
+    match suited.formulation {
+        formulation @ (Formulation::Rcr | Formulation::RcrElastic) => {
+            let options = TransientOptions { method, ..options.clone() };
+            joint_transient(compiled, formulation, &options, sample, watch).map(|(r, _)| r)
+        }
+        _ => record(compiled, options, &mut Compliant { system, options }, sample, watch),
+    }
+}

@@ -1,0 +1,185 @@
+//! The error of a run's signals over time, from the error of its motion, see [`bimorph_solve::time::defect`].
+
+use super::super::chart::error::{SMALL, half_range};
+use super::options::TransientOptions;
+use crate::readout::signal::{Signal, SignalView};
+use bimorph_domains::Ramp;
+use bimorph_model::compile::CompiledModel;
+use bimorph_multibody::planar::Pose;
+use bimorph_solve::time::method::Motion;
+
+/// Ends of steps at which signals are compared, at most.
+const ENOUGH: f64 = 1000.0;
+/// Motion below this fraction of the model's length scale, or of 1 rad or 1 K, is rounding [1].
+const NEGLIGIBLE_MOTION: f64 = 1e-9;
+/// Error of a signal, of its range, from which on it is not predictable.
+const LOST: f64 = 0.3;
+/// Growth of an error from the second to the last quarter of the time until phase is lost. Phase errors grow at most as
+/// a power of time, and stay below this; neighbouring chaotic motions diverge by more.
+const CHAOTIC: f64 = 30.0;
+
+/// When a signal is lost.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SignalLoss {
+    pub(crate) signal: String,
+    /// From when on [s].
+    pub(crate) t: f64,
+    /// Neighbouring motions part exponentially: no tolerance helps for long.
+    pub(crate) chaotic: bool,
+}
+
+/// Step error of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StepErrorEstimate {
+    /// Root mean square error of the worst signal, of its amplitude [1].
+    pub(crate) error: f64,
+    /// The first signal that is lost, if any is.
+    pub(crate) lost: Option<SignalLoss>,
+}
+
+/// Signals and their errors at some ends of steps.
+pub(super) struct ErrorLog<'a> {
+    compiled: &'a CompiledModel,
+    ramp: &'a Ramp<'a>,
+    volts: &'a [f64],
+    signals: &'a [Signal],
+    stride: f64,
+    next: f64,
+    exact: Motion,
+    rise: Vec<f64>,
+    t: Vec<f64>,
+    values: Vec<Vec<f64>>,
+    errors: Vec<Vec<f64>>,
+    /// Parts touch: the error after that is not estimated.
+    touched: bool,
+}
+
+impl<'a> ErrorLog<'a> {
+    /// From the start of the motion, which has no error.
+    pub(super) fn start(
+        (compiled, stop): (&'a CompiledModel, f64),
+        (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
+        signals: &'a [Signal],
+        motion: &Motion,
+    ) -> Self {
+        let system = &compiled.parts.system;
+        let mut log = Self {
+            compiled,
+            ramp,
+            volts,
+            signals,
+            stride: stop / ENOUGH,
+            next: 0.0,
+            exact: Motion::zeros(system.bodies()),
+            rise: vec![0.0; system.electrics.heating.heaters.len()],
+            t: Vec::new(),
+            values: vec![Vec::new(); signals.len()],
+            errors: vec![Vec::new(); signals.len()],
+            touched: false,
+        };
+        log.observe(0.0, motion, &Motion::zeros(system.bodies()));
+        log
+    }
+
+    /// The end of a step at time `t` [s], the motion there and its error; returns whether the next one is of use.
+    pub(super) fn observe(&mut self, t: f64, motion: &Motion, error: &Motion) -> bool {
+        self.touched = self.touched || self.compiled.parts.system.contact_energy(&motion.q) > 0.0;
+        if self.touched {
+            return false;
+        }
+        if t < self.next {
+            return true;
+        }
+        self.next = t + self.stride;
+        for (k, r) in self.rise.iter_mut().enumerate() {
+            *r = self.ramp.rise_at(k, t);
+        }
+        let less = |to: &mut [Pose], x: &[Pose], e: &[Pose]| {
+            to.iter_mut().zip(x.iter().zip(e)).for_each(|(to, (x, e))| *to = x - e);
+        };
+        less(&mut self.exact.q, &motion.q, &error.q);
+        less(&mut self.exact.v, &motion.v, &error.v);
+        bimorph_base::budget::lay_out(2 * size_of::<f64>() * self.signals.len());
+        for (signal, (values, errors)) in self.signals.iter().zip(self.values.iter_mut().zip(&mut self.errors)) {
+            let of = |m: &Motion| {
+                signal.value(self.compiled, &SignalView { q: &m.q, v: &m.v, rise: &self.rise, volts: self.volts })
+            };
+            let value = of(motion);
+            values.push(value);
+            errors.push((value - of(&self.exact)).abs());
+        }
+        self.t.push(t);
+        true
+    }
+
+    /// The estimate; none where something touched, or nothing was compared.
+    pub(super) fn estimate(&self, options: &TransientOptions<'_>) -> Option<StepErrorEstimate> {
+        if self.touched || self.t.len() < 2 || self.signals.is_empty() {
+            return None;
+        }
+        let swings: Vec<f64> = self.values.iter().map(|values| half_range(values)).collect();
+        let largest = |unit: &str| {
+            let own = self.signals.iter().zip(&swings).filter(|(s, _)| s.unit() == unit);
+            own.map(|(_, swing)| *swing).fold(0.0, f64::max)
+        };
+        let mut found = StepErrorEstimate { error: 0.0, lost: None };
+        for (k, signal) in self.signals.iter().enumerate() {
+            let amplitude =
+                swings[k].max(SMALL * largest(signal.unit())).max(least(signal.unit(), options, self.compiled));
+            let relative: Vec<f64> = self.errors[k].iter().map(|e| relative(*e, amplitude)).collect();
+            let error = self.mean_square(&relative).sqrt();
+            found.error = if error.is_nan() { f64::INFINITY } else { found.error.max(error) };
+            let lost = relative.iter().position(|e| *e > 2.0 * LOST);
+            if let Some(at) = lost.filter(|at| found.lost.as_ref().is_none_or(|lost| self.t[*at] < lost.t)) {
+                let signal = options.signals[k].clone();
+                found.lost = Some(SignalLoss { signal, t: self.t[at], chaotic: grows_fast(&relative[..=at]) });
+            }
+        }
+        Some(found)
+    }
+
+    /// Mean over time of the squares of values at the ends of steps.
+    fn mean_square(&self, values: &[f64]) -> f64 {
+        let spans = self.t.windows(2).zip(values.windows(2));
+        let sum: f64 = spans.map(|(t, e)| 0.5 * (t[1] - t[0]) * (e[0] * e[0] + e[1] * e[1])).sum();
+        sum / (self.t[self.t.len() - 1] - self.t[0])
+    }
+}
+
+/// An error relative to the amplitude: a signal of unknown phase has an error of twice the amplitude at most.
+fn relative(error: f64, amplitude: f64) -> f64 {
+    if error == 0.0 { 0.0 } else { (error / amplitude).min(2.0) }
+}
+
+/// Whether an error that ends lost grew faster than phases add up.
+fn grows_fast(errors: &[f64]) -> bool {
+    let quarter = errors.len() / 4;
+    let most = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
+    quarter > 0 && most(&errors[3 * quarter..]) > CHAOTIC * most(&errors[quarter..2 * quarter])
+}
+
+/// The amplitude below which a signal of this unit stands still.
+pub(crate) fn least(unit: &str, options: &TransientOptions<'_>, model: &CompiledModel) -> f64 {
+    let length = model.parts.system.length_scale;
+    match unit {
+        "m" => NEGLIGIBLE_MOTION * length,
+        "rad" | "K" => NEGLIGIBLE_MOTION,
+        "m/s" => NEGLIGIBLE_MOTION * length / options.stop,
+        "rad/s" => NEGLIGIBLE_MOTION / options.stop,
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Phases that add up in proportion to time, or to its square, are lost and not chaotic; an error that grows as exp(t/5) is.
+    #[test]
+    fn powers_are_no_chaos() {
+        let errors = |of: fn(f64) -> f64| (1..=100).map(|k| of(f64::from(k))).collect::<Vec<f64>>();
+        assert!(!grows_fast(&errors(|t| t)) && !grows_fast(&errors(|t| t * t)));
+        assert!(grows_fast(&errors(|t| (0.2 * t).exp())));
+        assert!(!grows_fast(&[0.0, 1.0]));
+    }
+}

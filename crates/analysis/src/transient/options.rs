@@ -1,0 +1,124 @@
+//! Options of a transient, and their errors.
+
+use super::super::AnalysisError;
+use super::super::integrator::Integrator;
+use bimorph_model::compile::CompiledModel;
+use bimorph_model::options::analysis::TRAN_POINTS;
+use bimorph_solve::baseline::SolverKind;
+use bimorph_solve::time::adaptive::Control;
+
+/// Condition that ends a run early.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Until {
+    /// The contact force of a gap or stop begins to act.
+    Contact,
+    /// A contact force ends.
+    Release,
+    /// A signal crosses a level, in the signal's unit.
+    Level(String, f64),
+}
+
+impl std::fmt::Display for Until {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Contact => f.write_str("contact"),
+            Self::Release => f.write_str("release"),
+            Self::Level(name, level) => write!(f, "{name}={level}"),
+        }
+    }
+}
+
+/// Options of a transient.
+#[derive(Debug, Clone)]
+pub struct TransientOptions<'a> {
+    /// End time [s].
+    pub stop: f64,
+    /// Names of the signals wanted, see [`bimorph_device::SignalInfo`].
+    pub signals: Vec<String>,
+    /// Number of equally spaced output times, ends included.
+    pub points: usize,
+    /// Relative error of a step [1].
+    pub tol: f64,
+    /// Voltages held during the run, by port name [V].
+    pub voltages: Vec<(String, f64)>,
+    /// A variant of the same netlist whose static equilibrium is the initial state; none: at rest as drawn.
+    pub release: Option<&'a CompiledModel>,
+    /// Integrator.
+    pub method: Integrator,
+    /// Length of equal steps [s]; none: steps follow `tol`.
+    pub step: Option<f64>,
+    /// Crossings to find: (signal name, level in the signal's unit).
+    pub events: Vec<(String, f64)>,
+    /// Condition that ends the run before `stop`.
+    pub until: Option<Until>,
+    /// Solver of the linear systems of the method. The result is the same to rounding; all but the recursion are
+    /// baselines, and Radau5 and rk45 have none.
+    pub solver: SolverKind,
+    /// Whether the run estimates the error of its steps, see
+    /// [`TransientResult::step_error`](super::TransientResult::step_error): Rodas4 with steps that follow the
+    /// tolerance, in a frame that does not rotate. The motion is bit-identical.
+    pub estimate: bool,
+    /// Whether the result stores the samples, default true; otherwise only the callback receives them.
+    pub keep: bool,
+}
+
+impl Default for TransientOptions<'_> {
+    /// From rest to 1 s by default.
+    fn default() -> Self {
+        Self {
+            stop: 1.0,
+            signals: Vec::new(),
+            points: TRAN_POINTS.count(),
+            tol: 1e-3,
+            voltages: Vec::new(),
+            release: None,
+            method: Integrator::default(),
+            step: None,
+            events: Vec::new(),
+            until: None,
+            solver: SolverKind::default(),
+            estimate: false,
+            keep: true,
+        }
+    }
+}
+
+/// Share of the tolerance that one step may use: errors of many steps add up.
+pub(crate) const STEP_SHARE: f64 = 1e-2;
+
+pub(crate) fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError> {
+    let bad = |what: &str, detail: String| Err(AnalysisError::BadRequest { what: what.into(), detail });
+    if !(options.stop.is_finite() && options.stop > 0.0) {
+        return bad("stop", format!("{} is not a positive time in seconds", options.stop));
+    }
+    if options.points < 2 {
+        return bad("points", format!("{} output times; at least 2 are needed", options.points));
+    }
+    if !(options.tol.is_finite() && options.tol > 0.0 && options.tol < 1.0) {
+        return bad("tol", format!("{} is not a relative error between 0 and 1", options.tol));
+    }
+    if let Some(step) = options.step.filter(|step| *step > options.stop) {
+        return bad("step", format!("{step} s is longer than the run, which takes {} s", options.stop));
+    }
+    if let Some(step) = options.step
+        && !(step.is_finite() && step > 0.0 && options.stop / step < 1e9)
+    {
+        return bad("step", format!("{step} is not a positive time in seconds, of which at most 1e9 make the run"));
+    }
+    if let Integrator::GeneralizedAlpha { rho } = options.method
+        && !(0.0..=1.0).contains(&rho)
+    {
+        return bad("rho", format!("{rho} is not between 0 and 1"));
+    }
+    if let Some((name, level)) = options.events.iter().find(|(_, level)| !level.is_finite()) {
+        return bad("event", format!("{name}={level}: the level is not finite"));
+    }
+    Ok(())
+}
+
+impl TransientOptions<'_> {
+    /// Control of the step length.
+    pub(crate) fn control(&self) -> Control {
+        self.step.map_or(Control::Tolerance(STEP_SHARE * self.tol), Control::Fixed)
+    }
+}

@@ -1,0 +1,214 @@
+//! A run from its start to its end, with its samples, crossings, and stability checks.
+
+use super::super::contact_range::within_contact_range;
+use super::super::stability::StabilityMonitor;
+use super::super::statics::{notes_at, operating_point, source_vector};
+use super::super::{AnalysisError, ProgressCallback};
+use super::contact_energy::ContactEnergy;
+use super::crossings::Crossings;
+use super::error_log::{ErrorLog, SignalLoss};
+use super::folded_segments;
+use super::options::{TransientOptions, check};
+use super::result::{Counters, TransientResult};
+use super::samples::SampleRecorder;
+use crate::readout::signal::Signal;
+use bimorph_domains::Ramp;
+use bimorph_model::compile::CompiledModel;
+use bimorph_multibody::Body;
+use bimorph_solve::time::adaptive::{Advance, Observer};
+use bimorph_solve::time::defect::SeeError;
+use bimorph_solve::time::method::{Motion, SolverCounters};
+
+/// Times of a run at which its stability is checked, the end included.
+pub(crate) const STABILITY_CHECKS: usize = 16;
+
+/// Propagates a motion from the start of a ramp to its end.
+pub(crate) trait Propagator {
+    /// Moves the start to a state from which the formulation can continue.
+    ///
+    /// # Errors
+    /// See [`AnalysisError`].
+    fn begin(&mut self, ramp: &Ramp<'_>, motion: &mut Motion) -> Result<(), AnalysisError> {
+        let _ = (ramp, motion);
+        Ok(())
+    }
+
+    /// Advances it; `observe` sees each step, and `errors` the error of the motion at its end where the method propagates it.
+    ///
+    /// # Errors
+    /// See [`AnalysisError`].
+    fn advance(
+        &mut self,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        observe: Observer<'_>,
+        errors: Option<SeeError<'_>>,
+    ) -> Result<(Advance, SolverCounters), AnalysisError>;
+}
+
+/// Advances `carrier` from the start to the end of a run, and takes samples and events.
+pub(crate) fn record(
+    compiled: &CompiledModel,
+    options: &TransientOptions<'_>,
+    carrier: &mut impl Propagator,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<TransientResult, AnalysisError> {
+    check(options)?;
+    let system = &compiled.parts.system;
+    let signals: Vec<Signal> =
+        options.signals.iter().map(|name| Signal::find(compiled, name)).collect::<Result<_, _>>()?;
+    let sources = source_vector(compiled, &options.voltages)?;
+    let (mut motion, rise, begun) = start(compiled, options)?;
+    let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop);
+    let mut drive = system.electrics.drive();
+    ramp.at(0.0, &mut drive);
+    let volts = drive.volts.clone();
+    carrier.begin(&ramp, &mut motion)?;
+
+    let (asked, held) = ((compiled, options), (&ramp, &volts[..]));
+    let mut crossings = Crossings::start(asked, held, (&motion, &rise))?;
+    let mut samples = SampleRecorder::start(asked, held, &signals, sample, &motion);
+    let mut log = options.estimate.then(|| ErrorLog::start((compiled, options.stop), held, &signals, &motion));
+    let mut stability = StabilityMonitor::new(system);
+    let mut energy = ContactEnergy::start(compiled, &motion, &drive);
+    let mut looks = 0;
+    let (mut beyond, mut stopped_at) = (None, None);
+    refuse_in_contact(compiled, options, 0.0, &motion)?;
+    let mut observe = |s: f64, h: f64, before: &Motion, after: &Motion| {
+        stopped_at = crossings.step(s, h, before, after);
+        let suits = refuse_in_contact(compiled, options, s + h, after);
+        let within = |()| within_contact_range(compiled, &after.q);
+        let done = ((s + h) / options.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize;
+        let look = options.step.is_some() || done > looks;
+        let kept = |()| energy.as_mut().map_or(Ok(()), |energy| energy.step(options, s + h, after, look));
+        // energy first: steps that are too long throw parts through each other
+        if let Err(error) = suits.and_then(kept).and_then(within).or_else(|error| stopped_at.map(|_| ()).ok_or(error)) {
+            beyond = Some(error);
+            return false;
+        }
+        samples.step(s, h, before, after, stopped_at.unwrap_or(f64::INFINITY));
+        if stopped_at.is_some() {
+            return false;
+        }
+        if done > looks {
+            looks = done;
+            ramp.at(s + h, &mut drive);
+            stability.check(system, &drive, s + h, (&after.q, &after.v));
+        }
+        watch(((s + h) / options.stop).min(1.0))
+    };
+    let mut errors = log.as_mut().map(|log| |t: f64, motion: &Motion, error: &Motion| log.observe(t, motion, error));
+    let see = errors.as_mut().map(|see| see as SeeError<'_>);
+    let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe, see).map_err(|error| match error {
+        AnalysisError::StepFailed { t, dt, detail } => {
+            AnalysisError::StepFailed { t, dt, detail: detail + &folded_segments::addition(compiled, &motion.q) }
+        }
+        other => other,
+    })?;
+    if end == Advance::Stopped && stopped_at.is_none() {
+        return Err(beyond.unwrap_or(AnalysisError::Cancelled));
+    }
+    let estimate = log.and_then(|log| log.estimate(options));
+    let unreached = options.until.as_ref().filter(|_| stopped_at.is_none()).map(|until| {
+        format!("the run does not reach what it goes on until ({until}) by {:e} s; take a longer --stop", options.stop)
+    });
+    let named = options.signals.iter().zip(&signals).zip(samples.columns);
+    Ok(TransientResult {
+        t: samples.t,
+        signals: named.map(|((name, s), values)| (name.clone(), s.unit().to_owned(), values)).collect(),
+        counters: Counters {
+            steps: work.steps,
+            rejected: work.rejected,
+            factorizations: work.factorizations,
+            solves: work.solves,
+            forces: work.forces,
+            iterations: work.iterations,
+        },
+        unknowns: compiled.unknowns(),
+        estimated_error: compiled.order.estimated_error,
+        step_error: estimate.as_ref().map(|estimate| estimate.error),
+        stopped_at,
+        reliable_until: None,
+        after_contact: Vec::new(),
+        events: crossings.events,
+        warnings: begun
+            .into_iter()
+            .chain(stability.warning())
+            .chain(estimate.and_then(|e| e.lost).map(lost))
+            .chain(unreached)
+            .collect(),
+    })
+}
+
+/// Refuses the motion at time `t` [s] where parts touch and the method gains energy in contact.
+fn refuse_in_contact(
+    compiled: &CompiledModel,
+    options: &TransientOptions<'_>,
+    t: f64,
+    motion: &Motion,
+) -> Result<(), AnalysisError> {
+    if !options.method.gains_in_contact() {
+        return Ok(());
+    }
+    let system = &compiled.parts.system;
+    let Some(gap) = (0..system.members.len()).find(|&g| system.touches(g, &motion.q)) else { return Ok(()) };
+    let name = &compiled.parts.gap_names[gap];
+    let method = options.method.name();
+    Err(AnalysisError::BadRequest {
+        what: format!("method {method}"),
+        detail: format!(
+            "the gap \"{name}\" touches at {t:.6e} s, and {method} gains energy without bound in contact; expected a method that does not: \
+             rodas4 (default), radau5, sdirk4, tr-bdf2, or generalized-alpha with --rho 0, in steps that follow --tol; or avf"
+        ),
+    })
+}
+
+/// The warning of a signal that is lost.
+fn lost(SignalLoss { signal, t, chaotic }: SignalLoss) -> String {
+    match chaotic {
+        true => format!(
+            "{signal} is not predictable after {t:.2e} s: neighbouring motions part exponentially there, at any tolerance; only its statistics hold"
+        ),
+        false => format!(
+            "the phase of {signal} is lost after {t:.2e} s: its step error exceeds 0.3 of its range; use a smaller --tol"
+        ),
+    }
+}
+
+/// Initial state of a run, temperature rises of its heaters [K], and warnings: at rest as drawn, or in the equilibrium
+/// of a released load.
+fn start(
+    compiled: &CompiledModel,
+    options: &TransientOptions<'_>,
+) -> Result<(Motion, Vec<f64>, Vec<String>), AnalysisError> {
+    let system = &compiled.parts.system;
+    let still = |b: &Body| b.mass == 0.0 && b.inertia == 0.0 && b.drag.amount == 0.0;
+    if system.model.dampers.is_empty() && system.model.bodies.iter().all(still) {
+        return Err(AnalysisError::BadRequest {
+            what: "motion in time".into(),
+            detail: "nothing that moves has mass or drag; give the layer a `density`, or ask for statics".into(),
+        });
+    }
+    let mut motion = Motion::zeros(system.bodies());
+    let mut rise = vec![0.0; system.electrics.heating.heaters.len()];
+    let mut reported = Vec::new();
+    if let Some(start) = options.release {
+        let point = operating_point(start, &options.voltages)?;
+        let places = |model: &CompiledModel| model.structure.nodes.iter().map(|node| node.position).collect::<Vec<_>>();
+        if point.q.len() != motion.q.len() || places(start) != places(compiled) {
+            return Err(AnalysisError::BadRequest {
+                what: "release".into(),
+                detail: "the released parameter changes the mechanism itself; release a load or a voltage".into(),
+            });
+        }
+        motion.q.copy_from_slice(&point.q);
+        rise.copy_from_slice(&point.rise);
+        reported = notes_at(start, &point);
+    }
+    Ok((
+        motion,
+        rise,
+        reported.into_iter().map(|way| format!("the equilibrium that it is released from: {way}")).collect(),
+    ))
+}

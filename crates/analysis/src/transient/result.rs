@@ -1,0 +1,85 @@
+//! Result of a transient: sampled signals, crossings of levels, and the work.
+
+use bimorph_solve::time::event::Direction;
+use serde::Serialize;
+
+/// Work done by an integration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Counters {
+    /// Accepted steps.
+    pub steps: u64,
+    /// Rejected steps.
+    pub rejected: u64,
+    /// Factorizations.
+    pub factorizations: u64,
+    /// Solves with a factor.
+    pub solves: u64,
+    /// Evaluations of the forces, with or without their tangent.
+    pub forces: u64,
+    /// Newton iterations.
+    pub iterations: u64,
+}
+
+/// A signal that crossed a level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CrossingEvent {
+    /// Name of the signal; of a gap that closes or opens, its `GAP.gap`.
+    pub signal: String,
+    /// The level, in the signal's unit.
+    pub level: f64,
+    /// When [s].
+    pub t: f64,
+    /// Which way.
+    pub direction: Direction,
+    /// True where the contact force of a gap begins (down) or ends (up) to act.
+    pub contact: bool,
+}
+
+/// Statistics of a signal over the part of a run whose single values do not hold, by windows of equal length.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Statistics {
+    /// Name of the signal.
+    pub signal: String,
+    /// From when [s].
+    pub from: f64,
+    /// To when [s].
+    pub to: f64,
+    /// Mean over that time, in the signal's unit.
+    pub mean: f64,
+    /// Half of its 95 % confidence interval.
+    pub mean_error: f64,
+    /// Root mean square about the mean.
+    pub rms: f64,
+    /// Lowest sample.
+    pub low: f64,
+    /// Highest sample.
+    pub high: f64,
+}
+
+/// Sampled signals.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct TransientResult {
+    /// Times [s].
+    pub t: Vec<f64>,
+    /// Samples of each signal, in the requested order: (name, unit, values).
+    pub signals: Vec<(String, String, Vec<f64>)>,
+    /// Work done.
+    pub counters: Counters,
+    /// Mechanical unknowns.
+    pub unknowns: usize,
+    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    pub estimated_error: Option<f64>,
+    /// Estimated root mean square error of the worst signal by the steps in time, of its amplitude [1]; none without an estimate, see
+    /// [`super::step_error`].
+    pub step_error: Option<f64>,
+    /// When [`super::TransientOptions::until`] ended the run [s].
+    pub stopped_at: Option<f64>,
+    /// Time up to which the tolerance holds [s]; none: to the end. See [`super::super::after_contact`].
+    pub reliable_until: Option<f64>,
+    /// Statistics of each signal after that.
+    pub after_contact: Vec<Statistics>,
+    /// Requested crossings and contacts of gaps, in order of time.
+    pub events: Vec<CrossingEvent>,
+    /// Warnings about the result.
+    pub warnings: Vec<String>,
+}

@@ -1,0 +1,193 @@
+//! Reply to a trial: currents, charges, outputs and their partials at the resulting state, and the bound of the
+//! circuit's next step.
+
+use super::session::DeviceSession;
+use super::states::Snapshot;
+use super::step_history::{StepHistory, SteppingRule};
+use super::{Trial, TrialReply};
+use bimorph_analysis::readout::ports::PortResponse;
+use bimorph_analysis::readout::signal::{Signal, SignalView};
+use bimorph_domains::System;
+use bimorph_model::compile::CompiledModel;
+
+/// Share of the compilation's tolerance that one internal step may use.
+pub(super) const STEP_SHARE: f64 = 1e-2;
+/// Share of the length scale that the integrator takes for nothing, in units of its tolerance [1].
+const FLOOR: f64 = 1e-4;
+/// Temperature difference that is negligible for a circuit [K].
+const SAME_TEMPERATURE: f64 = 1e-6;
+/// Voltage difference that is negligible for a circuit, and its fraction of the voltage at the port: the tolerances of
+/// ngspice's iteration [V, 1].
+const SAME_VOLTAGE: [f64; 2] = [1e-6, 1e-6];
+
+impl DeviceSession {
+    /// Fills in the reply from `motion`, `rise`, `sources` and `sensitivity`, and stores the state. `from` holds the
+    /// sources at the start of a transient step, and what was seen up to there; `dt_next` becomes what is seen now.
+    pub(super) fn answer(
+        &mut self,
+        compiled: &CompiledModel,
+        request: &Trial<'_>,
+        from: Option<(&[f64], &Snapshot)>,
+        next_step: f64,
+        reply: &mut TrialReply,
+    ) {
+        let own = self.ports.system.clone();
+        let system = Self::system(&own, compiled);
+        self.values(compiled, system, reply);
+        self.partials(compiled, system, from.map(|(from, _)| (from, request.dt)), reply);
+        let (shown, bound) = self.seen(compiled, system, request, from.map(|(_, before)| before), reply);
+        reply.dt_next = bound;
+        let snapshot = Snapshot {
+            shown,
+            q: self.motion.q.clone(),
+            v: self.motion.v.clone(),
+            rise: self.rise.clone(),
+            sources: self.sources.clone(),
+            next_step,
+            elapsed: from.map_or(0.0, |(_, before)| before.elapsed + request.dt),
+            carried: if from.is_some() { self.stepper.method.state().to_vec() } else { Vec::new() },
+        };
+        reply.token = Some(self.states.insert(request, snapshot));
+    }
+
+    fn view(&self) -> SignalView<'_> {
+        SignalView { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts }
+    }
+
+    /// Currents, charges and outputs; of the partials of currents those that the circuit alone makes.
+    fn values(&self, compiled: &CompiledModel, system: &System, reply: &mut TrialReply) {
+        let electrics = &system.electrics;
+        let (ports, gaps) = (self.ports.len(), self.drive.volts.len());
+        let view = self.view();
+        reply.currents.clear();
+        reply.charges.clear();
+        reply.di_dv.clear();
+        reply.outputs.clear();
+        for (&port, answer) in self.ports.sources.iter().zip(&self.ports.answers) {
+            let (mut current, mut charge) = (0.0, 0.0);
+            match answer {
+                PortResponse::Current => {
+                    let row = electrics.conductance.row(port);
+                    current = row.iter().zip(&self.sources).map(|(g, u)| g * u).sum();
+                    reply.di_dv.extend(self.ports.sources.iter().map(|&other| row[other]));
+                    let of = |g: usize| electrics.gap_rows[(g, port)] * system.capacitance(g, view.q) * view.volts[g];
+                    charge = (0..gaps).map(of).sum();
+                }
+                PortResponse::Motion(signal) => current = signal.value(compiled, &view),
+                PortResponse::Rise(heater) => current = view.rise[*heater],
+                PortResponse::Nothing => {}
+            }
+            reply.currents.push(current);
+            reply.charges.push(charge);
+            // what is not electrical is filled in with the sensitivities
+            reply.di_dv.resize(reply.currents.len() * ports, 0.0);
+        }
+        reply.outputs.extend(self.signals.iter().map(|s| s.value(compiled, &view)));
+    }
+
+    /// Partials of charges, outputs and what is not electrical, from the sensitivities. `step` holds the sources at the start of
+    /// a transient step and its length [s].
+    fn partials(
+        &mut self,
+        compiled: &CompiledModel,
+        system: &System,
+        step: Option<(&[f64], f64)>,
+        reply: &mut TrialReply,
+    ) {
+        let electrics = &system.electrics;
+        let (ports, gaps) = (self.ports.len(), self.drive.volts.len());
+        let view = SignalView { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts };
+        reply.dq_dv.clear();
+        reply.dq_dv.resize(ports * ports, 0.0);
+        reply.doutputs_dv.clear();
+        reply.doutputs_dv.resize(self.signals.len() * ports, 0.0);
+        for (p, &port) in self.ports.sources.iter().enumerate() {
+            let s = &self.stepper.method.sensitivity()[p];
+            let gap_row: Vec<f64> = (0..gaps).map(|g| electrics.gap_rows[(g, port)]).collect();
+            match step {
+                None => {
+                    self.unit.fill(0.0);
+                    self.unit[port] = 1.0;
+                    for (k, slope) in self.rise_slope.iter_mut().enumerate() {
+                        *slope = electrics.heating.slope(k, &self.sources, &self.unit);
+                    }
+                }
+                Some((from, dt)) => {
+                    let slopes = &mut self.rise_slope;
+                    electrics.rise_sensitivities((from, &self.sources), dt, dt, port, |k, slope| slopes[k] = slope);
+                }
+            }
+            for (g, volts) in gap_row.iter().enumerate() {
+                let dq =
+                    system.capacitance(g, view.q) * volts + system.capacitance_slope(g, view.q, &s.q) * view.volts[g];
+                for (row, &other) in self.ports.sources.iter().enumerate() {
+                    if self.ports.answers[row] == PortResponse::Current {
+                        reply.dq_dv[row * ports + p] += electrics.gap_rows[(g, other)] * dq;
+                    }
+                }
+            }
+            let change = SignalView { q: &s.q, v: &s.v, rise: &self.rise_slope, volts: &gap_row };
+            for (row, signal) in self.signals.iter().enumerate() {
+                reply.doutputs_dv[row * ports + p] = signal.slope(compiled, &view, &change);
+            }
+            for (row, answer) in self.ports.answers.iter().enumerate() {
+                match answer {
+                    PortResponse::Motion(signal) => {
+                        reply.di_dv[row * ports + p] = signal.slope(compiled, &view, &change)
+                    }
+                    PortResponse::Rise(heater) => reply.di_dv[row * ports + p] = change.rise[*heater],
+                    PortResponse::Current | PortResponse::Nothing => {}
+                }
+            }
+        }
+    }
+
+    /// Values of a state for the circuit, and the bound of the step from there [s].
+    fn seen(
+        &self,
+        compiled: &CompiledModel,
+        system: &System,
+        request: &Trial<'_>,
+        before: Option<&Snapshot>,
+        reply: &TrialReply,
+    ) -> (StepHistory, f64) {
+        let (ports, view) = (self.ports.len(), self.view());
+        let electrical = |row: usize| self.ports.answers[row] == PortResponse::Current;
+        let shown = (0..ports).map(|row| if electrical(row) { reply.charges[row] } else { reply.currents[row] });
+        let seen = reply.outputs.iter().copied().chain(shown).collect();
+        match before {
+            None => (StepHistory::start(seen), f64::INFINITY),
+            Some(before) => {
+                let (tol, signals) = (compiled.options.tol, self.signals.len());
+                let nothing = STEP_SHARE * tol * FLOOR;
+                let charge = |capacitance: f64, volts: f64| {
+                    capacitance.abs() * (SAME_VOLTAGE[0] + SAME_VOLTAGE[1] * volts.abs())
+                };
+                let of_signal = |signal: &Signal| match signal {
+                    Signal::Displacement(_, 2) => nothing,
+                    Signal::Displacement(..) | Signal::Distance(_) => nothing * system.length_scale,
+                    Signal::Rate(_, 2) => nothing / self.first_step,
+                    Signal::Rate(..) => nothing * system.length_scale / self.first_step,
+                    Signal::Temperature(_) | Signal::Prescribed(_) => SAME_TEMPERATURE,
+                    Signal::Capacitance(g) => nothing * system.capacitance(*g, view.q).abs(),
+                    Signal::Pull(g) => nothing * system.pull(*g, view.q, view.volts[*g]).abs(),
+                    Signal::Charge(g) => charge(system.capacitance(*g, view.q), view.volts[*g]),
+                };
+                let follow = |n: usize| match n.checked_sub(signals).map(|port| &self.ports.answers[port]) {
+                    Some(PortResponse::Motion(_)) => SteppingRule::Even,
+                    Some(PortResponse::Current) => SteppingRule::Differentiated,
+                    _ => SteppingRule::Line,
+                };
+                let floor = |n: usize| match n.checked_sub(signals) {
+                    None => of_signal(&self.signals[n]),
+                    Some(port) => match &self.ports.answers[port] {
+                        PortResponse::Current => charge(reply.dq_dv[port * (ports + 1)], request.voltages[port]),
+                        PortResponse::Motion(signal) => of_signal(signal),
+                        PortResponse::Rise(_) | PortResponse::Nothing => SAME_TEMPERATURE,
+                    },
+                };
+                before.shown.step(request.dt, seen, tol, floor, follow)
+            }
+        }
+    }
+}

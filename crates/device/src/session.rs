@@ -1,0 +1,219 @@
+//! Session of a device: its ports, its signals, its states, and the storage that every trial reuses.
+
+use super::agitation::ThermalForce;
+use super::contact_steps::ContactSteps;
+use super::growth::{Difference, Growth};
+use super::output_gradient::{OutputGradient, surroundings};
+use super::phase_error::PhaseErrorMonitor;
+use super::states::{Snapshot, States};
+use super::{Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, Token, Trial};
+use bimorph_analysis::readout::ports::OpenedPorts;
+use bimorph_analysis::readout::signal::Signal;
+use bimorph_analysis::transient::first_step;
+use bimorph_base::budget;
+use bimorph_domains::drive::Electrics;
+use bimorph_domains::{Drive, System};
+use bimorph_model::compile::CompiledModel;
+use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::planar::Pose;
+use bimorph_solve::equations::bodies::NormWeights;
+use bimorph_solve::equilibrium::{Equilibrium, EquilibriumOptions};
+use bimorph_solve::harmonic::{ComplexPose, Harmonic};
+use bimorph_solve::time::adaptive::Adaptive;
+use bimorph_solve::time::formulated::Formulated;
+use bimorph_solve::time::method::Motion;
+use std::sync::Arc;
+
+/// An open session: the choice of ports and signals, the states, and the storage that every trial reuses.
+#[derive(Debug)]
+pub(super) struct DeviceSession {
+    /// The request that opened it.
+    pub(super) opened: OpenRequest,
+    pub(super) ports: OpenedPorts,
+    pub(super) signals: Vec<Signal>,
+    pub(super) states: States,
+    pub(super) first_step: f64,
+    pub(super) equilibrium: Equilibrium,
+    /// Thermal agitation, if requested.
+    pub(super) shaken: Option<ThermalForce>,
+    /// Carries ∂motion/∂(final voltage), one for each opened port.
+    pub(super) stepper: Adaptive<Formulated>,
+    /// Weights of its step errors.
+    pub(super) weights: NormWeights,
+    pub(super) motion: Motion,
+    pub(super) rise: Vec<f64>,
+    pub(super) rise_slope: Vec<f64>,
+    pub(super) sources: Vec<f64>,
+    pub(super) unit: Vec<f64>,
+    pub(super) drive: Drive,
+    pub(super) change: Drive,
+    pub(super) zeros: Vec<Pose>,
+    pub(super) linear: Option<(Token, BlockMatrix<f64, 3>)>,
+    pub(super) harmonic: Harmonic,
+    /// Gradient of each output over displacements, about the last state whose noise was requested.
+    pub(super) seen: Option<(Token, Vec<OutputGradient>)>,
+    pub(super) response: Vec<ComplexPose>,
+    /// Codes of previous warnings, and the size of each.
+    pub(super) warned: Vec<(String, f64)>,
+    /// How what was accepted rings.
+    pub(super) ringing: PhaseErrorMonitor,
+    /// How fast the last trial's motion grows at fixed voltages.
+    pub(super) growth: Growth,
+    pub(super) difference: Difference,
+    /// Steps of the point at hand where parts touch.
+    pub(super) contact_steps: ContactSteps,
+}
+
+/// Doubles for each port and body: stages, displacements, velocities, and those of states that are kept.
+const DOUBLES: usize = 64;
+
+impl DeviceSession {
+    pub(super) fn open(compiled: &CompiledModel, request: &OpenRequest) -> Result<(Self, Description), DeviceError> {
+        let ports = OpenedPorts::find(compiled, &request.ports)?;
+        let own = ports.system.clone();
+        let system = own.as_deref().unwrap_or(&compiled.parts.system);
+        let electrics = &system.electrics;
+        let signals: Vec<Signal> = (request.signals.iter())
+            .map(|name| {
+                budget::check();
+                Signal::find(compiled, name)
+            })
+            .collect::<Result<_, _>>()?;
+        let description = Description {
+            ports: if request.ports.is_empty() {
+                let name = |&source: &usize| electrics.names[source].clone();
+                ports.sources.iter().map(|p| PortInfo { name: name(p), kind: PortKind::Electrical }).collect()
+            } else {
+                let kinds = request.ports.iter().zip(&ports.kinds);
+                kinds.map(|(name, &kind)| PortInfo { name: name.clone(), kind }).collect()
+            },
+            signals: (request.signals.iter().zip(&signals))
+                .map(|(name, s)| SignalInfo { name: name.clone(), unit: s.unit().into() })
+                .collect(),
+            unknowns: compiled.unknowns(),
+        };
+        let n = system.bodies();
+        // each port has its sensitivity in every stage of a step, and matrices of ports and signals go with every reply
+        budget::lay_out_matrix(ports.len(), DOUBLES * n + 4 * ports.len() + 2 * signals.len());
+        let heaters = electrics.heating.heaters.len();
+        let first_step = first_step(system, f64::INFINITY);
+        let joints = match &compiled.joints {
+            Some(Ok(joints)) => Some(ports.joints(joints)),
+            Some(Err(unfit)) => {
+                return Err(DeviceError::BadRequest {
+                    what: "formulation",
+                    expected: format!("one that suits this mechanism ({unfit})"),
+                    got: compiled.options.formulation.name().into(),
+                });
+            }
+            None => None,
+        };
+        let shaken = match &request.noise {
+            Some(noise) => Some(ThermalForce::new(noise, compiled, surroundings(compiled))?),
+            None => None,
+        };
+        let session = Self {
+            opened: request.clone(),
+            shaken,
+            stepper: Adaptive::new(n, Formulated::new(system, joints.as_ref(), first_step, &ports.sources)),
+            weights: NormWeights::new(&system.model),
+            ports,
+            signals,
+            states: States::default(),
+            first_step,
+            equilibrium: Equilibrium::new(system, EquilibriumOptions::with_side(compiled.options.other_branch)),
+            motion: Motion::zeros(n),
+            rise: vec![0.0; heaters],
+            rise_slope: vec![0.0; heaters],
+            sources: vec![0.0; electrics.sources()],
+            unit: vec![0.0; electrics.sources()],
+            drive: electrics.drive(),
+            change: electrics.drive(),
+            zeros: vec![Pose::zeros(); n],
+            linear: None,
+            harmonic: Harmonic::new(system),
+            seen: None,
+            response: vec![ComplexPose::zeros(); n],
+            warned: Vec::new(),
+            ringing: PhaseErrorMonitor::default(),
+            growth: Growth::default(),
+            difference: Difference::new(n),
+            contact_steps: ContactSteps::default(),
+        };
+        Ok((session, description))
+    }
+
+    /// Whether a state has the sizes and the sense that one of this session has.
+    pub(super) fn fits(&self, state: &Snapshot) -> bool {
+        let n = self.zeros.len();
+        let poses = |poses: &[Pose]| poses.len() == n && poses.iter().all(|p| p.iter().all(|x| x.is_finite()));
+        let numbers = |numbers: &[f64], count: usize| numbers.len() == count && numbers.iter().all(|x| x.is_finite());
+        let carried = self.stepper.method.state();
+        let finite = |poses: &[Pose]| poses.iter().all(|p| p.iter().all(|x| x.is_finite()));
+        let alike = |(a, b): (&Motion, &Motion)| {
+            a.q.len() == b.q.len() && a.v.len() == b.v.len() && finite(&a.q) && finite(&a.v)
+        };
+        let followed = state.shown.followed();
+        poses(&state.q)
+            && poses(&state.v)
+            && numbers(&state.rise, self.rise.len())
+            && numbers(&state.sources, self.sources.len())
+            && state.next_step > 0.0
+            && (0.0..f64::INFINITY).contains(&state.elapsed)
+            && state.shown.numbers().into_iter().flatten().all(|x| x.is_finite())
+            && (followed == 0 || followed == self.signals.len() + self.ports.len())
+            && (state.carried.is_empty()
+                || state.carried.len() == carried.len() && state.carried.iter().zip(carried).all(alike))
+    }
+
+    /// The state that a small signal is about.
+    pub(super) fn about(&mut self, token: Token, omega: f64) -> Result<Arc<Snapshot>, DeviceError> {
+        if !omega.is_finite() || omega < 0.0 {
+            return Err(DeviceError::BadRequest {
+                what: "omega",
+                expected: "a finite angular frequency of at least 0 rad/s".into(),
+                got: omega.to_string(),
+            });
+        }
+        self.states.get(token).ok_or(DeviceError::UnknownToken(token))
+    }
+
+    pub(super) fn check(&self, request: &Trial<'_>) -> Result<(), DeviceError> {
+        if request.voltages.len() != self.ports.len() {
+            return Err(DeviceError::BadRequest {
+                what: "voltages",
+                expected: format!("{} values, one for each opened port", self.ports.len()),
+                got: request.voltages.len().to_string(),
+            });
+        }
+        if let Some(v) = request.voltages.iter().find(|v| !v.is_finite()) {
+            return Err(DeviceError::BadRequest {
+                what: "voltages",
+                expected: "finite numbers".into(),
+                got: v.to_string(),
+            });
+        }
+        if request.mode == Mode::Transient && !(request.dt.is_finite() && request.dt > 0.0) {
+            return Err(DeviceError::BadRequest {
+                what: "dt",
+                expected: "a positive time in seconds".into(),
+                got: request.dt.to_string(),
+            });
+        }
+        Ok(())
+    }
+
+    /// The model as it was opened, with the inputs among its ports.
+    pub(super) fn system<'a>(own: &'a Option<Arc<System>>, compiled: &'a CompiledModel) -> &'a System {
+        own.as_deref().unwrap_or(&compiled.parts.system)
+    }
+
+    /// Fills in the source vector: opened ports as asked, the others at 0, the netlist's own sources.
+    pub(super) fn fill_sources(&mut self, electrics: &Electrics, given: &[f64]) {
+        self.sources.fill(0.0);
+        self.sources[electrics.ports..electrics.voltages()].copy_from_slice(&electrics.fixed);
+        for (&port, &value) in self.ports.sources.iter().zip(given) {
+            self.sources[port] = value;
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! The states of a session as bytes, and back: the open request, and every stored state in order of last use.
+//!
+//! Little-endian words; numbers as the bits of their doubles, so that a restored device is bit-identical to the
+//! original. Reading trusts nothing: lengths are bounded by the bytes that are there, and sizes by the model's.
+
+use super::contract::{Agitation, DeviceError, OpenRequest, Token, refused};
+use super::states::{Snapshot, States};
+use super::step_history::StepHistory;
+use bimorph_multibody::planar::Pose;
+use bimorph_solve::time::method::Motion;
+
+/// Magic bytes: a name and the version of this format.
+const HEAD: [u8; 8] = *b"bimorph\x02";
+
+/// Writes what is open and its states.
+pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
+    let mut out = SnapshotWriter(HEAD.to_vec());
+    for names in [&opened.ports, &opened.signals] {
+        out.count(names.len());
+        for name in names {
+            out.count(name.len());
+            out.0.extend(name.as_bytes());
+        }
+    }
+    out.word(opened.noise.is_some().into());
+    if let Some(noise) = &opened.noise {
+        out.word(noise.seed);
+        out.word(noise.band.map_or(0, f64::to_bits));
+    }
+    out.count(states.len());
+    for (token, parent, state) in states.in_order() {
+        out.word(token.0);
+        out.word(parent.map_or(0, |token| token.0));
+        out.poses(&state.q);
+        out.poses(&state.v);
+        out.numbers(&state.rise);
+        out.numbers(&state.sources);
+        out.word(state.next_step.to_bits());
+        out.word(state.elapsed.to_bits());
+        for numbers in state.shown.numbers() {
+            out.numbers(numbers);
+        }
+        out.count(state.carried.len());
+        for motion in &state.carried {
+            out.poses(&motion.q);
+            out.poses(&motion.v);
+        }
+    }
+    out.0
+}
+
+/// Reads them back.
+///
+/// # Errors
+/// [`DeviceError::BadRequest`] for bytes that [`write`] has not made.
+pub(super) fn read(bytes: &[u8]) -> Result<(OpenRequest, States), DeviceError> {
+    let mut from = SnapshotReader(bytes);
+    let read = from.all();
+    match read {
+        Some(read) if from.0.is_empty() => Ok(read),
+        _ => Err(refused("the bytes of a snapshot", "something else, or a part of one")),
+    }
+}
+
+struct SnapshotWriter(Vec<u8>);
+
+impl SnapshotWriter {
+    fn word(&mut self, word: u64) {
+        self.0.extend(word.to_le_bytes());
+    }
+
+    fn count(&mut self, count: usize) {
+        self.word(count as u64);
+    }
+
+    fn numbers(&mut self, numbers: &[f64]) {
+        self.count(numbers.len());
+        numbers.iter().for_each(|x| self.word(x.to_bits()));
+    }
+
+    fn poses(&mut self, poses: &[Pose]) {
+        self.count(poses.len());
+        poses.iter().flat_map(|pose| pose.iter()).for_each(|x| self.word(x.to_bits()));
+    }
+}
+
+/// Remaining bytes; every read returns `None` for invalid bytes.
+struct SnapshotReader<'a>(&'a [u8]);
+
+impl SnapshotReader<'_> {
+    fn all(&mut self) -> Option<(OpenRequest, States)> {
+        self.0 = self.0.strip_prefix(&HEAD)?;
+        let opened = OpenRequest { ports: self.names()?, signals: self.names()?, noise: self.noise()? };
+        let mut states = States::default();
+        for _ in 0..self.count(8)? {
+            let (token, parent) = (Token(self.word()?), self.word()?);
+            let state = Snapshot {
+                q: self.poses()?,
+                v: self.poses()?,
+                rise: self.numbers()?,
+                sources: self.numbers()?,
+                next_step: f64::from_bits(self.word()?),
+                elapsed: f64::from_bits(self.word()?),
+                shown: {
+                    let mut parts = [const { Vec::new() }; StepHistory::PARTS];
+                    for part in &mut parts {
+                        *part = self.numbers()?;
+                    }
+                    StepHistory::from_numbers(parts)?
+                },
+                carried: {
+                    let mut carried = Vec::new();
+                    for _ in 0..self.count(16)? {
+                        carried.push(Motion { q: self.poses()?, v: self.poses()? });
+                    }
+                    carried
+                },
+            };
+            states.put(token, (parent != 0).then_some(Token(parent)), state);
+        }
+        Some((opened, states))
+    }
+
+    fn bytes(&mut self, count: usize) -> Option<&[u8]> {
+        let (taken, left) = self.0.split_at_checked(count)?;
+        self.0 = left;
+        Some(taken)
+    }
+
+    fn word(&mut self) -> Option<u64> {
+        self.bytes(8)?.try_into().ok().map(u64::from_le_bytes)
+    }
+
+    /// A number of things of at least `each` bytes: there are no more than the bytes that are left hold.
+    fn count(&mut self, each: usize) -> Option<usize> {
+        let count = usize::try_from(self.word()?).ok()?;
+        (count <= self.0.len() / each).then_some(count)
+    }
+
+    fn noise(&mut self) -> Option<Option<Agitation>> {
+        Some(match self.word()? {
+            0 => None,
+            1 => {
+                let (seed, band) = (self.word()?, self.word()?);
+                Some(Agitation { seed, band: (band != 0).then(|| f64::from_bits(band)) })
+            }
+            _ => return None,
+        })
+    }
+
+    fn names(&mut self) -> Option<Vec<String>> {
+        let mut names = Vec::new();
+        for _ in 0..self.count(8)? {
+            let length = self.count(1)?;
+            names.push(String::from_utf8(self.bytes(length)?.to_vec()).ok()?);
+        }
+        Some(names)
+    }
+
+    fn numbers(&mut self) -> Option<Vec<f64>> {
+        let count = self.count(8)?;
+        let bytes = self.bytes(8 * count)?;
+        Some(bytes.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)).collect())
+    }
+
+    fn poses(&mut self) -> Option<Vec<Pose>> {
+        let count = self.count(24)?;
+        let bytes = self.bytes(24 * count)?;
+        let number = |k: usize, pose: &[[u8; 8]]| f64::from_le_bytes(pose[k]);
+        Some(
+            (bytes.as_chunks::<8>().0.chunks_exact(3))
+                .map(|pose| Pose::new(number(0, pose), number(1, pose), number(2, pose)))
+                .collect(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! States come back with the same bits, and nothing else is taken for them.
+    use super::*;
+    use crate::{Mode, Trial};
+
+    fn some() -> (OpenRequest, States) {
+        let opened = OpenRequest {
+            ports: vec!["drive".into()],
+            signals: vec!["µ.x".into(), String::new()],
+            noise: Some(Agitation { seed: 7, band: Some(1e6) }),
+        };
+        let mut states = States::default();
+        let mut parent = None;
+        for k in 0..3 {
+            let pose = |x: f64| vec![Pose::new(x, f64::NAN, -0.0), Pose::new(f64::INFINITY, 1e-320, x)];
+            let carried = if k == 2 { vec![Motion { q: pose(7.0), v: pose(8.0) }] } else { vec![] };
+            let state = Snapshot {
+                q: pose(1.0 + f64::from(k)),
+                v: pose(0.1),
+                rise: vec![300.0; k as usize],
+                sources: vec![1.0, -2.0],
+                elapsed: 3e-6,
+                next_step: f64::INFINITY,
+                shown: StepHistory::start(vec![1.0, 2.0])
+                    .step(1e-6, vec![1.5, 2.5], 1e-3, |_| 1e-9, |_| crate::step_history::SteppingRule::Line)
+                    .0,
+                carried,
+            };
+            let voltages = [f64::from(k)];
+            parent = Some(
+                states.insert(&Trial { mode: Mode::Transient, parent, t: 0.0, dt: 1e-6, voltages: &voltages }, state),
+            );
+        }
+        (opened, states)
+    }
+
+    #[test]
+    fn states_come_back() {
+        let (opened, states) = some();
+        let bytes = write(&opened, &states);
+        let (read_opened, read_states) = read(&bytes).expect("its own bytes");
+        assert_eq!(read_opened, opened);
+        assert_eq!(write(&read_opened, &read_states), bytes, "with the same bits, in the same order");
+    }
+
+    #[test]
+    fn other_bytes_are_refused() {
+        let (opened, states) = some();
+        let bytes = write(&opened, &states);
+        for length in 0..bytes.len() {
+            assert!(read(&bytes[..length]).is_err(), "{length}");
+        }
+        assert!(read(&[bytes.as_slice(), &[0]].concat()).is_err());
+        for at in 0..bytes.len() {
+            for bit in [0, 7] {
+                let mut wrong = bytes.clone();
+                wrong[at] ^= 1 << bit;
+                // it may be a state, but it neither panics nor allocates more than its bytes
+                let _ = read(&wrong);
+            }
+        }
+        assert!(read(&[&HEAD[..], &[255; 64]].concat()).is_err());
+    }
+}

@@ -1,0 +1,224 @@
+//! How a trial is made: a static one by following the parent's equilibrium, a transient one by integrating from the parent's
+//! state.
+
+use super::agitation::ThermalForce;
+use super::contact_steps::{ContactSteps, MAX_ERROR, near};
+use super::growth::{Bound, rate_along};
+use super::reply::STEP_SHARE;
+use super::session::DeviceSession;
+use super::states::Snapshot;
+use super::{Status, Trial, TrialReply};
+use bimorph_analysis::contact_range::within_contact_range;
+use bimorph_domains::{Ramp, System};
+use bimorph_model::compile::CompiledModel;
+use bimorph_multibody::planar::Pose;
+use bimorph_solve::equations::Bodies;
+use bimorph_solve::path::SourcePath;
+use bimorph_solve::time::adaptive::{Advance, Control};
+
+/// Internal steps in one circuit step before the device requires a shorter one.
+const MAX_INTERNAL_STEPS: usize = 512;
+/// Longest circuit step proposed, in internal steps, whatever the circuit sees: a step that has to be taken again shall
+/// not cost too much, and a change of pace from one step to the next stay below [`MAX_INTERNAL_STEPS`].
+const PROPOSED_STEPS: f64 = 32.0;
+
+/// Share of a charge's derivative beyond that of the capacitance at rest from which on the motion may be unstable [1]: at λh = 1 the response of a
+/// growing motion adds 18 % or more.
+const RESPONDS: f64 = 0.1;
+
+impl DeviceSession {
+    /// A static trial: from the parent's equilibrium along straight lines in voltage, or from rest.
+    pub(super) fn balance(
+        &mut self,
+        compiled: &CompiledModel,
+        request: &Trial<'_>,
+        parent: Option<&Snapshot>,
+        reply: &mut TrialReply,
+    ) {
+        let own = self.ports.system.clone();
+        let system = Self::system(&own, compiled);
+        let electrics = &system.electrics;
+        self.fill_sources(electrics, request.voltages);
+        let rest = vec![0.0; self.sources.len()];
+        let (from, load) = parent.map_or((rest.as_slice(), 0.0), |p| (p.sources.as_slice(), 1.0));
+        self.motion.q.copy_from_slice(parent.map_or(&self.zeros, |p| &p.q));
+        self.motion.v.fill(Pose::zeros());
+        let path = SourcePath::new(electrics, from, &self.sources, [load, 1.0]);
+        match self.equilibrium.follow(system, &path, &mut self.motion.q) {
+            Ok(found) => reply.jumped = !found.passed.is_empty(),
+            Err(error) => {
+                // a gap pressed beyond its law is the reason where there is one
+                let error = within_contact_range(compiled, &self.motion.q).err().unwrap_or_else(|| error.into());
+                reply.status = Status::Fail(error.to_string());
+                return;
+            }
+        }
+        if let Err(error) = within_contact_range(compiled, &self.motion.q) {
+            reply.status = Status::Fail(error.to_string());
+            return;
+        }
+        electrics.steady(&self.sources, &mut self.rise, &mut self.drive);
+        // ∂q/∂V = −K⁻¹·∂r/∂V with the factor that the last Newton iteration left
+        for (p, &port) in self.ports.sources.iter().enumerate() {
+            self.unit.fill(0.0);
+            self.unit[port] = 1.0;
+            electrics.steady_slope(&self.sources, &self.unit, &mut self.change);
+            let s = &mut self.stepper.method.sensitivity_mut()[p];
+            system.drive_force(&self.motion.q, &self.drive, &self.change, &mut s.q);
+            for x in &mut s.q {
+                *x = -*x;
+            }
+            self.equilibrium.factor().solve(&system.model.pattern, &mut s.q);
+            s.v.fill(Pose::zeros());
+        }
+        self.answer(compiled, request, None, self.first_step, reply);
+    }
+
+    /// A transient trial: the motion over dt, sensitivities along.
+    pub(super) fn advance(
+        &mut self,
+        compiled: &CompiledModel,
+        request: &Trial<'_>,
+        parent: Option<&Snapshot>,
+        reply: &mut TrialReply,
+    ) {
+        let own = self.ports.system.clone();
+        let system = Self::system(&own, compiled);
+        self.fill_sources(&system.electrics, request.voltages);
+        let from = parent.map_or_else(|| vec![0.0; self.sources.len()], |p| p.sources.clone());
+        let electrics = &system.electrics;
+        if let Some(shaken) = &mut self.shaken {
+            let start = parent.map_or(0.0, |p| p.elapsed);
+            if let Err(longest) = shaken.over(compiled, start, request.dt) {
+                reply.status = Status::NeedDt(longest);
+                return;
+            }
+        }
+        let tol = STEP_SHARE * compiled.options.tol;
+        let kept = parent.is_some_and(|parent| self.keep_steps(system, (request, parent), &from, tol));
+        self.begin(parent);
+        let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
+        let mut ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
+        let mut h = self.contact_steps.next;
+        let ends = &self.contact_steps.ends;
+        let bodies = &mut Bodies::weighed(system, &ramp, &self.weights);
+        if !(kept && self.stepper.along(bodies, &mut self.motion, ends, (tol, MAX_ERROR))) {
+            self.begin(parent);
+            h = parent.map_or(self.first_step, |p| p.next_step);
+            let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
+            ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
+            let advanced = self.stepper.advance(
+                &mut Bodies::weighed(system, &ramp, &self.weights),
+                &mut self.motion,
+                &mut h,
+                Control::Tolerance(tol),
+                MAX_INTERNAL_STEPS,
+                &mut |_, _, _, _| true,
+            );
+            match advanced {
+                // the observer above never stops it
+                Ok(Advance::Done | Advance::Stopped) => {}
+                Ok(Advance::OutOfSteps(reached)) => {
+                    reply.status = Status::NeedDt(f64::max(0.5 * reached, 1e-3 * request.dt));
+                    return;
+                }
+                Err(error) => {
+                    reply.status = Status::Fail(error.begun_at(request.t - request.dt).to_string());
+                    return;
+                }
+            }
+        }
+        if let Err(error) = within_contact_range(compiled, &self.motion.q) {
+            reply.status = Status::Fail(error.to_string());
+            return;
+        }
+        for k in 0..self.rise_slope.len() {
+            self.rise_slope[k] = ramp.rise_at(k, request.dt);
+        }
+        ramp.at(request.dt, &mut self.drive);
+        self.rise.copy_from_slice(&self.rise_slope);
+        let rest = Snapshot::default();
+        self.answer(compiled, request, Some((&from, parent.unwrap_or(&rest))), h, reply);
+        let cell = self.shaken.as_ref().map_or(f64::INFINITY, |shaken| shaken.cell);
+        reply.dt_next = reply.dt_next.min(PROPOSED_STEPS * h).min(cell);
+        let rate = self.growth_rate(system, reply);
+        match self.growth.tried(rate, request.dt) {
+            Bound::Next(longest) => reply.dt_next = reply.dt_next.min(longest),
+            Bound::This(longest) => (reply.status, reply.token) = (Status::NeedDt(longest), None),
+        }
+    }
+
+    /// The state that a trial starts from.
+    fn begin(&mut self, parent: Option<&Snapshot>) {
+        match parent {
+            Some(p) => {
+                self.motion.q.copy_from_slice(&p.q);
+                self.motion.v.copy_from_slice(&p.v);
+                self.rise.copy_from_slice(&p.rise);
+            }
+            None => {
+                self.motion.q.fill(Pose::zeros());
+                self.motion.v.fill(Pose::zeros());
+                self.rise.fill(0.0);
+            }
+        }
+        self.stepper.method.begin(parent.map_or(&[], |p| &p.carried));
+    }
+
+    /// The steps that all trials of a point take, see [`super::contact_steps`]. False where each takes its own.
+    fn keep_steps(
+        &mut self,
+        system: &System,
+        (request, parent): (&Trial<'_>, &Snapshot),
+        from: &[f64],
+        tol: f64,
+    ) -> bool {
+        let Some(state) = request.parent.filter(|_| near(system, &parent.q, &parent.v, request.dt)) else {
+            return false;
+        };
+        if self.contact_steps.is_of(state, request.dt) {
+            return !self.contact_steps.ends.is_empty();
+        }
+        self.begin(Some(parent));
+        let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
+        let ramp = Ramp::new(&system.electrics, from, from, &self.rise, request.dt).pushed(push);
+        let (mut h, mut touches) = (parent.next_step, system.contact_energy(&parent.q) > 0.0);
+        let ContactSteps { ends, next, .. } = &mut self.contact_steps;
+        let advanced = self.stepper.advance(
+            &mut Bodies::weighed(system, &ramp, &self.weights),
+            &mut self.motion,
+            &mut h,
+            Control::Tolerance(tol),
+            MAX_INTERNAL_STEPS,
+            &mut |t, step, _, after| {
+                ends.push(t + step);
+                touches |= system.contact_energy(&after.q) > 0.0;
+                true
+            },
+        );
+        if !touches || !matches!(advanced, Ok(Advance::Done)) {
+            ends.clear();
+        } else if let Some(last) = ends.last_mut() {
+            (*last, *next) = (request.dt, h);
+        }
+        !ends.is_empty()
+    }
+
+    /// Rate at which the motion at the end of a trial grows at fixed voltages [1/s]; 0 where nothing shows that it does.
+    fn growth_rate(&mut self, system: &System, reply: &TrialReply) -> f64 {
+        let (electrics, ports) = (&system.electrics, self.ports.len());
+        let mut fastest = 0.0f64;
+        for (p, &source) in self.ports.sources.iter().enumerate() {
+            let fixed: f64 = (0..self.drive.volts.len())
+                .map(|g| electrics.gap_rows[(g, source)].powi(2) * system.capacitance(g, &self.motion.q))
+                .sum();
+            let moving = reply.dq_dv[p * (ports + 1)] - fixed;
+            if moving.abs() > RESPONDS * fixed.abs() {
+                let response = &self.stepper.method.sensitivity()[p].q;
+                fastest =
+                    fastest.max(rate_along(system, &self.drive, (&self.motion.q, response), &mut self.difference));
+            }
+        }
+        fastest
+    }
+}

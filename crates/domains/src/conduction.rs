@@ -1,0 +1,156 @@
+//! Conduction of heat between nodes and to those at ambient: mean rises of beams, and how long they lag behind the heat.
+//!
+//! Where a beam has a heat capacity, its time constant is the mean delay of its temperature rise behind the heat of all
+//! beams in its thermal network. This is the first moment of its step response (Elmore, "The transient response of
+//! damped linear networks", J. Appl. Phys. 19 (1948)): with θ the steady rise along the beams, the rise that the heat
+//! C·θ would bring over θ. Along one beam of the capacity C that is, end temperatures θ_a and θ_b, in closed form
+//! ```text
+//! mean rise                 φ̄   = (φ_a + φ_b)/2 + C/K·((θ_a + θ_b)/24 + P/(120·K))
+//! heat into the node at a   C·(θ_a/3 + θ_b/6 + P/(24·K))
+//! ```
+//! and C/(10·K) = ρ·c·l²/(10·k) between two anchors.
+
+use super::laplacian::Laplacian;
+use bimorph_base::sets::Sets;
+use thiserror::Error;
+
+/// A conductor of heat and current between two nodes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeatConductor {
+    /// First node.
+    pub a: usize,
+    /// Second node.
+    pub b: usize,
+    /// Electrical resistance [Ω].
+    pub resistance: f64,
+    /// Thermal conductance from end to end [W/K].
+    pub conductance: f64,
+    /// Thermal expansion coefficient [1/K].
+    pub expansion: f64,
+    /// Temperature at which it is as drawn [K].
+    pub ambient: f64,
+    /// Time constant [s]; 0: at once.
+    pub time_constant: f64,
+    /// Whether that is to come of the heat capacities of all that conducts.
+    pub delayed: bool,
+    /// Heat capacity [J/K]; 0 where it is not known.
+    pub capacity: f64,
+}
+
+/// A heated beam whose heat cannot leave: nothing conducts from it to an anchor.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("heater {heater} is not connected to any anchor through heat conductors")]
+pub struct NoHeatSink {
+    /// Index of a heater in that part.
+    pub heater: usize,
+}
+
+/// Conduction of heat between nodes and to those at ambient.
+pub(super) struct Conduction {
+    /// Row of each node; none for one at ambient.
+    row: Vec<Option<usize>>,
+    free: usize,
+    laplacian: Laplacian,
+}
+
+impl Conduction {
+    /// # Errors
+    /// [`NoHeatSink`].
+    pub(super) fn new(heaters: &[HeatConductor], sink: &[bool]) -> Result<Self, NoHeatSink> {
+        let mut row = vec![None; sink.len()];
+        let mut free = 0;
+        for h in heaters {
+            for node in [h.a, h.b] {
+                if !sink[node] && row[node].is_none() {
+                    row[node] = Some(free);
+                    free += 1;
+                }
+            }
+        }
+        if let Some(heater) = without_sink(heaters, sink) {
+            return Err(NoHeatSink { heater });
+        }
+        let conductors = heaters.iter().map(|h| (row[h.a], row[h.b], h.conductance));
+        let laplacian = Laplacian::new(free, conductors).ok_or(NoHeatSink { heater: 0 })?;
+        Ok(Self { row, free, laplacian })
+    }
+
+    /// Mean rise of each heater for the heat into each [K, W].
+    pub(super) fn rises(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
+        let ends = self.ends(heaters, watts.iter().map(|watts| [0.5 * watts; 2]));
+        heaters.iter().zip(watts).zip(ends).map(|((h, watts), ends)| mean(h, *watts, ends)).collect()
+    }
+
+    /// Rise at both ends of each heater for the heat from it into both [K, W].
+    fn ends(&self, heaters: &[HeatConductor], into: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+        let mut rise = vec![0.0; self.free];
+        for (h, watts) in heaters.iter().zip(into) {
+            for (row, watts) in [self.row[h.a], self.row[h.b]].into_iter().zip(watts) {
+                if let Some(row) = row {
+                    rise[row] += watts;
+                }
+            }
+        }
+        self.laplacian.solve(&mut rise);
+        let at = |node: usize| self.row[node].map_or(0.0, |row| rise[row]);
+        heaters.iter().map(|h| [at(h.a), at(h.b)]).collect()
+    }
+
+    /// The heat into each heater, and where none comes into a part that conducts together, heat in proportion to capacity [W]. The nodes
+    /// of a heater that are not at ambient join it to a part.
+    fn evenly(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
+        let count = self.row.len();
+        let mut parts = Sets::new(count + heaters.len());
+        for (k, h) in heaters.iter().enumerate() {
+            for node in [h.a, h.b] {
+                if self.row[node].is_some() {
+                    parts.join(node, count + k);
+                }
+            }
+        }
+        let mut heated = vec![false; count + heaters.len()];
+        for (k, watts) in watts.iter().enumerate() {
+            heated[parts.first(count + k)] |= *watts > 0.0;
+        }
+        let one = |(k, (h, watts)): (usize, (&HeatConductor, &f64))| {
+            if heated[parts.first(count + k)] { *watts } else { h.capacity }
+        };
+        heaters.iter().zip(watts).enumerate().map(one).collect()
+    }
+
+    /// Mean delay of the rise of each heater behind the heat into all of them [s, W]. A part that none comes into is heated evenly.
+    pub(super) fn delays(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
+        let watts = &self.evenly(heaters, watts);
+        let warm = self.ends(heaters, watts.iter().map(|watts| [0.5 * watts; 2]));
+        let stored = |((h, watts), [a, b]): ((&HeatConductor, &f64), &[f64; 2])| {
+            let own = watts / (24.0 * h.conductance);
+            [h.capacity * (a / 3.0 + b / 6.0 + own), h.capacity * (a / 6.0 + b / 3.0 + own)]
+        };
+        let late = self.ends(heaters, heaters.iter().zip(watts).zip(&warm).map(stored));
+        let one = |(h, watts): (&HeatConductor, &f64), warm: [f64; 2], late: [f64; 2]| {
+            let own = h.capacity / h.conductance;
+            let rise = mean(h, *watts, warm);
+            let delayed =
+                0.5 * (late[0] + late[1]) + own * ((warm[0] + warm[1]) / 24.0 + watts / (120.0 * h.conductance));
+            if rise > 0.0 { delayed / rise } else { own / 10.0 }
+        };
+        let ends = warm.into_iter().zip(late);
+        heaters.iter().zip(watts).zip(ends).map(|(heated, (warm, late))| one(heated, warm, late)).collect()
+    }
+}
+
+/// Mean rise of a heater between its ends [K].
+fn mean(h: &HeatConductor, watts: f64, ends: [f64; 2]) -> f64 {
+    0.5 * (ends[0] + ends[1]) + watts / (12.0 * h.conductance)
+}
+
+/// A heater of a part that holds no sink.
+fn without_sink(heaters: &[HeatConductor], sink: &[bool]) -> Option<usize> {
+    let mut parts = Sets::new(sink.len());
+    for h in heaters {
+        parts.join(h.a, h.b);
+    }
+    let mut cooled = vec![false; sink.len()];
+    (0..sink.len()).filter(|node| sink[*node]).for_each(|node| cooled[parts.first(node)] = true);
+    heaters.iter().position(|h| !cooled[parts.first(h.a)])
+}

@@ -1,0 +1,246 @@
+//! Force elements of a mechanism: one trait for fields, contacts, loads and the motion of a frame.
+//!
+//! The mechanism knows bodies and joints; a domain knows where those are and what drives it, and says what that does to them.
+//! Its potential Π(q, u) gives all of it, so that forces, stiffness, charges and the small-signal response agree:
+//! ```text
+//! forces ∂Π/∂q      tangent ∂²Π/∂q²      change of the forces with what drives it ∂²Π/∂q∂u      charge −∂Π/∂u
+//! ```
+//! Constant damping belongs to the mechanism: a domain returns its dampers when it is built
+//! ([`super::from_structure::FromStructure::dampers`]), and every integrator, frequency response and noise has them.
+//! Other forces that depend on rates are added by [`Domain::add_loss`]. Only heat has states of its own
+//! ([`super::lag`]): temperatures follow voltages alone, so that they come before the mechanism and not with it.
+//!
+//! Nothing here is called through a pointer: [`super::member::Member`] is one of the registered domains, chosen by a `match`.
+
+use super::approach::{Approach, MaterialPoint};
+use super::capacitor::Capacitor;
+use super::contact::Contact;
+use super::contact_loss::Loss;
+use super::stop::StopKind;
+use bimorph_multibody::planar::Pose;
+use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use nalgebra::Vector2;
+
+/// Where the bodies are.
+#[derive(Debug, Clone, Copy)]
+pub struct Configuration<'a> {
+    /// Displacements.
+    pub q: &'a [Pose],
+    /// Small displacements about the drawing.
+    pub linear: bool,
+}
+
+/// A step of length `h` [s]: its start, middle and end.
+#[derive(Debug, Clone, Copy)]
+pub struct Chord<'a> {
+    /// Configurations at the start, the middle and the end.
+    pub at: [Configuration<'a>; 3],
+    /// Length [s].
+    pub h: f64,
+}
+
+/// A law of one approach, as other simulators can write it down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Law {
+    /// A field, and what bears where its conductors touch.
+    Field(Capacitor, Option<Contact>),
+    /// A stop with the ways to its two sides [m].
+    Stop([Option<f64>; 2], StopKind),
+}
+
+/// One thing that acts on bodies. Forces are those of the residual: minus the wrench on each body.
+pub trait Domain {
+    /// Its input: the voltage across a gap [V], the fraction of the dead loads that acts [1], a force [N], the motion
+    /// of a frame.
+    type Given: Copy;
+
+    /// Calls `see` for each body that forces act on.
+    fn bodies(&self, see: impl FnMut(BodyId));
+
+    /// `see` is called with each pair of bodies that the tangent couples; some come more than once.
+    fn pairs(&self, mut see: impl FnMut(BodyId, BodyId)) {
+        let mut bodies = Vec::new();
+        self.bodies(|body| bodies.push(body));
+        for (i, a) in bodies.iter().enumerate() {
+            bodies[..i].iter().for_each(|b| see(*a, *b));
+        }
+    }
+
+    /// `r += ∂Π/∂q`, held directions not removed.
+    fn add_force(&self, at: Configuration<'_>, given: Self::Given, r: &mut [Pose]);
+
+    /// `r += (∂²Π/∂q∂u)·change`: how the forces at `given` change with it.
+    fn add_force_change(&self, at: Configuration<'_>, given: Self::Given, change: Self::Given, r: &mut [Pose]);
+
+    /// `tangent += ∂²Π/∂q²`, on a pattern that couples its bodies.
+    fn add_tangent(
+        &self,
+        at: Configuration<'_>,
+        given: Self::Given,
+        pattern: &Pattern,
+        tangent: &mut BlockMatrix<f64, 3>,
+    );
+
+    /// Both: [`Domain::add_force`] and [`Domain::add_tangent`].
+    fn add_force_and_tangent(
+        &self,
+        at: Configuration<'_>,
+        given: Self::Given,
+        pattern: &Pattern,
+        (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
+    ) {
+        self.add_force(at, given, r);
+        self.add_tangent(at, given, pattern, tangent);
+    }
+
+    /// True where it has two sides with a distance between them, and is called a gap.
+    fn is_gap(&self) -> bool {
+        true
+    }
+
+    /// False where it adds no force, wherever the bodies are.
+    fn is_active(&self, given: Self::Given) -> bool {
+        let _ = given;
+        true
+    }
+
+    /// Calls `lever` for each point with a force of fixed direction, and the force [N]: terms that the tangent of a
+    /// linear model omits.
+    fn load_points(&self, at: Configuration<'_>, given: Self::Given, lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
+        let _ = (at, given, lever);
+    }
+
+    /// Π [J] without the terms of the field, −½·C·V², and of contact, which have functions of their own below.
+    fn energy(&self, at: Configuration<'_>, given: Self::Given) -> f64 {
+        let _ = (at, given);
+        0.0
+    }
+
+    /// Capacitance [F].
+    fn capacitance(&self, at: Configuration<'_>) -> f64 {
+        let _ = at;
+        0.0
+    }
+
+    /// Change of the capacitance with a change `dq` of the configuration [F].
+    fn capacitance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let _ = (at, dq);
+        0.0
+    }
+
+    /// Force per ½V² that pulls its two sides together, ∂C/∂u with u the approach of all of it [N/V²].
+    fn pull(&self, at: Configuration<'_>) -> f64 {
+        let _ = at;
+        0.0
+    }
+
+    /// The same, and its change with a change `dq` of the configuration.
+    fn pull_and_change(&self, at: Configuration<'_>, dq: &[Pose]) -> (f64, f64) {
+        let _ = (at, dq);
+        (0.0, 0.0)
+    }
+
+    /// True for electrodes that voltage draws upon each other.
+    fn is_electrostatic(&self) -> bool {
+        false
+    }
+
+    /// `r +=` the change of the forces by the shape that beams take within segments under the load along them, which forces on the
+    /// bodies leave out; the sum of the changes' sizes [N].
+    fn add_shape_force(&self, at: Configuration<'_>, given: Self::Given, r: &mut [Pose]) -> f64 {
+        let _ = (at, given, r);
+        0.0
+    }
+
+    /// Distance left between its two sides [m]; infinite where it has none.
+    fn distance(&self, at: Configuration<'_>) -> f64 {
+        let _ = at;
+        f64::INFINITY
+    }
+
+    /// Change of the distance with a change `dq` of the configuration [m].
+    fn distance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let _ = (at, dq);
+        0.0
+    }
+
+    /// Distance at which its sides touch, and the least one that its law of contact knows [m]; none: they never do.
+    fn touching(&self) -> Option<[f64; 2]> {
+        None
+    }
+
+    /// Remaining travel until the gap is closed completely [m].
+    fn clearance(&self, at: Configuration<'_>) -> f64 {
+        self.distance(at)
+    }
+
+    /// Force with which its sides bear on each other [N].
+    fn bearing(&self, at: Configuration<'_>) -> f64 {
+        let _ = at;
+        0.0
+    }
+
+    /// Energy stored where its sides touch [J].
+    fn contact_energy(&self, at: Configuration<'_>) -> f64 {
+        let _ = at;
+        0.0
+    }
+
+    /// Work of the contact force over a small change `dq` of the configuration [J], of either sign.
+    fn contact_work(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let _ = (at, dq);
+        0.0
+    }
+
+    /// Contact losses; `None` without contact.
+    fn loss(&self) -> Option<Loss> {
+        None
+    }
+
+    /// Replaces it.
+    fn set_loss(&mut self, loss: Loss) {
+        let _ = loss;
+    }
+
+    /// `r +=` a load that closes its contact as drawn, of any size. Returns how far its parts fall, as [`super::contact_speed`] takes it [m].
+    fn add_closing(&self, at: Configuration<'_>, r: &mut [Pose]) -> f64 {
+        let _ = (at, r);
+        0.0
+    }
+
+    /// `r +=` the force that rates add to ∂Π/∂q where contact loses energy, `rate` the rate of each body.
+    fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        let _ = (at, rate, r);
+    }
+
+    /// Adds the derivatives of that force with displacements to `stiffness` and with rates to `damping`. True where there are any.
+    fn add_loss_tangent(
+        &self,
+        at: Configuration<'_>,
+        rate: &impl Fn(usize) -> Pose,
+        pattern: &Pattern,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        damping: &mut BlockMatrix<f64, 3>,
+    ) -> bool {
+        let _ = (at, rate, pattern, stiffness, damping);
+        false
+    }
+
+    /// Adds its discrete force over a step, loss included, and the symmetric part of the tangent with the end of the step.
+    fn add_quotient(
+        &self,
+        chord: &Chord<'_>,
+        given: Self::Given,
+        pattern: &Pattern,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        self.add_force(chord.at[1], given, r);
+        self.add_tangent(chord.at[1], given, pattern, tangent);
+    }
+
+    /// The approach and the law, where it is a function of one approach.
+    fn law(&self) -> Option<(&Approach, Law)> {
+        None
+    }
+}

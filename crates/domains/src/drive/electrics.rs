@@ -1,0 +1,200 @@
+//! The electrical side of a mechanism, and what it makes of source voltages at one time.
+
+use super::super::input::Input;
+use super::super::lag::Lags;
+use super::super::thermal::Heating;
+use bimorph_multibody::forces::RestStrain;
+use bimorph_multibody::planar::Pose;
+use nalgebra::DMatrix;
+
+/// Electrical and thermal state that acts on a mechanism at one instant, or its change.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Drive {
+    /// Voltage of each gap [V].
+    pub volts: Vec<f64>,
+    /// Free strain α·T̄ of each heated beam [1].
+    pub expansion: Vec<f64>,
+    /// Share of the dead loads and built-in strains that acts [1].
+    pub load: f64,
+    /// Value of each input in its own unit, in the order of [`Electrics::inputs`].
+    pub inputs: Vec<f64>,
+    /// Rate of change of the frame's rate [rad/s²].
+    pub turning: f64,
+    /// Force and moment on each body, as thermal agitation gives them; empty: none.
+    pub push: Vec<Pose>,
+}
+
+impl Drive {
+    /// The part that sets rest offsets.
+    #[inline]
+    pub fn rest(&self) -> RestStrain<'_> {
+        RestStrain { expansion: &self.expansion, built_in: self.load }
+    }
+
+    /// Leaves of a change what acts in proportion to the drive that it changes: voltages, and the rate of the frame.
+    #[inline]
+    pub fn keep_quadratic(&mut self, electrics: &Electrics) {
+        self.expansion.fill(0.0);
+        self.push.clear();
+        (self.load, self.turning) = (0.0, 0.0);
+        for (value, input) in self.inputs.iter_mut().zip(&electrics.inputs) {
+            if *input != Input::Rate {
+                *value = 0.0;
+            }
+        }
+    }
+}
+
+/// The electrical side of a system. The source vector u holds the ports first, then the netlist's own sources, then the inputs
+/// that are no voltages.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Electrics {
+    /// Number of ports.
+    pub ports: usize,
+    /// Voltages of the netlist's own sources [V].
+    pub fixed: Vec<f64>,
+    /// Names of all sources, ports first.
+    pub names: Vec<String>,
+    /// ∂gap voltage/∂u, gaps × sources.
+    pub gap_rows: DMatrix<f64>,
+    /// ∂port current/∂u, ports × sources [S].
+    pub conductance: DMatrix<f64>,
+    /// Heated beams.
+    pub heating: Heating,
+    /// Inputs other than voltages.
+    pub inputs: Vec<Input>,
+}
+
+impl Electrics {
+    /// Length of the source vector.
+    #[inline]
+    pub fn sources(&self) -> usize {
+        self.voltages() + self.inputs.len()
+    }
+
+    /// Voltages in the source vector: the place of the first input.
+    #[inline]
+    pub fn voltages(&self) -> usize {
+        self.ports + self.fixed.len()
+    }
+
+    /// The same with these inputs.
+    #[inline]
+    pub fn with_inputs(&self, inputs: Vec<Input>) -> Self {
+        let sources = self.voltages() + inputs.len();
+        let (gaps, ports) = (self.gap_rows.nrows(), self.conductance.nrows());
+        bimorph_base::budget::lay_out_matrix(gaps + ports + self.heating.heaters.len(), sources);
+        Self {
+            gap_rows: self.gap_rows.clone().resize(gaps, sources, 0.0),
+            conductance: self.conductance.clone().resize(ports, sources, 0.0),
+            heating: self.heating.with_heat(&inputs),
+            inputs,
+            ..self.clone()
+        }
+    }
+
+    /// A drive of the right size, all zero, loads acting fully.
+    #[inline]
+    pub fn drive(&self) -> Drive {
+        Drive {
+            volts: vec![0.0; self.gap_rows.nrows()],
+            expansion: vec![0.0; self.heating.heaters.len()],
+            load: 1.0,
+            inputs: vec![0.0; self.inputs.len()],
+            turning: 0.0,
+            push: Vec::new(),
+        }
+    }
+
+    /// Fills in the source vector for given port voltages.
+    #[inline]
+    pub fn fill_sources(&self, ports: &[f64], u: &mut [f64]) {
+        u[..self.ports].copy_from_slice(ports);
+        u[self.ports..self.voltages()].copy_from_slice(&self.fixed);
+        u[self.voltages()..].fill(0.0);
+    }
+
+    /// The drive at source voltages `u` when every heater is at its steady rise, which goes to `rise` [K].
+    #[inline]
+    pub fn steady(&self, u: &[f64], rise: &mut [f64], drive: &mut Drive) {
+        for (k, rise) in rise.iter_mut().enumerate() {
+            *rise = self.heating.steady(k, u);
+        }
+        self.apply(u, rise, drive);
+    }
+
+    /// The drive at source voltages `u` and temperature rises `rise` [K].
+    #[inline]
+    pub fn apply(&self, u: &[f64], rise: &[f64], drive: &mut Drive) {
+        self.gap_volts(u, &mut drive.volts);
+        for (k, heater) in self.heating.heaters.iter().enumerate() {
+            drive.expansion[k] = heater.expansion * rise[k];
+        }
+        drive.inputs.copy_from_slice(&u[self.voltages()..]);
+        drive.turning = 0.0;
+        drive.push.clear();
+    }
+
+    /// The change of the steady drive with source `s`, at source voltages `u`.
+    #[inline]
+    pub fn steady_slope(&self, u: &[f64], unit: &[f64], slope: &mut Drive) {
+        self.gap_volts(unit, &mut slope.volts);
+        for (k, heater) in self.heating.heaters.iter().enumerate() {
+            slope.expansion[k] = heater.expansion * self.heating.slope(k, u, unit);
+        }
+        slope.inputs.copy_from_slice(&unit[self.voltages()..]);
+        (slope.load, slope.turning) = (0.0, 0.0);
+    }
+
+    /// Of each heater the coefficients of its steady rise in the time [s] since the sources began to go `from` one value `to` another
+    /// [V] in `dt` [s]: K, K/s, K/s².
+    pub(super) fn heat_course(&self, (from, to): (&[f64], &[f64]), dt: f64) -> Vec<[f64; 3]> {
+        let course = |k: usize| {
+            let [a, b, c] = self.heating.between(k, from, to);
+            [a, b / dt, c / (dt * dt)]
+        };
+        (0..self.heating.heaters.len()).map(course).collect()
+    }
+
+    /// Change of the second and third coefficient of [`Electrics::heat_course`] with the final voltage of source `port`; the first
+    /// has none.
+    pub(super) fn heat_course_change(&self, k: usize, (from, to): (&[f64], &[f64]), dt: f64, port: usize) -> [f64; 2] {
+        let (b, c) = (self.row(k, port, from), self.row(k, port, to));
+        let heat = self.heating.per_watt(k, port);
+        [(2.0 * b + heat) / dt, 2.0 * (c - b) / (dt * dt)]
+    }
+
+    /// (Q·u)_port of heater `k`.
+    fn row(&self, k: usize, port: usize, u: &[f64]) -> f64 {
+        let voltages = self.voltages();
+        if port >= voltages {
+            return 0.0;
+        }
+        (0..voltages).map(|j| self.heating.entry(k, port, j) * u[j]).sum()
+    }
+
+    /// The change of the rise of each heater with the final voltage of source `port` [K/V], `s` after the sources began to go `from` one
+    /// value `to` another in `dt` [s].
+    pub fn rise_sensitivities(
+        &self,
+        way: (&[f64], &[f64]),
+        dt: f64,
+        s: f64,
+        port: usize,
+        mut put: impl FnMut(usize, f64),
+    ) {
+        let mut lags = Lags::new(s);
+        for (k, heater) in self.heating.heaters.iter().enumerate() {
+            let [p1, p2] = self.heat_course_change(k, way, dt, port);
+            let tau = heater.time_constant;
+            put(k, if tau > 0.0 { lags.of(tau).rise(0.0, [0.0, p1, p2]) } else { s * (p1 + s * p2) });
+        }
+    }
+
+    #[inline]
+    fn gap_volts(&self, u: &[f64], volts: &mut [f64]) {
+        for (g, v) in volts.iter_mut().enumerate() {
+            *v = (0..u.len()).map(|s| self.gap_rows[(g, s)] * u[s]).sum();
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Voltages, strains and inputs over the time of one step or run, from a start to an end.
+
+use super::super::input::Input;
+use super::super::lag::Lags;
+use super::electrics::{Drive, Electrics};
+use bimorph_multibody::planar::Pose;
+
+/// Source voltages that go linearly from one value to another during a step, with the rises that follow them.
+/// Time-independent quantities are computed once.
+#[derive(Debug, Clone)]
+pub struct Ramp<'a> {
+    /// The electrical side.
+    pub electrics: &'a Electrics,
+    /// Source voltages at the start [V].
+    pub from: &'a [f64],
+    /// Source voltages at the end [V].
+    pub to: &'a [f64],
+    /// Rise of each heater at the start [K].
+    pub rise: &'a [f64],
+    /// Length of the step [s].
+    pub dt: f64,
+    /// Force and moment on each body throughout the step; empty: none.
+    pub push: &'a [Pose],
+    /// Of each heater the coefficients of its steady rise in the time since the start: [`Electrics::heat_course`].
+    heat: Vec<[f64; 3]>,
+}
+
+impl<'a> Ramp<'a> {
+    /// Sources that go `from` one value `to` another [V] in `dt` [s], with heaters at `rise` [K] before.
+    #[inline]
+    pub fn new(electrics: &'a Electrics, from: &'a [f64], to: &'a [f64], rise: &'a [f64], dt: f64) -> Self {
+        Self { electrics, from, to, rise, dt, push: &[], heat: electrics.heat_course((from, to), dt) }
+    }
+
+    /// The same with a force and a moment on each body.
+    #[inline]
+    pub fn pushed(self, push: &'a [Pose]) -> Self {
+        Self { push, ..self }
+    }
+
+    /// Rise of heater `k` that the sources at the start lead to [K].
+    #[inline]
+    pub fn steady_at_start(&self, k: usize) -> f64 {
+        self.heat[k][0]
+    }
+
+    /// Rise of heater `k` at time `s` after the start [K].
+    #[inline]
+    pub fn rise_at(&self, k: usize, s: f64) -> f64 {
+        self.rise_after(k, &mut Lags::new(s))
+    }
+
+    /// The same with the exponentials that other heaters have needed at this time.
+    #[inline]
+    fn rise_after(&self, k: usize, lags: &mut Lags) -> f64 {
+        let (tau, p) = (self.electrics.heating.heaters[k].time_constant, self.heat[k]);
+        if tau <= 0.0 {
+            return p[0] + lags.t * (p[1] + lags.t * p[2]);
+        }
+        lags.of(tau).rise(self.rise[k], p)
+    }
+
+    /// The free strain of each heater at the time of `lags` after the start.
+    #[inline]
+    pub fn expansions(&self, lags: &mut Lags, mut put: impl FnMut(usize, f64)) {
+        for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
+            put(k, heater.expansion * self.rise_after(k, lags));
+        }
+    }
+
+    /// Their rates of change in time [1/s].
+    #[inline]
+    pub fn expansion_rates(&self, lags: &mut Lags, mut put: impl FnMut(usize, f64)) {
+        let s = lags.t;
+        for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
+            let p = self.heat[k];
+            let slope = if heater.time_constant > 0.0 {
+                (p[0] + s * (p[1] + s * p[2]) - self.rise_after(k, lags)) / heater.time_constant
+            } else {
+                p[1] + 2.0 * s * p[2]
+            };
+            put(k, heater.expansion * slope);
+        }
+    }
+
+    /// The drive at time `s` after the start.
+    #[inline]
+    pub fn at(&self, s: f64, drive: &mut Drive) {
+        self.set(&mut Lags::new(s), drive);
+    }
+
+    /// The drive at time `s`, and its rate of change in time [1/s].
+    #[inline]
+    pub fn at_and_rate(&self, s: f64, drive: &mut Drive, rate: &mut Drive) {
+        let mut lags = Lags::new(s);
+        self.set(&mut lags, drive);
+        self.set_rate(&mut lags, rate);
+    }
+
+    fn set(&self, lags: &mut Lags, drive: &mut Drive) {
+        let s = lags.t;
+        let x = s / self.dt;
+        for (g, v) in drive.volts.iter_mut().enumerate() {
+            *v = self.gap(g, |i| self.from[i] + x * (self.to[i] - self.from[i]));
+        }
+        self.expansions(lags, |k, strain| drive.expansion[k] = strain);
+        drive.push.clear();
+        drive.push.extend_from_slice(self.push);
+        let first = self.electrics.voltages();
+        drive.turning = 0.0;
+        for (k, value) in drive.inputs.iter_mut().enumerate() {
+            let change = self.to[first + k] - self.from[first + k];
+            *value = self.from[first + k] + x * change;
+            if self.electrics.inputs[k] == Input::Rate {
+                drive.turning += change / self.dt;
+            }
+        }
+    }
+
+    fn set_rate(&self, lags: &mut Lags, rate: &mut Drive) {
+        for (g, v) in rate.volts.iter_mut().enumerate() {
+            *v = self.gap(g, |i| (self.to[i] - self.from[i]) / self.dt);
+        }
+        self.expansion_rates(lags, |k, strain| rate.expansion[k] = strain);
+        let first = self.electrics.voltages();
+        for (k, value) in rate.inputs.iter_mut().enumerate() {
+            *value = (self.to[first + k] - self.from[first + k]) / self.dt;
+        }
+        (rate.load, rate.turning) = (0.0, 0.0);
+        rate.push.clear();
+    }
+
+    /// The change of the drive at time `s` with the final voltage of source `port`.
+    #[inline]
+    pub fn sensitivity(&self, s: f64, port: usize, out: &mut Drive) {
+        let x = s / self.dt;
+        for (g, v) in out.volts.iter_mut().enumerate() {
+            *v = self.electrics.gap_rows[(g, port)] * x;
+        }
+        let heaters = &self.electrics.heating.heaters;
+        let put = |k: usize, rise: f64| out.expansion[k] = heaters[k].expansion * rise;
+        self.electrics.rise_sensitivities((self.from, self.to), self.dt, s, port, put);
+        out.load = 0.0;
+        out.push.clear();
+        out.turning = if self.set_input(port, x, out) == Some(Input::Rate) { 1.0 / self.dt } else { 0.0 };
+    }
+
+    /// Sets the input that source `port` is, if it is one, and all others to 0.
+    fn set_input(&self, port: usize, value: f64, out: &mut Drive) -> Option<Input> {
+        out.inputs.fill(0.0);
+        let k = port.checked_sub(self.electrics.voltages())?;
+        out.inputs[k] = value;
+        Some(self.electrics.inputs[k])
+    }
+
+    /// The change of [`Ramp::rate`] at time `s` with the final voltage of source `port`.
+    pub fn rate_sensitivity(&self, s: f64, port: usize, out: &mut Drive) {
+        for (g, v) in out.volts.iter_mut().enumerate() {
+            *v = self.electrics.gap_rows[(g, port)] / self.dt;
+        }
+        let mut lags = Lags::new(s);
+        for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
+            let [p1, p2] = self.electrics.heat_course_change(k, (self.from, self.to), self.dt, port);
+            let slope = if heater.time_constant > 0.0 {
+                let rise = lags.of(heater.time_constant).rise(0.0, [0.0, p1, p2]);
+                (s * (p1 + s * p2) - rise) / heater.time_constant
+            } else {
+                p1 + 2.0 * s * p2
+            };
+            out.expansion[k] = heater.expansion * slope;
+        }
+        self.set_input(port, 1.0 / self.dt, out);
+        (out.load, out.turning) = (0.0, 0.0);
+        out.push.clear();
+    }
+
+    fn gap(&self, g: usize, u: impl Fn(usize) -> f64) -> f64 {
+        (0..self.from.len()).map(|i| self.electrics.gap_rows[(g, i)] * u(i)).sum()
+    }
+}

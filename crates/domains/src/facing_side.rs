@@ -1,0 +1,152 @@
+//! One side of a gap along beams: the points that bear it, and the distances and slopes that they measure.
+
+use super::approach::MaterialPoint;
+use super::from_structure::Station;
+use bimorph_multibody::BodyId;
+use bimorph_multibody::planar::{self, Pose};
+use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3, Vector4};
+
+/// The direction in which a gap opens, and the sign of the slope that a positive rotation makes along it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Opening {
+    /// Unit vector from the lower side to the upper one, as drawn.
+    pub axis: Vector2<f64>,
+    /// +1, or −1 where the element was mirrored.
+    pub side: f64,
+}
+
+/// Deflection at a station, with the derivatives over the pose of its body.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Deflection {
+    /// Displacement along the axis [m], and its derivatives with x, y, θ.
+    pub(super) w: f64,
+    pub(super) gradient: Vector3<f64>,
+    /// ∂²w/∂θ² [m].
+    pub(super) bend: f64,
+    /// Slope along the gap [1].
+    pub(super) slope: f64,
+}
+
+impl Opening {
+    /// Deflection of a point in a configuration.
+    #[inline]
+    pub(super) fn deflection(&self, point: &MaterialPoint, q: &[Pose], linear: bool) -> Deflection {
+        let BodyId::Free(k) = point.body else { return Deflection::default() };
+        let (pose, axis) = (&q[k], self.axis);
+        let moved = planar::point(pose, point.arm, linear);
+        // the arm where its body has turned it
+        let arm = if linear { point.arm } else { point.arm + moved - Vector2::new(pose.x, pose.y) };
+        let gradient = Vector3::new(axis.x, axis.y, axis.dot(&planar::perpendicular(arm)));
+        let bend = if linear { 0.0 } else { -axis.dot(&arm) };
+        Deflection { w: moved.dot(&axis), gradient, bend, slope: self.side * pose.z }
+    }
+
+    /// The forces on the pose of a body where a potential changes by `first` with the displacement and the slope of a station.
+    #[inline]
+    pub(super) fn force(&self, seen: &Deflection, first: [f64; 2]) -> Pose {
+        let mut force = seen.gradient * first[0];
+        force.z += self.side * first[1];
+        force
+    }
+
+    /// Over the poses of two bodies, what is `h` over the displacements and slopes of their stations.
+    #[inline]
+    pub(super) fn block(&self, a: &Deflection, b: &Deflection, h: &Matrix2<f64>) -> Matrix3<f64> {
+        let side = self.side;
+        let mut block = a.gradient * (b.gradient * h[(0, 0)]).transpose();
+        let (row, column) = (b.gradient * (side * h[(1, 0)]), a.gradient * (side * h[(0, 1)]));
+        for k in 0..3 {
+            block[(2, k)] += row[k];
+            block[(k, 2)] += column[k];
+        }
+        block[(2, 2)] += side * side * h[(1, 1)];
+        block
+    }
+
+    /// Change of the displacement and of the slope of a station with a change of the pose of its body.
+    #[inline]
+    pub(super) fn change(&self, seen: &Deflection, pose: &Pose) -> [f64; 2] {
+        [seen.gradient.dot(pose), self.side * pose.z]
+    }
+}
+
+/// The stations along a side, two or more.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Flank {
+    /// Where they are, from the start of the gap.
+    pub stations: Vec<Station>,
+    /// None of them moves.
+    pub fixed: bool,
+    /// h⁴/24EI of each segment between two stations [m²/N]; empty where nothing bends.
+    pub yields: Vec<f64>,
+}
+
+impl Flank {
+    /// Deflection of a segment beyond its cubic, towards the other side, at distance `at` from the start of the gap
+    /// [m], under the load per length `load` [N/m].
+    pub(super) fn bent(&self, segment: usize, at: f64, load: f64) -> f64 {
+        let Some(yields) = self.yields.get(segment) else { return 0.0 };
+        let [begin, end] = [self.stations[segment].at, self.stations[segment + 1].at];
+        let s = (at - begin) / (end - begin);
+        load * yields * (s * (1.0 - s)).powi(2)
+    }
+}
+
+/// How the two ends of a stretch follow from the ends of the segment that it lies on; none: they are those ends.
+pub(super) type EndWeights = Option<Box<Matrix4<f64>>>;
+
+/// (w₁, φ₁, w₂, φ₂) of a stretch from those of its segment.
+#[inline]
+pub(super) fn onto(weights: &EndWeights, ends: Vector4<f64>) -> Vector4<f64> {
+    weights.as_ref().map_or(ends, |weights| **weights * ends)
+}
+
+/// Gradient over the ends of a segment, from the gradient `first` over the ends of a stretch on it.
+#[inline]
+pub(super) fn back(weights: &EndWeights, first: Vector4<f64>) -> Vector4<f64> {
+    weights.as_ref().map_or(first, |weights| weights.tr_mul(&first))
+}
+
+/// A side as it is followed from its start to its end: each station is evaluated once.
+pub(super) struct Walk<'a> {
+    frame: Opening,
+    side: &'a Flank,
+    q: &'a [Pose],
+    linear: bool,
+    /// The segment whose ends are known, and those ends.
+    segment: usize,
+    ends: [Deflection; 2],
+}
+
+impl<'a> Walk<'a> {
+    #[inline(always)]
+    pub(super) fn new(frame: Opening, side: &'a Flank, q: &'a [Pose], linear: bool) -> Self {
+        let mut walk = Self { frame, side, q, linear, segment: 0, ends: [Deflection::default(); 2] };
+        if !side.fixed {
+            walk.ends = [walk.at(0), walk.at(1)];
+        }
+        walk
+    }
+
+    #[inline]
+    fn at(&self, station: usize) -> Deflection {
+        self.frame.deflection(&self.side.stations[station].point, self.q, self.linear)
+    }
+
+    /// The two ends of a segment; segments come in ascending order.
+    #[inline(always)]
+    pub(super) fn to(&mut self, segment: usize) -> &[Deflection; 2] {
+        while !self.side.fixed && self.segment < segment {
+            self.segment += 1;
+            self.ends[0] = self.ends[1];
+            self.ends[1] = self.at(self.segment + 1);
+        }
+        &self.ends
+    }
+}
+
+/// (w₁, φ₁, w₂, φ₂) of the ends of a segment.
+#[inline]
+pub(super) fn values(ends: &[Deflection; 2]) -> Vector4<f64> {
+    Vector4::new(ends[0].w, ends[0].slope, ends[1].w, ends[1].slope)
+}

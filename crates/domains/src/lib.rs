@@ -1,0 +1,94 @@
+//! Domains: the effects of heat, voltage, contact and loads on a mechanism.
+//!
+//! Two kinds (Popa et al., "Computationally efficient dynamic modeling of MEMS", Q4): a *rest offset* of a joint (thermal
+//! expansion ∝ V², residual stress) and a *force law* between two bodies (comb, plates, contact). Force laws come from a
+//! potential, so that forces, stiffness, charges and the small-signal response of one element always agree:
+//! ```text
+//! Π(q, V) = U(q) − ½ Σ C_k(q) V_k² + Σ contact(q),     r = ∂Π/∂q,     Q_k = C_k V_k
+//! ```
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`approach`] | the scalar a gap measures between two material points, and its derivatives |
+//! | [`backbending`] | the strength of a hot arm, beyond which it is shortened for good |
+//! | [`beam_line`] | the centreline of a beam: how it bends in a motion, and how far its segments are turned |
+//! | [`capacitor`] | C(u) of a comb and of parallel plates |
+//! | [`contact`] | pressure between surfaces that touch |
+//! | [`contact_loss`] | impact losses |
+//! | [`contact_speed`] | at which speed, from statics |
+//! | [`loss_derivatives`] | derivatives of the forces of that over the bodies |
+//! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
+//! | [`dashpot`] | a damper to the ground |
+//! | [`from_structure`], [`element`] | from a drawing to them; elements of their own |
+//! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
+//! | [`load`], [`moving_frame`] | dead loads, and forces that sources give; the motion of the frame |
+//! | [`facing`] | a stretch of two facing beams: pressure along a gap that varies over their length |
+//! | `facing_side`, `facing_stretches` | where facing beams measure; how the segments of both sides cut a gap |
+//! | [`quadrature`] | rules of integration along it |
+//! | [`network`] | potentials of a resistive network driven by ports and sources |
+//! | `laplacian` | potentials in a network of conductors |
+//! | [`thermal`] | mean temperature rise of beams that carry current |
+//! | [`lag`] | how a rise lags behind its steady value |
+//! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
+//! | [`inputs`] | effects of forces at points, heat into beams and frame motion; `input`: their kinds |
+//! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
+//! | `side` | the side to which a part buckles |
+//! | [`stop`] | how a stop bears |
+//! | [`quotient`] | discrete gradients of members over a step |
+//! | `reading` | quantities of gaps: capacitance, distance, pull, contact |
+//! | [`system`] | a multibody model with its gaps, loads and network: the input of `solve` |
+//!
+//! **Architecture invariant.** Below are [`bimorph_multibody`] and [`bimorph_structure`]. A domain never solves: it gives
+//! forces, tangents, charges and energies at a state.
+
+pub mod approach;
+pub mod backbending;
+pub mod beam_line;
+pub mod capacitor;
+mod conduction;
+pub mod contact;
+pub mod contact_loss;
+pub mod contact_speed;
+pub mod dashpot;
+pub mod domain;
+pub mod drive;
+pub mod electrodes;
+pub mod element;
+pub mod energy;
+pub mod facing;
+pub mod facing_beams;
+pub mod facing_local;
+mod facing_loss;
+mod facing_side;
+mod facing_stretches;
+pub mod from_structure;
+mod input;
+pub mod inputs;
+pub mod lag;
+mod laplacian;
+pub mod load;
+pub mod loss_derivatives;
+pub mod member;
+pub mod moving_frame;
+pub mod network;
+pub mod quadrature;
+pub mod quotient;
+mod reading;
+mod side;
+pub mod stop;
+pub mod stop_pair;
+pub mod system;
+pub mod thermal;
+
+pub use approach::MaterialPoint;
+pub use beam_line::BeamLine;
+pub use domain::{Configuration, Domain, Law};
+pub use drive::{Drive, Ramp};
+pub use element::DomainElement;
+pub use facing_stretches::BeamRows;
+pub use from_structure::{PlacedMember, Station, StructureView};
+pub use input::Input;
+pub use lag::Lags;
+pub use load::DeadLoad;
+pub use member::{Member, elements};
+pub use system::System;

@@ -1,0 +1,314 @@
+//! A multibody model with its gaps, loads and electrics: residual, tangent and charges.
+//!
+//! The residual is r(q, drive) = ∂Π/∂q − load, so that statics is r = 0 and dynamics M·q̈ + C·q̇ + r = 0.
+
+use super::approach::MaterialPoint;
+use super::beam_line::BeamLine;
+use super::domain::{Chord, Configuration, Domain};
+use super::drive::{Drive, Electrics};
+use super::load::DeadLoad;
+use super::member::Member;
+use bimorph_multibody::planar::Pose;
+use bimorph_multibody::{BlockMatrix, BodyId, Model, forces};
+use nalgebra::Vector2;
+use std::sync::Arc;
+
+/// The mechanical system that `solve` works on. Immutable; shared by sessions.
+#[derive(Debug, Clone)]
+pub struct System {
+    /// Bodies and joints.
+    pub model: Model,
+    /// Force elements across gaps and on bodies, in the order of [`Drive::volts`]: gaps first.
+    pub members: Vec<Member>,
+    /// Dead loads.
+    pub loads: Vec<DeadLoad>,
+    /// Ports, sources, heaters.
+    pub electrics: Arc<Electrics>,
+    /// Scale of displacements [m]: the narrowest beam or the smallest gap, whichever is smaller; 1 µm without either.
+    pub length_scale: f64,
+    /// Centrelines of the beams in netlist order, which name directions of buckling.
+    pub beams: Arc<Vec<BeamLine>>,
+}
+
+impl System {
+    /// A mechanism on which nothing acts but its joints, with a length scale [m].
+    #[inline]
+    pub fn of_model(model: Model, length_scale: f64) -> Self {
+        let (members, loads) = (Vec::new(), Vec::new());
+        Self { model, members, loads, electrics: Arc::default(), length_scale, beams: Arc::default() }
+    }
+
+    /// Bodies that move.
+    #[inline]
+    pub fn bodies(&self) -> usize {
+        self.model.bodies.len()
+    }
+
+    /// `r = ∂Π/∂q − load`, held directions removed.
+    #[inline]
+    pub fn residual(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
+        r.fill(Pose::zeros());
+        forces::add_elastic(&self.model, q, &drive.rest(), r);
+        self.add_body_forces(q, drive, r);
+        self.model.project(r);
+    }
+
+    /// `r += ∂Π/∂q − load`, held directions removed from the sum. Goes from the last joint to the first: between sweeps
+    /// over the bodies from the first to the last it finds in the caches what the one before left there.
+    #[inline]
+    pub fn add_residual(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
+        self.add_residual_and(q, drive, r, |_| ());
+    }
+
+    /// The same with what `more` adds before held directions are removed.
+    #[inline]
+    pub fn add_residual_and(&self, q: &[Pose], drive: &Drive, r: &mut [Pose], more: impl FnOnce(&mut [Pose])) {
+        forces::add_elastic_backwards(&self.model, q, &drive.rest(), r);
+        self.add_body_forces(q, drive, r);
+        more(r);
+        self.model.project(r);
+    }
+
+    /// `r +=` the share of gaps, contacts and dead loads in the residual: minus the wrench on each body. A formulation that
+    /// has its own way with joints needs only this of a system.
+    #[inline]
+    pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
+        let at = self.at(q);
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
+            gap.add_force(at, volts, r);
+        }
+        for load in &self.loads {
+            load.add_force(at, drive.load, r);
+        }
+        self.add_input_forces(at, drive, r);
+    }
+
+    /// True where [`System::add_body_forces`] adds anything.
+    #[inline]
+    pub fn is_acted_on(&self, drive: &Drive) -> bool {
+        !(self.loads.is_empty() && drive.inputs.is_empty() && drive.push.is_empty())
+            || self.members.iter().zip(&drive.volts).any(|(gap, volts)| gap.is_active(*volts))
+    }
+
+    /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
+    #[inline]
+    pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+        let (at, pattern) = (self.at(q), &self.model.pattern);
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
+            gap.add_tangent(at, volts, pattern, tangent);
+        }
+        for load in &self.loads {
+            load.add_tangent(at, drive.load, pattern, tangent);
+        }
+        self.add_input_tangent(at, drive, tangent);
+    }
+
+    /// The tangent ∂r/∂q and the residual r. Held directions of the tangent are left to the caller, which may add
+    /// inertia.
+    #[inline]
+    pub fn tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
+        r.fill(Pose::zeros());
+        self.add_tangent(q, drive, tangent, r);
+    }
+
+    /// [`System::tangent`] with the residual added to `r`, held directions removed from the sum.
+    #[inline]
+    pub fn add_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
+        self.add_tangent_and(q, drive, tangent, r, |_| ());
+    }
+
+    /// The same with what `more` adds to `r` before held directions are removed.
+    pub fn add_tangent_and(
+        &self,
+        q: &[Pose],
+        drive: &Drive,
+        tangent: &mut BlockMatrix<f64, 3>,
+        r: &mut [Pose],
+        more: impl FnOnce(&mut [Pose]),
+    ) {
+        tangent.clear();
+        forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
+        let (at, pattern) = (self.at(q), &self.model.pattern);
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
+            gap.add_force_and_tangent(at, volts, pattern, (r, tangent));
+        }
+        for load in &self.loads {
+            load.add_force_and_tangent(at, drive.load, pattern, (r, tangent));
+        }
+        self.add_input_forces(at, drive, r);
+        self.add_input_tangent(at, drive, tangent);
+        more(r);
+        self.model.project(r);
+    }
+
+    /// The tangent at `here` less a share of that at `there`, held directions not removed; `r` is spoiled.
+    pub fn tangent_less(
+        &self,
+        here: (&[Pose], &Drive),
+        share: f64,
+        there: (&[Pose], &Drive),
+        tangent: &mut BlockMatrix<f64, 3>,
+        r: &mut [Pose],
+    ) {
+        tangent.clear();
+        for (factor, (q, drive)) in [(-share, there), (1.0, here)] {
+            forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
+            self.add_body_tangent(q, drive, tangent);
+            if factor != 1.0 {
+                tangent.diagonal.iter_mut().chain(&mut tangent.below).for_each(|block| *block *= factor);
+            }
+        }
+    }
+
+    /// `out = (∂r/∂drive)·change` at `drive`, held directions removed.
+    #[inline]
+    pub fn drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
+        out.fill(Pose::zeros());
+        self.add_drive_force(q, drive, change, out);
+    }
+
+    /// `out += (∂r/∂drive)·change` at `drive`, held directions removed from the sum.
+    #[inline]
+    pub fn add_drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
+        forces::add_rest_change(&self.model, q, &change.rest(), out);
+        self.add_body_drive_force(q, drive, change, out);
+        self.model.project(out);
+    }
+
+    /// The share of gaps, loads and inputs in that, held directions not removed.
+    pub fn add_body_drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
+        let at = self.at(q);
+        for ((gap, &volts), &dv) in self.members.iter().zip(&drive.volts).zip(&change.volts) {
+            if dv != 0.0 {
+                gap.add_force_change(at, volts, dv, out);
+            }
+        }
+        if change.load != 0.0 {
+            for load in &self.loads {
+                load.add_force_change(at, drive.load, change.load, out);
+            }
+        }
+        self.add_input_change(at, drive, change, out);
+    }
+
+    /// `tangent +=` what the forces at `q` under `drive` add to the stiffness of a linear model; nothing in any other, whose tangent has it.
+    ///
+    /// Small displacements about the drawing have K of unstressed parts. Vibrations about an equilibrium have more: the forces N, V, M in
+    /// the joints turn with them (K_σ of [`forces::add_stress_stiffness`]), and so do the points at which loads, voltage and contact act:
+    /// [`System::add_levers`]. Left out, a beam of N segments under thrust is too stiff by a share that falls with 1/N only.
+    #[inline]
+    pub fn add_stress_stiffness(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+        forces::add_stress_stiffness(&self.model, q, &drive.rest(), tangent);
+        self.add_levers(q, drive, tangent);
+    }
+
+    /// Its geometric part from the points of application of forces. A body that rotates by θ moves the point at its arm
+    /// r. The force F keeps its direction and gets the lever −θ·r, a moment of −θ·(r·F).
+    pub fn add_levers(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+        if !self.model.linear {
+            return;
+        }
+        let mut lever = |point: MaterialPoint, force: Vector2<f64>| {
+            if let BodyId::Free(k) = point.body {
+                tangent.diagonal[k][(2, 2)] += point.arm.dot(&force);
+            }
+        };
+        let at = self.at(q);
+        for load in &self.loads {
+            load.load_points(at, drive.load, &mut lever);
+        }
+        for (load, size) in self.given_loads(&drive.inputs) {
+            load.load_points(at, size, &mut lever);
+        }
+        for (gap, &volts) in self.members.iter().zip(&drive.volts) {
+            gap.load_points(at, volts, &mut lever);
+        }
+    }
+
+    /// [`System::tangent`] without what members add.
+    pub fn tangent_without_members(
+        &self,
+        q: &[Pose],
+        drive: &Drive,
+        tangent: &mut BlockMatrix<f64, 3>,
+        r: &mut [Pose],
+    ) {
+        tangent.clear();
+        r.fill(Pose::zeros());
+        forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
+        let (at, pattern) = (self.at(q), &self.model.pattern);
+        for load in &self.loads {
+            load.add_force(at, drive.load, r);
+            load.add_tangent(at, drive.load, pattern, tangent);
+        }
+        self.add_input_forces(at, drive, r);
+        self.add_input_tangent(at, drive, tangent);
+        self.model.project(r);
+    }
+
+    /// Adds the discrete forces of members over a step of length `h` [s] with the configurations `q` at its start, middle and end, and the
+    /// symmetric part of their tangent with the end; held directions not removed.
+    #[inline]
+    pub fn add_quotients(
+        &self,
+        q: [&[Pose]; 3],
+        h: f64,
+        drive: &Drive,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        let chord = Chord { at: q.map(|q| self.at(q)), h };
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
+            gap.add_quotient(&chord, volts, &self.model.pattern, r, tangent);
+        }
+    }
+
+    /// True where parts can touch.
+    #[inline]
+    pub fn can_touch(&self) -> bool {
+        self.members.iter().any(|member| member.touching().is_some())
+    }
+
+    /// `r +=` the forces that rates add where contact loses energy, `rate` the rate of each body; held directions not removed.
+    #[inline]
+    pub fn add_loss(&self, q: &[Pose], rate: impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        let at = self.at(q);
+        self.members.iter().for_each(|member| member.add_loss(at, &rate, r));
+    }
+
+    /// Adds the derivatives of those forces with displacements to `stiffness` and with rates to `damping`. True where there are any.
+    #[inline]
+    pub fn add_loss_tangent(
+        &self,
+        q: &[Pose],
+        rate: impl Fn(usize) -> Pose,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        damping: &mut BlockMatrix<f64, 3>,
+    ) -> bool {
+        let (at, pattern) = (self.at(q), &self.model.pattern);
+        let add = |any, member: &Member| member.add_loss_tangent(at, &rate, pattern, stiffness, damping) | any;
+        self.members.iter().fold(false, add)
+    }
+
+    /// Bodies that gaps and dead loads act on, ascending.
+    #[inline]
+    pub fn acted_on(&self) -> Vec<usize> {
+        let mut bodies = Vec::new();
+        let mut see = |id: BodyId| {
+            if let BodyId::Free(k) = id {
+                bodies.push(k);
+            }
+        };
+        self.members.iter().for_each(|gap| gap.bodies(&mut see));
+        self.loads.iter().for_each(|load| load.bodies(&mut see));
+        bodies.sort_unstable();
+        bodies.dedup();
+        bodies
+    }
+
+    /// A configuration, as domains take it.
+    #[inline]
+    pub(super) fn at<'a>(&self, q: &'a [Pose]) -> Configuration<'a> {
+        Configuration { q, linear: self.model.linear }
+    }
+}

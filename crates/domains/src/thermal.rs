@@ -1,0 +1,268 @@
+//! Mean temperature rise of beams that carry current.
+//!
+//! Steady one-dimensional conduction along each beam with uniform Joule heat P = R·I², end temperatures T_a and T_b above
+//! ambient, and end-to-end conductance K = k·A/l (Carslaw & Jaeger, "Conduction of Heat in Solids", §4.9):
+//! ```text
+//! mean rise                 T̄   = (T_a + T_b)/2 + P/(12·K)
+//! heat into the node at a   Q_a = K·(T_b − T_a) + P/2
+//! ```
+//! For a beam clamped to ambient at both ends, T̄ = V²/(12·ρ_el·k), whatever its length. Beams that meet share the
+//! temperature of their node; anchors are at ambient. Since currents are linear in the source voltages u, each mean rise is
+//! a quadratic form T̄ = uᵀ·Q·u. Heat W that comes from elsewhere, spread evenly along a beam, acts as P does and adds Z·W with
+//! the same thermal resistances Z. Resistance and conductivity do not depend on temperature here.
+//!
+//! With a time constant the rise follows its steady value: [`super::lag`]. Where a beam has a heat capacity instead, that comes from
+//! `conduction.rs`.
+
+use super::conduction::Conduction;
+pub use super::conduction::{HeatConductor, NoHeatSink};
+use super::input::Input;
+use super::network::Potentials;
+use nalgebra::DVector;
+
+/// Heaters with their quadratic forms.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Heating {
+    /// The heaters.
+    pub heaters: Vec<HeatConductor>,
+    sources: usize,
+    /// Heater by heater, its symmetric form Q over the sources, row-major [K/V²].
+    form: Vec<f64>,
+    /// Heater by heater, its current for each volt of the sources that drive the network [S].
+    currents: Vec<DVector<f64>>,
+    /// Nodes that stay at ambient.
+    sink: Vec<bool>,
+    /// Heater by heater, its rise for each watt of the inputs that follow the sources [K/W].
+    heat: Vec<f64>,
+}
+
+impl Heating {
+    /// Finds the forms over `sources` source voltages, of which the first drive the network. `sink[node]` is true for
+    /// nodes at ambient temperature.
+    ///
+    /// # Errors
+    /// [`NoHeatSink`].
+    pub fn new(
+        mut heaters: Vec<HeatConductor>,
+        potentials: &Potentials,
+        sources: usize,
+        sink: &[bool],
+    ) -> Result<Self, NoHeatSink> {
+        let driven = potentials.potential.ncols();
+        let conduction = Conduction::new(&heaters, sink)?;
+        bimorph_base::budget::lay_out_matrix(heaters.len(), sources.saturating_mul(sources).saturating_add(2 * driven));
+        let currents: Vec<DVector<f64>> =
+            heaters.iter().map(|h| potentials.difference(h.a, h.b) / h.resistance).collect();
+        let mut form = vec![0.0; heaters.len() * sources * sources];
+        let mut watts = vec![0.0; heaters.len()];
+        for i in 0..driven {
+            for j in 0..=i {
+                bimorph_base::budget::check();
+                for ((watts, h), current) in watts.iter_mut().zip(&heaters).zip(&currents) {
+                    *watts = h.resistance * current[i] * current[j];
+                }
+                for (k, rise) in conduction.rises(&heaters, &watts).into_iter().enumerate() {
+                    form[(k * sources + i) * sources + j] = rise;
+                    form[(k * sources + j) * sources + i] = rise;
+                }
+            }
+        }
+        if heaters.iter().any(|h| h.delayed) {
+            // that of one volt of each source in turn, all together
+            for (k, watts) in watts.iter_mut().enumerate() {
+                *watts = heaters[k].resistance * currents[k].norm_squared();
+            }
+            let delays = conduction.delays(&heaters, &watts);
+            heaters.iter_mut().zip(delays).filter(|(h, _)| h.delayed).for_each(|(h, tau)| h.time_constant = tau);
+        }
+        Ok(Self { heaters, sources, form, currents, sink: sink.to_vec(), heat: Vec::new() })
+    }
+
+    /// The same with inputs behind the sources, some of them heat.
+    pub fn with_heat(&self, inputs: &[Input]) -> Self {
+        let mut heat = vec![0.0; self.heaters.len() * inputs.len()];
+        if inputs.iter().any(|input| matches!(input, Input::Heat { .. }))
+            && let Ok(conduction) = Conduction::new(&self.heaters, &self.sink)
+        {
+            for (i, input) in inputs.iter().enumerate() {
+                let Input::Heat { heater } = input else { continue };
+                let mut watts = vec![0.0; self.heaters.len()];
+                watts[*heater] = 1.0;
+                for (k, rise) in conduction.rises(&self.heaters, &watts).into_iter().enumerate() {
+                    heat[k * inputs.len() + i] = rise;
+                }
+            }
+        }
+        Self { heat, ..self.clone() }
+    }
+
+    /// Inputs behind the sources.
+    fn inputs(&self) -> usize {
+        self.heat.len().checked_div(self.heaters.len()).unwrap_or(0)
+    }
+
+    /// Rise of heater `k` for each unit of source `source` in so far as that is heat [K/W].
+    #[inline]
+    pub fn per_watt(&self, k: usize, source: usize) -> f64 {
+        source.checked_sub(self.sources).map_or(0.0, |i| self.heat[k * self.inputs() + i])
+    }
+
+    /// Steady rise of heater `k` by the heat among the sources `u` [K].
+    fn heated(&self, k: usize, u: &[f64]) -> f64 {
+        let count = self.inputs();
+        if count == 0 {
+            return 0.0;
+        }
+        self.heat[k * count..(k + 1) * count].iter().zip(&u[self.sources..]).map(|(z, w)| z * w).sum()
+    }
+
+    /// Current in heater `k` for each volt of source `source` [S].
+    #[inline]
+    pub fn current(&self, k: usize, source: usize) -> f64 {
+        self.currents[k].get(source).copied().unwrap_or(0.0)
+    }
+
+    /// Entry (i, j) of the form of heater `k` [K/V²].
+    #[inline]
+    pub fn entry(&self, k: usize, i: usize, j: usize) -> f64 {
+        self.form[(k * self.sources + i) * self.sources + j]
+    }
+
+    /// Mixed value uᵀ·Q·w of heater `k` [K].
+    #[inline]
+    pub fn mixed(&self, k: usize, u: &[f64], w: &[f64]) -> f64 {
+        let s = self.sources;
+        let mut sum = 0.0;
+        for (i, u) in u[..s].iter().enumerate() {
+            let row = &self.form[(k * s + i) * s..(k * s + i + 1) * s];
+            sum += u * row.iter().zip(w).map(|(q, w)| q * w).sum::<f64>();
+        }
+        sum
+    }
+
+    /// Steady mean rise of heater `k` on the straight line from `from` to `to`: its coefficients in the share x of the way,
+    /// c₀ + c₁·x + c₂·x² [K].
+    #[inline]
+    pub fn between(&self, k: usize, from: &[f64], to: &[f64]) -> [f64; 3] {
+        let (a, b, c) = (self.mixed(k, from, from), self.mixed(k, from, to), self.mixed(k, to, to));
+        let (before, after) = (self.heated(k, from), self.heated(k, to));
+        [a + before, 2.0 * (b - a) + (after - before), a - 2.0 * b + c]
+    }
+
+    /// Change of the steady mean rise of heater `k` at source voltages `u` with the sources, along `unit` [K].
+    #[inline]
+    pub fn slope(&self, k: usize, u: &[f64], unit: &[f64]) -> f64 {
+        2.0 * self.mixed(k, u, unit) + self.heated(k, unit)
+    }
+
+    /// Steady mean rise of heater `k` at source voltages `u` [K].
+    #[inline]
+    pub fn steady(&self, k: usize, u: &[f64]) -> f64 {
+        self.mixed(k, u, u) + self.heated(k, u)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::network::ElectricalNetwork;
+    use super::*;
+
+    fn bar(pieces: usize) -> Heating {
+        // 200 µm × 2 µm × 2 µm, ρ = 2e-5 Ω·m, k = 41 W/(m·K), cut into equal pieces
+        let (rho, k, length, area) = (2e-5, 41.0, 200e-6, 4e-12);
+        let l = length / pieces as f64;
+        let heater = |i: usize| HeatConductor {
+            a: i,
+            b: i + 1,
+            resistance: rho * l / area,
+            conductance: k * area / l,
+            expansion: 0.0,
+            ambient: 0.0,
+            time_constant: 0.0,
+            delayed: true,
+            capacity: 1600e3 * l * area,
+        };
+        let heaters: Vec<_> = (0..pieces).map(heater).collect();
+        let circuit = ElectricalNetwork {
+            nodes: pieces + 1,
+            resistors: heaters.iter().map(|h| (h.a, h.b, h.resistance)).collect(),
+            sources: vec![(0, Some(pieces))],
+            grounds: vec![pieces],
+        };
+        let mut sink = vec![false; pieces + 1];
+        (sink[0], sink[pieces]) = (true, true);
+        Heating::new(heaters, &circuit.solve().unwrap(), 1, &sink).unwrap()
+    }
+
+    /// However a bar is cut, its mean rise lags by ρ·c·l²/(10·k) (heat capacity 1.6 MJ/(m³·K)): the delays of its pieces, weighed with
+    /// their rises. A half of it lags as the whole does, not as a bar of half the length.
+    #[test]
+    fn a_bar_of_pieces_is_as_slow_as_the_bar() {
+        let exact = 1600e3 * 200e-6f64.powi(2) / (10.0 * 41.0);
+        for pieces in [1, 2, 3, 7] {
+            let bar = bar(pieces);
+            let rise: Vec<f64> = (0..pieces).map(|p| bar.steady(p, &[1.0])).collect();
+            let late = bar.heaters.iter().zip(&rise).map(|(h, rise)| h.time_constant * rise).sum::<f64>();
+            assert!((late / rise.iter().sum::<f64>() / exact - 1.0).abs() < 1e-12, "{pieces}");
+        }
+        assert!((bar(2).heaters[0].time_constant / exact - 1.0).abs() < 1e-12);
+    }
+
+    /// A uniform clamped heater rises by V²/(12ρk) = 914.63 K at 3 V on average (ρ 2e-5 Ω·m, k 41 W/(m·K)), to 1e-12
+    /// relative, in one piece or in seven.
+    #[test]
+    fn clamped_bar() {
+        let exact: f64 = 9.0 / (12.0 * 2e-5 * 41.0);
+        assert!((exact - 914.63).abs() < 0.01);
+        for pieces in [1, 2, 7] {
+            let bar = bar(pieces);
+            let mean = (0..pieces).map(|p| bar.steady(p, &[3.0])).sum::<f64>() / pieces as f64;
+            assert!((mean / exact - 1.0).abs() < 1e-12, "{pieces}");
+        }
+    }
+
+    /// Heat that comes from elsewhere, without any circuit, lags as that of a current does; and a piece whose own time constant is given still
+    /// takes its heat.
+    #[test]
+    fn delays_need_no_current() {
+        let driven = bar(4);
+        let heaters: Vec<HeatConductor> =
+            driven.heaters.iter().map(|h| HeatConductor { time_constant: 0.0, ..*h }).collect();
+        let sink = [true, false, false, false, true];
+        let none = ElectricalNetwork { nodes: 5, resistors: Vec::new(), sources: Vec::new(), grounds: Vec::new() };
+        let alone = Heating::new(heaters.clone(), &none.solve().unwrap(), 0, &sink).unwrap();
+        let given: Vec<HeatConductor> = heaters
+            .iter()
+            .enumerate()
+            .map(|(k, h)| HeatConductor { delayed: k != 0, time_constant: 1e-6, ..*h })
+            .collect();
+        let beside = Heating::new(given, &none.solve().unwrap(), 0, &sink).unwrap();
+        for k in 1..4 {
+            let want = driven.heaters[k].time_constant;
+            for heating in [&alone, &beside] {
+                assert!((heating.heaters[k].time_constant / want - 1.0).abs() < 1e-12, "{k}");
+            }
+        }
+        assert_eq!(beside.heaters[0].time_constant, 1e-6);
+    }
+
+    /// A heater without a path for its heat is refused.
+    #[test]
+    fn no_sink() {
+        let h = HeatConductor {
+            a: 0,
+            b: 1,
+            resistance: 1.0,
+            conductance: 1.0,
+            expansion: 0.0,
+            ambient: 0.0,
+            time_constant: 0.0,
+            delayed: false,
+            capacity: 0.0,
+        };
+        let circuit =
+            ElectricalNetwork { nodes: 2, resistors: vec![(0, 1, 1.0)], sources: vec![(0, Some(1))], grounds: vec![1] };
+        let refused = Heating::new(vec![h], &circuit.solve().unwrap(), 1, &[false, false]);
+        assert_eq!(refused, Err(NoHeatSink { heater: 0 }));
+    }
+}

@@ -1,0 +1,141 @@
+//! Out of the simulator: a model written down for circuit simulators that know nothing of this program.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`linear`] | the reduced linear model: modes, static correction, lags of heaters, ports; its response |
+//! | [`reduce`], [`basis`] | how it is made of a mechanism at an operating point, and in which directions it moves |
+//! | `mechanism` | that mechanism, and what its inputs do there |
+//! | [`compare`] | how far it is from the exact small-signal answer, and how many modes that takes |
+//! | [`spice`] | it as a subcircuit |
+//! | [`verilog_a`] | it as a Verilog-A module |
+//! | [`lumped`] | the whole nonlinear model of rigid parts that only slide |
+//! | `laws` | gap functions as text |
+//! | [`lumped_spice`], [`lumped_verilog_a`] | that model as a subcircuit and as a module |
+//! | [`names`], `parts` | pins, and parts of a subcircuit |
+//!
+//! Voltages across ports and currents into them have the scales of the ngspice plug-in ([`bimorph_device::scale`]), so
+//! that a subcircuit replaces an instance pin by pin.
+//!
+//! **Architecture invariant.** Below is [`bimorph_device`]. Nothing here writes files: exports are text.
+
+pub mod basis;
+pub mod compare;
+mod laws;
+pub mod linear;
+pub mod lumped;
+pub mod lumped_spice;
+pub mod lumped_verilog_a;
+mod mechanism;
+pub mod names;
+mod parts;
+pub mod reduce;
+pub mod spice;
+pub mod verilog_a;
+
+pub use linear::ReducedModel;
+
+use bimorph_analysis::AnalysisError;
+use bimorph_analysis::readout::ReadoutError;
+use bimorph_device::DeviceError;
+use thiserror::Error;
+
+/// Request for an export.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExportRequest {
+    /// Ports with volts per unit of what lies across them, where that is not the default; none: every electrical one.
+    pub ports: Vec<(String, Option<f64>)>,
+    /// Signals shown as voltages, with volts per unit.
+    pub signals: Vec<(String, f64)>,
+    /// Voltages of the operating point by port name [V]; others are at 0 V.
+    pub bias: Vec<(String, f64)>,
+    /// Modes to keep; none: as many as `within` takes.
+    pub count: Option<usize>,
+    /// Highest frequency that the model is for [Hz]; none: that of the second mode that ports and signals see.
+    pub to: Option<f64>,
+    /// Largest relative deviation from the exact small-signal answer [1].
+    pub within: f64,
+}
+
+impl From<ReadoutError> for ExportError {
+    fn from(error: ReadoutError) -> Self {
+        match error {
+            ReadoutError::UnknownSignal { .. } => Self::Analysis(error.into()),
+            ReadoutError::UnknownPort { .. } | ReadoutError::BadPort { .. } => Self::Device(error.into()),
+        }
+    }
+}
+
+/// Why nothing can be written.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// The operating point or its modes cannot be had.
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
+    /// A port or signal cannot be had.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// There is nothing to connect.
+    #[error(
+        "the netlist has no ports, and none is asked for: add one with `NAME port * [node] []`, or name NODE.x with --ports"
+    )]
+    NoPorts,
+    /// A port that a linear model with constant coefficients cannot have.
+    #[error(
+        "port \"{port}\": the rate of a frame couples motions by its own value and its rate of change, which the written \
+         model does not have; leave it out, or use the plug-in"
+    )]
+    Turning {
+        /// Its name.
+        port: String,
+    },
+    /// The equilibrium is unstable.
+    #[error(
+        "the equilibrium at these voltages is unstable in {negative} direction(s): a linear model about it would grow \
+         without bound; choose another --port voltage"
+    )]
+    Unstable {
+        /// Directions in which it is.
+        negative: usize,
+    },
+    /// No number of modes is enough.
+    #[error(
+        "{modes} modes come within {error:.1e} of the exact small-signal answer up to {to:.4e} Hz, not within {within:.1e}; \
+         lower --to, raise --within, or name --count"
+    )]
+    NotReached {
+        /// Modes tried.
+        modes: usize,
+        /// Largest deviation [1].
+        error: f64,
+        /// Up to [Hz].
+        to: f64,
+        /// The requested tolerance [1].
+        within: f64,
+    },
+    /// The nonlinear form is one of rigid parts that slide.
+    #[error(
+        "--nonlinear writes rigid parts that only slide, on linear springs, but {why}; leave --nonlinear out for the linear \
+         model about an operating point, or use the plug-in"
+    )]
+    NotLumped {
+        /// The reason.
+        why: String,
+    },
+    /// Two names would be the same in the file.
+    #[error("\"{first}\" and \"{second}\" would both be called {name} in the file; leave one out")]
+    SameName {
+        /// First of them.
+        first: String,
+        /// Second of them.
+        second: String,
+        /// Their common name.
+        name: String,
+    },
+    /// A name that files cannot have.
+    #[error("--name: expected a letter, then letters, digits and _, and no word of Verilog-A, got \"{got}\"")]
+    BadName {
+        /// The given value.
+        got: String,
+    },
+}

@@ -1,0 +1,293 @@
+//! Batched sweeps of transients: some dozens of points at a time.
+//!
+//! To find the mesh of a transient costs more than to run it. So meshes are searched at the corners of the grid and in
+//! its middle (`probes`). All points use the finest of them beam by beam, and report the largest of their estimates. A
+//! point whose drawing has other beams finds its own.
+//!
+//! The step tolerance and the step error are determined in the middle of the grid, at the cost of about two runs. Every
+//! point reports a step error beyond the tolerance.
+
+use super::axis::{SweepParameter, at};
+use super::point::{PointOutcome, PointResults, PointValue, brief};
+use super::point_budget::PointBudget;
+use super::point_error::Failed;
+use super::samples::SampleGenerator;
+use super::shared_meshes::{alike, middle};
+use super::spec::{SweepAnalysis, SweepSpec};
+use bimorph_analysis::AnalysisError;
+use bimorph_analysis::batch_transient::{self, RunEnd};
+use bimorph_analysis::mesh;
+use bimorph_analysis::readout::signal::Signal;
+use bimorph_analysis::step_error;
+use bimorph_analysis::transient::{TransientOptions, transient};
+use bimorph_model::compile::{CompileOptions, CompiledModel, draw};
+use bimorph_model::refine::mesh_search::Mesh;
+use bimorph_netlist::{NetlistSource, Setting};
+use bimorph_structure::Beam;
+use std::collections::BTreeSet;
+use std::sync::{Arc, OnceLock};
+
+/// Points that are laid out at once.
+pub(super) const CHUNK: usize = 64;
+/// Most corners that are all run; where there are more, the ends of each axis with the others in the middle.
+const MAX_CORNERS: usize = 8;
+
+/// Where steps are judged that all points share.
+const IN_THE_MIDDLE: &str = "in the middle of the grid";
+/// Output times of the run by which the steps are judged.
+const ERROR_SAMPLES: usize = 201;
+
+/// The mesh of a sweep.
+struct SweepMesh {
+    beams: Vec<Beam>,
+    order: Mesh,
+    /// The steps in the middle of the grid.
+    steps: Steps,
+}
+
+/// Step tolerance of a run, and its estimated error.
+#[derive(Debug, Clone, Copy)]
+struct Steps {
+    /// Their tolerance [1].
+    tol: f64,
+    /// As a share of the amplitude; none: not compared.
+    error: Option<f64>,
+    /// Where that was found.
+    place: &'static str,
+}
+
+/// A point on its mesh.
+struct MeshedPoint {
+    compiled: CompiledModel,
+    steps: Steps,
+    /// Warnings about effects that its run omits.
+    reported: Vec<String>,
+}
+
+/// Data that all points share.
+pub(super) struct TransientSweep<'a> {
+    spec: &'a SweepSpec,
+    source: &'a NetlistSource,
+    options: Arc<CompileOptions>,
+    mesh: OnceLock<Option<SweepMesh>>,
+}
+
+impl<'a> TransientSweep<'a> {
+    pub(super) fn new(spec: &'a SweepSpec, source: &'a NetlistSource, options: Arc<CompileOptions>) -> Self {
+        Self { spec, source, options, mesh: OnceLock::new() }
+    }
+
+    /// Runs some points. `finished` is called for each with whether it has a result, and returns whether to continue.
+    /// `None` if it returned false.
+    pub(super) fn run(
+        &self,
+        numbers: &[usize],
+        means: &PointBudget,
+        finished: &(dyn Fn(Option<&PointOutcome>) -> bool + Sync),
+    ) -> Option<Vec<PointOutcome>> {
+        let go_on = || finished(None);
+        let prepare = |&number: &usize| means.guarded(|| self.prepare(&self.spec.settings(number), &go_on));
+        let prepared: Vec<Result<MeshedPoint, Failed>> = numbers.iter().map(prepare).collect();
+        // lanes have one tolerance for all
+        let tol = prepared.iter().flatten().next().map_or(self.options.tol, |point| point.steps.tol);
+        let like = |p: &'_ Result<MeshedPoint, Failed>| p.as_ref().is_ok_and(|point| point.steps.tol == tol);
+        let variants: Vec<(usize, &CompiledModel)> = (prepared.iter().enumerate().filter(|(_, p)| like(p)))
+            .filter_map(|(k, p)| Some((k, &p.as_ref().ok()?.compiled)))
+            .collect();
+        let compiled: Vec<&CompiledModel> = variants.iter().map(|(_, compiled)| *compiled).collect();
+        // lanes have one voltage for all
+        let same = self.spec.ports().next().is_none();
+        let side_by_side = same.then(|| {
+            let options = TransientOptions { tol, ..self.transient(&[]) };
+            means.guarded(|| {
+                batch_transient::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
+            })
+        });
+        let mut ends: Vec<Option<RunEnd>> = vec![None; numbers.len()];
+        if let Some(Ok((found, _))) = side_by_side {
+            for ((k, _), end) in variants.iter().zip(found) {
+                ends[*k] = end;
+            }
+        }
+        let mut outcomes = Vec::with_capacity(numbers.len());
+        for ((&number, prepared), end) in numbers.iter().zip(&prepared).zip(ends) {
+            let settings = self.spec.settings(number);
+            let options = self.transient(&settings);
+            let values = match (prepared, end) {
+                (Err(error), _) => Err(error.clone()),
+                (Ok(point), Some(end)) => self.found(point, &options, end).map_err(Failed::from),
+                (Ok(point), None) => means.guarded(|| self.found(point, &options, alone(point, &options)?)),
+            };
+            let parameters = settings.into_iter().map(|(_, value)| value).collect();
+            let outcome = PointOutcome { number, parameters, values };
+            if !finished(Some(&outcome)) {
+                return None;
+            }
+            outcomes.push(outcome);
+        }
+        Some(outcomes)
+    }
+
+    /// The run of a point.
+    fn transient(&self, settings: &[(String, Setting)]) -> TransientOptions<'static> {
+        let SweepAnalysis::Transient { stop, outputs, voltages } = &*self.spec.analysis_at(settings) else {
+            return TransientOptions::default();
+        };
+        TransientOptions {
+            stop: *stop,
+            signals: outputs.clone(),
+            points: 2,
+            tol: self.options.tol,
+            voltages: voltages.clone(),
+            ..TransientOptions::default()
+        }
+    }
+
+    /// A point on its mesh.
+    fn prepare(&self, settings: &[(String, Setting)], go_on: &dyn Fn() -> bool) -> Result<MeshedPoint, String> {
+        let drawn = draw(self.source, &at(&self.options, settings)).map_err(|error| brief(&error))?;
+        let options = self.transient(settings);
+        let shared =
+            if self.spec.has_variants() { self.mesh.get_or_init(|| self.search(go_on)).as_ref() } else { None };
+        match shared.filter(|shared| alike(&shared.beams, &drawn.structure.beams)) {
+            Some(shared) => {
+                let compiled = drawn.on(shared.order.clone()).map_err(|error| error.to_string())?;
+                Ok(prepared(compiled, &options, shared.steps))
+            }
+            None => {
+                let compiled = drawn.compile().map_err(|error| brief(&error))?;
+                let (compiled, _) = mesh::fitted_in_time(&compiled, &options).map_err(|error| error.to_string())?;
+                let steps = steps(&compiled, options.clone(), "by the end of the run", go_on);
+                Ok(prepared(compiled, &options, steps))
+            }
+        }
+    }
+
+    /// The mesh that is fine enough at every probe.
+    fn search(&self, go_on: &dyn Fn() -> bool) -> Option<SweepMesh> {
+        let mut shared: Option<SweepMesh> = None;
+        for settings in probes(self.spec) {
+            let drawn = draw(self.source, &at(&self.options, &settings));
+            let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
+            let Ok(order) = mesh::order_in_time(&compiled, &self.transient(&settings)) else { continue };
+            match &mut shared {
+                None => {
+                    let steps = Steps { tol: self.options.tol, error: None, place: IN_THE_MIDDLE };
+                    shared = Some(SweepMesh { beams: compiled.structure.beams.clone(), order, steps });
+                }
+                Some(shared) if alike(&shared.beams, &compiled.structure.beams) => {
+                    for (most, n) in shared.order.segments.iter_mut().zip(order.segments) {
+                        *most = (*most).max(n);
+                    }
+                    let both = shared.order.estimated_error.zip(order.estimated_error);
+                    shared.order.estimated_error = both.map(|(a, b)| a.max(b));
+                }
+                Some(_) => {}
+            }
+        }
+        let mut shared = shared?;
+        let settings = middle(self.spec);
+        let drawn = draw(self.source, &at(&self.options, &settings)).ok();
+        let middle = drawn.filter(|drawn| alike(&shared.beams, &drawn.structure.beams));
+        let middle = middle.and_then(|drawn| drawn.on(shared.order.clone()).ok());
+        if let Some(compiled) = middle {
+            shared.steps = steps(&compiled, self.transient(&settings), IN_THE_MIDDLE, go_on);
+        }
+        Some(shared)
+    }
+
+    fn found(&self, point: &MeshedPoint, options: &TransientOptions<'_>, end: RunEnd) -> Result<PointResults, String> {
+        let MeshedPoint { compiled, steps: Steps { error, place, .. }, reported } = point;
+        let mut values = Vec::with_capacity(end.values.len());
+        for (name, value) in options.signals.iter().zip(end.values) {
+            if !value.is_finite() {
+                return Err(format!("{name} is not finite"));
+            }
+            let unit = Signal::find(compiled, name).map_err(|error| error.to_string())?.unit();
+            values.push(PointValue { name: name.clone(), unit: unit.into(), value: Some(value) });
+        }
+        let estimated_error = compiled.order.estimated_error;
+        let beyond = mesh::beyond(self.options.tol, estimated_error);
+        let beyond = beyond.map(|message| format!("{}: {message}", mesh::WARNING));
+        let steps = match error {
+            Some(error) => step_error::beyond(options, *error, place),
+            None => Some(step_error::unknown(options)),
+        };
+        let reported = reported.iter().cloned();
+        let warnings: Vec<String> = beyond.into_iter().chain(reported).chain(steps).chain(end.warnings).collect();
+        let estimated_error = estimated_error.filter(|error| error.is_finite());
+        Ok(PointResults { values, estimated_error, warning: warnings.join("; ") })
+    }
+}
+
+/// A point on its mesh, with what its run leaves out.
+fn prepared(compiled: CompiledModel, options: &TransientOptions<'_>, steps: Steps) -> MeshedPoint {
+    let reported = mesh::run_warnings(&compiled, None, &options.voltages);
+    MeshedPoint { steps, reported: reported.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
+}
+
+/// The steps of a run of this variant.
+fn steps(compiled: &CompiledModel, run: TransientOptions<'_>, place: &'static str, go_on: &dyn Fn() -> bool) -> Steps {
+    let options = TransientOptions { points: ERROR_SAMPLES, ..run };
+    let (error, tol) = step_error::step_error(&options, compiled, &mut |_| go_on());
+    Steps { tol, error, place }
+}
+
+/// A run of its own.
+fn alone(point: &MeshedPoint, options: &TransientOptions<'_>) -> Result<RunEnd, String> {
+    let options = TransientOptions { tol: point.steps.tol, ..options.clone() };
+    let result = transient(&point.compiled, &options, &mut |_, _| (), &mut |_| true);
+    let result = result.map_err(|error: AnalysisError| error.to_string())?;
+    let last = |(_, _, values): &(String, String, Vec<f64>)| values.last().copied().unwrap_or(f64::NAN);
+    let values = result.signals.iter().map(last).collect();
+    Ok(RunEnd { values, steps: result.counters.steps, warnings: result.warnings })
+}
+
+/// Share of the samples beyond a probe on either side.
+const RARE: f64 = 1e-3;
+
+/// The middle of the grid and its corners. A numeric axis contributes its least and largest value, another its first
+/// and last. Linked axes contribute the points where one of them is at an end, and random parameters their 0.1 %
+/// quantiles.
+fn probes(spec: &SweepSpec) -> Vec<Vec<(String, Setting)>> {
+    let ends: Vec<Vec<Vec<(String, Setting)>>> = spec.groups().map(ends).chain(drawn(spec)).collect();
+    let middle = middle(spec);
+    let with = |probe: &[(String, Setting)], end: &[(String, Setting)]| {
+        let other = |(name, value): &(String, Setting)| {
+            let end = end.iter().find(|(at, _)| at == name).map(|(_, value)| value);
+            (name.clone(), end.unwrap_or(value).clone())
+        };
+        probe.iter().map(other).collect::<Vec<_>>()
+    };
+    let mut probes = vec![middle.clone()];
+    if ends.iter().map(Vec::len).fold(1, usize::saturating_mul) <= MAX_CORNERS {
+        let mut corners = vec![middle];
+        for ends in &ends {
+            corners = ends.iter().flat_map(|end| corners.iter().map(|corner| with(corner, end))).collect();
+        }
+        probes.extend(corners);
+    } else {
+        probes.extend(ends.iter().flatten().map(|end| with(&middle, end)));
+    }
+    probes.dedup();
+    probes
+}
+
+/// The points of an axis where one of what goes together is at an end.
+fn ends(group: &[SweepParameter]) -> Vec<Vec<(String, Setting)>> {
+    let of_axis = |axis: &SweepParameter| axis.values.ends().map(|(least, largest)| [least, largest]);
+    let axes = group.iter().filter(|axis| axis.option().is_none());
+    let mut places: BTreeSet<usize> = axes.filter_map(of_axis).flatten().collect();
+    if places.is_empty() {
+        places.insert(group[0].values.len() / 2);
+    }
+    let at =
+        |place: usize| group.iter().filter_map(|axis| Some((axis.name.clone(), axis.values.get(place)?))).collect();
+    places.into_iter().map(at).collect()
+}
+
+/// The ends of what is drawn.
+fn drawn(spec: &SweepSpec) -> impl Iterator<Item = Vec<Vec<(String, Setting)>>> {
+    let both = |samples: &SampleGenerator| samples.quantiles(RARE).into_iter().zip(samples.quantiles(1.0 - RARE));
+    spec.samples.iter().flat_map(both).map(|(low, high)| vec![vec![low], vec![high]])
+}

@@ -1,0 +1,101 @@
+//! Lines of combs, gaps, stops and what domains have of their own.
+
+use super::{OfStructure, unmirrored};
+use bimorph_domains::elements;
+use bimorph_structure::{Beam, GapVoltage, Impact, NodeId};
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// Impact losses, where the netlist gives them.
+fn impact(impact: &Impact) -> impl Iterator<Item = (&'static str, f64)> {
+    let given = [("restitution", impact.restitution), ("speed", impact.speed)];
+    given.into_iter().filter_map(|(name, value)| Some((name, value?)))
+}
+
+impl OfStructure<'_> {
+    /// `gap2d` at a fixed voltage brings its two beams with it; gives their names.
+    pub(super) fn gaps_with_beams(&mut self) -> HashSet<String> {
+        let structure = self.structure;
+        let beams: HashMap<&str, &Beam> = structure.beams.iter().map(|b| (b.name.as_str(), b)).collect();
+        let mut inside = HashSet::new();
+        for gap in &structure.beam_gaps {
+            let GapVoltage::Fixed(voltage) = gap.voltage else { continue };
+            let parts = ["upper", "lower"].map(|part| format!("{}.{part}", gap.name));
+            let (Some(upper), Some(lower)) = (beams.get(parts[0].as_str()), beams.get(parts[1].as_str())) else {
+                self.left.push(format!("the gap `{}` at a fixed voltage without its beams", gap.name));
+                continue;
+            };
+            let process = self.process_of(upper);
+            let mut parameters = vec![("l", gap.length), ("w1", upper.width), ("w2", lower.width), ("gap", gap.gap)];
+            let (nodes, angle) = unmirrored(gap);
+            parameters.extend([("oz", angle), ("V", voltage), ("permittivity", gap.permittivity)]);
+            parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
+            self.push(&gap.name, "gap2d", &process, &nodes, &parameters);
+            inside.extend(parts);
+        }
+        inside
+    }
+
+    pub(super) fn fields(&mut self) {
+        let structure = self.structure;
+        let turned = |axis: [f64; 2]| ("oz", axis[1].atan2(axis[0]));
+        let across: BTreeMap<(NodeId, NodeId), f64> =
+            structure.beams.iter().flat_map(|b| [((b.a, b.b), b.width), ((b.b, b.a), b.width)]).collect();
+        for comb in &structure.combs {
+            let mut parameters = vec![("N", comb.gaps), ("gap", comb.gap), ("l", comb.overlap), ("L", comb.finger[0])];
+            parameters.extend([("h", comb.height), turned(comb.axis), ("permittivity", comb.permittivity)]);
+            if comb.finger[1] > 0.0 {
+                parameters.push(("w", comb.finger[1]));
+            }
+            let model = match comb.voltage {
+                GapVoltage::Fixed(v) => {
+                    parameters.push(("V", v));
+                    "comb2d"
+                }
+                GapVoltage::Nodes(..) => {
+                    if comb.parasitic != 0.0 {
+                        parameters.push(("Cp", comb.parasitic));
+                    }
+                    "comb2de"
+                }
+            };
+            self.push(&comb.name, model, "*", &[comb.a, comb.b], &parameters);
+        }
+        for gap in structure.beam_gaps.iter().filter(|g| matches!(g.voltage, GapVoltage::Nodes(..))) {
+            let [a, b, c, d] = gap.nodes;
+            let (p, q) = (self.position(a), self.position(c));
+            // Both widths come back from the distance of the centre lines and the width of the beam that is there.
+            let both = 2.0 * ((p[0] - q[0]).hypot(p[1] - q[1]) - gap.gap);
+            let w1 = across.get(&(a, b)).copied();
+            let w2 = across.get(&(c, d)).copied();
+            let w1 = w1.or(w2.map(|w| both - w)).unwrap_or(both / 2.0);
+            let w2 = w2.unwrap_or(both - w1);
+            let mut parameters = vec![("l", gap.length), ("w1", w1), ("w2", w2), ("gap", gap.gap), ("h", gap.height)];
+            let (nodes, angle) = unmirrored(gap);
+            parameters.extend([("oz", angle), ("permittivity", gap.permittivity)]);
+            parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
+            self.push(&gap.name, "gap2dforce", "*", &nodes, &parameters);
+        }
+        for gap in &structure.plate_gaps {
+            if matches!(gap.voltage, GapVoltage::Fixed(_)) {
+                self.left.push(format!("the fixed voltage of `{}`", gap.name));
+            }
+            let mut parameters =
+                vec![("A", gap.area), ("gap", gap.gap), turned(gap.axis), ("permittivity", gap.permittivity)];
+            parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
+            self.push(&gap.name, "plategap2d", "*", &[gap.a, gap.b], &parameters);
+        }
+        for stop in &structure.stops {
+            let mut parameters = vec![("A", stop.area), turned(stop.axis)];
+            let optional = [("gap", stop.ways[0]), ("back", stop.ways[1]), ("k", stop.stiffness)];
+            parameters.extend(optional.into_iter().filter_map(|(n, v)| Some((n, v?))).chain(impact(&stop.impact)));
+            let nodes: Vec<NodeId> = [Some(stop.a), stop.b].into_iter().flatten().collect();
+            self.push(&stop.name, "stop2d", "*", &nodes, &parameters);
+        }
+        for placed in &structure.placed {
+            let Some(element) = elements().find(|element| element.name == placed.element) else { continue };
+            let given = element.parameters.iter().copied().zip(placed.values.iter().copied());
+            let parameters: Vec<_> = given.filter(|(_, value)| *value != 0.0).chain([("oz", placed.angle)]).collect();
+            self.push(&placed.name, element.name, "*", &placed.nodes, &parameters);
+        }
+    }
+}

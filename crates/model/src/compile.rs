@@ -1,0 +1,250 @@
+//! From netlist text to a ready model: netlist → structure → discretize.
+
+use crate::discretize::{Assembly, DiscretizeError, discretize_like, order, permanent_strain};
+use crate::options::OptionError;
+use crate::refine::imperfection;
+use crate::refine::mesh_search::{self, Mesh};
+use bimorph_multibody::joint_coordinates::sprung_loops::UnsupportedModel;
+use bimorph_multibody::planar::Pose;
+use bimorph_netlist::{Bundle, Diagnostic, Diagnostics, NetlistSource, Setting};
+use bimorph_solve::equations::Joints;
+use bimorph_structure::Structure;
+use std::sync::Arc;
+use thiserror::Error;
+
+pub use crate::options::{CompileOptions, Formulation, Junctions, Scheme};
+
+/// A ready model with everything it came from.
+#[derive(Debug, Clone)]
+pub struct CompiledModel {
+    /// The structure.
+    pub structure: Arc<Structure>,
+    /// Netlist parameters with the values they took.
+    pub parameters: Vec<(String, Setting)>,
+    /// Warnings of the netlist.
+    pub warnings: Diagnostics,
+    /// The options it was compiled with.
+    pub options: CompileOptions,
+    /// Bodies, joints, gaps and electrics, and where the drawing's parts went.
+    pub parts: Assembly,
+    /// Segments of each beam, and the error estimated for them where a band was given or an analysis chose them.
+    pub order: Mesh,
+    /// The system in joint coordinates where the formulation has them; or why they cannot be had.
+    pub joints: Option<Result<Arc<Joints>, UnsupportedModel>>,
+    /// Its lowest mode, where that was looked for: in a circuit.
+    pub lowest: Option<LowestMode>,
+    /// Modes above that whose errors are known, where they were looked for: in a circuit.
+    pub higher: Arc<[HigherMode]>,
+}
+
+/// A mode above the lowest about the equilibrium without voltages.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HigherMode {
+    /// Frequency [Hz].
+    pub frequency_hz: f64,
+    /// Quality by the drag and dampers of the drawing [1]; infinite without.
+    pub quality: f64,
+    /// Estimated relative error of the frequency by the mesh [1].
+    pub error: f64,
+    /// Displacements of the bodies, of modal mass 1 kg.
+    pub shape: Vec<Pose>,
+}
+
+/// The lowest mode about the equilibrium without voltages.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LowestMode {
+    /// Frequency [Hz].
+    pub frequency_hz: f64,
+    /// Quality by the drag and dampers of the drawing [1]; infinite without.
+    pub quality: f64,
+    /// Estimated relative error of the frequency by the mesh [1].
+    pub error: f64,
+}
+
+impl CompiledModel {
+    /// Mechanical unknowns of the formulation.
+    pub fn unknowns(&self) -> usize {
+        match &self.joints {
+            Some(Ok(joints)) => joints.tree.coordinates,
+            _ => self.parts.system.model.unknowns(),
+        }
+    }
+
+    /// The same drawing on another mesh.
+    ///
+    /// # Errors
+    /// See [`DiscretizeError`].
+    pub fn with_order(&self, order: Mesh) -> Result<Self, DiscretizeError> {
+        let rigid = |segments: &[usize]| segments.iter().map(|n| *n == 0).collect::<Vec<_>>();
+        let like = (rigid(&self.order.segments) == rigid(&order.segments)).then_some(&self.parts);
+        let parts = laid_out(&self.structure, &self.options, &order.segments, like)?;
+        Ok(Self {
+            structure: Arc::clone(&self.structure),
+            parameters: self.parameters.clone(),
+            warnings: self.warnings.clone(),
+            options: self.options.clone(),
+            joints: in_joints_of(&parts, &self.options),
+            parts,
+            order,
+            lowest: None,
+            higher: Arc::default(),
+        })
+    }
+}
+
+/// Errors of a compilation.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CompileError {
+    /// An option is out of its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
+    /// The netlist has errors.
+    #[error("{0}")]
+    Netlist(Diagnostics),
+    /// The structure cannot be made into a model.
+    #[error(transparent)]
+    Structure(#[from] DiscretizeError),
+}
+
+/// Compiles a netlist.
+///
+/// # Errors
+/// See [`CompileError`].
+pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<CompiledModel, CompileError> {
+    draw(&NetlistSource::new(bundle), options)?.compile()
+}
+
+/// A netlist as drawn with its options settled, before any mesh.
+#[derive(Debug, Clone)]
+pub struct ParsedStructure {
+    /// The structure.
+    pub structure: Arc<Structure>,
+    /// Netlist parameters with the values they took.
+    pub parameters: Vec<(String, Setting)>,
+    /// Warnings of the netlist.
+    pub warnings: Diagnostics,
+    /// The options, with what one of them says of another.
+    pub options: CompileOptions,
+}
+
+/// Draws a netlist that has been read: the part of [`compile`] that depends on the values of parameters alone.
+///
+/// # Errors
+/// See [`CompileError`].
+pub fn draw(source: &NetlistSource, options: &CompileOptions) -> Result<ParsedStructure, CompileError> {
+    options.check()?;
+    let scheme = options.scheme.in_formulation(options.formulation);
+    let mut options = CompileOptions { scheme, ..options.clone() };
+    if options.as_sugar {
+        (options.linear, options.junctions) = (true, Junctions::Centreline);
+    }
+    let loaded = source.load(&options.set).map_err(CompileError::Netlist)?;
+    let structure = if options.without_circuit { loaded.structure.without_circuit() } else { loaded.structure };
+    Ok(ParsedStructure {
+        structure: Arc::new(structure),
+        parameters: loaded.parameters,
+        warnings: loaded.warnings,
+        options,
+    })
+}
+
+impl ParsedStructure {
+    /// The model on the mesh that the options specify.
+    ///
+    /// # Errors
+    /// See [`CompileError`].
+    pub fn compile(self) -> Result<CompiledModel, CompileError> {
+        let order = match (self.options.band, self.options.segments) {
+            (Some(band), None) => mesh_search::choose(&self.structure, &self.options, band)?,
+            _ => {
+                let segments = order::a_priori(&self.structure, &self.options)?;
+                Mesh { segments, estimated_error: None, modes_in_band: 0, passes: 0 }
+            }
+        };
+        Ok(self.on(order)?)
+    }
+
+    /// The model on a given mesh.
+    ///
+    /// # Errors
+    /// See [`DiscretizeError`].
+    pub fn on(mut self, order: Mesh) -> Result<CompiledModel, DiscretizeError> {
+        let parts = laid_out(&self.structure, &self.options, &order.segments, None)?;
+        self.warnings.items.extend(beyond_table(&self.structure, &self.options, &parts));
+        Ok(CompiledModel {
+            joints: in_joints_of(&parts, &self.options),
+            structure: self.structure,
+            parameters: self.parameters,
+            warnings: self.warnings,
+            options: self.options,
+            parts,
+            order,
+            lowest: None,
+            higher: Arc::default(),
+        })
+    }
+}
+
+/// Warning about junctions outside the calibrated range.
+fn beyond_table(structure: &Structure, options: &CompileOptions, parts: &Assembly) -> Option<Diagnostic> {
+    if options.junctions != Junctions::Calibrated {
+        return None;
+    }
+    let found = parts.beyond_table(structure)?;
+    let more = if found.count > 1 { format!(" ({} such beams in all)", found.count) } else { String::new() };
+    let name = &structure.beams[found.first].name;
+    let message = format!("the junctions of `{name}` are beyond what they were calibrated for: {}{more}", found.why);
+    let help = "the accuracy given in docs/junctions.md does not hold there; compare with `--junctions offset`";
+    Some(Diagnostic::warning("W017", message, help))
+}
+
+/// Bodies and joints, with the requested imperfection.
+fn laid_out(
+    structure: &Structure,
+    options: &CompileOptions,
+    segments: &[usize],
+    other: Option<&Assembly>,
+) -> Result<Assembly, DiscretizeError> {
+    let mut parts = discretize_like(structure, options, segments, other)?;
+    for (arm, strain) in
+        permanent_strain::arms(&parts, &structure.yields).iter().zip(structure.yields.iter().map(|y| y.strain))
+    {
+        permanent_strain::strain(&mut parts, arm, strain);
+    }
+    if let Some(share) = options.imperfection {
+        imperfection::apply(&mut parts, share * structure.extent());
+    }
+    Ok(parts)
+}
+
+/// The system in joint coordinates, where the formulation has them.
+fn in_joints_of(parts: &Assembly, options: &CompileOptions) -> Option<Result<Arc<Joints>, UnsupportedModel>> {
+    match options.formulation {
+        Formulation::Rcr | Formulation::RcrElastic => Some(Joints::elastic(&parts.system).map(Arc::new)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Structures beyond the limits are rejected before any allocation.
+    use super::*;
+
+    #[test]
+    fn options_are_bounded_before_anything_is_laid_out() {
+        let mut text = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [n0] [l=1u w=1u]\n".to_owned();
+        for k in 0..21 {
+            text += &format!("beam2d p [n{k} n{}] [l=100u w=2u]\n", k + 1);
+        }
+        let bundle = Bundle::from_text("chain.net", &text);
+        let asked = |options: CompileOptions| compile(&bundle, &options).map(|_| ());
+        let refused = asked(CompileOptions { tol: 2.0, ..CompileOptions::default() });
+        assert!(matches!(&refused, Err(CompileError::Option(r)) if r.option == "tol"), "{refused:?}");
+        // 21 beams of 100 000 segments each, every one of them within its own range
+        let fine = asked(CompileOptions { segments: Some(100_000), ..CompileOptions::default() });
+        assert_eq!(fine, Err(DiscretizeError::TooFine { segments: 2_100_000 }.into()));
+        let sharp = asked(CompileOptions { band: Some(1e12), tol: 1e-300, ..CompileOptions::default() });
+        assert!(matches!(sharp, Err(CompileError::Structure(DiscretizeError::TooFine { .. }))), "{sharp:?}");
+    }
+}

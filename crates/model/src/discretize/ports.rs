@@ -1,0 +1,106 @@
+//! Resistors, heated beams, sources and ports → potentials, port conductances and quadratic forms of temperature.
+//!
+//! Sources are numbered ports first, then the netlist's voltage sources, then one for each gap with a fixed voltage (which
+//! touches no node).
+
+use super::error::DiscretizeError;
+use super::rigid::RigidGroups;
+use bimorph_domains::drive::Electrics;
+use bimorph_domains::network::{CircuitError, ElectricalNetwork};
+use bimorph_domains::thermal::{HeatConductor, Heating};
+use bimorph_domains::{Member, PlacedMember};
+use bimorph_structure::{GapVoltage, Structure};
+use nalgebra::{DMatrix, RowDVector};
+
+/// Builds the electrical side; `heated` lists the beams that are heaters, in heater order, and `gaps` what
+/// acts across gaps.
+///
+/// # Errors
+/// [`DiscretizeError::SourceLoop`], [`DiscretizeError::Conductances`], [`DiscretizeError::NoHeatSink`].
+pub fn lay(
+    structure: &Structure,
+    heated: &[usize],
+    gaps: &[PlacedMember<'_, Member>],
+    rigid: &RigidGroups,
+) -> Result<Electrics, DiscretizeError> {
+    let ports = structure.ports.len();
+    let mut names: Vec<String> = structure.ports.iter().map(|p| p.name.clone()).collect();
+    names.extend(structure.voltage_sources.iter().map(|s| s.name.clone()));
+    let mut fixed: Vec<f64> = structure.voltage_sources.iter().map(|s| s.voltage).collect();
+
+    let net: Vec<usize> = structure.nets().into_iter().map(|node| node.0).collect();
+    let mut heaters = Vec::with_capacity(heated.len());
+    for &index in heated {
+        let beam = &structure.beams[index];
+        if let Some(h) = &beam.heater {
+            heaters.push(HeatConductor {
+                a: net[beam.a.0],
+                b: net[beam.b.0],
+                resistance: h.resistance,
+                conductance: h.conductance,
+                expansion: beam.material.thermal_expansion,
+                ambient: beam.material.ambient_temperature,
+                time_constant: h.time_constant.unwrap_or(0.0),
+                delayed: h.time_constant.is_none(),
+                capacity: h.capacity,
+            });
+        }
+    }
+    let circuit = ElectricalNetwork {
+        nodes: structure.nodes.len(),
+        resistors: (structure.resistors.iter().map(|r| (net[r.a.0], net[r.b.0], r.resistance)))
+            .chain(heaters.iter().map(|h| (h.a, h.b, h.resistance)))
+            .collect(),
+        sources: (structure.ports.iter().map(|p| (net[p.plus.0], p.minus.map(|n| net[n.0]))))
+            .chain(structure.voltage_sources.iter().map(|s| (net[s.plus.0], Some(net[s.minus.0]))))
+            .collect(),
+        grounds: structure.electrical_grounds.iter().map(|n| net[n.0]).collect(),
+    };
+    let potentials = circuit.solve().map_err(|e| match e {
+        CircuitError::SourceLoop { source_index } => {
+            DiscretizeError::SourceLoop { source_name: names[source_index].clone() }
+        }
+        CircuitError::Range { resistor } => {
+            let element = match structure.resistors.get(resistor) {
+                Some(resistor) => &resistor.name,
+                None => &structure.beams[heated[resistor - structure.resistors.len()]].name,
+            };
+            DiscretizeError::Conductances { element: element.clone() }
+        }
+    })?;
+    let driven = potentials.potential.ncols();
+    let fields = gaps.iter().filter(|gap| gap.voltage.is_some()).count();
+    // a gap with a voltage of its own is a source
+    bimorph_base::budget::lay_out_matrix(fields + 2 * ports, driven + ports + structure.voltage_sources.len() + fields);
+
+    let mut rows: Vec<(usize, Result<Vec<f64>, usize>)> = Vec::new();
+    for (g, gap) in gaps.iter().enumerate() {
+        let row = match gap.voltage {
+            None => continue,
+            Some(GapVoltage::Nodes(a, b)) => Ok(potentials.difference(net[a.0], net[b.0]).iter().copied().collect()),
+            Some(GapVoltage::Fixed(v)) => {
+                fixed.push(*v);
+                names.push(gap.name.to_owned());
+                Err(ports + fixed.len() - 1)
+            }
+        };
+        rows.push((g, row));
+    }
+    let sources = ports + fixed.len();
+    let mut gap_rows = DMatrix::zeros(gaps.len(), sources);
+    for (g, row) in rows {
+        match row {
+            Ok(row) => gap_rows.view_mut((g, 0), (1, driven)).copy_from(&RowDVector::from_vec(row)),
+            Err(own) => gap_rows[(g, own)] = 1.0,
+        }
+    }
+    let mut sink = vec![false; structure.nodes.len()];
+    for n in (0..structure.nodes.len()).filter(|n| structure.nodes[*n].mechanical && rigid.grounded(*n)) {
+        sink[net[n]] = true;
+    }
+    let heating = Heating::new(heaters, &potentials, sources, &sink)
+        .map_err(|e| DiscretizeError::NoHeatSink { beam: structure.beams[heated[e.heater]].name.clone() })?;
+    let mut conductance = DMatrix::zeros(ports, sources);
+    conductance.view_mut((0, 0), (ports, driven)).copy_from(&potentials.conductance.rows(0, ports));
+    Ok(Electrics { ports, fixed, names, gap_rows, conductance, heating, inputs: Vec::new() })
+}

@@ -1,0 +1,18 @@
+//! Options, defined once: names, units, defaults, ranges and help for the command, the protocol, decks, sweeps, Python
+//! and docs/.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`model`] | the table of the options of a model |
+//! | [`analysis`] | options of single analyses |
+//! | [`table`] | description of an option, and the check of a value |
+//! | [`choices`] | the names that some options take |
+
+pub mod analysis;
+pub mod choices;
+pub mod model;
+pub mod table;
+
+pub use choices::{Formulation, Junctions, Scheme};
+pub use model::{CompileOptions, MODEL, ModelOption};
+pub use table::{OptionDescription, OptionError, OptionValue, Range};

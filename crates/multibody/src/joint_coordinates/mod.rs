@@ -1,0 +1,9 @@
+//! Motion in relative joint coordinates, in two formulations that differ in how loops are closed.
+//!
+//! | module | loops |
+//! |---|---|
+//! | [`sprung_loops`] | a joint that closes a loop keeps its springs: no constraint, no singular configuration |
+//! | [`constrained_loops`] | loops are rigid, and their constraints are reduced inside the recursion (docs/rcr.md) |
+
+pub mod constrained_loops;
+pub mod sprung_loops;

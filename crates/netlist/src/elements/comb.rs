@@ -1,0 +1,52 @@
+//! Comb drives: SUGAR's comb2d at a fixed voltage, and comb2de between two electrical nodes.
+
+use super::super::diagnostic_sink::Reported;
+use super::arguments::ElementSite;
+use bimorph_structure::{Comb, GapVoltage};
+
+impl ElementSite<'_, '_> {
+    fn comb(&mut self, finite: bool, parasitic: f64, voltage: GapVoltage) -> Result<(), Reported> {
+        self.told_apart();
+        let angle = self.direction(self.instance.rotation)?;
+        let (gaps, gap, height) = (self.positive("N")?, self.positive("gap")?, self.positive("h")?);
+        let (overlap, finger) = (self.non_negative_or("l", 0.0)?, self.positive("L")?);
+        if overlap > finger {
+            let span = self.span_of("l");
+            let message = "the overlap `l` of a comb is longer than its fingers `L`".to_owned();
+            return Err(self.sink.error("E060", span, message, ""));
+        }
+        let width = self.positive_if_any("w")?.unwrap_or(0.0);
+        let permittivity = self.permittivity()?;
+        let axis = [angle.cos(), angle.sin()];
+        let (a, b) = (self.node(0), self.node(1));
+        let apart = 2.0 * finger - overlap;
+        self.drawing.place(self.instance.span, &[a, b], &[[0.0; 2], [apart * axis[0], apart * axis[1]]]);
+        self.drawing.structure.combs.push(Comb {
+            name: self.name(),
+            a,
+            b,
+            axis,
+            gaps,
+            gap,
+            height,
+            overlap,
+            permittivity,
+            parasitic,
+            finger: [finger, width],
+            finite,
+            voltage,
+        });
+        Ok(())
+    }
+}
+
+pub(super) fn comb2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    let voltage = GapVoltage::Fixed(site.required("V")?);
+    site.comb(false, 0.0, voltage)
+}
+
+pub(super) fn comb2de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    let parasitic = site.non_negative_or("Cp", 0.0)?;
+    let voltage = site.across(0, 1);
+    site.comb(true, parasitic, voltage)
+}

@@ -1,0 +1,184 @@
+//! Electrostatic gaps between facing beams (SUGAR's gap2d family) and between lumped plates.
+
+use super::super::diagnostic_sink::Reported;
+use super::super::drawing::Fact;
+use super::super::value::short;
+use super::arguments::ElementSite;
+use bimorph_structure::{BeamGap, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, NodeId, PlateGap, Resistor};
+
+/// SUGAR's factor on the fringe field: α = 1 + 1.12·gap/h.
+const FRINGE: f64 = 1.12;
+
+impl ElementSite<'_, '_> {
+    /// Widths of the upper and the lower beam [m]: `w1` and `w2`, or `w` for both.
+    fn widths(&mut self) -> Result<[f64; 2], Reported> {
+        let both = self.positive_if_any("w")?;
+        let mut widths = [0.0; 2];
+        for (width, name) in widths.iter_mut().zip(["w1", "w2"]) {
+            *width = match (self.positive_if_any(name)?, both) {
+                (Some(w), _) | (None, Some(w)) => w,
+                (None, None) => return Err(self.missing(name)),
+            };
+        }
+        Ok(widths)
+    }
+
+    /// Distance at which electrodes drawn `gap` apart touch [m], if it is given.
+    fn touch(&mut self, gap: f64) -> Result<Option<f64>, Reported> {
+        let touch = self.positive_if_any("touch")?;
+        if let Some(touch) = touch
+            && touch >= gap
+        {
+            let message = format!("`touch` is {} m, but the parts are drawn only {} m apart", short(touch), short(gap));
+            let help = "give a distance below `gap`: the thickness of the insulation, or the height of the bumps";
+            return Err(self.sink.error("E060", self.span_of("touch"), message, help));
+        }
+        Ok(touch)
+    }
+
+    /// Impact losses, where they are given.
+    pub(super) fn impact(&mut self) -> Result<Impact, Reported> {
+        let within = |site: &mut Self, name: &str, [least, most]: [f64; 2], help: &str| match site.number(name)? {
+            Some(x) if !(least..=most).contains(&x) => {
+                let message = format!("`{name}` is {x:e}, expected {least:e} to {most:e}");
+                Err(site.sink.error("E060", site.span_of(name), message, help))
+            }
+            x => Ok(x),
+        };
+        let elastic = "1 is elastic contact; the default is 0.5 at the speed `speed` [m/s]";
+        let restitution = within(self, "restitution", [MIN_RESTITUTION, 1.0], elastic)?;
+        let speed =
+            within(self, "speed", IMPACT_SPEEDS, "a speed of impact [m/s]; by default it is found from statics")?;
+        Ok(Impact { restitution, speed })
+    }
+
+    /// The field between two facing beams. Node c lies at local y = −(gap + (w1+w2)/2) under a, d under b.
+    fn facing(&mut self, voltage: GapVoltage) -> Result<(), Reported> {
+        let angle = self.direction(self.instance.rotation)?;
+        let side = self.side()?;
+        let [w1, w2] = self.widths()?;
+        let (length, gap, height) = (self.positive("l")?, self.positive("gap")?, self.positive("h")?);
+        let permittivity = self.permittivity()?;
+        let touch = self.touch(gap)?;
+        let impact = self.impact()?;
+        let below = -(gap + (w1 + w2) / 2.0);
+        let nodes: [NodeId; 4] = std::array::from_fn(|i| self.node(i));
+        let offsets = [[0.0; 2], [length, 0.0], [0.0, below], [length, below]].map(|v| self.global(v));
+        self.drawing.place(self.instance.span, &nodes, &offsets);
+        self.drawing.structure.beam_gaps.push(BeamGap {
+            name: self.name(),
+            nodes,
+            angle,
+            side,
+            length,
+            gap,
+            height,
+            permittivity,
+            fringe: 1.0 + FRINGE * gap / height,
+            touch,
+            impact,
+            voltage,
+        });
+        Ok(())
+    }
+
+    fn facing_beams(&mut self) -> Result<(), Reported> {
+        let [w1, w2] = self.widths()?;
+        self.add_beam(format!("{}.upper", self.instance.name), [self.node(0), self.node(1)], w1)?;
+        self.add_beam(format!("{}.lower", self.instance.name), [self.node(2), self.node(3)], w2)
+    }
+
+    /// The resistance of one of the two beams, from the node `end` to the next.
+    fn add_resistor(&mut self, end: usize, part: &str, resistance: f64) {
+        let (a, b) = (self.node(end), self.node(end + 1));
+        let name = format!("{}.{part}", self.instance.name);
+        self.drawing.electrical(&[a, b]);
+        self.drawing.structure.resistors.push(Resistor { name, a, b, resistance });
+    }
+
+    /// Warns of a voltage given to a gap that takes it from its nodes.
+    fn no_voltage(&mut self, fixed: &str) {
+        if self.is_given("V") {
+            let model = self.instance.model;
+            let message = format!("`{model}` takes no `V`: its voltage is that between its nodes a and c");
+            let help = format!("use `{fixed}` for a fixed voltage, or put a `Vsrc` or a `port` between the nodes");
+            let span = self.span_of("V");
+            self.sink.warning("W004", span, message, help);
+        }
+    }
+
+    /// The potential difference of the nodes `i` and `j`.
+    pub(super) fn across(&mut self, i: usize, j: usize) -> GapVoltage {
+        let (a, b) = (self.node(i), self.node(j));
+        self.drawing.electrical(&[a, b]);
+        GapVoltage::Nodes(a, b)
+    }
+}
+
+/// gap2d: two beams and the field between them, at a fixed voltage.
+pub(super) fn gap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    let voltage = GapVoltage::Fixed(site.required("V")?);
+    site.facing_beams()?;
+    site.facing(voltage)
+}
+
+/// gap2dforce: the field alone, at the voltage between nodes a and c.
+pub(super) fn gap2dforce(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.no_voltage("gap2d");
+    let voltage = site.across(0, 2);
+    site.facing(voltage)
+}
+
+/// gap2de: two conducting beams and the field between them.
+pub(super) fn gap2de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.no_voltage("gap2dV");
+    let [w1, w2] = site.widths()?;
+    for (end, part, width, r, g) in [(0, "upper", w1, "R1", "G1"), (2, "lower", w2, "R2", "G2")] {
+        let own = site.is_given(r) || site.is_given(g);
+        let (r, g) = if own { (r, g) } else { ("R", "G") };
+        let resistance = site.resistance(r, g, width)?;
+        site.add_resistor(end, part, resistance);
+    }
+    site.facing_beams()?;
+    let voltage = site.across(0, 2);
+    site.facing(voltage)
+}
+
+/// gap2de_b and those after it: two beams of the sheet resistance `Rs` and the field between them, which is that of `gap2de`.
+pub(super) fn gap2de_b(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.no_voltage("gap2dV");
+    let ([w1, w2], length, sheet) = (site.widths()?, site.positive("l")?, site.positive("Rs")?);
+    site.drawing.note(Fact::TrialGap, site.instance.span);
+    site.add_resistor(0, "upper", sheet * length / w1);
+    site.add_resistor(2, "lower", sheet * length / w2);
+    site.facing_beams()?;
+    let voltage = site.across(0, 2);
+    site.facing(voltage)
+}
+
+pub(super) fn gap3d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.drawing.note(Fact::OutOfPlane, site.instance.span);
+    gap2d(site)
+}
+
+pub(super) fn gap3de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.drawing.note(Fact::OutOfPlane, site.instance.span);
+    gap2de(site)
+}
+
+/// plategap2d: two lumped plates; b lies at `gap` along local x from a.
+pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    let angle = site.direction(site.instance.rotation)?;
+    let (area, gap) = (site.positive("A")?, site.positive("gap")?);
+    let permittivity = site.permittivity()?;
+    let touch = site.touch(gap)?;
+    let impact = site.impact()?;
+    let axis = [angle.cos(), angle.sin()];
+    let (a, b) = (site.node(0), site.node(1));
+    let voltage = site.across(0, 1);
+    site.drawing.place(site.instance.span, &[a, b], &[[0.0; 2], [gap * axis[0], gap * axis[1]]]);
+    let name = site.name();
+    let plate = PlateGap { name, a, b, axis, area, gap, permittivity, touch, impact, voltage };
+    site.drawing.structure.plate_gaps.push(plate);
+    Ok(())
+}

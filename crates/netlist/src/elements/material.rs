@@ -1,0 +1,148 @@
+//! Material constants of an element, from its own list and its layer.
+
+use super::super::diagnostic_sink::Reported;
+use super::super::drawing::Fact;
+use super::arguments::ElementSite;
+use bimorph_structure::{MOLTEN, Material};
+
+/// Poisson's ratio where a layer gives none [1]. Planar beams do not depend on it.
+const POISSON: f64 = 0.3;
+/// Film thickness of a material without damping [m]; its viscosity is 0 then, so that no number depends on it.
+const NO_FILM: f64 = 1.0;
+/// Young's moduli of structural solids, from rubber to diamond [Pa].
+const SOLID: std::ops::Range<f64> = 1e6..2e12;
+/// Densities of solids, from foam to osmium [kg/m³].
+const DENSE: std::ops::Range<f64> = 10.0..25e3;
+/// Strain of a residual stress beyond the strength of any solid, including defect-free crystals [1].
+const STRONGEST: f64 = 0.1;
+/// Permittivity of vacuum, as SUGAR's process files round it [F/m].
+pub(super) const VACUUM: f64 = 8.854e-12;
+
+/// Parameters of a material.
+const READ: [&str; 9] = [
+    "Youngsmodulus",
+    "Poisson",
+    "density",
+    "viscosity",
+    "fluid",
+    "stress",
+    "straingradient",
+    "thermalexpansion",
+    "ambienttemperature",
+];
+
+impl ElementSite<'_, '_> {
+    /// The material of a flexible member. That of a layer is read once.
+    pub(super) fn material(&mut self) -> Result<Material, Reported> {
+        let instance = self.instance;
+        if instance.arguments.given.iter().any(|argument| READ.contains(&argument.name)) {
+            return self.read_material();
+        }
+        if let Some(known) = instance.arguments.layer.material.get() {
+            return Ok(known.clone());
+        }
+        let noted = self.drawing.noted();
+        let material = self.read_material()?;
+        // a message about a layer applies to every element
+        if self.drawing.noted() == noted {
+            let _ = instance.arguments.layer.material.set(material.clone());
+        }
+        Ok(material)
+    }
+
+    fn read_material(&mut self) -> Result<Material, Reported> {
+        let youngs_modulus = self.positive("Youngsmodulus")?;
+        let [viscosity, fluid] = self.film()?;
+        let span = self.instance.span;
+        if !SOLID.contains(&youngs_modulus) {
+            let span = self.span_of("Youngsmodulus");
+            self.drawing.note_number(Fact::OddModulus, span, youngs_modulus);
+        }
+        let stress = self.number_or("stress", 0.0)?;
+        if stress.abs() > STRONGEST * youngs_modulus {
+            let span = self.span_of("stress");
+            self.drawing.note_number(Fact::OddStress, span, stress);
+        }
+        if self.number_or("straingradient", 0.0)? != 0.0 {
+            self.drawing.note(Fact::StrainGradient, span);
+        }
+        let poisson = self.number_or("Poisson", POISSON)?;
+        if !(poisson > -1.0 && poisson <= 0.5) {
+            return Err(self.out_of_range("Poisson", poisson, "above −1 and at most 0.5"));
+        }
+        Ok(Material {
+            youngs_modulus,
+            poisson,
+            density: self.density()?,
+            viscosity,
+            fluid,
+            thermal_expansion: self.number_or("thermalexpansion", 0.0)?,
+            ambient_temperature: self.ambient()?,
+            stress,
+        })
+    }
+
+    /// Ambient temperature [K]; 0 by default, so that temperatures are rises.
+    fn ambient(&mut self) -> Result<f64, Reported> {
+        let ambient = self.number_or("ambienttemperature", 0.0)?;
+        if ambient < 0.0 {
+            return Err(self.out_of_range("ambienttemperature", ambient, "an absolute temperature, zero or positive"));
+        }
+        if ambient > MOLTEN {
+            let span = self.span_of("ambienttemperature");
+            self.drawing.note_number(Fact::OddRise, span, ambient);
+        }
+        Ok(ambient)
+    }
+
+    /// Density [kg/m³]; 0 with a warning where it is missing.
+    pub(super) fn density(&mut self) -> Result<f64, Reported> {
+        if let Some(density) = self.number("density")? {
+            if density > 0.0 && !DENSE.contains(&density) {
+                let span = self.span_of("density");
+                self.drawing.note_number(Fact::OddDensity, span, density);
+            }
+            return if density < 0.0 { self.non_negative_or("density", 0.0) } else { Ok(density) };
+        }
+        let span = self.instance.span;
+        self.drawing.note(Fact::NoDensity, span);
+        Ok(0.0)
+    }
+
+    /// Viscosity [Pa·s] and thickness [m] of the gas film; no viscosity when either is missing.
+    pub(super) fn film(&mut self) -> Result<[f64; 2], Reported> {
+        let viscosity = self.non_negative_or("viscosity", 0.0)?;
+        match self.number("fluid")? {
+            Some(fluid) if fluid <= 0.0 && viscosity > 0.0 => {
+                Err(self.out_of_range("fluid", fluid, "positive where there is a `viscosity`"))
+            }
+            Some(fluid) if fluid > 0.0 && viscosity > 0.0 => Ok([viscosity, fluid]),
+            _ => Ok([0.0, NO_FILM]),
+        }
+    }
+
+    /// Permittivity [F/m].
+    pub(super) fn permittivity(&mut self) -> Result<f64, Reported> {
+        Ok(self.positive_if_any("permittivity")?.unwrap_or(VACUUM))
+    }
+
+    /// Prescribed mean temperature [K], if the element or its layer gives one.
+    pub(super) fn temperature(&mut self, material: &Material) -> Result<Option<f64>, Reported> {
+        let Some(temperature) = self.number("T")? else { return Ok(None) };
+        if self.number("thermalexpansion")?.is_none() {
+            return Err(self.missing("thermalexpansion"));
+        }
+        if temperature < 0.0 && material.ambient_temperature > 0.0 {
+            return Err(self.out_of_range("T", temperature, "an absolute temperature, zero or positive"));
+        }
+        if material.ambient_temperature == 0.0 && temperature != 0.0 {
+            let span = self.span_of("T");
+            self.drawing.note_number(Fact::AmbientZero, span, temperature);
+        }
+        if (temperature - material.ambient_temperature).abs() > MOLTEN {
+            let span = self.span_of("T");
+            self.drawing.note_number(Fact::OddRise, span, temperature);
+        }
+        Ok(Some(temperature))
+    }
+}

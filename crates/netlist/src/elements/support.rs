@@ -1,0 +1,77 @@
+//! Supports: anchors, hinges, sliders, guides, sliding beams; and `pos`, which only places nodes.
+
+use super::super::diagnostic_sink::Reported;
+use super::super::drawing::Fact;
+use super::super::rotation::Rotation;
+use super::arguments::ElementSite;
+use bimorph_structure::{NodeId, Pad, Support};
+
+impl ElementSite<'_, '_> {
+    fn support(&mut self, held: [bool; 3]) -> Result<(), Reported> {
+        let [l, w, _] = [self.positive_if_any("l")?, self.positive_if_any("w")?, self.positive_if_any("h")?];
+        let node = self.node(0);
+        let angle = self.instance.rotation.angle();
+        self.hold(node, held, angle);
+        if let (Some(l), Some(w)) = (l, w) {
+            let support = self.drawing.structure.supports.len() - 1;
+            self.drawing.structure.pads.push(Pad { support, size: [l, w] });
+        }
+        Ok(())
+    }
+
+    fn hold(&mut self, node: NodeId, held: [bool; 3], angle: f64) {
+        self.drawing.place(self.instance.span, &[node], &[[0.0; 2]]);
+        self.drawing.structure.supports.push(Support { name: self.name(), node, held, angle });
+    }
+}
+
+/// An anchor holds every node that it is given.
+pub(super) fn anchor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.support([true, true, true])?;
+    let angle = site.instance.rotation.angle();
+    for k in 1..site.instance.nodes.len() {
+        site.hold(site.node(k), [true; 3], angle);
+        site.drawing.note(Fact::AnchorNodes, site.instance.span);
+    }
+    Ok(())
+}
+
+pub(super) fn hinge(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.support([true, true, false])
+}
+
+pub(super) fn slider(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.support([false, false, true])
+}
+
+/// SUGAR's pinjoint holds z only: nothing in the drawing plane.
+pub(super) fn pinjoint(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.drawing.place(site.instance.span, &[site.node(0)], &[[0.0; 2]]);
+    Ok(())
+}
+
+pub(super) fn guide2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.direction(site.instance.rotation)?;
+    site.support([false, true, true])
+}
+
+/// slider2: a beam whose far end slides along a direction of the whole drawing, that of x turned by `sliderox slideroy slideroz`.
+pub(super) fn slider2(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    site.drawing.note(Fact::OutOfPlane, site.instance.span);
+    let [ox, oy, oz] =
+        [site.number_or("sliderox", 0.0)?, site.number_or("slideroy", 0.0)?, site.number_or("slideroz", 0.0)?];
+    let slope = Rotation::IDENTITY.turned(ox, oy, oz);
+    let angle = site.direction(slope)?;
+    let width = site.positive("w")?;
+    site.positive("l")?;
+    site.add_beam(site.name(), [site.node(0), site.node(1)], width)?;
+    site.hold(site.node(1), [false, true, false], angle);
+    Ok(())
+}
+
+pub(super) fn pos(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    let offset = [site.number_or("x", 0.0)?, site.number_or("y", 0.0)?, site.number_or("z", 0.0)?];
+    let [x, y, _] = site.instance.rotation.apply(offset);
+    site.drawing.lay(site.instance.span, &[site.node(0), site.node(1)], &[[0.0; 2], [x, y]]);
+    Ok(())
+}

@@ -1,0 +1,59 @@
+//! Reading: a bundle is given to the front end of its language.
+
+use super::bundle::Bundle;
+use super::diagnostic::Diagnostics;
+use super::foreign;
+use super::front_end::{FrontEnd, LoadedNetlist};
+use super::setting::Setting;
+use super::sugar2::Sugar2;
+
+/// Parses and elaborates a bundle with parameters set from outside.
+///
+/// # Errors
+/// Every error found in one run; warnings are among them.
+pub fn load(bundle: &Bundle, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics> {
+    NetlistSource::new(bundle).load(set)
+}
+
+/// A drawing that has been read, in whichever language it is.
+#[derive(Debug)]
+pub struct NetlistSource {
+    front: Box<dyn FrontEnd>,
+}
+
+impl NetlistSource {
+    /// Reads a bundle. Errors are returned by [`NetlistSource::load`].
+    pub fn new(bundle: &Bundle) -> Self {
+        Self { front: read(bundle) }
+    }
+
+    /// A source that another front end has read.
+    pub fn from_front(front: Box<dyn FrontEnd>) -> Self {
+        Self { front }
+    }
+
+    /// Draws it with parameters set from outside.
+    ///
+    /// # Errors
+    /// Every error found in one run, those of reading too; warnings are among them.
+    pub fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics> {
+        self.front.load(set)
+    }
+}
+
+/// Reads a bundle by the language of its root: SUGAR 3 where its first line that decides is Lua, else SUGAR 2.
+fn read(bundle: &Bundle) -> Box<dyn FrontEnd> {
+    #[cfg(feature = "lua")]
+    if bundle.is_program() {
+        return Box::new(super::sugar3::Sugar3::new(bundle));
+    }
+    Box::new(Sugar2::new(bundle))
+}
+
+impl Bundle {
+    /// True when the root is a SUGAR 3 netlist: a program, in Lua.
+    pub fn is_program(&self) -> bool {
+        let root = self.files.get(&self.root).map_or("", String::as_str);
+        matches!(foreign::kind(root, 0), foreign::FileKind::Lua(_))
+    }
+}

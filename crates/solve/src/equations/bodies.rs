@@ -1,0 +1,153 @@
+//! Every body's own coordinates: M·q̈ + C·q̇ + r(q, t) = 0 of a system while its sources go along a ramp.
+//!
+//! **Error norm.** The mass norm ‖e‖² = eᵀMe has one unit for translations and rotations. The error √(‖e_q‖² +
+//! h²‖e_v‖²) must stay below tol·(‖q‖ + floor). Here ‖q‖ is the larger of both ends of a step, and the floor is 1e-4 of
+//! the model's length scale. Where parts touch, the time of a bounce is nothing beside that of the motion, and a
+//! displacement beside its reach: there the error of the energy,
+//! |vᵀMe_v| + |work of the contact forces over e_q|, must also stay below tol·(kinetic energy + energy in the contacts), three times that where contact loses
+//! energy, and the error of a penetration below a tenth of it. A step that leaps beyond the law of contact is rejected, whatever its error is relative
+//! to where it ends.
+
+use super::{DegreeOfFreedom, Equations, Motion};
+use bimorph_domains::{Ramp, System};
+use bimorph_multibody::planar::Pose;
+use bimorph_multibody::{BodyId, Model};
+use nalgebra::Matrix6;
+use std::borrow::Cow;
+
+/// Share of the length scale below which a displacement's relative error does not count.
+pub const FLOOR: f64 = 1e-4;
+
+/// Names of a planar body's directions, for messages.
+pub const DIRECTIONS: [&str; 3] = ["along x", "along y", "about z"];
+
+/// Weights of displacements and rates of a system.
+#[derive(Debug, Clone)]
+pub struct NormWeights {
+    /// Of all bodies [kg].
+    pub(crate) mass: f64,
+    /// Directions that have drag and no mass: body, direction and drag [N·s/m, N·m·s].
+    pub(crate) dragged: Vec<(usize, usize, f64)>,
+}
+
+impl NormWeights {
+    /// Of a model.
+    pub fn new(model: &Model) -> Self {
+        Self { mass: model.bodies.iter().map(|b| b.mass).sum(), dragged: dragged(model) }
+    }
+}
+
+/// See the module.
+#[derive(Debug, Clone)]
+pub struct Bodies<'a> {
+    /// The mechanism.
+    pub system: &'a System,
+    /// Its sources, inputs and heat over time.
+    pub ramp: &'a Ramp<'a>,
+    weights: Cow<'a, NormWeights>,
+}
+
+impl<'a> Bodies<'a> {
+    /// A system under a ramp.
+    pub fn new(system: &'a System, ramp: &'a Ramp<'a>) -> Self {
+        Self { system, ramp, weights: Cow::Owned(NormWeights::new(&system.model)) }
+    }
+
+    /// The same with weights that have been found before.
+    pub fn weighed(system: &'a System, ramp: &'a Ramp<'a>, weights: &'a NormWeights) -> Self {
+        Self { system, ramp, weights: Cow::Borrowed(weights) }
+    }
+}
+
+impl Equations for Bodies<'_> {
+    type Unknown = Pose;
+
+    fn unknowns(&self) -> usize {
+        self.system.bodies()
+    }
+
+    fn end(&self) -> f64 {
+        self.ramp.dt
+    }
+
+    fn share(&self, [before, after]: [&Motion; 2], error: &Motion, h: f64, tol: f64) -> f64 {
+        let (system, NormWeights { mass, dragged }) = (self.system, &*self.weights);
+        if *mass == 0.0 && dragged.is_empty() {
+            return 0.0; // nothing moves in time with neither mass nor drag
+        }
+        // what drag holds back and no mass weighs as much as a mass that it would stop in this step
+        let drag = |x: &[Pose]| h * dragged.iter().map(|(j, i, c)| c * x[*j][*i] * x[*j][*i]).sum::<f64>();
+        let own = |x: &[Pose]| system.model.mass_product(x, x).sqrt();
+        let norm = |x: &[Pose]| match dragged.is_empty() {
+            true => own(x),
+            false => own(x).hypot(drag(x).sqrt()),
+        };
+        let mass = mass + h * dragged.iter().map(|(_, _, c)| c).sum::<f64>();
+        let (eq, ev) = (norm(&error.q), norm(&error.v));
+        let reach = norm(&before.q).max(norm(&after.q)) + FLOOR * system.length_scale * mass.sqrt();
+        let share = (eq * eq + h * h * ev * ev).sqrt() / (tol * reach);
+        // a sum: the larger of the two would hide what is not a number
+        let share = share.hypot(contact_error(system, (before, after), error, tol));
+        if share.is_nan() { f64::INFINITY } else { share }
+    }
+
+    fn worst(&self, error: &[Pose]) -> DegreeOfFreedom {
+        let (mut place, mut worst) = ((0, 0), -1.0);
+        for (j, e) in error.iter().enumerate() {
+            let m = self.system.model.mass(j);
+            for i in 0..3 {
+                let share = m[i] * e[i] * e[i];
+                if share > worst || share.is_nan() {
+                    (place, worst) = ((j, i), share);
+                }
+            }
+        }
+        place
+    }
+
+    fn named(&self, (body, direction): DegreeOfFreedom) -> (String, &'static str) {
+        (self.system.model.bodies[body].name.to_string(), DIRECTIONS[direction])
+    }
+}
+
+/// Fraction of the energy error that counts where contact dissipates energy, since the error decays as well.
+const OF_LOSS: f64 = 0.3;
+/// Error of a contact's penetration that is allowed, of the penetration [1], and the least one that it is measured by [m]: the force grows with its fourth
+/// power, and a point without inertia is in no norm of masses.
+const PRESSED: (f64, f64) = (0.1, 1e-10);
+
+/// Error of a step that begins or ends in contact: of the energy, and of the penetration; 0 elsewhere.
+pub(crate) fn contact_error(system: &System, (before, after): (&Motion, &Motion), error: &Motion, tol: f64) -> f64 {
+    let stored = system.contact_energy(&before.q).max(system.contact_energy(&after.q));
+    if stored == 0.0 {
+        return 0.0;
+    }
+    let model = &system.model;
+    let kinetic = 0.5 * model.mass_product(&after.v, &after.v).max(model.mass_product(&before.v, &before.v));
+    let work = system.contact_work(&after.q, &error.q);
+    let weight = if system.loses() { OF_LOSS } else { 1.0 };
+    let energy = weight * (model.mass_product(&after.v, &error.v).abs() + work) / (tol * (kinetic + stored));
+    energy.hypot(system.contact_change([&before.q, &after.q], &error.q, PRESSED.1) / PRESSED.0)
+}
+
+/// Directions of bodies without mass that drag holds back, with the drag [N·s/m, N·m·s].
+pub(crate) fn dragged(model: &Model) -> Vec<(usize, usize, f64)> {
+    if model.bodies.iter().all(|body| body.mass > 0.0) {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    for (j, body) in model.bodies.iter().enumerate().filter(|(_, body)| body.mass == 0.0) {
+        bimorph_base::budget::check();
+        let own = body.drag.matrix();
+        for i in (0..3).filter(|i| *i < 2 || body.inertia == 0.0) {
+            let at =
+                |id: BodyId, i: usize, matrix: &Matrix6<f64>| if id == BodyId::Free(j) { matrix[(i, i)] } else { 0.0 };
+            let dampers = model.dampers.iter().zip(&model.damper_matrix);
+            let drag = own[(i, i)] + dampers.map(|(d, m)| at(d.a, i, m) + at(d.b, i + 3, m)).sum::<f64>();
+            if drag > 0.0 {
+                found.push((j, i, drag));
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,310 @@
+//! Rodas4 in relative joint coordinates: one factorization a step, stages by inverse dynamics and one back-substitution.
+//!
+//! With q the coordinates of a [`Tree`](bimorph_multibody::joint_coordinates::sprung_loops::Tree), v their rates and z their accelerations, the motion is the differential-algebraic
+//! system q̇ = v, v̇ = z, 0 = R(q, v, z, t): R is the force that the motion would take, inertia included. The accelerations are
+//! carried from step to step, so that no stage needs a reduction of its own. In the variables U of a Rosenbrock method
+//! ```text
+//! r₁ = v_i + Σ c_ij/h·Uq_j          r₂ = z_i + Σ c_ij/h·Uv_j
+//! W·Uq = −R(q_i, v_i, z_i, t_i) − γ_i·h·∂R/∂t + M·(r₁/(γh) + r₂) + C·r₁          W = M/(γh)² + C/(γh) + K
+//! Uv = Uq/(γh) − r₁                 Uz = Uv/(γh) − r₂
+//! ```
+//! with M, C and K at the start of the step. K holds the springs of the tree's joints, the stiffness that forces and
+//! inertia bring to them ([`geometric`]), and the exact tangent of closures and gaps. The contribution of rates is
+//! omitted: it is small where joints rotate little in a step.
+//!
+//! To its caller the motion is that of the bodies, as with every other method; coordinates are internal.
+//!
+//! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 (RODAS) and §VI.3 (the direct
+//! approach to differential-algebraic systems).
+
+mod defect;
+mod error;
+mod ports;
+mod stages;
+mod tableau;
+
+use super::method::{Method, Motion, SolverCounters, StepFailure};
+use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I, moves_on};
+use super::stage_loss::StageLoss;
+use crate::equations::{Bodies, Joints};
+use bimorph_domains::Drive;
+use bimorph_multibody::forces;
+use bimorph_multibody::joint_coordinates::sprung_loops::JointMatrix;
+use bimorph_multibody::joint_coordinates::sprung_loops::columns::Four;
+use bimorph_multibody::joint_coordinates::sprung_loops::dynamics::Stresses;
+use bimorph_multibody::joint_coordinates::sprung_loops::geometric::{self, Geometric};
+use bimorph_multibody::joint_coordinates::sprung_loops::poses::{TreeKinematics, place_of};
+use bimorph_multibody::planar::Pose;
+use error::JointDefectEstimate;
+use ports::JointPortSensitivities;
+use stages::JointStages;
+use std::sync::Arc;
+
+/// Share of the shortest time at which accelerations are made consistent: directions without inertia follow their springs,
+/// all others their inertia.
+const CONSISTENT: f64 = 1e-3;
+
+/// The method with its storage.
+#[derive(Debug, Clone)]
+pub struct JointRodas4 {
+    joints: Arc<Joints>,
+    w: JointMatrix,
+    placed: TreeKinematics,
+    stresses: Stresses,
+    geometric: Vec<Geometric>,
+    /// Coordinates and rates, and accelerations (with nothing beside them); then the same of each sensitivity.
+    carried: Vec<Motion>,
+    stages: JointStages,
+    ports: JointPortSensitivities,
+    /// ∂(bodies' motion)/∂(final voltage of a source), one for each source given to [`JointRodas4::new`].
+    pub sensitivity: Vec<Motion>,
+    force: Vec<Pose>,
+    /// Right side of a stage over the coordinates, and over the bodies' motions; then what the solve has found.
+    right: Vec<Four>,
+    wrench: Vec<Four>,
+    forcing: Vec<Pose>,
+    drive: Drive,
+    rate: Drive,
+    /// The bodies have been placed at the argument of the stages.
+    is_placed: bool,
+    /// Derivatives of what contact loses, at the start of the step and in the stage at hand; none where it loses nothing.
+    loss: Option<Box<StageLoss>>,
+    /// Accelerations are those of the motion to come.
+    resumed: bool,
+    /// The error of the motion, where it is wanted.
+    defect: Option<Box<JointDefectEstimate>>,
+    /// About the shortest time in which something moves [s].
+    shortest: f64,
+    work: SolverCounters,
+}
+
+impl JointRodas4 {
+    /// Storage for a tree, with sensitivities to the final voltages of `sources`; `shortest` is about the shortest time in
+    /// which something moves [s].
+    pub fn new(joints: Arc<Joints>, shortest: f64, sources: &[usize]) -> Self {
+        let Joints { tree, closures, .. } = &*joints;
+        let count = tree.links.len();
+        let zeros = vec![Pose::zeros(); count];
+        let electrics = &closures.electrics;
+        Self {
+            w: JointMatrix::new(tree),
+            placed: TreeKinematics::new(tree),
+            stresses: Stresses::new(tree),
+            geometric: vec![Geometric::ZERO; count],
+            carried: vec![Motion::zeros(count); 2 + 2 * sources.len()],
+            stages: JointStages::new(count),
+            ports: JointPortSensitivities::new(&joints, sources),
+            sensitivity: vec![Motion::zeros(count); sources.len()],
+            force: zeros.clone(),
+            right: vec![Four::ZERO; count],
+            wrench: vec![Four::ZERO; count + 1],
+            forcing: zeros,
+            drive: electrics.drive(),
+            rate: electrics.drive(),
+            is_placed: false,
+            loss: StageLoss::new(closures, !sources.is_empty()).map(Box::new),
+            resumed: false,
+            defect: None,
+            shortest,
+            work: SolverCounters::default(),
+            joints,
+        }
+    }
+
+    /// Coordinates, rates and accelerations, for [`JointRodas4::resume`].
+    pub fn state(&self) -> &[Motion] {
+        &self.carried[..2]
+    }
+
+    /// Continues from a state: the next start takes it as it is.
+    pub fn resume(&mut self, state: &[Motion]) {
+        for (to, from) in self.carried.iter_mut().zip(state) {
+            to.copy(from);
+        }
+        self.resumed = true;
+    }
+
+    /// Drops the sensitivities of the motion.
+    pub fn forget_sensitivities(&mut self) {
+        self.carried[2..].iter_mut().chain(&mut self.sensitivity).for_each(Motion::clear);
+    }
+
+    /// Places the bodies at the argument of the stage at hand, unless that is where they are, and puts −R into `right`. The
+    /// first stage also begins W.
+    fn residual(&mut self, first: bool, stays: bool) {
+        let Self { joints, w, placed, stresses, is_placed, stages, ports, force, right, drive, loss, .. } = self;
+        let Joints { tree, closures, loops, inertias, .. } = &**joints;
+        let model = &closures.model;
+        if !(stays && *is_placed) {
+            placed.place(tree, &stages.argument);
+            *is_placed = true;
+        }
+        let moving = placed.acceleration.iter().zip(&placed.rate);
+        for ((force, inertia), (push, speed)) in force.iter_mut().zip(inertias).zip(moving) {
+            *force = inertia.force(push, speed);
+        }
+        if !model.dampers.is_empty() {
+            forces::add_dampers(model, |k| placed.rate[k], force);
+        }
+        let poses = placed.at.as_slice();
+        if let Some(loss) = loss {
+            loss.add_forces(closures, first, poses, |k| placed.rate[k], force);
+        }
+        if first {
+            closures.add_tangent(poses, drive, &mut w.bodies, force);
+            if !ports.is_empty() {
+                ports.tangent.diagonal.copy_from_slice(&w.bodies.diagonal);
+                ports.tangent.below.copy_from_slice(&w.bodies.below);
+            }
+        } else if ports.is_empty() {
+            loops.add_forces(placed, &drive.rest(), force);
+            forces::add_couplings(model, poses, force);
+            closures.add_body_forces(poses, drive, force);
+            model.project(force);
+        } else {
+            closures.add_tangent(poses, drive, &mut ports.tangent, force);
+        }
+        if !ports.is_empty() {
+            if let Some(loss) = loss {
+                loss.add_tangent(&mut ports.tangent);
+            }
+            ports.force.copy_from_slice(force);
+        }
+        stresses.fill(tree, &stages.argument, &drive.rest());
+        placed.resist(tree, stresses, force, right);
+        self.work.forces += 1;
+    }
+
+    fn factor(&mut self, gh: f64) -> Result<(), StepFailure> {
+        let Self { joints, w, placed, geometric, stages, force, loss, .. } = self;
+        forces::add_inertia(&joints.closures.model, 1.0 / (gh * gh), 1.0 / gh, &mut w.bodies);
+        if let Some(loss) = loss {
+            loss.add_matrix(gh, &mut w.bodies);
+        }
+        let at = |j: usize| {
+            let (tile, lane) = place_of(j);
+            stages.argument[tile].of(lane)[0]
+        };
+        geometric::fill(&joints.tree, placed, at, force, geometric);
+        w.factor(&joints.tree, placed, 1.0, Some(geometric))?;
+        self.work.factorizations += 1;
+        Ok(())
+    }
+
+    /// Completes the right side of stage `i` of a step of length `h` [s]: `right` holds −R.
+    fn inertia(&mut self, i: usize, h: f64) {
+        let rate = GAMMA_I[i] * h;
+        let Self { joints, stages, right, wrench, forcing, force, loss, .. } = self;
+        let Joints { tree, closures, inertias, drags, .. } = &**joints;
+        let loses = loss.as_ref().is_some_and(|loss| loss.start.is_nonzero());
+        stages.move_bodies(i, h, *drags || loses);
+        for ((j, inertia), (wrench, forcing)) in inertias.iter().enumerate().zip(wrench.iter_mut().zip(forcing)) {
+            *wrench = Four::from(inertia.force(&stages.push(j), &stages.drift(j)) - *forcing * rate);
+        }
+        if !closures.model.dampers.is_empty() {
+            force.fill(Pose::zeros());
+            forces::add_dampers(&closures.model, |k| stages.drift(k), force);
+            for (wrench, force) in wrench.iter_mut().zip(force.iter()) {
+                *wrench = Four::from(wrench.pose() + *force);
+            }
+        }
+        if let Some(loss) = loss.as_ref().filter(|_| loses) {
+            force.fill(Pose::zeros());
+            loss.start.add_damping(&closures.model, |k| stages.drift(k), force);
+            for (wrench, force) in wrench.iter_mut().zip(force) {
+                *wrench = Four::from(wrench.pose() + *force);
+            }
+        }
+        // ∂R/∂t of a heated joint is −K·ė₀
+        let rest = self.rate.rest();
+        for &j in &tree.heated {
+            let link = &tree.links[j as usize];
+            let more = link.stiffness.column(0) * (rate * link.offset(&rest));
+            let right = &mut right[j as usize];
+            *right = Four::from(right.pose() + more);
+        }
+    }
+}
+
+impl Method<Bodies<'_>> for JointRodas4 {
+    fn error_order(&self) -> f64 {
+        4.0
+    }
+
+    fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> Result<(), StepFailure> {
+        if std::mem::take(&mut self.resumed) {
+            return Ok(());
+        }
+        bodies.ramp.at(0.0, &mut self.drive);
+        self.drive.load = 1.0;
+        let now = &mut self.carried[0];
+        self.joints.tree.coordinates_at(&motion.q, &mut now.q);
+        self.joints.tree.rates_at(&motion.q, &motion.v, &mut now.v);
+        self.carried[1].clear();
+        self.stages.begin_first(&self.carried[0], &self.carried[1]);
+        self.residual(true, false);
+        let gh = CONSISTENT * self.shortest;
+        self.factor(gh)?;
+        self.wrench.fill(Four::ZERO);
+        self.w.solve(&mut self.wrench, &mut self.right);
+        for (z, x) in self.carried[1].q.iter_mut().zip(&self.right) {
+            *z = x.pose() / (gh * gh);
+        }
+        self.work.solves += 1;
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        bodies: &mut Bodies<'_>,
+        s: f64,
+        h: f64,
+        motion: &mut Motion,
+        error: &mut Motion,
+    ) -> Result<(), StepFailure> {
+        let (gh, ramp) = (GAMMA * h, bodies.ramp);
+        for i in 0..6 {
+            let (at, rate) = (s + ALPHA[i] * h, GAMMA_I[i] * h);
+            if i == 0 {
+                ramp.at_and_rate(s, &mut self.drive, &mut self.rate);
+            } else if moves_on(i) {
+                ramp.at(at, &mut self.drive);
+            }
+            self.drive.load = 1.0;
+            let stays = self.stages.begin(i, h, &self.carried[0], &self.carried[1]);
+            self.residual(i == 0, stays);
+            if i == 0 {
+                self.factor(gh)?;
+                self.stages.set_out(&self.joints.tree, &self.w, &self.carried[0], &self.carried[1]);
+                self.joints.closures.drive_force(&self.placed.at, &self.drive, &self.rate, &mut self.forcing);
+                self.ports.begin(&self.joints, ramp, s, &self.placed.at, (&self.drive, &self.rate));
+            }
+            self.inertia(i, h);
+            self.w.solve(&mut self.wrench, &mut self.right);
+            let stage = (&self.stages, self.placed.at.as_slice(), &self.drive);
+            let matrices = (&self.w, self.loss.as_deref());
+            let solves = self.ports.stage(&self.joints, ramp, (i, at, h, rate), stage, matrices, &self.carried[2..]);
+            self.stages.keep(i, &self.right, &self.wrench);
+            self.work.solves += 1 + solves;
+        }
+        // stiffly accurate: the last argument plus its increment is the new value, the increment the error
+        self.stages.last(h, &mut error.q, &mut error.v);
+        let (own, sensitivities) = self.carried.split_at_mut(2);
+        if let [now, push] = own {
+            self.stages.finish(h, now, push);
+        }
+        self.placed.place(&self.joints.tree, &self.stages.argument);
+        motion.q.copy_from_slice(&self.placed.at);
+        motion.v.copy_from_slice(&self.placed.rate);
+        self.ports.finish(&self.joints.tree, h, &self.stages, sensitivities, &mut self.sensitivity);
+        Ok(())
+    }
+
+    fn carried(&mut self) -> &mut [Motion] {
+        &mut self.carried
+    }
+
+    fn work(&self) -> SolverCounters {
+        self.work
+    }
+}

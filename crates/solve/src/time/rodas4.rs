@@ -1,0 +1,202 @@
+//! Rodas4: a stiffly accurate Rosenbrock method of order 4 with an embedded estimate of order 3.
+//!
+//! For M·q̈ + C·q̇ + r(q, t) = 0 with y = (q, v) each of its six stages solves (W)·U = right-hand side with one matrix
+//! per step, W = M/(γh)² + C/(γh) + K(q_n). The velocity half is eliminated by hand and W stays symmetric, so that a
+//! step takes one block factorization and six solves. Nothing iterates and nothing is allocated.
+//! ```text
+//! r₁ = v_i + Σ c_ij/h·Uq_j                                 v-row of stage i
+//! r₂ = −r(q_i, t_i) − C·v_i + M·Σ c_ij/h·Uv_j + γ_i·h·∂F/∂t
+//! W·Uq_i = r₂ + (M/(γh) + C)·r₁,   Uv_i = Uq_i/(γh) − r₁
+//! ```
+//! Since r₁ − v_i = Σ c_ij/h·Uq_j, damping acts on that sum alone: everything but r itself is known before the forces are
+//! evaluated, and the forces are added to it.
+//!
+//! Its stability function is L-stable: axial motions of stiff beams, a thousand times faster than the step, die out.
+//!
+//! Sensitivities with respect to the final port voltages go through the same stages with the exact tangent of each, so the
+//! partials of a single step are those of the numbers it returns.
+//!
+//! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 and table 7.1 (RODAS).
+
+mod defect;
+pub mod lanes;
+mod ports;
+mod stages;
+pub(crate) mod tableau;
+
+use super::defect::Propagates;
+pub use super::method::Motion;
+use super::method::{Method, SolverCounters, StepFailure};
+use crate::equations::Bodies;
+use crate::equations::linear::{LinearSolver, Recursion};
+use crate::time::gyration::{Gyration, held_out, skew};
+use crate::time::stage_loss::StageLoss;
+use bimorph_domains::{Drive, System};
+use bimorph_multibody::planar::Pose;
+use bimorph_multibody::{BlockMatrix, forces};
+use defect::DefectEstimate;
+use ports::{FrameRotation, PortSensitivities};
+use stages::Stages;
+use tableau::{ALPHA, GAMMA, moves_on};
+
+/// The method with its storage.
+#[derive(Debug, Clone)]
+pub struct Rodas4<S = Recursion> {
+    solver: S,
+    w: BlockMatrix<f64, 3>,
+    stages: Stages,
+    drive: Drive,
+    rate: Drive,
+    ports: PortSensitivities,
+    loss: Option<Box<StageLoss>>,
+    /// Terms of the series in a frame that turns; empty where no input turns it.
+    scratch: Vec<Pose>,
+    /// ∂motion/∂(final voltage of a source), one for each source given to [`Rodas4::new`]; advanced with the motion.
+    pub sensitivity: Vec<Motion>,
+    /// The error of the motion, where it is wanted.
+    defect: Option<Box<DefectEstimate>>,
+    work: SolverCounters,
+}
+
+impl Rodas4 {
+    /// Storage for a system, with sensitivities to the final voltages of `sources`.
+    pub fn new(system: &System, sources: &[usize]) -> Self {
+        Self::with_solver(Recursion, system, sources)
+    }
+}
+
+impl<S: LinearSolver> Rodas4<S> {
+    /// [`Rodas4::new`] with another solver of its linear systems.
+    pub fn with_solver(solver: S, system: &System, sources: &[usize]) -> Self {
+        Self {
+            solver,
+            w: BlockMatrix::new(&system.model.pattern),
+            stages: Stages::new(&system.model),
+            drive: system.electrics.drive(),
+            rate: system.electrics.drive(),
+            ports: PortSensitivities::new(system, sources),
+            loss: StageLoss::new(system, !sources.is_empty()).map(Box::new),
+            scratch: vec![Pose::zeros(); if system.turns() { system.bodies() } else { 0 }],
+            sensitivity: vec![Motion::zeros(system.bodies()); sources.len()],
+            defect: None,
+            work: SolverCounters::default(),
+        }
+    }
+}
+
+impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
+    fn error_order(&self) -> f64 {
+        4.0
+    }
+
+    fn step(
+        &mut self,
+        bodies: &mut Bodies<'_>,
+        s: f64,
+        h: f64,
+        motion: &mut Motion,
+        error: &mut Motion,
+    ) -> Result<(), StepFailure> {
+        let Bodies { system, ramp, .. } = *bodies;
+        let model = &system.model;
+        let gh = GAMMA * h;
+        ramp.at_and_rate(s, &mut self.drive, &mut self.rate);
+        self.drive.load = 1.0;
+        system.drive_force(&motion.q, &self.drive, &self.rate, &mut self.stages.forcing);
+        self.ports.begin(system, ramp, s, &motion.q, (&self.drive, &self.rate));
+        let mut turning = None;
+        if let Some(frame) = system.frame(&self.drive).filter(|_| system.turns()) {
+            let start = Gyration::new(frame);
+            turning = Some(FrameRotation { start, now: start, terms: start.terms(gh)? });
+            let rate = system.frame(&self.rate).map(Gyration::new).unwrap_or_default();
+            for ((force, body), v) in self.stages.forcing.iter_mut().zip(&model.bodies).zip(&motion.v) {
+                *force += held_out(body, skew(body, rate.rate, v));
+            }
+            self.ports.begin_turning(system, ramp, s, (&motion.v, rate), &self.sensitivity);
+        }
+        for (i, alpha) in ALPHA.into_iter().enumerate() {
+            let at = s + alpha * h;
+            if moves_on(i) {
+                ramp.at(at, &mut self.drive);
+            }
+            self.stages.begin(model, i, h, motion);
+            if let Some(turning) = &mut turning {
+                turning.now = system.frame(&self.drive).map(Gyration::new).unwrap_or_default();
+                self.stages.add_gyration(model, (i, h), turning.now, turning.start);
+            }
+            // what contact loses needs the stages beside their force
+            let mut force = std::mem::take(&mut self.stages.force);
+            let (stages, loss, from) = (&self.stages, &mut self.loss, &*motion);
+            let lose = |force: &mut [Pose]| {
+                if let Some(loss) = loss {
+                    loss.add_forces(system, i == 0, stages.at(i, from), |k| stages.speed(i, h, k), force);
+                    loss.start.add_damping(model, |k| -stages.r1()[k], force);
+                }
+            };
+            let q = stages.at(i, from);
+            if i == 0 {
+                self.defect.iter_mut().for_each(|defect| defect.before_forces(&force));
+                system.add_tangent_and(q, &self.drive, &mut self.w, &mut force, lose);
+                self.defect.iter_mut().for_each(|defect| defect.after_forces(&force));
+            } else if let Some(tangent) = self.ports.tangent() {
+                system.add_tangent_and(q, &self.drive, tangent, &mut force, lose);
+            } else {
+                system.add_residual_and(q, &self.drive, &mut force, lose);
+            }
+            self.stages.force = force;
+            if i == 0 {
+                self.ports.keep_tangent(&self.w);
+                if let Some(loss) = &self.loss {
+                    loss.add_matrix(gh, &mut self.w);
+                }
+                forces::add_inertia(model, 1.0 / (gh * gh), 1.0 / gh, &mut self.w);
+                model.project_matrix(&mut self.w);
+                self.solver.factor(&model.pattern, &mut self.w)?;
+                self.work.factorizations += 1;
+                self.work.forces += 6;
+            }
+            if let (Some(loss), Some(tangent)) = (&self.loss, self.ports.tangent()) {
+                loss.add_tangent(tangent);
+            }
+            let force = &mut self.stages.force;
+            self.solver.solve(&model.pattern, &self.w, force);
+            let mut solves = 1;
+            if let Some(turning) = turning {
+                turning.start.complete(model, gh, turning.terms, &mut self.scratch, force, |x| {
+                    self.solver.solve(&model.pattern, &self.w, x);
+                });
+                solves += turning.terms as u64;
+            }
+            let q = self.stages.at(i, motion);
+            let matrix = (&self.solver, &self.w);
+            let beside = (turning.map(|turning| (&self.stages, turning)), self.loss.as_deref());
+            solves +=
+                self.ports.stage(system, ramp, (i, at, h), (q, &self.drive), matrix, beside, &mut self.sensitivity);
+            self.work.solves += solves;
+        }
+        self.stages.finish(model, h, motion, Some(error));
+        self.ports.finish(model, h, &mut self.sensitivity);
+        Ok(())
+    }
+
+    fn carried(&mut self) -> &mut [Motion] {
+        &mut self.sensitivity
+    }
+
+    fn work(&self) -> SolverCounters {
+        self.work
+    }
+}
+
+impl<'s, S: LinearSolver> Propagates<'s> for Rodas4<S> {
+    fn begin_error(&mut self) {
+        self.defect = Some(Box::new(DefectEstimate::zeros(self.stages.forcing.len())));
+    }
+
+    fn error(&mut self, bodies: &mut Bodies<'s>, (s, h): (f64, f64), ends: [&Motion; 2], _: &[Motion]) -> &Motion {
+        let Self { solver, w, drive, defect, .. } = self;
+        let Bodies { system, ramp, .. } = *bodies;
+        let defect = defect.get_or_insert_with(|| Box::new(DefectEstimate::zeros(system.bodies())));
+        defect.advance(system, (ramp, drive), (&*solver, w), (s, h), ends)
+    }
+}

@@ -1,0 +1,120 @@
+//! Storage of a batched step.
+
+use super::heat::LaneHeat;
+use super::motion::{LaneMotion, Norms};
+use bimorph_domains::loss_derivatives::LossDerivatives;
+use bimorph_domains::{Drive, Ramp, System};
+use bimorph_multibody::batch::joint::LanePlaced;
+use bimorph_multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, SimdReal, ZERO_POSE, load};
+use bimorph_multibody::joint_coordinates::constrained_loops::has_lanes;
+use bimorph_multibody::planar::Pose;
+use bimorph_multibody::{BlockMatrix, Pattern};
+
+/// From this stage on the motion itself carries the argument.
+pub(super) const IN_PLACE: usize = 4;
+
+/// Run of a lane.
+#[derive(Debug, Clone)]
+pub struct Lane<'a> {
+    /// The variant.
+    pub system: &'a System,
+    /// Its sources and heat.
+    pub ramp: Ramp<'a>,
+}
+
+/// Change of the displacement and rate of one body.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LaneIncrement<T = Lane8> {
+    pub(super) q: LanePose<T>,
+    pub(super) v: LanePose<T>,
+}
+
+impl LaneIncrement {
+    #[inline(always)]
+    pub(super) fn load<W: SimdReal>(&self, simd: W::Simd) -> LaneIncrement<W> {
+        LaneIncrement { q: load(simd, &self.q), v: load(simd, &self.v) }
+    }
+}
+
+/// The method with its storage.
+#[derive(Debug, Clone)]
+pub struct LaneRodas4 {
+    pub(super) model: LaneModel,
+    pub(super) w: LaneMatrix,
+    /// The motion; each lane begins its next step from here.
+    pub motion: LaneMotion,
+    /// Where the last step began.
+    pub before: LaneMotion,
+    /// Its estimated error.
+    pub error: LaneMotion,
+    /// Norms in the mass of the displacements before and after it and of both parts of its error.
+    pub norms: Norms,
+    pub(super) force: Vec<LanePose>,
+    pub(super) forcing: Vec<LanePose>,
+    pub(super) at: Vec<LanePose>,
+    pub(super) r1: Vec<LanePose>,
+    pub(super) increments: Vec<[LaneIncrement; 5]>,
+    /// Rates by which dampers lag, for each body; empty without dampers.
+    pub(super) lags: Vec<LanePose>,
+    pub(super) placed: Vec<LanePlaced>,
+    pub(super) heat: LaneHeat,
+    pub(super) expansion: Vec<Lane8>,
+    pub(super) rate: Vec<Lane8>,
+    pub(super) vanished: [bool; LANES],
+    pub(super) h: Lane8,
+    pub(super) acted: Vec<usize>,
+    pub(super) acted_blocks: Vec<usize>,
+    pub(super) drives: Vec<Drive>,
+    pub(super) q: Vec<Pose>,
+    pub(super) r: Vec<Pose>,
+    pub(super) tangent: BlockMatrix<f64, 3>,
+    /// Contact losses, lane by lane; empty where parts cannot touch.
+    pub(super) losses: Vec<LossDerivatives>,
+    /// r₁ and rates of one lane.
+    pub(super) rates: [Vec<Pose>; 2],
+}
+
+fn block(pattern: &Pattern, row: usize, column: usize) -> Option<usize> {
+    if row > column { pattern.block(row, column) } else { None }
+}
+
+impl LaneRodas4 {
+    /// Storage for a mechanism, with its numbers in every lane; none for a linear model, for one with inputs beside voltages,
+    /// and on a processor without vectors.
+    pub fn new(system: &System) -> Option<Self> {
+        let model = LaneModel::new(&system.model).filter(|_| has_lanes() && system.electrics.inputs.is_empty())?;
+        let (n, pattern) = (system.bodies(), &system.model.pattern);
+        let acted = system.acted_on();
+        let between = |&row: &usize| acted.iter().filter_map(move |&column| block(pattern, row, column));
+        let none = LaneIncrement { q: ZERO_POSE, v: ZERO_POSE };
+        let heaters = system.electrics.heating.heaters.len();
+        Some(Self {
+            w: LaneMatrix::new(pattern),
+            motion: LaneMotion::zeros(n),
+            before: LaneMotion::zeros(n),
+            error: LaneMotion::zeros(n),
+            norms: Norms::default(),
+            force: vec![ZERO_POSE; n],
+            forcing: vec![ZERO_POSE; n],
+            at: vec![ZERO_POSE; n],
+            r1: vec![ZERO_POSE; n],
+            increments: vec![[none; 5]; n],
+            lags: vec![ZERO_POSE; if model.dampers.is_empty() { 0 } else { n }],
+            placed: vec![LanePlaced::GROUND; n + 1],
+            heat: LaneHeat::new(&system.electrics.heating.heaters),
+            expansion: vec![Lane8::NONE; heaters],
+            rate: vec![Lane8::NONE; heaters],
+            vanished: [false; LANES],
+            h: Lane8::of(1.0),
+            acted_blocks: acted.iter().flat_map(between).collect(),
+            acted,
+            drives: vec![system.electrics.drive(); LANES],
+            q: vec![Pose::zeros(); n],
+            r: vec![Pose::zeros(); n],
+            tangent: BlockMatrix::new(pattern),
+            losses: vec![LossDerivatives::new(&system.model); if system.can_touch() { LANES } else { 0 }],
+            rates: [(); 2].map(|()| vec![Pose::zeros(); n]),
+            model,
+        })
+    }
+}

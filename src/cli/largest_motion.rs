@@ -1,0 +1,43 @@
+//! The node that moves most on a path: the default signal.
+
+use bimorph::compile::CompiledModel;
+
+/// Nodes among which it is sought.
+const MAX_NODES: usize = 1000;
+
+/// x and y of every node; of very many, of some evenly among them.
+pub(super) fn every(compiled: &CompiledModel) -> Vec<String> {
+    let nodes = || compiled.structure.nodes.iter().filter(|node| node.mechanical);
+    // sampled nodes represent their neighbours
+    let nodes = nodes().step_by(nodes().count().div_ceil(MAX_NODES).max(1));
+    nodes.flat_map(|node| [format!("{}.x", node.name), format!("{}.y", node.name)]).collect()
+}
+
+/// x and y of the node with the largest displacement on the path, by the signals of [`every`] one.
+pub(super) fn busiest(signals: &[(String, String, Vec<f64>)]) -> Vec<String> {
+    let far = |pair: &[(String, String, Vec<f64>)]| {
+        let at = pair[0].2.iter().zip(&pair[1].2);
+        at.map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max)
+    };
+    let pair = signals.chunks_exact(2).max_by(|a, b| far(a).total_cmp(&far(b)));
+    pair.map(|pair| pair.iter().map(|(name, _, _)| name.clone()).collect()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Motion along the path counts even if it returns at the end, where nothing distinguishes the nodes.
+    #[test]
+    fn the_way_counts() {
+        let signal = |name: &str, values: &[f64]| (name.to_owned(), "m".to_owned(), values.to_vec());
+        let signals = [
+            signal("m.x", &[2e-6, 1e-6, 0.0]),
+            signal("m.y", &[0.0, 0.0, 0.0]),
+            signal("e.x", &[0.0, 0.0, 0.0]),
+            signal("e.y", &[0.0, 0.0, 0.0]),
+        ];
+        assert_eq!(busiest(&signals), ["m.x", "m.y"]);
+        assert!(busiest(&[]).is_empty());
+    }
+}

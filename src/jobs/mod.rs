@@ -1,3 +1,0 @@
-//! Sweeps: a grid of parameter values over one analysis.
-
-pub mod sweep;
