@@ -146,7 +146,7 @@ impl ExportCommand {
 
     /// Limitations of the file that its numbers do not show.
     fn warnings(&self, compiled: &CompiledModel, fitted: &ModelFit) -> Vec<String> {
-        let mut warnings: Vec<String> = beyond(compiled.options.tol, mesh_error(compiled)).into_iter().collect();
+        let mut warnings: Vec<String> = beyond(compiled.options.errors(), mesh_error(compiled)).into_iter().collect();
         if fitted.error > self.within {
             let (modes, error, within) = (fitted.model.modes.len(), fitted.error, self.within);
             warnings.push(format!("{modes} modes deviate by {error:.1e}, more than --within {within:.1e}"));

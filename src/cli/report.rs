@@ -46,8 +46,8 @@ const ROUNDED: f64 = 5e-4;
 /// The options of a model in one line.
 pub(crate) fn options(compiled: &CompiledModel) -> String {
     let options = &compiled.options;
-    let mut text = format!("tolerance {:e}", options.tol);
-    if options.tol < ROUNDED {
+    let mut text = format!("tolerance {:e}", options.errors().requested());
+    if options.errors().requested() < ROUNDED {
         text += " (shown to four digits; --json has all)";
     }
     if let Some(band) = options.band {

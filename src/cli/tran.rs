@@ -139,7 +139,7 @@ impl TransientCommand {
             stop: self.stop,
             signals,
             points: self.points,
-            tol: compiled.options.tol,
+            tol: compiled.options.errors().requested(),
             voltages: self.ports.clone(),
             release: start,
             method,

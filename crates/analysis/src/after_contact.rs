@@ -57,7 +57,7 @@ pub(super) fn judge(
     result.warnings.push(format!(
         "{WARNING}: the tolerance {:e} holds up to {from:.4e} s; parts touch at {contact:.4e} s, and from then on rebounds multiply small \
          differences. Use means over the time that is left (after_contact), or a smaller `restitution` or --tol",
-        options.tol
+        options.errors().requested()
     ));
 }
 
@@ -96,7 +96,9 @@ fn allowed(
     let swings: Vec<(&str, f64)> =
         result.signals.iter().zip(columns).map(|((_, unit, _), c)| (unit.as_str(), half_range(c))).collect();
     let largest = |of: &str| swings.iter().filter(|(unit, _)| *unit == of).map(|(_, swing)| *swing).fold(0.0, f64::max);
-    let one = |(unit, swing): &(&str, f64)| APART * options.tol * swing.max(SMALL * largest(unit)).max(least(unit));
+    let one = |(unit, swing): &(&str, f64)| {
+        APART * options.errors().requested() * swing.max(SMALL * largest(unit)).max(least(unit))
+    };
     swings.iter().map(one).collect()
 }
 

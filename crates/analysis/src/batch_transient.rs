@@ -10,7 +10,7 @@ use super::formulation::{self, Formulation};
 use super::stability::StabilityMonitor;
 use super::statics::source_vector;
 use super::transient::first_step::first_step;
-use super::transient::options::{STEP_SHARE, TransientOptions, check};
+use super::transient::options::{TransientOptions, check};
 use super::transient::record::STABILITY_CHECKS;
 use crate::readout::signal::{Signal, SignalView};
 use bimorph_domains::{Drive, Ramp};
@@ -70,7 +70,7 @@ pub fn ends(
                     let (Some(setup), Some(watcher)) = (&set[number], slots[number].take()) else { continue };
                     let system = &variants[number].parts.system;
                     let motion = Motion::zeros(system.bodies());
-                    let (h, tol) = (first_step(system, options.stop), STEP_SHARE * options.tol);
+                    let (h, tol) = (first_step(system, options.stop), options.errors().step());
                     let ramp = setup.ramp(variants[number], options.stop);
                     return Some((number, BatchRun { system, ramp, motion, h, tol, watcher }));
                 }

@@ -35,7 +35,8 @@ const SETTLED: f64 = 1e-12;
 /// [`AnalysisError::BadRequest`] for drawings that make no frame.
 pub fn frame(compiled: &CompiledModel) -> Result<LinearFrame, AnalysisError> {
     let options = &compiled.options;
-    let elements = options.band.map_or(ElementCount::Each(1), |band| ElementCount::Band(band, options.tol));
+    let elements =
+        options.band.map_or(ElementCount::Each(1), |band| ElementCount::Band(band, options.errors().requested()));
     let elements = options.segments.map_or(elements, ElementCount::Each);
     let gaps = FrameGaps::Laid { chord: options.as_sugar };
     frame_with(compiled, &FrameOptions { elements, shear: options.shear, undamped: options.undamped, gaps })
@@ -199,7 +200,7 @@ fn balance(
         // a correction that does not shrink any more is rounding
         if moved > 0.5 * before && (iteration > FEW || acting(frame, volts).next().is_none()) {
             // what is printed is within the tolerance beside it
-            if moved <= compiled.options.tol * all {
+            if moved <= compiled.options.errors().requested() * all {
                 return Ok((q, iteration));
             }
             break;

@@ -82,7 +82,7 @@ pub fn joint_transient(
     let options = TransientOptions { release: start.as_ref(), ..options.clone() };
     let mut result = record(compiled, &options, &mut carrier, sample, watch)?;
     result.warnings.extend(rotary);
-    result.warnings.extend(open(carrier.report.largest_gap_m, options.tol * system.length_scale));
+    result.warnings.extend(open(carrier.report.largest_gap_m, options.errors().requested() * system.length_scale));
     result.unknowns = carrier.linkage.coordinates.saturating_sub(carrier.linkage.constraints);
     Ok((result, carrier.report))
 }

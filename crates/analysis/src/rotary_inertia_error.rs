@@ -20,7 +20,7 @@ pub(super) fn rotary_inertia_note(compiled: &CompiledModel, modes: &[Vec<Pose>])
     let options = &compiled.options;
     let all = modes.iter().map(|x| too_high(compiled, x));
     let (mode, over) = all.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (over > options.tol.max(WORTH)).then(|| {
+    (over > options.errors().requested().max(WORTH)).then(|| {
         format!(
             "rotary inertia of wide beams is neglected: mode {} has the largest error, its frequency is too high by about {:.1} %; use --rotary-inertia",
             mode + 1,

@@ -24,9 +24,10 @@ use super::transient::{TransientOptions, TransientResult, transient};
 use super::{AnalysisError, ProgressCallback};
 use crate::formulation;
 use bimorph_model::compile::CompiledModel;
+use bimorph_model::options::ErrorBudget;
 use companion::{companion, compared};
 pub use run::RunFunction;
-use run::{AT_THE_END, COMPANION_TOLERANCE_RATIO, MAX_AGAIN, MAX_STORED_SAMPLES, room};
+use run::{AT_THE_END, MAX_AGAIN, MAX_STORED_SAMPLES};
 pub use run::{beyond, unknown};
 use samples::{BufferedSamples, SelectedSamples, resolved};
 use std::cell::Cell;
@@ -135,7 +136,7 @@ fn first<T>(
     };
     let (mut result, more) = run(options, &mut keep, &mut count)?;
     result.step_error = result.step_error.filter(|_| resolved(&picked, &result, options, model));
-    Ok(SampledRun { result, more, kept, tol: options.tol, long: long.get() })
+    Ok(SampledRun { result, more, kept, tol: options.errors().requested(), long: long.get() })
 }
 
 /// Runs at sharper tolerances until one is within what its mesh leaves of the tolerance of `options`.
@@ -149,7 +150,7 @@ fn sharper<T>(
     run: RunFunction<'_, T>,
     watch: ProgressCallback<'_>,
 ) -> Result<SampledRun<T>, AnalysisError> {
-    let room = room(options.tol, made.result.estimated_error);
+    let room = options.errors().left_for_steps(made.result.estimated_error);
     let unknowns = model.unknowns() as f64;
     let mut exponent = EXPONENT;
     for _ in 1..RUNS {
@@ -162,7 +163,7 @@ fn sharper<T>(
         if made.result.counters.steps as f64 * ratio.powf(-0.25) * unknowns > MAX_AGAIN {
             break;
         }
-        let options = TransientOptions { tol: ratio * made.tol, ..options.clone() };
+        let options = options.with_tolerance(ratio * made.tol);
         let (mut kept, mut picked) = (BufferedSamples::default(), SelectedSamples::new(&options));
         let mut keep = |t: f64, values: &[f64]| {
             picked.add(values);
@@ -175,7 +176,7 @@ fn sharper<T>(
         };
         result.step_error = result.step_error.filter(|_| resolved(&picked, &result, &options, model));
         let errors = made.result.step_error.zip(result.step_error);
-        made = SampledRun { result, more, kept, tol: options.tol, long: false };
+        made = SampledRun { result, more, kept, tol: options.errors().requested(), long: false };
         if let Some((before, after)) = errors {
             exponent = ((before / after).ln() / -ratio.ln()).clamp(EXPONENTS.0, EXPONENTS.1);
             if before.min(after) > HOPELESS {
@@ -199,11 +200,11 @@ pub fn step_error(
     let found = held(options, model, &mut run, &mut |_, _| (), watch);
     // the others need somewhat coarser or sharper steps: whole tenths
     let tenths = |tol: f64| {
-        let mut held = options.tol;
+        let mut held = options.errors().requested();
         while held > tol {
-            held /= COMPANION_TOLERANCE_RATIO;
+            held = ErrorBudget::of(held).sharper_run();
         }
         held
     };
-    found.map_or((None, options.tol), |(result, (), tol)| (result.step_error, tenths(tol)))
+    found.map_or((None, options.errors().requested()), |(result, (), tol)| (result.step_error, tenths(tol)))
 }

@@ -10,8 +10,6 @@ use bimorph_analysis::readout::signal::{Signal, SignalView};
 use bimorph_domains::System;
 use bimorph_model::compile::CompiledModel;
 
-/// Share of the compilation's tolerance that one internal step may use.
-pub(super) const STEP_SHARE: f64 = 1e-2;
 /// Share of the length scale that the integrator takes for nothing, in units of its tolerance [1].
 const FLOOR: f64 = 1e-4;
 /// Temperature difference that is negligible for a circuit [K].
@@ -158,8 +156,8 @@ impl DeviceSession {
         match before {
             None => (StepHistory::start(seen), f64::INFINITY),
             Some(before) => {
-                let (tol, signals) = (compiled.options.tol, self.signals.len());
-                let nothing = STEP_SHARE * tol * FLOOR;
+                let (tol, signals) = (compiled.options.errors().requested(), self.signals.len());
+                let nothing = compiled.options.errors().step() * FLOOR;
                 let charge = |capacitance: f64, volts: f64| {
                     capacitance.abs() * (SAME_VOLTAGE[0] + SAME_VOLTAGE[1] * volts.abs())
                 };

@@ -4,7 +4,6 @@
 use super::agitation::ThermalForce;
 use super::contact_steps::{ContactSteps, MAX_ERROR, near};
 use super::growth::{Bound, rate_along};
-use super::reply::STEP_SHARE;
 use super::session::DeviceSession;
 use super::states::Snapshot;
 use super::{Status, Trial, TrialReply};
@@ -94,7 +93,7 @@ impl DeviceSession {
                 return;
             }
         }
-        let tol = STEP_SHARE * compiled.options.tol;
+        let tol = compiled.options.errors().step();
         let kept = parent.is_some_and(|parent| self.keep_steps(system, (request, parent), &from, tol));
         self.begin(parent);
         let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);

@@ -111,7 +111,7 @@ impl BimorphService {
         let stop = request.stop_s;
         given(&TRAN_STOP, OptionValue::Number(stop))?;
         let tol = match request.tol {
-            0.0 => model.compiled.options.tol,
+            0.0 => model.compiled.options.errors().requested(),
             tol => convert::number("tol", tol, true).map_err(status::violation)?,
         };
         let points = if request.points == 0 { TRAN_POINTS.count() } else { request.points as usize };
@@ -161,9 +161,9 @@ impl BimorphService {
             let job = || {
                 let release = release.as_ref().map(|model| &*model.compiled);
                 // the mesh, too, holds the tolerance of the run
-                let sharper = (tol < model.compiled.options.tol).then(|| {
+                let sharper = (tol < model.compiled.options.errors().requested()).then(|| {
                     let mut sharper = CompiledModel::clone(&model.compiled);
-                    sharper.options.tol = tol;
+                    sharper.options = sharper.options.with_tolerance(tol);
                     sharper
                 });
                 let options = TransientOptions {

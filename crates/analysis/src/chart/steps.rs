@@ -41,7 +41,7 @@ pub(super) fn measure(
         formulation: Formulation::Compliant,
         method: Integrator::Rodas4.name(),
         solver: kind.name(),
-        tol: compiled.options.tol,
+        tol: compiled.options.errors().requested(),
         band_hz: compiled.options.band,
         unknowns: system.model.unknowns(),
         measured: None,

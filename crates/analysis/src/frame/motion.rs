@@ -89,7 +89,7 @@ pub fn frame_transient(
         let fine = run(between, &mut counters)?;
         // the rule is of second order: the error of the finer run is a third of the difference
         let error = coarse.iter().zip(&fine).map(|(a, b)| change(a, b) / 3.0).fold(0.0, f64::max);
-        if error <= options.tol {
+        if options.errors().holds(error) {
             break fine;
         }
         if between >= MAX_STEPS {

@@ -155,10 +155,10 @@ pub fn harmonic(
         _ => None,
     };
     let (values, lost) = swept(&mut exact, sum.as_ref().filter(|_| options.by_modes), &frequencies_hz, &known, watch)?;
-    if let Some(error) = modal_error.filter(|error| *error > compiled.options.tol) {
+    if let Some(error) = modal_error.filter(|error| *error > compiled.options.errors().requested()) {
         warnings.push(format!(
             "the sum over modes is up to {error:.1e} off the exact response, more than the tolerance {:e}; leave --by-modes away",
-            compiled.options.tol
+            compiled.options.errors().requested()
         ));
     }
     if lost > 0 {

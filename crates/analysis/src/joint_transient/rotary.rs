@@ -31,11 +31,11 @@ pub(super) fn rotary_inertia_warning(
     let elastic = operating_point(drawn, &options.voltages).ok()?;
     let turning = operating_point(&locked(drawn, formulation), &options.voltages).ok()?;
     let share = apart(drawn, &elastic, &turning)?;
-    (share > options.tol).then(|| {
+    (share > options.errors().requested()).then(|| {
         format!(
             "joints that only turn leave out how beams stretch: its equilibrium is {share:.1e} of the largest displacement away from that \
              of the elastic beams, more than the tolerance {:e}; take --formulation compliant, or --method rodas4, whose joints stretch",
-            options.tol
+            options.errors().requested()
         )
     })
 }

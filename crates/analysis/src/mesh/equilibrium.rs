@@ -75,7 +75,7 @@ fn refined(
             Ok(order) => order,
         };
         // a long segment may bear a bend that shorter ones do not: further on they do
-        let holds = order.estimated_error.is_some_and(|error| error <= compiled.options.tol);
+        let holds = order.estimated_error.is_some_and(|error| compiled.options.errors().holds(error));
         if let Some(error) = search.refused.take().filter(|_| !holds)
             && let Some(finer) = refinement.next(compiled, &order.segments, &error)
         {
@@ -213,7 +213,7 @@ impl<'a> EquilibriumSearch<'a> {
         };
         let limit = |value: Option<f64>| {
             let value = value.unwrap_or(f64::NAN);
-            Output { value, scale: softening::scale(value, self.compiled.options.tol) }
+            Output { value, scale: softening::scale(value, self.compiled.options.errors().requested()) }
         };
         let mut outputs = outputs(&model, &point);
         outputs.extend([limit(left), limit(beyond(&point))]);

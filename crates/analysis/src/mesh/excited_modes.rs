@@ -26,6 +26,7 @@ use bimorph_domains::Drive;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::DiscretizeError;
 use bimorph_model::options::CompileOptions;
+use bimorph_model::options::ErrorBudget;
 use bimorph_model::refine::doubling::{self, Output};
 use bimorph_model::refine::lowest_modes;
 use bimorph_model::refine::mesh_search::{self, Mesh, MeshTarget};
@@ -84,7 +85,7 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
             still = merged(&still, &end);
         }
     }
-    let tol = moving.options.tol;
+    let tol = moving.options.errors().requested();
     let mut count = FIRST_MODES;
     loop {
         let mesh = match given {
@@ -117,10 +118,10 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
         }
         // measured frequency errors exceeded their estimates: the modes get a part of the tolerance, and the estimate
         // is reported
-        let sharper = tolerances.iter().map(|t| (lowest_modes::SAFETY * t).max(MIN_FREQUENCY_ERROR)).collect();
+        let sharper = tolerances.iter().map(|t| (ErrorBudget::of(*t).modes()).max(MIN_FREQUENCY_ERROR)).collect();
         let aim = MeshTarget { band: 1.01 * modes[highest].frequency, tolerances: sharper, rigid: false };
         let order = mesh_search::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
-        let order = order.with_estimate_times(looser * lowest_modes::SAFETY);
+        let order = order.with_estimate_times(looser * ErrorBudget::MODES);
         let mesh = merged(&still, &order);
         if order.estimated_error.is_some() {
             return Ok((mesh, left));
@@ -156,7 +157,9 @@ fn turned(modes: &[ExcitedMode], stop: f64) -> f64 {
 /// The mode that a run in equal steps begins with and cannot follow: its frequency [Hz] and its share of the way. A step longer than a
 /// radian of it damps it away or slows it, in a companion of twice the step as well.
 fn outrun(moving: &CompiledModel, step: f64, modes: &[ExcitedMode]) -> Option<(f64, f64)> {
-    let swings = |mode: &&ExcitedMode| mode.decay < 2.0 * TAU * mode.frequency && mode.amplitude > moving.options.tol;
+    let swings = |mode: &&ExcitedMode| {
+        mode.decay < 2.0 * TAU * mode.frequency && mode.amplitude > moving.options.errors().requested()
+    };
     let too_fast = |mode: &&ExcitedMode| TAU * mode.frequency * step > 1.0;
     let most = modes.iter().filter(swings).filter(too_fast).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
     Some((most.frequency, most.amplitude))
@@ -182,7 +185,7 @@ fn frequencies(
 ) -> Result<Vec<Output>, AnalysisError> {
     let model = meshed(moving, segments)?;
     let found = modes(&model, tolerances.len(), voltages)?.frequencies_hz;
-    let scale = |f: f64, tolerance: f64| (f * tolerance / moving.options.tol).max(f64::MIN_POSITIVE);
+    let scale = |f: f64, tolerance: f64| (f * tolerance / moving.options.errors().requested()).max(f64::MIN_POSITIVE);
     let mut outputs: Vec<Output> =
         found.iter().zip(tolerances).map(|(&f, &tolerance)| Output { value: f, scale: scale(f, tolerance) }).collect();
     outputs.resize(tolerances.len(), Output { value: f64::NAN, scale: 1.0 });

@@ -7,7 +7,8 @@ use super::mode_pairs;
 use super::remeshed::{chosen, meshed, on};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::DiscretizeError;
-use bimorph_model::options::{CompileOptions, Junctions};
+use bimorph_model::options::ErrorBudget;
+use bimorph_model::options::Junctions;
 use bimorph_model::refine::doubling::{self, Output};
 use bimorph_model::refine::lowest_modes;
 use bimorph_model::refine::mesh_search::Mesh;
@@ -19,8 +20,6 @@ const MAX_COMPARED: usize = 64;
 /// excludes one effect: half a segment's mass lies on the wrong side of a junction's spring. This error is inversely
 /// proportional to the number of segments, and was measured up to 1e-5.
 const FINEST_KNOWN: f64 = 3e-5;
-/// Remaining error of the first order over the estimate of the comparison, which assumes the second order.
-const FIRST_ORDER: f64 = 1.5;
 
 /// The modes on the mesh for them, which comes with it, each with the estimate of its own error, and the displacement of points along every beam.
 ///
@@ -66,8 +65,7 @@ pub(super) fn for_modes(
     let (still, _) = equilibrium::order(compiled, voltages, order.segments)?;
     let (own, found) = own_estimate(compiled, still.clone(), count, voltages)?;
     let carried = is_carried(compiled, &found.0, still.estimated_error);
-    let enough =
-        carried && own.estimated_error.is_some_and(|error| error <= lowest_modes::SAFETY * compiled.options.tol);
+    let enough = carried && own.estimated_error.is_some_and(|error| error <= compiled.options.errors().modes());
     if (enough && !is_fine(compiled)) || count > MAX_COMPARED {
         let (result, curves) = found;
         let faster = result.per_deflection.iter().copied().fold(1.0, f64::max);
@@ -97,7 +95,7 @@ fn about_drawing(
     let fine = is_fine(compiled);
     let (order, found) = own_estimate(compiled, order, count, &[])?;
     // two neighbouring modes may change places from the compared mesh to this one
-    let holds = order.estimated_error.is_some_and(|error| error <= compiled.options.tol);
+    let holds = order.estimated_error.is_some_and(|error| compiled.options.errors().holds(error));
     let known = if given { order.estimated_error.is_some() } else { holds && !fine };
     if known || count > MAX_COMPARED {
         return Ok((order, found));
@@ -154,15 +152,15 @@ impl ComparedMeshes<'_> {
         if !is_fine(compiled) {
             return doubling::fit(&compiled.structure, &compiled.options, segments, &mut analyse);
         }
-        let options = CompileOptions { tol: compiled.options.tol / FIRST_ORDER, ..compiled.options.clone() };
+        let options = compiled.options.with_tolerance(compiled.options.errors().first_order());
         let order = doubling::fit(&compiled.structure, &options, segments, &mut analyse)?;
-        Ok(order.with_estimate_times(FIRST_ORDER))
+        Ok(order.with_estimate_times(ErrorBudget::FIRST_ORDER))
     }
 
     /// The modes on the mesh that was chosen, each with the difference that twice its segments make.
     fn finish(&mut self, order: Mesh) -> Result<(Mesh, ModesWithShapes), AnalysisError> {
         let compiled = self.compiled;
-        let times = if is_fine(compiled) { FIRST_ORDER } else { 1.0 };
+        let times = if is_fine(compiled) { ErrorBudget::FIRST_ORDER } else { 1.0 };
         let (mut result, curves) = self.shaped(&order.segments)?.clone();
         let twice = doubling::twice(&compiled.options, &order).map(|twice| twice.segments);
         // without an estimate there is no finer mesh with modes
@@ -183,13 +181,13 @@ impl ComparedMeshes<'_> {
 
 /// Whether the tolerance is finer than what modes of the drawing know of their errors.
 pub(super) fn is_fine(compiled: &CompiledModel) -> bool {
-    compiled.options.junctions == Junctions::Calibrated && compiled.options.tol < FINEST_KNOWN
+    compiled.options.junctions == Junctions::Calibrated && compiled.options.errors().requested() < FINEST_KNOWN
 }
 
 /// Whether what the mesh leaves uncertain of the equilibrium moves no frequency beyond the tolerance: next to a fold it does.
 pub(super) fn is_carried(compiled: &CompiledModel, found: &ModesResult, still: Option<f64>) -> bool {
     let faster = found.per_deflection.iter().copied().fold(1.0, f64::max);
-    still.is_some_and(|error| error * faster <= doubling::SAFETY * compiled.options.tol)
+    still.is_some_and(|error| error * faster <= compiled.options.errors().comparison())
 }
 
 /// Largest of the errors; none where one of them is not known.

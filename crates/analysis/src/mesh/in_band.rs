@@ -26,7 +26,6 @@ use super::remeshed::{chosen, meshed, on};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::DiscretizeError;
 use bimorph_model::refine::doubling::{self, Output};
-use bimorph_model::refine::lowest_modes;
 use bimorph_model::refine::mesh_search::{self, Mesh, MeshTarget};
 use nalgebra::Complex;
 use std::cell::OnceCell;
@@ -114,7 +113,7 @@ fn order(compiled: &CompiledModel, options: &HarmonicOptions) -> Result<Mesh, An
 /// The mesh for the modes up to the end of the band, about the drawing.
 fn for_band(compiled: &CompiledModel, options: &HarmonicOptions) -> Result<Vec<usize>, AnalysisError> {
     let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
-    let tolerances = vec![lowest_modes::SAFETY * compiled.options.tol; MAX_MODES];
+    let tolerances = vec![compiled.options.errors().modes(); MAX_MODES];
     let aim = MeshTarget { band: options.to, tolerances, rigid: false };
     let order = mesh_search::choose_for(&compiled.structure, &compiled.options, &aim).map_err(detail)?;
     Ok(order.segments.iter().zip(&compiled.order.segments).map(|(a, b)| *a.max(b)).collect())
@@ -169,7 +168,7 @@ impl ComparisonGrid {
             self.groups.get_or_init(|| groups(inside, highest));
         }
         // rounding at the tolerance requires no mesh
-        let rounding = modal::UNSEEN.max(SHAPES / model.options.tol);
+        let rounding = modal::UNSEEN.max(SHAPES / model.options.errors().requested());
         if let Some(sum) = &sum {
             (0..exact.rows.len()).for_each(|row| outputs.extend(self.shares(sum, row, rounding)));
         }

@@ -49,7 +49,9 @@ pub fn in_circuit(compiled: &CompiledModel) -> CompiledModel {
     };
     let sought = finer.as_ref().and_then(|finer| finer.order.estimated_error);
     let mut fitted = finer.unwrap_or_else(|| compiled.clone());
-    fitted.lowest = bounded(2 * MAX_UNKNOWNS, || lowest(&fitted, || twice(&fitted, fitted.options.tol).ok())).flatten();
+    fitted.lowest =
+        bounded(2 * MAX_UNKNOWNS, || lowest(&fitted, || twice(&fitted, fitted.options.errors().requested()).ok()))
+            .flatten();
     fitted.higher = bounded(2 * MAX_UNKNOWNS, || higher(&fitted, FOLLOWED)).unwrap_or_default().into();
     let compared = if sought.is_some() { None } else { bounded(2 * MAX_UNKNOWNS, || worse(&fitted)) };
     match (sought, compared) {
@@ -65,7 +67,7 @@ pub fn in_circuit(compiled: &CompiledModel) -> CompiledModel {
 /// Adds a warning if the estimated error exceeds `tol` or is unknown.
 fn warned(mut fitted: CompiledModel, what: &str, error: Option<f64>) -> CompiledModel {
     let help = "give the model `segments` or a `band`; `bimorph cosim --check` compares whole runs";
-    let reported = beyond(fitted.options.tol, error);
+    let reported = beyond(fitted.options.errors(), error);
     fitted
         .warnings
         .items
@@ -82,18 +84,18 @@ pub fn twice(compiled: &CompiledModel, tol: f64) -> Result<CompiledModel, Analys
     let twice = |&n: &usize| if n == 0 { 0 } else { scheme.segments(2 * n) };
     let segments = compiled.order.segments.iter().map(twice).collect();
     let mut finer = remeshed(compiled, Mesh { segments, estimated_error: None, ..compiled.order.clone() })?;
-    finer.options.tol = tol;
+    finer.options = finer.options.with_tolerance(tol);
     Ok(finer)
 }
 
 /// The model on the mesh that holds `looser` times the tolerance, where that is not too fine.
 fn within_most(compiled: &CompiledModel, looser: f64) -> Option<CompiledModel> {
-    let tol = compiled.options.tol;
+    let tol = compiled.options.errors().requested();
     let mut asked = compiled.clone();
-    asked.options.tol = looser * tol;
+    asked.options = asked.options.with_tolerance(looser * tol);
     let mut found =
         bounded(2 * MAX_UNKNOWNS, || sought(&asked)).flatten().filter(|finer| finer.unknowns() <= MAX_UNKNOWNS)?;
-    found.options.tol = tol;
+    found.options = found.options.with_tolerance(tol);
     Some(found)
 }
 

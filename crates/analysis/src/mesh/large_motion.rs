@@ -31,10 +31,6 @@ use bimorph_multibody::planar::Pose;
 /// Largest difference between the run and its linear prediction with the final stiffness, as a fraction of the travel,
 /// for which its modes determine the mesh.
 const STRAIGHT: f64 = 0.03;
-/// How much looser than the run its steps are here.
-const STEP_TOLERANCE_RATIO: f64 = 10.0;
-/// Loosest tolerance of them.
-const LOOSEST: f64 = 0.1;
 /// Output times that are compared, at least and at most, whatever is printed.
 const POINTS: (usize, usize) = (201, 1001);
 /// Times as many of a run that ends at an event.
@@ -47,8 +43,6 @@ const MIN_SAMPLES: usize = 16;
 const MAX_PASSES: usize = 6;
 /// Segments of all beams together, at most.
 const MAX_SEGMENTS: usize = 4000;
-/// Share of the tolerance that the estimate may use, and of that what a mesh that was not run is laid out for.
-const SAFETY: f64 = 0.6;
 const AIM: f64 = 0.7;
 /// The order of convergence until it is measured, and the highest accepted one. Stretching has 2; among coarse meshes
 /// and near buckling the measured order is lower, or seems higher.
@@ -69,12 +63,13 @@ pub(super) fn order(
     if !beams || !same || options.signals.is_empty() {
         return Ok(at_least(left));
     }
-    let goal = SAFETY * moving.options.tol;
+    let goal = moving.options.errors().large_motion();
     let closes = ends_in_contact(moving, options);
     let until = if closes { options.until.clone().or(Some(Until::Contact)) } else { options.until.clone() };
     let options = &TransientOptions { until, ..options.clone() };
     if !closes && !bends(moving, options, &order)? {
-        let found = (left > moving.options.tol).then(|| compared(moving, options, &order.segments)).flatten();
+        let found =
+            (left > moving.options.errors().requested()).then(|| compared(moving, options, &order.segments)).flatten();
         return Ok(match found {
             // both runs include the error of the modes, too
             Some(error) if error <= goal => Mesh { estimated_error: Some(error), ..order },
@@ -183,7 +178,7 @@ fn sample_run(moving: &CompiledModel, options: &TransientOptions<'_>, segments: 
     let model = meshed(moving, segments).ok()?;
     let start = options.release.map(|start| meshed(start, segments)).transpose().ok()?;
     let loose = TransientOptions {
-        tol: (STEP_TOLERANCE_RATIO * moving.options.tol).min(LOOSEST).max(moving.options.tol),
+        tol: moving.options.errors().mesh_run(),
         points: points(options),
         release: start.as_deref(),
         method: Integrator::default(),

@@ -17,7 +17,6 @@ use super::remeshed::meshed;
 use super::{MeshRequest, fitted};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::doubling::{self, Output};
-use bimorph_model::refine::lowest_modes;
 use bimorph_netlist::Diagnostic;
 
 /// Result of an analysis.
@@ -91,7 +90,7 @@ fn coded(reported: impl IntoIterator<Item = Diagnostic>) -> Vec<String> {
 
 /// Within the share of the tolerance that a comparison with twice the segments may use.
 fn within(compiled: &CompiledModel, error: Option<f64>) -> bool {
-    error.is_some_and(|error| error <= doubling::SAFETY * compiled.options.tol)
+    error.is_some_and(|error| error <= compiled.options.errors().comparison())
 }
 
 fn assess_static(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<Assessment, AnalysisError> {
@@ -138,7 +137,7 @@ pub fn assess_found_modes(
     // a mesh without so many modes says nothing about those that it lacks
     let all = found.frequencies_hz.len() == count;
     let own = worst(found.errors.iter().copied());
-    let sure = own.is_some_and(|error| error <= lowest_modes::SAFETY * compiled.options.tol);
+    let sure = own.is_some_and(|error| error <= compiled.options.errors().modes());
     let loaded = about_equilibrium(compiled, voltages);
     let moved = if loaded { equilibrium::assess(compiled, voltages)?.1 } else { Some(0.0) };
     let (own, sure) = match own {

@@ -6,11 +6,7 @@ use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::equilibrium::{SMALL, static_fitted};
 use super::remeshed::{chosen, meshed, remeshed, warn_of_mesh};
 use bimorph_model::compile::CompiledModel;
-use bimorph_model::options::CompileOptions;
 use bimorph_model::refine::doubling::{self, Output};
-
-/// Share of the tolerance for the strains: the rest is for what comes after them.
-const STRAIN_TOLERANCE_FRACTION: f64 = 0.25;
 
 /// Where a mechanism rests at `voltages` after its ports were raised to `raised` once: the model, the equilibrium, the displacement of
 /// points along every beam, and permanent strains by name.
@@ -45,7 +41,7 @@ fn backbent_fitted(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<
         known.push((segments.to_vec(), bent));
         Ok::<_, AnalysisError>(outputs)
     };
-    let options = CompileOptions { tol: STRAIN_TOLERANCE_FRACTION * compiled.options.tol, ..compiled.options.clone() };
+    let options = compiled.options.with_tolerance(compiled.options.errors().strains());
     let segments = compiled.order.segments.clone();
     let order = match chosen(compiled) {
         true => doubling::estimate(&options, segments, &mut analyse)?,

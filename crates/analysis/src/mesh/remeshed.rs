@@ -33,7 +33,7 @@ pub(super) fn remeshed(compiled: &CompiledModel, order: Mesh) -> Result<Compiled
 /// Says so where the estimate of a mesh is beyond the tolerance, or missing: once, with the last estimate.
 pub(super) fn warn_of_mesh(fitted: &mut CompiledModel) {
     fitted.warnings.items.retain(|d| d.code != WARNING);
-    let Some(message) = beyond(fitted.options.tol, fitted.order.estimated_error) else { return };
+    let Some(message) = beyond(fitted.options.errors(), fitted.order.estimated_error) else { return };
     let help =
         if chosen(fitted) { "leave --segments away, or take more" } else { "compare with --segments of your own" };
     fitted.warnings.items.push(Diagnostic::warning(WARNING, message, help));

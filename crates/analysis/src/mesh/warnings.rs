@@ -4,6 +4,7 @@ use super::super::contact_range::comb_beyond_told;
 use super::super::rotary_inertia_error;
 use super::super::statics::{OperatingPoint, too_hot};
 use bimorph_model::compile::CompiledModel;
+use bimorph_model::options::ErrorBudget;
 use bimorph_netlist::Diagnostic;
 
 /// Code of the warning that a mesh does not hold the tolerance.
@@ -34,20 +35,21 @@ pub fn warnings(fitted: &CompiledModel) -> impl Iterator<Item = String> {
 }
 
 /// Warning about an estimate beyond the tolerance, or a missing one.
-pub fn beyond(tol: f64, estimated_error: Option<f64>) -> Option<String> {
+pub fn beyond(budget: ErrorBudget, estimated_error: Option<f64>) -> Option<String> {
     match estimated_error {
-        Some(error) if error <= 1.05 * tol => None,
-        Some(error) if error.is_finite() => {
-            Some(format!("the estimated error of the mesh is {error:.1e}, more than the tolerance {tol:e}"))
-        }
+        Some(error) if !budget.is_exceeded(error) => None,
+        Some(error) if error.is_finite() => Some(format!(
+            "the estimated error of the mesh is {error:.1e}, more than the tolerance {:e}",
+            budget.requested()
+        )),
         // on twice the segments something is there that was not, or the other way round
-        _ => Some(format!("the error of the mesh is unknown: the tolerance {tol:e} is not confirmed")),
+        _ => Some(format!("the error of the mesh is unknown: the tolerance {:e} is not confirmed", budget.requested())),
     }
 }
 
 /// Warning about omitted stress stiffening of a linear model, where its effect exceeds the tolerance.
 pub(super) fn of_stress(compiled: &CompiledModel, share: Option<f64>) -> Option<Diagnostic> {
-    let share = share.filter(|share| *share > compiled.options.tol)?;
+    let share = share.filter(|share| *share > compiled.options.errors().requested())?;
     let message = if share.is_finite() {
         format!(
             "the linear model leaves out what stress does to stiffness: it would change the deflection by {share:.1e}"
@@ -77,7 +79,7 @@ pub(super) fn of_steps(step: f64, (frequency, share): (f64, f64)) -> Diagnostic 
 
 /// Warning about a waveform error of this size from missing rotary inertia of wide beams.
 pub(super) fn of_rotary(compiled: &CompiledModel, error: f64) -> Option<Diagnostic> {
-    if error <= compiled.options.tol.max(rotary_inertia_error::WORTH) {
+    if error <= compiled.options.errors().requested().max(rotary_inertia_error::WORTH) {
         return None;
     }
     let message =
@@ -105,13 +107,13 @@ pub(super) fn of_heat(compiled: &CompiledModel, point: &OperatingPoint) -> Optio
 /// Where segments are too long for the field along them, with the gap that leaves out most and the error of the deflection [1].
 pub(super) fn of_segments(compiled: &CompiledModel, worst: &(String, f64)) -> Option<Diagnostic> {
     let (name, error) = worst;
-    if *error <= compiled.options.tol {
+    if compiled.options.errors().holds(*error) {
         return None;
     }
     let message = if error.is_finite() {
         format!(
             "segments along `{name}`: estimated error of the deflection {error:.1e}, tolerance {:e}",
-            compiled.options.tol
+            compiled.options.errors().requested()
         )
     } else {
         format!("segments along `{name}`: the gap may pull in at this voltage with more of them")

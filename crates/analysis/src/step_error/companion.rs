@@ -18,10 +18,7 @@ use super::super::integrator::Integrator;
 use super::super::transient::error_log::least;
 use super::super::transient::{TransientOptions, TransientResult};
 use super::super::{AnalysisError, ProgressCallback};
-use super::run::{
-    AT_THE_END, COMPANION_TOLERANCE_RATIO, MAX_AGAIN, MAX_STORED_SAMPLES, MAX_WORK, RunFunction, beyond, loose, room,
-    unknown,
-};
+use super::run::{AT_THE_END, MAX_AGAIN, MAX_STORED_SAMPLES, MAX_WORK, RunFunction, beyond, unknown};
 use super::samples::{BufferedSamples, SelectedSamples, resolved, stride};
 use crate::formulation;
 use bimorph_model::compile::CompiledModel;
@@ -59,17 +56,17 @@ pub(super) fn compared<T>(
     if !again {
         let mut made = once(options, model, (companion, whole), run, sample, watch)?;
         made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
-        return Ok((made.result, made.more, options.tol));
+        return Ok((made.result, made.more, options.errors().requested()));
     }
     let mut now = options.clone();
     let mut kept = BufferedSamples::default();
     let mut made = once(&now, model, (companion, whole), run, &mut |t, values| kept.keep(t, values), watch)?;
-    let room = room(options.tol, made.result.estimated_error);
+    let room = options.errors().left_for_steps(made.result.estimated_error);
     while made.result.step_error.is_some_and(|error| error > room)
         && MORE * made.result.counters.steps as f64 * unknowns <= MAX_AGAIN
-        && now.tol > options.tol / MAX_SHARPER
+        && now.errors().requested() > options.errors().requested() / MAX_SHARPER
     {
-        let sharper = TransientOptions { tol: now.tol / COMPANION_TOLERANCE_RATIO, ..options.clone() };
+        let sharper = options.with_tolerance(now.errors().sharper_run());
         let mut others = BufferedSamples::default();
         let companion = (Some(made.picked.clone()), true);
         match once(&sharper, model, companion, run, &mut |t, values| others.keep(t, values), watch) {
@@ -80,7 +77,7 @@ pub(super) fn compared<T>(
     }
     kept.send(sample);
     made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
-    Ok((made.result, made.more, now.tol))
+    Ok((made.result, made.more, now.errors().requested()))
 }
 
 /// A run with its estimate, and what a sharper one is compared with.
@@ -144,7 +141,7 @@ fn reported_fraction(options: &TransientOptions<'_>, method: Integrator) -> f64 
     let share = if is_high(method) { REPORTED_FRACTION } else { SHARE_OF_SECOND };
     match options.step {
         Some(_) => REPORTED_FRACTION,
-        None => share.max(RESERVE / (loose(options) / options.tol - 1.0)),
+        None => share.max(RESERVE / (options.errors().companion() / options.errors().requested() - 1.0)),
     }
 }
 
@@ -180,8 +177,8 @@ pub(super) fn companion<T>(
     run: RunFunction<'_, T>,
     watch: ProgressCallback<'_>,
 ) -> Result<(Option<TransientResult>, bool), AnalysisError> {
-    let tol = loose(options);
-    let looser = options.step.is_some() || tol >= 2.0 * options.tol;
+    let tol = options.errors().companion();
+    let looser = options.step.is_some() || tol >= 2.0 * options.errors().requested();
     if options.signals.is_empty() || options.points < 2 || !looser {
         return Ok((None, false));
     }

@@ -1,7 +1,6 @@
 //! Samples of a run that its estimate keeps.
 
 use super::super::chart::error::half_range;
-use super::super::transient::options::STEP_SHARE;
 use super::super::transient::{TransientOptions, TransientResult};
 use bimorph_model::compile::CompiledModel;
 use bimorph_solve::equations::bodies::FLOOR;
@@ -43,7 +42,7 @@ pub(super) fn resolved(
     let length = model.parts.system.length_scale;
     let lengths = result.signals.iter().zip(&picked.columns).filter(|((_, unit, _), _)| unit == "m");
     let most = lengths.map(|(_, column)| half_range(column)).fold(0.0, f64::max);
-    most < ROUNDING * length || most > RESOLVED * STEP_SHARE * options.tol * FLOOR * length
+    most < ROUNDING * length || most > RESOLVED * options.errors().step() * FLOOR * length
 }
 
 /// One of so many output times is compared.

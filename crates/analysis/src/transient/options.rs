@@ -3,6 +3,7 @@
 use super::super::AnalysisError;
 use super::super::integrator::Integrator;
 use bimorph_model::compile::CompiledModel;
+use bimorph_model::options::ErrorBudget;
 use bimorph_model::options::analysis::TRAN_POINTS;
 use bimorph_solve::baseline::SolverKind;
 use bimorph_solve::time::adaptive::Control;
@@ -83,9 +84,6 @@ impl Default for TransientOptions<'_> {
     }
 }
 
-/// Share of the tolerance that one step may use: errors of many steps add up.
-pub(crate) const STEP_SHARE: f64 = 1e-2;
-
 pub(crate) fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError> {
     let bad = |what: &str, detail: String| Err(AnalysisError::BadRequest { what: what.into(), detail });
     if !(options.stop.is_finite() && options.stop > 0.0) {
@@ -117,8 +115,19 @@ pub(crate) fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError>
 }
 
 impl TransientOptions<'_> {
+    /// The division of the tolerance.
+    pub fn errors(&self) -> ErrorBudget {
+        ErrorBudget::of(self.tol)
+    }
+
+    /// The same options with another tolerance.
+    #[must_use]
+    pub fn with_tolerance(&self, tolerance: f64) -> Self {
+        Self { tol: tolerance, ..self.clone() }
+    }
+
     /// Control of the step length.
     pub(crate) fn control(&self) -> Control {
-        self.step.map_or(Control::Tolerance(STEP_SHARE * self.tol), Control::Fixed)
+        self.step.map_or(Control::Tolerance(self.errors().step()), Control::Fixed)
     }
 }

@@ -199,7 +199,7 @@ fn solve(
 /// The stored part of a result.
 pub(super) fn found(assessed: Assessment, spec: &SweepSpec, options: &CompileOptions) -> Result<PointResults, String> {
     let estimated_error = assessed.estimated_error;
-    let beyond = mesh::beyond(options.tol, estimated_error).map(|message| format!("{}: {message}", mesh::WARNING));
+    let beyond = mesh::beyond(options.errors(), estimated_error).map(|message| format!("{}: {message}", mesh::WARNING));
     let warnings: Vec<String> = beyond.into_iter().chain(assessed.warnings).collect();
     let values = values(&assessed.answer, &spec.analysis)?;
     // its warning contains it; files of JSON have no infinity

@@ -85,9 +85,9 @@ impl<'a> SharedMeshes<'a> {
     /// The mesh that holds a share of the tolerance for one variant.
     fn search(&self, first: &CompiledModel, share: f64) -> Option<Vec<usize>> {
         let mut sharper = first.clone();
-        sharper.options.tol *= share;
+        sharper.options = sharper.options.with_tolerance(share * sharper.options.errors().requested());
         let order = mesh::order(&sharper, &self.analysis.request()?).ok()?;
-        order.estimated_error.is_some_and(|error| error <= sharper.options.tol).then_some(order.segments)
+        order.estimated_error.is_some_and(|error| sharper.options.errors().holds(error)).then_some(order.segments)
     }
 
     /// The middle of the grid.

@@ -89,7 +89,7 @@ impl<'a> TransientSweep<'a> {
         let prepare = |&number: &usize| means.guarded(|| self.prepare(&self.spec.settings(number), &go_on));
         let prepared: Vec<Result<MeshedPoint, Failed>> = numbers.iter().map(prepare).collect();
         // lanes have one tolerance for all
-        let tol = prepared.iter().flatten().next().map_or(self.options.tol, |point| point.steps.tol);
+        let tol = prepared.iter().flatten().next().map_or(self.options.errors().requested(), |point| point.steps.tol);
         let like = |p: &'_ Result<MeshedPoint, Failed>| p.as_ref().is_ok_and(|point| point.steps.tol == tol);
         let variants: Vec<(usize, &CompiledModel)> = (prepared.iter().enumerate().filter(|(_, p)| like(p)))
             .filter_map(|(k, p)| Some((k, &p.as_ref().ok()?.compiled)))
@@ -137,7 +137,7 @@ impl<'a> TransientSweep<'a> {
             stop: *stop,
             signals: outputs.clone(),
             points: 2,
-            tol: self.options.tol,
+            tol: self.options.errors().requested(),
             voltages: voltages.clone(),
             ..TransientOptions::default()
         }
@@ -172,7 +172,7 @@ impl<'a> TransientSweep<'a> {
             let Ok(order) = mesh::order_in_time(&compiled, &self.transient(&settings)) else { continue };
             match &mut shared {
                 None => {
-                    let steps = Steps { tol: self.options.tol, error: None, place: IN_THE_MIDDLE };
+                    let steps = Steps { tol: self.options.errors().requested(), error: None, place: IN_THE_MIDDLE };
                     shared = Some(SweepMesh { beams: compiled.structure.beams.clone(), order, steps });
                 }
                 Some(shared) if alike(&shared.beams, &compiled.structure.beams) => {
@@ -207,7 +207,7 @@ impl<'a> TransientSweep<'a> {
             values.push(PointValue { name: name.clone(), unit: unit.into(), value: Some(value) });
         }
         let estimated_error = compiled.order.estimated_error;
-        let beyond = mesh::beyond(self.options.tol, estimated_error);
+        let beyond = mesh::beyond(self.options.errors(), estimated_error);
         let beyond = beyond.map(|message| format!("{}: {message}", mesh::WARNING));
         let steps = match error {
             Some(error) => step_error::beyond(options, *error, place),
@@ -235,7 +235,7 @@ fn steps(compiled: &CompiledModel, run: TransientOptions<'_>, place: &'static st
 
 /// A run of its own.
 fn alone(point: &MeshedPoint, options: &TransientOptions<'_>) -> Result<RunEnd, String> {
-    let options = TransientOptions { tol: point.steps.tol, ..options.clone() };
+    let options = options.with_tolerance(point.steps.tol);
     let result = transient(&point.compiled, &options, &mut |_, _| (), &mut |_| true);
     let result = result.map_err(|error: AnalysisError| error.to_string())?;
     let last = |(_, _, values): &(String, String, Vec<f64>)| values.last().copied().unwrap_or(f64::NAN);

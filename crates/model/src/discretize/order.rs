@@ -46,7 +46,8 @@ pub fn a_priori(structure: &Structure, options: &CompileOptions) -> Result<Vec<u
     let count = |(index, beam): (usize, &Beam)| {
         check(beam)?;
         let least = if held.contains(&index) { 2 } else { 1 };
-        let count = options.segments.unwrap_or_else(|| segments(beam, options.band, options.tol).max(least));
+        let count =
+            options.segments.unwrap_or_else(|| segments(beam, options.band, options.errors().requested()).max(least));
         Ok(options.scheme.segments(count))
     };
     structure.beams.iter().enumerate().map(count).collect()

@@ -7,12 +7,15 @@
 //! | [`analysis`] | options of single analyses |
 //! | [`table`] | description of an option, and the check of a value |
 //! | [`choices`] | the names that some options take |
+//! | [`error_budget`] | what each source of error may use of the tolerance |
 
 pub mod analysis;
 pub mod choices;
+pub mod error_budget;
 pub mod model;
 pub mod table;
 
 pub use choices::{Formulation, Junctions, Scheme};
+pub use error_budget::ErrorBudget;
 pub use model::{CompileOptions, MODEL, ModelOption};
 pub use table::{OptionDescription, OptionError, OptionValue, Range};

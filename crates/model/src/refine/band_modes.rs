@@ -105,7 +105,7 @@ fn modes_in_band(
         _ => fresh,
     };
     // far below the errors to be reported, which are twice as large in λ
-    let tightest = (0..modes).map(|m| aim.tolerance(options, m)).fold(options.tol, f64::min);
+    let tightest = (0..modes).map(|m| aim.tolerance(options, m)).fold(options.errors().requested(), f64::min);
     let settled = (0.05 * tightest).clamp(1e-9, 1e-3);
     let found = subspace::iterate(model, (&factor, shift), start, modes, settled)?;
     // two more than wanted, to separate the highest wanted one from its neighbours

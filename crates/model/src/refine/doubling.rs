@@ -8,7 +8,7 @@
 //!
 //! Reference: L. F. Richardson, "The deferred approach to the limit", Phil. Trans. R. Soc. A 226 (1927).
 
-use super::groups::{Groups, MARGIN};
+use super::groups::Groups;
 use super::mesh_target::Mesh;
 use crate::options::CompileOptions;
 use bimorph_structure::Structure;
@@ -19,8 +19,6 @@ const MAX_PASSES: usize = 10;
 const MAX_SEGMENTS: usize = 60_000;
 /// Groups that are doubled alone at most.
 const MAX_GROUPS: usize = 8;
-/// Share of the tolerance that the estimate may use: it has been found up to a quarter smaller than the error (docs/accuracy.md).
-pub const SAFETY: f64 = 0.75;
 /// Results that decide, at most: the worst.
 const MAX_RESULTS: usize = 24;
 
@@ -71,7 +69,7 @@ pub fn fit<E>(
         let errors = differences(&coarse, &fine);
         let worst = errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
         let here = order(&segments, Some(worst), passes);
-        if worst <= SAFETY * options.tol {
+        if worst <= options.errors().comparison() {
             return Ok(here);
         }
         best = Some(best.filter(|best| best.estimated_error.is_some_and(|least| least <= worst)).unwrap_or(here));
@@ -88,13 +86,14 @@ pub fn fit<E>(
             (segments, coarse) = (twice, fine);
             continue;
         }
-        let mut decide: Vec<usize> = (0..errors.len()).filter(|&j| errors[j].abs() > 0.1 * options.tol).collect();
+        let mut decide: Vec<usize> =
+            (0..errors.len()).filter(|&j| errors[j].abs() > options.errors().minor()).collect();
         decide.sort_by(|&i, &j| errors[j].abs().total_cmp(&errors[i].abs()).then(i.cmp(&j)));
         decide.truncate(MAX_RESULTS);
         let shares = shares(options, &groups, &segments, &coarse, (&errors, &decide), analyse);
         let next = match shares {
             Some(shares) => {
-                let goals = vec![MARGIN * SAFETY * options.tol; decide.len()];
+                let goals = vec![options.errors().predicted_comparison(); decide.len()];
                 groups.fewest(options, &shares, &goals, &segments, &segments)
             }
             None => twice.clone(),

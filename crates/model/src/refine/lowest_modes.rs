@@ -9,7 +9,7 @@ use super::band_modes::mechanics;
 use super::mesh_search;
 use super::mesh_target::{Mesh, MeshTarget};
 use crate::discretize::{Assembly, DiscretizeError, discretize_with, order};
-use crate::options::CompileOptions;
+use crate::options::{CompileOptions, ErrorBudget};
 use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::forces::add_inertia;
 use bimorph_multibody::planar::Pose;
@@ -20,9 +20,6 @@ use std::f64::consts::TAU;
 const MAX_PASSES: usize = 12;
 /// Fraction by which the band lies above the highest requested mode.
 const ABOVE: f64 = 0.01;
-/// Share of the tolerance that the estimate may use: it has been found smaller than the error, by up to a factor of 2.9 where short wide beams
-/// weigh in (docs/accuracy.md).
-pub const SAFETY: f64 = 0.36;
 /// Frequencies within which modes are looked for [Hz].
 const LOWEST: f64 = 1e-6;
 const HIGHEST: f64 = 1e13;
@@ -46,9 +43,9 @@ pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> 
             segments = finer;
             continue;
         };
-        let tolerances = vec![SAFETY * options.tol; count];
+        let tolerances = vec![options.errors().modes(); count];
         let aim = MeshTarget { band: frequency * (1.0 + ABOVE), tolerances, rigid: false };
-        let order = mesh_search::choose_for(structure, options, &aim)?.with_estimate_times(SAFETY);
+        let order = mesh_search::choose_for(structure, options, &aim)?.with_estimate_times(ErrorBudget::MODES);
         let done = order.estimated_error.is_none() || order.modes_in_band >= count;
         segments.clone_from(&order.segments);
         chosen = Some(order);

@@ -17,12 +17,12 @@
 //! refinement led by an estimate.
 
 use super::band_modes::{MeshModes, mechanics, solve_modes};
-use super::groups::{Groups, MARGIN};
+use super::groups::Groups;
 pub use super::mesh_target::{Mesh, MeshTarget};
 use super::mode_errors::ModeErrors;
 use super::rigid_beams::stiffen;
 use crate::discretize::{DiscretizeError, order};
-use crate::options::{CompileOptions, Scheme};
+use crate::options::{CompileOptions, ErrorBudget, Scheme};
 use bimorph_structure::Structure;
 
 /// Largest kh of a segment at the edge of the band.
@@ -85,7 +85,7 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &MeshTar
         let order = Mesh { segments: segments.clone(), estimated_error: Some(worst), modes_in_band: now.modes, passes };
         let mut next = predicted(options, aim, &groups, error, now.modes, (&segments, &floor));
         let total = |n: &[usize]| n.iter().sum::<usize>();
-        if worst <= options.tol {
+        if options.errors().holds(worst) {
             let done = total(&next) >= total(&segments);
             holds = Some((order, now));
             seen = None;
@@ -123,8 +123,8 @@ fn by_another_scheme(
     options: &CompileOptions,
     aim: &MeshTarget,
 ) -> Result<Mesh, DiscretizeError> {
-    let finer = CompileOptions { scheme: Scheme::E4, tol: 0.5 * options.tol, ..options.clone() };
-    let tolerances = aim.tolerances.iter().map(|tol| 0.5 * tol).collect();
+    let finer = CompileOptions { scheme: Scheme::E4, ..options.with_tolerance(options.errors().confirmation()) };
+    let tolerances = aim.tolerances.iter().map(|tol| ErrorBudget::of(*tol).confirmation()).collect();
     let order = choose_for(structure, &finer, &MeshTarget { tolerances, ..aim.clone() })?;
     Ok(Mesh { estimated_error: None, ..order })
 }
@@ -140,6 +140,6 @@ fn predicted(
 ) -> Vec<usize> {
     let share = |mode: usize, g: &Vec<usize>| g.iter().map(|&b| error.shares[mode][b].abs()).sum::<f64>();
     let shares: Vec<Vec<f64>> = (0..modes).map(|m| groups.0.iter().map(|g| share(m, g)).collect()).collect();
-    let goals: Vec<f64> = (0..modes).map(|m| MARGIN * aim.tolerance(options, m)).collect();
+    let goals: Vec<f64> = (0..modes).map(|m| ErrorBudget::of(aim.tolerance(options, m)).prediction()).collect();
     groups.fewest(options, &shares, &goals, segments, floor)
 }

@@ -38,12 +38,12 @@ pub struct MeshTarget {
 
 impl MeshTarget {
     pub(super) fn tolerance(&self, options: &CompileOptions, mode: usize) -> f64 {
-        self.tolerances.get(mode).copied().unwrap_or(options.tol)
+        self.tolerances.get(mode).copied().unwrap_or(options.errors().requested())
     }
 
     /// Largest error over what is allowed for it, times the option `tol`.
     pub(super) fn worst(&self, options: &CompileOptions, relative: &[f64]) -> f64 {
         let over = |(m, e): (usize, &f64)| e.abs() / self.tolerance(options, m);
-        options.tol * relative.iter().enumerate().map(over).fold(0.0, f64::max)
+        options.errors().requested() * relative.iter().enumerate().map(over).fold(0.0, f64::max)
     }
 }

@@ -6,7 +6,7 @@
 //! elastic, as they may matter where nothing rings.
 
 use super::band_modes::{MeshModes, solve_modes};
-use super::groups::{Groups, MARGIN};
+use super::groups::Groups;
 use super::mesh_target::{Mesh, MeshTarget};
 use super::mode_errors::{relative, strain_shares};
 use crate::discretize::{Assembly, DiscretizeError, discretize_with};
@@ -46,7 +46,7 @@ pub(super) fn stiffen(
     let mut chosen: Vec<&Vec<usize>> = Vec::new();
     for group in candidates {
         let next: Vec<f64> = sums.iter().enumerate().map(|(m, sum)| sum + rise(m, group)).collect();
-        if next.iter().any(|e| e.abs() > MARGIN * options.tol) {
+        if next.iter().any(|e| e.abs() > options.errors().prediction()) {
             break;
         }
         sums = next;
@@ -67,13 +67,16 @@ pub(super) fn stiffen(
         let stiff = discretize_with(bare, options, &segments)?;
         let still = compliances(structure, &acted, &stiff).unwrap_or_default();
         let firm = still.len() == yields.len()
-            && still.iter().zip(&yields).all(|(rigid, elastic)| (rigid - elastic).abs() <= options.tol * elastic);
+            && still
+                .iter()
+                .zip(&yields)
+                .all(|(rigid, elastic)| (rigid - elastic).abs() <= options.errors().requested() * elastic);
         if firm {
             let now = solve_modes(bare, options, aim, &segments, Some(elastic))?;
             order.passes += 1;
             let apart = relative(&now.lambda, &error.reference);
             let worst = apart.iter().take(modes).fold(0.0, |m: f64, e| m.max(e.abs()));
-            if now.lambda.len() >= modes && worst <= options.tol {
+            if now.lambda.len() >= modes && options.errors().holds(worst) {
                 (order.segments, order.estimated_error) = (segments, Some(worst));
                 break;
             }

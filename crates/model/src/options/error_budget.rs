@@ -1,0 +1,174 @@
+//! The one place that divides a tolerance: what each source of error may use of it, with the reason.
+//!
+//! A result has errors of its mesh, of its modes and of its steps. Each estimate has been compared with the true error, and where it was found
+//! smaller than that, it may use only a part of the tolerance (docs/accuracy.md). Everything else asks here and multiplies no tolerance itself.
+
+use super::CompileOptions;
+
+/// A relative tolerance, and its division.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorBudget {
+    requested: f64,
+}
+
+impl ErrorBudget {
+    /// Fraction of the tolerance for estimates of modes by the next term of the dynamic stiffness: they were found smaller than the error, by up to
+    /// a factor of 2.9 where short wide beams matter.
+    pub const MODES: f64 = 0.36;
+    /// Fraction of the tolerance for estimates by comparison with twice the segments: they were found up to a quarter smaller than the error.
+    const COMPARISON: f64 = 0.75;
+    /// Fraction of a goal that predictions for meshes that were not run may use.
+    const PREDICTION: f64 = 0.9;
+    /// Fraction of the tolerance below which the error of a group of beams decides nothing.
+    const MINOR: f64 = 0.1;
+    /// Remaining error of the first order over the estimate of a comparison, which assumes the second order.
+    pub const FIRST_ORDER: f64 = 1.5;
+    /// Fraction of the tolerance for meshes that confirm a choice.
+    const CONFIRMATION: f64 = 0.5;
+    /// Fraction of the tolerance for permanent strains: the equilibrium after them uses the rest.
+    const STRAINS: f64 = 0.25;
+    /// Fraction of the tolerance for the mesh of a large motion: its estimate is a difference of two runs.
+    const LARGE_MOTION: f64 = 0.6;
+    /// Fraction of the tolerance that one step may use: errors of many steps add up.
+    const STEP: f64 = 1e-2;
+    /// Least fraction of the tolerance that is left to the steps beside the mesh.
+    const LEAST_FOR_STEPS: f64 = 0.3;
+    /// Ratio of the tolerance of a companion run to that of the run.
+    const COMPANION: f64 = 10.0;
+    /// Loosest tolerance of a companion run, and of a run that chooses a mesh.
+    const LOOSEST: [f64; 2] = [0.3, 0.1];
+    /// Estimates above this multiple of the tolerance are reported: the display has two digits.
+    const REPORTED: f64 = 1.05;
+
+    /// The division of a tolerance.
+    pub fn of(tolerance: f64) -> Self {
+        Self { requested: tolerance }
+    }
+
+    /// The tolerance as requested [1].
+    pub fn requested(self) -> f64 {
+        self.requested
+    }
+
+    /// Whether an error is within the tolerance.
+    pub fn holds(self, error: f64) -> bool {
+        error <= self.requested
+    }
+
+    /// Whether an estimate exceeds the tolerance by more than its display rounds.
+    pub fn is_exceeded(self, estimate: f64) -> bool {
+        // an estimate that is not a number exceeds every tolerance
+        !(estimate <= Self::REPORTED * self.requested)
+    }
+
+    /// For an estimate by comparison with twice the segments.
+    pub fn comparison(self) -> f64 {
+        Self::COMPARISON * self.requested
+    }
+
+    /// For the prediction of such an estimate, on a mesh that was not run.
+    pub fn predicted_comparison(self) -> f64 {
+        Self::PREDICTION * Self::COMPARISON * self.requested
+    }
+
+    /// For a prediction.
+    pub fn prediction(self) -> f64 {
+        Self::PREDICTION * self.requested
+    }
+
+    /// Below it the error of a group of beams decides nothing.
+    pub fn minor(self) -> f64 {
+        Self::MINOR * self.requested
+    }
+
+    /// For an estimate of modes.
+    pub fn modes(self) -> f64 {
+        Self::MODES * self.requested
+    }
+
+    /// For a comparison of errors of the first order.
+    pub fn first_order(self) -> f64 {
+        self.requested / Self::FIRST_ORDER
+    }
+
+    /// For a mesh that confirms a choice.
+    pub fn confirmation(self) -> f64 {
+        Self::CONFIRMATION * self.requested
+    }
+
+    /// For permanent strains.
+    pub fn strains(self) -> f64 {
+        Self::STRAINS * self.requested
+    }
+
+    /// For the mesh of a large motion.
+    pub fn large_motion(self) -> f64 {
+        Self::LARGE_MOTION * self.requested
+    }
+
+    /// For the steps of a run that chooses the mesh of a large motion.
+    pub fn mesh_run(self) -> f64 {
+        (Self::COMPANION * self.requested).min(Self::LOOSEST[1]).max(self.requested)
+    }
+
+    /// For one step of an integrator.
+    pub fn step(self) -> f64 {
+        Self::STEP * self.requested
+    }
+
+    /// For the steps of a companion run.
+    pub fn companion(self) -> f64 {
+        (Self::COMPANION * self.requested).min(Self::LOOSEST[0])
+    }
+
+    /// For a run that is repeated because its steps missed the tolerance.
+    pub fn sharper_run(self) -> f64 {
+        self.requested / Self::COMPANION
+    }
+
+    /// What the error of the mesh leaves to the steps.
+    pub fn left_for_steps(self, mesh: Option<f64>) -> f64 {
+        match mesh {
+            Some(mesh) if mesh <= self.requested => (self.requested - mesh).max(Self::LEAST_FOR_STEPS * self.requested),
+            _ => self.requested,
+        }
+    }
+}
+
+impl CompileOptions {
+    /// The division of the tolerance.
+    pub fn errors(&self) -> ErrorBudget {
+        ErrorBudget::of(self.tol)
+    }
+
+    /// The same options with another tolerance.
+    #[must_use]
+    pub fn with_tolerance(&self, tolerance: f64) -> Self {
+        Self { tol: tolerance, ..self.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! The parts of a tolerance are within it, and what the mesh leaves is never nothing.
+    use super::*;
+
+    #[test]
+    fn parts_are_within_the_whole() {
+        for tolerance in [1e-12, 1e-3, 0.5] {
+            let budget = ErrorBudget::of(tolerance);
+            let parts = [budget.comparison(), budget.predicted_comparison(), budget.prediction(), budget.modes()];
+            let more =
+                [budget.first_order(), budget.confirmation(), budget.strains(), budget.large_motion(), budget.step()];
+            assert!(parts.iter().chain(&more).all(|part| *part > 0.0 && budget.holds(*part)));
+            assert!(budget.predicted_comparison() < budget.comparison());
+            assert!(budget.mesh_run() >= tolerance);
+            assert!(!budget.is_exceeded(1.04 * tolerance) && budget.is_exceeded(1.06 * tolerance));
+            assert!(budget.is_exceeded(f64::NAN) && !budget.holds(f64::NAN));
+            for mesh in [None, Some(0.0), Some(0.5 * tolerance), Some(tolerance), Some(2.0 * tolerance)] {
+                let left = budget.left_for_steps(mesh);
+                assert!(left >= 0.29 * tolerance && left <= tolerance, "{mesh:?}: {left}");
+            }
+        }
+    }
+}
