@@ -126,7 +126,7 @@ impl ErrorBudget {
         self.requested / Self::COMPANION
     }
 
-    /// What the error of the mesh leaves to the steps.
+    /// For the steps, beside a mesh with this error.
     pub fn left_for_steps(self, mesh: Option<f64>) -> f64 {
         match mesh {
             Some(mesh) if mesh <= self.requested => (self.requested - mesh).max(Self::LEAST_FOR_STEPS * self.requested),
