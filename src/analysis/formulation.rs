@@ -82,7 +82,7 @@ impl Formulation {
             && options.solver == SolverKind::Recursion
             && options.release.is_none();
         if !plain {
-            let why = "a release, a method, equal steps or a solver was asked for".into();
+            let why = "a release, a method, equal steps or a solver was given".into();
             return (ChosenFormulation { formulation: Self::Compliant, why }, method);
         }
         let suited = Self::suited(compiled, Some(options.stop));

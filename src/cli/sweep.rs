@@ -216,7 +216,9 @@ impl SweepCommand {
         }
         match table {
             Err(SweepError::Cancelled { done, points }) => {
-                bar.suspend(|| eprintln!("{done} of {points} points are in {}: go on with --resume", path.display()));
+                bar.suspend(|| {
+                    eprintln!("{done} of {points} points are in {}: continue with --resume", path.display())
+                });
                 Err(Failure::Interrupted)
             }
             table => Ok((table?, Some(journal))),
