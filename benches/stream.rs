@@ -26,7 +26,7 @@ mod echo;
 /// How long an answer may take.
 const PATIENCE: Duration = Duration::from_secs(10);
 const CALLS: usize = 20_000;
-/// A plate on a spring over an electrode. The echo device does not look at it.
+/// A plate on a spring over an electrode. The echo device does not read it.
 const NETLIST: &str = "anchor * [f] [l=1u w=1u h=1u]
 spring2d * [f m] [kx=1]
 mass2d * [m] [m=1e-10]

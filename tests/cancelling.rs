@@ -25,7 +25,7 @@ fn chain(segments: usize) -> (Bundle, CompileOptions) {
     )
 }
 
-/// How long `job` goes on after it was cancelled at `at`; none when it ended before.
+/// Time for which `job` runs after it was cancelled at `at`; `None` when it ended before.
 fn after_cancelling(at: Duration, job: impl FnOnce() + Send) -> Option<Duration> {
     let budget = Budget::new(Allowance::default());
     let (ended, end) = channel();
@@ -42,7 +42,7 @@ fn after_cancelling(at: Duration, job: impl FnOnce() + Send) -> Option<Duration>
     })
 }
 
-/// Cancels a computation at five moments; the median of how long it goes on.
+/// Cancels a computation at five moments; the median of its further run time.
 fn median(name: &str, mut job: impl FnMut() + Send) -> Duration {
     let moments = [20, 60, 120, 250, 500].map(Duration::from_millis);
     let mut after: Vec<Duration> = moments.iter().filter_map(|at| after_cancelling(*at, &mut job)).collect();
@@ -51,8 +51,9 @@ fn median(name: &str, mut job: impl FnMut() + Send) -> Duration {
     after.get(after.len() / 2).copied().unwrap_or_default()
 }
 
-/// Statics, modes, pull-in, transients and compilations of 30 000 unknowns go on for some milliseconds, on a machine that is
-/// not loaded; asserted is twenty times the aim of 50 ms, which what cannot be stopped exceeds by far.
+/// Statics, modes, pull-in, transients and compilations of 30 000 unknowns run for some milliseconds longer, on a
+/// machine without load. The asserted limit is twenty times the aim of 50 ms, which an unstoppable computation exceeds
+/// by far.
 #[test]
 fn computations_stop_soon() {
     let (bundle, options) = chain(10_000);

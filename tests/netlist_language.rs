@@ -99,7 +99,7 @@ fn logic_and_comparisons() {
     assert_eq!(value("'ab' != 'abc'"), 1.0);
 }
 
-/// `&`, `|` and `cond` look at no more than they need.
+/// `&`, `|` and `cond` evaluate only the operands that they need.
 #[test]
 fn lazy_evaluation() {
     assert_eq!(value("0 & 1/0"), 0.0);

@@ -46,7 +46,7 @@ def corners():
             table[r, t] = row(edge[0], ratio, springs[0])
             opposite = row(edge[1], 1, springs[1] * MIRROR)
             table[len(RATIOS) - 1 - r, t] = (opposite + table[r, t]) / 2 if ratio == 1 else opposite
-    # nothing changes where a beam goes on: what the mesh leaves there is noise
+    # nothing changes where a beam continues: what the mesh leaves there is noise
     table[RATIOS.index(1), TURNS.index(0)] = np.zeros(7)
     return np.array([[table[r, t] for t in range(len(TURNS))] for r in range(len(RATIOS))])
 

@@ -1,6 +1,6 @@
 """One junction: its outline, where its branches leave it, and what its springs must be.
 
-A branch is (angle from the node outwards, width). The drawing is the union of the beams' rectangles; where nothing goes on
+A branch is (angle from the node outwards, width). The drawing is the union of the beams' rectangles; where nothing continues
 in line, a rectangle reaches past the node far enough to fill the outer corner. Compliances are in the unit 1/(E·t),
 over a normal force N, a shear force V and a moment over width M/w, so that a rotation spring 12·a is a piece of beam a·w long.
 """

@@ -220,7 +220,7 @@ impl SweepCommand {
         match table {
             Err(SweepError::Cancelled { done, points }) => {
                 bar.suspend(|| {
-                    stderr_line!("{done} of {points} points are in {}: go on with --resume", path.display())
+                    stderr_line!("{done} of {points} points are in {}: continue with --resume", path.display())
                 });
                 Err(Failure::Interrupted)
             }

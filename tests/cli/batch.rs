@@ -18,8 +18,8 @@ fn column(csv: &str, name: &str) -> Vec<f64> {
     lines.map(|line| line.split(',').nth(at).expect("a cell").parse().expect("a number")).collect()
 }
 
-/// The scatter of the deflection is that of its formula, F·l³/(3·E·I): of w³ alone. The mean of w and its deviation are those asked
-/// for to a Latin hypercube's precision, and the same seed gives the same bytes, in shards too.
+/// The scatter of the deflection is that of its formula, F·l³/(3·E·I): of w³ alone. The mean of w and its deviation are
+/// the specified ones to a Latin hypercube's precision, and the same seed gives the same bytes, in shards too.
 #[test]
 fn monte_carlo() {
     let bench = Bench::new(&[("c.net", CANTILEVER)]);
@@ -134,8 +134,9 @@ fn a_shard_without_a_result() {
     assert!(!bench.path("none.csv").exists() && bench.path("none.csv.journal").exists(), "{}", none.stderr);
 }
 
-/// A sweep that is killed in the middle, or interrupted, keeps what is done: the same command with --resume goes on, computes at most the
-/// points in flight again, and its table has the bytes of one run. Without --resume, or for another sweep, the points are not touched.
+/// A sweep that is killed in the middle, or interrupted, keeps its finished points: the same command with --resume
+/// continues, computes at most the points in flight again, and its table has the bytes of one run. Without --resume, or
+/// for another sweep, the points are not touched.
 #[test]
 fn killed_and_resumed() {
     let bench = Bench::new(&[("c.net", CANTILEVER)]);

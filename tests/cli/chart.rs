@@ -49,8 +49,8 @@ fn joint_coordinates_converge() {
     assert!(number(&chart["reference_error"]) < errors[2]);
 }
 
-/// Where every direction is elastic, joint coordinates are charted by Rodas4 and by those of the methods asked for that they
-/// have: TR-BDF2 converges in them.
+/// Where every direction is elastic, joint coordinates are charted by Rodas4 and by those of the requested methods that
+/// they support: TR-BDF2 converges in them.
 #[test]
 fn implicit_methods_in_joint_coordinates() {
     let bench = Bench::new(&[("c.net", CANTILEVER)]);

@@ -140,7 +140,7 @@ async fn made(wire: &mut BimorphClient<Channel>) -> Before {
 /// State of a session and a job after a bit was changed; each has its numbers, or is rejected as damaged.
 #[derive(Debug, Default, PartialEq)]
 struct Left {
-    /// Steps that the session goes on after; none: it is refused.
+    /// Steps after which the session continues; `None`: it is rejected.
     steps: Option<usize>,
     job: bool,
 }

@@ -99,7 +99,7 @@ fn state(snapshot: &[u8]) -> usize {
 }
 
 /// The bytes of a state can be given any number, with the matching checksum. Each word of it that is NaN or below all
-/// numbers is refused; the snapshot itself goes on, with the bits of its session.
+/// numbers is rejected; the snapshot itself continues, with the bits of its session.
 #[test]
 fn states_with_numbers_that_are_none_are_refused() {
     let bench = Bench::new(&[]);

@@ -23,7 +23,7 @@ async fn check(channel: &Channel, service: &str) -> Result<ServingStatus, Code> 
     answer.map(|answer| answer.into_inner().status()).map_err(|status| status.code())
 }
 
-/// A stream that goes on, once it has said something.
+/// A stream of health, after its first message.
 async fn watch(channel: &Channel) -> Result<Streaming<HealthCheckResponse>, Code> {
     let request = HealthCheckRequest { service: String::new() };
     let mut stream = HealthClient::new(channel.clone()).watch(request).await.map_err(|s| s.code())?.into_inner();

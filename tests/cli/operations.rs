@@ -208,7 +208,8 @@ fn damaged_rows_of_finished_jobs_are_computed_again() {
     server.line_with(&["damaged", "1 of 100"]);
 }
 
-/// A kept session whose newest file is damaged goes on from the state before; with both damaged, its owner hears of it. The log has both.
+/// A stored session whose newest file is damaged continues from the state before; with both damaged, its owner receives
+/// an error. The log has both.
 #[test]
 fn damaged_sessions_are_told() {
     let bench = Bench::new(&[]);

@@ -25,7 +25,8 @@ fn every_format() {
     }
 }
 
-/// A netlist's deck is written whole and not run, beside the netlist by its name; with what was asked for in it.
+/// A netlist's deck is written whole and not run, beside the netlist by its name; with the requested sources and
+/// outputs in it.
 #[test]
 fn a_netlist_becomes_a_deck() {
     let netlist = "anchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\n\

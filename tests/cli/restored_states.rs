@@ -98,7 +98,7 @@ fn programs_are_not_run_to_wake() {
     });
 }
 
-/// A session whose model was forgotten still forks: it has its model.
+/// A session whose model was dropped still forks: it has its model.
 #[test]
 fn a_fork_needs_no_model_that_is_named() {
     block_on(async {

@@ -45,7 +45,7 @@ impl Stream {
         }
     }
 
-    /// One question.
+    /// One request.
     pub(crate) async fn ask(&mut self, kind: Ask) -> Result<Reply, Status> {
         let gone = || Status::unavailable("the stream has ended");
         self.requests.send(proto::DeviceRequest { kind: Some(kind) }).await.map_err(|_| gone())?;

@@ -55,7 +55,7 @@ fn with_certificate(access: Access, name: &str) -> Access {
     Access { certificate, key, ..access }
 }
 
-/// Asks for the version: an error's code and message.
+/// Calls for the version: an error's code and message.
 pub(crate) fn asked(address: &str, access: &Access) -> Result<String, (String, String)> {
     Client::connect_with(address, access, PATIENCE)
         .and_then(|mut client| client.version())
@@ -83,7 +83,7 @@ fn tokens_over_tls() {
         .expect("compiles over TLS");
     device.open(&OpenRequest::default()).expect("a stream opens over TLS");
 
-    refused(address, &access(&bench, None), "Unauthenticated", "asks for a token: --token-file");
+    refused(address, &access(&bench, None), "Unauthenticated", "requires a token: --token-file");
     refused(address, &access(&bench, Some("mallory")), "Unauthenticated", "none of this server's");
     let plain = address.replace("https://", "http://");
     refused(&plain, &right, "Unauthenticated", "speaks TLS: connect with https://");
@@ -95,7 +95,7 @@ fn tokens_over_tls() {
     refused(&format!("https://{}", open.address), &right, "Unavailable", "speaks no TLS");
 }
 
-/// Without TLS, on this machine, tokens are asked for over TCP and not over a Unix socket; health is open.
+/// Without TLS, on this machine, tokens are required over TCP and not over a Unix socket; health is open.
 #[test]
 fn tokens_without_tls() {
     let bench = bench();
@@ -104,7 +104,7 @@ fn tokens_without_tls() {
     let address = server.address.clone();
     assert_eq!(server.line("listening on "), socket);
     assert!(asked(&address, &access(&bench, Some("tokens"))).is_ok(), "the same file serves a single client");
-    refused(&address, &access(&bench, None), "Unauthenticated", "asks for a token");
+    refused(&address, &access(&bench, None), "Unauthenticated", "requires a token");
     assert!(asked(&socket, &access(&bench, None)).is_ok(), "its mode lets in the owner alone");
 
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
@@ -132,7 +132,7 @@ fn certificates_of_clients() {
     let server = Server::start(&bench, &format!("{} --tls-client-ca {}", certified("server"), authority.display()));
     let plain = access(&bench, None);
     assert!(asked(&server.address, &with_certificate(plain.clone(), "client")).is_ok());
-    refused(&server.address, &plain, "Unavailable", "asks for a client certificate");
+    refused(&server.address, &plain, "Unavailable", "requires a client certificate");
     refused(&server.address, &with_certificate(plain.clone(), "client-expired"), "Unavailable", "it has expired");
     refused(&server.address, &with_certificate(plain.clone(), "client-stranger"), "Unavailable", "not of an authority");
     let halved = Access { certificate: Some(tls("client.pem")), ..plain };
@@ -159,11 +159,11 @@ fn commands_show_them_too() {
     assert_eq!(String::from_utf8_lossy(&ran.stdout), stdout, "{}", String::from_utf8_lossy(&ran.stderr));
     let without = bench.run(&format!("{words} --ca {}", tls("authority.pem").display()));
     assert_eq!(without.status, 1);
-    assert!(without.stderr.contains("asks for a token"), "{}", without.stderr);
+    assert!(without.stderr.contains("requires a token"), "{}", without.stderr);
 }
 
-/// Addresses that others can reach take TLS and somebody to ask for; the message says what. Files that cannot be used are
-/// named, and a token is not sent unencrypted to another machine.
+/// Addresses that others can reach require TLS and a client authentication; the message names the missing one. Files
+/// that cannot be used are named, and a token is not sent unencrypted to another machine.
 #[test]
 fn what_is_not_enough_is_refused() {
     let bench = bench();

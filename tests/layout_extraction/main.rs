@@ -47,7 +47,7 @@ fn agree(drawing: &FlatLayout, reference: &str, count: usize, relative: f64) -> 
     text
 }
 
-/// A folded flexure: a shuttle that hangs on four beams from two trusses, each of which hangs on two beams from pads.
+/// A folded flexure: a shuttle on four beams from two trusses, each of them on two beams from pads.
 fn folded(degrees: f64, shift: [f64; 2]) -> Sheet {
     let mut sheet = Sheet::new(degrees, shift);
     for side in [1.0, -1.0] {

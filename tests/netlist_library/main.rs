@@ -129,8 +129,8 @@ fn pinned_bars() {
     }
 }
 
-/// A beam whose end slides along a slope of 30° under a force along it: it bends as its own stiffness projected on the slope. A held
-/// direction of a part that may turn is a spring that gives way by some 1e-4 of that.
+/// A beam whose end slides along a slope of 30° under a force along it: it bends as its own stiffness projected on the
+/// slope. A held direction of a part that may rotate is a spring with a displacement of some 1e-4 of that.
 #[test]
 fn sliding_ends() {
     let text = "slider2 p1 [a b] [l=100u w=2u slideroz=pi/6]\nf2d * [b] [F=1u oz=pi/6]";

@@ -114,7 +114,7 @@ fn bank_modes() {
     }
 }
 
-/// A structure that hangs on nothing is refused, and the message names a body.
+/// A structure without support is rejected, and the message names a body.
 #[test]
 fn a_mechanism_without_support_is_singular() {
     let compiled = model("beam2d p1 [a b] [l=100u w=2u]\nf2d * [b] [F=1u oz=pi/2]", &CompileOptions::default());

@@ -110,7 +110,7 @@ fn linear_models_keep_the_stiffness_of_stress() {
     assert!(beyond.frequencies_hz[0] == 0.0 && beyond.warnings[0].contains("unstable"), "{:?}", beyond.warnings);
 }
 
-/// Modes about a state that is bent far from the drawing say so, and that there are fewer than asked for is said too.
+/// Modes about a state that is bent far from the drawing say so, and fewer modes than requested cause a warning too.
 #[test]
 fn modes_say_what_they_are_about() {
     let text = "anchor p1 [a] []\nbeam2d p1 [a b] [l=200u w=2u]\nf2d * [b] [F=20u oz=pi/2]";

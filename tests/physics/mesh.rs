@@ -49,8 +49,8 @@ fn elastica_within_the_tolerance() {
     }
 }
 
-/// A beam clamped at both ends, by its number of modes alone: each within 1e-3 of (βl)² = 22.3733, 61.6728, 120.903 (Blevins 1979,
-/// table 8-1), as many as were asked for, each with an estimate within a factor of three.
+/// A beam clamped at both ends, by its number of modes alone: each within 1e-3 of (βl)² = 22.3733, 61.6728, 120.903
+/// (Blevins 1979, table 8-1), in the requested number, each with an estimate within a factor of three.
 #[test]
 fn modes_by_their_number() {
     let model = drawn("beam2d p [a b] [l=200u w=2u]\nanchor p [b] []", CompileOptions::default());
@@ -79,7 +79,7 @@ fn modes_by_their_number() {
     }
 }
 
-/// A number of segments that was asked for is kept, its estimate is that of its error within a factor of three, and a warning says
+/// A given number of segments is kept, its estimate is that of its error within a factor of three, and a warning says
 /// that it does not hold the tolerance.
 #[test]
 fn segments_of_the_user_are_told() {

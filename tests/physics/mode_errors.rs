@@ -18,7 +18,7 @@ const UNLIKE: &str = "
 
 /// Under forces each estimate is the distance from 40 segments a beam within a factor 3 on a given mesh. On the mesh
 /// for the tolerance, where the error of the state is added, it is no smaller than a third of that distance. Estimates
-/// of one table differ by more than ten. (One for all was the largest: 5e4 times what the best mode is off.)
+/// of one table differ by more than ten. (One for all was the largest: 5e4 times the error of the best mode.)
 #[test]
 fn each_mode_has_its_own_estimate_about_a_loaded_state() {
     const COUNT: usize = 8;

@@ -70,8 +70,8 @@ fn with_pieces(mut bundle: Bundle, n: f64) -> Bundle {
     bundle
 }
 
-/// A part that is stressed and still by symmetry needs no finer mesh for what rounding makes of its displacements (1e-27 m), and nothing is
-/// off; its modes hold the tolerance against 48 segments a beam.
+/// A part that is stressed and still by symmetry needs no finer mesh for the rounding of its displacements (1e-27 m),
+/// and has no error; its modes hold the tolerance against 48 segments a beam.
 #[test]
 fn rounding_needs_no_mesh() {
     for s in [50e6, -3e6] {

@@ -78,7 +78,8 @@ fn column() {
     close(*straight.signals[1].2.last().unwrap(), -1.2 * EULER * L / (E * W * W), 1e-6);
 }
 
-/// A path to 0.99 or 0.9999 of the load at which it bifurcates ends there, straight. (It ended on the bent branch, at more than was asked for.)
+/// A path to 0.99 or 0.9999 of the load at which it bifurcates ends there, straight. (It ended on the bent branch,
+/// beyond the requested value.)
 #[test]
 fn ends_before_a_bifurcation() {
     let at = |force: f64| scene("column/column.net", &[("F", force)], &fine());
@@ -221,8 +222,8 @@ fn arch_snaps_through() {
     assert!(sways.signals[1].2.iter().any(|rz| rz.abs() > 1e-2));
 }
 
-/// The voltage of a lumped plate folds at √(8·k·g³/(27·ε·A)) = 5.1741 V and g/3 (Nathanson 1967), to 1e-4, and the path goes
-/// on behind pull-in along the unstable branch, where V² = 2·k·u·(g − u)²/(ε·A).
+/// The voltage of a lumped plate folds at √(8·k·g³/(27·ε·A)) = 5.1741 V and g/3 (Nathanson 1967), to 1e-4, and the path
+/// continues behind pull-in along the unstable branch, where V² = 2·k·u·(g − u)²/(ε·A).
 #[test]
 fn behind_pull_in() {
     let text = "

@@ -231,8 +231,8 @@ fn what_does_not_fit_is_told() {
     assert_eq!(Tree::elastic(&linear.parts.system.model).err(), Some(UnsupportedModel::Linear));
 }
 
-/// A scheme without rotary inertia that is asked for by name beside joint coordinates is refused with the way out; where none is
-/// named, joint coordinates take es and bodies e4.
+/// A scheme without rotary inertia, given by name with joint coordinates, is rejected with a remedy; by default joint
+/// coordinates use es and bodies e4.
 #[test]
 fn a_scheme_without_rotary_inertia_is_refused() {
     let bundle = Bundle::from_text(

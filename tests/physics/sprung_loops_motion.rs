@@ -175,7 +175,7 @@ fn sensitivities_of_a_step_are_exact() {
         for k in 0..15 {
             method.step(&mut bodies, f64::from(k) * 2e-8, 2e-8, &mut motion, &mut error).unwrap();
         }
-        // a moving start, from which the step that is differentiated goes on
+        // a moving start, from which the differentiated step continues
         let rise: Vec<f64> = (0..rise.len()).map(|k| before.rise_at(k, 3e-7)).collect();
         let ramp = Ramp::new(electrics, &from, &to, &rise, 2e-8);
         method.forget_sensitivities();

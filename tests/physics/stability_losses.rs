@@ -145,9 +145,9 @@ fn states_do_not_depend_on_the_direction_of_the_drawing() {
     }
 }
 
-/// A column with a guided end 0.4 % above Euler's load 4π²EI/L² has buckled, and a slender beam that hangs beside it,
-/// at its foot or at its head, does not hide that; 5 % below, it stands straight in both cases. A column that buckles
-/// at most 1 % above the load says so.
+/// A column with a guided end 0.4 % above Euler's load 4π²EI/L² has buckled, and a slender beam attached at its foot or
+/// at its head does not hide that; 5 % below, it stands straight in both cases. A column that buckles at most 1 % above
+/// the load says so.
 #[test]
 fn a_slender_beam_hides_no_buckling() {
     let (length, width) = (120e-6, 2.2e-6);

@@ -96,7 +96,7 @@ fn trials_are_pure() {
         let mut fresh = all(&compiled);
         let rest = ask(&mut fresh, Mode::Static, None, 0.0, &given(formulation, 0.5));
         assert_eq!(ask(&mut fresh, Mode::Transient, rest.token, 2e-7, &given(formulation, 0.7)), first);
-        // a snapshot goes on with the same bits
+        // a snapshot continues with the same bits
         let bytes = device.save(rest.token.as_ref().map(std::slice::from_ref)).unwrap();
         let mut other = LocalDevice::new(Arc::clone(&compiled));
         other.load(&bytes).unwrap();

@@ -39,7 +39,7 @@ class Bench:
 
 @pytest.fixture(scope="session")
 def bench(tmp_path_factory):
-    # PySpice asks for libngspice.so, which only the development package holds; the library itself has a version.
+    # PySpice requires libngspice.so, which only the development package holds; the library itself has a version.
     if library := ctypes.util.find_library("ngspice"):
         os.environ.setdefault("NGSPICE_LIBRARY_PATH", library)
     with warnings.catch_warnings():

@@ -118,8 +118,8 @@ fn singular_as_drawn() {
     }
 }
 
-/// Hangs `copies` of a random subtree on bodies of a trunk, which is drawn at `places`: up to four bodies with joints
-/// of any kind, with loops inside, to ground and to the trunk. Its random properties besides its size come from
+/// Attaches `copies` of a random subtree to bodies of a trunk, which is drawn at `places`: up to four bodies with
+/// joints of any kind, with loops inside, to ground and to the trunk. Its random properties besides its size come from
 /// `shape`.
 fn hang(m: &mut Mechanism, trunk: &[(BodyId, [f64; 2])], copies: usize, shape: u64, s: &mut Stream) {
     let kinds = [PIN, PIN, [false; 3], [true, false, true], [true, false, false]];

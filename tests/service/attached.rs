@@ -73,7 +73,7 @@ impl Attached {
     }
 }
 
-/// A question of one port.
+/// A trial request of one port.
 pub(crate) fn trial(parent: u64, dt: f64, volts: f64) -> Ask {
     let mode = if dt > 0.0 { proto::Mode::Transient } else { proto::Mode::Static };
     Ask::Trial(proto::TrialRequest { mode: mode.into(), parent, t: 0.0, dt, voltages: vec![volts] })

@@ -1,5 +1,5 @@
 //! One request, or one careless client, neither ends nor freezes the server: each attack runs against `bimorph serve`
-//! in a process of its own while a stranger asks for `Info` all the time. After it the server is alive, has never held
+//! in a process of its own while another client calls `Info` all the time. After it the server is alive, has never held
 //! a gigabyte, answers the attack with the right code, is idle, and stops on request.
 #![cfg(target_os = "linux")]
 

@@ -1,4 +1,4 @@
-//! Questions as bytes, for programs in other languages: the replies of a stream, each to its own question.
+//! Requests as bytes, for programs in other languages: the replies of a stream, each to its own request.
 
 use super::attached::trial;
 use super::echo::echo;
@@ -52,7 +52,7 @@ fn ask(line: &mut TrialChannel, kind: Ask, patience: Duration) -> Result<Option<
     Ok(reply.and_then(|reply| proto::DeviceReply::decode(&*reply).expect("a reply").kind))
 }
 
-/// A question whose answer was not waited for to its end does not leave it to the next one; an accept has none.
+/// An abandoned request does not leave its reply to the next one; an accept has none.
 #[test]
 fn each_question_has_its_own_reply() {
     let server = start_with("127.0.0.1:0", Limits::default(), slow);
@@ -76,7 +76,7 @@ fn each_question_has_its_own_reply() {
     }
 }
 
-/// Without a server, and after it has gone, a question ends as UNAVAILABLE, and a new server at the address is found.
+/// Without a server, and after it has gone, a request ends as UNAVAILABLE, and a new server at the address is found.
 #[test]
 fn a_server_that_goes() {
     let lines = TrialConnections::new().expect("a thread");

@@ -11,7 +11,7 @@ use bimorph::service::limits::Limits;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Two ports and as many signals as are asked for; what the first signal is called, it does.
+/// Two ports and the requested number of signals; the name of the first signal selects the fault.
 struct Liar {
     lie: String,
     ports: usize,
@@ -130,14 +130,14 @@ fn lies_are_named() {
         ("need nan", "need_dt: expected less than the step"),
         ("need 0", "need_dt: expected less than the step"),
         ("need more", "need_dt: expected less than the step"),
-        ("need on and on", "need_dt: 500 trials in a row asked for a shorter step"),
+        ("need on and on", "need_dt: 500 trials in a row required a shorter step"),
         ("next 0", "dt_next: expected a time above"),
         ("next below 0", "dt_next: expected a time above"),
         ("next tiny", "dt_next: expected a time above"),
         ("no token", "token: expected one, got 0"),
         ("old", "it names the state of an earlier trial"),
         ("fails", "\\u{1b}[2Jwhy\nmore"),
-        ("other signals", "signals: expected the 1 that were asked for, got 0 others"),
+        ("other signals", "signals: expected the 1 requested, got 0 others"),
         ("controls", "no signal named \"a\"; \\u{1b}[2J"),
         ("ports", "port: expected a name, got \"a\\u{1b}[2J\""),
     ] {

@@ -1,4 +1,5 @@
-//! Any bytes as messages and as snapshots: each call ends, with a status that is no fault of the server's, and the server goes on.
+//! Any bytes as messages and as snapshots: each call ends, with a status that is no fault of the server's, and the
+//! server continues.
 //!
 //! Messages are sound ones of every call, changed at random: bits turned, bytes exchanged, stretches lost, doubled and
 //! mixed, numbers made extreme. Snapshots are those of a session, changed in the same ways, with a recomputed checksum

@@ -42,8 +42,8 @@ fn id(name: &str) -> &str {
     name.strip_prefix("jobs/").expect("a name")
 }
 
-/// A job that another version began has its rows, however often they are asked for, and says why there are not more; it stays for a server of that
-/// version, unless it is cancelled.
+/// A job that another version began has its rows, for any number of requests, and reports why there are not more; it
+/// stays for a server of that version, unless it is cancelled.
 #[test]
 fn a_job_of_another_version_is_left_to_it() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -109,7 +109,7 @@ fn a_damaged_journal_keeps_what_it_has() {
     });
 }
 
-/// An end that cannot be read hides no job: it goes on, and has nothing left to do.
+/// An unreadable outcome hides no job: it continues, and has nothing left to do.
 #[test]
 fn a_damaged_end_hides_no_job() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -140,7 +140,7 @@ fn a_server_that_was_stopped_for_long_forgets_nothing() {
     let running = start_kept(folder.path(), limits, LOCAL);
     block_on(async {
         let mut wire = running.client().await;
-        // what looks for old jobs looks at once, and again every while
+        // the task for old jobs runs at once, and then periodically
         tokio::time::sleep(Duration::from_millis(200)).await;
         assert_eq!(rows(&mut wire, &name).await.expect("its rows").0, whole);
     });

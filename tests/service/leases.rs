@@ -39,9 +39,9 @@ fn is_left(folder: &Path, session: &str) -> bool {
     files.map(|file| file.expect("a file").file_name()).any(|name| name.to_string_lossy().starts_with(session))
 }
 
-/// A lease outlives the server as the states do: of two sessions that wake after a restart, the one without is
-/// forgotten after `idle`, and then the other is still there, with the state that was accepted. A lease that was
-/// withdrawn has no effect.
+/// A lease outlives the server as the states do. Of two sessions restored after a restart, the one without is removed
+/// after `idle`, and then the other is still there, with the state that was accepted. A lease that was withdrawn has no
+/// effect.
 #[test]
 fn a_lease_outlives_the_server() {
     let folder = tempfile::tempdir().expect("a folder");

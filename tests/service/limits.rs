@@ -1,4 +1,4 @@
-//! Each limit is answered with RESOURCE_EXHAUSTED and its name; what was idle too long is forgotten.
+//! Each limit is answered with RESOURCE_EXHAUSTED and its name; sessions idle for too long are removed.
 
 use super::test_server::{DEADLINE, block_on, bundle, compiled, start, start_with, wire_bundle};
 use bimorph::compile::CompileOptions;
@@ -151,7 +151,7 @@ fn the_oldest_model_goes_first() {
     });
 }
 
-/// A session without a stream is forgotten when it was idle for long, one on a stream is not.
+/// A session without a stream is removed when it was idle for long, one on a stream is not.
 #[test]
 fn idle_sessions_are_forgotten() {
     let server = start("127.0.0.1:0", Limits { idle: Duration::from_millis(40), ..Limits::default() });

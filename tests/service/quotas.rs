@@ -56,7 +56,7 @@ async fn open(client: &mut Known, model: &str) -> Result<String, Status> {
     client.open(request).await.map(|answer| answer.into_inner().session)
 }
 
-/// A stream of questions, with the first one's answer.
+/// A stream of requests, with the first reply.
 async fn stream(
     client: &mut Known,
     first: Ask,
@@ -82,7 +82,7 @@ fn sessions_of_one_client() {
         assert!(matches!(opened, ReplyKind::Opened(_)), "{opened:?}");
         let refused = open(&mut again, &model).await.expect_err("two are open");
         assert_eq!(refused.code(), Code::ResourceExhausted);
-        let text = "client_sessions: at most 2 for client \"alice\", 2 used, 1 more asked for";
+        let text = "client_sessions: at most 2 for client \"alice\", 2 used, 1 more requested";
         assert!(refused.message().starts_with(text), "{refused}");
         let (_, _, refused) = stream(&mut again, own).await;
         assert_eq!(super::attached::refusal(&refused), Code::ResourceExhausted);

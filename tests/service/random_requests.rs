@@ -63,7 +63,7 @@ fn analysis() -> impl Strategy<Value = proto::TransientRequest> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
-    /// Every request but an accept that asks for none has one reply, in order, whatever it holds.
+    /// Every request but an accept without a reply has one reply, in order, for any content.
     #[test]
     fn streams_survive_anything(kinds in prop::collection::vec(request(), 1..24)) {
         block_on(async {
@@ -87,7 +87,7 @@ proptest! {
         });
     }
 
-    /// A transient with any values ends with a status, and the server goes on.
+    /// A transient with any values ends with a status, and the server continues.
     #[test]
     fn analyses_survive_anything(request in analysis()) {
         block_on(async {

@@ -19,7 +19,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use tonic::Code;
 
-/// One step as a circuit takes it: whole, then in pieces as short as the device asks for; the state that it comes to, and trials.
+/// One step as a circuit takes it: whole, then in pieces as short as the device requires; the resulting state, and
+/// trials.
 fn by_hand(
     device: &mut dyn Device,
     parent: Option<Token>,
@@ -105,7 +106,8 @@ fn a_run_has_the_bits_of_its_steps() {
 /// Trials of all [`Fussy`] devices.
 static TRIALS: AtomicUsize = AtomicUsize::new(0);
 
-/// A device whose signal is its voltage, which asks for steps of at most 1 s, has no answer above 5 V, and computes 20 µs.
+/// A device whose signal is its voltage, which requires steps of at most 1 s, has no answer above 5 V, and computes 20
+/// µs.
 struct Fussy;
 
 fn fussy(_: Arc<CompiledModel>) -> Box<dyn Device> {
@@ -166,8 +168,8 @@ async fn session(server: &Running) -> (proto::bimorph_client::BimorphClient<toni
     (client, session)
 }
 
-/// The steps before it are there, with why it has none; other sessions of the call go on. Pieces count: 4 s from 0 to 4 V are four trials
-/// of 1 s after one that asks for them.
+/// The steps before it are there, with the reason why it has none; other sessions of the call continue. Pieces count: 4
+/// s from 0 to 4 V are four trials of 1 s after one that requires them.
 #[test]
 fn a_step_without_an_answer_ends_a_run() {
     let server = start_with("127.0.0.1:0", Limits::default(), fussy);

@@ -74,7 +74,7 @@ impl Wire {
             if !matches!(tokio::time::timeout(Duration::from_millis(300), written).await, Ok(Ok(()))) {
                 break;
             }
-            // what the server says, windows among it, is not looked at
+            // the server's bytes, windows among them, are ignored
             let mut said = [0; 4096];
             let _ = socket.try_read(&mut said);
         }

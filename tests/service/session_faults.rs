@@ -183,8 +183,8 @@ fn run(device: &mut dyn Device, expected: &[TrialReply], tell: &mpsc::Sender<()>
     Ok(())
 }
 
-/// A circuit with a device on a server through so many failures: every answer that it gets is the right one, a device that was cut
-/// off says so until it is opened again, and no call hangs.
+/// A circuit with a device on a server through so many failures: every reply is the right one, a device that was cut
+/// off reports it until it is opened again, and no call blocks.
 fn co_simulation(failures: u64, seed: u64) {
     let server = start_with("127.0.0.1:0", Limits::default(), LOCAL);
     let cut = Cut::to(socket(&server), seed, WITHIN);

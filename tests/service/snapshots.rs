@@ -1,5 +1,5 @@
-//! A session goes on elsewhere with the same bits: from a snapshot at any step, on another server, or as a fork; and not
-//! from one of another model.
+//! A session continues elsewhere with the same bits: from a snapshot at any step, on another server, or as a fork; and
+//! not from one of another model.
 
 use super::attached::Attached;
 use super::test_server::{Running, block_on, compiled, start_with, wire_bundle};

@@ -44,9 +44,9 @@ pub(crate) fn file(folder: &Path, name: &str, end: &str) -> PathBuf {
     folder.join(format!("{name}.{end}"))
 }
 
-/// A job goes on when the server does: rows that were given keep their numbers and their bits, none is there twice, and the whole is the
-/// sweep in process. A submission whose answer was lost is found again by its name, finished jobs keep their rows, a cancelled one stays so,
-/// and a deleted one is gone.
+/// A job survives its server: sent rows keep their numbers and their bits, none is there twice, and the whole is the
+/// sweep in process. A submission whose answer was lost is found again by its name, finished jobs keep their rows, a
+/// cancelled one stays so, and a deleted one is gone.
 #[test]
 fn jobs_outlive_the_server() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -183,8 +183,8 @@ fn ended_jobs_make_room() {
     });
 }
 
-/// Rows for which there is no room end their job, with what is full and the rows that have a place; the server goes on, and where even the
-/// request has no room there is no job.
+/// Rows without disk space end their job, with the reason and the stored rows; the server continues, and without space
+/// for the request itself there is no job.
 #[test]
 fn a_full_folder_ends_a_job_and_not_the_server() {
     let folder = tempfile::tempdir().expect("a folder");

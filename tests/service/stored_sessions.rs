@@ -165,7 +165,8 @@ impl Asleep {
     }
 }
 
-/// A trial that panics closes its session; the states are there as they were accepted, and a new stream goes on with them.
+/// A trial that panics closes its session; the states are there as they were accepted, and a new stream continues with
+/// them.
 #[test]
 fn a_panic_takes_no_state_along() {
     static GATE: Gate = Gate::open();
@@ -247,7 +248,7 @@ fn a_slow_wake_holds_nobody_up() {
     });
 }
 
-/// Two streams that ask for one sleeping session get the same one, and one of them accepts.
+/// Two streams that request one stored session get the same one, and one of them accepts.
 #[test]
 fn two_who_wake_one_session() {
     static GATE: Gate = Gate::open();

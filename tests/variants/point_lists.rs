@@ -1,4 +1,4 @@
-//! Axes of options, and lists of points: each row is what a sweep has that asks for its point alone.
+//! Axes of options, and lists of points: each row is that of a sweep of its point alone.
 
 use super::{BEAMS, statics, swept};
 use bimorph::compile::CompileOptions;

@@ -67,7 +67,7 @@ def test_the_environment_says_the_same(secure: str, tmp_path: Path, monkeypatch:
     assert bimorph.Client(secure).version() == bimorph.Client(secure).version()
 
 
-@pytest.mark.parametrize("token, said", [(None, "asks for a token"), ("x" * 32, "none of this server's")])
+@pytest.mark.parametrize("token, said", [(None, "requires a token"), ("x" * 32, "none of this server's")])
 def test_tokens_that_are_missing_or_wrong(secure: str, token: str | None, said: str) -> None:
     """Refused, with what to do."""
     client = bimorph.Client(secure, ca=KEYS / "authority.pem", token=token, **OWN)

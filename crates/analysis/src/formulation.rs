@@ -81,7 +81,7 @@ pub fn of_run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> (Chos
         && options.solver == SolverKind::Recursion
         && options.release.is_none();
     if !plain {
-        let why = "a release, a method, equal steps or a solver was asked for".into();
+        let why = "a release, a method, equal steps or a solver was given".into();
         return (ChosenFormulation { formulation: Formulation::Compliant, why }, method);
     }
     let chosen = suited(compiled, Some(options.stop));

@@ -187,7 +187,7 @@ fn shapeless(compiled: &CompiledModel, count: usize, voltages: &PortVoltages) ->
     }
     if found.missed {
         return Err(AnalysisError::NotConverged {
-            detail: format!("there are more than {count} modes below the highest one found; ask for more modes"),
+            detail: format!("there are more than {count} modes below the highest one found; request more modes"),
         });
     }
     let rigid = loose_parts::settle_rigid(system, &tangent, &mut found);

@@ -58,7 +58,7 @@ pub enum CosimError {
         output: String,
     },
     /// The deck requests no analysis.
-    #[error("{deck}: no simulation was run; add .print, .plot or .control lines, or ask for a raw file")]
+    #[error("{deck}: no simulation was run; add .print, .plot or .control lines, or request a raw file")]
     NothingRun {
         /// The deck.
         deck: PathBuf,

@@ -106,7 +106,7 @@ impl Run {
                     h = (need / dt).min(h / 2.0);
                     if h < SHORTEST || h.is_nan() {
                         let short = h * dt;
-                        return Ok(Stepped::Failed(format!("the device asks for steps below {short:.3e} s")));
+                        return Ok(Stepped::Failed(format!("the device requires steps below {short:.3e} s")));
                     }
                 }
                 Status::Fail(reason) => return Ok(Stepped::Failed(reason.clone())),

@@ -77,7 +77,7 @@ pub enum ExportError {
     Device(#[from] DeviceError),
     /// There is nothing to connect.
     #[error(
-        "the netlist has no ports, and none is asked for: add one with `NAME port * [node] []`, or name NODE.x with --ports"
+        "the netlist has no ports, and none is given: add one with `NAME port * [node] []`, or name NODE.x with --ports"
     )]
     NoPorts,
     /// A port that a linear model with constant coefficients cannot have.

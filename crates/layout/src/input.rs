@@ -53,7 +53,7 @@ pub enum FrontError {
 }
 
 impl LayoutChoice {
-    /// The process that was asked for.
+    /// The requested process.
     ///
     /// # Errors
     /// It is not there, or cannot be read.

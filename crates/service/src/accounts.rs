@@ -154,7 +154,7 @@ impl Account {
 
     fn refused(&self, limit: &str, most: usize, (used, more): (usize, usize), way_out: &str) -> Status {
         Status::resource_exhausted(format!(
-            "{limit}: at most {most} for client \"{}\", {used} used, {more} more asked for; {way_out}, or see Info for the \
+            "{limit}: at most {most} for client \"{}\", {used} used, {more} more requested; {way_out}, or see Info for the \
              limits of this server",
             self.name
         ))

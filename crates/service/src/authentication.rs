@@ -46,7 +46,7 @@ pub enum GuardError {
     #[error("a certificate and its key go together: --tls-cert and --tls-key")]
     Unpaired,
     /// Clients are to show certificates, and the server has none.
-    #[error("--tls-client-ca asks for certificates of clients, which needs TLS: --tls-cert and --tls-key")]
+    #[error("--tls-client-ca requires certificates of clients, which needs TLS: --tls-cert and --tls-key")]
     NoCertificate,
     /// The certificate and the key, or the authority, are refused.
     #[error("certificate {path}: {reason}", path = path.display())]

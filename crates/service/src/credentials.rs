@@ -47,7 +47,7 @@ pub enum AccessError {
     #[error("a token is not sent unencrypted to another machine: write https:// before {0}")]
     Unencrypted(String),
     /// Built without TLS.
-    #[error("{0} asks for TLS, and this build has none (it was built without \"tls\")")]
+    #[error("{0} requires TLS, and this build has none (it was built without \"tls\")")]
     NoTls(String),
 }
 

@@ -84,7 +84,7 @@ pub enum ServeError {
         address: Address,
     },
     /// An `https://` address without a certificate.
-    #[error("{address} asks for TLS, which takes a certificate and its key: --tls-cert and --tls-key")]
+    #[error("{address} requires TLS, which takes a certificate and its key: --tls-cert and --tls-key")]
     NoTls {
         /// The address.
         address: Address,

@@ -97,10 +97,7 @@ pub(super) fn stopped(why: Stopped) -> Status {
 
 /// ABORTED for an accept that comes after another stream has joined its session.
 pub(super) fn overtaken(id: &str) -> Status {
-    Status::aborted(format!(
-        "session \"{}\" goes on by a stream that joined it later; attach again",
-        cut(id.to_owned(), 80)
-    ))
+    Status::aborted(format!("session \"{}\" is attached to a later stream; attach again", cut(id.to_owned(), 80)))
 }
 
 /// NOT_FOUND for an id.
@@ -136,7 +133,7 @@ pub(super) fn limit(name: &str, most: usize, got: impl std::fmt::Display) -> Sta
 
 /// INTERNAL for a fault of ours that was caught.
 pub(super) fn fault() -> Status {
-    Status::internal("internal fault while answering this request; the server goes on, its log has the place")
+    Status::internal("internal fault while answering this request; the server continues, its log has the place")
 }
 
 /// UNAVAILABLE while shutting down.

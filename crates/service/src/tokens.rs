@@ -86,7 +86,7 @@ impl Tokens {
     pub(super) fn who(&self, headers: &HeaderMap) -> Result<Arc<str>, Status> {
         let Some(value) = headers.get(AUTHORIZATION) else {
             return Err(Status::unauthenticated(
-                "this server asks for a token: --token-file, or BIMORPH_TOKEN_FILE (metadata: authorization = Bearer TOKEN)",
+                "this server requires a token: --token-file, or BIMORPH_TOKEN_FILE (metadata: authorization = Bearer TOKEN)",
             ));
         };
         let shown = value.as_bytes();

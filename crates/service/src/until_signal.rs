@@ -27,7 +27,7 @@ const FILE_TOO_LARGE: i32 = 25;
 pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
     let wanted = std::env::var("BIMORPH_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
     let filter = wanted.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
-    // A host program that logs already goes on as it does.
+    // A host program that logs already keeps its logger.
     let ansi = std::io::stderr().is_terminal();
     let log = tracing_subscriber::fmt().with_max_level(LevelFilter::TRACE).with_writer(|| LogLines);
     let _ = match options.log_json {

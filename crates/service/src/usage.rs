@@ -1,4 +1,4 @@
-//! When a session was used last, for how long it is kept without use, and by which stream it goes on.
+//! Time of a session's last use, its lifetime without use, and its current stream.
 
 use super::limits::Limits;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 pub(super) struct Usage {
     started: Instant,
     used_ms: AtomicU64,
-    /// 0: none was asked for.
+    /// 0: none was requested.
     lease_ms: AtomicU64,
     /// Streams that hold it.
     streams: AtomicUsize,

@@ -22,7 +22,7 @@ unsafe extern "C" fn setup(_: *mut c_void, _: *mut u64, _: *mut c_void, _: *mut 
 }
 unsafe extern "C" fn reserve(_: c_int, _: c_int) {}
 unsafe extern "C" fn memory(_: c_int, point: c_int) -> *mut c_void {
-    // SAFETY: the plug-in asks for points 0 and 1, from the one thread of the bench.
+    // SAFETY: the plug-in accesses points 0 and 1, from the one thread of the bench.
     unsafe { (&raw mut (*MEMORY.load(Ordering::Relaxed))[point as usize]).cast() }
 }
 unsafe extern "C" fn integrate(_: f64, _: *mut f64, _: *mut f64) -> c_int {

@@ -116,7 +116,7 @@ fn every_analysis_after_every_other() {
                     row.push('-');
                     continue;
                 }
-                // A control section goes on after a refused analysis, but the run as a whole is refused.
+                // A control section continues after a refused analysis, but the run as a whole is refused.
                 if *first == "pz" || (*first == "sens" && version > 39) {
                     row.push(if *first == "pz" { 'm' } else { '-' });
                     continue;

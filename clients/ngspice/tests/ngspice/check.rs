@@ -77,7 +77,7 @@ fn control_sections_are_compared() {
     }
 }
 
-/// A run that cannot be, as it is or finer, is its error, and one that shall not go on ends; neither leaves a file.
+/// A run that is impossible, as it is or refined, is its error, and a cancelled one ends; neither leaves a file.
 #[test]
 fn a_failed_check_leaves_nothing() {
     for (version, ngspice) in versions() {

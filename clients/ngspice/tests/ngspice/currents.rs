@@ -1,4 +1,4 @@
-//! Currents of charges as results: how far they are off, and what the trapezoidal rule leaves in them.
+//! Currents of charges as results: their error, and the part that the trapezoidal rule leaves in them.
 
 use crate::support::{all_decks, deviation, real, versions};
 use bimorph::cosim::{self, CosimOptions};

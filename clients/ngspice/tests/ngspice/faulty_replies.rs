@@ -17,7 +17,7 @@ const LIES: [(&str, &str); 27] = [
     ("compile ports", "port: expected a name"),
     ("compile nothing", "described no model"),
     ("open kind", "another kind"),
-    ("open ports", "ports: expected the 2 that were asked for"),
+    ("open ports", "ports: expected the 2 requested"),
     ("nan", "currents[0]: expected a finite number, got NaN"),
     ("inf", "charges[0]: expected a finite number, got inf"),
     ("sizes", "currents: expected 2 numbers, got 7"),

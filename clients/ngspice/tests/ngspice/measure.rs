@@ -24,8 +24,8 @@ fn numbers(output: &str, name: &str) -> Vec<f64> {
     output.lines().filter_map(of).collect()
 }
 
-/// A small step swings over by e^(−πζ/√(1−ζ²)), and its peak comes π/(ω₀√(1−ζ²)) after the step; the pull that is looked at is k·x
-/// where the plate has settled. `--check` compares what was measured.
+/// A small step overshoots by e^(−πζ/√(1−ζ²)), and its peak comes π/(ω₀√(1−ζ²)) after the step; the measured pull is
+/// k·x where the plate has settled. `--check` compares what was measured.
 #[test]
 fn a_step_is_measured() {
     let (omega, zeta) = PLATE;

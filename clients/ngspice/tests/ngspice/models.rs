@@ -30,7 +30,7 @@ fn static_pull_in() {
 }
 
 /// Stepped to 0.5 % below the dynamic pull-in voltage √(kg³/4εA) = 4.7527 V the undamped plate turns back within half
-/// the gap; 0.5 % above it goes on.
+/// the gap; 0.5 % above it pulls in.
 #[test]
 fn dynamic_pull_in() {
     if skipped() {
@@ -88,8 +88,8 @@ fn comb_agrees_with_b_sources() {
     }
 }
 
-/// Hard edges, rejected steps and steps of ngspice's own choice give the motion of a small fixed step. Tolerance: ngspice
-/// was asked for 1e-4 per step.
+/// Hard edges, rejected steps and steps of ngspice's own choice give the motion of a small fixed step. Tolerance:
+/// ngspice's limit was 1e-4 per step.
 #[test]
 fn rejected_steps_leave_no_trace() {
     if skipped() {

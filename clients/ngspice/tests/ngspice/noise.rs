@@ -12,8 +12,8 @@ A1 %gd [t 0 b 0] %v [x] mass
 .end
 ";
 
-/// Between plates at held voltages the displacement has 4·k_B·T·c·|χ|², χ with the spring that the plate at 1.2 V softens: 1e-3 asked
-/// for. Over all frequencies that is k_B·T/k (equipartition).
+/// Between plates at held voltages the displacement has 4·k_B·T·c·|χ|², χ with the spring that the plate at 1.2 V
+/// softens: 1e-3 requested. Over all frequencies that is k_B·T/k (equipartition).
 #[test]
 fn a_damped_mass() {
     let (m, c, k, area, gap, volts): (f64, f64, f64, f64, f64, f64) = (1e-9, 2e-6, 1.0, 1e-7, 2e-6, 1.2);

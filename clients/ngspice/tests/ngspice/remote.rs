@@ -30,7 +30,7 @@ impl Serving {
         Self::start_with(tempfile::tempdir().unwrap(), GuardFiles::default())
     }
 
-    /// On its socket and at a free port, where it asks for what `guard` says.
+    /// On its socket and at a free port, with the authentication of `guard`.
     fn start_with(folder: TempDir, guard: GuardFiles) -> Self {
         let (stop, stopped) = oneshot::channel::<()>();
         let (ready, is_ready) = mpsc::channel();
@@ -147,7 +147,7 @@ fn a_deck_over_tls() {
     let Err(CosimError::Stopped { reason, .. }) = run(with(Access { token_file: None, ..shown })) else {
         panic!("served without a token")
     };
-    assert!(reason.contains("asks for a token"), "{reason}");
+    assert!(reason.contains("requires a token"), "{reason}");
 }
 
 /// The bank's deck in each formulation. On a server the waveforms are those of the process to the last bit. Two
@@ -209,8 +209,8 @@ fn a_killed_server_ends_the_run() {
     }
 }
 
-/// A server that is killed in the middle of a transient and comes back within the deadline, without any of its states, goes on where it was: the
-/// waveforms are those of the process to the last bit.
+/// A server that is killed in the middle of a transient and comes back within the deadline, without any of its states,
+/// continues where it was: the waveforms are those of the process to the last bit.
 #[test]
 fn a_server_that_comes_back_goes_on() {
     if skipped() {

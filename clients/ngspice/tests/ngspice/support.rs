@@ -79,7 +79,7 @@ pub(crate) fn analytic_plugin() -> PathBuf {
     built
 }
 
-/// Runs a deck whose raw file is asked for, in a folder of its own.
+/// Runs a deck with a raw file, in a folder of its own.
 pub(crate) fn run(options: CosimOptions) -> Result<Run, CosimError> {
     let folder = tempfile::tempdir().unwrap();
     let raw = folder.path().join("out.raw");

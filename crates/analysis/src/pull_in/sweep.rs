@@ -153,7 +153,7 @@ impl<'a> VoltageSweep<'a> {
         let passed = match self.passed.as_slice() {
             [] => None,
             some => {
-                Some(format!("on the way it jumps at {} without closing a gap, and goes on from there", named(some)))
+                Some(format!("before that it jumps at {} without closing a gap, and continues from there", named(some)))
             }
         };
         self.jumped.map(str::to_owned).into_iter().chain(passed).chain(self.of_closed.clone()).collect()

@@ -184,7 +184,7 @@ fn hint(compiled: &CompiledModel, name: &str) -> String {
     let part = name.rsplit_once('.').map_or(name, |(part, _)| part);
     let nodes: Vec<&str> = compiled.structure.nodes.iter().filter(|n| n.mechanical).map(|n| n.name.as_str()).collect();
     if nodes.contains(&part) {
-        return format!("\"{part}\" is a node: ask for {part}.x, .y, .rz, .vx, .vy or .vrz");
+        return format!("\"{part}\" is a node: use {part}.x, .y, .rz, .vx, .vy or .vrz");
     }
     let beams = compiled.structure.beams.iter().map(|b| b.name.as_str());
     let known: Vec<&str> =

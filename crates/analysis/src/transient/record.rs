@@ -111,7 +111,7 @@ pub(crate) fn record(
     }
     let estimate = log.and_then(|log| log.estimate(options));
     let unreached = options.until.as_ref().filter(|_| stopped_at.is_none()).map(|until| {
-        format!("the run does not reach what it goes on until ({until}) by {:e} s; take a longer --stop", options.stop)
+        format!("the run does not reach its end condition ({until}) by {:e} s; take a longer --stop", options.stop)
     });
     let named = options.signals.iter().zip(&signals).zip(samples.columns);
     Ok(TransientResult {
@@ -187,7 +187,7 @@ fn start(
     if system.model.dampers.is_empty() && system.model.bodies.iter().all(still) {
         return Err(AnalysisError::BadRequest {
             what: "motion in time".into(),
-            detail: "nothing that moves has mass or drag; give the layer a `density`, or ask for statics".into(),
+            detail: "nothing that moves has mass or drag; give the layer a `density`, or use statics".into(),
         });
     }
     let mut motion = Motion::zeros(system.bodies());

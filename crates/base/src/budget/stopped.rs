@@ -29,7 +29,7 @@ pub enum Stopped {
     },
     /// All computations of its owner would lay out more at once than they may.
     #[error(
-        "client_bytes: at most {most} bytes at once in all computations of one client, {used} used, {more} more asked for"
+        "client_bytes: at most {most} bytes at once in all computations of one client, {used} used, {more} more requested"
     )]
     OwnerBytes {
         /// The quota [byte].

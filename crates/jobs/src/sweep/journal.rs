@@ -46,7 +46,7 @@ struct JournalHeader {
 pub enum JournalError {
     /// A journal exists, and neither resumption nor removal was requested.
     #[error(
-        "{} has points of a sweep that did not end; go on with it by --resume, or remove the file to begin anew", path.display()
+        "{} has points of a sweep that did not end; continue it with --resume, or remove the file to begin anew", path.display()
     )]
     Exists {
         /// Where.

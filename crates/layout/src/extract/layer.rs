@@ -158,7 +158,7 @@ pub(super) fn extract(
         let why = if (model.area - (solid - missing)).abs() > BALANCE * solid {
             "the parts of its axis do not cover it: it is drawn too finely for its grid"
         } else if loose[k] {
-            "it lies like a finger of a comb, and hangs on nothing"
+            "it has the shape of a finger of a comb, without support"
         } else if !model.is_held() && held > 0 && taps[k].is_empty() {
             "nothing holds it, and it faces nothing that is held: it would float away"
         } else {

@@ -44,9 +44,9 @@ impl JunctionEnd {
 
     /// Moves the edge outwards until the spring is compliant under every load, by at most `most` [m].
     ///
-    /// A rod of length ℓ between the old and the new edge becomes rigid, and its compliance P = [ℓ/EA, 0, 0; 0, ℓ³/3EI
-    /// + ℓ/κGA, ℓ²/2EI; 0, ℓ²/2EI, ℓ/EI] is added to the spring's, seen from the new edge. Compliance that is still
-    /// negative after `most` is omitted, since so short a beam has no length for its junctions.
+    /// A rod of length ℓ between the old and the new edge becomes rigid, and its compliance P = [ℓ/EA, 0, 0; 0, ℓ³/3EI + ℓ/κGA,
+    /// ℓ²/2EI; 0, ℓ²/2EI, ℓ/EI] is added to the spring's, seen from the new edge. Compliance that is still negative after
+    /// `most` is omitted, since so short a beam has no length for its junctions.
     pub fn settle(&mut self, beam: &Beam, most: f64) {
         let old = self.spring;
         let most = f64::min(most, MAX_WIDTHS * beam.width);

@@ -80,7 +80,7 @@ impl http_body::Body for RequestBody {
                     let pause =
                         this.pause.get_or_insert_with(|| Box::pin(tokio::time::sleep_until(Instant::now() + longest)));
                     if pause.as_mut().poll(cx).is_ready() {
-                        let text = format!("request_pause: a request was begun and did not go on for {longest:?}");
+                        let text = format!("request_pause: a request was begun and did not continue for {longest:?}");
                         return Poll::Ready(Some(Err(Status::new(Code::DeadlineExceeded, text))));
                     }
                     return Poll::Pending;

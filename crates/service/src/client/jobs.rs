@@ -235,7 +235,7 @@ impl Client {
                     read.map_err(|v| self.error(&Status::internal(format!("{}: {}", v.field, v.description))))?;
                 if !all.points.insert(read.1.point) {
                     let text = format!(
-                        "point {} came twice: the server has lost rows and computed them again; ask for all of them anew",
+                        "point {} came twice: the server has lost rows and computed them again; fetch all of them anew",
                         read.1.point
                     );
                     return Err(self.error(&Status::data_loss(text)));

@@ -91,7 +91,7 @@ pub(super) fn model(described: &proto::ModelDescription) -> Result<(), String> {
 pub(super) fn opened(request: &OpenRequest, device: &proto::DeviceDescription) -> Result<(), String> {
     if !request.ports.is_empty() && request.ports != device.ports {
         return Err(format!(
-            "ports: expected the {} that were asked for, got {} others",
+            "ports: expected the {} requested, got {} others",
             request.ports.len(),
             device.ports.len()
         ));
@@ -102,7 +102,7 @@ pub(super) fn opened(request: &OpenRequest, device: &proto::DeviceDescription) -
     }
     if !device.signals.iter().map(|signal| &signal.name).eq(&request.signals) {
         return Err(format!(
-            "signals: expected the {} that were asked for, got {} others",
+            "signals: expected the {} requested, got {} others",
             request.signals.len(),
             device.signals.len()
         ));
@@ -208,11 +208,7 @@ pub(super) fn response(signals: &[String], reply: &proto::FrequencyResponseReply
     finite("frequencies_hz", &reply.frequencies_hz)?;
     // without signals it is what the driven place answers
     if !signals.is_empty() && !reply.signals.iter().map(|signal| &signal.name).eq(signals) {
-        return Err(format!(
-            "signals: expected the {} that were asked for, got {} others",
-            signals.len(),
-            reply.signals.len()
-        ));
+        return Err(format!("signals: expected the {} requested, got {} others", signals.len(), reply.signals.len()));
     }
     for signal in &reply.signals {
         length(&signal.name, signal.re.len(), count)?;

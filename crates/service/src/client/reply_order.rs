@@ -39,7 +39,7 @@ impl TrialOrder {
     pub(super) fn check(&mut self, trial: &Trial<'_>, reply: &TrialReply) -> Result<(), String> {
         self.shortened = if matches!(reply.status, Status::NeedDt(_)) { self.shortened + 1 } else { 0 };
         if self.shortened > SHORTENED {
-            return Err(format!("need_dt: {SHORTENED} trials in a row asked for a shorter step"));
+            return Err(format!("need_dt: {SHORTENED} trials in a row required a shorter step"));
         }
         let Some(token) = reply.token else { return Ok(()) };
         let asked = PendingTrial::of(trial);

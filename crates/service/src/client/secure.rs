@@ -105,7 +105,7 @@ pub(super) fn refused(error: &(dyn std::error::Error + 'static)) -> Option<Strin
             "the server speaks no TLS at this address; leave https:// away if that is meant".to_owned()
         }
         rustls::Error::AlertReceived(AlertDescription::CertificateRequired) => {
-            "the server asks for a client certificate: --client-cert and --client-key, or BIMORPH_CLIENT_CERT and \
+            "the server requires a client certificate: --client-cert and --client-key, or BIMORPH_CLIENT_CERT and \
              BIMORPH_CLIENT_KEY"
                 .to_owned()
         }

@@ -170,7 +170,7 @@ impl JobFile {
         let end = there("end")?.and_then(|bytes| {
             let end: Option<JobOutcome> = opened(&bytes).and_then(|object| serde_json::from_slice(&object).ok());
             if end.is_none() {
-                tracing::warn!(job = self.id, "its end is damaged, so it goes on");
+                tracing::warn!(job = self.id, "its end is damaged, so it continues");
             }
             end
         });

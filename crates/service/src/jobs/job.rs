@@ -278,7 +278,7 @@ impl Job {
         let mut file = held(&self.file);
         if let Some(file) = file.as_mut() {
             if let Err(error) = file.end(&end) {
-                tracing::warn!(%error, job = self.id, "its end cannot be kept: after a restart it goes on");
+                tracing::warn!(%error, job = self.id, "its end cannot be kept: after a restart it continues");
             }
             file.close();
         }

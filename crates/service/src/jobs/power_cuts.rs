@@ -76,7 +76,7 @@ fn nothing_that_a_job_gave_out_is_lost_with_the_power() {
                 };
                 assert_eq!((&known, &*request), (&asked(), REQUEST), "{case}");
                 let ended = before().any(|what| matches!(what, Answered::End));
-                assert!(!ended || end.as_ref().is_some_and(|end| end.bytes == file.row_bytes()), "goes on: {case}");
+                assert!(!ended || end.as_ref().is_some_and(|end| end.bytes == file.row_bytes()), "continues: {case}");
                 // an end that is there says how many rows there are, and so they are
                 let all = end.filter(|end| end.bytes == file.row_bytes()).map(|_| file.read_rows().expect(&case));
                 let there = file.open().unwrap_or_else(|error| panic!("{error}: {case}"));

@@ -65,7 +65,7 @@ impl SessionWriter {
     /// Keeps for how long the session is kept without use [ms], beside its states as they are.
     ///
     /// # Errors
-    /// As [`Self::keep`]; what was asked for before holds on.
+    /// As [`Self::keep`]; earlier requests stay in force.
     pub(crate) fn lease(&mut self, lease_ms: u64) -> io::Result<()> {
         let before = std::mem::replace(&mut self.lease_ms, lease_ms);
         let kept = (before != lease_ms).then(|| self.store.load(&self.id, &self.model)).flatten();

@@ -215,6 +215,8 @@ impl Equilibrium {
             return None;
         }
         let name = &model.bodies[softest].name;
-        Some(format!("the part with \"{name}\" is nearly unheld: it gives way {over:.0e} times as far as what is held"))
+        Some(format!(
+            "the part with \"{name}\" is nearly unsupported: it is {over:.0e} times as compliant as supported parts"
+        ))
     }
 }
