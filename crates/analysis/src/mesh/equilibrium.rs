@@ -332,7 +332,7 @@ pub fn static_fitted(
 }
 
 /// Warnings about an equilibrium of a circuit, each with its size: an error that grows [1], or 1. Beside what
-/// [`static_warnings`] warns of, the mesh along its gaps, which was chosen without any voltage.
+/// `static_warnings` warns of, the mesh along its gaps, which was chosen without any voltage.
 pub fn operating_point_warnings(fitted: &CompiledModel, point: &OperatingPoint) -> Vec<(Diagnostic, f64)> {
     let share = stress_left_out(fitted, point);
     let worst = gap_shape::left_out(fitted, point);

@@ -100,6 +100,11 @@ impl OpenedPorts {
         self.sources.len()
     }
 
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.sources.is_empty()
+    }
+
     /// Joint coordinates of the model with the inputs.
     pub fn joints(&self, joints: &Arc<Joints>) -> Arc<Joints> {
         match &self.system {

@@ -58,7 +58,7 @@ impl ErrorBudget {
     /// Whether an estimate exceeds the tolerance by more than its display rounds.
     pub fn is_exceeded(self, estimate: f64) -> bool {
         // an estimate that is not a number exceeds every tolerance
-        !(estimate <= Self::REPORTED * self.requested)
+        estimate.is_nan() || estimate > Self::REPORTED * self.requested
     }
 
     /// For an estimate by comparison with twice the segments.

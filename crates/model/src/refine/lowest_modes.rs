@@ -2,7 +2,7 @@
 //!
 //! The highest requested mode sets the band: the frequency at which the number of modes below it, which is the number
 //! of negative pivots of K − ω²M (Sylvester), reaches the requested number. It is found by bisection on a first mesh.
-//! Then [`mesh_search`](super::mesh_search) chooses the mesh for that band, and the band is determined again on it
+//! Then [`mesh_search`] chooses the mesh for that band, and the band is determined again on it
 //! until the requested modes lie within.
 
 use super::band_modes::mechanics;
