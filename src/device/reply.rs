@@ -10,9 +10,9 @@ use crate::domains::System;
 use crate::readout::ports::PortResponse;
 use crate::readout::signal::{Signal, SignalView};
 
-/// Share of the compilation's tolerance that one internal step may use.
+/// Fraction of the compilation's tolerance that one internal step may use.
 pub(super) const STEP_SHARE: f64 = 1e-2;
-/// Share of the length scale that the integrator takes for nothing, in units of its tolerance [1].
+/// Fraction of the length scale that the integrator takes for nothing, in units of its tolerance [1].
 const FLOOR: f64 = 1e-4;
 /// Temperature difference that is negligible for a circuit [K].
 const SAME_TEMPERATURE: f64 = 1e-6;

@@ -12,7 +12,7 @@ use std::collections::HashMap;
 
 /// Pads whose sizes are not given [m].
 const PAD: f64 = 10e-6;
-/// The mask of anchors lies inside its pad by this share of the pad's smaller side [1].
+/// The mask of anchors lies inside its pad by this fraction of the pad's smaller side [1].
 const INSET: f64 = 0.1;
 /// A corner is closed up to this many half widths behind its node.
 const LONGEST_CORNER: f64 = 2.0;

@@ -1,6 +1,6 @@
 //! The mesh for whatever an analysis gives: its results are compared with those of twice the segments.
 //!
-//! The difference of the two is the error of the coarser one but for a share 2^−p, p the order of convergence;
+//! The difference of the two is the error of the coarser one but for a fraction 2^−p, p the order of convergence;
 //! Richardson's rule takes that into account, with p = 2, the order of what stretches. Bending converges faster, and
 //! its error is overestimated by a quarter. Where it exceeds the tolerance, each group of equal beams is doubled alone.
 //! The change is the contribution of that group, and the groups with the largest gain per body are refined until the
@@ -19,7 +19,7 @@ const MAX_PASSES: usize = 10;
 const MAX_SEGMENTS: usize = 60_000;
 /// Groups that are doubled alone at most.
 const MAX_GROUPS: usize = 8;
-/// Share of the tolerance that the estimate may use: it has been found up to a quarter smaller than the error (docs/accuracy.md).
+/// Fraction of the tolerance that the estimate may use: it has been found up to a quarter smaller than the error (docs/accuracy.md).
 pub const SAFETY: f64 = 0.75;
 /// Results that decide, at most: the worst.
 const MAX_RESULTS: usize = 24;

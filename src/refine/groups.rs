@@ -4,7 +4,7 @@ use crate::options::CompileOptions;
 use crate::structure::Beam;
 use std::collections::HashMap;
 
-/// Share of the tolerance that predictions may use.
+/// Fraction of the tolerance that predictions may use.
 pub(super) const MARGIN: f64 = 0.9;
 
 /// Segments of a beam for each of those it has, at most, by one prediction: further it is a guess.

@@ -20,7 +20,7 @@ use std::f64::consts::TAU;
 const MAX_PASSES: usize = 12;
 /// Fraction by which the band lies above the highest requested mode.
 const ABOVE: f64 = 0.01;
-/// Share of the tolerance that the estimate may use: it has been found smaller than the error, by up to a factor of 2.9 where short wide beams
+/// Fraction of the tolerance that the estimate may use: it has been found smaller than the error, by up to a factor of 2.9 where short wide beams
 /// weigh in (docs/accuracy.md).
 pub const SAFETY: f64 = 0.36;
 /// Frequencies within which modes are looked for [Hz].

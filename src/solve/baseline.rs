@@ -135,7 +135,7 @@ mod tests {
                 solver.solve(pattern, &matrix, &mut x);
                 let mut back = zeros.clone();
                 a.multiply_add(pattern, &x, &mut back);
-                // what rounding may leave in a row is a share of the terms that the row adds up
+                // what rounding may leave in a row is a fraction of the terms that the row adds up
                 let mut sizes = a.clone();
                 sizes.diagonal.iter_mut().chain(&mut sizes.below).for_each(|block| *block = block.abs());
                 let magnitudes: Vec<Pose> = x.iter().map(|x| x.abs()).collect();

@@ -274,7 +274,7 @@ unsafe fn bind_by(which: usize, model: *mut ModelHead, circuit: *mut c_void) -> 
 /// can bear. An answer that was given stands, so a device rejects no step here: one that
 /// needs a shorter step says so in its answer.
 pub(crate) unsafe extern "C" fn trunc(model: *mut ModelHead, circuit: *mut c_void, step: *mut f64) -> c_int {
-    /// ngspice rejects a step when the next one would be less than this share of it, with a little to spare.
+    /// ngspice rejects a step when the next one would be less than this fraction of it, with a little to spare.
     const KEEPS: f64 = 0.91;
     guarded(|| {
         // SAFETY: passed on.

@@ -28,10 +28,10 @@ use crate::refine::transfer::carried;
 use crate::solve::equilibrium::Equilibrium;
 use std::borrow::Cow;
 
-/// Share of the mechanism's size below which a displacement is rounding.
+/// Fraction of the mechanism's size below which a displacement is rounding.
 pub(super) const ROUNDING: f64 = 1e-12;
 
-/// Share of the path beyond which a fold that it passed is looked for anew on each mesh: the one before may have passed it by mistake.
+/// Fraction of the path beyond which a fold that it passed is looked for anew on each mesh: the one before may have passed it by mistake.
 const NEAR_THE_END: f64 = 0.9;
 
 /// The mesh for the equilibrium at these voltages, from `segments` upwards, and the equilibrium on it.
@@ -126,7 +126,7 @@ struct MeshEquilibrium {
     left: Option<f64>,
 }
 
-/// How far beyond its fold an equilibrium is, as a share of the way, where that is little: the mesh may have passed it by mistake.
+/// How far beyond its fold an equilibrium is, as a fraction of the way, where that is little: the mesh may have passed it by mistake.
 fn beyond(point: &OperatingPoint) -> Option<f64> {
     point.path.passed.last().map(|passed| passed.share).filter(|share| *share > NEAR_THE_END).map(|share| 1.0 - share)
 }

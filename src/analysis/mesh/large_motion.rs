@@ -47,7 +47,7 @@ const MIN_SAMPLES: usize = 16;
 const MAX_PASSES: usize = 6;
 /// Segments of all beams together, at most.
 const MAX_SEGMENTS: usize = 4000;
-/// Share of the tolerance that the estimate may use, and of that what a mesh that was not run is laid out for.
+/// Fraction of the tolerance that the estimate may use, and of that what a mesh that was not run is laid out for.
 const SAFETY: f64 = 0.6;
 const AIM: f64 = 0.7;
 /// The order of convergence until it is measured, and the highest accepted one. Stretching has 2; among coarse meshes
@@ -150,7 +150,7 @@ fn compared(moving: &CompiledModel, options: &TransientOptions<'_>, segments: &[
     Some(if from == segments { difference + of_finer } else { of_finer })
 }
 
-/// A share of the segments, and no fewer than at least.
+/// A fraction of the segments, and no fewer than at least.
 fn between(least: &[usize], segments: &[usize], share: f64) -> Vec<usize> {
     let share = share.clamp(0.5, 1.0);
     segments.iter().zip(least).map(|(n, least)| ((*n as f64 * share).ceil() as usize).max(*least)).collect()

@@ -20,7 +20,7 @@ use crate::solve::continuation::Branch;
 const MAX_EVENTS: usize = 8;
 /// Ends of a path that are compared.
 const ENDS: [&str; 2] = ["arrived", "turned back"];
-/// Results that differ by more than this share are of another branch.
+/// Results that differ by more than this fraction are of another branch.
 const OTHER_BRANCH: f64 = 0.3;
 
 /// The path on the mesh for it, which comes with it.
@@ -67,7 +67,7 @@ fn path_from(
     Ok((fitted, result))
 }
 
-/// Share of the largest critical value below which one is taken for zero, and of the whole way [1].
+/// Fraction of the largest critical value below which one is taken for zero, and of the whole way [1].
 const CROSSING: [f64; 2] = [1e-3, 1e-6];
 
 /// Paths on one mesh after the other.
@@ -164,7 +164,7 @@ impl PathSearch<'_, '_> {
     }
 }
 
-/// The largest difference of two paths, as a share.
+/// The largest difference of two paths, as a fraction.
 fn apart(first: &[Output], other: &[Output]) -> f64 {
     let one = |(a, b): (&Output, &Output)| {
         if a.value.is_nan() || b.value.is_nan() { 0.0 } else { (a.value - b.value).abs() / a.scale.max(b.scale) }

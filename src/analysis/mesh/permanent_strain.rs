@@ -9,7 +9,7 @@ use crate::compile::CompiledModel;
 use crate::options::CompileOptions;
 use crate::refine::doubling::{self, Output};
 
-/// Share of the tolerance for the strains: the rest is for what comes after them.
+/// Fraction of the tolerance for the strains: the rest is for what comes after them.
 const STRAIN_TOLERANCE_FRACTION: f64 = 0.25;
 
 /// Where a mechanism rests at `voltages` after its ports were raised to `raised` once: the model, the equilibrium, the displacement of

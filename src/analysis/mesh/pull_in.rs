@@ -12,7 +12,7 @@ use crate::netlist::Diagnostic;
 use crate::refine::doubling::{self, Output};
 use crate::refine::mesh_search::Mesh;
 
-/// Share of the pull-in voltage that stands for the fold itself, next to which nothing has an equilibrium for sure.
+/// Fraction of the pull-in voltage that stands for the fold itself, next to which nothing has an equilibrium for sure.
 const NEXT: f64 = 0.98;
 
 /// Compared outputs of pull-in.

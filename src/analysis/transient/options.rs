@@ -83,7 +83,7 @@ impl Default for TransientOptions<'_> {
     }
 }
 
-/// Share of the tolerance that one step may use: errors of many steps add up.
+/// Fraction of the tolerance that one step may use: errors of many steps add up.
 pub(in crate::analysis) const STEP_SHARE: f64 = 1e-2;
 
 pub(crate) fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError> {

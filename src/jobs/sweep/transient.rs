@@ -50,7 +50,7 @@ struct SweepMesh {
 struct Steps {
     /// Their tolerance [1].
     tol: f64,
-    /// As a share of the amplitude; none: not compared.
+    /// As a fraction of the amplitude; none: not compared.
     error: Option<f64>,
     /// Where that was found.
     place: &'static str,
@@ -243,7 +243,7 @@ fn alone(point: &MeshedPoint, options: &TransientOptions<'_>) -> Result<RunEnd, 
     Ok(RunEnd { values, steps: result.counters.steps, warnings: result.warnings })
 }
 
-/// Share of the samples beyond a probe on either side.
+/// Fraction of the samples beyond a probe on either side.
 const RARE: f64 = 1e-3;
 
 /// The middle of the grid and its corners. A numeric axis contributes its least and largest value, another its first
