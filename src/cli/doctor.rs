@@ -71,14 +71,14 @@ impl DoctorCommand {
         }
         let options = settings.options();
         let found =
-            authentication::look_at(&options.guard).map_err(|error| error.to_string()).map(|found| match found {
+            authentication::inspect(&options.guard).map_err(|error| error.to_string()).map(|found| match found {
                 found if found.is_empty() => "clients need no credentials".to_owned(),
                 found => found.join("; "),
             });
         line("access", &found, "docs/service.md says what a server asks of its clients, and of its files")?;
         let mut good = found.is_ok();
         if let Some(folder) = &options.state_dir {
-            let found = scan::look_at(folder).map_err(|error| error.to_string());
+            let found = scan::inspect(folder).map_err(|error| error.to_string());
             good &= found.is_ok();
             line("states", &found, "name a folder of this server's own in state_dir, which its user can write")?;
         }

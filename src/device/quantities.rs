@@ -8,7 +8,7 @@ use crate::compile::CompiledModel;
 use crate::domains::{Domain, MaterialPoint};
 use crate::readout::signal::{self, Signal, SignalView};
 
-/// Quantities of a state as a whole, with what they are, by the names under which [`super::Device::look`] knows them beside signals.
+/// Quantities of a state as a whole, with what they are, by the names under which [`super::Device::read_quantity`] knows them beside signals.
 pub const WHOLE: [(&str, &str); 3] = [
     ("moved", "largest displacement of a node or a point along a beam [m]"),
     ("closest", "smallest distance left between plates or facing beams [m]"),

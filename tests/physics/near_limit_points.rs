@@ -95,7 +95,7 @@ fn a_path_that_ends_at_rest() {
         model(&format!("{BEAM}f2d * [m] [F=F oz=pi/2]\n"), &options)
     };
     let request = ContinuationRequest {
-        growing: PathInput::Loads,
+        input: PathInput::Loads,
         from: 1.0,
         to: 0.0,
         voltages: Vec::new(),

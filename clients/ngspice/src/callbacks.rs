@@ -51,7 +51,7 @@ pub(crate) unsafe extern "C" fn ask(
     guarded(|| {
         // SAFETY: the host passes a live instance.
         let key = unsafe { (*instance).conn as usize };
-        let found = usize::try_from(index).ok().and_then(|number| registry().look(key, number));
+        let found = usize::try_from(index).ok().and_then(|number| registry().query(key, number));
         let Some(x) = found else { return code::BADPARM };
         // SAFETY: the host passes a place for a value, which for a real parameter begins with a double.
         unsafe { value.cast::<f64>().write(x) };

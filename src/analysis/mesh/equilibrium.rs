@@ -208,7 +208,7 @@ impl<'a> EquilibriumSearch<'a> {
     /// Whether this mesh and twice its segments, where compared, are on one side of their limit.
     fn is_sure(&self, order: &Mesh) -> bool {
         let of = |segments: &[usize]| {
-            self.points.iter().find(|looked| looked.segments == segments).map(|looked| looked.left)
+            self.points.iter().find(|compared| compared.segments == segments).map(|compared| compared.left)
         };
         let twice = doubling::twice(&self.compiled.options, order).and_then(|twice| of(&twice.segments));
         of(&order.segments).zip(twice).is_none_or(|(here, twice)| softening::agree(here, twice))
@@ -217,7 +217,7 @@ impl<'a> EquilibriumSearch<'a> {
     /// The resulting mesh with its equilibrium, and a mesh on which that has buckled. Where the side of the limit is
     /// unknown, there is no error estimate.
     fn ended(mut self, mut order: Mesh) -> Result<(Mesh, OperatingPoint, Option<Vec<usize>>), AnalysisError> {
-        let mut found = self.points.iter().position(|looked| looked.segments == order.segments);
+        let mut found = self.points.iter().position(|compared| compared.segments == order.segments);
         if found.is_none() {
             self.follow(&order.segments)?;
             found = self.points.len().checked_sub(1);

@@ -105,12 +105,12 @@ impl PathSearch<'_, '_> {
 
     fn on(&mut self, segments: &[usize], branch: Branch) -> Result<ContinuationResult, AnalysisError> {
         let model = meshed(self.compiled, segments)?;
-        let last = match self.request.growing {
+        let last = match self.request.input {
             PathInput::Parameter(last) => Some(meshed(last, segments)?),
             _ => None,
         };
-        let growing = last.as_deref().map_or_else(|| self.request.growing.clone(), PathInput::Parameter);
-        let request = ContinuationRequest { growing, branch, ..self.request.clone() };
+        let input = last.as_deref().map_or_else(|| self.request.input.clone(), PathInput::Parameter);
+        let request = ContinuationRequest { input, branch, ..self.request.clone() };
         let found = trace(&model, &request, self.watch);
         self.stopped |= matches!(found, Err(AnalysisError::Cancelled));
         found
@@ -179,7 +179,7 @@ fn left_out_at_end(fitted: &CompiledModel, request: &ContinuationRequest<'_>) ->
         let point = operating_point(model, volts).ok()?;
         left_out(model, &point, &point.q)
     };
-    match request.growing {
+    match request.input {
         PathInput::Port(name) => {
             volts.retain(|(port, _)| port != name);
             volts.push((name.to_owned(), request.to));
