@@ -1,6 +1,6 @@
 //! Equilibrium paths: the equilibria of a mechanism under a growing load, voltage, temperature or stress, past folds
 //! and through bifurcations.
-use super::contact_range::{comb_beyond_told, within_contact_range};
+use super::contact_range::{comb_beyond_reported, within_contact_range};
 use super::statics::{OperatingPoint, beam_motions, node_motions, notes_at, operating_point, source_vector, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, ProgressCallback};
 use crate::compile::CompiledModel;
@@ -198,7 +198,7 @@ fn path_notes(
     notes_at(compiled, start)
         .into_iter()
         .map(begins)
-        .chain(traced.points.iter().find_map(|point| comb_beyond_told(compiled, &point.q)))
+        .chain(traced.points.iter().find_map(|point| comb_beyond_reported(compiled, &point.q)))
         .chain(hot(0.0).or_else(|| hot(farthest)))
         .collect()
 }

@@ -153,11 +153,11 @@ fn server() -> Result<String, String> {
     let path = std::env::temp_dir().join(format!("bimorph-doctor-{}.sock", std::process::id()));
     let runtime = tokio::runtime::Runtime::new().map_err(|e| e.to_string())?;
     let (stop, stopped) = tokio::sync::oneshot::channel::<()>();
-    let (tell, ready) = mpsc::channel();
-    let tell_failure = tell.clone();
+    let (report, ready) = mpsc::channel();
+    let tell_failure = report.clone();
     let options = ServeOptions {
         listen: vec![Address::Unix(path.clone())],
-        ready: Box::new(move |_| drop(tell.send(Ok(())))),
+        ready: Box::new(move |_| drop(report.send(Ok(())))),
         ..ServeOptions::default()
     };
     let serving = runtime.spawn(async move {

@@ -61,7 +61,7 @@ pub(crate) fn draw(lines: &ElementLines, at: &HashMap<String, [f64; 2]>, process
     drawing.beams_and_plates();
     drawing.anchors();
     drawing.fields();
-    drawing.tell();
+    drawing.report();
     drawing.figure
 }
 
@@ -261,7 +261,7 @@ impl<'a> Draw<'a> {
         }
     }
 
-    fn tell(&mut self) {
+    fn report(&mut self) {
         let mut missing: HashMap<&str, usize> = HashMap::new();
         for line in &self.lines.elements {
             let lumped =

@@ -1,6 +1,6 @@
 //! Warnings from fitting a model to a request.
 
-use super::super::contact_range::comb_beyond_told;
+use super::super::contact_range::comb_beyond_reported;
 use super::super::rotary_inertia_error;
 use super::super::statics::{OperatingPoint, too_hot};
 use crate::compile::CompiledModel;
@@ -60,7 +60,7 @@ pub(super) fn of_stress(compiled: &CompiledModel, share: Option<f64>) -> Option<
 
 /// Where the fingers of a comb go through its other side at an equilibrium.
 pub(super) fn of_fingers(compiled: &CompiledModel, point: &OperatingPoint) -> Option<Diagnostic> {
-    let message = comb_beyond_told(compiled, &point.q)?;
+    let message = comb_beyond_reported(compiled, &point.q)?;
     Some(Diagnostic::warning(FINGERS, message, "draw the `stop2d` that holds the part, or longer fingers"))
 }
 

@@ -97,14 +97,14 @@ impl<'a> TransientSweep<'a> {
         let compiled: Vec<&CompiledModel> = variants.iter().map(|(_, compiled)| *compiled).collect();
         // lanes have one voltage for all
         let same = self.spec.ports().next().is_none();
-        let side_by_side = same.then(|| {
+        let batch_results = same.then(|| {
             let options = TransientOptions { tol, ..self.transient(&[]) };
             means.guarded(|| {
                 batch_transient::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
             })
         });
         let mut ends: Vec<Option<RunEnd>> = vec![None; numbers.len()];
-        if let Some(Ok((found, _))) = side_by_side {
+        if let Some(Ok((found, _))) = batch_results {
             for ((k, _), end) in variants.iter().zip(found) {
                 ends[*k] = end;
             }
