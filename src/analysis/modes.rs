@@ -169,7 +169,10 @@ fn shapeless(compiled: &CompiledModel, count: usize, voltages: &PortVoltages) ->
     let rigid = 3 * system.model.loose().count();
     let mut found = lowest_modes(system, (&q, &drive), &tangent, count + GUARDS + rigid)?;
     if found.lambda.is_empty() {
-        let detail = "no mode was found: nothing that moves has mass (give the layer a `density`), or the stiffness is not finite".into();
+        let detail = match compiled.unknowns() {
+            0 => "there are no modes: anchors, guides and pins leave no node free to move".into(),
+            _ => "there are no modes: nothing that moves has mass (give the layer a `density`), or the stiffness is not finite".into(),
+        };
         return Err(AnalysisError::NotConverged { detail });
     }
     if let Some(k) = found.residuals.iter().take(count).position(|&r| r.is_nan() || r > RELIABLE) {

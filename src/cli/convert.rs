@@ -94,7 +94,7 @@ impl ConvertCommand {
         if self.out.is_some() {
             return output::print(&report);
         }
-        eprint!("{report}");
+        stderr_text!("{report}");
         output::print(&converted.netlist)
     }
 

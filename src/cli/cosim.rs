@@ -118,7 +118,7 @@ impl CosimCommand {
             Err(CosimError::Failed { .. }) if interrupt::asked_just_now() => return Err(Failure::Interrupted),
             other => other?,
         };
-        eprintln!("{}: done in {:.2} s", self.deck.display(), start.elapsed().as_secs_f64());
+        stderr_line!("{}: done in {:.2} s", self.deck.display(), start.elapsed().as_secs_f64());
         if let Some(checked) = &checked {
             cosim_check::print_check(&self.deck, checked, self.json, self.quiet)?;
         }
@@ -129,7 +129,7 @@ impl CosimCommand {
         let drawn = longest(&raw, None).and_then(|(table, count)| {
             if count > 1 {
                 let (file, plot) = (out.display(), &table.title);
-                eprintln!("note: {file} has the longest of {count} plots ({plot}); a .raw file has all, and `bimorph plot` draws any of them");
+                stderr_line!("note: {file} has the longest of {count} plots ({plot}); a .raw file has all, and `bimorph plot` draws any of them");
             }
             let picture = chart_of(&table, None, &[]);
             write(out, format, || Ok(table), || picture)

@@ -20,7 +20,7 @@ struct CosimDocument<'a> {
 /// Prints ngspice's output of the run as it is, unless `quiet`, then a table for each plot; or one document.
 pub(crate) fn print_check(deck: &Path, checked: &CosimCheck, json: bool, quiet: bool) -> Result<(), Failure> {
     for note in &checked.notes {
-        eprintln!("warning: {note}");
+        stderr_line!("warning: {note}");
     }
     if json {
         let file = deck.display().to_string();

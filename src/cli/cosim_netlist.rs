@@ -87,7 +87,7 @@ impl NetlistArgs {
             check_folder(emit)?;
         }
         self.chosen.options()?;
-        let warn = &mut |dropped: DroppedInclude| eprintln!("warning: {dropped}");
+        let warn = &mut |dropped: DroppedInclude| stderr_line!("warning: {dropped}");
         let bundle =
             Bundle::read_telling(file, &[], warn).map_err(|source| Failure::Read { path: file.to_owned(), source })?;
         let mut loaded = netlist::load(&bundle, &self.set)
@@ -98,7 +98,7 @@ impl NetlistArgs {
             .items
             .retain(|w| !OF_THE_CIRCUIT.contains(&w.code.as_str()) || w.message.starts_with("switches"));
         if !loaded.warnings.items.is_empty() {
-            eprint!("{}", loaded.warnings.render(io::stderr().is_terminal()));
+            stderr_text!("{}", loaded.warnings.render(io::stderr().is_terminal()));
         }
         let deck = around(&loaded.structure, &self.wanted(self.named(file)?))?;
         let Some(emit) = &self.emit else { return Ok(Some(deck)) };

@@ -138,16 +138,16 @@ impl Failure {
     pub(crate) fn show(&self) {
         match self {
             Self::Compile(CompileError::Netlist(diagnostics)) => {
-                eprint!("{}", diagnostics.render(io::stderr().is_terminal()));
+                stderr_text!("{}", diagnostics.render(io::stderr().is_terminal()));
             }
             _ if self.is_broken_pipe() => {}
             Self::Cosim(error) => {
-                eprintln!("error: {}", error.to_string().trim_end());
+                stderr_line!("error: {}", error.to_string().trim_end());
                 if let Some(words) = last_words(error) {
-                    eprintln!("ngspice's last words:\n{words}");
+                    stderr_line!("ngspice's last words:\n{words}");
                 }
             }
-            _ => eprintln!("error: {self}"),
+            _ => stderr_line!("error: {self}"),
         }
     }
 

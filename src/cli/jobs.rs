@@ -84,7 +84,7 @@ impl Attach {
         let (table, job) = followed?;
         let part = (!job.part.is_empty()).then_some(job.part.as_str());
         sweep_output::deliver(self.out.as_deref(), &table, part)?;
-        eprintln!("{}", sweep_output::summary(&table, ""));
+        stderr_line!("{}", sweep_output::summary(&table, ""));
         match failure(&at.to, &job) {
             Some(failure) => Err(failure),
             None => sweep_output::nothing(&table),

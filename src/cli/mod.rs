@@ -3,6 +3,9 @@
 //! Every subcommand is an [`clap::Args`] struct with a `run` method. It reads, computes, writes its `--out` file, and
 //! only then prints to standard output, so that a failure leaves standard output empty and no file behind.
 
+#[macro_use]
+mod stderr;
+
 mod ac;
 mod ac_report;
 mod chart;

@@ -72,7 +72,7 @@ impl ModelArgs {
 
     fn bundle_asked(&self, asked: &LayoutChoice) -> Result<Bundle, Failure> {
         interrupt::listen();
-        let warn = &mut |dropped: DroppedInclude| eprintln!("warning: {dropped}");
+        let warn = &mut |dropped: DroppedInclude| stderr_line!("warning: {dropped}");
         let bar = progress::bar("reading");
         let read = input::read(&self.file, &self.include, asked, warn, &mut progress::watch(&bar, ""));
         bar.finish_and_clear();
@@ -80,12 +80,12 @@ impl ModelArgs {
         if let Some(converted) = &source.converted {
             let report = &converted.report;
             for note in &report.notes {
-                eprintln!("warning: {note}");
+                stderr_line!("warning: {note}");
             }
             if report.areas.unrecognised_m2 > 0.0 {
                 let [part, all] =
                     [report.areas.unrecognised_m2, report.areas.drawn_m2].map(|a| (a * 1e14).round() / 1e2);
-                eprintln!("warning: {part} of {all} µm² were not understood: `bimorph convert` lists them");
+                stderr_line!("warning: {part} of {all} µm² were not understood: `bimorph convert` lists them");
             }
         }
         Ok(source.bundle)
@@ -105,7 +105,7 @@ impl ModelArgs {
         };
         let drawn = draw(&bimorph::netlist::NetlistSource::new(&self.bundle_asked(&asked)?), &self.options()?)?;
         if !drawn.warnings.items.is_empty() {
-            eprint!("{}", drawn.warnings.render(io::stderr().is_terminal()));
+            stderr_text!("{}", drawn.warnings.render(io::stderr().is_terminal()));
         }
         Ok(drawn)
     }
@@ -179,14 +179,14 @@ pub(crate) fn warn_of_mesh(before: &CompiledModel, fitted: &CompiledModel) {
     let mut added = fitted.warnings.clone();
     added.items.drain(..before.warnings.items.len().min(added.items.len()));
     if !added.items.is_empty() {
-        eprint!("{}", added.render(io::stderr().is_terminal()));
+        stderr_text!("{}", added.render(io::stderr().is_terminal()));
     }
 }
 
 /// Shows the warnings of a netlist on standard error.
 pub(crate) fn warn(compiled: &CompiledModel) {
     if !compiled.warnings.items.is_empty() {
-        eprint!("{}", compiled.warnings.render(io::stderr().is_terminal()));
+        stderr_text!("{}", compiled.warnings.render(io::stderr().is_terminal()));
     }
 }
 
@@ -217,7 +217,7 @@ impl<'a> Context<'a> {
 /// Shows what an analysis warns of on standard error.
 pub(crate) fn warn_of(warnings: &[String]) {
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        stderr_line!("warning: {warning}");
     }
 }
 

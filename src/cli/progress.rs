@@ -47,11 +47,11 @@ pub(crate) fn watch<'a>(bar: &'a ProgressBar, advice: &'a str) -> impl FnMut(f64
         if let Some(all) = forecast.at(spent, fraction) {
             let way = if advice.is_empty() { String::new() } else { format!("; {advice}") };
             let forecast = format!("forecast: {all:.0} s in total{way}");
-            bar.suspend(|| eprintln!("{forecast}"));
+            bar.suspend(|| stderr_line!("{forecast}"));
         }
         if !watched && spent > line {
             line += LINES;
-            eprintln!("{:.1} % after {spent:.0} s", 100.0 * fraction);
+            stderr_line!("{:.1} % after {spent:.0} s", 100.0 * fraction);
         }
         !interrupt::asked()
     }

@@ -103,7 +103,7 @@ pub(super) fn follow(
         let lost = ["Unavailable", "DeadlineExceeded"].contains(&&*error.code);
         if lost || interrupt::asked() {
             let after = "has its table, `cancel` in its place ends it";
-            bar.suspend(|| eprintln!("the sweep continues there: `bimorph jobs attach {name} --to {uri}` {after}"));
+            bar.suspend(|| stderr_line!("the sweep continues there: `bimorph jobs attach {name} --to {uri}` {after}"));
         }
         if interrupt::asked() { Failure::Interrupted } else { error.into() }
     })

@@ -159,7 +159,9 @@ impl SweepCommand {
         bar.finish_and_clear();
         let (table, job) = followed?;
         if let Some(failure) = failure(uri, &job) {
-            eprintln!("the rows that it has stay on the server: `bimorph jobs delete {name} --to {uri}` forgets them");
+            stderr_line!(
+                "the rows that it has stay on the server: `bimorph jobs delete {name} --to {uri}` forgets them"
+            );
             return Err(failure);
         }
         // the version in it is that of the server
@@ -167,7 +169,7 @@ impl SweepCommand {
         let written = self.deliver(&table, spec, part).map(drop);
         // a table that could not be written is still there
         if let Err(error @ (Failure::Write { .. } | Failure::Stdout(_))) = written {
-            eprintln!("its rows are on the server: `bimorph jobs attach {name} --to {uri}` has them");
+            stderr_line!("its rows are on the server: `bimorph jobs attach {name} --to {uri}` has them");
             return Err(error);
         }
         self.remote.forget(&mut client, &name);
@@ -181,9 +183,10 @@ impl SweepCommand {
         let shown = (spec.samples.is_some(), self.limits.as_slice());
         let written = sweep_files::deliver(&self.out, &self.model.title(), table, part, shown)?;
         let shard = part.map(|_| format!(" (shard {index}/{count})")).unwrap_or_default();
-        eprintln!("{}", sweep_output::summary(table, &shard));
-        if !self.limits.is_empty() {
-            eprintln!("{}", sweep_files::report(&SweepStatistics::of(table, &self.limits)?, spec.samples.is_some()));
+        stderr_line!("{}", sweep_output::summary(table, &shard));
+        // where no point has a result there is no column to compare
+        if !self.limits.is_empty() && table.failed() < table.rows.len() {
+            stderr_line!("{}", sweep_files::report(&SweepStatistics::of(table, &self.limits)?, spec.samples.is_some()));
         }
         Ok(written)
     }
@@ -203,10 +206,10 @@ impl SweepCommand {
         let (journal, known) = Journal::open(&path, &journal::name(spec, bundle, options), self.resume)?;
         if journal.damaged() > 0 {
             let (lines, path) = (journal.damaged(), path.display());
-            bar.suspend(|| eprintln!("{path}: {lines} of its lines are damaged: their points are computed again"));
+            bar.suspend(|| stderr_line!("{path}: {lines} of its lines are damaged: their points are computed again"));
         }
         if !known.is_empty() {
-            bar.suspend(|| eprintln!("{} points are there from before", known.len()));
+            bar.suspend(|| stderr_line!("{} points are there from before", known.len()));
         }
         let refused = OnceLock::new();
         let keep = |kept: &JournalRow| journal.keep(kept).map_err(|error| refused.set(error)).is_ok();
@@ -217,7 +220,7 @@ impl SweepCommand {
         match table {
             Err(SweepError::Cancelled { done, points }) => {
                 bar.suspend(|| {
-                    eprintln!("{done} of {points} points are in {}: continue with --resume", path.display())
+                    stderr_line!("{done} of {points} points are in {}: continue with --resume", path.display())
                 });
                 Err(Failure::Interrupted)
             }
@@ -308,7 +311,7 @@ fn warn_of_netlist(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) 
     if let Ok(drawn) = sweep::first_drawn(spec, bundle, options)
         && !drawn.warnings.items.is_empty()
     {
-        eprint!("{}", drawn.warnings.render(io::stderr().is_terminal()));
+        stderr_text!("{}", drawn.warnings.render(io::stderr().is_terminal()));
     }
 }
 

@@ -59,7 +59,8 @@ pub(super) fn check_limits(spec: &SweepSpec, limits: &[YieldLimit]) -> Result<()
     let axes = spec.parameters.iter().map(|axis| &axis.name);
     let varied = spec.samples.iter().flat_map(|samples| samples.asked.vary.iter().map(|vary| &vary.name));
     let known: Vec<&String> = axes.chain(varied).chain(&results).collect();
-    match limits.iter().find(|limit| !known.contains(&&limit.name)) {
+    let is_known = |name: &String| known.contains(&name) || name == statistics::ESTIMATED_ERROR;
+    match limits.iter().find(|limit| !is_known(&limit.name)) {
         Some(limit) => {
             let names: Vec<&str> = known.iter().map(|name| name.as_str()).collect();
             let expected = format!("a column of the table, one of {}", names.join(", "));

@@ -285,6 +285,9 @@ impl Sender {
     }
 
     fn flush(&mut self, outlet: &mut MessageSink<proto::RunEvent>) {
+        if self.event.rows.is_empty() && self.event.ends.is_empty() {
+            return;
+        }
         let progress = self.done as f64 / self.steps.max(1) as f64;
         let event = proto::RunEvent { progress, ..std::mem::take(&mut self.event) };
         outlet.send(Ok(event));

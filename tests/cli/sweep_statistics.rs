@@ -69,6 +69,45 @@ fn tables_and_pictures() {
     assert!(!bench.path("grid.svg.journal").exists());
 }
 
+/// A limit may name a column as the table's header does, with its unit, and the column of the estimated errors. Where no point has a result, the
+/// error is that of the points and not of the limit.
+#[test]
+fn columns_by_header() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let ran = |words: &str| {
+        bench.command(SWEEP).args(["--param", "w=1.9u,2u", "--limits"]).arg(words).output().expect("the command starts")
+    };
+    for (limit, line) in [
+        ("b.y [m]<1", "b.y < 1e0: 100.00 % of 2 points"),
+        ("estimated_error<=1", "estimated_error <= 1e0: 100.00 % of 2 points"),
+        ("estimated_error [1]<-1", "estimated_error < -1e0: 0.00 % of 2 points"),
+    ] {
+        let done = ran(limit);
+        let stderr = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.success() && stderr.contains(line), "{limit}: {stderr}");
+    }
+    let done = ran("b.y [mm]<1");
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    assert!(!done.status.success() && stderr.contains("expected the unit of the column, [m], got [mm]"), "{stderr}");
+    let done = bench.run(&format!("{SWEEP} --param E=1 --limits b.y<1"));
+    assert_eq!(done.status, 1);
+    let done = bench.run("sweep c.net --signals b.y --param l=-1u,-2u --limits b.y<1");
+    assert!(done.status == 1 && !done.stderr.contains("a column of the table"), "{}", done.stderr);
+}
+
+/// A line that standard error does not take is no reason to fail.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_standard_error() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let full = || std::fs::File::options().write(true).open("/dev/full").expect("/dev/full");
+    let sweep = bench.command(&format!("{SWEEP} --param w=1.9u,2u --limits b.y<1")).stderr(full()).output();
+    let sweep = sweep.expect("the command starts");
+    assert!(sweep.status.success() && !sweep.stdout.is_empty(), "{:?}", sweep.status);
+    let missing = bench.command("static missing.net").stderr(full()).output().expect("the command starts");
+    assert_eq!(missing.status.code(), Some(1));
+}
+
 /// An invalid limit, a limit on an unknown column, and a file of another kind are rejected before anything is computed.
 #[test]
 fn rejected() {

@@ -56,6 +56,21 @@ fn the_other_branch_is_the_mirror_image() {
     close(right.rz, -left.rz, 1e-9);
 }
 
+/// Two clamped beams of 100 µm under a moment at their common end. Coarse meshes have an equilibrium at a third of the rotation, and their doubles have none;
+/// the search continues to meshes that have the right one. Rotations of the extensible elastica x(L) = L, y(L) = 0, EI·θ'(L) = ½M (collocation by
+/// scipy.integrate.solve_bvp, tolerance 1e-6).
+#[test]
+fn a_mesh_between_coarse_and_fine_has_no_equilibrium() {
+    for (moment, rotation) in [(10e-9, 0.717018), (20e-9, 1.117575), (30e-9, 1.469926), (60e-9, 2.597643)] {
+        let text = format!(
+            "anchor p1 [r] []\nbeam2d p1 [r t] [l=100u w=1u]\nbeam2d p1 [t q] [l=100u w=1u]\nanchor p1 [q] []\nf2d * [t] [M={moment:e}]"
+        );
+        let (_, result, _) = static_fitted(&model(&text, &CompileOptions::default()), &[]).unwrap();
+        close(node(&result, "t").rz, rotation, 1e-3);
+        assert!(result.estimated_error.unwrap() <= 1e-3, "{moment:e}: {:?}", result.estimated_error);
+    }
+}
+
 /// A moment that no beam at its node can bear: M/EI is a radius of 35 nm for the beam of 0.6 µm, and less for the other. Past the first loss of stability the
 /// part winds itself up, and the refusal says so.
 #[test]

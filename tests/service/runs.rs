@@ -202,6 +202,30 @@ fn a_step_without_an_answer_ends_a_run() {
     });
 }
 
+/// The end of a run is its last message, also where it is due by time (0.3 s for the 15,000 trials of a step): no message is empty.
+#[test]
+fn no_message_follows_the_end_of_a_run() {
+    let server = start_with("127.0.0.1:0", Limits::default(), fussy);
+    block_on(async {
+        let (mut client, id) = session(&server).await;
+        let request = proto::RunRequest {
+            lanes: vec![lane(&id, 0.0)],
+            times: pack(&[15_000.0]),
+            values: pack(&[1.0]),
+            signals: vec!["x".into()],
+            ports: false,
+        };
+        let mut stream = client.run(request).await.expect("runs").into_inner();
+        let mut ends = 0;
+        while let Some(event) = stream.message().await.expect("goes on") {
+            assert_eq!(ends, 0, "a message after the end: {event:?}");
+            assert!(!event.rows.is_empty() || !event.ends.is_empty());
+            ends += event.ends.len();
+        }
+        assert_eq!(ends, 1);
+    });
+}
+
 /// Inconsistent requests are rejected by field before anything is computed.
 #[test]
 fn what_does_not_fit_is_refused() {

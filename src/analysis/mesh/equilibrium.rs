@@ -43,6 +43,21 @@ pub(super) fn order(
     if chosen(compiled) {
         return estimated(compiled, voltages, segments);
     }
+    let mut coarse = None;
+    match refined(compiled, voltages, segments, &mut coarse) {
+        // what a coarse mesh has and no finer one is unconfirmed, and says so
+        Err(AnalysisError::NoEquilibrium { .. }) if coarse.is_some() => coarse.ok_or_else(no_mesh),
+        result => result,
+    }
+}
+
+/// The same on finer meshes where those on the way have no equilibrium; `coarse` becomes that of a mesh whose double has none.
+fn refined(
+    compiled: &CompiledModel,
+    voltages: &PortVoltages,
+    segments: Vec<usize>,
+    coarse: &mut Option<(Mesh, OperatingPoint)>,
+) -> Result<(Mesh, OperatingPoint), AnalysisError> {
     let (mut segments, mut refinement, mut lost) = (segments, Refinement::default(), None);
     loop {
         let mut search = EquilibriumSearch::new(compiled, voltages);
@@ -59,6 +74,17 @@ pub(super) fn order(
             Err(error) => return Err(lost.unwrap_or(error)),
             Ok(order) => order,
         };
+        // a long segment may bear a bend that shorter ones do not: further on they do
+        let holds = order.estimated_error.is_some_and(|error| error <= compiled.options.tol);
+        if let Some(error) = search.refused.take().filter(|_| !holds)
+            && let Some(finer) = refinement.next(compiled, &order.segments, &error)
+        {
+            let (order, point, _) = search.ended(order)?;
+            coarse.get_or_insert((order, point));
+            segments = finer;
+            lost = Some(error);
+            continue;
+        }
         let finer = if search.is_sure(&order) { None } else { doubling::twice(&compiled.options, &order) };
         match finer.filter(|finer| finer.segments.iter().sum::<usize>() <= MAX_NEAR_LIMIT) {
             Some(finer) => segments = finer.segments,
@@ -118,6 +144,10 @@ pub(super) fn assess(
     Ok((point, order.estimated_error))
 }
 
+fn no_mesh() -> AnalysisError {
+    AnalysisError::NotConverged { detail: "no mesh has an equilibrium".into() }
+}
+
 /// An equilibrium on a mesh.
 struct MeshEquilibrium {
     segments: Vec<usize>,
@@ -142,11 +172,13 @@ struct EquilibriumSearch<'a> {
     /// The first equilibrium, and that of another mesh next to it, where they have been found before.
     known: Option<OperatingPoint>,
     finer: Option<(CompiledModel, OperatingPoint)>,
+    /// Why the last mesh that has no equilibrium has none.
+    refused: Option<AnalysisError>,
 }
 
 impl<'a> EquilibriumSearch<'a> {
     fn new(compiled: &'a CompiledModel, voltages: &'a PortVoltages) -> Self {
-        Self { compiled, voltages, last: None, points: Vec::new(), known: None, finer: None }
+        Self { compiled, voltages, last: None, points: Vec::new(), known: None, finer: None, refused: None }
     }
 
     /// A mesh with the estimate of its error and its equilibrium.
@@ -162,7 +194,11 @@ impl<'a> EquilibriumSearch<'a> {
         let known = self.finer.take_if(|(finer, _)| finer.order.segments == segments);
         let (model, (mut point, from_rest)) = match known.filter(|_| !anew) {
             Some((finer, point)) => (Cow::Owned(finer), (point, false)),
-            None => self.solve(segments, anew)?,
+            None => self.solve(segments, anew).inspect_err(|error| {
+                if matches!(error, AnalysisError::NoEquilibrium { .. }) {
+                    self.refused = Some(error.clone());
+                }
+            })?,
         };
         if let (false, Some(MeshEquilibrium { point: before, .. })) = (from_rest, self.points.last()) {
             // the way from rest is that of the mesh before
@@ -226,8 +262,7 @@ impl<'a> EquilibriumSearch<'a> {
             order.estimated_error = None;
         }
         let point = found.map(|k| self.points.swap_remove(k).point);
-        let lost = || AnalysisError::NotConverged { detail: "no mesh has an equilibrium".into() };
-        let mut point = point.ok_or_else(lost)?;
+        let mut point = point.ok_or_else(no_mesh)?;
         let buckled = match hidden(&*meshed(self.compiled, &order.segments)?, self.voltages, &point) {
             Hidden::Nothing => None,
             Hidden::Near(beam) => {

@@ -82,7 +82,8 @@ pub(in crate::analysis) fn record(
         let done = ((s + h) / options.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize;
         let look = options.step.is_some() || done > looks;
         let kept = |()| energy.as_mut().map_or(Ok(()), |energy| energy.step(options, s + h, after, look));
-        if let Err(error) = suits.and_then(within).and_then(kept).or_else(|error| stopped_at.map(|_| ()).ok_or(error)) {
+        // energy first: steps that are too long throw parts through each other
+        if let Err(error) = suits.and_then(kept).and_then(within).or_else(|error| stopped_at.map(|_| ()).ok_or(error)) {
             beyond = Some(error);
             return false;
         }

@@ -35,6 +35,8 @@ pub enum Relation {
 pub struct YieldLimit {
     /// Name of the column.
     pub name: String,
+    /// Unit of the column, where it was written with the name: `yoke.y [m]`.
+    pub unit: Option<String>,
     /// How its values and the limit compare.
     pub relation: Relation,
     /// The limit, in the unit of the column.
@@ -61,7 +63,11 @@ impl FromStr for YieldLimit {
         }
         let parsed = number(value).filter(|value| value.is_finite());
         let value = parsed.ok_or_else(|| bad(what(), "a number behind the relation", value))?;
-        Ok(Self { name: name.to_owned(), relation, value })
+        let (name, unit) = match name.strip_suffix(']').and_then(|name| name.split_once(" [")) {
+            Some((name, unit)) => (name, Some(unit.to_owned())),
+            None => (name, None),
+        };
+        Ok(Self { name: name.to_owned(), unit, relation, value })
     }
 }
 
@@ -165,7 +171,7 @@ impl SweepStatistics {
         let mut is_close = vec![false; points];
         let mut found = Vec::with_capacity(limits.len());
         for limit in limits {
-            let place = place(table, &limit.name)?;
+            let place = place(table, limit)?;
             let mut passed = 0;
             for (row, (passes, is_close)) in table.rows.iter().zip(passes.iter_mut().zip(&mut is_close)) {
                 let keeps = value(row, place).is_some_and(|value| limit.holds(value));
@@ -186,13 +192,31 @@ impl SweepStatistics {
 enum Place {
     Parameter(usize),
     Result(usize),
+    EstimatedError,
 }
 
-fn place(table: &SweepTable, name: &str) -> Result<Place, SweepError> {
+/// Name of the column of the estimated relative errors by the mesh.
+pub const ESTIMATED_ERROR: &str = "estimated_error";
+
+fn place(table: &SweepTable, limit: &YieldLimit) -> Result<Place, SweepError> {
+    let name = limit.name.as_str();
     let at = |names: &[String]| names.iter().position(|known| known == name);
+    let error = || (name == ESTIMATED_ERROR).then_some(Place::EstimatedError);
     let found = at(&table.results).map(Place::Result).or_else(|| at(&table.parameters).map(Place::Parameter));
     let known = || [table.parameters.as_slice(), table.results.as_slice()].concat().join(", ");
-    found.ok_or_else(|| bad("limits".into(), &format!("a column of the table, one of {}", known()), name))
+    let missing = || bad("limits".into(), &format!("a column of the table, one of {}", known()), name);
+    let place = found.or_else(error).ok_or_else(missing)?;
+    let unit = match place {
+        Place::Parameter(_) => "",
+        Place::Result(k) => &table.units[k],
+        Place::EstimatedError => "1",
+    };
+    match &limit.unit {
+        Some(other) if other != unit => {
+            Err(bad(format!("limit on {name}"), &format!("the unit of the column, [{unit}]"), &format!("[{other}]")))
+        }
+        _ => Ok(place),
+    }
 }
 
 fn value(row: &SweepRow, place: Place) -> Option<f64> {
@@ -202,6 +226,7 @@ fn value(row: &SweepRow, place: Place) -> Option<f64> {
             Setting::Text(_) => None,
         },
         Place::Result(k) => row.values.as_ref().ok()?.get(k).copied().flatten(),
+        Place::EstimatedError => row.estimated_error,
     }
 }
 
@@ -213,8 +238,10 @@ pub fn values(table: &SweepTable, result: usize) -> Vec<f64> {
 fn column(table: &SweepTable, result: usize) -> ColumnStatistics {
     let mut values = values(table, result);
     let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let scale = power_of_two(largest * n);
+    let mean = values.iter().map(|value| value / scale).sum::<f64>() / n * scale;
+    let deviation = deviation(&values, mean);
     values.sort_by(f64::total_cmp);
     let ends = [values.first(), values.last()].map(|end| end.copied().unwrap_or(f64::NAN));
     ColumnStatistics {
@@ -222,10 +249,23 @@ fn column(table: &SweepTable, result: usize) -> ColumnStatistics {
         unit: table.units[result].clone(),
         count: values.len(),
         mean,
-        deviation: (squares / (n - 1.0)).sqrt(),
+        deviation,
         percentiles: PERCENTILES.map(|percent| percentile(&values, percent)),
         range: ends,
     }
+}
+
+/// Standard deviation with `n - 1`. Squares neither overflow nor vanish: they are of differences of the size of 1.
+fn deviation(values: &[f64], mean: f64) -> f64 {
+    let largest = values.iter().fold(0.0, |largest: f64, value| largest.max((value / 2.0 - mean / 2.0).abs()));
+    let scale = power_of_two(largest);
+    let squares: f64 = values.iter().map(|value| (value / 2.0 - mean / 2.0) / scale).map(|x| x * x).sum();
+    2.0 * scale * (squares / (values.len() as f64 - 1.0)).sqrt()
+}
+
+/// The power of two below a size, by which numbers are divided and multiplied without rounding; 1 for what has none.
+fn power_of_two(size: f64) -> f64 {
+    if size == 0.0 || size.is_nan() { 1.0 } else { size.log2().floor().clamp(-1000.0, 1000.0).exp2() }
 }
 
 /// The value at a percentage of ordered values; NaN without any.
@@ -298,6 +338,22 @@ mod tests {
         assert_eq!((one.count, one.range, one.percentiles[1]), (7, [1.0, 9.0], 3.0));
         // 5 % of six intervals is 0.3 of the first, 95 % is 0.7 of the last
         assert!((one.percentiles[0] - 1.15).abs() < 1e-14 && (one.percentiles[2] - 7.8).abs() < 1e-14);
+    }
+
+    /// Moments of a multiple are the multiple of the moments, to the smallest and the largest numbers.
+    #[test]
+    fn moments_scale() {
+        let of = |factor: f64| {
+            let values = [3.0, 1.0, 4.0, 1.5, 9.0].map(|x| Some(x * factor));
+            SweepStatistics::of(&table(&values), &[]).expect("statistics").columns.remove(0)
+        };
+        let one = of(1.0);
+        for factor in [1e-300, 1e-160, 1e160, 1e307] {
+            let found = of(factor);
+            assert!((found.mean / factor / one.mean - 1.0).abs() < 1e-12, "{factor:e}: {found:?}");
+            assert!((found.deviation / factor / one.deviation - 1.0).abs() < 1e-12, "{factor:e}: {found:?}");
+        }
+        assert_eq!(of(0.0).deviation, 0.0);
     }
 
     /// A point without a result is beyond each limit; Wilson's interval of 8 in 10 is 0.4901625 to 0.9433178.

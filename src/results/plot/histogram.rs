@@ -30,6 +30,11 @@ const INK: &str = "#333333";
 pub fn draw(histogram: &Histogram) -> Picture {
     let width = WIDTH - LEFT - RIGHT;
     let mut picture = Picture::new(WIDTH, TOP + HEIGHT + 52.0);
+    if histogram.edges.is_empty() {
+        picture.text(LEFT, 24.0, 15.0, Align::Start, INK, &histogram.title);
+        picture.text(LEFT + width / 2.0, TOP + HEIGHT / 2.0, 12.0, Align::Middle, INK, "no point has a value");
+        return picture;
+    }
     let ends = histogram.edges.iter().chain(&histogram.limits).filter(|value| value.is_finite());
     let (low, high) =
         ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));

@@ -36,8 +36,8 @@ impl RemoteDevice {
         let (mut ran, mut ended) = (Ran::default(), false);
         let mut events = self.about(async |mut rpc, session| rpc.run(request(session)).await)?.into_inner();
         while let Some(event) = self.next(&mut events)? {
-            if ended {
-                return Err(self.unexpected_run("a message after the end of the run"));
+            if ended && !(event.rows.is_empty() && event.ends.is_empty()) {
+                return Err(self.unexpected_run("rows after the end of the run"));
             }
             for rows in event.rows {
                 rows_fit(&rows, course, shape, ran.steps).map_err(|what| self.unexpected_run(&what))?;
