@@ -67,14 +67,14 @@ fn a_look_is_what_the_trial_answered() {
         for reply in [&rest, &moved] {
             for (name, value) in ["s.y", "s.x", "s.vy", "left.T", "right.T", "drive.q"].iter().zip(&reply.outputs) {
                 assert!(names.iter().any(|n| n == name), "{name}");
-                let seen = device.look(reply.token.unwrap(), name).unwrap();
+                let seen = device.read_quantity(reply.token.unwrap(), name).unwrap();
                 assert!((seen - value).abs() <= 1e-14 * value.abs(), "{name}: {seen} for {value}");
             }
             for name in &names {
-                assert!(device.look(reply.token.unwrap(), name).unwrap().is_finite(), "{name}");
+                assert!(device.read_quantity(reply.token.unwrap(), name).unwrap().is_finite(), "{name}");
             }
         }
-        let unknown = device.look(moved.token.unwrap(), "nothing.x");
+        let unknown = device.read_quantity(moved.token.unwrap(), "nothing.x");
         assert!(matches!(unknown, Err(DeviceError::UnknownSignal { .. })), "{unknown:?}");
         assert_eq!(ask(&mut device, Mode::Transient, rest.token, 2e-7, &[1.4, 5.5]), moved);
     }

@@ -245,7 +245,7 @@ fn heat_lags() {
 /// The mesh holds the tolerance. The reported error is about that against a mesh that is ten times finer, in the
 /// reported measure: a value, or the frequency at which it occurs.
 #[test]
-fn the_told_error_is_the_mesh() {
+fn the_reported_error_is_the_mesh() {
     for tol in [1e-2, 1e-3, 1e-4] {
         let drawn = model(ELBOW, CompileOptions { tol, ..CompileOptions::default() });
         let options = HarmonicOptions { even: true, points: 41, ..asked("b.fx", &["b.x", "b.y"], 1e3, 2e6) };

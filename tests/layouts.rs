@@ -107,7 +107,7 @@ fn a_node_that_was_moved_takes_its_beam_along() {
 }
 
 #[test]
-fn what_is_only_in_the_drawing_is_told_with_its_area_and_place() {
+fn what_is_only_in_the_drawing_is_reported_with_its_area_and_place() {
     let mut drawing = drawn_beam();
     let micron = (1e-6 / drawing.unit_m).round() as i32;
     let extra = Polygon::rectangle([200 * micron, 0], [210 * micron, 4 * micron]);
@@ -146,7 +146,7 @@ fn labels_that_say_too_little_are_one_error_with_its_place() {
 }
 
 #[test]
-fn a_netlist_without_outlines_is_told_as_such() {
+fn a_netlist_without_outlines_is_reported_as_such() {
     let text = "anchor * [f] []\nspring2d * [f m] [kx=1 l=5u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\n";
     let structure = load(&Bundle::from_text("x.net", text), &[]).unwrap().structure;
     // An anchor alone has a pad, and that is all that is drawn.

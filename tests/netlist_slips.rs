@@ -9,7 +9,7 @@ use bimorph::structure::Structure;
 const HEAD: &str = "process p1 = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p1 [a] []\n";
 const BEAM: &str = "beam2d p1 [a b] [l=100u w=2u]\n";
 
-fn told_with(text: &str, set: &[(String, Setting)]) -> Vec<Diagnostic> {
+fn reported_with(text: &str, set: &[(String, Setting)]) -> Vec<Diagnostic> {
     match load(&Bundle::from_text("t.net", text), set) {
         Ok(loaded) => loaded.warnings.items,
         Err(found) => found.items,
@@ -19,7 +19,7 @@ fn told_with(text: &str, set: &[(String, Setting)]) -> Vec<Diagnostic> {
 /// The only message of a netlist: its code, line and column, and its text with the way out.
 #[track_caller]
 fn only(text: &str) -> (String, (usize, usize), String) {
-    let found = told_with(text, &[]);
+    let found = reported_with(text, &[]);
     assert_eq!(found.len(), 1, "{found:?}");
     let one = &found[0];
     assert!(!one.help.is_empty(), "{one:?}");
@@ -53,14 +53,14 @@ fn what_stands_twice() {
     says(&format!("{HEAD}{BEAM}subnet s [p p] [] []\n"), "W018", (4, 13), &["node `p`"]);
     let stray = format!("{HEAD}beam2d p1 [a b] [l=100u w=2u] [oz=pi/2]\n");
     says(&stray, "W019", (3, 31), &["one list of parameters"]);
-    assert!(told_with(&format!("{HEAD}{BEAM}[x=1 beam2d p1 [b c] [l=x*1u w=1u]]\n"), &[]).is_empty());
+    assert!(reported_with(&format!("{HEAD}{BEAM}[x=1 beam2d p1 [b c] [l=x*1u w=1u]]\n"), &[]).is_empty());
 }
 
 /// A definition that replaces a parameter set from outside is reported; one made of it, or to the same value, is not.
 #[test]
 fn settings_are_not_overwritten_in_silence() {
     let set = [("w".to_owned(), Setting::Number(3e-6))];
-    let with = |line: &str| told_with(&format!("param w=2u\n{line}\n{HEAD}beam2d p1 [a b] [l=100u w=w]\n"), &set);
+    let with = |line: &str| reported_with(&format!("param w=2u\n{line}\n{HEAD}beam2d p1 [a b] [l=100u w=w]\n"), &set);
     let found = with("w=4u");
     assert_eq!(found.iter().map(|d| (d.code.as_str(), d.line)).collect::<Vec<_>>(), [("W023", 2)], "{found:?}");
     assert!(with("w=2*w").is_empty() && with("w=3u").is_empty());
@@ -76,7 +76,7 @@ fn entries_of_layers() {
         says(&text, "W004", (1, 53), &[&format!("`{slip}`"), &format!("did you mean `{meant}`")]);
     }
     let layer = "process p1 = [Youngsmodulus=165e9 density=2300 h=2u stres=9 w=2u]\nanchor p1 [a] []\n";
-    assert!(told_with(&format!("{layer}subnet s [p] [stres=*] []\n{BEAM}"), &[]).is_empty());
+    assert!(reported_with(&format!("{layer}subnet s [p] [stres=*] []\n{BEAM}"), &[]).is_empty());
     let warm =
         "process p1 = [Youngsmodulus=165e9 density=2300 h=2u T=500 thermalexpansion=2e-6 ambienttemperature=300]\n";
     assert_eq!(drawn(&format!("{warm}anchor p1 [a] []\n{BEAM}")).beams[0].temperature, Some(500.0));
@@ -91,7 +91,7 @@ fn constants_of_no_material() {
         ("viscosity=1.8e-5 fluid=-2u", "fluid"),
         ("T=-100 thermalexpansion=2e-6 ambienttemperature=300", "`T`"),
     ] {
-        let found = told_with(&format!("{HEAD}beam2d p1 [a b] [l=100u w=2u {entry}]\n"), &[]);
+        let found = reported_with(&format!("{HEAD}beam2d p1 [a b] [l=100u w=2u {entry}]\n"), &[]);
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].code == "E060" && found[0].message.contains(name), "{found:?}");
     }
@@ -110,7 +110,7 @@ fn what_has_no_effect() {
     }
     let loop_ = "beam2d p1 [a b] [l=100u w=2u oz=pi/2]\nbeam2d p1 [b c] [l=100u w=2u oz=pi/2+2*pi/3]\n
         beam2d p1 [c d] [l=100u w=2u oz=pi/2+4*pi/3]\nbeam2d p1 [a d] [w=2u]\n";
-    let found = told_with(&format!("{HEAD}{loop_}"), &[]);
+    let found = reported_with(&format!("{HEAD}{loop_}"), &[]);
     assert!(found.iter().any(|d| d.code == "E064"), "{found:?}");
 }
 
@@ -119,7 +119,7 @@ fn what_has_no_effect() {
 fn exponents_beyond_any_number() {
     let of = |force: &str| drawn(&format!("{HEAD}{BEAM}f2d * [b] [F={force}]\n")).loads[0].force[0];
     assert_eq!((of("1e-99999999999"), of("1e-3")), (0.0, 1e-3));
-    let found = told_with(&format!("{HEAD}{BEAM}f2d * [b] [F=1e99999999999]\n"), &[]);
+    let found = reported_with(&format!("{HEAD}{BEAM}f2d * [b] [F=1e99999999999]\n"), &[]);
     assert!(found.iter().any(|d| d.code == "E050"), "{found:?}");
 }
 
@@ -143,7 +143,7 @@ fn loops_name_what_they_build() {
 fn many_warnings_hide_no_other() {
     let many = "for k=1:150 [ call print(k) ]\n".to_owned()
         + &(0..30).map(|k| format!("beam2d p1 [a n{k}] [l=100u w=2u {}=1]\n", "q".repeat(k + 9))).collect::<String>();
-    let found = told_with(&format!("{HEAD}{many}beam2d p1 [x y] [l=100u w=2u]\n"), &[]);
+    let found = reported_with(&format!("{HEAD}{many}beam2d p1 [x y] [l=100u w=2u]\n"), &[]);
     let count = |code: &str| found.iter().filter(|d| d.code == code).count();
     assert_eq!([count("W002"), count("W004"), count("W010"), count("W012")], [100, 20, 1, 1], "{found:?}");
     let last = found.last().unwrap();
@@ -154,7 +154,11 @@ fn many_warnings_hide_no_other() {
 #[test]
 fn degrees_of_arms() {
     let text = format!("{HEAD}rigidlinkbeam p1 [a b] [l=100u w=2u]\nbeam3dlink p1 [a c] [l=100u w=2u L1=20u oz1=90]\n");
-    assert!(told_with(&text, &[]).iter().any(|d| d.code == "W003" && d.line == 4), "{:?}", told_with(&text, &[]));
+    assert!(
+        reported_with(&text, &[]).iter().any(|d| d.code == "W003" && d.line == 4),
+        "{:?}",
+        reported_with(&text, &[])
+    );
 }
 
 /// Junctions beyond their table are reported once, with their number: cut offsets, ratios of widths, beams shorter than

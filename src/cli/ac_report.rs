@@ -104,7 +104,7 @@ fn degrees([re, im]: [f64; 2]) -> String {
 
 /// By how much more the nearer of two frequencies has to show for a resonance to be seen.
 const SEEN: f64 = 1.01;
-/// Share of its width within which a resonance is seen by the frequency on the grid next to it.
+/// Fraction of its width within which a resonance is seen by the frequency on the grid next to it.
 const ON_TOP: f64 = 0.1;
 
 /// Value of a signal at a resonance at `hertz` of this half-power width [Hz]: that at the frequency on the grid next to it, none where that

@@ -71,14 +71,14 @@ impl DoctorCommand {
         }
         let options = settings.options();
         let found =
-            authentication::look_at(&options.guard).map_err(|error| error.to_string()).map(|found| match found {
+            authentication::inspect(&options.guard).map_err(|error| error.to_string()).map(|found| match found {
                 found if found.is_empty() => "clients need no credentials".to_owned(),
                 found => found.join("; "),
             });
         line("access", &found, "docs/service.md says what a server asks of its clients, and of its files")?;
         let mut good = found.is_ok();
         if let Some(folder) = &options.state_dir {
-            let found = scan::look_at(folder).map_err(|error| error.to_string());
+            let found = scan::inspect(folder).map_err(|error| error.to_string());
             good &= found.is_ok();
             line("states", &found, "name a folder of this server's own in state_dir, which its user can write")?;
         }
@@ -153,11 +153,11 @@ fn server() -> Result<String, String> {
     let path = std::env::temp_dir().join(format!("bimorph-doctor-{}.sock", std::process::id()));
     let runtime = tokio::runtime::Runtime::new().map_err(|e| e.to_string())?;
     let (stop, stopped) = tokio::sync::oneshot::channel::<()>();
-    let (tell, ready) = mpsc::channel();
-    let tell_failure = tell.clone();
+    let (report, ready) = mpsc::channel();
+    let tell_failure = report.clone();
     let options = ServeOptions {
         listen: vec![Address::Unix(path.clone())],
-        ready: Box::new(move |_| drop(tell.send(Ok(())))),
+        ready: Box::new(move |_| drop(report.send(Ok(())))),
         ..ServeOptions::default()
     };
     let serving = runtime.spawn(async move {

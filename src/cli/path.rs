@@ -121,13 +121,13 @@ impl PathCommand {
         let drawn = self.model.compile()?;
         let ends = self.ends(&drawn)?;
         let first = ends.as_ref().map_or(&drawn, |[first, _]| first);
-        let growing = match &ends {
+        let input = match &ends {
             Some([_, last]) => PathInput::Parameter(last),
             None if drawn.structure.port(&self.along.name).is_some() => PathInput::Port(&self.along.name),
             None => PathInput::Loads,
         };
         let mut request = ContinuationRequest {
-            growing,
+            input,
             from: self.along.from,
             to: self.along.to,
             voltages: self.ports.clone(),

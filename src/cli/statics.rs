@@ -216,7 +216,7 @@ fn history(result: &StaticResult) -> String {
     result.notes().iter().map(|sentence| format!("\n{sentence}\n")).collect()
 }
 
-/// A displacement below this share of the largest one is rounding.
+/// A displacement below this fraction of the largest one is rounding.
 const NOISE: f64 = 1e-12;
 
 fn text(compiled: &CompiledModel, result: &StaticResult, strains: &[(String, f64)]) -> String {

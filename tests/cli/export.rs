@@ -129,7 +129,7 @@ fn the_nonlinear_form() {
 /// Where no voltage couples motion and circuit, a warning says so, and the circuit's part remains: R = 2400 Ω of two
 /// beams of 60 squares of 20 Ω.
 #[test]
-fn no_motion_is_told() {
+fn no_motion_is_reported() {
     let ran = bench().run("export chevron.net --spice");
     assert_eq!(ran.status, 0, "{}", ran.stderr);
     assert!(ran.stderr.contains("no mode"), "{}", ran.stderr);
@@ -139,7 +139,7 @@ fn no_motion_is_told() {
 
 /// A bias at which the plate has pulled in is reported, on the terminal and in the file.
 #[test]
-fn a_jump_is_told() {
+fn a_jump_is_reported() {
     let bench = bench();
     let ran = bench.run("export plate.net --spice --port drive=12");
     assert_eq!(ran.status, 0, "{}", ran.stderr);

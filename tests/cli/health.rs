@@ -34,7 +34,7 @@ async fn watch(channel: &Channel) -> Result<Streaming<HealthCheckResponse>, Code
 
 /// With the maximum number of connections, each with a watch and no token, a client with a token gets a permit.
 #[test]
-fn watches_lock_nobody_out() {
+fn watches_block_no_client() {
     let bench = tls_and_tokens::bench();
     let server = Server::start(&bench, "--listen 127.0.0.1:0 --token-file tokens --max-connections 4");
     block_on(async {
@@ -73,7 +73,7 @@ fn health_has_small_places_of_its_own() {
 
 /// A plain client on a TLS address receives an error that says so, for any call.
 #[test]
-fn health_is_not_told_plainly_where_tls_is_spoken() {
+fn health_requires_tls_on_tls_addresses() {
     let bench = tls_and_tokens::bench();
     let authority = tls_and_tokens::tls("authority.pem");
     let server = Server::start(&bench, &format!("{} --tls-client-ca {}", certified("server"), authority.display()));
@@ -99,7 +99,7 @@ fn a_server_that_stops_says_so() {
         let queue = tokio_stream::wrappers::ReceiverStream::new(queue);
         let mut replies = client.trial(queue).await.expect("a stream").into_inner();
         replies.message().await.expect("a reply");
-        server.tell("-TERM");
+        server.report("-TERM");
         let next = well.message().await.expect("a stream that goes on").expect("a word");
         assert_eq!(next.status(), ServingStatus::NotServing);
     });

@@ -53,7 +53,7 @@ fn tables_are_those_of_this_process() {
 /// Ctrl-C detaches from a sweep and prints how to continue. The sweep runs until it is cancelled, and its finished
 /// points form a table all the same.
 #[test]
-fn ctrl_c_lets_go_of_a_sweep() {
+fn ctrl_c_detaches_from_a_sweep() {
     let bench = Bench::new(&[("plate.net", PLATE)]);
     let server = Server::start(&bench, "--listen unix://s");
     let to = format!("--to {}", server.address);

@@ -32,7 +32,7 @@ fn hangup_reads_tokens_and_certificates_again() {
         Server::start(&bench, "--listen 127.0.0.1:0 --tls-cert own.pem --tls-key own.key --token-file tokens");
     let tokens = |token: &str| format!("carol {token}\n");
     let wait = |server: &mut Server, is_so: &dyn Fn() -> bool| {
-        server.tell("-HUP");
+        server.report("-HUP");
         let asked = std::time::Instant::now();
         while !is_so() {
             assert!(asked.elapsed() < Duration::from_secs(20), "it is not read");
@@ -52,7 +52,7 @@ fn hangup_reads_tokens_and_certificates_again() {
     assert!(!knows(&bench, "alice"));
     // a file that is wrong
     std::fs::write(bench.path("tokens"), "short\n").expect("written");
-    server.tell("-HUP");
+    server.report("-HUP");
     server.line("stay as they were");
     assert!(knows(&bench, "mallory"));
     // a certificate that has expired
@@ -74,7 +74,7 @@ fn server_uri(address: &str) -> String {
 fn hangup_ends_no_server() {
     let bench = Bench::new(&[]);
     let mut server = Server::start(&bench, &format!("--listen unix://{}", bench.path("s").display()));
-    server.tell("-HUP");
+    server.report("-HUP");
     block_on(async {
         client(&server.address).await.info(proto::InfoRequest {}).await.expect("it is there");
     });
@@ -211,7 +211,7 @@ fn damaged_rows_of_finished_jobs_are_computed_again() {
 /// A stored session whose newest file is damaged continues from the state before; with both damaged, its owner receives
 /// an error. The log has both.
 #[test]
-fn damaged_sessions_are_told() {
+fn damaged_sessions_are_reported() {
     let bench = Bench::new(&[]);
     let options = format!("--listen unix://{} --state-dir states", bench.path("s").display());
     let mut server = Server::start(&bench, &options);

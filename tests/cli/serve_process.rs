@@ -58,14 +58,14 @@ impl Server {
     }
 
     /// Sends it a signal.
-    pub(crate) fn tell(&mut self, signal: &str) {
+    pub(crate) fn report(&mut self, signal: &str) {
         let id = self.id().to_string();
         assert!(Command::new("kill").args([signal, &id]).status().is_ok_and(|s| s.success()));
     }
 
     /// Ends it by a signal; its exit status, if it has one.
     pub(crate) fn signal(&mut self, signal: &str) -> Option<i32> {
-        self.tell(signal);
+        self.report(signal);
         self.child.wait().expect("it ends").code()
     }
 }

@@ -37,7 +37,8 @@ fn manifests_name_the_layers_below() {
     let mut found: Vec<String> =
         fs::read_dir(&root).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     let mut listed: Vec<&str> = CRATES.iter().map(|(name, _)| *name).collect();
-    (found.sort(), listed.sort_unstable());
+    found.sort();
+    listed.sort_unstable();
     assert_eq!(found, listed);
     for (place, (name, below)) in CRATES.iter().enumerate() {
         let manifest = fs::read_to_string(root.join(name).join("Cargo.toml")).unwrap();

@@ -201,7 +201,7 @@ fn a_long_bond_pad() {
 
 /// Of labels without an object the first twenty are reported, and the number of the others.
 #[test]
-fn few_labels_are_told() {
+fn few_labels_are_reported() {
     let mut sheet = chevron("a", "b");
     (0..1000).for_each(|k| sheet.label("lost", [f64::from(k), 500.0]));
     let notes = extracted(sheet.drawing()).notes;

@@ -299,7 +299,7 @@ fn angles_are_parameters_too() {
 
 /// Files that are no netlist are reported in words, and the help names no other kind.
 #[test]
-fn told_in_words() {
+fn reported_in_words() {
     let reported =
         |name: &str, text: &str| load(&Bundle::from_text(name, text), &[]).expect_err("an error").items.remove(0);
     let script = reported("run.m", "% a sweep\nnet = cho_load('a.net');\n");

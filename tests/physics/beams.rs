@@ -137,7 +137,7 @@ fn a_free_beam_has_three_rigid_modes() {
 /// A part on beams that are too soft to resolve (2 nm × 2 nm, like drawing aids in old decks) stays in place, and the
 /// result says so, with the net load on it, if any. The rest has its displacement, F·l³/(3·E·I).
 #[test]
-fn a_part_on_threads_is_held_and_told() {
+fn a_part_on_slender_beams_is_held_and_reported() {
     let text = |force: &str| {
         format!(
             "anchor p1 [a] [l=5u w=5u]\nbeam2d p1 [a b] [l=100u w=2u]\nf2d * [b] [F=2u oz=pi/2]\n\

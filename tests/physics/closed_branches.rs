@@ -205,7 +205,7 @@ fn snaps_are_limit_points_of_the_path() {
     let compiled = model(text, &CompileOptions::default());
     let found = pull_in(&compiled, None, 20.0).unwrap();
     let request = ContinuationRequest {
-        growing: PathInput::Port("drive"),
+        input: PathInput::Port("drive"),
         from: 0.0,
         to: 20.0,
         voltages: vec![],

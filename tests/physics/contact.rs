@@ -169,7 +169,7 @@ fn pull_in_does_not_depend_on_the_largest_voltage() {
 
 /// Plates pull in at Nathanson's voltage, and open where kx = εAV²/2(g − x)² at the touching distance.
 #[test]
-fn plates_pull_in_and_let_go() {
+fn plates_pull_in_and_open() {
     let mut random = Numbers(5);
     for _ in 0..100 {
         let (k, area, gap) = (random.between(0.1, 10.0), random.between(1e-9, 1e-7), random.between(0.5e-6, 4e-6));

@@ -124,7 +124,7 @@ fn modes_say_what_they_are_about() {
 /// says so. With an imperfection of a ten-thousandth it reaches the branch of the static equilibrium, without a
 /// message.
 #[test]
-fn a_balanced_motion_is_told_and_an_imperfection_takes_the_branch() {
+fn a_balanced_motion_is_reported_and_an_imperfection_takes_the_branch() {
     let text = "h1 beam2det p1 [a m] [l=150u w=2u R=1000 tau=5u]\nh2 beam2det p1 [m b] [l=150u w=2u R=1000 tau=5u]\n\
                 anchor p1 [a] []\nanchor p1 [b] []\neground * [b] []\nv port * [a b] []";
     let volts = vec![("v".to_owned(), 1.2)];

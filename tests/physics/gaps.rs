@@ -230,7 +230,7 @@ fn differences_of_a_nanometre() {
 /// The frame does not detect unstable equilibria. At 20 V, with a load of 4 µN that holds the gap open, Newton's method
 /// from the drawing converges to the one between the stable branch (−3.391 µm) and the electrode.
 #[test]
-fn a_frame_tells_no_unstable_equilibrium() {
+fn a_frame_reports_no_unstable_equilibrium() {
     let text = format!("{PLATE}\nf2d * [m] [F=-4u]");
     let compiled = model(&text, &CompileOptions { as_sugar: true, ..CompileOptions::default() });
     let frame = frame(&compiled).unwrap();

@@ -306,7 +306,7 @@ fn table() {
 /// well. Generalized-α began with M⁻¹ of the forces, which threw the light body at the tip 250 times as far; in equal
 /// steps it failed.
 #[test]
-fn what_is_let_go_is_not_thrown() {
+fn a_released_part_is_not_thrown() {
     let text = "param F=1u\nanchor p1 [r] []\nb beam2d p1 [r t] [l=100u w=2u]\nf2d * [t] [F=F oz=pi/2]\n";
     let options = |force: f64| CompileOptions {
         segments: Some(4),

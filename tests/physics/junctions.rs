@@ -54,7 +54,7 @@ fn six_layouts_in_plane_stress() {
 /// high (`six_layouts_in_plane_stress` has the other), which is reported within a tenth. Narrow beams cause no warning,
 /// nor does the option.
 #[test]
-fn rotary_inertia_left_out_is_told() {
+fn rotary_inertia_left_out_is_reported() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/netlists/junctions/paddle.net");
     let found = |rotary_inertia: bool| {
         let options = CompileOptions { rotary_inertia, ..CompileOptions::default() };

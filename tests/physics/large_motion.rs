@@ -95,7 +95,7 @@ fn sweeps_of_such_runs_hold_it_too() {
 
 /// Given segments have an error estimate in such a run.
 #[test]
-fn given_segments_are_told() {
+fn given_segments_are_reported() {
     let with =
         |segments: usize, tol: f64| CompileOptions { tol, segments: Some(segments), ..CompileOptions::default() };
     let reference = run(THROWN, "s.y", 100e-6, &[], with(40, 1e-6));
@@ -110,7 +110,7 @@ fn given_segments_are_told() {
 /// The estimated error of a mode about a loaded state is no less than the effect of that state's error: a clamped beam
 /// under a force that bends it far. The reference has 64 segments.
 #[test]
-fn modes_about_a_load_are_told() {
+fn modes_about_a_load_are_reported() {
     let text = "process p = [Youngsmodulus=165e9 density=2300 h=20u]
 anchor p [a] []
 left beam2d p [a s] [l=250u w=1.6u]

@@ -82,7 +82,7 @@ fn modes_by_their_number() {
 /// A given number of segments is kept, its estimate is that of its error within a factor of three, and a warning says
 /// that it does not hold the tolerance.
 #[test]
-fn segments_of_the_user_are_told() {
+fn segments_of_the_user_are_reported() {
     let text = "beam2d p [a t] [l=1000u w=0.5u]\nf2d * [t] [F=1.375e-8 oz=pi/2]";
     let model = drawn(text, CompileOptions { segments: Some(1), ..CompileOptions::default() });
     let model = fitted(&model, &MeshRequest::Static { voltages: &[] }).unwrap();

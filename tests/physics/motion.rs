@@ -133,7 +133,7 @@ fn one_step_compared_with_itself() {
 
 /// Loose steps (0.15, after a first run at 0.3) report their error over 160 periods within a factor of 1.5. Closed form.
 #[test]
-fn loose_steps_tell_enough() {
+fn loose_steps_report_enough() {
     let text = OSCILLATOR.replace("damper2d * [f m] [bx=1e-6]", "");
     let start = model(&text.replace("F=0", "F=1u"), &CompileOptions::default());
     let compiled = model(&text, &CompileOptions::default());

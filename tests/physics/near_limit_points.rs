@@ -95,7 +95,7 @@ fn a_path_that_ends_at_rest() {
         model(&format!("{BEAM}f2d * [m] [F=F oz=pi/2]\n"), &options)
     };
     let request = ContinuationRequest {
-        growing: PathInput::Loads,
+        input: PathInput::Loads,
         from: 1.0,
         to: 0.0,
         voltages: Vec::new(),
@@ -111,7 +111,7 @@ fn a_path_that_ends_at_rest() {
 /// Events before any voltage are reported with pull-in: compressed by 80 MPa (critical: 54) the part has buckled to one
 /// of two sides.
 #[test]
-fn pull_in_of_a_buckled_part_is_told() {
+fn pull_in_of_a_buckled_part_is_reported() {
     let plate =
         "anchor * [e] []\nplategap2d * [m e] [A=2e-9 gap=3u oz=-pi/2]\neground * [e] []\ndrive port * [m e] []\n";
     let reported = |s: f64| {
@@ -125,7 +125,7 @@ fn pull_in_of_a_buckled_part_is_told() {
 /// A jump on a finer mesh is reported although the first mesh has none: a column under 1.0012 of Euler's load (217.13
 /// µN by π²EI/(4·L²) of its guided end).
 #[test]
-fn a_jump_on_a_finer_mesh_is_told() {
+fn a_jump_on_a_finer_mesh_is_reported() {
     let text = "anchor p1 [a] []\nbeam2d p1 [a m] [l=100u w=2u]\nbeam2d p1 [m b] [l=100u w=2u]\nguide2d * [b] []\n\
         f2d * [b] [F=217.4u oz=pi]\n";
     let (_, result, _) = static_fitted(&model(text, &CompileOptions::default()), &[]).unwrap();
@@ -149,7 +149,7 @@ fn modes_of_a_buckled_part_as_drawn() {
 /// the side moves by 60.6 nm without the stress and by (S/F)·(tan kL/k − L) = 227.95 nm with it: the difference is 2.76
 /// times the printed number.
 #[test]
-fn a_linear_model_tells_what_it_leaves_out() {
+fn a_linear_model_reports_what_it_leaves_out() {
     let text = "anchor p1 [a] []\nbeam2d p1 [a b] [l=100u w=2u]\nf2d * [b] [F=40u oz=pi]\nf2d * [b] [F=40n oz=pi/2]\n";
     let options = CompileOptions { linear: true, ..CompileOptions::default() };
     let (fitted, result, _) = static_fitted(&model(text, &options), &[]).unwrap();

@@ -63,7 +63,7 @@ fn statics(compiled: &CompiledModel, angle: f64, name: &str, volts: f64) -> [f64
 /// Limit points of the path up to a voltage [V].
 fn limits(compiled: &CompiledModel, to: f64) -> Vec<f64> {
     let request = ContinuationRequest {
-        growing: PathInput::Port("drive"),
+        input: PathInput::Port("drive"),
         from: 0.0,
         to,
         voltages: vec![],

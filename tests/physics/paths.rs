@@ -31,7 +31,7 @@ fn fine() -> CompileOptions {
 
 fn follow(model: &CompiledModel, by: PathInput<'_>, to: f64, signals: &[&str], branch: Branch) -> ContinuationResult {
     let signals = signals.iter().map(|s| (*s).to_owned()).collect();
-    let request = ContinuationRequest { growing: by, from: 0.0, to, voltages: vec![], signals, branch, points: 3000 };
+    let request = ContinuationRequest { input: by, from: 0.0, to, voltages: vec![], signals, branch, points: 3000 };
     trace(model, &request, &mut |_| true).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -103,7 +103,7 @@ fn the_mesh_of_a_path_holds_the_tolerance() {
         let at = |force: f64| scene("column/column.net", &[("F", force)], options);
         let (first, last) = (at(0.0), at(to));
         let request = ContinuationRequest {
-            growing: PathInput::Parameter(&last),
+            input: PathInput::Parameter(&last),
             from: 0.0,
             to,
             voltages: vec![],
@@ -124,7 +124,7 @@ fn the_mesh_of_a_path_holds_the_tolerance() {
     // a path that ends by its limit of points has no particular end: there is no error estimate
     let last = scene("column/column.net", &[("F", to)], &CompileOptions::default());
     let request = ContinuationRequest {
-        growing: PathInput::Parameter(&last),
+        input: PathInput::Parameter(&last),
         from: 0.0,
         to,
         voltages: vec![],
@@ -291,7 +291,7 @@ fn geometry_is_no_load() {
         model(text, &CompileOptions { set: vec![("w".into(), Setting::Number(w))], ..CompileOptions::default() })
     };
     let request = ContinuationRequest {
-        growing: PathInput::Parameter(&at(3e-6)),
+        input: PathInput::Parameter(&at(3e-6)),
         from: 2e-6,
         to: 3e-6,
         voltages: vec![],

@@ -57,7 +57,7 @@ fn the_other_branch_is_the_mirror_image() {
 }
 
 /// Two clamped beams of 100 µm under a moment at their common end. Coarse meshes have an equilibrium at a third of the rotation, and their doubles have none;
-/// the search goes on to meshes that have the right one. Rotations of the extensible elastica x(L) = L, y(L) = 0, EI·θ'(L) = ½M (collocation by
+/// the search continues to meshes that have the right one. Rotations of the extensible elastica x(L) = L, y(L) = 0, EI·θ'(L) = ½M (collocation by
 /// scipy.integrate.solve_bvp, tolerance 1e-6).
 #[test]
 fn a_mesh_between_coarse_and_fine_has_no_equilibrium() {

@@ -56,7 +56,7 @@ fn a_signal_has_the_mesh_that_it_shows() {
 /// A motion below the resolution of the step control causes a warning: its companion is below it too, and their
 /// difference gives no estimate. (The tip moved by 1e-16 m; the estimated step error was 1.6e-2, the true one 0.94.)
 #[test]
-fn a_motion_below_the_steps_own_floor_is_told() {
+fn a_motion_below_the_steps_own_floor_is_reported() {
     for (force, tells) in [(10e-15, false), (1e-6, true)] {
         let set = [("F", 0.0), ("f", force)].map(|(n, v)| (n.to_owned(), Setting::Number(v))).to_vec();
         let compiled = model(TWO, &CompileOptions { set, segments: Some(2), ..CompileOptions::default() });

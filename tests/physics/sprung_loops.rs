@@ -226,7 +226,7 @@ fn newton_over_coordinates_is_quadratic() {
 
 /// A loop of rigid joints and small displacements are refused with the reason.
 #[test]
-fn what_does_not_fit_is_told() {
+fn what_does_not_fit_is_reported() {
     let linear = model(FRAME, &CompileOptions { linear: true, ..CompileOptions::default() });
     assert_eq!(Tree::elastic(&linear.parts.system.model).err(), Some(UnsupportedModel::Linear));
 }

@@ -58,7 +58,7 @@ fn vm236_pull_in_and_release() {
 fn vm236_hysteresis_in_one_path() {
     let compiled = vm236(16);
     let request = ContinuationRequest {
-        growing: PathInput::Port("drive"),
+        input: PathInput::Port("drive"),
         from: 0.0,
         to: 18.0,
         voltages: vec![],
@@ -97,7 +97,7 @@ fn the_switch_shows_its_hysteresis() {
     let bundle = Bundle::read(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
     let compiled = compile(&bundle, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let request = ContinuationRequest {
-        growing: PathInput::Port("drive"),
+        input: PathInput::Port("drive"),
         from: 0.0,
         to: 20.0,
         voltages: vec![],

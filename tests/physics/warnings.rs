@@ -43,7 +43,7 @@ fn reported(model: &CompiledModel, start: &CompiledModel, options: &TransientOpt
 /// hold the tolerance over a run of 50 µs. The estimate is the error within a factor of four, and a warning appears
 /// where it is beyond the tolerance. Against steps a thousand times more exact.
 #[test]
-fn steps_in_time_tell_their_error() {
+fn steps_in_time_report_their_error() {
     let options = CompileOptions { set: with(20e-6), segments: Some(4), ..CompileOptions::default() };
     let start = compile(&example("single_bimorph"), &options).unwrap();
     let moving = chart::released(&example("single_bimorph"), &start, "F").unwrap();
@@ -134,7 +134,7 @@ fn too_large_a_load_is_no_loose_part() {
 
 /// One segment has two modes; a request for three gets two, with an estimate and a warning.
 #[test]
-fn fewer_modes_than_asked_for_are_told() {
+fn fewer_modes_than_asked_for_are_reported() {
     let text = "beam2d p [a b] [l=100u w=2u]";
     let model = drawn(text, &CompileOptions { segments: Some(1), ..CompileOptions::default() });
     let found = modes(&model, 3, &[]).unwrap();
@@ -145,7 +145,7 @@ fn fewer_modes_than_asked_for_are_told() {
 /// Equal steps far longer than the initial motion damp it away, in a companion of twice the step as well. An oscillator
 /// of 15.9 kHz is released from 1 µm, in steps of 100 µs (ω·h = 10) and of 1 µs, over 2 ms.
 #[test]
-fn steps_that_outrun_the_motion_are_told() {
+fn steps_that_outrun_the_motion_are_reported() {
     let text = "param F=1u\nanchor * [f] []\nspring2d * [f m] [kx=1]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nf2d * [m] [F=F]";
     let drawn = |f: f64| {
         let options = CompileOptions { set: with(f), ..CompileOptions::default() };
@@ -169,7 +169,7 @@ fn steps_that_outrun_the_motion_are_told() {
 
 /// A part that is unstable where it is drawn, and rests on its gap without any voltage, is said to be so: nothing pulls it in.
 #[test]
-fn what_no_voltage_holds_open_is_told() {
+fn what_no_voltage_holds_open_is_reported() {
     let plate = "anchor * [f] []\nspring2d * [f m] [kx=-1]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\n\
                  gp plategap2d * [m e] [A=1e-8 gap=2u]\nanchor * [e] []\neground * [e] []\ndrive port * [m e] []\n";
     let error = pull_in_fitted(&drawn(plate, &CompileOptions::default()), None, 200.0).unwrap_err().to_string();

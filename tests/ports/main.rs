@@ -72,7 +72,7 @@ fn given(formulation: Formulation, share: f64) -> Vec<f64> {
 
 /// The description of opened ports includes their kinds.
 #[test]
-fn kinds_are_told() {
+fn kinds_are_reported() {
     let mut device = LocalDevice::new(compiled(SHUTTLE, Formulation::Compliant));
     let ports = PORTS.iter().map(|(name, ..)| (*name).to_owned()).collect();
     let reported = device.open(&OpenRequest { ports, signals: vec![], noise: None }).unwrap();

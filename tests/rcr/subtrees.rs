@@ -29,8 +29,8 @@ fn same_bits(model: &Model, seed: u64, size: f64) -> usize {
     let (q, v, torque) = (random(size), random(1.0), random(1.0));
     let force: Vec<[f64; 3]> = (0..count).map(|_| [s.next(), s.next(), s.next()]).collect();
     let ways = [Reduction::<f64>::new(&[linkage]), Reduction::without_packs(&[linkage]), Reduction::plain(&[linkage])];
-    let packed = ways[0].side_by_side();
-    assert_eq!([ways[1].side_by_side(), ways[2].side_by_side()], [0, 0]);
+    let packed = ways[0].packed_bodies();
+    assert_eq!([ways[1].packed_bodies(), ways[2].packed_bodies()], [0, 0]);
     let [first, others @ ..] = ways.map(|r| seen(r, linkage, (&q, &v), (&force, &torque)));
     for (which, other) in others.into_iter().enumerate() {
         assert_eq!(first.len(), other.len());

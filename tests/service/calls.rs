@@ -19,7 +19,7 @@ fn trial(parent: u64, t: f64, voltages: &[f64]) -> Ask {
 
 /// Info reports the version and the limits in force.
 #[test]
-fn info_tells_version_and_limits() {
+fn info_reports_version_and_limits() {
     let server = start("127.0.0.1:0", Limits { sessions: 7, ..Limits::default() });
     let info = block_on(async { server.client().await.info(proto::InfoRequest {}).await });
     let info = info.expect("an answer").into_inner();

@@ -142,20 +142,20 @@ fn kept(failures: u64, seed: u64) {
 }
 
 /// Role of a circuit: steps from the start, again after each failure, until all of them are answered.
-fn circuit(uri: &str, expected: &[TrialReply], tell: &mpsc::Sender<()>) {
+fn circuit(uri: &str, expected: &[TrialReply], report: &mpsc::Sender<()>) {
     let request = OpenRequest { ports: vec![], signals: vec!["m.x".into()], noise: None };
     loop {
         let device = RemoteDevice::connect(uri, &bundle(), &CompileOptions::default(), PATIENCE);
-        let _ = tell.send(());
+        let _ = report.send(());
         let Ok(mut device) = device else { continue };
         // opened again on the same device: it connects anew by itself
         for _ in 0..3 {
             let opened = device.open(&request);
-            let _ = tell.send(());
+            let _ = report.send(());
             if opened.is_err() {
                 continue;
             }
-            if run(&mut device, expected, tell).is_ok() {
+            if run(&mut device, expected, report).is_ok() {
                 return;
             }
             let again = device.trial(&question(None, &[1.0]), &mut TrialReply::default());
@@ -169,12 +169,12 @@ fn question(parent: Option<Token>, voltages: &[f64]) -> Trial<'_> {
 }
 
 /// A run from the start: each answer is the right one.
-fn run(device: &mut dyn Device, expected: &[TrialReply], tell: &mpsc::Sender<()>) -> Result<(), DeviceError> {
+fn run(device: &mut dyn Device, expected: &[TrialReply], report: &mpsc::Sender<()>) -> Result<(), DeviceError> {
     let mut parent = None;
     for (step, expected) in expected.iter().enumerate() {
         let mut reply = TrialReply::default();
         let answered = device.trial(&question(parent, &[volts(step)]), &mut reply);
-        let _ = tell.send(());
+        let _ = report.send(());
         answered?;
         assert_eq!(reply, *expected, "step {step}");
         parent = reply.token;
@@ -199,15 +199,15 @@ fn co_simulation(failures: u64, seed: u64) {
         parent = reply.token;
         expected.push(reply);
     }
-    let (tell, reported) = mpsc::channel();
+    let (report, reported) = mpsc::channel();
     let (uri, calm) = (cut.uri(), Arc::new(AtomicBool::new(false)));
     let theirs = Arc::clone(&calm);
     let running = std::thread::spawn(move || {
         while !theirs.load(Ordering::SeqCst) {
-            circuit(&uri, &expected, &tell);
+            circuit(&uri, &expected, &report);
         }
         // nothing disturbs this one
-        circuit(&uri, &expected, &tell);
+        circuit(&uri, &expected, &report);
     });
     let mut calls = 0_u64;
     loop {

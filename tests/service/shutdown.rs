@@ -23,7 +23,7 @@ fn an_idle_server_stops() {
 
 /// A silent open stream receives UNAVAILABLE when the drain time is over.
 #[test]
-fn open_streams_are_told() {
+fn open_streams_are_reported() {
     let mut server = hasty();
     block_on(async {
         let mut client = server.client().await;
@@ -34,7 +34,7 @@ fn open_streams_are_told() {
         let queue = tokio_stream::wrappers::ReceiverStream::new(queue);
         let mut replies = client.trial(queue).await.expect("a stream").into_inner();
         replies.message().await.expect("opened").expect("a reply");
-        server.tell();
+        server.report();
         let status = replies.message().await.expect_err("the end");
         assert_eq!(status.code(), Code::Unavailable);
         assert!(status.message().contains("shutting down"), "{}", status.message());

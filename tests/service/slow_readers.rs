@@ -95,7 +95,7 @@ fn rows_that_are_not_all_do_not_end_well() {
         let sweep = swept(&mut client).await;
         let mut slow = fetch(&mut client, &sweep).await;
         let mut rows = slow.message().await.expect("a chunk").expect("the first").rows.len();
-        server.tell();
+        server.report();
         let end = loop {
             match slow.message().await {
                 Ok(Some(chunk)) => rows += chunk.rows.len(),

@@ -233,7 +233,7 @@ fn a_restore_that_is_stopped_leaves_nothing() {
 
 /// While one session wakes slowly, others open, and their states are kept.
 #[test]
-fn a_slow_wake_holds_nobody_up() {
+fn a_slow_restore_blocks_no_client() {
     static GATE: Gate = Gate::open();
     let asleep = Asleep::new(&GATE, gated!(GATE), limits());
     block_on(async {
@@ -314,7 +314,7 @@ fn closing_what_wakes() {
 
 /// A failure to store an accept without a reply is reported by the next reply of its stream, to any request.
 #[test]
-fn an_accept_that_is_not_kept_is_told() {
+fn an_accept_that_is_not_kept_is_reported() {
     static GATE: Gate = Gate::open();
     let folder = tempfile::tempdir().expect("a folder");
     // room for the netlist and no state

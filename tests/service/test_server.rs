@@ -78,7 +78,7 @@ impl Running {
     }
 
     /// Requests it to stop.
-    pub(crate) fn tell(&mut self) {
+    pub(crate) fn report(&mut self) {
         drop(self.stop.take());
     }
 

@@ -175,7 +175,7 @@ fn sweeps_of_transients_are_runs_alone() {
 /// one of the row's own, and on given segments. A cantilever pressed with up to half of Euler's load; one pulled in one
 /// piece.
 #[test]
-fn rows_tell_what_the_commands_tell() {
+fn rows_report_what_the_commands_report() {
     let pressed = "param F=1u\nprocess p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\n\
                    beam2d p [a b] [l=200u w=2u]\nf2d * [b] [F=F oz=pi]\nf2d * [b] [F=1n oz=pi/2]\n";
     let outputs = vec!["b.y".to_owned()];
@@ -206,7 +206,7 @@ fn rows_tell_what_the_commands_tell() {
 /// to a part released far that exchanges energy between its modes for milliseconds, and not to one that has only begun
 /// to move.
 #[test]
-fn rows_tell_how_far_their_steps_are_off() {
+fn rows_report_how_far_their_steps_are_off() {
     let text = BEAMS;
     let outputs = vec!["t.y".to_owned()];
     let options = CompileOptions { segments: Some(3), undamped: true, tol: 1e-2, ..CompileOptions::default() };

@@ -129,7 +129,7 @@ mod tests {
 
     /// A sine of 28 points a cycle, even or uneven steps, is no alternation by itself; one of 5 % of its range is reported once.
     #[test]
-    fn alternation_is_told_from_motion() {
+    fn alternation_is_distinguished_from_motion() {
         let even = |_: u32| std::f64::consts::TAU / 28.0;
         let uneven = |n: u32| even(n) * [1.3, 0.7, 1.1, 0.9, 1.0][n as usize % 5];
         assert_eq!(reports(f64::sin, f64::cos, 0.0, even), 0);

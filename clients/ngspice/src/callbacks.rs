@@ -51,7 +51,7 @@ pub(crate) unsafe extern "C" fn ask(
     guarded(|| {
         // SAFETY: the host passes a live instance.
         let key = unsafe { (*instance).conn as usize };
-        let found = usize::try_from(index).ok().and_then(|number| registry().look(key, number));
+        let found = usize::try_from(index).ok().and_then(|number| registry().query(key, number));
         let Some(x) = found else { return code::BADPARM };
         // SAFETY: the host passes a place for a value, which for a real parameter begins with a double.
         unsafe { value.cast::<f64>().write(x) };
@@ -274,7 +274,7 @@ unsafe fn bind_by(which: usize, model: *mut ModelHead, circuit: *mut c_void) -> 
 /// can bear. An answer that was given stands, so a device rejects no step here: one that
 /// needs a shorter step says so in its answer.
 pub(crate) unsafe extern "C" fn trunc(model: *mut ModelHead, circuit: *mut c_void, step: *mut f64) -> c_int {
-    /// ngspice rejects a step when the next one would be less than this share of it, with a little to spare.
+    /// ngspice rejects a step when the next one would be less than this fraction of it, with a little to spare.
     const KEEPS: f64 = 0.91;
     guarded(|| {
         // SAFETY: passed on.

@@ -28,15 +28,15 @@
 pub enum DifferentiationRule {
     /// Backward Euler: nothing before the last point counts.
     First,
-    /// The trapezoidal rule with this share of the current at the last point [1], ½ unless the deck says otherwise.
+    /// The trapezoidal rule with this fraction of the current at the last point [1], ½ unless the deck says otherwise.
     Trapezoidal(f64),
     /// BDF2.
     Gear,
 }
 
-/// Steps below this share of the time since the start may be of rounding [1]: about 10⁶ roundings of the time.
+/// Steps below this fraction of the time since the start may be of rounding [1]: about 10⁶ roundings of the time.
 const RESOLUTION: f64 = 1e-10;
-/// Share of the largest current that rounding may make [1].
+/// Fraction of the largest current that rounding may make [1].
 const SEEN: f64 = 1e-5;
 
 /// The shortest step to differentiate over that ends at `t` [s], where rounding hides the slope.

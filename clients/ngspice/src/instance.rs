@@ -32,7 +32,7 @@ pub struct Instance {
     small_key: Option<(Token, u64)>,
     accepted: Option<Token>,
     /// The last equilibrium whose warnings were read.
-    looked: Option<Token>,
+    warned: Option<Token>,
     step_bound: f64,
     refusals: FailedEvaluations,
     alternation: Alternation,
@@ -123,7 +123,7 @@ impl Instance {
             small: SmallSignal::default(),
             small_key: None,
             accepted: None,
-            looked: None,
+            warned: None,
             step_bound: f64::INFINITY,
             refusals: FailedEvaluations::default(),
             alternation: Alternation::default(),
@@ -206,8 +206,8 @@ impl Instance {
     /// Warnings about its last equilibrium, where the circuit has converged there, in a sweep or at an operating point.
     pub fn settled(&mut self, sweeping: bool) -> Vec<Diagnostic> {
         // a test of convergence comes again where another part has not settled
-        let still = self.answer.token.filter(|_| self.answer.step == 0.0 && self.looked != self.answer.token);
-        self.looked = still.or(self.looked);
+        let still = self.answer.token.filter(|_| self.answer.step == 0.0 && self.warned != self.answer.token);
+        self.warned = still.or(self.warned);
         if sweeping {
             self.refusals.settled();
         }

@@ -49,7 +49,7 @@ pub struct ModelCard {
     pub remote: Option<String>,
     /// How the netlist is compiled.
     pub options: CompileOptions,
-    /// Share of its tolerance that the model gets [1]; below 1 on twice the segments, as the run that another is compared with.
+    /// Fraction of its tolerance that the model gets [1]; below 1 on twice the segments, as the run that another is compared with.
     pub share: f64,
     /// Longest wait for an answer of the server [s], default 5.
     pub deadline: Duration,
@@ -166,7 +166,7 @@ impl ModelCard {
         })
     }
 
-    /// With this share of its tolerance [1]; a smaller one than all of it comes with a finer mesh, too.
+    /// With this fraction of its tolerance [1]; a smaller one than all of it comes with a finer mesh, too.
     pub fn with_share(self, share: f64) -> Self {
         Self { share, ..self }
     }

@@ -26,7 +26,7 @@ impl Instance {
     }
 
     /// Value of a quantity in the last state, in its own unit; `None` for an unknown one, or without a state.
-    pub(crate) fn look(&mut self, name: &str) -> Option<f64> {
+    pub(crate) fn query(&mut self, name: &str) -> Option<f64> {
         match name {
             "unknowns" => return Some(self.description().unknowns as f64),
             "points" => return Some(self.counts.points as f64),
@@ -35,7 +35,7 @@ impl Instance {
             _ => {}
         }
         let token = self.answer().token?;
-        if let Ok(value) = self.device.look(token, name) {
+        if let Ok(value) = self.device.read_quantity(token, name) {
             return Some(value);
         }
         if let Some(n) = self.monitors.iter().position(|m| m.signal == name) {

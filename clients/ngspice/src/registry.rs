@@ -117,9 +117,9 @@ impl Registry {
     }
 
     /// Value of the quantity with this number in the last state of an instance; none where it has none.
-    pub(crate) fn look(&mut self, key: usize, number: usize) -> Option<f64> {
+    pub(crate) fn query(&mut self, key: usize, number: usize) -> Option<f64> {
         let name = self.names.as_ref()?.get(number)?.to_owned();
-        self.find(key)?.instance.look(&name)
+        self.find(key)?.instance.query(&name)
     }
 
     /// The instance whose connections are at `key`: that address stays the same for its lifetime.

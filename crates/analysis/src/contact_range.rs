@@ -23,7 +23,7 @@ pub fn within_contact_range(compiled: &CompiledModel, q: &[Pose]) -> Result<(), 
 }
 
 /// Warning about that comb.
-pub(crate) fn comb_beyond_told(compiled: &CompiledModel, q: &[Pose]) -> Option<String> {
+pub(crate) fn comb_beyond_reported(compiled: &CompiledModel, q: &[Pose]) -> Option<String> {
     let (name, [way, room]) = comb_beyond(compiled, q)?;
     Some(format!(
         "the comb `{name}` closes by {:.3} µm, and its fingers have {:.3} µm to the other side: nothing stops them there",

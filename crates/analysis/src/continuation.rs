@@ -1,6 +1,6 @@
 //! Equilibrium paths: the equilibria of a mechanism under a growing load, voltage, temperature or stress, past folds
 //! and through bifurcations.
-use super::contact_range::{comb_beyond_told, within_contact_range};
+use super::contact_range::{comb_beyond_reported, within_contact_range};
 use super::statics::{OperatingPoint, beam_motions, node_motions, notes_at, operating_point, source_vector, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, ProgressCallback};
 use crate::readout::signal::{Signal, SignalView};
@@ -25,7 +25,7 @@ pub enum PathInput<'a> {
 #[derive(Debug, Clone)]
 pub struct ContinuationRequest<'a> {
     /// Parameter of the path.
-    pub growing: PathInput<'a>,
+    pub input: PathInput<'a>,
     /// Its first value [V, the parameter's unit, or 1]. The path starts at the equilibrium there.
     pub from: f64,
     /// Its last value.
@@ -100,7 +100,7 @@ pub fn trace(
         request.signals.iter().map(|name| Signal::find(compiled, name)).collect::<Result<_, _>>()?;
     let mut volts = [request.voltages.clone(), request.voltages.clone()];
     let mut last = compiled;
-    match request.growing {
+    match request.input {
         PathInput::Port(name) => {
             for (volts, value) in volts.iter_mut().zip([request.from, request.to]) {
                 volts.retain(|(port, _)| port != name);
@@ -114,7 +114,7 @@ pub fn trace(
     let sources = [source_vector(compiled, &volts[0])?, source_vector(last, &volts[1])?];
     let mut family = LoadFamily::new(system, &sources[0], &last.parts.system, &sources[1])
         .map_err(|e| bad("along", e.to_string()))?;
-    let start = if matches!(request.growing, PathInput::Loads) {
+    let start = if matches!(request.input, PathInput::Loads) {
         family.scale_loads([request.from, request.to]);
         let mut first = compiled.clone();
         first.parts.system = family.system().clone();
@@ -198,7 +198,7 @@ fn path_notes(
     notes_at(compiled, start)
         .into_iter()
         .map(begins)
-        .chain(traced.points.iter().find_map(|point| comb_beyond_told(compiled, &point.q)))
+        .chain(traced.points.iter().find_map(|point| comb_beyond_reported(compiled, &point.q)))
         .chain(hot(0.0).or_else(|| hot(farthest)))
         .collect()
 }

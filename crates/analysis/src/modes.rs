@@ -1,5 +1,5 @@
 //! Natural frequencies and shapes about the operating point.
-use super::contact_range::comb_beyond_told;
+use super::contact_range::comb_beyond_reported;
 use super::loose_parts;
 use super::rotary_inertia_error;
 use super::sensitivity::LinearizationPoint;
@@ -150,7 +150,7 @@ fn shapeless(compiled: &CompiledModel, count: usize, voltages: &PortVoltages) ->
     let q = if loaded {
         let point = operating_point(compiled, voltages)?;
         way = notes_at(compiled, &point);
-        way.extend(comb_beyond_told(compiled, &point.q));
+        way.extend(comb_beyond_reported(compiled, &point.q));
         way.extend(too_hot(compiled, &point));
         let driven = point.drive(compiled);
         // as SUGAR: heat and loads move what the field pulls at, and do nothing to the stiffness of beams

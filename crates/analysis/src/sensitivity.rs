@@ -1,7 +1,7 @@
 //! How much faster frequencies move than the equilibrium that they are about.
 //!
 //! Next to a fold the lowest frequency goes to zero as the fourth root of what is left of the voltage: an error of the deflection there is
-//! one of a hundred times that in the frequency. Seen by moving the equilibrium by a share of itself, mode by mode:
+//! one of a hundred times that in the frequency. Seen by moving the equilibrium by a fraction of itself, mode by mode:
 //! ```text
 //! d ln f / d ln q = xᵀ·[K(q·(1 + δ)) − K(q·(1 − δ))]·x / (4·δ·λ),   xᵀMx = 1
 //! ```
@@ -14,7 +14,7 @@ use bimorph_multibody::planar::Pose;
 
 /// δ of the equilibrium: far above rounding, far below what a gap closes by.
 const STEP: f64 = 1e-5;
-/// A mode below this share of the highest one is one without stiffness, whose frequency is rounding.
+/// A mode below this fraction of the highest one is one without stiffness, whose frequency is rounding.
 const FREE: f64 = 1e-9;
 
 /// Modes about an equilibrium: `q` under `drive`, with the stiffness that stress adds where `stressed`, their λ and shapes.

@@ -3,7 +3,7 @@
 //! A straight beam that is heated beyond its buckling load stays straight in an ideal computation: nothing pushes it
 //! aside. The signs of the pivots of the tangent stiffness show it (Sylvester): each negative one is an unstable
 //! direction. Such a direction is no fault while the motion goes along it, as in a snap or a pull-in; it is one while
-//! the motion has no share in it.
+//! the motion has no part in it.
 
 use bimorph_domains::{Drive, System};
 use bimorph_multibody::forces::add_inertia;

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 /// Smallest range that a voltage [V] or a current [A] is measured against: ngspice solves no finer (`vntol`, `abstol`).
 const MIN_RANGE: [(&str, f64); 2] = [("V", 1e-6), ("A", 1e-12)];
-/// Smallest range, as a share of the largest magnitude [1]: of a constant, the difference is relative to a thousandth of it.
+/// Smallest range, as a fraction of the largest magnitude [1]: of a constant, the difference is relative to a thousandth of it.
 const MIN_SHARE: f64 = 1e-3;
 
 /// How far apart a vector is.

@@ -265,7 +265,7 @@ mod tests {
 
     /// The waveform of a source follows its voltage; a name without a source is an error.
     #[test]
-    fn sources_give_what_they_are_told() {
+    fn sources_follow_their_waveforms() {
         let drive =
             |name: &str| DeckSpec { drives: vec![(name.into(), "PULSE(0 4 1u)".into())], ..DeckSpec::default() };
         let more = "bias Vsrc * [s e] [V=4]\nr R * [s m] [R=1k]\ndrive port * [m e] []\n";
@@ -329,7 +329,7 @@ mod tests {
 
     /// Each port is driven by a source; missing or unknown ones are an error.
     #[test]
-    fn what_is_missing_is_told() {
+    fn what_is_missing_is_reported() {
         let port = "drive port * [m e] []\n";
         let wanted = DeckSpec { ports: vec![("drive".into(), 2.0)], ..DeckSpec::default() };
         let text = deck(port, &wanted).unwrap();

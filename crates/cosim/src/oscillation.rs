@@ -30,7 +30,7 @@ pub struct Oscillation {
     pub difference: [f64; 2],
 }
 
-/// The oscillation that two runs have in common, where the difference of their points, as a share of the range, is one of phase.
+/// The oscillation that two runs have in common, where the difference of their points, as a fraction of the range, is one of phase.
 pub(super) fn common(a: (&[f64], &[f64]), b: (&[f64], &[f64]), largest: f64) -> Option<Oscillation> {
     let [[f, p], [g, q]] = [settled(a)?, settled(b)?];
     let difference = [(f / g - 1.0).abs(), (p / q - 1.0).abs()];

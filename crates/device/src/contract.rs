@@ -212,7 +212,7 @@ pub trait Device: Send {
     /// [`DeviceError::UnknownToken`], [`DeviceError::Remote`].
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError>;
 
-    /// Names that [`Device::look`] knows: those of [`quantities::WHOLE`] and every signal. Empty where a device cannot
+    /// Names that [`Device::read_quantity`] knows: those of [`quantities::WHOLE`] and every signal. Empty where a device cannot
     /// be inspected.
     fn names(&self) -> Vec<String> {
         Vec::new()
@@ -222,7 +222,7 @@ pub trait Device: Send {
     ///
     /// # Errors
     /// [`DeviceError::UnknownToken`], [`DeviceError::UnknownSignal`].
-    fn look(&mut self, token: Token, name: &str) -> Result<f64, DeviceError> {
+    fn read_quantity(&mut self, token: Token, name: &str) -> Result<f64, DeviceError> {
         let _ = token;
         let hint = "this device shows what was opened alone".to_owned();
         Err(DeviceError::UnknownSignal { name: name.to_owned(), hint })

@@ -18,7 +18,7 @@ use bimorph_multibody::planar::Pose;
 const NEXT: f64 = 1.0;
 /// Growth over a step beyond which its result is not used [1].
 const MAX: f64 = 3.0;
-/// Length of the difference that stands for K·s, as a share of the model's length scale [1].
+/// Length of the difference that stands for K·s, as a fraction of the model's length scale [1].
 const DIFFERENCE: f64 = 1e-5;
 
 /// Growth rates of the last trials.

@@ -84,7 +84,7 @@ impl Device for LocalDevice {
         quantities::names(&self.compiled)
     }
 
-    fn look(&mut self, token: Token, name: &str) -> Result<f64, DeviceError> {
+    fn read_quantity(&mut self, token: Token, name: &str) -> Result<f64, DeviceError> {
         let session = self.session.as_mut().ok_or(DeviceError::NotOpen)?;
         let state = session.states.get(token).ok_or(DeviceError::UnknownToken(token))?;
         session.read_quantity(&self.compiled, &state, name)

@@ -119,7 +119,7 @@ impl PhaseErrorMonitor {
 
     /// The warning with the number of the value, where the error exceeds the tolerance for the first time, or three
     /// times the last warning.
-    pub(super) fn tell(
+    pub(super) fn report(
         &mut self,
         mode: &LowestMode,
         tol: f64,

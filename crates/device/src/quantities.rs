@@ -8,7 +8,7 @@ use bimorph_analysis::readout::signal::{self, Signal, SignalView};
 use bimorph_domains::{Domain, MaterialPoint};
 use bimorph_model::compile::CompiledModel;
 
-/// Quantities of a state as a whole, with what they are, by the names under which [`super::Device::look`] knows them beside signals.
+/// Quantities of a state as a whole, with what they are, by the names under which [`super::Device::read_quantity`] knows them beside signals.
 pub const WHOLE: [(&str, &str); 3] = [
     ("moved", "largest displacement of a node or a point along a beam [m]"),
     ("closest", "smallest distance left between plates or facing beams [m]"),

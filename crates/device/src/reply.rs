@@ -10,7 +10,7 @@ use bimorph_analysis::readout::signal::{Signal, SignalView};
 use bimorph_domains::System;
 use bimorph_model::compile::CompiledModel;
 
-/// Share of the length scale that the integrator takes for nothing, in units of its tolerance [1].
+/// Fraction of the length scale that the integrator takes for nothing, in units of its tolerance [1].
 const FLOOR: f64 = 1e-4;
 /// Temperature difference that is negligible for a circuit [K].
 const SAME_TEMPERATURE: f64 = 1e-6;

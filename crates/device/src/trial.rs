@@ -21,7 +21,7 @@ const MAX_INTERNAL_STEPS: usize = 512;
 /// not cost too much, and a change of pace from one step to the next stay below [`MAX_INTERNAL_STEPS`].
 const PROPOSED_STEPS: f64 = 32.0;
 
-/// Share of a charge's derivative beyond that of the capacitance at rest from which on the motion may be unstable [1]: at λh = 1 the response of a
+/// Fraction of a charge's derivative beyond that of the capacitance at rest from which on the motion may be unstable [1]: at λh = 1 the response of a
 /// growing motion adds 18 % or more.
 const RESPONDS: f64 = 0.1;
 

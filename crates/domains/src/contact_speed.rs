@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 
 /// Speed of reference where nothing elastic holds the part, or it has no mass [m/s].
 pub const WITHOUT_STATICS: f64 = 1.0;
-/// Loads that cancel to less than this share of their sum act one by one.
+/// Loads that cancel to less than this fraction of their sum act one by one.
 const CANCELLED: f64 = 1e-3;
 /// Contacts that get a shape of their own; the others share that of the last one.
 const MAX_SHAPES: usize = 256;

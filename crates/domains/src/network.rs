@@ -278,7 +278,7 @@ mod tests {
     /// Infinite conductances, or conductances with an infinite sum, are reported by the smallest resistance, also
     /// without any source.
     #[test]
-    fn conductances_out_of_range_are_told() {
+    fn conductances_out_of_range_are_reported() {
         for resistors in [vec![(0, 1, 1.0), (0, 1, 1e-310)], vec![(0, 1, 1.01e-308), (0, 1, 1e-308)]] {
             let circuit = ElectricalNetwork { nodes: 3, resistors, sources: vec![], grounds: vec![1] };
             assert_eq!(circuit.solve(), Err(CircuitError::Range { resistor: 1 }));

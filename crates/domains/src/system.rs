@@ -141,7 +141,7 @@ impl System {
         self.model.project(r);
     }
 
-    /// The tangent at `here` less a share of that at `there`, held directions not removed; `r` is spoiled.
+    /// The tangent at `here` less a fraction of that at `there`, held directions not removed; `r` is spoiled.
     pub fn tangent_less(
         &self,
         here: (&[Pose], &Drive),
@@ -195,7 +195,7 @@ impl System {
     ///
     /// Small displacements about the drawing have K of unstressed parts. Vibrations about an equilibrium have more: the forces N, V, M in
     /// the joints turn with them (K_σ of [`forces::add_stress_stiffness`]), and so do the points at which loads, voltage and contact act:
-    /// [`System::add_levers`]. Left out, a beam of N segments under thrust is too stiff by a share that falls with 1/N only.
+    /// [`System::add_levers`]. Left out, a beam of N segments under thrust is too stiff by a fraction that falls with 1/N only.
     #[inline]
     pub fn add_stress_stiffness(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
         forces::add_stress_stiffness(&self.model, q, &drive.rest(), tangent);

@@ -140,7 +140,7 @@ impl Heating {
         sum
     }
 
-    /// Steady mean rise of heater `k` on the straight line from `from` to `to`: its coefficients in the share x of the way,
+    /// Steady mean rise of heater `k` on the straight line from `from` to `to`: its coefficients in the fraction x of the way,
     /// c₀ + c₁·x + c₂·x² [K].
     #[inline]
     pub fn between(&self, k: usize, from: &[f64], to: &[f64]) -> [f64; 3] {

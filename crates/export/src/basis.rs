@@ -13,7 +13,7 @@ use bimorph_solve::eigen::Modes;
 use bimorph_solve::frequency::refined::Refined;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Share of its energy below which a direction of the static correction depends on others.
+/// Fraction of its energy below which a direction of the static correction depends on others.
 const DEPENDENT: f64 = 1e-9;
 
 /// Directions in which a model moves, φᵀMφ = 1 and φᵀKφ = λ, orthogonal to each other.

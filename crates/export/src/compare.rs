@@ -28,13 +28,13 @@ const MAX_MODES: usize = 128;
 const PER_DECADE: f64 = 30.0;
 /// How far below the lowest corner the comparison begins.
 const FAR_BELOW: f64 = 100.0;
-/// Share of the parts of a value below which it counts as a zero of the curve.
+/// Fraction of the parts of a value below which it counts as a zero of the curve.
 const ZERO: f64 = 0.01;
-/// Share of what modes could contribute below which ports and signals do not see each other.
+/// Fraction of what modes could contribute below which ports and signals do not see each other.
 const UNSEEN: f64 = 1e-7;
-/// Share of the tolerance with which a mode must show at its own resonance to be kept.
+/// Fraction of the tolerance with which a mode must show at its own resonance to be kept.
 const SHOWS: f64 = 0.1;
-/// Share of what is there at its resonance from which a mode counts for the band.
+/// Fraction of what is there at its resonance from which a mode counts for the band.
 const COUPLED: f64 = 0.01;
 /// Damping over frequency up to which a mode counts as undamped, and the half width of the grid about its resonance.
 const UNDAMPED: f64 = 1e-9;

@@ -24,7 +24,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Displacement that a volt of a mode's share stands for where the mode moves most [m].
 const MICROMETRE: f64 = 1e-6;
-/// A coupling below this share of the largest of its kind is rounding.
+/// A coupling below this fraction of the largest of its kind is rounding.
 const NONE: f64 = 1e-10;
 
 /// Kind of a row of y.

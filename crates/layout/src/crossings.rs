@@ -317,7 +317,7 @@ mod tests {
     /// Adjacent boxes share edges without an intersection. Shifted boxes intersect once for each end that lies on
     /// another's edge.
     #[test]
-    fn boxes_side_by_side() {
+    fn adjacent_boxes() {
         let row = |shift: i32| -> Vec<Polygon> {
             (0..100).map(|k| Polygon::rectangle([10 * k + shift, shift / 3], [10 * k + 10 + shift, 10])).collect()
         };

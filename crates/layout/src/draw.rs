@@ -12,7 +12,7 @@ use std::collections::HashMap;
 
 /// Pads whose sizes are not given [m].
 const PAD: f64 = 10e-6;
-/// The mask of anchors lies inside its pad by this share of the pad's smaller side [1].
+/// The mask of anchors lies inside its pad by this fraction of the pad's smaller side [1].
 const INSET: f64 = 0.1;
 /// A corner is closed up to this many half widths behind its node.
 const LONGEST_CORNER: f64 = 2.0;
@@ -61,7 +61,7 @@ pub(crate) fn draw(lines: &ElementLines, at: &HashMap<String, [f64; 2]>, process
     drawing.beams_and_plates();
     drawing.anchors();
     drawing.fields();
-    drawing.tell();
+    drawing.report();
     drawing.figure
 }
 
@@ -261,7 +261,7 @@ impl<'a> Draw<'a> {
         }
     }
 
-    fn tell(&mut self) {
+    fn report(&mut self) {
         let mut missing: HashMap<&str, usize> = HashMap::new();
         for line in &self.lines.elements {
             let lumped =

@@ -194,7 +194,7 @@ fn measure(
     let figure = draw::draw(lines, at, process);
     let mut notes = Vec::new();
     let mut changed = 0;
-    let mut tell = |text: String| {
+    let mut report = |text: String| {
         changed += 1;
         if changed <= MAX_REPORTED {
             notes.push(text);
@@ -215,7 +215,7 @@ fn measure(
         let reported = [line.get("l").unwrap_or(0.0), line.get("oz").unwrap_or(0.0)];
         let miss = (reported[0] * reported[1].cos() - dx).hypot(reported[0] * reported[1].sin() - dy);
         if miss > ROUNDING * unit {
-            tell(format!("`{}` is drawn {} µm long, its label says {}", line.name, um(l), um(reported[0])));
+            report(format!("`{}` is drawn {} µm long, its label says {}", line.name, um(l), um(reported[0])));
             line.set("l", l);
             line.set("oz", oz);
         }
@@ -226,11 +226,11 @@ fn measure(
         match widths.measure(layer, a.map(|x| x / unit), b.map(|x| x / unit), w / unit) {
             Width::AsTold => {}
             Width::Other(drawn) => {
-                tell(format!("`{}` is drawn {} µm wide, its label says {}", line.name, um(drawn * unit), um(w)));
+                report(format!("`{}` is drawn {} µm wide, its label says {}", line.name, um(drawn * unit), um(w)));
                 line.set("w", drawn * unit);
             }
             Width::Unclear => {
-                tell(format!(
+                report(format!(
                     "the width of `{}` cannot be measured at {place}: its label's {} µm were taken",
                     line.name,
                     um(w)

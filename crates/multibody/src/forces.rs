@@ -77,7 +77,7 @@ impl PackedJoint {
 pub struct RestStrain<'a> {
     /// Free strain of each group of joints [1].
     pub expansion: &'a [f64],
-    /// Share of the built-in offsets ([`Joint::rest`]) that acts [1].
+    /// Fraction of the built-in offsets ([`Joint::rest`]) that acts [1].
     pub built_in: f64,
 }
 

@@ -238,7 +238,7 @@ impl Model {
         }
     }
 
-    /// Removes the held directions from a matrix and gives them pivots, so that solutions have no share in them.
+    /// Removes the held directions from a matrix and gives them pivots, so that solutions have no part in them.
     pub fn project_matrix<T: super::Scalar>(&self, matrix: &mut BlockMatrix<T, 3>) {
         if self.held.is_empty() {
             return;

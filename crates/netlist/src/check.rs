@@ -24,7 +24,7 @@ const RESISTANCES: RangeInclusive<f64> = 1e-300..=1e300;
 pub(crate) fn finite(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     let s = &drawing.structure;
     let mut reported = HashSet::new();
-    let mut look = |name: &str, node: NodeId, good: bool| {
+    let mut check_finite = |name: &str, node: NodeId, good: bool| {
         if !good && reported.len() < MAX_REPORTED && reported.insert(name.to_owned()) {
             let message = format!("what `{name}` has in the model is not finite: its sizes are out of any range");
             let help = "check its numbers, their suffixes and exponents";
@@ -33,37 +33,41 @@ pub(crate) fn finite(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     };
     let all = |values: &[f64]| values.iter().all(|x| x.is_finite());
     for (index, node) in s.nodes.iter().enumerate() {
-        look(&node.name, NodeId(index), all(&node.position));
+        check_finite(&node.name, NodeId(index), all(&node.position));
     }
     for b in &s.beams {
         let sizes = [b.length, b.width, b.thickness];
         let products = [b.material.density * b.width * b.thickness * b.length, b.thickness * b.width.powi(3)];
-        look(&b.name, b.a, all(&sizes) && all(&products) && sizes.iter().chain([&products[1]]).all(|x| *x > 0.0));
+        check_finite(
+            &b.name,
+            b.a,
+            all(&sizes) && all(&products) && sizes.iter().chain([&products[1]]).all(|x| *x > 0.0),
+        );
     }
     for m in &s.masses {
-        look(&m.name, m.node, all(&[m.mass, m.inertia, m.drag[0], m.drag[1]]));
+        check_finite(&m.name, m.node, all(&[m.mass, m.inertia, m.drag[0], m.drag[1]]));
     }
     for k in &s.springs {
-        look(&k.name, k.a, all(&k.stiffness) && all(&k.damping));
+        check_finite(&k.name, k.a, all(&k.stiffness) && all(&k.damping));
     }
     for p in &s.placed {
-        look(&p.name, p.nodes[0], all(&p.values));
+        check_finite(&p.name, p.nodes[0], all(&p.values));
     }
     for f in &s.loads {
-        look(&f.name, f.node, all(&f.force) && f.moment.is_finite());
+        check_finite(&f.name, f.node, all(&f.force) && f.moment.is_finite());
     }
     for r in &s.resistors {
-        look(&r.name, r.a, RESISTANCES.contains(&r.resistance));
+        check_finite(&r.name, r.a, RESISTANCES.contains(&r.resistance));
     }
     for c in &s.combs {
-        look(&c.name, c.a, all(&[c.gaps * c.permittivity * c.height / c.gap, c.overlap, c.parasitic]));
+        check_finite(&c.name, c.a, all(&[c.gaps * c.permittivity * c.height / c.gap, c.overlap, c.parasitic]));
     }
     for g in &s.beam_gaps {
-        look(&g.name, g.nodes[0], all(&[g.permittivity * g.height * g.fringe, g.length, g.gap]));
+        check_finite(&g.name, g.nodes[0], all(&[g.permittivity * g.height * g.fringe, g.length, g.gap]));
     }
     for b in s.beams.iter().filter_map(|b| b.heater.as_ref().map(|h| (b, h))) {
         let conducts = RESISTANCES.contains(&b.1.resistance) && RESISTANCES.contains(&b.1.conductance);
-        look(&b.0.name, b.0.a, conducts && all(&[b.1.time_constant.unwrap_or(0.0), b.1.capacity]));
+        check_finite(&b.0.name, b.0.a, conducts && all(&[b.1.time_constant.unwrap_or(0.0), b.1.capacity]));
     }
 }
 

@@ -107,7 +107,7 @@ mod tests {
 
     /// The first line that only one language allows decides the language; comments of SUGAR 2 decide nothing.
     #[test]
-    fn files_are_told_apart() {
+    fn languages_are_detected() {
         assert_eq!(language("% net=cho_load('x.net');\nuses mumps.net\nanchor p1 [a] []\n"), ('n', 0));
         assert_eq!(language("% title\nuse(\"mumps.net\")\n"), ('l', 8));
         assert_eq!(language("use 'mumps.net'\n"), ('l', 0));

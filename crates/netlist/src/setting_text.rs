@@ -28,7 +28,7 @@ impl Setting {
         let bundle = Bundle::from_text("setting", &format!("param value = {line}"));
         let mut sink = DiagnosticSink::new(&bundle.root);
         if percent {
-            // it would begin a comment, and a share in percent become one in full
+            // it would begin a comment, and a fraction in percent become one in full
             sink.error("E049", TextSpan::NOWHERE, format!("`{line}` has a `%`"), "write 0.01 for 1 %");
         }
         let program = parser::parse(&bundle, &mut sink);

@@ -62,7 +62,7 @@ pub enum GuardError {
 ///
 /// # Errors
 /// [`GuardError`].
-pub fn look_at(files: &GuardFiles) -> Result<Vec<String>, GuardError> {
+pub fn inspect(files: &GuardFiles) -> Result<Vec<String>, GuardError> {
     let guard = LoadedFiles::of(files)?;
     let mut found = Vec::new();
     if let Some(path) = &files.certificate {

@@ -25,7 +25,7 @@ impl ByteQuota {
     ///
     /// # Errors
     /// A storage that is full, with the name of the limit.
-    pub(super) fn look(&self, before: usize, after: usize) -> io::Result<()> {
+    pub(super) fn check(&self, before: usize, after: usize) -> io::Result<()> {
         let used = self.used().saturating_sub(before).saturating_add(after);
         if used > self.most { Err(self.full(used)) } else { Ok(()) }
     }

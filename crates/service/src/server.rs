@@ -279,8 +279,8 @@ async fn expire(shared: Arc<ServerState>) {
             let _ = tokio::task::spawn_blocking(move || store.expire(forget)).await;
         }
         let sessions = shared.sessions.expire(&shared.limits);
-        let looked = Arc::clone(&shared);
-        let sweeps = tokio::task::spawn_blocking(move || looked.jobs.expire(&looked.limits)).await.unwrap_or(0);
+        let expiring = Arc::clone(&shared);
+        let sweeps = tokio::task::spawn_blocking(move || expiring.jobs.expire(&expiring.limits)).await.unwrap_or(0);
         if sessions + sweeps > 0 {
             tracing::info!(sessions, sweeps, open = shared.sessions.len(), "forgot what was idle");
         }

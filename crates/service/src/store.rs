@@ -256,7 +256,7 @@ impl SessionStore {
     /// that fails.
     pub(super) fn counted(&self, path: &Path, bytes: usize, write: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
         let before = size(path);
-        self.room.look(before, bytes)?;
+        self.room.check(before, bytes)?;
         let written = write();
         self.room.count(before, size(path));
         written

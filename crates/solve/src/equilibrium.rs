@@ -27,7 +27,7 @@ use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::Pose;
 use path::LoadPath;
 
-/// Corrections below this share of the displacement that no longer shrink are rounding.
+/// Corrections below this fraction of the displacement that no longer shrink are rounding.
 const STALLED: f64 = 1e-5;
 /// Largest residual force in such a place, as a fraction of the largest contact force, where parts touch. Contact softens towards
 /// the touch, and Newton's method then takes a quarter of the way each time: that is no rounding.
@@ -36,13 +36,13 @@ const UNBALANCED: f64 = 1e-6;
 /// Smallest load step where the present load is next to nothing, as a fraction of the path.
 const MIN_STEP: f64 = 1e-10;
 
-/// Share of the distance of electrodes that one step may change. A plate on a spring folds at a third.
+/// Fraction of the distance of electrodes that one step may change. A plate on a spring folds at a third.
 const LEAP: f64 = 0.5;
 
 /// How an equilibrium is searched. `Default` is the only place where the numbers stand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EquilibriumOptions {
-    /// Newton stops when a correction is below this share of the displacement, default 1e-10. Smaller: one more iteration.
+    /// Newton stops when a correction is below this fraction of the displacement, default 1e-10. Smaller: one more iteration.
     pub tolerance: f64,
     /// Newton iterations per load step, default 12.
     pub iterations: usize,

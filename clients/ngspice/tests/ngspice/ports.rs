@@ -143,7 +143,7 @@ fn circuit_elements_are_dampers_and_springs() {
 
 /// A mechanical port on `%gd`, an electrical one on `%hd`, and a scale on an electrical port are refused with the way out.
 #[test]
-fn wrong_connections_are_told() {
+fn wrong_connections_are_reported() {
     let (_, ngspice) = versions().swap_remove(0);
     for (instance, ports, words) in [
         ("A1 %gd [a 0] null plate", "\"m.x\"", "%hd before the nodes of \"m.x\""),

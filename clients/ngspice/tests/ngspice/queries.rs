@@ -62,7 +62,7 @@ fn an_operating_point_shows_what_the_plate_is_like() {
 
 /// `show` lists an instance's numbers, and ends no run; a name that an instance does not have is an error of `print` alone.
 #[test]
-fn show_lists_numbers_and_unknown_names_are_told() {
+fn show_lists_numbers_and_unknown_names_are_reported() {
     for (version, ngspice) in versions() {
         let output =
             said(&ngspice, "op\nshow a1\nshow a2 : hottest\nprint @a1[nothing.x]\nprint @a2[gap.gap]\necho on");

@@ -24,7 +24,7 @@ fn reported(ngspice: &Path, source: &str, analysis: &str) -> Vec<String> {
 /// Heat beyond the strength of any solid (W037) and fingers beyond the other side of their comb (W024) are reported by
 /// an operating point, a sweep and a transient, each once. A deck within its range has no warnings.
 #[test]
-fn states_beyond_their_range_are_told_once() {
+fn states_beyond_their_range_are_reported_once() {
     for (version, ngspice) in versions() {
         let both = ["W024", "W037"].map(String::from);
         for (source, analysis) in [("30", ".op"), ("0", ".dc V1 0 30 1"), ("PWL(0 0 10u 40)", ".tran 1u 400u")] {
@@ -40,7 +40,7 @@ fn states_beyond_their_range_are_told_once() {
 /// error of its mesh reaches the tolerance, and again whenever it is three times larger, up to six times. On the mesh
 /// for the tolerance there is none.
 #[test]
-fn what_rings_out_of_step_is_told() {
+fn phase_errors_are_reported() {
     let net = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=200u w=2u]\n";
     for (version, ngspice) in versions() {
         for (more, reported) in [("segments=3", 4..=6), ("", 0..=0)] {

@@ -6,7 +6,7 @@
 
 use crate::transient::TransientResult;
 
-/// Share of the largest displacement, or swing of a unit, by which what moves less is measured.
+/// Fraction of the largest displacement, or swing of a unit, by which what moves less is measured.
 pub(crate) const SMALL: f64 = 1.0 / 30.0;
 
 /// A signal: name, unit, samples.

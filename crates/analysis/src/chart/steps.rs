@@ -19,7 +19,7 @@ use std::time::Instant;
 /// A repeat makes as many steps as fit into this many multiplications, at least one and at most [`MAX_STEPS`].
 const MULTIPLICATIONS: u64 = 20_000_000;
 const MAX_STEPS: u64 = 20;
-/// Length of a step, as a share of the run.
+/// Length of a step, as a fraction of the run.
 const STEP_FRACTION: f64 = 1e-3;
 /// A step with more multiplications than this is left out: it would take seconds.
 const MAX_MULTIPLICATIONS: u64 = 5_000_000_000;

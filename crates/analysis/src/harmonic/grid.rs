@@ -16,17 +16,17 @@ pub enum Spacing {
 
 /// Where points are added about a resonance, in half widths.
 const ABOUT: [f64; 13] = [-8.0, -4.0, -2.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0];
-/// The same where nothing damps it, as shares of its frequency: its height has no bound, so that it is drawn by its flanks.
+/// The same where nothing damps it, as fractions of its frequency: its height has no bound, so that it is drawn by its flanks.
 const FLANK_OFFSETS: [f64; 8] = [-1e-3, -1e-4, -1e-5, -1e-6, 1e-6, 1e-5, 1e-4, 1e-3];
 /// Points that are added at most.
 pub(super) const MAX_ADDED: usize = 4000;
 /// Doublings of the distance from a resonance at most, on its flanks.
 const MAX_DOUBLED: i32 = 40;
-/// Nearer than this share of its frequency to an undamped resonance a value says nothing: rounding moves the resonance by as much.
+/// Nearer than this fraction of its frequency to an undamped resonance a value says nothing: rounding moves the resonance by as much.
 pub(super) const UNBOUNDED: f64 = 1e-9;
 /// Steps shorter than this fraction of the others are omitted.
 const WHOLE: f64 = 1e-6;
-/// Two frequencies nearer than this share are one.
+/// Two frequencies nearer than this fraction are one.
 const FREQUENCY_TOLERANCE: f64 = 1e-12;
 
 /// How many points the even grid has; none where they cannot be counted.

@@ -40,7 +40,7 @@ pub(crate) const GUARDS: usize = 2;
 const MAX_ZEROS: usize = 8;
 /// Frequencies at which a sum over modes is compared with the exact response.
 const COMPARED: usize = 60;
-/// Share of the sum of its parts below which a value is a zero of the curve.
+/// Fraction of the sum of its parts below which a value is a zero of the curve.
 const ZERO: f64 = 0.01;
 
 /// Response of a signal.

@@ -26,9 +26,9 @@ use std::ops::Range;
 /// Additional modes in a block iteration, and the change of λ at which it ends [1].
 const GUARDS: usize = 6;
 const SETTLED: f64 = 1e-14;
-/// Share of what a row could see below which it sees nothing.
+/// Fraction of what a row could see below which it sees nothing.
 pub(crate) const UNSEEN: f64 = 1e-7;
-/// Of a mechanism that floats the correction is taken at this share of the frequency up to which modes are known [1].
+/// Of a mechanism that floats the correction is taken at this fraction of the frequency up to which modes are known [1].
 const ASIDE: f64 = 0.03;
 
 /// The lowest modes of the small-signal problem, or all there are: about a nonlinear state those of its tangent; of a linear model those
@@ -133,7 +133,7 @@ pub(crate) struct ModalSum {
     pub(super) stir: Vec<Pose>,
 }
 
-/// A rest below this share of what the modes bring is rounding: some 5e-13 were seen where all modes are there.
+/// A rest below this fraction of what the modes bring is rounding: some 5e-13 were seen where all modes are there.
 const NOTHING_LEFT: f64 = 4e-12;
 
 impl ModalSum {
@@ -260,7 +260,7 @@ impl ModalSum {
         force * self.seen[(row, mode)] / *lambda
     }
 
-    /// The same for the most that a row could see of a mode, whatever it sees: below a share [`UNSEEN`] of it, its own share is rounding.
+    /// The same for the most that a row could see of a mode, whatever it sees: below a fraction [`UNSEEN`] of it, its own contribution is rounding.
     pub(crate) fn most_of(&self, row: usize, mode: usize) -> f64 {
         let Some(lambda) = self.lambda.get(mode) else { return 0.0 };
         self.both(Complex::new(0.0, lambda.max(0.0).sqrt()), row) / lambda

@@ -4,7 +4,7 @@ use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// Real part that is rounding, as a share of |s|.
+/// Real part that is rounding, as a fraction of |s|.
 const UNDAMPED: f64 = 1e-13;
 
 /// A pole or a zero, of each conjugate pair that in the upper half plane.

@@ -16,20 +16,20 @@ use faer::Mat;
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 
-/// Steps of the secant rule at most, where they begin beside the guess, and a step that is rounding, as shares of |s|.
+/// Steps of the secant rule at most, where they begin beside the guess, and a step that is rounding, as fractions of |s|.
 const MAX_STEPS: usize = 40;
 const SECANT_OFFSET: f64 = 1e-4;
 const SETTLED: f64 = 1e-13;
 const ROUNDED: f64 = 1e-7;
-/// A zero further from its guess than this share is another one.
+/// A zero further from its guess than this fraction is another one.
 const NEAR: f64 = 0.1;
-/// A zero within this share of the damping of a pole takes it out of the curve.
+/// A zero within this fraction of the damping of a pole takes it out of the curve.
 const UNSEEN: f64 = 0.05;
 /// Frequencies of a band at which a signal is looked for.
 const SEARCH_FREQUENCIES: usize = 8;
 /// Shifts about which the pencil is inverted, in units of the end of the band.
 const SHIFTS: [f64; 3] = [0.37, 0.73, -0.53];
-/// Two of them that are nearer to each other than this share are one.
+/// Two of them that are nearer to each other than this fraction are one.
 const ROOT_TOLERANCE: f64 = 1e-6;
 
 fn sorted(mut roots: Vec<Root>) -> Vec<Root> {

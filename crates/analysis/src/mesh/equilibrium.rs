@@ -28,10 +28,10 @@ use bimorph_netlist::Diagnostic;
 use bimorph_solve::equilibrium::Equilibrium;
 use std::borrow::Cow;
 
-/// Share of the mechanism's size below which a displacement is rounding.
+/// Fraction of the mechanism's size below which a displacement is rounding.
 pub(super) const ROUNDING: f64 = 1e-12;
 
-/// Share of the path beyond which a fold that it passed is looked for anew on each mesh: the one before may have passed it by mistake.
+/// Fraction of the path beyond which a fold that it passed is looked for anew on each mesh: the one before may have passed it by mistake.
 const NEAR_THE_END: f64 = 0.9;
 
 /// The mesh for the equilibrium at these voltages, from `segments` upwards, and the equilibrium on it.
@@ -156,7 +156,7 @@ struct MeshEquilibrium {
     left: Option<f64>,
 }
 
-/// How far beyond its fold an equilibrium is, as a share of the way, where that is little: the mesh may have passed it by mistake.
+/// How far beyond its fold an equilibrium is, as a fraction of the way, where that is little: the mesh may have passed it by mistake.
 fn beyond(point: &OperatingPoint) -> Option<f64> {
     point.path.passed.last().map(|passed| passed.share).filter(|share| *share > NEAR_THE_END).map(|share| 1.0 - share)
 }
@@ -244,7 +244,7 @@ impl<'a> EquilibriumSearch<'a> {
     /// Whether this mesh and twice its segments, where compared, are on one side of their limit.
     fn is_sure(&self, order: &Mesh) -> bool {
         let of = |segments: &[usize]| {
-            self.points.iter().find(|looked| looked.segments == segments).map(|looked| looked.left)
+            self.points.iter().find(|compared| compared.segments == segments).map(|compared| compared.left)
         };
         let twice = doubling::twice(&self.compiled.options, order).and_then(|twice| of(&twice.segments));
         of(&order.segments).zip(twice).is_none_or(|(here, twice)| softening::agree(here, twice))
@@ -253,7 +253,7 @@ impl<'a> EquilibriumSearch<'a> {
     /// The resulting mesh with its equilibrium, and a mesh on which that has buckled. Where the side of the limit is
     /// unknown, there is no error estimate.
     fn ended(mut self, mut order: Mesh) -> Result<(Mesh, OperatingPoint, Option<Vec<usize>>), AnalysisError> {
-        let mut found = self.points.iter().position(|looked| looked.segments == order.segments);
+        let mut found = self.points.iter().position(|compared| compared.segments == order.segments);
         if found.is_none() {
             self.follow(&order.segments)?;
             found = self.points.len().checked_sub(1);

@@ -40,7 +40,7 @@ use std::f64::consts::TAU;
 /// Modes computed first, and at most.
 const FIRST_MODES: usize = 6;
 const MAX_MODES: usize = 48;
-/// Share of the tolerance below which an amplitude is negligible.
+/// Fraction of the tolerance below which an amplitude is negligible.
 const NEGLIGIBLE: f64 = 0.3;
 /// Fraction of the mesh-independent error that each mode may add: the residual outside the modes, and missing rotary
 /// inertia where that is large.

@@ -7,7 +7,7 @@
 //! ```text
 //! |H| + |dH/d ln f|
 //! ```
-//! which is e for a curve that is e too high, and e too for one that is shifted by the share e. Frequencies next to a
+//! which is e for a curve that is e too high, and e too for one that is shifted by the fraction e. Frequencies next to a
 //! resonance of the first mesh are omitted. The frequency of the mode and its contribution to the signal determine the
 //! values there. The contribution is compared as well, relative to itself where its peak exceeds the contributions of
 //! the other modes. A mode next to a zero has a peak and a zero of its own only where the two are distinct. Modes
@@ -36,18 +36,18 @@ use std::ops::Range;
 const COMPARED: usize = 24;
 /// Relative step over which the slope is taken.
 const STEP: f64 = 1e-4;
-/// Frequencies this near to a resonance are left out, as a share.
+/// Frequencies this near to a resonance are left out, as a fraction.
 const NEAR: f64 = 0.02;
 /// Signals that are compared at most, and modes.
 const MAX_SIGNALS: usize = 32;
 const MAX_MODES: usize = 64;
-/// Modes are alike whose frequencies differ by a smaller share.
+/// Modes are alike whose frequencies differ by a smaller fraction.
 const ALIKE: f64 = 0.01;
-/// Modes below this share of the highest λ are rigid motions.
+/// Modes below this fraction of the highest λ are rigid motions.
 const RIGID: f64 = 1e-9;
-/// Share of a mode that rows may see of another by rounding, where both have much the same frequency: 5e-10 were seen.
+/// Fraction of a mode that rows may see of another by rounding, where both have much the same frequency: 5e-10 were seen.
 const SHAPES: f64 = 2e-9;
-/// Sizes below this share of the largest of a signal over the band are errors of that.
+/// Sizes below this fraction of the largest of a signal over the band are errors of that.
 const SMALL: f64 = 1e-9;
 
 /// The response on the mesh that holds the tolerance, which comes with it.

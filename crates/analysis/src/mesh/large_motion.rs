@@ -145,7 +145,7 @@ fn compared(moving: &CompiledModel, options: &TransientOptions<'_>, segments: &[
     Some(if from == segments { difference + of_finer } else { of_finer })
 }
 
-/// A share of the segments, and no fewer than at least.
+/// A fraction of the segments, and no fewer than at least.
 fn between(least: &[usize], segments: &[usize], share: f64) -> Vec<usize> {
     let share = share.clamp(0.5, 1.0);
     segments.iter().zip(least).map(|(n, least)| ((*n as f64 * share).ceil() as usize).max(*least)).collect()

@@ -20,7 +20,7 @@ use bimorph_solve::continuation::Branch;
 const MAX_EVENTS: usize = 8;
 /// Ends of a path that are compared.
 const ENDS: [&str; 2] = ["arrived", "turned back"];
-/// Results that differ by more than this share are of another branch.
+/// Results that differ by more than this fraction are of another branch.
 const OTHER_BRANCH: f64 = 0.3;
 
 /// The path on the mesh for it, which comes with it.
@@ -67,7 +67,7 @@ fn path_from(
     Ok((fitted, result))
 }
 
-/// Share of the largest critical value below which one is taken for zero, and of the whole way [1].
+/// Fraction of the largest critical value below which one is taken for zero, and of the whole way [1].
 const CROSSING: [f64; 2] = [1e-3, 1e-6];
 
 /// Paths on one mesh after the other.
@@ -105,12 +105,12 @@ impl PathSearch<'_, '_> {
 
     fn on(&mut self, segments: &[usize], branch: Branch) -> Result<ContinuationResult, AnalysisError> {
         let model = meshed(self.compiled, segments)?;
-        let last = match self.request.growing {
+        let last = match self.request.input {
             PathInput::Parameter(last) => Some(meshed(last, segments)?),
             _ => None,
         };
-        let growing = last.as_deref().map_or_else(|| self.request.growing.clone(), PathInput::Parameter);
-        let request = ContinuationRequest { growing, branch, ..self.request.clone() };
+        let input = last.as_deref().map_or_else(|| self.request.input.clone(), PathInput::Parameter);
+        let request = ContinuationRequest { input, branch, ..self.request.clone() };
         let found = trace(&model, &request, self.watch);
         self.stopped |= matches!(found, Err(AnalysisError::Cancelled));
         found
@@ -164,7 +164,7 @@ impl PathSearch<'_, '_> {
     }
 }
 
-/// The largest difference of two paths, as a share.
+/// The largest difference of two paths, as a fraction.
 fn apart(first: &[Output], other: &[Output]) -> f64 {
     let one = |(a, b): (&Output, &Output)| {
         if a.value.is_nan() || b.value.is_nan() { 0.0 } else { (a.value - b.value).abs() / a.scale.max(b.scale) }
@@ -179,7 +179,7 @@ fn left_out_at_end(fitted: &CompiledModel, request: &ContinuationRequest<'_>) ->
         let point = operating_point(model, volts).ok()?;
         left_out(model, &point, &point.q)
     };
-    match request.growing {
+    match request.input {
         PathInput::Port(name) => {
             volts.retain(|(port, _)| port != name);
             volts.push((name.to_owned(), request.to));

@@ -12,7 +12,7 @@ use bimorph_model::refine::doubling::{self, Output};
 use bimorph_model::refine::mesh_search::Mesh;
 use bimorph_netlist::Diagnostic;
 
-/// Share of the pull-in voltage that stands for the fold itself, next to which nothing has an equilibrium for sure.
+/// Fraction of the pull-in voltage that stands for the fold itself, next to which nothing has an equilibrium for sure.
 const NEXT: f64 = 0.98;
 
 /// Compared outputs of pull-in.

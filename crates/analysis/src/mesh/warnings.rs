@@ -1,6 +1,6 @@
 //! Warnings from fitting a model to a request.
 
-use super::super::contact_range::comb_beyond_told;
+use super::super::contact_range::comb_beyond_reported;
 use super::super::rotary_inertia_error;
 use super::super::statics::{OperatingPoint, too_hot};
 use bimorph_model::compile::CompiledModel;
@@ -62,11 +62,11 @@ pub(super) fn of_stress(compiled: &CompiledModel, share: Option<f64>) -> Option<
 
 /// Where the fingers of a comb go through its other side at an equilibrium.
 pub(super) fn of_fingers(compiled: &CompiledModel, point: &OperatingPoint) -> Option<Diagnostic> {
-    let message = comb_beyond_told(compiled, &point.q)?;
+    let message = comb_beyond_reported(compiled, &point.q)?;
     Some(Diagnostic::warning(FINGERS, message, "draw the `stop2d` that holds the part, or longer fingers"))
 }
 
-/// Where equal steps [s] are longer than a radian of a motion that a run begins with, of a frequency [Hz] and a share of the way.
+/// Where equal steps [s] are longer than a radian of a motion that a run begins with, of a frequency [Hz] and a fraction of the way.
 pub(super) fn of_steps(step: f64, (frequency, share): (f64, f64)) -> Diagnostic {
     let message = format!(
         "steps of {step:e} s are longer than a radian of the motion at {frequency:.4e} Hz, which has {:.0} % of the way that the run begins with: \

@@ -14,7 +14,7 @@ pub(super) struct SampleRecorder<'a> {
     ramp: &'a Ramp<'a>,
     volts: &'a [f64],
     signals: &'a [Signal],
-    tell: &'a mut dyn FnMut(f64, &[f64]),
+    report: &'a mut dyn FnMut(f64, &[f64]),
     /// Number of the next output time.
     next: usize,
     spacing: f64,
@@ -33,7 +33,7 @@ impl<'a> SampleRecorder<'a> {
         (compiled, options): (&'a CompiledModel, &'a TransientOptions<'a>),
         (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
         signals: &'a [Signal],
-        tell: &'a mut dyn FnMut(f64, &[f64]),
+        report: &'a mut dyn FnMut(f64, &[f64]),
         motion: &Motion,
     ) -> Self {
         let system = &compiled.parts.system;
@@ -44,7 +44,7 @@ impl<'a> SampleRecorder<'a> {
             ramp,
             volts,
             signals,
-            tell,
+            report,
             next: 1,
             spacing: options.stop / (options.points - 1) as f64,
             now: Motion::zeros(system.bodies()),
@@ -88,6 +88,6 @@ impl<'a> SampleRecorder<'a> {
                 column.push(*value);
             }
         }
-        (self.tell)(t, &self.row);
+        (self.report)(t, &self.row);
     }
 }

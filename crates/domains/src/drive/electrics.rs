@@ -14,7 +14,7 @@ pub struct Drive {
     pub volts: Vec<f64>,
     /// Free strain α·T̄ of each heated beam [1].
     pub expansion: Vec<f64>,
-    /// Share of the dead loads and built-in strains that acts [1].
+    /// Fraction of the dead loads and built-in strains that acts [1].
     pub load: f64,
     /// Value of each input in its own unit, in the order of [`Electrics::inputs`].
     pub inputs: Vec<f64>,

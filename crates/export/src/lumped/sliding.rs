@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, Vector2};
 const MAX_COORDINATES: usize = 24;
 /// Scale of the rate of a part without a spring [rad/s].
 pub(super) const FREE_RATE: f64 = 1e5;
-/// Share of a spring's force that may be beside a straight line [1].
+/// Fraction of a spring's force that may be beside a straight line [1].
 const STRAIGHT: f64 = 1e-9;
 
 /// x or y.

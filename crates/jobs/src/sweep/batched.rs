@@ -114,7 +114,7 @@ impl<'a> BatchedSweep<'a> {
         means: &PointBudget,
         finished: &(dyn Fn(&PointOutcome) -> bool + Sync),
     ) -> Option<Vec<PointOutcome>> {
-        let mut found = self.side_by_side(numbers, means);
+        let mut found = self.batch_results(numbers, means);
         let mut outcomes = Vec::with_capacity(numbers.len());
         for (&number, found) in numbers.iter().zip(&mut found) {
             let outcome = match found.take() {
@@ -133,7 +133,7 @@ impl<'a> BatchedSweep<'a> {
     }
 
     /// Results of points from lanes; `None` for those that have to run alone, which also finds their errors.
-    fn side_by_side(&self, numbers: &[usize], means: &PointBudget) -> Vec<Option<PointResults>> {
+    fn batch_results(&self, numbers: &[usize], means: &PointBudget) -> Vec<Option<PointResults>> {
         let none = || numbers.iter().map(|_| None).collect();
         if !self.family.shares() || matches!(self.lanes.get(), Some(None)) {
             return none();

@@ -40,7 +40,7 @@ pub struct Vary {
 }
 
 impl Distribution {
-    /// The value below which the share `u` lies, 0 < u < 1, and `score`, the same share's quantile of the standard normal distribution.
+    /// The value below which the fraction `u` lies, 0 < u < 1, and `score`, the same fraction's quantile of the standard normal distribution.
     pub fn quantile(&self, u: f64, score: f64) -> f64 {
         match *self {
             Self::Normal { mean, deviation } => mean + deviation * score,

@@ -63,7 +63,7 @@ impl SampleGenerator {
         self.asked.vary.iter().enumerate().map(value).collect()
     }
 
-    /// The values below which the share `u` of each parameter lies.
+    /// The values below which the fraction `u` of each parameter lies.
     pub fn quantiles(&self, u: f64) -> Vec<(String, Setting)> {
         let value = |vary: &Vary| Setting::Number(vary.distribution.quantile(u, normal_score(u)));
         self.asked.vary.iter().map(|vary| (vary.name.clone(), value(vary))).collect()

@@ -19,7 +19,7 @@ use bimorph_structure::Beam;
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-/// Shares of the tolerance for which meshes are searched, from coarse to fine.
+/// Fractions of the tolerance for which meshes are searched, from coarse to fine.
 const SHARES: [f64; 3] = [0.6, 0.2, 0.06];
 
 /// See the module.
@@ -82,7 +82,7 @@ impl<'a> SharedMeshes<'a> {
         alike(&first.structure.beams, &drawn.structure.beams).then_some(first)
     }
 
-    /// The mesh that holds a share of the tolerance for one variant.
+    /// The mesh that holds a fraction of the tolerance for one variant.
     fn search(&self, first: &CompiledModel, share: f64) -> Option<Vec<usize>> {
         let mut sharper = first.clone();
         sharper.options = sharper.options.with_tolerance(share * sharper.options.errors().requested());

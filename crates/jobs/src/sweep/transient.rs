@@ -50,7 +50,7 @@ struct SweepMesh {
 struct Steps {
     /// Their tolerance [1].
     tol: f64,
-    /// As a share of the amplitude; none: not compared.
+    /// As a fraction of the amplitude; none: not compared.
     error: Option<f64>,
     /// Where that was found.
     place: &'static str,
@@ -97,14 +97,14 @@ impl<'a> TransientSweep<'a> {
         let compiled: Vec<&CompiledModel> = variants.iter().map(|(_, compiled)| *compiled).collect();
         // lanes have one voltage for all
         let same = self.spec.ports().next().is_none();
-        let side_by_side = same.then(|| {
+        let batch_results = same.then(|| {
             let options = TransientOptions { tol, ..self.transient(&[]) };
             means.guarded(|| {
                 batch_transient::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
             })
         });
         let mut ends: Vec<Option<RunEnd>> = vec![None; numbers.len()];
-        if let Some(Ok((found, _))) = side_by_side {
+        if let Some(Ok((found, _))) = batch_results {
             for ((k, _), end) in variants.iter().zip(found) {
                 ends[*k] = end;
             }
@@ -243,7 +243,7 @@ fn alone(point: &MeshedPoint, options: &TransientOptions<'_>) -> Result<RunEnd, 
     Ok(RunEnd { values, steps: result.counters.steps, warnings: result.warnings })
 }
 
-/// Share of the samples beyond a probe on either side.
+/// Fraction of the samples beyond a probe on either side.
 const RARE: f64 = 1e-3;
 
 /// The middle of the grid and its corners. A numeric axis contributes its least and largest value, another its first

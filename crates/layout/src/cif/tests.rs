@@ -84,7 +84,7 @@ fn labels_names_and_redefined_symbols() {
 }
 
 #[test]
-fn what_is_wrong_is_told_with_its_place() {
+fn what_is_wrong_is_reported_with_its_place() {
     let cases = [
         ("L A; B 10 10 0 0;", "line 1, column 18: the file ends without `E`"),
         ("L A;\n B 10 0 0 0; E", "line 2, column 8: the width of a box is 0"),

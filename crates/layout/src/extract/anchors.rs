@@ -103,7 +103,7 @@ impl AnchorAreas {
         cells.any(|cell| !self.0.overlapping(&cell).is_empty())
     }
 
-    /// Stretches of the line from `a` to `b` over them, as shares of its length, in order and disjoint.
+    /// Stretches of the line from `a` to `b` over them, as fractions of its length, in order and disjoint.
     pub(super) fn over(&self, a: [f64; 2], b: [f64; 2]) -> Vec<[f64; 2]> {
         self.0.over(a, b)
     }

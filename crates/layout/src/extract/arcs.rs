@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 /// Fewest beams that make an arc.
 const MIN_BEAMS: usize = 4;
-/// Nodes may lie off the circle by so many database units, and this share of the width.
+/// Nodes may lie off the circle by so many database units, and this fraction of the width.
 const OFF: [f64; 2] = [3.0, 0.02];
 /// Largest change of the width along an arc [1].
 const SWELL: f64 = 0.02;

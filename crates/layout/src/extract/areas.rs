@@ -93,7 +93,7 @@ impl AreaIndex {
         found
     }
 
-    /// Stretches of the line from `a` to `b` over them, as shares of its length, in order and disjoint.
+    /// Stretches of the line from `a` to `b` over them, as fractions of its length, in order and disjoint.
     pub(super) fn over(&self, a: [f64; 2], b: [f64; 2]) -> Vec<[f64; 2]> {
         let mut cuts = vec![0.0, 1.0];
         let d = [b[0] - a[0], b[1] - a[1]];

@@ -123,7 +123,7 @@ pub struct ExtractedBeam {
     pub nodes: [usize; 2],
     /// Width at both [m].
     pub width: [f64; 2],
-    /// Share of its area that etch holes take [1].
+    /// Fraction of its area that etch holes take [1].
     pub porosity: f64,
 }
 
@@ -138,7 +138,7 @@ pub struct Arc {
     pub angle: f64,
     /// Width [m].
     pub width: f64,
-    /// Share of its area that etch holes take [1].
+    /// Fraction of its area that etch holes take [1].
     pub porosity: f64,
 }
 

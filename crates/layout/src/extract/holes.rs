@@ -10,7 +10,7 @@ use super::boxes::{self, Extent};
 use crate::drawing::{GridPoint, Polygon, twice_area};
 use std::f64::consts::SQRT_2;
 
-/// Least share of the smallest rectangle around it that a hole fills, less what rounding of its corners to the grid takes [1].
+/// Least fraction of the smallest rectangle around it that a hole fills, less what rounding of its corners to the grid takes [1].
 const COMPACT: f64 = 0.5 - 1e-3;
 
 /// By how much rounding of its corners may lengthen a side [database units].
@@ -106,7 +106,7 @@ fn smallest_rectangle(mut points: Vec<GridPoint>) -> [f64; 2] {
     least
 }
 
-/// Stiffness of a strip with a share of holes, over that of a solid one [1].
+/// Stiffness of a strip with a fraction of holes, over that of a solid one [1].
 pub(super) fn stiffness(porosity: f64) -> f64 {
     let s = porosity.clamp(0.0, 0.99).sqrt();
     (1.0 - s) / (1.0 - s + s * s)

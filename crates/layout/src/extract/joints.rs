@@ -19,7 +19,7 @@ const MISS: [f64; 2] = [3.0, 0.03];
 const FULL: f64 = 1.35;
 /// How far a limb may be led on to its node or to a body's edge, in widths [1].
 const REACH: f64 = 6.0;
-/// A joint between nodes on a bar shorter than this share of the bar's width is rigid [1].
+/// A joint between nodes on a bar shorter than this fraction of the bar's width is rigid [1].
 const STOUT: f64 = 0.5;
 /// Sine of an angle below which axes run in line [1].
 const IN_LINE: f64 = 0.02;

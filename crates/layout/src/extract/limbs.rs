@@ -14,7 +14,7 @@ const TAPER: f64 = 0.15;
 const CONNECTING: f64 = 0.75;
 /// The same for one that ends freely [1].
 const ENDING: f64 = 1.0;
-/// Pieces of one line may lie off it by this many database units, which rounding to the grid does, and this share of the width.
+/// Pieces of one line may lie off it by this many database units, which rounding to the grid does, and this fraction of the width.
 const OFF: [f64; 2] = [2.0, 2e-3];
 /// Largest turn between two pieces of a curve [rad].
 const BEND: f64 = 0.55;

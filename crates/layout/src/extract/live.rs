@@ -1,7 +1,7 @@
 //! Parts that carry current: their beams as resistors that warm themselves.
 //!
 //! All beams of such a part conduct, those without current too, so that heat can flow. Where the material says how heat
-//! is conducted and what it does, they are `beam2det`, else `beam2de`. Etch holes that take the share p of a beam leave
+//! is conducted and what it does, they are `beam2det`, else `beam2de`. Etch holes that take the fraction p of a beam leave
 //! (1 − p)/(1 + p) of what it conducts (Maxwell's mixture in the plane).
 
 use super::{ExtractedBeam, ExtractedNode, Extraction, LayerResult};

@@ -5,7 +5,7 @@ use bimorph_base::sets::Sets;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// A stretch of a limb as shares of its length, with nodes on it.
+/// A stretch of a limb as fractions of its length, with nodes on it.
 pub(super) type AnchoredStretch = ([f64; 2], Vec<usize>);
 
 impl Builder<'_> {

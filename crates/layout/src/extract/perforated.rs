@@ -25,7 +25,7 @@ const STIFF: f64 = 30.0;
 /// Compliance of a free plate bent by its inertia, over four times that of its limbs as a cantilever [1]: 5/384 over
 /// 1/3.
 const BENT: f64 = 0.16;
-/// Limbs of one plate are given up together down to this share of the most compliant one [1].
+/// Limbs of one plate are given up together down to this fraction of the most compliant one [1].
 const ALIKE: f64 = 0.5;
 
 /// Extra length of a limb from the rotation of an elastic edge under a moment, in limb widths [1]. With the traction of

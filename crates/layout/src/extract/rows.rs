@@ -2,7 +2,7 @@
 
 use super::{ExtractedBeam, Extraction, LayerResult, holes, live};
 
-/// Two values are one up to this share of them, and to this many metres or radians: rounding of arithmetic, not of a grid.
+/// Two values are one up to this fraction of them, and to this many metres or radians: rounding of arithmetic, not of a grid.
 const VALUE_TOLERANCE: [f64; 2] = [1e-9, 1e-15];
 
 /// Where something is seen from: p ↦ origin + R(angle)·(mirrored ? (x, −y) : (x, y)) leads out of it.

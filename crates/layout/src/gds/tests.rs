@@ -114,7 +114,7 @@ fn calls_mirror_magnify_turn_and_shift() {
 }
 
 #[test]
-fn texts_are_labels_and_nodes_are_told() {
+fn texts_are_labels_and_nodes_are_reported() {
     let label = element(
         kind::TEXT,
         &[
@@ -134,7 +134,7 @@ fn texts_are_labels_and_nodes_are_told() {
 }
 
 #[test]
-fn what_is_wrong_is_told_with_its_byte_and_record() {
+fn what_is_wrong_is_reported_with_its_byte_and_record() {
     let fault = |bytes: &[u8]| match read(bytes, "x.gds", &mut |_| true) {
         Err(e) => e.to_string(),
         Ok(library) => library.flatten(None).map(|_| String::new()).unwrap_or_else(|e| e.to_string()),

@@ -29,7 +29,7 @@ use bimorph_multibody::BodyId;
 use bimorph_structure::{Beam, Structure};
 use std::f64::consts::PI;
 
-/// Share of a beam that its two offsets may take together.
+/// Fraction of a beam that its two offsets may take together.
 const MAX_OFFSET_FRACTION: f64 = 0.9;
 /// Most cached kinds of beams with settled ends.
 const MAX_CACHED_ENDS: usize = 16;

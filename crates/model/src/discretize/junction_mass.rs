@@ -15,7 +15,7 @@ use nalgebra::Vector2;
 
 /// Sharpest turn up to which beams lie above each other within their rigid ends only [rad].
 const MAX_OVERLAP_TURN: f64 = 0.75 * std::f64::consts::PI;
-/// Share of the mass that beams bring to a junction which it may have twice.
+/// Fraction of the mass that beams bring to a junction which it may have twice.
 const MAX_MASS: f64 = 0.5;
 
 /// Junctions with two beams or more.
@@ -136,7 +136,7 @@ fn rod(strip: &Strip, beam: &Beam, length: f64) -> Lump {
     Lump { amount, first: along * (0.5 * length * amount), second }
 }
 
-/// The largest share of what is there twice that leaves half of the mass of rigid ends, and half of its inertia about its centre.
+/// The largest fraction of what is there twice that leaves half of the mass of rigid ends, and half of its inertia about its centre.
 fn spared(rods: &Lump, twice: &Lump) -> f64 {
     let inertia = |lump: &Lump| lump.second - lump.first.norm_squared() / lump.amount.max(f64::MIN_POSITIVE);
     let enough = |share: f64| {

@@ -24,7 +24,7 @@ pub(super) struct MeshModes {
     pub(super) error: Option<ModeErrors>,
 }
 
-/// The drawing without what has no share in the modes of the drawn geometry.
+/// The drawing without what has no part in the modes of the drawn geometry.
 pub(super) fn mechanics(structure: &Structure) -> Structure {
     let mut bare = Structure {
         nodes: structure.nodes.clone(),

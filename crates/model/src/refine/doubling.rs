@@ -1,6 +1,6 @@
 //! The mesh for whatever an analysis gives: its results are compared with those of twice the segments.
 //!
-//! The difference of the two is the error of the coarser one but for a share 2^−p, p the order of convergence;
+//! The difference of the two is the error of the coarser one but for a fraction 2^−p, p the order of convergence;
 //! Richardson's rule takes that into account, with p = 2, the order of what stretches. Bending converges faster, and
 //! its error is overestimated by a quarter. Where it exceeds the tolerance, each group of equal beams is doubled alone.
 //! The change is the contribution of that group, and the groups with the largest gain per body are refined until the

@@ -1,4 +1,4 @@
-//! The imperfection that every real part has: a small share of the shape of its lowest mode.
+//! The imperfection that every real part has: a small fraction of the shape of its lowest mode.
 //!
 //! A structure that was made a little in the shape x₀ rests there without stress. To first order that is the ideal one under
 //! the constant forces K·x₀, which here are a·λ·M·x of the lowest mode: loads then bring out what an ideal part hides, such

@@ -11,7 +11,7 @@ use crate::section::{NONE, PairSlot};
 pub struct LaneRestStrain<'a> {
     /// Free strain of each group of joints [1].
     pub expansion: &'a [Lane8],
-    /// Share of the built-in offsets that acts, the same in every lane [1].
+    /// Fraction of the built-in offsets that acts, the same in every lane [1].
     pub built_in: f64,
 }
 

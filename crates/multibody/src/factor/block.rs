@@ -11,7 +11,7 @@ impl Scalar for f64 {}
 
 impl Scalar for nalgebra::Complex<f64> {}
 
-/// A pivot smaller than this share of its diagonal entry is taken for zero. A beam cut into
+/// A pivot smaller than this fraction of its diagonal entry is taken for zero. A beam cut into
 /// 10,000 segments reaches 2.5e-13.
 pub(crate) const LOST: f64 = 1e-13;
 

@@ -181,7 +181,7 @@ impl ElementSite<'_, '_> {
     }
 
     /// Warns of an element between two ends whose ends are one node.
-    pub(super) fn told_apart(&mut self) {
+    pub(super) fn warn_of_coincident_ends(&mut self) {
         if self.node(0) == self.node(1) {
             let node = &self.drawing.structure.nodes[self.node(0).0].name;
             let message = format!("`{}` does nothing: both its ends are the node `{node}`", self.instance.name);

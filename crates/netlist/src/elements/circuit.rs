@@ -15,7 +15,7 @@ pub(super) fn resistor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
         (None, Some(conductance)) => 1.0 / conductance,
         (None, None) => return Err(site.missing("R")),
     };
-    site.told_apart();
+    site.warn_of_coincident_ends();
     let (a, b) = (site.node(0), site.node(1));
     site.drawing.electrical(&[a, b]);
     site.drawing.structure.resistors.push(Resistor { name: site.name(), a, b, resistance });

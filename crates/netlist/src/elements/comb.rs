@@ -6,7 +6,7 @@ use bimorph_structure::{Comb, GapVoltage};
 
 impl ElementSite<'_, '_> {
     fn comb(&mut self, finite: bool, parasitic: f64, voltage: GapVoltage) -> Result<(), Reported> {
-        self.told_apart();
+        self.warn_of_coincident_ends();
         let angle = self.direction(self.instance.rotation)?;
         let (gaps, gap, height) = (self.positive("N")?, self.positive("gap")?, self.positive("h")?);
         let (overlap, finger) = (self.non_negative_or("l", 0.0)?, self.positive("L")?);

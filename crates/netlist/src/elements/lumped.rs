@@ -94,7 +94,7 @@ impl ElementSite<'_, '_> {
             self.sink.warning("W006", self.instance.span, message, format!("give {names}"));
         }
         let angle = self.direction(self.instance.rotation)?;
-        self.told_apart();
+        self.warn_of_coincident_ends();
         let l = self.non_negative_or("l", 0.0)?;
         let (a, b) = (self.node(0), self.node(1));
         self.drawing.place(self.instance.span, &[a, b], &[[0.0; 2], [l * angle.cos(), l * angle.sin()]]);

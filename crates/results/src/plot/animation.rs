@@ -11,7 +11,7 @@ use std::fmt::Write;
 const SCRIPT: &str = include_str!("animation.js");
 /// Whole numbers that stand for the largest displacement.
 const COUNTS: f64 = 1e4;
-/// Share of the mechanism's size that the largest displacement becomes.
+/// Fraction of the mechanism's size that the largest displacement becomes.
 const DISPLACED_FRACTION: f64 = 0.07;
 
 /// One state of the mechanism: an instant, or a mode.

@@ -34,7 +34,7 @@ const MAX_CURVES: usize = 7;
 /// Decades of magnitude shown below the largest.
 const DECADES: f64 = 14.0;
 
-/// Ticks of an axis at shares of its length, with fine lines without labels.
+/// Ticks of an axis at fractions of its length, with fine lines without labels.
 struct AxisScale {
     ticks: Vec<(f64, String)>,
     fine: Vec<f64>,

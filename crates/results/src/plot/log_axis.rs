@@ -23,7 +23,7 @@ impl LogAxis {
         Self { low: low - short, high: high + short }
     }
 
-    /// Share of the axis at which a value lies.
+    /// Fraction of the axis at which a value lies.
     pub fn share(&self, value: f64) -> f64 {
         (value.log10() - self.low) / (self.high - self.low)
     }

@@ -175,7 +175,7 @@ fn draw_slope(
     to: &impl Fn([f64; 2]) -> [f64; 2],
 ) {
     let at = |x: f64| slope.through[1] * (x / slope.through[0]).powf(slope.exponent);
-    // cut at the frame: the share of the way along x where y leaves it
+    // cut at the frame: the fraction of the way along x where y leaves it
     let inside = |x: f64| (y_axis.low..=y_axis.high).contains(&at(x).log10());
     let steps = 200;
     let xs: Vec<f64> = (0..=steps)

@@ -40,7 +40,7 @@ const MARGIN: f64 = 46.0;
 const INK: &str = "#333333";
 const REST: Paint<'static> = Paint { fill: "#d0d0d0", stroke: "#a8a8a8", width: 0.6, opacity: 1.0 };
 const MOVED: &str = "#0072B2";
-/// Share of the mechanism's size that the largest displacement of a mode shape becomes.
+/// Fraction of the mechanism's size that the largest displacement of a mode shape becomes.
 const SHAPE: f64 = 0.07;
 
 /// A drawing with its displacements enlarged and its bounds found.

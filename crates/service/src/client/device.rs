@@ -325,7 +325,7 @@ impl Device for RemoteDevice {
         if let Some(stream) = &self.stream {
             let accept = proto::Accept { token: token.0, answer: false };
             // Advisory: when the queue is full, the next one says as much.
-            stream.tell(RequestKind::Accept(accept));
+            stream.report(RequestKind::Accept(accept));
         }
     }
 

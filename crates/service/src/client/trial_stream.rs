@@ -67,7 +67,7 @@ impl OpenTrialStream {
     }
 
     /// Says what has no reply. Advisory: when the queue is full, the next one says as much.
-    pub(super) fn tell(&self, request: RequestKind) {
+    pub(super) fn report(&self, request: RequestKind) {
         let _ = self.requests.try_send(proto::DeviceRequest { kind: Some(request) });
     }
 }

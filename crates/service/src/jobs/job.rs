@@ -135,7 +135,7 @@ impl Job {
     }
 
     /// Cancels it where its client is gone for longer than its limit; a request in process has no limit.
-    pub(super) fn look_for_client(&self, open: &BTreeSet<u64>) {
+    pub(super) fn check_client(&self, open: &BTreeSet<u64>) {
         let Some(release) = self.asked.release().filter(|_| !self.has_ended()) else { return };
         // a reader or a watcher keeps it
         if self.is_watched() {

@@ -274,7 +274,7 @@ impl JobRegistry {
         let jobs: Vec<_> = self.kept().values().filter(|job| job.asked.release().is_some()).cloned().collect();
         if !jobs.is_empty() {
             let open = connections.numbers();
-            jobs.iter().for_each(|job| job.look_for_client(&open));
+            jobs.iter().for_each(|job| job.check_client(&open));
         }
     }
 

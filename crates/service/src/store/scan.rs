@@ -30,7 +30,7 @@ pub enum StoreError {
 ///
 /// # Errors
 /// [`StoreError`].
-pub fn look_at(folder: &Path) -> Result<String, StoreError> {
+pub fn inspect(folder: &Path) -> Result<String, StoreError> {
     let wrong = |reason| StoreError::Folder { path: folder.to_owned(), reason };
     match fs::metadata(folder) {
         Ok(_) => {}

@@ -18,17 +18,17 @@ pub enum Branch {
 /// How a path is traced. `Default` is the only place where the numbers stand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContinuationOptions {
-    /// Newton stops when a correction is below this share of the displacement, default 1e-9. Smaller: one more iteration.
+    /// Newton stops when a correction is below this fraction of the displacement, default 1e-9. Smaller: one more iteration.
     pub tolerance: f64,
     /// Newton iterations before a step is halved, default 8.
     pub iterations: usize,
     /// Longest step in s, default 0.04 of the way. Smaller: more points.
     pub longest: f64,
-    /// Longest step as a share of s, default 0: where it exceeds `longest`, steps grow with s.
+    /// Longest step as a fraction of s, default 0: where it exceeds `longest`, steps grow with s.
     pub growth: f64,
     /// The path arrives where s comes to this, default 1.
     pub target: f64,
-    /// Largest change of a gap in one step, as a share of what is left of it, default 0.2: no step leads across a gap to
+    /// Largest change of a gap in one step, as a fraction of what is left of it, default 0.2: no step leads across a gap to
     /// another branch. Smaller: more points.
     pub closing: f64,
     /// Largest distance of a point from where the tangent led, in steps, default 0.5. Tangents with the requested

@@ -15,7 +15,7 @@ use bimorph_multibody::{BodyId, Model};
 use nalgebra::Matrix6;
 use std::borrow::Cow;
 
-/// Share of the length scale below which a displacement's relative error does not count.
+/// Fraction of the length scale below which a displacement's relative error does not count.
 pub const FLOOR: f64 = 1e-4;
 
 /// Names of a planar body's directions, for messages.

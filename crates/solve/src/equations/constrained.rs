@@ -29,9 +29,9 @@ const MAX_ITERATIONS: usize = 60;
 const PATIENCE: i32 = 6;
 /// Mean contraction beyond which a shorter step is better than more iterations.
 const SLOW: f64 = 0.7;
-/// Corrections below this share of the coordinates that no longer shrink are rounding.
+/// Corrections below this fraction of the coordinates that no longer shrink are rounding.
 const STALLED: f64 = 1e-10;
-/// Share of the size of a coordinate below which its relative error does not count.
+/// Fraction of the size of a coordinate below which its relative error does not count.
 const FLOOR: f64 = 1e-4;
 /// Error of a stage over that of the step.
 const STAGE_SHARE: f64 = 1e-2;
@@ -219,7 +219,7 @@ impl<L: Loads> Staged for Constrained<'_, L> {
         self.finite(a)
     }
 
-    /// Until its coordinates are right to a share of what the step may be wrong.
+    /// Until its coordinates are right to a fraction of what the step may be wrong.
     fn stage(&mut self, stage: &Stage<'_, f64>, a: &mut [f64], at: &mut Motion<f64>) -> Result<(), StepFailure> {
         let tolerance = self.exact * (self.norm(stage.near) + FLOOR);
         let (mut first, mut last) = (0.0, f64::INFINITY);

@@ -97,7 +97,7 @@ impl From<ZeroPivot> for StepFailure {
 }
 
 impl StepFailure {
-    /// Share of the step to try next.
+    /// Fraction of the step to try next.
     pub fn shorter(self) -> f64 {
         match self {
             Self::Diverged { .. } => 0.25,

@@ -18,7 +18,7 @@ use bimorph_multibody::{BlockMatrix, forces};
 
 /// Next correction allowed, relative to the displacement.
 const TOLERANCE: f64 = 1e-12;
-/// Corrections below this share that no longer shrink are rounding.
+/// Corrections below this fraction that no longer shrink are rounding.
 const STALLED: f64 = 1e-9;
 /// Most iterations.
 const MAX_ITERATIONS: usize = 20;
@@ -30,7 +30,7 @@ const LOST: f64 = 1e3;
 pub(crate) struct ForceEvaluation {
     /// Weight w.
     pub(crate) weight: f64,
-    /// Share ξ of the displacement.
+    /// Fraction ξ of the displacement.
     pub(crate) share: f64,
     /// Time on the ramp [s].
     pub(crate) time: f64,

@@ -63,7 +63,7 @@ pub(super) struct EscapeDirection {
 }
 
 impl Equilibrium {
-    /// Leads from the last stable equilibrium `q` at `s` past the loss of stability that follows to a stable equilibrium at a larger share,
+    /// Leads from the last stable equilibrium `q` at `s` past the loss of stability that follows to a stable equilibrium at a larger fraction,
     /// which it returns with the next load step.
     pub(super) fn pass(
         &mut self,

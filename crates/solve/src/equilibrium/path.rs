@@ -25,7 +25,7 @@ pub trait LoadPath {
     }
 }
 
-/// The smallest share of a way from rest at which sources are taken [1]: nothing at all would have no slope.
+/// The smallest fraction of a way from rest at which sources are taken [1]: nothing at all would have no slope.
 const LEAST: f64 = 1e-30;
 
 /// Remaining distance to a station that counts as zero [1].
@@ -51,7 +51,7 @@ pub struct SourcePath<'a> {
 }
 
 impl<'a> SourcePath<'a> {
-    /// From source voltages `from` to `to` [V], and the share `load` of dead loads and built-in strains at both ends.
+    /// From source voltages `from` to `to` [V], and the fraction `load` of dead loads and built-in strains at both ends.
     pub fn new(electrics: &'a Electrics, from: &'a [f64], to: &'a [f64], load: [f64; 2]) -> Self {
         let gap = |g: usize, u: &[f64]| u.iter().enumerate().map(|(i, v)| electrics.gap_rows[(g, i)] * v).sum::<f64>();
         let attracts = (0..electrics.gap_rows.nrows()).any(|g| gap(g, to) != 0.0);

@@ -13,7 +13,7 @@ use nalgebra::Complex;
 
 /// Vectors at most: more modes than take part in any band.
 const MAX_VECTORS: usize = 60;
-/// Share of the right-hand side at which the residual is rounding [1].
+/// Fraction of the right-hand side at which the residual is rounding [1].
 const ENOUGH: f64 = 1e-14;
 
 type ComplexVector = Vec<ComplexPose>;

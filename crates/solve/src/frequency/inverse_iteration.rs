@@ -4,7 +4,7 @@
 //! ```text
 //! ‖(K + |λ|·M)⁻¹·(K·x − λ·M·x)‖ in the mass norm, λ = xᵀKx, xᵀMx = 1
 //! ```
-//! A share e of mode j in x adds e·|λ_j − λ|/(λ_j + |λ|): the residual is about the relative error of the shape, with
+//! A fraction e of mode j in x adds e·|λ_j − λ|/(λ_j + |λ|): the residual is about the relative error of the shape, with
 //! modes far below and far above counted alike. K·x is summed in extended precision; the error of the frequency is the
 //! square.
 //!
@@ -64,7 +64,7 @@ pub fn settle(
     Some(block)
 }
 
-/// One solve for each vector, and the best modes in their span; and by what share the worst of the solves is still off.
+/// One solve for each vector, and the best modes in their span; and by what fraction the worst of the solves is still off.
 fn improve(
     model: &Model,
     refined: &mut Refined<'_>,

@@ -22,7 +22,7 @@ pub struct Pairs {
     pub settled: usize,
 }
 
-/// A step that leaves less than this share of the largest eigenvalue has closed a subspace.
+/// A step that leaves less than this fraction of the largest eigenvalue has closed a subspace.
 pub(super) const CLOSED: f64 = 1e-14;
 /// Vectors beyond the wanted ones before the first convergence check, and between two checks at least.
 const FIRST_LOOK: usize = 6;

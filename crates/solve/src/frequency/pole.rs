@@ -19,7 +19,7 @@ const MAX_ITERATIONS: usize = 20;
 const SETTLED: f64 = 1e-14;
 /// A change no smaller than that before is rounding too where it is below this [1].
 const ROUNDED: f64 = 1e-8;
-/// A pole further from its guess than this share is another one.
+/// A pole further from its guess than this fraction is another one.
 const NEAR: f64 = 0.2;
 
 /// The pole next to `guess` [rad/s] for a tangent `stiffness`, starting from the force `push` on each body; none where the iteration

@@ -16,7 +16,7 @@ use bimorph_multibody::{BlockMatrix, Model};
 
 /// Corrections of one solve at most.
 const MAX_CORRECTIONS: usize = 40;
-/// An error below this share of the solution is rounding.
+/// An error below this fraction of the solution is rounding.
 pub const ROUNDING: f64 = 1e-15;
 
 /// K of a system at one place, unsummed, and storage for products with it.
@@ -38,7 +38,7 @@ pub struct Refined<'a> {
 pub struct SolveAccuracy {
     /// Size of the first correction over that of the solution: about the relative error of the factor [1].
     pub first: f64,
-    /// Share by which the solution may still be off [1].
+    /// Fraction by which the solution may still be off [1].
     pub left: f64,
 }
 

@@ -16,7 +16,7 @@ use bimorph_multibody::{Body, Model};
 
 /// Most terms of the series; a larger number requires shorter steps.
 const MAX_TERMS: usize = 12;
-/// Share of the solution at which the series ends [1].
+/// Fraction of the solution at which the series ends [1].
 const NEGLIGIBLE: f64 = 1e-16;
 
 /// How the frame turns at an instant of a step.

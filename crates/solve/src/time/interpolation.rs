@@ -3,7 +3,7 @@
 
 use super::method::Motion;
 
-/// The motion at the share `x` of a step of length `h` from `before` to `after`.
+/// The motion at the fraction `x` of a step of length `h` from `before` to `after`.
 pub fn interpolate(before: &Motion, after: &Motion, h: f64, x: f64, out: &mut Motion) {
     let (a, b) = ((1.0 + 2.0 * x) * (1.0 - x) * (1.0 - x), x * x * (3.0 - 2.0 * x));
     let (c, d) = (h * x * (1.0 - x) * (1.0 - x), -h * x * x * (1.0 - x));

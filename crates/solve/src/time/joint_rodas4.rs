@@ -40,7 +40,7 @@ use ports::JointPortSensitivities;
 use stages::JointStages;
 use std::sync::Arc;
 
-/// Share of the shortest time at which accelerations are made consistent: directions without inertia follow their springs,
+/// Fraction of the shortest time at which accelerations are made consistent: directions without inertia follow their springs,
 /// all others their inertia.
 const CONSISTENT: f64 = 1e-3;
 

@@ -1,6 +1,6 @@
 //! How long steps are: the rule that every driver with error control shares (Hairer & Wanner 1996, §IV.8), and equal steps.
 
-/// Aim for this share of the step that would just be allowed.
+/// Aim for this fraction of the step that would just be allowed.
 const SAFETY: f64 = 0.9;
 /// Rejections in a row before giving up.
 const MAX_REJECTED: usize = 40;

@@ -42,7 +42,7 @@ const ESTIMATE: [f64; 3] = [-10.048_809_399_827_414, 1.382_142_733_160_748, -1.0
 
 /// Next correction allowed, relative to the displacement.
 const TOLERANCE: f64 = 1e-11;
-/// Corrections below this share that no longer shrink are rounding.
+/// Corrections below this fraction that no longer shrink are rounding.
 const STALLED: f64 = 1e-9;
 /// Most iterations.
 const MAX_ITERATIONS: usize = 15;

@@ -61,9 +61,9 @@ pub static SDIRK4: Tableau = Tableau {
 /// Parameters of generalized-α: α_m, α_f, β and γ.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Alpha {
-    /// Share of the start's acceleration.
+    /// Fraction of the start's acceleration.
     pub m: f64,
-    /// Share of the start's forces.
+    /// Fraction of the start's forces.
     pub f: f64,
     /// Of displacements by accelerations.
     pub beta: f64,

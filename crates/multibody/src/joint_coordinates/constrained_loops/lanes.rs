@@ -1,6 +1,6 @@
 //! Lanes of numbers: a batch of variants, in vector instructions.
 
-use super::scalar::{Real, side_by_side};
+use super::scalar::{Real, sines_and_cosines};
 use pulp::Arch;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -81,7 +81,7 @@ impl<const N: usize> Real for Lanes<N> {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        let (sin, cos) = side_by_side(&self.0);
+        let (sin, cos) = sines_and_cosines(&self.0);
         (Self(sin), Self(cos))
     }
     #[inline(always)]

@@ -68,7 +68,7 @@ pub trait Traversal<T: Traversed>: Sized + Clone + Debug + Send + Sync + 'static
     fn prescribe(&mut self, offsets: &Offsets<T>);
 
     /// Number of bodies that go another way.
-    fn side_by_side(&self) -> usize;
+    fn packed_bodies(&self) -> usize;
 }
 
 impl<T: Traversed> Reduction<T> {
@@ -118,8 +118,8 @@ impl<T: Traversed> Reduction<T> {
 
     /// Number of bodies that are reduced in packs of equal subtrees.
     #[inline]
-    pub fn side_by_side(&self) -> usize {
-        self.traversal.as_ref().map_or(0, |t| t.side_by_side())
+    pub fn packed_bodies(&self) -> usize {
+        self.traversal.as_ref().map_or(0, |t| t.packed_bodies())
     }
 
     /// Displacement and rotation of a body from its drawn place [m, m, rad].

@@ -80,7 +80,7 @@ impl Real for f64 {
         let (eights, ones) = sin.as_chunks_mut::<8>();
         let (cos_eights, cos_ones) = cos.as_chunks_mut::<8>();
         for (s, c) in eights.iter_mut().zip(cos_eights) {
-            (*s, *c) = side_by_side(s);
+            (*s, *c) = sines_and_cosines(s);
         }
         for (s, c) in ones.iter_mut().zip(cos_ones) {
             // not f64's own method, which is the platform's
@@ -107,7 +107,7 @@ impl Real for f64 {
 
 /// Sines and cosines of `N` angles in vector instructions, each with the bits of [`Real::sin_cos`] of that angle alone.
 #[inline(always)]
-pub(super) fn side_by_side<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
+pub(super) fn sines_and_cosines<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
     let (mut sin, mut cos) = (*angles, *angles);
     let mut far = false;
     for k in 0..N {

@@ -31,7 +31,7 @@ use super::data::ReductionTask;
 
 /// Ratio up to which a row is squared into the inertia: its square times the rounding unit is lost.
 const LIGHT: f64 = 30.0;
-/// A hard row shorter than this share of a closure's own rows is zero: it is lost in rounding.
+/// A hard row shorter than this fraction of a closure's own rows is zero: it is lost in rounding.
 const ZERO: f64 = 1e-11;
 /// The same in a projection. A gap that only a thousandfold motion could close is left until the mechanism has moved on:
 /// at the crossing of two branches such a correction would choose one at random.

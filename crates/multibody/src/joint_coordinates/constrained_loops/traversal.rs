@@ -71,7 +71,7 @@ impl<T: Traversed> Traversal<T> for OneByOne {
 
     fn prescribe(&mut self, _: &Offsets<T>) {}
 
-    fn side_by_side(&self) -> usize {
+    fn packed_bodies(&self) -> usize {
         0
     }
 }

@@ -27,7 +27,7 @@ use crate::planar::Pose;
 use crate::{BlockMatrix, Pattern};
 use pulp::{Simd, WithSimd};
 
-/// A pivot smaller than this share of what it came from is taken for zero.
+/// A pivot smaller than this fraction of what it came from is taken for zero.
 const LOST: f64 = 1e-13;
 
 /// A form over joint coordinates, and its factors.

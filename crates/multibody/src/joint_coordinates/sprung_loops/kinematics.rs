@@ -70,7 +70,7 @@ impl<T: Number> MotionMap<T> {
         out
     }
 
-    /// Share of a wrench on the body in the coordinates.
+    /// Part of a wrench on the body in the coordinates.
     #[inline(always)]
     pub(super) fn gather(&self, sign: f64, wrench: &Triple<T>) -> Triple<T> {
         let f = [wrench[0], wrench[1]];

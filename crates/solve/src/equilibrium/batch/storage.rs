@@ -15,7 +15,7 @@ pub struct LaneEquilibrium {
     pub(super) placed: Vec<LanePlaced>,
     pub(super) expansion: Vec<Lane8>,
     pub(super) rate: Vec<Lane8>,
-    /// Share of built-in strains, and the change of it.
+    /// Fraction of built-in strains, and the change of it.
     pub(super) built_in: [f64; 2],
     pub(super) trial: Vec<LanePose>,
     /// Residual, then the step.

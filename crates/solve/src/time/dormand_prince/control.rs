@@ -16,7 +16,7 @@ pub struct Tolerances {
 
 impl Tolerances {
     /// The norm of `x` against these bounds, where the state is the larger of `a` and `b`: 1 is just allowed. Also the
-    /// component with the largest share (rates follow coordinates).
+    /// component with the largest contribution (rates follow coordinates).
     fn norm(&self, x: &PhasePoint, a: &PhasePoint, b: &PhasePoint) -> (f64, usize) {
         let (mut sum, mut worst, mut component) = (0.0, -1.0, 0);
         let n = x.q.len();
@@ -75,7 +75,7 @@ pub enum IntegrationError<E> {
 
 /// Rejections in a row before giving up.
 const MAX_REJECTED: usize = 60;
-/// Share of the last error in the control of the next step.
+/// Fraction of the last error in the control of the next step.
 const BETA: f64 = 0.04;
 
 impl DormandPrince {

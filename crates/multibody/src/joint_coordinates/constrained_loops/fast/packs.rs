@@ -212,7 +212,7 @@ impl Traversal<f64> for Packs {
         self.take_offsets(offsets);
     }
 
-    fn side_by_side(&self) -> usize {
+    fn packed_bodies(&self) -> usize {
         self.packing.place.len() - self.packing.rest.iter().map(Range::len).sum::<usize>()
     }
 }
