@@ -129,7 +129,7 @@ fn reading_once_is_reading_anew() {
 fn sweeps_of_transients_are_runs_alone() {
     let text = format!("param more=0\n{BEAMS}if more\n[ tail beam2d p [t e] [l=20u w=1.5u oz=0] ]\n");
     let transients =
-        SweepAnalysis::Transient { stop: 20e-6, outputs: vec!["m.y".into(), "t.vx".into()], voltages: Vec::new() };
+        SweepAnalysis::Transient { stop: 5e-6, outputs: vec!["m.y".into(), "t.vx".into()], voltages: Vec::new() };
     let axes = ["more=0,1", "w=1.6u:2.4u:5", "F=1u,50u,200u"];
     let options = CompileOptions { segments: Some(3), ..CompileOptions::default() };
     let whole = swept(&text, &axes, transients.clone(), &options, Shard::default());
@@ -146,7 +146,7 @@ fn sweeps_of_transients_are_runs_alone() {
         let set = spec.settings(row.point);
         let compiled = compile(&Bundle::from_text("beams.net", &text), &CompileOptions { set, ..options.clone() });
         let run = TransientOptions {
-            stop: 20e-6,
+            stop: 5e-6,
             signals: vec!["m.y".into(), "t.vx".into()],
             points: 2,
             tol,
