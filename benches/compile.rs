@@ -6,13 +6,13 @@
 
 use bimorph::analysis::modes::modes;
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Bundle, Setting, read_bundle};
 use std::path::Path;
 use std::time::Instant;
 
 fn bundle(name: &str) -> Bundle {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name);
-    Bundle::read(&path, &[]).unwrap_or_else(|e| panic!("{e}"))
+    read_bundle(&path, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Median of repeated calls [ms].

@@ -8,7 +8,7 @@ use bimorph::domains::Ramp;
 use bimorph::equations::Bodies;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, forces};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::read_bundle;
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// The bank of the demonstration, resolved to 300 kHz at a tolerance of 1e-3.
 fn bank() -> Arc<CompiledModel> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
-    let bundle = Bundle::read(&path, &[]).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let bundle = read_bundle(&path, &[]).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let options = CompileOptions { band: Some(3e5), ..CompileOptions::default() };
     Arc::new(compile(&bundle, &options).unwrap_or_else(|e| panic!("{e}")))
 }

@@ -20,7 +20,7 @@ use bimorph::equations::{Bodies, Joints};
 use bimorph::multibody::joint_coordinates::sprung_loops::Tree;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, BodyId};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Setting, read_bundle};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::frequency::eigen::lowest_modes;
 use bimorph::solve::path::SourcePath;
@@ -58,7 +58,7 @@ fn main() {
 
 /// A run of the row of plates; returns where its end is, and prints a line unless `label` is empty.
 fn pivots(label: &str, formulation: Formulation, scheme: Scheme, tol: f64, times: usize, end: [f64; 2]) -> [f64; 2] {
-    let bundle = Bundle::read(Path::new("examples/pivots/pivots.net"), &[]).unwrap();
+    let bundle = read_bundle(Path::new("examples/pivots/pivots.net"), &[]).unwrap();
     let options =
         CompileOptions { tol, formulation, scheme, undamped: true, segments: Some(1), ..CompileOptions::default() };
     let compiled = compile(&bundle, &options).unwrap();
@@ -96,7 +96,7 @@ fn pivots(label: &str, formulation: Formulation, scheme: Scheme, tol: f64, times
 
 fn measure((file, set, start, volts, stop): &Scene<'_>, tol: f64) {
     let build = |extra: &[(&str, f64)]| {
-        let bundle = Bundle::read(Path::new(file), &[]).unwrap();
+        let bundle = read_bundle(Path::new(file), &[]).unwrap();
         let named = |&(n, v): &(&str, f64)| (n.to_owned(), Setting::Number(v));
         let set = set.iter().chain(extra).map(named).collect();
         compile(&bundle, &CompileOptions { tol, set, scheme: Scheme::Es, ..CompileOptions::default() }).unwrap()

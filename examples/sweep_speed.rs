@@ -14,7 +14,7 @@ use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::analysis::{modes::modes, statics::static_equilibrium};
 use bimorph::compile::{CompileOptions, CompiledModel, compile, draw};
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepSpec};
-use bimorph::netlist::{Bundle, NetlistSource};
+use bimorph::netlist::{Bundle, NetlistSource, read_bundle};
 use bimorph::refine::mesh_search::Mesh;
 use std::hint::black_box;
 use std::path::Path;
@@ -109,7 +109,7 @@ fn grid(points: usize, analysis: SweepAnalysis) -> (SweepSpec, Bundle) {
     let axis = |text: String| text.parse::<SweepParameter>().expect("an axis");
     let parameters = vec![axis(format!("wh=1.8u:2.2u:{side}")), axis(format!("pitch=48u:51u:{side}"))];
     let spec = SweepSpec { parameters, samples: None, analysis, shard: Shard::default(), threads: Some(1) };
-    let mut bundle = Bundle::read(Path::new("examples/bank/bank.net"), &[]).expect("the bank");
+    let mut bundle = read_bundle(Path::new("examples/bank/bank.net"), &[]).expect("the bank");
     for text in bundle.files.values_mut() {
         *text = text.replace("pitch = 49.5u", "param pitch = 49.5u");
     }

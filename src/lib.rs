@@ -24,11 +24,32 @@ pub use bimorph_domains as domains;
 pub use bimorph_export as export;
 pub use bimorph_jobs::{self as jobs, content};
 pub use bimorph_layout::{self as layout, input};
-pub use bimorph_model::{compile, discretize, options, refine};
+pub use bimorph_model::{discretize, options, refine};
 pub use bimorph_multibody as multibody;
-pub use bimorph_netlist as netlist;
 pub use bimorph_results as results;
 #[cfg(feature = "remote")]
 pub use bimorph_service as service;
 pub use bimorph_solve::{self as solve, equations};
 pub use bimorph_structure as structure;
+
+pub mod netlist {
+    //! Netlists, and what they share with every front end: bundles, settings and diagnostics.
+
+    pub use bimorph_base::{Bundle, Diagnostic, Diagnostics, Setting, Severity};
+    pub use bimorph_netlist::*;
+    pub use bimorph_structure::{FrontEnd, LoadedNetlist};
+}
+
+pub mod compile {
+    //! From netlist text to a ready model: netlist → structure → mesh.
+
+    pub use bimorph_model::compile::*;
+
+    /// Compiles a netlist.
+    ///
+    /// # Errors
+    /// See [`CompileError`].
+    pub fn compile(bundle: &super::netlist::Bundle, options: &CompileOptions) -> Result<CompiledModel, CompileError> {
+        draw(&super::netlist::NetlistSource::new(bundle), options)?.compile()
+    }
+}

@@ -6,7 +6,7 @@ use bimorph::device::scale::PortScale;
 use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Trial, TrialReply};
 use bimorph::export::compare::{ModelFit, fit};
 use bimorph::export::{ExportError, ExportRequest};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::{Bundle, read_bundle};
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 fn compiled(file: &str, options: CompileOptions) -> Arc<CompiledModel> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
-    Arc::new(compile(&Bundle::read(&path, &[]).unwrap(), &options).unwrap_or_else(|e| panic!("{file}: {e}")))
+    Arc::new(compile(&read_bundle(&path, &[]).unwrap(), &options).unwrap_or_else(|e| panic!("{file}: {e}")))
 }
 
 fn request(ports: &[&str], signals: &[&str], bias: &[(&str, f64)]) -> ExportRequest {

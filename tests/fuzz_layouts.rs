@@ -6,7 +6,7 @@
 use bimorph::input::from_bytes;
 use bimorph::layout::mask::mask;
 use bimorph::layout::{LayoutFormat, Process};
-use bimorph::netlist::{Bundle, load};
+use bimorph::netlist::{load, read_bundle};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -44,7 +44,7 @@ fn corpus(format: LayoutFormat) -> Vec<Vec<u8>> {
     let mut all = Vec::new();
     for name in ["bank/bank", "comb_resonator/comb_resonator", "switch/switch", "pivots/pivots", "arch/arch"] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/{name}.net"));
-        let structure = load(&Bundle::read(&path, &[]).unwrap(), &[]).unwrap().structure;
+        let structure = load(&read_bundle(&path, &[]).unwrap(), &[]).unwrap().structure;
         let drawn = mask(&structure, &process, format, "x").unwrap().bytes;
         if format == LayoutFormat::Cif {
             let bare: Vec<u8> = drawn

@@ -8,7 +8,7 @@ use bimorph::input::from_bytes;
 use bimorph::layout::drawing::Polygon;
 use bimorph::layout::mask::{MaskError, mask};
 use bimorph::layout::{self, LayoutFormat, Process, convert};
-use bimorph::netlist::{Bundle, Setting, load};
+use bimorph::netlist::{Bundle, Setting, load, read_bundle};
 use std::path::Path;
 
 const EXAMPLES: [&str; 10] = [
@@ -40,7 +40,7 @@ fn frequencies(bundle: &Bundle) -> Vec<f64> {
 fn every_planar_example_comes_back_with_its_modes() {
     for name in EXAMPLES {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/{name}.net"));
-        let drawn = Bundle::read(&path, &[]).unwrap();
+        let drawn = read_bundle(&path, &[]).unwrap();
         let before = frequencies(&drawn);
         let structure = load(&drawn, &[]).unwrap().structure;
         for (format, file) in [(LayoutFormat::Gds, "x.gds"), (LayoutFormat::Cif, "x.cif")] {
@@ -160,7 +160,7 @@ fn a_netlist_without_outlines_is_reported_as_such() {
 #[test]
 fn outlines_alone_give_the_bank_back() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
-    let (drawn, bare) = (Bundle::read(&path, &[]).unwrap(), vec![("comb".to_owned(), Setting::Number(0.0))]);
+    let (drawn, bare) = (read_bundle(&path, &[]).unwrap(), vec![("comb".to_owned(), Setting::Number(0.0))]);
     let structure = load(&drawn, &bare).unwrap().structure;
     let bytes = mask(&structure, &polymumps(), LayoutFormat::Cif, "bank.cif").unwrap().bytes;
     let outlines: Vec<u8> =

@@ -1,11 +1,11 @@
 //! Whole netlists: every file in tests/netlists loads without a message and holds what was drawn.
 
-use bimorph::netlist::{Bundle, LoadedNetlist, Setting, load};
+use bimorph::netlist::{LoadedNetlist, Setting, load, read_bundle};
 use std::path::Path;
 
 fn loaded(name: &str, set: &[(&str, f64)]) -> LoadedNetlist {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/netlists").join(name);
-    let bundle = Bundle::read(&path, &[]).expect("readable");
+    let bundle = read_bundle(&path, &[]).expect("readable");
     let set: Vec<_> = set.iter().map(|(n, v)| ((*n).to_owned(), Setting::Number(*v))).collect();
     let loaded = load(&bundle, &set).unwrap_or_else(|d| panic!("{d}"));
     assert!(loaded.warnings.items.is_empty(), "{}", loaded.warnings);

@@ -1,6 +1,6 @@
 //! Bundles: which files are read, in which order they are found, and what is said when they are not.
 
-use bimorph::netlist::{Bundle, Setting, load};
+use bimorph::netlist::{Bundle, Setting, load, read_bundle};
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -28,7 +28,7 @@ fn found_beside_the_including_file() {
         ("lib/deep.m", "n=0\nparam d=2"),
         ("b.net", "n=n+1"),
     ]);
-    let bundle = Bundle::read(&folder.path().join("root.net"), &[]).expect("readable");
+    let bundle = read_bundle(&folder.path().join("root.net"), &[]).expect("readable");
     let names: Vec<&str> = bundle.files.keys().map(String::as_str).filter(|n| **n != bundle.root).collect();
     assert_eq!(names, ["b.net", "deep.m", "lib/a.net"]);
     let parameters: Vec<String> = parameters(&bundle).into_iter().map(|(n, v)| format!("{n} {v:?}")).collect();
@@ -43,7 +43,7 @@ fn names_in_quotes() {
         ("ü dir/mein netz é.net", "a=3"),
         ("b c.net", "param d=2"),
     ]);
-    let bundle = Bundle::read(&folder.path().join("root.net"), &[]).expect("readable");
+    let bundle = read_bundle(&folder.path().join("root.net"), &[]).expect("readable");
     let parameters: Vec<String> = parameters(&bundle).into_iter().map(|(n, v)| format!("{n} {v:?}")).collect();
     assert_eq!(parameters, ["d Number(2.0)", "r Number(3.0)"]);
 }
@@ -57,7 +57,7 @@ fn first_met_counts() {
         ("lib/x.net", "param x=1"),
         ("x.net", "param x=2"),
     ]);
-    let bundle = Bundle::read(&folder.path().join("root.net"), &[]).expect("readable");
+    let bundle = read_bundle(&folder.path().join("root.net"), &[]).expect("readable");
     assert_eq!(parameters(&bundle), [("x".to_owned(), Setting::Number(1.0))]);
 }
 
@@ -72,7 +72,7 @@ fn include_folders() {
         ("two/y.net", "param y=2"),
     ]);
     let include: Vec<PathBuf> = ["one", "two"].iter().map(|n| folder.path().join(n)).collect();
-    let bundle = Bundle::read(&folder.path().join("main/root.net"), &include).expect("readable");
+    let bundle = read_bundle(&folder.path().join("main/root.net"), &include).expect("readable");
     let want = [("x".to_owned(), Setting::Number(1.0)), ("y".to_owned(), Setting::Number(1.0))];
     assert_eq!(parameters(&bundle), want);
 }
@@ -82,7 +82,7 @@ fn include_folders() {
 fn self_contained() {
     let bundle = {
         let folder = folder(&[("root.net", "uses x.net"), ("x.net", "param x=1")]);
-        Bundle::read(&folder.path().join("root.net"), &[]).expect("readable")
+        read_bundle(&folder.path().join("root.net"), &[]).expect("readable")
     };
     assert_eq!(parameters(&bundle).len(), 1);
 }
@@ -106,7 +106,7 @@ fn missing_file() {
 /// A root that cannot be read is the only error of reading.
 #[test]
 fn missing_root() {
-    assert!(Bundle::read(&PathBuf::from("no such file.net"), &[]).is_err());
+    assert!(read_bundle(&PathBuf::from("no such file.net"), &[]).is_err());
 }
 
 /// Errors inside an included file carry that file's name and line.
@@ -122,7 +122,7 @@ fn errors_name_the_file() {
 #[test]
 fn includes_itself() {
     let folder = folder(&[("root.net", "uses root.net\nparam a=1")]);
-    let bundle = Bundle::read(&folder.path().join("root.net"), &[]).expect("readable");
+    let bundle = read_bundle(&folder.path().join("root.net"), &[]).expect("readable");
     let found = load(&bundle, &[]).expect_err("includes itself");
     assert_eq!((found.items[0].code.as_str(), found.items[0].message.as_str()), ("E022", "`root.net` includes itself"));
 }
@@ -132,7 +132,7 @@ fn includes_itself() {
 fn include_cycles_end() {
     let folder =
         folder(&[("root.net", "uses a.net"), ("a.net", "uses b.net\nparam a=1"), ("b.net", "uses a.net\nparam b=1")]);
-    let bundle = Bundle::read(&folder.path().join("root.net"), &[]).expect("readable");
+    let bundle = read_bundle(&folder.path().join("root.net"), &[]).expect("readable");
     assert_eq!(parameters(&bundle).len(), 2);
 }
 
@@ -164,7 +164,7 @@ fn reading_is_bounded() {
     let files: Vec<(String, String)> = (0..60).map(|i| (format!("f{i}"), format!("uses f{}", i + 1))).collect();
     let files: Vec<(&str, &str)> = files.iter().map(|(n, t)| (n.as_str(), t.as_str())).collect();
     let folder = folder(&files);
-    let bundle = Bundle::read(&folder.path().join("f0"), &[]).expect("readable");
+    let bundle = read_bundle(&folder.path().join("f0"), &[]).expect("readable");
     assert!(bundle.files.len() < 20, "{}", bundle.files.len());
     assert_eq!(load(&bundle, &[]).expect_err("too deep").items[0].code, "E023");
 }
@@ -175,7 +175,7 @@ fn other_encodings() {
     let folder = TempDir::new().expect("a folder");
     let path = folder.path().join("root.net");
     fs::write(&path, b"% 10 \xb5m wide\nparam a=1").expect("file");
-    assert_eq!(parameters(&Bundle::read(&path, &[]).expect("readable")).len(), 1);
+    assert_eq!(parameters(&read_bundle(&path, &[]).expect("readable")).len(), 1);
 }
 
 /// `uses degrees.net` turns `ox oy oz` of its own file to degrees, wherever it stands; other angles and other files

@@ -1,7 +1,7 @@
 //! The rules of the SUGAR 2 language, one test a rule: numbers, operators, scopes, layers, subnets, names, settings.
 //! The expected values follow from the grammar (sugar.y, sugar.lex of SUGAR 2) and were seen in runs of it.
 
-use bimorph::netlist::{Bundle, Diagnostics, LoadedNetlist, Setting, load};
+use bimorph::netlist::{Bundle, Diagnostics, LoadedNetlist, Setting, load, parse_setting};
 
 /// The process most tests use.
 const PROCESS: &str = "process p1 = [Youngsmodulus=165e9 Poisson=0.3 density=2300 h=2u viscosity=1.78e-5 fluid=2u]\n";
@@ -243,13 +243,13 @@ fn settings() {
 /// Settings are read as the netlist language writes values.
 #[test]
 fn settings_from_text() {
-    assert_eq!(Setting::parse("2.1u"), Ok(Setting::Number(2.1e-6)));
-    assert_eq!(Setting::parse(" -pi/2 "), Ok(Setting::Number(-std::f64::consts::FRAC_PI_2)));
-    assert_eq!(Setting::parse("deg(180)"), Ok(Setting::Number(std::f64::consts::PI)));
-    assert_eq!(Setting::parse("poly"), Ok(Setting::Text("poly".into())));
-    assert_eq!(Setting::parse("'two words'"), Ok(Setting::Text("two words".into())));
-    assert!(Setting::parse("10um").is_err());
-    assert!(Setting::parse("1\nparam b = 2").is_err());
+    assert_eq!(parse_setting("2.1u"), Ok(Setting::Number(2.1e-6)));
+    assert_eq!(parse_setting(" -pi/2 "), Ok(Setting::Number(-std::f64::consts::FRAC_PI_2)));
+    assert_eq!(parse_setting("deg(180)"), Ok(Setting::Number(std::f64::consts::PI)));
+    assert_eq!(parse_setting("poly"), Ok(Setting::Text("poly".into())));
+    assert_eq!(parse_setting("'two words'"), Ok(Setting::Text("two words".into())));
+    assert!(parse_setting("10um").is_err());
+    assert!(parse_setting("1\nparam b = 2").is_err());
 }
 
 /// Comments run to the end of the line, also at the end of the text without a line end; CR LF counts as one line end.

@@ -5,7 +5,7 @@ use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::domains::Ramp;
 use bimorph::equations::Bodies;
-use bimorph::netlist::Bundle;
+use bimorph::netlist::read_bundle;
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
 use std::path::Path;
@@ -22,7 +22,7 @@ fn a_bank_session_is_small_and_steps_allocate_nothing() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
     let options = CompileOptions { band: Some(3e5), ..CompileOptions::default() };
     let before = dhat::HeapStats::get().curr_bytes;
-    let compiled = Arc::new(compile(&Bundle::read(&path, &[]).unwrap(), &options).unwrap());
+    let compiled = Arc::new(compile(&read_bundle(&path, &[]).unwrap(), &options).unwrap());
     let mut device = LocalDevice::new(Arc::clone(&compiled));
     device.open(&OpenRequest::default()).unwrap();
     let mut reply = TrialReply::default();

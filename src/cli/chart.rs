@@ -10,6 +10,7 @@ use super::output::{check_folder, print, write_picture};
 use super::{interrupt, progress, value};
 use bimorph::analysis::chart::{Chart as Measured, ChartPart, ChartSpec, Formulation, chart};
 use bimorph::analysis::integrator::Integrator;
+use bimorph::netlist::NetlistSource;
 use bimorph::options::OptionValue;
 use bimorph::options::analysis::CHART_POINTS;
 use bimorph::results::atomic;
@@ -136,7 +137,7 @@ impl ChartCommand {
         let compiled = self.model.compile()?;
         let (bundle, options) = (self.model.bundle()?, self.model.options()?);
         let bar = progress::bar("chart");
-        let result = chart(&bundle, &options, &spec, &mut progress::watch(&bar, CHEAPER));
+        let result = chart(&NetlistSource::new(&bundle), &options, &spec, &mut progress::watch(&bar, CHEAPER));
         bar.finish_and_clear();
         let result = result?;
         let first = result.points.iter().find_map(|p| p.failed.as_ref());

@@ -5,9 +5,8 @@ use super::model::{Context, JsonMap, ModelArgs};
 use super::output;
 use bimorph::analysis::formulation;
 use bimorph::compile::{CompiledModel, Formulation};
-use bimorph::domains::elements;
 use bimorph::netlist::Setting;
-use bimorph::structure::Structure;
+use bimorph::structure::{DomainElement, Structure};
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
@@ -138,7 +137,7 @@ fn contents(s: &Structure) -> String {
         (_, "mass") => format!("{n} masses"),
         _ => format!("{n} {word}s"),
     };
-    let placed = elements().map(|e| (s.placed.iter().filter(|p| p.element == e.name).count(), e.name));
+    let placed = DomainElement::ALL.iter().map(|e| (s.placed.iter().filter(|p| p.element == e.name).count(), e.name));
     let counts = counts.into_iter().chain(placed).filter(|(n, _)| *n > 0);
     let list: Vec<String> = counts.map(|(n, word)| plural(n, word)).collect();
     list.join(", ")

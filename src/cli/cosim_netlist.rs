@@ -6,7 +6,7 @@ use super::output::{check_folder, write_page};
 use super::value;
 use bimorph::cosim::deck::{DeckSpec, around};
 use bimorph::cosim::refined_deck;
-use bimorph::netlist::{self, Bundle, DroppedInclude, Setting};
+use bimorph::netlist::{self, DroppedInclude, Setting, read_bundle_reporting};
 use clap::Args;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -89,7 +89,7 @@ impl NetlistArgs {
         self.chosen.options()?;
         let warn = &mut |dropped: DroppedInclude| stderr_line!("warning: {dropped}");
         let bundle =
-            Bundle::read_telling(file, &[], warn).map_err(|source| Failure::Read { path: file.to_owned(), source })?;
+            read_bundle_reporting(file, &[], warn).map_err(|source| Failure::Read { path: file.to_owned(), source })?;
         let mut loaded = netlist::load(&bundle, &self.set)
             .map_err(|errors| Failure::from(bimorph::compile::CompileError::Netlist(errors)))?;
         // a switch is left out here, too

@@ -9,6 +9,7 @@ use bimorph::analysis::largest_motion::path_with_signals;
 use bimorph::analysis::path_parameter::{PathModels, PathOptions, PathParameter, UnknownPathParameter};
 use bimorph::analysis::statics::NodeMotion;
 use bimorph::compile::CompiledModel;
+use bimorph::netlist::NetlistSource;
 use bimorph::options::OptionValue;
 use bimorph::options::analysis::PATH_POINTS;
 use bimorph::results::plot::axis::quantity;
@@ -134,7 +135,9 @@ impl PathCommand {
         };
         let parameter = PathParameter::find(&drawn, &options.along)
             .map_err(|unknown| Failure::bad("--along", UnknownPathParameter::EXPECTED, unknown.got()))?;
-        let models = PathModels::new(parameter, &drawn, &options, || self.model.bundle())?;
+        let models = PathModels::new(parameter, &drawn, &options, || {
+            Ok::<_, Failure>(NetlistSource::new(&self.model.bundle()?))
+        })?;
         let (first, input) = models.input(&drawn, &options.along);
         let bar = progress::bar("path");
         let result = path_with_signals(first, &options.request(input), &mut progress::watch(&bar, CHEAPER));

@@ -17,6 +17,7 @@ use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
 use bimorph::compile::{CompiledModel, Formulation};
 use bimorph::multibody::joint_coordinates::sprung_loops::UnsupportedModel;
+use bimorph::netlist::NetlistSource;
 use bimorph::options::OptionValue;
 use bimorph::options::analysis::{TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use clap::Args;
@@ -122,7 +123,7 @@ impl TransientCommand {
             _ => self.model.compile()?,
         };
         let released = match &self.release {
-            Some(name) => Some(released(&self.model.bundle()?, &initial, name)?),
+            Some(name) => Some(released(&NetlistSource::new(&self.model.bundle()?), &initial, name)?),
             None => None,
         };
         let drawn = released.as_ref().unwrap_or(&initial);

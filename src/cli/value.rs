@@ -2,11 +2,11 @@
 
 use bimorph::analysis::transient::Until;
 use bimorph::jobs::sweep;
-use bimorph::netlist::Setting;
+use bimorph::netlist::{Setting, parse_setting};
 
 /// A number as netlists write it, with an optional suffix: `30u`, `1.2e6`, `-5`, `2*pi`.
 pub(crate) fn number(text: &str) -> Result<f64, String> {
-    match sweep::number(text.trim()).map_or_else(|| Setting::parse(text).ok(), |x| Some(Setting::Number(x))) {
+    match sweep::number(text.trim()).map_or_else(|| parse_setting(text).ok(), |x| Some(Setting::Number(x))) {
         Some(Setting::Number(value)) if value.is_finite() => Ok(value),
         _ => Err(format!("expected a number such as 2.1u, 30n or 1.2e6 (m milli, M mega), got \"{text}\"")),
     }
@@ -15,7 +15,7 @@ pub(crate) fn number(text: &str) -> Result<f64, String> {
 /// `NAME=VALUE`; the value is a number, an expression of numbers, or text.
 pub(crate) fn setting(text: &str) -> Result<(String, Setting), String> {
     let (name, value) = pair(text)?;
-    let value = number(&value).map_or_else(|_| Setting::parse(&value), |x| Ok(Setting::Number(x)));
+    let value = number(&value).map_or_else(|_| parse_setting(&value), |x| Ok(Setting::Number(x)));
     Ok((name, value.map_err(|_| format!("expected a number or a text as value, got \"{text}\""))?))
 }
 

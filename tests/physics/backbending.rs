@@ -5,7 +5,7 @@ use bimorph::analysis::backbending::backbend;
 use bimorph::analysis::mesh::static_backbent;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Setting, read_bundle};
 use std::path::Path;
 
 /// A stocky beam between two pads, of 100 MPa strength at 293 K and none at 1293 K.
@@ -47,7 +47,7 @@ fn bank() -> CompiledModel {
 fn bank_with(options: CompileOptions) -> CompiledModel {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
     let set = vec![("comb".to_owned(), Setting::Number(0.0))];
-    compile(&Bundle::read(&path, &[]).unwrap(), &CompileOptions { set, junctions: Junctions::Centreline, ..options })
+    compile(&read_bundle(&path, &[]).unwrap(), &CompileOptions { set, junctions: Junctions::Centreline, ..options })
         .unwrap()
 }
 

@@ -6,12 +6,12 @@ use bimorph::analysis::modes::modes;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::discretize::frame::{ElementCount, FrameGaps, FrameOptions};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Setting, read_bundle};
 use bimorph::solve::baseline::SolverKind;
 use std::path::Path;
 
 fn bank(band: Option<f64>) -> CompiledModel {
-    let bundle = Bundle::read(Path::new("examples/bank/bank.net"), &[]).unwrap();
+    let bundle = read_bundle(Path::new("examples/bank/bank.net"), &[]).unwrap();
     compile(&bundle, &CompileOptions { band, junctions: Junctions::Centreline, ..CompileOptions::default() }).unwrap()
 }
 

@@ -4,12 +4,12 @@ use crate::{balance, close, node};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Setting, read_bundle};
 use std::path::Path;
 
 fn scene(name: &str, set: &[(&str, f64)], options: &CompileOptions) -> CompiledModel {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name);
-    let bundle = Bundle::read(&path, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let bundle = read_bundle(&path, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
     let set = set.iter().map(|(n, v)| ((*n).to_owned(), Setting::Number(*v))).collect();
     let compiled = compile(&bundle, &CompileOptions { set, junctions: Junctions::Centreline, ..options.clone() })
         .unwrap_or_else(|e| panic!("{e}"));

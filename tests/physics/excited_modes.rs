@@ -4,7 +4,7 @@ use bimorph::analysis::chart::error::relative_error;
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Bundle, Setting, read_bundle};
 use std::path::Path;
 
 /// Two short beams between anchors and a load where they meet, which moves them along as well: waves of some gigahertz.
@@ -62,7 +62,7 @@ fn warned(model: &CompiledModel) -> bool {
 /// (before: 1.3e-3 at both). The reference has 24 segments a beam.
 #[test]
 fn what_no_mode_holds_is_compared() {
-    let bundle = Bundle::read(Path::new("examples/quarter_stage/quarter_stage.net"), &[]).unwrap();
+    let bundle = read_bundle(Path::new("examples/quarter_stage/quarter_stage.net"), &[]).unwrap();
     let options = CompileOptions { undamped: true, ..CompileOptions::default() };
     let release = |options: &CompileOptions| run(&bundle, Some(20e-6), 20e-6, &["c.x", "c.y"], options);
     let (reference, _) = release(&CompileOptions { tol: 2e-5, segments: Some(24), ..options.clone() });

@@ -6,7 +6,7 @@ use super::{POLY, close, linear, node};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::{Bundle, read_bundle};
 use plane_stress::LAYOUTS;
 use std::path::Path;
 
@@ -32,7 +32,7 @@ fn six_layouts_in_plane_stress() {
             rotary_inertia: wide,
             ..CompileOptions::default()
         };
-        let compiled = compile(&Bundle::read(&path, &[]).unwrap(), &options).unwrap();
+        let compiled = compile(&read_bundle(&path, &[]).unwrap(), &options).unwrap();
         assert_eq!(compiled.options.junctions, Junctions::Calibrated);
         let found = modes(&compiled, reference.len(), &[]).unwrap().frequencies_hz;
         assert_eq!(found.len(), reference.len());
@@ -58,7 +58,7 @@ fn rotary_inertia_left_out_is_reported() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/netlists/junctions/paddle.net");
     let found = |rotary_inertia: bool| {
         let options = CompileOptions { rotary_inertia, ..CompileOptions::default() };
-        let found = modes(&compile(&Bundle::read(&path, &[]).unwrap(), &options).unwrap(), 3, &[]).unwrap();
+        let found = modes(&compile(&read_bundle(&path, &[]).unwrap(), &options).unwrap(), 3, &[]).unwrap();
         let said = found.warnings.iter().find(|w| w.contains("--rotary-inertia")).cloned();
         (found.frequencies_hz[1], said)
     };

@@ -7,7 +7,7 @@ use bimorph::analysis::modes::modes;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Junctions, compile};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Bundle, Setting, read_bundle};
 use std::path::Path;
 
 const SILICON: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nparam F=0\nanchor p [a] []\n";
@@ -131,7 +131,7 @@ fn transients_hold_over_their_length() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/comb_resonator/comb_resonator.net");
     let run = |tol: f64, formulation: Formulation| {
         let model = compile(
-            &Bundle::read(&path, &[]).unwrap(),
+            &read_bundle(&path, &[]).unwrap(),
             &CompileOptions { tol, formulation, ..CompileOptions::default() },
         );
         let options = TransientOptions {
@@ -194,7 +194,7 @@ fn modes_about_stress_converge_at_junctions() {
 #[test]
 fn meshes_of_circuits_have_no_cliff() {
     let bundle =
-        Bundle::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/quarter_stage/quarter_stage.net"), &[])
+        read_bundle(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/quarter_stage/quarter_stage.net"), &[])
             .unwrap();
     let mut before = 0;
     for (tol, holds) in [(1e-3, true), (1e-5, true), (1e-6, false)] {
@@ -213,7 +213,7 @@ fn meshes_of_circuits_have_no_cliff() {
 #[test]
 fn circuits_know_the_error_of_their_lowest_mode() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
-    let bundle = Bundle::read(&path, &[]).unwrap();
+    let bundle = read_bundle(&path, &[]).unwrap();
     for formulation in [Formulation::Compliant, Formulation::Rcr] {
         let at = |segments| {
             let options = CompileOptions { formulation, segments, ..CompileOptions::default() };

@@ -6,7 +6,7 @@ use bimorph::analysis::continuation::{ContinuationRequest, PathInput};
 use bimorph::analysis::mesh::{modes_fitted, path_fitted, pull_in_fitted, static_fitted, warnings};
 use bimorph::analysis::modes::modes;
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Bundle, Setting, read_bundle};
 use bimorph::solve::continuation::Branch;
 use std::path::Path;
 
@@ -25,7 +25,7 @@ fn stressed(more: &str, s: f64, options: &CompileOptions) -> CompiledModel {
 #[test]
 fn modes_next_to_pull_in() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/switch/switch.net");
-    let bundle = Bundle::read(&path, &[]).unwrap();
+    let bundle = read_bundle(&path, &[]).unwrap();
     let at = |options: &CompileOptions| {
         let compiled = compile(&bundle, options).unwrap();
         let (fitted, found, _) = modes_fitted(&compiled, 1, &[("drive".into(), 17.8398)]).unwrap();
@@ -44,7 +44,7 @@ fn modes_next_to_pull_in() {
 #[test]
 fn few_pieces_next_to_pull_in() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/netlists/accuracy/cantilever_gap.net");
-    let pieces = |n: f64| Bundle::read(&path, &[]).map(|bundle| with_pieces(bundle, n)).unwrap();
+    let pieces = |n: f64| read_bundle(&path, &[]).map(|bundle| with_pieces(bundle, n)).unwrap();
     let at = |n: f64, volts: f64| {
         let compiled = compile(&pieces(n), &CompileOptions::default()).unwrap();
         let (fitted, result, _) = static_fitted(&compiled, &[("drive".into(), volts)]).unwrap();

@@ -4,7 +4,7 @@ use crate::{close, model};
 use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, PathInput, trace};
 use bimorph::analysis::mesh::path_fitted;
 use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Setting, read_bundle};
 use bimorph::solve::continuation::Branch;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
@@ -19,7 +19,7 @@ const EULER: f64 = 4.0 * PI * PI * EI / (L * L);
 
 fn scene(name: &str, set: &[(&str, f64)], options: &CompileOptions) -> CompiledModel {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name);
-    let bundle = Bundle::read(&path, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let bundle = read_bundle(&path, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
     let set = set.iter().map(|(n, v)| ((*n).to_owned(), Setting::Number(*v))).collect();
     compile(&bundle, &CompileOptions { set, junctions: Junctions::Centreline, ..options.clone() })
         .unwrap_or_else(|e| panic!("{e}"))

@@ -5,7 +5,7 @@ use bimorph::analysis::chart::error::{half_range, largest_error};
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, CompiledModel, Formulation, compile};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::{Bundle, NetlistSource, read_bundle};
 use std::path::Path;
 
 fn reported(model: &CompiledModel, options: &TransientOptions<'_>) -> TransientResult {
@@ -75,7 +75,7 @@ fn bimorph() -> (Bundle, CompileOptions) {
     let path = format!("{}/examples/single_bimorph/single_bimorph.net", env!("CARGO_MANIFEST_DIR"));
     let set = vec![("F".to_owned(), bimorph::netlist::Setting::Number(20e-6))];
     let options = CompileOptions { set, segments: Some(4), ..CompileOptions::default() };
-    (Bundle::read(Path::new(&path), &[]).unwrap(), options)
+    (read_bundle(Path::new(&path), &[]).unwrap(), options)
 }
 
 /// A large motion on bodies and in joint coordinates: with the estimate the samples are bit-identical to those without, and it is the
@@ -86,7 +86,7 @@ fn estimates_leave_the_motion_alone() {
         let (bundle, options) = bimorph();
         let options = CompileOptions { formulation, ..options };
         let start = compile(&bundle, &options).unwrap();
-        let moving = bimorph::analysis::chart::released(&bundle, &start, "F").unwrap();
+        let moving = bimorph::analysis::chart::released(&NetlistSource::new(&bundle), &start, "F").unwrap();
         let run = |tol: f64, estimate: bool| {
             let options = TransientOptions {
                 stop: 50e-6,

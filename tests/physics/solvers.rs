@@ -4,7 +4,7 @@ use bimorph::compile::{CompileOptions, compile};
 use bimorph::equations::linear::LinearSolver;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, forces};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::read_bundle;
 use bimorph::solve::baseline::sparse::Sparse;
 use bimorph::solve::baseline::{Solver, SolverKind};
 use std::path::Path;
@@ -13,7 +13,7 @@ use std::path::Path;
 /// the recursion. The residual of every row is at rounding, 1e-12 of the terms that it sums (1e-10 with exchanges).
 #[test]
 fn all_solvers_agree_on_step_matrices() {
-    let bundle = Bundle::read(Path::new("examples/bank/bank.net"), &[]).unwrap();
+    let bundle = read_bundle(Path::new("examples/bank/bank.net"), &[]).unwrap();
     let options = CompileOptions { segments: Some(4), ..CompileOptions::default() };
     let system = compile(&bundle, &options).unwrap().parts.system;
     let pattern = &system.model.pattern;
@@ -61,7 +61,7 @@ fn all_solvers_agree_on_step_matrices() {
 /// bank is no larger than the recursion's by a half.
 #[test]
 fn sparse_factor_is_small() {
-    let bundle = Bundle::read(Path::new("examples/bank/bank.net"), &[]).unwrap();
+    let bundle = read_bundle(Path::new("examples/bank/bank.net"), &[]).unwrap();
     let options = CompileOptions { band: Some(1.3e6), ..CompileOptions::default() };
     let system = compile(&bundle, &options).unwrap().parts.system;
     let pattern = &system.model.pattern;

@@ -11,7 +11,7 @@ use bimorph::multibody::joint_coordinates::sprung_loops::geometric::{Geometric, 
 use bimorph::multibody::joint_coordinates::sprung_loops::poses::{LaneJointStates, TreeKinematics};
 use bimorph::multibody::joint_coordinates::sprung_loops::{JointMatrix, Tree, TreeParent, UnsupportedModel};
 use bimorph::multibody::planar::Pose;
-use bimorph::netlist::Bundle;
+use bimorph::netlist::{Bundle, read_bundle};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::path::SourcePath;
 use nalgebra::{DMatrix, DVector, Matrix3};
@@ -253,7 +253,7 @@ fn a_scheme_without_rotary_inertia_is_refused() {
 /// within it. (It had eight times as many.)
 #[test]
 fn es_takes_as_many_segments_as_the_tolerance_wants() {
-    let bundle = Bundle::read(Path::new("examples/quarter_stage/quarter_stage.net"), &[]).unwrap();
+    let bundle = read_bundle(Path::new("examples/quarter_stage/quarter_stage.net"), &[]).unwrap();
     for tol in [1e-2, 1e-3] {
         let [e4, es] = [Scheme::E4, Scheme::Es].map(|scheme| {
             let compiled = compile(&bundle, &CompileOptions { scheme, tol, ..CompileOptions::default() }).unwrap();

@@ -6,7 +6,7 @@ use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Scheme, compi
 use bimorph::domains::Ramp;
 use bimorph::equations::{Bodies, Joints};
 use bimorph::multibody::joint_coordinates::sprung_loops::{Tree, UnsupportedModel};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Setting, read_bundle};
 use bimorph::solve::time::joint_rodas4::JointRodas4;
 
 use bimorph::solve::time::method::{Method, Motion};
@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// takes the bodies' own coordinates.
 #[test]
 fn plates_on_pivots_step_explicitly() {
-    let bundle = Bundle::read(Path::new("examples/pivots/pivots.net"), &[]).unwrap();
+    let bundle = read_bundle(Path::new("examples/pivots/pivots.net"), &[]).unwrap();
     let swing = |formulation, scheme, tol| {
         let options =
             CompileOptions { formulation, scheme, tol, undamped: true, segments: Some(1), ..CompileOptions::default() };
@@ -49,7 +49,7 @@ fn plates_on_pivots_step_explicitly() {
 }
 
 fn scene(file: &str, formulation: Formulation, tol: f64, set: &[(&str, f64)]) -> CompiledModel {
-    let bundle = Bundle::read(Path::new(file), &[]).unwrap();
+    let bundle = read_bundle(Path::new(file), &[]).unwrap();
     let set = set.iter().map(|&(n, v)| (n.to_owned(), Setting::Number(v))).collect();
     let options = CompileOptions { formulation, tol, set, scheme: Scheme::Es, ..CompileOptions::default() };
     compile(&bundle, &options).unwrap_or_else(|e| panic!("{file}: {e}"))

@@ -8,7 +8,7 @@ use bimorph::analysis::pull_in::pull_in;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::read_bundle;
 use bimorph::solve::continuation::Branch;
 use bimorph::solve::time::event::Direction;
 use std::fmt::Write;
@@ -94,7 +94,7 @@ fn vm236_hysteresis_in_one_path() {
 #[test]
 fn the_switch_shows_its_hysteresis() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/switch/switch.net");
-    let bundle = Bundle::read(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
+    let bundle = read_bundle(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
     let compiled = compile(&bundle, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let request = ContinuationRequest {
         input: PathInput::Port("drive"),

@@ -10,7 +10,7 @@ use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::analysis::{AnalysisError, chart};
 use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Bundle, NetlistSource, Setting, read_bundle};
 use std::path::Path;
 
 const SILICON: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nparam F=0\nanchor p [a] []\n";
@@ -26,7 +26,7 @@ fn with(f: f64) -> Vec<(String, Setting)> {
 
 fn example(name: &str) -> Bundle {
     let path = format!("{}/examples/{name}/{name}.net", env!("CARGO_MANIFEST_DIR"));
-    Bundle::read(Path::new(&path), &[]).unwrap()
+    read_bundle(Path::new(&path), &[]).unwrap()
 }
 
 /// A run with its step error and warnings.
@@ -46,7 +46,7 @@ fn reported(model: &CompiledModel, start: &CompiledModel, options: &TransientOpt
 fn steps_in_time_report_their_error() {
     let options = CompileOptions { set: with(20e-6), segments: Some(4), ..CompileOptions::default() };
     let start = compile(&example("single_bimorph"), &options).unwrap();
-    let moving = chart::released(&example("single_bimorph"), &start, "F").unwrap();
+    let moving = chart::released(&NetlistSource::new(&example("single_bimorph")), &start, "F").unwrap();
     let run = |tol: f64| {
         let signals = vec!["tip.y".to_owned()];
         reported(&moving, &start, &TransientOptions { stop: 50e-6, tol, signals, ..TransientOptions::default() })

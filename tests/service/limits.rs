@@ -119,7 +119,7 @@ fn meshes_of_circuits_fit_the_limit() {
     let server =
         start_with("127.0.0.1:0", Limits { unknowns: 300, ..Limits::default() }, |m| Box::new(LocalDevice::new(m)));
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/quarter_stage/quarter_stage.net");
-    let bundle = bimorph::netlist::Bundle::read(std::path::Path::new(path), &[]).expect("an example");
+    let bundle = bimorph::netlist::read_bundle(std::path::Path::new(path), &[]).expect("an example");
     let bundle = Some(bimorph::service::convert::model::bundle_to_wire(&bundle));
     let options = Some(proto::CompileOptions { tol: Some(1e-4), ..Default::default() });
     let request = proto::CompileRequest { bundle, options };

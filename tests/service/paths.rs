@@ -7,7 +7,7 @@ use bimorph::analysis::largest_motion::path_with_signals;
 use bimorph::analysis::mesh::{self, pull_in_fitted, static_backbent};
 use bimorph::analysis::path_parameter::{PathModels, PathOptions, PathParameter};
 use bimorph::compile::{CompileError, CompileOptions, compile};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::{Bundle, NetlistSource};
 use bimorph::service::client::Client;
 use bimorph::service::convert::path::PathReply;
 use bimorph::service::limits::Limits;
@@ -65,7 +65,8 @@ fn path_here(text: &str, options: &PathOptions) -> PathReply {
     let netlist = bundle(text);
     let drawn = compile(&netlist, &CompileOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let parameter = PathParameter::find(&drawn, &options.along).expect("a parameter");
-    let models = PathModels::new(parameter, &drawn, options, || Ok::<_, CompileError>(netlist)).expect("compiles");
+    let models = PathModels::new(parameter, &drawn, options, || Ok::<_, CompileError>(NetlistSource::new(&netlist)))
+        .expect("compiles");
     let (first, input) = models.input(&drawn, &options.along);
     let (fitted, mut result) = path_with_signals(first, &options.request(input), &mut |_| true).expect("a path");
     result.warnings.extend(mesh::warnings(&fitted));

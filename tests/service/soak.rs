@@ -2,7 +2,7 @@
 #![cfg(target_os = "linux")]
 
 use super::serve_process::{Victim, Wire};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::read_bundle;
 use bimorph::service::convert::model::bundle_to_wire;
 use bimorph::service::proto;
 use proto::device_reply::Kind as ReplyKind;
@@ -16,7 +16,7 @@ const LONG: Duration = Duration::from_secs(60);
 const STEP: f64 = 1e-6;
 
 async fn bank(wire: &mut Wire) -> String {
-    let bundle = Bundle::read(Path::new("examples/bank/bank.net"), &[]).expect("the example is there");
+    let bundle = read_bundle(Path::new("examples/bank/bank.net"), &[]).expect("the example is there");
     let request = proto::CompileRequest { bundle: Some(bundle_to_wire(&bundle)), options: None };
     wire.compile(request).await.expect("compiles").into_inner().model.expect("a description").id
 }

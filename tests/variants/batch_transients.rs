@@ -4,7 +4,7 @@ use bimorph::analysis::transient::first_step;
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::domains::Ramp;
 use bimorph::equations::Bodies;
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Bundle, Setting, read_bundle};
 use bimorph::solve::time::adaptive::{Adaptive, Control};
 use bimorph::solve::time::batch::{self, BatchRun, Ended, Watcher};
 use bimorph::solve::time::method::Motion;
@@ -93,7 +93,7 @@ fn bits(ran: &Ran) -> Vec<u64> {
 fn a_lane_has_the_bits_of_its_variant_alone() {
     let bank = std::fs::read_to_string("examples/bank/bank.net").expect("the bank");
     let bundle = |text: &str| {
-        let mut bundle = Bundle::read(std::path::Path::new("examples/bank/bank.net"), &[]).expect("the bank");
+        let mut bundle = read_bundle(std::path::Path::new("examples/bank/bank.net"), &[]).expect("the bank");
         let root = bundle.root.clone();
         *bundle.files.get_mut(&root).expect("its root") = text.to_owned();
         bundle

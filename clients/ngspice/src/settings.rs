@@ -4,7 +4,7 @@
 //! parentheses. So `set=["w=2.1u" "F=0"]` arrives as w, 2.1u, F, 0, and a node `x1(2)` arrives as two words. Later
 //! versions keep more of it together. Both forms are read here.
 
-use bimorph::netlist::Setting;
+use bimorph::netlist::{Setting, parse_setting};
 
 /// A signal shown as a voltage.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +48,7 @@ fn number(text: &str) -> Option<f64> {
     if let Ok(value) = text.parse::<f64>() {
         return Some(value).filter(|v| v.is_finite());
     }
-    match Setting::parse(text) {
+    match parse_setting(text) {
         Ok(Setting::Number(value)) if value.is_finite() => Some(value),
         _ => None,
     }

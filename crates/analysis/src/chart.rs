@@ -28,7 +28,7 @@ pub use variant::released;
 use super::modes::modes;
 use super::{AnalysisError, PortVoltages, ProgressCallback};
 use bimorph_model::compile::CompileOptions;
-use bimorph_netlist::Bundle;
+use bimorph_structure::FrontEnd;
 use runs::{ChartProgress, RunSeries, order, precision};
 use variant::{ChartVariant, FormulationModels};
 
@@ -42,14 +42,14 @@ const BANDS: [f64; 6] = [2.0, 8.0, 32.0, 128.0, 512.0, 2048.0];
 /// # Errors
 /// See [`ChartError`]; a single run that fails is a point that says so.
 pub fn chart(
-    bundle: &Bundle,
+    source: &dyn FrontEnd,
     options: &CompileOptions,
     spec: &ChartSpec,
     watch: ProgressCallback<'_>,
 ) -> Result<Chart, ChartError> {
     check(spec)?;
     let release = spec.release.as_deref();
-    let models = |band| FormulationModels::new(bundle, options, band, release, &spec.formulations);
+    let models = |band| FormulationModels::new(source, options, band, release, &spec.formulations);
     let base = models(options.band)?;
     let lowest = if spec.stop.is_none() || spec.bands.is_empty() {
         Some(lowest_mode(&base.bodies, &spec.voltages)?)
@@ -95,7 +95,7 @@ pub fn chart(
         }
     }
     if spec.parts.contains(&ChartPart::Defaults) {
-        defaults::defaults((bundle, options), (spec, stop), &mut chart, &mut progress)?;
+        defaults::defaults((source, options), (spec, stop), &mut chart, &mut progress)?;
     }
     Ok(chart)
 }

@@ -1,10 +1,11 @@
 //! Parameter of a path by name: a port, a numeric parameter of the netlist, or `loads`, the factor on all dead loads.
 
 use super::continuation::{ContinuationRequest, PathInput};
-use bimorph_model::compile::{CompileError, CompiledModel, compile};
+use bimorph_base::Setting;
+use bimorph_model::compile::{CompileError, CompiledModel, draw};
 use bimorph_model::options::analysis::PATH_POINTS;
-use bimorph_netlist::{Bundle, Setting};
 use bimorph_solve::continuation::Branch;
+use bimorph_structure::FrontEnd;
 use thiserror::Error;
 
 /// Name of the factor on all dead loads.
@@ -123,27 +124,27 @@ pub enum PathModels {
 }
 
 impl PathModels {
-    /// The models of a path. A path along a parameter of the netlist compiles `bundle` with its first and with its last value.
+    /// The models of a path. A path along a parameter of the netlist compiles what `source` gives with its first and with its last value.
     ///
     /// # Errors
-    /// Those of `bundle`; see [`CompileError`].
-    pub fn new<E: From<CompileError>>(
+    /// Those of `source`; see [`CompileError`].
+    pub fn new<S: FrontEnd, E: From<CompileError>>(
         parameter: PathParameter,
         compiled: &CompiledModel,
         options: &PathOptions,
-        bundle: impl FnOnce() -> Result<Bundle, E>,
+        source: impl FnOnce() -> Result<S, E>,
     ) -> Result<Self, E> {
         match parameter {
             PathParameter::Port => return Ok(Self::Port),
             PathParameter::Loads => return Ok(Self::Loads),
             PathParameter::Netlist => {}
         }
-        let bundle = bundle()?;
+        let source = source()?;
         let at = |value: f64| {
             let mut set = compiled.options.clone();
             set.set.retain(|(parameter, _)| *parameter != options.along);
             set.set.push((options.along.clone(), Setting::Number(value)));
-            compile(&bundle, &set)
+            draw(&source, &set)?.compile()
         };
         Ok(Self::Netlist(Box::new([at(options.from)?, at(options.to)?])))
     }

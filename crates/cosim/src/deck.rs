@@ -252,7 +252,8 @@ fn line(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bimorph_netlist::{Bundle, load};
+    use bimorph_base::Bundle;
+    use bimorph_netlist::load;
 
     const PLATE: &str = "anchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\n\
         anchor * [e] [l=1u w=1u h=1u]\nplategap2d * [m e] [A=1e-8 gap=2u]\neground * [e] []\n";

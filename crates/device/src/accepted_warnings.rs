@@ -9,8 +9,8 @@ use super::states::Snapshot;
 use bimorph_analysis::mesh::{WARNING, operating_point_warnings, transient_warnings};
 use bimorph_analysis::readout::ports::PortResponse;
 use bimorph_analysis::statics::OperatingPoint;
+use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
-use bimorph_netlist::Diagnostic;
 
 /// Code of the warning that a charge alone holds a mechanism.
 const HELD: &str = "W048";

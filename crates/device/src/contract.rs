@@ -1,7 +1,7 @@
 //! The contract of a device: requests, replies, and errors.
 
 use bimorph_analysis::readout::{PortKind, ReadoutError};
-use bimorph_netlist::Diagnostic;
+use bimorph_base::Diagnostic;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

@@ -9,8 +9,8 @@ use super::quantities;
 use super::session::DeviceSession;
 use super::snapshot;
 use super::{Description, Device, DeviceError, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
+use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
-use bimorph_netlist::Diagnostic;
 use std::sync::Arc;
 
 /// A [`Device`] over a compiled model.

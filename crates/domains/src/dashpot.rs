@@ -2,11 +2,10 @@
 
 use super::approach::MaterialPoint;
 use super::domain::{Configuration, Domain};
-use super::element::DomainElement;
 use super::from_structure::{FromStructure, StructureView};
 use bimorph_multibody::planar::{JointFrame, Pose};
 use bimorph_multibody::{BlockMatrix, BodyId, Damper, Pattern};
-use bimorph_structure::GapVoltage;
+use bimorph_structure::{DomainElement, GapVoltage};
 use nalgebra::{Vector2, Vector3};
 
 /// A dashpot.
@@ -21,8 +20,7 @@ pub struct Dashpot {
 }
 
 impl FromStructure for Dashpot {
-    const ELEMENT: Option<DomainElement> =
-        Some(DomainElement { name: "dashpot2d", nodes: &[1], node_names: "[n]", parameters: &["bx", "by", "brz"] });
+    const ELEMENT: Option<DomainElement> = Some(DomainElement::DASHPOT);
 
     fn lay<'a>(drawing: &StructureView<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
         for placed in drawing.placed::<Self>() {

@@ -10,11 +10,11 @@ pub use super::facing_local::FacingBeams;
 use super::facing_local::SIGNS;
 use super::facing_loss;
 use super::facing_side::{Opening, back};
-use super::facing_stretches::{BeamRows, CubicStretch, stretches};
+use super::facing_stretches::{CubicStretch, side, stretches};
 use super::from_structure::{FromStructure, StructureView};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
-use bimorph_structure::GapVoltage;
+use bimorph_structure::{BeamRows, GapVoltage};
 use nalgebra::{Vector2, Vector4};
 
 impl FromStructure for FacingBeams {
@@ -28,7 +28,7 @@ impl FromStructure for FacingBeams {
             let normal = gap.angle + gap.side * std::f64::consts::FRAC_PI_2;
             let frame = Opening { axis: Vector2::new(normal.cos(), normal.sin()), side: gap.side };
             let [a, b, c, d] = gap.nodes;
-            let sides = [[a, b], [c, d]].map(|nodes| beams.side(drawing, gap, nodes));
+            let sides = [[a, b], [c, d]].map(|nodes| side(&beams, drawing, gap, nodes));
             let cut = stretches(&sides);
             let facing = FacingStretch {
                 length: gap.length,

@@ -11,98 +11,41 @@ use super::facing_side::{EndWeights, Flank};
 use super::from_structure::{Station, StructureView};
 use super::quadrature::{hermite, hermite_slope};
 use bimorph_multibody::BodyId;
-use bimorph_structure::{BeamGap, NodeId, Structure};
+use bimorph_structure::{ALIKE, BeamGap, BeamRows, NodeId};
 use nalgebra::Matrix4;
-use std::collections::HashMap;
 
-/// Difference of lengths [of the gap's] and of directions [rad] that is rounding of the drawing.
-const ALIKE: f64 = 1e-6;
-
-/// The beams at each node of a drawing.
-pub struct BeamRows<'d> {
-    structure: &'d Structure,
-    at: HashMap<NodeId, Vec<usize>>,
-}
-
-impl<'d> BeamRows<'d> {
-    /// Of a drawing.
-    #[inline]
-    pub fn new(structure: &'d Structure) -> Self {
-        let mut at: HashMap<NodeId, Vec<usize>> = HashMap::new();
-        for (index, beam) in structure.beams.iter().enumerate() {
-            for node in [beam.a, beam.b] {
-                at.entry(node).or_default().push(index);
-            }
+/// The stations of a side of a gap, from one node to another: those of the beams along it, or its two ends where no beam
+/// lies there or none bends.
+pub(super) fn side(beams: &BeamRows<'_>, drawing: &StructureView<'_, '_>, gap: &BeamGap, nodes: [NodeId; 2]) -> Flank {
+    let [start, end] = nodes.map(|node| (drawing.point)(node));
+    let ends = || vec![Station { at: 0.0, point: start }, Station { at: gap.length, point: end }];
+    let cut = !drawing.chord && !drawing.stations.is_empty();
+    let fixed = |stations: &[Station]| stations.iter().all(|station| station.point.body == BodyId::Ground);
+    let straight = || Flank { fixed: fixed(&ends()), stations: ends(), yields: Vec::new() };
+    let Some(row) = (if cut { beams.row(gap, nodes) } else { None }) else { return straight() };
+    let mut yields = Vec::new();
+    let mut stations = vec![Station { at: 0.0, point: start }];
+    let mut begin = 0.0;
+    for (index, against) in row {
+        let (beam, own) = (&drawing.structure.beams[index], &drawing.stations[index]);
+        let (length, before) = (beam.length, stations.len() - 1);
+        let stiffness = beam.material.youngs_modulus * beam.thickness * beam.width.powi(3) / 12.0;
+        let place = |station: &Station, at: f64| Station { at: begin + at, point: station.point };
+        if against {
+            stations.extend(own.iter().rev().skip(1).map(|station| place(station, length - station.at)));
+        } else {
+            stations.extend(own.iter().skip(1).map(|station| place(station, station.at)));
         }
-        Self { structure, at }
+        begin += length;
+        yields.extend(stations[before..].windows(2).map(|ends| {
+            let stiff = ends[0].point.body == ends[1].point.body;
+            if stiff { 0.0 } else { (ends[1].at - ends[0].at).powi(4) / (24.0 * stiffness) }
+        }));
     }
-
-    /// The chain of beams from one node to another along a gap, each with true where its direction is opposite to that
-    /// of the gap. `None` where no straight chain of the gap's length connects the nodes.
-    fn row(&self, gap: &BeamGap, [from, to]: [NodeId; 2]) -> Option<Vec<(usize, bool)>> {
-        let (mut row, mut node, mut at) = (Vec::new(), from, 0.0);
-        let within = gap.length * (1.0 + ALIKE);
-        while node != to && row.len() <= self.structure.beams.len() {
-            let next = |&index: &usize| {
-                let beam = &self.structure.beams[index];
-                let against = beam.a != node;
-                let other = if against { beam.a } else { beam.b };
-                let turned = beam.angle - gap.angle;
-                let along = if against { -turned.cos() } else { turned.cos() };
-                let fits = other != node && along > 0.0 && turned.sin().abs() < ALIKE && at + beam.length <= within;
-                fits.then_some((index, against, other))
-            };
-            let fitting = self.at.get(&node)?.iter().filter_map(next);
-            // a beam that ends where the gap does comes before those that lead on
-            let (index, against, other) = fitting.min_by_key(|(index, _, other)| (*other != to, *index))?;
-            row.push((index, against));
-            at += self.structure.beams[index].length;
-            node = other;
-        }
-        (node == to && (at - gap.length).abs() <= ALIKE * gap.length).then_some(row)
-    }
-
-    /// The beams that a gap follows, on both sides, as indices.
-    #[inline]
-    pub fn along(&self, gap: &BeamGap) -> impl Iterator<Item = usize> {
-        let [a, b, c, d] = gap.nodes;
-        let rows = [[a, b], [c, d]].map(|nodes| self.row(gap, nodes).unwrap_or_default());
-        rows.into_iter().flatten().map(|(index, _)| index)
-    }
-
-    /// The stations of a side of a gap, from one node to another: those of the beams along it, or its two ends where no beam
-    /// lies there or none bends.
-    pub(super) fn side(&self, drawing: &StructureView<'_, '_>, gap: &BeamGap, nodes: [NodeId; 2]) -> Flank {
-        let [start, end] = nodes.map(|node| (drawing.point)(node));
-        let ends = || vec![Station { at: 0.0, point: start }, Station { at: gap.length, point: end }];
-        let cut = !drawing.chord && !drawing.stations.is_empty();
-        let fixed = |stations: &[Station]| stations.iter().all(|station| station.point.body == BodyId::Ground);
-        let straight = || Flank { fixed: fixed(&ends()), stations: ends(), yields: Vec::new() };
-        let Some(row) = (if cut { self.row(gap, nodes) } else { None }) else { return straight() };
-        let mut yields = Vec::new();
-        let mut stations = vec![Station { at: 0.0, point: start }];
-        let mut begin = 0.0;
-        for (index, against) in row {
-            let (beam, own) = (&self.structure.beams[index], &drawing.stations[index]);
-            let (length, before) = (beam.length, stations.len() - 1);
-            let stiffness = beam.material.youngs_modulus * beam.thickness * beam.width.powi(3) / 12.0;
-            let place = |station: &Station, at: f64| Station { at: begin + at, point: station.point };
-            if against {
-                stations.extend(own.iter().rev().skip(1).map(|station| place(station, length - station.at)));
-            } else {
-                stations.extend(own.iter().skip(1).map(|station| place(station, station.at)));
-            }
-            begin += length;
-            yields.extend(stations[before..].windows(2).map(|ends| {
-                let stiff = ends[0].point.body == ends[1].point.body;
-                if stiff { 0.0 } else { (ends[1].at - ends[0].at).powi(4) / (24.0 * stiffness) }
-            }));
-        }
-        let last = stations.len() - 1;
-        stations[last] = Station { at: gap.length, point: end };
-        let rigid = stations.iter().all(|station| station.point.body == start.body);
-        if rigid { straight() } else { Flank { fixed: false, stations, yields } }
-    }
+    let last = stations.len() - 1;
+    stations[last] = Station { at: gap.length, point: end };
+    let rigid = stations.iter().all(|station| station.point.body == start.body);
+    if rigid { straight() } else { Flank { fixed: false, stations, yields } }
 }
 
 /// A part of the gap over which both sides are single cubics.

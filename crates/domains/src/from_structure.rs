@@ -2,9 +2,8 @@
 
 use super::approach::{Approach, MaterialPoint};
 use super::domain::Domain;
-use super::element::DomainElement;
 use bimorph_multibody::Damper;
-use bimorph_structure::{GapVoltage, NodeId, PlacedElement, Structure};
+use bimorph_structure::{DomainElement, GapVoltage, NodeId, PlacedElement, Structure};
 use nalgebra::Vector2;
 
 /// A point along a beam that one body carries.

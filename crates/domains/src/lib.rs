@@ -19,7 +19,7 @@
 //! | [`loss_derivatives`] | derivatives of the forces of that over the bodies |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
 //! | [`dashpot`] | a damper to the ground |
-//! | [`from_structure`], [`element`] | from a drawing to them; elements of their own |
+//! | [`from_structure`] | from a drawing to them |
 //! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
 //! | [`load`], [`moving_frame`] | dead loads, and forces that sources give; the motion of the frame |
 //! | [`facing`] | a stretch of two facing beams: pressure along a gap that varies over their length |
@@ -53,7 +53,6 @@ pub mod dashpot;
 pub mod domain;
 pub mod drive;
 pub mod electrodes;
-pub mod element;
 pub mod energy;
 pub mod facing;
 pub mod facing_beams;
@@ -84,11 +83,9 @@ pub use approach::MaterialPoint;
 pub use beam_line::BeamLine;
 pub use domain::{Configuration, Domain, Law};
 pub use drive::{Drive, Ramp};
-pub use element::DomainElement;
-pub use facing_stretches::BeamRows;
 pub use from_structure::{PlacedMember, Station, StructureView};
 pub use input::Input;
 pub use lag::Lags;
 pub use load::DeadLoad;
-pub use member::{Member, elements};
+pub use member::Member;
 pub use system::System;

@@ -3,7 +3,6 @@
 use super::approach::{Approach, MaterialPoint};
 use super::contact_loss::Loss;
 use super::domain::{Chord, Configuration, Domain, Law};
-use super::element::DomainElement;
 use super::from_structure::{FromStructure, PlacedMember, StructureView};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Damper, Pattern};
@@ -32,8 +31,6 @@ macro_rules! domains {
         }
 
         impl Member {
-            const ELEMENTS: &'static [Option<DomainElement>] = &[$(<$law as FromStructure>::ELEMENT),+];
-
             /// The members of a drawing, domain by domain: those that are gaps first.
             #[inline]
             pub fn lay<'a>(drawing: &StructureView<'a, '_>) -> Vec<PlacedMember<'a, Self>> {
@@ -64,12 +61,6 @@ domains! {
     FacingBeams: super::facing_beams::FacingBeams, "Two beams that face each other.";
     StopPair: super::stop_pair::StopPair, "A stop.";
     Dashpot: super::dashpot::Dashpot, "A damper to the ground.";
-}
-
-/// The elements that domains have of their own, in the order of the register.
-#[inline]
-pub fn elements() -> impl Iterator<Item = &'static DomainElement> {
-    Member::ELEMENTS.iter().flatten()
 }
 
 impl Domain for Member {

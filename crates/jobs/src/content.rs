@@ -1,8 +1,8 @@
 //! Names for contents: FNV-1a, 128 bits (Fowler, Noll, Vo), over lengths and bytes. The same on every machine and in every
 //! process; for telling apart what is different, not against forgery.
 
+use bimorph_base::{Bundle, Setting};
 use bimorph_model::options::CompileOptions;
-use bimorph_netlist::{Bundle, Setting};
 
 /// Bytes of a text between two checks of the budget.
 const CHUNK: usize = 1 << 20;

@@ -41,8 +41,9 @@ pub use spec::{Shard, SweepAnalysis, SweepSpec};
 pub use table::{SweepRow, SweepTable};
 pub use values::Values;
 
+use bimorph_base::{Bundle, Setting};
 use bimorph_model::compile::{CompileError, CompileOptions, ParsedStructure, draw};
-use bimorph_netlist::{Bundle, NetlistSource, Setting};
+use bimorph_netlist::NetlistSource;
 use journal::JournalRow;
 use point::PointOutcome;
 use std::collections::BTreeMap;

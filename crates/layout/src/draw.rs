@@ -7,7 +7,7 @@
 
 use super::lines::{ElementLine, ElementLines};
 use super::process::Process;
-use bimorph_domains::elements;
+use bimorph_structure::DomainElement;
 use std::collections::HashMap;
 
 /// Pads whose sizes are not given [m].
@@ -266,7 +266,7 @@ impl<'a> Draw<'a> {
         for line in &self.lines.elements {
             let lumped =
                 matches!(line.model.as_str(), "link2d" | "spring2d" | "damper2d" | "mass2d" | "plategap2d" | "stop2d");
-            if lumped || elements().any(|element| element.name == line.model) {
+            if lumped || DomainElement::ALL.iter().any(|element| element.name == line.model) {
                 *missing.entry(line.model.as_str()).or_insert(0) += 1;
             }
         }

@@ -5,7 +5,8 @@
 
 use crate::convert::{ConvertError, Converted, convert};
 use crate::{FlatLayout, LayoutError, LayoutFormat, Process, ProcessError};
-use bimorph_netlist::{Bundle, DroppedInclude};
+use bimorph_base::Bundle;
+use bimorph_netlist::{DroppedInclude, read_bundle_reporting};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -90,7 +91,7 @@ pub fn read(
                 return Err(FrontError::Netlist { option, file });
             }
         }
-        let read = Bundle::read_telling(path, include, dropped);
+        let read = read_bundle_reporting(path, include, dropped);
         let bundle = read.map_err(|source| FrontError::Read { path: path.to_owned(), source })?;
         return Ok(InputBundle { bundle, converted: None });
     }

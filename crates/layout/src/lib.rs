@@ -4,8 +4,8 @@
 //! set operations on such polygons. A [`Process`] says what the layers are: which ones move, how thick they are and of
 //! what, and what holds them.
 //!
-//! **Architecture invariant.** Below are [`bimorph_structure`], the table of elements of [`bimorph_domains`], and
-//! [`bimorph_netlist`] for the text that a layout becomes. Nothing here solves.
+//! **Architecture invariant.** Below are [`bimorph_structure`] and [`bimorph_netlist`],
+//! the latter for the text that a layout becomes. Nothing here solves.
 
 mod cells;
 mod chords;

@@ -1,14 +1,14 @@
-//! From netlist text to a ready model: netlist → structure → discretize.
+//! From what a front end reads to a ready model: structure → mesh → bodies and joints.
 
 use crate::discretize::{Assembly, DiscretizeError, discretize_like, order, permanent_strain};
 use crate::options::OptionError;
 use crate::refine::imperfection;
 use crate::refine::mesh_search::{self, Mesh};
+use bimorph_base::{Diagnostic, Diagnostics, Setting};
 use bimorph_multibody::joint_coordinates::sprung_loops::UnsupportedModel;
 use bimorph_multibody::planar::Pose;
-use bimorph_netlist::{Bundle, Diagnostic, Diagnostics, NetlistSource, Setting};
 use bimorph_solve::equations::Joints;
-use bimorph_structure::Structure;
+use bimorph_structure::{FrontEnd, Structure};
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -107,14 +107,6 @@ pub enum CompileError {
     Structure(#[from] DiscretizeError),
 }
 
-/// Compiles a netlist.
-///
-/// # Errors
-/// See [`CompileError`].
-pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<CompiledModel, CompileError> {
-    draw(&NetlistSource::new(bundle), options)?.compile()
-}
-
 /// A netlist as drawn with its options settled, before any mesh.
 #[derive(Debug, Clone)]
 pub struct ParsedStructure {
@@ -128,11 +120,11 @@ pub struct ParsedStructure {
     pub options: CompileOptions,
 }
 
-/// Draws a netlist that has been read: the part of [`compile`] that depends on the values of parameters alone.
+/// Draws a netlist that has been read: the part of a compilation that depends on the values of parameters alone.
 ///
 /// # Errors
 /// See [`CompileError`].
-pub fn draw(source: &NetlistSource, options: &CompileOptions) -> Result<ParsedStructure, CompileError> {
+pub fn draw(source: &dyn FrontEnd, options: &CompileOptions) -> Result<ParsedStructure, CompileError> {
     options.check()?;
     let scheme = options.scheme.in_formulation(options.formulation);
     let mut options = CompileOptions { scheme, ..options.clone() };
@@ -230,6 +222,8 @@ fn in_joints_of(parts: &Assembly, options: &CompileOptions) -> Option<Result<Arc
 mod tests {
     //! Structures beyond the limits are rejected before any allocation.
     use super::*;
+    use bimorph_base::Bundle;
+    use bimorph_netlist::NetlistSource;
 
     #[test]
     fn options_are_bounded_before_anything_is_laid_out() {
@@ -237,8 +231,8 @@ mod tests {
         for k in 0..21 {
             text += &format!("beam2d p [n{k} n{}] [l=100u w=2u]\n", k + 1);
         }
-        let bundle = Bundle::from_text("chain.net", &text);
-        let asked = |options: CompileOptions| compile(&bundle, &options).map(|_| ());
+        let source = NetlistSource::new(&Bundle::from_text("chain.net", &text));
+        let asked = |options: CompileOptions| draw(&source, &options).and_then(ParsedStructure::compile).map(|_| ());
         let refused = asked(CompileOptions { tol: 2.0, ..CompileOptions::default() });
         assert!(matches!(&refused, Err(CompileError::Option(r)) if r.option == "tol"), "{refused:?}");
         // 21 beams of 100 000 segments each, every one of them within its own range

@@ -1,7 +1,7 @@
 //! From a structure to a compiled model: options, discretisation, and choice of the mesh.
 //!
-//! **Architecture invariant.** Below are [`bimorph_solve`], [`bimorph_domains`] and [`bimorph_netlist`]. A
-//! [`compile::CompiledModel`] never changes. Within the crate the order is [`options`], [`discretize`], [`refine`],
+//! **Architecture invariant.** Below are [`bimorph_solve`] and [`bimorph_domains`]. A model comes from a
+//! [`FrontEnd`](bimorph_structure::FrontEnd) and knows no text. A [`compile::CompiledModel`] never changes. Within the crate the order is [`options`], [`discretize`], [`refine`],
 //! [`compile`](mod@compile).
 
 pub mod compile;

@@ -3,10 +3,10 @@
 
 use super::diagnostic_sink::DiagnosticSink;
 use super::drawing::{Fact, StructureBuilder};
-use super::suggest::did_you_mean;
 use super::value::short;
 use bimorph_base::sets::Sets;
-use bimorph_domains::BeamRows;
+use bimorph_base::suggest::did_you_mean;
+use bimorph_structure::BeamRows;
 use bimorph_structure::{BeamGap, GapVoltage, NodeId, Structure};
 use std::collections::HashSet;
 use std::ops::RangeInclusive;

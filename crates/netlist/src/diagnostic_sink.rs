@@ -1,8 +1,7 @@
 //! Collects messages while a bundle is read, so that one run reports every error.
 
-use super::bundle::Bundle;
-use super::diagnostic::{Diagnostic, Diagnostics, Severity};
 use super::source::TextSpan;
+use bimorph_base::{Bundle, Diagnostic, Diagnostics, Severity};
 use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 use std::sync::Arc;

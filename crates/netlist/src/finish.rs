@@ -1,12 +1,10 @@
 //! The last steps of every front end of netlists.
 
-use super::bundle::Bundle;
-use super::diagnostic::Diagnostics;
 use super::diagnostic_sink::DiagnosticSink;
 use super::drawing::StructureBuilder;
-use super::front_end::LoadedNetlist;
-use super::setting::Setting;
 use super::{check, elements, place};
+use bimorph_base::{Bundle, Diagnostics, Setting};
+use bimorph_structure::LoadedNetlist;
 use std::sync::Arc;
 
 /// Final steps of every front end: out-of-plane members, positions of nodes, checks for loose ends.

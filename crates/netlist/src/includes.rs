@@ -1,39 +1,41 @@
 //! Reading a netlist from the disk, with the files that it uses.
 
-use super::bundle::{Bundle, DEEPEST_INCLUDE, MAX_INCLUDES};
 use super::{foreign, lexer, sugar3};
+use bimorph_base::Bundle;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-impl Bundle {
-    /// Reads `path` and, in turn, every file it `uses`.
-    ///
-    /// A name is looked up in the folder of the file that includes it, then in the working directory, then in the
-    /// `include` folders in their order. As in SUGAR each spelled name is read once. Text that is not UTF-8 is taken
-    /// byte by byte with the odd ones replaced.
-    ///
-    /// # Errors
-    /// The root cannot be read. A missing include is no error here: [`load`](super::load) reports it with its place.
-    pub fn read(path: &Path, include: &[PathBuf]) -> Result<Self, std::io::Error> {
-        Self::read_telling(path, include, &mut |_| ())
-    }
+/// Includes may nest this deep, as in SUGAR.
+pub(crate) const DEEPEST_INCLUDE: usize = 10;
+/// A netlist may include this many files in all, as in SUGAR.
+pub(crate) const MAX_INCLUDES: usize = 40;
 
-    /// As above; calls `dropped` for each include skipped because its path is already taken.
-    ///
-    /// # Errors
-    /// As [`Bundle::read`].
-    pub fn read_telling(
-        path: &Path,
-        include: &[PathBuf],
-        dropped: &mut dyn FnMut(DroppedInclude),
-    ) -> Result<Self, std::io::Error> {
-        let root = path.display().to_string();
-        let files = BTreeMap::from([(root.clone(), text_of(path)?)]);
-        let mut reader =
-            IncludeReader { files, found: BTreeMap::new(), own: path.canonicalize().ok(), include, dropped };
-        reader.includes_of(&root, &folder_of(path), 0);
-        Ok(Self { root, files: reader.files, places: BTreeMap::new() })
-    }
+/// Reads `path` and, in turn, every file it `uses`.
+///
+/// A name is looked up in the folder of the file that includes it, then in the working directory, then in the
+/// `include` folders in their order. As in SUGAR each spelled name is read once. Text that is not UTF-8 is taken
+/// byte by byte with the odd ones replaced.
+///
+/// # Errors
+/// The root cannot be read. A missing include is no error here: [`load`](super::load) reports it with its place.
+pub fn read_bundle(path: &Path, include: &[PathBuf]) -> Result<Bundle, std::io::Error> {
+    read_bundle_reporting(path, include, &mut |_| ())
+}
+
+/// [`read_bundle`] that calls `dropped` for each include skipped because its path is already taken.
+///
+/// # Errors
+/// As [`read_bundle`].
+pub fn read_bundle_reporting(
+    path: &Path,
+    include: &[PathBuf],
+    dropped: &mut dyn FnMut(DroppedInclude),
+) -> Result<Bundle, std::io::Error> {
+    let root = path.display().to_string();
+    let files = BTreeMap::from([(root.clone(), text_of(path)?)]);
+    let mut reader = IncludeReader { files, found: BTreeMap::new(), own: path.canonicalize().ok(), include, dropped };
+    reader.includes_of(&root, &folder_of(path), 0);
+    Ok(Bundle { root, files: reader.files, places: BTreeMap::new() })
 }
 
 /// A file that is left out: each spelled name is read once, where the text meets it first.

@@ -1,6 +1,6 @@
 //! SUGAR netlists, of both languages: text → elements → placed [`Structure`], behind one trait, [`FrontEnd`].
 //!
-//! [`Bundle`] holds the text of a netlist and of every file it includes, so that nothing after it touches the disk: a
+//! [`Bundle`](bimorph_base::Bundle) holds the text of a netlist and of every file it includes, so that nothing after it touches the disk: a
 //! bundle can be sent to a server as it is. [`load`] turns a bundle into a structure, or into diagnostics.
 //!
 //! `foreign` recognizes the language of a file. SUGAR 2, one module a step: `lexer` makes tokens, `parser`, `statement`
@@ -9,13 +9,11 @@
 //! `elements`. `finish` calls `place` for node positions and `check` for loose ends. docs/netlist.md describes the
 //! languages.
 //!
-//! **Architecture invariant.** Below are [`bimorph_structure`] and the table of elements of [`bimorph_domains`]. Nothing
-//! here touches the disk after a [`Bundle`] is read, and nothing solves.
+//! **Architecture invariant.** Below are [`bimorph_base`] and [`bimorph_structure`]. Nothing here touches the disk after a
+//! bundle is read, nothing solves, and nothing knows bodies or joints.
 
 mod ast;
-mod bundle;
 mod check;
-mod diagnostic;
 mod diagnostic_sink;
 mod drawing;
 mod elaborate;
@@ -24,32 +22,26 @@ mod evaluate;
 mod expression;
 mod finish;
 mod foreign;
-mod front_end;
 mod functions;
 mod includes;
 mod instance;
 mod lexer;
+mod parse_setting;
 mod parser;
 mod place;
 mod read;
 mod resolve;
 mod rotation;
-mod setting;
-mod setting_text;
 mod source;
 mod statement;
 mod sugar2;
 mod sugar3;
-mod suggest;
 mod token;
 mod value;
 
-pub use bundle::Bundle;
-pub use diagnostic::{Diagnostic, Diagnostics, Severity};
-pub use front_end::{FrontEnd, LoadedNetlist};
-pub use includes::DroppedInclude;
-pub use read::{NetlistSource, load};
-pub use setting::Setting;
+pub use includes::{DroppedInclude, read_bundle, read_bundle_reporting};
+pub use parse_setting::parse_setting;
+pub use read::{NetlistSource, is_program, load};
 
 /// The names of all built-in elements, in the order of docs/netlist.md.
 pub fn element_names() -> impl Iterator<Item = &'static str> {

@@ -1,12 +1,13 @@
 //! Tokens → syntax tree, by recursive descent. Included files are read where they are named.
 
 use super::ast::{Ident, Program, Statement};
-use super::bundle::{Bundle, DEEPEST_INCLUDE, MAX_INCLUDES};
 use super::diagnostic_sink::{DiagnosticSink, Reported};
 use super::foreign;
+use super::includes::{DEEPEST_INCLUDE, MAX_INCLUDES};
 use super::lexer;
 use super::source::TextSpan;
 use super::token::{Lexeme, TokenKind};
+use bimorph_base::Bundle;
 use std::collections::HashMap;
 use std::sync::Arc;
 

@@ -1,11 +1,9 @@
 //! Reading: a bundle is given to the front end of its language.
 
-use super::bundle::Bundle;
-use super::diagnostic::Diagnostics;
 use super::foreign;
-use super::front_end::{FrontEnd, LoadedNetlist};
-use super::setting::Setting;
 use super::sugar2::Sugar2;
+use bimorph_base::{Bundle, Diagnostics, Setting};
+use bimorph_structure::{FrontEnd, LoadedNetlist};
 
 /// Parses and elaborates a bundle with parameters set from outside.
 ///
@@ -31,29 +29,28 @@ impl NetlistSource {
     pub fn from_front(front: Box<dyn FrontEnd>) -> Self {
         Self { front }
     }
+}
 
-    /// Draws it with parameters set from outside.
-    ///
-    /// # Errors
-    /// Every error found in one run, those of reading too; warnings are among them.
-    pub fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics> {
+impl FrontEnd for NetlistSource {
+    fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics> {
         self.front.load(set)
     }
 }
 
+/// Reads a bundle in one language.
+pub(crate) type ReadFunction = fn(&Bundle) -> Box<dyn FrontEnd>;
+
 /// Reads a bundle by the language of its root: SUGAR 3 where its first line that decides is Lua, else SUGAR 2.
 fn read(bundle: &Bundle) -> Box<dyn FrontEnd> {
     #[cfg(feature = "lua")]
-    if bundle.is_program() {
+    if is_program(bundle) {
         return Box::new(super::sugar3::Sugar3::new(bundle));
     }
     Box::new(Sugar2::new(bundle))
 }
 
-impl Bundle {
-    /// True when the root is a SUGAR 3 netlist: a program, in Lua.
-    pub fn is_program(&self) -> bool {
-        let root = self.files.get(&self.root).map_or("", String::as_str);
-        matches!(foreign::kind(root, 0), foreign::FileKind::Lua(_))
-    }
+/// True when the root is a SUGAR 3 netlist: a program, in Lua.
+pub fn is_program(bundle: &Bundle) -> bool {
+    let root = bundle.files.get(&bundle.root).map_or("", String::as_str);
+    matches!(foreign::kind(root, 0), foreign::FileKind::Lua(_))
 }

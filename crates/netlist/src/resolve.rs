@@ -9,7 +9,7 @@ use super::ast::{
 use super::diagnostic_sink::DiagnosticSink;
 use super::elements;
 use super::functions;
-use super::suggest::{MAX_LISTED, did_you_mean};
+use bimorph_base::suggest::{MAX_LISTED, did_you_mean};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

@@ -1,16 +1,14 @@
 //! SUGAR 2 netlists: parsed and their names bound once, elaborated for each set of parameters.
 
 use super::ast::{Program, Statement};
-use super::bundle::Bundle;
-use super::diagnostic::Diagnostics;
 use super::diagnostic_sink::DiagnosticSink;
 use super::elaborate::Elaborator;
 use super::finish::finish;
-use super::front_end::{FrontEnd, LoadedNetlist};
-use super::setting::Setting;
 use super::source::TextSpan;
-use super::suggest::MAX_LISTED;
-use super::{parser, resolve, suggest};
+use super::{parser, resolve};
+use bimorph_base::suggest::{self, MAX_LISTED};
+use bimorph_base::{Bundle, Diagnostics, Setting};
+use bimorph_structure::{FrontEnd, LoadedNetlist};
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 

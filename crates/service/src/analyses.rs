@@ -19,6 +19,7 @@ use bimorph_analysis::transient::TransientOptions;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::OptionValue;
 use bimorph_model::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
+use bimorph_netlist::NetlistSource;
 use std::sync::Arc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Response, Status};
@@ -138,7 +139,7 @@ impl BimorphService {
                     check_voltages(compiled, &[(options.along.clone(), volts)]).map_err(refused)?;
                 }
             }
-            let models = PathModels::new(parameter, compiled, &options, || Ok(model.bundle.clone()))
+            let models = PathModels::new(parameter, compiled, &options, || Ok(NetlistSource::new(&model.bundle)))
                 .map_err(|error| status::compile(&error))?;
             let (first, input) = models.input(compiled, &options.along);
             let (fitted, mut result) =

@@ -7,11 +7,12 @@ use super::limits::Limits;
 use super::server::MakeDevice;
 use super::{proto, status};
 use bimorph_analysis::mesh;
+use bimorph_base::Bundle;
 use bimorph_base::budget;
 use bimorph_device::OpenRequest;
 use bimorph_jobs::content::Fnv;
-use bimorph_model::compile::{CompileOptions, CompiledModel, compile};
-use bimorph_netlist::Bundle;
+use bimorph_model::compile::{CompileOptions, CompiledModel, ParsedStructure, draw};
+use bimorph_netlist::{NetlistSource, is_program};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 use tonic::Status;
@@ -173,7 +174,9 @@ impl ModelCache {
             }
             key = key.wrapping_add(1);
         }
-        let compiled = compile(&bundle, &options).map_err(|error| status::compile(&error))?;
+        let compiled = draw(&NetlistSource::new(&bundle), &options)
+            .and_then(ParsedStructure::compile)
+            .map_err(|error| status::compile(&error))?;
         if compiled.unknowns() > limits.unknowns {
             return Err(status::limit("unknowns", limits.unknowns, compiled.unknowns()));
         }
@@ -211,7 +214,7 @@ pub(super) fn check_size(bundle: &Bundle, limits: &Limits) -> Result<(), Status>
     if bytes > limits.netlist_bytes {
         return Err(status::limit("netlist_bytes", limits.netlist_bytes, bytes));
     }
-    if bundle.is_program() && bytes > limits.program_bytes {
+    if is_program(bundle) && bytes > limits.program_bytes {
         let got =
             format!("a SUGAR 3 netlist of {bytes}, which is a program: `serve --limit program_bytes=1M` allows it");
         return Err(status::limit("program_bytes", limits.program_bytes, got));
@@ -245,7 +248,7 @@ fn hash(bundle: &Bundle, options: &CompileOptions) -> u128 {
 mod tests {
     //! Ids depend on every part of what is compiled, and on nothing else.
     use super::*;
-    use bimorph_netlist::Setting;
+    use bimorph_base::Setting;
 
     #[test]
     fn ids_are_content() {

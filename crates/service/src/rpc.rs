@@ -10,10 +10,11 @@ use super::shared::{BimorphService, Reply};
 use super::stream::TrialStream;
 use super::stream_request::StreamRequest;
 use super::{proto, status};
+use bimorph_base::Bundle;
 use bimorph_base::budget::Budget;
 use bimorph_device::Token;
-use bimorph_model::compile::{CompileError, CompileOptions, compile};
-use bimorph_netlist::Bundle;
+use bimorph_model::compile::{CompileError, CompileOptions, ParsedStructure, draw};
+use bimorph_netlist::NetlistSource;
 use proto::device_reply::Kind as ReplyKind;
 use std::sync::Arc;
 use std::time::Duration;
@@ -263,7 +264,7 @@ fn refusal(fault: proto::Fault) -> Status {
 }
 
 fn check(bundle: &Bundle, options: &CompileOptions) -> proto::CheckResponse {
-    match compile(bundle, options) {
+    match draw(&NetlistSource::new(bundle), options).and_then(ParsedStructure::compile) {
         Ok(compiled) => proto::CheckResponse {
             ok: true,
             diagnostics: text::diagnostics_to_wire(&compiled.warnings),

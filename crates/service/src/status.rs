@@ -6,10 +6,10 @@
 use super::convert::{Violation, options};
 use bimorph_analysis::AnalysisError;
 use bimorph_base::budget::Stopped;
+use bimorph_base::{Diagnostics, Severity};
 use bimorph_device::DeviceError;
 use bimorph_export::ExportError;
 use bimorph_model::compile::CompileError;
-use bimorph_netlist::{Diagnostics, Severity};
 use tonic::codegen::http::HeaderMap;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
@@ -210,7 +210,7 @@ pub(super) fn undecodable(reported: &Status) -> Status {
 mod tests {
     //! A bad netlist comes back by place, and however long it is, the status fits into trailers.
     use super::*;
-    use bimorph_netlist::{Bundle, Diagnostic};
+    use bimorph_base::{Bundle, Diagnostic};
     use std::sync::Arc;
 
     fn diagnostics(count: usize) -> Diagnostics {

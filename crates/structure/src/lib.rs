@@ -6,10 +6,16 @@
 //! A node may be mechanical (it has a position), electrical (it has a potential), or both: as in SUGAR, one netlist name
 //! stands for the mechanical point and for the electrical net at that point.
 //!
+//! [`FrontEnd`] is what a language gives: a structure for the values of its parameters. [`DomainElement`] lists the elements that only
+//! one domain reads.
+//!
 //! **Architecture invariant.** Only [`bimorph_base`] lies below. A structure has no bodies, joints, meshes or text of a
 //! netlist.
 
+mod beam_rows;
 mod circuit;
+mod domain_element;
+mod front_end;
 mod gap;
 mod index;
 mod mechanical;
@@ -18,7 +24,10 @@ mod node;
 mod placed;
 mod without_circuit;
 
+pub use beam_rows::{ALIKE, BeamRows};
 pub use circuit::{CircuitElement, CircuitKind};
+pub use domain_element::DomainElement;
+pub use front_end::{FrontEnd, LoadedNetlist};
 pub use gap::{BeamGap, Comb, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, PlateGap, Stop};
 pub use index::NodeIndex;
 pub use mechanical::{Beam, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};

@@ -7,7 +7,7 @@ use bimorph::cosim::CosimOptions;
 use bimorph::export::compare::{ModelFit, fit};
 use bimorph::export::names::Pins;
 use bimorph::export::{ExportRequest, lumped, lumped_spice, spice};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::read_bundle;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -76,7 +76,7 @@ fn netlist(file: &str) -> PathBuf {
 
 impl Scene {
     fn compiled(&self) -> Arc<CompiledModel> {
-        let bundle = Bundle::read(&netlist(self.file), &[]).unwrap();
+        let bundle = read_bundle(&netlist(self.file), &[]).unwrap();
         let drawn = compile(&bundle, &CompileOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", self.file));
         Arc::new(in_circuit(&drawn))
     }

@@ -19,8 +19,8 @@ use crate::step_error::with_step_error;
 use crate::transient::{TransientOptions, TransientResult, transient};
 use crate::{AnalysisError, ProgressCallback};
 use bimorph_model::compile::CompileOptions;
-use bimorph_netlist::Bundle;
 use bimorph_solve::baseline::SolverKind;
+use bimorph_structure::FrontEnd;
 use std::time::Instant;
 
 /// Modes that are compared.
@@ -50,7 +50,7 @@ struct CompletedAnalysis {
 /// # Errors
 /// Those of a reference; a point that fails says so.
 pub(super) fn defaults(
-    (bundle, options): (&Bundle, &CompileOptions),
+    (source, options): (&dyn FrontEnd, &CompileOptions),
     (spec, stop): (&ChartSpec, f64),
     chart: &mut Chart,
     progress: &mut ChartProgress<'_>,
@@ -58,7 +58,7 @@ pub(super) fn defaults(
     let tight = TIGHTER * spec.tols.iter().copied().fold(f64::INFINITY, f64::min);
     for analysis in ANALYSES {
         let mut at = |tol: f64| {
-            let done = analyse((bundle, options), (spec, stop), analysis, tol, &mut |f| progress.run(f));
+            let done = analyse((source, options), (spec, stop), analysis, tol, &mut |f| progress.run(f));
             progress.done += 1.0;
             if progress.run(0.0) { done } else { Err(AnalysisError::Cancelled.into()) }
         };
@@ -108,7 +108,7 @@ pub(super) fn defaults(
 
 /// One analysis from the drawing at one tolerance.
 fn analyse(
-    (bundle, options): (&Bundle, &CompileOptions),
+    (source, options): (&dyn FrontEnd, &CompileOptions),
     (spec, stop): (&ChartSpec, f64),
     analysis: &str,
     tol: f64,
@@ -116,7 +116,7 @@ fn analyse(
 ) -> Result<CompletedAnalysis, ChartError> {
     let begun = Instant::now();
     let options = CompileOptions { tol, ..options.clone() };
-    let drawn = ChartVariant::new(bundle, &options, options.band, spec.release.as_deref())?;
+    let drawn = ChartVariant::new(source, &options, options.band, spec.release.as_deref())?;
     let mut measured = RunMeasurement::default();
     let (found, told, unknowns) = match analysis {
         "static" => {

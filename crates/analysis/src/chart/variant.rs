@@ -2,8 +2,9 @@
 
 use super::spec::{ChartError, Formulation};
 use crate::AnalysisError;
-use bimorph_model::compile::{CompileOptions, CompiledModel, compile};
-use bimorph_netlist::{Bundle, Setting};
+use bimorph_base::Setting;
+use bimorph_model::compile::{CompileOptions, CompiledModel, draw};
+use bimorph_structure::FrontEnd;
 
 /// The compiled mechanism, with what a release needs.
 #[derive(Debug, Clone)]
@@ -13,16 +14,16 @@ pub(super) struct ChartVariant {
 }
 
 impl ChartVariant {
-    /// Compiles `bundle` for one band.
+    /// Compiles `source` for one band.
     pub(super) fn new(
-        bundle: &Bundle,
+        source: &dyn FrontEnd,
         options: &CompileOptions,
         band: Option<f64>,
         release: Option<&str>,
     ) -> Result<Self, ChartError> {
         let options = CompileOptions { band, ..options.clone() };
-        let initial = compile(bundle, &options)?;
-        let released = release.map(|name| released(bundle, &initial, name)).transpose()?;
+        let initial = draw(source, &options)?.compile()?;
+        let released = release.map(|name| released(source, &initial, name)).transpose()?;
         Ok(Self { initial, released })
     }
 
@@ -46,19 +47,19 @@ pub(super) struct FormulationModels {
 }
 
 impl FormulationModels {
-    /// Compiles `bundle` for one band, once for each formulation that discretizes it differently.
+    /// Compiles `source` for one band, once for each formulation that discretizes it differently.
     pub(super) fn new(
-        bundle: &Bundle,
+        source: &dyn FrontEnd,
         options: &CompileOptions,
         band: Option<f64>,
         release: Option<&str>,
         formulations: &[Formulation],
     ) -> Result<Self, ChartError> {
-        let bodies = ChartVariant::new(bundle, options, band, release)?;
+        let bodies = ChartVariant::new(source, options, band, release)?;
         let compiled = |&one: &Formulation| {
             let options = CompileOptions { formulation: one.compiled_as()?, ..options.clone() };
             // what bodies can be made of may not suit joints: points that say so
-            Some((one, ChartVariant::new(bundle, &options, band, release).map_err(|e| e.to_string())))
+            Some((one, ChartVariant::new(source, &options, band, release).map_err(|e| e.to_string())))
         };
         Ok(Self { bodies, joints: formulations.iter().filter_map(compiled).collect() })
     }
@@ -75,8 +76,8 @@ impl FormulationModels {
 /// The same netlist with one parameter at 0.
 ///
 /// # Errors
-/// `BadRequest` for an unknown or non-numeric parameter; errors of [`compile`].
-pub fn released(bundle: &Bundle, initial: &CompiledModel, name: &str) -> Result<CompiledModel, ChartError> {
+/// `BadRequest` for an unknown or non-numeric parameter; errors of a compilation.
+pub fn released(source: &dyn FrontEnd, initial: &CompiledModel, name: &str) -> Result<CompiledModel, ChartError> {
     if !initial.parameters.iter().any(|(p, value)| p == name && matches!(value, Setting::Number(_))) {
         let known: Vec<&str> = initial.parameters.iter().map(|(p, _)| p.as_str()).collect();
         let detail = format!("no numeric parameter of that name; the netlist has {}", known.join(", "));
@@ -85,5 +86,5 @@ pub fn released(bundle: &Bundle, initial: &CompiledModel, name: &str) -> Result<
     let mut options = initial.options.clone();
     options.set.retain(|(parameter, _)| parameter != name);
     options.set.push((name.to_owned(), Setting::Number(0.0)));
-    Ok(compile(bundle, &options)?)
+    Ok(draw(source, &options)?.compile()?)
 }

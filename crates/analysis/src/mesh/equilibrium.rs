@@ -20,11 +20,11 @@ use super::refined::Refinement;
 use super::remeshed::{chosen, meshed, on};
 use super::softening;
 use super::warnings::{near_buckling, of_fingers, of_heat, of_segments, of_stress};
+use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::doubling::{self, Output};
 use bimorph_model::refine::mesh_search::Mesh;
 use bimorph_model::refine::transfer::carried;
-use bimorph_netlist::Diagnostic;
 use bimorph_solve::equilibrium::Equilibrium;
 use std::borrow::Cow;
 

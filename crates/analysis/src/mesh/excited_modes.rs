@@ -22,6 +22,7 @@ use super::equilibrium;
 use super::remeshed::{chosen, meshed};
 use super::signal_amplitudes::SignalAmplitudes;
 use super::warnings::{of_rotary, of_steps};
+use bimorph_base::Diagnostic;
 use bimorph_domains::Drive;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::DiscretizeError;
@@ -33,7 +34,6 @@ use bimorph_model::refine::mesh_search::{self, Mesh, MeshTarget};
 use bimorph_multibody::forces::add_damping;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, Model};
-use bimorph_netlist::Diagnostic;
 use bimorph_solve::eigen::lowest_modes;
 use std::f64::consts::TAU;
 

@@ -8,10 +8,10 @@ use super::frequencies::for_modes;
 use super::remeshed::{chosen, remeshed};
 use super::section_inertia::with_section_inertia;
 use super::warnings::{WARNING, beyond};
+use bimorph_base::Diagnostic;
 use bimorph_base::budget::bounded;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::mesh_search::Mesh;
-use bimorph_netlist::Diagnostic;
 
 /// Unknowns of the finest mesh that is taken, and of the largest drawing for which one is sought: a circuit is not to wait for it. Meshes
 /// that it is compared with may have twice as many.

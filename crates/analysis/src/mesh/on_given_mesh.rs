@@ -15,9 +15,9 @@ use super::frequencies::{frequency_outputs, is_carried, is_fine, worst};
 use super::pull_in::{pull_in_outputs, pull_in_warnings};
 use super::remeshed::meshed;
 use super::{MeshRequest, fitted};
+use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::doubling::{self, Output};
-use bimorph_netlist::Diagnostic;
 
 /// Result of an analysis.
 #[derive(Debug, Clone)]

@@ -7,10 +7,10 @@ use super::super::statics::operating_point;
 use super::refined::refining;
 use super::remeshed::{chosen, meshed, on};
 use super::warnings::of_stress;
+use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::doubling::{self, Output};
 use bimorph_model::refine::mesh_search::Mesh;
-use bimorph_netlist::Diagnostic;
 
 /// Fraction of the pull-in voltage that stands for the fold itself, next to which nothing has an equilibrium for sure.
 const NEXT: f64 = 0.98;

@@ -2,10 +2,10 @@
 
 use super::super::AnalysisError;
 use super::warnings::{WARNING, beyond};
+use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::DiscretizeError;
 use bimorph_model::refine::mesh_search::Mesh;
-use bimorph_netlist::Diagnostic;
 use std::borrow::Cow;
 
 /// True where the number of segments is the user's.

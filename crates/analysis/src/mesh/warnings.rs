@@ -3,9 +3,9 @@
 use super::super::contact_range::comb_beyond_reported;
 use super::super::rotary_inertia_error;
 use super::super::statics::{OperatingPoint, too_hot};
+use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::ErrorBudget;
-use bimorph_netlist::Diagnostic;
 
 /// Code of the warning that a mesh does not hold the tolerance.
 pub const WARNING: &str = "W040";

@@ -2,8 +2,8 @@
 
 use super::error::{SweepError, bad};
 use super::values::Values;
+use bimorph_base::Setting;
 use bimorph_model::options::{CompileOptions, MODEL, ModelOption, OptionValue, Range};
-use bimorph_netlist::Setting;
 use std::collections::HashSet;
 
 /// Suffix of a port's name that makes the name of an axis of its voltages: `heat.v`. No netlist parameter has a point

@@ -1,7 +1,8 @@
 //! How a parameter varies: a distribution, by its quantiles.
 
 use super::error::{SweepError, bad};
-use bimorph_netlist::Setting;
+use bimorph_base::Setting;
+use bimorph_netlist::parse_setting;
 use std::str::FromStr;
 
 /// The distribution of one parameter.
@@ -149,7 +150,7 @@ pub(super) fn normal_score(u: f64) -> f64 {
 
 /// A finite number as the netlist language writes it.
 pub fn number(text: &str) -> Option<f64> {
-    match Setting::parse(text) {
+    match parse_setting(text) {
         Ok(Setting::Number(value)) if value.is_finite() => Some(value),
         _ => None,
     }

@@ -5,8 +5,8 @@
 use super::checksummed_line::{opened, sealed};
 use super::spec::SweepSpec;
 use crate::content::Fnv;
+use bimorph_base::{Bundle, Setting};
 use bimorph_model::options::CompileOptions;
-use bimorph_netlist::{Bundle, Setting};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};

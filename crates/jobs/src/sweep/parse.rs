@@ -5,7 +5,7 @@ use super::distribution::number;
 use super::error::{SweepError, bad};
 use super::spec::Shard;
 use super::values::Values;
-use bimorph_netlist::Setting;
+use bimorph_netlist::parse_setting;
 use std::str::FromStr;
 
 /// Most values one axis may be given as text; a longer one is a slip of the keyboard.
@@ -15,7 +15,7 @@ impl FromStr for SweepParameter {
     type Err = SweepError;
 
     /// `NAME=low:high:count` is `count` equally spaced numbers, both ends included; `NAME=a,b,c` is a list. Numbers may
-    /// carry a netlist suffix (`2u`); list entries are read as [`Setting::parse`] reads them, words as strings.
+    /// carry a netlist suffix (`2u`); list entries are read as [`parse_setting`] reads them, words as strings.
     fn from_str(text: &str) -> Result<Self, SweepError> {
         let what = || format!("parameter \"{text}\"");
         let forms = "NAME=low:high:count or NAME=a,b,c";
@@ -29,7 +29,7 @@ impl FromStr for SweepParameter {
             [list] => {
                 let entry = |text: &str| {
                     let refused = |_| bad(what(), "numbers or words, separated by commas", text);
-                    Setting::parse(text).map_err(refused)
+                    parse_setting(text).map_err(refused)
                 };
                 list.split(',').map(|text| entry(text.trim())).collect::<Result<Vec<_>, _>>()?.into()
             }
@@ -62,6 +62,7 @@ impl FromStr for Shard {
 mod tests {
     //! Axes read as they are written, and slips are refused.
     use super::*;
+    use bimorph_base::Setting;
 
     fn numbers(text: &str) -> Vec<f64> {
         let axis: SweepParameter = text.parse().expect("an axis");

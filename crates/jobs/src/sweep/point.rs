@@ -12,8 +12,9 @@ use bimorph_analysis::mesh::{self, MeshRequest};
 use bimorph_analysis::readout::run_signal::RunSignal;
 use bimorph_analysis::{AnalysisError, statics};
 use bimorph_base::budget;
+use bimorph_base::{Setting, Severity};
 use bimorph_model::compile::{CompileError, CompileOptions, draw};
-use bimorph_netlist::{NetlistSource, Setting, Severity};
+use bimorph_netlist::NetlistSource;
 use std::borrow::Cow;
 use std::collections::HashSet;
 

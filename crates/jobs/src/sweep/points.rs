@@ -2,7 +2,8 @@
 
 use super::axis::SweepParameter;
 use super::error::{SweepError, bad};
-use bimorph_netlist::Setting;
+use bimorph_base::Setting;
+use bimorph_netlist::parse_setting;
 
 /// Reads a list of points (CSV, RFC 4180): parameters that go together, the first of them an axis. Cells are read as the entries of a list
 /// are: `2u`, `-3`, `poly`. Lines that begin with `#` are left out.
@@ -28,7 +29,7 @@ pub fn points(name: &str, text: &str) -> Result<Vec<SweepParameter>, SweepError>
             if cell.is_empty() {
                 return Err(bad(what(), "a number or a word", "nothing"));
             }
-            let value = Setting::parse(cell).map_err(|_| bad(what(), "a number or a word", cell))?;
+            let value = parse_setting(cell).map_err(|_| bad(what(), "a number or a word", cell))?;
             column.push(value);
         }
     }

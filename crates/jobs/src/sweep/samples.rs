@@ -3,7 +3,7 @@
 use super::design::{Cube, Design};
 use super::distribution::{Distribution, Vary, normal_score};
 use super::error::{SweepError, bad};
-use bimorph_netlist::Setting;
+use bimorph_base::Setting;
 use nalgebra::DMatrix;
 use std::collections::HashSet;
 

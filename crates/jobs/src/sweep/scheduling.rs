@@ -10,9 +10,10 @@ use super::point_error::Failed;
 use super::shared_meshes::SharedMeshes;
 use super::spec::{SweepAnalysis, SweepSpec};
 use super::transient::{self, TransientSweep};
+use bimorph_base::Bundle;
 use bimorph_base::budget::Stopped;
 use bimorph_model::compile::CompileOptions;
-use bimorph_netlist::{Bundle, NetlistSource};
+use bimorph_netlist::NetlistSource;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 

@@ -4,8 +4,8 @@
 use super::error::SweepError;
 use super::journal;
 use super::spec::{Shard, SweepSpec};
+use bimorph_base::Bundle;
 use bimorph_model::options::CompileOptions;
-use bimorph_netlist::Bundle;
 use std::fmt;
 use std::str::FromStr;
 

@@ -4,7 +4,7 @@ use super::axis::{SweepParameter, VOLTS, Varied, varied};
 use super::error::{SweepError, bad};
 use super::samples::SampleGenerator;
 use bimorph_analysis::mesh::MeshRequest;
-use bimorph_netlist::Setting;
+use bimorph_base::Setting;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashSet};
 

@@ -6,7 +6,7 @@
 use super::distribution::number;
 use super::error::{SweepError, bad};
 use super::table::{SweepRow, SweepTable};
-use bimorph_netlist::Setting;
+use bimorph_base::Setting;
 use std::fmt;
 use std::str::FromStr;
 

@@ -1,7 +1,7 @@
 //! The rows of a sweep, and the same as CSV.
 
 use super::point::PointOutcome;
-use bimorph_netlist::Setting;
+use bimorph_base::Setting;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 

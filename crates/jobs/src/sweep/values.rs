@@ -1,6 +1,6 @@
 //! The values of an axis: listed, or counted out between two ends, which takes no memory however many they are.
 
-use bimorph_netlist::Setting;
+use bimorph_base::Setting;
 
 /// Values in order.
 #[derive(Debug, Clone)]

@@ -11,7 +11,7 @@
 
 use super::error::{DiscretizeError, MAX_SEGMENTS};
 use crate::options::CompileOptions;
-use bimorph_domains::BeamRows;
+use bimorph_structure::BeamRows;
 use bimorph_structure::{Beam, Structure};
 
 /// Length over width above which a beam counts as slender.

@@ -7,7 +7,7 @@
 
 use super::choices::{Formulation, Junctions, Scheme};
 use super::table::{Field, OptionDescription, OptionError, OptionValue, Range};
-use bimorph_netlist::Setting;
+use bimorph_base::Setting;
 use std::sync::LazyLock;
 
 /// An option of a model: what it is, and its field.

@@ -194,7 +194,8 @@ fn differences(coarse: &[Output], fine: &[Output]) -> Vec<f64> {
 mod tests {
     //! The mesh holds the tolerance, the estimate is the error, and what contributes nothing stays as it is.
     use super::*;
-    use bimorph_netlist::{Bundle, load};
+    use bimorph_base::Bundle;
+    use bimorph_netlist::load;
 
     /// Two beams whose errors fall with the fourth power: one a thousand times the other's.
     #[test]

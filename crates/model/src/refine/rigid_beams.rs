@@ -11,9 +11,10 @@ use super::mesh_target::{Mesh, MeshTarget};
 use super::mode_errors::{relative, strain_shares};
 use crate::discretize::{Assembly, DiscretizeError, discretize_with};
 use crate::options::CompileOptions;
-use bimorph_domains::{BeamRows, MaterialPoint};
+use bimorph_domains::MaterialPoint;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId};
+use bimorph_structure::BeamRows;
 use bimorph_structure::{NodeId, Structure};
 
 /// Makes beams rigid where the tolerance allows.

@@ -2,7 +2,7 @@
 
 use super::super::diagnostic_sink::{DiagnosticSink, Reported};
 use super::super::drawing::StructureBuilder;
-use super::super::front_end::ReadFunction;
+use super::super::read::ReadFunction;
 use super::super::rotation::Rotation;
 use super::super::source::TextSpan;
 use super::super::value::{LayerValues, Value, short};

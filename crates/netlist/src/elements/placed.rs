@@ -2,12 +2,13 @@
 
 use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
-use bimorph_domains::elements;
-use bimorph_structure::PlacedElement;
+use bimorph_structure::{DomainElement, PlacedElement};
 
 /// An element of a domain's own.
 pub(super) fn placed(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
-    let Some(element) = elements().find(|element| element.name == site.instance.model) else { return Ok(()) };
+    let Some(element) = DomainElement::ALL.iter().find(|element| element.name == site.instance.model) else {
+        return Ok(());
+    };
     let mut values = Vec::with_capacity(element.parameters.len());
     for parameter in element.parameters {
         values.push(site.non_negative_or(parameter, 0.0)?);

@@ -2,11 +2,10 @@
 //!
 //! The load is a number or, as SUGAR has it, a string with x, the way from the first node: `P="-250000*x"`.
 
-use super::super::bundle::Bundle;
 use super::super::diagnostic_sink::Reported;
-use super::super::setting::Setting;
 use super::super::value::Value;
 use super::arguments::ElementSite;
+use bimorph_base::{Bundle, Setting};
 use bimorph_structure::Load;
 
 /// Pieces of the length over which the load is summed, each by Gauss's rule of three points: exact for polynomials to x² in the

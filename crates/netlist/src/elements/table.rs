@@ -3,7 +3,7 @@
 use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
 use super::{arm, beam, circuit, comb, curve, gap, load, lumped, pinned, placed, pressure, section, stop, support};
-use bimorph_domains::elements;
+use bimorph_structure::DomainElement;
 use std::sync::LazyLock;
 
 /// An element of the language.
@@ -36,7 +36,7 @@ pub(crate) fn model(name: &str) -> Option<&'static ElementModel> {
 /// Every element: those of the language, then those of domains that have their own.
 pub(crate) fn models() -> impl Iterator<Item = &'static ElementModel> {
     static OF_DOMAINS: LazyLock<Vec<ElementModel>> = LazyLock::new(|| {
-        elements().map(|e| own(e.name, e.nodes, e.node_names, e.parameters, placed::placed)).collect()
+        DomainElement::ALL.iter().map(|e| own(e.name, e.nodes, e.node_names, e.parameters, placed::placed)).collect()
     });
     MODELS.iter().chain(OF_DOMAINS.iter())
 }

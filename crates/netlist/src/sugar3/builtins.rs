@@ -49,8 +49,8 @@ pub(super) fn install(lua: &Lua, shared: &SharedState) -> mlua::Result<()> {
             let LuaValue::String(key) = key else { return Ok(LuaValue::Nil) };
             let setting = state.borrow_mut().ask(&key.to_string_lossy());
             Ok(match setting {
-                Some(super::super::Setting::Number(x)) => LuaValue::Number(x),
-                Some(super::super::Setting::Text(text)) => LuaValue::String(lua.create_string(text)?),
+                Some(bimorph_base::Setting::Number(x)) => LuaValue::Number(x),
+                Some(bimorph_base::Setting::Text(text)) => LuaValue::String(lua.create_string(text)?),
                 None => LuaValue::Nil,
             })
         })?,

@@ -1,20 +1,19 @@
 //! Runs a SUGAR 3 netlist.
 
-use super::super::bundle::Bundle;
 use super::super::diagnostic_sink::DiagnosticSink;
 use super::super::drawing::StructureBuilder;
 use super::super::elements;
 use super::super::finish::finish;
-use super::super::front_end::{FrontEnd, LoadedNetlist};
 use super::super::rotation::Rotation;
-use super::super::setting::Setting;
 use super::super::source::TextSpan;
-use super::super::suggest;
 use super::builtins;
 use super::files::run;
 use super::sandbox::{SandboxLimit, SandboxProgress, sandbox};
 use super::state::{LuaState, NameScope, SharedState, file_number};
 use bimorph_base::budget;
+use bimorph_base::suggest;
+use bimorph_base::{Bundle, Setting};
+use bimorph_structure::{FrontEnd, LoadedNetlist};
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
@@ -51,7 +50,7 @@ impl Sugar3 {
 }
 
 impl FrontEnd for Sugar3 {
-    fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, super::super::Diagnostics> {
+    fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, bimorph_base::Diagnostics> {
         let bytes: usize = self.bundle.files.values().map(String::len).sum();
         let progress = Rc::new(SandboxProgress::default());
         let state = LuaState {

@@ -1,6 +1,6 @@
 //! Files of a SUGAR 3 netlist, and those that they use.
 
-use super::super::bundle::MAX_INCLUDES;
+use super::super::includes::MAX_INCLUDES;
 use super::super::source::TextSpan;
 use super::state::{IndexedText, SharedState};
 use super::translate::translate;

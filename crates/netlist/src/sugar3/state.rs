@@ -1,13 +1,12 @@
 //! State shared by the functions of a SUGAR 3 netlist.
 
-use super::super::bundle::Bundle;
 use super::super::diagnostic_sink::DiagnosticSink;
 use super::super::drawing::StructureBuilder;
 use super::super::rotation::Rotation;
-use super::super::setting::Setting;
 use super::super::source::TextSpan;
 use super::arguments::{LuaNode, number};
 use super::sandbox::SandboxProgress;
+use bimorph_base::{Bundle, Setting};
 use bimorph_structure::NodeId;
 use mlua::{Lua, Value};
 use std::cell::{Cell, RefCell};

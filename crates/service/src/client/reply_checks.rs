@@ -2,8 +2,8 @@
 //! kinds, order and numbers must be the requested ones, and no text controls a terminal.
 
 use crate::proto;
+use bimorph_base::Diagnostic;
 use bimorph_device::{DeviceError, Mode, OpenRequest, Trial};
-use bimorph_netlist::Diagnostic;
 use proto::trial_reply::Status as WireStatus;
 
 /// Longest text of a server that is shown [byte].

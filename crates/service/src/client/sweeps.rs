@@ -2,9 +2,9 @@
 
 use super::analyses::{Client, ClientError};
 use super::jobs::Submission;
+use bimorph_base::Bundle;
 use bimorph_jobs::sweep::{SweepProgress, SweepSpec, SweepTable};
 use bimorph_model::compile::CompileOptions;
-use bimorph_netlist::Bundle;
 
 impl Client {
     /// Runs a sweep; `progress` receives the progress and may cancel it. A connection that fails meanwhile is made

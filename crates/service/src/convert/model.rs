@@ -2,11 +2,11 @@
 
 use super::{Violation, number, required};
 use crate::proto;
+use bimorph_base::{Bundle, Diagnostic, Diagnostics, Setting, Severity};
 use bimorph_layout::LayoutError;
 use bimorph_layout::convert::ConvertError;
 use bimorph_layout::flatten::FlattenError;
 use bimorph_layout::input;
-use bimorph_netlist::{Bundle, Diagnostic, Diagnostics, Setting, Severity};
 
 /// A bundle as it travels.
 pub fn bundle_to_wire(bundle: &Bundle) -> proto::Bundle {

@@ -116,8 +116,8 @@ fn take(option: &ModelOption, mut bytes: &[u8]) -> Result<Option<OptionValue>, p
 mod tests {
     //! Options arrive as they were sent; invalid values are rejected by field.
     use super::*;
+    use bimorph_base::Setting;
     use bimorph_model::options::{Formulation, Junctions, Scheme};
-    use bimorph_netlist::Setting;
 
     #[test]
     fn options_survive_the_wire() {

@@ -3,11 +3,11 @@
 use super::model::{setting_from_wire, setting_to_wire};
 use super::{Violation, named, number, options, required, samples, voltages};
 use crate::proto;
+use bimorph_base::Setting;
 use bimorph_jobs::sweep::journal::JournalRow;
 use bimorph_jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepRow, SweepSpec, SweepTable};
 use bimorph_model::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_STOP};
 use bimorph_model::options::{OptionDescription, OptionValue};
-use bimorph_netlist::Setting;
 use proto::sweep_parameter::Values;
 use proto::sweep_spec::Analysis;
 

@@ -3,11 +3,11 @@
 use super::super::convert::{self, Violation};
 use super::super::fair_semaphore::client;
 use super::super::proto;
+use bimorph_base::Bundle;
 use bimorph_jobs::content::Fnv;
 use bimorph_jobs::sweep::shard::SweepPart;
 use bimorph_jobs::sweep::{SweepParameter, SweepSpec, journal};
 use bimorph_model::options::CompileOptions;
-use bimorph_netlist::Bundle;
 use prost::Message;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};

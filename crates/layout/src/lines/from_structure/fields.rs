@@ -1,7 +1,7 @@
 //! Lines of combs, gaps, stops and what domains have of their own.
 
 use super::{OfStructure, unmirrored};
-use bimorph_domains::elements;
+use bimorph_structure::DomainElement;
 use bimorph_structure::{Beam, GapVoltage, Impact, NodeId};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -92,7 +92,9 @@ impl OfStructure<'_> {
             self.push(&stop.name, "stop2d", "*", &nodes, &parameters);
         }
         for placed in &structure.placed {
-            let Some(element) = elements().find(|element| element.name == placed.element) else { continue };
+            let Some(element) = DomainElement::ALL.iter().find(|element| element.name == placed.element) else {
+                continue;
+            };
             let given = element.parameters.iter().copied().zip(placed.values.iter().copied());
             let parameters: Vec<_> = given.filter(|(_, value)| *value != 0.0).chain([("oz", placed.angle)]).collect();
             self.push(&placed.name, element.name, "*", &placed.nodes, &parameters);

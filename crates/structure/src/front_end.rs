@@ -1,10 +1,8 @@
 //! Front ends: each language elaborates to a structure, parameters and messages. Nothing after this knows where a
 //! drawing came from.
 
-use super::bundle::Bundle;
-use super::diagnostic::Diagnostics;
-use super::setting::Setting;
-use bimorph_structure::Structure;
+use crate::Structure;
+use bimorph_base::{Diagnostics, Setting};
 use std::fmt::Debug;
 
 /// Result of elaborating a netlist.
@@ -26,6 +24,3 @@ pub trait FrontEnd: Debug + Send + Sync {
     /// Every error found in one run, those of reading too; warnings are among them.
     fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics>;
 }
-
-/// Reads a bundle in one language.
-pub(crate) type ReadFunction = fn(&Bundle) -> Box<dyn FrontEnd>;

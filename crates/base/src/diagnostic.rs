@@ -73,7 +73,7 @@ impl Diagnostics {
         let renderer = if colour { Renderer::styled() } else { Renderer::plain() };
         let mut out = String::new();
         for item in &self.items {
-            bimorph_base::budget::check();
+            crate::budget::check();
             out.push_str(&renderer.render(&self.groups(item)));
             out.push('\n');
         }

@@ -1,13 +1,13 @@
 //! "Did you mean": the nearest known name.
 
 /// Longer lists of names are cut in messages.
-pub(crate) const MAX_LISTED: usize = 40;
+pub const MAX_LISTED: usize = 40;
 
 /// No name longer than this [characters] is compared.
 const LONGEST: usize = 64;
 
 /// The known name nearest to `name`, if it is near enough to be a slip of the pen.
-pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let length = name.chars().count();
     if length > LONGEST {
         return None;
@@ -20,7 +20,7 @@ pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
     // names of much different length are far without a comparison of their letters
     let near = known.into_iter().filter(|k| *k != name && k.len().abs_diff(name.len()) <= 4 * limit);
     let scored = near.map(|k| {
-        bimorph_base::budget::check();
+        crate::budget::check();
         (distance(name, k), k)
     });
     // Ties go to the name that comes first in the alphabet, so that messages do not depend on any order.
@@ -28,7 +28,7 @@ pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
 }
 
 /// "did you mean `x`?" or, without a near name, `otherwise`.
-pub(crate) fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>, otherwise: &str) -> String {
+pub fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>, otherwise: &str) -> String {
     nearest(name, known).map_or_else(|| otherwise.to_owned(), |k| format!("did you mean `{k}`?"))
 }
 

@@ -2,11 +2,6 @@
 
 use std::collections::BTreeMap;
 
-/// Includes may nest this deep, as in SUGAR.
-pub(crate) const DEEPEST_INCLUDE: usize = 10;
-/// A netlist may include this many files in all, as in SUGAR.
-pub(crate) const MAX_INCLUDES: usize = 40;
-
 /// A netlist's text with every file it includes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bundle {
