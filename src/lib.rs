@@ -27,8 +27,6 @@ pub use bimorph_layout::{self as layout, input};
 pub use bimorph_model::{discretize, options, refine};
 pub use bimorph_multibody as multibody;
 pub use bimorph_results as results;
-#[cfg(feature = "remote")]
-pub use bimorph_service as service;
 pub use bimorph_solve::{self as solve, equations};
 pub use bimorph_structure as structure;
 
@@ -52,4 +50,13 @@ pub mod compile {
     pub fn compile(bundle: &super::netlist::Bundle, options: &CompileOptions) -> Result<CompiledModel, CompileError> {
         draw(&super::netlist::NetlistSource::new(bundle), options)?.compile()
     }
+}
+
+#[cfg(feature = "remote")]
+pub mod service {
+    //! The protocol with its clients and, with the feature `server`, the server.
+
+    #[cfg(feature = "server")]
+    pub use bimorph_server::*;
+    pub use bimorph_wire::*;
 }

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// Crates from the bottom up, each with the crates that it may depend on.
-const CRATES: [(&str, &[&str]); 15] = [
+const CRATES: [(&str, &[&str]); 16] = [
     ("base", &[]),
     ("structure", &["base"]),
     ("multibody", &["base"]),
@@ -21,7 +21,8 @@ const CRATES: [(&str, &[&str]); 15] = [
     ("export", &["base", "multibody", "domains", "solve", "results", "model", "analysis", "device"]),
     ("jobs", &["base", "structure", "netlist", "model", "analysis"]),
     ("cosim", &["structure", "results"]),
-    ("service", &["base", "solve", "netlist", "layout", "model", "analysis", "device", "export", "jobs"]),
+    ("wire", &["base", "solve", "layout", "model", "analysis", "device", "export", "jobs"]),
+    ("server", &["base", "netlist", "layout", "model", "analysis", "device", "export", "jobs", "wire"]),
 ];
 
 /// Modules of one crate from the bottom up: a module names modules before it alone. `*` is all that is not listed.
