@@ -6,7 +6,7 @@
 //! `foreign` recognizes the language of a file. SUGAR 2, one module a step: `lexer` makes tokens, `parser`, `statement`
 //! and `expression` the tree with all includes in place, `resolve` binds names, `elaborate` and `instance` run
 //! definitions, loops and subnets. SUGAR 3, which is Lua, is run by `sugar3`. Both front ends build elements with
-//! `elements`. `finish` calls `place` for node positions and `check` for loose ends. docs/netlist.md describes the
+//! `elements`. `finish` calls `place` for node positions and `check` for loose ends. docs/reference/netlist.md describes the
 //! languages.
 //!
 //! **Architecture invariant.** Below are [`bimorph_structure`] and the table of elements of [`bimorph_domains`]. Nothing
@@ -51,7 +51,7 @@ pub use includes::DroppedInclude;
 pub use read::{NetlistSource, load};
 pub use setting::Setting;
 
-/// The names of all built-in elements, in the order of docs/netlist.md.
+/// The names of all built-in elements, in the order of docs/reference/netlist.md.
 pub fn element_names() -> impl Iterator<Item = &'static str> {
     elements::models().map(|model| model.name)
 }
