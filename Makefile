@@ -1,13 +1,14 @@
 # Every target does its own set-up on a fresh Debian or Ubuntu with a Rust toolchain, and says what it does.
-.PHONY: help demo test soak fuzz bench pictures charts wheel clean
+.PHONY: help demo test docs docs-pdf soak fuzz bench pictures charts wheel clean
 
 help:
 	@echo "make demo    build, run the bank in ngspice here and through a server, compare, draw (out/demo)"
 	@echo "make test    everything that must hold: format, lints, tests, documentation, Python, ngspice decks"
+	@echo "make docs    the manual as a site (target/docs/html), links, spelling and sentences checked; make docs-pdf prints it"
 	@echo "make soak    a thousand sessions for a minute, ten thousand in turn, two hundred and fifty kills, hundreds of bits changed in files, a hundred killed clients, hundreds of failures of the network: what a server bears (some minutes)"
 	@echo "make fuzz    any text as netlist, any bytes as layout, as messages to a server and as snapshots, ten minutes each (FUZZ_MINUTES)"
 	@echo "make bench   measure (criterion)"
-	@echo "make pictures draw the scenes and the figures of docs/paper.md (docs/pictures)"
+	@echo "make pictures draw the scenes and the figures of docs/project/paper.md (docs/pictures)"
 	@echo "make charts  draw the charts of the README from counted work (docs/pictures); scripts/charts --time measures"
 	@echo "make wheel   the Python package with the command, the plug-in and models in process in it, tried with every Python here (out/wheel)"
 	@echo "make clean   remove everything that was built"
@@ -19,6 +20,13 @@ demo:
 test:
 	@scripts/setup ngspice versions
 	@scripts/check
+
+docs:
+	@scripts/docs
+
+# Needs chromium.
+docs-pdf:
+	@scripts/docs pdf
 
 soak:
 	@scripts/setup build

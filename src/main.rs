@@ -3,7 +3,7 @@
 mod cli;
 
 /// Memory of the command and of the service that it runs: sweeps are an eighth to a sixth faster with it than with that of glibc
-/// (docs/performance.md).
+/// (docs/project/benchmarks.md).
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

@@ -1,4 +1,4 @@
-//! docs/netlist.md is complete and true: its examples load, and it names every element and every message.
+//! docs/reference/netlist.md is complete and true: its examples load, and it names every element and every message.
 
 use bimorph::netlist::{Bundle, element_names, load};
 use std::collections::BTreeSet;
@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 fn page() -> String {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/netlist.md")).expect("the page")
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/netlist.md")).expect("the page")
 }
 
 /// Every example loads without a message.
@@ -16,7 +16,8 @@ fn examples_load() {
     let examples: Vec<&str> = page.split("```netlist\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
     assert!(examples.len() >= 4);
     for example in examples {
-        let loaded = load(&Bundle::from_text("docs/netlist.md", example), &[]).unwrap_or_else(|d| panic!("{d}"));
+        let loaded =
+            load(&Bundle::from_text("docs/reference/netlist.md", example), &[]).unwrap_or_else(|d| panic!("{d}"));
         assert!(loaded.warnings.items.is_empty(), "{}", loaded.warnings);
     }
 }

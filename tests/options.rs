@@ -1,6 +1,6 @@
 //! Every front end has every option of a model, under its name, in its unit, with its default and within its range.
 //!
-//! The files generated from the table (docs/options.md, fields in proto/, the keywords of the Python client) are
+//! The files generated from the table (docs/reference/options.md, fields in proto/, the keywords of the Python client) are
 //! compared with it; `BIMORPH_WRITE=1 cargo test --test options` regenerates them.
 
 use bimorph::analysis::integrator::Integrator;
@@ -132,8 +132,8 @@ fn section<'a>(text: &'a str, markers: Option<[&str; 2]>) -> [&'a str; 3] {
 fn files_are_as_written_from_the_table() {
     let proto = ["written from the table in crates/model/src/options/model.rs.", "// end of the options"];
     for (path, markers, want) in [
-        ("docs/options.md", Some(["<!-- options -->", "<!-- end of options -->"]), rows()),
-        ("docs/options.md", Some(["<!-- analyses -->", "<!-- end of analyses -->"]), analysis_rows()),
+        ("docs/reference/options.md", Some(["<!-- options -->", "<!-- end of options -->"]), rows()),
+        ("docs/reference/options.md", Some(["<!-- analyses -->", "<!-- end of analyses -->"]), analysis_rows()),
         ("proto/bimorph/v1/model.proto", Some(proto), fields()),
         ("clients/python/src/bimorph/options.py", None, python()),
     ] {
@@ -190,7 +190,7 @@ fn every_front_takes_the_same_options() {
     let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
     let proto = fs::read_to_string(place("proto/bimorph/v1/model.proto")).expect("the messages");
     let client = fs::read_to_string(place("clients/python/src/bimorph/options.py")).expect("the client");
-    let docs = fs::read_to_string(place("docs/options.md")).expect("the page");
+    let docs = fs::read_to_string(place("docs/reference/options.md")).expect("the page");
     let deck = deck_options::declared();
     assert_eq!(deck.len(), MODEL.len());
     let defaults = CompileOptions::default();

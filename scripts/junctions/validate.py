@@ -14,7 +14,7 @@ import layouts
 ROOT = pathlib.Path(__file__).parents[2]
 NETLISTS = ROOT / "tests/netlists/junctions"
 NUMBERS = ROOT / "tests/physics/junctions/plane_stress.rs"
-DOCUMENT = ROOT / "docs/junctions.md"
+DOCUMENT = ROOT / "docs/explanation/junctions.md"
 # options of each column; what a bound is asked of is the default, and rotary inertia where the command says that it is missing
 KINDS = {
     "centreline": ["--junctions", "centreline"],

@@ -75,7 +75,7 @@ impl DoctorCommand {
                 found if found.is_empty() => "clients need no credentials".to_owned(),
                 found => found.join("; "),
             });
-        line("access", &found, "docs/service.md says what a server asks of its clients, and of its files")?;
+        line("access", &found, "docs/reference/server.md says what a server asks of its clients, and of its files")?;
         let mut good = found.is_ok();
         if let Some(folder) = &options.state_dir {
             let found = scan::inspect(folder).map_err(|error| error.to_string());

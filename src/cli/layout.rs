@@ -16,7 +16,7 @@ use std::path::PathBuf;
 ///
 /// Beams, plates, anchors, combs and facing beams become polygons on the masks of --process (polymumps unless given):
 /// the layer as thick as they are. Names of nodes are labels at the nodes. Labels on the layer 255/0 (BIMORPH in CIF)
-/// hold data that outlines cannot express, so that `bimorph convert` gives the same mechanism back. docs/layout.md
+/// hold data that outlines cannot express, so that `bimorph convert` gives the same mechanism back. docs/reference/layouts.md
 /// describes them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph layout bank.net --out bank.gds\n  \

@@ -40,7 +40,7 @@ pub(crate) struct ModelArgs {
 #[derive(Debug, Args)]
 pub(crate) struct LayoutArgs {
     /// Layouts only: definition of the layers; a built-in process (polymumps, soi) or a process file (.toml,
-    /// docs/layout.md)
+    /// docs/reference/layouts.md)
     #[arg(long, value_name = "NAME|FILE")]
     process: Option<String>,
 

@@ -146,9 +146,9 @@ impl Args for SettingSources {
             }
         });
         let short = SHORT.map(|(flag, _, help)| value(flag, "N").help(help));
-        let limits = "Set a limit of docs/service.md: bytes as 64M or 2G, times in seconds. Repeatable";
+        let limits = "Set a limit of docs/reference/server.md: bytes as 64M or 2G, times in seconds. Repeatable";
         command
-            .arg(value("config", "FILE").help("File of settings, TOML; docs/service.md has their names"))
+            .arg(value("config", "FILE").help("File of settings, TOML; docs/reference/server.md has their names"))
             .args(settings)
             .args(short)
             .arg(value("limit", "NAME=VALUE").action(ArgAction::Append).help(limits))

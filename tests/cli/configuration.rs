@@ -1,4 +1,4 @@
-//! Settings of a server: options before the environment before a file; `Info` reports them, and docs/service.md has
+//! Settings of a server: options before the environment before a file; `Info` reports them, and docs/reference/server.md has
 //! every setting.
 
 use crate::command::Bench;
@@ -167,10 +167,10 @@ fn limits_rows() -> String {
     text
 }
 
-/// The tables of docs/service.md are written from those of the program: `BIMORPH_WRITE=1 cargo test --test cli documented` does so.
+/// The tables of docs/reference/server.md are written from those of the program: `BIMORPH_WRITE=1 cargo test --test cli documented` does so.
 #[test]
 fn documented() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/service.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/reference/server.md");
     let mut text = std::fs::read_to_string(path).expect("the page");
     for (first, last, want) in [
         ("<!-- settings -->\n", "<!-- end of settings -->", settings_rows()),

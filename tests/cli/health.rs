@@ -14,7 +14,7 @@ use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 use tonic_health::pb::{HealthCheckRequest, HealthCheckResponse};
 
-/// Watches and checks at once, as docs/service.md says.
+/// Watches and checks at once, as docs/reference/server.md says.
 const PLACES: usize = 64;
 
 async fn check(channel: &Channel, service: &str) -> Result<ServingStatus, Code> {

@@ -144,10 +144,11 @@ fn metrics_need_a_port() {
     assert!(ran.stderr.contains("expected host:port"), "{}", ran.stderr);
 }
 
-/// docs/service.md has every metric.
+/// docs/reference/server.md has every metric.
 #[test]
 fn documented_metrics() {
-    let docs = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/service.md")).expect("the page");
+    let docs =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/reference/server.md")).expect("the page");
     for metric in METRICS {
         let row = format!("| `{}` | {} | {} |", metric.name, metric.kind, metric.help);
         assert!(docs.contains(&row), "no row {row}");

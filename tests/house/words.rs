@@ -61,14 +61,14 @@ const ALLOWED: &[(&str, &str, &str)] = &[
     ("tests/scaling.rs", "front", "the front of a frontal elimination"),
     ("docs/", "front", "the front of a frontal elimination"),
     ("docs/", "fronts", "the fronts of a frontal elimination"),
-    ("docs/rcr.md", "comes out", "a coordinate is eliminated"),
-    ("docs/stability.md", "comes out", "a coordinate is eliminated"),
+    ("docs/explanation/recursion.md", "comes out", "a coordinate is eliminated"),
+    ("docs/project/stability.md", "comes out", "a coordinate is eliminated"),
     ("tests/house/words.rs", "*", "this list"),
     ("src/cli/chart", "told", "the documented key and column of a chart"),
     ("crates/analysis/src/chart", "told", "the documented key of a chart"),
-    ("docs/command.md", "told", "the documented column of a chart"),
+    ("docs/reference/analyses.md", "told", "the documented column of a chart"),
     ("crates/model/src/options/model.rs", "asks for", "the default of the band as the Python client has it, too"),
-    ("docs/options.md", "asks for", "the default of the band as the Python client has it, too"),
+    ("docs/reference/options.md", "asks for", "the default of the band as the Python client has it, too"),
     ("proto/bimorph/v1/model.proto", "asks for", "the default of the band as the Python client has it, too"),
 ];
 

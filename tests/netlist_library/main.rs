@@ -1,4 +1,4 @@
-//! The planar models beside SUGAR's own: their effects, from closed forms and from the equations in docs/netlist.md,
+//! The planar models beside SUGAR's own: their effects, from closed forms and from the equations in docs/reference/netlist.md,
 //! and the warnings about members that leave the plane.
 
 mod arcs;

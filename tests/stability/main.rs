@@ -1,5 +1,5 @@
 //! Failures of methods, and the methods that work instead: each test asserts both sides with measured figures.
-//! docs/stability.md describes them, and examples/stability_pictures draws the measurements.
+//! docs/project/stability.md describes them, and examples/stability_pictures draws the measurements.
 
 // the pictures use tracks and times that no test reads
 #![allow(dead_code)]

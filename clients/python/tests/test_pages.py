@@ -25,7 +25,7 @@ def blocks(page: Path) -> list[tuple[int, str]]:
     return [(text[: found.start(1)].count("\n") + 1, found[1]) for found in re.finditer(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)]
 
 
-PAGES = [page for page in (ROOT / "README.md", ROOT / "clients/python/README.md", *sorted((ROOT / "docs").glob("*.md"))) if page.is_file() and blocks(page)]
+PAGES = [page for page in (ROOT / "README.md", ROOT / "clients/python/README.md", *sorted((ROOT / "docs").rglob("*.md"))) if page.is_file() and blocks(page)]
 
 
 def run(words: list[str], folder: Path, program: str) -> None:

@@ -1,7 +1,7 @@
 //! Effect of a formulation on bodies and joints (locked directions, tree and loops), and the choice of a formulation.
 //!
 //! **Choice of `auto`.** With joints that are elastic in every direction, a step in joint coordinates costs as much as
-//! one of the bodies or more, and both take the same steps (docs/rcr.md has the measurements): compliant. Now consider
+//! one of the bodies or more, and both take the same steps (docs/explanation/recursion.md has the measurements): compliant. Now consider
 //! joints that only rotate and close no loops, as rigid plates on flexure pivots under a scheme of the paper. The
 //! bodies' own coordinates then need stiff springs in the rigid directions, and short steps. The recursion needs
 //! neither, and its explicit steps cost a few evaluations without any factorization: rcr with rk45, as long as the

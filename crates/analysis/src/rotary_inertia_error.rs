@@ -1,6 +1,6 @@
 //! Frequency error from missing rotary inertia.
 //!
-//! Bodies along a beam have none by default (docs/junctions.md): the sections of a wide beam rotate without inertia.
+//! Bodies along a beam have none by default (docs/explanation/junctions.md): the sections of a wide beam rotate without inertia.
 //! Let J = Σ ∫ ρ·t·w³/12·θ² dx for a mode of mass 1, with θ its rotation along the beams. Rayleigh's quotient with
 //! rotary inertia is ω²/(1 + J) (Lord Rayleigh, *The Theory of Sound*, 1877, § 186). The reported frequency is
 //! therefore too high by about √(1 + J) − 1.
@@ -10,7 +10,7 @@ use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 use bimorph_structure::Beam;
 
-/// Accuracy of the models themselves [1]: junctions agree with plane stress within about this (docs/junctions.md), and
+/// Accuracy of the models themselves [1]: junctions agree with plane stress within about this (docs/explanation/junctions.md), and
 /// smaller effects are not reported.
 pub(super) const WORTH: f64 = 7e-3;
 

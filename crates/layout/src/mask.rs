@@ -1,7 +1,7 @@
 //! A mechanism as a layout file: its outlines on the masks of a process, with labels for names and for data that
 //! outlines cannot express.
 //!
-//! docs/layout.md describes the labels. Nodes are texts on the layer that they belong to. On the layer of notes (`BIMORPH` in CIF,
+//! docs/reference/layouts.md describes the labels. Nodes are texts on the layer that they belong to. On the layer of notes (`BIMORPH` in CIF,
 //! 255/0 in GDSII) stand a text `bimorph layout 1 PROCESS`, one for each process and one for each element, numbered and at its place.
 
 use super::cells::{Cell, CellShape, CellText, Library};

@@ -1,6 +1,6 @@
 //! The process file, which defines the layers of a drawing.
 //!
-//! TOML, all numbers SI; docs/layout.md describes it. Two processes travel inside the program ([`Process::builtin`]).
+//! TOML, all numbers SI; docs/reference/layouts.md describes it. Two processes travel inside the program ([`Process::builtin`]).
 
 mod error;
 mod file;

@@ -187,7 +187,8 @@ fn beyond_table(structure: &Structure, options: &CompileOptions, parts: &Assembl
     let more = if found.count > 1 { format!(" ({} such beams in all)", found.count) } else { String::new() };
     let name = &structure.beams[found.first].name;
     let message = format!("the junctions of `{name}` are beyond what they were calibrated for: {}{more}", found.why);
-    let help = "the accuracy given in docs/junctions.md does not hold there; compare with `--junctions offset`";
+    let help =
+        "the accuracy given in docs/explanation/junctions.md does not hold there; compare with `--junctions offset`";
     Some(Diagnostic::warning("W017", message, help))
 }
 

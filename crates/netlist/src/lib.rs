@@ -6,7 +6,7 @@
 //! `foreign` recognizes the language of a file. SUGAR 2, one module a step: `lexer` makes tokens, `parser`, `statement`
 //! and `expression` the tree with all includes in place, `resolve` binds names, `elaborate` and `instance` run
 //! definitions, loops and subnets. SUGAR 3, which is Lua, is run by `sugar3`. Both front ends build elements with
-//! `elements`. `finish` calls `place` for node positions and `check` for loose ends. docs/netlist.md describes the
+//! `elements`. `finish` calls `place` for node positions and `check` for loose ends. docs/reference/netlist.md describes the
 //! languages.
 //!
 //! **Architecture invariant.** Below are [`bimorph_base`] and [`bimorph_structure`]. Nothing here touches the disk after a
@@ -43,7 +43,7 @@ pub use includes::{DroppedInclude, read_bundle, read_bundle_reporting};
 pub use parse_setting::parse_setting;
 pub use read::{NetlistSource, is_program, load};
 
-/// The names of all built-in elements, in the order of docs/netlist.md.
+/// The names of all built-in elements, in the order of docs/reference/netlist.md.
 pub fn element_names() -> impl Iterator<Item = &'static str> {
     elements::models().map(|model| model.name)
 }

@@ -1,4 +1,4 @@
-//! `.measure`, `.four` and loops in `.control`, by the decks that docs/ngspice.md names, against closed forms.
+//! `.measure`, `.four` and loops in `.control`, by the decks that docs/reference/ngspice.md names, against closed forms.
 
 use crate::support::{deck, versions};
 use bimorph::cosim::check::check;

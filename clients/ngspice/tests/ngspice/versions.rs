@@ -1,4 +1,4 @@
-//! The decks of the project, of its samples and of docs/ngspice.md on every ngspice at hand, compared with each other; and
+//! The decks of the project, of its samples and of docs/reference/ngspice.md on every ngspice at hand, compared with each other; and
 //! with KLU in place of Sparse where an ngspice has both.
 
 use crate::support::{Run, all_decks, complex_deviation, deviation, real, run, run_text, versions};
@@ -14,7 +14,8 @@ const WAVES: [(&str, f64); 6] =
 /// Decks that run here: every `.cir` with a part in it but those that want a server, and every whole deck of the
 /// documentation.
 fn decks(folder: &Path) -> Vec<PathBuf> {
-    let docs = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/ngspice.md")).unwrap();
+    let docs =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/ngspice.md")).unwrap();
     let mut written: Vec<String> = Vec::new();
     let mut inside = false;
     for line in docs.lines() {
@@ -32,7 +33,7 @@ fn decks(folder: &Path) -> Vec<PathBuf> {
         }
     }
     written.retain(|deck| deck.contains("bimorph(") && deck.trim_end().ends_with(".end"));
-    assert!(!written.is_empty(), "docs/ngspice.md has no whole deck");
+    assert!(!written.is_empty(), "docs/reference/ngspice.md has no whole deck");
     for (n, text) in written.iter().enumerate() {
         std::fs::write(folder.join(format!("docs_{n}.cir")), text).unwrap();
     }

@@ -78,7 +78,7 @@ class Client:
         return str(self._channel.call("Info", model_pb2.InfoRequest()).version)
 
     def settings(self) -> dict[str, str]:
-        """All settings of the server, defaults included, by the names of docs/service.md."""
+        """All settings of the server, defaults included, by the names of docs/reference/server.md."""
         return {s.name: s.value for s in self._channel.call("Info", model_pb2.InfoRequest()).settings}
 
     def convert(

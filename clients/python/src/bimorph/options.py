@@ -17,8 +17,8 @@ class Options(TypedDict, total=False):
 
     junctions: Literal["centreline", "offset", "calibrated"] | None
     """How beams meet. centreline: in points, as in SUGAR; offset: at the edges of rigid junctions; calibrated:
-    with springs there, from two-dimensional elasticity (docs/junctions.md). One of centreline, offset or
-    calibrated; default: calibrated."""
+    with springs there, from two-dimensional elasticity (docs/explanation/junctions.md). One of centreline,
+    offset or calibrated; default: calibrated."""
 
     linear: bool | None
     """Small displacements about the drawn geometry, as SUGAR."""
@@ -27,7 +27,7 @@ class Options(TypedDict, total=False):
     """Leave out gas damping."""
 
     scheme: Literal["a0", "a2", "c1", "d1", "b", "e4", "es", "auto"] | None
-    """How beams are cut into bodies and joints (docs/theory.md has their errors). auto: e4; es in joint
+    """How beams are cut into bodies and joints (docs/explanation/beams.md has their errors). auto: e4; es in joint
     coordinates, where every body needs rotary inertia. One of a0, a2, c1, d1, b, e4, es, auto; default: auto."""
 
     segments: int | None

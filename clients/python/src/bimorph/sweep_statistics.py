@@ -25,7 +25,7 @@ _SUFFIXES = {
     **{"": 0, "a": -18, "f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "h": 2, "k": 3},
     **{"M": 6, "meg": 6, "G": 9, "T": 12, "P": 15, "E": 18},
 }
-"""Exponents by the suffixes of netlists (docs/netlist.md, "Numbers"): ``m`` is milli, ``M`` mega; and ``meg`` of SPICE."""
+"""Exponents by the suffixes of netlists (docs/reference/netlist.md, "Numbers"): ``m`` is milli, ``M`` mega; and ``meg`` of SPICE."""
 _LIMIT = re.compile(r"\s*(?P<name>.+?)\s*(?P<relation><=|>=|<|>)\s*(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,9})?)(?P<suffix>[a-zA-Z]*)\s*\Z")
 _RELATIONS: dict[str, Callable[[Any, float], Any]] = {
     "<": lambda values, bound: values < bound,

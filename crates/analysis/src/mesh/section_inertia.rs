@@ -1,6 +1,6 @@
 //! Rotary inertia of sections in runs whose parts may touch.
 //!
-//! Sections of beams have no rotary inertia by default (docs/junctions.md): next to the lowest frequencies theirs is
+//! Sections of beams have no rotary inertia by default (docs/explanation/junctions.md): next to the lowest frequencies theirs is
 //! negligible. An impact is no such motion. A section without inertia that a contact pushes follows the force at once,
 //! so that no step is short enough where the force depends on its rate: steps fell to 1e-21 s. In time, models whose
 //! parts may touch therefore have it, and points without mass that contacts act on have some (`bimorph_model::discretize`).

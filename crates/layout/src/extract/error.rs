@@ -13,7 +13,7 @@ pub enum ExtractError {
     /// No layer of the process is drawn.
     #[error(
         "{source_name}: no layer that moves in process `{process}` is drawn: expected one of {expected}, found {found}; name another \
-         process, or write a process file for these layers (docs/layout.md)"
+         process, or write a process file for these layers (docs/reference/layouts.md)"
     )]
     NothingMoves {
         /// Name of the drawing.

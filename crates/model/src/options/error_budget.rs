@@ -1,7 +1,7 @@
 //! The one place that divides a tolerance: what each source of error may use of it, with the reason.
 //!
 //! A result has errors of its mesh, of its modes and of its steps. Each estimate has been compared with the true error, and where it was found
-//! smaller than that, it may use only a part of the tolerance (docs/accuracy.md). Everything else asks here and multiplies no tolerance itself.
+//! smaller than that, it may use only a part of the tolerance (docs/project/accuracy.md). Everything else asks here and multiplies no tolerance itself.
 
 use super::CompileOptions;
 

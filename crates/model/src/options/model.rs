@@ -2,7 +2,7 @@
 //!
 //! The struct and its defaults, the parsing and `--help` of the command, and the fields of the protocol come from it.
 //! So do the parameters of an ngspice `.model` line, the keywords of the Python client, the keys of JSON documents, and
-//! the table in docs/options.md. After a change, `BIMORPH_WRITE=1 cargo test --test options` writes what is generated
+//! the table in docs/reference/options.md. After a change, `BIMORPH_WRITE=1 cargo test --test options` writes what is generated
 //! from it.
 
 use super::choices::{Formulation, Junctions, Scheme};
@@ -70,7 +70,7 @@ options! {
     band: Option<f64> = None, "band_hz" = 2, ["Hz"], Range::Above(0.0, 1e12), "by what the analysis asks for";
 
     /// How beams meet. centreline: in points, as in SUGAR; offset: at the edges of rigid junctions; calibrated: with springs
-    /// there, from two-dimensional elasticity (docs/junctions.md).
+    /// there, from two-dimensional elasticity (docs/explanation/junctions.md).
     junctions: Junctions = Junctions::Calibrated, "junctions" = 6, [""], Range::Names(&Junctions::NAMES), "";
 
     /// Small displacements about the drawn geometry, as SUGAR.
@@ -79,7 +79,7 @@ options! {
     /// Leave out gas damping.
     undamped: bool = false, "undamped" = 5, [""], Range::Flag, "";
 
-    /// How beams are cut into bodies and joints (docs/theory.md has their errors). auto: e4; es in joint coordinates, where every
+    /// How beams are cut into bodies and joints (docs/explanation/beams.md has their errors). auto: e4; es in joint coordinates, where every
     /// body needs rotary inertia.
     scheme: Scheme = Scheme::Auto, "scheme" = 7, [""], Range::Names(&Scheme::NAMES), "";
 

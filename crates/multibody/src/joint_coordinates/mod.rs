@@ -3,7 +3,7 @@
 //! | module | loops |
 //! |---|---|
 //! | [`sprung_loops`] | a joint that closes a loop keeps its springs: no constraint, no singular configuration |
-//! | [`constrained_loops`] | loops are rigid, and their constraints are reduced inside the recursion (docs/rcr.md) |
+//! | [`constrained_loops`] | loops are rigid, and their constraints are reduced inside the recursion (docs/explanation/recursion.md) |
 
 pub mod constrained_loops;
 pub mod sprung_loops;
