@@ -5,7 +5,7 @@ use super::report;
 use bimorph::analysis::harmonic::{HarmonicResult, Root};
 use bimorph::results::plot::Picture;
 use bimorph::results::plot::axis::{prefix, quantity};
-use bimorph::results::plot::bode::{self, BodeCurve};
+use bimorph::results::plot::bode::{self, BodeChart, BodeCurve, BodeResonance, Magnitude};
 use bimorph::results::table::{Column, ColumnSamples, Table};
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -30,7 +30,16 @@ pub(super) fn picture(title: &str, result: &HarmonicResult, linear: bool) -> Pic
         values: s.values.clone(),
     };
     let curves: Vec<BodeCurve> = result.signals.iter().map(curve).collect();
-    bode::draw(title, &result.frequencies_hz, linear, &curves)
+    let resonance = |pole: &Root| BodeResonance { frequency: pole.frequency_hz(), quality: pole.quality() };
+    let ringing = result.poles.iter().flatten().filter(|pole| pole.im > 0.0);
+    bode::draw(&BodeChart {
+        title: title.to_owned(),
+        frequencies: result.frequencies_hz.clone(),
+        linear,
+        magnitude: Magnitude::Units,
+        curves,
+        resonances: ringing.map(resonance).collect(),
+    })
 }
 
 pub(super) fn text(result: &HarmonicResult) -> String {
@@ -155,14 +164,14 @@ fn resonances(result: &HarmonicResult, poles: &[Root]) -> String {
                 vec![quantity(pole.frequency_hz(), "Hz"), q, quantity(pole.width_hz(), "Hz"), height, phase]
             })
             .collect();
-        text += &report::columns(&["resonance", "Q", "half-power width", &first.name, "phase"], &rows);
+        text += &report::columns(&["resonance", "Q", "-3 dB bandwidth", &first.name, "phase"], &rows);
         if ringing.len() > MAX_NAMED {
             let _ = writeln!(text, "… {} more; --json has all", ringing.len() - MAX_NAMED);
         }
     }
     if !corners.is_empty() {
         let shown: Vec<String> = corners.iter().take(MAX_NAMED).cloned().collect();
-        let _ = writeln!(text, "corners of what lags without ringing: {}", shown.join(", "));
+        let _ = writeln!(text, "real poles: {}", shown.join(", "));
     }
     text
 }

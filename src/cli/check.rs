@@ -6,17 +6,21 @@ use super::output;
 use bimorph::analysis::formulation;
 use bimorph::compile::{CompiledModel, Formulation};
 use bimorph::netlist::Setting;
+use bimorph::results::format::ResultFormat;
+use bimorph::results::plot::mechanism;
 use bimorph::structure::{DomainElement, Structure};
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
+use std::path::PathBuf;
 
 /// Parse and elaborate a netlist, and report every error and warning.
 ///
 /// Exit status 1 on any error. Prints the model's unknowns, and with --band their estimated error; JSON has "segments"
 /// by beam (0: rigid).
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph check bank.net\n  bimorph check bank.net --set w=2.1u --json")]
+#[command(after_help = "Examples:\n  bimorph check bank.net\n  bimorph check bank.net --set w=2.1u --json\n  \
+    bimorph check bank.net --out bank.svg                           a drawing with the names of nodes")]
 pub(crate) struct CheckCommand {
     #[command(flatten)]
     model: ModelArgs,
@@ -24,6 +28,10 @@ pub(crate) struct CheckCommand {
     /// Print one JSON document
     #[arg(long)]
     json: bool,
+
+    /// Draw the netlist with the names of its nodes: .svg, .png or .html
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
 }
 
 #[derive(Debug, Serialize)]
@@ -46,8 +54,15 @@ struct CheckDocument<'a> {
 
 impl CheckCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
+        let format = self.out.as_deref().map(ResultFormat::from_path).transpose()?;
+        self.out.as_deref().map(output::check_folder).transpose()?;
         let compiled = self.model.compile()?;
         let s = &compiled.structure;
+        if let (Some(out), Some(format)) = (&self.out, format) {
+            let no_table =
+                || Err(Failure::NoSuchOutput { what: "check", kind: "table", hint: "write .svg, .png or .html" });
+            output::write(out, format, no_table, || Ok(mechanism::named(&self.model.title(), s)))?;
+        }
         let order = &compiled.order;
         let unknowns = compiled.parts.system.model.unknowns();
         let segments: Vec<(String, usize)> =

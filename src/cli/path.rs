@@ -185,6 +185,22 @@ impl PathCommand {
         Ok(table)
     }
 
+    /// Limit points and bifurcations with their names.
+    fn critical<'r>(
+        &self,
+        compiled: &CompiledModel,
+        result: &'r ContinuationResult,
+    ) -> Vec<(&'r CriticalPoint, &'static str)> {
+        let electrics = &compiled.parts.system.electrics;
+        let attracts = compiled
+            .structure
+            .port(&self.along.name)
+            .is_some_and(|port| (0..electrics.gap_rows.nrows()).any(|gap| electrics.gap_rows[(gap, port)] != 0.0));
+        let rises = (self.along.to - self.along.from).signum();
+        let folds = result.folds.iter().map(|point| (point, limit_point(result, point, rises, attracts)));
+        folds.chain(result.bifurcations.iter().map(|point| (point, BIFURCATION))).collect()
+    }
+
     fn picture(&self, compiled: &CompiledModel, result: &ContinuationResult, unit: &str) -> Picture {
         let mut units: Vec<&str> = Vec::new();
         for (_, unit, _) in &result.signals {
@@ -193,35 +209,32 @@ impl PathCommand {
             }
         }
         let title = self.model.title();
+        let critical = self.critical(compiled, result);
         let mut pictures: Vec<Picture> = units
             .iter()
-            .map(|x_unit| {
-                let of_unit: Vec<_> = result.signals.iter().filter(|s| s.1 == **x_unit).collect();
+            .map(|y_unit| {
+                let of_unit: Vec<_> = result.signals.iter().filter(|s| s.1 == **y_unit).collect();
                 let curves = of_unit.iter().map(|(name, _, values)| PlaneCurve {
                     name: name.clone(),
-                    points: values.iter().zip(&result.values).map(|(x, y)| [*x, *y]).collect(),
+                    points: result.values.iter().zip(values).map(|(x, y)| [*x, *y]).collect(),
                     dashed: result.negative.iter().map(|n| *n > 0).collect(),
                 });
-                let marks = [(&result.folds, "fold", Sign::Dot), (&result.bifurcations, "bifurcation", Sign::Square)];
-                let marks = marks.iter().flat_map(|(list, word, sign)| {
-                    let of_unit = &of_unit;
-                    list.iter().flat_map(move |c| {
-                        of_unit.iter().enumerate().map(move |(k, s)| PlaneMark {
-                            at: [s.2[c.point], c.value],
-                            sign: *sign,
-                            word: if k == 0 { plane::word(word, c.value, unit) } else { String::new() },
-                            below: c.point > 0 && result.values[c.point - 1] > c.value,
-                        })
+                let of_unit = &of_unit;
+                let marks = critical.iter().flat_map(|(point, word)| {
+                    of_unit.iter().enumerate().map(move |(k, s)| PlaneMark {
+                        at: [point.value, s.2[point.point]],
+                        sign: if *word == BIFURCATION { Sign::Square } else { Sign::Dot },
+                        word: if k == 0 { plane::word(word, point.value, unit) } else { String::new() },
                     })
                 });
-                let x_name = match of_unit.as_slice() {
+                let y_name = match of_unit.as_slice() {
                     [one] => one.0.clone(),
-                    _ => chart::word(x_unit).to_owned(),
+                    _ => chart::word(y_unit).to_owned(),
                 };
                 plane::draw(&PlaneChart {
                     title: title.clone(),
-                    x: [x_name, (*x_unit).to_owned()],
-                    y: [self.along.name.clone(), unit.to_owned()],
+                    x: [self.along.name.clone(), unit.to_owned()],
+                    y: [y_name, (*y_unit).to_owned()],
                     curves: curves.collect(),
                     marks: marks.collect(),
                     equal: false,
@@ -246,19 +259,17 @@ impl PathCommand {
         let mut row = |what: &str, point: usize| {
             let mut cells = vec![what.to_owned(), quantity(result.values[point], unit)];
             cells.extend(result.signals.iter().map(|(_, unit, values)| quantity(values[point], unit)));
-            // a fold is the limit of both
             cells.push(match (what, result.negative[point]) {
-                ("fold", _) => String::new(),
-                (_, 0) => "stable".into(),
-                _ => "unstable".into(),
+                ("start" | "end" | BIFURCATION, 0) => "stable".into(),
+                ("start" | "end" | BIFURCATION, _) => "unstable".into(),
+                // a limit point is the limit of both
+                _ => String::new(),
             });
             rows.push((point, cells));
         };
         row("start", 0);
-        for (list, word) in [(&result.folds, "fold"), (&result.bifurcations, "bifurcation")] {
-            for critical in list {
-                row(word, critical.point);
-            }
+        for (critical, word) in self.critical(compiled, result) {
+            row(word, critical.point);
         }
         row("end", result.values.len() - 1);
         rows.sort_by_key(|(point, _)| *point);
@@ -276,6 +287,25 @@ impl PathCommand {
             report::footing(compiled, result.unknowns)
         );
         text
+    }
+}
+
+/// Name of a bifurcation.
+const BIFURCATION: &str = "bifurcation";
+
+/// Name of a limit point: what a part does that is driven past it. `rises` is the sign of the change from start to end, and `attracts` says
+/// that the parameter is a voltage across gaps.
+fn limit_point(result: &ContinuationResult, point: &CriticalPoint, rises: f64, attracts: bool) -> &'static str {
+    let k = point.point;
+    let (before, after) = (k.checked_sub(1), (k + 1 < result.values.len()).then_some(k + 1));
+    let stable = |k: Option<usize>| k.is_some_and(|k| result.negative[k] == 0);
+    let is_maximum = before.is_some_and(|k| rises * (point.value - result.values[k]) > 0.0);
+    match (is_maximum && stable(before), !is_maximum && stable(after), attracts) {
+        (true, _, true) => "pull-in",
+        (_, true, true) => "release",
+        (true, _, false) => "snap-through",
+        (_, true, false) => "snap-back",
+        _ => "limit point",
     }
 }
 

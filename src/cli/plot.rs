@@ -8,11 +8,12 @@ use bimorph::compile::{CompileOptions, compile};
 use bimorph::input::{self, LayoutChoice};
 use bimorph::netlist::Setting;
 use bimorph::results::format::ResultFormat;
+use bimorph::results::plot::bode::{self, BodeChart, BodeCurve, Magnitude};
 use bimorph::results::plot::chart::{self, Panel, PanelChart, Series};
 use bimorph::results::plot::plane::{self, PlaneChart, PlaneCurve, PlaneMark, Sign};
 use bimorph::results::plot::{stack, svg::Picture};
 use bimorph::results::raw;
-use bimorph::results::table::{Column, Table};
+use bimorph::results::table::{Column, ColumnSamples, Table};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -125,6 +126,9 @@ pub(crate) fn longest(path: &Path, number: Option<usize>) -> Result<(Table, usiz
 /// The chart of a table; without panels one for each unit.
 pub(crate) fn chart_of(table: &Table, title: Option<&str>, panels: &[String]) -> Result<Picture, Failure> {
     let columns = table.columns();
+    if panels.is_empty() && columns.iter().skip(1).any(|c| matches!(c.samples, ColumnSamples::Complex(_))) {
+        return Ok(frequency_response(table, title));
+    }
     let panels = if panels.is_empty() {
         by_unit(columns.get(1..).unwrap_or_default())
     } else {
@@ -138,6 +142,31 @@ pub(crate) fn chart_of(table: &Table, title: Option<&str>, panels: &[String]) ->
         x: first.map(|c| c.samples.magnitudes()).unwrap_or_default(),
         panels,
     }))
+}
+
+/// The picture of a small-signal analysis: decibels and degrees over the frequency.
+fn frequency_response(table: &Table, title: Option<&str>) -> Picture {
+    let columns = table.columns();
+    let curve = |column: &Column| match &column.samples {
+        ColumnSamples::Complex(values) => {
+            Some(BodeCurve { name: column.name.clone(), unit: unit(column), values: values.clone() })
+        }
+        ColumnSamples::Real(_) => None,
+    };
+    let frequencies = columns.first().map(|c| c.samples.magnitudes()).unwrap_or_default();
+    // equal steps: a linear sweep
+    let linear = match frequencies.as_slice() {
+        [first, second, .., last] => (second - first) * (frequencies.len() - 1) as f64 <= 1.01 * (last - first),
+        _ => true,
+    };
+    bode::draw(&BodeChart {
+        title: title.unwrap_or(&table.title).to_owned(),
+        linear,
+        magnitude: Magnitude::Decibels,
+        curves: columns.iter().skip(1).filter_map(curve).collect(),
+        frequencies,
+        resonances: Vec::new(),
+    })
 }
 
 /// Adds the signals of another raw file, which must run over the same axis.
@@ -187,7 +216,7 @@ fn tracks(table: &Table, title: Option<&str>, tracks: &[String]) -> Result<Pictu
         x,
         y,
         curves,
-        marks: vec![PlaneMark { at: start, sign: Sign::Dot, word: "start".to_owned(), below: false }],
+        marks: vec![PlaneMark { at: start, sign: Sign::Dot, word: "start".to_owned() }],
         equal: true,
         note: String::new(),
     }))

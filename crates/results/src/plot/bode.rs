@@ -5,8 +5,9 @@
 //! curve.
 
 use super::PALETTE;
-use super::axis::axis;
+use super::axis::{axis, quantity};
 use super::chart::{WIDTH, thin_out, word};
+use super::labels::LabelPlaces;
 use super::log_axis::LogAxis;
 use super::svg::{Align, Paint, Picture};
 
@@ -21,6 +22,41 @@ pub struct BodeCurve {
     pub values: Vec<[f64; 2]>,
 }
 
+/// A resonance, which is marked on the curves that show it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodeResonance {
+    /// Frequency [Hz].
+    pub frequency: f64,
+    /// Quality [1]; none: undamped.
+    pub quality: Option<f64>,
+}
+
+/// How magnitudes are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Magnitude {
+    /// In their unit, on a logarithmic axis.
+    Units,
+    /// In decibels of their unit.
+    Decibels,
+}
+
+/// Content of a Bode picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodeChart {
+    /// Line above the panels.
+    pub title: String,
+    /// Frequencies [Hz], ascending.
+    pub frequencies: Vec<f64>,
+    /// The axis of frequencies is linear.
+    pub linear: bool,
+    /// How magnitudes are drawn.
+    pub magnitude: Magnitude,
+    /// The curves.
+    pub curves: Vec<BodeCurve>,
+    /// Resonances to mark.
+    pub resonances: Vec<BodeResonance>,
+}
+
 const LEFT: f64 = 92.0;
 const RIGHT: f64 = 24.0;
 const HEIGHT: f64 = 230.0;
@@ -33,6 +69,10 @@ const FAINT: &str = "#e4e4e4";
 const MAX_CURVES: usize = 7;
 /// Decades of magnitude shown below the largest.
 const DECADES: f64 = 14.0;
+/// Resonances marked on a panel.
+const MAX_MARKED: usize = 8;
+/// A curve shows a resonance where it exceeds its values at a width to both sides by this factor.
+const SHOWS: f64 = 1.05;
 
 /// Ticks of an axis at fractions of its length, with fine lines without labels.
 struct AxisScale {
@@ -40,8 +80,10 @@ struct AxisScale {
     fine: Vec<f64>,
 }
 
-/// Draws the curves over `frequencies` [Hz], ascending; over a linear axis where `linear` says so.
-pub fn draw(title: &str, frequencies: &[f64], linear: bool, curves: &[BodeCurve]) -> Picture {
+/// Draws the curves.
+pub fn draw(chart: &BodeChart) -> Picture {
+    let BodeChart { title, frequencies, linear, curves, .. } = chart;
+    let (frequencies, linear) = (frequencies.as_slice(), *linear);
     let shown = &curves[..curves.len().min(MAX_CURVES)];
     let mut units: Vec<&str> = Vec::new();
     for curve in shown {
@@ -80,12 +122,12 @@ pub fn draw(title: &str, frequencies: &[f64], linear: bool, curves: &[BodeCurve]
         let most = all().fold(0.0, f64::max);
         let mut y = LogAxis::new(all().filter(|v| *v > most * 10f64.powf(-DECADES)));
         y.low = y.low.max(y.high - DECADES - 1.0);
-        let scale = AxisScale {
-            ticks: y.ticks().into_iter().map(|(v, label)| (y.share(v), label)).collect(),
-            fine: Vec::new(),
+        let (scale, shown_unit) = match chart.magnitude {
+            Magnitude::Units => (units_scale(&y), unit.to_owned()),
+            Magnitude::Decibels => (decibel_scale(&y), format!("dB {unit}").trim_end().to_owned()),
         };
         panel(&mut picture, [top, HEIGHT], &x_scale, &scale, None);
-        picture.text(LEFT, top - 6.0, 12.0, Align::Start, INK, &format!("{} [{unit}]", named(unit)));
+        picture.text(LEFT, top - 6.0, 12.0, Align::Start, INK, &format!("{} [{shown_unit}]", named(unit)));
         legend(&mut picture, top, &own.iter().map(|k| (*k, shown[*k].name.as_str())).collect::<Vec<_>>());
         let to_y = |v: f64| top + HEIGHT * (1.0 - y.share(v).clamp(0.0, 1.0));
         for k in own {
@@ -93,6 +135,9 @@ pub fn draw(title: &str, frequencies: &[f64], linear: bool, curves: &[BodeCurve]
             let usable: Vec<f64> = sizes.iter().map(|v| if *v > 0.0 { *v } else { f64::NAN }).collect();
             curve(&mut picture, k, frequencies, &usable, to_x, to_y);
         }
+        let sizes: Vec<Vec<f64>> =
+            (shown.iter().filter(|c| c.unit == unit)).map(|c| c.values.iter().map(size).collect()).collect();
+        mark_resonances(&mut picture, chart, &sizes, top, (&to_x, &to_y));
         top += HEIGHT + PITCH;
     }
     let phases: Vec<Vec<f64>> = shown.iter().map(|c| unwrapped(&c.values)).collect();
@@ -115,6 +160,56 @@ pub fn draw(title: &str, frequencies: &[f64], linear: bool, curves: &[BodeCurve]
         curve(&mut picture, k, frequencies, phase, to_x, to_y);
     }
     picture
+}
+
+/// Ticks of a magnitude in its unit.
+fn units_scale(y: &LogAxis) -> AxisScale {
+    AxisScale { ticks: y.ticks().into_iter().map(|(v, label)| (y.share(v), label)).collect(), fine: Vec::new() }
+}
+
+/// Ticks of a magnitude in decibels, at round numbers of them.
+fn decibel_scale(y: &LogAxis) -> AxisScale {
+    let (low, high) = (20.0 * y.low, 20.0 * y.high);
+    let plain = axis(low, high, "", 7, false);
+    let ticks = plain.ticks.iter().map(|(v, label)| ((v - low) / (high - low), label.clone())).collect();
+    AxisScale { ticks, fine: Vec::new() }
+}
+
+/// Marks the resonances that a curve shows as peaks, each once, on the curve where it is highest.
+fn mark_resonances(
+    picture: &mut Picture,
+    chart: &BodeChart,
+    sizes: &[Vec<f64>],
+    top: f64,
+    (to_x, to_y): (&impl Fn(f64) -> f64, &impl Fn(f64) -> f64),
+) {
+    let f = &chart.frequencies;
+    let mut places = LabelPlaces::new([LEFT, top, WIDTH - RIGHT, top + HEIGHT]);
+    let nearest = |at: f64| {
+        let after = f.partition_point(|f| *f < at).min(f.len() - 1);
+        if after > 0 && at - f[after - 1] < f[after] - at { after - 1 } else { after }
+    };
+    let seen = |at: f64, quality: Option<f64>| {
+        let (k, width) = (nearest(at), (at / quality.unwrap_or(f64::INFINITY)).max(0.01 * at));
+        let sides = [nearest(at - width), nearest(at + width)];
+        let peak = |s: &Vec<f64>| {
+            let shows = s[k].is_finite() && sides.iter().all(|&side| side != k && s[k] > SHOWS * s[side]);
+            shows.then_some((k, s[k]))
+        };
+        sizes.iter().filter_map(peak).max_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let inside = |r: &&BodeResonance| !f.is_empty() && (f[0]..=f[f.len() - 1]).contains(&r.frequency);
+    let found = chart.resonances.iter().filter(inside).filter_map(|r| Some((r, seen(r.frequency, r.quality)?)));
+    for (resonance, (k, height)) in found.take(MAX_MARKED) {
+        let at = [to_x(f[k]), to_y(height)];
+        picture.circle(at[0], at[1], 3.0, Paint { fill: INK, stroke: "#ffffff", width: 1.0, opacity: 1.0 });
+        places.keep_free(at, 4.0);
+        let q = resonance.quality.map_or(String::new(), |q| format!(", Q {}", quantity(q, "")));
+        let text = quantity(resonance.frequency, "Hz") + &q;
+        if let Some(place) = places.place(at, 11.0, &text) {
+            picture.label(place.x, place.y, 11.0, place.align, INK, &text);
+        }
+    }
 }
 
 /// Name of the quantity of a quotient of units.
@@ -231,12 +326,48 @@ mod tests {
             values: vec![[1.0, 0.0], [f64::NAN; 2], [1e-3, -1e-3], [1e-6, 0.0]],
         };
         let curves = [curve("a.x", "m/N"), curve("b.x", "m/N"), curve("p.i", "A/N")];
-        let svg = draw("t", &[1.0, 10.0, 100.0, 1e3], false, &curves).to_svg();
+        let chart = BodeChart {
+            title: "t".into(),
+            frequencies: vec![1.0, 10.0, 100.0, 1e3],
+            linear: false,
+            magnitude: Magnitude::Units,
+            curves: curves.to_vec(),
+            resonances: vec![],
+        };
+        let svg = draw(&chart).to_svg();
         for text in ["displacement [m/N]", "current [A/N]", "phase [°]", "frequency [Hz]", ">a.x<"] {
             assert!(svg.contains(text), "{text}");
         }
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
-        let narrow = draw("t", &[100.0, 101.0, 102.0, 103.0], true, &curves).to_svg();
+        let narrow =
+            draw(&BodeChart { frequencies: vec![100.0, 101.0, 102.0, 103.0], linear: true, ..chart.clone() }).to_svg();
         assert!(!narrow.contains("NaN") && !narrow.contains("inf"));
+        let decibels = draw(&BodeChart { magnitude: Magnitude::Decibels, ..chart }).to_svg();
+        assert!(decibels.contains("displacement [dB m/N]") && decibels.contains(">-100<"), "{decibels}");
+    }
+
+    /// A peak is marked with its frequency and quality; a resonance that no curve shows is not.
+    #[test]
+    fn peaks_are_marked() {
+        let frequencies: Vec<f64> = (0..400).map(|k| 1e3 * 1.01f64.powi(k)).collect();
+        let response = |f: &f64| {
+            // 1/(1 − x² + i·x/Q) about 10 kHz with Q = 20
+            let x = f / 1e4;
+            let (a, b) = (1.0 - x * x, x / 20.0);
+            [a / (a * a + b * b), -b / (a * a + b * b)]
+        };
+        let curve =
+            BodeCurve { name: "m.x".into(), unit: "m/N".into(), values: frequencies.iter().map(response).collect() };
+        let resonance = |frequency: f64| BodeResonance { frequency, quality: Some(20.0) };
+        let chart = BodeChart {
+            title: "t".into(),
+            frequencies,
+            linear: false,
+            magnitude: Magnitude::Units,
+            curves: vec![curve],
+            resonances: vec![resonance(1e4), resonance(2e4)],
+        };
+        let svg = draw(&chart).to_svg();
+        assert!(svg.contains("10.00 kHz, Q 20.00") && !svg.contains("20.00 kHz"), "{svg}");
     }
 }

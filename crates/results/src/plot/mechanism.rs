@@ -1,10 +1,11 @@
 //! The mechanism as it was drawn, in grey, and deflected, in colour: one large drawing, or a grid of small ones.
 
 use super::axis::{nice_step, quantity};
+use super::labels::LabelPlaces;
 use super::parts::{PixelTransform, bounds, draw_lines, draw_ports, draw_supports, outlines};
 use super::shapes::{DisplacedShape, NodeDisplacement};
 use super::svg::{Align, Paint, Picture};
-use bimorph_structure::Structure;
+use bimorph_structure::{NodeId, Structure};
 
 /// Content of a figure of a mechanism.
 #[derive(Debug, Clone, Copy)]
@@ -64,7 +65,9 @@ impl<'a> ScaledFigure<'a> {
         let all = drawing.motion.iter().chain(drawing.curves.iter().flatten());
         let largest = all.map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max);
         let factor = match drawing.scale {
-            DisplacementScale::Visible => round_factor(largest, extent),
+            DisplacementScale::Visible => {
+                round_factor(largest, extent).min(open_factor(structure, drawing.motion)).max(1.0)
+            }
             DisplacementScale::Times(factor) => factor,
             DisplacementScale::Shape if largest > 0.0 => SHAPE * extent / largest,
             DisplacementScale::Shape => 1.0,
@@ -110,6 +113,30 @@ impl<'a> ScaledFigure<'a> {
     }
 }
 
+/// Largest round factor that closes no gap of the drawing: gaps are drawn by the scale of displacements. Infinite without gaps.
+fn open_factor(structure: &Structure, motion: &[NodeDisplacement]) -> f64 {
+    let moved = |node: NodeId, axis: [f64; 2]| motion.get(node.0).map_or(0.0, |[x, y, _]| axis[0] * x + axis[1] * y);
+    let plates = structure.plate_gaps.iter().map(|gap| (gap.gap, moved(gap.a, gap.axis) - moved(gap.b, gap.axis)));
+    let beams = structure.beam_gaps.iter().flat_map(|gap| {
+        let normal = gap.angle + gap.side * std::f64::consts::FRAC_PI_2;
+        let (axis, [a, b, c, d]) = ([normal.cos(), normal.sin()], gap.nodes);
+        [(a, c), (b, d)].map(|(upper, lower)| (gap.gap, moved(lower, axis) - moved(upper, axis)))
+    });
+    let stops = structure.stops.iter().flat_map(|stop| {
+        let way = moved(stop.a, stop.axis) - stop.b.map_or(0.0, |b| moved(b, stop.axis));
+        [(stop.ways[0], way), (stop.ways[1], -way)].into_iter().filter_map(|(gap, way)| Some((gap?, way)))
+    });
+    let closing = plates.chain(beams).chain(stops).filter(|(gap, way)| *way > 1e-3 * gap);
+    let most = closing.map(|(gap, way)| gap / way).fold(f64::INFINITY, f64::min);
+    if most.is_infinite() { most } else { round_down(most) }
+}
+
+/// 1, 2 or 5 times a power of ten, not above `most`.
+fn round_down(most: f64) -> f64 {
+    let found = [1.0, 0.5, 0.4, 0.2].iter().map(|s| nice_step(s * most)).find(|f| *f <= most * (1.0 + 1e-9));
+    found.filter(|f| f.is_finite()).unwrap_or(1.0)
+}
+
 fn hottest(temperatures: &[(String, f64)]) -> Option<&(String, f64)> {
     temperatures.iter().max_by(|a, b| a.1.total_cmp(&b.1))
 }
@@ -134,6 +161,57 @@ pub fn draw(drawing: &MechanismFigure<'_>) -> Picture {
     prepared.paint(&mut picture, &view);
     draw_ports(&mut picture, drawing.structure, &view);
     legend(&mut picture, drawing, prepared.factor, hottest(drawing.temperatures), scale, height + 76.0);
+    picture
+}
+
+/// Draws a mechanism at rest with the names of its nodes; says how many found no room.
+pub fn named(title: &str, structure: &Structure) -> Picture {
+    let drawing = MechanismFigure {
+        structure,
+        title,
+        motion: &[],
+        curves: &[],
+        temperatures: &[],
+        scale: DisplacementScale::Visible,
+    };
+    let prepared = ScaledFigure::new(&drawing);
+    let [across, up] = prepared.size();
+    let scale = ((WIDTH - 2.0 * MARGIN) / across).min(MAX_HEIGHT / up);
+    let height = up * scale;
+    let mut picture = Picture::new(WIDTH, height + 116.0);
+    let view = PixelTransform { low: prepared.low, scale, bottom: 52.0 + height, left: (WIDTH - across * scale) / 2.0 };
+    picture.text(MARGIN, 24.0, 15.0, Align::Start, INK, title);
+    prepared.paint(&mut picture, &view);
+    let drawn: Vec<_> = structure.nodes.iter().filter(|node| node.mechanical && !node.name.is_empty()).collect();
+    let mut places = LabelPlaces::new([4.0, 34.0, WIDTH - 4.0, height + 66.0]);
+    drawn.iter().for_each(|node| places.keep_free(view.at(node.position), 3.0));
+    let mut left_out = 0;
+    for node in &drawn {
+        let [x, y] = view.at(node.position);
+        picture.circle(x, y, 2.5, Paint { fill: "#ffffff", stroke: MOVED, width: 1.4, opacity: 1.0 });
+        match places.place([x, y], 12.0, &node.name) {
+            Some(place) => picture.label(place.x, place.y, 12.0, place.align, MOVED, &node.name),
+            None => left_out += 1,
+        }
+    }
+    for port in &structure.ports {
+        let Some(node) = structure.nodes.get(port.plus.0).filter(|node| node.mechanical) else { continue };
+        let [x, y] = view.at(node.position);
+        picture.circle(x, y, 4.5, Paint { fill: "none", stroke: "#D55E00", width: 2.0, opacity: 1.0 });
+        let text = format!("port {}", port.name);
+        if let Some(place) = places.place([x, y], 12.0, &text) {
+            picture.label(place.x, place.y, 12.0, place.align, "#D55E00", &text);
+        }
+    }
+    let y = height + 76.0;
+    let length = nice_step(110.0 / scale / 2.0);
+    picture.polyline(&[[MARGIN, y], [MARGIN + length * scale, y]], Paint::line(INK, 3.0));
+    picture.text(MARGIN, y + 17.0, 12.0, Align::Start, INK, &round_length(length));
+    let note = match left_out {
+        0 => format!("{} nodes", drawn.len()),
+        _ => format!("{} nodes, {left_out} names without room", drawn.len()),
+    };
+    picture.text(WIDTH - MARGIN, y + 17.0, 12.0, Align::End, INK, &note);
     picture
 }
 
@@ -221,11 +299,7 @@ fn round_factor(largest: f64, extent: f64) -> f64 {
     if largest == 0.0 || !largest.is_finite() || largest > 0.03 * extent {
         return 1.0;
     }
-    // the round number at or below
-    let most = 0.06 * extent / largest;
-    let factor =
-        [1.0, 0.5, 0.4, 0.2].iter().map(|s| nice_step(s * most)).find(|f| *f <= most * (1.0 + 1e-9)).unwrap_or(1.0);
-    if factor.is_finite() { factor } else { 1.0 }
+    round_down(0.06 * extent / largest)
 }
 
 fn legend(
@@ -251,8 +325,23 @@ fn legend(
     }
     if let Some((name, t)) = hot.filter(|(_, t)| *t > coldest(drawing)) {
         parts.push(format!("hottest: {name} {}", quantity(*t, "K")));
+        colour_bar(picture, [x + length * scale + 36.0, y], [coldest(drawing), *t]);
     }
     picture.text(WIDTH - MARGIN, y + 17.0, 12.0, Align::End, INK, &parts.join("  ·  "));
+}
+
+/// The colours between two temperatures [K], with both beside them.
+fn colour_bar(picture: &mut Picture, [x, y]: [f64; 2], [cold, hot]: [f64; 2]) {
+    const STEPS: usize = 24;
+    const STEP: f64 = 5.0;
+    let left = quantity(cold, "K");
+    let x = x + 6.6 * left.chars().count() as f64 + 6.0;
+    picture.text(x - 6.0, y + 4.0, 11.0, Align::End, INK, &left);
+    for k in 0..STEPS {
+        let colour = warm(k as f64, 0.0, (STEPS - 1) as f64);
+        picture.rectangle(x + STEP * k as f64, y - 4.0, STEP, 9.0, Paint::fill(&colour));
+    }
+    picture.text(x + STEP * STEPS as f64 + 6.0, y + 4.0, 11.0, Align::Start, INK, &quantity(hot, "K"));
 }
 
 fn round_length(length: f64) -> String {
@@ -270,7 +359,7 @@ fn warm(t: f64, coldest: f64, hottest: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bimorph_structure::{Link, Node, NodeId};
+    use bimorph_structure::{Link, Node};
 
     /// Small motion is exaggerated by a round factor that the picture states; large motion is shown to scale.
     #[test]

@@ -8,6 +8,7 @@ pub mod axis;
 pub mod bode;
 pub mod chart;
 pub mod histogram;
+mod labels;
 pub mod log_axis;
 pub mod loglog;
 pub mod mechanism;

@@ -3,6 +3,7 @@
 use super::PALETTE;
 use super::axis::{Axis, axis, quantity};
 use super::chart::WIDTH;
+use super::labels::LabelPlaces;
 use super::svg::{Align, Paint, Picture};
 
 /// One curve.
@@ -34,8 +35,6 @@ pub struct PlaneMark {
     pub sign: Sign,
     /// The word; empty: none.
     pub word: String,
-    /// The word stands below.
-    pub below: bool,
 }
 
 /// Curves over two quantities.
@@ -80,6 +79,8 @@ pub fn draw(plane: &PlaneChart) -> Picture {
     for (i, curve) in plane.curves.iter().enumerate() {
         draw_curve(&mut picture, curve, PALETTE[i % PALETTE.len()], &at);
     }
+    let mut places = LabelPlaces::new([LEFT, TOP, LEFT + width, TOP + height]);
+    plane.marks.iter().for_each(|mark| places.keep_free(at(mark.at), 6.0));
     for mark in &plane.marks {
         let [x, y] = at(mark.at);
         match mark.sign {
@@ -92,10 +93,12 @@ pub fn draw(plane: &PlaneChart) -> Picture {
                 Paint { fill: "#ffffff", stroke: INK, width: 1.8, opacity: 1.0 },
             ),
         }
-        // towards the middle, where there is room
-        let (align, shift) = if x > LEFT + 0.6 * width { (Align::End, -10.0) } else { (Align::Start, 10.0) };
-        let below = if mark.below || y < TOP + 24.0 { 20.0 } else { -8.0 };
-        picture.label(x + shift, y + below, 12.0, align, INK, &mark.word);
+        if mark.word.is_empty() {
+            continue;
+        }
+        if let Some(place) = places.place([x, y], 12.0, &mark.word) {
+            picture.label(place.x, place.y, 12.0, place.align, INK, &mark.word);
+        }
     }
     if !plane.note.is_empty() {
         picture.text(LEFT, TOP + height + 58.0, 11.0, Align::Start, "#666666", &plane.note);
@@ -208,7 +211,7 @@ fn dashes(line: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     list
 }
 
-/// Label of a mark: "fold at 17.9 µN".
+/// Label of a mark: "pull-in at 17.9 V".
 pub fn word(what: &str, value: f64, unit: &str) -> String {
     format!("{what} at {}", quantity(value, unit))
 }
