@@ -21,7 +21,7 @@ use std::time::Instant;
 #[command(after_help = "Examples:\n  \
     bimorph cosim examples/bank/bank.cir --out bank.raw\n  \
     bimorph cosim examples/bank/bank.cir --out bank.png              # every voltage and current of the analysis in the deck\n  \
-    bimorph cosim examples/bank/bank.cir --check                     # a second, refined run: error of steps and tolerances\n  \
+    bimorph cosim examples/comb_resonator/comb_resonator.net --tran '0.1u 10u' --drive 'drive=PULSE(0 4 1u 1u)' --check     # error of steps and tolerances\n  \
     bimorph cosim examples/comb_resonator/comb_resonator.net --tran '0.1u 10u' --drive 'drive=PULSE(0 4 1u 1u)' --out comb.png\n  \
     bimorph cosim examples/comb_resonator/comb_resonator.net --port drive=10 --ac 'dec 20 1k 1meg' --emit comb.cir\n\n\
     A device in a deck:\n  \

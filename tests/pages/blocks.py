@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 FENCE = re.compile(r"^(`{3,})(\S*) *(.*)$")
-FILE = re.compile(r"`([\w./-]+\.(?:net|cir|py|csv|toml|lib|inc|sp))`[^`]*:$")
+FILE = re.compile(r"`([\w./-]+\.(?:net|cir|cif|py|csv|toml|lib|inc|sp))`[^`]*:$")
 NOT_RUN = re.compile(r"^<!-- not run: (.+) -->$")
-COMMAND = re.compile(r"^(bimorph |printf |grep |cat |openssl |chmod |cd |export |make |cargo |scripts/|benches/|taskset |pip |\()")
+COMMAND = re.compile(r"^(bimorph |printf |grep |cat |openssl |chmod |cd |export |make |cargo |scripts/|benches/|taskset |pip |\((?:cat|echo) )")
 """Words that begin a command in an indented block or in the examples of a help text."""
 
 
@@ -57,7 +57,7 @@ def blocks(page: Path) -> list[Block]:
 def _fenced(found: list[Block], language: str, line: int, text: str, before: str, reason: str) -> None:
     """Adds a fenced block."""
     name = FILE.search(before.strip())
-    if language == "text":
+    if language == "text" and not name:
         if found and found[-1].kind == "python" and found[-1].output is None and before == "":
             found[-1].output = text
     elif language in ("console", "python", "netlist", "lua"):
@@ -97,3 +97,9 @@ def steps(text: str) -> list[tuple[int, str, str]]:
         elif found:
             found[-1][2].append(line)
     return [(k, command, "\n".join(output).strip("\n")) for k, command, output in found]
+
+
+def pictures(page: Path) -> dict[str, str]:
+    """The pictures that a page draws itself: name in docs/pictures, and the file that a command of the page writes."""
+    names = re.findall(r"\]\(\.\./pictures/([\w.-]+)\)", page.read_text())
+    return {name: name.removeprefix(f"{page.stem}_") for name in names if name.startswith(f"{page.stem}_")}

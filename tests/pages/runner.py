@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -15,18 +16,18 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from blocks import Block, blocks, commands, steps
+from blocks import Block, blocks, commands, pictures, steps
 from compare import differs
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 120.0
 """Longest time that a page may take [s]."""
-EXIT = re.compile(r"# exit status (\d+)\s*$")
+EXIT = re.compile(r"#.*\bexit status (\d+)\s*$")
 """The remark behind a command that is meant to fail."""
 ELSEWHERE = re.compile(r"^(make|cargo|scripts/|benches/|taskset|systemctl|pip|python|sbatch|kubectl|podman|docker|git|apt|sudo|cd bimorph)\b")
 """Commands that install, build, measure, or belong to other machines: other tests run these, and what they name must be there."""
-PORT = re.compile(r":(50051|9464)\b")
-"""Ports of pages and settings, in whose place a server of a test takes a free one."""
+PORTS = (50051, 9464)
+"""Ports of pages and settings, in whose place a server of a test takes free ones."""
 OPTIONAL = {"gdsfactory": "gdsfactory", "bimorph.local()": "bimorph._native", "to_pandas()": "pandas", "to_xarray()": "xarray"}
 """Modules that a Python block may need and a machine may lack, by a word of the block."""
 
@@ -53,7 +54,7 @@ class Shell:
         self.count += 1
         output = self.folder / f".output{self.count}"
         assert self.process.stdin and self.process.stdout
-        self.process.stdin.write(f"{{ {command}\n}} >{output.name} 2>&1 </dev/null; printf 'done %s\\n' $?\n")
+        self.process.stdin.write(f"{{ {command}\n}} >{output} 2>&1 </dev/null; printf 'done %s\\n' $?\n")
         self.process.stdin.flush()
         for line in self.process.stdout:
             if line.startswith("done "):
@@ -121,8 +122,9 @@ class Page:
     def __init__(self, name: str, folder: Path, program: str) -> None:
         self.name, self.folder, self.report = name, folder, Report()
         shutil.copytree(ROOT / "examples", folder / "examples", ignore=shutil.ignore_patterns("*.rs"))
+        self.ports = {f":{port}": f":{_free_port()}" for port in PORTS}
         for settings in (folder / "examples").rglob("*.toml"):
-            settings.write_text(PORT.sub(":0", settings.read_text()))
+            settings.write_text(self._on_free_ports(settings.read_text()))
         path = folder / ".bin"
         path.mkdir()
         (path / "bimorph").symlink_to(program)
@@ -174,7 +176,9 @@ class Page:
             self._named(line, command)
             return
         wanted = EXIT.search(command)
-        command = PORT.sub(":0", command.replace("/tmp/", f"{self.folder}/"))
+        if re.match(r"bimorph serve\b.*:\d", command):
+            self.ports |= {f":{port}": f":{_free_port()}" for port in PORTS}
+        command = self._on_free_ports(command.replace("/tmp/", f"{self.folder}/"))
         if "JOB" in command and "job" in self.replies:
             command = command.replace("JOB", self.replies["job"])
         if re.match(r"bimorph serve\b", command) and "--help" not in command and not wanted:
@@ -192,9 +196,14 @@ class Page:
             return
         self.report.ran["commands, output compared" if shown else "commands"] += 1
 
+    def _on_free_ports(self, text: str) -> str:
+        for port, free in self.ports.items():
+            text = text.replace(port, free)
+        return text
+
     def _in_background(self, command: str) -> str:
         """A server is started, and has to say where it listens."""
-        log = f".server{self.shell.count}"
+        log = self.folder / f".server{self.shell.count}"
         command = re.sub(r"(\s#.*)?(\s&)?\s*$", "", command)
         wait = f"for k in $(seq 200); do grep -q 'listening on' {log} && break; kill -0 $! 2>/dev/null || break; sleep 0.05; done; cat {log}; grep -q 'listening on' {log}"
         return f"{command} >{log} 2>&1 & {wait}"
@@ -283,9 +292,20 @@ class Page:
         self.report.ran["Python blocks" if block.output is None else "Python blocks, output compared"] += 1
 
 
+def _free_port() -> int:
+    """A port that nothing listens on."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
 def page(path: Path, folder: Path, program: str) -> Report:
     """Runs a page."""
-    return Page(str(path.relative_to(ROOT)), folder, program).run(blocks(path))
+    report = Page(str(path.relative_to(ROOT)), folder, program).run(blocks(path))
+    for picture, file in pictures(path).items():
+        if not (folder / file).is_file():
+            report.failures.append(f"{path.relative_to(ROOT)}: shows {picture}, but no command writes {file}")
+    return report
 
 
 def help_text(words: list[str], folder: Path, program: str) -> Report:
