@@ -22,11 +22,11 @@ use serde::Serialize;
 /// "Computer solution and perturbation analysis of generalized linear least squares problems", Math.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    bimorph ac stage.net --drive c.fx --signals c.x,c.y --from 10k --to 1M --out stage.png\n  \
-    bimorph ac comb.net --drive drive --signals drive.i,shuttle.x --port drive=10 --from 1k --to 100k\n      \
-    the current that 1 V of a sinusoid drives into the port on top of 10 V, and the motion\n  \
-    bimorph ac comb.net --drive frame.ax --signals shuttle.x --from 1 --to 100k --points 20 --per-decade\n  \
-    bimorph ac stage.net --drive c.fx --signals c.x --from 80k --to 90k --points 1001 --linear-scale --even --json")]
+    bimorph ac examples/bank/bank.net --drive yoke.fy --signals yoke.y --from 10k --to 1M --out bank.png\n  \
+    # the current that 1 V of a sinusoid drives into the port at a bias of 10 V, and the motion\n  \
+    bimorph ac examples/comb_resonator/comb_resonator.net --drive drive --signals drive.i,shuttle.x --port drive=10 --from 1k --to 100k\n  \
+    bimorph ac examples/comb_resonator/comb_resonator.net --drive frame.ax --signals shuttle.x --from 1 --to 100k --points 20 --per-decade\n  \
+    bimorph ac examples/bank/bank.net --drive yoke.fy --signals yoke.y --from 80k --to 90k --points 201 --linear-scale --even --json")]
 pub(crate) struct AcCommand {
     #[command(flatten)]
     model: ModelArgs,

@@ -30,12 +30,9 @@ use std::path::{Path, PathBuf};
 /// same on every run; times are wall-clock times of this machine.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    bimorph chart bank.net --signals yoke.y --port heat=2.2 --stop 100u --out bank.png --out bank.csv\n  \
-    bimorph chart stage.net --set F=100u --release F --signals c.x,c.y --stop 30u --undamped --out stage.html\n  \
-    bimorph chart bank.net --signals yoke.y --parts solvers --bands 1M,10M,100M --repeat 9 --json\n  \
-    bimorph chart stage.net --set F=20u --release F --signals c.x --parts defaults --tols 1e-2,1e-3,1e-4 --out asked.png\n      \
-    whether default commands keep their tolerance on a scene, and what that costs\n  \
-    bimorph chart bank.net --signals yoke.y --work counts --out bank.svg     the same picture on every machine")]
+    bimorph chart examples/bank/bank.net --signals yoke.y --port heat=2.2 --stop 20u --parts precision --tols 1e-2,1e-3 --out bank.png --out bank.csv\n  \
+    bimorph chart examples/bank/bank.net --signals yoke.y --parts solvers --bands 1M,10M --repeat 3 --json\n  \
+    bimorph chart examples/bank/bank.net --signals yoke.y --parts solvers --bands 1M,10M --work counts --out bank.svg     # the same picture on every machine")]
 pub(crate) struct ChartCommand {
     #[command(flatten)]
     model: ModelArgs,

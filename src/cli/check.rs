@@ -19,8 +19,10 @@ use std::path::PathBuf;
 /// Exit status 1 on any error. Prints the model's unknowns, and with --band their estimated error; JSON has "segments"
 /// by beam (0: rigid).
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph check bank.net\n  bimorph check bank.net --set w=2.1u --json\n  \
-    bimorph check bank.net --out bank.svg                           a drawing with the names of nodes")]
+#[command(after_help = "Examples:\n  \
+    bimorph check examples/bank/bank.net\n  \
+    bimorph check examples/bank/bank.net --set wh=2.1u --json\n  \
+    bimorph check examples/bank/bank.net --out bank.svg     a drawing with the names of nodes")]
 pub(crate) struct CheckCommand {
     #[command(flatten)]
     model: ModelArgs,

@@ -19,8 +19,11 @@ use std::path::PathBuf;
 /// size and position, and drawn red in the picture. Every other command takes layouts too, with the same --process and
 /// --cell.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph convert resonator.gds -o resonator.net --picture resonator.png\n  \
-    bimorph convert chip.gds --cell tuning_fork --process soi -o fork.net\n  bimorph modes resonator.gds --count 3")]
+#[command(after_help = "Examples:\n  \
+    bimorph layout examples/bank/bank.net --out bank.gds\n  \
+    bimorph convert bank.gds --out again.net --picture again.png\n  \
+    bimorph convert bank.gds --cell bank --process polymumps --out again.net\n  \
+    bimorph modes bank.gds --count 3                                   # every analysis takes a layout")]
 pub(crate) struct ConvertCommand {
     /// Layout: .cif or .gds
     file: PathBuf,

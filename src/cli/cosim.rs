@@ -18,12 +18,12 @@ use std::time::Instant;
 /// ngspice's own output is passed on. It runs in the working directory, as it always does; netlists named by a deck are
 /// found beside it. Nothing is written under the name of --out unless the run is good.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph cosim bank.cir --out bank.raw\n  \
-    bimorph cosim bank.cir --out bank.png              every voltage and current of the deck's analysis\n  \
-    bimorph cosim bank.cir --check                     how far off may the steps and tolerances be?\n  \
-    bimorph cosim part.net --tran '1u 1m' --drive 'V1=PULSE(0 4 1u 1u)' --out part.png\n  \
-    bimorph cosim part.net --ac 'dec 20 1k 1meg' --emit part.cir\n  \
-    bimorph cosim bank.cir --remote unix:///tmp/bimorph.sock --out bank.raw\n\n\
+#[command(after_help = "Examples:\n  \
+    bimorph cosim examples/bank/bank.cir --out bank.raw\n  \
+    bimorph cosim examples/bank/bank.cir --out bank.png              # every voltage and current of the analysis in the deck\n  \
+    bimorph cosim examples/comb_resonator/comb_resonator.net --tran '0.1u 10u' --drive 'drive=PULSE(0 4 1u 1u)' --check     # error of steps and tolerances\n  \
+    bimorph cosim examples/comb_resonator/comb_resonator.net --tran '0.1u 10u' --drive 'drive=PULSE(0 4 1u 1u)' --out comb.png\n  \
+    bimorph cosim examples/comb_resonator/comb_resonator.net --port drive=10 --ac 'dec 20 1k 1meg' --emit comb.cir\n\n\
     A device in a deck:\n  \
     .model bank bimorph(file=\"bank.net\" ports=[\"heat\" \"sense\"] monitors=[\"yoke.y:1e6\"])\n  \
     A1 %gd [heat 0 sense 0] %v [y] bank")]

@@ -24,7 +24,9 @@ use std::time::Duration;
 /// Exit status 0 when the core works; the other lines say what is missing and what to do. If a file or the environment
 /// (BIMORPH_SERVE_NAME) has settings of a server, its certificate, key, tokens and folder of states must be valid, too.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph doctor\n  bimorph doctor --config /etc/bimorph/serve.toml")]
+#[command(after_help = "Examples:\n  \
+    bimorph doctor\n  \
+    bimorph doctor --config examples/serve/serve.toml     # what is missing for these settings; exit status 1")]
 pub(crate) struct DoctorCommand {
     /// File of settings of a server, TOML
     #[arg(long, value_name = "FILE")]

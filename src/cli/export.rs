@@ -21,11 +21,10 @@ use std::sync::Arc;
 /// the exact small-signal answer up to --to, and has as many modes as --within takes. The mesh is that of a deck with
 /// the same options.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  bimorph export bank.net --spice --port heat=1 --port sense=10 --signals yoke.y:1M --out bank.lib\n  \
-                        bimorph export bank.net --verilog-a --name bank --out bank.va\n  \
-                        bimorph export stage.net --spice --ports drive,m.x --to 200k"
-)]
+#[command(after_help = "Examples:\n  \
+    bimorph export examples/bank/bank.net --spice --port heat=1 --port sense=10 --signals yoke.y:1M --out bank.lib\n  \
+    bimorph export examples/bank/bank.net --verilog-a --name bank --out bank.va\n  \
+    bimorph export examples/comb_resonator/comb_resonator.net --spice --ports drive,shuttle.x --to 200k")]
 pub(crate) struct ExportCommand {
     #[command(flatten)]
     model: ModelArgs,

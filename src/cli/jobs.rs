@@ -14,9 +14,10 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// `bimorph sweep --to` starts them; they run there whether or not anybody waits.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    bimorph sweep bank.net --param w=1.8u:2.2u:2001 --to unix:///tmp/bimorph.sock --detach\n  \
+    bimorph serve --listen unix:///tmp/bimorph.sock\n  \
+    bimorph sweep examples/bank/bank.net --param wh=1.8u:2.2u:2001 --signals yoke.y --to unix:///tmp/bimorph.sock --detach\n  \
     bimorph jobs list --to unix:///tmp/bimorph.sock\n  \
-    bimorph jobs attach jobs/0123456789abcdef0123456789abcdef --to unix:///tmp/bimorph.sock --out w.csv")]
+    bimorph jobs attach JOB --to unix:///tmp/bimorph.sock --out w.csv     # JOB as `sweep --detach` or `list` print it")]
 pub(crate) struct JobsCommand {
     #[command(subcommand)]
     action: Action,

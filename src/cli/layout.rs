@@ -19,8 +19,9 @@ use std::path::PathBuf;
 /// hold data that outlines cannot express, so that `bimorph convert` gives the same mechanism back. docs/reference/layouts.md
 /// describes them.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph layout bank.net --out bank.gds\n  \
-    bimorph layout bank.net --set wh=2.2u --out bank.cif --process polymumps")]
+#[command(after_help = "Examples:\n  \
+    bimorph layout examples/bank/bank.net --out bank.gds\n  \
+    bimorph layout examples/bank/bank.net --set wh=2.2u --out bank.cif --process polymumps")]
 pub(crate) struct LayoutCommand {
     #[command(flatten)]
     model: ModelArgs,

@@ -16,8 +16,8 @@ use std::path::PathBuf;
 /// identified by the column "part" of their rows, are an error too; the merged table omits that column.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/2 --out part0.csv\n  \
-    bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 1/2 --out part1.csv\n  \
+    bimorph sweep examples/switch/switch.net --param touch=0.08u:0.12u:9 --analysis pullin --shard 0/2 --out part0.csv\n  \
+    bimorph sweep examples/switch/switch.net --param touch=0.08u:0.12u:9 --analysis pullin --shard 1/2 --out part1.csv\n  \
     bimorph merge part0.csv part1.csv --out whole.csv")]
 pub(crate) struct MergeCommand {
     /// Tables of `bimorph sweep --shard I/N`, in any order

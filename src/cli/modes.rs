@@ -31,9 +31,10 @@ const MAX_SHAPES: usize = 12;
 /// "at_rest": by name. "poles" and, by name, "zeros": "re", "im" [rad/s], "frequency_hz", "quality" (null: undamped),
 /// "width_hz". "points_added": points about resonances and zeros. "modes" and "modal_error": with --by-modes.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph modes bank.net --count 10 --band 1.3M\n  \
-                        bimorph modes bank.net --port sense=40 --json      about the equilibrium at 40 V\n  \
-                        bimorph modes bank.net --count 4 --out shapes.png")]
+#[command(after_help = "Examples:\n  \
+    bimorph modes examples/bank/bank.net --count 10 --band 1.3M\n  \
+    bimorph modes examples/bank/bank.net --port sense=40 --json      # about the equilibrium at 40 V\n  \
+    bimorph modes examples/bank/bank.net --count 4 --out shapes.png")]
 pub(crate) struct ModesCommand {
     #[command(flatten)]
     model: ModelArgs,

@@ -29,10 +29,11 @@ use std::fmt::Write;
 /// what grows and "signals" along the path; "negative": eigenvalues below 0 (0: stable under fixed loads and voltages);
 /// "folds" and "bifurcations": value and index of the point; "last": displacement of every node at the end.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph path column.net --along F=0:260u --signals middle.y --out column.png\n  \
-    bimorph path arch.net --along F=0:10u --signals 'p(20).y' --json\n  \
-    bimorph path switch.net --along drive=0:20 --signals tip.y      past pull-in, along the unstable branch\n  \
-    bimorph path old.net --along loads=0:2 --signals tip.x          a factor on all loads of the netlist")]
+#[command(after_help = "Examples:\n  \
+    bimorph path examples/column/column.net --along F=0:260u --signals middle.y --out column.png\n  \
+    bimorph path examples/arch/arch.net --along F=0:10u --signals 'p(20).y' --json\n  \
+    bimorph path examples/switch/switch.net --along drive=0:20 --signals 'a(8).y'     # past pull-in, along the unstable branch\n  \
+    bimorph path examples/quarter_stage/quarter_stage.net --set F=100u --along loads=0:2 --signals c.x     # a factor on all loads")]
 pub(crate) struct PathCommand {
     #[command(flatten)]
     model: ModelArgs,

@@ -21,10 +21,12 @@ use std::path::{Path, PathBuf};
 ///
 /// Also converts: --out FILE.csv writes the numbers.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph plot bank.raw --out bank.png\n  \
-    bimorph plot bank.raw --panel 'drive=v(heat)' --panel 'yoke [µm]=v(y)' --out bank.svg\n  \
-    bimorph plot bank.raw --mechanism bank.net --port heat=2.2 --out bank.png\n  \
-    bimorph plot stage.raw --track c.x,c.y --out track.png          one signal against another, to one scale")]
+#[command(after_help = "Examples:\n  \
+    bimorph tran examples/bank/bank.net --port heat=2.2 --stop 200u --signals yoke.x,yoke.y,b1.hot.T --out bank.raw\n  \
+    bimorph plot bank.raw --out bank.png\n  \
+    bimorph plot bank.raw --panel 'hot arm=b1.hot.T' --panel 'yoke=yoke.y' --out bank.svg\n  \
+    bimorph plot bank.raw --mechanism examples/bank/bank.net --port heat=2.2 --out bank.png\n  \
+    bimorph plot bank.raw --track yoke.x,yoke.y --out track.png          # one signal against another, to one scale")]
 pub(crate) struct PlotCommand {
     /// ngspice raw file, binary or ASCII
     file: PathBuf,

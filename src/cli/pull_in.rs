@@ -20,8 +20,9 @@ use serde::Serialize;
 /// when it stays closed at 0 V; "snaps_v": voltages of further snaps; "release_before_snaps_v": release without those; "held": false when
 /// no contact holds it.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph pullin switch.net --max 50\n  \
-                        bimorph pullin switch.net --source drive --set gap=1.5u --json")]
+#[command(after_help = "Examples:\n  \
+    bimorph pullin examples/switch/switch.net --max 50\n  \
+    bimorph pullin examples/switch/switch.net --source drive --set touch=0.15u --json")]
 pub(crate) struct PullInCommand {
     #[command(flatten)]
     model: ModelArgs,

@@ -16,10 +16,12 @@ use std::sync::LazyLock;
 /// reflection services are always on. An address that other machines can reach takes TLS, and tokens or certificates of
 /// clients. Missing options are taken from the environment (BIMORPH_SERVE_NAME), then from the file of --config.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph serve --listen unix:///tmp/bimorph.sock\n  \
-                        bimorph serve --listen 127.0.0.1:50051 --listen unix:///run/bimorph.sock\n  \
-                        bimorph serve --listen 127.0.0.1:0         any free port; the line says which\n  \
-                        bimorph serve --config /etc/bimorph/serve.toml")]
+#[command(after_help = "Examples:\n  \
+    bimorph serve --listen unix:///tmp/bimorph.sock\n  \
+    bimorph serve --listen 127.0.0.1:50051 --listen unix:///tmp/second.sock\n  \
+    bimorph serve --listen 127.0.0.1:0         # any free port; the line printed says which\n  \
+    printf 'listen = [\"unix:///tmp/third.sock\"]\\n' > serve.toml\n  \
+    bimorph serve --config serve.toml          # examples/serve/serve.toml has more settings")]
 pub(crate) struct ServeCommand {
     #[command(flatten)]
     reported: SettingSources,

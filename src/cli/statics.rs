@@ -30,10 +30,11 @@ use std::fmt::Write;
 /// moves less. The relative error of a small component, or of a small rotation beside large displacements, may be
 /// larger: use a smaller tolerance for it.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph static bank.net --port heat=2.2\n  \
-                        bimorph static stage.net --set F=100u --json\n  \
-                        bimorph static bank.net --port heat=2.2 --out bank.svg     the mechanism, at rest and deflected\n  \
-                        bimorph static bank.net --backbend heat=2.6          at rest after it was heated too far once")]
+#[command(after_help = "Examples:\n  \
+    bimorph static examples/bank/bank.net --port heat=2.2\n  \
+    bimorph static examples/quarter_stage/quarter_stage.net --set F=100u --json\n  \
+    bimorph static examples/bank/bank.net --port heat=2.2 --out bank.svg     # the mechanism, at rest and deflected\n  \
+    bimorph static examples/bank/bank.net --backbend heat=2.6                # at rest, after one overload that yields the hot arms")]
 pub(crate) struct StaticCommand {
     #[command(flatten)]
     model: ModelArgs,

@@ -34,18 +34,18 @@ use std::sync::OnceLock;
 /// lists it, attaches to it, and cancels it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    bimorph sweep bank.net --param w=1.8u:2.2u:21 --port heat=2.2 --signals yoke.y --out w.csv\n  \
-    bimorph sweep bank.net --param w=1.8u:2.2u:21 --param Lh=200u,206u --analysis modes --count 3\n  \
-    bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/4 --out part0.csv\n  \
-    bimorph sweep bank.net --param wh=1.8u:2.2u:16 --analysis tran --stop 100u --port heat=2.2 --signals yoke.y\n  \
-    bimorph sweep bank.net --vary wh=normal:2u:0.05u --samples 1000 --seed 7 --analysis modes --out mc.csv\n  \
-    bimorph sweep bank.net --vary wh=normal:2u:0.05u --samples 1000 --seed 7 --port heat=2.2 --signals yoke.y \
-      --limits 'yoke.y<-2.5u' --out mc.parquet --out mc.png\n  \
-    bimorph sweep bank.net --param wh=1.8u:2.2u:5 --param heat.v=0:3:31 --signals yoke.y --out hv.csv\n  \
-    bimorph sweep bank.net --points corners.csv --port heat=2.2 --signals yoke.y --out c.csv\n  \
-    bimorph sweep bank.net --param option.tol=1e-2,1e-3,1e-4 --analysis modes\n  \
-    bimorph sweep bank.net --param wh=1.8u:2.2u:201 --out w.csv --resume\n  \
-    bimorph sweep bank.net --param w=1.8u:2.2u:21 --to unix:///tmp/bimorph.sock")]
+    bimorph sweep examples/bank/bank.net --param wh=1.8u:2.2u:21 --port heat=2.2 --signals yoke.y --out w.csv\n  \
+    bimorph sweep examples/bank/bank.net --param wh=1.8u:2.2u:21 --param comb=0,1 --analysis modes --count 3\n  \
+    bimorph sweep examples/switch/switch.net --param touch=0.08u:0.12u:9 --analysis pullin --shard 0/4 --out part0.csv\n  \
+    bimorph sweep examples/bank/bank.net --param wh=1.8u:2.2u:16 --analysis tran --stop 100u --port heat=2.2 --signals yoke.y\n  \
+    bimorph sweep examples/bank/bank.net --vary wh=normal:2u:0.05u --samples 1000 --seed 7 --analysis modes --out mc.csv\n  \
+    bimorph sweep examples/bank/bank.net --vary wh=normal:2u:0.05u --samples 1000 --seed 7 --port heat=2.2 --signals yoke.y \
+      --limits 'yoke.y<-0.94u' --out mc.parquet --out mc.png\n  \
+    bimorph sweep examples/bank/bank.net --param wh=1.8u:2.2u:5 --param heat.v=0:3:31 --signals yoke.y --out hv.csv\n  \
+    printf 'wh\\n1.9u\\n2.1u\\n' > corners.csv\n  \
+    bimorph sweep examples/bank/bank.net --points corners.csv --port heat=2.2 --signals yoke.y --out c.csv\n  \
+    bimorph sweep examples/bank/bank.net --param option.tol=1e-2,1e-3,1e-4 --analysis modes\n  \
+    bimorph sweep examples/bank/bank.net --param wh=1.8u:2.2u:201 --port heat=2.2 --signals yoke.y --out w.csv --resume")]
 pub(crate) struct SweepCommand {
     #[command(flatten)]
     model: ModelArgs,

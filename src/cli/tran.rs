@@ -48,16 +48,14 @@ Joint coordinates (--formulation rcr, rcr-elastic) have rodas4, the default, wit
 sdirk4, midpoint, newmark and generalized-alpha with constraints reduced in the recursion: the paper's model of joints that\n\
 only turn, and mechanisms of rigid loops, where rk45 is the default.\n\n\
 Examples:\n  \
-    bimorph tran bank.net --stop 300u --port heat=2.2 --signals yoke.y,b1.hot.T --out heat.svg\n  \
-    bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --signals c.x --json\n      \
-    starts from the equilibrium under F = 100 µN and lets go at t = 0\n  \
-    bimorph tran stage.net --set F=100u --release F --stop 100u --undamped --method avf --step 0.1u --event c.x=0\n      \
-    keeps the energy over many swings and tells each passage through the middle\n  \
-    bimorph tran stage.net --set F=100u --release F --stop 30u --draw motion.html\n  \
-    bimorph tran stage.net --set F=100u --release F --stop 1u --undamped --formulation rcr --method rk45 --signals c.x --json\n      \
-    the model of the paper: joints that only turn, in joint coordinates; \"joint_coordinates\" tells n, m and the gaps\n  \
-    bimorph tran stage.net --set F=100u --release F --stop 10u --formulation rcr-elastic --rotary-inertia --method tr-bdf2\n      \
-    every elastic direction a coordinate, in implicit steps by the same recursion")]
+    bimorph tran examples/bank/bank.net --stop 300u --port heat=2.2 --signals yoke.y,b1.hot.T --out heat.svg\n  \
+    # from the equilibrium under F = 100 µN, which is released at t = 0\n  \
+    bimorph tran examples/quarter_stage/quarter_stage.net --set F=100u --release F --stop 30u --undamped --signals c.x --json\n  \
+    # keeps the energy over many periods and lists each passage through the middle\n  \
+    bimorph tran examples/quarter_stage/quarter_stage.net --set F=100u --release F --stop 30u --undamped --method avf --step 0.1u --event c.x=0\n  \
+    bimorph tran examples/single_bimorph/single_bimorph.net --set F=10u --release F --stop 30u --draw motion.html\n  \
+    # joint coordinates of joints that only turn; \"joint_coordinates\" in the document has n, m and the gaps\n  \
+    bimorph tran examples/pivots/pivots.net --stop 20u --undamped --formulation rcr --method rk45 --scheme a2 --segments 1 --json")]
 pub(crate) struct TransientCommand {
     #[command(flatten)]
     model: ModelArgs,
