@@ -1,12 +1,13 @@
 //! docs/reference/netlist.md is complete and true: its examples load, and it names every element and every message.
 
-use bimorph::netlist::{Bundle, element_names, load};
+use bimorph_base::Bundle;
+use bimorph_netlist::{element_names, load};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 fn page() -> String {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/netlist.md")).expect("the page")
+    fs::read_to_string(Path::new(crate::ROOT).join("docs/reference/netlist.md")).expect("the page")
 }
 
 /// Every example loads without a message.
@@ -34,7 +35,7 @@ fn every_element() {
 #[test]
 fn every_message() {
     let mut used = BTreeSet::new();
-    let mut folders = vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("crates/netlist/src")];
+    let mut folders = vec![PathBuf::from(crate::ROOT).join("crates/netlist/src")];
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).expect("the source") {
             let path = entry.expect("an entry").path();
@@ -48,7 +49,7 @@ fn every_message() {
     let mut listed = BTreeSet::new();
     codes(&page(), ' ', &mut listed);
     codes(
-        &fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/crates/model/src/compile.rs")).expect("text"),
+        &fs::read_to_string(Path::new(crate::ROOT).join("crates/model/src/compile.rs")).expect("text"),
         '"',
         &mut used,
     );

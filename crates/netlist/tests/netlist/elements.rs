@@ -1,7 +1,8 @@
 //! Additions of each element to the structure, with numbers worked out by hand from its equations in docs/reference/netlist.md.
 
-use bimorph::netlist::{Bundle, load};
-use bimorph::structure::{GapVoltage, NodeId, Structure};
+use bimorph_base::Bundle;
+use bimorph_netlist::load;
+use bimorph_structure::{GapVoltage, NodeId, Structure};
 
 /// A layer with round numbers.
 const P1: &str = "process p1 = [Youngsmodulus=160e9 Poisson=0.25 density=2000 h=2u viscosity=2e-5 fluid=1u permittivity=9e-12\n\

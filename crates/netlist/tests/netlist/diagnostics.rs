@@ -1,6 +1,7 @@
 //! Every message says what is wrong, where, and what to do; one run reports all errors.
 
-use bimorph::netlist::{Bundle, Diagnostic, Diagnostics, Setting, Severity, load};
+use bimorph_base::{Bundle, Diagnostic, Diagnostics, Setting, Severity};
+use bimorph_netlist::load;
 
 const PROCESS: &str =
     "process p1 = [Youngsmodulus=165e9 density=2300 h=2u thermalexpansion=2e-6 thermcond=2.33 sheetresistance=20]\n";

@@ -1,6 +1,7 @@
 //! Properties that hold for every text: reading never panics, and expressions mean what their tree says.
 
-use bimorph::netlist::{Bundle, Setting, load};
+use bimorph_base::{Bundle, Setting};
+use bimorph_netlist::load;
 use proptest::prelude::*;
 
 /// Loads a text and renders every message, whatever comes of it.
@@ -212,7 +213,7 @@ proptest! {
     /// Any cut through a sound netlist is read to its end.
     #[test]
     fn any_cut(from in 0usize..600, to in 0usize..600) {
-        let text = include_str!("netlists/bank.net");
+        let text = include_str!("../../../../tests/netlists/bank.net");
         let cut = |at: usize| (0..=at.min(text.len())).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0);
         let (from, to) = (cut(from), cut(to));
         survive(&text[from.min(to)..from.max(to)]);

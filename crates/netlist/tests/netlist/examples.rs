@@ -1,10 +1,12 @@
 //! Whole netlists: every file in tests/netlists loads without a message and holds what was drawn.
 
-use bimorph::netlist::{LoadedNetlist, Setting, load, read_bundle};
+use bimorph_base::Setting;
+use bimorph_netlist::{load, read_bundle};
+use bimorph_structure::LoadedNetlist;
 use std::path::Path;
 
 fn loaded(name: &str, set: &[(&str, f64)]) -> LoadedNetlist {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/netlists").join(name);
+    let path = Path::new(crate::ROOT).join("tests/netlists").join(name);
     let bundle = read_bundle(&path, &[]).expect("readable");
     let set: Vec<_> = set.iter().map(|(n, v)| ((*n).to_owned(), Setting::Number(*v))).collect();
     let loaded = load(&bundle, &set).unwrap_or_else(|d| panic!("{d}"));
@@ -69,5 +71,5 @@ fn nodes_by_name() {
 fn structure_as_json() {
     let s = loaded("switch.net", &[]).structure;
     let text = serde_json::to_string(&s).expect("written");
-    assert_eq!(serde_json::from_str::<bimorph::structure::Structure>(&text).expect("read"), s);
+    assert_eq!(serde_json::from_str::<bimorph_structure::Structure>(&text).expect("read"), s);
 }

@@ -1,6 +1,7 @@
 //! Bundles: which files are read, in which order they are found, and what is said when they are not.
 
-use bimorph::netlist::{Bundle, Setting, load, read_bundle};
+use bimorph_base::{Bundle, Setting};
+use bimorph_netlist::{load, read_bundle};
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;

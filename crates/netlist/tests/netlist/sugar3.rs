@@ -1,9 +1,9 @@
 //! SUGAR 3 netlists: they draw what their SUGAR 2 twins draw, say where they are wrong, and cannot reach out of their sandbox or run
 //! without end.
-#![cfg(feature = "lua")]
 
-use bimorph::netlist::{Bundle, Diagnostic, Setting, load};
-use bimorph::structure::Structure;
+use bimorph_base::{Bundle, Diagnostic, Setting};
+use bimorph_netlist::load;
+use bimorph_structure::Structure;
 use std::time::{Duration, Instant};
 
 const LAYER: &str =
@@ -38,7 +38,7 @@ fn same(a: &Structure, b: &Structure) {
     assert_eq!(a.beams.len(), b.beams.len());
     for (m, n) in a.beams.iter().zip(&b.beams) {
         assert_eq!((m.a, m.b, &m.material), (n.a, n.b, &n.material));
-        let sizes = |b: &bimorph::structure::Beam| [b.length, b.width, b.thickness, b.angle.cos(), b.angle.sin()];
+        let sizes = |b: &bimorph_structure::Beam| [b.length, b.width, b.thickness, b.angle.cos(), b.angle.sin()];
         for (x, y) in sizes(m).into_iter().zip(sizes(n)) {
             near(x, y, x.abs().max(1e-6));
         }

@@ -1,7 +1,9 @@
 //! The rules of the SUGAR 2 language, one test a rule: numbers, operators, scopes, layers, subnets, names, settings.
 //! The expected values follow from the grammar (sugar.y, sugar.lex of SUGAR 2) and were seen in runs of it.
 
-use bimorph::netlist::{Bundle, Diagnostics, LoadedNetlist, Setting, load, parse_setting};
+use bimorph_base::{Bundle, Diagnostics, Setting};
+use bimorph_netlist::{load, parse_setting};
+use bimorph_structure::LoadedNetlist;
 
 /// The process most tests use.
 const PROCESS: &str = "process p1 = [Youngsmodulus=165e9 Poisson=0.3 density=2300 h=2u viscosity=1.78e-5 fluid=2u]\n";

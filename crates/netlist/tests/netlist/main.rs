@@ -1,0 +1,14 @@
+//! Contracts of the netlist languages: rules, elements, messages, includes, and the page that describes them.
+
+mod diagnostics;
+mod docs;
+mod elements;
+mod examples;
+mod include;
+mod language;
+mod properties;
+#[cfg(feature = "lua")]
+mod sugar3;
+
+/// Root of the repository.
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
