@@ -16,7 +16,6 @@ pub(super) mod writer;
 use super::byte_quota::ByteQuota;
 use super::disk::{Disk, private};
 use bimorph_wire::proto;
-use prost::Message;
 use record::SessionRecord;
 use scan::{StoreError, StoreScan};
 use std::collections::BTreeMap;
