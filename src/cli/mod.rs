@@ -22,7 +22,6 @@ mod export;
 mod failure;
 mod interrupt;
 mod jobs;
-mod largest_motion;
 mod layout;
 mod merge;
 mod merge_error;

@@ -3,12 +3,12 @@
 use super::failure::Failure;
 use super::model::{Context, JsonMap, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
-use super::{largest_motion, progress, report, statics, value};
-use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, PathInput, trace};
-use bimorph::analysis::mesh::path_fitted;
+use super::{progress, report, statics, value};
+use bimorph::analysis::continuation::{ContinuationResult, CriticalPoint};
+use bimorph::analysis::largest_motion::path_with_signals;
+use bimorph::analysis::path_parameter::{PathModels, PathOptions, PathParameter, UnknownPathParameter};
 use bimorph::analysis::statics::NodeMotion;
-use bimorph::compile::{CompiledModel, compile};
-use bimorph::netlist::Setting;
+use bimorph::compile::CompiledModel;
 use bimorph::options::OptionValue;
 use bimorph::options::analysis::PATH_POINTS;
 use bimorph::results::plot::axis::quantity;
@@ -120,15 +120,8 @@ impl PathCommand {
         self.output.check()?;
         PATH_POINTS.check(&OptionValue::Count(self.points))?;
         let drawn = self.model.compile()?;
-        let ends = self.ends(&drawn)?;
-        let first = ends.as_ref().map_or(&drawn, |[first, _]| first);
-        let input = match &ends {
-            Some([_, last]) => PathInput::Parameter(last),
-            None if drawn.structure.port(&self.along.name).is_some() => PathInput::Port(&self.along.name),
-            None => PathInput::Loads,
-        };
-        let mut request = ContinuationRequest {
-            input,
+        let options = PathOptions {
+            along: self.along.name.clone(),
             from: self.along.from,
             to: self.along.to,
             voltages: self.ports.clone(),
@@ -140,13 +133,12 @@ impl PathCommand {
             },
             points: self.points,
         };
+        let parameter = PathParameter::find(&drawn, &options.along)
+            .map_err(|unknown| Failure::bad("--along", UnknownPathParameter::EXPECTED, unknown.got()))?;
+        let models = PathModels::new(parameter, &drawn, &options, || self.model.bundle())?;
+        let (first, input) = models.input(&drawn, &options.along);
         let bar = progress::bar("path");
-        if request.signals.is_empty() {
-            request.signals = largest_motion::every(first);
-            let found = trace(first, &request, &mut progress::watch(&bar, CHEAPER))?;
-            request.signals = largest_motion::busiest(&found.signals);
-        }
-        let result = path_fitted(first, &request, &mut progress::watch(&bar, CHEAPER));
+        let result = path_with_signals(first, &options.request(input), &mut progress::watch(&bar, CHEAPER));
         bar.finish_and_clear();
         let (fitted, result) = result?;
         warn_of_mesh(first, &fitted);
@@ -172,59 +164,13 @@ impl PathCommand {
             port_voltages_v: JsonMap(&self.ports),
             context: self.model.context(&fitted).with(&result.warnings),
         };
-        let unit = self.unit(&drawn, ends.as_ref());
+        let unit = models.unit();
         self.output.finish(
             || self.table(&result, unit),
             || Ok(self.picture(&fitted, &result, unit)),
             &document,
             &self.text(&fitted, &result, unit),
         )
-    }
-
-    /// The netlist at both ends, where a parameter grows; none for ports and `loads`.
-    fn ends(&self, drawn: &CompiledModel) -> Result<Option<[CompiledModel; 2]>, Failure> {
-        let name = &self.along.name;
-        if drawn.structure.port(name).is_some() {
-            return Ok(None);
-        }
-        if !drawn.parameters.iter().any(|(p, v)| p == name && matches!(v, Setting::Number(_))) {
-            if name == "loads" {
-                return Ok(None);
-            }
-            let known = drawn.structure.ports.iter().map(|p| p.name.as_str());
-            let known: Vec<&str> = known.chain(drawn.parameters.iter().map(|(p, _)| p.as_str())).collect();
-            let got = format!("\"{name}\"; there is {}", [known, vec!["loads"]].concat().join(", "));
-            return Err(Failure::bad("--along", "a port, a numeric parameter, or loads", got));
-        }
-        let bundle = self.model.bundle()?;
-        let at = |value: f64| -> Result<CompiledModel, Failure> {
-            let mut options = drawn.options.clone();
-            options.set.retain(|(parameter, _)| parameter != name);
-            options.set.push((name.clone(), Setting::Number(value)));
-            Ok(compile(&bundle, &options)?)
-        };
-        Ok(Some([at(self.along.from)?, at(self.along.to)?]))
-    }
-
-    /// The unit of the path parameter, where its effects determine it.
-    fn unit(&self, drawn: &CompiledModel, ends: Option<&[CompiledModel; 2]>) -> &'static str {
-        let Some([first, last]) = ends else {
-            return if drawn.structure.port(&self.along.name).is_some() { "V" } else { "" };
-        };
-        let (a, b) = (&first.structure, &last.structure);
-        let loads = || a.loads.iter().zip(&b.loads);
-        let beams = || a.beams.iter().zip(&b.beams);
-        let changes = [
-            ("N", loads().any(|(x, y)| x.force != y.force)),
-            ("N·m", loads().any(|(x, y)| x.moment != y.moment)),
-            ("K", beams().any(|(x, y)| x.temperature != y.temperature)),
-            ("Pa", beams().any(|(x, y)| x.material.stress != y.material.stress)),
-        ];
-        let mut found = changes.iter().filter(|(_, changes)| *changes);
-        match (found.next(), found.next()) {
-            (Some((unit, _)), None) => unit,
-            _ => "",
-        }
     }
 
     fn table(&self, result: &ContinuationResult, unit: &str) -> Result<Table, Failure> {

@@ -73,10 +73,8 @@ pub struct ContinuationResult {
     pub unknowns: usize,
     /// Newton iterations.
     pub iterations: usize,
-    /// The gap along beams with the largest error from too few pieces, and the largest fraction of its distance on the
-    /// path.
-    #[serde(skip)]
     /// Warnings about the path.
+    #[serde(skip)]
     pub warnings: Vec<String>,
 }
 
@@ -125,7 +123,11 @@ pub fn trace(
     let options =
         ContinuationOptions { branch: request.branch, points: request.points, ..ContinuationOptions::default() };
     let mut tracer = Continuation::new(system, options);
-    let traced = tracer.trace(&mut family, &start.q, &mut |s| watch(s.clamp(0.0, 1.0)))?;
+    let bytes = size_of::<Pose>() * system.bodies() + size_of::<f64>() * (signals.len() + 2);
+    let traced = tracer.trace(&mut family, &start.q, &mut |s| {
+        bimorph_base::budget::lay_out(bytes);
+        watch(s.clamp(0.0, 1.0))
+    })?;
     if traced.end == PathEnd::Stopped {
         return Err(AnalysisError::Cancelled);
     }

@@ -1,12 +1,32 @@
-//! The node that moves most on a path: the default signal.
+//! The node that moves most on a path: its x and y are the signals of a request that names none.
 
-use bimorph::compile::CompiledModel;
+use super::continuation::{ContinuationRequest, ContinuationResult, trace};
+use super::mesh::path_fitted;
+use super::{AnalysisError, ProgressCallback};
+use bimorph_model::compile::CompiledModel;
 
-/// Nodes among which it is sought.
+/// Nodes among which it is searched.
 const MAX_NODES: usize = 1000;
 
+/// The path on its mesh, as [`path_fitted`] has it. Without signals in the request, the signals are x and y of the node that moves most.
+///
+/// # Errors
+/// See [`trace`].
+pub fn path_with_signals(
+    compiled: &CompiledModel,
+    request: &ContinuationRequest<'_>,
+    watch: ProgressCallback<'_>,
+) -> Result<(CompiledModel, ContinuationResult), AnalysisError> {
+    if !request.signals.is_empty() {
+        return path_fitted(compiled, request, watch);
+    }
+    let found = trace(compiled, &ContinuationRequest { signals: every(compiled), ..request.clone() }, &mut *watch)?;
+    let signals = busiest(&found.signals);
+    path_fitted(compiled, &ContinuationRequest { signals, ..request.clone() }, watch)
+}
+
 /// x and y of every node; of very many, of some evenly among them.
-pub(super) fn every(compiled: &CompiledModel) -> Vec<String> {
+fn every(compiled: &CompiledModel) -> Vec<String> {
     let nodes = || compiled.structure.nodes.iter().filter(|node| node.mechanical);
     // sampled nodes represent their neighbours
     let nodes = nodes().step_by(nodes().count().div_ceil(MAX_NODES).max(1));
@@ -14,7 +34,7 @@ pub(super) fn every(compiled: &CompiledModel) -> Vec<String> {
 }
 
 /// x and y of the node with the largest displacement on the path, by the signals of [`every`] one.
-pub(super) fn busiest(signals: &[(String, String, Vec<f64>)]) -> Vec<String> {
+fn busiest(signals: &[(String, String, Vec<f64>)]) -> Vec<String> {
     let far = |pair: &[(String, String, Vec<f64>)]| {
         let at = pair[0].2.iter().zip(&pair[1].2);
         at.map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max)
