@@ -5,7 +5,7 @@
 
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::TransientOptions;
-use bimorph::options::analysis::{ANALYSES, MODES_COUNT, TRAN_POINTS, TRAN_RHO};
+use bimorph::options::analysis::{ANALYSES, MODES_COUNT, PATH_POINTS, TRAN_POINTS, TRAN_RHO};
 use bimorph::options::{CompileOptions, MODEL, ModelOption, OptionDescription, OptionValue, Range};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -293,7 +293,10 @@ fn analyses_take_the_same_options() {
     }
     let proto = fs::read_to_string(place("proto/bimorph/v1/analysis.proto")).expect("the messages");
     assert!(proto.contains(&format!("{}; 0: {}.", TRAN_POINTS.range, TRAN_POINTS.count())));
+    let proto = fs::read_to_string(place("proto/bimorph/v1/path.proto")).expect("the messages");
+    assert!(proto.contains(&format!("{}; 0: {}.", PATH_POINTS.range, PATH_POINTS.count())));
     let client = fs::read_to_string(place("clients/python/src/bimorph/model.py")).expect("the client");
+    assert!(client.contains(&format!("points: int = {},", PATH_POINTS.count())));
     assert!(client.contains(&format!("points: int = {},", TRAN_POINTS.count())));
     assert!(client.contains(&format!("count: int = {},", MODES_COUNT.count())));
     assert_eq!((TransientOptions::default().points, Integrator::RHO), (TRAN_POINTS.count(), TRAN_RHO.number()));

@@ -119,7 +119,7 @@ fn huge_numbers() {
                 match wire.compile(request).await {
                     Ok(model) => {
                         let model = model.into_inner().model.expect("a description").id;
-                        let request = proto::StaticRequest { model: model.clone(), voltages: vec![] };
+                        let request = proto::StaticRequest { model: model.clone(), ..Default::default() };
                         let ended = wire.r#static(request).await.map_or_else(|s| s.code(), |_| Code::Ok);
                         assert!(!matches!(ended, Code::Internal | Code::Unknown), "{text} {ended:?}");
                         let request = proto::ModesRequest { model, count: 2, voltages: vec![] };
@@ -140,7 +140,7 @@ fn huge_numbers() {
 fn many_names() {
     Victim::attacked("400 000 names", async |wire| {
         let model = compiled(wire, (chain(40).0, proto::CompileOptions::default())).await;
-        let request = proto::StaticRequest { model, voltages: named(400_000) };
+        let request = proto::StaticRequest { model, voltages: named(400_000), ..Default::default() };
         assert_eq!(wire.r#static(request).await.expect_err("no such port").code(), Code::InvalidArgument);
         let one = proto::SettingList { values: vec![proto::Setting { name: String::new(), value: number(1.0) }] };
         let axis = |k| proto::SweepParameter {

@@ -117,7 +117,12 @@ fn calls(wire: &Wire, [large, many]: &[String; 2]) -> Vec<(&'static str, Asking)
             open,
             proto::OpenRequest { model: model(), signals: vec!["n3_3.y".into(); 9000], ..Default::default() }
         ),
-        call!("Static", r#static, proto::StaticRequest { model: model(), voltages: vec![] }),
+        call!("Static", r#static, proto::StaticRequest { model: model(), ..Default::default() }),
+        call!(
+            "Path",
+            path,
+            proto::PathRequest { model: model(), along: "F".into(), to: 1e-3, points: 100_000, ..Default::default() }
+        ),
         call!("Modes", modes, proto::ModesRequest { model: model(), count: 300, voltages: vec![] }),
         call!("FrequencyResponse", frequency_response, response),
         ("Transient", motion),

@@ -44,7 +44,7 @@ async fn compiled(client: &mut Known, bundle: Option<proto::Bundle>) -> String {
 async fn heavy(client: &mut Known, kind: &str, model: String, salt: usize) {
     match kind {
         "modes" => drop(client.modes(proto::ModesRequest { model, count: 200, voltages: vec![] }).await),
-        "static" => drop(client.r#static(proto::StaticRequest { model, voltages: vec![] }).await),
+        "static" => drop(client.r#static(proto::StaticRequest { model, ..Default::default() }).await),
         "transient" => {
             let signals = vec!["n3_3.y".to_owned()];
             let request = proto::TransientRequest {
@@ -98,7 +98,9 @@ fn a_short_call_does_not_wait_for_long_ones_of_another_client() {
             let mut waits = Vec::new();
             for _ in 0..20 {
                 let start = Instant::now();
-                bob.r#static(proto::StaticRequest { model: small.clone(), voltages: vec![] }).await.expect("an answer");
+                bob.r#static(proto::StaticRequest { model: small.clone(), ..Default::default() })
+                    .await
+                    .expect("an answer");
                 waits.push(start.elapsed());
                 tokio::time::sleep(Duration::from_millis(20)).await;
             }

@@ -38,7 +38,7 @@ fn it_says_what_a_server_says() {
     let server = start_with("127.0.0.1:0", Limits::default(), LOCAL);
     let model = compiled(&inside);
     let voltages = vec![proto::Named { name: "drive".into(), value: 3.0 }];
-    let statics = proto::StaticRequest { model: model.clone(), voltages };
+    let statics = proto::StaticRequest { model: model.clone(), voltages, ..Default::default() };
     let pull_in = proto::PullInRequest { model: model.clone(), port: "drive".into(), max_v: 1.0 };
     let open = proto::OpenRequest { model: model.clone(), ..Default::default() };
     let (there, refused, device, replies) = block_on(async {

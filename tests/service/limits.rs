@@ -195,7 +195,7 @@ fn analyses_do_not_block_circuits() {
         let _running = client.transient(request.clone()).await.expect("starts");
         let late = client.transient(request).await;
         assert_eq!(late.expect_err("waits in vain").code(), Code::DeadlineExceeded);
-        client.r#static(proto::StaticRequest { model: model.clone(), voltages: vec![] }).await.expect("is short");
+        client.r#static(proto::StaticRequest { model: model.clone(), ..Default::default() }).await.expect("is short");
         let options = Some(proto::CompileOptions { tol: Some(1e-4), ..Default::default() });
         client.compile(proto::CompileRequest { bundle: wire_bundle(), options }).await.expect("compiles");
         client.open(proto::OpenRequest { model, ..Default::default() }).await.expect("opens");
@@ -218,7 +218,7 @@ fn slow_readers_keep_no_place() {
             ..Default::default()
         };
         let _unread = client.transient(request).await.expect("starts");
-        client.r#static(proto::StaticRequest { model, voltages: vec![] }).await.expect("has a place");
+        client.r#static(proto::StaticRequest { model, ..Default::default() }).await.expect("has a place");
     });
 }
 

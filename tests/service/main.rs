@@ -19,6 +19,7 @@ mod leases;
 mod limits;
 mod listening;
 mod network_faults;
+mod paths;
 mod quotas;
 mod random_requests;
 mod rejected_requests;

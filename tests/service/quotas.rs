@@ -167,7 +167,7 @@ fn processor_time_of_one_client() {
         assert_eq!(refused.code(), Code::ResourceExhausted, "{refused}");
         let text = "client_cpu: at most 0.3 s of processor time of one client within an hour, 0.";
         assert!(refused.message().starts_with(text), "{refused}");
-        let request = proto::StaticRequest { model: model.clone(), voltages };
+        let request = proto::StaticRequest { model: model.clone(), voltages, ..Default::default() };
         let again = alice.r#static(request.clone()).await.expect_err("nothing is left");
         assert_eq!(again.code(), Code::ResourceExhausted);
         bob.r#static(request).await.expect("bob has his own");

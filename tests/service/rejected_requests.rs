@@ -53,7 +53,8 @@ fn bad_fields_are_named() {
         let root = client.compile(proto::CompileRequest { bundle: Some(root), options: None }).await;
         assert_eq!(field(root.expect_err("is refused")), "bundle.root");
         let nan = vec![proto::Named { name: "drive".into(), value: f64::NAN }];
-        let nan = client.r#static(proto::StaticRequest { model: model.clone(), voltages: nan }).await;
+        let nan =
+            client.r#static(proto::StaticRequest { model: model.clone(), voltages: nan, ..Default::default() }).await;
         assert_eq!(field(nan.expect_err("is refused")), "voltages[0]");
         let stop = proto::TransientRequest { model: model.clone(), stop_s: -1.0, ..Default::default() };
         assert_eq!(field(client.transient(stop).await.expect_err("is refused")), "stop_s");

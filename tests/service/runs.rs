@@ -284,7 +284,7 @@ fn a_run_is_in_no_way_and_ends_with_its_client() {
         let model = compiled(&mut client).await;
         for _ in 0..3 {
             let asked = Instant::now();
-            let statics = proto::StaticRequest { model: model.clone(), voltages: vec![] };
+            let statics = proto::StaticRequest { model: model.clone(), ..Default::default() };
             client.r#static(statics).await.expect("an equilibrium");
             assert!(asked.elapsed() < Duration::from_secs(5), "{:?}", asked.elapsed());
         }

@@ -42,7 +42,7 @@ fn of_models(model: &dyn Fn() -> String) -> Vec<Sound> {
             .encode_to_vec(),
         ),
         ("Describe", proto::DescribeRequest { model: model() }.encode_to_vec()),
-        ("Static", proto::StaticRequest { model: model(), voltages: volts() }.encode_to_vec()),
+        ("Static", proto::StaticRequest { model: model(), voltages: volts(), ..Default::default() }.encode_to_vec()),
         ("Modes", proto::ModesRequest { model: model(), count: 2, voltages: volts() }.encode_to_vec()),
         (
             "FrequencyResponse",
@@ -58,6 +58,18 @@ fn of_models(model: &dyn Fn() -> String) -> Vec<Sound> {
             .encode_to_vec(),
         ),
         ("PullIn", proto::PullInRequest { model: model(), port: "drive".into(), max_v: 50.0 }.encode_to_vec()),
+        (
+            "Path",
+            proto::PathRequest {
+                model: model(),
+                along: "drive".into(),
+                to: 8.0,
+                signals: vec!["m.x".into()],
+                points: 20,
+                ..Default::default()
+            }
+            .encode_to_vec(),
+        ),
         (
             "Transient",
             proto::TransientRequest {

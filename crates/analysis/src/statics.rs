@@ -322,6 +322,14 @@ pub(crate) fn source_vector(compiled: &CompiledModel, voltages: &PortVoltages) -
     Ok(sources)
 }
 
+/// Checks port voltages: each is that of a port, given once, finite and within the range.
+///
+/// # Errors
+/// [`AnalysisError::BadRequest`] with the port.
+pub fn check_voltages(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<(), AnalysisError> {
+    source_vector(compiled, voltages).map(|_| ())
+}
+
 /// Displacement of every mechanical node, by name.
 pub(crate) fn node_motions(compiled: &CompiledModel, q: &[Pose]) -> Vec<(String, NodeMotion)> {
     let linear = compiled.parts.system.model.linear;

@@ -1,6 +1,7 @@
 //! The calls that analyse a model, each bounded before anything is computed.
 
 use super::chunks::{MessageSink, send_transient};
+use super::convert::path::PathReply;
 use super::convert::{self, Violation, analysis as results};
 use super::limits::Limits;
 use super::models::NamedModel;
@@ -8,7 +9,10 @@ use super::shared::{BimorphService, Reply};
 use super::work::{CancellingStream, guarded};
 use super::{proto, status};
 use bimorph_analysis::integrator::Integrator;
+use bimorph_analysis::largest_motion::path_with_signals;
 use bimorph_analysis::mesh;
+use bimorph_analysis::path_parameter::{PathModels, PathParameter};
+use bimorph_analysis::statics::check_voltages;
 use bimorph_analysis::transient::TransientOptions;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::OptionValue;
@@ -31,13 +35,25 @@ impl BimorphService {
         self.0.work.run(move || job(&model)).await.map(Response::new)
     }
 
-    /// Static equilibrium.
+    /// Static equilibrium, also of a mechanism with permanent strains after ports were raised once.
     pub(super) async fn statics(&self, request: proto::StaticRequest) -> Reply<proto::StaticResponse> {
         let voltages = voltages(request.voltages)?;
+        let raised = convert::voltages("backbend", request.backbend).map_err(status::violation)?;
         let job = move |model: &NamedModel| {
-            let (fitted, mut result, _) = mesh::static_fitted(&model.compiled, &voltages).map_err(status::analysis)?;
+            let compiled = &model.compiled;
+            let (fitted, mut result, strains) = if raised.is_empty() {
+                let (fitted, result, _) = mesh::static_fitted(compiled, &voltages).map_err(status::analysis)?;
+                (fitted, result, Vec::new())
+            } else {
+                let refused = |error| status::analysis_of("backbend", error);
+                check_voltages(compiled, &raised).map_err(refused)?;
+                check_voltages(compiled, &voltages).map_err(status::analysis)?;
+                let (fitted, result, _, strains) =
+                    mesh::static_backbent(compiled, &raised, &voltages).map_err(refused)?;
+                (fitted, result, strains)
+            };
             result.warnings.extend(mesh::warnings(&fitted));
-            Ok(results::static_to_wire(&result))
+            Ok(results::static_to_wire(&result, &strains))
         };
         self.analyse(&request.model, job).await
     }
@@ -98,6 +114,39 @@ impl BimorphService {
             Ok(results::pull_in_to_wire(&result))
         };
         self.analyse(&request.model, job).await
+    }
+
+    /// Equilibrium path.
+    pub(super) async fn traced(&self, request: proto::PathRequest) -> Reply<proto::PathResponse> {
+        let id = request.model.clone();
+        count("signals", request.signals.len(), &self.0.limits)?;
+        let options = convert::path::request_from_wire(request).map_err(status::violation)?;
+        let most = self.0.limits.message_bytes;
+        let bytes = options.points.saturating_mul((options.signals.len().max(2) + 2) * size_of::<f64>());
+        if bytes > most {
+            return Err(status::limit("message_bytes", most, bytes));
+        }
+        let job = move |model: &NamedModel| {
+            let compiled = &model.compiled;
+            let parameter = PathParameter::find(compiled, &options.along)
+                .map_err(|unknown| status::violation(Violation::new("along", unknown.to_string())))?;
+            if parameter == PathParameter::Port {
+                for (field, volts) in [("from", options.from), ("to", options.to)] {
+                    let refused = |error| status::analysis_of(field, error);
+                    check_voltages(compiled, &[(options.along.clone(), volts)]).map_err(refused)?;
+                }
+            }
+            let models = PathModels::new(parameter, compiled, &options, || Ok(model.bundle.clone()))
+                .map_err(|error| status::compile(&error))?;
+            let (first, input) = models.input(compiled, &options.along);
+            let (fitted, mut result) =
+                path_with_signals(first, &options.request(input), &mut |_| true).map_err(status::analysis)?;
+            result.warnings.extend(mesh::warnings(&fitted));
+            let estimated_error = fitted.order.estimated_error;
+            let path = PathReply { result, unit: models.unit().to_owned(), estimated_error };
+            Ok(convert::path::result_to_wire(&path))
+        };
+        self.analyse(&id, job).await
     }
 
     /// Motion in time, streamed as it is computed.

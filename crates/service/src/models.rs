@@ -22,7 +22,7 @@ pub(super) struct NamedModel {
     /// The same on the mesh that it has in a circuit.
     pub(super) in_circuit: Arc<CompiledModel>,
     pub(super) description: proto::ModelDescription,
-    bundle: Bundle,
+    pub(super) bundle: Bundle,
     options: CompileOptions,
     /// Memory allocated during its compilation, an upper bound of its size [byte].
     bytes: usize,

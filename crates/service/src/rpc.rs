@@ -187,6 +187,10 @@ impl proto::bimorph_server::Bimorph for BimorphService {
         self.pulled_in(request.into_inner()).await
     }
 
+    async fn path(&self, request: Request<proto::PathRequest>) -> Reply<proto::PathResponse> {
+        self.traced(request.into_inner()).await
+    }
+
     type TransientStream = TransientStream;
 
     async fn transient(&self, request: Request<proto::TransientRequest>) -> Reply<Self::TransientStream> {

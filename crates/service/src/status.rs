@@ -73,6 +73,14 @@ pub(super) fn analysis(error: AnalysisError) -> Status {
     }
 }
 
+/// An analysis without a result, where an invalid request is the fault of `field`.
+pub(super) fn analysis_of(field: &str, error: AnalysisError) -> Status {
+    match error {
+        AnalysisError::BadRequest { what, detail } => violation(Violation::new(field, format!("{what}: {detail}"))),
+        other => analysis(other),
+    }
+}
+
 /// A device that refused a unary request.
 pub(super) fn device(error: &DeviceError) -> Status {
     let message = error.to_string();

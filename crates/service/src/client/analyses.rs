@@ -2,12 +2,15 @@
 
 use super::link::{ServerLink, is_broken, reason, unexpected};
 use super::reply_checks;
-use crate::convert::{analysis as results, harmonic as harmonics, named};
+use crate::convert::path::{self as paths, PathReply};
+use crate::convert::{analysis as results, harmonic as harmonics, named, pairs};
 use crate::credentials::Access;
 use crate::proto;
+use bimorph_analysis::backbending::Strains;
 use bimorph_analysis::harmonic::{HarmonicOptions, HarmonicResult};
 use bimorph_analysis::integrator::Integrator;
 use bimorph_analysis::modes::ModesResult;
+use bimorph_analysis::path_parameter::PathOptions;
 use bimorph_analysis::pull_in::PullInResult;
 use bimorph_analysis::statics::StaticResult;
 use bimorph_analysis::transient::{TransientResult, Until};
@@ -115,11 +118,26 @@ impl Client {
     /// # Errors
     /// [`ClientError`].
     pub fn statics(&mut self, model: &str, voltages: &PortVoltages) -> Result<StaticResult, ClientError> {
-        let request = proto::StaticRequest { model: model.to_owned(), voltages: named(voltages) };
+        self.statics_backbent(model, &[], voltages).map(|(result, _)| result)
+    }
+
+    /// Static equilibrium after the ports were raised once to `raised`, with the permanent strain of each beam that can yield [1].
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn statics_backbent(
+        &mut self,
+        model: &str,
+        raised: &PortVoltages,
+        voltages: &PortVoltages,
+    ) -> Result<(StaticResult, Strains), ClientError> {
+        let (voltages, backbend) = (named(voltages), named(raised));
+        let request = proto::StaticRequest { model: model.to_owned(), voltages, backbend };
         let mut rpc = self.link.rpc.clone();
-        let reply = self.call(rpc.r#static(request))?;
+        let mut reply = self.call(rpc.r#static(request))?;
         self.checked(reply_checks::statics(&reply))?;
-        Ok(results::static_from_wire(reply))
+        let strains = pairs(std::mem::take(&mut reply.permanent_strains));
+        Ok((results::static_from_wire(reply), strains))
     }
 
     /// Natural frequencies; `count` 0: six.
@@ -160,6 +178,17 @@ impl Client {
         let request = proto::PullInRequest { model: model.to_owned(), port, max_v: max };
         let mut rpc = self.link.rpc.clone();
         self.call(rpc.pull_in(request)).map(results::pull_in_from_wire)
+    }
+
+    /// Equilibrium path.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn path(&mut self, model: &str, options: &PathOptions) -> Result<PathReply, ClientError> {
+        let mut rpc = self.link.rpc.clone();
+        let reply = self.call(rpc.path(paths::request_to_wire(model, options)))?;
+        self.checked(reply_checks::path(&options.signals, &reply))?;
+        Ok(paths::result_from_wire(reply))
     }
 
     /// Transient analysis; `watch` receives the progress and may cancel it.

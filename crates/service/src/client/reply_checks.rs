@@ -176,13 +176,42 @@ fn named(what: &str, values: &[proto::Named]) -> Result<(), String> {
 
 /// A static equilibrium.
 pub(super) fn statics(reply: &proto::StaticResponse) -> Result<(), String> {
-    for node in &reply.nodes {
-        name("node", &node.name)?;
-        finite(&node.name, &[node.x, node.y, node.rz])?;
-    }
+    nodes(&reply.nodes)?;
     named("temperatures_k", &reply.temperatures_k)?;
     named("currents_a", &reply.currents_a)?;
-    named("charges_c", &reply.charges_c)
+    named("charges_c", &reply.charges_c)?;
+    named("permanent_strains", &reply.permanent_strains)
+}
+
+/// Displacements of nodes.
+fn nodes(nodes: &[proto::NodeMotion]) -> Result<(), String> {
+    nodes.iter().try_for_each(|node| {
+        name("node", &node.name)?;
+        finite(&node.name, &[node.x, node.y, node.rz])
+    })
+}
+
+/// An equilibrium path: a value of each signal and a number of eigenvalues at each point, and critical points among the points.
+pub(super) fn path(signals: &[String], reply: &proto::PathResponse) -> Result<(), String> {
+    let count = reply.values.len();
+    finite("values", &reply.values)?;
+    length("negative", reply.negative.len(), count)?;
+    if !signals.is_empty() && !reply.signals.iter().map(|signal| &signal.name).eq(signals) {
+        return Err(format!("signals: expected the {} requested, got {} others", signals.len(), reply.signals.len()));
+    }
+    for signal in &reply.signals {
+        name("signal", &signal.name)?;
+        numbers(&signal.name, &signal.values, count)?;
+    }
+    for (what, points) in [("limit_points", &reply.limit_points), ("bifurcations", &reply.bifurcations)] {
+        for critical in points {
+            finite(what, &[critical.value])?;
+            if critical.point >= count as u64 {
+                return Err(format!("{what}: expected one of the {count} points, got {}", critical.point));
+            }
+        }
+    }
+    nodes(&reply.last)
 }
 
 /// Modes: frequencies in their order, and a shape of each over all nodes.

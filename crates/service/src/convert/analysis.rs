@@ -13,11 +13,21 @@ fn size(n: u64) -> usize {
     usize::try_from(n).unwrap_or(usize::MAX)
 }
 
-/// A static equilibrium as it travels.
-pub fn static_to_wire(result: &StaticResult) -> proto::StaticResponse {
+/// Displacements of nodes as they travel.
+pub(super) fn nodes_to_wire(nodes: &[(String, NodeMotion)]) -> Vec<proto::NodeMotion> {
     let node = |(name, m): &(String, NodeMotion)| proto::NodeMotion { name: name.clone(), x: m.x, y: m.y, rz: m.rz };
+    nodes.iter().map(node).collect()
+}
+
+/// Displacements of nodes back.
+pub(super) fn nodes_from_wire(nodes: Vec<proto::NodeMotion>) -> Vec<(String, NodeMotion)> {
+    nodes.into_iter().map(|n| (n.name, NodeMotion { x: n.x, y: n.y, rz: n.rz })).collect()
+}
+
+/// A static equilibrium as it travels, with the permanent strains of beams by name [1].
+pub fn static_to_wire(result: &StaticResult, strains: &[(String, f64)]) -> proto::StaticResponse {
     proto::StaticResponse {
-        nodes: result.nodes.iter().map(node).collect(),
+        nodes: nodes_to_wire(&result.nodes),
         temperatures_k: named(&result.temperatures_k),
         currents_a: named(&result.currents_a),
         charges_c: named(&result.charges_c),
@@ -29,6 +39,7 @@ pub fn static_to_wire(result: &StaticResult) -> proto::StaticResponse {
         iterations: result.iterations as u64,
         estimated_error: result.estimated_error,
         warnings: result.warnings.clone(),
+        permanent_strains: named(strains),
     }
 }
 
@@ -48,11 +59,10 @@ fn passed_from_wire(wire: proto::PassedLoss) -> StabilityLoss {
     StabilityLoss { kind, share: wire.share, direction: wire.direction }
 }
 
-/// A static equilibrium back.
+/// A static equilibrium back, without permanent strains.
 pub fn static_from_wire(wire: proto::StaticResponse) -> StaticResult {
-    let node = |n: proto::NodeMotion| (n.name, NodeMotion { x: n.x, y: n.y, rz: n.rz });
     StaticResult {
-        nodes: wire.nodes.into_iter().map(node).collect(),
+        nodes: nodes_from_wire(wire.nodes),
         temperatures_k: pairs(wire.temperatures_k),
         currents_a: pairs(wire.currents_a),
         charges_c: pairs(wire.charges_c),
@@ -132,6 +142,8 @@ pub fn pull_in_to_wire(result: &PullInResult) -> proto::PullInResponse {
         unheld: !result.held,
         estimated_error: result.estimated_error,
         warnings: result.warnings.clone(),
+        snaps_v: result.snaps_v.clone(),
+        release_before_snaps_v: result.release_before_snaps_v,
     }
 }
 
@@ -142,9 +154,8 @@ pub fn pull_in_from_wire(wire: proto::PullInResponse) -> PullInResult {
         pull_in_v: wire.pull_in_v,
         release_v: wire.release_v,
         held: !wire.unheld,
-        // what a server says of these is among the warnings
-        snaps_v: Vec::new(),
-        release_before_snaps_v: None,
+        snaps_v: wire.snaps_v,
+        release_before_snaps_v: wire.release_before_snaps_v,
         estimated_error: wire.estimated_error,
         warnings: wire.warnings,
     }

@@ -8,6 +8,7 @@ pub mod device;
 pub mod harmonic;
 pub mod model;
 pub mod options;
+pub mod path;
 pub mod run;
 mod samples;
 pub mod sweep;
