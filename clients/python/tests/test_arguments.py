@@ -184,7 +184,7 @@ def models(model: bimorph.Model, session: bimorph.Session) -> dict[str, Case]:
     """Methods of a model."""
     ac = {"drive": "m.fx", "start": 1e3, "stop": 2e3, "points": 3}
     return {
-        "Model.static": Case(model.static, {}, {"voltages": VOLTAGES}),
+        "Model.static": Case(model.static, {}, {"voltages": VOLTAGES, "backbend": VOLTAGES}),
         "Model.modes": Case(model.modes, {"count": 1}, {"count": integer(1, 1000), "voltages": VOLTAGES}),
         "Model.ac": Case(
             model.ac,
@@ -203,6 +203,19 @@ def models(model: bimorph.Model, session: bimorph.Session) -> dict[str, Case]:
             },
         ),
         "Model.pull_in": Case(model.pull_in, {}, {"max_v": never, "port": lambda value: isinstance(value, str) and value == ""}),
+        "Model.path": Case(
+            model.path,
+            {"along": "drive", "start": -1.0, "stop": 0.5, "points": 4},
+            {
+                "along": never,
+                "start": number(-10.0, 10.0),
+                "stop": lambda value: number(-10.0, 10.0)(value) and value != -1.0,
+                "signals": empty_list,
+                "branch": never,
+                "points": integer(2, 1000),
+                "voltages": VOLTAGES,
+            },
+        ),
         "Model.transient": Case(
             model.transient,
             {"stop": 1e-6, "signals": ["m.x"], "points": 3},
@@ -495,7 +508,7 @@ def test_bad_arguments_are_rejected_by_name(cases: dict[str, Case]) -> None:
 MADE_BY_CALLS = {
     *("Conversion", "Diagnostic", "FrequencyResponse", "Model", "ModesResult", "NodeMotion", "Options", "Piece", "PullInResult", "Root"),
     *("Row", "Session", "Snapshot", "StaticResult", "Statistics", "Sweep", "SweepStatus", "Table", "Ticket", "TransientResult", "TrialReply"),
-    *("BatchRun", "ColumnStatistics", "Crossing", "StabilityLoss", "Failure", "Fraction", "Histogram", "Run", "SweepStatistics"),
+    *("BatchRun", "ColumnStatistics", "CriticalPoint", "Crossing", "PathResult", "StabilityLoss", "Failure", "Fraction", "Histogram", "Run", "SweepStatistics"),
     *("Violation", "aio", "local"),
 }
 """Public names without arguments of a user: what calls give, the package for asyncio, which passes its arguments on, and `local()`."""

@@ -31,6 +31,7 @@ from .executors import sweep_on
 from .model import Model
 from .netlist import Netlist
 from .options import Options
+from .paths import CriticalPoint, PathResult
 from .results import (
     Crossing,
     FrequencyResponse,
@@ -61,6 +62,7 @@ __all__ = [
     "Client",
     "ColumnStatistics",
     "Conversion",
+    "CriticalPoint",
     "Crossing",
     "Diagnostic",
     "Failure",
@@ -84,6 +86,7 @@ __all__ = [
     "Normal",
     "NotFound",
     "Options",
+    "PathResult",
     "Piece",
     "PullIn",
     "PullInResult",

@@ -50,9 +50,9 @@ def diagnostic(d: Any) -> Diagnostic:
     return Diagnostic(d.code, severity, d.file, d.line, d.column, d.message, d.help)
 
 
-def named(voltages: Voltages | None) -> list[Any]:
+def named(voltages: Voltages | None, argument: str = "voltages") -> list[Any]:
     """Messages of port voltages."""
-    return [analysis_pb2.Named(name=name, value=value) for name, value in arguments.volts("voltages", voltages).items()]
+    return [analysis_pb2.Named(name=name, value=value) for name, value in arguments.volts(argument, voltages).items()]
 
 
 def by_name(named: Iterable[Any]) -> dict[str, float]:

@@ -16,6 +16,7 @@ from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable, shown
 from .events import Until, crossing, events_to_wire, statistics, until_to_wire
 from .messages import Voltages, by_name, diagnostic, estimate_of, named, setting_value
 from .naming import by_argument, each
+from .paths import Branch, PathResult, path_of, request_of
 from .response import SPACINGS, response_of
 from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, StabilityLoss, StaticResult, TransientResult
 from .session import Session, opened_just_now
@@ -96,9 +97,13 @@ class Model:
     def __repr__(self) -> str:
         return f"Model({self.id[:8]}…, ports={list(self.ports)}, {self.unknowns} unknowns)"
 
-    def static(self, voltages: Voltages | None = None) -> StaticResult:
-        """Static equilibrium at these port voltages [V], followed from rest."""
-        request = analysis_pb2.StaticRequest(model=self.id, voltages=named(voltages))
+    def static(self, voltages: Voltages | None = None, *, backbend: Voltages | None = None) -> StaticResult:
+        """Static equilibrium at these port voltages [V], followed from rest.
+
+        ``backbend`` are voltages [V] to which ports are raised once before, so that hot arms with a ``yieldstress`` yield and stay shorter; the
+        ``permanent_strains`` of the result are those of the arms.
+        """
+        request = analysis_pb2.StaticRequest(model=self.id, voltages=named(voltages), backbend=named(backbend, "backbend"))
         answer = self._call("Static", request)
         self._checked("static").static(answer)
         return StaticResult(
@@ -114,6 +119,7 @@ class Model:
             warnings=issue(answer.warnings),
             free_motions=tuple(answer.free_motions),
             passed=tuple(_loss(one) for one in answer.passed),
+            permanent_strains=by_name(answer.permanent_strains),
         )
 
     def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
@@ -184,9 +190,41 @@ class Model:
         max_v = arguments.number("max_v", max_v, "a voltage", above=0.0)
         request = analysis_pb2.PullInRequest(model=self.id, port=port, max_v=max_v)
         answer = self._call("PullIn", request)
-        release = answer.release_v if answer.HasField("release_v") else None
-        warnings = issue(answer.warnings)
-        return PullInResult(answer.port, answer.pull_in_v, release, estimate_of(answer), not answer.unheld, warnings)
+        self._checked("pull_in").pull_in(answer)
+        return PullInResult(
+            port=answer.port,
+            pull_in_v=answer.pull_in_v,
+            release_v=answer.release_v if answer.HasField("release_v") else None,
+            estimated_error=estimate_of(answer),
+            held=not answer.unheld,
+            warnings=issue(answer.warnings),
+            snaps_v=tuple(answer.snaps_v),
+            release_before_snaps_v=answer.release_before_snaps_v if answer.HasField("release_before_snaps_v") else None,
+        )
+
+    def path(
+        self,
+        along: str,
+        start: float,
+        stop: float,
+        signals: Sequence[str] = (),
+        *,
+        branch: Branch = "plus",
+        points: int = 2000,
+        voltages: Voltages | None = None,
+    ) -> PathResult:
+        """Equilibria while a parameter goes from ``start`` to ``stop``, past limit points and through bifurcations.
+
+        ``along`` is a port [V], a parameter of the netlist that sets loads, temperatures or stresses, or ``"loads"``, the factor on all dead loads.
+        The path starts at the equilibrium at ``start``. Where it loses its stability at a bifurcation it follows the branch along the buckling
+        shape (``"plus"``), against it (``"minus"``), or goes straight on (``"stay"``). ``signals`` are those of ``transient``; the default is x and y
+        of the node that moves most. ``points`` is the largest number of points, and ``voltages`` are those of other ports [V].
+        """
+        request = request_of(self.id, along, (start, stop), signals, branch, points, voltages)
+        answer = self._call("Path", request)
+        self._checked("path").path(answer, request.signals)
+        issue(answer.warnings)
+        return path_of(answer, along)
 
     def transient(
         self,

@@ -17,6 +17,7 @@ _RULES: dict[str, tuple[tuple[str, str], ...]] = {
     "Static": (_PORT,),
     "Modes": (_PORT, ("modes:", "count")),
     "FrequencyResponse": (_PORT, _SIGNAL, ("from:", "start"), ("to:", "stop")),
+    "Path": (_PORT, _SIGNAL, ("from:", "start"), ("to:", "stop"), ("message_bytes:", "points")),
     "Transient": (_PORT, _SIGNAL, ("stop_s:", "stop"), ("release_model", "release"), ("step_s:", "step")),
     "Open": ((_PORT[0], "ports"), _SIGNAL, ("noise band:", "noise_band")),
     "SubmitJob": (("release_after_s:", "release_after"), (r"(spec\.)?parameter", "parameters"), (r"(spec\.)?sample", "samples")),

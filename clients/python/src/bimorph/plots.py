@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .batch import BatchRun
+    from .paths import PathResult
     from .results import FrequencyResponse, ModesResult, PullInResult, StaticResult
     from .table import Table
 
@@ -76,6 +77,28 @@ def response(result: FrequencyResponse, ax: Axes | None) -> Axes:
         ax.loglog(result.frequencies_hz, values, label=f"{name} [{result.units[name]}]")
     ax.set_xlabel("f [Hz]")
     ax.legend()
+    return ax
+
+
+def path(result: PathResult, ax: Axes | None) -> Axes:
+    """Every signal over the parameter of a path: solid where stable, dashed where unstable, with its limit points and bifurcations."""
+    ax = axes(ax)
+    # a segment is stable if both of its ends are
+    solid = result.stable[:-1] & result.stable[1:]
+    for k, (name, values) in enumerate(result.signals.items()):
+        label: str | None = f"{name} [{result.units[name]}]"
+        for shown, line in ((solid, "-"), (~solid, "--")):
+            bounds = np.flatnonzero(np.diff(np.concatenate([[False], shown, [False]])))
+            for first, last in bounds.reshape(-1, 2):
+                run = slice(first, last + 1)
+                ax.plot(result.values[run], values[run], line, color=f"C{k % 10}", label=label)
+                label = None
+        for points, marker in ((result.limit_points, "o"), (result.bifurcations, "s")):
+            at = [one.point for one in points]
+            ax.plot(result.values[at], values[at], marker, color=f"C{k % 10}")
+    ax.set_xlabel(f"{result.along} [{result.unit}]" if result.unit else result.along)
+    if result.signals:
+        ax.legend()
     return ax
 
 

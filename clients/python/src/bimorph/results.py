@@ -75,6 +75,8 @@ class StaticResult:
     """Motions without noticeable stiffness and without load; they are fixed at their undeformed position."""
     passed: tuple[StabilityLoss, ...] = ()
     """Losses of stability between rest and the load, in their order."""
+    permanent_strains: dict[str, float] = field(default_factory=dict)
+    """Permanent strain of each beam that can yield [1], negative if it is shorter; of a call with ``backbend``."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """Displacement [m] and rotation [rad] of every node; ``attrs["units"]`` has the units."""
@@ -97,7 +99,8 @@ class StaticResult:
         way = "pulled in below the load" if self.pulled_in else "snapped through or buckled below the load" if self.jumped else ""
         held = [f"fixed at its undeformed position: {motion}" for motion in self.free_motions]
         losses = [f"{loss.kind} at {loss.fraction:.4g} of the load ({loss.direction})" for loss in self.passed]
-        note = showing.note(self.estimated_error, [*filter(None, [way]), *losses, *held, *self.warnings])
+        strains = [f"permanent strain of {name}: {strain:.3e}" for name, strain in self.permanent_strains.items()]
+        note = showing.note(self.estimated_error, [*filter(None, [way]), *losses, *strains, *held, *self.warnings])
         return showing.table(["node", "x [m]", "y [m]", "rz [rad]"], rows, note)
 
 
@@ -252,24 +255,34 @@ class PullInResult:
     """False if no contact holds the part beyond pull-in."""
     warnings: tuple[str, ...] = ()
     """Warnings about the result."""
+    snaps_v: tuple[float, ...] = ()
+    """Voltages between pull-in and the highest one searched at which the closed part snaps further [V]; ``release_v`` is that beyond the last."""
+    release_before_snaps_v: float | None = None
+    """Release voltage from the state to which pull-in itself leads [V]; None if the part does not snap further, or stays closed."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """One row, by port; ``attrs["units"]`` has the units."""
-        columns = {"pull_in_v": [self.pull_in_v], "release_v": [math.nan if self.release_v is None else self.release_v]}
-        return showing.frame(columns, ("port", [self.port]), {"pull_in_v": "V", "release_v": "V"})
+        columns = self._columns()
+        return showing.frame(columns, ("port", [self.port]), dict.fromkeys(columns, "V"))
 
     def to_xarray(self) -> xarray.Dataset:
-        """The numbers of :meth:`to_pandas`, each with its unit in ``attrs["units"]``."""
-        columns = {"pull_in_v": [self.pull_in_v], "release_v": [math.nan if self.release_v is None else self.release_v]}
+        """The numbers of :meth:`to_pandas`, and ``snaps_v`` by number of the snap, each with its unit in ``attrs["units"]``."""
+        columns = self._columns()
         about = {"estimated_error": self.estimated_error, "held": int(self.held)}
-        return labelled.dataset(("port", [self.port], ""), columns, {"pull_in_v": "V", "release_v": "V"}, about)
+        found = labelled.dataset(("port", [self.port], ""), columns, dict.fromkeys(columns, "V"), about)
+        return found.assign(snaps_v=("snap", np.array(self.snaps_v, dtype=np.float64), {"units": "V"}))
+
+    def _columns(self) -> dict[str, list[float]]:
+        voltages = {"pull_in_v": self.pull_in_v, "release_v": self.release_v, "release_before_snaps_v": self.release_before_snaps_v}
+        return {name: [math.nan if volts is None else volts] for name, volts in voltages.items()}
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws the state of the gap at rising and at falling voltage."""
         return plots.pull_in(self, ax)
 
     def _repr_html_(self) -> str:
-        note = showing.note(self.estimated_error, self.warnings)
+        snaps = [f"snaps further at {volts:.6g} V" for volts in self.snaps_v]
+        note = showing.note(self.estimated_error, [*snaps, *self.warnings])
         return showing.table(["port", "pull-in [V]", "release [V]"], [(self.port, self.pull_in_v, self.release_v)], note)
 
 

@@ -104,6 +104,7 @@ class Checked:
             ("temperatures_k", answer.temperatures_k),
             ("currents_a", answer.currents_a),
             ("charges_c", answer.charges_c),
+            ("permanent_strains", answer.permanent_strains),
         ):
             self.names(what, (named.name for named in values))
             self.numbers(what, [named.value for named in values], len(values))
@@ -128,6 +129,27 @@ class Checked:
         self.names("signals", (signal.name for signal in answer.signals), signals)
         for signal in answer.signals:
             self.require(len(signal.re) == len(signal.im) == count, f"{signal.name}: expected {count} values")
+
+    def pull_in(self, answer: Any) -> None:
+        """Checks voltages of pull-in, release and snaps."""
+        self.names("port", [answer.port])
+        found = [answer.pull_in_v, answer.release_v, answer.release_before_snaps_v, *answer.snaps_v]
+        self.numbers("voltages", found, len(found))
+
+    def path(self, answer: Any, signals: Sequence[str]) -> None:
+        """Checks a path: a value of each signal at each point, and critical points among its points."""
+        count = len(answer.values)
+        self.numbers("values", answer.values, count)
+        self.require(len(answer.negative) == count, f"negative: expected {count} numbers, got {len(answer.negative)}")
+        self.names("signals", (signal.name for signal in answer.signals), signals)
+        for signal in answer.signals:
+            self.numbers(signal.name, signal.values, count)
+        for what, points in (("limit_points", answer.limit_points), ("bifurcations", answer.bifurcations)):
+            self.numbers(what, [one.value for one in points], len(points))
+            self.require(all(one.point < count for one in points), f"{what}: expected some of the {count} points")
+        self.names("nodes", (node.name for node in answer.last))
+        for node in answer.last:
+            self.numbers(node.name, (node.x, node.y, node.rz), 3)
 
     def samples(self, samples: Any, last: float, signals: int) -> None:
         """Checks samples after the time ``last`` [s]: a value of each signal at each time."""
