@@ -1,8 +1,7 @@
 //! Reports for people: aligned columns in engineering units.
 
 use bimorph::compile::CompiledModel;
-use bimorph::discretize::Scheme;
-use bimorph::results::plot::axis::quantity;
+pub(crate) use bimorph::export::model_options::model_options as options;
 use std::fmt::Write;
 
 /// Rows shown of a long list.
@@ -38,39 +37,4 @@ pub(crate) fn columns(header: &[&str], rows: &[Vec<String>]) -> String {
 /// The last line of a report: mesh, unknowns and error estimate.
 pub(crate) fn footing(compiled: &CompiledModel, unknowns: usize) -> String {
     format!("{unknowns} unknowns, {}", options(compiled))
-}
-
-/// By how much four digits may be off at most [1].
-const ROUNDED: f64 = 5e-4;
-
-/// The options of a model in one line.
-pub(crate) fn options(compiled: &CompiledModel) -> String {
-    let options = &compiled.options;
-    let mut text = format!("tolerance {:e}", options.errors().requested());
-    if options.errors().requested() < ROUNDED {
-        text += " (shown to four digits; --json has all)";
-    }
-    if let Some(band) = options.band {
-        let _ = write!(text, ", band {}", quantity(band, "Hz"));
-    }
-    let _ = write!(text, ", junctions {}", options.junctions.name());
-    if options.scheme != Scheme::E4 {
-        let _ = write!(text, ", scheme {}", options.scheme.name());
-    }
-    let words = [
-        (options.linear, ", linear"),
-        (options.undamped, ", undamped"),
-        (options.shear, ", shear"),
-        (options.rotary_inertia, ", rotary inertia"),
-    ];
-    for (on, word) in words {
-        if on {
-            text.push_str(word);
-        }
-    }
-    if let Some(error) = compiled.order.estimated_error {
-        let _ = write!(text, ", estimated error {error:.1e}");
-    }
-    text.push('\n');
-    text
 }

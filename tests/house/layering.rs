@@ -18,10 +18,10 @@ const CRATES: [(&str, &[&str]); 15] = [
     ("model", &["base", "structure", "multibody", "domains", "solve", "netlist"]),
     ("analysis", &["base", "structure", "multibody", "domains", "solve", "netlist", "model"]),
     ("device", &["base", "multibody", "domains", "solve", "netlist", "model", "analysis"]),
-    ("export", &["base", "multibody", "domains", "solve", "model", "analysis", "device"]),
+    ("export", &["base", "multibody", "domains", "solve", "results", "model", "analysis", "device"]),
     ("jobs", &["base", "structure", "netlist", "model", "analysis"]),
     ("cosim", &["structure", "results"]),
-    ("service", &["base", "solve", "netlist", "layout", "model", "analysis", "device", "jobs"]),
+    ("service", &["base", "solve", "netlist", "layout", "model", "analysis", "device", "export", "jobs"]),
 ];
 
 /// Modules of one crate from the bottom up: a module names modules before it alone. `*` is all that is not listed.

@@ -123,6 +123,16 @@ fn calls(wire: &Wire, [large, many]: &[String; 2]) -> Vec<(&'static str, Asking)
             path,
             proto::PathRequest { model: model(), along: "F".into(), to: 1e-3, points: 100_000, ..Default::default() }
         ),
+        call!(
+            "Export",
+            export,
+            proto::ExportRequest {
+                model: model(),
+                ports: (0..40).map(|k| proto::Scaled { name: format!("n{k}_9.y"), scale: None }).collect(),
+                count: 300,
+                ..Default::default()
+            }
+        ),
         call!("Modes", modes, proto::ModesRequest { model: model(), count: 300, voltages: vec![] }),
         call!("FrequencyResponse", frequency_response, response),
         ("Transient", motion),

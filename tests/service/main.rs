@@ -9,6 +9,7 @@ mod client_cancellation;
 mod device_channel;
 mod earlier_clients;
 mod echo;
+mod exports;
 mod fairness;
 mod faulty_server;
 mod fuzz;

@@ -59,6 +59,21 @@ fn of_models(model: &dyn Fn() -> String) -> Vec<Sound> {
         ),
         ("PullIn", proto::PullInRequest { model: model(), port: "drive".into(), max_v: 50.0 }.encode_to_vec()),
         (
+            "Export",
+            proto::ExportRequest {
+                model: model(),
+                ports: vec![proto::Scaled { name: "drive".into(), scale: Some(1.0) }],
+                signals: vec![proto::Scaled { name: "m.x".into(), scale: Some(1e6) }],
+                voltages: volts(),
+                to_hz: 1e6,
+                within: 1e-3,
+                count: 1,
+                name: "plate".into(),
+                ..Default::default()
+            }
+            .encode_to_vec(),
+        ),
+        (
             "Path",
             proto::PathRequest {
                 model: model(),

@@ -216,6 +216,21 @@ def models(model: bimorph.Model, session: bimorph.Session) -> dict[str, Case]:
                 "voltages": VOLTAGES,
             },
         ),
+        "Model.export": Case(
+            model.export,
+            {"voltages": {"drive": 2.0}},
+            {
+                "language": never,
+                "ports": either(empty_list, empty_mapping),
+                "signals": either(empty_list, empty_mapping),
+                "voltages": VOLTAGES,
+                "to": either(nothing, number(0.0, 1e12, open_low=True)),
+                "within": never,
+                "count": either(nothing, integer(1, 1000)),
+                "name": either(nothing, lambda value: text(value) and value.isidentifier()),
+                "nonlinear": lambda value: value is False,
+            },
+        ),
         "Model.transient": Case(
             model.transient,
             {"stop": 1e-6, "signals": ["m.x"], "points": 3},
@@ -508,7 +523,7 @@ def test_bad_arguments_are_rejected_by_name(cases: dict[str, Case]) -> None:
 MADE_BY_CALLS = {
     *("Conversion", "Diagnostic", "FrequencyResponse", "Model", "ModesResult", "NodeMotion", "Options", "Piece", "PullInResult", "Root"),
     *("Row", "Session", "Snapshot", "StaticResult", "Statistics", "Sweep", "SweepStatus", "Table", "Ticket", "TransientResult", "TrialReply"),
-    *("BatchRun", "ColumnStatistics", "CriticalPoint", "Crossing", "PathResult", "StabilityLoss", "Failure", "Fraction", "Histogram", "Run", "SweepStatistics"),
+    *("BatchRun", "ColumnStatistics", "CriticalPoint", "Crossing", "ExportResult", "PathResult", "StabilityLoss", "Failure", "Fraction", "Histogram", "Run", "SweepStatistics"),
     *("Violation", "aio", "local"),
 }
 """Public names without arguments of a user: what calls give, the package for asyncio, which passes its arguments on, and `local()`."""

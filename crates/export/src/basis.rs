@@ -5,7 +5,7 @@
 //! Yuan, Dickens, Earthquake Eng. Struct. Dyn. 10 (1982)).
 
 use super::ExportError;
-use super::mechanism::{InputExcitation, LinearizedMechanism, dot};
+use super::mechanism::{DENSE_WORK, InputExcitation, LinearizedMechanism, dot};
 use bimorph_analysis::AnalysisError;
 use bimorph_analysis::harmonic::modal;
 use bimorph_multibody::planar::Pose;
@@ -114,11 +114,14 @@ impl LinearizedMechanism<'_> {
         if m == 0 {
             return out; // every push is in the basis
         }
+        bimorph_base::budget::modes(m, || DENSE_WORK * m);
         let stiff = SymmetricEigen::new(DMatrix::from_fn(m, m, |i, j| {
+            bimorph_base::budget::check();
             0.5 * (dot(&columns[i], &forces[j]) + dot(&columns[j], &forces[i]))
         }));
         let kept: Vec<usize> = (0..m).filter(|&k| stiff.eigenvalues[k] > DEPENDENT).collect();
         let blend = |weights: &dyn Fn(usize) -> f64, of: &[Vec<Pose>]| -> Vec<Pose> {
+            bimorph_base::budget::check();
             let mut sum = vec![Pose::zeros(); self.q.len()];
             for (k, x) in of.iter().enumerate() {
                 let weight = weights(k);
@@ -133,7 +136,10 @@ impl LinearizedMechanism<'_> {
         if n == 0 {
             return out;
         }
-        let mass = DMatrix::from_fn(n, n, |i, j| model.mass_product(&upright[i], &upright[j]));
+        let mass = DMatrix::from_fn(n, n, |i, j| {
+            bimorph_base::budget::check();
+            model.mass_product(&upright[i], &upright[j])
+        });
         let heavy = SymmetricEigen::new((&mass + mass.transpose()) * 0.5);
         let mut order: Vec<usize> = (0..n).filter(|&k| heavy.eigenvalues[k] > 0.0).collect();
         order.sort_by(|&i, &j| heavy.eigenvalues[j].total_cmp(&heavy.eigenvalues[i]));

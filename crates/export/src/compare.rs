@@ -199,6 +199,7 @@ fn deviation(
     });
     let mut worst = (0.0, (String::new(), String::new(), 0.0));
     for (omega, exact) in grid.iter().zip(answers) {
+        bimorph_base::budget::check();
         let Some(y) = model.response(*omega) else { return (f64::INFINITY, worst.1) };
         let (parts, reach) = (all.parts(*omega), all.reach(*omega));
         for row in 0..r {
@@ -255,6 +256,7 @@ impl ExactDevice {
         let mut small = SmallSignal::default();
         self.device.linearize(self.token, omega, &mut small)?;
         let p = self.scales.len();
+        bimorph_base::budget::lay_out_matrix(2 * (p + self.signals.len()), p);
         Ok(DMatrix::from_fn(p + self.signals.len(), p, |row, q| {
             let ([re, im], scale) = match row.checked_sub(p) {
                 None => (small.admittance[row * self.opened + q], self.scales[row].answered),

@@ -12,20 +12,23 @@
 //! | `laws` | gap functions as text |
 //! | [`lumped_spice`], [`lumped_verilog_a`] | that model as a subcircuit and as a module |
 //! | [`names`], `parts` | pins, and parts of a subcircuit |
+//! | [`file`](mod@file), [`model_options`](mod@model_options) | a file with its header, and a summary of the model in it |
 //!
 //! Voltages across ports and currents into them have the scales of the ngspice plug-in ([`bimorph_device::scale`]), so
 //! that a subcircuit replaces an instance pin by pin.
 //!
-//! **Architecture invariant.** Below is [`bimorph_device`]. Nothing here writes files: exports are text.
+//! **Architecture invariant.** Below are [`bimorph_device`] and [`bimorph_results`]. Nothing here writes files: exports are text.
 
 pub mod basis;
 pub mod compare;
+pub mod file;
 mod laws;
 pub mod linear;
 pub mod lumped;
 pub mod lumped_spice;
 pub mod lumped_verilog_a;
 mod mechanism;
+pub mod model_options;
 pub mod names;
 mod parts;
 pub mod reduce;
@@ -54,6 +57,23 @@ pub struct ExportRequest {
     pub to: Option<f64>,
     /// Largest relative deviation from the exact small-signal answer [1].
     pub within: f64,
+}
+
+impl ExportRequest {
+    /// Largest relative deviation by default [1].
+    pub const WITHIN: f64 = 1e-4;
+    /// Smallest one that can be requested [1]; the largest is below 1.
+    pub const MIN_WITHIN: f64 = 1e-9;
+    /// Most modes that can be requested.
+    pub const MAX_COUNT: usize = 1000;
+}
+
+impl Default for ExportRequest {
+    /// Every electrical port, all at 0 V.
+    fn default() -> Self {
+        let (ports, signals, bias) = (Vec::new(), Vec::new(), Vec::new());
+        Self { ports, signals, bias, count: None, to: None, within: Self::WITHIN }
+    }
 }
 
 impl From<ReadoutError> for ExportError {

@@ -14,6 +14,9 @@ use bimorph_multibody::planar::Pose;
 use bimorph_solve::SolveError;
 use bimorph_solve::frequency::refined::{ROUNDING, Refined};
 
+/// Unknowns that a dense matrix counts as for each of its rows in the work of modes: its factorization has no check of the budget.
+pub(super) const DENSE_WORK: usize = 10;
+
 /// A unit of one input, at once or behind a lag: what it does to a mechanism that does not swing.
 #[derive(Debug)]
 pub(super) struct InputExcitation {
@@ -141,6 +144,8 @@ impl<'a> LinearizedMechanism<'a> {
                 }
             }
             for tau in taus {
+                // its force, its response, and the directions that are made of them
+                bimorph_base::budget::lay_out(8 * size_of::<Pose>() * system.bodies());
                 let of = |(h, slope): (&bimorph_domains::thermal::HeatConductor, &f64)| {
                     let own = Some(h.time_constant).filter(|tau| *tau > 0.0);
                     if own == tau { *slope } else { 0.0 }

@@ -11,7 +11,7 @@
 
 use super::basis::Basis;
 use super::linear::{HeatLag, ReducedMode, ReducedModel, ReducedPort};
-use super::mechanism::{InputExcitation, dot};
+use super::mechanism::{DENSE_WORK, InputExcitation, dot};
 pub use super::mechanism::{LinearizedMechanism, port_names};
 use bimorph_analysis::readout::ports::PortResponse;
 use bimorph_analysis::readout::signal::{Signal, SignalView};
@@ -50,6 +50,8 @@ impl LinearizedMechanism<'_> {
             self.ports.kinds.iter().zip(&self.across).map(|(kind, across)| PortScale::new(*kind, *across)).collect();
         let rows = self.rows();
         let (n, r, p) = (basis.lambda.len(), rows.len(), scales.len());
+        bimorph_base::budget::modes(n, || DENSE_WORK * n);
+        bimorph_base::budget::lay_out_matrix(r, 2 * (n + p));
         let answered = |row: usize| if row < p { scales[row].answered } else { self.shown[row - p].1.scale };
         let (shapes, lambda) = (&basis.shapes, &basis.lambda);
         let omega: Vec<f64> = lambda.iter().map(|l| l.sqrt()).collect();
@@ -77,6 +79,7 @@ impl LinearizedMechanism<'_> {
         }
         let still = (vec![0.0; self.drive.volts.len()], vec![0.0; self.rise.len()]);
         for k in 0..n {
+            bimorph_base::budget::check();
             drag.fill(Pose::zeros());
             add_damping(&system.model, &shapes[k], &mut drag);
             if let Some(loss) = &loss {
@@ -95,6 +98,7 @@ impl LinearizedMechanism<'_> {
         }
         let mut l = 0;
         for push in &self.pushes {
+            bimorph_base::budget::check();
             let (q, given) = (push.port, scales[push.port].given);
             let shares: Vec<f64> = shapes.iter().map(|x| dot(x, &push.force)).collect();
             for j in 0..n {

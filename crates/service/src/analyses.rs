@@ -1,10 +1,12 @@
 //! The calls that analyse a model, each bounded before anything is computed.
 
 use super::chunks::{MessageSink, send_transient};
+use super::convert::export::ExportReply;
 use super::convert::path::PathReply;
 use super::convert::{self, Violation, analysis as results};
 use super::limits::Limits;
 use super::models::NamedModel;
+use super::reply_size::bounded;
 use super::shared::{BimorphService, Reply};
 use super::work::{CancellingStream, guarded};
 use super::{proto, status};
@@ -145,6 +147,30 @@ impl BimorphService {
             let estimated_error = fitted.order.estimated_error;
             let path = PathReply { result, unit: models.unit().to_owned(), estimated_error };
             Ok(convert::path::result_to_wire(&path))
+        };
+        self.analyse(&id, job).await
+    }
+
+    /// A model for other simulators.
+    pub(super) async fn exported(&self, request: proto::ExportRequest) -> Reply<proto::ExportResponse> {
+        let (id, limits) = (request.model.clone(), self.0.limits.clone());
+        let asked = convert::export::request_from_wire(request).map_err(status::violation)?;
+        if let Some(count) = asked.model.count.filter(|count| *count > limits.modes) {
+            return Err(status::limit("modes", limits.modes, count));
+        }
+        let job = move |model: &NamedModel| {
+            let compiled = &model.in_circuit;
+            let ports = match asked.model.ports.len() {
+                0 => compiled.parts.system.electrics.ports,
+                ports => ports,
+            };
+            bounded(ports, asked.model.signals.len(), &limits)?;
+            let file = asked.write(compiled, model.title()).map_err(status::export)?;
+            if file.text.len() > limits.message_bytes {
+                return Err(status::limit("message_bytes", limits.message_bytes, file.text.len()));
+            }
+            let estimated_error = compiled.order.estimated_error;
+            Ok(convert::export::reply_to_wire(ExportReply { file, estimated_error }))
         };
         self.analyse(&id, job).await
     }

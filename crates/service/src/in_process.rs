@@ -126,7 +126,7 @@ impl InProcessServer {
                 "Open" open, "Linearize" linearize, "Snapshot" snapshot, "Restore" restore, "Fork" fork,
                 "KeepAlive" keep_alive, "Close" close,
                 "Static" r#static, "Modes" modes, "FrequencyResponse" frequency_response, "PullIn" pull_in,
-                "Path" path,
+                "Path" path, "Export" export,
                 "SubmitJob" submit_job, "GetJob" get_job, "ListJobs" list_jobs, "CancelJob" cancel_job,
                 "DeleteJob" delete_job, "SubmitSweep" submit_sweep, "CancelSweep" cancel_sweep,
             )

@@ -20,8 +20,8 @@
 //! | `monitoring`, [`metrics`], [`log`], `status` | endpoints, counters, log lines, errors as gRPC statuses |
 //! | [`in_process`] | the service without a network |
 //!
-//! **Architecture invariant.** Below are [`bimorph_device`], [`bimorph_jobs`] and [`bimorph_layout`]. Only [`convert`]
-//! knows messages and types of the library at once. No crate below knows gRPC.
+//! **Architecture invariant.** Below are [`bimorph_device`], [`bimorph_export`], [`bimorph_jobs`] and [`bimorph_layout`]. Only
+//! [`convert`] knows messages and types of the library at once. No crate below knows gRPC.
 
 #[cfg(feature = "server")]
 mod accounts;

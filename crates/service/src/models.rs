@@ -33,6 +33,11 @@ impl NamedModel {
         &self.description.id
     }
 
+    /// File name of the netlist, for titles.
+    pub(super) fn title(&self) -> &str {
+        self.bundle.root.rsplit(['/', '\\']).next().unwrap_or_default()
+    }
+
     /// The request that it was compiled from, as a message.
     pub(super) fn source(&self) -> proto::CompileRequest {
         proto::CompileRequest {

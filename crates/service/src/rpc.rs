@@ -191,6 +191,10 @@ impl proto::bimorph_server::Bimorph for BimorphService {
         self.traced(request.into_inner()).await
     }
 
+    async fn export(&self, request: Request<proto::ExportRequest>) -> Reply<proto::ExportResponse> {
+        self.exported(request.into_inner()).await
+    }
+
     type TransientStream = TransientStream;
 
     async fn transient(&self, request: Request<proto::TransientRequest>) -> Reply<Self::TransientStream> {

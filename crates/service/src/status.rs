@@ -7,6 +7,7 @@ use super::convert::{Violation, options};
 use bimorph_analysis::AnalysisError;
 use bimorph_base::budget::Stopped;
 use bimorph_device::DeviceError;
+use bimorph_export::ExportError;
 use bimorph_model::compile::CompileError;
 use bimorph_netlist::{Diagnostics, Severity};
 use tonic::codegen::http::HeaderMap;
@@ -78,6 +79,20 @@ pub(super) fn analysis_of(field: &str, error: AnalysisError) -> Status {
     match error {
         AnalysisError::BadRequest { what, detail } => violation(Violation::new(field, format!("{what}: {detail}"))),
         other => analysis(other),
+    }
+}
+
+/// A model that cannot be written.
+pub(super) fn export(error: ExportError) -> Status {
+    let message = error.to_string();
+    match error {
+        ExportError::Analysis(error) => analysis(error),
+        ExportError::Device(error) => device(&error),
+        ExportError::NoPorts | ExportError::Turning { .. } | ExportError::SameName { .. } => {
+            violation(Violation::new("ports", message))
+        }
+        ExportError::BadName { .. } => violation(Violation::new("name", message)),
+        _ => Status::failed_precondition(cut(message, MESSAGE_BYTES)),
     }
 }
 

@@ -28,6 +28,7 @@ from .errors import (
     Violation,
 )
 from .executors import sweep_on
+from .exports import ExportResult
 from .model import Model
 from .netlist import Netlist
 from .options import Options
@@ -65,6 +66,7 @@ __all__ = [
     "CriticalPoint",
     "Crossing",
     "Diagnostic",
+    "ExportResult",
     "Failure",
     "Fraction",
     "FrequencyResponse",

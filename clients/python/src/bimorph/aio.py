@@ -226,6 +226,7 @@ class Model:
     ac = _awaited(_model.Model.ac)
     pull_in = _awaited(_model.Model.pull_in)
     path = _awaited(_model.Model.path)
+    export = _awaited(_model.Model.export)
     transient = _awaited(_model.Model.transient)
     session = _awaited_as(Session, _model.Model.session, _session.Session.close)
     restore = _awaited_as(Session, _model.Model.restore, _session.Session.close)

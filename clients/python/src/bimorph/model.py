@@ -9,14 +9,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from . import arguments
+from . import arguments, exports, paths
 from .aloud import issue, of_mesh
 from .channel import Channel
 from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable, shown
 from .events import Until, crossing, events_to_wire, statistics, until_to_wire
+from .exports import ExportResult, Language, Scales
 from .messages import Voltages, by_name, diagnostic, estimate_of, named, setting_value
 from .naming import by_argument, each
-from .paths import Branch, PathResult, path_of, request_of
+from .paths import Branch, PathResult
 from .response import SPACINGS, response_of
 from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, StabilityLoss, StaticResult, TransientResult
 from .session import Session, opened_just_now
@@ -220,11 +221,41 @@ class Model:
         shape (``"plus"``), against it (``"minus"``), or goes straight on (``"stay"``). ``signals`` are those of ``transient``; the default is x and y
         of the node that moves most. ``points`` is the largest number of points, and ``voltages`` are those of other ports [V].
         """
-        request = request_of(self.id, along, (start, stop), signals, branch, points, voltages)
+        request = paths.request_of(self.id, along, (start, stop), signals, branch, points, voltages)
         answer = self._call("Path", request)
         self._checked("path").path(answer, request.signals)
         issue(answer.warnings)
-        return path_of(answer, along)
+        return paths.path_of(answer, along)
+
+    def export(
+        self,
+        language: Language = "spice",
+        *,
+        ports: Scales = (),
+        signals: Scales = (),
+        voltages: Voltages | None = None,
+        to: float | None = None,
+        within: float = 1e-4,
+        count: int | None = None,
+        name: str | None = None,
+        nonlinear: bool = False,
+    ) -> ExportResult:
+        """The model as text for other simulators: a SPICE subcircuit or a Verilog-A module, as ``bimorph export`` writes it.
+
+        By default it is the linear model about the equilibrium at ``voltages`` [V]. It deviates by at most ``within`` from the exact small-signal
+        response up to the frequency ``to`` [Hz], by default that of the second mode that ports and signals see. It has as many modes as that
+        requires, or exactly the ``count`` lowest. ``nonlinear`` is the whole model of rigid parts that only slide on linear springs, without an
+        operating point.
+
+        ``ports`` are those of the file in its order, by default all of the netlist: ``NODE.x``, ``NODE.vx``, ``BEAM.T`` and ``frame.ax`` too.
+        ``signals`` are shown as voltages. Both are names, or names with a scale in volts per unit, as ``{"yoke.y": 1e6}``. ``name`` is that of
+        the subcircuit or module.
+        """
+        request = exports.request_of(self.id, language, ports, signals, voltages, to, within, count, name, nonlinear)
+        answer = self._call("Export", request)
+        self._checked("export").export(answer)
+        issue(answer.warnings)
+        return exports.export_of(answer, language)
 
     def transient(
         self,

@@ -17,6 +17,7 @@ _RULES: dict[str, tuple[tuple[str, str], ...]] = {
     "Static": (_PORT,),
     "Modes": (_PORT, ("modes:", "count")),
     "FrequencyResponse": (_PORT, _SIGNAL, ("from:", "start"), ("to:", "stop")),
+    "Export": (_PORT, _SIGNAL, ("to_hz:", "to"), ("modes:|mode_work:", "count")),
     "Path": (_PORT, _SIGNAL, ("from:", "start"), ("to:", "stop"), ("message_bytes:", "points")),
     "Transient": (_PORT, _SIGNAL, ("stop_s:", "stop"), ("release_model", "release"), ("step_s:", "step")),
     "Open": ((_PORT[0], "ports"), _SIGNAL, ("noise band:", "noise_band")),

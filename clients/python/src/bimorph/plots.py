@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .batch import BatchRun
+    from .exports import ExportResult
     from .paths import PathResult
     from .results import FrequencyResponse, ModesResult, PullInResult, StaticResult
     from .table import Table
@@ -99,6 +100,18 @@ def path(result: PathResult, ax: Axes | None) -> Axes:
     ax.set_xlabel(f"{result.along} [{result.unit}]" if result.unit else result.along)
     if result.signals:
         ax.legend()
+    return ax
+
+
+def export(result: ExportResult, ax: Axes | None) -> Axes:
+    """Quality factor of every mode over its frequency; a vertical line for each undamped mode."""
+    ax = axes(ax)
+    damped = np.isfinite(result.quality)
+    ax.loglog(result.frequencies_hz[damped], result.quality[damped], "o")
+    for frequency in result.frequencies_hz[~damped]:
+        ax.axvline(frequency, linestyle="--")
+    ax.set_xlabel("f [Hz]")
+    ax.set_ylabel("Q")
     return ax
 
 

@@ -151,6 +151,17 @@ class Checked:
         for node in answer.last:
             self.numbers(node.name, (node.x, node.y, node.rz), 3)
 
+    def export(self, answer: Any) -> None:
+        """Checks a file: names of its pins, and numbers of each mode."""
+        self.names("pins", [answer.name, *answer.pins])
+        content = answer.WhichOneof("content")
+        self.require(content is not None, "content: expected a linear or a nonlinear model, got none")
+        linear = answer.linear
+        count = len(linear.frequencies_hz)
+        self.numbers("frequencies_hz", linear.frequencies_hz, count)
+        self.require(len(linear.quality) == len(linear.numbers) == count, f"quality: expected {count} numbers, got {len(linear.quality)}")
+        self.numbers("band", (linear.from_hz, linear.to_hz, linear.error), 3)
+
     def samples(self, samples: Any, last: float, signals: int) -> None:
         """Checks samples after the time ``last`` [s]: a value of each signal at each time."""
         times = samples.t

@@ -2,6 +2,7 @@
 
 use super::link::{ServerLink, is_broken, reason, unexpected};
 use super::reply_checks;
+use crate::convert::export::{self as exports, ExportReply};
 use crate::convert::path::{self as paths, PathReply};
 use crate::convert::{analysis as results, harmonic as harmonics, named, pairs};
 use crate::credentials::Access;
@@ -15,6 +16,7 @@ use bimorph_analysis::pull_in::PullInResult;
 use bimorph_analysis::statics::StaticResult;
 use bimorph_analysis::transient::{TransientResult, Until};
 use bimorph_analysis::{PortVoltages, ProgressCallback};
+use bimorph_export::file::FileRequest;
 use bimorph_model::compile::CompileOptions;
 use bimorph_netlist::Bundle;
 use proto::transient_event::Kind as EventKind;
@@ -189,6 +191,17 @@ impl Client {
         let reply = self.call(rpc.path(paths::request_to_wire(model, options)))?;
         self.checked(reply_checks::path(&options.signals, &reply))?;
         Ok(paths::result_from_wire(reply))
+    }
+
+    /// A model for other simulators.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn export(&mut self, model: &str, request: &FileRequest) -> Result<ExportReply, ClientError> {
+        let mut rpc = self.link.rpc.clone();
+        let reply = self.call(rpc.export(exports::request_to_wire(model, request)))?;
+        self.checked(reply_checks::export(&reply))?;
+        exports::reply_from_wire(reply).map_err(|violation| self.error(&unexpected(&violation.description)))
     }
 
     /// Transient analysis; `watch` receives the progress and may cancel it.

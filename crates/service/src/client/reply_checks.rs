@@ -246,6 +246,23 @@ pub(super) fn response(signals: &[String], reply: &proto::FrequencyResponseReply
     Ok(())
 }
 
+/// A model for other simulators: names of pins, and a quality of each mode. Its text is not for terminals and stays as it is.
+pub(super) fn export(reply: &proto::ExportResponse) -> Result<(), String> {
+    name("name", &reply.name)?;
+    reply.pins.iter().try_for_each(|pin| name("pin", pin))?;
+    match &reply.content {
+        Some(proto::export_response::Content::Linear(linear)) => {
+            let count = linear.frequencies_hz.len();
+            finite("frequencies_hz", &linear.frequencies_hz)?;
+            length("quality", linear.quality.len(), count)?;
+            length("numbers", linear.numbers.len(), count)?;
+            finite("band", &[linear.from_hz, linear.to_hz])
+        }
+        Some(proto::export_response::Content::Nonlinear(_)) => Ok(()),
+        None => Err("content: expected a linear or a nonlinear model".to_owned()),
+    }
+}
+
 /// Samples that follow those until `last` [s]: a value of each signal at each time.
 pub(super) fn samples(last: f64, signals: usize, samples: &proto::Samples) -> Result<(), String> {
     finite("t", &samples.t)?;

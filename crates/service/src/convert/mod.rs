@@ -5,6 +5,7 @@
 
 pub mod analysis;
 pub mod device;
+pub mod export;
 pub mod harmonic;
 pub mod model;
 pub mod options;

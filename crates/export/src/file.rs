@@ -1,0 +1,224 @@
+//! The file of an export as text, with a summary of the model in it: what the command writes and a server sends.
+
+use super::compare::{ModelFit, fit};
+use super::linear::SignalShown;
+use super::model_options::model_options;
+use super::names::{self, Pins};
+use super::{ExportError, ExportRequest, lumped, lumped_spice, lumped_verilog_a, spice, verilog_a};
+use bimorph_analysis::mesh::beyond;
+use bimorph_model::compile::CompiledModel;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// Longest line of a file, roughly [byte].
+const LINE: usize = 64;
+
+/// Language of a file.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum FileLanguage {
+    /// A SPICE subcircuit of R, L, C and linear sources; of a nonlinear model with B sources.
+    #[default]
+    Spice,
+    /// A Verilog-A module.
+    VerilogA,
+}
+
+/// Request for a file.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FileRequest {
+    /// Its language.
+    pub language: FileLanguage,
+    /// The whole nonlinear model, without an operating point, in place of the linear one about it.
+    pub nonlinear: bool,
+    /// Name of the subcircuit or module; none: that of the netlist.
+    pub name: Option<String>,
+    /// Ports, signals, operating point and band.
+    pub model: ExportRequest,
+}
+
+/// A file as text.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExportedFile {
+    /// The file.
+    pub text: String,
+    /// Name of its subcircuit or module.
+    pub name: String,
+    /// Its pins, in order: a positive and a negative one for each port, then one for each signal.
+    pub pins: Vec<String>,
+    /// Its model.
+    pub content: FileContent,
+    /// Limitations that the numbers do not show, as sentences.
+    pub warnings: Vec<String>,
+}
+
+/// Model of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FileContent {
+    /// The linear model about an operating point.
+    Linear(LinearSummary),
+    /// The whole nonlinear model.
+    Nonlinear {
+        /// Directions in which parts slide.
+        directions: usize,
+        /// Gaps.
+        gaps: usize,
+    },
+}
+
+/// Summary of a linear model.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LinearSummary {
+    /// Number of each mode among the undamped modes at the operating point, from 1; none for a direction of the static correction.
+    pub numbers: Vec<Option<usize>>,
+    /// Frequency of each mode [Hz].
+    pub frequencies_hz: Vec<f64>,
+    /// Quality factor of each mode [1]; infinite without damping.
+    pub quality: Vec<f64>,
+    /// Lags of heat.
+    pub lags: usize,
+    /// Largest relative deviation from the exact small-signal answer [1].
+    pub error: f64,
+    /// Band of that comparison [Hz].
+    pub band_hz: [f64; 2],
+    /// Mechanical unknowns of the full model.
+    pub unknowns: usize,
+}
+
+impl FileRequest {
+    /// The file of a model on the mesh that it has in a circuit. `source` is the name of its netlist.
+    ///
+    /// # Errors
+    /// See [`ExportError`].
+    pub fn write(&self, compiled: &Arc<CompiledModel>, source: &str) -> Result<ExportedFile, ExportError> {
+        let name = match &self.name {
+            Some(name) => names::checked(name)?.to_owned(),
+            None => names::from_file(source.rsplit_once('.').map_or(source, |(stem, _)| stem)),
+        };
+        if self.nonlinear { self.whole(compiled, source, name) } else { self.linear(compiled, source, name) }
+    }
+
+    fn linear(&self, compiled: &Arc<CompiledModel>, source: &str, name: String) -> Result<ExportedFile, ExportError> {
+        let fitted = fit(compiled, &self.model)?;
+        let model = &fitted.model;
+        let pins = Pins::of(&model.ports, &model.signals)?;
+        let warnings = self.warnings(compiled, &fitted);
+        let about = self.about(compiled, &fitted, source, &warnings);
+        let (rows, ports, modes, lags) = (model.rows(), model.ports.len(), model.modes.len(), model.lags.len());
+        let couplings = rows * (2 * ports + 2 * modes + lags) + modes * (modes + ports + lags);
+        bimorph_base::budget::lay_out(LINE.saturating_mul(couplings));
+        let text = match self.language {
+            FileLanguage::Spice => spice::write(&fitted, &pins, &name, &about),
+            FileLanguage::VerilogA => verilog_a::write(&fitted, &pins, &name, &about),
+        };
+        let content = FileContent::Linear(LinearSummary {
+            numbers: model.modes.iter().map(|mode| mode.number).collect(),
+            frequencies_hz: model.modes.iter().map(|mode| mode.omega / TAU).collect(),
+            quality: model.modes.iter().enumerate().map(|(j, mode)| mode.omega / model.damping[(j, j)]).collect(),
+            lags,
+            error: fitted.error,
+            band_hz: fitted.band,
+            unknowns: fitted.unknowns,
+        });
+        Ok(ExportedFile { text, name, pins: pins.all().map(str::to_owned).collect(), content, warnings })
+    }
+
+    /// The nonlinear model.
+    fn whole(&self, compiled: &CompiledModel, source: &str, name: String) -> Result<ExportedFile, ExportError> {
+        let model = lumped::lump(compiled, &self.model)?;
+        let pins = Pins::of(&model.ports, &model.signals)?;
+        let version = env!("CARGO_PKG_VERSION");
+        let (directions, gaps) = (model.coordinates.len(), model.gaps.len());
+        let mut about = vec![
+            format!("{source}, the whole nonlinear model, written by bimorph {version} export"),
+            format!("{directions} direction(s) in which parts slide, {gaps} gap(s)"),
+        ];
+        about.extend(model.signals.iter().map(meaning));
+        let rows = model.ports.len() + model.signals.len();
+        bimorph_base::budget::lay_out((2 * LINE).saturating_mul(rows * (model.ports.len() + directions + gaps)));
+        let text = match self.language {
+            FileLanguage::Spice => lumped_spice::write(&model, &pins, &name, &about),
+            FileLanguage::VerilogA => lumped_verilog_a::write(&model, &pins, &name, &about),
+        };
+        let content = FileContent::Nonlinear { directions, gaps };
+        Ok(ExportedFile { text, name, pins: pins.all().map(str::to_owned).collect(), content, warnings: Vec::new() })
+    }
+
+    /// Limitations of the file that its numbers do not show.
+    fn warnings(&self, compiled: &CompiledModel, fitted: &ModelFit) -> Vec<String> {
+        let mut warnings: Vec<String> = beyond(compiled.options.errors(), mesh_error(compiled)).into_iter().collect();
+        let within = self.model.within;
+        if fitted.error > within {
+            let (modes, error) = (fitted.model.modes.len(), fitted.error);
+            warnings.push(format!("{modes} modes deviate by {error:.1e}, more than --within {within:.1e}"));
+        }
+        if fitted.model.modes.is_empty() {
+            warnings.push(
+                "the file has no mode, and answers at once at every frequency: none that ports and signals see lies below --to; take a \
+                 higher --to, or where they see no motion at this operating point, a --port voltage or NODE.x with --ports or --signals"
+                    .to_owned(),
+            );
+        }
+        if fitted.jumped {
+            warnings.push(
+                "the part pulled in, snapped or buckled on the way to this operating point: the file is about where it went, \
+                 and knows no way back"
+                    .to_owned(),
+            );
+        }
+        warnings
+    }
+
+    /// The lines at the head of the file.
+    fn about(&self, compiled: &CompiledModel, fitted: &ModelFit, source: &str, warnings: &[String]) -> Vec<String> {
+        let version = env!("CARGO_PKG_VERSION");
+        let model = &fitted.model;
+        let bias: Vec<String> = self.model.bias.iter().map(|(n, v)| format!("{n}={v:e} V")).collect();
+        let at = if bias.is_empty() { "all ports at 0 V".into() } else { bias.join(", ") };
+        let (row, port, hertz) = &fitted.worst;
+        let mut about = vec![
+            format!("{source}, linear about the operating point, written by bimorph {version} export"),
+            format!("operating point: {at}"),
+            format!("full model: {} unknowns, {}", fitted.unknowns, model_options(compiled).trim_end()),
+            mesh_note(compiled),
+            format!(
+                "kept: {} modes, {} lags of heat, static correction for the rest",
+                model.modes.len(),
+                model.lags.len()
+            ),
+            format!(
+                "largest relative deviation from the full model, {:.3e} Hz to {:.3e} Hz at {} frequencies: {:.1e}",
+                fitted.band[0], fitted.band[1], fitted.compared, fitted.error
+            ),
+        ];
+        if fitted.error > 0.0 {
+            about.push(format!("  found at {hertz:.4e} Hz from port {port} to {row}"));
+        }
+        about.extend(warnings.iter().map(|warning| format!("warning: {warning}")));
+        about.extend(model.signals.iter().map(meaning));
+        about
+    }
+}
+
+/// Meaning of a volt of a signal.
+fn meaning(signal: &SignalShown) -> String {
+    format!("signal {}: 1 V is {:e} {}", signal.name, 1.0 / signal.scale, signal.unit)
+}
+
+/// The estimate of the mesh, or of its lowest mode where that is all that is known; a model without beams has no mesh.
+fn mesh_error(compiled: &CompiledModel) -> Option<f64> {
+    let lowest = || compiled.lowest.map(|lowest| lowest.error.abs());
+    if compiled.structure.beams.is_empty() { Some(0.0) } else { compiled.order.estimated_error.or_else(lowest) }
+}
+
+/// Estimated error of the full model by its mesh, as a sentence.
+pub fn mesh_note(compiled: &CompiledModel) -> String {
+    match mesh_error(compiled) {
+        Some(error) if compiled.options.band.is_none() && compiled.options.segments.is_none() => format!(
+            "the equilibrium and the lowest frequencies of the full model: estimated error {error:.1e} at most, from its mesh; --band HZ covers all below it"
+        ),
+        Some(error) => {
+            format!("frequencies of the full model: estimated error {error:.1e} at most in the band, from its mesh")
+        }
+        None => "frequencies of the full model: the error of its mesh is unknown; --band HZ estimates it".to_owned(),
+    }
+}
