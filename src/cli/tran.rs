@@ -28,7 +28,7 @@ use std::path::PathBuf;
 /// ones, where that takes some seconds at most.
 ///
 /// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C], GAP.gap
-/// [m], GAP.C [F], GAP.F [N]. JSON: "frequencies_hz": ascending [Hz]. "shapes": for each mode the displacement of every
+/// [m], GAP.C [F], GAP.F [N], PORT.q [C], PORT.i [A]. JSON: "frequencies_hz": ascending [Hz]. "shapes": for each mode the displacement of every
 /// node, the largest translation being 1. "residuals": approximate relative error of each shape. "estimated_errors":
 /// relative errors by the number of segments, one for each mode, signed about the drawing, null where unknown.
 /// "deflection_m": distance of their equilibrium from the drawing.

@@ -29,6 +29,7 @@ mod motion;
 mod near_limit_points;
 mod orientation;
 mod paths;
+mod port_currents;
 mod responses;
 mod rodas4;
 mod run_errors;

@@ -160,7 +160,7 @@ fn analyses_have_the_same_bits() {
 
     let options = TransientOptions {
         stop: 2e-5,
-        signals: vec!["m.x".into(), "m.vx".into()],
+        signals: vec!["m.x".into(), "m.vx".into(), "drive.i".into(), "drive.q".into()],
         points: 101,
         tol: 1e-4,
         voltages: volts.to_vec(),

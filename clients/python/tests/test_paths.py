@@ -140,6 +140,19 @@ def test_further_snaps(client: bimorph.Client, program: str, tmp_path: Path) -> 
     assert found.to_xarray()["snaps_v"].values.tolist() == list(found.snaps_v)
 
 
+def test_currents_into_ports_during_a_run(plate: bimorph.Model, program: str, tmp_path: Path) -> None:
+    """Charge and current at held voltages are those of the command; the integral of the current is the charge that came."""
+    found = plate.transient(5e-5, ["drive.i", "drive.q", "m.x"], points=401, voltages={"drive": 3.0})
+    document = documented(program, tmp_path, PLATE, "tran", "--stop", "50u", "--points", "401", "--signals", "drive.i,drive.q,m.x", "--port", "drive=3")
+    assert {name: column.tolist() for name, column in found.signals.items()} == document["signals"]
+    assert found.units == {"drive.i": "A", "drive.q": "C", "m.x": "m"}
+    came = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(found.t) * (found.signals["drive.i"][1:] + found.signals["drive.i"][:-1]))])
+    charge = found.signals["drive.q"] - found.signals["drive.q"][0]
+    assert np.allclose(came, charge, rtol=0.0, atol=1e-3 * np.ptp(charge))
+    with pytest.raises(bimorph.InvalidRequest, match="signals: .*PORT.i"):
+        plate.transient(5e-5, ["drove.i"], voltages={"drive": 3.0})
+
+
 def test_refusals(client: bimorph.Client, plate: bimorph.Model) -> None:
     """Unknown names, values beyond their range and too many points are rejected by the name of their argument."""
     for what, along, keywords in [

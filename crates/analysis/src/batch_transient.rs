@@ -12,7 +12,8 @@ use super::statics::source_vector;
 use super::transient::first_step::first_step;
 use super::transient::options::{TransientOptions, check};
 use super::transient::record::STABILITY_CHECKS;
-use crate::readout::signal::{Signal, SignalView};
+use crate::readout::run_signal::RunSignal;
+use crate::readout::signal::SignalView;
 use bimorph_domains::{Drive, Ramp};
 use bimorph_model::compile::CompiledModel;
 use bimorph_solve::baseline::SolverKind;
@@ -105,7 +106,7 @@ pub fn ends(
 
 /// Setup of a run of one variant.
 struct Setup {
-    signals: Vec<Signal>,
+    signals: Vec<RunSignal>,
     sources: Vec<f64>,
     rise: Vec<f64>,
 }
@@ -117,8 +118,9 @@ impl Setup {
         if compiled.joints.is_some() || formulation::of_run(compiled, options).0.formulation != Formulation::Compliant {
             return None;
         }
-        let signals = options.signals.iter().map(|name| Signal::find(compiled, name)).collect::<Result<_, _>>().ok()?;
         let sources = source_vector(compiled, &options.voltages).ok()?;
+        let find = |name: &String| RunSignal::find(compiled, name, &sources);
+        let signals = options.signals.iter().map(find).collect::<Result<_, _>>().ok()?;
         let rise = vec![0.0; compiled.parts.system.electrics.heating.heaters.len()];
         Some(Self { signals, sources, rise })
     }

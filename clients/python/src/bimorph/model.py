@@ -160,7 +160,7 @@ class Model:
         """Small-signal frequency response from ``start`` to ``stop`` [Hz], about the equilibrium at these port voltages [V].
 
         ``drive`` is ``NODE.fx``, ``NODE.fy`` [N], ``NODE.m`` [N·m], a port [V], ``BEAM.T`` (heat) [W], ``frame.ax``, ``frame.ay`` [m/s²]
-        or ``frame.wz`` [rad/s]. ``signals`` are those of ``transient``, and ``PORT.i``, the current into a port [A]; the default
+        or ``frame.wz`` [rad/s]. ``signals`` are those of nodes, beams and gaps, and ``PORT.i``, the current into a port [A]; the default
         is the driving-point response. ``points`` is the number of frequencies with equal quotients (``"log"``) or equal differences (``"linear"``),
         or their number in each ``"decade"``. Points are added near resonances and zeros unless ``even``. ``by_modes`` selects modal superposition
         with static correction, of the ``modes`` lowest modes or, with 0, of those up to twice ``stop``. Otherwise each frequency is solved exactly.
@@ -218,7 +218,7 @@ class Model:
 
         ``along`` is a port [V], a parameter of the netlist that sets loads, temperatures or stresses, or ``"loads"``, the factor on all dead loads.
         The path starts at the equilibrium at ``start``. Where it loses its stability at a bifurcation it follows the branch along the buckling
-        shape (``"plus"``), against it (``"minus"``), or goes straight on (``"stay"``). ``signals`` are those of ``transient``; the default is x and y
+        shape (``"plus"``), against it (``"minus"``), or goes straight on (``"stay"``). ``signals`` are those of nodes, beams and gaps; the default is x and y
         of the node that moves most. ``points`` is the largest number of points, and ``voltages`` are those of other ports [V].
         """
         request = paths.request_of(self.id, along, (start, stop), signals, branch, points, voltages)
@@ -276,6 +276,9 @@ class Model:
         progress: Callable[[float], object] | None = None,
     ) -> TransientResult:
         """Motion from 0 to ``stop`` [s] at constant port voltages [V], at ``points`` equally spaced times.
+
+        ``signals`` are those of nodes (``m.x``, ``m.vx``), beams (``b.T``) and gaps (``g.gap``, ``g.q``), and of ports the charge ``PORT.q`` [C] and the
+        current ``PORT.i`` [A], which runs along ``inputs`` do not have.
 
         ``release`` is a variant of the same netlist, whose static equilibrium is the initial state. By default the initial state is the undeformed
         model at rest. ``tol`` is the relative tolerance of a step [1], by default (0) that of the model; the mesh meets the smaller of the two.

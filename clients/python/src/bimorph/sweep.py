@@ -60,7 +60,7 @@ class Transient:
     stop: float
     """End time [s]."""
     signals: Sequence[str]
-    """Signals: ``NODE.x`` [m], ``NODE.vx`` [m/s], ``BEAM.T`` [K], ``GAP.gap`` [m], …"""
+    """Signals: ``NODE.x`` [m], ``NODE.vx`` [m/s], ``BEAM.T`` [K], ``GAP.gap`` [m], ``PORT.i`` [A], …"""
     voltages: Mapping[str, float] = field(default_factory=dict)
     """Port voltages held during the run [V]."""
 

@@ -8,7 +8,8 @@ use super::super::chart::error::SMALL;
 use super::super::statics::OperatingPoint;
 use super::super::step_error;
 use super::super::transient::TransientOptions;
-use crate::readout::signal::{Signal, SignalView};
+use crate::readout::run_signal::RunSignal;
+use crate::readout::signal::SignalView;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 
@@ -16,7 +17,7 @@ use bimorph_multibody::planar::Pose;
 pub(super) struct SignalAmplitudes<'a> {
     model: &'a CompiledModel,
     about: &'a OperatingPoint,
-    signals: Vec<Signal>,
+    signals: Vec<RunSignal>,
     still: Vec<Pose>,
     rise: Vec<f64>,
     volts: Vec<f64>,
@@ -28,7 +29,11 @@ impl<'a> SignalAmplitudes<'a> {
         Self {
             model,
             about,
-            signals: options.signals.iter().filter_map(|name| Signal::find(model, name).ok()).collect(),
+            signals: options
+                .signals
+                .iter()
+                .filter_map(|name| RunSignal::find(model, name, &about.sources).ok())
+                .collect(),
             still: vec![Pose::zeros(); about.q.len()],
             rise: vec![0.0; about.rise.len()],
             volts: vec![0.0; about.volts.len()],
@@ -39,7 +44,7 @@ impl<'a> SignalAmplitudes<'a> {
     pub(super) fn of(&self, shape: &[Pose], omega: f64) -> Vec<f64> {
         let state = SignalView { q: &self.about.q, v: &self.still, rise: &self.about.rise, volts: &self.about.volts };
         let moved = |q, v| SignalView { q, v, rise: &self.rise, volts: &self.volts };
-        let swing = |signal: &Signal| {
+        let swing = |signal: &RunSignal| {
             let place = signal.slope(self.model, &state, &moved(shape, &self.still));
             let rate = signal.slope(self.model, &state, &moved(&self.still, shape));
             place.hypot(omega * rate)
@@ -51,7 +56,7 @@ impl<'a> SignalAmplitudes<'a> {
     pub(super) fn sizes(&self, swings: &[Vec<f64>], options: &TransientOptions<'_>) -> Vec<f64> {
         let most: Vec<f64> =
             (0..self.signals.len()).map(|s| swings.iter().map(|of| of[s]).fold(0.0, f64::max)).collect();
-        let size = |(signal, own): (&Signal, &f64)| {
+        let size = |(signal, own): (&RunSignal, &f64)| {
             let unit = signal.unit();
             let beside = self.signals.iter().zip(&most).filter(|(other, _)| other.unit() == unit);
             let largest = beside.map(|(_, own)| *own).fold(0.0, f64::max);

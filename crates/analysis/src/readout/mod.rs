@@ -3,6 +3,7 @@
 //! | file | contents |
 //! |---|---|
 //! | [`signal`] | quantities of a state: displacements, rates, temperatures, charges, distances |
+//! | [`run_signal`] | quantities of a run: those of its states, charges on ports and currents into them |
 //! | [`ports`] | ports of the netlist, and those that any node, heated beam or the frame offers |
 //! | `small_signal` | the effect of a small change at a port on the forces, and on the quantities read from the motion that follows |
 //!
@@ -11,6 +12,7 @@
 mod error;
 mod port_kind;
 pub mod ports;
+pub mod run_signal;
 pub mod signal;
 pub mod small_signal;
 

@@ -4,6 +4,7 @@ use super::super::AnalysisError;
 use super::options::{TransientOptions, Until};
 use super::result::CrossingEvent;
 use crate::readout::ReadoutError;
+use crate::readout::run_signal::RunSignal;
 use crate::readout::signal::{Signal, SignalView};
 use bimorph_domains::Ramp;
 use bimorph_model::compile::CompiledModel;
@@ -14,14 +15,18 @@ use bimorph_solve::time::method::Motion;
 /// A signal whose crossings of a level are found.
 struct WatchedSignal {
     name: String,
-    signal: Signal,
+    signal: RunSignal,
     level: f64,
     contact: bool,
     detector: Detector,
 }
 
 /// The requested crossings, and the contact of every gap that has one.
-fn watched(compiled: &CompiledModel, options: &TransientOptions<'_>) -> Result<Vec<WatchedSignal>, AnalysisError> {
+fn watched(
+    compiled: &CompiledModel,
+    options: &TransientOptions<'_>,
+    sources: &[f64],
+) -> Result<Vec<WatchedSignal>, AnalysisError> {
     let watch = |name: String, signal, level, contact| WatchedSignal {
         name,
         signal,
@@ -29,21 +34,20 @@ fn watched(compiled: &CompiledModel, options: &TransientOptions<'_>) -> Result<V
         contact,
         detector: Detector::default(),
     };
-    let asked = options
-        .events
-        .iter()
-        .map(|(name, level)| Signal::find(compiled, name).map(|signal| watch(name.clone(), signal, *level, false)));
+    let asked = options.events.iter().map(|(name, level)| {
+        RunSignal::find(compiled, name, sources).map(|signal| watch(name.clone(), signal, *level, false))
+    });
     let system = &compiled.parts.system;
     let ending = match &options.until {
         Some(Until::Level(name, level)) if !options.events.contains(&(name.clone(), *level)) => {
-            Some(Signal::find(compiled, name).map(|signal| watch(name.clone(), signal, *level, false)))
+            Some(RunSignal::find(compiled, name, sources).map(|signal| watch(name.clone(), signal, *level, false)))
         }
         _ => None,
     };
     let touching =
         (0..system.members.len()).filter_map(|g| system.touching(g).map(|[touch, _]| (g, touch))).map(|(g, touch)| {
             let name = format!("{}.gap", compiled.parts.gap_names[g]);
-            Ok(watch(name, Signal::Distance(g), touch, true))
+            Ok(watch(name, RunSignal::State(Signal::Distance(g)), touch, true))
         });
     Ok(asked.chain(ending).chain(touching).collect::<Result<_, ReadoutError>>()?)
 }
@@ -71,16 +75,16 @@ pub(super) struct Crossings<'a> {
 }
 
 impl<'a> Crossings<'a> {
-    /// From the motion at the start, where the heaters are `rise` warmer [K].
+    /// From the motion at the start, where the heaters are `rise` warmer [K], at the held voltages of sources and gaps [V].
     ///
     /// # Errors
     /// See [`AnalysisError`].
     pub(super) fn start(
         (compiled, options): (&'a CompiledModel, &'a TransientOptions<'a>),
-        (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
+        (sources, (ramp, volts)): (&[f64], (&'a Ramp<'a>, &'a [f64])),
         (motion, rise): (&Motion, &[f64]),
     ) -> Result<Self, AnalysisError> {
-        let mut watched = watched(compiled, options)?;
+        let mut watched = watched(compiled, options, sources)?;
         for w in &mut watched {
             let view = SignalView { q: &motion.q, v: &motion.v, rise, volts };
             w.detector = Detector::new(w.signal.value(compiled, &view) - w.level);

@@ -1,8 +1,10 @@
 //! The error of a run's signals over time, from the error of its motion, see [`bimorph_solve::time::defect`].
 
 use super::super::chart::error::{SMALL, half_range};
+use super::super::statics::source_vector;
 use super::options::TransientOptions;
-use crate::readout::signal::{Signal, SignalView};
+use crate::readout::run_signal::RunSignal;
+use crate::readout::signal::SignalView;
 use bimorph_domains::Ramp;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
@@ -42,7 +44,7 @@ pub(super) struct ErrorLog<'a> {
     compiled: &'a CompiledModel,
     ramp: &'a Ramp<'a>,
     volts: &'a [f64],
-    signals: &'a [Signal],
+    signals: &'a [RunSignal],
     stride: f64,
     next: f64,
     exact: Motion,
@@ -59,7 +61,7 @@ impl<'a> ErrorLog<'a> {
     pub(super) fn start(
         (compiled, stop): (&'a CompiledModel, f64),
         (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
-        signals: &'a [Signal],
+        signals: &'a [RunSignal],
         motion: &Motion,
     ) -> Self {
         let system = &compiled.parts.system;
@@ -166,8 +168,22 @@ pub(crate) fn least(unit: &str, options: &TransientOptions<'_>, model: &Compiled
         "rad" | "K" => NEGLIGIBLE_MOTION,
         "m/s" => NEGLIGIBLE_MOTION * length / options.stop,
         "rad/s" => NEGLIGIBLE_MOTION / options.stop,
+        "A" => NEGLIGIBLE_MOTION * largest_current(options, model),
         _ => 0.0,
     }
+}
+
+/// Scale of the currents into ports [A]: that through resistances, and all charge within the run.
+fn largest_current(options: &TransientOptions<'_>, model: &CompiledModel) -> f64 {
+    let Ok(sources) = source_vector(model, &options.voltages) else { return 0.0 };
+    let system = &model.parts.system;
+    let electrics = &system.electrics;
+    let (mut rise, mut drive) = (vec![0.0; electrics.heating.heaters.len()], electrics.drive());
+    electrics.steady(&sources, &mut rise, &mut drive);
+    let rest = vec![Pose::zeros(); system.bodies()];
+    let charge: f64 = drive.volts.iter().enumerate().map(|(g, v)| (system.capacitance(g, &rest) * v).abs()).sum();
+    let through = |p: usize| sources.iter().enumerate().map(|(s, u)| electrics.conductance[(p, s)] * u).sum::<f64>();
+    (0..electrics.ports).map(|p| through(p).abs()).fold(charge / options.stop, f64::max)
 }
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ impl std::fmt::Display for Until {
 pub struct TransientOptions<'a> {
     /// End time [s].
     pub stop: f64,
-    /// Names of the signals wanted, see [`bimorph_device::SignalInfo`].
+    /// Names of the signals wanted, see [`RunSignal::find`](crate::readout::run_signal::RunSignal::find).
     pub signals: Vec<String>,
     /// Number of equally spaced output times, ends included.
     pub points: usize,

@@ -11,7 +11,7 @@ use super::folded_segments;
 use super::options::{TransientOptions, check};
 use super::result::{Counters, TransientResult};
 use super::samples::SampleRecorder;
-use crate::readout::signal::Signal;
+use crate::readout::run_signal::RunSignal;
 use bimorph_domains::Ramp;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::Body;
@@ -56,9 +56,9 @@ pub(crate) fn record(
 ) -> Result<TransientResult, AnalysisError> {
     check(options)?;
     let system = &compiled.parts.system;
-    let signals: Vec<Signal> =
-        options.signals.iter().map(|name| Signal::find(compiled, name)).collect::<Result<_, _>>()?;
     let sources = source_vector(compiled, &options.voltages)?;
+    let signals: Vec<RunSignal> =
+        options.signals.iter().map(|name| RunSignal::find(compiled, name, &sources)).collect::<Result<_, _>>()?;
     let (mut motion, rise, begun) = start(compiled, options)?;
     let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop);
     let mut drive = system.electrics.drive();
@@ -67,7 +67,7 @@ pub(crate) fn record(
     carrier.begin(&ramp, &mut motion)?;
 
     let (asked, held) = ((compiled, options), (&ramp, &volts[..]));
-    let mut crossings = Crossings::start(asked, held, (&motion, &rise))?;
+    let mut crossings = Crossings::start(asked, (&sources, held), (&motion, &rise))?;
     let mut samples = SampleRecorder::start(asked, held, &signals, sample, &motion);
     let mut log = options.estimate.then(|| ErrorLog::start((compiled, options.stop), held, &signals, &motion));
     let mut stability = StabilityMonitor::new(system);

@@ -1,7 +1,8 @@
 //! Signals at equally spaced times, between the steps of a run.
 
 use super::options::TransientOptions;
-use crate::readout::signal::{Signal, SignalView};
+use crate::readout::run_signal::RunSignal;
+use crate::readout::signal::SignalView;
 use bimorph_domains::Ramp;
 use bimorph_model::compile::CompiledModel;
 use bimorph_solve::dense::interpolate;
@@ -13,7 +14,7 @@ pub(super) struct SampleRecorder<'a> {
     options: &'a TransientOptions<'a>,
     ramp: &'a Ramp<'a>,
     volts: &'a [f64],
-    signals: &'a [Signal],
+    signals: &'a [RunSignal],
     report: &'a mut dyn FnMut(f64, &[f64]),
     /// Number of the next output time.
     next: usize,
@@ -32,7 +33,7 @@ impl<'a> SampleRecorder<'a> {
     pub(super) fn start(
         (compiled, options): (&'a CompiledModel, &'a TransientOptions<'a>),
         (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
-        signals: &'a [Signal],
+        signals: &'a [RunSignal],
         report: &'a mut dyn FnMut(f64, &[f64]),
         motion: &Motion,
     ) -> Self {

@@ -9,7 +9,7 @@ use super::shared_meshes::SharedMeshes;
 use super::spec::{SweepAnalysis, SweepSpec};
 use bimorph_analysis::mesh::on_given_mesh::{AnalysisResult, Assessment, assess, refine_and_assess};
 use bimorph_analysis::mesh::{self, MeshRequest};
-use bimorph_analysis::readout::signal::Signal;
+use bimorph_analysis::readout::run_signal::RunSignal;
 use bimorph_analysis::{AnalysisError, statics};
 use bimorph_base::budget;
 use bimorph_model::compile::{CompileError, CompileOptions, draw};
@@ -140,7 +140,7 @@ pub(super) fn check_names(
         SweepAnalysis::Static { outputs, .. } => outputs,
         SweepAnalysis::Transient { outputs, .. } => {
             let Ok(compiled) = drawn.compile() else { return Ok(()) };
-            let refusal = outputs.iter().find_map(|name| Signal::find(&compiled, name).err());
+            let refusal = outputs.iter().find_map(|name| RunSignal::find(&compiled, name, &[]).err());
             return match refusal {
                 Some(error) => refused("outputs", "signals of the netlist".to_owned(), error.to_string()),
                 None => Ok(()),

@@ -55,7 +55,7 @@ pub enum SweepAnalysis {
     Transient {
         /// End time [s].
         stop: f64,
-        /// Columns wanted, as signals of a transient: `NODE.x` [m], `NODE.vx` [m/s], `BEAM.T` [K], `GAP.gap` [m], ….
+        /// Columns wanted, as signals of a transient: `NODE.x` [m], `NODE.vx` [m/s], `BEAM.T` [K], `GAP.gap` [m], `PORT.i` [A], ….
         outputs: Vec<String>,
         /// Port voltages held during the run, by name [V].
         voltages: Vec<(String, f64)>,

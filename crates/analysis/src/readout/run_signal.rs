@@ -1,0 +1,101 @@
+//! Quantities of a run at held voltages, by name: signals of its states, and charges on ports and currents into them.
+//!
+//! With the voltages V of the gaps held, the charge on a port is Q = Σ rows·C(q)·V over the gaps, and the current into it is that through
+//! resistances, which is constant, and dQ/dt = Σ rows·(∂C/∂q·q̇)·V.
+
+use super::ReadoutError;
+use super::signal::{Signal, SignalView};
+use bimorph_model::compile::CompiledModel;
+
+/// A quantity of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RunSignal {
+    /// A quantity of a state.
+    State(Signal),
+    /// Charge on a port [C].
+    PortCharge(usize),
+    /// Current into a port [A], of which `conduction` is that through resistances.
+    PortCurrent {
+        /// Index of the port.
+        port: usize,
+        /// Current through resistances [A].
+        conduction: f64,
+    },
+}
+
+impl RunSignal {
+    /// Finds a quantity by name: a signal, see [`Signal::find`], or `PORT.q` or `PORT.i`. The sources have these voltages [V]; a caller that
+    /// needs no values gives none.
+    ///
+    /// # Errors
+    /// [`ReadoutError::UnknownSignal`] with what would be understood.
+    pub fn find(compiled: &CompiledModel, name: &str, sources: &[f64]) -> Result<Self, ReadoutError> {
+        let electrics = &compiled.parts.system.electrics;
+        let port = |quantity: &str| name.strip_suffix(quantity).and_then(|port| compiled.structure.port(port));
+        match Signal::find(compiled, name) {
+            Ok(signal) => Ok(Self::State(signal)),
+            Err(unknown) => {
+                if let Some(port) = port(".q") {
+                    return Ok(Self::PortCharge(port));
+                }
+                if let Some(port) = port(".i") {
+                    let conduction =
+                        sources.iter().enumerate().map(|(s, u)| electrics.conductance[(port, s)] * u).sum();
+                    return Ok(Self::PortCurrent { port, conduction });
+                }
+                Err(match unknown {
+                    ReadoutError::UnknownSignal { name, hint } if electrics.ports > 0 => {
+                        let ports = electrics.names[..electrics.ports].join(", ");
+                        ReadoutError::UnknownSignal {
+                            name,
+                            hint: format!("{hint}; or PORT.i, PORT.q, with the ports {ports}"),
+                        }
+                    }
+                    other => other,
+                })
+            }
+        }
+    }
+
+    /// Its unit.
+    pub fn unit(&self) -> &'static str {
+        match self {
+            Self::State(signal) => signal.unit(),
+            Self::PortCharge(_) => "C",
+            Self::PortCurrent { .. } => "A",
+        }
+    }
+
+    /// Its value in a state at held voltages.
+    pub fn value(&self, compiled: &CompiledModel, state: &SignalView<'_>) -> f64 {
+        let system = &compiled.parts.system;
+        match *self {
+            Self::State(signal) => signal.value(compiled, state),
+            Self::PortCharge(port) => of_gaps(compiled, port, |g| system.capacitance(g, state.q) * state.volts[g]),
+            Self::PortCurrent { port, conduction } => {
+                conduction + of_gaps(compiled, port, |g| system.capacitance_slope(g, state.q, state.v) * state.volts[g])
+            }
+        }
+    }
+
+    /// Its change with a change of the state, from one at rest.
+    pub fn slope(&self, compiled: &CompiledModel, state: &SignalView<'_>, change: &SignalView<'_>) -> f64 {
+        let system = &compiled.parts.system;
+        match *self {
+            Self::State(signal) => signal.slope(compiled, state, change),
+            Self::PortCharge(port) => of_gaps(compiled, port, |g| {
+                system.capacitance(g, state.q) * change.volts[g]
+                    + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
+            }),
+            Self::PortCurrent { port, .. } => {
+                of_gaps(compiled, port, |g| system.capacitance_slope(g, state.q, change.v) * state.volts[g])
+            }
+        }
+    }
+}
+
+/// Sum over the gaps that a port reaches, each with the fraction that it has of the port.
+fn of_gaps(compiled: &CompiledModel, port: usize, of: impl Fn(usize) -> f64) -> f64 {
+    let rows = &compiled.parts.system.electrics.gap_rows;
+    (0..rows.nrows()).filter(|&g| rows[(g, port)] != 0.0).map(|g| rows[(g, port)] * of(g)).sum()
+}
