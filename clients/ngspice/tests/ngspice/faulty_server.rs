@@ -71,6 +71,8 @@ liar! {
         modes(ModesRequest) -> ModesResponse;
         frequency_response(FrequencyResponseRequest) -> FrequencyResponseReply;
         pull_in(PullInRequest) -> PullInResponse;
+        path(PathRequest) -> PathResponse;
+        export(ExportRequest) -> ExportResponse;
         submit_job(SubmitJobRequest) -> Job;
         get_job(GetJobRequest) -> Job;
         list_jobs(ListJobsRequest) -> ListJobsResponse;
