@@ -4,6 +4,7 @@ use crate::command::{Bench, PLATE};
 use crate::serve_process::Server;
 use bimorph::netlist::Bundle;
 use bimorph::service::convert::model::bundle_to_wire;
+use bimorph::service::convert::run::pack;
 use bimorph::service::metrics::METRICS;
 use bimorph::service::proto;
 use proto::bimorph_client::BimorphClient;
@@ -102,6 +103,36 @@ fn metrics_and_readiness() {
         client.close(proto::CloseRequest { session }).await.expect("closes");
         while !is_ready(&channel).await {}
         assert_eq!(get(&metrics, "/ready").0, 200);
+    });
+}
+
+/// Steps of a run count as trials, and its call and those of a path by their names.
+#[test]
+fn runs_count_their_trials() {
+    let bench = Bench::new(&[]);
+    let (server, metrics) = start(&bench, "");
+    block_on(async {
+        let mut client = BimorphClient::new(channel(&server.address).await);
+        let bundle = Some(bundle_to_wire(&Bundle::from_text("plate.net", PLATE)));
+        let model = client.compile(proto::CompileRequest { bundle, options: None }).await.expect("compiles");
+        let model = model.into_inner().model.expect("a model").id;
+        client.path(proto::PathRequest { model: model.clone(), ..Default::default() }).await.expect_err("no values");
+        let open = proto::OpenRequest { model, ..Default::default() };
+        let session = client.open(open).await.expect("opens").into_inner().session;
+        let times: Vec<f64> = (1..=50).map(|k| 1e-7 * f64::from(k)).collect();
+        let lane = proto::RunLane { session, start: pack(&[0.0]), ..Default::default() };
+        let request =
+            proto::RunRequest { times: pack(&times), values: pack(&[2.0]), lanes: vec![lane], ..Default::default() };
+        let mut events = client.run(request).await.expect("runs").into_inner();
+        let mut trials = 0;
+        while let Some(event) = events.message().await.expect("an event") {
+            trials += event.ends.iter().map(|end| end.trials).sum::<u64>();
+        }
+        assert!(trials >= 50, "{trials}");
+        let text = get(&metrics, "/metrics").1;
+        assert_eq!(value(&text, "bimorph_trials_total"), trials as f64);
+        assert_eq!(value(&text, "bimorph_calls_total{call=\"Run\",code=\"Ok\"}"), 1.0);
+        assert_eq!(value(&text, "bimorph_calls_total{call=\"Path\",code=\"InvalidArgument\"}"), 1.0);
     });
 }
 

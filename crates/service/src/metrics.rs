@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 use tonic::Code;
 
 /// Calls that are counted by name; the last stands for all others.
-const CALLS: [&str; 34] = [
+const CALLS: [&str; 36] = [
     "Info",
     "Check",
     "Convert",
@@ -25,6 +25,8 @@ const CALLS: [&str; 34] = [
     "Modes",
     "FrequencyResponse",
     "PullIn",
+    "Path",
+    "Export",
     "Transient",
     "SubmitJob",
     "GetJob",
@@ -70,7 +72,7 @@ pub const METRICS: [Metric; 17] = [
     metric("bimorph_calls", "gauge", "Calls under way, streams among them."),
     metric("bimorph_calls_total", "counter", "Calls that ended, by name and gRPC code."),
     metric("bimorph_call_seconds", "histogram", "How long calls took, by name [s]."),
-    metric("bimorph_trials_total", "counter", "Questions on Trial streams."),
+    metric("bimorph_trials_total", "counter", "Requests on Trial streams, and trials of runs."),
     metric("bimorph_held_bytes", "gauge", "Bytes of requests that are held [byte]."),
     metric("bimorph_sessions", "gauge", "Sessions open."),
     metric("bimorph_models", "gauge", "Models kept."),
@@ -94,7 +96,7 @@ pub(super) struct Metrics {
     pub(super) classes: Vec<[AtomicU64; CLASSES.len()]>,
     /// Microseconds.
     pub(super) took: Vec<AtomicU64>,
-    /// Requests on Trial streams.
+    /// Requests on Trial streams, and trials of runs.
     pub(super) trials: AtomicU64,
 }
 

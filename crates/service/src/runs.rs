@@ -14,6 +14,7 @@ use bimorph_device::{Device, DeviceError, Token, TrialReply};
 use prost::Message;
 use std::collections::HashSet;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Response, Status};
@@ -92,11 +93,12 @@ impl BimorphService {
         let (outlet, receiver) = MessageSink::new(Arc::clone(&self.0));
         let mut outlet = outlet.with_place(place);
         let results = CancellingStream::new(ReceiverStream::new(receiver), budget.clone());
+        let server = Arc::clone(&self.0);
         tokio::task::spawn_blocking(move || {
             let _sending = sending;
             let mut sender = Sender::new(course.times.len().saturating_mul(lanes.len()));
             for lane in lanes {
-                if let Err(status) = lane.run(&course, &budget, &mut sender, &mut outlet) {
+                if let Err(status) = lane.run((&course, &budget), &mut sender, &mut outlet, &server.metrics.trials) {
                     outlet.send(Err(status));
                     return;
                 }
@@ -151,19 +153,21 @@ impl RunLane {
         })
     }
 
-    /// Runs it to its end.
+    /// Runs it to its end, and adds its trials to a count.
     fn run(
         mut self,
-        course: &RunContext,
-        budget: &Budget,
+        (course, budget): (&RunContext, &Budget),
         sender: &mut Sender,
         outlet: &mut MessageSink<proto::RunEvent>,
+        trials: &AtomicU64,
     ) -> Result<(), Status> {
         let session = Arc::clone(&self.session);
         session.begin_run(budget);
         loop {
-            let stepped = session.burst(budget, |device| self.burst(device, course, sender))?;
-            let failed = stepped.map_err(|error| status::device(&error))?;
+            let counted = self.run.trials();
+            let stepped = session.burst(budget, |device| self.burst(device, course, sender));
+            trials.fetch_add((self.run.trials() - counted) as u64, Ordering::Relaxed);
+            let failed = stepped?.map_err(|error| status::device(&error))?;
             let ends = failed.is_some() || self.done == course.times.len();
             if ends {
                 sender.ends(self.ended(failed.unwrap_or_default()));

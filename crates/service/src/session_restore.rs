@@ -8,8 +8,8 @@ use super::models::{NamedModel, check_size};
 use super::session::Session;
 use super::shared::ServerState;
 use super::status;
-use super::store::SessionStore;
 use super::store::writer::SessionWriter;
+use super::store::{ModelLoss, SessionStore};
 use std::sync::Arc;
 use tonic::Status;
 
@@ -98,7 +98,10 @@ impl ServerState {
     /// The model of a session that sleeps, compiled again where it is not here.
     fn model_of(&self, store: &SessionStore, id: &str) -> Result<Arc<NamedModel>, Status> {
         self.models.get(id).or_else(|_| {
-            let source = store.model(id).ok_or_else(|| status::not_found("model", id))?;
+            let source = store.model(id).map_err(|loss| match loss {
+                ModelLoss::Missing => status::not_found("model", id),
+                ModelLoss::Damaged => status::damaged("model", id, "compile it again, and open a new session"),
+            })?;
             let bundle = text::bundle_from_wire(source.bundle).map_err(status::violation)?;
             check_size(&bundle, &self.limits)?;
             let options = options_wire::options_from_wire(source.options).map_err(status::violation)?;

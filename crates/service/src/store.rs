@@ -3,11 +3,12 @@
 //! Each session has two files, `sessions/ID.0` and `ID.1`, written in turn: when one is being written, the other holds
 //! what was accepted before, so that whatever moment the server ends at, one of them is whole. A file holds the last
 //! two accepted states, as a client may not have heard of the last one. Beside them `models/ID` holds each netlist with
-//! its options, from which the model is compiled again; `jobs` has files of its own (`jobs::folder`). Only the owner
+//! its options and a checksum, from which the model is compiled again; `jobs` has files of its own (`jobs::folder`). Only the owner
 //! can read any of it.
 //!
 //! The folder is bounded: two files a session, and `state_bytes` in all, jobs among them.
 
+mod model_record;
 pub(super) mod record;
 pub mod scan;
 pub(super) mod writer;
@@ -15,7 +16,6 @@ pub(super) mod writer;
 use super::byte_quota::ByteQuota;
 use super::disk::{Disk, private};
 use super::proto;
-use prost::Message;
 use record::SessionRecord;
 use scan::{StoreError, StoreScan};
 use std::collections::BTreeMap;
@@ -49,6 +49,15 @@ struct StoredSession {
     model: String,
     /// Since when it waits for a request; `None`: it is in use.
     asleep: Option<Instant>,
+}
+
+/// Why there is no netlist of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ModelLoss {
+    /// There is no file that can be read.
+    Missing,
+    /// The file is damaged, or of another version.
+    Damaged,
 }
 
 /// A session that waits for a request.
@@ -229,7 +238,7 @@ impl SessionStore {
     fn keep_model(&self, id: &str, source: &proto::CompileRequest) -> io::Result<()> {
         let models = self.folder.join("models");
         let path = models.join(id);
-        let bytes = source.encode_to_vec();
+        let bytes = model_record::write(source);
         // one that the machine left half written when it lost its power is not what it should be
         if fs::read(&path).is_ok_and(|held| held == bytes) {
             return Ok(());
@@ -247,9 +256,12 @@ impl SessionStore {
     }
 
     /// The netlist and the options of a model.
-    pub(super) fn model(&self, id: &str) -> Option<proto::CompileRequest> {
-        let bytes = fs::read(self.folder.join("models").join(id)).ok()?;
-        proto::CompileRequest::decode(&*bytes).ok()
+    ///
+    /// # Errors
+    /// [`ModelLoss`].
+    pub(super) fn model(&self, id: &str) -> Result<proto::CompileRequest, ModelLoss> {
+        let bytes = fs::read(self.folder.join("models").join(id)).map_err(|_| ModelLoss::Missing)?;
+        model_record::read(&bytes).ok_or(ModelLoss::Damaged)
     }
 
     /// Writes a file that is to have so many bytes, where there is room for them; counted is what it has in the end, also when
