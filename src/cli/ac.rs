@@ -35,7 +35,7 @@ pub(crate) struct AcCommand {
     #[arg(long, short = 'd', value_name = "NAME")]
     drive: String,
 
-    /// Output signals, PORT.i among them: a,b or repeated [default: the output at the driven place itself]
+    /// Output signals, PORT.i among them, or sums such as top.C-0.5*bot.C: a,b or repeated [default: the output at the driven place itself]
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 

@@ -42,7 +42,7 @@ pub(crate) struct PathCommand {
     #[arg(long, value_name = "NAME=FROM:TO", value_parser = way)]
     along: PathRange,
 
-    /// Signals wanted: a,b or repeated [default: x and y of the node that moves most]
+    /// Signals wanted, or sums such as top.C-0.5*bot.C: a,b or repeated [default: x and y of the node that moves most]
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 

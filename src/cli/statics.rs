@@ -5,11 +5,14 @@ use super::model::{Context, JsonMap, ModelArgs, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::ModelChoice;
 use super::{progress, report, value};
-use bimorph::analysis::BeamMotions;
 use bimorph::analysis::frame::{frame, frame_statics};
 use bimorph::analysis::mesh::static_backbent;
 use bimorph::analysis::mesh::static_fitted;
+use bimorph::analysis::readout::ReadoutError;
+use bimorph::analysis::readout::expression::Expression;
+use bimorph::analysis::static_outputs::StaticOutput;
 use bimorph::analysis::statics::{NodeMotion, StaticResult};
+use bimorph::analysis::{AnalysisError, BeamMotions};
 use bimorph::compile::CompiledModel;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::mechanism::{self, DisplacementScale, MechanismFigure};
@@ -43,7 +46,7 @@ pub(crate) struct StaticCommand {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// Show these only, in the text and in CSV and raw files (JSON documents are whole): NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i, PORT.q; a,b or repeated
+    /// Show these only, in the text and in CSV and raw files (JSON documents are whole): NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i, PORT.q, or sums such as a.x-0.5*b.x; a,b or repeated
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 
@@ -138,22 +141,22 @@ impl StaticCommand {
 /// One row: every quantity of the operating point in a column of its own, or the requested ones.
 fn table(title: &str, result: &StaticResult, names: &[String]) -> Result<Table, Failure> {
     let mut table = Table::new(title, "Operating Point");
-    let asked = |column: &str| names.is_empty() || names.iter().any(|name| name == column);
+    for name in names {
+        let found = sum(result, name)?;
+        table.push_real(name, found.unit(), vec![found.value()])?;
+    }
+    if !names.is_empty() {
+        return Ok(table);
+    }
     for (name, motion) in &result.nodes {
         for (suffix, unit, value) in [("x", "m", motion.x), ("y", "m", motion.y), ("rz", "rad", motion.rz)] {
-            let column = format!("{name}.{suffix}");
-            if asked(&column) {
-                table.push_real(&column, unit, vec![value])?;
-            }
+            table.push_real(&format!("{name}.{suffix}"), unit, vec![value])?;
         }
     }
     let lists = [(&result.temperatures_k, "T", "K"), (&result.currents_a, "i", "A"), (&result.charges_c, "q", "C")];
     for (list, suffix, unit) in lists {
         for (name, value) in list {
-            let column = format!("{name}.{suffix}");
-            if asked(&column) {
-                table.push_real(&column, unit, vec![*value])?;
-            }
+            table.push_real(&format!("{name}.{suffix}"), unit, vec![*value])?;
         }
     }
     Ok(table)
@@ -189,27 +192,20 @@ pub(crate) fn beams(curves: &BeamMotions) -> Vec<Vec<NodeDisplacement>> {
 
 /// The requested signals, one a line.
 fn chosen(result: &StaticResult, names: &[String]) -> Result<String, Failure> {
-    let listed = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
-    let one = |signal: &String| {
-        let (name, part) = signal.rsplit_once('.')?;
-        let node = || result.nodes.iter().find(|(n, _)| n == name).map(|(_, m)| *m);
-        Some(match part {
-            "x" => quantity(node()?.x, "m"),
-            "y" => quantity(node()?.y, "m"),
-            "rz" => quantity(node()?.rz, "rad"),
-            "T" => quantity(listed(&result.temperatures_k, name)?, "K"),
-            "i" => quantity(listed(&result.currents_a, name)?, "A"),
-            "q" => quantity(listed(&result.charges_c, name)?, "C"),
-            _ => return None,
-        })
-    };
     let row = |signal: &String| {
-        let shown = one(signal)
-            .ok_or_else(|| Failure::bad("--signals", "NODE.x, .y or .rz, BEAM.T, PORT.i or .q", signal.clone()))?;
-        Ok(vec![signal.clone(), shown])
+        let found = sum(result, signal)?;
+        Ok(vec![signal.clone(), quantity(found.value(), found.unit())])
     };
     let rows = names.iter().map(row).collect::<Result<Vec<_>, Failure>>()?;
     Ok(report::columns(&["signal", "value"], &rows) + "\n")
+}
+
+/// A number of the result, or a sum of such numbers.
+fn sum(result: &StaticResult, text: &str) -> Result<Expression<StaticOutput>, Failure> {
+    Expression::of_static(result, text).map_err(|error| match error {
+        sum @ ReadoutError::BadExpression { .. } => AnalysisError::from(sum).into(),
+        _ => Failure::bad("--signals", "NODE.x, .y or .rz, BEAM.T, PORT.i or .q, or a sum of these", text.to_owned()),
+    })
 }
 
 /// How the equilibrium came about.

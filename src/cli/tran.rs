@@ -67,7 +67,7 @@ pub(crate) struct TransientCommand {
     #[arg(long, default_value_t = TRAN_POINTS.count())]
     points: usize,
 
-    /// Signals wanted: a,b or repeated [default: x and y of every free node]
+    /// Signals wanted, or sums such as top.C-0.5*bot.C: a,b or repeated [default: x and y of every free node]
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 

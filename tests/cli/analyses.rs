@@ -137,6 +137,37 @@ fn transient_methods() {
     }
 }
 
+/// Sums of signals stand in columns beside their terms in `static`, `tran` and both kinds of sweep; others are rejected before anything is computed.
+#[test]
+fn sums_of_signals() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    for words in [
+        "static c.net --set F=1u",
+        "sweep c.net --param F=1u",
+        "sweep c.net --param F=1u --analysis tran --stop 1u",
+        "tran c.net --set F=1u --stop 1u --points 2",
+    ] {
+        let file = bench.path("found.csv");
+        let ran = bench.run(&format!("{words} --signals b.y,b.x,3*b.y-0.5*b.x --out found.csv"));
+        assert_eq!(ran.status, 0, "{words}: {}", ran.stderr);
+        let table = std::fs::read_to_string(&file).expect("a table");
+        let mut lines = table.lines().filter(|line| !line.starts_with('#'));
+        let place = |head: &str, name: &str| head.split(',').position(|column| column == format!("{name} [m]"));
+        let head = lines.next().expect("a head");
+        let cells: Vec<&str> = lines.last().expect("a row").split(',').collect();
+        let [y, x, sum] = ["b.y", "b.x", "3*b.y-0.5*b.x"].map(|name| {
+            let at = place(head, name).unwrap_or_else(|| panic!("{words}: no {name} in {head}"));
+            cells[at].parse::<f64>().expect("a number")
+        });
+        assert!(y != 0.0);
+        assert_relative_eq!(sum, 3.0 * y - 0.5 * x, max_relative = 1e-12);
+        let ran = bench.run(&format!("{words} --signals b.y-b.rz --out other.csv"));
+        assert!(ran.status != 0 && ran.stderr.contains("b.y [m] and b.rz [rad]"), "{words}: {}", ran.stderr);
+        let ran = bench.run(&format!("{words} --signals b.y-c.y --out other.csv"));
+        assert!(ran.status != 0 && ran.stderr.contains("c.y"), "{words}: {}", ran.stderr);
+    }
+}
+
 /// Shards of a sweep put together are the whole sweep, to the byte, on any number of threads.
 #[test]
 fn sweep() {

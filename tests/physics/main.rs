@@ -13,6 +13,7 @@ mod eigenvalues;
 mod electrothermal;
 mod examples;
 mod excited_modes;
+mod expressions;
 mod formulations;
 mod free_coordinates;
 mod gaps;

@@ -153,6 +153,27 @@ def test_currents_into_ports_during_a_run(plate: bimorph.Model, program: str, tm
         plate.transient(5e-5, ["drove.i"], voltages={"drive": 3.0})
 
 
+def test_sums_of_signals(plate: bimorph.Model, client: bimorph.Client) -> None:
+    """A sum has the values of its terms in runs, paths, responses, sessions and sweeps, and its text as its name."""
+    text, names = "m.x-0.25*m.x", ["m.x", "m.x-0.25*m.x"]
+
+    def holds(columns: Any) -> None:
+        assert np.allclose(columns[text], 0.75 * np.asarray(columns["m.x"]), rtol=1e-12, atol=0.0)
+
+    run = plate.transient(2e-5, names, points=11, voltages={"drive": 3.0}, events=[(text, 1e-9)])
+    holds(run.signals)
+    assert run.units[text] == "m"
+    assert run.events[0].signal == text
+    holds(plate.path("drive", 0.0, 2.0, signals=names).signals)
+    holds(plate.ac("m.fx", names, start=1e3, stop=1e5, points=11).signals)
+    with plate.session(names) as session:
+        holds(session.operating_point({"drive": 3.0}).outputs)
+    table = client.sweep(bimorph.Netlist.text(PLATE, "plate.net"), {"k": [1.0, 2.0]}, bimorph.Static(names, {"drive": 1.0}))
+    holds({name: table.column(name) for name in names})
+    with pytest.raises(bimorph.InvalidRequest, match="same unit"):
+        plate.transient(2e-5, ["m.x-m.vx"])
+
+
 def test_refusals(client: bimorph.Client, plate: bimorph.Model) -> None:
     """Unknown names, values beyond their range and too many points are rejected by the name of their argument."""
     for what, along, keywords in [

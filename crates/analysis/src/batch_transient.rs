@@ -12,6 +12,7 @@ use super::statics::source_vector;
 use super::transient::first_step::first_step;
 use super::transient::options::{TransientOptions, check};
 use super::transient::record::STABILITY_CHECKS;
+use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use crate::readout::signal::SignalView;
 use bimorph_domains::{Drive, Ramp};
@@ -106,7 +107,7 @@ pub fn ends(
 
 /// Setup of a run of one variant.
 struct Setup {
-    signals: Vec<RunSignal>,
+    signals: Vec<Expression<RunSignal>>,
     sources: Vec<f64>,
     rise: Vec<f64>,
 }
@@ -119,7 +120,7 @@ impl Setup {
             return None;
         }
         let sources = source_vector(compiled, &options.voltages).ok()?;
-        let find = |name: &String| RunSignal::find(compiled, name, &sources);
+        let find = |name: &String| Expression::of_run(compiled, name, &sources);
         let signals = options.signals.iter().map(find).collect::<Result<_, _>>().ok()?;
         let rise = vec![0.0; compiled.parts.system.electrics.heating.heaters.len()];
         Some(Self { signals, sources, rise })

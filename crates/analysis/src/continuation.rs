@@ -3,6 +3,7 @@
 use super::contact_range::{comb_beyond_reported, within_contact_range};
 use super::statics::{OperatingPoint, beam_motions, node_motions, notes_at, operating_point, source_vector, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, ProgressCallback};
+use crate::readout::expression::Expression;
 use crate::readout::signal::{Signal, SignalView};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
@@ -32,7 +33,7 @@ pub struct ContinuationRequest<'a> {
     pub to: f64,
     /// Voltages held on the other ports, by name [V].
     pub voltages: Vec<(String, f64)>,
-    /// Signals wanted along the path, see [`Signal::find`].
+    /// Signals wanted along the path, see [`Expression::of_state`].
     pub signals: Vec<String>,
     /// Treatment of a bifurcation at which the path loses its stability.
     pub branch: Branch,
@@ -94,8 +95,8 @@ pub fn trace(
             format!("what grows has to go from one value to another, not from {} to {}", request.from, request.to),
         ));
     }
-    let signals: Vec<Signal> =
-        request.signals.iter().map(|name| Signal::find(compiled, name)).collect::<Result<_, _>>()?;
+    let signals: Vec<Expression<Signal>> =
+        request.signals.iter().map(|name| Expression::of_state(compiled, name)).collect::<Result<_, _>>()?;
     let mut volts = [request.voltages.clone(), request.voltages.clone()];
     let mut last = compiled;
     match request.input {

@@ -28,6 +28,7 @@ pub mod readout;
 mod rotary_inertia_error;
 mod sensitivity;
 mod stability;
+pub mod static_outputs;
 pub mod statics;
 pub mod step_error;
 pub mod transient;
@@ -126,6 +127,9 @@ impl From<ReadoutError> for AnalysisError {
         match error {
             ReadoutError::UnknownSignal { name, hint } => {
                 Self::BadRequest { what: format!("signal \"{name}\""), detail: hint }
+            }
+            ReadoutError::BadExpression { text, detail } => {
+                Self::BadRequest { what: format!("signal \"{text}\""), detail }
             }
             other => Self::BadRequest { what: "ports".into(), detail: other.to_string() },
         }

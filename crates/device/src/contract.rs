@@ -173,7 +173,7 @@ pub enum DeviceError {
 impl From<ReadoutError> for DeviceError {
     fn from(error: ReadoutError) -> Self {
         match error {
-            ReadoutError::UnknownSignal { ref name, .. } => {
+            ReadoutError::UnknownSignal { ref name, .. } | ReadoutError::BadExpression { text: ref name, .. } => {
                 Self::UnknownSignal { name: name.clone(), hint: error.to_string() }
             }
             ReadoutError::UnknownPort { name, available } => Self::UnknownPort { name, available },

@@ -89,17 +89,17 @@ impl DeviceSession {
     fn seen_by(&self, compiled: &CompiledModel, system: &System, state: &Snapshot, i: usize) -> OutputGradient {
         let mut seen = OutputGradient::nothing(system.bodies());
         let signal = match i.checked_sub(self.ports.len()) {
-            Some(signal) => self.signals[signal],
+            Some(signal) => self.signals[signal].clone(),
             None => match self.ports.answers[i] {
                 PortResponse::Current => {
                     seen.change = self.charge_seen(system, state, self.ports.sources[i]);
                     return seen;
                 }
-                PortResponse::Motion(signal) => signal,
+                PortResponse::Motion(signal) => signal.into(),
                 PortResponse::Rise(_) | PortResponse::Nothing => return seen,
             },
         };
-        if matches!(signal, Signal::Temperature(_) | Signal::Prescribed(_)) {
+        if signal.quantities().all(|one| matches!(one, Signal::Temperature(_) | Signal::Prescribed(_))) {
             return seen;
         }
         let (heaters, gaps) = (state.rise.len(), self.drive.volts.len());

@@ -4,7 +4,8 @@
 use super::DeviceError;
 use super::session::DeviceSession;
 use super::states::Snapshot;
-use bimorph_analysis::readout::signal::{self, Signal, SignalView};
+use bimorph_analysis::readout::expression::Expression;
+use bimorph_analysis::readout::signal::{self, SignalView};
 use bimorph_domains::{Domain, MaterialPoint};
 use bimorph_model::compile::CompiledModel;
 
@@ -64,7 +65,7 @@ impl DeviceSession {
                 .reduce(f64::max)
                 .ok_or_else(|| none("the netlist has no heated beam")),
             _ => {
-                let signal = Signal::find(compiled, name).map_err(|e| none(&e.to_string()))?;
+                let signal = Expression::of_state(compiled, name).map_err(|e| none(&e.to_string()))?;
                 Ok(signal.value(compiled, &SignalView { q: &state.q, v: &state.v, rise: &state.rise, volts: &volts }))
             }
         }

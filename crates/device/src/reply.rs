@@ -177,7 +177,7 @@ impl DeviceSession {
                     _ => SteppingRule::Line,
                 };
                 let floor = |n: usize| match n.checked_sub(signals) {
-                    None => of_signal(&self.signals[n]),
+                    None => self.signals[n].bound(of_signal),
                     Some(port) => match &self.ports.answers[port] {
                         PortResponse::Current => charge(reply.dq_dv[port * (ports + 1)], request.voltages[port]),
                         PortResponse::Motion(signal) => of_signal(signal),

@@ -7,6 +7,7 @@ use super::output_gradient::{OutputGradient, surroundings};
 use super::phase_error::PhaseErrorMonitor;
 use super::states::{Snapshot, States};
 use super::{Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, Token, Trial};
+use bimorph_analysis::readout::expression::Expression;
 use bimorph_analysis::readout::ports::OpenedPorts;
 use bimorph_analysis::readout::signal::Signal;
 use bimorph_analysis::transient::first_step;
@@ -30,7 +31,7 @@ pub(super) struct DeviceSession {
     /// The request that opened it.
     pub(super) opened: OpenRequest,
     pub(super) ports: OpenedPorts,
-    pub(super) signals: Vec<Signal>,
+    pub(super) signals: Vec<Expression<Signal>>,
     pub(super) states: States,
     pub(super) first_step: f64,
     pub(super) equilibrium: Equilibrium,
@@ -73,10 +74,10 @@ impl DeviceSession {
         let own = ports.system.clone();
         let system = own.as_deref().unwrap_or(&compiled.parts.system);
         let electrics = &system.electrics;
-        let signals: Vec<Signal> = (request.signals.iter())
+        let signals: Vec<Expression<Signal>> = (request.signals.iter())
             .map(|name| {
                 budget::check();
-                Signal::find(compiled, name)
+                Expression::of_state(compiled, name)
             })
             .collect::<Result<_, _>>()?;
         let description = Description {

@@ -65,7 +65,7 @@ impl DeviceSession {
             gyroscopic::solve(&mut self.harmonic, system, (omega, rate), &mut self.response);
             let moved = ForcedMotion::new(&push, &self.response, s);
             for (row, signal) in self.signals.iter().enumerate() {
-                reply.outputs[row * ports + p] = pair(about.signal_change(*signal, &moved));
+                reply.outputs[row * ports + p] = pair(signal.sum(|one| about.signal_change(*one, &moved)));
             }
             let charges = about.charges(&self.ports.sources, &moved);
             for (row, (answer, &other)) in self.ports.answers.iter().zip(&self.ports.sources).enumerate() {

@@ -79,7 +79,7 @@ impl Default for ExportRequest {
 impl From<ReadoutError> for ExportError {
     fn from(error: ReadoutError) -> Self {
         match error {
-            ReadoutError::UnknownSignal { .. } => Self::Analysis(error.into()),
+            ReadoutError::UnknownSignal { .. } | ReadoutError::BadExpression { .. } => Self::Analysis(error.into()),
             ReadoutError::UnknownPort { .. } | ReadoutError::BadPort { .. } => Self::Device(error.into()),
         }
     }

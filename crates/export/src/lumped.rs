@@ -16,6 +16,7 @@ use super::ExportError;
 use super::ExportRequest;
 use super::linear::{ReducedPort, SignalShown};
 use super::mechanism::port_names;
+use bimorph_analysis::readout::expression::Quantity;
 use bimorph_analysis::readout::ports::{OpenedPorts, PortResponse};
 use bimorph_analysis::readout::signal::Signal;
 use bimorph_device::PortKind;

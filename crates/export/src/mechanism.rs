@@ -3,6 +3,7 @@
 use super::linear::SignalShown;
 use super::{ExportError, ExportRequest};
 use bimorph_analysis::AnalysisError;
+use bimorph_analysis::readout::expression::Quantity;
 use bimorph_analysis::readout::ports::OpenedPorts;
 use bimorph_analysis::readout::signal::Signal;
 use bimorph_analysis::statics::operating_point;

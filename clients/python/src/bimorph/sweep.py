@@ -20,7 +20,7 @@ class Static:
     """Static equilibrium at each point."""
 
     outputs: Sequence[str] = ()
-    """Columns: ``NODE.x`` [m], ``NODE.y`` [m], ``NODE.rz`` [rad], ``PORT.i`` [A], ``PORT.q`` [C], ``BEAM.T`` [K]."""
+    """Columns: ``NODE.x`` [m], ``NODE.y`` [m], ``NODE.rz`` [rad], ``PORT.i`` [A], ``PORT.q`` [C], ``BEAM.T`` [K], or sums of these."""
     voltages: Mapping[str, float] = field(default_factory=dict)
     """Port voltages [V]."""
 

@@ -4,6 +4,8 @@ use super::super::transient::options::{TransientOptions, check};
 use super::super::transient::result::{Counters, TransientResult};
 use super::super::{AnalysisError, ProgressCallback};
 use super::{balance, force, singular, steady};
+use crate::readout::ReadoutError;
+use crate::readout::expression::{Expression, Quantity};
 use crate::readout::signal::{Signal, SignalView, node_signal};
 use bimorph_domains::{MaterialPoint, Ramp};
 use bimorph_model::compile::CompiledModel;
@@ -42,8 +44,8 @@ pub fn frame_transient(
         }
         None => (zeros.clone(), vec![0.0; heaters]),
     };
-    let signals: Vec<FrameSignal> =
-        options.signals.iter().map(|name| FrameSignal::find(compiled, frame, name)).collect::<Result<_, _>>()?;
+    let find = |text: &String| Expression::find(text, |name| FrameSignal::find(compiled, frame, name));
+    let signals: Vec<Expression<FrameSignal>> = options.signals.iter().map(find).collect::<Result<_, _>>()?;
     let electrics = &compiled.parts.system.electrics;
     let ramp = Ramp::new(electrics, &sources, &sources, &rise, options.stop);
     let spacing = options.stop / (options.points - 1) as f64;
@@ -59,7 +61,7 @@ pub fn frame_transient(
         let mut rows = vec![Vec::with_capacity(options.points); signals.len()];
         let mut sample = |q: &[Pose], v: &[Pose], rise: &[f64]| {
             for (row, signal) in rows.iter_mut().zip(&signals) {
-                row.push(signal.value(compiled, q, v, rise));
+                row.push(signal.sum(|one| one.value(compiled, q, v, rise)));
             }
         };
         sample(&q, &v, &rise);
@@ -115,6 +117,7 @@ fn change(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// A quantity of a frame.
+#[derive(Debug)]
 enum FrameSignal {
     /// Displacement of a node: direction 0 x, 1 y, 2 rotation; or its rate.
     Node { point: MaterialPoint, direction: usize, rate: bool },
@@ -122,22 +125,7 @@ enum FrameSignal {
     Temperature(Signal),
 }
 
-impl FrameSignal {
-    fn find(compiled: &CompiledModel, frame: &LinearFrame, name: &str) -> Result<Self, AnalysisError> {
-        if let Some((node, direction, rate)) = node_signal(compiled, name)
-            && let Some(point) = frame.nodes[node]
-        {
-            return Ok(Self::Node { point, direction, rate });
-        }
-        match Signal::find(compiled, name)? {
-            signal @ (Signal::Temperature(_) | Signal::Prescribed(_)) => Ok(Self::Temperature(signal)),
-            _ => Err(AnalysisError::BadRequest {
-                what: format!("signal \"{name}\""),
-                detail: "the linear frame knows the motion of nodes and the temperature of beams".into(),
-            }),
-        }
-    }
-
+impl Quantity for FrameSignal {
     fn unit(&self) -> &'static str {
         match self {
             Self::Node { direction: 2, rate: false, .. } => "rad",
@@ -145,6 +133,23 @@ impl FrameSignal {
             Self::Node { rate: false, .. } => "m",
             Self::Node { rate: true, .. } => "m/s",
             Self::Temperature(_) => "K",
+        }
+    }
+}
+
+impl FrameSignal {
+    fn find(compiled: &CompiledModel, frame: &LinearFrame, name: &str) -> Result<Self, ReadoutError> {
+        if let Some((node, direction, rate)) = node_signal(compiled, name)
+            && let Some(point) = frame.nodes[node]
+        {
+            return Ok(Self::Node { point, direction, rate });
+        }
+        match Signal::find(compiled, name)? {
+            signal @ (Signal::Temperature(_) | Signal::Prescribed(_)) => Ok(Self::Temperature(signal)),
+            _ => Err(ReadoutError::UnknownSignal {
+                name: name.to_owned(),
+                hint: "the linear frame knows the motion of nodes and the temperature of beams".into(),
+            }),
         }
     }
 

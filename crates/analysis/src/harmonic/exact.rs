@@ -3,6 +3,7 @@
 use super::named::{ResponseRow, drive_port, row, unit};
 use super::options::HarmonicOptions;
 use crate::AnalysisError;
+use crate::readout::expression::Expression;
 use crate::readout::ports::OpenedPorts;
 use crate::readout::small_signal::{ForcedMotion, PerturbedState};
 use crate::statics::{OperatingPoint, operating_point};
@@ -27,7 +28,7 @@ pub(crate) struct ExactResponse<'a> {
     /// The tangent unsummed; none for a linear model, whose tangent is another one.
     refined: Option<Refined<'a>>,
     response: Vec<ComplexPose>,
-    pub(crate) rows: Vec<ResponseRow>,
+    pub(crate) rows: Vec<Expression<ResponseRow>>,
     /// Name and unit of each row.
     pub(super) shown: Vec<(String, String)>,
     pub(super) drive_unit: &'static str,
@@ -48,7 +49,7 @@ impl<'a> ExactResponse<'a> {
         };
         let rows = signals.iter().map(|name| row(compiled, name)).collect::<Result<Vec<_>, _>>()?;
         let drive_unit = ports.kinds[0].given().1;
-        let shown = signals.iter().zip(&rows).map(|(name, row)| (name.clone(), unit(*row, drive_unit))).collect();
+        let shown = signals.iter().zip(&rows).map(|(name, row)| (name.clone(), unit(row, drive_unit))).collect();
         let (point, floats) = match operating_point(compiled, &options.voltages) {
             Ok(point) => {
                 let free = !point.free_motions.is_empty();
@@ -149,15 +150,14 @@ impl<'a> ExactResponse<'a> {
         }
         let moved = ForcedMotion::new(&push, &self.response, s);
         let about = self.perturbed();
-        let values: Vec<Complex<f64>> = (self.rows.iter())
-            .map(|row| match row {
-                ResponseRow::Signal(signal) => about.signal_change(*signal, &moved),
-                ResponseRow::Current(port) => {
-                    let conducted = system.electrics.conductance[(*port, source)];
-                    s * about.charges(&[*port], &moved)[0] + conducted
-                }
-            })
-            .collect();
+        let value = |row: &ResponseRow| match row {
+            ResponseRow::Signal(signal) => about.signal_change(*signal, &moved),
+            ResponseRow::Current(port) => {
+                let conducted = system.electrics.conductance[(*port, source)];
+                s * about.charges(&[*port], &moved)[0] + conducted
+            }
+        };
+        let values: Vec<Complex<f64>> = self.rows.iter().map(|row| row.sum(value)).collect();
         values.iter().all(|v| v.re.is_finite() && v.im.is_finite()).then_some(values)
     }
 }

@@ -168,12 +168,12 @@ impl ModalSum {
         for (j, shape) in found.shapes.iter().enumerate() {
             bimorph_base::budget::check();
             let moved = ForcedMotion::held(shape.clone(), none.0.clone(), none.1.clone());
-            rows.iter().enumerate().for_each(|(r, row)| seen[(r, j)] = read(row, &moved));
+            rows.iter().enumerate().for_each(|(r, row)| seen[(r, j)] = row.sum(|one| read(one, &moved)));
         }
         let mut rest = DMatrix::zeros(rows.len(), constituents.len());
         for (c, (part, z)) in constituents.iter().zip(rests).enumerate() {
             let moved = ForcedMotion::held(z, part.volts.clone(), part.rise.clone());
-            rows.iter().enumerate().for_each(|(r, row)| rest[(r, c)] = read(row, &moved));
+            rows.iter().enumerate().for_each(|(r, row)| rest[(r, c)] = row.sum(|one| read(one, &moved)));
         }
         let push = DMatrix::from_fn(n, constituents.len(), |j, c| dot(&found.shapes[j], &constituents[c].force));
         // what is left of a level that the modes make up is its rounding; far above them it would stand alone in the sum
@@ -196,6 +196,7 @@ impl ModalSum {
                 *s += model.mass(j).component_mul(x);
             }
         }
+        // all parts of a row have its unit, and are rates or none is
         let rate = |r: &ResponseRow| matches!(r, ResponseRow::Current(_) | ResponseRow::Signal(Signal::Rate(..)));
         Ok(Self {
             lambda: found.lambda.clone(),
@@ -205,8 +206,8 @@ impl ModalSum {
             seen,
             rest,
             added,
-            rates: rows.iter().map(rate).collect(),
-            conducted: rows.iter().map(conducted).collect(),
+            rates: rows.iter().map(|row| row.quantities().any(rate)).collect(),
+            conducted: rows.iter().map(|row| row.sum(conducted)).collect(),
             stir,
         })
     }

@@ -2,6 +2,7 @@
 
 use crate::AnalysisError;
 use crate::readout::ReadoutError;
+use crate::readout::expression::{Expression, Quantity};
 use crate::readout::ports::{OpenedPorts, PortResponse};
 use crate::readout::signal::Signal;
 use bimorph_model::compile::CompiledModel;
@@ -52,7 +53,7 @@ pub(crate) fn drive_port(compiled: &CompiledModel, drive: &str) -> Result<Opened
             ))
         }
         ReadoutError::BadPort { expected, got } => refused(format!("expected {expected}, got {got}")),
-        other @ ReadoutError::UnknownSignal { .. } => refused(other.to_string()),
+        other @ (ReadoutError::UnknownSignal { .. } | ReadoutError::BadExpression { .. }) => refused(other.to_string()),
     })
 }
 
@@ -70,19 +71,36 @@ pub(super) fn own_answer(compiled: &CompiledModel, drive: &str, ports: &OpenedPo
     }
 }
 
-/// A signal, or `PORT.i`, the current into a port.
+impl Quantity for ResponseRow {
+    fn unit(&self) -> &'static str {
+        match self {
+            Self::Signal(signal) => signal.unit(),
+            Self::Current(_) => "A",
+        }
+    }
+}
+
+impl ResponseRow {
+    /// A signal, or `PORT.i`, the current into a port.
+    fn find(compiled: &CompiledModel, name: &str) -> Result<Self, ReadoutError> {
+        match name.strip_suffix(".i").and_then(|port| compiled.structure.port(port)) {
+            Some(port) => Ok(Self::Current(port)),
+            None => Signal::find(compiled, name).map(Self::Signal),
+        }
+    }
+}
+
+/// A signal, `PORT.i`, the current into a port, or a sum of these.
 ///
 /// # Errors
 /// [`AnalysisError::BadRequest`] with what would be understood.
-pub(crate) fn row(compiled: &CompiledModel, name: &str) -> Result<ResponseRow, AnalysisError> {
+pub(crate) fn row(compiled: &CompiledModel, text: &str) -> Result<Expression<ResponseRow>, AnalysisError> {
     bimorph_base::budget::check();
-    if let Some(port) = name.strip_suffix(".i").and_then(|port| compiled.structure.port(port)) {
-        return Ok(ResponseRow::Current(port));
-    }
-    Signal::find(compiled, name).map(ResponseRow::Signal).map_err(|error| {
+    Expression::find(text, |name| ResponseRow::find(compiled, name)).map_err(|error| {
+        let unknown = matches!(error, ReadoutError::UnknownSignal { .. });
         let electrics = &compiled.parts.system.electrics;
         match AnalysisError::from(error) {
-            AnalysisError::BadRequest { what, detail } if electrics.ports > 0 => {
+            AnalysisError::BadRequest { what, detail } if unknown && electrics.ports > 0 => {
                 let ports = electrics.names[..electrics.ports].join(", ");
                 AnalysisError::BadRequest { what, detail: format!("{detail}; or PORT.i, with the ports {ports}") }
             }
@@ -92,10 +110,7 @@ pub(crate) fn row(compiled: &CompiledModel, name: &str) -> Result<ResponseRow, A
 }
 
 /// Unit of a row over that of the drive.
-pub(super) fn unit(row: ResponseRow, drive: &str) -> String {
-    let own = match row {
-        ResponseRow::Signal(signal) => signal.unit(),
-        ResponseRow::Current(_) => "A",
-    };
+pub(super) fn unit(row: &Expression<ResponseRow>, drive: &str) -> String {
+    let own = row.unit();
     if drive.contains(['/', '·']) { format!("{own}/({drive})") } else { format!("{own}/{drive}") }
 }

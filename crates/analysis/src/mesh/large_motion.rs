@@ -22,7 +22,7 @@ use super::super::step_error;
 use super::super::transient::{TransientOptions, TransientResult, Until, transient};
 use super::excited_modes;
 use super::remeshed::{chosen, meshed};
-use crate::readout::run_signal::RunSignal;
+use crate::readout::expression::Expression;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::doubling;
 use bimorph_model::refine::mesh_search::Mesh;
@@ -222,7 +222,7 @@ fn apart(
     let both = coarse.first()?.len().min(fine.first()?.len());
     let named = |columns: &[Vec<f64>]| {
         let signal = |(name, column): (&String, &Vec<f64>)| {
-            let unit = RunSignal::find(moving, name, &[]).ok()?.unit().to_owned();
+            let unit = Expression::of_run(moving, name, &[]).ok()?.unit().to_owned();
             Some((name.clone(), unit, column[..both].to_vec()))
         };
         let signals = options.signals.iter().zip(columns).map(signal).collect::<Option<_>>()?;

@@ -41,7 +41,7 @@ use super::linear_stress::left_out;
 use super::statics::{OperatingPoint, operating_point};
 use super::transient::TransientOptions;
 use super::{AnalysisError, PortVoltages};
-use crate::readout::run_signal::RunSignal;
+use crate::readout::expression::Expression;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::mesh_search::Mesh;
 use bimorph_multibody::planar::Pose;
@@ -118,7 +118,7 @@ pub fn fitted_in_time(
 ) -> Result<(CompiledModel, Option<CompiledModel>), AnalysisError> {
     // reject unknown signal names before the mesh search; points along beams depend on the mesh
     for name in options.signals.iter().filter(|name| !name.contains('[')) {
-        RunSignal::find(moving, name, &[])?;
+        Expression::of_run(moving, name, &[])?;
     }
     let moving = &*with_section_inertia(moving)?;
     let order = order_in_time(moving, options)?;

@@ -8,6 +8,7 @@ use super::super::chart::error::SMALL;
 use super::super::statics::OperatingPoint;
 use super::super::step_error;
 use super::super::transient::TransientOptions;
+use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use crate::readout::signal::SignalView;
 use bimorph_model::compile::CompiledModel;
@@ -17,7 +18,7 @@ use bimorph_multibody::planar::Pose;
 pub(super) struct SignalAmplitudes<'a> {
     model: &'a CompiledModel,
     about: &'a OperatingPoint,
-    signals: Vec<RunSignal>,
+    signals: Vec<Expression<RunSignal>>,
     still: Vec<Pose>,
     rise: Vec<f64>,
     volts: Vec<f64>,
@@ -32,7 +33,7 @@ impl<'a> SignalAmplitudes<'a> {
             signals: options
                 .signals
                 .iter()
-                .filter_map(|name| RunSignal::find(model, name, &about.sources).ok())
+                .filter_map(|name| Expression::of_run(model, name, &about.sources).ok())
                 .collect(),
             still: vec![Pose::zeros(); about.q.len()],
             rise: vec![0.0; about.rise.len()],
@@ -44,7 +45,7 @@ impl<'a> SignalAmplitudes<'a> {
     pub(super) fn of(&self, shape: &[Pose], omega: f64) -> Vec<f64> {
         let state = SignalView { q: &self.about.q, v: &self.still, rise: &self.about.rise, volts: &self.about.volts };
         let moved = |q, v| SignalView { q, v, rise: &self.rise, volts: &self.volts };
-        let swing = |signal: &RunSignal| {
+        let swing = |signal: &Expression<RunSignal>| {
             let place = signal.slope(self.model, &state, &moved(shape, &self.still));
             let rate = signal.slope(self.model, &state, &moved(&self.still, shape));
             place.hypot(omega * rate)
@@ -56,7 +57,7 @@ impl<'a> SignalAmplitudes<'a> {
     pub(super) fn sizes(&self, swings: &[Vec<f64>], options: &TransientOptions<'_>) -> Vec<f64> {
         let most: Vec<f64> =
             (0..self.signals.len()).map(|s| swings.iter().map(|of| of[s]).fold(0.0, f64::max)).collect();
-        let size = |(signal, own): (&RunSignal, &f64)| {
+        let size = |(signal, own): (&Expression<RunSignal>, &f64)| {
             let unit = signal.unit();
             let beside = self.signals.iter().zip(&most).filter(|(other, _)| other.unit() == unit);
             let largest = beside.map(|(_, own)| *own).fold(0.0, f64::max);

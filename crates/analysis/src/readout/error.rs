@@ -13,6 +13,14 @@ pub enum ReadoutError {
         /// Suggested names.
         hint: String,
     },
+    /// A sum of signals that cannot be read.
+    #[error("signal \"{text}\": {detail}")]
+    BadExpression {
+        /// The text.
+        text: String,
+        /// The part that is wrong, and what was expected.
+        detail: String,
+    },
     /// No port of that name.
     #[error("no port named \"{name}\"; the netlist has {available:?}")]
     UnknownPort {

@@ -1,9 +1,10 @@
-//! Quantities of a run at held voltages, by name: signals of its states, and charges on ports and currents into them.
+//! Quantities of a run at held voltages, by name: signals of its states, charges on ports and currents into them, and sums of these.
 //!
 //! With the voltages V of the gaps held, the charge on a port is Q = Σ rows·C(q)·V over the gaps, and the current into it is that through
 //! resistances, which is constant, and dQ/dt = Σ rows·(∂C/∂q·q̇)·V.
 
 use super::ReadoutError;
+use super::expression::{Expression, Quantity};
 use super::signal::{Signal, SignalView};
 use bimorph_model::compile::CompiledModel;
 
@@ -24,12 +25,11 @@ pub enum RunSignal {
 }
 
 impl RunSignal {
-    /// Finds a quantity by name: a signal, see [`Signal::find`], or `PORT.q` or `PORT.i`. The sources have these voltages [V]; a caller that
-    /// needs no values gives none.
+    /// Finds a quantity by name: a signal, see [`Signal::find`], or `PORT.q` or `PORT.i` with these voltages of the sources [V].
     ///
     /// # Errors
     /// [`ReadoutError::UnknownSignal`] with what would be understood.
-    pub fn find(compiled: &CompiledModel, name: &str, sources: &[f64]) -> Result<Self, ReadoutError> {
+    fn find(compiled: &CompiledModel, name: &str, sources: &[f64]) -> Result<Self, ReadoutError> {
         let electrics = &compiled.parts.system.electrics;
         let port = |quantity: &str| name.strip_suffix(quantity).and_then(|port| compiled.structure.port(port));
         match Signal::find(compiled, name) {
@@ -57,17 +57,8 @@ impl RunSignal {
         }
     }
 
-    /// Its unit.
-    pub fn unit(&self) -> &'static str {
-        match self {
-            Self::State(signal) => signal.unit(),
-            Self::PortCharge(_) => "C",
-            Self::PortCurrent { .. } => "A",
-        }
-    }
-
     /// Its value in a state at held voltages.
-    pub fn value(&self, compiled: &CompiledModel, state: &SignalView<'_>) -> f64 {
+    fn value(&self, compiled: &CompiledModel, state: &SignalView<'_>) -> f64 {
         let system = &compiled.parts.system;
         match *self {
             Self::State(signal) => signal.value(compiled, state),
@@ -79,7 +70,7 @@ impl RunSignal {
     }
 
     /// Its change with a change of the state, from one at rest.
-    pub fn slope(&self, compiled: &CompiledModel, state: &SignalView<'_>, change: &SignalView<'_>) -> f64 {
+    fn slope(&self, compiled: &CompiledModel, state: &SignalView<'_>, change: &SignalView<'_>) -> f64 {
         let system = &compiled.parts.system;
         match *self {
             Self::State(signal) => signal.slope(compiled, state, change),
@@ -91,6 +82,36 @@ impl RunSignal {
                 of_gaps(compiled, port, |g| system.capacitance_slope(g, state.q, change.v) * state.volts[g])
             }
         }
+    }
+}
+
+impl Quantity for RunSignal {
+    fn unit(&self) -> &'static str {
+        match self {
+            Self::State(signal) => signal.unit(),
+            Self::PortCharge(_) => "C",
+            Self::PortCurrent { .. } => "A",
+        }
+    }
+}
+
+impl Expression<RunSignal> {
+    /// Finds a quantity by name or a sum of them. The sources have these voltages [V]; a caller that needs no values gives none.
+    ///
+    /// # Errors
+    /// [`ReadoutError::UnknownSignal`] with what would be understood, [`ReadoutError::BadExpression`].
+    pub fn of_run(compiled: &CompiledModel, text: &str, sources: &[f64]) -> Result<Self, ReadoutError> {
+        Self::find(text, |name| RunSignal::find(compiled, name, sources))
+    }
+
+    /// Its value in a state at held voltages.
+    pub fn value(&self, compiled: &CompiledModel, state: &SignalView<'_>) -> f64 {
+        self.sum(|signal| signal.value(compiled, state))
+    }
+
+    /// Its change with a change of the state, from one at rest.
+    pub fn slope(&self, compiled: &CompiledModel, state: &SignalView<'_>, change: &SignalView<'_>) -> f64 {
+        self.sum(|signal| signal.slope(compiled, state, change))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Quantities that can be read from a state by name.
 
 use super::ReadoutError;
+use super::expression::{Expression, Quantity};
 use bimorph_domains::MaterialPoint;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::{self, Pose};
@@ -80,20 +81,6 @@ impl Signal {
         }
     }
 
-    /// Its unit.
-    pub fn unit(&self) -> &'static str {
-        match self {
-            Self::Displacement(_, 2) => "rad",
-            Self::Displacement(..) | Self::Distance(_) => "m",
-            Self::Rate(_, 2) => "rad/s",
-            Self::Rate(..) => "m/s",
-            Self::Temperature(_) | Self::Prescribed(_) => "K",
-            Self::Charge(_) => "C",
-            Self::Capacitance(_) => "F",
-            Self::Pull(_) => "N",
-        }
-    }
-
     /// Its value in a state.
     pub fn value(&self, compiled: &CompiledModel, state: &SignalView<'_>) -> f64 {
         let system = &compiled.parts.system;
@@ -136,6 +123,41 @@ impl Signal {
             Self::Capacitance(g) => system.capacitance_slope(g, state.q, change.q),
             Self::Pull(g) => system.pull_slope(g, state.q, state.volts[g], change.q, change.volts[g]),
         }
+    }
+}
+
+impl Quantity for Signal {
+    fn unit(&self) -> &'static str {
+        match self {
+            Self::Displacement(_, 2) => "rad",
+            Self::Displacement(..) | Self::Distance(_) => "m",
+            Self::Rate(_, 2) => "rad/s",
+            Self::Rate(..) => "m/s",
+            Self::Temperature(_) | Self::Prescribed(_) => "K",
+            Self::Charge(_) => "C",
+            Self::Capacitance(_) => "F",
+            Self::Pull(_) => "N",
+        }
+    }
+}
+
+impl Expression<Signal> {
+    /// Finds a signal by name, see [`Signal::find`], or a sum of them.
+    ///
+    /// # Errors
+    /// [`ReadoutError::UnknownSignal`] with what would be understood, [`ReadoutError::BadExpression`].
+    pub fn of_state(compiled: &CompiledModel, text: &str) -> Result<Self, ReadoutError> {
+        Self::find(text, |name| Signal::find(compiled, name))
+    }
+
+    /// Its value in a state.
+    pub fn value(&self, compiled: &CompiledModel, state: &SignalView<'_>) -> f64 {
+        self.sum(|signal| signal.value(compiled, state))
+    }
+
+    /// Its change with a change of the state.
+    pub fn slope(&self, compiled: &CompiledModel, state: &SignalView<'_>, change: &SignalView<'_>) -> f64 {
+        self.sum(|signal| signal.slope(compiled, state, change))
     }
 }
 

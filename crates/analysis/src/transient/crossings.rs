@@ -4,6 +4,7 @@ use super::super::AnalysisError;
 use super::options::{TransientOptions, Until};
 use super::result::CrossingEvent;
 use crate::readout::ReadoutError;
+use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use crate::readout::signal::{Signal, SignalView};
 use bimorph_domains::Ramp;
@@ -15,7 +16,7 @@ use bimorph_solve::time::method::Motion;
 /// A signal whose crossings of a level are found.
 struct WatchedSignal {
     name: String,
-    signal: RunSignal,
+    signal: Expression<RunSignal>,
     level: f64,
     contact: bool,
     detector: Detector,
@@ -35,19 +36,19 @@ fn watched(
         detector: Detector::default(),
     };
     let asked = options.events.iter().map(|(name, level)| {
-        RunSignal::find(compiled, name, sources).map(|signal| watch(name.clone(), signal, *level, false))
+        Expression::of_run(compiled, name, sources).map(|signal| watch(name.clone(), signal, *level, false))
     });
     let system = &compiled.parts.system;
     let ending = match &options.until {
         Some(Until::Level(name, level)) if !options.events.contains(&(name.clone(), *level)) => {
-            Some(RunSignal::find(compiled, name, sources).map(|signal| watch(name.clone(), signal, *level, false)))
+            Some(Expression::of_run(compiled, name, sources).map(|signal| watch(name.clone(), signal, *level, false)))
         }
         _ => None,
     };
     let touching =
         (0..system.members.len()).filter_map(|g| system.touching(g).map(|[touch, _]| (g, touch))).map(|(g, touch)| {
             let name = format!("{}.gap", compiled.parts.gap_names[g]);
-            Ok(watch(name, RunSignal::State(Signal::Distance(g)), touch, true))
+            Ok(watch(name, RunSignal::State(Signal::Distance(g)).into(), touch, true))
         });
     Ok(asked.chain(ending).chain(touching).collect::<Result<_, ReadoutError>>()?)
 }

@@ -3,6 +3,7 @@
 use super::super::chart::error::{SMALL, half_range};
 use super::super::statics::source_vector;
 use super::options::TransientOptions;
+use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use crate::readout::signal::SignalView;
 use bimorph_domains::Ramp;
@@ -44,7 +45,7 @@ pub(super) struct ErrorLog<'a> {
     compiled: &'a CompiledModel,
     ramp: &'a Ramp<'a>,
     volts: &'a [f64],
-    signals: &'a [RunSignal],
+    signals: &'a [Expression<RunSignal>],
     stride: f64,
     next: f64,
     exact: Motion,
@@ -61,7 +62,7 @@ impl<'a> ErrorLog<'a> {
     pub(super) fn start(
         (compiled, stop): (&'a CompiledModel, f64),
         (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
-        signals: &'a [RunSignal],
+        signals: &'a [Expression<RunSignal>],
         motion: &Motion,
     ) -> Self {
         let system = &compiled.parts.system;

@@ -34,7 +34,7 @@ impl std::fmt::Display for Until {
 pub struct TransientOptions<'a> {
     /// End time [s].
     pub stop: f64,
-    /// Names of the signals wanted, see [`RunSignal::find`](crate::readout::run_signal::RunSignal::find).
+    /// Names of the signals wanted, see [`of_run`](crate::readout::expression::Expression::of_run).
     pub signals: Vec<String>,
     /// Number of equally spaced output times, ends included.
     pub points: usize,

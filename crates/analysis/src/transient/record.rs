@@ -11,6 +11,7 @@ use super::folded_segments;
 use super::options::{TransientOptions, check};
 use super::result::{Counters, TransientResult};
 use super::samples::SampleRecorder;
+use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use bimorph_domains::Ramp;
 use bimorph_model::compile::CompiledModel;
@@ -57,8 +58,8 @@ pub(crate) fn record(
     check(options)?;
     let system = &compiled.parts.system;
     let sources = source_vector(compiled, &options.voltages)?;
-    let signals: Vec<RunSignal> =
-        options.signals.iter().map(|name| RunSignal::find(compiled, name, &sources)).collect::<Result<_, _>>()?;
+    let signals: Vec<Expression<RunSignal>> =
+        options.signals.iter().map(|name| Expression::of_run(compiled, name, &sources)).collect::<Result<_, _>>()?;
     let (mut motion, rise, begun) = start(compiled, options)?;
     let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop);
     let mut drive = system.electrics.drive();

@@ -1,6 +1,7 @@
 //! Signals at equally spaced times, between the steps of a run.
 
 use super::options::TransientOptions;
+use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use crate::readout::signal::SignalView;
 use bimorph_domains::Ramp;
@@ -14,7 +15,7 @@ pub(super) struct SampleRecorder<'a> {
     options: &'a TransientOptions<'a>,
     ramp: &'a Ramp<'a>,
     volts: &'a [f64],
-    signals: &'a [RunSignal],
+    signals: &'a [Expression<RunSignal>],
     report: &'a mut dyn FnMut(f64, &[f64]),
     /// Number of the next output time.
     next: usize,
@@ -33,7 +34,7 @@ impl<'a> SampleRecorder<'a> {
     pub(super) fn start(
         (compiled, options): (&'a CompiledModel, &'a TransientOptions<'a>),
         (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
-        signals: &'a [RunSignal],
+        signals: &'a [Expression<RunSignal>],
         report: &'a mut dyn FnMut(f64, &[f64]),
         motion: &Motion,
     ) -> Self {

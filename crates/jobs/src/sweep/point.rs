@@ -9,7 +9,9 @@ use super::shared_meshes::SharedMeshes;
 use super::spec::{SweepAnalysis, SweepSpec};
 use bimorph_analysis::mesh::on_given_mesh::{AnalysisResult, Assessment, assess, refine_and_assess};
 use bimorph_analysis::mesh::{self, MeshRequest};
-use bimorph_analysis::readout::run_signal::RunSignal;
+use bimorph_analysis::readout::ReadoutError;
+use bimorph_analysis::readout::expression::Expression;
+use bimorph_analysis::static_outputs::{self, OUTPUTS};
 use bimorph_analysis::{AnalysisError, statics};
 use bimorph_base::budget;
 use bimorph_model::compile::{CompileError, CompileOptions, draw};
@@ -17,8 +19,6 @@ use bimorph_netlist::{NetlistSource, Setting, Severity};
 use std::borrow::Cow;
 use std::collections::HashSet;
 
-/// Names of the columns of a static sweep.
-const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q";
 /// Ports that a refusal names.
 const MAX_LISTED_PORTS: usize = 20;
 /// The code of the diagnostic for a setting that names no parameter.
@@ -140,7 +140,7 @@ pub(super) fn check_names(
         SweepAnalysis::Static { outputs, .. } => outputs,
         SweepAnalysis::Transient { outputs, .. } => {
             let Ok(compiled) = drawn.compile() else { return Ok(()) };
-            let refusal = outputs.iter().find_map(|name| RunSignal::find(&compiled, name, &[]).err());
+            let refusal = outputs.iter().find_map(|name| Expression::of_run(&compiled, name, &[]).err());
             return match refusal {
                 Some(error) => refused("outputs", "signals of the netlist".to_owned(), error.to_string()),
                 None => Ok(()),
@@ -148,24 +148,10 @@ pub(super) fn check_names(
         }
         SweepAnalysis::Modes { .. } | SweepAnalysis::PullIn { .. } => return Ok(()),
     };
-    let structure = &drawn.structure;
-    let nodes = structure.nodes.iter().filter(|node| node.mechanical).map(|node| (node.name.as_str(), 'n'));
-    let beams = structure.beams.iter().map(|beam| (beam.name.as_str(), 'b'));
-    let ports = structure.ports.iter().map(|port| (port.name.as_str(), 'p'));
-    let known: HashSet<(&str, char)> = nodes.chain(beams).chain(ports).collect();
-    let unknown = outputs.iter().find(|output| {
-        let kind = |quantity: &str| match quantity {
-            "x" | "y" | "rz" => Some('n'),
-            "T" => Some('b'),
-            "i" | "q" => Some('p'),
-            _ => None,
-        };
-        let found = output.rsplit_once('.').and_then(|(part, quantity)| Some((part, kind(quantity)?)));
-        found.is_none_or(|found| !known.contains(&found))
-    });
-    match unknown {
-        Some(name) => refused("outputs", OUTPUTS.to_owned(), format!("\"{name}\"")),
-        None => Ok(()),
+    match static_outputs::check(&drawn.structure, outputs) {
+        Ok(()) => Ok(()),
+        Err(ReadoutError::UnknownSignal { name, .. }) => refused("outputs", OUTPUTS.to_owned(), format!("\"{name}\"")),
+        Err(error) => refused("outputs", format!("{OUTPUTS}, or a sum of these"), error.to_string()),
     }
 }
 
@@ -246,23 +232,9 @@ fn static_values(result: &statics::StaticResult, outputs: &[String]) -> Result<V
         }
         return finite(all);
     }
-    let of_part = |all: &[(String, f64)], part: &str| all.iter().find(|(name, _)| name == part).map(|(_, x)| *x);
-    let pick = |name: &String| {
-        let found = name.rsplit_once('.').and_then(|(part, quantity)| {
-            let motion = || result.nodes.iter().find(|(node, _)| node == part).map(|(_, motion)| motion);
-            Some(match quantity {
-                "x" => ("m", motion()?.x),
-                "y" => ("m", motion()?.y),
-                "rz" => ("rad", motion()?.rz),
-                "T" => ("K", of_part(&result.temperatures_k, part)?),
-                "i" => ("A", of_part(&result.currents_a, part)?),
-                "q" => ("C", of_part(&result.charges_c, part)?),
-                _ => return None,
-            })
-        });
-        found
-            .map(|(unit, x)| value(name.clone(), unit, Some(x)))
-            .ok_or_else(|| format!("no output named \"{name}\"; expected {OUTPUTS}"))
+    let pick = |text: &String| {
+        let found = Expression::of_static(result, text).map_err(|error| error.to_string())?;
+        Ok::<_, String>(value(text.clone(), found.unit(), Some(found.value())))
     };
     finite(outputs.iter().map(pick).collect::<Result<_, _>>()?)
 }

@@ -17,7 +17,7 @@ use super::spec::{SweepAnalysis, SweepSpec};
 use bimorph_analysis::AnalysisError;
 use bimorph_analysis::batch_transient::{self, RunEnd};
 use bimorph_analysis::mesh;
-use bimorph_analysis::readout::run_signal::RunSignal;
+use bimorph_analysis::readout::expression::Expression;
 use bimorph_analysis::step_error;
 use bimorph_analysis::transient::{TransientOptions, transient};
 use bimorph_model::compile::{CompileOptions, CompiledModel, draw};
@@ -203,7 +203,7 @@ impl<'a> TransientSweep<'a> {
             if !value.is_finite() {
                 return Err(format!("{name} is not finite"));
             }
-            let unit = RunSignal::find(compiled, name, &[]).map_err(|error| error.to_string())?.unit();
+            let unit = Expression::of_run(compiled, name, &[]).map_err(|error| error.to_string())?.unit();
             values.push(PointValue { name: name.clone(), unit: unit.into(), value: Some(value) });
         }
         let estimated_error = compiled.order.estimated_error;

@@ -1,0 +1,96 @@
+//! Numbers of a static result by name, and sums of them.
+
+use crate::readout::ReadoutError;
+use crate::readout::expression::{Expression, Quantity};
+use crate::statics::StaticResult;
+use bimorph_structure::Structure;
+use std::collections::HashSet;
+
+/// Names of the numbers of a static result.
+pub const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q";
+
+/// A number of a static result.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StaticOutput {
+    unit: &'static str,
+    value: f64,
+}
+
+impl Quantity for StaticOutput {
+    fn unit(&self) -> &'static str {
+        self.unit
+    }
+}
+
+/// Kind of a part that has numbers in a static result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum StaticPart {
+    Node,
+    Beam,
+    Port,
+}
+
+/// Name, kind and unit of `PART.QUANTITY`.
+fn split(name: &str) -> Option<(&str, &str, StaticPart, &'static str)> {
+    let (part, quantity) = name.rsplit_once('.')?;
+    let (kind, unit) = match quantity {
+        "x" | "y" => (StaticPart::Node, "m"),
+        "rz" => (StaticPart::Node, "rad"),
+        "T" => (StaticPart::Beam, "K"),
+        "i" => (StaticPart::Port, "A"),
+        "q" => (StaticPart::Port, "C"),
+        _ => return None,
+    };
+    Some((part, quantity, kind, unit))
+}
+
+fn unknown(name: &str) -> ReadoutError {
+    ReadoutError::UnknownSignal { name: name.to_owned(), hint: format!("expected {OUTPUTS}, or a sum of these") }
+}
+
+fn output(result: &StaticResult, name: &str) -> Option<StaticOutput> {
+    let (part, quantity, _, unit) = split(name)?;
+    let node = || result.nodes.iter().find(|(node, _)| node == part).map(|(_, motion)| motion);
+    let listed = |list: &[(String, f64)]| list.iter().find(|(name, _)| name == part).map(|(_, x)| *x);
+    let value = match quantity {
+        "x" => node()?.x,
+        "y" => node()?.y,
+        "rz" => node()?.rz,
+        "T" => listed(&result.temperatures_k)?,
+        "i" => listed(&result.currents_a)?,
+        _ => listed(&result.charges_c)?,
+    };
+    Some(StaticOutput { unit, value })
+}
+
+impl Expression<StaticOutput> {
+    /// The number of that name, or a sum of such numbers.
+    ///
+    /// # Errors
+    /// [`ReadoutError::UnknownSignal`], [`ReadoutError::BadExpression`].
+    pub fn of_static(result: &StaticResult, text: &str) -> Result<Self, ReadoutError> {
+        Self::find(text, |name| output(result, name).ok_or_else(|| unknown(name)))
+    }
+
+    /// Its value.
+    pub fn value(&self) -> f64 {
+        self.sum(|output| output.value)
+    }
+}
+
+/// Checks that static results of a structure have these numbers and sums.
+///
+/// # Errors
+/// Those of [`Expression::of_static`].
+pub fn check(structure: &Structure, texts: &[String]) -> Result<(), ReadoutError> {
+    let nodes =
+        structure.nodes.iter().filter(|node| node.mechanical).map(|node| (node.name.as_str(), StaticPart::Node));
+    let beams = structure.beams.iter().map(|beam| (beam.name.as_str(), StaticPart::Beam));
+    let ports = structure.ports.iter().map(|port| (port.name.as_str(), StaticPart::Port));
+    let known: HashSet<(&str, StaticPart)> = nodes.chain(beams).chain(ports).collect();
+    let find = |name: &str| match split(name) {
+        Some((part, _, kind, unit)) if known.contains(&(part, kind)) => Ok(StaticOutput { unit, value: 0.0 }),
+        _ => Err(unknown(name)),
+    };
+    texts.iter().try_for_each(|text| Expression::find(text, find).map(drop))
+}
