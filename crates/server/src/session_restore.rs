@@ -8,8 +8,8 @@ use super::session::Session;
 use super::shared::ServerState;
 use super::status;
 use super::store::writer::SessionWriter;
-use bimorph_wire::convert::{model as text, options as options_wire};
 use super::store::{ModelLoss, SessionStore};
+use bimorph_wire::convert::{model as text, options as options_wire};
 use std::sync::Arc;
 use tonic::Status;
 

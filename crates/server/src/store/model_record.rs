@@ -1,7 +1,7 @@
 //! Stored netlist and options of a model, as bytes with a checksum.
 
-use bimorph_wire::proto;
 use crate::snapshots::checksum;
+use bimorph_wire::proto;
 use prost::Message;
 
 /// Magic bytes of a file.

@@ -6,7 +6,7 @@ use bimorph_jobs::sweep::{Design, Distribution, SampleGenerator, Sampling, Vary}
 use proto::sweep_vary::Distribution as Wire;
 
 /// The request as a message.
-pub fn to_wire(asked: &Sampling) -> proto::SweepSamples {
+pub(super) fn to_wire(asked: &Sampling) -> proto::SweepSamples {
     let vary = |vary: &Vary| proto::SweepVary {
         name: vary.name.clone(),
         distribution: Some(match vary.distribution {
@@ -34,7 +34,7 @@ pub fn to_wire(asked: &Sampling) -> proto::SweepSamples {
 }
 
 /// Checked samples. Nothing is laid out for them.
-pub fn from_wire(samples: proto::SweepSamples) -> Result<SampleGenerator, Violation> {
+pub(super) fn from_wire(samples: proto::SweepSamples) -> Result<SampleGenerator, Violation> {
     use proto::sweep_samples::Design as WireDesign;
     let design = match WireDesign::try_from(samples.design) {
         Ok(WireDesign::Random) => Design::Random,
