@@ -15,7 +15,7 @@ fn bundle(name: &str) -> Bundle {
     read_bundle(&path, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Median of repeated calls [ms].
+/// Median of repeated calls (ms).
 fn median(count: usize, mut call: impl FnMut()) -> f64 {
     let mut times: Vec<f64> = (0..count)
         .map(|_| {

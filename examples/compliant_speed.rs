@@ -110,7 +110,7 @@ fn median(mut call: impl FnMut()) -> f64 {
     times[times.len() / 2]
 }
 
-/// Processor time of this thread [ns] where the system provides it, else wall time.
+/// Processor time of this thread (ns) where the system provides it, else wall time.
 struct Clock {
     on_cpu: Option<f64>,
     wall: Instant,

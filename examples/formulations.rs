@@ -32,7 +32,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A model: file, parameters, parameters of the start, port voltages, duration [s].
+/// A model: file, parameters, parameters of the start, port voltages, duration (s).
 type Scene<'a> = (&'a str, &'a [(&'a str, f64)], &'a [(&'a str, f64)], &'a [f64], f64);
 
 fn main() {

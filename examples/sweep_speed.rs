@@ -176,7 +176,7 @@ fn parts(points: usize) {
     }
 }
 
-/// Processor time of all threads of this process [s], in ticks of a hundredth (Linux).
+/// Processor time of all threads of this process (s), in ticks of a hundredth (Linux).
 fn used() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").expect("Linux");
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();

@@ -16,7 +16,7 @@ use std::hint::black_box;
 use std::time::Instant;
 use topologies::Topology;
 
-/// Best time of one call [ns].
+/// Best time of one call (ns).
 fn best(mut call: impl FnMut()) -> f64 {
     let started = Instant::now();
     call();

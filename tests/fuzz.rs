@@ -299,7 +299,7 @@ fn a_few_sugar3() {
     run(sugar3(), 1, |count| count >= QUICK);
 }
 
-/// For `FUZZ_MINUTES` [min], each time with other texts: the seed is the time, and is printed on failure.
+/// For `FUZZ_MINUTES` (min), each time with other texts: the seed is the time, and is printed on failure.
 fn for_minutes(corpus: Vec<String>) {
     let minutes: f64 = std::env::var("FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0);
     let end = Instant::now() + Duration::from_secs_f64(60.0 * minutes);

@@ -167,7 +167,7 @@ fn a_few_gds() {
     run(LayoutFormat::Gds, "fuzz.gds", (1, false), |count| count >= QUICK);
 }
 
-/// For `FUZZ_MINUTES` [min], each time with other drawings: the seed is the time, and is printed on failure.
+/// For `FUZZ_MINUTES` (min), each time with other drawings: the seed is the time, and is printed on failure.
 fn for_minutes(format: LayoutFormat, name: &str) {
     let minutes: f64 = std::env::var("FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0);
     let end = Instant::now() + Duration::from_secs_f64(60.0 * minutes);

@@ -19,7 +19,7 @@ use std::time::Duration;
 use tonic::transport::Channel;
 use tonic::{Code, Status};
 
-/// Longest life of a command that is to be killed [µs].
+/// Longest life of a command that is to be killed (µs).
 const LONGEST_LIFE: u64 = 250_000;
 /// Points of a sweep.
 const POINTS: usize = 3000;

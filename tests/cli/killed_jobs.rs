@@ -15,7 +15,7 @@ use std::time::Duration;
 use tonic::transport::Channel;
 use tonic::{Code, Status};
 
-/// Longest life of a server that is to be killed, from where its fate is decided [µs].
+/// Longest life of a server that is to be killed, from where its fate is decided (µs).
 const LONGEST_LIFE: u64 = 60_000;
 /// Points of a job.
 const POINTS: usize = 600;

@@ -13,10 +13,10 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Status, Streaming};
 
-/// Length of a step [s].
+/// Length of a step (s).
 const DT: f64 = 1e-7;
 
-/// Voltages of the circuit in a step [V].
+/// Voltages of the circuit in a step (V).
 fn voltages(step: usize) -> Vec<f64> {
     vec![1.0 + (step % 7) as f64]
 }

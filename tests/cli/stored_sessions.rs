@@ -8,7 +8,7 @@ use proto::device_request::Kind as Ask;
 use std::process::Command;
 use std::time::Duration;
 
-/// Longest life of a server that is to be killed, from where its fate is decided [µs].
+/// Longest life of a server that is to be killed, from where its fate is decided (µs).
 const LONGEST_LIFE: u64 = 4000;
 
 /// Numbers without chance: SplitMix64 (Steele, Lea, Flood 2014).

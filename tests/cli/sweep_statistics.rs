@@ -11,7 +11,7 @@ f2d * [b] [F=F oz=deg(90)]
 ";
 const SWEEP: &str = "sweep c.net --linear --junctions centreline --segments 1 --signals b.y";
 
-/// F·l³/(3·E·I) for a width [m].
+/// F·l³/(3·E·I) for a width (m).
 fn deflection(w: f64) -> f64 {
     1e-6 * 1e-12 / (3.0 * 165e9 * 2e-6 * w.powi(3) / 12.0)
 }

@@ -9,7 +9,7 @@ const GRID: f64 = 1000.0;
 #[derive(Debug, Clone)]
 pub(crate) struct Sheet {
     drawing: FlatLayout,
-    /// Everything is turned by this [rad] and then moved.
+    /// Everything is turned by this (rad) and then moved.
     angle: f64,
     shift: [f64; 2],
 }

@@ -7,7 +7,7 @@ use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::layout::extract::netlist;
 use bimorph::netlist::Bundle;
 
-/// PolyMUMPs' sheet resistance [Ω/square].
+/// PolyMUMPs' sheet resistance (Ω/square).
 const SHEET: f64 = 20.0;
 
 fn model(text: &str) -> CompiledModel {

@@ -10,7 +10,7 @@ use bimorph::netlist::Bundle;
 
 /// A plate of square holes in rows.
 struct Plate {
-    /// Side of a hole, wall between two, wall to the edge [µm].
+    /// Side of a hole, wall between two, wall to the edge (µm).
     hole: [f64; 3],
     /// Columns and rows.
     count: [usize; 2],
@@ -29,7 +29,7 @@ impl Plate {
         [[along, -away], [w + away, along], [w - along, h + away], [-away, h - along]][side]
     }
 
-    /// Area of what moves [m²].
+    /// Area of what moves (m²).
     fn area(&self) -> f64 {
         let ([w, h], [a, ..]) = (self.size(), self.hole);
         let springs: f64 = self.springs.iter().map(|(_, _, w, l)| w * l).sum();
@@ -66,7 +66,7 @@ impl Plate {
     }
 }
 
-/// Area that beams and bodies weigh [m²].
+/// Area that beams and bodies weigh (m²).
 fn weight(found: &Extraction) -> f64 {
     let bodies: f64 = found.bodies.iter().map(|b| b.area).sum();
     let beams = found.beams.iter().map(|b| {

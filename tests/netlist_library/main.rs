@@ -12,9 +12,9 @@ use std::f64::consts::PI;
 
 const P1: &str =
     "process p1 = [Youngsmodulus=160e9 Poisson=0.25 density=2000 h=2u viscosity=2e-5 fluid=1u]\nanchor p1 [a] []\n";
-/// Bending stiffness of a beam 2 µm wide [N·m²].
+/// Bending stiffness of a beam 2 µm wide (N·m²).
 const EI: f64 = 160e9 * 2e-6 * 8e-18 / 12.0;
-/// Stiffness along it, times length [N].
+/// Stiffness along it, times length (N).
 const EA: f64 = 160e9 * 4e-12;
 
 fn bundle(text: &str) -> Bundle {

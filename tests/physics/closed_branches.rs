@@ -10,7 +10,7 @@ use bimorph::device::{Device, Mode, OpenRequest, Status, Token, Trial, TrialRepl
 use bimorph::solve::continuation::Branch;
 use std::sync::Arc;
 
-/// A plate of an area [m²] on a spring [N/m], in front of an electrode at a gap, which it touches at a distance [m].
+/// A plate of an area (m²) on a spring (N/m), in front of an electrode at a gap, which it touches at a distance (m).
 #[derive(Debug, Clone, Copy)]
 struct Plate {
     k: f64,
@@ -35,17 +35,17 @@ impl Plate {
         model(&text, &CompileOptions::default())
     }
 
-    /// Force of contact at a distance [N]: p = 1 TPa·(2(t − d)/t)⁴.
+    /// Force of contact at a distance (N): p = 1 TPa·(2(t − d)/t)⁴.
     fn contact(&self, d: f64) -> f64 {
         self.area * 1e12 * (2.0 * (self.touch - d).max(0.0) / self.touch).powi(4)
     }
 
-    /// V² of the equilibrium at a distance [V²]: ½εAV²/d² = k·(g − d) + F.
+    /// V² of the equilibrium at a distance (V²): ½εAV²/d² = k·(g − d) + F.
     fn squared(&self, d: f64) -> f64 {
         2.0 * d * d / (EPS * self.area) * (self.k * (self.gap - d) + self.contact(d))
     }
 
-    /// The smallest voltage of the closed branch [V], by golden sections of its distance.
+    /// The smallest voltage of the closed branch (V), by golden sections of its distance.
     fn release(&self) -> f64 {
         let share = 0.5 * (5f64.sqrt() - 1.0);
         let (mut a, mut b) = (0.75 * self.touch, self.touch);
@@ -105,7 +105,7 @@ impl Sweep {
         Self { device, at: None }
     }
 
-    /// Distance left at a voltage [m], from the state before.
+    /// Distance left at a voltage (m), from the state before.
     fn to(&mut self, volts: f64) -> f64 {
         let mut reply = TrialReply::default();
         let trial = Trial { mode: Mode::Static, parent: self.at, t: 0.0, dt: 0.0, voltages: &[volts] };

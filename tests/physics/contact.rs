@@ -9,7 +9,7 @@ use bimorph::domains::contact::{DEEPEST, TOUCH};
 use bimorph::solve::time::event::Direction;
 
 pub(crate) const EPS: f64 = 8.854e-12;
-/// Least distance that the law of contact allows between parts drawn more than 0.2 µm apart [m].
+/// Least distance that the law of contact allows between parts drawn more than 0.2 µm apart (m).
 pub(crate) const LEAST: f64 = TOUCH * (1.0 - 0.5 * DEEPEST);
 
 /// A plate of area A on a spring k in front of an electrode at a distance g.

@@ -31,7 +31,7 @@ fn ask(device: &mut LocalDevice, parent: Option<Token>, dt: f64, volts: f64) -> 
     reply
 }
 
-/// The last accepted state at 8 V before the plate touches, in steps of 0.2 µs, and the time from there to the touch [s].
+/// The last accepted state at 8 V before the plate touches, in steps of 0.2 µs, and the time from there to the touch (s).
 fn before_contact(device: &mut LocalDevice) -> (Token, f64) {
     let mut now = ask(device, None, 0.0, 0.0).token;
     let mut volts = 0.0;

@@ -15,7 +15,7 @@ fn options<'a>(stop: f64, release: Option<&'a CompiledModel>) -> TransientOption
     TransientOptions { stop, signals: vec!["m.x".into()], points: 201, release, ..TransientOptions::default() }
 }
 
-/// Position of m = 1e-10 kg on k = 1 N/m with c = 1e-6 N·s/m at the time `t` [s] after its release at 1 µm [m]:
+/// Position of m = 1e-10 kg on k = 1 N/m with c = 1e-6 N·s/m at the time `t` (s) after its release at 1 µm (m):
 /// e^{−δt}(cos ωt + δ/ω·sin ωt), δ = c/2m.
 pub(crate) fn released(t: f64) -> f64 {
     let (decay, omega) = (5e3, (1e10f64 - 25e6).sqrt());

@@ -10,7 +10,7 @@ use bimorph::netlist::{Bundle, Setting, read_bundle};
 use bimorph::solve::continuation::Branch;
 use std::path::Path;
 
-/// A beam of 200 × 2 µm between anchors, under the stress `s`, in two pieces that meet in [m].
+/// A beam of 200 × 2 µm between anchors, under the stress `s`, in two pieces that meet in (m).
 const BEAM: &str = "param s = 0\nparam F = 0\nanchor p1 [a] []\nbeam2d p1 [a m] [l=100u w=2u stress=s]\n\
     beam2d p1 [m b] [l=100u w=2u stress=s]\nanchor p1 [b] []\n";
 

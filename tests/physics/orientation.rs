@@ -13,7 +13,7 @@ use bimorph::device::{Device, Mode, OpenRequest, Status, Token, Trial, TrialRepl
 use bimorph::solve::continuation::Branch;
 use std::sync::Arc;
 
-/// A plate on a guide, a spring and a damper, before an electrode, along a direction [deg].
+/// A plate on a guide, a spring and a damper, before an electrode, along a direction (deg).
 fn guided(angle: f64) -> CompiledModel {
     let text = format!(
         "anchor * [f] []
@@ -29,7 +29,7 @@ fn guided(angle: f64) -> CompiledModel {
     model(&text, &CompileOptions::default())
 }
 
-/// A cantilever of 80 µm over an electrode, along a direction [deg].
+/// A cantilever of 80 µm over an electrode, along a direction (deg).
 fn cantilever(angle: f64) -> CompiledModel {
     let text = format!(
         "dl = 20u
@@ -52,7 +52,7 @@ fn drive(volts: f64) -> Vec<(String, f64)> {
     vec![("drive".to_owned(), volts)]
 }
 
-/// Static results of a node at a voltage: its motion along the direction and across it [m], and the charge [C].
+/// Static results of a node at a voltage: its motion along the direction and across it (m), and the charge (C).
 fn statics(compiled: &CompiledModel, angle: f64, name: &str, volts: f64) -> [f64; 3] {
     let result = static_equilibrium(compiled, &drive(volts)).unwrap_or_else(|e| panic!("{angle}° {volts} V: {e}"));
     let at = crate::node(&result, name);
@@ -60,7 +60,7 @@ fn statics(compiled: &CompiledModel, angle: f64, name: &str, volts: f64) -> [f64
     [at.x * cos + at.y * sin, at.y * cos - at.x * sin, result.charges_c[0].1]
 }
 
-/// Limit points of the path up to a voltage [V].
+/// Limit points of the path up to a voltage (V).
 fn limits(compiled: &CompiledModel, to: f64) -> Vec<f64> {
     let request = ContinuationRequest {
         input: PathInput::Port("drive"),
@@ -76,7 +76,7 @@ fn limits(compiled: &CompiledModel, to: f64) -> Vec<f64> {
     path.folds.iter().map(|p| p.value).collect()
 }
 
-/// Capacitance in sweeps of a device, up through pull-in and down through release, and 5 µs later [F].
+/// Capacitance in sweeps of a device, up through pull-in and down through release, and 5 µs later (F).
 fn session(compiled: CompiledModel) -> Vec<f64> {
     let mut device = LocalDevice::new(Arc::new(compiled));
     device.open(&OpenRequest { ports: Vec::new(), signals: vec!["gap.C".to_owned()], noise: None }).unwrap();

@@ -6,7 +6,7 @@ use bimorph::analysis::mesh::harmonic_fitted;
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::netlist::Bundle;
 
-/// A plate between two beams in a line, turned as a whole by `turn` [rad].
+/// A plate between two beams in a line, turned as a whole by `turn` (rad).
 fn plate(turn: f64) -> String {
     format!(
         "process p = [Youngsmodulus=160e9 density=2330 h=20u viscosity=1.8e-5 fluid=2u]\nplate2d p [s] [l=100u w=100u oz={turn}]\n\

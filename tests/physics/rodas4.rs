@@ -59,7 +59,7 @@ fn sensitivities() {
     }
 }
 
-/// From 5 nm within contact at 0.1 m/s: the displacement after `dt` [s] in so many steps, and its derivative with the final voltage.
+/// From 5 nm within contact at 0.1 m/s: the displacement after `dt` (s) in so many steps, and its derivative with the final voltage.
 fn within_contact(steps: usize, dt: f64, end: f64) -> (f64, f64) {
     let compiled = compile(&Bundle::from_text("plate", PLATE), &CompileOptions::default()).unwrap();
     let system = &compiled.parts.system;

@@ -8,7 +8,7 @@ use bimorph::compile::CompileOptions;
 use bimorph::solve::equilibrium::LossKind;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Bending stiffness EI of a section `w` wide, 2 µm thick, E = 165 GPa [N·m²].
+/// Bending stiffness EI of a section `w` wide, 2 µm thick, E = 165 GPa (N·m²).
 fn rigidity(w: f64) -> f64 {
     165e9 * 2e-6 * w.powi(3) / 12.0
 }
@@ -55,7 +55,7 @@ fn overloaded(load: f64) -> String {
     )
 }
 
-/// Loads of [`overloaded`], some up to 300 times what its slender members bear [N].
+/// Loads of [`overloaded`], some up to 300 times what its slender members bear (N).
 const LOADS: [f64; 3] = [2e-5, 2e-4, 1e-3];
 
 /// Loads far beyond what slender members bear have an equilibrium, on finer segments where those of the first mesh are turned too far from their chords, and

@@ -8,7 +8,7 @@ use bimorph::service::proto;
 use std::time::{Duration, Instant};
 use tonic::Code;
 
-/// Most memory of a server whose clients announce much and send nothing [kB].
+/// Most memory of a server whose clients announce much and send nothing (kB).
 const MAX_KB: u64 = 300 << 10;
 
 /// A thousand calls of five bytes announce 64 MiB each, on twenty connections, in an address space of 6 GiB, which holds 96 of them.

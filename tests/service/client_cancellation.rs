@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// How long a client stays.
 const STAY: Duration = Duration::from_millis(400);
-/// Processor time of the server after that, with two cores: a fraction of what it would compute [s].
+/// Processor time of the server after that, with two cores: a fraction of what it would compute (s).
 const MAX_AFTER_S: f64 = 0.5;
 
 /// A grid of beams with `side` by `side` meshes.

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tonic::{Code, Status};
 
-/// The voltage that is answered late [V].
+/// The voltage that is answered late (V).
 const SLOW: f64 = 7.0;
 
 /// A device that takes its time over one voltage.

@@ -17,7 +17,7 @@ pub(crate) struct Echo {
     tokens: BTreeSet<u64>,
 }
 
-/// The voltage at which the device panics [V].
+/// The voltage at which the device panics (V).
 pub(crate) const PANIC: f64 = 666.0;
 
 /// Makes the device; has the type of `bimorph::service::server::MakeDevice`.

@@ -262,7 +262,7 @@ fn a_few_snapshots() {
     snapshots(1, |count| count >= QUICK[1]);
 }
 
-/// For `FUZZ_MINUTES` [min], each time with others: the seed is the time, and is printed on failure.
+/// For `FUZZ_MINUTES` (min), each time with others: the seed is the time, and is printed on failure.
 fn for_minutes() -> (u64, impl FnMut(usize) -> bool) {
     let minutes: f64 = std::env::var("FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0);
     let end = Instant::now() + Duration::from_secs_f64(60.0 * minutes);

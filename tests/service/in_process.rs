@@ -77,7 +77,7 @@ fn it_says_what_a_server_says() {
     }
 }
 
-/// Length of a step [s]; the first is static.
+/// Length of a step (s); the first is static.
 fn dt(step: u32) -> f64 {
     if step == 0 { 0.0 } else { 1e-6 }
 }

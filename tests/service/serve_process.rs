@@ -13,9 +13,9 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tonic::transport::{Channel, Endpoint};
 
-/// Largest memory under any attack [kB].
+/// Largest memory under any attack (kB).
 const MAX_MEMORY_KB: u64 = 1 << 20;
-/// Processor time that it may still use when its callers are gone [s].
+/// Processor time that it may still use when its callers are gone (s).
 const MAX_AFTER_S: f64 = 3.0;
 /// The stranger's longest wait. The aim is 250 ms for 99 of 100. Machines that run tests are loaded, so that this is
 /// printed, and only the wait of a frozen event loop fails the test.
@@ -258,7 +258,7 @@ impl Victim {
         }
     }
 
-    /// The most that it has held [kB].
+    /// The most that it has held (kB).
     pub(crate) fn peak_kb(&self) -> u64 {
         self.status_kb("VmHWM:")
     }
@@ -268,7 +268,7 @@ impl Victim {
         &self.address
     }
 
-    /// Its present memory [kB].
+    /// Its present memory (kB).
     pub(crate) fn memory_kb(&self) -> u64 {
         self.status_kb("VmRSS:")
     }
@@ -278,7 +278,7 @@ impl Victim {
         std::fs::read_dir(format!("/proc/{}/fd", self.process.id())).expect("it is alive").count()
     }
 
-    /// Processor time so far [s].
+    /// Processor time so far (s).
     pub(crate) fn cpu_s(&self) -> f64 {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.process.id())).expect("it is alive");
         let fields: Vec<&str> = stat.rsplit(')').next().expect("fields").split_whitespace().collect();

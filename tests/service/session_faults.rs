@@ -26,7 +26,7 @@ use tonic::{Code, Streaming};
 pub(crate) const PATIENCE: Duration = Duration::from_millis(400);
 /// No call may take longer.
 const HANG: Duration = Duration::from_secs(5);
-/// Length of a step [s].
+/// Length of a step (s).
 const DT: f64 = 1e-7;
 /// Steps of a whole run.
 const STEPS: usize = 30;

@@ -55,7 +55,7 @@ async fn co_simulate(mut wire: Wire, model: String, end: Instant) -> Vec<Duratio
     steps
 }
 
-/// Steps `count` sessions; processor time of the server for a step [s], memory above idle [kB], and the steps' times.
+/// Steps `count` sessions; processor time of the server for a step (s), memory above idle (kB), and the steps' times.
 fn run(count: usize, long: Duration) -> (f64, u64, Vec<Duration>) {
     let victim = Victim::started(&["--max-sessions", "1100", "--limit", "calls=4096"]);
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");

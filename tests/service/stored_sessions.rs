@@ -20,9 +20,9 @@ use tempfile::TempDir;
 use tonic::Code;
 use tonic::transport::Channel;
 
-/// The voltage at which the device panics [V].
+/// The voltage at which the device panics (V).
 const PANIC: f64 = 666.0;
-/// Length of a step [s].
+/// Length of a step (s).
 const DT: f64 = 1e-7;
 
 /// Blocks loads of states.

@@ -7,11 +7,11 @@
 use super::mechanism::{Mechanism, PIN};
 use bimorph::multibody::BodyId;
 
-/// Length of an arm, distance of the two arms, distance of bimorphs [m].
+/// Length of an arm, distance of the two arms, distance of bimorphs (m).
 const LENGTH: f64 = 200e-6;
 const GAP: f64 = 10e-6;
 const PITCH: f64 = 60e-6;
-/// Density [kg/m³], thickness [m] and Young's modulus [Pa] of polysilicon.
+/// Density (kg/m³), thickness (m) and Young's modulus (Pa) of polysilicon.
 const DENSITY: f64 = 2300.0;
 const THICK: f64 = 2e-6;
 const MODULUS: f64 = 165e9;
@@ -23,11 +23,11 @@ pub(crate) const COORDINATES: usize = 10;
 pub(crate) struct Bank {
     /// Bodies and joints.
     pub(crate) mechanism: Mechanism,
-    /// Parents of each body, with the position of the pin [m].
+    /// Parents of each body, with the position of the pin (m).
     pub(crate) hangs: Vec<(BodyId, [f64; 2])>,
-    /// Pins that close loops: two bodies and the place [m].
+    /// Pins that close loops: two bodies and the place (m).
     pub(crate) closes: Vec<(BodyId, BodyId, [f64; 2])>,
-    /// Centres of mass as drawn [m].
+    /// Centres of mass as drawn (m).
     pub(crate) centers: Vec<[f64; 2]>,
 }
 
@@ -79,7 +79,7 @@ impl Bank {
     }
 }
 
-/// EI/h of a pin [N·m/rad], h a tenth of an arm.
+/// EI/h of a pin (N·m/rad), h a tenth of an arm.
 fn spring(width: f64) -> f64 {
     MODULUS * THICK * width.powi(3) / 12.0 / (0.1 * LENGTH)
 }

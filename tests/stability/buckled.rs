@@ -9,7 +9,7 @@ use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::family::LoadFamily;
 use bimorph::solve::path::SourcePath;
 
-/// Euler's load of a clamped–free column, π²EI/(4L²), E = 165 GPa, 2 µm square, L = 200 µm [N].
+/// Euler's load of a clamped–free column, π²EI/(4L²), E = 165 GPa, 2 µm square, L = 200 µm (N).
 pub(crate) fn euler() -> f64 {
     std::f64::consts::PI.powi(2) * 165e9 * (2e-6f64.powi(4) / 12.0) / (4.0 * 200e-6f64.powi(2))
 }
@@ -25,9 +25,9 @@ fn column(share: f64) -> (System, usize) {
 /// Result of Newton's iteration alone at a fraction of Euler's load, from the straight column.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Found {
-    /// Largest displacement sideways [m].
+    /// Largest displacement sideways (m).
     pub(crate) sideways: f64,
-    /// Largest force left [N].
+    /// Largest force left (N).
     pub(crate) residual: f64,
     /// Negative pivots.
     pub(crate) negative: usize,
@@ -51,7 +51,7 @@ pub(crate) fn newton(share: f64) -> Found {
     Found { sideways: largest(&|p| p.y.abs(), &q), residual: largest(&|p| p.x.hypot(p.y), &r), negative }
 }
 
-/// How far aside the equilibrium lies that the search with signs comes to at a share of Euler's load [m]; none where it finds none.
+/// How far aside the equilibrium lies that the search with signs comes to at a share of Euler's load (m); none where it finds none.
 pub(crate) fn followed(share: f64) -> Option<f64> {
     let (system, _) = column(share);
     let mut q = vec![Pose::zeros(); system.bodies()];
@@ -60,7 +60,7 @@ pub(crate) fn followed(share: f64) -> Option<f64> {
     found.ok().map(|_| q.iter().map(|p| p.y.abs()).fold(0.0, f64::max))
 }
 
-/// The path up to 1.1 of Euler's load, along `branch` where it forks: share, sideways displacement of the tip [m], negative
+/// The path up to 1.1 of Euler's load, along `branch` where it forks: share, sideways displacement of the tip (m), negative
 /// pivots.
 pub(crate) fn path(branch: Branch) -> Vec<(f64, f64, usize)> {
     let ((from, tip), (to, _)) = (column(0.0), column(1.1));

@@ -7,7 +7,7 @@ use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, LinkageP
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 
-/// Upper end of the first upright at 10 s on the in-phase branch [m], θ'' = −(g/L)·((3N+1)/2)/((4N+1)/3)·cos θ integrated
+/// Upper end of the first upright at 10 s on the in-phase branch (m), θ'' = −(g/L)·((3N+1)/2)/((4N+1)/3)·cos θ integrated
 /// with 40 digits.
 const AT_10_S: [f64; 2] = [0.328_458_111_540_815_4, 0.944_518_538_178_601];
 
@@ -83,7 +83,7 @@ impl SecondOrder for Feedback<'_> {
     }
 }
 
-/// How a run went: gap of the loops over time (t [s], m), distance from the exact place at 10 s [m], evaluations.
+/// How a run went: gap of the loops over time (t (s), m), distance from the exact place at 10 s (m), evaluations.
 #[derive(Debug, Clone)]
 pub(crate) struct Passage {
     pub(crate) gap: Vec<[f64; 2]>,
@@ -111,7 +111,7 @@ fn run<P: SecondOrder>(of: &FourBar, rtol: f64, problem: &mut P) -> Passage {
     Passage { gap, apart, evaluations: method.effort.accelerations }
 }
 
-/// Local pivots with feedback of strength `alpha` [1/s].
+/// Local pivots with feedback of strength `alpha` (1/s).
 pub(crate) fn with_feedback(alpha: f64, rtol: f64) -> Passage {
     let of = four_bar();
     let n = of.linkage.coordinates;

@@ -7,7 +7,7 @@ use bimorph::multibody::{Body, BodyId, Joint, Model};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use std::sync::Arc;
 
-/// Young's modulus [Pa], density [kg/m³] and thickness [m] of polysilicon.
+/// Young's modulus (Pa), density (kg/m³) and thickness (m) of polysilicon.
 pub(crate) const MODULUS: f64 = 165e9;
 pub(crate) const DENSITY: f64 = 2300.0;
 pub(crate) const THICK: f64 = 2e-6;
@@ -26,7 +26,7 @@ impl Frame {
         Self { bodies: Vec::new(), joints: Vec::new(), axial }
     }
 
-    /// A node at `at` [m], without mass until beams bring some.
+    /// A node at `at` (m), without mass until beams bring some.
     pub(crate) fn node(&mut self, at: [f64; 2]) -> BodyId {
         self.bodies.push(Body {
             name: format!("n{}", self.bodies.len()).into(),
@@ -39,7 +39,7 @@ impl Frame {
         BodyId::Free(self.bodies.len() - 1)
     }
 
-    /// A beam of `count` segments, `width` wide [m], from body `a` at `from` to body `b` at `to`.
+    /// A beam of `count` segments, `width` wide (m), from body `a` at `from` to body `b` at `to`.
     pub(crate) fn beam(
         &mut self,
         (a, from): (BodyId, [f64; 2]),
@@ -98,7 +98,7 @@ impl Frame {
         });
     }
 
-    /// The system with dead loads (node, force [N]); also says where each node went.
+    /// The system with dead loads (node, force (N)); also says where each node went.
     pub(crate) fn system(self, loads: &[(BodyId, [f64; 2])]) -> (System, Vec<usize>) {
         let (model, place) = Model::new(self.bodies, self.joints, Vec::new(), &[], false);
         let at = |id: BodyId| match id {
@@ -111,7 +111,7 @@ impl Frame {
     }
 }
 
-/// A time of `dt` [s] in which nothing electrical happens.
+/// A time of `dt` (s) in which nothing electrical happens.
 pub(crate) fn quiet(system: &System, dt: f64) -> Ramp<'_> {
     Ramp::new(&system.electrics, &[], &[], &[], dt)
 }

@@ -18,8 +18,8 @@ fn parallel(bars: usize) -> (Model, Vec<usize>) {
     m.model()
 }
 
-/// Result of projecting a state with errors of `size` [rad, m]: gap before [m], gap after [m], rate of the gap after
-/// [m/s].
+/// Result of projecting a state with errors of `size` (rad, m): gap before (m), gap after (m), rate of the gap after
+/// (m/s).
 pub(crate) fn projected(size: f64) -> [f64; 3] {
     let (model, _) = parallel(2);
     let linkage = Linkage::new(&model);
@@ -63,7 +63,7 @@ fn gravity(model: &Model, r: &mut Reduction<f64>) {
     }
 }
 
-/// Gap [m] after `end` [s] of a linkage that began 1e-6 rad and 1e-3 rad/s off: never projected, projected.
+/// Gap (m) after `end` (s) of a linkage that began 1e-6 rad and 1e-3 rad/s off: never projected, projected.
 pub(crate) fn kept(end: f64) -> [f64; 2] {
     let (model, _) = parallel(2);
     let linkage = Linkage::new(&model);
@@ -87,7 +87,7 @@ pub(crate) fn kept(end: f64) -> [f64; 2] {
     gaps
 }
 
-/// Place of the coupler [m, m, rad] after 0.5 s under gravity on `bars` cranks, which together weigh as much as two; what
+/// Place of the coupler (m, m, rad) after 0.5 s under gravity on `bars` cranks, which together weigh as much as two; what
 /// the last reduction near a singular configuration met, and how many there were.
 pub(crate) fn swung(bars: usize) -> ([f64; 3], Singularity, u64) {
     let (mut model, place) = parallel(bars);
@@ -107,7 +107,7 @@ pub(crate) fn swung(bars: usize) -> ([f64; 3], Singularity, u64) {
     (r.pose(place[0]), motion.met, motion.singular)
 }
 
-/// Largest acceleration by local pivots alone on `bars` cranks [m/s²]; not a number where a pivot is zero.
+/// Largest acceleration by local pivots alone on `bars` cranks (m/s²); not a number where a pivot is zero.
 pub(crate) fn local(bars: usize) -> f64 {
     let (model, _) = parallel(bars);
     let linkage = Linkage::new(&model);

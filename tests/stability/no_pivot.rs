@@ -10,7 +10,7 @@ use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 
 const NO_HEAT: RestStrain<'_> = RestStrain { expansion: &[], built_in: 1.0 };
-/// A lever that makes accelerations of rotation comparable [m]: a quarter of an arm.
+/// A lever that makes accelerations of rotation comparable (m): a quarter of an arm.
 const LEVER: f64 = 50e-6;
 
 struct Case {
@@ -28,7 +28,7 @@ impl Case {
         Self { bank, model, place, linkage }
     }
 
-    /// Joint coordinates bent by `size` [rad] at random, on the loops.
+    /// Joint coordinates bent by `size` (rad) at random, on the loops.
     fn bent(&self, size: f64) -> Vec<f64> {
         let mut s = Stream(3);
         let n = self.linkage.coordinates;
@@ -59,7 +59,7 @@ fn apart(a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64, n: usize) -> f64 {
     difference.fold(0.0, |m: f64, x| if x.is_nan() { f64::INFINITY } else { m.max(x) }) / largest
 }
 
-/// Relative errors of the accelerations of a bank of `count` bimorphs bent by `bent` [rad]: without pivots, and ours.
+/// Relative errors of the accelerations of a bank of `count` bimorphs bent by `bent` (rad): without pivots, and ours.
 pub(crate) fn errors(chosen: Chosen, count: usize, bent: f64) -> (f64, f64) {
     let case = Case::new(count);
     let n = case.linkage.coordinates;
@@ -136,7 +136,7 @@ impl SecondOrder for Blind<'_> {
     }
 }
 
-/// How an integration went: time reached [s], accelerations evaluated, displacement of the first yoke over time (t, y) [m].
+/// How an integration went: time reached (s), accelerations evaluated, displacement of the first yoke over time (t, y) (m).
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Run {
     pub(crate) reached: f64,
@@ -175,7 +175,7 @@ fn integrate<P: SecondOrder>(case: &Case, problem: &mut P, q: &mut [f64]) -> Run
     run
 }
 
-/// Integrates a bank of `count` bimorphs from `bent` [rad] for 2 µs under a sudden force: without pivots, and ours.
+/// Integrates a bank of `count` bimorphs from `bent` (rad) for 2 µs under a sudden force: without pivots, and ours.
 pub(crate) fn runs(chosen: Chosen, count: usize, bent: f64) -> (Run, Run) {
     let case = Case::new(count);
     let mut q = case.bent(bent);

@@ -7,7 +7,7 @@ use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::{JointMotion, NotFinite};
 
 const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
-/// Torque of the motor [N·m]; stiffness [N/m] and length [m] of the spring; where it is fixed [m].
+/// Torque of the motor (N·m); stiffness (N/m) and length (m) of the spring; where it is fixed (m).
 const TORQUE: f64 = 33e-3;
 const SPRING: f64 = 4530.0;
 const REST: f64 = 7785e-5;
@@ -57,7 +57,7 @@ pub(crate) fn squeezer() -> Squeezer {
 }
 
 impl Squeezer {
-    /// From the spring's fixed end to its hook, and from the rocker's centre to the hook [m].
+    /// From the spring's fixed end to its hook, and from the rocker's centre to the hook (m).
     fn spring(&self, r: &Reduction<f64>) -> ([f64; 2], [f64; 2]) {
         let [x, y, turn] = r.pose(self.rocker);
         let (s, c) = turn.sin_cos();
@@ -75,7 +75,7 @@ impl Squeezer {
         *force = [force[0] + f[0], force[1] + f[1], force[2] + lever[0] * f[1] - lever[1] * f[0]];
     }
 
-    /// Kinetic energy and spring energy less the motor's work [J].
+    /// Kinetic energy and spring energy less the motor's work (J).
     fn energy(&self, r: &Reduction<f64>) -> f64 {
         let (from, _) = self.spring(r);
         let stretch = from[0].hypot(from[1]) - REST;
@@ -98,7 +98,7 @@ impl<P: SecondOrder> SecondOrder for Adrift<P> {
     }
 }
 
-/// Largest gap of a loop [m] and change of the energy [J] over time [s]; the motor's work [J].
+/// Largest gap of a loop (m) and change of the energy (J) over time (s); the motor's work (J).
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Drift {
     pub(crate) gap: Vec<[f64; 2]>,
@@ -129,7 +129,7 @@ fn run<P: SecondOrder<Error = NotFinite>>(of: &Squeezer, end: f64, problem: &mut
     drift
 }
 
-/// To `end` [s]: without projection, with it.
+/// To `end` (s): without projection, with it.
 pub(crate) fn drifts(end: f64) -> (Drift, Drift) {
     let of = squeezer();
     let loads = |_: f64, _: &[f64], _: &[f64], r: &mut Reduction<f64>| of.loads(r);

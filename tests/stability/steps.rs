@@ -12,7 +12,7 @@ use bimorph::solve::linear::Recursion;
 use bimorph::solve::method::Motion;
 use bimorph::solve::path::SourcePath;
 
-/// Three bimorphs, bent by `force` [N] on the first yoke, or free.
+/// Three bimorphs, bent by `force` (N) on the first yoke, or free.
 fn three(force: f64) -> (System, usize) {
     let (frame, node) = bank(3, 4);
     let (system, place) = frame.system(&[(node, [0.0, force])]);
@@ -20,7 +20,7 @@ fn three(force: f64) -> (System, usize) {
     (system, place[k])
 }
 
-/// Energy over time after release, relative to the first, in equal steps of `h` [s] for `count` steps; stops beyond a
+/// Energy over time after release, relative to the first, in equal steps of `h` (s) for `count` steps; stops beyond a
 /// thousandfold.
 pub(crate) fn energies(method: Integrator, force: f64, h: f64, count: usize) -> Vec<[f64; 2]> {
     let (loaded, _) = three(force);

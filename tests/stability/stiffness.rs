@@ -33,14 +33,14 @@ fn bent(system: &System) -> Vec<Pose> {
     q
 }
 
-/// A released beam: displacement of its tip over time [s, m], and how many forces were evaluated and matrices factored.
+/// A released beam: displacement of its tip over time (s, m), and how many forces were evaluated and matrices factored.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Released {
     pub(crate) track: Vec<[f64; 2]>,
     pub(crate) work: SolverCounters,
 }
 
-/// The tip after release until `end` [s]; ends early when it is beyond ten times the first displacement.
+/// The tip after release until `end` (s); ends early when it is beyond ten times the first displacement.
 fn released(ratio: f64, method: Integrator, control: Control, end: f64) -> Released {
     let (loaded, tip) = stiff(ratio, 0.2e-6);
     let q = bent(&loaded);
@@ -58,7 +58,7 @@ fn released(ratio: f64, method: Integrator, control: Control, end: f64) -> Relea
     out
 }
 
-/// About twice the period of the first mode [s].
+/// About twice the period of the first mode (s).
 const END: f64 = 120e-6;
 
 /// Rodas4 with a tolerance.
@@ -71,13 +71,13 @@ pub(crate) fn explicit(ratio: f64, tol: f64) -> Released {
     released(ratio, Integrator::Rk45, Control::Tolerance(tol), 2e-6)
 }
 
-/// True when 400 explicit steps of `h` [s] stay bounded.
+/// True when 400 explicit steps of `h` (s) stay bounded.
 pub(crate) fn explicit_holds(ratio: f64, h: f64) -> bool {
     let track = released(ratio, Integrator::Rk45, Control::Fixed(h), 400.0 * h).track;
     track.len() > 400 && track.iter().all(|y| (y[1] / track[0][1]).abs() < 2.0)
 }
 
-/// Longest explicit step that stays bounded, to 5 % [s].
+/// Longest explicit step that stays bounded, to 5 % (s).
 pub(crate) fn longest_explicit(ratio: f64) -> f64 {
     let (mut low, mut high) = (1e-13, 1e-6);
     while high / low > 1.05 {

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) const EQUAL: [f64; 6] = [1.0; 6];
 pub(crate) const MIXED: [f64; 6] = [1.0, 1.3, 0.1, 7.0, 1.0, 2.0];
 
-/// Acceleration of the shuttle [m/s², rad/s²] for the kinks of [`EQUAL`]; scripts/stability/kinks.py, 60 digits.
+/// Acceleration of the shuttle (m/s², rad/s²) for the kinks of [`EQUAL`]; scripts/stability/kinks.py, 60 digits.
 #[rustfmt::skip]
 pub(crate) const EQUAL_REFERENCE: [(f64, [f64; 3]); 7] = [
     (0.01, [-0.006_259_057_389_088_57, 0.045_159_524_886_230_78, -13.933_398_277_137_213]),
@@ -31,7 +31,7 @@ pub(crate) const MIXED_REFERENCE: [(f64, [f64; 3]); 7] = [
     (1.0e-7, [1.985_425_147_823_804e-7, 1.538_072_409_023_249_5e-7, -14.133_520_007_147_26]),
     (1.0e-8, [1.985_424_609_700_362e-8, 1.538_072_123_452_68e-8, -14.133_520_080_300_084]),
 ];
-/// Rotation of the shuttle with straight arms [rad/s²]; the same script.
+/// Rotation of the shuttle with straight arms (rad/s²); the same script.
 const STRAIGHT_TURN: f64 = -14.026_564_005_7;
 
 /// Arms in directions that no axis helps; the first stands at 0.6435 rad.
@@ -52,7 +52,7 @@ fn star(kinks: &[f64]) -> (Model, Vec<usize>) {
     m.model()
 }
 
-/// Acceleration of the shuttle [m/s², rad/s²] by local pivots, by the path for singular configurations, by dense
+/// Acceleration of the shuttle (m/s², rad/s²) by local pivots, by the path for singular configurations, by dense
 /// elimination with partial pivoting; and what the second met.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shuttle {
@@ -118,7 +118,7 @@ pub(crate) fn error(got: [f64; 3], want: [f64; 3]) -> f64 {
         .fold(0.0, |m: f64, x| if x.is_nan() { f64::INFINITY } else { m.max(x) })
 }
 
-/// A shuttle with `count` straight arms: its diagnostics, and the shortest time of five reductions [s].
+/// A shuttle with `count` straight arms: its diagnostics, and the shortest time of five reductions (s).
 pub(crate) fn crowded(count: usize) -> (Singularity, f64) {
     let (_, _, linkage, mut r) = loaded(&vec![1e-7; count]);
     let mut out = vec![0.0; linkage.coordinates];

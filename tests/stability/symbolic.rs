@@ -32,7 +32,7 @@ pub(crate) struct Symbolic {
 
 impl Symbolic {
     /// Writes the equations down. `pose`, `rate`, `force` are those of a body in the order of description, `masses` its
-    /// mass [kg] and moment of inertia [kg·m²].
+    /// mass (kg) and moment of inertia (kg·m²).
     pub(crate) fn new(
         bank: &Bank,
         chosen: Chosen,

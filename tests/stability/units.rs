@@ -85,7 +85,7 @@ fn push(model: &Model, u: Units) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// Accelerations of all bodies in SI [m/s², rad/s²].
+/// Accelerations of all bodies in SI (m/s², rad/s²).
 fn in_si(a: &[[f64; 3]], u: Units) -> Vec<[f64; 3]> {
     let t = u.time * u.time;
     a.iter().map(|a| [a[0] * t / u.length, a[1] * t / u.length, a[2] * t]).collect()

@@ -24,25 +24,25 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-/// Length of a rod [m].
+/// Length of a rod (m).
 pub const ROD: f64 = 10e-6;
 const WIDTH: f64 = 2e-6;
 const THICKNESS: f64 = 2e-6;
 const MODULUS: f64 = 160e9;
 const DENSITY: f64 = 2330.0;
-/// Gas drag per mass [1/s].
+/// Gas drag per mass (1/s).
 const DRAG: f64 = 2e4;
-/// Half of the kink of an arm [rad]: a straight arm on pins is a singular configuration.
+/// Half of the kink of an arm (rad): a straight arm on pins is a singular configuration.
 const KINK: f64 = 0.15;
 
 /// A rigid body.
 #[derive(Debug, Clone, Copy)]
 pub struct Rod {
-    /// Centre of mass [m].
+    /// Centre of mass (m).
     pub centre: Vector2<f64>,
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f64,
-    /// Moment of inertia about the centre of mass [kg·m²].
+    /// Moment of inertia about the centre of mass (kg·m²).
     pub inertia: f64,
 }
 
@@ -53,9 +53,9 @@ pub struct Pin {
     pub a: Option<u32>,
     /// Body b.
     pub b: u32,
-    /// Where [m].
+    /// Where (m).
     pub position: Vector2<f64>,
-    /// Angle of the x axis [rad].
+    /// Angle of the x axis (rad).
     pub angle: f64,
 }
 

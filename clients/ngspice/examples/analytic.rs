@@ -27,9 +27,9 @@ const GAP: f64 = 2e-6;
 const SENSE: f64 = 50e-15;
 const SENSE_SLOPE: f64 = 1e-8;
 
-/// Longest step of `plate.short` [s].
+/// Longest step of `plate.short` (s).
 const SHORT: f64 = 50e-9;
-/// When `plate.fails` ends [s].
+/// When `plate.fails` ends (s).
 const END: f64 = 10e-6;
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -44,7 +44,7 @@ struct Plate {
     states: BTreeMap<Token, State>,
 }
 
-/// Force [N], ∂force/∂x, ∂force/∂V, capacitances [F] and their slopes.
+/// Force (N), ∂force/∂x, ∂force/∂V, capacitances (F) and their slopes.
 struct Field {
     force: f64,
     slope: f64,

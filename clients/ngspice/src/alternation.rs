@@ -11,43 +11,43 @@ use bimorph::netlist::Diagnostic;
 
 /// Code of the warning.
 const CODE: &str = "W047";
-/// Smallest alternation that is reported, as a fraction of the range of the current [1].
+/// Smallest alternation that is reported, as a fraction of the range of the current (1).
 const REPORTED: f64 = 3e-3;
 /// Points in a row that must alternate: a corner of a source makes few.
 const MIN_POINTS: u32 = 12;
-/// Relative error of a charge that integrators leave [1].
+/// Relative error of a charge that integrators leave (1).
 const NOISE: f64 = 1e-7;
-/// By how much an alternation is larger than the one that was reported last, to be reported again [1].
+/// By how much an alternation is larger than the one that was reported last, to be reported again (1).
 const GROWS: f64 = 3.0;
-/// Ratio of a step to the one before it below which a point has no derivative [1].
+/// Ratio of a step to the one before it below which a point has no derivative (1).
 const MIN_RATIO: f64 = 1e-3;
 
 /// Alternation of an instance's currents at its accepted points.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Alternation {
-    /// Length of the last step [s]; 0 without a step since an equilibrium.
+    /// Length of the last step (s); 0 without a step since an equilibrium.
     step: f64,
     ports: Vec<PortAlternation>,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
 struct PortAlternation {
-    /// Charges at the last two points, the last first [C].
+    /// Charges at the last two points, the last first (C).
     charges: [f64; 2],
-    /// Current of the charge at the last point [A].
+    /// Current of the charge at the last point (A).
     current: f64,
-    /// Differences between current and derivative, the last first [A].
+    /// Differences between current and derivative, the last first (A).
     off: [f64; 3],
-    /// Range of the derivative [A].
+    /// Range of the derivative (A).
     range: [f64; 2],
     /// Points in a row at which the difference changed its sign by as much.
     points: u32,
-    /// Largest reported alternation, relative to its range [1].
+    /// Largest reported alternation, relative to its range (1).
     reported: f64,
 }
 
 impl PortAlternation {
-    /// Alternation [A] at the point before the last, where it is one.
+    /// Alternation (A) at the point before the last, where it is one.
     fn add(&mut self, [before, step]: [f64; 2], charge: f64) -> f64 {
         let [last, first] = self.charges;
         let slopes = [(last - first) / before, (charge - last) / step];
@@ -68,7 +68,7 @@ impl PortAlternation {
 }
 
 impl Alternation {
-    /// Warnings after an accepted point: `step` [s], 0 at an equilibrium; `names` of the ports. A port is reported again at three times as much.
+    /// Warnings after an accepted point: `step` (s), 0 at an equilibrium; `names` of the ports. A port is reported again at three times as much.
     pub(crate) fn accepted<'a>(
         &mut self,
         step: f64,

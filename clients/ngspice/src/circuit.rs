@@ -7,30 +7,30 @@ use crate::companion::DifferentiationRule;
 use crate::layout::{Generation, HostLayout};
 use std::ffi::c_void;
 
-/// Offset of the state vectors, eight pointers [byte].
+/// Offset of the state vectors, eight pointers (byte).
 const STATES: usize = 16;
-/// Offset of the present step [byte].
+/// Offset of the present step (byte).
 const DELTA: usize = 88;
-/// Offset of the order of integration, and after the largest order that of its method, three integers of four bytes [byte].
+/// Offset of the order of integration, and after the largest order that of its method, three integers of four bytes (byte).
 const ORDER: usize = 232;
-/// Offset of the share of the last current in the trapezoidal rule [byte].
+/// Offset of the share of the last current in the trapezoidal rule (byte).
 const XMU: usize = 248;
 /// Number of Gear's method.
 const GEAR: i32 = 2;
-/// Offset of the right-hand side; after a solve, of the solution [byte].
+/// Offset of the right-hand side; after a solve, of the solution (byte).
 const SOLUTION: usize = 280;
-/// Offset of the solution before it, at which the devices were loaded [byte].
+/// Offset of the solution before it, at which the devices were loaded (byte).
 const LOADED_AT: usize = 288;
 
-/// Offset of the imaginary part of a small-signal solution [byte].
+/// Offset of the imaginary part of a small-signal solution (byte).
 const IMAGINARY: usize = 304;
 
-/// Offset of the angular frequency up to ngspice 41 [byte].
+/// Offset of the angular frequency up to ngspice 41 (byte).
 const OMEGA_39: usize = 568;
 
-/// Offsets of the job that is being run: where the mode stands at [`MODE_UNTIL_45`], and elsewhere [byte].
+/// Offsets of the job that is being run: where the mode stands at [`MODE_UNTIL_45`], and elsewhere (byte).
 const JOB: [usize; 2] = [664, 704];
-/// Offset of the mode up to ngspice 45 [byte].
+/// Offset of the mode up to ngspice 45 (byte).
 const MODE_UNTIL_45: usize = 392;
 
 /// Bits of the mode.
@@ -73,7 +73,7 @@ impl HostCircuit {
         unsafe { ((self.base + offset) as *const T).read() }
     }
 
-    /// The present step [s].
+    /// The present step (s).
     pub(crate) fn delta(self) -> f64 {
         self.read(DELTA)
     }
@@ -133,7 +133,7 @@ impl HostCircuit {
         self.layout.mode_offsets().into_iter().any(|offset| noise(self.read(offset)))
     }
 
-    /// Angular frequency of a small-signal solution [rad/s], where it is known how this host keeps it.
+    /// Angular frequency of a small-signal solution (rad/s), where it is known how this host keeps it.
     pub(crate) fn omega(self) -> Option<f64> {
         (self.layout.generation == Generation::Since39).then(|| self.read(OMEGA_39))
     }
@@ -143,7 +143,7 @@ impl HostCircuit {
         self.read(STATES + point * size_of::<usize>())
     }
 
-    /// Voltage between two nodes in the newest solution [V]. During a load that vector is the right-hand side.
+    /// Voltage between two nodes in the newest solution (V). During a load that vector is the right-hand side.
     ///
     /// # Safety
     /// The nodes are the circuit's.
@@ -152,7 +152,7 @@ impl HostCircuit {
         unsafe { difference(self.read(SOLUTION), positive, negative) }
     }
 
-    /// Voltage between two nodes in the solution at which devices are loaded [V].
+    /// Voltage between two nodes in the solution at which devices are loaded (V).
     ///
     /// # Safety
     /// The nodes are the circuit's.

@@ -28,23 +28,23 @@
 pub enum DifferentiationRule {
     /// Backward Euler: nothing before the last point counts.
     First,
-    /// The trapezoidal rule with this fraction of the current at the last point [1], ½ unless the deck says otherwise.
+    /// The trapezoidal rule with this fraction of the current at the last point (1), ½ unless the deck says otherwise.
     Trapezoidal(f64),
     /// BDF2.
     Gear,
 }
 
-/// Steps below this fraction of the time since the start may be of rounding [1]: about 10⁶ roundings of the time.
+/// Steps below this fraction of the time since the start may be of rounding (1): about 10⁶ roundings of the time.
 const RESOLUTION: f64 = 1e-10;
-/// Fraction of the largest current that rounding may make [1].
+/// Fraction of the largest current that rounding may make (1).
 const SEEN: f64 = 1e-5;
 
-/// The shortest step to differentiate over that ends at `t` [s], where rounding hides the slope.
+/// The shortest step to differentiate over that ends at `t` (s), where rounding hides the slope.
 pub fn shortest(t: f64) -> f64 {
     RESOLUTION * t
 }
 
-/// Whether a step `h` [s] that ends at `t` is so short that the rounding of a charge `q` [C] makes a current of its own beside the largest so far, `peak` [A].
+/// Whether a step `h` (s) that ends at `t` is so short that the rounding of a charge `q` (C) makes a current of its own beside the largest so far, `peak` (A).
 pub fn hidden((t, h): (f64, f64), q: f64, peak: f64) -> bool {
     h < shortest(t) && f64::EPSILON * q.abs() > SEEN * peak * h
 }
@@ -52,16 +52,16 @@ pub fn hidden((t, h): (f64, f64), q: f64, peak: f64) -> bool {
 /// dq/dt = `slope`·(q − q₁) + `second`·(q₂ − q₁) − `memory`·i₁, for every port of an instance alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Companion {
-    /// Factor of the new charge [1/s].
+    /// Factor of the new charge (1/s).
     pub slope: f64,
-    /// Factor of the charge accepted before the last [1/s].
+    /// Factor of the charge accepted before the last (1/s).
     pub second: f64,
-    /// Factor of the current at the last point [1].
+    /// Factor of the current at the last point (1).
     pub memory: f64,
 }
 
 impl Companion {
-    /// For a step `h` [s] by a rule, after a step of `before` [s]; 0 without a step since the last change of slope.
+    /// For a step `h` (s) by a rule, after a step of `before` (s); 0 without a step since the last change of slope.
     pub fn new(rule: DifferentiationRule, h: f64, before: f64) -> Self {
         match rule {
             DifferentiationRule::Trapezoidal(mu) => {
@@ -75,8 +75,8 @@ impl Companion {
         }
     }
 
-    /// Displacement current [A] for the charges `q` now and `before` at the last two accepted points, the last first [C], after
-    /// a current of `last` [A].
+    /// Displacement current (A) for the charges `q` now and `before` at the last two accepted points, the last first (C), after
+    /// a current of `last` (A).
     pub fn current(&self, q: f64, before: [f64; 2], last: f64) -> f64 {
         // Differences: the factors sum to zero, and a large constant charge must not leave a residue.
         let [q1, q2] = before;
@@ -160,10 +160,10 @@ mod tests {
         }
     }
 
-    /// 28 points a cycle [rad].
+    /// 28 points a cycle (rad).
     const EVEN: f64 = std::f64::consts::TAU / 28.0;
 
-    /// A tank at these steps [rad], i = q' by a rule, L·i' = −q by the trapezoidal rule as in ngspice: its swing at the end over that at the start.
+    /// A tank at these steps (rad), i = q' by a rule, L·i' = −q by the trapezoidal rule as in ngspice: its swing at the end over that at the start.
     fn tank(rule: DifferentiationRule, steps: impl Iterator<Item = f64>) -> f64 {
         let (mut q, mut i, mut last, mut before) = ([1.0, EVEN.cos()], 0.0, 0.0, EVEN);
         for h in steps {

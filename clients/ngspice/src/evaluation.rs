@@ -9,18 +9,18 @@ use bimorph::device::{Token, TrialReply};
 pub enum EvaluationRequest {
     /// Operating point or sweep: equilibrium.
     Static,
-    /// A step of `dt` [s] that ends at `t` [s].
+    /// A step of `dt` (s) that ends at `t` (s).
     Transient {
-        /// End of the step [s].
+        /// End of the step (s).
         t: f64,
-        /// Length [s], positive.
+        /// Length (s), positive.
         dt: f64,
         /// How charges are differentiated over it.
         rule: DifferentiationRule,
     },
-    /// Small-signal answer at `omega` [rad/s].
+    /// Small-signal answer at `omega` (rad/s).
     SmallSignal {
-        /// Angular frequency [rad/s].
+        /// Angular frequency (rad/s).
         omega: f64,
     },
 }
@@ -41,26 +41,26 @@ pub enum EvaluationOutcome {
 pub struct Evaluation {
     /// State reached.
     pub token: Option<Token>,
-    /// Step that led to it [s]; 0 for equilibrium.
+    /// Step that led to it (s); 0 for equilibrium.
     pub step: f64,
-    /// Current into each port [A], or the voltage across one whose current is given [V] (p).
+    /// Current into each port (A), or the voltage across one whose current is given (V) (p).
     pub currents: Vec<f64>,
-    /// ∂current/∂voltage [S], or of what else is answered and given (p×p).
+    /// ∂current/∂voltage (S), or of what else is answered and given (p×p).
     pub conductances: Vec<f64>,
-    /// Charges [C] (p).
+    /// Charges (C) (p).
     pub charges: Vec<f64>,
     /// Base for differentiating the next step's charges, if this point is accepted.
     pub base: Base,
-    /// By how much a current changes with its charge over this step [1/s]; 0 for equilibrium.
+    /// By how much a current changes with its charge over this step (1/s); 0 for equilibrium.
     pub slope: f64,
-    /// Scaled monitors [V] (s).
+    /// Scaled monitors (V) (s).
     pub monitors: Vec<f64>,
-    /// ∂monitor/∂voltage [1] (s×p).
+    /// ∂monitor/∂voltage (1) (s×p).
     pub monitor_gains: Vec<f64>,
 }
 
 impl Evaluation {
-    /// Takes a reply over, its charges as currents where time passes: by a rule, to t [s], over a step [s], from what the point before has
+    /// Takes a reply over, its charges as currents where time passes: by a rule, to t (s), over a step (s), from what the point before has
     /// left.
     pub(crate) fn take(&mut self, reply: &TrialReply, time: Option<(DifferentiationRule, f64, f64)>, base: &Base) {
         self.token = reply.token;

@@ -9,7 +9,7 @@
 const MAX_IN_A_ROW: u32 = 4;
 /// Refusals of one operating point, or of one point of a sweep, after which it has failed, however many evaluations between them succeeded.
 const MAX_AT_REST: u32 = 24;
-/// A step that fails although it is shorter than this fraction of the longest one taken is hopeless, too [1]: the steps
+/// A step that fails although it is shorter than this fraction of the longest one taken is hopeless, too (1): the steps
 /// are creeping up to a point beyond which there is no answer.
 const HOPELESS: f64 = 1e-4;
 
@@ -18,12 +18,12 @@ const HOPELESS: f64 = 1e-4;
 pub(crate) struct FailedEvaluations {
     in_a_row: u32,
     at_rest: u32,
-    /// Longest step so far [s].
+    /// Longest step so far (s).
     longest: f64,
 }
 
 impl FailedEvaluations {
-    /// After an evaluation with a result. `step`: its length [s]; none at rest.
+    /// After an evaluation with a result. `step`: its length (s); none at rest.
     pub(crate) fn solved(&mut self, step: Option<f64>) {
         self.in_a_row = 0;
         if let Some(step) = step {
@@ -37,7 +37,7 @@ impl FailedEvaluations {
         self.at_rest = 0;
     }
 
-    /// Whether a shorter step than this one [s] may still help.
+    /// Whether a shorter step than this one (s) may still help.
     pub(crate) fn may_shorten(&self, step: f64) -> bool {
         step > HOPELESS * self.longest
     }

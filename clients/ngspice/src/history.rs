@@ -17,25 +17,25 @@ pub struct History {
     pub token: Option<Token>,
     /// Base for differentiating charges.
     pub base: Base,
-    /// Charge of each port [C].
+    /// Charge of each port (C).
     pub charges: Vec<f64>,
 }
 
 /// The last two points far enough apart to give a slope, the last one first, see [`crate::companion`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Base {
-    /// Time between them [s]; 0 without a step since an operating point, or since the slope changed.
+    /// Time between them (s); 0 without a step since an operating point, or since the slope changed.
     pub step: f64,
-    /// Charges at each [C].
+    /// Charges at each (C).
     pub charges: [Vec<f64>; 2],
-    /// Currents from the change of charges at the last one [A].
+    /// Currents from the change of charges at the last one (A).
     pub currents: Vec<f64>,
-    /// The largest of those so far [A].
+    /// The largest of those so far (A).
     pub peaks: Vec<f64>,
 }
 
 impl Base {
-    /// At an operating point with these charges [C].
+    /// At an operating point with these charges (C).
     pub fn start(&mut self, charges: &[f64]) {
         self.step = 0.0;
         for place in &mut self.charges {
@@ -48,8 +48,8 @@ impl Base {
         }
     }
 
-    /// At the end of a step that ends at `t` and is `dt` long [s], with these charges there [C]: adds the currents that they
-    /// make [A], and answers by how much each changes with its charge [1/s].
+    /// At the end of a step that ends at `t` and is `dt` long (s), with these charges there (C): adds the currents that they
+    /// make (A), and answers by how much each changes with its charge (1/s).
     pub fn advance(
         &mut self,
         rule: DifferentiationRule,
@@ -83,7 +83,7 @@ impl Base {
         companion.slope
     }
 
-    /// The charges at the last point become these [C], and its currents what follows with `slope` [1/s], that of the step to it.
+    /// The charges at the last point become these (C), and its currents what follows with `slope` (1/s), that of the step to it.
     pub fn settle(&mut self, charges: &[f64], slope: f64) {
         for ((kept, current), charge) in self.charges[0].iter_mut().zip(&mut self.currents).zip(charges) {
             *current += slope * (charge - *kept);

@@ -162,7 +162,7 @@ impl Instance {
         row.iter().zip(&self.scales).map(move |(part, scale)| part.map(|x| answered * x * scale.given))
     }
 
-    /// Longest next step the device is likely to bear [s].
+    /// Longest next step the device is likely to bear (s).
     pub fn step_bound(&self) -> f64 {
         self.step_bound
     }
@@ -214,7 +214,7 @@ impl Instance {
         still.map_or_else(Vec::new, |token| self.device.warns(token))
     }
 
-    /// Moves the charges of the last transient answer along their derivatives by `volts` [V], and with them what the next
+    /// Moves the charges of the last transient answer along their derivatives by `volts` (V), and with them what the next
     /// step is differentiated from. False where there is nothing to move.
     pub fn settle(&mut self, volts: &[f64]) -> bool {
         let (answer, dq_dv, ports) = (&mut self.answer, &self.reply.dq_dv, volts.len());

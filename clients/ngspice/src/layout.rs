@@ -50,7 +50,7 @@ pub enum HostLayoutError {
         "this ngspice has an unknown device table (instance size field at byte {offset:?}); known are ngspice 39 to 47"
     )]
     Table {
-        /// Where the size was found [byte].
+        /// Where the size was found (byte).
         offset: Option<usize>,
     },
     /// The host's instances have a size that no known version has.
@@ -58,7 +58,7 @@ pub enum HostLayoutError {
         "this ngspice has code model instances of {size} bytes; known are 152 (39 to 41), 160 (42 to 46) and 224 (47)"
     )]
     Instance {
-        /// Size of an instance [byte].
+        /// Size of an instance (byte).
         size: i32,
     },
 }
@@ -96,17 +96,17 @@ impl HostLayout {
         Ok(Self { generation, osdi, cider })
     }
 
-    /// Offset of the first device function, `DEVparam` [byte].
+    /// Offset of the first device function, `DEVparam` (byte).
     pub fn functions(&self) -> usize {
         136 + 8 * usize::from(self.osdi)
     }
 
-    /// Offset of the two sizes that the host wrote; what a host with KLU calls follows them [byte].
+    /// Offset of the two sizes that the host wrote; what a host with KLU calls follows them (byte).
     pub fn sizes(&self) -> usize {
         360 + 8 * usize::from(self.osdi) + 16 * usize::from(self.cider)
     }
 
-    /// Where the circuit's mode may stand: the likelier place first [byte].
+    /// Where the circuit's mode may stand: the likelier place first (byte).
     pub fn mode_offsets(&self) -> [usize; 2] {
         match self.generation {
             Generation::Since39 | Generation::Since42 => [392, 392],
@@ -132,13 +132,13 @@ impl HostLayout {
         }
     }
 
-    /// Offset of a port's matrix data, with its node numbers [byte]. `partial_at_80`: the host keeps a port's partials
+    /// Offset of a port's matrix data, with its node numbers (byte). `partial_at_80`: the host keeps a port's partials
     /// where ngspice 39 does.
     pub fn port_matrix(&self, partial_at_80: bool) -> usize {
         if partial_at_80 { 144 } else { 152 }
     }
 
-    /// Offset of the connections in a call [byte].
+    /// Offset of the connections in a call (byte).
     pub fn call_tail(&self) -> usize {
         if self.generation == Generation::Since47 { 120 } else { 104 }
     }

@@ -22,13 +22,13 @@ pub struct RawCard {
     pub set: Vec<String>,
     /// `remote`
     pub remote: Option<String>,
-    /// `deadline` [s]
+    /// `deadline` (s)
     pub deadline: Option<f64>,
     /// `noise`
     pub noise: Option<bool>,
     /// `seed`
     pub seed: Option<f64>,
-    /// `noise_band` [Hz]
+    /// `noise_band` (Hz)
     pub noise_band: Option<f64>,
     /// The options of the model, in the order of [`MODEL`]; omitted ones are `None`.
     pub options: Vec<Option<DeckValue>>,
@@ -49,9 +49,9 @@ pub struct ModelCard {
     pub remote: Option<String>,
     /// How the netlist is compiled.
     pub options: CompileOptions,
-    /// Fraction of its tolerance that the model gets [1]; below 1 on twice the segments, as the run that another is compared with.
+    /// Fraction of its tolerance that the model gets (1); below 1 on twice the segments, as the run that another is compared with.
     pub share: f64,
-    /// Longest wait for an answer of the server [s], default 5.
+    /// Longest wait for an answer of the server (s), default 5.
     pub deadline: Duration,
     /// Thermal agitation in transients.
     pub noise: Option<Agitation>,
@@ -109,7 +109,7 @@ pub enum CardError {
     },
 }
 
-/// Longest wait for a server's answer unless `deadline` says otherwise [s].
+/// Longest wait for a server's answer unless `deadline` says otherwise (s).
 pub const DEADLINE: f64 = 5.0;
 
 /// The agitation that a line specifies. A band of 0 means unset.
@@ -166,7 +166,7 @@ impl ModelCard {
         })
     }
 
-    /// With this fraction of its tolerance [1]; a smaller one than all of it comes with a finer mesh, too.
+    /// With this fraction of its tolerance (1); a smaller one than all of it comes with a finer mesh, too.
     pub fn with_share(self, share: f64) -> Self {
         Self { share, ..self }
     }

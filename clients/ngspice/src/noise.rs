@@ -20,7 +20,7 @@ const DENSITY: c_int = 1;
 /// In the middle of an analysis: not at its begin or end.
 const CALCULATE: c_int = 2;
 
-/// Densities below this are nothing [V²/Hz or A²/Hz]: the host takes no logarithms of less.
+/// Densities below this are nothing (V²/Hz or A²/Hz): the host takes no logarithms of less.
 const LEAST: f64 = 1e-38;
 /// Slopes of a density over the frequency, both in logarithms, below which they count as zero; and the same distance
 /// from −1.
@@ -29,11 +29,11 @@ const FLAT: f64 = 1e-10;
 /// The host's data of a noise analysis, in part: the same from SPICE 3 on.
 #[repr(C)]
 pub(crate) struct NoiseAnalysis {
-    /// Frequency [Hz].
+    /// Frequency (Hz).
     frequency: f64,
-    /// The one before it [Hz].
+    /// The one before it (Hz).
     before: f64,
-    /// Their difference [Hz].
+    /// Their difference (Hz).
     step: f64,
     /// Noise at the output up to here, integrated.
     output: f64,
@@ -113,7 +113,7 @@ fn share(entry: &mut RegisteredInstance, gains: &[[f64; 2]], frequency: f64) -> 
 }
 
 impl Instance {
-    /// Spectral density that the part adds at an output on which its ports, then its monitors act by `gains` [complex].
+    /// Spectral density that the part adds at an output on which its ports, then its monitors act by `gains` (complex).
     ///
     /// # Errors
     /// Those of the device.

@@ -5,8 +5,8 @@ use bimorph::device::{PortKind, quantities::WHOLE};
 
 /// Numbers of an instance, by name.
 const NUMBERS: [&str; 4] = ["unknowns", "points", "trials", "refused"];
-/// Quantities of an electrical port: voltage [V], current into it [A], charge [C], and change of the charge with the voltage over
-/// the last step [F].
+/// Quantities of an electrical port: voltage (V), current into it (A), charge (C), and change of the charge with the voltage over
+/// the last step (F).
 const OF_A_PORT: [&str; 4] = ["v", "i", "q", "dq"];
 
 impl Instance {

@@ -88,7 +88,7 @@ fn write_answer(call: &ModelCall<'_>, entry: &mut RegisteredInstance, memory: *m
     }
 }
 
-/// Change of a monitor from one iteration to the next at which an equilibrium has converged, relative to its value [1]. Newton's iteration
+/// Change of a monitor from one iteration to the next at which an equilibrium has converged, relative to its value (1). Newton's iteration
 /// converges quadratically, so one or two more iterations than ngspice's own reach it.
 const SETTLED_CHANGE: f64 = 1e-6;
 /// Iterations for that beyond ngspice's own, at most.

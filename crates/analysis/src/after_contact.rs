@@ -11,7 +11,7 @@ use super::transient::{Statistics, TransientOptions, TransientResult};
 
 /// Code of the warning that single values hold no more.
 pub const WARNING: &str = "W049";
-/// Tolerances between a run and its companion up to which single values hold [1].
+/// Tolerances between a run and its companion up to which single values hold (1).
 const APART: f64 = 10.0;
 /// Windows of a run in which it is compared with its companion: an impact that comes a little later makes a peak in the difference of two
 /// rates, which says nothing of what follows.
@@ -23,7 +23,7 @@ const STUDENT: f64 = 2.776;
 
 /// A run and its companion at the same output times.
 pub(super) struct CompanionRuns<'a> {
-    /// Distance of the output times, from 0 on [s].
+    /// Distance of the output times, from 0 on (s).
     pub(super) spacing: f64,
     /// Samples of the run, signal by signal.
     pub(super) run: &'a [Vec<f64>],
@@ -31,7 +31,7 @@ pub(super) struct CompanionRuns<'a> {
     pub(super) companion: Option<&'a [Vec<f64>]>,
 }
 
-/// When parts first touch in a run [s].
+/// When parts first touch in a run (s).
 pub(super) fn first_contact(result: &TransientResult) -> Option<f64> {
     result.events.iter().find(|event| event.contact).map(|event| event.t)
 }

@@ -18,7 +18,7 @@ const CORRECTIONS: usize = 60;
 /// Tolerance of the stress, relative to the cold strength: far below the error of any mesh.
 const TOLERANCE: f64 = 1e-9;
 
-/// Permanent strains of beams by name [1]; negative: shorter.
+/// Permanent strains of beams by name (1); negative: shorter.
 pub type Strains = Vec<(String, f64)>;
 
 /// A backbent mechanism.
@@ -26,9 +26,9 @@ pub type Strains = Vec<(String, f64)>;
 pub struct BackbentMechanism {
     /// The mechanism with its hot arms shortened.
     pub compiled: CompiledModel,
-    /// Permanent strain of each beam that can yield [1], by name; negative: shorter.
+    /// Permanent strain of each beam that can yield (1), by name; negative: shorter.
     pub strains: Strains,
-    /// Yield stress over Young's modulus of each [1]: the scale of its strains.
+    /// Yield stress over Young's modulus of each (1): the scale of its strains.
     pub bearable: Vec<f64>,
 }
 
@@ -41,7 +41,7 @@ struct YieldingBeam {
     strength: Strength,
     area: f64,
     joints: permanent_strain::YieldingJoints,
-    /// Shortening so far [1].
+    /// Shortening so far (1).
     strain: f64,
 }
 
@@ -116,8 +116,8 @@ fn settle(bent: &mut CompiledModel, arms: &mut [YieldingBeam], voltages: &PortVo
     Err(AnalysisError::NotConverged { detail: "the plastic strains of the hot arms do not settle".into() })
 }
 
-/// By how much each arm's pressure exceeds its strength [Pa], and the pressure that a unit of shortening of each arm (column)
-/// takes from each arm (row) [Pa].
+/// By how much each arm's pressure exceeds its strength (Pa), and the pressure that a unit of shortening of each arm (column)
+/// takes from each arm (row) (Pa).
 fn pressures(
     bent: &CompiledModel,
     arms: &[YieldingBeam],

@@ -100,7 +100,7 @@ pub fn chart(
     Ok(chart)
 }
 
-/// The lowest natural frequency that is not a rigid motion [Hz].
+/// The lowest natural frequency that is not a rigid motion (Hz).
 fn lowest_mode(model: &ChartVariant, voltages: &PortVoltages) -> Result<f64, AnalysisError> {
     let found = modes(model.moving(), 4, voltages)?.frequencies_hz;
     let highest = found.last().copied().unwrap_or(0.0);

@@ -33,7 +33,7 @@ pub(crate) fn comb_beyond_reported(compiled: &CompiledModel, q: &[Pose]) -> Opti
 }
 
 /// The comb whose fingers go furthest through the other side at `q`: its name, and how far its sides have come together of how
-/// much they can [m].
+/// much they can (m).
 pub(crate) fn comb_beyond<'a>(compiled: &'a CompiledModel, q: &[Pose]) -> Option<(&'a str, [f64; 2])> {
     let system = &compiled.parts.system;
     // combs are the first gaps, in their order

@@ -31,7 +31,7 @@ pub struct ContinuationRequest<'a> {
     pub from: f64,
     /// Its last value.
     pub to: f64,
-    /// Voltages held on the other ports, by name [V].
+    /// Voltages held on the other ports, by name (V).
     pub voltages: Vec<(String, f64)>,
     /// Signals wanted along the path, see [`Expression::of_state`].
     pub signals: Vec<String>,

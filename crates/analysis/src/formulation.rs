@@ -20,7 +20,7 @@ use std::borrow::Cow;
 
 pub use bimorph_model::options::Formulation;
 
-/// Largest phase [rad] of the fastest joint motion in a run with explicit steps. A step is stable up to about three, so
+/// Largest phase (rad) of the fastest joint motion in a run with explicit steps. A step is stable up to about three, so
 /// that this means a thousand steps, as many as the bodies' coordinates take for such a motion at a tolerance of 1e-3.
 const FEW: f64 = 3e3;
 
@@ -33,7 +33,7 @@ pub struct ChosenFormulation {
     pub why: String,
 }
 
-/// Choice of `auto` for a run of `stop` [s], or for steps of the caller (`None`).
+/// Choice of `auto` for a run of `stop` (s), or for steps of the caller (`None`).
 pub fn suited(compiled: &CompiledModel, stop: Option<f64>) -> ChosenFormulation {
     let system = &compiled.parts.system;
     let model = &system.model;
@@ -130,7 +130,7 @@ pub fn linkage(formulation: Formulation, system: &System) -> Result<Linkage, Ana
     Ok(Linkage::new(&model))
 }
 
-/// Size of each coordinate: `length` [m] for a displacement, an angle that moves a body's end by as much for a rotation.
+/// Size of each coordinate: `length` (m) for a displacement, an angle that moves a body's end by as much for a rotation.
 pub fn coordinate_scales(linkage: &Linkage, length: f64) -> Vec<f64> {
     let mut scale = vec![length; linkage.coordinates];
     for link in &linkage.links {

@@ -213,7 +213,7 @@ fn balance(
     })
 }
 
-/// Largest translation, or rotation times the drawing's size [m].
+/// Largest translation, or rotation times the drawing's size (m).
 fn amount(q: &[Pose], size: f64) -> f64 {
     q.iter().map(|p| p.fixed_rows::<2>(0).amax().max(size * p[2].abs())).fold(0.0, f64::max)
 }

@@ -9,7 +9,7 @@ use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::planar::Pose;
 
-/// The gap with the largest part in that error of an equilibrium, and the error of the largest displacement of a node [1]: infinite
+/// The gap with the largest part in that error of an equilibrium, and the error of the largest displacement of a node (1): infinite
 /// where the tangent is singular, none without gaps along beams.
 pub(super) fn left_out(compiled: &CompiledModel, point: &OperatingPoint) -> Option<(String, f64)> {
     if compiled.structure.beam_gaps.is_empty() {

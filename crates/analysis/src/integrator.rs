@@ -103,7 +103,7 @@ impl Integrator {
         }
     }
 
-    /// Advances `motion` over bodies from the start of the ramp to its end; `h` is the first step to try [s]. Methods
+    /// Advances `motion` over bodies from the start of the ramp to its end; `h` is the first step to try (s). Methods
     /// without an error estimate go by step doubling under [`Control::Tolerance`]. The work is reported also where it
     /// ends in an error.
     #[allow(clippy::too_many_arguments)]
@@ -190,7 +190,7 @@ impl IntegrationRule {
 pub struct IntegrationRun<'a, 'b, X> {
     /// Where it begins; becomes where it ends.
     pub motion: &'a mut Motion<X>,
-    /// First step to try [s].
+    /// First step to try (s).
     pub h: f64,
     /// Criterion for the length of steps.
     pub control: Control,

@@ -87,7 +87,7 @@ pub fn joint_transient(
     Ok((result, carrier.report))
 }
 
-/// Warning about loops that were open by more than `most` [m].
+/// Warning about loops that were open by more than `most` (m).
 fn open(gap: f64, most: f64) -> Option<String> {
     (gap > most).then(|| {
         format!(

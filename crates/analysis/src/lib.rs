@@ -71,9 +71,9 @@ pub enum AnalysisError {
     /// An integration gave up.
     #[error("transient stopped at t = {t:e} s (dt = {dt:e} s): {detail}")]
     StepFailed {
-        /// Time reached [s].
+        /// Time reached (s).
         t: f64,
-        /// Step that failed [s].
+        /// Step that failed (s).
         dt: f64,
         /// Which body and direction, and why.
         detail: String,
@@ -86,9 +86,9 @@ pub enum AnalysisError {
     ContactRange {
         /// Name of the gap.
         gap: String,
-        /// Distance that is left [m]; negative: through.
+        /// Distance that is left (m); negative: through.
         left: f64,
-        /// Least distance within the range [m].
+        /// Least distance within the range (m).
         least: f64,
     },
     /// An iteration did not settle.
@@ -105,11 +105,11 @@ pub enum AnalysisError {
 /// Displacement of a node from its drawn place.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct NodeMotion {
-    /// Along x [m].
+    /// Along x (m).
     pub x: f64,
-    /// Along y [m].
+    /// Along y (m).
     pub y: f64,
-    /// Rotation about z [rad].
+    /// Rotation about z (rad).
     pub rz: f64,
 }
 

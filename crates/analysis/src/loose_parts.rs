@@ -11,11 +11,11 @@ use bimorph_multibody::{BlockMatrix, Model};
 use bimorph_solve::eigen::Modes;
 use nalgebra::Vector2;
 
-/// Force through what holds a loose part, as a fraction of all forces, from which loads do not balance [1].
+/// Force through what holds a loose part, as a fraction of all forces, from which loads do not balance (1).
 const UNBALANCED: f64 = 1e-6;
-/// λ of a rigid-body mode, as a fraction of the highest found, is below this [1]: it is rounding.
+/// λ of a rigid-body mode, as a fraction of the highest found, is below this (1): it is rounding.
 const RIGID: f64 = 1e-9;
-/// Strain energy of a rigid-body mode, as a fraction of that of its bodies moving one by one, is below this [1].
+/// Strain energy of a rigid-body mode, as a fraction of that of its bodies moving one by one, is below this (1).
 const UNSTRAINED: f64 = 1e-9;
 
 /// The first loose part whose loads do not balance at `q` under `drive`, with the direction of the net load.

@@ -21,28 +21,28 @@ use std::f64::consts::TAU;
 /// Undamped modes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModesResult {
-    /// Frequencies, ascending [Hz].
+    /// Frequencies, ascending (Hz).
     pub frequencies_hz: Vec<f64>,
     /// For each mode, the displacement of every mechanical node (largest translation 1), in netlist order.
     pub shapes: Vec<Vec<(String, NodeMotion)>>,
     /// For each mode, the residual ‖(K + λM)⁻¹(Kx − λMx)‖ in the mass norm, approximately the relative error of its
-    /// shape; the error of the frequency is its square [1].
+    /// shape; the error of the frequency is its square (1).
     pub residuals: Vec<f64>,
-    /// For each mode, the estimated relative error of its frequency by the number of segments [1]; none where no estimate can be made, as
+    /// For each mode, the estimated relative error of its frequency by the number of segments (1); none where no estimate can be made, as
     /// for the baselines. About the drawing it is signed. About a loaded equilibrium it includes the error of that, and is a size where it
     /// does not come from a comparison with twice the segments.
     pub errors: Vec<Option<f64>>,
     /// Mechanical unknowns.
     pub unknowns: usize,
-    /// Largest displacement of a node at the equilibrium that the modes are about [m].
+    /// Largest displacement of a node at the equilibrium that the modes are about (m).
     pub deflection_m: f64,
-    /// How much faster each frequency moves than the equilibrium, |d ln f / d ln q| [1]; for the search for a mesh, and empty in what it
+    /// How much faster each frequency moves than the equilibrium, |d ln f / d ln q| (1); for the search for a mesh, and empty in what it
     /// ends with and about the drawing.
     #[serde(skip)]
     pub per_deflection: Vec<f64>,
     /// Warnings about the result.
     pub warnings: Vec<String>,
-    /// Largest estimated relative error from the mesh, of every frequency and of their equilibrium [1]; `None` without
+    /// Largest estimated relative error from the mesh, of every frequency and of their equilibrium (1); `None` without
     /// an estimate, and where the mesh was not fitted to them.
     pub estimated_error: Option<f64>,
 }
@@ -98,7 +98,7 @@ pub(super) fn higher(compiled: &CompiledModel, count: usize) -> Vec<HigherMode> 
     known.collect()
 }
 
-/// Quality of a mode by drag and dampers [1].
+/// Quality of a mode by drag and dampers (1).
 fn quality(compiled: &CompiledModel, shape: &[Pose], frequency_hz: f64) -> f64 {
     let model = &compiled.parts.system.model;
     let mut drag = vec![Pose::zeros(); shape.len()];
@@ -283,7 +283,7 @@ fn estimated(
     compared.map_or(none, |errors| errors.into_iter().map(sure).collect())
 }
 
-/// Largest displacement of a node [m].
+/// Largest displacement of a node (m).
 fn deflection(compiled: &CompiledModel, q: &[Pose]) -> f64 {
     let linear = compiled.parts.system.model.linear;
     let moved = |point: &Option<MaterialPoint>| point.map_or(0.0, |p| p.displacement(q, linear).norm());

@@ -20,7 +20,7 @@ pub struct PathOptions {
     pub from: f64,
     /// Its last value.
     pub to: f64,
-    /// Voltages held on the other ports, by name [V].
+    /// Voltages held on the other ports, by name (V).
     pub voltages: Vec<(String, f64)>,
     /// Signals wanted along the path; none: x and y of the node that moves most.
     pub signals: Vec<String>,

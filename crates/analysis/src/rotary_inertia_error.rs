@@ -10,7 +10,7 @@ use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 use bimorph_structure::Beam;
 
-/// Accuracy of the models themselves [1]: junctions agree with plane stress within about this (docs/explanation/junctions.md), and
+/// Accuracy of the models themselves (1): junctions agree with plane stress within about this (docs/explanation/junctions.md), and
 /// smaller effects are not reported.
 pub(super) const WORTH: f64 = 7e-3;
 
@@ -29,7 +29,7 @@ pub(super) fn rotary_inertia_note(compiled: &CompiledModel, modes: &[Vec<Pose>])
     })
 }
 
-/// Relative excess of the frequency of a mode (xᵀMx = 1) without rotary inertia [1].
+/// Relative excess of the frequency of a mode (xᵀMx = 1) without rotary inertia (1).
 pub(super) fn too_high(compiled: &CompiledModel, x: &[Pose]) -> f64 {
     let options = &compiled.options;
     // --as-sugar requests SUGAR's mass matrix, which has none either

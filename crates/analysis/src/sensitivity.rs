@@ -28,7 +28,7 @@ pub(super) struct LinearizationPoint<'a> {
 }
 
 impl LinearizationPoint<'_> {
-    /// |d ln f / d ln q| of each mode [1].
+    /// |d ln f / d ln q| of each mode (1).
     pub(super) fn to_deflection(self) -> Vec<f64> {
         if self.q.iter().all(|q| *q == Pose::zeros()) {
             return vec![0.0; self.modes.0.len()];

@@ -10,7 +10,7 @@ use bimorph_multibody::forces::add_inertia;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, Model};
 
-/// Fraction of displacement or rate in an unstable direction from which the motion counts as unstable [1].
+/// Fraction of displacement or rate in an unstable direction from which the motion counts as unstable (1).
 const MOVING: f64 = 1e-2;
 /// Inverse iterations towards the softest direction.
 const ROUNDS: usize = 4;
@@ -18,7 +18,7 @@ const ROUNDS: usize = 4;
 /// An unstable place that a motion balances on.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct UnstableEquilibrium {
-    /// When it was first seen [s].
+    /// When it was first seen (s).
     pub(crate) since: f64,
     /// Directions that run away.
     pub(crate) directions: usize,
@@ -42,7 +42,7 @@ impl StabilityMonitor {
         Self { tangent: BlockMatrix::new(&system.model.pattern), rest, found: None, lasts: false }
     }
 
-    /// Checks a state at time `t` [s].
+    /// Checks a state at time `t` (s).
     pub(crate) fn check(&mut self, system: &System, drive: &Drive, t: f64, (q, v): (&[Pose], &[Pose])) {
         let model = &system.model;
         self.stiffness(system, drive, q, 0.0);
@@ -121,7 +121,7 @@ impl StabilityMonitor {
     }
 }
 
-/// Smallest inverse diagonal entry times mass: no faster than the stiffest body alone [rad²/s²].
+/// Smallest inverse diagonal entry times mass: no faster than the stiffest body alone (rad²/s²).
 fn fastest(model: &Model, factor: &BlockMatrix<f64, 3>) -> f64 {
     let rate = |j: usize| 1.0 / (factor.diagonal[j][(0, 0)].abs() * model.mass(j).x);
     (0..factor.diagonal.len()).map(rate).filter(|r| r.is_finite()).fold(1.0, f64::max)

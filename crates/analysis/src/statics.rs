@@ -19,11 +19,11 @@ use serde::Serialize;
 pub struct StaticResult {
     /// Displacement of every mechanical node, by name, in netlist order.
     pub nodes: Vec<(String, NodeMotion)>,
-    /// Mean temperature of every heated or prescribed beam [K], by name.
+    /// Mean temperature of every heated or prescribed beam (K), by name.
     pub temperatures_k: Vec<(String, f64)>,
-    /// Current into each port [A], by name.
+    /// Current into each port (A), by name.
     pub currents_a: Vec<(String, f64)>,
-    /// Charge on each port [C], by name.
+    /// Charge on each port (C), by name.
     pub charges_c: Vec<(String, f64)>,
     /// True when the part jumped before, past a fold or a bifurcation, and voltage closed a gap.
     pub pulled_in: bool,
@@ -35,7 +35,7 @@ pub struct StaticResult {
     pub free_motions: Vec<String>,
     /// Mechanical unknowns.
     pub unknowns: usize,
-    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    /// Largest estimated relative error by the mesh (1); none without an estimate.
     pub estimated_error: Option<f64>,
     /// Newton iterations over all load steps.
     pub iterations: usize,
@@ -167,13 +167,13 @@ pub(crate) fn electrical(compiled: &CompiledModel, sources: &[f64], rise: &[f64]
 /// An equilibrium with what it was found at.
 #[derive(Debug, Clone, Default)]
 pub struct OperatingPoint {
-    /// Displacements in elimination order ([m], [rad]).
+    /// Displacements in elimination order ((m), (rad)).
     pub q: Vec<Pose>,
     /// Values of the sources.
     pub sources: Vec<f64>,
-    /// Temperature rise of each heater [K].
+    /// Temperature rise of each heater (K).
     pub rise: Vec<f64>,
-    /// Voltage of each gap [V].
+    /// Voltage of each gap (V).
     pub volts: Vec<f64>,
     /// How the equilibrium was reached.
     pub path: Path,
@@ -278,7 +278,7 @@ pub(super) fn settled(
     OperatingPoint { q, sources, rise, volts: drive.volts, path, free_motions, near_buckling: None }
 }
 
-/// Largest voltage of a port [V], as of those that are searched.
+/// Largest voltage of a port (V), as of those that are searched.
 const MAX_VOLTS: f64 = 1e9;
 
 /// Warning about beams that the current heats beyond the strength of any solid.

@@ -9,10 +9,10 @@ use bimorph_domains::System;
 use bimorph_multibody::planar::{Block, Pose};
 use bimorph_multibody::{BlockMatrix, BodyId};
 
-/// Bending stiffness of a joint, as a fraction of the largest, below which it holds nothing [1]: rounding of the stiffness is 1e-16 of that, times
+/// Bending stiffness of a joint, as a fraction of the largest, below which it holds nothing (1): rounding of the stiffness is 1e-16 of that, times
 /// what elimination loses.
 const WEAK: f64 = 1e-12;
-/// Stiffness of what holds a part, as a fraction of the largest of a body [1].
+/// Stiffness of what holds a part, as a fraction of the largest of a body (1).
 const HOLDS: f64 = 1e-3;
 
 /// The system with its weakly held parts held, and for each a body of it; none where there is no such part.

@@ -8,7 +8,7 @@
 //! A stopped computation unwinds to its [`within`] like a panic, but without one: no hook runs and nothing is logged
 //! (`std::panic::resume_unwind`; Salsa stops its queries this way). Partial results are dropped. A value that outlives
 //! a stopped computation, as the storage of a device does, must be made anew:
-//! [`Device::recover`](bimorph_device::Device::recover).
+//! `Device::recover`.
 
 mod allowance;
 mod bounded;

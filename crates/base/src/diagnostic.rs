@@ -4,7 +4,7 @@ use super::bundle::Bundle;
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use std::sync::Arc;
 
-/// Of longer lines only the part around the mark is shown [bytes].
+/// Of longer lines only the part around the mark is shown (bytes).
 const LONGEST_LINE: usize = 1000;
 
 /// How bad a diagnostic is.

@@ -9,9 +9,9 @@ use super::oscillation::common;
 use bimorph_results::table::{ColumnSamples, Table};
 use serde::Serialize;
 
-/// Smallest range that a voltage [V] or a current [A] is measured against: ngspice solves no finer (`vntol`, `abstol`).
+/// Smallest range that a voltage (V) or a current (A) is measured against: ngspice solves no finer (`vntol`, `abstol`).
 const MIN_RANGE: [(&str, f64); 2] = [("V", 1e-6), ("A", 1e-12)];
-/// Smallest range, as a fraction of the largest magnitude [1]: of a constant, the difference is relative to a thousandth of it.
+/// Smallest range, as a fraction of the largest magnitude (1): of a constant, the difference is relative to a thousandth of it.
 const MIN_SHARE: f64 = 1e-3;
 
 /// How far apart a vector is.
@@ -24,9 +24,9 @@ pub struct VectorComparison {
     /// Scale of differences, in its unit: largest less smallest value, of complex ones the largest magnitude, and at
     /// least the resolution of ngspice.
     pub range: f64,
-    /// Largest difference [1].
+    /// Largest difference (1).
     pub largest: f64,
-    /// Root mean square of the differences [1].
+    /// Root mean square of the differences (1).
     pub rms: f64,
     /// Where the largest is: value of the axis.
     pub at: f64,
@@ -35,7 +35,7 @@ pub struct VectorComparison {
 }
 
 impl VectorComparison {
-    /// The largest difference that counts [1]: of an oscillator that of its frequency or amplitude, not that of its phase.
+    /// The largest difference that counts (1): of an oscillator that of its frequency or amplitude, not that of its phase.
     pub fn counts(&self) -> f64 {
         self.oscillation.map_or(self.largest, |o| o.difference[0].max(o.difference[1]))
     }
@@ -61,7 +61,7 @@ pub struct PrintedNumber {
     pub name: String,
     /// The values of the first run and the second.
     pub values: [f64; 2],
-    /// Their difference over the larger magnitude [1].
+    /// Their difference over the larger magnitude (1).
     pub difference: f64,
 }
 

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
 use thiserror::Error;
 
-/// Gain that stands for an ideal operational amplifier [1].
+/// Gain that stands for an ideal operational amplifier (1).
 const IDEAL_GAIN: f64 = 1e6;
 
 /// Content of the deck beside the netlist.
@@ -21,7 +21,7 @@ pub struct DeckSpec {
     pub file: String,
     /// Netlist parameters and options of the model, as words of the `.model` line.
     pub model: Vec<String>,
-    /// Voltages of ports [V].
+    /// Voltages of ports (V).
     pub ports: Vec<(String, f64)>,
     /// Signals shown as voltages.
     pub signals: Vec<String>,

@@ -8,25 +8,25 @@ use std::f64::consts::PI;
 
 /// Whole cycles that an oscillation has at least.
 const MIN_CYCLES: usize = 8;
-/// By how much a cycle may be longer or shorter than the mean one [1].
+/// By how much a cycle may be longer or shorter than the mean one (1).
 const REGULAR: f64 = 0.05;
 /// By how much the difference of points is larger than that of amplitudes and of frequencies where it is one of phase.
 const PHASE: f64 = 3.0;
 
-/// Part of the difference of points that the frequencies make up over the run, at least [1]. A driven circuit has the
+/// Part of the difference of points that the frequencies make up over the run, at least (1). A driven circuit has the
 /// frequency of its source: its phase is a result.
 const DRIFTS: f64 = 0.3;
-/// By how much the swing of a cycle may be larger or smaller than the mean one [1]: of what dies away the phase is a result, too.
+/// By how much the swing of a cycle may be larger or smaller than the mean one (1): of what dies away the phase is a result, too.
 const STEADY: f64 = 0.2;
 
 /// The oscillation of a vector in two runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Oscillation {
-    /// Frequency of both [Hz].
+    /// Frequency of both (Hz).
     pub frequency: [f64; 2],
     /// Half of the mean swing of both, in the unit of the vector.
     pub amplitude: [f64; 2],
-    /// Differences of the two frequencies and of the two amplitudes, relative to the second run's [1].
+    /// Differences of the two frequencies and of the two amplitudes, relative to the second run's (1).
     pub difference: [f64; 2],
 }
 
@@ -40,7 +40,7 @@ pub(super) fn common(a: (&[f64], &[f64]), b: (&[f64], &[f64]), largest: f64) -> 
     (same && of_phase).then_some(Oscillation { frequency: [f, g], amplitude: [p, q], difference })
 }
 
-/// Frequency [Hz] and amplitude of the second half of a waveform, where it is a regular oscillation.
+/// Frequency (Hz) and amplitude of the second half of a waveform, where it is a regular oscillation.
 fn settled((t, y): (&[f64], &[f64])) -> Option<[f64; 2]> {
     let (first, last) = (*t.first()?, *t.last()?);
     let from = t.partition_point(|&x| x < 0.5 * (first + last));

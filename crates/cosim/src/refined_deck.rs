@@ -7,11 +7,11 @@
 
 use std::path::Path;
 
-/// How many times smaller `reltol` and each model's tolerance become [1].
+/// How many times smaller `reltol` and each model's tolerance become (1).
 pub const TIGHTER: f64 = 10.0;
-/// By how much the longest step becomes shorter [1].
+/// By how much the longest step becomes shorter (1).
 const STEP_SHARE: f64 = 0.5;
-/// ngspice's `reltol` where a deck says nothing [1].
+/// ngspice's `reltol` where a deck says nothing (1).
 const DEFAULT_RELTOL: f64 = 1e-3;
 /// Steps that ngspice takes at least, where `.tran` gives no longest one.
 const MIN_STEPS: f64 = 50.0;

@@ -34,7 +34,7 @@ pub struct CosimOptions {
     pub plugin: Option<PathBuf>,
     /// Runs this text in the deck's place, as if it stood there; none: the deck itself.
     pub text: Option<String>,
-    /// Fraction of its tolerance that every model gets [1]; none: all of it.
+    /// Fraction of its tolerance that every model gets (1); none: all of it.
     pub tolerance_share: Option<f64>,
     /// Keep ngspice's output for [`CosimReport::output`] instead of passing it on.
     pub capture: bool,

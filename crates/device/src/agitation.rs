@@ -18,9 +18,9 @@ use bimorph_multibody::planar::Pose;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// Default band, in lowest natural frequencies [1].
+/// Default band, in lowest natural frequencies (1).
 const BAND: f64 = 20.0;
-/// Highest band [Hz]: beyond what any mechanism feels.
+/// Highest band (Hz): beyond what any mechanism feels.
 const HIGHEST: f64 = 1e12;
 /// Cells that one step may cross: beyond, the mean of the force says too little.
 const MAX_CELLS: f64 = 2.0;
@@ -29,7 +29,7 @@ const MAX_CELLS: f64 = 2.0;
 #[derive(Debug, Clone)]
 pub(super) struct ThermalForce {
     seed: u64,
-    /// Length of a cell [s].
+    /// Length of a cell (s).
     pub(super) cell: f64,
     /// √(2·k_B·T/τ) [√(J/s)].
     size: f64,
@@ -48,7 +48,7 @@ fn normal(numbers: &mut ChaCha8Rng) -> f64 {
 }
 
 impl ThermalForce {
-    /// Of a model whose surroundings are at `temperature` [K].
+    /// Of a model whose surroundings are at `temperature` (K).
     ///
     /// # Errors
     /// [`DeviceError::BadRequest`] for an invalid band, or a missing one.
@@ -84,7 +84,7 @@ impl ThermalForce {
     /// Finds the mean force over the `dt` seconds from `start`; or the longest step that may be taken.
     ///
     /// # Errors
-    /// That step [s].
+    /// That step (s).
     pub(super) fn over(&mut self, compiled: &CompiledModel, start: f64, dt: f64) -> Result<(), f64> {
         if self.over == Some((start, dt)) {
             return Ok(());

@@ -10,19 +10,19 @@ use super::Token;
 use bimorph_domains::System;
 use bimorph_multibody::planar::Pose;
 
-/// Largest error of a kept step, relative to the allowed one [1]. Beyond it a trial chooses steps of its own.
+/// Largest error of a kept step, relative to the allowed one (1). Beyond it a trial chooses steps of its own.
 pub(super) const MAX_ERROR: f64 = 3.0;
-/// Parts may touch within a point where they would at so many times their closing speed [1].
+/// Parts may touch within a point where they would at so many times their closing speed (1).
 const NEAR: f64 = 3.0;
 
 /// The steps of one point.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ContactSteps {
-    /// The accepted state and the length [s] that they are of.
+    /// The accepted state and the length (s) that they are of.
     of: Option<(Token, u64)>,
-    /// Where they end [s]; empty where nothing touches during the step, or the motion failed.
+    /// Where they end (s); empty where nothing touches during the step, or the motion failed.
     pub(super) ends: Vec<f64>,
-    /// The step that would come next [s].
+    /// The step that would come next (s).
     pub(super) next: f64,
 }
 
@@ -39,7 +39,7 @@ impl ContactSteps {
     }
 }
 
-/// True where parts touch at displacements `q`, or may within `dt` [s] at rates `v`.
+/// True where parts touch at displacements `q`, or may within `dt` (s) at rates `v`.
 pub(super) fn near(system: &System, q: &[Pose], v: &[Pose], dt: f64) -> bool {
     (0..system.members.len()).any(|g| {
         system.touching(g).is_some_and(|[touch, _]| {

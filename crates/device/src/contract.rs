@@ -25,9 +25,9 @@ pub struct Trial<'a> {
     pub mode: Mode,
     /// State to start from; none: the model at rest as drawn.
     pub parent: Option<Token>,
-    /// Time at the end of the step [s]. Only for messages: a trial depends on `dt`, not on `t`.
+    /// Time at the end of the step (s). Only for messages: a trial depends on `dt`, not on `t`.
     pub t: f64,
-    /// Length of the step [s]; positive in [`Mode::Transient`], ignored otherwise.
+    /// Length of the step (s); positive in [`Mode::Transient`], ignored otherwise.
     pub dt: f64,
     /// Input of the ports at `t` [V, N, W, …: [`PortKind::given`]], in the order of [`Description::ports`].
     pub voltages: &'a [f64],
@@ -39,7 +39,7 @@ pub enum Status {
     /// The reply holds.
     #[default]
     Ok,
-    /// The step was too long for the device's tolerance: ask again with at most this dt [s].
+    /// The step was too long for the device's tolerance: ask again with at most this dt (s).
     NeedDt(f64),
     /// No answer exists; the text says why. Nothing else in the reply may be used.
     Fail(String),
@@ -52,20 +52,20 @@ pub struct TrialReply {
     pub token: Option<Token>,
     /// Whether the rest may be used.
     pub status: Status,
-    /// Conduction current into each port [A], or what it answers in its place [m, K, …: [`PortKind::answered`]] (p).
+    /// Conduction current into each port (A), or what it answers in its place [m, K, …: [`PortKind::answered`]] (p).
     pub currents: Vec<f64>,
-    /// Charge on each port [C]; 0 for one that is not electrical (p).
+    /// Charge on each port (C); 0 for one that is not electrical (p).
     pub charges: Vec<f64>,
-    /// ∂current/∂voltage [S] (p×p); for ports that are not electrical ∂answered/∂given, with the mechanical response over
+    /// ∂current/∂voltage (S) (p×p); for ports that are not electrical ∂answered/∂given, with the mechanical response over
     /// this dt.
     pub di_dv: Vec<f64>,
-    /// ∂charge/∂voltage [F] (p×p), with the mechanical response over this dt.
+    /// ∂charge/∂voltage (F) (p×p), with the mechanical response over this dt.
     pub dq_dv: Vec<f64>,
     /// Value of each opened signal in its own unit (s).
     pub outputs: Vec<f64>,
     /// ∂output/∂voltage (s×p).
     pub doutputs_dv: Vec<f64>,
-    /// Longest next step the device's tolerance is likely to bear [s]; infinite when it does not care.
+    /// Longest next step the device's tolerance is likely to bear (s); infinite when it does not care.
     pub dt_next: f64,
     /// A static trial passed a fold: the part pulled in (or opened) on the way to these voltages.
     pub jumped: bool,
@@ -74,7 +74,7 @@ pub struct TrialReply {
 /// Small-signal answer about a state: y(ω), and outputs per volt. Matrices row-major, [re, im].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SmallSignal {
-    /// Port admittances [S] (p×p), row: current, column: voltage; for ports that are not electrical answered over given.
+    /// Port admittances (S) (p×p), row: current, column: voltage; for ports that are not electrical answered over given.
     pub admittance: Vec<[f64; 2]>,
     /// Signals per volt (s×p).
     pub outputs: Vec<[f64; 2]>,
@@ -113,7 +113,7 @@ pub struct Description {
 /// Request to open a device: ports in their order, and signals.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OpenRequest {
-    /// Port names in the caller's order, see [`ports`]; empty: all electrical ones, in netlist order. A port left out is held
+    /// Port names in the caller's order, see [`ports`](bimorph_analysis::readout::ports); empty: all electrical ones, in netlist order. A port left out is held
     /// at 0 V, or free.
     pub ports: Vec<String>,
     /// Signal names, see [`SignalInfo::name`].
@@ -206,19 +206,19 @@ pub trait Device: Send {
         Vec::new()
     }
 
-    /// Small-signal answer at angular frequency `omega` [rad/s] about the state `token`.
+    /// Small-signal answer at angular frequency `omega` (rad/s) about the state `token`.
     ///
     /// # Errors
     /// [`DeviceError::UnknownToken`], [`DeviceError::Remote`].
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError>;
 
-    /// Names that [`Device::read_quantity`] knows: those of [`quantities::WHOLE`] and every signal. Empty where a device cannot
+    /// Names that [`Device::read_quantity`] knows: those of [`WHOLE`](crate::quantities::WHOLE) and every signal. Empty where a device cannot
     /// be inspected.
     fn names(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Value of a signal in a state, whether it was opened or not, or of the state as a whole ([`quantities::WHOLE`]), in its own unit.
+    /// Value of a signal in a state, whether it was opened or not, or of the state as a whole ([`WHOLE`](crate::quantities::WHOLE)), in its own unit.
     ///
     /// # Errors
     /// [`DeviceError::UnknownToken`], [`DeviceError::UnknownSignal`].
@@ -228,7 +228,7 @@ pub trait Device: Send {
         Err(DeviceError::UnknownSignal { name: name.to_owned(), hint })
     }
 
-    /// One-sided spectral densities of what ports and signals answer at angular frequency `omega` [rad/s] about the state
+    /// One-sided spectral densities of what ports and signals answer at angular frequency `omega` (rad/s) about the state
     /// `token`, and their cross-spectra: ports, then signals; row-major, complex, [answered²/Hz]. Each is that with nothing
     /// else changed: the current of a port whose voltage is held. Empty where a device makes no noise.
     ///
@@ -275,7 +275,7 @@ pub trait Device: Send {
 pub struct Agitation {
     /// Names the random numbers.
     pub seed: u64,
-    /// Band of the force [Hz], above 0, at most 1e12; none: twenty times the lowest natural frequency, about the drawing.
+    /// Band of the force (Hz), above 0, at most 1e12; none: twenty times the lowest natural frequency, about the drawing.
     pub band: Option<f64>,
 }
 

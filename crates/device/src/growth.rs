@@ -14,43 +14,43 @@ use bimorph_domains::{Drive, System};
 use bimorph_multibody::forces;
 use bimorph_multibody::planar::Pose;
 
-/// Growth over one step that the circuit may take next [1].
+/// Growth over one step that the circuit may take next (1).
 const NEXT: f64 = 1.0;
-/// Growth over a step beyond which its result is not used [1].
+/// Growth over a step beyond which its result is not used (1).
 const MAX: f64 = 3.0;
-/// Length of the difference that stands for K·s, as a fraction of the model's length scale [1].
+/// Length of the difference that stands for K·s, as a fraction of the model's length scale (1).
 const DIFFERENCE: f64 = 1e-5;
 
 /// Growth rates of the last trials.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Growth {
-    /// Rate at the state of the last trial [1/s]; 0 where it is stable.
+    /// Rate at the state of the last trial (1/s); 0 where it is stable.
     rate: f64,
-    /// Length of the step to it [s].
+    /// Length of the step to it (s).
     step: f64,
-    /// ∫λ dt over the accepted states in a row that are unstable [1].
+    /// ∫λ dt over the accepted states in a row that are unstable (1).
     grown: f64,
 }
 
 /// Step bound for the circuit from the growth rate of a step.
 pub(super) enum Bound {
-    /// The longest next step [s].
+    /// The longest next step (s).
     Next(f64),
-    /// This step was too long; the longest one [s].
+    /// This step was too long; the longest one (s).
     This(f64),
 }
 
 impl Growth {
-    /// After a trial over a step [s] to a state with this rate [1/s].
+    /// After a trial over a step (s) to a state with this rate (1/s).
     pub(super) fn tried(&mut self, rate: f64, step: f64) -> Bound {
         (self.rate, self.step) = (rate, step);
         if rate * step > MAX { Bound::This(NEXT / rate) } else { Bound::Next(NEXT / rate) }
     }
 
-    /// After the last trial was accepted: time constant [s] of a motion that the charge alone has held for a long time.
+    /// After the last trial was accepted: time constant (s) of a motion that the charge alone has held for a long time.
     /// A transit from one stable state to another is shorter, with a growth of e^15 or so.
     pub(super) fn held(&mut self) -> Option<f64> {
-        /// Growth beyond any transit [1].
+        /// Growth beyond any transit (1).
         const HELD: f64 = 40.0;
         self.grown = if self.rate > 0.0 { self.grown + self.rate * self.step } else { 0.0 };
         (self.grown > HELD).then(|| self.rate.recip())
@@ -72,7 +72,7 @@ impl Difference {
     }
 }
 
-/// The rate [1/s] at `q` along the response `s` of the motion; 0 where its stiffness at fixed voltages is positive.
+/// The rate (1/s) at `q` along the response `s` of the motion; 0 where its stiffness at fixed voltages is positive.
 pub(super) fn rate_along(
     system: &System,
     drive: &Drive,

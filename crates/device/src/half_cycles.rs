@@ -2,24 +2,24 @@
 
 use std::f64::consts::PI;
 
-/// By how much half a swing may be longer or shorter than half a cycle of the mode [1]: voltages move its frequency, and a turning point is
+/// By how much half a swing may be longer or shorter than half a cycle of the mode (1): voltages move its frequency, and a turning point is
 /// known to a step.
 const ALIKE: f64 = 0.25;
 
-/// The same where the points are so far apart that a turning point is known to no better [1].
+/// The same where the points are so far apart that a turning point is known to no better (1).
 const MIN_ALIKE: f64 = 0.4;
 
 /// Phase error of a motion.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Phase {
-    /// Relative error of its frequency [1].
+    /// Relative error of its frequency (1).
     pub(super) error: f64,
-    /// Quality [1].
+    /// Quality (1).
     pub(super) quality: f64,
 }
 
 impl Phase {
-    /// Error after so many half cycles, of the amplitude [1].
+    /// Error after so many half cycles, of the amplitude (1).
     pub(super) fn after(self, halves: u32) -> f64 {
         (self.error.abs() * (PI * f64::from(halves)).min(2.0 * self.quality)).min(2.0)
     }
@@ -33,7 +33,7 @@ pub(super) struct Waveform {
     high: f64,
     /// Whether it rises.
     rises: Option<bool>,
-    /// The last turning point: time [s], value.
+    /// The last turning point: time (s), value.
     turned: Option<(f64, f64)>,
     /// Halves of a cycle of the mode so far.
     halves: u32,
@@ -50,7 +50,7 @@ impl Waveform {
         self.high - self.low
     }
 
-    /// The next value `y`, at the second of two times [s]: the size of the half swing of a mode with half cycles of `half` [s] that ended at the
+    /// The next value `y`, at the second of two times (s): the size of the half swing of a mode with half cycles of `half` (s) that ended at the
     /// first, and how many there were.
     pub(super) fn half(&mut self, [before, t]: [f64; 2], y: f64, half: f64) -> Option<(f64, u32)> {
         let last = std::mem::replace(&mut self.now, y);

@@ -23,7 +23,7 @@ pub(super) struct Split<'a> {
     pub(super) modes: &'a [HigherMode],
     /// η̇ of each.
     pub(super) rates: &'a [f64],
-    /// Length of a step of the integrator [s].
+    /// Length of a step of the integrator (s).
     pub(super) step: f64,
     /// Charge of a value of the circuit per η of a mode: number of the mode, then of the value.
     pub(super) coupling: &'a dyn Fn(usize, usize) -> f64,
@@ -34,11 +34,11 @@ pub(super) struct Split<'a> {
 pub(super) struct OfMode {
     /// Number of the mode.
     pub(super) mode: usize,
-    /// Error of the current [A].
+    /// Error of the current (A).
     pub(super) error: f64,
     /// Cycles that it took.
     pub(super) cycles: f64,
-    /// Relative error of the frequency by the steps [1].
+    /// Relative error of the frequency by the steps (1).
     pub(super) steps: f64,
 }
 
@@ -49,9 +49,9 @@ pub(super) struct HigherModes(Vec<Followed>);
 #[derive(Debug, Clone)]
 struct Followed {
     course: Waveform,
-    /// Sum of the errors of steps [1], and of their angles [rad].
+    /// Sum of the errors of steps (1), and of their angles (rad).
     steps: [f64; 2],
-    /// Error of each current [A] at the last half cycle, and when that was [s].
+    /// Error of each current (A) at the last half cycle, and when that was (s).
     errors: Vec<f64>,
     at: f64,
     cycles: f64,
@@ -64,7 +64,7 @@ impl Followed {
 }
 
 impl HigherModes {
-    /// After an accepted point at `times[1]` that follows one at `times[0]` [s]; `charges` says which values are charges. True where a mode has turned.
+    /// After an accepted point at `times[1]` that follows one at `times[0]` (s); `charges` says which values are charges. True where a mode has turned.
     pub(super) fn observe(&mut self, times: [f64; 2], charges: &[bool], split: &Split<'_>) -> bool {
         let [before, t] = times;
         if self.0.len() != split.modes.len() {
@@ -98,7 +98,7 @@ impl HigherModes {
         turned
     }
 
-    /// The sum of the errors of the current of value `n` [A], and the largest of them.
+    /// The sum of the errors of the current of value `n` (A), and the largest of them.
     pub(super) fn of(&self, n: usize) -> (f64, Option<OfMode>) {
         let of = |(mode, followed): (usize, &Followed)| OfMode {
             mode,

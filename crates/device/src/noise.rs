@@ -133,7 +133,7 @@ impl DeviceSession {
         force
     }
 
-    /// Σ rise·R·I·I of two answers [K·S].
+    /// Σ rise·R·I·I of two answers (K·S).
     fn johnson(&self, system: &System, state: &Snapshot, (i, j): (usize, usize)) -> f64 {
         let Some((a, b)) = self.both_electrical(i, j) else { return 0.0 };
         let heating = &system.electrics.heating;
@@ -143,7 +143,7 @@ impl DeviceSession {
         state.rise.iter().enumerate().map(one).sum()
     }
 
-    /// Conductance between two answers [S].
+    /// Conductance between two answers (S).
     fn conducted(&self, system: &System, (i, j): (usize, usize)) -> f64 {
         self.both_electrical(i, j).map_or(0.0, |(a, b)| system.electrics.conductance[(a, b)])
     }

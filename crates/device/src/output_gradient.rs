@@ -5,10 +5,10 @@ use bimorph_multibody::planar::Pose;
 use bimorph_solve::harmonic::ComplexPose;
 use nalgebra::Complex;
 
-/// Temperature of a mechanism whose netlist names none: 27 °C, as circuits have it [K].
+/// Temperature of a mechanism whose netlist names none: 27 °C, as circuits have it (K).
 const ROOM: f64 = 300.15;
 
-/// Temperature of what surrounds the mechanism [K].
+/// Temperature of what surrounds the mechanism (K).
 pub(super) fn surroundings(compiled: &CompiledModel) -> f64 {
     let ambient = compiled.structure.beams.iter().map(|beam| beam.material.ambient_temperature);
     ambient.into_iter().find(|t| *t > 0.0).unwrap_or(ROOM)
@@ -26,7 +26,7 @@ impl OutputGradient {
         Self { place: vec![Pose::zeros(); bodies], change: vec![Pose::zeros(); bodies] }
     }
 
-    /// Of a displacement that swings at `omega` [rad/s].
+    /// Of a displacement that swings at `omega` (rad/s).
     pub(super) fn at(&self, omega: f64) -> Vec<ComplexPose> {
         let one = |(place, change): (&Pose, &Pose)| place.zip_map(change, |p, c| Complex::new(p, omega * c));
         self.place.iter().zip(&self.change).map(one).collect()

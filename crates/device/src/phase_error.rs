@@ -13,17 +13,17 @@ use super::half_cycles::{Phase, Waveform};
 use super::higher_modes::{HigherModes, OfMode, Split};
 use bimorph_model::compile::LowestMode;
 
-/// Fraction of half a cycle below which two points give no rate of a charge [1]: at corners of a source they are
+/// Fraction of half a cycle below which two points give no rate of a charge (1): at corners of a source they are
 /// separated by rounding.
 const MIN_STEP: f64 = 1e-4;
 
-/// Growth of an error since the last warning that causes another one [1].
+/// Growth of an error since the last warning that causes another one (1).
 const GROWS: f64 = 3.0;
 
 /// An accepted state as the circuit sees it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AcceptedState<'a> {
-    /// Time since the equilibrium [s].
+    /// Time since the equilibrium (s).
     pub(super) t: f64,
     /// Signals, then charges or answers of ports.
     pub(super) values: &'a [f64],
@@ -32,15 +32,15 @@ pub(super) struct AcceptedState<'a> {
 /// The motion of one transient, from its accepted points.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PhaseErrorMonitor {
-    /// Time of the last point [s].
+    /// Time of the last point (s).
     at: f64,
     /// Those of the values, then those of the rates of charges.
     courses: Vec<Waveform>,
-    /// Rates of the charges among the values, in their places [1/s]; the others stay 0.
+    /// Rates of the charges among the values, in their places (1/s); the others stay 0.
     rates: Vec<f64>,
-    /// Values and time [s] at the last point with rates.
+    /// Values and time (s) at the last point with rates.
     rated: (Vec<f64>, f64),
-    /// The last errors of rates [1].
+    /// The last errors of rates (1).
     errors: Vec<f64>,
     higher: HigherModes,
     /// Last phase error warned about, in units of `tol`.
@@ -50,7 +50,7 @@ pub(super) struct PhaseErrorMonitor {
 /// The largest phase error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Worst {
-    /// Error, of its range [1].
+    /// Error, of its range (1).
     pub(super) error: f64,
     /// Cycles that it took.
     pub(super) cycles: f64,
@@ -162,7 +162,7 @@ mod tests {
 
     const MODE: LowestMode = LowestMode { frequency_hz: 1e3, quality: f64::INFINITY, error: 1e-4 };
 
-    /// Largest error of [`PhaseErrorMonitor`] for a waveform up to `end` [s], and the true error of a motion with
+    /// Largest error of [`PhaseErrorMonitor`] for a waveform up to `end` (s), and the true error of a motion with
     /// another frequency.
     fn worst(mode: &LowestMode, end: f64, course: impl Fn(f64) -> f64) -> f64 {
         let mut ringing = PhaseErrorMonitor::default();

@@ -10,12 +10,12 @@ use bimorph_analysis::readout::signal::{Signal, SignalView};
 use bimorph_domains::System;
 use bimorph_model::compile::CompiledModel;
 
-/// Fraction of the length scale that the integrator takes for nothing, in units of its tolerance [1].
+/// Fraction of the length scale that the integrator takes for nothing, in units of its tolerance (1).
 const FLOOR: f64 = 1e-4;
-/// Temperature difference that is negligible for a circuit [K].
+/// Temperature difference that is negligible for a circuit (K).
 const SAME_TEMPERATURE: f64 = 1e-6;
 /// Voltage difference that is negligible for a circuit, and its fraction of the voltage at the port: the tolerances of
-/// ngspice's iteration [V, 1].
+/// ngspice's iteration (V, 1).
 const SAME_VOLTAGE: [f64; 2] = [1e-6, 1e-6];
 
 impl DeviceSession {
@@ -84,7 +84,7 @@ impl DeviceSession {
     }
 
     /// Partials of charges, outputs and what is not electrical, from the sensitivities. `step` holds the sources at the start of
-    /// a transient step and its length [s].
+    /// a transient step and its length (s).
     fn partials(
         &mut self,
         compiled: &CompiledModel,
@@ -140,7 +140,7 @@ impl DeviceSession {
         }
     }
 
-    /// Values of a state for the circuit, and the bound of the step from there [s].
+    /// Values of a state for the circuit, and the bound of the step from there (s).
     fn seen(
         &self,
         compiled: &CompiledModel,

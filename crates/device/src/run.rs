@@ -33,7 +33,7 @@ pub enum Stepped {
 }
 
 impl Run {
-    /// A run from the state `start` (none: the model at rest) at time `t` [s], where the ports have the values `given`.
+    /// A run from the state `start` (none: the model at rest) at time `t` (s), where the ports have the values `given`.
     pub fn new(start: Option<Token>, t: f64, given: Vec<f64>) -> Self {
         Self {
             start,
@@ -47,7 +47,7 @@ impl Run {
         }
     }
 
-    /// Time of the state that it has come to [s].
+    /// Time of the state that it has come to (s).
     pub fn t(&self) -> f64 {
         self.t
     }
@@ -62,7 +62,7 @@ impl Run {
         self.trials
     }
 
-    /// Steps to the time `t` [s], the ports going linearly to `given`.
+    /// Steps to the time `t` (s), the ports going linearly to `given`.
     ///
     /// # Errors
     /// Those of [`Device::trial`]; the run stands where it stood.
@@ -120,7 +120,7 @@ impl Run {
 pub struct Start<'a> {
     /// The state; none: the model at rest as drawn.
     pub state: Option<Token>,
-    /// Its time [s].
+    /// Its time (s).
     pub t: f64,
     /// Input of the ports there (p).
     pub given: &'a [f64],
@@ -129,7 +129,7 @@ pub struct Start<'a> {
 /// Inputs over time of a run, and its outputs.
 #[derive(Debug, Clone, Copy)]
 pub struct DriveSchedule<'a> {
-    /// Times at the ends of the steps [s], ascending (n).
+    /// Times at the ends of the steps (s), ascending (n).
     pub times: &'a [f64],
     /// Port values at each time, row by row (n×p), or one row for all (p).
     pub values: &'a [f64],

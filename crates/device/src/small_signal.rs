@@ -1,6 +1,6 @@
 //! The small-signal answer: how ports and signals of a state respond to a small change at one port that goes as e^(st).
 //!
-//! [`PerturbedState`] is the physics at any complex s [rad/s]; [`DeviceSession::respond`] asks at s = iω.
+//! [`PerturbedState`] is the physics at any complex s (rad/s); [`DeviceSession::respond`] asks at s = iω.
 
 use super::session::DeviceSession;
 use super::states::Snapshot;

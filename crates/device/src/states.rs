@@ -22,13 +22,13 @@ pub struct Snapshot {
     pub q: Vec<Pose>,
     /// Rates.
     pub v: Vec<Pose>,
-    /// Rise of each heater [K].
+    /// Rise of each heater (K).
     pub rise: Vec<f64>,
-    /// Source voltages [V].
+    /// Source voltages (V).
     pub sources: Vec<f64>,
-    /// First internal step of what follows [s].
+    /// First internal step of what follows (s).
     pub next_step: f64,
-    /// Time since the equilibrium that the motion began from [s].
+    /// Time since the equilibrium that the motion began from (s).
     pub elapsed: f64,
     /// Values that the circuit has received.
     pub shown: StepHistory,

@@ -16,11 +16,11 @@
 use serde::{Deserialize, Serialize};
 
 /// Fraction of its range by which a quantity may depart from the line for either term, in units of the compilation's
-/// tolerance [1]. At the default it is 0.2 %, or 28 points for a cycle of full amplitude, which then stays within 0.5
+/// tolerance (1). At the default it is 0.2 %, or 28 points for a cycle of full amplitude, which then stays within 0.5
 /// %.
 const BEND_FRACTION: f64 = 2.0;
 
-/// The same of a charge [1]. Only its change matters: with even steps the trapezoidal rule keeps that within 0.2 % of
+/// The same of a charge (1). Only its change matters: with even steps the trapezoidal rule keeps that within 0.2 % of
 /// its range, with 28 points a cycle. (Without them an oscillator that its own current drives takes 43 points a cycle
 /// where it takes 36.)
 const BEND_FRACTION_OF_CHARGES: f64 = 3.6;
@@ -45,7 +45,7 @@ pub struct StepHistory {
     slopes: Vec<f64>,
     /// Second divided differences over the last two steps, per second squared; empty before the second.
     bends: Vec<f64>,
-    /// Lengths of the last step and of the one before it [s].
+    /// Lengths of the last step and of the one before it (s).
     steps: [f64; 2],
     /// Smallest values so far.
     low: Vec<f64>,
@@ -60,8 +60,8 @@ impl StepHistory {
         Self { now: values, slopes: Vec::new(), bends: Vec::new(), steps: [0.0; 2], low, high }
     }
 
-    /// After a step of `dt` [s], and the longest next step [s] at which each quantity keeps to the line within its share
-    /// of `tol` [1] or within `floor`, in its own unit.
+    /// After a step of `dt` (s), and the longest next step (s) at which each quantity keeps to the line within its share
+    /// of `tol` (1) or within `floor`, in its own unit.
     pub fn step(
         &self,
         dt: f64,
@@ -123,7 +123,7 @@ impl StepHistory {
         &self.now
     }
 
-    /// Length of the step that led here [s]; 0 at the start.
+    /// Length of the step that led here (s); 0 at the start.
     pub(super) fn last_step(&self) -> f64 {
         self.steps[0]
     }

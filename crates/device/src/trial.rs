@@ -21,7 +21,7 @@ const MAX_INTERNAL_STEPS: usize = 512;
 /// not cost too much, and a change of pace from one step to the next stay below [`MAX_INTERNAL_STEPS`].
 const PROPOSED_STEPS: f64 = 32.0;
 
-/// Fraction of a charge's derivative beyond that of the capacitance at rest from which on the motion may be unstable [1]: at λh = 1 the response of a
+/// Fraction of a charge's derivative beyond that of the capacitance at rest from which on the motion may be unstable (1): at λh = 1 the response of a
 /// growing motion adds 18 % or more.
 const RESPONDS: f64 = 0.1;
 
@@ -203,7 +203,7 @@ impl DeviceSession {
         !ends.is_empty()
     }
 
-    /// Rate at which the motion at the end of a trial grows at fixed voltages [1/s]; 0 where nothing shows that it does.
+    /// Rate at which the motion at the end of a trial grows at fixed voltages (1/s); 0 where nothing shows that it does.
     fn growth_rate(&mut self, system: &System, reply: &TrialReply) -> f64 {
         let (electrics, ports) = (&system.electrics, self.ports.len());
         let mut fastest = 0.0f64;

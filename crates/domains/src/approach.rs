@@ -10,12 +10,12 @@ use nalgebra::{Matrix6, Vector2, Vector6};
 pub struct MaterialPoint {
     /// The body.
     pub body: BodyId,
-    /// From its centre of mass to the point, as drawn [m].
+    /// From its centre of mass to the point, as drawn (m).
     pub arm: Vector2<f64>,
 }
 
 impl MaterialPoint {
-    /// The point of the same body that lies `shift` further as drawn [m]; ground has no places.
+    /// The point of the same body that lies `shift` further as drawn (m); ground has no places.
     #[inline]
     pub fn beyond(&self, shift: Vector2<f64>) -> Self {
         match self.body {
@@ -24,13 +24,13 @@ impl MaterialPoint {
         }
     }
 
-    /// Displacement of the point [m].
+    /// Displacement of the point (m).
     #[inline]
     pub fn displacement(&self, q: &[Pose], linear: bool) -> Vector2<f64> {
         planar::point(&Model::pose(q, self.body), self.arm, linear)
     }
 
-    /// Rotation of its body [rad].
+    /// Rotation of its body (rad).
     #[inline]
     pub fn rotation(&self, q: &[Pose]) -> f64 {
         Model::pose(q, self.body).z
@@ -51,16 +51,16 @@ pub struct Approach {
 /// An approach with its derivatives over the pair's six coordinates.
 #[derive(Debug, Clone, Copy)]
 pub struct ApproachDerivatives {
-    /// u [m].
+    /// u (m).
     pub value: f64,
     /// ∂u/∂(q_a, q_b).
     pub gradient: Vector6<f64>,
-    /// ∂²u/∂θ_a², ∂²u/∂θ_b² [m]; every other second derivative is zero.
+    /// ∂²u/∂θ_a², ∂²u/∂θ_b² (m); every other second derivative is zero.
     pub bend: [f64; 2],
 }
 
 impl Approach {
-    /// u at a configuration [m].
+    /// u at a configuration (m).
     #[inline]
     pub fn value(&self, q: &[Pose], linear: bool) -> f64 {
         (self.a.displacement(q, linear) - self.b.displacement(q, linear)).dot(&self.axis)
@@ -102,13 +102,13 @@ impl Approach {
         }
     }
 
-    /// Change of u with a change `dq` of the configuration where it was measured [m].
+    /// Change of u with a change `dq` of the configuration where it was measured (m).
     pub(super) fn change(&self, m: &ApproachDerivatives, dq: &[Pose]) -> f64 {
         let (da, db) = (Model::pose(dq, self.a.body), Model::pose(dq, self.b.body));
         m.gradient.fixed_rows::<3>(0).dot(&da) + m.gradient.fixed_rows::<3>(3).dot(&db)
     }
 
-    /// Rate of u where it was measured, with the rate of each body [m/s].
+    /// Rate of u where it was measured, with the rate of each body (m/s).
     #[inline]
     pub(super) fn rate(&self, m: &ApproachDerivatives, rate: &impl Fn(usize) -> Pose) -> f64 {
         let of = |id: BodyId| if let BodyId::Free(k) = id { rate(k) } else { Pose::zeros() };

@@ -16,22 +16,22 @@
 /// Strength of a material against pressure along a beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strength {
-    /// Yield stress at ambient temperature σ_0 [Pa].
+    /// Yield stress at ambient temperature σ_0 (Pa).
     pub cold: f64,
-    /// Ambient temperature T_0 [K].
+    /// Ambient temperature T_0 (K).
     pub ambient: f64,
-    /// Temperature at which no strength is left T_s [K], above T_0.
+    /// Temperature at which no strength is left T_s (K), above T_0.
     pub softening: f64,
 }
 
 impl Strength {
-    /// Yield stress at temperature `t` [Pa].
+    /// Yield stress at temperature `t` (Pa).
     #[inline]
     pub fn at(&self, t: f64) -> f64 {
         self.cold * ((self.softening - t) / (self.softening - self.ambient)).max(0.0)
     }
 
-    /// By how much the pressure `stress` [Pa] (positive: pressed) exceeds it at temperature `t`; negative: it holds.
+    /// By how much the pressure `stress` (Pa) (positive: pressed) exceeds it at temperature `t`; negative: it holds.
     #[inline]
     pub fn excess(&self, stress: f64, t: f64) -> f64 {
         stress - self.at(t)

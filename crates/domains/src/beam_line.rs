@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// Places along a segment where its shape is taken.
 const PLACES: usize = 8;
-/// Fraction of the largest displacement across a beam at which its side is taken [1].
+/// Fraction of the largest displacement across a beam at which its side is taken (1).
 const HALF: f64 = 0.5;
 
 /// The centreline of a beam.
@@ -21,13 +21,13 @@ pub struct BeamLine {
     pub name: Arc<str>,
     /// Equally spaced points, ends included.
     pub points: Arc<[MaterialPoint]>,
-    /// Direction as drawn [rad].
+    /// Direction as drawn (rad).
     pub angle: f64,
-    /// Length [m].
+    /// Length (m).
     pub length: f64,
-    /// Bending stiffness EI [N·m²].
+    /// Bending stiffness EI (N·m²).
     pub rigidity: f64,
-    /// Width in the plane of bending [m].
+    /// Width in the plane of bending (m).
     pub width: f64,
 }
 
@@ -43,9 +43,9 @@ pub enum BeamSide {
 /// A segment at a configuration.
 #[derive(Debug, Clone, Copy)]
 pub struct SegmentState {
-    /// Relative change of the distance between its ends [1].
+    /// Relative change of the distance between its ends (1).
     pub strain: f64,
-    /// Rotations of its ends from its chord [rad].
+    /// Rotations of its ends from its chord (rad).
     pub turns: [f64; 2],
 }
 
@@ -56,13 +56,13 @@ impl BeamLine {
         self.points.len().saturating_sub(1)
     }
 
-    /// Length of a segment [m].
+    /// Length of a segment (m).
     #[inline]
     pub fn segment_length(&self) -> f64 {
         self.length / self.segments().max(1) as f64
     }
 
-    /// The chord of segment `k` at a configuration [m].
+    /// The chord of segment `k` at a configuration (m).
     fn chord(&self, k: usize, q: &[Pose], linear: bool) -> Vector2<f64> {
         let drawn = Vector2::new(self.angle.cos(), self.angle.sin()) * self.segment_length();
         drawn + self.points[k + 1].displacement(q, linear) - self.points[k].displacement(q, linear)
@@ -80,7 +80,7 @@ impl BeamLine {
         SegmentState { strain: chord.norm() / h - 1.0, turns: ends.map(|end| end - turned) }
     }
 
-    /// Energy [J] with which a motion `dq` from the configuration `q` bends the beam, and the side to which it carries the beam: that of the
+    /// Energy (J) with which a motion `dq` from the configuration `q` bends the beam, and the side to which it carries the beam: that of the
     /// first place that moves across the beam by half of the largest such displacement.
     pub fn bending(&self, q: &[Pose], dq: &[Pose], linear: bool) -> (f64, BeamSide) {
         let (mut energy, mut shape) = (0.0, Vec::with_capacity(PLACES * self.segments()));

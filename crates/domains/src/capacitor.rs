@@ -3,11 +3,11 @@
 /// C, C′ = dC/du, C″ at an approach.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Capacitance {
-    /// C [F].
+    /// C (F).
     pub value: f64,
-    /// dC/du [F/m].
+    /// dC/du (F/m).
     pub slope: f64,
-    /// d²C/du² [F/m²].
+    /// d²C/du² (F/m²).
     pub curvature: f64,
 }
 
@@ -19,14 +19,14 @@ pub enum Capacitor {
     /// Around the end of the overlap, |o| < `blend`, a parabola joins the line to zero with continuous slope: a comb that
     /// has left its stator no longer pulls.
     Comb {
-        /// dC/du while engaged, N·ε·h/g [F/m].
+        /// dC/du while engaged, N·ε·h/g (F/m).
         slope: f64,
-        /// Overlap as drawn o₀ [m]; infinite for a comb whose force does not depend on the position (SUGAR's `comb2d`),
+        /// Overlap as drawn o₀ (m); infinite for a comb whose force does not depend on the position (SUGAR's `comb2d`),
         /// whose capacitance is then counted from the drawn position.
         overlap: f64,
-        /// Half width of the blend [m]: one finger gap.
+        /// Half width of the blend (m): one finger gap.
         blend: f64,
-        /// Constant part C_p [F].
+        /// Constant part C_p (F).
         parasitic: f64,
     },
     /// Parallel plates, C = ε·A/d with d = g₀ − u (Nathanson 1967).
@@ -34,17 +34,17 @@ pub enum Capacitor {
     /// Below `closest` the field is frozen: C continues along its tangent, so that nothing is divided by a vanishing
     /// gap while an iteration oversteps. Contact holds real plates further apart than that.
     Plates {
-        /// ε·A [F·m].
+        /// ε·A (F·m).
         strength: f64,
-        /// Gap as drawn g₀ [m].
+        /// Gap as drawn g₀ (m).
         gap: f64,
-        /// Distance below which the field is frozen [m].
+        /// Distance below which the field is frozen (m).
         closest: f64,
     },
 }
 
 impl Capacitor {
-    /// C and its derivatives at approach `u` [m].
+    /// C and its derivatives at approach `u` (m).
     #[inline]
     pub fn at(&self, u: f64) -> Capacitance {
         match *self {
@@ -80,7 +80,7 @@ impl Capacitor {
         }
     }
 
-    /// Distance left between the conductors [m], where that has a meaning.
+    /// Distance left between the conductors (m), where that has a meaning.
     #[inline]
     pub fn distance(&self, u: f64) -> f64 {
         match *self {

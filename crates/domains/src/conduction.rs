@@ -21,19 +21,19 @@ pub struct HeatConductor {
     pub a: usize,
     /// Second node.
     pub b: usize,
-    /// Electrical resistance [Ω].
+    /// Electrical resistance (Ω).
     pub resistance: f64,
-    /// Thermal conductance from end to end [W/K].
+    /// Thermal conductance from end to end (W/K).
     pub conductance: f64,
-    /// Thermal expansion coefficient [1/K].
+    /// Thermal expansion coefficient (1/K).
     pub expansion: f64,
-    /// Temperature at which it is as drawn [K].
+    /// Temperature at which it is as drawn (K).
     pub ambient: f64,
-    /// Time constant [s]; 0: at once.
+    /// Time constant (s); 0: at once.
     pub time_constant: f64,
     /// Whether that is to come of the heat capacities of all that conducts.
     pub delayed: bool,
-    /// Heat capacity [J/K]; 0 where it is not known.
+    /// Heat capacity (J/K); 0 where it is not known.
     pub capacity: f64,
 }
 
@@ -75,13 +75,13 @@ impl Conduction {
         Ok(Self { row, free, laplacian })
     }
 
-    /// Mean rise of each heater for the heat into each [K, W].
+    /// Mean rise of each heater for the heat into each (K, W).
     pub(super) fn rises(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
         let ends = self.ends(heaters, watts.iter().map(|watts| [0.5 * watts; 2]));
         heaters.iter().zip(watts).zip(ends).map(|((h, watts), ends)| mean(h, *watts, ends)).collect()
     }
 
-    /// Rise at both ends of each heater for the heat from it into both [K, W].
+    /// Rise at both ends of each heater for the heat from it into both (K, W).
     fn ends(&self, heaters: &[HeatConductor], into: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
         let mut rise = vec![0.0; self.free];
         for (h, watts) in heaters.iter().zip(into) {
@@ -96,7 +96,7 @@ impl Conduction {
         heaters.iter().map(|h| [at(h.a), at(h.b)]).collect()
     }
 
-    /// The heat into each heater, and where none comes into a part that conducts together, heat in proportion to capacity [W]. The nodes
+    /// The heat into each heater, and where none comes into a part that conducts together, heat in proportion to capacity (W). The nodes
     /// of a heater that are not at ambient join it to a part.
     fn evenly(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
         let count = self.row.len();
@@ -118,7 +118,7 @@ impl Conduction {
         heaters.iter().zip(watts).enumerate().map(one).collect()
     }
 
-    /// Mean delay of the rise of each heater behind the heat into all of them [s, W]. A part that none comes into is heated evenly.
+    /// Mean delay of the rise of each heater behind the heat into all of them (s, W). A part that none comes into is heated evenly.
     pub(super) fn delays(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
         let watts = &self.evenly(heaters, watts);
         let warm = self.ends(heaters, watts.iter().map(|watts| [0.5 * watts; 2]));
@@ -139,7 +139,7 @@ impl Conduction {
     }
 }
 
-/// Mean rise of a heater between its ends [K].
+/// Mean rise of a heater between its ends (K).
 fn mean(h: &HeatConductor, watts: f64, ends: [f64; 2]) -> f64 {
     0.5 * (ends[0] + ends[1]) + watts / (12.0 * h.conductance)
 }

@@ -14,14 +14,14 @@
 //! come to bear one after another, as in J. A. Greenwood, J. B. P. Williamson, Proc. R. Soc. A 295 (1966) 300; P is chosen
 //! so that micromachined parts rest within a few nanometres of where they touch.
 
-/// Default distance at which surfaces touch [m]; see [`touching_distance`].
+/// Default distance at which surfaces touch (m); see [`touching_distance`].
 pub const TOUCH: f64 = 0.1e-6;
-/// Pressure P that the law is measured in [Pa].
+/// Pressure P that the law is measured in (Pa).
 pub const PRESSURE: f64 = 1e12;
-/// Largest s for which the law holds [1].
+/// Largest s for which the law holds (1).
 pub const DEEPEST: f64 = 0.5;
 
-/// Where surfaces touch that were drawn `gap` apart [m]: [`TOUCH`], and in smaller gaps half of what was drawn.
+/// Where surfaces touch that were drawn `gap` apart (m): [`TOUCH`], and in smaller gaps half of what was drawn.
 #[inline]
 pub fn touching_distance(gap: f64) -> f64 {
     TOUCH.min(0.5 * gap)
@@ -30,20 +30,20 @@ pub fn touching_distance(gap: f64) -> f64 {
 /// Surfaces that face each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
-    /// Distance at which they touch t [m].
+    /// Distance at which they touch t (m).
     pub touch: f64,
-    /// Area that faces [m²].
+    /// Area that faces (m²).
     pub area: f64,
 }
 
 impl Contact {
-    /// Least distance at which the law holds [m].
+    /// Least distance at which the law holds (m).
     #[inline]
     pub fn least(&self) -> f64 {
         self.touch * (1.0 - 0.5 * DEEPEST)
     }
 
-    /// Repulsive force [N] and its derivative with respect to the distance [N/m] (not positive) at distance `d` [m].
+    /// Repulsive force (N) and its derivative with respect to the distance (N/m) (not positive) at distance `d` (m).
     #[inline]
     pub fn force(&self, d: f64) -> (f64, f64) {
         if d >= self.touch {
@@ -54,7 +54,7 @@ impl Contact {
         (cube * s, -8.0 * cube / self.touch)
     }
 
-    /// Energy stored at distance `d` [J]: the integral of the force from there to where it begins.
+    /// Energy stored at distance `d` (J): the integral of the force from there to where it begins.
     #[inline]
     pub fn energy(&self, d: f64) -> f64 {
         if d >= self.touch { 0.0 } else { 0.1 * self.touch * self.area * PRESSURE * self.share(d).powi(5) }

@@ -15,17 +15,17 @@
 
 use bimorph_structure::Impact;
 
-/// Restitution unless a netlist gives one [1].
+/// Restitution unless a netlist gives one (1).
 pub const RESTITUTION: f64 = 0.5;
 
 /// Loss of one contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Loss {
-    /// Restitution e at the reference speed [1]; 1: elastic.
+    /// Restitution e at the reference speed (1); 1: elastic.
     pub restitution: f64,
-    /// Reference speed v_ref [m/s]; none: not known yet.
+    /// Reference speed v_ref (m/s); none: not known yet.
     pub speed: Option<f64>,
-    /// χ [s/m].
+    /// χ (s/m).
     chi: f64,
 }
 
@@ -37,7 +37,7 @@ impl Loss {
         impact.speed.map_or(loss, |speed| loss.at(speed))
     }
 
-    /// The same with a reference speed [m/s].
+    /// The same with a reference speed (m/s).
     #[must_use]
     #[inline]
     pub fn at(self, speed: f64) -> Self {
@@ -50,14 +50,14 @@ impl Loss {
         self.chi > 0.0
     }
 
-    /// χ [s/m]; 0: elastic.
+    /// χ (s/m); 0: elastic.
     #[inline]
     pub fn coefficient(&self) -> f64 {
         self.chi
     }
 
-    /// Damping force at the closing speed [m/s] as a fraction of the elastic force, and its derivative with the speed
-    /// [s/m].
+    /// Damping force at the closing speed (m/s) as a fraction of the elastic force, and its derivative with the speed
+    /// (s/m).
     #[inline]
     pub fn fraction(&self, closing: f64) -> (f64, f64) {
         let added = self.chi * closing;
@@ -65,7 +65,7 @@ impl Loss {
     }
 }
 
-/// ω₀⁻¹ times the speed with which a plate arrives at its pull-in voltage [m], see [`super::contact_speed`]: from the gap `g` to where it touches, `t` [m].
+/// ω₀⁻¹ times the speed with which a plate arrives at its pull-in voltage (m), see [`super::contact_speed`]: from the gap `g` to where it touches, `t` (m).
 pub(super) fn fall_at_pull_in(g: f64, t: f64) -> f64 {
     g * (8.0 / 27.0 * (g / t - 1.0) - (1.0 - t / g) * (1.0 - t / g)).max(0.0).sqrt()
 }

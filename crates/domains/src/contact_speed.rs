@@ -16,7 +16,7 @@ use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, forces};
 use std::collections::BTreeMap;
 
-/// Speed of reference where nothing elastic holds the part, or it has no mass [m/s].
+/// Speed of reference where nothing elastic holds the part, or it has no mass (m/s).
 pub const WITHOUT_STATICS: f64 = 1.0;
 /// Loads that cancel to less than this fraction of their sum act one by one.
 const CANCELLED: f64 = 1e-3;
@@ -100,7 +100,7 @@ impl Bent {
         Self { stiffness, rest, unused, shapes: 0 }
     }
 
-    /// ω₀ [rad/s] of the shape into which contacts bend the mechanism together; `None` where they cancel or there is no
+    /// ω₀ (rad/s) of the shape into which contacts bend the mechanism together; `None` where they cancel or there is no
     /// contact.
     fn frequency(&mut self, system: &System, contacts: &[usize]) -> Option<f64> {
         let stiffness = self.stiffness.as_ref()?;

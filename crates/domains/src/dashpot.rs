@@ -15,7 +15,7 @@ pub struct Dashpot {
     pub point: MaterialPoint,
     /// Its local x axis, a unit vector.
     pub axis: Vector2<f64>,
-    /// Force per rate along local x and y, moment per rate about z [N·s/m, N·s/m, N·m·s].
+    /// Force per rate along local x and y, moment per rate about z (N·s/m, N·s/m, N·m·s).
     pub coefficients: Vector3<f64>,
 }
 

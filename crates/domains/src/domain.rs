@@ -30,12 +30,12 @@ pub struct Configuration<'a> {
     pub linear: bool,
 }
 
-/// A step of length `h` [s]: its start, middle and end.
+/// A step of length `h` (s): its start, middle and end.
 #[derive(Debug, Clone, Copy)]
 pub struct Chord<'a> {
     /// Configurations at the start, the middle and the end.
     pub at: [Configuration<'a>; 3],
-    /// Length [s].
+    /// Length (s).
     pub h: f64,
 }
 
@@ -44,13 +44,13 @@ pub struct Chord<'a> {
 pub enum Law {
     /// A field, and what bears where its conductors touch.
     Field(Capacitor, Option<Contact>),
-    /// A stop with the ways to its two sides [m].
+    /// A stop with the ways to its two sides (m).
     Stop([Option<f64>; 2], StopKind),
 }
 
 /// One thing that acts on bodies. Forces are those of the residual: minus the wrench on each body.
 pub trait Domain {
-    /// Its input: the voltage across a gap [V], the fraction of the dead loads that acts [1], a force [N], the motion
+    /// Its input: the voltage across a gap (V), the fraction of the dead loads that acts (1), a force (N), the motion
     /// of a frame.
     type Given: Copy;
 
@@ -104,31 +104,31 @@ pub trait Domain {
         true
     }
 
-    /// Calls `lever` for each point with a force of fixed direction, and the force [N]: terms that the tangent of a
+    /// Calls `lever` for each point with a force of fixed direction, and the force (N): terms that the tangent of a
     /// linear model omits.
     fn load_points(&self, at: Configuration<'_>, given: Self::Given, lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
         let _ = (at, given, lever);
     }
 
-    /// Π [J] without the terms of the field, −½·C·V², and of contact, which have functions of their own below.
+    /// Π (J) without the terms of the field, −½·C·V², and of contact, which have functions of their own below.
     fn energy(&self, at: Configuration<'_>, given: Self::Given) -> f64 {
         let _ = (at, given);
         0.0
     }
 
-    /// Capacitance [F].
+    /// Capacitance (F).
     fn capacitance(&self, at: Configuration<'_>) -> f64 {
         let _ = at;
         0.0
     }
 
-    /// Change of the capacitance with a change `dq` of the configuration [F].
+    /// Change of the capacitance with a change `dq` of the configuration (F).
     fn capacitance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let _ = (at, dq);
         0.0
     }
 
-    /// Force per ½V² that pulls its two sides together, ∂C/∂u with u the approach of all of it [N/V²].
+    /// Force per ½V² that pulls its two sides together, ∂C/∂u with u the approach of all of it (N/V²).
     fn pull(&self, at: Configuration<'_>) -> f64 {
         let _ = at;
         0.0
@@ -146,47 +146,47 @@ pub trait Domain {
     }
 
     /// `r +=` the change of the forces by the shape that beams take within segments under the load along them, which forces on the
-    /// bodies leave out; the sum of the changes' sizes [N].
+    /// bodies leave out; the sum of the changes' sizes (N).
     fn add_shape_force(&self, at: Configuration<'_>, given: Self::Given, r: &mut [Pose]) -> f64 {
         let _ = (at, given, r);
         0.0
     }
 
-    /// Distance left between its two sides [m]; infinite where it has none.
+    /// Distance left between its two sides (m); infinite where it has none.
     fn distance(&self, at: Configuration<'_>) -> f64 {
         let _ = at;
         f64::INFINITY
     }
 
-    /// Change of the distance with a change `dq` of the configuration [m].
+    /// Change of the distance with a change `dq` of the configuration (m).
     fn distance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let _ = (at, dq);
         0.0
     }
 
-    /// Distance at which its sides touch, and the least one that its law of contact knows [m]; none: they never do.
+    /// Distance at which its sides touch, and the least one that its law of contact knows (m); none: they never do.
     fn touching(&self) -> Option<[f64; 2]> {
         None
     }
 
-    /// Remaining travel until the gap is closed completely [m].
+    /// Remaining travel until the gap is closed completely (m).
     fn clearance(&self, at: Configuration<'_>) -> f64 {
         self.distance(at)
     }
 
-    /// Force with which its sides bear on each other [N].
+    /// Force with which its sides bear on each other (N).
     fn bearing(&self, at: Configuration<'_>) -> f64 {
         let _ = at;
         0.0
     }
 
-    /// Energy stored where its sides touch [J].
+    /// Energy stored where its sides touch (J).
     fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         let _ = at;
         0.0
     }
 
-    /// Work of the contact force over a small change `dq` of the configuration [J], of either sign.
+    /// Work of the contact force over a small change `dq` of the configuration (J), of either sign.
     fn contact_work(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let _ = (at, dq);
         0.0
@@ -202,7 +202,7 @@ pub trait Domain {
         let _ = loss;
     }
 
-    /// `r +=` a load that closes its contact as drawn, of any size. Returns how far its parts fall, as [`super::contact_speed`] takes it [m].
+    /// `r +=` a load that closes its contact as drawn, of any size. Returns how far its parts fall, as [`super::contact_speed`] takes it (m).
     fn add_closing(&self, at: Configuration<'_>, r: &mut [Pose]) -> f64 {
         let _ = (at, r);
         0.0

@@ -27,14 +27,14 @@ pub struct Electrodes {
 }
 
 impl Electrodes {
-    /// The force of contact with the distance left at approach `u` [N], and its derivative [N/m].
+    /// The force of contact with the distance left at approach `u` (N), and its derivative (N/m).
     fn pressed(&self, u: f64) -> (f64, f64) {
         self.contact.map_or((0.0, 0.0), |contact| contact.force(self.capacitor.distance(u)))
     }
 }
 
 impl Electrodes {
-    /// Rate-dependent part of that force at approach `u` that changes at `rate` [m/s], and its derivatives with both.
+    /// Rate-dependent part of that force at approach `u` that changes at `rate` (m/s), and its derivatives with both.
     fn lost(&self, (u, rate): (f64, f64)) -> (f64, f64, f64) {
         let (force, slope) = self.pressed(u);
         let (added, by_rate) = self.loss.fraction(rate);

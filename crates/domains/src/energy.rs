@@ -11,7 +11,7 @@ use bimorph_multibody::forces;
 use bimorph_multibody::planar::Pose;
 
 impl System {
-    /// Potential Π(q) at a drive [J]; see [`crate::energy`].
+    /// Potential Π(q) at a drive (J); see [`crate::energy`].
     pub fn potential(&self, q: &[Pose], drive: &Drive) -> f64 {
         let mut sum = forces::strain_energy(&self.model, q, &drive.rest());
         for g in 0..self.members.len() {
@@ -30,7 +30,7 @@ impl System {
         sum + self.input_energy(at, drive)
     }
 
-    /// Kinetic energy plus potential [J] of a motion (q, v) at a drive.
+    /// Kinetic energy plus potential (J) of a motion (q, v) at a drive.
     #[inline]
     pub fn energy(&self, q: &[Pose], v: &[Pose], drive: &Drive) -> f64 {
         forces::kinetic_energy(&self.model, v) + self.potential(q, drive)

@@ -16,15 +16,15 @@ use nalgebra::{Matrix4, Vector4};
 /// Constants of a stretch of facing beams.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FacingStretch {
-    /// Length [m].
+    /// Length (m).
     pub length: f64,
-    /// Gap as drawn [m].
+    /// Gap as drawn (m).
     pub gap: f64,
-    /// ε·h·α, capacitance times gap per length [F].
+    /// ε·h·α, capacitance times gap per length (F).
     pub strength: f64,
-    /// Electrode height h [m].
+    /// Electrode height h (m).
     pub height: f64,
-    /// Distance at which the beams touch [m].
+    /// Distance at which the beams touch (m).
     pub touch: f64,
     /// The gap along the straight lines between the ends, as SUGAR measures it, instead of that along the cubics.
     pub chord: bool,
@@ -35,9 +35,9 @@ pub struct FacingStretch {
 /// C(z) with gradient and Hessian.
 #[derive(Debug, Clone, Copy)]
 pub struct FacingCapacitance {
-    /// C [F].
+    /// C (F).
     pub value: f64,
-    /// ∂C/∂z [F/m, F/rad]; along chords what the pressure exerts instead.
+    /// ∂C/∂z (F/m, F/rad); along chords what the pressure exerts instead.
     pub gradient: Vector4<f64>,
     /// ∂²C/∂z²; along chords the symmetric part of the gradient's derivative.
     pub hessian: Matrix4<f64>,
@@ -63,7 +63,7 @@ impl FacingStretch {
         FacingCapacitance { value, gradient: gradient.component_mul(&scale), hessian }
     }
 
-    /// C(z) alone [F].
+    /// C(z) alone (F).
     #[inline]
     pub fn capacitance(&self, z: &Vector4<f64>) -> f64 {
         let mut value = 0.0;
@@ -79,7 +79,7 @@ impl FacingStretch {
         gradient.component_mul(&self.scale())
     }
 
-    /// Change of ∂Π/∂z at `volts` where the distance at the fraction s of the stretch is smaller by `bent(s)` [m].
+    /// Change of ∂Π/∂z at `volts` where the distance at the fraction s of the stretch is smaller by `bent(s)` (m).
     #[inline]
     pub fn shape_force(&self, z: &Vector4<f64>, volts: f64, bent: impl Fn(f64) -> f64) -> Vector4<f64> {
         let mut change = Vector4::zeros();
@@ -89,7 +89,7 @@ impl FacingStretch {
         change.component_mul(&self.scale())
     }
 
-    /// `see` gets each point of the field's rule with what it adds to C [F], and the derivatives of that with the distance there.
+    /// `see` gets each point of the field's rule with what it adds to C (F), and the derivatives of that with the distance there.
     #[inline(always)]
     fn field(&self, z: &Vector4<f64>, mut see: impl FnMut(&Abscissa, [f64; 3])) {
         let closest = self.least();
@@ -105,7 +105,7 @@ impl FacingStretch {
         }
     }
 
-    /// Least distance of the law of contact [m]; below it the field continues along its tangent.
+    /// Least distance of the law of contact (m); below it the field continues along its tangent.
     #[inline]
     pub fn least(&self) -> f64 {
         Contact { touch: self.touch, area: 0.0 }.least()
@@ -117,7 +117,7 @@ impl FacingStretch {
         Vector4::new(1.0, self.length, 1.0, self.length)
     }
 
-    /// The distance at a point of a rule [m].
+    /// The distance at a point of a rule (m).
     #[inline]
     pub(super) fn distance(&self, node: &Abscissa, z: &Vector4<f64>) -> f64 {
         self.gap + Vector4::from(node.shape).dot(&z.component_mul(&self.scale()))
@@ -143,7 +143,7 @@ impl FacingStretch {
         if self.alone { &LOBATTO_9 } else { &LOBATTO_5 }
     }
 
-    /// Smallest distance among the points of the contact's rule [m], and its derivative with z.
+    /// Smallest distance among the points of the contact's rule (m), and its derivative with z.
     #[inline]
     pub fn closest(&self, z: &Vector4<f64>) -> (f64, Vector4<f64>) {
         let mut found = (f64::INFINITY, &self.lobatto()[0]);
@@ -214,7 +214,7 @@ impl FacingStretch {
         Some((first, second))
     }
 
-    /// Energy stored in the contact [J].
+    /// Energy stored in the contact (J).
     #[inline]
     pub fn contact_energy(&self, z: &Vector4<f64>) -> f64 {
         if self.apart(z) {

@@ -107,7 +107,7 @@ impl FacingBeams {
         upper - lower
     }
 
-    /// The stretch with the smallest distance, that distance [m], and its derivative with z.
+    /// The stretch with the smallest distance, that distance (m), and its derivative with z.
     pub(super) fn closest(&self, at: Configuration<'_>, mut each: impl FnMut(&Local<'_>, f64, Vector4<f64>)) {
         let mut least = f64::INFINITY;
         self.along(at, |local| {

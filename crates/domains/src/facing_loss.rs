@@ -15,7 +15,7 @@ use nalgebra::{Matrix4, Vector4};
 type Derivatives = (Vector4<f64>, Matrix4<f64>);
 
 impl FacingStretch {
-    /// Points of the contact's rule that are pressed: ∂g/∂z, the force [N] and its derivative with the distance [N/m].
+    /// Points of the contact's rule that are pressed: ∂g/∂z, the force (N) and its derivative with the distance (N/m).
     fn pressed(&self, z: &Vector4<f64>) -> impl Iterator<Item = (Vector4<f64>, f64, f64)> {
         let points = if self.apart(z) { &[] } else { self.lobatto() };
         points.iter().filter_map(move |node| {
@@ -27,7 +27,7 @@ impl FacingStretch {
         })
     }
 
-    /// Discrete force over z and its derivative with the end of a step of length `h` [s] from `z0` to `z1`: of the field at `volts` [V], and of
+    /// Discrete force over z and its derivative with the end of a step of length `h` (s) from `z0` to `z1`: of the field at `volts` (V), and of
     /// the contact with its `loss`.
     fn discrete(&self, [z0, z1]: [&Vector4<f64>; 2], (volts, h): (f64, f64), loss: &Loss) -> Derivatives {
         let (mut first, mut second) = (Vector4::zeros(), Matrix4::zeros());

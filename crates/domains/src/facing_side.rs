@@ -18,12 +18,12 @@ pub struct Opening {
 /// Deflection at a station, with the derivatives over the pose of its body.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Deflection {
-    /// Displacement along the axis [m], and its derivatives with x, y, θ.
+    /// Displacement along the axis (m), and its derivatives with x, y, θ.
     pub(super) w: f64,
     pub(super) gradient: Vector3<f64>,
-    /// ∂²w/∂θ² [m].
+    /// ∂²w/∂θ² (m).
     pub(super) bend: f64,
-    /// Slope along the gap [1].
+    /// Slope along the gap (1).
     pub(super) slope: f64,
 }
 
@@ -77,13 +77,13 @@ pub struct Flank {
     pub stations: Vec<Station>,
     /// None of them moves.
     pub fixed: bool,
-    /// h⁴/24EI of each segment between two stations [m²/N]; empty where nothing bends.
+    /// h⁴/24EI of each segment between two stations (m²/N); empty where nothing bends.
     pub yields: Vec<f64>,
 }
 
 impl Flank {
     /// Deflection of a segment beyond its cubic, towards the other side, at distance `at` from the start of the gap
-    /// [m], under the load per length `load` [N/m].
+    /// (m), under the load per length `load` (N/m).
     pub(super) fn bent(&self, segment: usize, at: f64, load: f64) -> f64 {
         let Some(yields) = self.yields.get(segment) else { return 0.0 };
         let [begin, end] = [self.stations[segment].at, self.stations[segment + 1].at];

@@ -60,7 +60,7 @@ pub(super) struct CubicStretch {
 
 /// A part of a gap over which both sides are single cubics.
 pub(super) struct Interval {
-    /// Its length [m].
+    /// Its length (m).
     pub(super) length: f64,
     /// The segment of each side that it lies on.
     pub(super) segments: [usize; 2],

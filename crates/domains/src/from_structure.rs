@@ -9,7 +9,7 @@ use nalgebra::Vector2;
 /// A point along a beam that one body carries.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Station {
-    /// Distance from where the beam, or what lies along it, begins [m].
+    /// Distance from where the beam, or what lies along it, begins (m).
     pub at: f64,
     /// The material point.
     pub point: MaterialPoint,

@@ -74,14 +74,14 @@ impl System {
         }
     }
 
-    /// Their share in the potential [J] but for Euler's force, which has none.
+    /// Their share in the potential (J) but for Euler's force, which has none.
     pub(super) fn input_energy(&self, at: Configuration<'_>, drive: &Drive) -> f64 {
         let given: f64 = self.given_loads(&drive.inputs).map(|(load, size)| load.energy(at, size)).sum();
         let pushed: f64 = at.q.iter().zip(&drive.push).map(|(q, push)| q.dot(push)).sum();
         given - pushed + self.frame(drive).map_or(0.0, |frame| self.in_frame().energy(at, frame))
     }
 
-    /// The forces and moments among the inputs: loads of one unit, with their sizes [N, N·m].
+    /// The forces and moments among the inputs: loads of one unit, with their sizes (N, N·m).
     pub(super) fn given_loads<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = (DeadLoad, f64)> + 'a {
         let unit = |point, direction| match direction {
             0 => DeadLoad { point, force: Vector2::x(), moment: 0.0 },

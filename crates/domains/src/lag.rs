@@ -30,7 +30,7 @@ pub fn phi(z: f64) -> ([f64; 3], f64) {
     }
 }
 
-/// The rise at time `t` after it was `start`, while its steady value is p₀ + p₁·s + p₂·s² [K].
+/// The rise at time `t` after it was `start`, while its steady value is p₀ + p₁·s + p₂·s² (K).
 #[inline]
 pub fn lagged(start: f64, time_constant: f64, t: f64, p: [f64; 3]) -> f64 {
     Lag::new(time_constant, t).rise(start, p)
@@ -47,7 +47,7 @@ pub struct Lag {
 }
 
 impl Lag {
-    /// At time `t` after the start [s].
+    /// At time `t` after the start (s).
     #[inline]
     pub fn new(time_constant: f64, t: f64) -> Self {
         let x = t / time_constant;
@@ -75,20 +75,20 @@ const CACHED_LAGS: usize = 4;
 /// The lags of heaters at one time: those of the last few time constants are not computed again.
 #[derive(Debug, Clone)]
 pub struct Lags {
-    /// Time after the start [s].
+    /// Time after the start (s).
     pub t: f64,
     kept: [Option<Lag>; CACHED_LAGS],
     next: usize,
 }
 
 impl Lags {
-    /// At time `t` after the start [s].
+    /// At time `t` after the start (s).
     #[inline]
     pub fn new(t: f64) -> Self {
         Self { t, kept: [None; CACHED_LAGS], next: 0 }
     }
 
-    /// Of a time constant [s], which is not zero.
+    /// Of a time constant (s), which is not zero.
     #[inline]
     pub fn of(&mut self, time_constant: f64) -> Lag {
         for kept in self.kept.iter().flatten() {

@@ -6,14 +6,14 @@ use bimorph_multibody::planar::{self, Pose};
 use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
 use nalgebra::Vector2;
 
-/// A dead load on a point. Its input is the fraction of it that acts [1]; for a unit load, its size [N, N·m].
+/// A dead load on a point. Its input is the fraction of it that acts (1); for a unit load, its size (N, N·m).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadLoad {
     /// Where it acts.
     pub point: MaterialPoint,
-    /// Force [N].
+    /// Force (N).
     pub force: Vector2<f64>,
-    /// Moment [N·m].
+    /// Moment (N·m).
     pub moment: f64,
 }
 

@@ -11,7 +11,7 @@ use nalgebra::Vector2;
 /// Makes [`Member`] of the types listed, in the order in which a drawing's members stand.
 macro_rules! domains {
     ($($kind:ident: $law:path, $what:literal;)+) => {
-        /// One of the registered domains; what drives it is a voltage [V].
+        /// One of the registered domains; what drives it is a voltage (V).
         #[derive(Debug, Clone, PartialEq)]
         pub enum Member {
             $(#[doc = $what] $kind($law),)+

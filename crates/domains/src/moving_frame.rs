@@ -6,7 +6,7 @@
 //! f = −m·(a + Ω̇ e×r − Ω²·r + 2Ω e×v),     moment −J·Ω̇,     e×r = (−y, x)
 //! ```
 //! (Goldstein, "Classical Mechanics" 1980, §4.10): Euler's, the centrifugal and Coriolis' force. All but the last depend on
-//! the place alone and belong to the residual here; Coriolis' force is that of [`bimorph_solve::time::gyration`].
+//! the place alone and belong to the residual here; Coriolis' force is that of `gyration` in the integrators.
 
 use super::domain::{Configuration, Domain};
 use bimorph_multibody::planar::{self, Pose};
@@ -16,11 +16,11 @@ use nalgebra::Vector2;
 /// Motion of the frame, or a change of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FrameMotion {
-    /// Acceleration of the origin [m/s²].
+    /// Acceleration of the origin (m/s²).
     pub acceleration: Vector2<f64>,
-    /// Rate about z [rad/s].
+    /// Rate about z (rad/s).
     pub rate: f64,
-    /// Rate of change of the rate [rad/s²].
+    /// Rate of change of the rate (rad/s²).
     pub turning: f64,
 }
 

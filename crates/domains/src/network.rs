@@ -21,7 +21,7 @@ use thiserror::Error;
 pub struct ElectricalNetwork {
     /// Number of nodes.
     pub nodes: usize,
-    /// Resistors (a, b, R [Ω]).
+    /// Resistors (a, b, R (Ω)).
     pub resistors: Vec<(usize, usize, f64)>,
     /// Ideal voltage sources (plus, minus); no minus: ground.
     pub sources: Vec<(usize, Option<usize>)>,
@@ -32,9 +32,9 @@ pub struct ElectricalNetwork {
 /// The network's response to one volt on each source, the others at zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Potentials {
-    /// ∂potential/∂source, nodes × sources [1].
+    /// ∂potential/∂source, nodes × sources (1).
     pub potential: DMatrix<f64>,
-    /// ∂current/∂source, current into the network at a source's plus, sources × sources [S].
+    /// ∂current/∂source, current into the network at a source's plus, sources × sources (S).
     pub conductance: DMatrix<f64>,
 }
 

@@ -3,7 +3,7 @@
 /// One point of a rule on 0…1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Abscissa {
-    /// Place along the stretch [1].
+    /// Place along the stretch (1).
     pub at: f64,
     /// Weight; the weights of a rule add up to 1.
     pub weight: f64,

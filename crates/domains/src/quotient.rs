@@ -13,7 +13,7 @@ use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
 
-/// Change of a distance below which Simpson's rule stands for the quotient [m].
+/// Change of a distance below which Simpson's rule stands for the quotient (m).
 const SMALL: f64 = 1e-12;
 
 impl Chord<'_> {

@@ -6,43 +6,43 @@ use super::system::System;
 use bimorph_multibody::planar::Pose;
 
 /// Largest penetration at the start of a step that may end beyond the law of contact, of the largest that the law knows
-/// [1]. A contact that is really pressed beyond it gets there in smaller steps.
+/// (1). A contact that is really pressed beyond it gets there in smaller steps.
 const PRESSED_BEFORE: f64 = 0.5;
 
 impl System {
-    /// Capacitance of a gap [F].
+    /// Capacitance of a gap (F).
     #[inline]
     pub fn capacitance(&self, gap: usize, q: &[Pose]) -> f64 {
         self.members[gap].capacitance(self.at(q))
     }
 
-    /// Change of a gap's capacitance with a change `dq` of the configuration [F].
+    /// Change of a gap's capacitance with a change `dq` of the configuration (F).
     #[inline]
     pub fn capacitance_slope(&self, gap: usize, q: &[Pose], dq: &[Pose]) -> f64 {
         self.members[gap].capacitance_change(self.at(q), dq)
     }
 
-    /// Distance left in a gap [m]: overlap of a comb, gap of plates, smallest gap of facing beams, way left to the nearer side of
+    /// Distance left in a gap (m): overlap of a comb, gap of plates, smallest gap of facing beams, way left to the nearer side of
     /// a stop.
     #[inline]
     pub fn distance(&self, gap: usize, q: &[Pose]) -> f64 {
         self.members[gap].distance(self.at(q))
     }
 
-    /// Change of a gap's distance with a change `dq` of the configuration [m].
+    /// Change of a gap's distance with a change `dq` of the configuration (m).
     #[inline]
     pub fn distance_slope(&self, gap: usize, q: &[Pose], dq: &[Pose]) -> f64 {
         self.members[gap].distance_change(self.at(q), dq)
     }
 
-    /// Force with which `volts` [V] pull the two sides of a gap together, ½V²·∂C/∂u, u the approach of both ends alike [N]; 0 of
+    /// Force with which `volts` (V) pull the two sides of a gap together, ½V²·∂C/∂u, u the approach of both ends alike (N); 0 of
     /// a stop.
     #[inline]
     pub fn pull(&self, gap: usize, q: &[Pose], volts: f64) -> f64 {
         0.5 * volts * volts * self.members[gap].pull(self.at(q))
     }
 
-    /// Change of [`Self::pull`] with a change `dq` of the configuration and `dv` [V] of the voltage [N].
+    /// Change of [`Self::pull`] with a change `dq` of the configuration and `dv` (V) of the voltage (N).
     #[inline]
     pub fn pull_slope(&self, gap: usize, q: &[Pose], volts: f64, dq: &[Pose], dv: f64) -> f64 {
         let (slope, change) = self.members[gap].pull_and_change(self.at(q), dq);
@@ -50,19 +50,19 @@ impl System {
     }
 
     /// `r +=` the change of a gap's forces by the shape that beams take within segments under the load along them; the sum of the
-    /// changes' sizes [N].
+    /// changes' sizes (N).
     #[inline]
     pub fn add_shape_force(&self, gap: usize, q: &[Pose], volts: f64, r: &mut [Pose]) -> f64 {
         self.members[gap].add_shape_force(self.at(q), volts, r)
     }
 
-    /// Distance at which the parts of a gap touch, and the least one that its law of contact knows [m]; none: they never do.
+    /// Distance at which the parts of a gap touch, and the least one that its law of contact knows (m); none: they never do.
     #[inline]
     pub fn touching(&self, gap: usize) -> Option<[f64; 2]> {
         self.members[gap].touching()
     }
 
-    /// Remaining travel of a gap until it is closed completely [m]: its distance; for a stop, the travel and, beyond
+    /// Remaining travel of a gap until it is closed completely (m): its distance; for a stop, the travel and, beyond
     /// it, the largest penetration.
     #[inline]
     pub fn clearance(&self, gap: usize, q: &[Pose]) -> f64 {
@@ -75,7 +75,7 @@ impl System {
         self.touching(gap).is_some_and(|[touch, _]| self.distance(gap, q) < touch)
     }
 
-    /// Scale of the force balance where parts touch [N]: the largest contact force. At a contact with almost no load, a
+    /// Scale of the force balance where parts touch (N): the largest contact force. At a contact with almost no load, a
     /// thousandth of the attraction there. 0 where nothing touches. `volts` of each gap.
     #[inline]
     pub fn contact_scale(&self, q: &[Pose], volts: &[f64]) -> f64 {
@@ -86,7 +86,7 @@ impl System {
         self.members.iter().zip(volts).enumerate().map(of).fold(0.0, f64::max)
     }
 
-    /// The first gap that is closed beyond the range of its law of contact, with the distance that is left [m].
+    /// The first gap that is closed beyond the range of its law of contact, with the distance that is left (m).
     #[inline]
     pub fn overrun(&self, q: &[Pose]) -> Option<(usize, f64)> {
         (0..self.members.len()).find_map(|g| {
@@ -96,20 +96,20 @@ impl System {
         })
     }
 
-    /// Energy stored where parts touch [J].
+    /// Energy stored where parts touch (J).
     #[inline]
     pub fn contact_energy(&self, q: &[Pose]) -> f64 {
         self.members.iter().map(|gap| gap.contact_energy(self.at(q))).sum()
     }
 
-    /// Work of the contact forces at `q` over a small change `dq`, each gap's taken positive [J].
+    /// Work of the contact forces at `q` over a small change `dq`, each gap's taken positive (J).
     #[inline]
     pub fn contact_work(&self, q: &[Pose], dq: &[Pose]) -> f64 {
         self.members.iter().map(|gap| gap.contact_work(self.at(q), dq).abs()).sum()
     }
 
     /// The largest change of a contact distance with a change `dq` at the end of a step from `before` to `q`. It is
-    /// relative to the penetration, of at least `least` [m] [1], and infinite where the step exceeds the law of
+    /// relative to the penetration, of at least `least` (m) (1), and infinite where the step exceeds the law of
     /// contact.
     #[inline]
     pub fn contact_change(&self, [before, q]: [&[Pose]; 2], dq: &[Pose], least: f64) -> f64 {

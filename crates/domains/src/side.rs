@@ -11,14 +11,14 @@ use bimorph_multibody::planar::Pose;
 use bimorph_multibody::unstressed::{add_stresses, strains};
 use nalgebra::Vector3;
 
-/// Fraction of the largest above which a beam, a gap or a joint decides [1].
+/// Fraction of the largest above which a beam, a gap or a joint decides (1).
 const DECIDES: f64 = 0.5;
 /// Step of the difference that strains of a motion come from.
 const STEP: f64 = 1e-6;
 
 impl System {
     /// Forces `r` of stresses in the joints' own frames, which excite whatever bends, shifts or stretches alike in any direction of the drawing.
-    /// `length` [m] makes moments and forces comparable.
+    /// `length` (m) makes moments and forces comparable.
     #[inline]
     pub fn excite(&self, q: &[Pose], length: f64, r: &mut [Pose]) {
         r.fill(Pose::zeros());

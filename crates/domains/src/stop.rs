@@ -10,20 +10,20 @@
 use super::contact::{Contact, TOUCH};
 use super::contact_loss::Loss;
 
-/// Penetration over which the stiffness of an elastic stop sets in [m].
+/// Penetration over which the stiffness of an elastic stop sets in (m).
 pub const SOFT: f64 = 1e-9;
 
 /// How a stop bears.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StopKind {
-    /// On an area [m²], by the law of contact.
+    /// On an area (m²), by the law of contact.
     Rigid(f64),
-    /// As a spring [N/m].
+    /// As a spring (N/m).
     Elastic(f64),
 }
 
 impl StopKind {
-    /// Way that is left where the law ends [m], negative: how far a rigid stop may be pressed.
+    /// Way that is left where the law ends (m), negative: how far a rigid stop may be pressed.
     #[inline]
     pub fn least(&self) -> f64 {
         match self {
@@ -32,7 +32,7 @@ impl StopKind {
         }
     }
 
-    /// Force [N] against the motion and its derivative with the way that is `left` [N/m] (not positive).
+    /// Force (N) against the motion and its derivative with the way that is `left` (N/m) (not positive).
     #[inline]
     pub fn force(&self, left: f64) -> (f64, f64) {
         if left >= 0.0 {
@@ -48,7 +48,7 @@ impl StopKind {
         }
     }
 
-    /// Energy stored [J] where the way `left` is negative.
+    /// Energy stored (J) where the way `left` is negative.
     pub fn energy(&self, left: f64) -> f64 {
         if left >= 0.0 {
             return 0.0;
@@ -68,8 +68,8 @@ impl StopKind {
         }
     }
 
-    /// First and second derivative of the potential with the approach `u` [m], for the `ways` ahead and back: force against it [N],
-    /// stiffness [N/m].
+    /// First and second derivative of the potential with the approach `u` (m), for the `ways` ahead and back: force against it (N),
+    /// stiffness (N/m).
     pub(super) fn bearing(&self, ways: &[Option<f64>; 2], u: f64) -> (f64, f64) {
         let side = |way: Option<f64>, u: f64| way.map_or((0.0, 0.0), |w| self.force(w - u));
         let (ahead, back) = (side(ways[0], u), side(ways[1], -u));
@@ -77,7 +77,7 @@ impl StopKind {
     }
 }
 
-/// Rate-dependent part of the force against the approach `u` [m] that changes at `rate` [m/s], and its derivatives with
+/// Rate-dependent part of the force against the approach `u` (m) that changes at `rate` (m/s), and its derivatives with
 /// both.
 pub(super) fn lost(stop: &StopKind, loss: &Loss, ways: &[Option<f64>; 2], (u, rate): (f64, f64)) -> (f64, f64, f64) {
     let side = |way: Option<f64>, u: f64, closing: f64| {
@@ -89,7 +89,7 @@ pub(super) fn lost(stop: &StopKind, loss: &Loss, ways: &[Option<f64>; 2], (u, ra
     (ahead.0 - back.0, ahead.1 + back.1, ahead.2 + back.2)
 }
 
-/// Way left to the nearer side of a stop at an approach `u` [m], and its derivative with the approach.
+/// Way left to the nearer side of a stop at an approach `u` (m), and its derivative with the approach.
 pub(super) fn nearer(ways: &[Option<f64>; 2], u: f64) -> (f64, f64) {
     let [ahead, back] = [ways[0].map_or(f64::INFINITY, |w| w - u), ways[1].map_or(f64::INFINITY, |w| w + u)];
     if ahead <= back { (ahead, -1.0) } else { (back, 1.0) }

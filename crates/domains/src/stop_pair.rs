@@ -18,7 +18,7 @@ use nalgebra::Vector2;
 pub struct StopPair {
     /// The approach that it measures.
     pub approach: Approach,
-    /// Way along the approach and against it until they touch [m].
+    /// Way along the approach and against it until they touch (m).
     pub ways: [Option<f64>; 2],
     /// How it bears.
     pub stop: StopKind,

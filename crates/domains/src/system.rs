@@ -24,14 +24,14 @@ pub struct System {
     pub loads: Vec<DeadLoad>,
     /// Ports, sources, heaters.
     pub electrics: Arc<Electrics>,
-    /// Scale of displacements [m]: the narrowest beam or the smallest gap, whichever is smaller; 1 µm without either.
+    /// Scale of displacements (m): the narrowest beam or the smallest gap, whichever is smaller; 1 µm without either.
     pub length_scale: f64,
     /// Centrelines of the beams in netlist order, which name directions of buckling.
     pub beams: Arc<Vec<BeamLine>>,
 }
 
 impl System {
-    /// A mechanism on which nothing acts but its joints, with a length scale [m].
+    /// A mechanism on which nothing acts but its joints, with a length scale (m).
     #[inline]
     pub fn of_model(model: Model, length_scale: f64) -> Self {
         let (members, loads) = (Vec::new(), Vec::new());
@@ -246,7 +246,7 @@ impl System {
         self.model.project(r);
     }
 
-    /// Adds the discrete forces of members over a step of length `h` [s] with the configurations `q` at its start, middle and end, and the
+    /// Adds the discrete forces of members over a step of length `h` (s) with the configurations `q` at its start, middle and end, and the
     /// symmetric part of their tangent with the end; held directions not removed.
     #[inline]
     pub fn add_quotients(

@@ -26,13 +26,13 @@ pub struct Heating {
     /// The heaters.
     pub heaters: Vec<HeatConductor>,
     sources: usize,
-    /// Heater by heater, its symmetric form Q over the sources, row-major [K/V²].
+    /// Heater by heater, its symmetric form Q over the sources, row-major (K/V²).
     form: Vec<f64>,
-    /// Heater by heater, its current for each volt of the sources that drive the network [S].
+    /// Heater by heater, its current for each volt of the sources that drive the network (S).
     currents: Vec<DVector<f64>>,
     /// Nodes that stay at ambient.
     sink: Vec<bool>,
-    /// Heater by heater, its rise for each watt of the inputs that follow the sources [K/W].
+    /// Heater by heater, its rise for each watt of the inputs that follow the sources (K/W).
     heat: Vec<f64>,
 }
 
@@ -101,13 +101,13 @@ impl Heating {
         self.heat.len().checked_div(self.heaters.len()).unwrap_or(0)
     }
 
-    /// Rise of heater `k` for each unit of source `source` in so far as that is heat [K/W].
+    /// Rise of heater `k` for each unit of source `source` in so far as that is heat (K/W).
     #[inline]
     pub fn per_watt(&self, k: usize, source: usize) -> f64 {
         source.checked_sub(self.sources).map_or(0.0, |i| self.heat[k * self.inputs() + i])
     }
 
-    /// Steady rise of heater `k` by the heat among the sources `u` [K].
+    /// Steady rise of heater `k` by the heat among the sources `u` (K).
     fn heated(&self, k: usize, u: &[f64]) -> f64 {
         let count = self.inputs();
         if count == 0 {
@@ -116,19 +116,19 @@ impl Heating {
         self.heat[k * count..(k + 1) * count].iter().zip(&u[self.sources..]).map(|(z, w)| z * w).sum()
     }
 
-    /// Current in heater `k` for each volt of source `source` [S].
+    /// Current in heater `k` for each volt of source `source` (S).
     #[inline]
     pub fn current(&self, k: usize, source: usize) -> f64 {
         self.currents[k].get(source).copied().unwrap_or(0.0)
     }
 
-    /// Entry (i, j) of the form of heater `k` [K/V²].
+    /// Entry (i, j) of the form of heater `k` (K/V²).
     #[inline]
     pub fn entry(&self, k: usize, i: usize, j: usize) -> f64 {
         self.form[(k * self.sources + i) * self.sources + j]
     }
 
-    /// Mixed value uᵀ·Q·w of heater `k` [K].
+    /// Mixed value uᵀ·Q·w of heater `k` (K).
     #[inline]
     pub fn mixed(&self, k: usize, u: &[f64], w: &[f64]) -> f64 {
         let s = self.sources;
@@ -141,7 +141,7 @@ impl Heating {
     }
 
     /// Steady mean rise of heater `k` on the straight line from `from` to `to`: its coefficients in the fraction x of the way,
-    /// c₀ + c₁·x + c₂·x² [K].
+    /// c₀ + c₁·x + c₂·x² (K).
     #[inline]
     pub fn between(&self, k: usize, from: &[f64], to: &[f64]) -> [f64; 3] {
         let (a, b, c) = (self.mixed(k, from, from), self.mixed(k, from, to), self.mixed(k, to, to));
@@ -149,13 +149,13 @@ impl Heating {
         [a + before, 2.0 * (b - a) + (after - before), a - 2.0 * b + c]
     }
 
-    /// Change of the steady mean rise of heater `k` at source voltages `u` with the sources, along `unit` [K].
+    /// Change of the steady mean rise of heater `k` at source voltages `u` with the sources, along `unit` (K).
     #[inline]
     pub fn slope(&self, k: usize, u: &[f64], unit: &[f64]) -> f64 {
         2.0 * self.mixed(k, u, unit) + self.heated(k, unit)
     }
 
-    /// Steady mean rise of heater `k` at source voltages `u` [K].
+    /// Steady mean rise of heater `k` at source voltages `u` (K).
     #[inline]
     pub fn steady(&self, k: usize, u: &[f64]) -> f64 {
         self.mixed(k, u, u) + self.heated(k, u)

@@ -62,11 +62,11 @@ struct ExactDevice {
 pub struct ModelFit {
     /// The model.
     pub model: ReducedModel,
-    /// Largest relative deviation from the exact small-signal answer [1].
+    /// Largest relative deviation from the exact small-signal answer (1).
     pub error: f64,
-    /// Where: row, port and frequency [Hz].
+    /// Where: row, port and frequency (Hz).
     pub worst: (String, String, f64),
-    /// Band of the comparison [Hz].
+    /// Band of the comparison (Hz).
     pub band: [f64; 2],
     /// Frequencies compared.
     pub compared: usize,
@@ -186,7 +186,7 @@ fn grid(model: &ReducedModel, to: f64) -> Vec<f64> {
     grid
 }
 
-/// Largest relative deviation, and where: row, port, frequency [Hz]. `all` is the model with every mode that is known.
+/// Largest relative deviation, and where: row, port, frequency (Hz). `all` is the model with every mode that is known.
 fn deviation(
     model: &ReducedModel,
     all: &ReducedModel,
@@ -266,7 +266,7 @@ impl ExactDevice {
         }))
     }
 
-    /// How much of what is there at its resonance each mode is, at the port or signal that sees it best [1].
+    /// How much of what is there at its resonance each mode is, at the port or signal that sees it best (1).
     fn shares(&mut self, model: &ReducedModel) -> Result<Vec<f64>, ExportError> {
         let share = |(j, mode): (usize, &super::linear::ReducedMode)| {
             // beside an undamped resonance, which has no answer itself

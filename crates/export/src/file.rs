@@ -10,7 +10,7 @@ use bimorph_model::compile::CompiledModel;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Longest line of a file, roughly [byte].
+/// Longest line of a file, roughly (byte).
 const LINE: usize = 64;
 
 /// Language of a file.
@@ -70,15 +70,15 @@ pub enum FileContent {
 pub struct LinearSummary {
     /// Number of each mode among the undamped modes at the operating point, from 1; none for a direction of the static correction.
     pub numbers: Vec<Option<usize>>,
-    /// Frequency of each mode [Hz].
+    /// Frequency of each mode (Hz).
     pub frequencies_hz: Vec<f64>,
-    /// Quality factor of each mode [1]; infinite without damping.
+    /// Quality factor of each mode (1); infinite without damping.
     pub quality: Vec<f64>,
     /// Lags of heat.
     pub lags: usize,
-    /// Largest relative deviation from the exact small-signal answer [1].
+    /// Largest relative deviation from the exact small-signal answer (1).
     pub error: f64,
-    /// Band of that comparison [Hz].
+    /// Band of that comparison (Hz).
     pub band_hz: [f64; 2],
     /// Mechanical unknowns of the full model.
     pub unknowns: usize,

@@ -8,7 +8,7 @@ use bimorph_domains::capacitor::Capacitor;
 use bimorph_domains::contact::{Contact, PRESSURE, TOUCH};
 use bimorph_domains::stop::{SOFT, StopKind};
 
-/// C(u) [F].
+/// C(u) (F).
 pub(super) fn capacitance(capacitor: &Capacitor, u: &str) -> String {
     match *capacitor {
         Capacitor::Comb { slope, overlap, parasitic, .. } if overlap.is_infinite() => {
@@ -26,7 +26,7 @@ pub(super) fn capacitance(capacitor: &Capacitor, u: &str) -> String {
     }
 }
 
-/// dC/du [F/m].
+/// dC/du (F/m).
 pub(super) fn slope(capacitor: &Capacitor, u: &str) -> String {
     match *capacitor {
         Capacitor::Comb { slope, overlap, .. } if overlap.is_infinite() => format!("{slope:e}"),
@@ -43,7 +43,7 @@ fn share(u: &str, overlap: f64, blend: f64) -> String {
     format!("min(max(({:e} + 1e-6 * {u}) / {:e}, 0), 1)", overlap + blend, 2.0 * blend)
 }
 
-/// Contact force against the approach `u` at its `rate`, a text in m/s [N]; none where parts never touch.
+/// Contact force against the approach `u` at its `rate`, a text in m/s (N); none where parts never touch.
 pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<String> {
     match law {
         Law::Field(_, None) => None,

@@ -49,20 +49,20 @@ pub struct ExportRequest {
     pub ports: Vec<(String, Option<f64>)>,
     /// Signals shown as voltages, with volts per unit.
     pub signals: Vec<(String, f64)>,
-    /// Voltages of the operating point by port name [V]; others are at 0 V.
+    /// Voltages of the operating point by port name (V); others are at 0 V.
     pub bias: Vec<(String, f64)>,
     /// Modes to keep; none: as many as `within` takes.
     pub count: Option<usize>,
-    /// Highest frequency that the model is for [Hz]; none: that of the second mode that ports and signals see.
+    /// Highest frequency that the model is for (Hz); none: that of the second mode that ports and signals see.
     pub to: Option<f64>,
-    /// Largest relative deviation from the exact small-signal answer [1].
+    /// Largest relative deviation from the exact small-signal answer (1).
     pub within: f64,
 }
 
 impl ExportRequest {
-    /// Largest relative deviation by default [1].
+    /// Largest relative deviation by default (1).
     pub const WITHIN: f64 = 1e-4;
-    /// Smallest one that can be requested [1]; the largest is below 1.
+    /// Smallest one that can be requested (1); the largest is below 1.
     pub const MIN_WITHIN: f64 = 1e-9;
     /// Most modes that can be requested.
     pub const MAX_COUNT: usize = 1000;
@@ -126,11 +126,11 @@ pub enum ExportError {
     NotReached {
         /// Modes tried.
         modes: usize,
-        /// Largest deviation [1].
+        /// Largest deviation (1).
         error: f64,
-        /// Up to [Hz].
+        /// Up to (Hz).
         to: f64,
-        /// The requested tolerance [1].
+        /// The requested tolerance (1).
         within: f64,
     },
     /// The nonlinear form is one of rigid parts that slide.

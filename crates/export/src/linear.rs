@@ -28,7 +28,7 @@ pub struct ReducedPort {
     pub kind: PortKind,
     /// Volts per unit of what lies across one that is not electrical.
     pub across: f64,
-    /// Voltage at the operating point of a port that is given one [V]; none where a flow is given, or there is no such point.
+    /// Voltage at the operating point of a port that is given one (V); none where a flow is given, or there is no such point.
     pub bias: Option<f64>,
 }
 
@@ -64,7 +64,7 @@ pub struct SignalShown {
 pub struct ReducedMode {
     /// Its number among the undamped modes at the operating point, from 1; none for a direction of the static correction.
     pub number: Option<usize>,
-    /// Angular frequency [rad/s].
+    /// Angular frequency (rad/s).
     pub omega: f64,
 }
 
@@ -73,7 +73,7 @@ pub struct ReducedMode {
 pub struct HeatLag {
     /// Index of the port.
     pub port: usize,
-    /// Time constant [s].
+    /// Time constant (s).
     pub tau: f64,
 }
 
@@ -88,9 +88,9 @@ pub struct ReducedModel {
     pub modes: Vec<ReducedMode>,
     /// Lags.
     pub lags: Vec<HeatLag>,
-    /// D, n × n [1/s].
+    /// D, n × n (1/s).
     pub damping: DMatrix<f64>,
-    /// B, n × p [V/V, V/A].
+    /// B, n × p (V/V, V/A).
     pub push: DMatrix<f64>,
     /// B', n × l.
     pub push_lagged: DMatrix<f64>,
@@ -104,7 +104,7 @@ pub struct ReducedModel {
     pub lagged: DMatrix<f64>,
     /// E, r × p.
     pub direct: DMatrix<f64>,
-    /// F, r × p [s].
+    /// F, r × p (s).
     pub change: DMatrix<f64>,
 }
 
@@ -122,7 +122,7 @@ impl ReducedModel {
         }
     }
 
-    /// Shares x of the modes per unit of each input at angular frequency `omega` [rad/s], n × p; none at an undamped resonance.
+    /// Shares x of the modes per unit of each input at angular frequency `omega` (rad/s), n × p; none at an undamped resonance.
     fn shares(&self, omega: f64) -> Option<DMatrix<Complex<f64>>> {
         let n = self.modes.len();
         if n == 0 {
@@ -144,7 +144,7 @@ impl ReducedModel {
         matrix.lu().solve(&force)
     }
 
-    /// Δy/Δu at angular frequency `omega` [rad/s], r × p; none at an undamped resonance.
+    /// Δy/Δu at angular frequency `omega` (rad/s), r × p; none at an undamped resonance.
     pub fn response(&self, omega: f64) -> Option<DMatrix<Complex<f64>>> {
         let x = self.shares(omega)?;
         let by_mode = DMatrix::from_fn(self.rows(), self.modes.len(), |r, j| self.by_mode(omega, r, j));

@@ -96,7 +96,7 @@ pub fn lump(compiled: &CompiledModel, request: &ExportRequest) -> Result<LumpedM
     })
 }
 
-/// Force per unit of what is given to each port, coordinates × ports [N per N, kg].
+/// Force per unit of what is given to each port, coordinates × ports (N per N, kg).
 fn pushes(electrics: &Electrics, ports: &OpenedPorts, coordinates: &[Coordinate]) -> DMatrix<f64> {
     let n = coordinates.len();
     let mut push = DMatrix::zeros(n, ports.sources.len());

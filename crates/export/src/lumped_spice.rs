@@ -46,7 +46,7 @@ struct LumpedSubcircuit<'a> {
 }
 
 impl LumpedSubcircuit<'_> {
-    /// Forces of part `j` are in units of this [N].
+    /// Forces of part `j` are in units of this (N).
     fn unit(&self, j: usize) -> f64 {
         let c = &self.model.coordinates[j];
         c.mass * c.omega * c.omega * 1e-6

@@ -22,7 +22,7 @@ pub(super) const DENSE_WORK: usize = 10;
 #[derive(Debug)]
 pub(super) struct InputExcitation {
     pub(super) port: usize,
-    /// Time constant that it comes with [s]; none: at once.
+    /// Time constant that it comes with (s); none: at once.
     pub(super) tau: Option<f64>,
     pub(super) force: Vec<Pose>,
     /// K⁻¹ times the force.

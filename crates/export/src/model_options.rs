@@ -5,7 +5,7 @@ use bimorph_model::discretize::Scheme;
 use bimorph_results::plot::axis::quantity;
 use std::fmt::Write;
 
-/// By how much four digits may be off at most [1].
+/// By how much four digits may be off at most (1).
 const ROUNDED: f64 = 5e-4;
 
 /// The options of a model in one line, with a line break at its end.

@@ -49,7 +49,7 @@ impl SubcircuitText {
         self.by_voltage((node, "0"), node, 1.0);
     }
 
-    /// A constant current [A]; none where it is 0.
+    /// A constant current (A); none where it is 0.
     pub(super) fn constant(&mut self, (from, to): (&str, &str), current: f64) {
         if current != 0.0 {
             self.counts[2] += 1;

@@ -22,7 +22,7 @@ use bimorph_multibody::forces::add_damping;
 use bimorph_multibody::planar::Pose;
 use nalgebra::{DMatrix, DVector};
 
-/// Displacement that a volt of a mode's share stands for where the mode moves most [m].
+/// Displacement that a volt of a mode's share stands for where the mode moves most (m).
 const MICROMETRE: f64 = 1e-6;
 /// A coupling below this fraction of the largest of its kind is rounding.
 const NONE: f64 = 1e-10;
@@ -184,7 +184,7 @@ impl LinearizedMechanism<'_> {
         }
     }
 
-    /// Largest displacement in a shape [m]; where nothing but rotation is, that of a lever of a millimetre.
+    /// Largest displacement in a shape (m); where nothing but rotation is, that of a lever of a millimetre.
     fn largest(&self, shape: &[Pose]) -> f64 {
         let nodes = self.compiled.parts.nodes.iter().flatten().map(|p| p.displacement(shape, true).norm());
         let moved = nodes.chain(shape.iter().map(|x| x.xy().norm())).fold(0.0, f64::max);

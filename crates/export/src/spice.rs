@@ -19,7 +19,7 @@ use super::parts::SubcircuitText;
 use bimorph_device::PortKind;
 use std::fmt::Write;
 
-/// Capacitor that shows the rate of change of a voltage [F], and inductor of a flow [H].
+/// Capacitor that shows the rate of change of a voltage (F), and inductor of a flow (H).
 const CAPACITOR: f64 = 1e-9;
 const INDUCTOR: f64 = 1.0;
 

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 pub(crate) struct Library {
     /// Name of the file.
     pub(crate) source: String,
-    /// Size of the unit in which all coordinates are given [m].
+    /// Size of the unit in which all coordinates are given (m).
     pub(crate) unit_m: f64,
     /// Names of layers; shapes and labels name them by index.
     pub(crate) layers: Vec<String>,
@@ -27,7 +27,7 @@ pub(crate) struct Library {
 pub(crate) struct Cell {
     /// Its name.
     pub(crate) name: String,
-    /// Contours, any direction, closed without repeating the first point [units].
+    /// Contours, any direction, closed without repeating the first point (units).
     pub(crate) shapes: Vec<CellShape>,
     /// Texts.
     pub(crate) texts: Vec<CellText>,
@@ -40,7 +40,7 @@ pub(crate) struct Cell {
 pub(crate) struct CellShape {
     /// Index into [`Library::layers`].
     pub(crate) layer: u32,
-    /// Its points [units].
+    /// Its points (units).
     pub(crate) points: Vec<[f64; 2]>,
 }
 
@@ -51,7 +51,7 @@ pub(crate) struct CellText {
     pub(crate) layer: Option<u32>,
     /// The text.
     pub(crate) text: String,
-    /// Its place [units].
+    /// Its place (units).
     pub(crate) at: [f64; 2],
 }
 
@@ -66,14 +66,14 @@ pub(crate) struct CellReference {
     pub(crate) transform: Transform,
     /// Columns and rows.
     pub(crate) count: [u32; 2],
-    /// From one column, and one row, to the next [units].
+    /// From one column, and one row, to the next (units).
     pub(crate) pitch: [[f64; 2]; 2],
 }
 
 /// p ↦ origin + columns·p, with columns magnification·R(angle), the second one negated where mirrored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Transform {
-    /// Where the origin goes [units].
+    /// Where the origin goes (units).
     pub(crate) origin: [f64; 2],
     /// Where the unit vectors of x and y go.
     pub(crate) columns: [[f64; 2]; 2],
@@ -101,7 +101,7 @@ impl Transform {
         Self { origin: [0.0; 2], columns: [[c, s], [-s, c]] }
     }
 
-    /// A rotation by an angle [degrees], exact at multiples of 90°.
+    /// A rotation by an angle (degrees), exact at multiples of 90°.
     pub(crate) fn turn_degrees(angle: f64) -> Self {
         let turned = angle.rem_euclid(360.0);
         let quarters = [(0.0, [1.0, 0.0]), (90.0, [0.0, 1.0]), (180.0, [-1.0, 0.0]), (270.0, [0.0, -1.0])];

@@ -17,7 +17,7 @@ use text::CifReader;
 
 pub use error::{CifError, CifFault};
 
-/// Size of the unit [m].
+/// Size of the unit (m).
 const CENTIMICRON: f64 = 1e-8;
 /// Most points of one polygon or wire.
 const LONGEST: usize = 1 << 20;

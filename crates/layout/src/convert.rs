@@ -44,7 +44,7 @@ pub struct Converted {
     pub process: String,
     /// For lines of the netlist, from 1, the layer and place in the drawing that they stand for.
     pub places: BTreeMap<usize, String>,
-    /// A node of the netlist and where it lies in the drawing [m]: netlists have an origin of their own.
+    /// A node of the netlist and where it lies in the drawing (m): netlists have an origin of their own.
     pub landmark: Option<(String, [f64; 2])>,
 }
 

@@ -30,7 +30,7 @@ const MAX_TRIED: usize = 50_000_000;
      side, about point {} {} of its grid", .at[0], .at[1]
 )]
 pub struct CrossingContours {
-    /// Where the counting ended [database units].
+    /// Where the counting ended (database units).
     pub at: GridPoint,
 }
 

@@ -10,13 +10,13 @@ use super::process::Process;
 use bimorph_structure::DomainElement;
 use std::collections::HashMap;
 
-/// Pads whose sizes are not given [m].
+/// Pads whose sizes are not given (m).
 const PAD: f64 = 10e-6;
-/// The mask of anchors lies inside its pad by this fraction of the pad's smaller side [1].
+/// The mask of anchors lies inside its pad by this fraction of the pad's smaller side (1).
 const INSET: f64 = 0.1;
 /// A corner is closed up to this many half widths behind its node.
 const LONGEST_CORNER: f64 = 2.0;
-/// Spines of combs, in widths of a finger [1].
+/// Spines of combs, in widths of a finger (1).
 const SPINE: f64 = 2.0;
 /// Most fingers that are drawn of one comb.
 const MAX_FINGERS: f64 = 10_000.0;
@@ -33,7 +33,7 @@ pub(crate) enum Role {
 /// Outlines of a mechanism.
 #[derive(Debug, Default)]
 pub(crate) struct Figure {
-    /// Contours [m], counter-clockwise.
+    /// Contours (m), counter-clockwise.
     pub(crate) shapes: Vec<(Role, Vec<[f64; 2]>)>,
     /// The layer of each node that a drawn part touches.
     pub(crate) layer_of: HashMap<String, usize>,
@@ -53,7 +53,7 @@ pub(crate) fn is_beam(model: &str) -> bool {
     matches!(model, "beam2d" | "beam2de" | "beam2det")
 }
 
-/// Draws lines whose nodes lie at these places [m].
+/// Draws lines whose nodes lie at these places (m).
 pub(crate) fn draw(lines: &ElementLines, at: &HashMap<String, [f64; 2]>, process: &Process) -> Figure {
     let mut drawing =
         Draw { lines, at, process, figure: Figure::default(), layers: HashMap::new(), ends: HashMap::new() };

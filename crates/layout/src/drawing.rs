@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 /// Coordinates stay within ±this many database units, so that set operations on them are exact (±1.07 mm at 1 pm).
 pub const LARGEST_COORDINATE: i32 = (1 << 30) - 1;
 
-/// A point of the grid: x, y [database units].
+/// A point of the grid: x, y (database units).
 pub type GridPoint = [i32; 2];
 
 /// A flat drawing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FlatLayout {
-    /// Size of a database unit [m].
+    /// Size of a database unit (m).
     pub unit_m: f64,
     /// Polygons as drawn (they may overlap), by layer: CIF's name, or GDSII's "layer/datatype".
     pub layers: BTreeMap<String, Vec<Polygon>>,
@@ -41,7 +41,7 @@ pub struct Label {
     pub layer: String,
     /// Its text.
     pub text: String,
-    /// Its place [database units].
+    /// Its place (database units).
     pub at: GridPoint,
 }
 
@@ -52,15 +52,15 @@ pub struct Placement {
     pub cell: String,
     /// Index of the placement that holds it in [`FlatLayout::cells`]; none: the top cell.
     pub parent: Option<usize>,
-    /// Place of the cell's origin in the drawing [database units].
+    /// Place of the cell's origin in the drawing (database units).
     pub origin: [f64; 2],
-    /// Rotation [rad], after mirroring.
+    /// Rotation (rad), after mirroring.
     pub angle: f64,
     /// Mirrored about its own x axis first.
     pub mirrored: bool,
-    /// Magnification [1].
+    /// Magnification (1).
     pub magnification: f64,
-    /// Lower left and upper right corner of the box around all polygons in it [database units].
+    /// Lower left and upper right corner of the box around all polygons in it (database units).
     pub extent: [GridPoint; 2],
 }
 
@@ -81,7 +81,7 @@ impl Polygon {
         Self { contours: vec![vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]] }
     }
 
-    /// Twice its area, holes taken off [square database units]: exact.
+    /// Twice its area, holes taken off (square database units): exact.
     pub fn twice_area(&self) -> i128 {
         self.contours.iter().map(|contour| twice_area(contour)).sum()
     }
@@ -96,7 +96,7 @@ impl Polygon {
     }
 }
 
-/// Twice the signed area of a closed contour [square database units], positive counter-clockwise: exact.
+/// Twice the signed area of a closed contour (square database units), positive counter-clockwise: exact.
 pub fn twice_area(contour: &[GridPoint]) -> i128 {
     let next = contour.iter().cycle().skip(1);
     let cross = |([x0, y0], [x1, y1]): (&GridPoint, &GridPoint)| {

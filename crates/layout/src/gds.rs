@@ -21,7 +21,7 @@ pub use error::{GdsError, GdsFault};
 const MAX_PARTS: usize = 4_000_000;
 /// Most cells of a file.
 const MAX_CELLS: usize = 1_000_000;
-/// Sizes of a database unit that can be meant [m].
+/// Sizes of a database unit that can be meant (m).
 const UNITS: std::ops::RangeInclusive<f64> = 1e-15..=1e-3;
 /// Records between two reports of progress.
 const REPORT: u32 = 1 << 14;

@@ -77,7 +77,7 @@ fn has_places(model: &str) -> bool {
     !matches!(model, "R" | "L" | "C" | "Vsrc" | "Isrc" | "opamp" | "vcvs" | "eground" | "port" | "wire")
 }
 
-/// A node and where it lies [m].
+/// A node and where it lies (m).
 type Landmark = Option<(String, [f64; 2])>;
 
 /// Reads the labels of a drawing and checks them against its polygons.
@@ -132,7 +132,7 @@ fn lines_of(drawing: &FlatLayout) -> Result<(ElementLines, Vec<String>), Labelle
     Ok((ElementLines { processes: processes.into_values().collect(), elements }, places))
 }
 
-/// Where nodes lie [m]: labels of their names.
+/// Where nodes lie (m): labels of their names.
 fn nodes_of(drawing: &FlatLayout, lines: &ElementLines, notes: &mut Vec<String>) -> HashMap<String, [f64; 2]> {
     let wanted: std::collections::HashSet<&String> = lines.elements.iter().flat_map(|l| &l.nodes).collect();
     let mut at: HashMap<String, [i32; 2]> = HashMap::new();
@@ -244,7 +244,7 @@ fn measure(
     Ok(notes)
 }
 
-/// A contour on the grid of a unit [m]; none where it reaches beyond.
+/// A contour on the grid of a unit (m); none where it reaches beyond.
 fn on_grid(shape: &[[f64; 2]], unit: f64) -> Option<Vec<GridPoint>> {
     let largest = f64::from(LARGEST_COORDINATE);
     let on = |p: &[f64; 2]| {

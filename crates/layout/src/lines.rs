@@ -10,7 +10,7 @@ pub(crate) mod text;
 use std::fmt;
 use thiserror::Error;
 
-/// Longest text of one label [bytes].
+/// Longest text of one label (bytes).
 pub(crate) const LONGEST_LABEL: usize = 4096;
 
 /// One element.

@@ -25,7 +25,7 @@ pub(crate) const NOTES: [&str; 2] = ["BIMORPH", "255/0"];
 pub(crate) const MARK: &str = "bimorph layout 1";
 /// Most parts of a drawing.
 const MAX_PARTS: usize = 200_000;
-/// The finest unit [m].
+/// The finest unit (m).
 const FINEST: f64 = 1e-12;
 /// Rounding of a grid, in units: of two corners each.
 pub(crate) const ROUNDING: f64 = 3.0;
@@ -41,7 +41,7 @@ pub struct Mask {
     pub polygons: usize,
     /// Labels written.
     pub labels: usize,
-    /// Size of the database unit [m].
+    /// Size of the database unit (m).
     pub unit_m: f64,
 }
 
@@ -61,7 +61,7 @@ pub enum MaskError {
     /// Wider than the grid.
     #[error("the mechanism reaches to {reach:e} m from its first node: a drawing reaches to 0.5 m")]
     Far {
-        /// How far [m].
+        /// How far (m).
         reach: f64,
     },
     /// A layer of the process has no name of the format.
@@ -171,7 +171,7 @@ fn mark_hidden(lines: &mut ElementLines, figure: &Figure, at: &HashMap<String, [
 pub(crate) enum Width {
     /// The drawing agrees with the given width.
     AsTold,
-    /// Another one, the same all along [units].
+    /// Another one, the same all along (units).
     Other(f64),
     /// Nothing clear: other parts cover it.
     Unclear,
@@ -199,7 +199,7 @@ impl Widths {
         Self(measurable.map(|(k, all)| (k, Chords::new(&regions::union(&all)))).collect())
     }
 
-    /// The width of a beam between two points whose nominal width is `w` [units].
+    /// The width of a beam between two points whose nominal width is `w` (units).
     pub(crate) fn measure(&self, layer: usize, a: [f64; 2], b: [f64; 2], w: f64) -> Width {
         let Some(chords) = self.0.get(&layer) else { return Width::Unclear };
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);

@@ -152,7 +152,7 @@ fn cap(p: [f64; 2], d: [f64; 2], h: f64, style: Style, outline: &mut Vec<[f64; 2
     }
 }
 
-/// Corners on a circle around p, from the right of direction `d` counter-clockwise through `angle` [rad], without the ends.
+/// Corners on a circle around p, from the right of direction `d` counter-clockwise through `angle` (rad), without the ends.
 fn arc(p: [f64; 2], d: [f64; 2], angle: f64, h: f64, outline: &mut Vec<[f64; 2]>) {
     let sides = ((angle / (2.0 * PI) * SIDES as f64).ceil() as usize).max(1);
     // The radius with which the corners and the two ends, at distance h, enclose the area of the sector.

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 const BUILTIN: [(&str, &str); 2] =
     [("polymumps", include_str!("processes/polymumps.toml")), ("soi", include_str!("processes/soi.toml"))];
 
-/// Longest process file [bytes].
+/// Longest process file (bytes).
 const LONGEST: usize = 1 << 20;
 /// Most layers of one process.
 const MAX_LAYERS: usize = 256;

@@ -8,7 +8,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 use thiserror::Error;
 
-/// Largest CIF file, which is held as text [bytes].
+/// Largest CIF file, which is held as text (bytes).
 pub const LONGEST_CIF: u64 = 1 << 30;
 
 /// Formats of layouts.

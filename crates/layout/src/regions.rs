@@ -26,12 +26,12 @@ pub fn difference(a: &[Polygon], b: &[Polygon]) -> Vec<Polygon> {
     combine(a, b, OverlayRule::Difference)
 }
 
-/// Twice the area of disjoint polygons [square database units]: exact.
+/// Twice the area of disjoint polygons (square database units): exact.
 pub fn twice_area_of(polygons: &[Polygon]) -> i128 {
     polygons.iter().map(Polygon::twice_area).sum()
 }
 
-/// Area of disjoint polygons [square database units].
+/// Area of disjoint polygons (square database units).
 pub fn area(polygons: &[Polygon]) -> f64 {
     twice_area_of(polygons) as f64 / 2.0
 }

@@ -25,7 +25,7 @@ pub struct ConversionReport {
     pub notes: Vec<String>,
 }
 
-/// Areas of the layers that move [m²].
+/// Areas of the layers that move (m²).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct LayerAreas {
     /// As drawn, merged.
@@ -43,13 +43,13 @@ pub struct LayerAreas {
 pub struct Unrecognised {
     /// Its layer.
     pub layer: String,
-    /// Its area [m²].
+    /// Its area (m²).
     pub area_m2: f64,
-    /// Its lower left corner and its upper right one [m].
+    /// Its lower left corner and its upper right one (m).
     pub box_m: [[f64; 2]; 2],
     /// Why it is in none.
     pub why: String,
-    /// Its contours [m].
+    /// Its contours (m).
     #[serde(skip)]
     pub contours: Vec<Vec<[f64; 2]>>,
 }

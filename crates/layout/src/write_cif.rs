@@ -5,7 +5,7 @@ use super::write_gds::WriteError;
 use std::collections::HashMap;
 use std::fmt::Write;
 
-/// The unit of CIF [m].
+/// The unit of CIF (m).
 const CENTIMICRON: f64 = 1e-8;
 
 /// The text of a CIF file. Cells must stand before those that call them.

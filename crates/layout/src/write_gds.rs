@@ -7,7 +7,7 @@ use thiserror::Error;
 
 /// Maximum number of points of a boundary, including the repeated first one: the capacity of one record.
 const MAX_POINTS: usize = 8191;
-/// Longest text of a record [bytes].
+/// Longest text of a record (bytes).
 const LONGEST_TEXT: usize = 65_000;
 
 /// Why a drawing cannot be written.
@@ -35,7 +35,7 @@ pub enum WriteError {
     Range {
         /// Its cell.
         cell: String,
-        /// The coordinate [units].
+        /// The coordinate (units).
         value: f64,
     },
     /// A text that cannot stand in the format.

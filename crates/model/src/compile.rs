@@ -40,11 +40,11 @@ pub struct CompiledModel {
 /// A mode above the lowest about the equilibrium without voltages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HigherMode {
-    /// Frequency [Hz].
+    /// Frequency (Hz).
     pub frequency_hz: f64,
-    /// Quality by the drag and dampers of the drawing [1]; infinite without.
+    /// Quality by the drag and dampers of the drawing (1); infinite without.
     pub quality: f64,
-    /// Estimated relative error of the frequency by the mesh [1].
+    /// Estimated relative error of the frequency by the mesh (1).
     pub error: f64,
     /// Displacements of the bodies, of modal mass 1 kg.
     pub shape: Vec<Pose>,
@@ -53,11 +53,11 @@ pub struct HigherMode {
 /// The lowest mode about the equilibrium without voltages.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowestMode {
-    /// Frequency [Hz].
+    /// Frequency (Hz).
     pub frequency_hz: f64,
-    /// Quality by the drag and dampers of the drawing [1]; infinite without.
+    /// Quality by the drag and dampers of the drawing (1); infinite without.
     pub quality: f64,
-    /// Estimated relative error of the frequency by the mesh [1].
+    /// Estimated relative error of the frequency by the mesh (1).
     pub error: f64,
 }
 

@@ -14,7 +14,7 @@ use super::planar::Pose;
 use super::{BodyId, forces};
 use nalgebra::{Complex, Matrix3, Vector3};
 
-/// Boltzmann's constant, exact since 2019 [J/K].
+/// Boltzmann's constant, exact since 2019 (J/K).
 pub const BOLTZMANN: f64 = 1.380_649e-23;
 
 /// A factor L of the matrix of a drag, L·Lᵀ = C.

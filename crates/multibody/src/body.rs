@@ -10,11 +10,11 @@ use std::sync::Arc;
 pub struct Body {
     /// Name for messages: the node or the beam segment it stands for.
     pub name: BodyName,
-    /// Centre of mass as drawn [m].
+    /// Centre of mass as drawn (m).
     pub center: Vector2<f64>,
-    /// Mass [kg]; 0 for a body that only joints hold.
+    /// Mass (kg); 0 for a body that only joints hold.
     pub mass: f64,
-    /// Moment of inertia about the centre of mass [kg·m²].
+    /// Moment of inertia about the centre of mass (kg·m²).
     pub inertia: f64,
     /// Gas damping.
     pub drag: Drag,
@@ -64,11 +64,11 @@ impl fmt::Display for BodyName {
 /// zeroth, first and second moments are all that acts on a rigid body. Force = −matrix · rate.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Drag {
-    /// On translation [N·s/m].
+    /// On translation (N·s/m).
     pub amount: f64,
-    /// First moment about the centre of mass [N·s].
+    /// First moment about the centre of mass (N·s).
     pub first: Vector2<f64>,
-    /// Second moment about the centre of mass: on rotation [N·m·s].
+    /// Second moment about the centre of mass: on rotation (N·m·s).
     pub second: f64,
 }
 

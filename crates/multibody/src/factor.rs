@@ -32,11 +32,11 @@ pub struct BlockMatrix<T: Scalar, const N: usize> {
     scale: Vec<SVector<f64, N>>,
 }
 
-/// Stiffness that holds a direction that has none, as a fraction of that of others [1]: with a thousandth, a load that excites it moves it a thousand
+/// Stiffness that holds a direction that has none, as a fraction of that of others (1): with a thousandth, a load that excites it moves it a thousand
 /// times as far as others in every iteration, and none settles.
 pub(crate) const HELD: f64 = 1e-3;
 
-/// Lever at which a stiffness against displacement holds a rotation where nothing resists any [m]: a micrometre, the size of parts.
+/// Lever at which a stiffness against displacement holds a rotation where nothing resists any (m): a micrometre, the size of parts.
 const LEVER: f64 = 1e-6;
 
 /// Bodies eliminated between two checks of the budget, some ten microseconds.

@@ -60,7 +60,7 @@ fn pose(q: &[Pose], body: u32) -> Pose {
 }
 
 impl PackedJoint {
-    /// Axial rest offset [m].
+    /// Axial rest offset (m).
     #[inline]
     fn offset(&self, section: &JointSection, rest: &RestStrain<'_>) -> f64 {
         self.rest * rest.built_in + section.expansion.map_or(0.0, |(group, length)| length * rest.expansion[group])
@@ -75,20 +75,20 @@ impl PackedJoint {
 /// Axial rest offsets of joints, or their change.
 #[derive(Debug, Clone, Copy)]
 pub struct RestStrain<'a> {
-    /// Free strain of each group of joints [1].
+    /// Free strain of each group of joints (1).
     pub expansion: &'a [f64],
-    /// Fraction of the built-in offsets ([`Joint::rest`]) that acts [1].
+    /// Fraction of the built-in offsets ([`Joint::rest`](crate::Joint::rest)) that acts (1).
     pub built_in: f64,
 }
 
-/// Force along the axis of a joint [N], tension positive.
+/// Force along the axis of a joint (N), tension positive.
 #[inline]
 pub fn axial_force(model: &Model, joint: &PackedJoint, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
     let section = model.section(joint);
     joint.stress(section, &HalfTurnCache::new().kinematics(model.linear, joint, section, q), rest).x
 }
 
-/// Change of [`axial_force`] with a change `dq` of the configuration [N].
+/// Change of [`axial_force`] with a change `dq` of the configuration (N).
 #[inline]
 pub fn axial_change(model: &Model, joint: &PackedJoint, q: &[Pose], dq: &[Pose]) -> f64 {
     let section = model.section(joint);
@@ -97,7 +97,7 @@ pub fn axial_change(model: &Model, joint: &PackedJoint, q: &[Pose], dq: &[Pose])
     (section.stiffness * (k.rows() * nalgebra::Vector6::new(da.x, da.y, da.z, db.x, db.y, db.z))).x
 }
 
-/// `r +=` the forces that a change `offset` [m] of one joint's rest offset brings.
+/// `r +=` the forces that a change `offset` (m) of one joint's rest offset brings.
 #[inline]
 pub fn add_offset_change(model: &Model, joint: &PackedJoint, q: &[Pose], offset: f64, r: &mut [Pose]) {
     let section = model.section(joint);
@@ -221,7 +221,7 @@ pub(crate) fn factored(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> Vec<
     model.joints.iter().map(one).collect()
 }
 
-/// Strain energy U(q) [J].
+/// Strain energy U(q) (J).
 #[inline]
 pub fn strain_energy(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
     let mut turns = HalfTurnCache::new();
@@ -235,7 +235,7 @@ pub fn strain_energy(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
     model.joints.iter().map(energy).sum::<f64>() + model.couplings.iter().map(coupled).sum::<f64>()
 }
 
-/// Kinetic energy ½·vᵀMv [J].
+/// Kinetic energy ½·vᵀMv (J).
 #[inline]
 pub fn kinetic_energy(model: &Model, v: &[Pose]) -> f64 {
     v.iter().enumerate().map(|(k, v)| 0.5 * v.dot(&model.mass(k).component_mul(v))).sum()

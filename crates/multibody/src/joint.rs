@@ -21,13 +21,13 @@ pub struct Joint {
     pub b: BodyId,
     /// Where it sits.
     pub frame: JointFrame,
-    /// Stress (N, V, M) per strain (u, g, p) [N/m, N/rad, N·m/rad]; symmetric.
+    /// Stress (N, V, M) per strain (u, g, p) (N/m, N/rad, N·m/rad); symmetric.
     pub stiffness: Matrix3<f64>,
     /// Second-order axial strain Q on (g, p); see [`super::planar`].
     pub second: Matrix2<f64>,
-    /// Which entry of the strain vector sets its axial rest offset, and the length it acts on [m].
+    /// Which entry of the strain vector sets its axial rest offset, and the length it acts on (m).
     pub expansion: Option<(usize, f64)>,
-    /// Axial rest offset that does not change [m] (residual stress, prescribed temperature).
+    /// Axial rest offset that does not change (m) (residual stress, prescribed temperature).
     pub rest: f64,
     /// Directions (u, g, p) that are meant to be rigid. `stiffness` is then only high enough for a formulation that needs
     /// one; a formulation in joint coordinates leaves the direction out.
@@ -43,7 +43,7 @@ pub struct Damper {
     pub b: BodyId,
     /// Where it sits.
     pub frame: JointFrame,
-    /// Force per rate of the strains (u, g, p), about the drawn place [N·s/m, N·s/m, N·m·s/rad].
+    /// Force per rate of the strains (u, g, p), about the drawn place (N·s/m, N·s/m, N·m·s/rad).
     pub coefficients: Vector3<f64>,
 }
 
@@ -69,7 +69,7 @@ pub struct Coupling {
     pub first: (BodyId, BodyId),
     /// Bodies a and b of the second joint.
     pub second: (BodyId, BodyId),
-    /// Moment of one joint per rotation of the other [N·m/rad].
+    /// Moment of one joint per rotation of the other (N·m/rad).
     pub stiffness: f64,
 }
 

@@ -16,11 +16,11 @@ pub struct LinearSystem {
     pub names: Vec<String>,
     /// Pattern of all three matrices.
     pub pattern: Pattern,
-    /// Stiffness [N/m, N, N·m].
+    /// Stiffness (N/m, N, N·m).
     pub stiffness: BlockMatrix<f64, 3>,
-    /// Mass [kg, kg·m, kg·m²].
+    /// Mass (kg, kg·m, kg·m²).
     pub mass: BlockMatrix<f64, 3>,
-    /// Damping [N·s/m, N·s, N·m·s].
+    /// Damping (N·s/m, N·s, N·m·s).
     pub damping: BlockMatrix<f64, 3>,
     /// Projector of each body onto the directions that supports leave free; none: all.
     pub free: Vec<Option<Block>>,

@@ -43,7 +43,7 @@ pub struct Model {
 /// State in a snapshot of a motion: displacement and rate of every body, in elimination order.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// Displacements (x [m], y [m], θ [rad]).
+    /// Displacements (x (m), y (m), θ (rad)).
     pub q: Vec<Pose>,
     /// Rates.
     pub v: Vec<Pose>,
@@ -160,8 +160,8 @@ impl Model {
         &self.loose
     }
 
-    /// The same model with a spring to ground at the centre of each of these bodies, of a stiffness for displacements [N/m] and one for
-    /// rotations [N·m/rad]. These joints stand after all others.
+    /// The same model with a spring to ground at the centre of each of these bodies, of a stiffness for displacements (N/m) and one for
+    /// rotations (N·m/rad). These joints stand after all others.
     #[must_use]
     pub fn with_springs_to_ground(&self, bodies: &[usize], [moves, turns]: [f64; 2]) -> Self {
         let mut model = self.clone();
@@ -269,7 +269,7 @@ impl Model {
     }
 }
 
-/// Least pivot of a translation that is held [N/m]: where the body's own stiffness passes through 0, as at a fold, its pivot does not.
+/// Least pivot of a translation that is held (N/m): where the body's own stiffness passes through 0, as at a fold, its pivot does not.
 pub(super) const MIN_HELD: f64 = 1.0;
 
 /// P·A·P with pivots in what the projector P takes away: 1 for a rotation. A translation that is held at an angle mixes with the one that is free, so its

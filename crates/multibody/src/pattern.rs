@@ -21,7 +21,7 @@ pub struct Pattern {
 }
 
 const NONE: u32 = u32::MAX;
-/// Of a block below the diagonal, in the tangents and factors that an analysis has, about [byte].
+/// Of a block below the diagonal, in the tangents and factors that an analysis has, about (byte).
 const FILL_BYTES: usize = 4 * 72;
 
 impl Pattern {
@@ -99,7 +99,7 @@ impl Pattern {
         (self.target, self.target_start) = (target, target_start);
     }
 
-    /// Its memory for a budget [byte]: see [`Pattern::new`].
+    /// Its memory for a budget (byte): see [`Pattern::new`].
     pub(crate) fn bytes(&self) -> usize {
         self.row.len() * FILL_BYTES + self.target.len() * size_of::<u32>()
     }
@@ -116,7 +116,7 @@ impl Pattern {
         self.row.len()
     }
 
-    /// Largest number of rows in a column: the widest front [bodies].
+    /// Largest number of rows in a column: the widest front (bodies).
     #[inline]
     pub fn widest_front(&self) -> usize {
         self.start.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)

@@ -13,7 +13,7 @@ pub use joint::{JointFrame, JointKinematics, PairTangent, Symmetric};
 use super::sine::sin_cos;
 use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
 
-/// Degrees of freedom of a planar body: x [m], y [m], θ [rad].
+/// Degrees of freedom of a planar body: x (m), y (m), θ (rad).
 pub const DOF: usize = 3;
 /// A body's displacement or rate.
 pub type Pose = Vector3<f64>;
@@ -77,14 +77,14 @@ impl HalfTurn {
     }
 }
 
-/// Displacement of the point at `arm` on a body at pose `q` [m].
+/// Displacement of the point at `arm` on a body at pose `q` (m).
 #[inline]
 pub fn point(q: &Pose, arm: Vector2<f64>, linear: bool) -> Vector2<f64> {
     let moved = if linear { perpendicular(arm) * q.z } else { rotation_minus_identity(q.z, arm) };
     Vector2::new(q.x, q.y) + moved
 }
 
-/// ∂(point)/∂θ and ∂²(point)/∂θ² at that pose [m/rad].
+/// ∂(point)/∂θ and ∂²(point)/∂θ² at that pose (m/rad).
 #[inline]
 pub fn point_turn(q: &Pose, arm: Vector2<f64>, linear: bool) -> (Vector2<f64>, Vector2<f64>) {
     if linear {

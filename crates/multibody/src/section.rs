@@ -25,11 +25,11 @@ pub struct JointSection {
 /// A joint of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PackedJoint {
-    /// From the centre of mass of body a to the joint, as drawn [m].
+    /// From the centre of mass of body a to the joint, as drawn (m).
     pub arm_a: Vector2<f64>,
-    /// From the centre of mass of body b to the joint, as drawn [m].
+    /// From the centre of mass of body b to the joint, as drawn (m).
     pub arm_b: Vector2<f64>,
-    /// Axial rest offset that does not change [m].
+    /// Axial rest offset that does not change (m).
     pub rest: f64,
     /// Where its bodies and their coupling lie.
     pub(crate) place: PairSlot,

@@ -7,7 +7,7 @@
 use crate::batch::Number;
 use std::f64::consts::FRAC_PI_4;
 
-/// Largest angle of [`small`] [rad].
+/// Largest angle of [`small`] (rad).
 pub const SMALL: f64 = FRAC_PI_4;
 
 // digits as published
@@ -43,7 +43,7 @@ pub fn small<T: Number>(x: T) -> (T, T) {
     (x + z * x * (z * s + SIN[0]), less + (((-less + 1.0) - half) + z * c))
 }
 
-/// Largest angle of [`reduced`] [rad].
+/// Largest angle of [`reduced`] (rad).
 pub const REDUCED: f64 = 1e5;
 
 /// (sin x, cos x) for |x| ≤ [`REDUCED`] to about one unit in the last place, without a branch, so that a loop over lanes

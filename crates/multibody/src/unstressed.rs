@@ -22,7 +22,7 @@ pub fn add_unstressed_tangent(model: &Model, q: &[Pose], factor: f64, tangent: &
     add_coupling_tangent(model, factor, tangent);
 }
 
-/// `r +=` the forces on the bodies of the stress (N [N], V [N], M [N·m]) that `stress` gives for each joint.
+/// `r +=` the forces on the bodies of the stress (N (N), V (N), M (N·m)) that `stress` gives for each joint.
 #[inline]
 pub fn add_stresses(model: &Model, q: &[Pose], mut stress: impl FnMut(usize) -> Vector3<f64>, r: &mut [Pose]) {
     let mut turns = HalfTurnCache::new();
@@ -33,7 +33,7 @@ pub fn add_stresses(model: &Model, q: &[Pose], mut stress: impl FnMut(usize) -> 
     }
 }
 
-/// Strains (u [m], g [m], p [rad]) of the joints of a model.
+/// Strains (u (m), g (m), p (rad)) of the joints of a model.
 #[inline]
 pub fn strains(model: &Model, q: &[Pose]) -> impl Iterator<Item = Vector3<f64>> {
     let mut turns = HalfTurnCache::new();

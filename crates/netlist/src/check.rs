@@ -17,7 +17,7 @@ const MAX_REPORTED: usize = 3;
 /// Most loose nodes reported.
 const MAX_LOOSE: usize = 20;
 
-/// Resistances that can be computed with [Ω], and conductances of heat [W/K]: sums and quotients of them stay numbers.
+/// Resistances that can be computed with (Ω), and conductances of heat (W/K): sums and quotients of them stay numbers.
 const RESISTANCES: RangeInclusive<f64> = 1e-300..=1e300;
 
 /// Reports what has become infinite or vanished: sizes may be in range one by one and not in their products.

@@ -24,7 +24,7 @@ const PRINT: &str = "W002";
 /// Messages that look for a near name.
 const MAX_SUGGESTIONS: usize = 20;
 
-/// Longer messages are cut [byte].
+/// Longer messages are cut (byte).
 const LONGEST_MESSAGE: usize = 4000;
 
 /// Longer instance names (deep recursion) are cut in messages.

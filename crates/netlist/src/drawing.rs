@@ -5,9 +5,9 @@ use bimorph_base::budget;
 use bimorph_structure::{Beam, Node, NodeId, Structure};
 use rustc_hash::FxHashSet;
 
-/// Of a node without its name, about [byte].
+/// Of a node without its name, about (byte).
 const NODE_BYTES: usize = 200;
-/// Of an element without its name, about [byte].
+/// Of an element without its name, about (byte).
 pub(crate) const ELEMENT_BYTES: usize = 400;
 /// Nodes and beams that room is made for at first.
 const ROOM: usize = 32;
@@ -24,7 +24,7 @@ pub(crate) struct ElementPlacement {
     count: usize,
 }
 
-/// A node, and its position relative to the first of the element [m], global axes.
+/// A node, and its position relative to the first of the element (m), global axes.
 pub(crate) type NodeOffset = (NodeId, [f64; 2]);
 
 /// A beam that takes its length and direction from the positions of its nodes.
@@ -66,9 +66,9 @@ pub(crate) enum Fact {
     Switch,
     /// Members out of the plane that join anchored nodes.
     BetweenAnchors,
-    /// Members normal to the plane that are taken as rigid; the number is the stiffness across one of them [N/m].
+    /// Members normal to the plane that are taken as rigid; the number is the stiffness across one of them (N/m).
     Post,
-    /// Weights that are left out; the number is one of them [N].
+    /// Weights that are left out; the number is one of them (N).
     Weight,
     /// Beams without a section.
     NoSection,
@@ -78,7 +78,7 @@ pub(crate) enum Fact {
     AnchorNodes,
     /// Trapezoidal sections.
     Trapezoid,
-    /// rigidlinkbeam with arms; the number is the longest arm [m].
+    /// rigidlinkbeam with arms; the number is the longest arm (m).
     ArmsPlace,
 }
 
@@ -99,7 +99,7 @@ pub(crate) struct Upright {
     pub(crate) nodes: [NodeId; 2],
     /// Normal to the plane and stouter than long.
     pub(crate) post: bool,
-    /// Transverse stiffness of the same beam as a cantilever [N/m].
+    /// Transverse stiffness of the same beam as a cantilever (N/m).
     pub(crate) stiffness: f64,
     /// Its axis lies in the plane, its section is askew.
     pub(crate) tilted: bool,

@@ -7,7 +7,7 @@ use bimorph_base::budget;
 
 /// Tokens between two checks of the budget.
 const CHUNK: usize = 1024;
-/// Memory of a token with its share of the syntax tree, approximately [byte].
+/// Memory of a token with its share of the syntax tree, approximately (byte).
 const TOKEN_BYTES: usize = 96;
 
 /// Turns the text of file number `file` into tokens. Errors go to the sink; a token stands in for what was wrong.

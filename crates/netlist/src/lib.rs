@@ -1,4 +1,4 @@
-//! SUGAR netlists, of both languages: text → elements → placed [`Structure`], behind one trait, [`FrontEnd`].
+//! SUGAR netlists, of both languages: text → elements → placed [`Structure`](bimorph_structure::Structure), behind one trait, [`FrontEnd`](bimorph_structure::FrontEnd).
 //!
 //! [`Bundle`](bimorph_base::Bundle) holds the text of a netlist and of every file it includes, so that nothing after it touches the disk: a
 //! bundle can be sent to a server as it is. [`load`] turns a bundle into a structure, or into diagnostics.

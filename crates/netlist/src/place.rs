@@ -8,9 +8,9 @@ use super::diagnostic_sink::DiagnosticSink;
 use super::drawing::StructureBuilder;
 use super::value::short;
 
-/// A loop is open when it misses by more than this part of its largest element [1].
+/// A loop is open when it misses by more than this part of its largest element (1).
 const OPEN_LOOP: f64 = 1e-6;
-/// Nodes nearer to each other than this part of the drawing's size are in one place [1].
+/// Nodes nearer to each other than this part of the drawing's size are in one place (1).
 const ROUNDING: f64 = 1e-9;
 /// Most open loops, and most unplaced parts, reported individually.
 const MAX_REPORTED: usize = 3;

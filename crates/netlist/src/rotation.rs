@@ -4,13 +4,13 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Rotation(pub(crate) [[f64; 3]; 3]);
 
-/// Components smaller than this count as zero when an axis is asked to lie in the drawing plane [1].
+/// Components smaller than this count as zero when an axis is asked to lie in the drawing plane (1).
 const IN_PLANE: f64 = 1e-6;
 
 impl Rotation {
     pub(crate) const IDENTITY: Self = Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
 
-    /// This orientation turned further by the angles of an element [rad].
+    /// This orientation turned further by the angles of an element (rad).
     pub(crate) fn turned(self, ox: f64, oy: f64, oz: f64) -> Self {
         let mut r = self;
         if oy != 0.0 {
@@ -43,7 +43,7 @@ impl Rotation {
         [self.0[0][0], self.0[1][0], self.0[2][0]]
     }
 
-    /// Angle of the local x axis in the drawing plane [rad].
+    /// Angle of the local x axis in the drawing plane (rad).
     pub(crate) fn angle(self) -> f64 {
         self.0[1][0].atan2(self.0[0][0])
     }

@@ -8,7 +8,7 @@ use tonic::codegen::Bytes;
 
 /// Bytes before each message: a flag and the length.
 const HEAD: usize = 5;
-/// Sizes of the pieces in which an unfinished message waits [byte].
+/// Sizes of the pieces in which an unfinished message waits (byte).
 const PIECE: std::ops::RangeInclusive<usize> = (4 << 10)..=(256 << 10);
 
 /// The messages of a stream as they come in.

@@ -22,7 +22,7 @@ pub struct Limit {
 macro_rules! limits {
     ($($(#[doc = $help:literal])+ $field:ident: $kind:ident = $default:expr;)+) => {
         /// Limits of a server. A request beyond one is answered with RESOURCE_EXHAUSTED and a message that names it.
-        /// `Default` is the only place where the numbers stand; bytes are in [byte], times in [s].
+        /// `Default` is the only place where the numbers stand; bytes are in (byte), times in (s).
         #[derive(Debug, Clone, PartialEq)]
         pub struct Limits {
             $($(#[doc = $help])+ pub $field: <$kind as ValueSyntax>::Held,)+

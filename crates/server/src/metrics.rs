@@ -46,7 +46,7 @@ const CALLS: [&str; 36] = [
 ];
 /// Codes of gRPC, by number.
 const CODES: usize = 17;
-/// Upper ends of the classes of durations [s].
+/// Upper ends of the classes of durations (s).
 const CLASSES: [f64; 8] = [0.001, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, f64::INFINITY];
 
 /// A metric: its name, what it is, and what it means.

@@ -26,7 +26,7 @@ pub(super) struct NamedModel {
     pub(super) description: proto::ModelDescription,
     pub(super) bundle: Bundle,
     options: CompileOptions,
-    /// Memory allocated during its compilation, an upper bound of its size [byte].
+    /// Memory allocated during its compilation, an upper bound of its size (byte).
     bytes: usize,
 }
 

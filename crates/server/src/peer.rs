@@ -18,7 +18,7 @@ pub(super) struct Peer {
     pub(super) calls: AtomicUsize,
     /// Bytes of requests, by the lengths that they announce.
     pub(super) requests: AtomicUsize,
-    /// When the last call ended, after `opened` [ms].
+    /// When the last call ended, after `opened` (ms).
     pub(super) used_ms: AtomicU64,
     pub(super) greeted: AtomicBool,
     /// Once its client has been understood.

@@ -281,7 +281,7 @@ impl Session {
         Ok(true)
     }
 
-    /// Keeps it for so long without use [ms], 0: as long as any; in the server after this one too. Waits for the disk.
+    /// Keeps it for so long without use (ms), 0: as long as any; in the server after this one too. Waits for the disk.
     pub(super) fn lease(&self, millis: u64) -> Result<(), Status> {
         if let Some(keeper) = &self.keeper {
             let mut keeper = keeper.lock().unwrap_or_else(PoisonError::into_inner);

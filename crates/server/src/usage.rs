@@ -51,7 +51,7 @@ impl Usage {
         self.streams.fetch_sub(1, Ordering::Relaxed);
     }
 
-    /// Keeps it for so long without use [ms]; 0: for as long as the server keeps any.
+    /// Keeps it for so long without use (ms); 0: for as long as the server keeps any.
     pub(super) fn lease(&self, millis: u64) {
         self.touch();
         self.lease_ms.store(millis, Ordering::Relaxed);

@@ -33,7 +33,7 @@ use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::planar::Pose;
 use family::LoadFamily;
 
-/// Step below which the path continues although its point at a given s was not found [1].
+/// Step below which the path continues although its point at a given s was not found (1).
 const NEAREST: f64 = 1e-10;
 
 impl Continuation {

@@ -291,7 +291,7 @@ pub(super) fn balanced(contact: f64, unbalanced: f64) -> bool {
     contact == 0.0 || unbalanced <= UNBALANCED * contact
 }
 
-/// Largest displacement of a body: translation [m], or rotation times the length scale.
+/// Largest displacement of a body: translation (m), or rotation times the length scale.
 fn size(system: &System, x: &[Pose]) -> f64 {
     x.iter().map(|p| extent(system, p)).fold(0.0, f64::max)
 }

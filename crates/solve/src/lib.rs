@@ -48,7 +48,7 @@ pub enum SolveError {
     /// No stable equilibrium was found beyond some load.
     #[error("the last stable equilibrium that was found bears {share:.4} of the load{passed}: {reason}")]
     Lost {
-        /// Fraction of the load path that was reached [1].
+        /// Fraction of the load path that was reached (1).
         share: f64,
         /// Previous losses of stability, as text; empty without any.
         passed: String,
@@ -62,9 +62,9 @@ pub enum SolveError {
         "step size fell to {dt:.3e} s at {t:.6e} s after {rejected} rejections in a row; worst body \"{body}\" {direction}"
     )]
     StepTooSmall {
-        /// Time reached since the start of the step [s].
+        /// Time reached since the start of the step (s).
         t: f64,
-        /// Last step tried [s].
+        /// Last step tried (s).
         dt: f64,
         /// Rejections in a row.
         rejected: usize,
@@ -76,9 +76,9 @@ pub enum SolveError {
     /// The integrator could not take a step at all.
     #[error("step of {dt:.3e} s at {t:.6e} s failed: {why}; worst body \"{body}\" {direction}")]
     StepFailed {
-        /// Time reached since the start [s].
+        /// Time reached since the start (s).
         t: f64,
-        /// The step [s].
+        /// The step (s).
         dt: f64,
         /// Why.
         why: WhyFailed,
@@ -127,7 +127,7 @@ pub use crate::equations::bodies::DIRECTIONS;
 pub use crate::equations::linear;
 
 impl SolveError {
-    /// The same with times counted from when the integration began, `start` [s] after what its reader calls 0.
+    /// The same with times counted from when the integration began, `start` (s) after what its reader calls 0.
     pub fn begun_at(mut self, start: f64) -> Self {
         if let Self::StepTooSmall { t, .. } | Self::StepFailed { t, .. } = &mut self {
             *t += start;

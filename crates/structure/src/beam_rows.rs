@@ -3,7 +3,7 @@
 use crate::{BeamGap, NodeId, Structure};
 use std::collections::HashMap;
 
-/// Difference of lengths [of the gap's] and of directions [rad] that is rounding of the drawing.
+/// Difference of lengths [of the gap's] and of directions (rad) that is rounding of the drawing.
 pub const ALIKE: f64 = 1e-6;
 
 /// The beams at each node of a drawing.

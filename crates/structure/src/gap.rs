@@ -6,25 +6,25 @@ use serde::{Deserialize, Serialize};
 /// Where the voltage across a gap comes from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum GapVoltage {
-    /// A fixed voltage from the netlist [V].
+    /// A fixed voltage from the netlist (V).
     Fixed(f64),
     /// The potential difference between two electrical nodes.
     Nodes(NodeId, NodeId),
 }
 
-/// Least restitution of an impact [1].
+/// Least restitution of an impact (1).
 pub const MIN_RESTITUTION: f64 = 0.01;
 
-/// Reference speeds of impacts that a netlist may give [m/s].
+/// Reference speeds of impacts that a netlist may give (m/s).
 pub const IMPACT_SPEEDS: [f64; 2] = [1e-9, 1e6];
 
 /// How an impact of two surfaces ends, as far as a netlist says it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Impact {
-    /// Speed after an impact over that before, at the reference speed [1]; 1: elastic.
+    /// Speed after an impact over that before, at the reference speed (1); 1: elastic.
     #[serde(default)]
     pub restitution: Option<f64>,
-    /// Reference speed [m/s].
+    /// Reference speed (m/s).
     #[serde(default)]
     pub speed: Option<f64>,
 }
@@ -40,19 +40,19 @@ pub struct Comb {
     pub b: NodeId,
     /// Unit vector along which `a` moves deeper into `b`.
     pub axis: [f64; 2],
-    /// Number of finger gaps N [1] (SUGAR's N: C' = N·ε·h/g).
+    /// Number of finger gaps N (1) (SUGAR's N: C' = N·ε·h/g).
     pub gaps: f64,
-    /// Gap between facing fingers g [m].
+    /// Gap between facing fingers g (m).
     pub gap: f64,
-    /// Height of the fingers h [m].
+    /// Height of the fingers h (m).
     pub height: f64,
-    /// Overlap as drawn o₀ [m].
+    /// Overlap as drawn o₀ (m).
     pub overlap: f64,
-    /// Permittivity ε [F/m].
+    /// Permittivity ε (F/m).
     pub permittivity: f64,
-    /// Capacitance that does not depend on the motion [F].
+    /// Capacitance that does not depend on the motion (F).
     pub parasitic: f64,
-    /// Length and width of its fingers [m], for drawings; a width of 0 where the netlist gives none.
+    /// Length and width of its fingers (m), for drawings; a width of 0 where the netlist gives none.
     #[serde(default)]
     pub finger: [f64; 2],
     /// False for SUGAR's `comb2d`, whose force is constant whatever the overlap.
@@ -72,13 +72,13 @@ pub struct PlateGap {
     pub b: NodeId,
     /// Unit vector from plate `a` towards plate `b`.
     pub axis: [f64; 2],
-    /// Area A [m²].
+    /// Area A (m²).
     pub area: f64,
-    /// Gap as drawn g₀ [m].
+    /// Gap as drawn g₀ (m).
     pub gap: f64,
-    /// Permittivity ε [F/m].
+    /// Permittivity ε (F/m).
     pub permittivity: f64,
-    /// Distance at which the plates touch [m]; none: that of nearly closed gaps of their size.
+    /// Distance at which the plates touch (m); none: that of nearly closed gaps of their size.
     #[serde(default)]
     pub touch: Option<f64>,
     /// Impact losses.
@@ -95,21 +95,21 @@ pub struct BeamGap {
     pub name: String,
     /// Upper beam's ends, then the lower beam's: a, b, c, d.
     pub nodes: [NodeId; 4],
-    /// Direction from `a` to `b` [rad].
+    /// Direction from `a` to `b` (rad).
     pub angle: f64,
     /// +1: the upper beam lies at local +y of the lower one; −1 where the element was mirrored.
     pub side: f64,
-    /// Length [m].
+    /// Length (m).
     pub length: f64,
-    /// Gap as drawn [m].
+    /// Gap as drawn (m).
     pub gap: f64,
-    /// Height of the electrodes [m].
+    /// Height of the electrodes (m).
     pub height: f64,
-    /// Permittivity ε [F/m].
+    /// Permittivity ε (F/m).
     pub permittivity: f64,
-    /// Factor on capacitance and force for the fringe field, 1 + 1.12·gap/h in SUGAR [1].
+    /// Factor on capacitance and force for the fringe field, 1 + 1.12·gap/h in SUGAR (1).
     pub fringe: f64,
-    /// Distance at which the beams touch [m]; none: that of nearly closed gaps of their size.
+    /// Distance at which the beams touch (m); none: that of nearly closed gaps of their size.
     #[serde(default)]
     pub touch: Option<f64>,
     /// Impact losses.
@@ -130,11 +130,11 @@ pub struct Stop {
     pub b: Option<NodeId>,
     /// Unit vector of the motion.
     pub axis: [f64; 2],
-    /// Way along the axis and against it until they touch [m]; none: no stop on that side.
+    /// Way along the axis and against it until they touch (m); none: no stop on that side.
     pub ways: [Option<f64>; 2],
-    /// Stiffness of the stop [N/m]; none: rigid.
+    /// Stiffness of the stop (N/m); none: rigid.
     pub stiffness: Option<f64>,
-    /// Area on which a rigid stop bears [m²].
+    /// Area on which a rigid stop bears (m²).
     pub area: f64,
     /// Impact losses.
     #[serde(default)]

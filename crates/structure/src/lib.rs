@@ -97,7 +97,7 @@ impl Structure {
         self.index.find(&self.nodes, name)
     }
 
-    /// Larger side of the box around the nodes as drawn [m].
+    /// Larger side of the box around the nodes as drawn (m).
     pub fn extent(&self) -> f64 {
         let side = |i: usize| {
             let (low, high) = self

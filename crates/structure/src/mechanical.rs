@@ -6,25 +6,25 @@ use serde::{Deserialize, Serialize};
 /// Material constants of the layer an element is made of. Values an element overrides are already in place.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Material {
-    /// Young's modulus [Pa].
+    /// Young's modulus (Pa).
     pub youngs_modulus: f64,
-    /// Poisson's ratio [1].
+    /// Poisson's ratio (1).
     pub poisson: f64,
-    /// Mass density [kg/m³].
+    /// Mass density (kg/m³).
     pub density: f64,
-    /// Dynamic viscosity of the gas around the part [Pa·s]; 0 without damping.
+    /// Dynamic viscosity of the gas around the part (Pa·s); 0 without damping.
     pub viscosity: f64,
-    /// Thickness of the gas film under the part [m].
+    /// Thickness of the gas film under the part (m).
     pub fluid: f64,
-    /// Coefficient of thermal expansion [1/K].
+    /// Coefficient of thermal expansion (1/K).
     pub thermal_expansion: f64,
-    /// Temperature at which the drawn length is stress-free [K].
+    /// Temperature at which the drawn length is stress-free (K).
     pub ambient_temperature: f64,
-    /// Residual stress of the layer [Pa], tensile positive.
+    /// Residual stress of the layer (Pa), tensile positive.
     pub stress: f64,
 }
 
-/// Temperature at which all structural solids have melted; tungsten does at 3695 K [K].
+/// Temperature at which all structural solids have melted; tungsten does at 3695 K (K).
 pub const MOLTEN: f64 = 4000.0;
 
 /// A straight beam of constant rectangular section between two nodes.
@@ -36,17 +36,17 @@ pub struct Beam {
     pub a: NodeId,
     /// End node.
     pub b: NodeId,
-    /// Length from the netlist [m]. Stiffness and mass come from it, not from the node positions.
+    /// Length from the netlist (m). Stiffness and mass come from it, not from the node positions.
     pub length: f64,
-    /// Direction from `a` to `b` [rad], from the global x axis.
+    /// Direction from `a` to `b` (rad), from the global x axis.
     pub angle: f64,
-    /// In-plane width [m].
+    /// In-plane width (m).
     pub width: f64,
-    /// Out-of-plane thickness [m].
+    /// Out-of-plane thickness (m).
     pub thickness: f64,
     /// Material constants.
     pub material: Material,
-    /// Prescribed mean temperature [K] (SUGAR's `T=`); none when at ambient or when heated by current.
+    /// Prescribed mean temperature (K) (SUGAR's `T=`); none when at ambient or when heated by current.
     pub temperature: Option<f64>,
     /// Joule heating, when the beam carries current.
     pub heater: Option<Heater>,
@@ -55,14 +55,14 @@ pub struct Beam {
 /// A beam seen as a resistor that warms itself and conducts heat along its length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Heater {
-    /// Electrical resistance from end to end [Ω].
+    /// Electrical resistance from end to end (Ω).
     pub resistance: f64,
-    /// Thermal conductance from end to end k·A/l [W/K].
+    /// Thermal conductance from end to end k·A/l (W/K).
     pub conductance: f64,
-    /// Time constant with which the mean temperature rise follows its steady value [s], 0: at once; none where it comes of the heat
+    /// Time constant with which the mean temperature rise follows its steady value (s), 0: at once; none where it comes of the heat
     /// capacities of all that conducts.
     pub time_constant: Option<f64>,
-    /// Heat capacity ρ·c·w·h·l [J/K]; 0 where no specific heat is known.
+    /// Heat capacity ρ·c·w·h·l (J/K); 0 where no specific heat is known.
     pub capacity: f64,
 }
 
@@ -73,13 +73,13 @@ pub struct Mass {
     pub name: String,
     /// Node at the centre of mass.
     pub node: NodeId,
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f64,
-    /// Moment of inertia about the node [kg·m²].
+    /// Moment of inertia about the node (kg·m²).
     pub inertia: f64,
-    /// Viscous drag on translation [N·s/m] and rotation [N·m·s] (Couette film under a plate).
+    /// Viscous drag on translation (N·s/m) and rotation (N·m·s) (Couette film under a plate).
     pub drag: [f64; 2],
-    /// Outline for pictures: size along local x and y [m] and angle [rad]; `[0, 0, 0]` for a lumped mass.
+    /// Outline for pictures: size along local x and y (m) and angle (rad); `[0, 0, 0]` for a lumped mass.
     pub outline: [f64; 3],
 }
 
@@ -103,16 +103,16 @@ pub struct Support {
     pub node: NodeId,
     /// Held directions: local x, local y, rotation about z. An anchor holds all three.
     pub held: [bool; 3],
-    /// Angle of the local x axis [rad].
+    /// Angle of the local x axis (rad).
     pub angle: f64,
 }
 
 /// The outline of an anchor's pad, for drawings: from its node along local x, and as much to either side.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pad {
-    /// Index of the anchor in [`Structure::supports`].
+    /// Index of the anchor in [`Structure::supports`](crate::Structure::supports).
     pub support: usize,
-    /// Length along local x and width across it [m].
+    /// Length along local x and width across it (m).
     pub size: [f64; 2],
 }
 
@@ -125,11 +125,11 @@ pub struct SpringDamper {
     pub a: NodeId,
     /// Second node.
     pub b: NodeId,
-    /// Angle of the local x axis [rad].
+    /// Angle of the local x axis (rad).
     pub angle: f64,
-    /// Stiffness along local x [N/m], local y [N/m], about z [N·m/rad].
+    /// Stiffness along local x (N/m), local y (N/m), about z (N·m/rad).
     pub stiffness: [f64; 3],
-    /// Damping along local x [N·s/m], local y [N·s/m], about z [N·m·s/rad].
+    /// Damping along local x (N·s/m), local y (N·s/m), about z (N·m·s/rad).
     pub damping: [f64; 3],
 }
 
@@ -140,21 +140,21 @@ pub struct Load {
     pub name: String,
     /// Loaded node.
     pub node: NodeId,
-    /// Force x, y [N].
+    /// Force x, y (N).
     pub force: [f64; 2],
-    /// Moment about z [N·m].
+    /// Moment about z (N·m).
     pub moment: f64,
 }
 
 /// How a heated beam loses its strength against pressure along it, so that it is shortened for good (backbending).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Yield {
-    /// Index of the beam in [`Structure::beams`].
+    /// Index of the beam in [`Structure::beams`](crate::Structure::beams).
     pub beam: usize,
-    /// Yield stress at ambient temperature [Pa].
+    /// Yield stress at ambient temperature (Pa).
     pub stress: f64,
-    /// Temperature at which no strength is left [K].
+    /// Temperature at which no strength is left (K).
     pub softening: f64,
-    /// Permanent strain so far [1]; negative: shorter. 0 as drawn.
+    /// Permanent strain so far (1); negative: shorter. 0 as drawn.
     pub strain: f64,
 }

@@ -14,7 +14,7 @@ pub struct Resistor {
     pub a: NodeId,
     /// Second node.
     pub b: NodeId,
-    /// Resistance [Ω], positive.
+    /// Resistance (Ω), positive.
     pub resistance: f64,
 }
 
@@ -36,7 +36,7 @@ pub struct VoltageSource {
     pub plus: NodeId,
     /// Negative node.
     pub minus: NodeId,
-    /// Voltage [V].
+    /// Voltage (V).
     pub voltage: f64,
 }
 

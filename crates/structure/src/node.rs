@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Index of a node in [`Structure::nodes`].
+/// Index of a node in [`Structure::nodes`](crate::Structure::nodes).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct NodeId(pub usize);
 
@@ -11,7 +11,7 @@ pub struct NodeId(pub usize);
 pub struct Node {
     /// Full name, with the names of the enclosing subnet instances ("bankA.b1.t", "x1(1)").
     pub name: String,
-    /// Drawn position x, y [m].
+    /// Drawn position x, y (m).
     pub position: [f64; 2],
     /// True when a mechanical element touches the node.
     pub mechanical: bool,

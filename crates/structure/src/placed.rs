@@ -12,8 +12,8 @@ pub struct PlacedElement {
     pub name: String,
     /// Its nodes.
     pub nodes: Vec<NodeId>,
-    /// Direction of its local x axis [rad].
+    /// Direction of its local x axis (rad).
     pub angle: f64,
-    /// Its parameters, in the order in which the domain lists them [SI].
+    /// Its parameters, in the order in which the domain lists them (SI).
     pub values: Vec<f64>,
 }

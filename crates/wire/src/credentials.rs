@@ -87,7 +87,7 @@ impl Access {
     }
 }
 
-/// Longest file of tokens or certificates [byte].
+/// Longest file of tokens or certificates (byte).
 pub const FILE_BYTES: u64 = 1 << 20;
 
 /// A small text file.

@@ -72,7 +72,7 @@ pub fn authorities(path: &Path) -> Result<RootCertStore, PemError> {
     Ok(roots)
 }
 
-/// The time within which a certificate holds, from 1970 [s]; none where that cannot be read.
+/// The time within which a certificate holds, from 1970 (s); none where that cannot be read.
 ///
 /// The certificate is a sequence whose first part has, after an optional version, number, algorithm and issuer, a sequence of
 /// two times (RFC 5280, 4.1).
@@ -109,7 +109,7 @@ fn element(der: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     Some((tag, contents, rest))
 }
 
-/// A time of a certificate, from 1970 [s]: YYMMDDHHMMSSZ (from 1950 on) or, with tag 24, YYYYMMDDHHMMSSZ.
+/// A time of a certificate, from 1970 (s): YYMMDDHHMMSSZ (from 1950 on) or, with tag 24, YYYYMMDDHHMMSSZ.
 fn seconds(tag: u8, text: &[u8]) -> Option<u64> {
     let text = std::str::from_utf8(text).ok()?.strip_suffix('Z')?;
     let (year, rest) = text.split_at_checked(if tag == 24 { 4 } else { 2 })?;

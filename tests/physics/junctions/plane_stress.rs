@@ -1,6 +1,6 @@
 //! Frequencies of the six layouts in plane stress. Written by `scripts/junctions/validate`: do not edit.
 
-/// Netlist and frequencies 1–7 [Hz]: CalculiX 2.20, CPS8, thin, 6 elements across the narrowest beam.
+/// Netlist and frequencies 1–7 (Hz): CalculiX 2.20, CPS8, thin, 6 elements across the narrowest beam.
 #[rustfmt::skip]
 pub(super) const LAYOUTS: [(&str, [f64; 7]); 6] = [
     ("heatuator", [147135.7, 464822.9, 733001.1, 1272674.0, 2467137.0, 3984528.0, 4222652.0]),

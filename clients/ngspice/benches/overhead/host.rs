@@ -102,7 +102,7 @@ impl Host {
         }
     }
 
-    /// Calls the model for a step from `before` to `t` [s] (the same: an operating point); returns the first current.
+    /// Calls the model for a step from `before` to `t` (s) (the same: an operating point); returns the first current.
     pub(crate) fn call(&mut self, t: f64, before: f64, v: f64) -> f64 {
         // SAFETY: the structures live as long as the process; the layout is that of a call in ngspice 39.
         unsafe {

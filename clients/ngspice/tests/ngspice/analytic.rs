@@ -8,7 +8,7 @@ fn options(deck: &str) -> CosimOptions {
     CosimOptions { deck: analytic_deck(deck), plugin: Some(analytic_plugin()), ..CosimOptions::default() }
 }
 
-/// The plate's displacement [um] at 5 V across the comb and `v` across the gap, from the balance of forces
+/// The plate's displacement (um) at 5 V across the comb and `v` across the gap, from the balance of forces
 /// k·x = ½v²εA/(g − x)² + ½·25 V²·10⁻⁸ F/m by fixed-point iteration.
 fn balance(v: f64) -> f64 {
     let mut x = 0.125f64;

@@ -3,7 +3,7 @@
 use crate::support::{deck as deck_file, real, run_text, versions};
 use std::path::Path;
 
-/// A current of 0.5646 nA for 1 ms onto a plate that nothing else holds. The gap's charge is a monitor [fC].
+/// A current of 0.5646 nA for 1 ms onto a plate that nothing else holds. The gap's charge is a monitor (fC).
 fn deck(step: &str, reltol: f64) -> String {
     format!(
         "* charge onto a plate\nIq 0 a PULSE(0 0.5646n 10u 1u 1u 999u 10m)\nA1 %gd [a 0] %v [q x] plate\n\

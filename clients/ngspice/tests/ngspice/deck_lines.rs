@@ -35,7 +35,7 @@ fn rows(output: &str) -> Vec<[f64; 3]> {
     output.lines().filter_map(row).collect()
 }
 
-/// Displacement [µm] of the plate at a voltage below pull-in: the fixed-point iteration of k·x = ½εAV²/(g − x)².
+/// Displacement (µm) of the plate at a voltage below pull-in: the fixed-point iteration of k·x = ½εAV²/(g − x)².
 fn stands_at(volts: f64) -> f64 {
     (0..4000).fold(0.0f64, |x, _| 0.5 * 8.854e-12 * 1e-8 * volts * volts / (2e-6 - x).powi(2)) * 1e6
 }

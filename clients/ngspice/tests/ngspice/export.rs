@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// A model with its operating point, and its connections.
 struct Scene {
     file: &'static str,
-    /// Electrical ports with their voltages at the operating point [V].
+    /// Electrical ports with their voltages at the operating point (V).
     electrical: &'static [(&'static str, f64)],
     /// Ports that a force is given to.
     forces: &'static [&'static str],

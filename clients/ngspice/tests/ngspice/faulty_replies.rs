@@ -6,7 +6,7 @@ use crate::support::{run_text, skipped};
 use bimorph::cosim::{self, CosimError};
 use std::time::{Duration, Instant};
 
-/// Longest wait of the device for an answer [s].
+/// Longest wait of the device for an answer (s).
 const DEADLINE: u64 = 2;
 /// Further time of a run: its start, its end, and a loaded machine.
 const AROUND: Duration = Duration::from_secs(8);

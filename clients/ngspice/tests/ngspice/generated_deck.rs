@@ -33,7 +33,7 @@ fn deck(netlist: &str, analyses: &[&str], drives: &[(&str, &str)]) -> String {
     around(&loaded.structure, &wanted).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Displacement [µm] of the plate at a voltage: the fixed-point iteration of k·x = ½εAV²/(g − x)².
+/// Displacement (µm) of the plate at a voltage: the fixed-point iteration of k·x = ½εAV²/(g − x)².
 fn stands_at(volts: f64) -> f64 {
     (0..200).fold(0.0f64, |x, _| 0.5 * 8.854e-12 * 1e-8 * volts * volts / (2e-6 - x).powi(2)) * 1e6
 }

@@ -6,7 +6,7 @@ use bimorph::cosim::{self, CosimOptions};
 use std::f64::consts::PI;
 use std::path::Path;
 
-/// The damped plate of small voltages: ω₀ [rad/s], and damping ratio (k = 1 N/m, m = 1e-10 kg, b = 1e-5 N·s/m).
+/// The damped plate of small voltages: ω₀ (rad/s), and damping ratio (k = 1 N/m, m = 1e-10 kg, b = 1e-5 N·s/m).
 const PLATE: (f64, f64) = (1e5, 0.5);
 
 fn options(name: &str, ngspice: &Path) -> CosimOptions {

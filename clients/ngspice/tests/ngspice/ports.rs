@@ -178,7 +178,7 @@ fn a_current_is_a_force() {
     }
 }
 
-/// Amplitude and phase of the oscillation at `omega` [rad/s] in a wave, by least squares.
+/// Amplitude and phase of the oscillation at `omega` (rad/s) in a wave, by least squares.
 fn oscillation(t: &[f64], y: &[f64], omega: f64) -> (f64, f64) {
     // y = a·sin + b·cos + c
     let mut normal = [[0.0f64; 4]; 3];

@@ -4,7 +4,7 @@ use crate::support::{deck, real, run_text, versions};
 use bimorph::cosim::{self, CosimOptions};
 use std::path::Path;
 
-/// ε·A of the plate [F·m], its gap [m] and stiffness [N/m]: tests/decks/damped_plate.net.
+/// ε·A of the plate (F·m), its gap (m) and stiffness (N/m): tests/decks/damped_plate.net.
 const PLATE: (f64, f64, f64) = (8.854e-12 * 1e-8, 2e-6, 1.0);
 
 const HEAD: &str = "* plate and heater\nVd a 0 dc 2 PULSE(2 3 1u 1u)\nVh h 0 1\n\

@@ -197,7 +197,7 @@ fn klu_agrees_with_sparse() {
     }
 }
 
-/// Where a plate 1 N/m stiff and 1e-8 m² large stands at 2 V [um], by fixed-point iteration of k·x = ½εAV²/(g − x)².
+/// Where a plate 1 N/m stiff and 1e-8 m² large stands at 2 V (um), by fixed-point iteration of k·x = ½εAV²/(g − x)².
 fn stands_at(gap: f64) -> f64 {
     (0..200).fold(0.0, |x, _| 0.5 * 8.854e-12 * 1e-8 * 4.0 / (gap - x).powi(2)) * 1e6
 }

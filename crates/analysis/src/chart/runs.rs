@@ -53,7 +53,7 @@ impl RunSeries<'_> {
         }
     }
 
-    /// One run with its wall-clock time [s].
+    /// One run with its wall-clock time (s).
     fn run(
         &self,
         formulation: Formulation,

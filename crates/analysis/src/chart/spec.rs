@@ -99,11 +99,11 @@ pub struct ChartSpec {
     pub parts: Vec<ChartPart>,
     /// Signals whose error counts, see [`crate::readout::signal::Signal::find`].
     pub signals: Vec<String>,
-    /// End time [s]; none: five periods of the lowest mode.
+    /// End time (s); none: five periods of the lowest mode.
     pub stop: Option<f64>,
     /// Output times at which errors are taken, ends included.
     pub points: usize,
-    /// Voltages held during a run, by port name [V].
+    /// Voltages held during a run, by port name (V).
     pub voltages: Vec<(String, f64)>,
     /// A parameter of the netlist that is released at t = 0, from the equilibrium at its value.
     pub release: Option<String>,
@@ -111,9 +111,9 @@ pub struct ChartSpec {
     pub formulations: Vec<Formulation>,
     /// Integration methods.
     pub methods: Vec<Integrator>,
-    /// Tolerances of the precision part [1].
+    /// Tolerances of the precision part (1).
     pub tols: Vec<f64>,
-    /// Bands of the order and solver parts [Hz]; empty: 2 to 2048 times the lowest frequency.
+    /// Bands of the order and solver parts (Hz); empty: 2 to 2048 times the lowest frequency.
     pub bands: Vec<f64>,
     /// Solvers.
     pub solvers: Vec<SolverKind>,
@@ -124,11 +124,11 @@ pub struct ChartSpec {
 /// Numbers of a run that succeeded.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct RunMeasurement {
-    /// Relative error [1]; none where nothing is compared.
+    /// Relative error (1); none where nothing is compared.
     pub error: Option<f64>,
-    /// Default part: the error estimate of the analysis itself [1].
+    /// Default part: the error estimate of the analysis itself (1).
     pub told: Option<f64>,
-    /// Wall-clock time: of the whole run, or of one step in the solver part [s].
+    /// Wall-clock time: of the whole run, or of one step in the solver part (s).
     pub seconds: f64,
     /// Accepted steps.
     pub steps: u64,
@@ -163,9 +163,9 @@ pub struct ChartPoint {
     pub method: &'static str,
     /// Solver of the linear systems.
     pub solver: &'static str,
-    /// Tolerance of the integration [1].
+    /// Tolerance of the integration (1).
     pub tol: f64,
-    /// Band that the model resolves [Hz]; none: by slenderness.
+    /// Band that the model resolves (Hz); none: by slenderness.
     pub band_hz: Option<f64>,
     /// Mechanical unknowns.
     pub unknowns: usize,
@@ -178,11 +178,11 @@ pub struct ChartPoint {
 /// A finished chart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Chart {
-    /// End time of every run [s].
+    /// End time of every run (s).
     pub stop: f64,
     /// Signals whose error counts.
     pub signals: Vec<String>,
-    /// Estimated error of the reference of the precision part, from a second reference [1].
+    /// Estimated error of the reference of the precision part, from a second reference (1).
     pub reference_error: Option<f64>,
     /// All points, in the order of the parts and of the requested lists.
     pub points: Vec<ChartPoint>,

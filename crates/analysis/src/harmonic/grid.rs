@@ -40,7 +40,7 @@ pub fn count(spacing: Spacing, points: usize, [from, to]: [f64; 2]) -> Option<us
     }
 }
 
-/// The even grid [Hz], both ends included; of [`Spacing::PerDecade`] its last step may be shorter.
+/// The even grid (Hz), both ends included; of [`Spacing::PerDecade`] its last step may be shorter.
 pub(super) fn even(spacing: Spacing, points: usize, band: [f64; 2]) -> Vec<f64> {
     let [from, to] = band;
     let count = count(spacing, points, band).unwrap_or(2);

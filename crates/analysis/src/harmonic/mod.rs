@@ -65,7 +65,7 @@ pub struct HarmonicResult {
     pub drive: String,
     /// Its unit.
     pub drive_unit: String,
-    /// Frequencies, ascending [Hz].
+    /// Frequencies, ascending (Hz).
     pub frequencies_hz: Vec<f64>,
     /// The signals in the requested order.
     pub signals: Vec<SignalResponse>,

@@ -23,12 +23,12 @@ use bimorph_solve::subspace;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::ops::Range;
 
-/// Additional modes in a block iteration, and the change of λ at which it ends [1].
+/// Additional modes in a block iteration, and the change of λ at which it ends (1).
 const GUARDS: usize = 6;
 const SETTLED: f64 = 1e-14;
 /// Fraction of what a row could see below which it sees nothing.
 pub(crate) const UNSEEN: f64 = 1e-7;
-/// Of a mechanism that floats the correction is taken at this fraction of the frequency up to which modes are known [1].
+/// Of a mechanism that floats the correction is taken at this fraction of the frequency up to which modes are known (1).
 const ASIDE: f64 = 0.03;
 
 /// The lowest modes of the small-signal problem, or all there are: about a nonlinear state those of its tangent; of a linear model those
@@ -99,7 +99,7 @@ fn unsettled(count: usize) -> AnalysisError {
     AnalysisError::NotConverged { detail }
 }
 
-/// How many modes lie below `omega` [rad/s]: negative pivots of K − ω²M (Sylvester).
+/// How many modes lie below `omega` (rad/s): negative pivots of K − ω²M (Sylvester).
 pub(crate) fn below(exact: &ExactResponse<'_>, omega: f64) -> usize {
     let model = &exact.system().model;
     let mut shifted = exact.tangent.clone();
@@ -111,9 +111,9 @@ pub(crate) fn below(exact: &ExactResponse<'_>, omega: f64) -> usize {
 /// The sum, with what each row sees of each mode.
 #[derive(Debug, Clone)]
 pub(crate) struct ModalSum {
-    /// λ of each mode, ascending [rad²/s²].
+    /// λ of each mode, ascending (rad²/s²).
     pub(super) lambda: Vec<f64>,
-    /// D, modes × modes [1/s].
+    /// D, modes × modes (1/s).
     pub(super) damping: DMatrix<f64>,
     /// How each part of the push depends on s.
     pub(super) laws: Vec<FrequencyDependence>,
@@ -127,7 +127,7 @@ pub(crate) struct ModalSum {
     added: DMatrix<f64>,
     /// Rows that see the rate of it.
     pub(super) rates: Vec<bool>,
-    /// Conductance between drive and row [S].
+    /// Conductance between drive and row (S).
     pub(super) conducted: Vec<f64>,
     /// Σ_j M·φ_j: a force that stirs every mode.
     pub(super) stir: Vec<Pose>,
@@ -277,7 +277,7 @@ impl ModalSum {
         self.left(s, row) + others.map(share).sum::<f64>()
     }
 
-    /// One over the quality of a mode [1]; not a number for one that there is not.
+    /// One over the quality of a mode (1); not a number for one that there is not.
     pub(crate) fn loss(&self, mode: usize) -> f64 {
         let lambda = self.lambda.get(mode).copied().unwrap_or(f64::NAN);
         self.damping.get((mode, mode)).map_or(f64::NAN, |damping| damping.abs() / lambda.max(0.0).sqrt())

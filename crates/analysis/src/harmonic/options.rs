@@ -15,9 +15,9 @@ pub struct HarmonicOptions {
     pub drive: String,
     /// Output signals, `PORT.i` among them; empty: the output at the driven place itself.
     pub signals: Vec<String>,
-    /// Lowest frequency [Hz].
+    /// Lowest frequency (Hz).
     pub from: f64,
-    /// Highest frequency [Hz].
+    /// Highest frequency (Hz).
     pub to: f64,
     /// Points of the even grid, or of each decade of it.
     pub points: usize,

@@ -10,9 +10,9 @@ const UNDAMPED: f64 = 1e-13;
 /// A pole or a zero, of each conjugate pair that in the upper half plane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Root {
-    /// Real part [rad/s].
+    /// Real part (rad/s).
     pub re: f64,
-    /// Imaginary part [rad/s].
+    /// Imaginary part (rad/s).
     pub im: f64,
 }
 
@@ -22,22 +22,22 @@ impl Root {
         Self { re: re + 0.0, im: if im <= UNDAMPED * s.norm() { 0.0 } else { im } }
     }
 
-    /// |s|/2π [Hz].
+    /// |s|/2π (Hz).
     pub fn frequency_hz(&self) -> f64 {
         self.re.hypot(self.im) / TAU
     }
 
-    /// |s|/(2·|Re s|) [1]; none where nothing damps it.
+    /// |s|/(2·|Re s|) (1); none where nothing damps it.
     pub fn quality(&self) -> Option<f64> {
         (self.re != 0.0).then(|| self.re.hypot(self.im) / (2.0 * self.re.abs()))
     }
 
-    /// Distance of the half-power points of a lightly damped resonance, |Re s|/π [Hz].
+    /// Distance of the half-power points of a lightly damped resonance, |Re s|/π (Hz).
     pub fn width_hz(&self) -> f64 {
         self.re.abs() / (0.5 * TAU)
     }
 
-    /// True where its frequency lies within a band [Hz].
+    /// True where its frequency lies within a band (Hz).
     pub(super) fn within(&self, [from, to]: [f64; 2]) -> bool {
         (from..=to).contains(&self.frequency_hz())
     }

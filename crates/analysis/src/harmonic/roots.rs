@@ -37,7 +37,7 @@ fn sorted(mut roots: Vec<Root>) -> Vec<Root> {
     roots
 }
 
-/// Frequencies by which modes are scaled, and one for all [rad/s].
+/// Frequencies by which modes are scaled, and one for all (rad/s).
 fn scales(sum: &ModalSum, to: f64) -> (Vec<f64>, f64) {
     let all = TAU * to;
     (sum.lambda.iter().map(|l| l.abs().sqrt().max(1e-9 * all)).collect(), all)

@@ -17,8 +17,8 @@ pub struct JointReport {
     pub accelerations: u64,
     /// Evaluations near a singular configuration of the loops.
     pub singular_evaluations: u64,
-    /// Largest gap of a loop after a step [m].
+    /// Largest gap of a loop after a step (m).
     pub largest_gap_m: f64,
-    /// Highest natural frequency about the drawn place [Hz]; null: nothing is elastic.
+    /// Highest natural frequency about the drawn place (Hz); null: nothing is elastic.
     pub highest_frequency_hz: Option<f64>,
 }

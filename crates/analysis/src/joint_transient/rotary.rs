@@ -40,7 +40,7 @@ pub(super) fn rotary_inertia_warning(
     })
 }
 
-/// How far two equilibria are apart [1].
+/// How far two equilibria are apart (1).
 fn apart(compiled: &CompiledModel, elastic: &OperatingPoint, turning: &OperatingPoint) -> Option<f64> {
     let linear = compiled.parts.system.model.linear;
     let nodes = || compiled.parts.nodes.iter().flatten();

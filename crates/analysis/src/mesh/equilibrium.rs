@@ -310,7 +310,7 @@ fn outputs(model: &CompiledModel, point: &OperatingPoint) -> Vec<Output> {
     outputs
 }
 
-/// The longest beam, which stands for the size of the mechanism [m].
+/// The longest beam, which stands for the size of the mechanism (m).
 pub(super) fn size(model: &CompiledModel) -> f64 {
     model.structure.beams.iter().map(|b| b.length).fold(model.parts.system.length_scale, f64::max)
 }
@@ -318,7 +318,7 @@ pub(super) fn size(model: &CompiledModel) -> f64 {
 /// The equilibrium on the mesh for it, which comes with it, and the displacement of points along every beam.
 ///
 /// # Errors
-/// See [`fitted`].
+/// See [`super::static_fitted`].
 pub fn static_fitted(
     compiled: &CompiledModel,
     voltages: &PortVoltages,
@@ -331,7 +331,7 @@ pub fn static_fitted(
     Ok((fitted, result, curves))
 }
 
-/// Warnings about an equilibrium of a circuit, each with its size: an error that grows [1], or 1. Beside what
+/// Warnings about an equilibrium of a circuit, each with its size: an error that grows (1), or 1. Beside what
 /// `static_warnings` warns of, the mesh along its gaps, which was chosen without any voltage.
 pub fn operating_point_warnings(fitted: &CompiledModel, point: &OperatingPoint) -> Vec<(Diagnostic, f64)> {
     let share = stress_left_out(fitted, point);
@@ -354,7 +354,7 @@ pub(super) fn static_warnings(fitted: &CompiledModel, point: &OperatingPoint) ->
     stress.into_iter().chain(transient_warnings(fitted, point)).chain(near_buckling(point)).collect()
 }
 
-/// Fraction of the deflection that a linear model omits [1].
+/// Fraction of the deflection that a linear model omits (1).
 fn stress_left_out(fitted: &CompiledModel, point: &OperatingPoint) -> Option<f64> {
     if fitted.options.linear { left_out(fitted, point, &point.q) } else { None }
 }

@@ -55,7 +55,7 @@ struct ExcitedMode {
     frequency: f64,
     amplitude: f64,
     decay: f64,
-    /// Relative excess of its frequency without rotary inertia [1].
+    /// Relative excess of its frequency without rotary inertia (1).
     rotary: f64,
 }
 
@@ -154,7 +154,7 @@ fn turned(modes: &[ExcitedMode], stop: f64) -> f64 {
     if late > UNRELATED_ERROR { late } else { 0.0 }
 }
 
-/// The mode that a run in equal steps begins with and cannot follow: its frequency [Hz] and its share of the way. A step longer than a
+/// The mode that a run in equal steps begins with and cannot follow: its frequency (Hz) and its share of the way. A step longer than a
 /// radian of it damps it away or slows it, in a companion of twice the step as well.
 fn outrun(moving: &CompiledModel, step: f64, modes: &[ExcitedMode]) -> Option<(f64, f64)> {
     let swings = |mode: &&ExcitedMode| {
@@ -316,19 +316,19 @@ pub(super) fn linear_way(model: &CompiledModel, from: &OperatingPoint, to: &Oper
     pushed(model, from, &drive, &stiffness)
 }
 
-/// Largest displacement of a node [m], of a small motion `x`.
+/// Largest displacement of a node (m), of a small motion `x`.
 pub(super) fn reach(model: &CompiledModel, x: &[Pose]) -> f64 {
     model.parts.nodes.iter().flatten().map(|p| p.displacement(x, true).norm()).fold(0.0, f64::max)
 }
 
-/// xᵀCx of a mode with xᵀMx = 1 [1/s].
+/// xᵀCx of a mode with xᵀMx = 1 (1/s).
 fn damping(model: &Model, x: &[Pose]) -> f64 {
     let mut force = vec![Pose::zeros(); x.len()];
     add_damping(model, x, &mut force);
     force.iter().zip(x).map(|(f, x)| f.dot(x)).sum()
 }
 
-/// The shortest time constant of the heat that the run begins with [s]; 0 where heat moves nothing.
+/// The shortest time constant of the heat that the run begins with (s); 0 where heat moves nothing.
 fn shortest_heat(model: &CompiledModel, from: &OperatingPoint, to: &OperatingPoint) -> f64 {
     let heaters = &model.parts.system.electrics.heating.heaters;
     let moves = |k: &usize| from.rise[*k] != to.rise[*k];

@@ -18,9 +18,9 @@ use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::unstressed::add_unstressed_tangent;
 
-/// μ below which finer meshes are asked: where a beam has one segment, and where all have more [1].
+/// μ below which finer meshes are asked: where a beam has one segment, and where all have more (1).
 const SUSPECT: [f64; 2] = [0.35, 0.1];
-/// μ of twice the segments below which four times are asked, and the load is within about 1 % of buckling [1].
+/// μ of twice the segments below which four times are asked, and the load is within about 1 % of buckling (1).
 const NEAR: f64 = 0.02;
 /// Iterations for the softest motion, whose μ is at least 15 times below that of others where needed.
 const ROUNDS: usize = 6;

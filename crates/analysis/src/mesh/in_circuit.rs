@@ -17,7 +17,7 @@ use bimorph_model::refine::mesh_search::Mesh;
 /// that it is compared with may have twice as many.
 const MAX_UNKNOWNS: usize = 3000;
 
-/// How much looser the tolerance becomes where its mesh would be finer than that [1], and how often.
+/// How much looser the tolerance becomes where its mesh would be finer than that (1), and how often.
 const TOLERANCE_RELAXATION: (f64, i32) = (10.0, 3);
 
 /// Modes whose errors are followed over a run.

@@ -83,7 +83,7 @@ pub enum MeshRequest<'a> {
     PullIn {
         /// Port or source; none: the first.
         port: Option<&'a str>,
-        /// Largest voltage [V].
+        /// Largest voltage (V).
         max: f64,
     },
 }

@@ -11,13 +11,13 @@ use bimorph_solve::frequency::mac::pair;
 use bimorph_structure::Structure;
 use nalgebra::DMatrix;
 
-/// Modes that have less than this in common are no pair; then the order of frequencies decides [1].
+/// Modes that have less than this in common are no pair; then the order of frequencies decides (1).
 const ALIKE: f64 = 0.5;
 
 /// Modes with the displacement of points along every beam.
 type ModeShapes<'a> = (&'a ModesResult, &'a [BeamMotions]);
 
-/// The relative error of each frequency of the coarser mesh, signed [1]; none where the finer one has no such mode.
+/// The relative error of each frequency of the coarser mesh, signed (1); none where the finer one has no such mode.
 pub(super) fn errors(structure: &Structure, coarse: ModeShapes<'_>, fine: ModeShapes<'_>) -> Vec<Option<f64>> {
     let vectors = |shapes: ModeShapes<'_>| -> Vec<Vec<f64>> {
         (0..shapes.0.frequencies_hz.len()).map(|k| sampled(structure, coarse.1, shapes, k)).collect()

@@ -35,7 +35,7 @@ pub enum AnalysisResult {
 pub struct Assessment {
     /// The result.
     pub answer: AnalysisResult,
-    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    /// Largest estimated relative error by the mesh (1); none without an estimate.
     pub estimated_error: Option<f64>,
     /// Further warnings, each with its code.
     pub warnings: Vec<String>,

@@ -67,7 +67,7 @@ fn path_from(
     Ok((fitted, result))
 }
 
-/// Fraction of the largest critical value below which one is taken for zero, and of the whole way [1].
+/// Fraction of the largest critical value below which one is taken for zero, and of the whole way (1).
 const CROSSING: [f64; 2] = [1e-3, 1e-6];
 
 /// Paths on one mesh after the other.

@@ -24,7 +24,7 @@ pub(super) fn pull_in_outputs(found: &PullInResult) -> Vec<Output> {
 /// Pull-in on the mesh for it, which comes with it.
 ///
 /// # Errors
-/// See [`fitted`].
+/// See [`super::static_fitted`].
 pub fn pull_in_fitted(
     compiled: &CompiledModel,
     port: Option<&str>,

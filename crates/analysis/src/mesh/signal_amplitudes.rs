@@ -41,7 +41,7 @@ impl<'a> SignalAmplitudes<'a> {
         }
     }
 
-    /// How far each signal swings with a motion of this shape at `omega` [rad/s].
+    /// How far each signal swings with a motion of this shape at `omega` (rad/s).
     pub(super) fn of(&self, shape: &[Pose], omega: f64) -> Vec<f64> {
         let state = SignalView { q: &self.about.q, v: &self.still, rise: &self.about.rise, volts: &self.about.volts };
         let moved = |q, v| SignalView { q, v, rise: &self.rise, volts: &self.volts };

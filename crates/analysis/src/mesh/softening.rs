@@ -24,14 +24,14 @@ use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::planar::Pose;
 
-/// Fraction of the stiffness at rest below which it is compared from mesh to mesh [1]. The coarsest mesh of a clamped
+/// Fraction of the stiffness at rest below which it is compared from mesh to mesh (1). The coarsest mesh of a clamped
 /// beam bears an eighth too much.
 const SOFT: f64 = 0.5;
-/// Fraction by which the remaining stiffness may differ between a mesh and twice its segments [1]. Slow convergence
+/// Fraction by which the remaining stiffness may differ between a mesh and twice its segments (1). Slow convergence
 /// must not count as converged: a column in one piece has 1.25 times the stiffness on two segments that it has on four,
 /// and none on eight.
 const KNOWN: f64 = 0.2;
-/// Inverse iterations at most, and the change of λ at which they end [1].
+/// Inverse iterations at most, and the change of λ at which they end (1).
 const ROUNDS: (usize, f64) = (30, 1e-3);
 
 /// [`left`] of an equilibrium that has less than half of its stiffness left; none of others.
@@ -57,7 +57,7 @@ pub(super) fn left_of_soft(compiled: &CompiledModel, point: &OperatingPoint) -> 
     })
 }
 
-/// The remaining stiffness at an equilibrium [N/m]; `None` where it is unknown.
+/// The remaining stiffness at an equilibrium (N/m); `None` where it is unknown.
 pub(super) fn left(compiled: &CompiledModel, point: &OperatingPoint) -> Option<f64> {
     let [here, ..] = drives(compiled, point);
     lowest(compiled, &point.q, &here).map(|lowest| lowest.left)
@@ -86,9 +86,9 @@ pub(super) fn scale(left: f64, tol: f64) -> f64 {
 
 /// The softest motion, for its masses.
 struct SoftestMotion {
-    /// xᵀ·K·x / xᵀ·M·x [rad²/s²], or [N/m] over bodies that are alike where nothing has mass.
+    /// xᵀ·K·x / xᵀ·M·x (rad²/s²), or (N/m) over bodies that are alike where nothing has mass.
     lambda: f64,
-    /// xᵀ·K·x / max |x_j|² [N/m].
+    /// xᵀ·K·x / max |x_j|² (N/m).
     left: f64,
 }
 

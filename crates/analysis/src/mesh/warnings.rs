@@ -66,7 +66,7 @@ pub(super) fn of_fingers(compiled: &CompiledModel, point: &OperatingPoint) -> Op
     Some(Diagnostic::warning(FINGERS, message, "draw the `stop2d` that holds the part, or longer fingers"))
 }
 
-/// Where equal steps [s] are longer than a radian of a motion that a run begins with, of a frequency [Hz] and a fraction of the way.
+/// Where equal steps (s) are longer than a radian of a motion that a run begins with, of a frequency (Hz) and a fraction of the way.
 pub(super) fn of_steps(step: f64, (frequency, share): (f64, f64)) -> Diagnostic {
     let message = format!(
         "steps of {step:e} s are longer than a radian of the motion at {frequency:.4e} Hz, which has {:.0} % of the way that the run begins with: \
@@ -104,7 +104,7 @@ pub(super) fn of_heat(compiled: &CompiledModel, point: &OperatingPoint) -> Optio
     Some(Diagnostic::warning(HEAT, message, "volts, not millivolts; `thermcond` in W/m/K, `sheetresistance` in Ω"))
 }
 
-/// Where segments are too long for the field along them, with the gap that leaves out most and the error of the deflection [1].
+/// Where segments are too long for the field along them, with the gap that leaves out most and the error of the deflection (1).
 pub(super) fn of_segments(compiled: &CompiledModel, worst: &(String, f64)) -> Option<Diagnostic> {
     let (name, error) = worst;
     if compiled.options.errors().holds(*error) {

@@ -8,16 +8,16 @@ use bimorph_solve::continuation::PathEnd;
 
 /// Longest upward step of the voltage, as a fraction of the voltage: pressed parts move little.
 const UPWARDS: f64 = 0.5;
-/// Releases that differ by less than this fraction are one [1].
+/// Releases that differ by less than this fraction are one (1).
 const RELEASE_TOLERANCE: f64 = 1e-6;
 
 /// Release of a closed part.
 pub(super) struct ReleaseVoltages {
-    /// Voltage at which the last of the closed gaps opens [V]; none: it is closed without any.
+    /// Voltage at which the last of the closed gaps opens (V); none: it is closed without any.
     pub(super) release_v: Option<f64>,
-    /// Voltages at which it snaps further [V].
+    /// Voltages at which it snaps further (V).
     pub(super) snaps_v: Vec<f64>,
-    /// Release without the last of those snaps [V].
+    /// Release without the last of those snaps (V).
     pub(super) release_before_snaps_v: Option<f64>,
 }
 

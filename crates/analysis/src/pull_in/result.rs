@@ -7,18 +7,18 @@ use serde::Serialize;
 pub struct PullInResult {
     /// The port or netlist source whose voltage was swept.
     pub port: String,
-    /// Voltage at which the open branch loses its stability with rising voltage, and a gap closes [V].
+    /// Voltage at which the open branch loses its stability with rising voltage, and a gap closes (V).
     pub pull_in_v: f64,
-    /// Voltage at which the last of the closed gaps opens with falling voltage [V]; `None` when it stays closed at 0 V,
+    /// Voltage at which the last of the closed gaps opens with falling voltage (V); `None` when it stays closed at 0 V,
     /// or when the part has no closed equilibrium after pull-in.
     pub release_v: Option<f64>,
-    /// Voltages between pull-in and the largest one at which the closed part snaps further [V]: `release_v` is that beyond the last.
+    /// Voltages between pull-in and the largest one at which the closed part snaps further (V): `release_v` is that beyond the last.
     pub snaps_v: Vec<f64>,
-    /// Voltage of release from the state to which pull-in itself leads [V], where the part can snap further.
+    /// Voltage of release from the state to which pull-in itself leads (V), where the part can snap further.
     pub release_before_snaps_v: Option<f64>,
     /// False when nothing holds the part after pull-in: no gap closes on contact.
     pub held: bool,
-    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    /// Largest estimated relative error by the mesh (1); none without an estimate.
     #[serde(skip)]
     pub estimated_error: Option<f64>,
     /// Warnings about the result, as sentences.

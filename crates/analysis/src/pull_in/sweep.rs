@@ -16,7 +16,7 @@ use bimorph_solve::path::SourcePath;
 pub(super) const PAST: f64 = 1e-3;
 /// Halvings of a step, at most, where the branch does not lead to its limit point.
 const BISECTIONS: usize = 40;
-/// Relative accuracy of a voltage found so [1].
+/// Relative accuracy of a voltage found so (1).
 const SHARP: f64 = 1e-8;
 /// Most limit points with rising voltage, or with falling voltage.
 pub(super) const MAX_LIMIT_POINTS: usize = 200;
@@ -45,14 +45,14 @@ pub(super) struct VoltageSweep<'a> {
     jumped: Option<&'static str>,
     /// Which gaps are closed without any voltage.
     pub(super) rest: Vec<bool>,
-    /// Voltages at which it jumped without closing a gap [V].
+    /// Voltages at which it jumped without closing a gap (V).
     passed: Vec<f64>,
     /// Sentences about the closed branch.
     pub(super) of_closed: Vec<String>,
 }
 
 impl<'a> VoltageSweep<'a> {
-    /// Of a `source`, all others at the voltages `off` [V].
+    /// Of a `source`, all others at the voltages `off` (V).
     pub(super) fn new(compiled: &'a CompiledModel, off: Vec<f64>, source: usize) -> Self {
         let system = &compiled.parts.system;
         Self {
@@ -216,7 +216,7 @@ impl<'a> VoltageSweep<'a> {
     }
 
     /// The voltage that moves the part by a tenth of the length scale, or removes a third of a stiffness, whichever is
-    /// smaller: the unit of steps [V]. `max` where it does neither.
+    /// smaller: the unit of steps (V). `max` where it does neither.
     fn unit(&self, q: &[Pose], max: f64) -> Result<f64, AnalysisError> {
         let system = self.system;
         let electrics = &system.electrics;

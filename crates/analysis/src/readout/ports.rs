@@ -2,11 +2,11 @@
 //!
 //! | name | kind | given | answered |
 //! |---|---|---|---|
-//! | of a `port` element | electrical | voltage [V] | current [A] and charge [C] |
-//! | `NODE.x`, `.y`, `.rz` | mechanical | force [N], moment [N·m] | displacement [m, rad] |
-//! | `NODE.vx`, `.vy`, `.vrz` | mechanical | force [N], moment [N·m] | velocity [m/s, rad/s] |
-//! | `BEAM.T` | thermal | heat into the beam [W] | its mean rise above ambient [K] |
-//! | `frame.ax`, `.ay`, `.wz` | inertial | acceleration [m/s²], rate [rad/s] of the frame | nothing |
+//! | of a `port` element | electrical | voltage (V) | current (A) and charge (C) |
+//! | `NODE.x`, `.y`, `.rz` | mechanical | force (N), moment (N·m) | displacement (m, rad) |
+//! | `NODE.vx`, `.vy`, `.vrz` | mechanical | force (N), moment (N·m) | velocity (m/s, rad/s) |
+//! | `BEAM.T` | thermal | heat into the beam (W) | its mean rise above ambient (K) |
+//! | `frame.ax`, `.ay`, `.wz` | inertial | acceleration (m/s²), rate (rad/s) of the frame | nothing |
 //!
 //! The frame's rate needs the compliant formulation.
 //!

@@ -13,19 +13,19 @@ use bimorph_model::compile::CompiledModel;
 pub enum RunSignal {
     /// A quantity of a state.
     State(Signal),
-    /// Charge on a port [C].
+    /// Charge on a port (C).
     PortCharge(usize),
-    /// Current into a port [A], of which `conduction` is that through resistances.
+    /// Current into a port (A), of which `conduction` is that through resistances.
     PortCurrent {
         /// Index of the port.
         port: usize,
-        /// Current through resistances [A].
+        /// Current through resistances (A).
         conduction: f64,
     },
 }
 
 impl RunSignal {
-    /// Finds a quantity by name: a signal, see [`Signal::find`], or `PORT.q` or `PORT.i` with these voltages of the sources [V].
+    /// Finds a quantity by name: a signal, see [`Signal::find`], or `PORT.q` or `PORT.i` with these voltages of the sources (V).
     ///
     /// # Errors
     /// [`ReadoutError::UnknownSignal`] with what would be understood.
@@ -96,7 +96,7 @@ impl Quantity for RunSignal {
 }
 
 impl Expression<RunSignal> {
-    /// Finds a quantity by name or a sum of them. The sources have these voltages [V]; a caller that needs no values gives none.
+    /// Finds a quantity by name or a sum of them. The sources have these voltages (V); a caller that needs no values gives none.
     ///
     /// # Errors
     /// [`ReadoutError::UnknownSignal`] with what would be understood, [`ReadoutError::BadExpression`].

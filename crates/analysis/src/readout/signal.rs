@@ -14,17 +14,17 @@ pub enum Signal {
     Displacement(MaterialPoint, usize),
     /// Rate of a node's displacement.
     Rate(MaterialPoint, usize),
-    /// Mean temperature of heater k [K].
+    /// Mean temperature of heater k (K).
     Temperature(usize),
-    /// A temperature that the netlist prescribes [K].
+    /// A temperature that the netlist prescribes (K).
     Prescribed(f64),
-    /// Charge of gap g [C].
+    /// Charge of gap g (C).
     Charge(usize),
-    /// Distance left in gap g [m].
+    /// Distance left in gap g (m).
     Distance(usize),
-    /// Capacitance of gap g [F].
+    /// Capacitance of gap g (F).
     Capacitance(usize),
-    /// Force with which the voltage closes gap g [N].
+    /// Force with which the voltage closes gap g (N).
     Pull(usize),
 }
 
@@ -35,9 +35,9 @@ pub struct SignalView<'a> {
     pub q: &'a [Pose],
     /// Rates.
     pub v: &'a [Pose],
-    /// Rise of each heater [K].
+    /// Rise of each heater (K).
     pub rise: &'a [f64],
-    /// Voltage of each gap [V].
+    /// Voltage of each gap (V).
     pub volts: &'a [f64],
 }
 

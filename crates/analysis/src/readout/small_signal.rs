@@ -1,6 +1,6 @@
 //! How a small change at one source that goes as e^(st) moves a state, and what is seen of it.
 //!
-//! [`PerturbedState`] is the physics at any complex s [rad/s]: the effect of a unit input on the forces, and on the
+//! [`PerturbedState`] is the physics at any complex s (rad/s): the effect of a unit input on the forces, and on the
 //! quantities read from the motion that follows. A device asks at s = iω, an analysis of responses at poles and zeros,
 //! too.
 
@@ -19,11 +19,11 @@ pub struct PerturbedState<'a> {
     pub compiled: &'a CompiledModel,
     /// The model with the inputs among its sources.
     pub system: &'a System,
-    /// Displacements in elimination order ([m], [rad]).
+    /// Displacements in elimination order ((m), (rad)).
     pub q: &'a [Pose],
     /// Rates.
     pub v: &'a [Pose],
-    /// Temperature rise of each heater [K].
+    /// Temperature rise of each heater (K).
     pub rise: &'a [f64],
     /// Values of the sources.
     pub sources: &'a [f64],
@@ -34,11 +34,11 @@ pub struct PerturbedState<'a> {
 /// Effect of a unit input at one source on the forces, without motion.
 #[derive(Debug, Clone)]
 pub struct SourceExcitation {
-    /// Force on each body [N, N·m].
+    /// Force on each body (N, N·m).
     pub force: Vec<ComplexPose>,
-    /// Change of the voltage of each gap [V].
+    /// Change of the voltage of each gap (V).
     pub(crate) volts: Vec<f64>,
-    /// Change of the rise of each heater [K].
+    /// Change of the rise of each heater (K).
     pub(crate) rise: Vec<Complex<f64>>,
 }
 
@@ -54,7 +54,7 @@ pub(crate) enum FrequencyDependence {
 }
 
 impl FrequencyDependence {
-    /// The factor at s [rad/s].
+    /// The factor at s (rad/s).
     pub(crate) fn factor(self, s: Complex<f64>) -> Complex<f64> {
         match self {
             Self::AtOnce => Complex::from(1.0),
@@ -69,11 +69,11 @@ impl FrequencyDependence {
 pub(crate) struct Constituent {
     /// How it depends on s.
     pub(crate) law: FrequencyDependence,
-    /// Force on each body for a factor of 1 [N, N·m].
+    /// Force on each body for a factor of 1 (N, N·m).
     pub(crate) force: Vec<Pose>,
-    /// Change of the voltage of each gap [V].
+    /// Change of the voltage of each gap (V).
     pub(crate) volts: Vec<f64>,
-    /// Change of the rise of each heater [K].
+    /// Change of the rise of each heater (K).
     pub(crate) rise: Vec<f64>,
 }
 
@@ -230,7 +230,7 @@ impl PerturbedState<'_> {
         Complex::new(re, im)
     }
 
-    /// Change of the charge that each source has brought [C].
+    /// Change of the charge that each source has brought (C).
     pub fn charges(&self, sources: &[usize], moved: &ForcedMotion) -> Vec<Complex<f64>> {
         let mut charges = vec![Complex::from(0.0); sources.len()];
         for g in 0..self.drive.volts.len() {
@@ -246,7 +246,7 @@ impl PerturbedState<'_> {
         charges
     }
 
-    /// Change of the rise of a heater [K].
+    /// Change of the rise of a heater (K).
     pub fn warmed(push: &SourceExcitation, heater: usize) -> Complex<f64> {
         push.rise[heater]
     }

@@ -27,7 +27,7 @@ use bimorph_model::compile::CompiledModel;
 const REPORTED_FRACTION: f64 = 0.5;
 /// The same for methods of second order, and explicit ones, whose error falls little with the tolerance.
 const SHARE_OF_SECOND: f64 = 1.0;
-/// Reserve where the companion is hardly looser [1].
+/// Reserve where the companion is hardly looser (1).
 const RESERVE: f64 = 1.2;
 /// Times the steps of a run that one at a tenth of its tolerance takes, of the methods that are run again.
 const MORE: f64 = 2.0;
@@ -145,7 +145,7 @@ fn reported_fraction(options: &TransientOptions<'_>, method: Integrator) -> f64 
     }
 }
 
-/// Distance of the output times that are compared [s].
+/// Distance of the output times that are compared (s).
 fn spacing(options: &TransientOptions<'_>) -> f64 {
     stride(options) as f64 * options.stop / (options.points - 1) as f64
 }

@@ -7,9 +7,9 @@ use bimorph_solve::equations::bodies::FLOOR;
 
 /// Output times that are compared, at most about twice as many: evenly spaced ones of a run that has more.
 const ENOUGH: usize = 1000;
-/// Smallest amplitude of a motion with an estimate, in floors of a step's error [1].
+/// Smallest amplitude of a motion with an estimate, in floors of a step's error (1).
 const RESOLVED: f64 = 10.0;
-/// Fraction of the length scale below which an amplitude is rounding [1].
+/// Fraction of the length scale below which an amplitude is rounding (1).
 const ROUNDING: f64 = 1e-12;
 
 /// Samples that are not sent yet.

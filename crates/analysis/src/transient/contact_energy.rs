@@ -11,9 +11,9 @@ use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::forces::kinetic_energy;
 use bimorph_solve::time::method::Motion;
 
-/// Energy that may be gained, of the largest kinetic energy so far [1].
+/// Energy that may be gained, of the largest kinetic energy so far (1).
 const GAINED: f64 = 0.1;
-/// Energy that may be gained at rest, of the energy itself [1].
+/// Energy that may be gained at rest, of the energy itself (1).
 const ROUNDING: f64 = 1e-9;
 
 /// The energy of a run.
@@ -21,7 +21,7 @@ pub(super) struct ContactEnergy<'a> {
     system: &'a System,
     drive: Drive,
     start: f64,
-    /// Largest kinetic energy so far [J].
+    /// Largest kinetic energy so far (J).
     kinetic: f64,
 }
 
@@ -38,7 +38,7 @@ impl<'a> ContactEnergy<'a> {
         })
     }
 
-    /// After a step to time `t` [s]; `look` where the energy is to be compared.
+    /// After a step to time `t` (s); `look` where the energy is to be compared.
     ///
     /// # Errors
     /// [`AnalysisError::BadRequest`] where energy was gained.

@@ -76,7 +76,7 @@ pub(super) struct Crossings<'a> {
 }
 
 impl<'a> Crossings<'a> {
-    /// From the motion at the start, where the heaters are `rise` warmer [K], at the held voltages of sources and gaps [V].
+    /// From the motion at the start, where the heaters are `rise` warmer (K), at the held voltages of sources and gaps (V).
     ///
     /// # Errors
     /// See [`AnalysisError`].
@@ -95,7 +95,7 @@ impl<'a> Crossings<'a> {
         Ok(Self { compiled, ramp, volts, watched, within, rise: rise.to_vec(), until, events: Vec::new() })
     }
 
-    /// Finds the crossings in a step of length `h` from time `s`, up to one that ends the run. Returns the time of that [s].
+    /// Finds the crossings in a step of length `h` from time `s`, up to one that ends the run. Returns the time of that (s).
     pub(super) fn step(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> Option<f64> {
         let (compiled, ramp, volts) = (self.compiled, self.ramp, self.volts);
         let first = self.events.len();

@@ -13,7 +13,7 @@ use bimorph_solve::time::method::Motion;
 
 /// Ends of steps at which signals are compared, at most.
 const ENOUGH: f64 = 1000.0;
-/// Motion below this fraction of the model's length scale, or of 1 rad or 1 K, is rounding [1].
+/// Motion below this fraction of the model's length scale, or of 1 rad or 1 K, is rounding (1).
 const NEGLIGIBLE_MOTION: f64 = 1e-9;
 /// Error of a signal, of its range, from which on it is not predictable.
 const LOST: f64 = 0.3;
@@ -25,7 +25,7 @@ const CHAOTIC: f64 = 30.0;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SignalLoss {
     pub(crate) signal: String,
-    /// From when on [s].
+    /// From when on (s).
     pub(crate) t: f64,
     /// Neighbouring motions part exponentially: no tolerance helps for long.
     pub(crate) chaotic: bool,
@@ -34,7 +34,7 @@ pub(crate) struct SignalLoss {
 /// Step error of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StepErrorEstimate {
-    /// Root mean square error of the worst signal, of its amplitude [1].
+    /// Root mean square error of the worst signal, of its amplitude (1).
     pub(crate) error: f64,
     /// The first signal that is lost, if any is.
     pub(crate) lost: Option<SignalLoss>,
@@ -84,7 +84,7 @@ impl<'a> ErrorLog<'a> {
         log
     }
 
-    /// The end of a step at time `t` [s], the motion there and its error; returns whether the next one is of use.
+    /// The end of a step at time `t` (s), the motion there and its error; returns whether the next one is of use.
     pub(super) fn observe(&mut self, t: f64, motion: &Motion, error: &Motion) -> bool {
         self.touched = self.touched || self.compiled.parts.system.contact_energy(&motion.q) > 0.0;
         if self.touched {
@@ -174,7 +174,7 @@ pub(crate) fn least(unit: &str, options: &TransientOptions<'_>, model: &Compiled
     }
 }
 
-/// Scale of the currents into ports [A]: that through resistances, and all charge within the run.
+/// Scale of the currents into ports (A): that through resistances, and all charge within the run.
 fn largest_current(options: &TransientOptions<'_>, model: &CompiledModel) -> f64 {
     let Ok(sources) = source_vector(model, &options.voltages) else { return 0.0 };
     let system = &model.parts.system;

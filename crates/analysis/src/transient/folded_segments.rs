@@ -7,7 +7,7 @@ use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyId, Model};
 
-/// Angle between the ends of a folded segment, at least [rad].
+/// Angle between the ends of a folded segment, at least (rad).
 const FOLDED: f64 = 0.5;
 
 /// Addition to the message of a step that failed at `q`; empty without a folded segment.

@@ -32,21 +32,21 @@ impl std::fmt::Display for Until {
 /// Options of a transient.
 #[derive(Debug, Clone)]
 pub struct TransientOptions<'a> {
-    /// End time [s].
+    /// End time (s).
     pub stop: f64,
     /// Names of the signals wanted, see [`of_run`](crate::readout::expression::Expression::of_run).
     pub signals: Vec<String>,
     /// Number of equally spaced output times, ends included.
     pub points: usize,
-    /// Relative error of a step [1].
+    /// Relative error of a step (1).
     pub tol: f64,
-    /// Voltages held during the run, by port name [V].
+    /// Voltages held during the run, by port name (V).
     pub voltages: Vec<(String, f64)>,
     /// A variant of the same netlist whose static equilibrium is the initial state; none: at rest as drawn.
     pub release: Option<&'a CompiledModel>,
     /// Integrator.
     pub method: Integrator,
-    /// Length of equal steps [s]; none: steps follow `tol`.
+    /// Length of equal steps (s); none: steps follow `tol`.
     pub step: Option<f64>,
     /// Crossings to find: (signal name, level in the signal's unit).
     pub events: Vec<(String, f64)>,

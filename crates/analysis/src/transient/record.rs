@@ -142,7 +142,7 @@ pub(crate) fn record(
     })
 }
 
-/// Refuses the motion at time `t` [s] where parts touch and the method gains energy in contact.
+/// Refuses the motion at time `t` (s) where parts touch and the method gains energy in contact.
 fn refuse_in_contact(
     compiled: &CompiledModel,
     options: &TransientOptions<'_>,
@@ -177,7 +177,7 @@ fn lost(SignalLoss { signal, t, chaotic }: SignalLoss) -> String {
     }
 }
 
-/// Initial state of a run, temperature rises of its heaters [K], and warnings: at rest as drawn, or in the equilibrium
+/// Initial state of a run, temperature rises of its heaters (K), and warnings: at rest as drawn, or in the equilibrium
 /// of a released load.
 fn start(
     compiled: &CompiledModel,

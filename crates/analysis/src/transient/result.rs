@@ -27,7 +27,7 @@ pub struct CrossingEvent {
     pub signal: String,
     /// The level, in the signal's unit.
     pub level: f64,
-    /// When [s].
+    /// When (s).
     pub t: f64,
     /// Which way.
     pub direction: Direction,
@@ -40,9 +40,9 @@ pub struct CrossingEvent {
 pub struct Statistics {
     /// Name of the signal.
     pub signal: String,
-    /// From when [s].
+    /// From when (s).
     pub from: f64,
-    /// To when [s].
+    /// To when (s).
     pub to: f64,
     /// Mean over that time, in the signal's unit.
     pub mean: f64,
@@ -59,7 +59,7 @@ pub struct Statistics {
 /// Sampled signals.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct TransientResult {
-    /// Times [s].
+    /// Times (s).
     pub t: Vec<f64>,
     /// Samples of each signal, in the requested order: (name, unit, values).
     pub signals: Vec<(String, String, Vec<f64>)>,
@@ -67,14 +67,14 @@ pub struct TransientResult {
     pub counters: Counters,
     /// Mechanical unknowns.
     pub unknowns: usize,
-    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    /// Largest estimated relative error by the mesh (1); none without an estimate.
     pub estimated_error: Option<f64>,
-    /// Estimated root mean square error of the worst signal by the steps in time, of its amplitude [1]; none without an estimate, see
-    /// [`super::step_error`].
+    /// Estimated root mean square error of the worst signal by the steps in time, of its amplitude (1); none without an estimate, see
+    /// [`step_error`](crate::step_error).
     pub step_error: Option<f64>,
-    /// When [`super::TransientOptions::until`] ended the run [s].
+    /// When [`super::TransientOptions::until`] ended the run (s).
     pub stopped_at: Option<f64>,
-    /// Time up to which the tolerance holds [s]; none: to the end. See [`super::super::after_contact`].
+    /// Time up to which the tolerance holds (s); none: to the end. See [`super::super::after_contact`].
     pub reliable_until: Option<f64>,
     /// Statistics of each signal after that.
     pub after_contact: Vec<Statistics>,

@@ -23,7 +23,7 @@ pub(super) struct SampleRecorder<'a> {
     now: Motion,
     rise: Vec<f64>,
     row: Vec<f64>,
-    /// Times that were kept [s].
+    /// Times that were kept (s).
     pub(super) t: Vec<f64>,
     /// Values that were kept, signal by signal.
     pub(super) columns: Vec<Vec<f64>>,
@@ -59,7 +59,7 @@ impl<'a> SampleRecorder<'a> {
         samples
     }
 
-    /// Takes the samples that fall into a step of length `h` from time `s`, those after `end` [s] not.
+    /// Takes the samples that fall into a step of length `h` from time `s`, those after `end` (s) not.
     pub(super) fn step(&mut self, s: f64, h: f64, before: &Motion, after: &Motion, end: f64) {
         let mut now = std::mem::take(&mut self.now);
         while self.next < self.options.points {

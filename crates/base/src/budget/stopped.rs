@@ -16,15 +16,15 @@ pub enum Stopped {
     /// It used up its processor time.
     #[error("processor time: at most {seconds} s")]
     Cpu {
-        /// The time limit [s].
+        /// The time limit (s).
         seconds: u64,
     },
     /// It would lay out more than it may.
     #[error("memory: at most {most} bytes, needs at least {needed}")]
     Bytes {
-        /// The limit [byte].
+        /// The limit (byte).
         most: usize,
-        /// The required memory [byte].
+        /// The required memory (byte).
         needed: usize,
     },
     /// All computations of its owner would lay out more at once than they may.
@@ -32,11 +32,11 @@ pub enum Stopped {
         "client_bytes: at most {most} bytes at once in all computations of one client, {used} used, {more} more requested"
     )]
     OwnerBytes {
-        /// The quota [byte].
+        /// The quota (byte).
         most: usize,
-        /// Memory in use [byte].
+        /// Memory in use (byte).
         used: usize,
-        /// Memory that this computation requires in addition [byte].
+        /// Memory that this computation requires in addition (byte).
         more: usize,
     },
     /// All computations of its owner used up their processor time.

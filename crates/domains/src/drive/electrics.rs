@@ -10,15 +10,15 @@ use nalgebra::DMatrix;
 /// Electrical and thermal state that acts on a mechanism at one instant, or its change.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Drive {
-    /// Voltage of each gap [V].
+    /// Voltage of each gap (V).
     pub volts: Vec<f64>,
-    /// Free strain α·T̄ of each heated beam [1].
+    /// Free strain α·T̄ of each heated beam (1).
     pub expansion: Vec<f64>,
-    /// Fraction of the dead loads and built-in strains that acts [1].
+    /// Fraction of the dead loads and built-in strains that acts (1).
     pub load: f64,
     /// Value of each input in its own unit, in the order of [`Electrics::inputs`].
     pub inputs: Vec<f64>,
-    /// Rate of change of the frame's rate [rad/s²].
+    /// Rate of change of the frame's rate (rad/s²).
     pub turning: f64,
     /// Force and moment on each body, as thermal agitation gives them; empty: none.
     pub push: Vec<Pose>,
@@ -51,13 +51,13 @@ impl Drive {
 pub struct Electrics {
     /// Number of ports.
     pub ports: usize,
-    /// Voltages of the netlist's own sources [V].
+    /// Voltages of the netlist's own sources (V).
     pub fixed: Vec<f64>,
     /// Names of all sources, ports first.
     pub names: Vec<String>,
     /// ∂gap voltage/∂u, gaps × sources.
     pub gap_rows: DMatrix<f64>,
-    /// ∂port current/∂u, ports × sources [S].
+    /// ∂port current/∂u, ports × sources (S).
     pub conductance: DMatrix<f64>,
     /// Heated beams.
     pub heating: Heating,
@@ -114,7 +114,7 @@ impl Electrics {
         u[self.voltages()..].fill(0.0);
     }
 
-    /// The drive at source voltages `u` when every heater is at its steady rise, which goes to `rise` [K].
+    /// The drive at source voltages `u` when every heater is at its steady rise, which goes to `rise` (K).
     #[inline]
     pub fn steady(&self, u: &[f64], rise: &mut [f64], drive: &mut Drive) {
         for (k, rise) in rise.iter_mut().enumerate() {
@@ -123,7 +123,7 @@ impl Electrics {
         self.apply(u, rise, drive);
     }
 
-    /// The drive at source voltages `u` and temperature rises `rise` [K].
+    /// The drive at source voltages `u` and temperature rises `rise` (K).
     #[inline]
     pub fn apply(&self, u: &[f64], rise: &[f64], drive: &mut Drive) {
         self.gap_volts(u, &mut drive.volts);
@@ -146,8 +146,8 @@ impl Electrics {
         (slope.load, slope.turning) = (0.0, 0.0);
     }
 
-    /// Of each heater the coefficients of its steady rise in the time [s] since the sources began to go `from` one value `to` another
-    /// [V] in `dt` [s]: K, K/s, K/s².
+    /// Of each heater the coefficients of its steady rise in the time (s) since the sources began to go `from` one value `to` another
+    /// (V) in `dt` (s): K, K/s, K/s².
     pub(super) fn heat_course(&self, (from, to): (&[f64], &[f64]), dt: f64) -> Vec<[f64; 3]> {
         let course = |k: usize| {
             let [a, b, c] = self.heating.between(k, from, to);
@@ -173,8 +173,8 @@ impl Electrics {
         (0..voltages).map(|j| self.heating.entry(k, port, j) * u[j]).sum()
     }
 
-    /// The change of the rise of each heater with the final voltage of source `port` [K/V], `s` after the sources began to go `from` one
-    /// value `to` another in `dt` [s].
+    /// The change of the rise of each heater with the final voltage of source `port` (K/V), `s` after the sources began to go `from` one
+    /// value `to` another in `dt` (s).
     pub fn rise_sensitivities(
         &self,
         way: (&[f64], &[f64]),

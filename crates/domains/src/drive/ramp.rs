@@ -11,13 +11,13 @@ use bimorph_multibody::planar::Pose;
 pub struct Ramp<'a> {
     /// The electrical side.
     pub electrics: &'a Electrics,
-    /// Source voltages at the start [V].
+    /// Source voltages at the start (V).
     pub from: &'a [f64],
-    /// Source voltages at the end [V].
+    /// Source voltages at the end (V).
     pub to: &'a [f64],
-    /// Rise of each heater at the start [K].
+    /// Rise of each heater at the start (K).
     pub rise: &'a [f64],
-    /// Length of the step [s].
+    /// Length of the step (s).
     pub dt: f64,
     /// Force and moment on each body throughout the step; empty: none.
     pub push: &'a [Pose],
@@ -26,7 +26,7 @@ pub struct Ramp<'a> {
 }
 
 impl<'a> Ramp<'a> {
-    /// Sources that go `from` one value `to` another [V] in `dt` [s], with heaters at `rise` [K] before.
+    /// Sources that go `from` one value `to` another (V) in `dt` (s), with heaters at `rise` (K) before.
     #[inline]
     pub fn new(electrics: &'a Electrics, from: &'a [f64], to: &'a [f64], rise: &'a [f64], dt: f64) -> Self {
         Self { electrics, from, to, rise, dt, push: &[], heat: electrics.heat_course((from, to), dt) }
@@ -38,13 +38,13 @@ impl<'a> Ramp<'a> {
         Self { push, ..self }
     }
 
-    /// Rise of heater `k` that the sources at the start lead to [K].
+    /// Rise of heater `k` that the sources at the start lead to (K).
     #[inline]
     pub fn steady_at_start(&self, k: usize) -> f64 {
         self.heat[k][0]
     }
 
-    /// Rise of heater `k` at time `s` after the start [K].
+    /// Rise of heater `k` at time `s` after the start (K).
     #[inline]
     pub fn rise_at(&self, k: usize, s: f64) -> f64 {
         self.rise_after(k, &mut Lags::new(s))
@@ -68,7 +68,7 @@ impl<'a> Ramp<'a> {
         }
     }
 
-    /// Their rates of change in time [1/s].
+    /// Their rates of change in time (1/s).
     #[inline]
     pub fn expansion_rates(&self, lags: &mut Lags, mut put: impl FnMut(usize, f64)) {
         let s = lags.t;
@@ -89,7 +89,7 @@ impl<'a> Ramp<'a> {
         self.set(&mut Lags::new(s), drive);
     }
 
-    /// The drive at time `s`, and its rate of change in time [1/s].
+    /// The drive at time `s`, and its rate of change in time (1/s).
     #[inline]
     pub fn at_and_rate(&self, s: f64, drive: &mut Drive, rate: &mut Drive) {
         let mut lags = Lags::new(s);
@@ -153,7 +153,7 @@ impl<'a> Ramp<'a> {
         Some(self.electrics.inputs[k])
     }
 
-    /// The change of [`Ramp::rate`] at time `s` with the final voltage of source `port`.
+    /// The change of [`Ramp::at_and_rate`] at time `s` with the final voltage of source `port`.
     pub fn rate_sensitivity(&self, s: f64, port: usize, out: &mut Drive) {
         for (g, v) in out.volts.iter_mut().enumerate() {
             *v = self.electrics.gap_rows[(g, port)] / self.dt;

@@ -13,9 +13,9 @@ pub struct Coordinate {
     pub(super) body: usize,
     /// Direction as drawn.
     pub direction: Vector2<f64>,
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f64,
-    /// Scale of its rate [rad/s]: that many micrometres per second are 1 V.
+    /// Scale of its rate (rad/s): that many micrometres per second are 1 V.
     pub omega: f64,
 }
 
@@ -24,22 +24,22 @@ pub struct Coordinate {
 pub struct LumpedGap {
     /// Its name.
     pub name: String,
-    /// n: approach per coordinate [1].
+    /// n: approach per coordinate (1).
     pub along: DVector<f64>,
     /// Force law of the gap.
     pub law: Law,
-    /// χ of its contact [s/m]; 0: elastic, or none.
+    /// χ of its contact (s/m); 0: elastic, or none.
     pub loss: f64,
-    /// Voltage per voltage of each port [1].
+    /// Voltage per voltage of each port (1).
     pub by_port: DVector<f64>,
-    /// Voltage by the netlist's own sources [V].
+    /// Voltage by the netlist's own sources (V).
     pub constant: f64,
 }
 
 /// Output of a port or signal.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LumpedOutput {
-    /// Current of an electrical port: conductance to each port [S], and what the netlist's own sources drive [A].
+    /// Current of an electrical port: conductance to each port (S), and what the netlist's own sources drive (A).
     Current(DVector<f64>, f64),
     /// A displacement, per coordinate.
     Place(DVector<f64>),
@@ -51,7 +51,7 @@ pub enum LumpedOutput {
     Capacitance(usize),
     /// Force of a gap's voltage.
     Pull(usize),
-    /// Distance left in a gap: at rest [m], and its sign with the approach.
+    /// Distance left in a gap: at rest (m), and its sign with the approach.
     Distance(usize, f64, f64),
     /// A constant.
     Constant(f64),
@@ -68,13 +68,13 @@ pub struct LumpedModel {
     pub signals: Vec<SignalShown>,
     /// Coordinates.
     pub coordinates: Vec<Coordinate>,
-    /// C [N·s/m].
+    /// C (N·s/m).
     pub damping: DMatrix<f64>,
-    /// K [N/m].
+    /// K (N/m).
     pub stiffness: DMatrix<f64>,
-    /// f₀: dead loads and built-in strain [N].
+    /// f₀: dead loads and built-in strain (N).
     pub load: DVector<f64>,
-    /// Force per unit of what is given to each port, coordinates × ports [N per N, kg].
+    /// Force per unit of what is given to each port, coordinates × ports (N per N, kg).
     pub push: DMatrix<f64>,
     /// Gaps.
     pub gaps: Vec<LumpedGap>,

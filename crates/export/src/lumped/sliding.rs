@@ -11,9 +11,9 @@ use nalgebra::{DMatrix, DVector, Vector2};
 
 /// Most coordinates of a lumped mechanism.
 const MAX_COORDINATES: usize = 24;
-/// Scale of the rate of a part without a spring [rad/s].
+/// Scale of the rate of a part without a spring (rad/s).
 pub(super) const FREE_RATE: f64 = 1e5;
-/// Fraction of a spring's force that may be beside a straight line [1].
+/// Fraction of a spring's force that may be beside a straight line (1).
 const STRAIGHT: f64 = 1e-9;
 
 /// x or y.
@@ -59,7 +59,7 @@ pub(super) fn coordinates(system: &System) -> Result<Vec<Coordinate>, ExportErro
     }
 }
 
-/// C over the coordinates [N·s/m].
+/// C over the coordinates (N·s/m).
 pub(super) fn dampers(system: &System, coordinates: &[Coordinate]) -> DMatrix<f64> {
     let n = coordinates.len();
     let mut drag = vec![Pose::zeros(); system.bodies()];
@@ -74,7 +74,7 @@ pub(super) fn dampers(system: &System, coordinates: &[Coordinate]) -> DMatrix<f6
     damping
 }
 
-/// How far a point goes along an axis with each coordinate [1].
+/// How far a point goes along an axis with each coordinate (1).
 pub(super) fn along(coordinates: &[Coordinate], point: &MaterialPoint, axis: Vector2<f64>) -> DVector<f64> {
     let of = |c: &Coordinate| if point.body == BodyId::Free(c.body) { c.direction.dot(&axis) } else { 0.0 };
     DVector::from_iterator(coordinates.len(), coordinates.iter().map(of))

@@ -15,7 +15,7 @@ const OPTION: &str = "option.";
 /// One axis of the grid, or of several that go together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepParameter {
-    /// A netlist parameter; a port with `.v` behind it: its voltage [V]; an option of the model with `option.` before it.
+    /// A netlist parameter; a port with `.v` behind it: its voltage (V); an option of the model with `option.` before it.
     pub name: String,
     /// The values it takes, in order. SI.
     pub values: Values,

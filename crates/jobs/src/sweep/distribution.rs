@@ -26,7 +26,7 @@ pub enum Distribution {
     LogNormal {
         /// Median, positive.
         median: f64,
-        /// Standard deviation of ln x [1], about the relative one of x where it is small.
+        /// Standard deviation of ln x (1), about the relative one of x where it is small.
         deviation: f64,
     },
 }

@@ -28,7 +28,7 @@ pub enum SweepError {
     /// The table would take more memory than the sweep may use.
     #[error("the table needs more than {most} bytes; name the outputs that are wanted, or split the sweep into shards")]
     TooLarge {
-        /// The limit [byte].
+        /// The limit (byte).
         most: usize,
     },
     /// The quota of its owner is used up.

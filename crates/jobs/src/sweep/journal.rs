@@ -25,7 +25,7 @@ pub struct JournalRow {
     pub point: usize,
     /// Name, unit and value; no value where the quantity does not exist at this point.
     pub values: Vec<(String, String, Option<f64>)>,
-    /// Largest estimated relative error by the mesh [1].
+    /// Largest estimated relative error by the mesh (1).
     pub estimated_error: Option<f64>,
     /// Why the numbers may be further off than the tolerance.
     pub warning: String,

@@ -42,7 +42,7 @@ pub(super) struct PointOutcome {
 /// The results of a point.
 pub(super) struct PointResults {
     pub(super) values: Vec<PointValue>,
-    /// Largest estimated relative error by the mesh [1].
+    /// Largest estimated relative error by the mesh (1).
     pub(super) estimated_error: Option<f64>,
     /// Code and message; empty without one.
     pub(super) warning: String,

@@ -31,33 +31,33 @@ pub struct SweepSpec {
 pub enum SweepAnalysis {
     /// Static equilibrium.
     Static {
-        /// Columns wanted: `NODE.x` [m], `NODE.y` [m], `NODE.rz` [rad], `PORT.i` [A], `PORT.q` [C], `BEAM.T` [K];
+        /// Columns wanted: `NODE.x` (m), `NODE.y` (m), `NODE.rz` (rad), `PORT.i` (A), `PORT.q` (C), `BEAM.T` (K);
         /// empty: x, y and rz of every node.
         outputs: Vec<String>,
-        /// Port voltages by name [V].
+        /// Port voltages by name (V).
         voltages: Vec<(String, f64)>,
     },
-    /// Natural frequencies [Hz].
+    /// Natural frequencies (Hz).
     Modes {
         /// How many, from the lowest.
         count: usize,
-        /// Port voltages of the operating point by name [V].
+        /// Port voltages of the operating point by name (V).
         voltages: Vec<(String, f64)>,
     },
-    /// Pull-in and release voltages [V].
+    /// Pull-in and release voltages (V).
     PullIn {
         /// Port or netlist source to raise; none: the first.
         port: Option<String>,
-        /// Highest voltage tried [V].
+        /// Highest voltage tried (V).
         max: f64,
     },
     /// Motion from rest, by Rodas4: signals at its end.
     Transient {
-        /// End time [s].
+        /// End time (s).
         stop: f64,
-        /// Columns wanted, as signals of a transient: `NODE.x` [m], `NODE.vx` [m/s], `BEAM.T` [K], `GAP.gap` [m], `PORT.i` [A], ….
+        /// Columns wanted, as signals of a transient: `NODE.x` (m), `NODE.vx` (m/s), `BEAM.T` (K), `GAP.gap` (m), `PORT.i` (A), ….
         outputs: Vec<String>,
-        /// Port voltages held during the run, by name [V].
+        /// Port voltages held during the run, by name (V).
         voltages: Vec<(String, f64)>,
     },
 }

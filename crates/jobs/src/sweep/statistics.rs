@@ -110,12 +110,12 @@ pub struct Fraction {
 }
 
 impl Fraction {
-    /// `passed / points` [1]; 0 without points.
+    /// `passed / points` (1); 0 without points.
     pub fn value(self) -> f64 {
         self.passed as f64 / self.points.max(1) as f64
     }
 
-    /// 95 % confidence interval of the fraction, where the points are independent random samples [1].
+    /// 95 % confidence interval of the fraction, where the points are independent random samples (1).
     pub fn interval(self) -> [f64; 2] {
         if self.points == 0 {
             return [0.0, 1.0];

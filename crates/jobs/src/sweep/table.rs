@@ -27,7 +27,7 @@ pub struct SweepRow {
     pub parameters: Vec<Setting>,
     /// One per result column, none where the quantity does not exist at this point; or why the point has no result.
     pub values: Result<Vec<Option<f64>>, String>,
-    /// Largest estimated relative error by the mesh [1]; none without an estimate, and for a point without a result.
+    /// Largest estimated relative error by the mesh (1); none without an estimate, and for a point without a result.
     pub estimated_error: Option<f64>,
     /// Why the numbers may be further off than the tolerance: code and message; empty where they are not.
     pub warning: String,

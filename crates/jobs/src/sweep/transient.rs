@@ -49,7 +49,7 @@ struct SweepMesh {
 /// Step tolerance of a run, and its estimated error.
 #[derive(Debug, Clone, Copy)]
 struct Steps {
-    /// Their tolerance [1].
+    /// Their tolerance (1).
     tol: f64,
     /// As a fraction of the amplitude; none: not compared.
     error: Option<f64>,

@@ -8,7 +8,7 @@ use crate::drawing::{FlatLayout, Polygon};
 use crate::process::{self, StructuralLayer};
 use crate::regions;
 
-/// A pad is at least this much wider than its limb [1].
+/// A pad is at least this much wider than its limb (1).
 const PAD: f64 = 1.5;
 
 /// Rule that decides which parts are held.

@@ -7,9 +7,9 @@ use std::f64::consts::PI;
 const MIN_BEAMS: usize = 4;
 /// Nodes may lie off the circle by so many database units, and this fraction of the width.
 const OFF: [f64; 2] = [3.0, 0.02];
-/// Largest change of the width along an arc [1].
+/// Largest change of the width along an arc (1).
 const SWELL: f64 = 0.02;
-/// Largest angle of one arc [rad].
+/// Largest angle of one arc (rad).
 const LARGEST: f64 = PI;
 /// Widths of beams at an angle to the grid are one when they differ by less than this many database units.
 const ROUNDING: f64 = 2.0;

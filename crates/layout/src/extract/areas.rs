@@ -28,7 +28,7 @@ pub(super) struct AreaIndex {
 }
 
 impl AreaIndex {
-    /// Of polygons [database units], in their order. Cost: n log n.
+    /// Of polygons (database units), in their order. Cost: n log n.
     pub(super) fn of<'a>(polygons: impl IntoIterator<Item = &'a Polygon>) -> Self {
         let (mut edges, mut extents) = (Vec::new(), Vec::new());
         for (of, polygon) in polygons.into_iter().enumerate() {

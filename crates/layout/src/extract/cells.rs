@@ -5,7 +5,7 @@ use super::boxes::{self, Boxes};
 use super::joints::LimbGraph;
 use super::medial::Medial;
 
-/// A place on the edge of a part may lie this far outside [database units].
+/// A place on the edge of a part may lie this far outside (database units).
 const EDGE_TOLERANCE: f64 = 4.0;
 
 /// Where something pulls.

@@ -11,13 +11,13 @@ use crate::drawing::{GridPoint, Polygon};
 use bimorph_base::budget;
 use bimorph_base::sets::Sets;
 
-/// Length over width of the shortest finger [1].
+/// Length over width of the shortest finger (1).
 const SLENDER: f64 = 1.5;
-/// Widest gap between fingers, in widths of the wider one [1].
+/// Widest gap between fingers, in widths of the wider one (1).
 const WIDEST_GAP: f64 = 6.0;
 /// Cosine of the angle between opposite fingers.
 const OPPOSITE: f64 = -0.9998;
-/// Gaps and overlaps of one comb differ by less than this [database units].
+/// Gaps and overlaps of one comb differ by less than this (database units).
 const ALIKE: f64 = 3.0;
 
 /// A limb with a free end, in coordinates of the drawing.

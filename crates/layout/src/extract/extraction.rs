@@ -35,7 +35,7 @@ pub struct Extraction {
     pub live: Vec<usize>,
     /// Where cells stand in the drawing.
     pub cells: Vec<Placement>,
-    /// Size of a database unit [m].
+    /// Size of a database unit (m).
     pub unit: f64,
     /// Comb drives.
     pub combs: Vec<ExtractedComb>,
@@ -54,22 +54,22 @@ pub struct Extraction {
 pub struct LayerResult {
     /// Name of the netlist's `process`.
     pub name: String,
-    /// Thickness [m].
+    /// Thickness (m).
     pub thickness: f64,
     /// Constants under the names that netlists have, SI.
     pub material: Vec<(String, f64)>,
-    /// Area of the union of its polygons [m²].
+    /// Area of the union of its polygons (m²).
     pub drawn: f64,
-    /// Area of slits between polygons drawn edge to edge, less than two grid units wide, that were closed [m²]; it and `drawn`
+    /// Area of slits between polygons drawn edge to edge, less than two grid units wide, that were closed (m²); it and `drawn`
     /// together are the sum of the three that follow.
     pub closed: f64,
-    /// Area of beams and bodies [m²].
+    /// Area of beams and bodies (m²).
     pub extracted: f64,
-    /// Area that is held [m²].
+    /// Area that is held (m²).
     pub anchored: f64,
-    /// Area that is in neither [m²].
+    /// Area that is in neither (m²).
     pub unrecognised: f64,
-    /// Number of etch holes that were filled, and their area [m²]; it is no part of `drawn`.
+    /// Number of etch holes that were filled, and their area (m²); it is no part of `drawn`.
     pub holes: (usize, f64),
     /// Number of connected parts.
     pub parts: usize,
@@ -80,9 +80,9 @@ pub struct LayerResult {
 pub struct ExtractedNode {
     /// Its name.
     pub name: String,
-    /// Its place [m].
+    /// Its place (m).
     pub at: [f64; 2],
-    /// How far from it a label may stand that names it [m].
+    /// How far from it a label may stand that names it (m).
     pub reach: f64,
     /// A label of the drawing names it.
     pub labelled: bool,
@@ -99,7 +99,7 @@ pub struct ExtractedPad {
     pub layer: usize,
     /// Number of the part that it belongs to.
     pub part: usize,
-    /// Outlines of what it consists of [database units].
+    /// Outlines of what it consists of (database units).
     pub outlines: Vec<Vec<[f64; 2]>>,
 }
 
@@ -121,9 +121,9 @@ pub struct ExtractedBeam {
     pub layer: usize,
     /// Nodes at its start and end.
     pub nodes: [usize; 2],
-    /// Width at both [m].
+    /// Width at both (m).
     pub width: [f64; 2],
-    /// Fraction of its area that etch holes take [1].
+    /// Fraction of its area that etch holes take (1).
     pub porosity: f64,
 }
 
@@ -134,11 +134,11 @@ pub struct Arc {
     pub layer: usize,
     /// Nodes at its start and end.
     pub nodes: [usize; 2],
-    /// Its angle from start to end [rad], positive to its left.
+    /// Its angle from start to end (rad), positive to its left.
     pub angle: f64,
-    /// Width [m].
+    /// Width (m).
     pub width: f64,
-    /// Fraction of its area that etch holes take [1].
+    /// Fraction of its area that etch holes take (1).
     pub porosity: f64,
 }
 
@@ -149,9 +149,9 @@ pub struct ExtractedBody {
     pub layer: usize,
     /// Node at its centroid.
     pub node: usize,
-    /// Area [m²].
+    /// Area (m²).
     pub area: f64,
-    /// Polar second moment of the area about the centroid [m⁴].
+    /// Polar second moment of the area about the centroid (m⁴).
     pub polar: f64,
 }
 
@@ -162,7 +162,7 @@ pub struct ExtractedRoot {
     pub nodes: [usize; 2],
     /// Direction of the limb.
     pub along: [f64; 2],
-    /// Stiffness along the limb and across it [N/m].
+    /// Stiffness along the limb and across it (N/m).
     pub shift: f64,
     /// Stiffness against turning [N m/rad].
     pub turn: f64,
@@ -179,9 +179,9 @@ pub struct ExtractedComb {
     pub gaps: usize,
     /// Number of fingers of both sides.
     pub fingers: [usize; 2],
-    /// Gap [m].
+    /// Gap (m).
     pub gap: f64,
-    /// Overlap as drawn [m].
+    /// Overlap as drawn (m).
     pub overlap: f64,
 }
 
@@ -192,9 +192,9 @@ pub struct Plates {
     pub layer: usize,
     /// Nodes on both sides, across the gap.
     pub nodes: [usize; 2],
-    /// Area [m²].
+    /// Area (m²).
     pub area: f64,
-    /// Gap [m].
+    /// Gap (m).
     pub gap: f64,
 }
 
@@ -205,9 +205,9 @@ pub struct ExtractedFacing {
     pub layer: usize,
     /// Nodes along the beam, and those across the gap, to the right of the way from the first to the second.
     pub nodes: [usize; 4],
-    /// Widths of the two [m].
+    /// Widths of the two (m).
     pub width: [f64; 2],
-    /// Gap [m].
+    /// Gap (m).
     pub gap: f64,
 }
 
@@ -216,11 +216,11 @@ pub struct ExtractedFacing {
 pub struct UnmodelledArea {
     /// The drawn layer, or the name of one that moves.
     pub layer: String,
-    /// Its area [m²].
+    /// Its area (m²).
     pub area: f64,
-    /// A point in it or near it [m].
+    /// A point in it or near it (m).
     pub at: [f64; 2],
-    /// Its polygons [database units].
+    /// Its polygons (database units).
     pub polygons: Vec<Polygon>,
     /// Why.
     pub why: String,

@@ -20,7 +20,7 @@ pub(super) struct ExtractionSink<'a> {
     /// Number of the layer's first part.
     pub(super) first: usize,
     pub(super) unit: f64,
-    /// Young's modulus times thickness [N/m]; none: the material has no modulus.
+    /// Young's modulus times thickness (N/m); none: the material has no modulus.
     pub(super) rigidity: Option<f64>,
 }
 

@@ -12,9 +12,9 @@ use super::part::Part;
 use bimorph_base::budget;
 use std::collections::BTreeMap;
 
-/// Widest gap [m].
+/// Widest gap (m).
 pub(super) const WIDEST: f64 = 10e-6;
-/// Least length over gap [1].
+/// Least length over gap (1).
 const SLENDER: f64 = 3.0;
 /// Sine of the angle between faces.
 const PARALLEL: f64 = 0.01;

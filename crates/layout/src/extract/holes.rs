@@ -10,10 +10,10 @@ use super::boxes::{self, Extent};
 use crate::drawing::{GridPoint, Polygon, twice_area};
 use std::f64::consts::SQRT_2;
 
-/// Least fraction of the smallest rectangle around it that a hole fills, less what rounding of its corners to the grid takes [1].
+/// Least fraction of the smallest rectangle around it that a hole fills, less what rounding of its corners to the grid takes (1).
 const COMPACT: f64 = 0.5 - 1e-3;
 
-/// By how much rounding of its corners may lengthen a side [database units].
+/// By how much rounding of its corners may lengthen a side (database units).
 const ROUNDED: f64 = 1.5;
 
 /// An etch hole.
@@ -21,7 +21,7 @@ const ROUNDED: f64 = 1.5;
 pub(super) struct Hole {
     /// Its outline, in coordinates of the drawing.
     pub(super) outline: Vec<[f64; 2]>,
-    /// Its area [square database units]: exact.
+    /// Its area (square database units): exact.
     pub(super) area: f64,
 }
 
@@ -106,7 +106,7 @@ fn smallest_rectangle(mut points: Vec<GridPoint>) -> [f64; 2] {
     least
 }
 
-/// Stiffness of a strip with a fraction of holes, over that of a solid one [1].
+/// Stiffness of a strip with a fraction of holes, over that of a solid one (1).
 pub(super) fn stiffness(porosity: f64) -> f64 {
     let s = porosity.clamp(0.0, 0.99).sqrt();
     (1.0 - s) / (1.0 - s + s * s)

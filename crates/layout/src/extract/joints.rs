@@ -15,13 +15,13 @@ use super::skeleton::Skeleton;
 
 /// How far axes may miss their node: grid units, and share of the widest limb.
 const MISS: [f64; 2] = [3.0, 0.03];
-/// Area of a joint over that of the limbs led up to the node [1].
+/// Area of a joint over that of the limbs led up to the node (1).
 const FULL: f64 = 1.35;
-/// How far a limb may be led on to its node or to a body's edge, in widths [1].
+/// How far a limb may be led on to its node or to a body's edge, in widths (1).
 const REACH: f64 = 6.0;
-/// A joint between nodes on a bar shorter than this fraction of the bar's width is rigid [1].
+/// A joint between nodes on a bar shorter than this fraction of the bar's width is rigid (1).
 const STOUT: f64 = 0.5;
-/// Sine of an angle below which axes run in line [1].
+/// Sine of an angle below which axes run in line (1).
 const IN_LINE: f64 = 0.02;
 
 /// One end of a limb at a joint.
@@ -43,7 +43,7 @@ pub(super) struct LimbJoint {
     pub(super) edges: Vec<u32>,
     /// Model element of the joint.
     pub(super) kind: JointRole,
-    /// Of a body whose edge is elastic, for each port, its compliance: shift [1], turn [1/square database unit]; none: it is rigid there.
+    /// Of a body whose edge is elastic, for each port, its compliance: shift (1), turn [1/square database unit]; none: it is rigid there.
     pub(super) roots: Vec<Option<[f64; 2]>>,
 }
 

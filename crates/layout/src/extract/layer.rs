@@ -26,7 +26,7 @@ use std::sync::Arc;
 /// Bytes for each point of a layer while its axis is made.
 const BYTES_PER_POINT: usize = 1200;
 
-/// By what fraction of a part its pieces may miss its area [1].
+/// By what fraction of a part its pieces may miss its area (1).
 const BALANCE: f64 = 1e-9;
 
 /// Cached analyses of shapes, since a drawing repeats them.

@@ -8,17 +8,17 @@ use super::medial::BoundarySite;
 use super::moments::Moments;
 use super::skeleton::Skeleton;
 
-/// Largest change of half the width along a strip [1].
+/// Largest change of half the width along a strip (1).
 const TAPER: f64 = 0.15;
-/// Length over width from which a strip between two joints is a limb [1].
+/// Length over width from which a strip between two joints is a limb (1).
 const CONNECTING: f64 = 0.75;
-/// The same for one that ends freely [1].
+/// The same for one that ends freely (1).
 const ENDING: f64 = 1.0;
 /// Pieces of one line may lie off it by this many database units, which rounding to the grid does, and this fraction of the width.
 const OFF: [f64; 2] = [2.0, 2e-3];
-/// Largest turn between two pieces of a curve [rad].
+/// Largest turn between two pieces of a curve (rad).
 const BEND: f64 = 0.55;
-/// Largest change of the width between two pieces of a curve [1].
+/// Largest change of the width between two pieces of a curve (1).
 const SWELL: f64 = 0.1;
 
 /// A straight strip.

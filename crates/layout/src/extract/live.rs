@@ -6,7 +6,7 @@
 
 use super::{ExtractedBeam, ExtractedNode, Extraction, LayerResult};
 
-/// Relative change of the width up to which a beam counts as uniform [1]: the effect of rounding to the grid.
+/// Relative change of the width up to which a beam counts as uniform (1): the effect of rounding to the grid.
 const UNIFORM: f64 = 5e-3;
 
 /// Pieces of a taper that carries current.

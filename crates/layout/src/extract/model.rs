@@ -8,7 +8,7 @@ use super::joints::{self, JointRole, LimbGraph};
 use super::medial::Medial;
 use super::moments::Moments;
 
-/// More than this fraction of a limb is no rounding [1].
+/// More than this fraction of a limb is no rounding (1).
 const ROUNDED: f64 = 1e-2;
 
 /// The model of one part, in database units of the drawing.
@@ -49,7 +49,7 @@ pub(super) struct PartBeam {
     pub(super) a: usize,
     pub(super) b: usize,
     pub(super) width: [f64; 2],
-    /// Fraction of its area that holes take [1].
+    /// Fraction of its area that holes take (1).
     pub(super) porosity: f64,
 }
 
@@ -59,7 +59,7 @@ pub(super) struct PartRoot {
     pub(super) nodes: [usize; 2],
     /// Direction of the limb.
     pub(super) along: [f64; 2],
-    /// Compliance, times Young's modulus and thickness: shift [1], turn [1/square database unit].
+    /// Compliance, times Young's modulus and thickness: shift (1), turn [1/square database unit].
     pub(super) compliance: [f64; 2],
 }
 

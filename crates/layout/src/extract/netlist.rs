@@ -22,7 +22,7 @@ pub struct WrittenNetlist {
     pub text: String,
     /// Full name of each node of the extraction in it.
     pub names: Vec<String>,
-    /// For lines that are elements or materials, from 1: the layer, and the middle of the nodes in the drawing [m].
+    /// For lines that are elements or materials, from 1: the layer, and the middle of the nodes in the drawing (m).
     pub places: BTreeMap<usize, (String, [f64; 2])>,
 }
 
@@ -110,7 +110,7 @@ struct LineMark {
     /// Byte of the netlist.
     at: usize,
     layer: String,
-    /// Place in the drawing [m].
+    /// Place in the drawing (m).
     place: [f64; 2],
 }
 

@@ -20,30 +20,30 @@ use super::skeleton::Skeleton;
 use bimorph_base::sets::Sets;
 use std::f64::consts::FRAC_PI_2;
 
-/// Ratio of the stiffness of a plate's limbs, in series, to that of each supporting limb [1].
+/// Ratio of the stiffness of a plate's limbs, in series, to that of each supporting limb (1).
 const STIFF: f64 = 30.0;
-/// Compliance of a free plate bent by its inertia, over four times that of its limbs as a cantilever [1]: 5/384 over
+/// Compliance of a free plate bent by its inertia, over four times that of its limbs as a cantilever (1): 5/384 over
 /// 1/3.
 const BENT: f64 = 0.16;
-/// Limbs of one plate are given up together down to this fraction of the most compliant one [1].
+/// Limbs of one plate are given up together down to this fraction of the most compliant one (1).
 const ALIKE: f64 = 0.5;
 
-/// Extra length of a limb from the rotation of an elastic edge under a moment, in limb widths [1]. With the traction of
+/// Extra length of a limb from the rotation of an elastic edge under a moment, in limb widths (1). With the traction of
 /// a long beam on a half-plane in plane stress, the edge rotates by 16.67·M/(π·E·w²) (W. J. O'Donnell, J. Appl. Mech.
 /// 27, 1960), the limb by 12·M/(E·w³) per length.
 const ROOT: f64 = 0.44;
-/// Contribution of the holes to that rotation, times E·w²·thickness [1]: fitted, as [`FLUSH`] and [`FAR`], to plane
+/// Contribution of the holes to that rotation, times E·w²·thickness (1): fitted, as [`FLUSH`] and [`FAR`], to plane
 /// stress of the plates that `scripts/random-plates` draws.
 const TURN: f64 = 0.37;
-/// Relative excess of an edge's compliance at a corner [1], and its range, in widths of the limb [1].
+/// Relative excess of an edge's compliance at a corner (1), and its range, in widths of the limb (1).
 const FLUSH: [f64; 2] = [1.1, 0.25];
-/// Shift of a half-plane under an even pressure on a width w, times π·E/2 over the pressure times w: ln(D/w) and this [1], for a plate of
+/// Shift of a half-plane under an even pressure on a width w, times π·E/2 over the pressure times w: ln(D/w) and this (1), for a plate of
 /// area D² (S. Timoshenko, J. N. Goodier, Theory of Elasticity, §36).
 const FAR: f64 = 1.0;
-/// Contribution to the shift of a plate with sides l along a limb and b across it, over E′/E [1]. The first term is
+/// Contribution to the shift of a plate with sides l along a limb and b across it, over E′/E (1). The first term is
 /// (l/b − 1)/3, as for a bar loaded by its own inertia. The second is (b²/l² − 1) times a fitted factor, for bending.
 const LONG: [f64; 2] = [1.0 / 3.0, 0.3];
-/// Widest limb for which a body is a half-plane, over twice the radius of the largest disc in it [1].
+/// Widest limb for which a body is a half-plane, over twice the radius of the largest disc in it (1).
 const NARROW: f64 = 0.5;
 
 /// Limbs and joints of a part with holes; `plain` are those of its outline alone.
@@ -165,13 +165,13 @@ fn plates(axis: &Medial, parts: &LimbGraph, cut: &HoleCutouts, origin: [f64; 2],
     }
 }
 
-/// Approximate transverse compliance of a limb: bending and shear [1].
+/// Approximate transverse compliance of a limb: bending and shear (1).
 fn compliance(limb: &Limb, porosity: f64) -> f64 {
     let slender = slender(limb);
     (slender.powi(3) + slender) / holes::stiffness(porosity)
 }
 
-/// Length over width [1]: axial compliance times E·thickness.
+/// Length over width (1): axial compliance times E·thickness.
 fn slender(limb: &Limb) -> f64 {
     limb.length() / (0.5 * (limb.width[0] + limb.width[1]))
 }

@@ -12,11 +12,11 @@ use super::rows::{Item, LocalFrame, NetlistRow, RowBuilder};
 use crate::drawing::Placement;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-/// Places are one when they are the same to this [m]: below any grid, above rounding of arithmetic.
+/// Places are one when they are the same to this (m): below any grid, above rounding of arithmetic.
 const QUANTUM: f64 = 1e-10;
 /// Fewest elements of a subnet.
 const MIN_ELEMENTS: usize = 2;
-/// Two magnifications are one up to this [1].
+/// Two magnifications are one up to this (1).
 const MAGNIFIED: f64 = 1e-9;
 /// Most kinds of content of cells with one name: with more they do not repeat, and the others stay flat.
 const MAX_KINDS: usize = 64;
@@ -93,7 +93,7 @@ struct Finder<'a> {
     nodes: Boxes,
     /// Placed cells in each placed cell.
     inside: Vec<Vec<usize>>,
-    /// Box of each cell in its own frame [m].
+    /// Box of each cell in its own frame (m).
     local: HashMap<String, [[f64; 2]; 2]>,
     subnets: Vec<Subnet>,
     taken: HashSet<String>,
@@ -260,7 +260,7 @@ impl Finder<'_> {
         Some(Content { frame, items: chosen, nodes, rows })
     }
 
-    /// The box of a cell in its own frame [m]: that of the first placed one, exact when that is turned by quarters.
+    /// The box of a cell in its own frame (m): that of the first placed one, exact when that is turned by quarters.
     fn own_box(&mut self, cell: &Placement, frame: &LocalFrame) -> [[f64; 2]; 2] {
         let key = format!("{} {:e}", cell.cell, (cell.magnification / MAGNIFIED).round());
         let quarters = frame.angle / std::f64::consts::FRAC_PI_2;

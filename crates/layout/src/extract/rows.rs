@@ -65,15 +65,15 @@ pub(super) enum Item {
 /// A value of a row.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum RowValue {
-    /// Length of a beam [m]: a parameter where several share it.
+    /// Length of a beam (m): a parameter where several share it.
     Long(f64),
-    /// Width of a beam [m]: a parameter where several share it.
+    /// Width of a beam (m): a parameter where several share it.
     Wide(f64),
-    /// Any other length [m].
+    /// Any other length (m).
     Metres(f64),
-    /// Direction [rad]; nothing is written along x.
+    /// Direction (rad); nothing is written along x.
     Turn(f64),
-    /// An angle [rad].
+    /// An angle (rad).
     Angle(f64),
     Plain(f64),
     /// A whole number.

@@ -7,9 +7,9 @@
 use super::medial::{Medial, Vertex};
 use super::moments::Moments;
 
-/// A vertex nearer than this to the outline is one of its corners [database units].
+/// A vertex nearer than this to the outline is one of its corners (database units).
 pub(super) const CORNER: f64 = 1e-3;
-/// A branch that protrudes by less than this fraction of its own width is a bump [1].
+/// A branch that protrudes by less than this fraction of its own width is a bump (1).
 const BUMP: f64 = 0.75;
 
 /// The medial axis without twigs.

@@ -7,7 +7,7 @@ use super::boxes::{self, Boxes, Extent};
 use crate::drawing::{GridPoint, Polygon};
 use bimorph_base::budget;
 
-/// Corners up to this far from an edge are put on it [database units].
+/// Corners up to this far from an edge are put on it (database units).
 const NEAR: f64 = 1.5;
 
 /// The polygons with corners near their edges put on them; none when nothing is near.

@@ -5,9 +5,9 @@ use super::cells::{Owner, Tap};
 use super::joints::JointRole;
 use super::model::{Builder, PartBeam};
 
-/// A free end beyond an anchor shorter than this many widths is part of the anchor [1].
+/// A free end beyond an anchor shorter than this many widths is part of the anchor (1).
 const STUMP: f64 = 1.5;
-/// Nodes nearer to each other than this many widths are one [1].
+/// Nodes nearer to each other than this many widths are one (1).
 const ON_AXIS: f64 = 0.01;
 
 impl Builder<'_> {

@@ -12,5 +12,5 @@ pub(super) const MAX_PLACEMENTS: u64 = 200_000;
 pub const DEEPEST: usize = 100;
 /// Most placed cells at all: a bound on the work, since empty cells can be called too.
 pub(super) const MAX_CALLS: u64 = 20_000_000;
-/// Half of the largest wafer and some [m].
+/// Half of the largest wafer and some (m).
 pub(super) const FARTHEST: f64 = 0.5;

@@ -13,7 +13,7 @@ pub(super) struct FlattenedSize {
     pub(super) labels: u64,
     pub(super) placements: u64,
     pub(super) depth: usize,
-    /// Box around it [units], and around its polygons alone.
+    /// Box around it (units), and around its polygons alone.
     pub(super) extent: Option<[[f64; 2]; 2]>,
     pub(super) drawn: Option<[[f64; 2]; 2]>,
     /// True when something falls off the grid of the file's unit.
@@ -149,7 +149,7 @@ pub(super) fn shifted(p: [f64; 2], pitch: &[[f64; 2]; 2], column: f64, row: f64)
     [p[0] + column * pitch[0][0] + row * pitch[1][0], p[1] + column * pitch[0][1] + row * pitch[1][1]]
 }
 
-/// The largest coordinate, or what is no number [units].
+/// The largest coordinate, or what is no number (units).
 pub(super) fn reach(count: &FlattenedSize) -> f64 {
     let extent = count.extent.unwrap_or_default();
     let largest = |r: f64, x: &f64| if x.is_finite() { r.max(x.abs()) } else { f64::INFINITY };

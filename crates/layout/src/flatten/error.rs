@@ -67,7 +67,7 @@ pub enum FlattenError {
     Far {
         /// The cell.
         cell: String,
-        /// How far [m].
+        /// How far (m).
         reach: f64,
     },
 }

@@ -5,7 +5,7 @@ use super::counts::{FlattenedSize, reach};
 use crate::cells::Library;
 use crate::drawing::LARGEST_COORDINATE;
 
-/// The finest unit [m].
+/// The finest unit (m).
 const FINEST: f64 = 1e-12;
 /// Decimals of the file's unit that are read before a coordinate counts as off the grid.
 const DECIMALS: u32 = 4;

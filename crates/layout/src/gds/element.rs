@@ -7,7 +7,7 @@ use crate::outline::{self, Style};
 
 /// Most points of one polygon or path.
 pub(super) const LONGEST: usize = 1 << 20;
-/// Factors of a call that can be meant [1].
+/// Factors of a call that can be meant (1).
 pub(super) const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
 /// An element that is being read.

@@ -8,7 +8,7 @@ use thiserror::Error;
 pub struct GdsError {
     /// Name of the file.
     pub file: String,
-    /// Where the record begins [bytes].
+    /// Where the record begins (bytes).
     pub offset: u64,
     /// Name of the record's type.
     pub record: String,

@@ -33,7 +33,7 @@ pub(super) struct Record<'a> {
     pub(super) kind: u8,
     /// Its bytes after the head.
     pub(super) data: &'a [u8],
-    /// Where it begins in the file [bytes].
+    /// Where it begins in the file (bytes).
     pub(super) offset: u64,
 }
 

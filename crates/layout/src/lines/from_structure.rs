@@ -70,7 +70,7 @@ struct OfStructure<'a> {
     left: Left,
     resistors: HashMap<&'a str, usize>,
     used_resistors: HashSet<usize>,
-    /// Rest curvatures' end moments, by beam name [N·m].
+    /// Rest curvatures' end moments, by beam name (N·m).
     bows: HashMap<&'a str, f64>,
 }
 

@@ -3,9 +3,9 @@
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// A layer thicker than this was not written in metres [m].
+/// A layer thicker than this was not written in metres (m).
 pub(super) const THICKEST: f64 = 1e-2;
-/// Holes up to this size are etch holes unless the process says otherwise [m]: those of PolyMUMPs and SOI are 3 to 10 µm.
+/// Holes up to this size are etch holes unless the process says otherwise (m): those of PolyMUMPs and SOI are 3 to 10 µm.
 pub(super) const LARGEST_HOLE: f64 = 12e-6;
 
 /// A layer stack.
@@ -32,11 +32,11 @@ pub struct StructuralLayer {
     pub name: String,
     /// Drawn layers it consists of, by any of their names.
     pub drawn: Vec<String>,
-    /// Thickness [m].
+    /// Thickness (m).
     pub thickness: f64,
     /// Constants of its material under the names that netlists have (`Youngsmodulus`, `density` …), SI.
     pub material: BTreeMap<String, f64>,
-    /// Thickness of the gas film under it [m]; none: no damping.
+    /// Thickness of the gas film under it (m); none: no damping.
     pub fluid: Option<f64>,
     /// How the layer is anchored.
     pub anchoring: Anchoring,
@@ -44,7 +44,7 @@ pub struct StructuralLayer {
     pub holes: Vec<String>,
     /// Drawn layers of metal on it.
     pub metal: Vec<String>,
-    /// Largest hole that is an etch hole and is filled for the model, with its share kept as porosity [m].
+    /// Largest hole that is an etch hole and is filled for the model, with its share kept as porosity (m).
     pub largest_hole: f64,
 }
 
@@ -56,7 +56,7 @@ pub struct Anchoring {
     pub drawn: Vec<String>,
     /// Drawn layers over which it is free (a trench from behind); the rest of it is held.
     pub released: Vec<String>,
-    /// Reach of the etchant under an edge [m]: areas wider than twice this are held.
+    /// Reach of the etchant under an edge (m): areas wider than twice this are held.
     pub undercut: Option<f64>,
 }
 
@@ -68,7 +68,7 @@ pub struct FixedLayer {
     pub name: String,
     /// Drawn layers it consists of.
     pub drawn: Vec<String>,
-    /// Sheet resistance [Ω/square].
+    /// Sheet resistance (Ω/square).
     #[serde(default)]
     pub sheetresistance: Option<f64>,
 }
@@ -77,9 +77,9 @@ pub struct FixedLayer {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MetalLayer {
-    /// Thickness [m].
+    /// Thickness (m).
     pub thickness: f64,
-    /// Sheet resistance [Ω/square].
+    /// Sheet resistance (Ω/square).
     pub sheetresistance: f64,
 }
 

@@ -21,7 +21,7 @@ pub fn bar(beam: &Beam, shear: bool, rotary: bool) -> Bar {
     }
 }
 
-/// Shear flexibility 1/(G·As) of a beam's section [1/N].
+/// Shear flexibility 1/(G·As) of a beam's section (1/N).
 pub(super) fn shear_flexibility(beam: &Beam) -> f64 {
     let m = &beam.material;
     let shear_modulus = m.youngs_modulus / (2.0 * (1.0 + m.poisson));

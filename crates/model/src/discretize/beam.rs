@@ -114,7 +114,7 @@ pub fn lay(
 struct JointProperties {
     /// Between the junctions.
     bar: Bar,
-    /// Shear flexibility of the section [1/N].
+    /// Shear flexibility of the section (1/N).
     give: f64,
     segments: usize,
     /// Its far end is part of the ground.
@@ -236,7 +236,7 @@ impl Springs {
     }
 }
 
-/// Drag per mass of a beam over a gas film [1/s].
+/// Drag per mass of a beam over a gas film (1/s).
 pub fn drag_per_mass(beam: &Beam, undamped: bool) -> f64 {
     let m = &beam.material;
     if undamped || m.viscosity == 0.0 { 0.0 } else { m.viscosity / (m.fluid * m.density * beam.thickness) }

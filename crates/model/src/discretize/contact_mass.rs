@@ -10,7 +10,7 @@ use bimorph_domains::from_structure::PlacedMember;
 use bimorph_domains::member::Member;
 use bimorph_multibody::{Body, BodyId};
 
-/// Mass of such a point, of that of all bodies [1].
+/// Mass of such a point, of that of all bodies (1).
 const LIGHT: f64 = 1e-6;
 
 /// The bodies, with some mass where they have none and a contact of `members` acts on them.

@@ -23,7 +23,7 @@ fn phi(bar: &Bar, h: f64) -> f64 {
     12.0 * bar.ei * bar.shear / (h * h)
 }
 
-/// Stiffness [N/m, N, N·m].
+/// Stiffness (N/m, N, N·m).
 pub fn stiffness(bar: &Bar, h: f64) -> Matrix6<f64> {
     let phi = phi(bar, h);
     let (a, b) = (bar.ea / h, bar.ei / (h * h * h) / (1.0 + phi));
@@ -40,7 +40,7 @@ pub fn stiffness(bar: &Bar, h: f64) -> Matrix6<f64> {
     k
 }
 
-/// Consistent mass [kg, kg·m, kg·m²].
+/// Consistent mass (kg, kg·m, kg·m²).
 pub fn mass(bar: &Bar, h: f64) -> Matrix6<f64> {
     let p = phi(bar, h);
     let pp = p * p;
@@ -73,7 +73,7 @@ pub fn mass(bar: &Bar, h: f64) -> Matrix6<f64> {
     join(&(Matrix2::new(2.0, 1.0, 1.0, 2.0) * (unit / 6.0)), &(across * scale))
 }
 
-/// M₂, the second term of the dynamic stiffness [kg·s², kg·m·s², kg·m²·s²].
+/// M₂, the second term of the dynamic stiffness (kg·s², kg·m·s², kg·m²·s²).
 pub fn second_mass(bar: &Bar, h: f64) -> Matrix6<f64> {
     let phi = phi(bar, h);
     // shapes over ξ = x/h as polynomials: w₀, h·θ₀, w₁, h·θ₁
@@ -110,7 +110,7 @@ pub fn second_mass(bar: &Bar, h: f64) -> Matrix6<f64> {
 }
 
 /// Contribution of an axial force N (tension positive) to the second term of the dynamic stiffness D = K + N·G − λ·(M +
-/// A) − λ²·M₂ − B. Returns A = N·(…) [kg, kg·m, kg·m²] and B = N²·(…) [N/m, N, N·m]. The load of the element's shapes
+/// A) − λ²·M₂ − B. Returns A = N·(…) (kg, kg·m, kg·m²) and B = N²·(…) (N/m, N, N·m). The load of the element's shapes
 /// on the clamped beam is N·w″ + λ·m·w; shear is left out.
 pub fn second_tension(bar: &Bar, h: f64, force: f64) -> (Matrix6<f64>, Matrix6<f64>) {
     #[rustfmt::skip]

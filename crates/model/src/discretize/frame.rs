@@ -30,7 +30,7 @@ use std::sync::Arc;
 pub enum ElementCount {
     /// The same number for every beam; 1 is what SUGAR does.
     Each(usize),
-    /// By the highest frequency to be resolved [Hz] and the relative error: the rule of [`order`], since a cubic element
+    /// By the highest frequency to be resolved (Hz) and the relative error: the rule of [`order`], since a cubic element
     /// has the frequency error of a segment, (kh)⁴/1440.
     Band(f64, f64),
     /// As many as given for each beam.
@@ -69,7 +69,7 @@ pub struct LinearFrame {
     pub system: LinearSystem,
     /// Forces of the dead loads and of strains that are built in or prescribed.
     pub load: Vec<Pose>,
-    /// For each heated beam, the forces per free strain [N, N·m].
+    /// For each heated beam, the forces per free strain (N, N·m).
     pub expansion: Vec<Vec<Pose>>,
     /// For each node of the structure, its material point; none for purely electrical nodes.
     pub nodes: Vec<Option<MaterialPoint>>,

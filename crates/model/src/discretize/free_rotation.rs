@@ -13,7 +13,7 @@ use bimorph_multibody::{BodyId, Damper, Joint};
 use bimorph_structure::Structure;
 use nalgebra::Vector2;
 
-/// Distance below which two points of a body are one, as a fraction of the size of the drawing [1]: coordinates are sums of rounded lengths.
+/// Distance below which two points of a body are one, as a fraction of the size of the drawing (1): coordinates are sums of rounded lengths.
 const POINT_TOLERANCE: f64 = 1e-9;
 
 /// Elements that use the rotation of a body.
@@ -21,7 +21,7 @@ const POINT_TOLERANCE: f64 = 1e-9;
 enum RotationUse {
     /// Nothing acts on the body yet.
     Unknown,
-    /// Everything so far acts on this point, given from the reference point [m].
+    /// Everything so far acts on this point, given from the reference point (m).
     About(Vector2<f64>),
     /// Something resists the rotation or acts on it.
     Used,

@@ -40,7 +40,7 @@ struct JunctionBeam {
     beam: usize,
     /// 0 where the beam starts, 1 where it ends.
     end: usize,
-    /// Direction from the node outwards [rad].
+    /// Direction from the node outwards (rad).
     angle: f64,
     width: f64,
 }
@@ -265,7 +265,7 @@ fn in_line(branches: &[JunctionBeam]) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// Angle from one branch to another, counterclockwise, −π…π [rad].
+/// Angle from one branch to another, counterclockwise, −π…π (rad).
 fn angle_to(from: &JunctionBeam, to: &JunctionBeam) -> f64 {
     (to.angle - from.angle + PI).rem_euclid(2.0 * PI) - PI
 }

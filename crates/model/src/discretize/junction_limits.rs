@@ -4,14 +4,14 @@ use super::junction::JunctionEnds;
 use super::overlap::{Strip, turn};
 use bimorph_structure::Structure;
 
-/// Ratio of widths up to which the table goes [1].
+/// Ratio of widths up to which the table goes (1).
 const RATIO: f64 = 8.0;
-/// Lean of a stem up to which the table goes, and sharpest turn of a corner [rad].
+/// Lean of a stem up to which the table goes, and sharpest turn of a corner (rad).
 const LEAN: f64 = std::f64::consts::FRAC_PI_4;
 const MAX_TABLE_TURN: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
-/// Beams that turn by less than this count as one, as the chords of an arc do [rad].
+/// Beams that turn by less than this count as one, as the chords of an arc do (rad).
 const STRAIGHT: f64 = std::f64::consts::FRAC_PI_6;
-/// Rounding of ratios and angles [1].
+/// Rounding of ratios and angles (1).
 const ROUNDING: f64 = 1e-6;
 
 /// Beams whose junctions are beyond the table.

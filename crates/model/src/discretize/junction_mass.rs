@@ -13,7 +13,7 @@ use super::rigid::{Lump, RigidGroups};
 use bimorph_structure::{Beam, Structure};
 use nalgebra::Vector2;
 
-/// Sharpest turn up to which beams lie above each other within their rigid ends only [rad].
+/// Sharpest turn up to which beams lie above each other within their rigid ends only (rad).
 const MAX_OVERLAP_TURN: f64 = 0.75 * std::f64::consts::PI;
 /// Fraction of the mass that beams bring to a junction which it may have twice.
 const MAX_MASS: f64 = 0.5;
@@ -51,7 +51,7 @@ impl Meetings {
 pub(super) struct Excess {
     node: usize,
     mass: Lump,
-    /// Drag of that mass per mass [1/s].
+    /// Drag of that mass per mass (1/s).
     drag_per_mass: f64,
     /// Drag by itself, where the beams' films differ.
     drag: Option<Lump>,

@@ -20,9 +20,9 @@ use nalgebra::Matrix3;
 /// Effect of the junction at one end of a beam.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct JunctionEnd {
-    /// Length that belongs to the rigid body of the node [m].
+    /// Length that belongs to the rigid body of the node (m).
     pub offset: f64,
-    /// Compliance of the spring at the edge over (N, V, M) [m/N, rad/N, rad/(N·m)], of the branch seen from the node.
+    /// Compliance of the spring at the edge over (N, V, M) (m/N, rad/N, rad/(N·m)), of the branch seen from the node.
     pub spring: Matrix3<f64>,
     /// Nothing else is there: neither another beam nor something rigid.
     pub free: bool,
@@ -42,7 +42,7 @@ impl JunctionEnd {
         self.spring += Matrix3::new(uu, ug, up, ug, gg, gp, up, gp, pp) * unit;
     }
 
-    /// Moves the edge outwards until the spring is compliant under every load, by at most `most` [m].
+    /// Moves the edge outwards until the spring is compliant under every load, by at most `most` (m).
     ///
     /// A rod of length ℓ between the old and the new edge becomes rigid, and its compliance P = [ℓ/EA, 0, 0; 0, ℓ³/3EI + ℓ/κGA,
     /// ℓ²/2EI; 0, ℓ²/2EI, ℓ/EI] is added to the spring's, seen from the new edge. Compliance that is still negative after
@@ -61,7 +61,7 @@ impl JunctionEnd {
         }
     }
 
-    /// The spring's compliance over the stress of a joint at distance `d` [m] along the beam from the edge; `outwards`
+    /// The spring's compliance over the stress of a joint at distance `d` (m) along the beam from the edge; `outwards`
     /// when the beam runs from this node, not towards it.
     pub fn at_joint(&self, d: f64, outwards: bool) -> Matrix3<f64> {
         // seen from the other end forces stay what they are, the moment changes sign
@@ -76,7 +76,7 @@ const ROD: f64 = 1.0 / 64.0;
 /// No junction reaches so far [widths].
 const MAX_WIDTHS: f64 = 64.0;
 
-/// A spring's compliance under loads at a distance `d` [m] outwards from its edge.
+/// A spring's compliance under loads at a distance `d` (m) outwards from its edge.
 fn moved(spring: &Matrix3<f64>, d: f64) -> Matrix3<f64> {
     let carry = Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, d, 1.0);
     carry.transpose() * spring * carry
@@ -116,7 +116,7 @@ fn positive_part(spring: &Matrix3<f64>, beam: &Beam) -> Matrix3<f64> {
     back * eigen.recompose() * back / unit
 }
 
-/// Row of [`table::CORNER`] at a ratio of widths (other over own, by its logarithm) and a turn [°], linear in between
+/// Row of [`table::CORNER`] at a ratio of widths (other over own, by its logarithm) and a turn (°), linear in between
 /// and constant outside. For nearly equal widths, a step of the width in a straight beam counts by the square of its
 /// logarithm. To first order the two beams already include it, so that a taper of many pieces converges to the beam
 /// that it represents.
@@ -132,7 +132,7 @@ pub fn corner(ratio: f64, turn: f64) -> ComplianceRow {
     blend(&table::CORNER, (r, share), place(&table::TURNS, turn))
 }
 
-/// Row of a two-way table at a ratio of widths (other over own, by its logarithm) and an angle [°], linear in between and
+/// Row of a two-way table at a ratio of widths (other over own, by its logarithm) and an angle (°), linear in between and
 /// constant outside.
 pub fn interpolate<const N: usize>(
     rows: &[[ComplianceRow; N]; 9],

@@ -19,11 +19,11 @@ pub type ComplianceRow = [f64; 7];
 
 /// log₂ of the other's width over the branch's own, of every table.
 pub const RATIOS: [f64; 9] = [-3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0];
-/// Angle by which a corner leaves the straight line [°].
+/// Angle by which a corner leaves the straight line (°).
 pub const TURNS: [f64; 9] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0, 105.0, 120.0];
-/// Lean of a stem or crossing bar from the perpendicular [°].
+/// Lean of a stem or crossing bar from the perpendicular (°).
 pub const TILTS: [f64; 4] = [0.0, 15.0, 30.0, 45.0];
-/// Lean of a stem towards the half of the bar [°].
+/// Lean of a stem towards the half of the bar (°).
 pub const LEANS: [f64; 7] = [-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0];
 
 /// A clamped end: the edge cannot contract across. Distance 0.

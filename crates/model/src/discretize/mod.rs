@@ -59,9 +59,9 @@ use bimorph_structure::Structure;
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use std::sync::Arc;
 
-/// Of a segment's joint and points, about [byte].
+/// Of a segment's joint and points, about (byte).
 const SEGMENT_BYTES: usize = 600;
-/// Of a body, with its share of the tangents and factors that an analysis has, about [byte].
+/// Of a body, with its share of the tangents and factors that an analysis has, about (byte).
 const BODY_BYTES: usize = 1000;
 
 /// A system, and where the drawing's parts went.
@@ -73,7 +73,7 @@ pub struct Assembly {
     pub nodes: Vec<Option<MaterialPoint>>,
     /// For each beam, the equally spaced points along its centreline, ends included: one more than its segments.
     pub beams: Vec<Arc<[MaterialPoint]>>,
-    /// For each beam, what the junctions at its start and its end take of its length [m].
+    /// For each beam, what the junctions at its start and its end take of its length (m).
     pub offsets: Vec<[f64; 2]>,
     /// Effects of junctions on the structure.
     ends: Arc<junction::JunctionEnds>,
@@ -214,7 +214,7 @@ impl Assembly {
     }
 }
 
-/// The smallest width of a beam, or gap of plates and combs [m]; 1 µm without any.
+/// The smallest width of a beam, or gap of plates and combs (m); 1 µm without any.
 fn length_scale(structure: &Structure) -> f64 {
     let narrowest = structure.beams.iter().map(|b| b.width).fold(f64::INFINITY, f64::min);
     let gaps = structure.plate_gaps.iter().map(|g| g.gap).chain(structure.combs.iter().map(|c| c.gap));

@@ -67,7 +67,7 @@ fn held_under_gaps(structure: &Structure) -> Vec<usize> {
     structure.beam_gaps.iter().flat_map(|gap| beams.along(gap)).filter(held).collect()
 }
 
-/// kL at the edge of a band [Hz].
+/// kL at the edge of a band (Hz).
 pub fn waves(beam: &Beam, band: f64) -> f64 {
     let omega = 2.0 * std::f64::consts::PI * band;
     // ρA/EI = 12ρ/(E·w²)

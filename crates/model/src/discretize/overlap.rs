@@ -18,22 +18,22 @@ use std::f64::consts::PI;
 /// One beam at a junction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strip {
-    /// Direction from the node outwards [rad].
+    /// Direction from the node outwards (rad).
     pub angle: f64,
-    /// Width [m].
+    /// Width (m).
     pub width: f64,
-    /// Its mass per area over the largest of the junction's strips [1].
+    /// Its mass per area over the largest of the junction's strips (1).
     pub weight: f64,
 }
 
-/// Turn below which two branches continue in line and leave no outer corner [rad].
+/// Turn below which two branches continue in line and leave no outer corner (rad).
 pub const IN_LINE: f64 = 50.0 * PI / 180.0;
-/// Sharpest turn whose outer corner is filled [rad].
+/// Sharpest turn whose outer corner is filled (rad).
 const MAX_FILLED_TURN: f64 = 2.1;
 /// Lines for each band between two corners.
 const LINES: usize = 24;
 
-/// By how much a branch of direction `b` departs from going straight on where one of direction `a` ends, 0…π [rad]; both
+/// By how much a branch of direction `b` departs from going straight on where one of direction `a` ends, 0…π (rad); both
 /// seen from the node.
 pub fn turn(a: f64, b: f64) -> f64 {
     let between = ((b - a + PI).rem_euclid(2.0 * PI) - PI).abs();
@@ -50,7 +50,7 @@ thread_local! {
     static KNOWN: RefCell<FxHashMap<Vec<[u64; 3]>, Lump>> = RefCell::default();
 }
 
-/// Area, by its weight, that the strips have in excess of their union, with its moments about the node: [m²], [m³], [m⁴].
+/// Area, by its weight, that the strips have in excess of their union, with its moments about the node: (m²), (m³), (m⁴).
 pub fn overlap(strips: &[Strip]) -> Lump {
     let bits = |s: &Strip| [s.angle.to_bits(), s.width.to_bits(), s.weight.to_bits()];
     let mut few = [[0; 3]; FEW];

@@ -3,7 +3,7 @@
 use super::Assembly;
 use bimorph_structure::Yield;
 
-/// The joints of a beam that can yield, each with the length that it stands for [m]; none where nothing heats it.
+/// The joints of a beam that can yield, each with the length that it stands for (m); none where nothing heats it.
 pub type YieldingJoints = Vec<(usize, f64)>;
 
 /// The arms in the order of `yields`.
@@ -20,7 +20,7 @@ pub fn arms(parts: &Assembly, yields: &[Yield]) -> Vec<YieldingJoints> {
     yields.iter().map(|y| of(y).unwrap_or_default()).collect()
 }
 
-/// Strains an arm by so much more, for good [1]; negative: shorter.
+/// Strains an arm by so much more, for good (1); negative: shorter.
 pub fn strain(parts: &mut Assembly, arm: &YieldingJoints, change: f64) {
     if change != 0.0 {
         for &(k, length) in arm {

@@ -18,11 +18,11 @@ const HINGE: f64 = 1e6;
 /// Mass, first and second moment of something, and the same for its drag.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Lump {
-    /// Mass [kg] or drag [N·s/m].
+    /// Mass (kg) or drag (N·s/m).
     pub amount: f64,
-    /// First moment about the reference point [kg·m].
+    /// First moment about the reference point (kg·m).
     pub first: Vector2<f64>,
-    /// Second moment about the reference point [kg·m²].
+    /// Second moment about the reference point (kg·m²).
     pub second: f64,
 }
 
@@ -117,7 +117,7 @@ impl RigidGroups {
         self.group[node] == BodyId::Ground
     }
 
-    /// Drawn position of a point [m].
+    /// Drawn position of a point (m).
     pub fn position(&self, node: usize) -> Vector2<f64> {
         self.position[node]
     }
@@ -276,8 +276,8 @@ impl UnfinishedBody {
         self.fixed_angle |= held[2];
     }
 
-    /// Calls `see` with the point that a mass or a drag acts on, from the reference point [m]; `None` where it resists
-    /// the rotation. Points nearer than `same` [m] to each other count as one.
+    /// Calls `see` with the point that a mass or a drag acts on, from the reference point (m); `None` where it resists
+    /// the rotation. Points nearer than `same` (m) to each other count as one.
     pub(super) fn lumps_act(&self, same: f64, mut see: impl FnMut(Option<Vector2<f64>>)) {
         for lump in [&self.mass, &self.drag].into_iter().filter(|lump| lump.amount != 0.0 || lump.second != 0.0) {
             let center = lump.center();

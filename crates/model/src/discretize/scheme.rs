@@ -30,17 +30,17 @@ pub const PENALTY: f64 = 1e4;
 /// Beam data required by a scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bar {
-    /// Length L [m].
+    /// Length L (m).
     pub length: f64,
-    /// Axial stiffness EA [N].
+    /// Axial stiffness EA (N).
     pub ea: f64,
-    /// Bending stiffness EI [N·m²].
+    /// Bending stiffness EI (N·m²).
     pub ei: f64,
-    /// Shear flexibility 1/(G·As) [1/N]; 0 for an Euler–Bernoulli beam.
+    /// Shear flexibility 1/(G·As) (1/N); 0 for an Euler–Bernoulli beam.
     pub shear: f64,
-    /// Mass per length ρA [kg/m].
+    /// Mass per length ρA (kg/m).
     pub line_mass: f64,
-    /// Rotary inertia of the section over its mass I/A [m²]; 0 for an Euler–Bernoulli beam.
+    /// Rotary inertia of the section over its mass I/A (m²); 0 for an Euler–Bernoulli beam.
     pub rotary: f64,
 }
 
@@ -49,11 +49,11 @@ pub struct Bar {
 pub struct BeamSegment {
     /// Its reference point [m from the start]; the first and the last part belong to the end nodes.
     pub at: f64,
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f64,
-    /// First moment about the reference point, towards the far end [kg·m].
+    /// First moment about the reference point, towards the far end (kg·m).
     pub first: f64,
-    /// Second moment about the reference point [kg·m²].
+    /// Second moment about the reference point (kg·m²).
     pub second: f64,
 }
 
@@ -62,7 +62,7 @@ pub struct BeamSegment {
 pub struct SegmentJoint {
     /// Place [m from the start].
     pub at: f64,
-    /// Length whose free strain it carries [m].
+    /// Length whose free strain it carries (m).
     pub length: f64,
     /// Stress per strain over (u, g, p).
     pub stiffness: Matrix3<f64>,
@@ -79,7 +79,7 @@ pub struct SegmentedBeam {
     pub parts: Vec<BeamSegment>,
     /// Joints from start to end, one fewer.
     pub pins: Vec<SegmentJoint>,
-    /// Pairs of joints whose rotations are coupled, with the stiffness [N·m/rad]: energy k·p₁·p₂.
+    /// Pairs of joints whose rotations are coupled, with the stiffness (N·m/rad): energy k·p₁·p₂.
     pub couplings: Vec<(usize, usize, f64)>,
     /// For each of the N + 1 equally spaced nodes, its part.
     pub nodes: Vec<usize>,

@@ -14,7 +14,7 @@
 use super::junction_springs::JunctionEnd;
 use nalgebra::{Matrix2, RowVector2};
 
-/// Q of a joint in the middle of a segment of length `h` [m], over the total (g, p). `own` is the segment's alone,
+/// Q of a joint in the middle of a segment of length `h` (m), over the total (g, p). `own` is the segment's alone,
 /// `compliance` its compliance over (V, M), and `ends` the springs at its start and its end, if any.
 pub(super) fn second_strain(
     own: &Matrix2<f64>,

@@ -28,7 +28,7 @@ pub(super) fn of_beams(
         .collect()
 }
 
-/// The stations of a beam of a length [m], of which each end has so much [m] up to the edge of its junction.
+/// The stations of a beam of a length (m), of which each end has so much (m) up to the edge of its junction.
 fn between(
     points: &[MaterialPoint],
     length: f64,

@@ -45,7 +45,7 @@ impl ErrorBudget {
         Self { requested: tolerance }
     }
 
-    /// The tolerance as requested [1].
+    /// The tolerance as requested (1).
     pub fn requested(self) -> f64 {
         self.requested
     }

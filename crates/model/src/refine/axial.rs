@@ -8,13 +8,13 @@ use bimorph_multibody::planar::Pose;
 use bimorph_structure::Structure;
 use std::collections::HashMap;
 
-/// Axis of a joint, x and y, and the axial force in it [N].
+/// Axis of a joint, x and y, and the axial force in it (N).
 type Along = (f64, f64, f64);
 
 /// Cosine of the largest angle between a joint's axis and its beam.
 const ALONG: f64 = 0.99;
 
-/// Mean over the segments of each beam, tension positive [N]; 0 for a rigid beam.
+/// Mean over the segments of each beam, tension positive (N); 0 for a rigid beam.
 pub fn axial_forces(structure: &Structure, parts: &Assembly, q: &[Pose], drive: &Drive) -> Vec<f64> {
     let model = &parts.system.model;
     let key = |a: BodyId, b: BodyId| (a.min(b), a.max(b));

@@ -14,7 +14,7 @@ use bimorph_multibody::{BlockMatrix, BodyId};
 use bimorph_solve::frequency::eigen::lowest_modes;
 use nalgebra::Vector2;
 
-/// Adds the forces of an imperfection whose largest displacement is `size` [m], of either sign. Adds nothing where no
+/// Adds the forces of an imperfection whose largest displacement is `size` (m), of either sign. Adds nothing where no
 /// mode is found or the lowest one is a rigid motion.
 pub fn apply(parts: &mut Assembly, size: f64) {
     let system = &parts.system;

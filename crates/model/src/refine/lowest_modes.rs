@@ -20,7 +20,7 @@ use std::f64::consts::TAU;
 const MAX_PASSES: usize = 12;
 /// Fraction by which the band lies above the highest requested mode.
 const ABOVE: f64 = 0.01;
-/// Frequencies within which modes are looked for [Hz].
+/// Frequencies within which modes are looked for (Hz).
 const LOWEST: f64 = 1e-6;
 const HIGHEST: f64 = 1e13;
 
@@ -56,7 +56,7 @@ pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> 
     Ok(chosen.unwrap_or(Mesh { segments, estimated_error: None, modes_in_band: 0, passes: 0 }))
 }
 
-/// Frequency of the `count`-th mode as drawn [Hz], to half of [`ABOVE`]; none where the mesh has no such mode.
+/// Frequency of the `count`-th mode as drawn (Hz), to half of [`ABOVE`]; none where the mesh has no such mode.
 fn highest_of(parts: &Assembly, count: usize) -> Option<f64> {
     let (system, model) = (&parts.system, &parts.system.model);
     let rest = vec![Pose::zeros(); system.bodies()];

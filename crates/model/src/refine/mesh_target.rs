@@ -8,7 +8,7 @@ use serde::Serialize;
 pub struct Mesh {
     /// Segments of each beam, in the order of the structure; 0: a rigid beam.
     pub segments: Vec<usize>,
-    /// Largest estimated relative error of a frequency within the band [1]; none where no mode lies in it or no estimate
+    /// Largest estimated relative error of a frequency within the band (1); none where no mode lies in it or no estimate
     /// could be made.
     pub estimated_error: Option<f64>,
     /// Modes within the band that the estimate stands for.
@@ -28,9 +28,9 @@ impl Mesh {
 /// Target of a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshTarget {
-    /// Highest frequency whose mode matters [Hz].
+    /// Highest frequency whose mode matters (Hz).
     pub band: f64,
-    /// Relative error that the frequency of each mode may have [1], from the lowest; beyond the list: the option `tol`.
+    /// Relative error that the frequency of each mode may have (1), from the lowest; beyond the list: the option `tol`.
     pub tolerances: Vec<f64>,
     /// Beams whose strain does not matter become rigid.
     pub rigid: bool,

@@ -25,7 +25,7 @@
 //! ([`cubic::second_tension`]), which segments lack. The reference is K − N²B with M_r + N·A. Compression makes the
 //! model too stiff; tension may make it too soft or too stiff.
 //!
-//! Modes of the model and of the reference are paired by shape ([`mac`]), not by place: their frequencies may cross.
+//! Modes of the model and of the reference are paired by shape ([`mac`](bimorph_solve::frequency::mac)), not by place: their frequencies may cross.
 //!
 //! Directions along and across a beam are those of the drawing, also about an equilibrium: right as long as beams turn by
 //! small angles.
@@ -47,17 +47,17 @@ use nalgebra::Vector3;
 /// Estimated errors of modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModeErrors {
-    /// For each mode, (f − f_beam)/f_beam [1]; 0 for a rigid motion.
+    /// For each mode, (f − f_beam)/f_beam (1); 0 for a rigid motion.
     pub relative: Vec<f64>,
-    /// For each mode, λ = ω² of the beams [rad²/s²].
+    /// For each mode, λ = ω² of the beams (rad²/s²).
     pub reference: Vec<f64>,
     /// For each mode, how much of it is in the reference modes of that frequency, 0…1; near 1 where the pairing is sure.
     pub likeness: Vec<f64>,
-    /// For each mode, what each beam contributes to it [1].
+    /// For each mode, what each beam contributes to it (1).
     pub shares: Vec<Vec<f64>>,
 }
 
-/// For each mode, the share of each beam in its strain energy [1]: a beam held rigid raises the frequency by about half of
+/// For each mode, the share of each beam in its strain energy (1): a beam held rigid raises the frequency by about half of
 /// it, relatively.
 pub fn strain_shares(
     structure: &Structure,
@@ -99,7 +99,7 @@ pub fn of_modes(
     of_loaded_modes(structure, options, parts, factor, &[], (lambda, shapes))
 }
 
-/// The same at an operating point where the beams carry these axial forces, tension positive [N]; none: no beam has any.
+/// The same at an operating point where the beams carry these axial forces, tension positive (N); none: no beam has any.
 pub fn of_loaded_modes(
     structure: &Structure,
     options: &CompileOptions,

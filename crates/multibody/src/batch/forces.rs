@@ -9,9 +9,9 @@ use crate::section::{NONE, PairSlot};
 /// Axial rest offsets, or their change.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneRestStrain<'a> {
-    /// Free strain of each group of joints [1].
+    /// Free strain of each group of joints (1).
     pub expansion: &'a [Lane8],
-    /// Fraction of the built-in offsets that acts, the same in every lane [1].
+    /// Fraction of the built-in offsets that acts, the same in every lane (1).
     pub built_in: f64,
 }
 

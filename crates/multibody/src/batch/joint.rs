@@ -107,7 +107,7 @@ impl<T: Number> LaneSection<T> {
 /// Strains with what their derivatives need.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneKinematics<T = Lane8> {
-    /// e_u [m], g [m], p [rad].
+    /// e_u (m), g (m), p (rad).
     pub strain: LanePose<T>,
     axial: T,
     shear: T,

@@ -11,13 +11,13 @@ use std::sync::Arc;
 /// A body in each variant.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneBody<T = Lane8> {
-    /// Mass [kg] and moment of inertia [kg·m²], as the mass matrix' diagonal.
+    /// Mass (kg) and moment of inertia (kg·m²), as the mass matrix' diagonal.
     pub mass: LanePose<T>,
-    /// Drag on translation [N·s/m].
+    /// Drag on translation (N·s/m).
     pub drag: T,
-    /// Its first moment [N·s].
+    /// Its first moment (N·s).
     pub first: LaneVector<T>,
-    /// Its second moment [N·m·s].
+    /// Its second moment (N·m·s).
     pub second: T,
 }
 

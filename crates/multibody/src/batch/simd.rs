@@ -35,7 +35,7 @@ pub trait SimdReal: Number {
     /// `this` in lanes that are zero, `other` elsewhere.
     fn if_zero(self, this: Self, other: Self) -> Self;
 
-    /// Sine and cosine [rad].
+    /// Sine and cosine (rad).
     #[inline(always)]
     fn sin_cos(self, simd: Self::Simd) -> (Self, Self) {
         let mut angles = Lane8::of(0.0);

@@ -21,9 +21,9 @@ use nalgebra::{Matrix3, Matrix6, Vector2, Vector3, Vector6};
 /// Geometry of a joint: where it sits and how its frame is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointFrame {
-    /// From the centre of mass of body a to the joint, as drawn [m].
+    /// From the centre of mass of body a to the joint, as drawn (m).
     pub arm_a: Vector2<f64>,
-    /// From the centre of mass of body b to the joint, as drawn [m].
+    /// From the centre of mass of body b to the joint, as drawn (m).
     pub arm_b: Vector2<f64>,
     /// Cosine and sine of the drawn angle β of the joint's x axis.
     pub axis: Vector2<f64>,
@@ -110,9 +110,9 @@ impl PairTangent {
 /// Strains of a joint with what their derivatives need.
 #[derive(Debug, Clone, Copy)]
 pub struct JointKinematics {
-    /// e_u [m], g [m], p [rad].
+    /// e_u (m), g (m), p (rad).
     pub strain: Vector3<f64>,
-    /// u and g where the derivatives are taken [m].
+    /// u and g where the derivatives are taken (m).
     axial: f64,
     shear: f64,
     /// Q·(g, p), half of ∂e_u/∂(g, p).

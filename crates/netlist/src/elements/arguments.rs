@@ -9,7 +9,7 @@ use super::super::value::{LayerValues, Value, short};
 use super::meaning::meaning;
 use bimorph_structure::NodeId;
 
-/// A length beyond this is a missing suffix rather than a part of a microsystem [m].
+/// A length beyond this is a missing suffix rather than a part of a microsystem (m).
 const LONGEST: f64 = 0.1;
 
 /// One parameter as given.
@@ -189,7 +189,7 @@ impl ElementSite<'_, '_> {
         }
     }
 
-    /// The direction of the local x axis [rad].
+    /// The direction of the local x axis (rad).
     ///
     /// # Errors
     /// It leaves the drawing plane.
@@ -215,7 +215,7 @@ impl ElementSite<'_, '_> {
         }
     }
 
-    /// A local in-plane vector in global coordinates [m].
+    /// A local in-plane vector in global coordinates (m).
     pub(crate) fn global(&self, v: [f64; 2]) -> [f64; 2] {
         let [x, y, _] = self.instance.rotation.apply([v[0], v[1], 0.0]);
         [x, y]

@@ -8,13 +8,13 @@ use super::super::drawing::Fact;
 use super::arguments::ElementSite;
 use bimorph_structure::{Link, NodeId};
 
-/// Standard gravity [m/s²].
+/// Standard gravity (m/s²).
 const GRAVITY: f64 = 9.806_65;
-/// Arms whose in-plane length is below this fraction of their length are ignored [1].
+/// Arms whose in-plane length is below this fraction of their length are ignored (1).
 const SEEN: f64 = 1e-9;
 
 impl ElementSite<'_, '_> {
-    /// The vector of arm `number` [m], global axes; zero without a length.
+    /// The vector of arm `number` (m), global axes; zero without a length.
     pub(super) fn arm(&mut self, number: usize) -> Result<[f64; 3], Reported> {
         let length = self.number_or(if number == 1 { "L1" } else { "L2" }, 0.0)?;
         let [ox, oy, oz] = [format!("ox{number}"), format!("oy{number}"), format!("oz{number}")];
@@ -45,7 +45,7 @@ impl ElementSite<'_, '_> {
         Ok(())
     }
 
-    /// Adds a rigid, massless link whose second node lies at `offset` [m] from the first.
+    /// Adds a rigid, massless link whose second node lies at `offset` (m) from the first.
     pub(super) fn add_link(&mut self, name: String, a: NodeId, b: NodeId, offset: [f64; 2]) {
         self.drawing.place(self.instance.span, &[a, b], &[[0.0; 2], offset]);
         self.drawing.structure.links.push(Link { name, a, b });

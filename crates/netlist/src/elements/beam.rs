@@ -5,7 +5,7 @@ use super::super::drawing::Fact;
 use super::arguments::ElementSite;
 use bimorph_structure::{Beam, Heater, Load, NodeId, Resistor, Yield};
 
-/// A layer's `thermcond` below this is no conductivity of a solid structural material [W/(m·K)]. The MUMPs process
+/// A layer's `thermcond` below this is no conductivity of a solid structural material (W/(m·K)). The MUMPs process
 /// file of SUGAR has 2.33, which is the digits of silicon's expansion coefficient.
 const SMALL_CONDUCTIVITY: f64 = 5.0;
 
@@ -71,7 +71,7 @@ impl ElementSite<'_, '_> {
         Ok(())
     }
 
-    /// A rest curvature [1/m], positive towards local y, as the pair of end moments E·I·curvature that
+    /// A rest curvature (1/m), positive towards local y, as the pair of end moments E·I·curvature that
     /// is the same thing: the moment is constant along the beam and does not turn with it.
     fn bow(&mut self, beam: &Beam) -> Result<(), Reported> {
         let Some(curvature) = self.number("curvature")?.filter(|c| *c != 0.0) else { return Ok(()) };
@@ -89,7 +89,7 @@ impl ElementSite<'_, '_> {
         Ok(())
     }
 
-    /// Resistance from end to end, from `R`, `G`, `resistivity` or the layer's sheet resistance [Ω].
+    /// Resistance from end to end, from `R`, `G`, `resistivity` or the layer's sheet resistance (Ω).
     pub(super) fn resistance(&mut self, r: &str, g: &str, width: f64) -> Result<f64, Reported> {
         if let Some(resistance) = self.positive_if_any(r)? {
             return Ok(resistance);

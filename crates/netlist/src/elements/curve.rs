@@ -17,11 +17,11 @@ use std::f64::consts::TAU;
 
 /// Chords of a curve, at least.
 const CHORDS: usize = 30;
-/// Turn of an arc from chord to chord, at most [rad]: 2.5°.
+/// Turn of an arc from chord to chord, at most (rad): 2.5°.
 const TURN: f64 = TAU / 144.0;
 
 impl ElementSite<'_, '_> {
-    /// Adds a chain of straight beams through `points` [m], local axes, from the first node to the second. Inner nodes and beams are
+    /// Adds a chain of straight beams through `points` (m), local axes, from the first node to the second. Inner nodes and beams are
     /// called `NAME.1`, `NAME.2`, …
     fn add_chain(&mut self, ends: [NodeId; 2], points: &[[f64; 2]], width: f64) -> Result<(), Reported> {
         let name = self.name();

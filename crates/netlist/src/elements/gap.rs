@@ -10,7 +10,7 @@ use bimorph_structure::{BeamGap, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUT
 const FRINGE: f64 = 1.12;
 
 impl ElementSite<'_, '_> {
-    /// Widths of the upper and the lower beam [m]: `w1` and `w2`, or `w` for both.
+    /// Widths of the upper and the lower beam (m): `w1` and `w2`, or `w` for both.
     fn widths(&mut self) -> Result<[f64; 2], Reported> {
         let both = self.positive_if_any("w")?;
         let mut widths = [0.0; 2];
@@ -23,7 +23,7 @@ impl ElementSite<'_, '_> {
         Ok(widths)
     }
 
-    /// Distance at which electrodes drawn `gap` apart touch [m], if it is given.
+    /// Distance at which electrodes drawn `gap` apart touch (m), if it is given.
     fn touch(&mut self, gap: f64) -> Result<Option<f64>, Reported> {
         let touch = self.positive_if_any("touch")?;
         if let Some(touch) = touch

@@ -4,7 +4,7 @@ use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
 use bimorph_structure::Load;
 
-/// Part of a force or moment that may point out of the plane, or of a moment that may lie in it, unsaid [1].
+/// Part of a force or moment that may point out of the plane, or of a moment that may lie in it, unsaid (1).
 const NEGLIGIBLE: f64 = 1e-6;
 
 pub(super) fn f2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {

@@ -5,17 +5,17 @@ use super::super::drawing::Fact;
 use super::arguments::ElementSite;
 use bimorph_structure::{MOLTEN, Material};
 
-/// Poisson's ratio where a layer gives none [1]. Planar beams do not depend on it.
+/// Poisson's ratio where a layer gives none (1). Planar beams do not depend on it.
 const POISSON: f64 = 0.3;
-/// Film thickness of a material without damping [m]; its viscosity is 0 then, so that no number depends on it.
+/// Film thickness of a material without damping (m); its viscosity is 0 then, so that no number depends on it.
 const NO_FILM: f64 = 1.0;
-/// Young's moduli of structural solids, from rubber to diamond [Pa].
+/// Young's moduli of structural solids, from rubber to diamond (Pa).
 const SOLID: std::ops::Range<f64> = 1e6..2e12;
-/// Densities of solids, from foam to osmium [kg/m³].
+/// Densities of solids, from foam to osmium (kg/m³).
 const DENSE: std::ops::Range<f64> = 10.0..25e3;
-/// Strain of a residual stress beyond the strength of any solid, including defect-free crystals [1].
+/// Strain of a residual stress beyond the strength of any solid, including defect-free crystals (1).
 const STRONGEST: f64 = 0.1;
-/// Permittivity of vacuum, as SUGAR's process files round it [F/m].
+/// Permittivity of vacuum, as SUGAR's process files round it (F/m).
 pub(super) const VACUUM: f64 = 8.854e-12;
 
 /// Parameters of a material.
@@ -82,7 +82,7 @@ impl ElementSite<'_, '_> {
         })
     }
 
-    /// Ambient temperature [K]; 0 by default, so that temperatures are rises.
+    /// Ambient temperature (K); 0 by default, so that temperatures are rises.
     fn ambient(&mut self) -> Result<f64, Reported> {
         let ambient = self.number_or("ambienttemperature", 0.0)?;
         if ambient < 0.0 {
@@ -95,7 +95,7 @@ impl ElementSite<'_, '_> {
         Ok(ambient)
     }
 
-    /// Density [kg/m³]; 0 with a warning where it is missing.
+    /// Density (kg/m³); 0 with a warning where it is missing.
     pub(super) fn density(&mut self) -> Result<f64, Reported> {
         if let Some(density) = self.number("density")? {
             if density > 0.0 && !DENSE.contains(&density) {
@@ -109,7 +109,7 @@ impl ElementSite<'_, '_> {
         Ok(0.0)
     }
 
-    /// Viscosity [Pa·s] and thickness [m] of the gas film; no viscosity when either is missing.
+    /// Viscosity (Pa·s) and thickness (m) of the gas film; no viscosity when either is missing.
     pub(super) fn film(&mut self) -> Result<[f64; 2], Reported> {
         let viscosity = self.non_negative_or("viscosity", 0.0)?;
         match self.number("fluid")? {
@@ -121,12 +121,12 @@ impl ElementSite<'_, '_> {
         }
     }
 
-    /// Permittivity [F/m].
+    /// Permittivity (F/m).
     pub(super) fn permittivity(&mut self) -> Result<f64, Reported> {
         Ok(self.positive_if_any("permittivity")?.unwrap_or(VACUUM))
     }
 
-    /// Prescribed mean temperature [K], if the element or its layer gives one.
+    /// Prescribed mean temperature (K), if the element or its layer gives one.
     pub(super) fn temperature(&mut self, material: &Material) -> Result<Option<f64>, Reported> {
         let Some(temperature) = self.number("T")? else { return Ok(None) };
         if self.number("thermalexpansion")?.is_none() {

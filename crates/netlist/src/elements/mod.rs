@@ -44,7 +44,7 @@ pub(crate) fn is_entry(name: &str) -> bool {
     table::LAYER_ENTRIES.contains(&name)
 }
 
-/// True for a parameter of an element that is an angle [rad], besides ox, oy, oz.
+/// True for a parameter of an element that is an angle (rad), besides ox, oy, oz.
 pub(crate) fn turns(name: &str) -> bool {
     table::ANGLES.contains(&name)
 }

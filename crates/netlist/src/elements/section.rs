@@ -4,11 +4,11 @@ use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
 use super::arguments::ElementSite;
 
-/// Fraction of the bending stiffness that `softjointlr` and `hinge3` retain [1].
+/// Fraction of the bending stiffness that `softjointlr` and `hinge3` retain (1).
 const SOFT: f64 = 1e-2;
 
 impl ElementSite<'_, '_> {
-    /// Adds a straight beam whose section has `area` [m²] and the second moment `second` [m⁴] about z.
+    /// Adds a straight beam whose section has `area` (m²) and the second moment `second` (m⁴) about z.
     fn add_equivalent(&mut self, area: f64, second: f64) -> Result<(), Reported> {
         self.drawing.note(Fact::OutOfPlane, self.instance.span);
         let length = self.positive("l")?;

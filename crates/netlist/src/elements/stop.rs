@@ -4,7 +4,7 @@ use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
 use bimorph_structure::Stop;
 
-/// Area on which a rigid stop bears unless it is given [m²]: 10 µm by 10 µm.
+/// Area on which a rigid stop bears unless it is given (m²): 10 µm by 10 µm.
 const AREA: f64 = 1e-10;
 
 /// stop2d: a may move by `gap` along local x, and by `back` against it, relative to b or to where it was drawn.

@@ -63,7 +63,7 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
     "layer",
 ];
 
-/// Parameters that are angles [rad], besides ox, oy, oz. (`qoz` of a prestressedbeam is in degrees everywhere.)
+/// Parameters that are angles (rad), besides ox, oy, oz. (`qoz` of a prestressedbeam is in degrees everywhere.)
 pub(super) const ANGLES: &[&str] = &[
     "alpha", "ox1", "oy1", "oz1", "ox2", "oy2", "oz2", "qox1", "qoy1", "qoz1", "qox2", "qoy2", "qoz2", "sliderox",
     "slideroy", "slideroz",

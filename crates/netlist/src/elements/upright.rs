@@ -9,7 +9,7 @@ use super::super::drawing::{Fact, StructureBuilder, Upright};
 use super::arguments::ElementSite;
 use bimorph_structure::{Link, NodeId};
 
-/// How far the direction of a post may be from the normal of the plane, as a part of its length [1].
+/// How far the direction of a post may be from the normal of the plane, as a part of its length (1).
 const NORMAL: f64 = 1e-6;
 
 impl ElementSite<'_, '_> {
@@ -19,7 +19,7 @@ impl ElementSite<'_, '_> {
     }
 
     /// Keeps a member that leaves the plane until all anchors are known; `offset` is the way from its first node to its
-    /// second [m], global axes.
+    /// second (m), global axes.
     pub(super) fn upright(
         &mut self,
         name: String,

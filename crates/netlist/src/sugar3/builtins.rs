@@ -152,7 +152,7 @@ fn node(lua: &Lua, shared: &SharedState, value: &LuaValue) -> mlua::Result<LuaNo
     Ok(state.lua_node(id))
 }
 
-/// Notes the coordinates of a node [m]; the first ones hold.
+/// Notes the coordinates of a node (m); the first ones hold.
 fn lie(state: &mut LuaState, id: NodeId, at: [f64; 2], span: TextSpan) {
     match state.coordinates.entry(id) {
         Entry::Occupied(known) if *known.get() != at => {
@@ -297,7 +297,7 @@ fn build(state: &mut LuaState, model: &str, call: &ElementCall, span: TextSpan) 
     elements::build(&instance, &mut state.drawing, &mut state.sink, sugar2::read)
 }
 
-/// SUGAR 3's own `force`: x, y [N] and rz [N·m] on a node, global axes.
+/// SUGAR 3's own `force`: x, y (N) and rz (N·m) on a node, global axes.
 fn force(state: &mut LuaState, name: String, call: &ElementCall, span: TextSpan) -> Result<(), Reported> {
     let [node] = call.nodes[..] else {
         let message = format!("`force` takes 1 node, {} given", call.nodes.len());

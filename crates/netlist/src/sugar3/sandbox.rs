@@ -17,7 +17,7 @@ const EVERY: u32 = 100;
 const INSTRUCTIONS: usize = 2_000_000;
 const INSTRUCTIONS_PER_BYTE: usize = 2;
 const INSTRUCTIONS_PER_ELEMENT: usize = 2_000;
-/// Memory [byte], the same.
+/// Memory (byte), the same.
 const MEMORY: usize = 8 << 20;
 const MEMORY_PER_BYTE: usize = 16;
 const MEMORY_PER_ELEMENT: usize = 4 << 10;

@@ -34,9 +34,9 @@ pub(super) struct LuaState {
     pub(super) elements: usize,
     /// Anonymous elements so far.
     pub(super) anonymous: usize,
-    /// The first node with coordinates, and these [m].
+    /// The first node with coordinates, and these (m).
     pub(super) first_placed: Option<(NodeId, [f64; 2])>,
-    /// Coordinates that were given to nodes [m].
+    /// Coordinates that were given to nodes (m).
     pub(super) coordinates: HashMap<NodeId, [f64; 2]>,
     /// True once `std2cvt.net` is used: angles are in radians.
     pub(super) radians: bool,

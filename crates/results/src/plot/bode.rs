@@ -25,9 +25,9 @@ pub struct BodeCurve {
 /// A resonance, which is marked on the curves that show it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodeResonance {
-    /// Frequency [Hz].
+    /// Frequency (Hz).
     pub frequency: f64,
-    /// Quality [1]; none: undamped.
+    /// Quality (1); none: undamped.
     pub quality: Option<f64>,
 }
 
@@ -45,7 +45,7 @@ pub enum Magnitude {
 pub struct BodeChart {
     /// Line above the panels.
     pub title: String,
-    /// Frequencies [Hz], ascending.
+    /// Frequencies (Hz), ascending.
     pub frequencies: Vec<f64>,
     /// The axis of frequencies is linear.
     pub linear: bool,
@@ -282,7 +282,7 @@ fn curve(
     }
 }
 
-/// Phases [°], continuous past half a turn, from between −180 and 180.
+/// Phases (°), continuous past half a turn, from between −180 and 180.
 fn unwrapped(values: &[[f64; 2]]) -> Vec<f64> {
     let mut last: Option<f64> = None;
     let one = |[re, im]: &[f64; 2]| {

@@ -18,7 +18,7 @@ pub struct Series {
 pub struct Panel {
     /// Title of the panel.
     pub title: String,
-    /// Unit in SI; an SI prefix is chosen to fit. A unit in brackets such as "[µm]" is taken as it is.
+    /// Unit in SI; an SI prefix is chosen to fit. A unit in brackets such as "(µm)" is taken as it is.
     pub unit: String,
     /// The curves, in the order of their legend.
     pub series: Vec<Series>,
@@ -39,7 +39,7 @@ pub struct PanelChart {
     pub panels: Vec<Panel>,
 }
 
-/// Width of every chart [px].
+/// Width of every chart (px).
 pub const WIDTH: f64 = 920.0;
 const LEFT: f64 = 92.0;
 const RIGHT: f64 = 24.0;

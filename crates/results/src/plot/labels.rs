@@ -10,7 +10,7 @@ const LETTER: f64 = 0.62;
 /// Rings of places about a point.
 const RINGS: usize = 4;
 
-/// A rectangle on the picture: left, top, right, bottom [px].
+/// A rectangle on the picture: left, top, right, bottom (px).
 pub(super) type Extent = [f64; 4];
 
 /// Labels placed so far.

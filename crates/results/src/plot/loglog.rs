@@ -95,7 +95,7 @@ pub fn draw(chart: &LogChart) -> Picture {
     picture
 }
 
-/// A note in lines that fit into `room` [px].
+/// A note in lines that fit into `room` (px).
 fn wrapped(note: &str, room: f64) -> Vec<String> {
     let most = (room / (0.56 * 11.0)) as usize;
     let mut lines: Vec<String> = Vec::new();

@@ -18,7 +18,7 @@ pub struct MechanismFigure<'a> {
     pub motion: &'a [NodeDisplacement],
     /// Displacement of points along each beam, equally spaced, ends included; empty: beams are bent by their ends alone.
     pub curves: &'a [Vec<NodeDisplacement>],
-    /// Mean temperature of beams [K], by name; colours the deflected beams.
+    /// Mean temperature of beams (K), by name; colours the deflected beams.
     pub temperatures: &'a [(String, f64)],
     /// How large displacements are drawn.
     pub scale: DisplacementScale,
@@ -52,7 +52,7 @@ struct ScaledFigure<'a> {
     curves: Vec<Vec<NodeDisplacement>>,
     low: [f64; 2],
     high: [f64; 2],
-    /// Size of support symbols [m].
+    /// Size of support symbols (m).
     symbol: f64,
 }
 
@@ -141,7 +141,7 @@ fn hottest(temperatures: &[(String, f64)]) -> Option<&(String, f64)> {
     temperatures.iter().max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The lowest temperature there is: that of the surroundings, where nothing is colder [K].
+/// The lowest temperature there is: that of the surroundings, where nothing is colder (K).
 fn coldest(drawing: &MechanismFigure<'_>) -> f64 {
     let ambient = drawing.structure.beams.iter().filter(|b| b.heater.is_some() || b.temperature.is_some());
     let ambient = ambient.map(|b| b.material.ambient_temperature);
@@ -218,9 +218,9 @@ pub fn named(title: &str, structure: &Structure) -> Picture {
 /// Background of a mechanism.
 #[derive(Debug, Clone, Default)]
 pub struct Ground {
-    /// Contours of a layout [m].
+    /// Contours of a layout (m).
     pub drawn: Vec<Vec<[f64; 2]>>,
-    /// Contours that no part of the mechanism covers [m].
+    /// Contours that no part of the mechanism covers (m).
     pub foreign: Vec<Vec<[f64; 2]>>,
 }
 
@@ -330,7 +330,7 @@ fn legend(
     picture.text(WIDTH - MARGIN, y + 17.0, 12.0, Align::End, INK, &parts.join("  ·  "));
 }
 
-/// The colours between two temperatures [K], with both beside them.
+/// The colours between two temperatures (K), with both beside them.
 fn colour_bar(picture: &mut Picture, [x, y]: [f64; 2], [cold, hot]: [f64; 2]) {
     const STEPS: usize = 24;
     const STEP: f64 = 5.0;

@@ -60,7 +60,7 @@ const LEFT: f64 = 92.0;
 const RIGHT: f64 = 34.0;
 const TOP: f64 = 66.0;
 const INK: &str = "#333333";
-/// Length of a dash and of the space after it [px].
+/// Length of a dash and of the space after it (px).
 const DASH: [f64; 2] = [7.0, 5.0];
 
 /// Draws the plane.
@@ -106,7 +106,7 @@ pub fn draw(plane: &PlaneChart) -> Picture {
     picture
 }
 
-/// Both axes, and the height of the frame [px].
+/// Both axes, and the height of the frame (px).
 fn axes(plane: &PlaneChart, width: f64) -> (Axis, Axis, f64) {
     let range = |i: usize| {
         let all = plane.curves.iter().flat_map(|c| c.points.iter().map(|p| p[i])).filter(|v| v.is_finite());

@@ -18,9 +18,9 @@ pub enum RenderError {
     /// Too large or empty.
     #[error("the picture of {width} x {height} pixels cannot be held in memory")]
     Size {
-        /// Width [px].
+        /// Width (px).
         width: u32,
-        /// Height [px].
+        /// Height (px).
         height: u32,
     },
     /// The pixels cannot be packed.

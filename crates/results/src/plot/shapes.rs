@@ -2,10 +2,10 @@
 
 use bimorph_structure::{Comb, Mass, Structure};
 
-/// Displacement of a node: x, y [m] and rotation [rad].
+/// Displacement of a node: x, y (m) and rotation (rad).
 pub type NodeDisplacement = [f64; 3];
 
-/// A point in the plane [m].
+/// A point in the plane (m).
 pub type PlanePoint = [f64; 2];
 
 /// Pieces into which a whole bent beam is divided at least.

@@ -8,9 +8,9 @@ const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
 /// A picture under construction. Coordinates are pixels from the upper left corner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// Width [px].
+    /// Width (px).
     pub width: f64,
-    /// Height [px].
+    /// Height (px).
     pub height: f64,
     body: String,
 }
@@ -33,7 +33,7 @@ pub struct Paint<'a> {
     pub fill: &'a str,
     /// Colour of the outline, or "none".
     pub stroke: &'a str,
-    /// Width of the outline [px].
+    /// Width of the outline (px).
     pub width: f64,
     /// 0 (invisible) to 1 (opaque).
     pub opacity: f64,
@@ -63,7 +63,7 @@ impl<'a> Paint<'a> {
 }
 
 impl Picture {
-    /// An empty picture of that size [px].
+    /// An empty picture of that size (px).
     pub fn new(width: f64, height: f64) -> Self {
         Self { width, height, body: String::new() }
     }
@@ -113,7 +113,7 @@ impl Picture {
         );
     }
 
-    /// A line of text with its base line at y, of that size [px] and colour.
+    /// A line of text with its base line at y, of that size (px) and colour.
     pub fn text(&mut self, x: f64, y: f64, size: f64, align: Align, colour: &str, text: &str) {
         let anchor = match align {
             Align::Start => "start",

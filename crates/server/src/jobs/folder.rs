@@ -29,7 +29,7 @@ pub(super) struct JobOutcome {
     pub(super) message: String,
     pub(super) rows: u64,
     pub(super) failed: u64,
-    /// When, since 1970 [ms].
+    /// When, since 1970 (ms).
     pub(super) ended_ms: u64,
     /// Bytes of its journal: with fewer it has not ended.
     pub(super) bytes: u64,

@@ -12,7 +12,7 @@ use prost::Message;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Longest name that a client gives to its request [byte].
+/// Longest name that a client gives to its request (byte).
 const LONGEST_REQUEST: usize = 64;
 
 /// Longest stored title of a netlist [character].
@@ -29,11 +29,11 @@ pub(super) struct JobOrigin {
     pub(super) content: String,
     /// Whether identical requests share one job.
     pub(super) share: bool,
-    /// After how long without its client it is cancelled [s]; 0: never.
+    /// After how long without its client it is cancelled (s); 0: never.
     pub(super) release_after_s: f64,
     /// Place among all jobs of a folder, in the order in which they came.
     pub(super) sequence: u64,
-    /// When, since 1970 [ms].
+    /// When, since 1970 (ms).
     pub(super) submitted_ms: u64,
     /// Version of the server.
     pub(super) version: String,

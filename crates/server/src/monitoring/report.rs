@@ -88,7 +88,7 @@ pub(crate) fn text(shared: &ServerState, gate: &AdmissionCounters) -> String {
     out
 }
 
-/// Resident memory [byte] on Linux; 0 elsewhere.
+/// Resident memory (byte) on Linux; 0 elsewhere.
 fn resident() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));

@@ -13,7 +13,7 @@ pub(crate) struct SessionRecord {
     pub(crate) sequence: u64,
     /// The last accepted state; 0: none yet.
     pub(crate) accepted: u64,
-    /// For how long it is kept without use [ms]; 0: as long as any.
+    /// For how long it is kept without use (ms); 0: as long as any.
     pub(crate) lease_ms: u64,
     /// States in their envelope.
     pub(crate) sealed: Vec<u8>,

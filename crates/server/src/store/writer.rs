@@ -16,7 +16,7 @@ pub(crate) struct SessionWriter {
     sequence: u64,
     /// The last accepted state; 0: none yet.
     pub(crate) accepted: u64,
-    /// For how long the session is kept without use [ms]; 0: as long as any.
+    /// For how long the session is kept without use (ms); 0: as long as any.
     pub(crate) lease_ms: u64,
 }
 
@@ -62,7 +62,7 @@ impl SessionWriter {
         Ok(())
     }
 
-    /// Keeps for how long the session is kept without use [ms], beside its states as they are.
+    /// Keeps for how long the session is kept without use (ms), beside its states as they are.
     ///
     /// # Errors
     /// As [`Self::keep`]; earlier requests stay in force.

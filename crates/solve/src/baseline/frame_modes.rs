@@ -15,7 +15,7 @@ use faer::{Mat, Par, Side};
 /// Modes with their residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConsistentModes {
-    /// λ = ω² of each mode, ascending [rad²/s²].
+    /// λ = ω² of each mode, ascending (rad²/s²).
     pub lambda: Vec<f64>,
     /// Shapes.
     pub shapes: Vec<Vec<Pose>>,
@@ -77,7 +77,7 @@ fn full(pattern: &Pattern, matrix: &BlockMatrix<f64, 3>) -> Mat<f64> {
     dense
 }
 
-/// Smallest ratio of a translation's stiffness to its mass [rad²/s²].
+/// Smallest ratio of a translation's stiffness to its mass (rad²/s²).
 fn typical(stiffness: &BlockMatrix<f64, 3>, mass: &BlockMatrix<f64, 3>) -> f64 {
     (stiffness.diagonal.iter().zip(&mass.diagonal))
         .map(|(k, m)| k[(0, 0)] / m[(0, 0)])

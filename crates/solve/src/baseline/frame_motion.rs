@@ -27,7 +27,7 @@ pub struct Newmark<S> {
 }
 
 impl<S: LinearSolver> Newmark<S> {
-    /// Factors the step matrix for steps of length `h` [s].
+    /// Factors the step matrix for steps of length `h` (s).
     ///
     /// # Errors
     /// [`ZeroPivot`] where it is singular.

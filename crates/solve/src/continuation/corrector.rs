@@ -55,7 +55,7 @@ pub(super) fn inner(system: &System, a: &[Pose], b: &[Pose]) -> f64 {
     a.iter().zip(b).map(|(a, b)| dot(system, a, b)).sum::<f64>() / a.len() as f64
 }
 
-/// Largest displacement [m]: translation, or rotation times the length scale.
+/// Largest displacement (m): translation, or rotation times the length scale.
 fn extent(system: &System, p: &Pose) -> f64 {
     let e = (p.x * p.x + p.y * p.y).sqrt().max(p.z.abs() * system.length_scale);
     if p.iter().all(|v| v.is_finite()) { e } else { f64::INFINITY }

@@ -9,7 +9,7 @@ use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::planar::Pose;
 use thiserror::Error;
 
-/// Half of the interval over which the residual is differenced [1]. Exact for any; 1 keeps rounding smallest.
+/// Half of the interval over which the residual is differenced (1). Exact for any; 1 keeps rounding smallest.
 const HALF: f64 = 1.0;
 
 /// Why two systems are no ends of one family.
@@ -45,7 +45,7 @@ pub struct LoadFamily {
 }
 
 impl LoadFamily {
-    /// From `from` at source voltages `from_sources` [V] at s = 0 to `to` at s = 1.
+    /// From `from` at source voltages `from_sources` (V) at s = 0 to `to` at s = 1.
     ///
     /// # Errors
     /// [`NotAFamily`] where anything else differs.

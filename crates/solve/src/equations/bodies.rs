@@ -24,9 +24,9 @@ pub const DIRECTIONS: [&str; 3] = ["along x", "along y", "about z"];
 /// Weights of displacements and rates of a system.
 #[derive(Debug, Clone)]
 pub struct NormWeights {
-    /// Of all bodies [kg].
+    /// Of all bodies (kg).
     pub(crate) mass: f64,
-    /// Directions that have drag and no mass: body, direction and drag [N·s/m, N·m·s].
+    /// Directions that have drag and no mass: body, direction and drag (N·s/m, N·m·s).
     pub(crate) dragged: Vec<(usize, usize, f64)>,
 }
 
@@ -112,7 +112,7 @@ impl Equations for Bodies<'_> {
 
 /// Fraction of the energy error that counts where contact dissipates energy, since the error decays as well.
 const OF_LOSS: f64 = 0.3;
-/// Error of a contact's penetration that is allowed, of the penetration [1], and the least one that it is measured by [m]: the force grows with its fourth
+/// Error of a contact's penetration that is allowed, of the penetration (1), and the least one that it is measured by (m): the force grows with its fourth
 /// power, and a point without inertia is in no norm of masses.
 const PRESSED: (f64, f64) = (0.1, 1e-10);
 
@@ -130,7 +130,7 @@ pub(crate) fn contact_error(system: &System, (before, after): (&Motion, &Motion)
     energy.hypot(system.contact_change([&before.q, &after.q], &error.q, PRESSED.1) / PRESSED.0)
 }
 
-/// Directions of bodies without mass that drag holds back, with the drag [N·s/m, N·m·s].
+/// Directions of bodies without mass that drag holds back, with the drag (N·s/m, N·m·s).
 pub(crate) fn dragged(model: &Model) -> Vec<(usize, usize, f64)> {
     if model.bodies.iter().all(|body| body.mass > 0.0) {
         return Vec::new();

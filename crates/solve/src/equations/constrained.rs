@@ -58,17 +58,17 @@ pub struct Constrained<'a, L> {
     zeros: Vec<f64>,
     /// Gives a slow iteration up early, because a shorter step can be had.
     hurried: bool,
-    /// Relative error that a stage may have [1].
+    /// Relative error that a stage may have (1).
     exact: f64,
     work: SolverCounters,
     /// Reductions that took the path for singular configurations.
     pub singular: u64,
-    /// Largest gap of a loop after a projection [m].
+    /// Largest gap of a loop after a projection (m).
     pub gap: f64,
 }
 
 impl<'a, L: Loads> Constrained<'a, L> {
-    /// Storage for `linkage`, to time `end` [s]; `scale` is the size of each coordinate [m or rad].
+    /// Storage for `linkage`, to time `end` (s); `scale` is the size of each coordinate (m or rad).
     pub fn new(linkage: &'a Linkage, loads: L, scale: &[f64], end: f64) -> Self {
         let zeros = vec![0.0; linkage.coordinates];
         Self {
@@ -97,7 +97,7 @@ impl<'a, L: Loads> Constrained<'a, L> {
         (sum / x.len().max(1) as f64).sqrt()
     }
 
-    /// Takes a motion to the loops as they are at time `t` [s].
+    /// Takes a motion to the loops as they are at time `t` (s).
     pub fn project(&mut self, t: f64, motion: &mut Motion<f64>) {
         self.loads.prescribe(t, &mut self.reduction);
         let gap = self.reduction.project_positions(&mut motion.q, &motion.v, &mut self.next);
@@ -105,7 +105,7 @@ impl<'a, L: Loads> Constrained<'a, L> {
         self.reduction.project_rates(&motion.q, &mut motion.v, &mut self.next);
     }
 
-    /// A step in which the first accelerations and rates move the coordinates by no more than an error of `tol` [s].
+    /// A step in which the first accelerations and rates move the coordinates by no more than an error of `tol` (s).
     ///
     /// # Errors
     /// [`StepFailure::NoInertia`].

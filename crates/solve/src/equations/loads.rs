@@ -14,15 +14,15 @@ use bimorph_multibody::planar::Pose;
 
 /// Loads on a mechanism in joint coordinates.
 pub trait Loads {
-    /// Sets what time alone prescribes, such as the offsets of heated joints that are locked, at `t` [s]. Before placing.
+    /// Sets what time alone prescribes, such as the offsets of heated joints that are locked, at `t` (s). Before placing.
     fn prescribe(&mut self, t: f64, reduction: &mut Reduction<f64>) {
         let _ = (t, reduction);
     }
 
-    /// Adds what acts at time `t` [s] to the force and torque of `reduction`, whose bodies are placed at `q` and `v`.
+    /// Adds what acts at time `t` (s) to the force and torque of `reduction`, whose bodies are placed at `q` and `v`.
     fn add(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>);
 
-    /// Adds β·K + γ·C of what acts where [`Loads::add`] was last called; `factors` are β [s²] and γ [s]. Omitted terms
+    /// Adds β·K + γ·C of what acts where [`Loads::add`] was last called; `factors` are β (s²) and γ (s). Omitted terms
     /// cost iterations, not accuracy.
     fn stiffen(&mut self, reduction: &Reduction<f64>, factors: (f64, f64), added: &mut AddedInertia) {
         let _ = (reduction, factors, added);
@@ -66,7 +66,7 @@ impl<'a> JointLoads<'a> {
         }
     }
 
-    /// Places the bodies at time `t` [s] of the ramp, locked directions at their prescribed lengths.
+    /// Places the bodies at time `t` (s) of the ramp, locked directions at their prescribed lengths.
     pub fn place(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>) {
         self.prescribe(t, reduction);
         reduction.place(q, v);

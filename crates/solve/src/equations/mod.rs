@@ -109,16 +109,16 @@ impl StepFailure {
 /// Criterion that determines the length of steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Control {
-    /// Relative error that a step may make [1].
+    /// Relative error that a step may make (1).
     Tolerance(f64),
-    /// Equal steps, as many as are needed for none to be longer than this [s].
+    /// Equal steps, as many as are needed for none to be longer than this (s).
     Fixed(f64),
 }
 
 /// One stage of an implicit method: a = A(t, q + β·a, v + γ·a).
 #[derive(Debug, Clone, Copy)]
 pub struct Stage<'a, X> {
-    /// Time [s].
+    /// Time (s).
     pub t: f64,
     /// Displacements without the stage's own acceleration.
     pub q: &'a [X],
@@ -126,9 +126,9 @@ pub struct Stage<'a, X> {
     pub v: &'a [X],
     /// Displacements near those of the stage, to begin with.
     pub near: &'a [X],
-    /// β [s²].
+    /// β (s²).
     pub beta: f64,
-    /// γ [s].
+    /// γ (s).
     pub gamma: f64,
 }
 
@@ -140,7 +140,7 @@ pub trait Equations {
     /// How many there are.
     fn unknowns(&self) -> usize;
 
-    /// When the motion ends [s].
+    /// When the motion ends (s).
     fn end(&self) -> f64;
 
     /// A motion begins, whose steps `control` sets.
@@ -148,10 +148,10 @@ pub trait Equations {
         let _ = control;
     }
 
-    /// The estimated error of a step of length `h` [s] over the relative error `tol` that it may make: 1 is just allowed.
+    /// The estimated error of a step of length `h` (s) over the relative error `tol` that it may make: 1 is just allowed.
     fn share(&self, ends: [&Motion<Self::Unknown>; 2], error: &Motion<Self::Unknown>, h: f64, tol: f64) -> f64;
 
-    /// Takes the end of a step to the constraints as they are at time `t` [s]. Returns how far that moved it, of what a step from
+    /// Takes the end of a step to the constraints as they are at time `t` (s). Returns how far that moved it, of what a step from
     /// `before` may be wrong at a relative error of `tol`.
     fn close(&mut self, t: f64, before: &[Self::Unknown], end: &mut Motion<Self::Unknown>, tol: f64) -> f64 {
         let _ = (t, before, end, tol);
@@ -172,7 +172,7 @@ pub trait Equations {
 
 /// Extra operations required by explicit and diagonally implicit methods.
 pub trait Staged: Equations {
-    /// `a` becomes q̈ at time `t` [s], displacements `q` and rates `v`; zero where there is no inertia and springs decide.
+    /// `a` becomes q̈ at time `t` (s), displacements `q` and rates `v`; zero where there is no inertia and springs decide.
     ///
     /// # Errors
     /// [`StepFailure`].
@@ -195,8 +195,8 @@ pub trait Staged: Equations {
         at: &mut Motion<Self::Unknown>,
     ) -> Result<(), StepFailure>;
 
-    /// Takes an estimated error through (I − γ·J)⁻¹, with the J that the last stage left, which had this γ [s]; the step ends at time
-    /// `t` [s] and displacements `q`.
+    /// Takes an estimated error through (I − γ·J)⁻¹, with the J that the last stage left, which had this γ (s); the step ends at time
+    /// `t` (s) and displacements `q`.
     ///
     /// # Errors
     /// [`StepFailure`].
@@ -207,7 +207,7 @@ pub trait Staged: Equations {
         error: &mut Motion<Self::Unknown>,
     ) -> Result<(), StepFailure>;
 
-    /// A rate without inertia is no state: after a step of length `h` [s] from displacements `before` it becomes the mean of the step, and
+    /// A rate without inertia is no state: after a step of length `h` (s) from displacements `before` it becomes the mean of the step, and
     /// its accelerations nothing. A rule that takes it from the last one would ring on.
     fn follow(
         &self,

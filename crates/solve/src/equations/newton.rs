@@ -32,16 +32,16 @@ pub(crate) struct ForceEvaluation {
     pub(crate) weight: f64,
     /// Fraction ξ of the displacement.
     pub(crate) share: f64,
-    /// Time on the ramp [s].
+    /// Time on the ramp (s).
     pub(crate) time: f64,
 }
 
 /// See the module.
 #[derive(Debug)]
 pub(crate) struct Equation<'a> {
-    /// Factor of M [1/s²].
+    /// Factor of M (1/s²).
     pub(crate) m: f64,
-    /// Factor of C [1/s]: the rate is `rates` + c·x.
+    /// Factor of C (1/s): the rate is `rates` + c·x.
     pub(crate) c: f64,
     /// Rates without x; their damping is in `constant`, and what contact loses is not.
     pub(crate) rates: &'a [Pose],
@@ -51,7 +51,7 @@ pub(crate) struct Equation<'a> {
     pub(crate) constant: &'a [Pose],
     /// Where the forces are taken.
     pub(crate) samples: &'a [ForceEvaluation],
-    /// Length of a step over which members have their discrete forces instead [s].
+    /// Length of a step over which members have their discrete forces instead (s).
     pub(crate) quotient: Option<f64>,
 }
 
@@ -316,7 +316,7 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
     }
 }
 
-/// Largest translation, or rotation times the length scale [m], with its body and direction; a NaN counts as infinite.
+/// Largest translation, or rotation times the length scale (m), with its body and direction; a NaN counts as infinite.
 pub(crate) fn largest(system: &System, x: &[Pose]) -> (f64, DegreeOfFreedom) {
     let mut found = (0.0, (0, 0));
     for (j, p) in x.iter().enumerate() {

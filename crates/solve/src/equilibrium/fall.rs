@@ -35,7 +35,7 @@ pub(super) const MAX_SHIFT: f64 = 1e20;
 const RATIO: [f64; 3] = [0.05, 0.25, 0.75];
 /// Rounding of the energy, as a fraction of it.
 const ROUNDING: f64 = 1e-12;
-/// Rotation between the ends of a segment beyond which a step is rejected [rad].
+/// Rotation between the ends of a segment beyond which a step is rejected (rad).
 const OVERTURNED: f64 = 1.5;
 /// Largest change of the distance of a gap in one step, as a fraction of the larger distance.
 const CLOSING: f64 = 0.5;
@@ -43,7 +43,7 @@ const CLOSING: f64 = 0.5;
 /// Units of displacements.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Units {
-    /// Mean segment length; where gaps may close, the length scale of the system [m].
+    /// Mean segment length; where gaps may close, the length scale of the system (m).
     pub(super) length: f64,
 }
 
@@ -80,7 +80,7 @@ impl Units {
         Pose::new(x.x / square, x.y / square, TURN_WEIGHT * x.z)
     }
 
-    /// The median of the translational stiffness of the bodies [J].
+    /// The median of the translational stiffness of the bodies (J).
     pub(super) fn median_stiffness(self, tangent: &BlockMatrix<f64, 3>) -> f64 {
         let one = |block: &Block| 0.5 * (block[(0, 0)] + block[(1, 1)]).abs() * self.length * self.length;
         let mut all: Vec<f64> = tangent.diagonal.iter().map(one).filter(|k| *k > 0.0).collect();

@@ -47,7 +47,7 @@ pub enum LossKind {
 pub struct StabilityLoss {
     /// Its kind.
     pub kind: LossKind,
-    /// Fraction of the path where it lies [1].
+    /// Fraction of the path where it lies (1).
     pub share: f64,
     /// Where the part went: the beam that bends and its side, seen along its drawn direction; without one the body that moves most.
     pub direction: String,

@@ -25,10 +25,10 @@ pub trait LoadPath {
     }
 }
 
-/// The smallest fraction of a way from rest at which sources are taken [1]: nothing at all would have no slope.
+/// The smallest fraction of a way from rest at which sources are taken (1): nothing at all would have no slope.
 const LEAST: f64 = 1e-30;
 
-/// Remaining distance to a station that counts as zero [1].
+/// Remaining distance to a station that counts as zero (1).
 const SMALLEST: f64 = 1e-12;
 
 /// Source voltages and dead loads that go from one value to another, heaters at their steady temperature.
@@ -44,14 +44,14 @@ pub struct SourcePath<'a> {
     to: &'a [f64],
     load: [f64; 2],
     from_rest: bool,
-    /// Of each gap, its voltage at both ends [V].
+    /// Of each gap, its voltage at both ends (V).
     volts: Vec<[f64; 2]>,
-    /// Of each heater, the coefficients of its rise in the share, and its rise at the end [K].
+    /// Of each heater, the coefficients of its rise in the share, and its rise at the end (K).
     rise: Vec<([f64; 3], f64)>,
 }
 
 impl<'a> SourcePath<'a> {
-    /// From source voltages `from` to `to` [V], and the fraction `load` of dead loads and built-in strains at both ends.
+    /// From source voltages `from` to `to` (V), and the fraction `load` of dead loads and built-in strains at both ends.
     pub fn new(electrics: &'a Electrics, from: &'a [f64], to: &'a [f64], load: [f64; 2]) -> Self {
         let gap = |g: usize, u: &[f64]| u.iter().enumerate().map(|(i, v)| electrics.gap_rows[(g, i)] * v).sum::<f64>();
         let attracts = (0..electrics.gap_rows.nrows()).any(|g| gap(g, to) != 0.0);

@@ -11,16 +11,16 @@ use std::sync::Arc;
 
 /// Compliance ratio above which a body counts as unsupported.
 const UNSUPPORTED_COMPLIANCE_RATIO: f64 = 1e8;
-/// Rotation of the end of a segment from its chord beyond which its law means nothing [rad].
+/// Rotation of the end of a segment from its chord beyond which its law means nothing (rad).
 const TURNED: f64 = 1.0;
 /// Rotation of an end of a segment from its chord, and between its ends, beyond which a refusal suggests shorter
-/// segments [rad].
+/// segments (rad).
 const COARSE: [f64; 2] = [0.7, 1.0];
-/// Axial strain beyond which a segment is no beam [1].
+/// Axial strain beyond which a segment is no beam (1).
 const CRUSHED: f64 = 0.3;
-/// Bending strain beyond which a segment is no beam [1]: its radius is less than half its width.
+/// Bending strain beyond which a segment is no beam (1): its radius is less than half its width.
 const OVERBENT: f64 = 1.0;
-/// Turn along a beam beyond which it has a loop [rad]; a hairpin has π.
+/// Turn along a beam beyond which it has a loop (rad); a hairpin has π.
 const WOUND: f64 = 1.5 * std::f64::consts::PI;
 /// Longest displacement of a part that is still there, in lengths of the longest beam.
 const GONE: f64 = 100.0;
@@ -181,7 +181,7 @@ impl Equilibrium {
         }
     }
 
-    /// The beam that turns farthest along its length, by how much [rad], where that makes a loop.
+    /// The beam that turns farthest along its length, by how much (rad), where that makes a loop.
     fn wound(system: &System, q: &[Pose]) -> Option<(Arc<str>, f64)> {
         let turn = |beam: &BeamLine| {
             let turns = beam.points.iter().map(|point| point.rotation(q));

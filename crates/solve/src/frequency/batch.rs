@@ -31,11 +31,11 @@ use storage::Which;
 
 /// Inverse iterations of all shapes before the best modes in their span are taken.
 const SPREAD: usize = 2;
-/// How far below its λ a mode is iterated: as near as a pivot stays a number, and farther than rounding [1].
+/// How far below its λ a mode is iterated: as near as a pivot stays a number, and farther than rounding (1).
 const SHIFT_OFFSET: f64 = 1e-4;
 /// Inverse iterations of a mode, first with a σ that is about right, then with one that is.
 const NEAR: [usize; 2] = [2, 3];
-/// A mode with a larger residual has not settled here [1].
+/// A mode with a larger residual has not settled here (1).
 const SETTLED: f64 = 1e-9;
 
 impl LaneModes {

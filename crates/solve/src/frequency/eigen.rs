@@ -3,7 +3,7 @@
 //! Shift-invert Lanczos: the operator A = M^½·(K − σM)⁻¹·M^½ is symmetric, its largest eigenvalues 1/(λ − σ) belong to the
 //! lowest modes, and one application is one solve with the block factor, O(n+m). Coordinates weighted by M^½ have one unit,
 //! so no scaling is needed. Small models go through a dense symmetric eigensolver. Where rounding has spoiled the factor
-//! (parts a million times stiffer than others) the operator applies solves that correct themselves ([`refined`]).
+//! (parts a million times stiffer than others) the operator applies solves that correct themselves (`refined`).
 //!
 //! The last digits come from inverse iteration of the block ([`inverse_iteration`]), which also measures each mode. The
 //! number of modes below the highest found is checked against the inertia of K − λM (Sylvester), which no lost mode
@@ -29,15 +29,15 @@ const DENSE: usize = 60;
 const GUARD_MODES: usize = 2;
 /// A factor whose solves have a larger relative error is corrected in every solve.
 const ROUGH: f64 = 1e-9;
-/// Residual at which an iteration stops [1].
+/// Residual at which an iteration stops (1).
 const GOAL: f64 = 1e-11;
-/// Residual of a reliable mode: the error of its frequency is the square [1].
+/// Residual of a reliable mode: the error of its frequency is the square (1).
 pub const RELIABLE: f64 = 1e-8;
 
 /// Modes with their residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Modes {
-    /// λ = ω² of each mode, ascending [rad²/s²].
+    /// λ = ω² of each mode, ascending (rad²/s²).
     pub lambda: Vec<f64>,
     /// Shapes with xᵀMx = 1.
     pub shapes: Vec<Vec<Pose>>,
@@ -45,7 +45,7 @@ pub struct Modes {
     pub residuals: Vec<f64>,
     /// The inertia below the highest mode counts more modes than were found.
     pub missed: bool,
-    /// About the relative error of K by rounding, as the factor has it [1].
+    /// About the relative error of K by rounding, as the factor has it (1).
     pub rounding: f64,
 }
 
@@ -204,7 +204,7 @@ fn massive_directions(model: &Model) -> usize {
         .sum()
 }
 
-/// Smallest ratio of a body's stiffness to its mass [rad²/s²].
+/// Smallest ratio of a body's stiffness to its mass (rad²/s²).
 fn typical(model: &Model, k: &BlockMatrix<f64, 3>) -> f64 {
     (0..k.diagonal.len())
         .filter(|&j| model.mass(j).x > 0.0)

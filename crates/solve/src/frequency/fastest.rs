@@ -15,7 +15,7 @@ const ROUNDS: usize = 60;
 /// The fastest motion about the drawn configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fastest {
-    /// Angular frequency [rad/s].
+    /// Angular frequency (rad/s).
     pub omega: f64,
     /// Body whose coordinate moves most.
     pub body: usize,

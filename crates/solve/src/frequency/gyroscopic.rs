@@ -13,12 +13,12 @@ use nalgebra::Complex;
 
 /// Vectors at most: more modes than take part in any band.
 const MAX_VECTORS: usize = 60;
-/// Fraction of the right-hand side at which the residual is rounding [1].
+/// Fraction of the right-hand side at which the residual is rounding (1).
 const ENOUGH: f64 = 1e-14;
 
 type ComplexVector = Vec<ComplexPose>;
 
-/// Solves for one force with the matrix that `harmonic` has factored and a frame at `rate` [rad/s]; `x` holds the force and
+/// Solves for one force with the matrix that `harmonic` has factored and a frame at `rate` (rad/s); `x` holds the force and
 /// becomes the response. `omega` in rad/s.
 pub fn solve(harmonic: &mut Harmonic, system: &System, (omega, rate): (f64, f64), x: &mut [ComplexPose]) {
     harmonic.solve(system, x);

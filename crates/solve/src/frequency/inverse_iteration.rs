@@ -18,17 +18,17 @@ use bimorph_multibody::{BlockMatrix, Model};
 
 /// Rounds at most.
 const MAX_ROUNDS: usize = 30;
-/// Error of a solve that is used only to measure a residual [1].
+/// Error of a solve that is used only to measure a residual (1).
 const MEASURED: f64 = 1e-3;
 
 /// Modes with their residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModeBlock {
-    /// λ of the wanted modes, ascending [rad²/s²].
+    /// λ of the wanted modes, ascending (rad²/s²).
     pub lambda: Vec<f64>,
     /// All shapes of the block, xᵀMx = 1, the wanted ones first.
     pub shapes: Vec<Vec<Pose>>,
-    /// Residual of each wanted mode [1].
+    /// Residual of each wanted mode (1).
     pub residuals: Vec<f64>,
 }
 

@@ -9,7 +9,7 @@ use bimorph_multibody::Model;
 use bimorph_multibody::planar::Pose;
 use nalgebra::DMatrix;
 
-/// MAC of every shape of `a` (rows) with every shape of `b` (columns), over the bodies of one model [1].
+/// MAC of every shape of `a` (rows) with every shape of `b` (columns), over the bodies of one model (1).
 pub fn mac(model: &Model, a: &[Vec<Pose>], b: &[Vec<Pose>]) -> DMatrix<f64> {
     let norm = |x: &Vec<Pose>| model.mass_product(x, x);
     let (of_a, of_b): (Vec<f64>, Vec<f64>) = (a.iter().map(norm).collect(), b.iter().map(norm).collect());

@@ -15,14 +15,14 @@ use nalgebra::Complex;
 
 /// Iterations at most.
 const MAX_ITERATIONS: usize = 20;
-/// Change of s that is rounding [1].
+/// Change of s that is rounding (1).
 const SETTLED: f64 = 1e-14;
-/// A change no smaller than that before is rounding too where it is below this [1].
+/// A change no smaller than that before is rounding too where it is below this (1).
 const ROUNDED: f64 = 1e-8;
 /// A pole further from its guess than this fraction is another one.
 const NEAR: f64 = 0.2;
 
-/// The pole next to `guess` [rad/s] for a tangent `stiffness`, starting from the force `push` on each body; none where the iteration
+/// The pole next to `guess` (rad/s) for a tangent `stiffness`, starting from the force `push` on each body; none where the iteration
 /// does not settle near it.
 pub fn pole(
     harmonic: &mut Harmonic,

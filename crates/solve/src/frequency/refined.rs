@@ -29,16 +29,16 @@ pub struct Refined<'a> {
     x: Vec<DoublePose>,
     product: Vec<DoublePose>,
     correction: Vec<Pose>,
-    /// About the relative error of a solve that is not corrected, as the first one showed [1].
+    /// About the relative error of a solve that is not corrected, as the first one showed (1).
     rounding: f64,
 }
 
 /// How a solve went.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolveAccuracy {
-    /// Size of the first correction over that of the solution: about the relative error of the factor [1].
+    /// Size of the first correction over that of the solution: about the relative error of the factor (1).
     pub first: f64,
-    /// Fraction by which the solution may still be off [1].
+    /// Fraction by which the solution may still be off (1).
     pub left: f64,
 }
 

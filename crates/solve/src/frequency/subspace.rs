@@ -16,7 +16,7 @@ const MAX_ITERATIONS: usize = 60;
 /// Modes as columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SubspaceModes {
-    /// λ = ω² of each vector of the block, ascending [rad²/s²].
+    /// λ = ω² of each vector of the block, ascending (rad²/s²).
     pub lambda: Vec<f64>,
     /// Shapes with xᵀMx = 1.
     pub shapes: Vec<Vec<Pose>>,

@@ -18,7 +18,7 @@ use bimorph_multibody::planar::Pose;
 pub enum Advance {
     /// At the end of the interval.
     Done,
-    /// The allowed number of steps was used up at this time [s].
+    /// The allowed number of steps was used up at this time (s).
     OutOfSteps(f64),
     /// The observer stopped it.
     Stopped,
@@ -68,7 +68,7 @@ impl<M, X: Unknown> Adaptive<M, X> {
     }
 
     /// Advances `motion` from the start of the equations to their end, and with it what the method carries. `h` holds the first
-    /// step to try [s] and receives the step that would come next.
+    /// step to try (s) and receives the step that would come next.
     ///
     /// # Errors
     /// [`SolveError::StepTooSmall`], [`SolveError::StepFailed`].
@@ -98,7 +98,7 @@ impl<M, X: Unknown> Adaptive<M, X> {
         end
     }
 
-    /// Advances `motion` in steps that end at the given times [s], the last of them the end of the equations, with what the method carries.
+    /// Advances `motion` in steps that end at the given times (s), the last of them the end of the equations, with what the method carries.
     /// False: a step made more than `most` times the error that `tol` allows, or failed; then `motion` is where that step began.
     pub fn along<E: Equations<Unknown = X>>(
         &mut self,

@@ -24,9 +24,9 @@ pub struct BatchRun<'a> {
     pub ramp: Ramp<'a>,
     /// Where it begins.
     pub motion: Motion,
-    /// First step to try [s].
+    /// First step to try (s).
     pub h: f64,
-    /// Relative error that a step may make [1].
+    /// Relative error that a step may make (1).
     pub tol: f64,
     /// Sees each accepted step.
     pub watcher: &'a mut dyn Watcher,
@@ -34,7 +34,7 @@ pub struct BatchRun<'a> {
 
 /// Sees the accepted steps of one run.
 pub trait Watcher {
-    /// True where the motions before and after the step from `s` to `s` + `h` [s] are to be seen.
+    /// True where the motions before and after the step from `s` to `s` + `h` (s) are to be seen.
     fn wants(&self, s: f64, h: f64) -> bool;
     /// Receives an accepted step; returns whether to continue.
     fn observe(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> bool;

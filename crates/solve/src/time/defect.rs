@@ -37,7 +37,7 @@ pub(super) const POWERS: [f64; 6] = [
     0.122_870_811_723_12,
 ];
 
-/// |R(iz)·exp(−iz) − 1|: relative error of a step that rotates a motion by the angle `z` [rad] [1].
+/// |R(iz)·exp(−iz) − 1|: relative error of a step that rotates a motion by the angle `z` (rad) (1).
 pub fn step_error(z: f64) -> f64 {
     let w = Complex::new(1.0, -GAMMA * z).inv();
     let r = POWERS.iter().rev().fold(Complex::new(0.0, 0.0), |sum, a| (sum + a) * w);
@@ -65,7 +65,7 @@ impl Impulses {
         self.both.fill(Pose::zeros());
     }
 
-    /// Adds the residual `rho` of unknown `k` at a node of a step of length `h` [s].
+    /// Adds the residual `rho` of unknown `k` at a node of a step of length `h` (s).
     pub(super) fn add(&mut self, k: usize, (x, weight): (f64, f64), h: f64, rho: Pose) {
         let early = rho * (-weight * x * h / GAMMA);
         self.early[k] += early;
@@ -82,7 +82,7 @@ impl Impulses {
     }
 }
 
-/// P, Ṗ and P̈ at the fraction `x` of a step of length `h` [s], from displacements and rates at both ends and the acceleration at the start.
+/// P, Ṗ and P̈ at the fraction `x` of a step of length `h` (s), from displacements and rates at both ends and the acceleration at the start.
 #[inline]
 pub(super) fn quartic(x: f64, h: f64, [q0, q1]: [&Pose; 2], [v0, v1]: [&Pose; 2], a0: &Pose) -> [Pose; 3] {
     let d = q1 - q0 - v0 * h - a0 * (0.5 * h * h);
@@ -125,12 +125,12 @@ pub trait Propagates<'s>: Method<Bodies<'s>> {
     /// Starts with no error.
     fn begin_error(&mut self);
 
-    /// After an accepted step of length `h` [s] from time `s` [s]: the error of the bodies' motion at its end. `carried` is what the
+    /// After an accepted step of length `h` (s) from time `s` (s): the error of the bodies' motion at its end. `carried` is what the
     /// method carried at its start.
     fn error(&mut self, bodies: &mut Bodies<'s>, step: (f64, f64), ends: [&Motion; 2], carried: &[Motion]) -> &Motion;
 }
 
-/// Receives each accepted step: its end [s], the motion there and the error of that; returns whether the error is still of use.
+/// Receives each accepted step: its end (s), the motion there and the error of that; returns whether the error is still of use.
 pub type SeeError<'a> = &'a mut dyn FnMut(f64, &Motion, &Motion) -> bool;
 
 /// A method whose error is reported after each accepted step. The motion is bit-identical to that of the method alone.

@@ -15,11 +15,11 @@ use bimorph_multibody::planar::Pose;
 #[derive(Debug, Clone)]
 pub struct Rk45<X = Pose> {
     core: DormandPrince<X>,
-    /// Start of the step last tried [s]; none before the first.
+    /// Start of the step last tried (s); none before the first.
     begun: Option<f64>,
     /// The motion there.
     start: Motion<X>,
-    /// End of it [s].
+    /// End of it (s).
     ended: f64,
 }
 

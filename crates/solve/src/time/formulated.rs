@@ -18,7 +18,7 @@ pub enum Formulated {
 
 impl Formulated {
     /// With sensitivities to the final voltages of `sources`, in joint coordinates where the model has them. `shortest` is
-    /// about the shortest time in which something moves [s].
+    /// about the shortest time in which something moves (s).
     pub fn new(system: &System, joints: Option<&Arc<Joints>>, shortest: f64, sources: &[usize]) -> Self {
         match joints {
             Some(joints) => Self::Joints(Box::new(JointRodas4::new(Arc::clone(joints), shortest, sources))),

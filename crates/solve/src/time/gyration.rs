@@ -16,15 +16,15 @@ use bimorph_multibody::{Body, Model};
 
 /// Most terms of the series; a larger number requires shorter steps.
 const MAX_TERMS: usize = 12;
-/// Fraction of the solution at which the series ends [1].
+/// Fraction of the solution at which the series ends (1).
 const NEGLIGIBLE: f64 = 1e-16;
 
 /// How the frame turns at an instant of a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Gyration {
-    /// Force per mass and rate, 2Ω [rad/s].
+    /// Force per mass and rate, 2Ω (rad/s).
     pub rate: f64,
-    /// Force per mass and displacement, Ω̇ [rad/s²].
+    /// Force per mass and displacement, Ω̇ (rad/s²).
     pub turning: f64,
 }
 
@@ -39,7 +39,7 @@ impl Gyration {
         self.rate == 0.0 && self.turning == 0.0
     }
 
-    /// Its contribution to the matrix of a stage, per mass: `gh` is γh [s].
+    /// Its contribution to the matrix of a stage, per mass: `gh` is γh (s).
     fn of_stage(&self, gh: f64) -> f64 {
         self.rate / gh + self.turning
     }

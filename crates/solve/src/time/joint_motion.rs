@@ -12,7 +12,7 @@ use thiserror::Error;
 pub struct NotFinite {
     /// Name of the first such body.
     pub body: String,
-    /// Time [s].
+    /// Time (s).
     pub t: f64,
 }
 
@@ -28,7 +28,7 @@ pub struct JointMotion<'a, F> {
     pub singular: u64,
     /// Diagnostics of the last of them.
     pub met: Singularity,
-    /// Largest gap of a loop after a projection [m].
+    /// Largest gap of a loop after a projection (m).
     pub gap: f64,
 }
 

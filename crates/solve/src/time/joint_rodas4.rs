@@ -73,14 +73,14 @@ pub struct JointRodas4 {
     resumed: bool,
     /// The error of the motion, where it is wanted.
     defect: Option<Box<JointDefectEstimate>>,
-    /// About the shortest time in which something moves [s].
+    /// About the shortest time in which something moves (s).
     shortest: f64,
     work: SolverCounters,
 }
 
 impl JointRodas4 {
     /// Storage for a tree, with sensitivities to the final voltages of `sources`; `shortest` is about the shortest time in
-    /// which something moves [s].
+    /// which something moves (s).
     pub fn new(joints: Arc<Joints>, shortest: f64, sources: &[usize]) -> Self {
         let Joints { tree, closures, .. } = &*joints;
         let count = tree.links.len();
@@ -191,7 +191,7 @@ impl JointRodas4 {
         Ok(())
     }
 
-    /// Completes the right side of stage `i` of a step of length `h` [s]: `right` holds −R.
+    /// Completes the right side of stage `i` of a step of length `h` (s): `right` holds −R.
     fn inertia(&mut self, i: usize, h: f64) {
         let rate = GAMMA_I[i] * h;
         let Self { joints, stages, right, wrench, forcing, force, loss, .. } = self;

@@ -18,7 +18,7 @@ pub trait Method<E: Equations> {
         Ok(())
     }
 
-    /// One step of length `h` [s] from `motion` at time `t` [s]. The new motion replaces `motion`, and `error` receives its
+    /// One step of length `h` (s) from `motion` at time `t` (s). The new motion replaces `motion`, and `error` receives its
     /// estimated error.
     ///
     /// # Errors
@@ -32,7 +32,7 @@ pub trait Method<E: Equations> {
         error: &mut Motion<E::Unknown>,
     ) -> Result<(), StepFailure>;
 
-    /// A step of length `h` [s] from time `t` [s] between these ends is accepted; `carried` is what the method carried at its start.
+    /// A step of length `h` (s) from time `t` (s) between these ends is accepted; `carried` is what the method carried at its start.
     fn accepted(
         &mut self,
         equations: &mut E,

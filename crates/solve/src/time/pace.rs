@@ -8,10 +8,10 @@ const MAX_REJECTED: usize = 40;
 /// Where a motion is on its way, and how long its next step is. Errors are relative to what a step may make.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StepController {
-    /// Now [s].
+    /// Now (s).
     pub(super) t: f64,
     end: f64,
-    /// The step that is wanted [s].
+    /// The step that is wanted (s).
     pub(super) h: f64,
     /// −1/p: errors fall with the p-th power of the step.
     exponent: f64,
@@ -20,7 +20,7 @@ pub(super) struct StepController {
 }
 
 impl StepController {
-    /// From `t` to `end` [s], with `h` [s] to begin with, by a method whose errors fall with the power `order` of the step.
+    /// From `t` to `end` (s), with `h` (s) to begin with, by a method whose errors fall with the power `order` of the step.
     pub(super) fn new((t, end): (f64, f64), h: f64, order: f64) -> Self {
         Self { t, end, h, exponent: -1.0 / order, rejected: 0 }
     }
@@ -30,13 +30,13 @@ impl StepController {
         self.t >= self.end
     }
 
-    /// The step to try [s]: the last two share what is left, so that no sliver remains.
+    /// The step to try (s): the last two share what is left, so that no sliver remains.
     pub(super) fn step(&self) -> f64 {
         let left = self.end - self.t;
         if self.h >= 0.999 * left { left } else { self.h.min(0.5 * left.max(self.h)) }
     }
 
-    /// Where a step ends [s].
+    /// Where a step ends (s).
     pub(super) fn after(&self, step: f64) -> f64 {
         if self.t + step >= self.end * (1.0 - 1e-14) { self.end } else { self.t + step }
     }
@@ -58,7 +58,7 @@ impl StepController {
     }
 }
 
-/// Starts and ends [s] of equal steps over a span, none longer than `length`, as few as that takes.
+/// Starts and ends (s) of equal steps over a span, none longer than `length`, as few as that takes.
 pub(super) fn equal((start, end): (f64, f64), length: f64) -> impl Iterator<Item = (f64, f64)> {
     let span = end - start;
     let count = (span / length * (1.0 - 1e-9)).ceil().max(1.0) as usize;

@@ -190,7 +190,7 @@ impl Radau5 {
         self.work.solves += 1;
     }
 
-    /// One simplified Newton iteration; the largest correction [m] and where.
+    /// One simplified Newton iteration; the largest correction (m) and where.
     fn iterate(
         &mut self,
         system: &System,

@@ -49,21 +49,21 @@ pub struct ClientError {
 /// named by a model id.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RemoteTransient {
-    /// End time [s].
+    /// End time (s).
     pub stop: f64,
     /// Names of the signals wanted.
     pub signals: Vec<String>,
     /// Number of equally spaced output times.
     pub points: usize,
-    /// Relative error of a step [1].
+    /// Relative error of a step (1).
     pub tol: f64,
-    /// Voltages held during the run, by port name [V].
+    /// Voltages held during the run, by port name (V).
     pub voltages: Vec<(String, f64)>,
     /// Model whose static equilibrium is the initial state; none: at rest as drawn.
     pub release: Option<String>,
     /// The integrator.
     pub method: Integrator,
-    /// Length of equal steps [s]; none: steps follow `tol`.
+    /// Length of equal steps (s); none: steps follow `tol`.
     pub step: Option<f64>,
     /// Crossings to find: (signal name, level in the signal's unit).
     pub events: Vec<(String, f64)>,
@@ -123,7 +123,7 @@ impl Client {
         self.statics_backbent(model, &[], voltages).map(|(result, _)| result)
     }
 
-    /// Static equilibrium after the ports were raised once to `raised`, with the permanent strain of each beam that can yield [1].
+    /// Static equilibrium after the ports were raised once to `raised`, with the permanent strain of each beam that can yield (1).
     ///
     /// # Errors
     /// [`ClientError`].

@@ -41,7 +41,7 @@ pub struct JobStatus {
     pub rows: u64,
     /// Rows with an error.
     pub failed: u64,
-    /// When it was submitted, since 1970 [s].
+    /// When it was submitted, since 1970 (s).
     pub submitted: i64,
     /// Root file of its netlist.
     pub netlist: String,

@@ -19,7 +19,7 @@ use tonic::service::interceptor::InterceptedService;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Request, Status};
 
-/// Largest reply accepted [byte], as the server's default limit.
+/// Largest reply accepted (byte), as the server's default limit.
 const MESSAGE_BYTES: usize = 64 << 20;
 
 /// The calls of a server, with its token.

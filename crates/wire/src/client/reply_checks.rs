@@ -6,9 +6,9 @@ use bimorph_base::Diagnostic;
 use bimorph_device::{DeviceError, Mode, OpenRequest, Trial};
 use proto::trial_reply::Status as WireStatus;
 
-/// Longest text of a server that is shown [byte].
+/// Longest text of a server that is shown (byte).
 const LONGEST: usize = 64 << 10;
-/// Shortest next step that a device may require, in units of the previous step [1].
+/// Shortest next step that a device may require, in units of the previous step (1).
 const SHORTEST: f64 = 1e-12;
 
 /// Text of a server: line breaks and tabs stay, other control characters are written out, and what is very long is cut.
@@ -263,7 +263,7 @@ pub(super) fn export(reply: &proto::ExportResponse) -> Result<(), String> {
     }
 }
 
-/// Samples that follow those until `last` [s]: a value of each signal at each time.
+/// Samples that follow those until `last` (s): a value of each signal at each time.
 pub(super) fn samples(last: f64, signals: usize, samples: &proto::Samples) -> Result<(), String> {
     finite("t", &samples.t)?;
     if samples.t.first().is_some_and(|first| *first < last) || !samples.t.is_sorted() {

@@ -24,7 +24,7 @@ pub fn nodes_from_wire(nodes: Vec<proto::NodeMotion>) -> Vec<(String, NodeMotion
     nodes.into_iter().map(|n| (n.name, NodeMotion { x: n.x, y: n.y, rz: n.rz })).collect()
 }
 
-/// A static equilibrium as it travels, with the permanent strains of beams by name [1].
+/// A static equilibrium as it travels, with the permanent strains of beams by name (1).
 pub fn static_to_wire(result: &StaticResult, strains: &[(String, f64)]) -> proto::StaticResponse {
     proto::StaticResponse {
         nodes: nodes_to_wire(&result.nodes),

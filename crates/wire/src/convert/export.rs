@@ -14,7 +14,7 @@ use proto::export_response::Content;
 pub struct ExportReply {
     /// The file.
     pub file: ExportedFile,
-    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    /// Largest estimated relative error by the mesh (1); none without an estimate.
     pub estimated_error: Option<f64>,
 }
 

@@ -27,7 +27,7 @@ pub struct PathReply {
     pub result: ContinuationResult,
     /// Unit of the parameter; empty where its effects do not determine it.
     pub unit: String,
-    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    /// Largest estimated relative error by the mesh (1); none without an estimate.
     pub estimated_error: Option<f64>,
 }
 

@@ -17,7 +17,7 @@ pub enum ReductionTask {
     Positions,
 }
 
-/// Axial offsets of locked directions [m].
+/// Axial offsets of locked directions (m).
 #[derive(Debug, Clone)]
 pub struct Offsets<T> {
     /// One for each body on a joint that is no pin.
@@ -51,13 +51,13 @@ pub(super) struct FrontAccumulator<T> {
 /// Contribution of one pin's body to the next inward, about the pin between them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PinContribution<T> {
-    /// Inertia left at the pin: xx, xy, yy [kg].
+    /// Inertia left at the pin: xx, xy, yy (kg).
     pub inertia: [T; 3],
-    /// Force through the pin [N].
+    /// Force through the pin (N).
     pub force: [T; 2],
-    /// Moment of the pin's drive on the next body [N·m].
+    /// Moment of the pin's drive on the next body (N·m).
     pub moment: T,
-    /// From the next body's centre of mass to the pin [m].
+    /// From the next body's centre of mass to the pin (m).
     pub lever: [T; 2],
 }
 

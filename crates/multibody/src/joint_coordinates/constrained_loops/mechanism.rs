@@ -22,9 +22,9 @@ pub(super) struct MechanismConstants<T> {
     pub joints: Vec<JointShape<T>>,
     /// One a loop closure.
     pub closures: Vec<ClosureShape<T>>,
-    /// Unit of each coordinate, which makes it a length [m, or m/m].
+    /// Unit of each coordinate, which makes it a length (m, or m/m).
     pub units: Vec<T>,
-    /// Length that converts a rotation of each body to a displacement [m].
+    /// Length that converts a rotation of each body to a displacement (m).
     pub levers: Vec<T>,
     /// Loop constraints m.
     pub constraints: usize,
@@ -33,13 +33,13 @@ pub(super) struct MechanismConstants<T> {
 /// Inertia of one body over lanes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LaneInertia<T> {
-    /// [kg]
+    /// (kg)
     pub mass: T,
-    /// About the centre of mass [kg·m²].
+    /// About the centre of mass (kg·m²).
     pub moment: T,
 }
 
-/// From the centres of mass of a link's parent and of itself to their joint, as drawn [m], over lanes.
+/// From the centres of mass of a link's parent and of itself to their joint, as drawn (m), over lanes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Arms<T> {
     pub arm_parent: LinkageVector<T>,
@@ -62,14 +62,14 @@ pub(super) struct JointShape<T> {
 /// Geometry of a closure over lanes.
 #[derive(Debug, Clone)]
 pub(super) struct ClosureShape<T> {
-    /// From the centres of mass of its two bodies to the joint, as drawn [m].
+    /// From the centres of mass of its two bodies to the joint, as drawn (m).
     pub arm_a: LinkageVector<T>,
     pub arm_b: LinkageVector<T>,
     /// Its axial direction, as drawn.
     pub axis: LinkageVector<T>,
     /// Second-order axial strain Q: gg, gp, pp.
     pub second: [T; 3],
-    /// Length that converts a rotation to a displacement [m].
+    /// Length that converts a rotation to a displacement (m).
     pub lever: T,
     /// Directions of a body that supports hold; none of a joint.
     pub held: Vec<[T; 3]>,

@@ -18,11 +18,11 @@ pub struct BodyKinematics<T> {
 /// Offset of a placed body from its parent, for the inward and outward passes of the reduction.
 #[derive(Debug, Clone, Copy)]
 pub struct ParentOffset<T> {
-    /// From the parent's centre of mass to the pin, R_p·arm_p; where there is no pin, to this body's centre of mass [m].
+    /// From the parent's centre of mass to the pin, R_p·arm_p; where there is no pin, to this body's centre of mass (m).
     pub lever_parent: LinkageVector<T>,
-    /// From this body's centre of mass to the pin, R·arm; zero without a pin [m].
+    /// From this body's centre of mass to the pin, R·arm; zero without a pin (m).
     pub lever: LinkageVector<T>,
-    /// Velocity part c of the acceleration [m/s²].
+    /// Velocity part c of the acceleration (m/s²).
     pub bias: LinkageVector<T>,
 }
 
@@ -83,7 +83,7 @@ impl<T: Real> ParentOffset<T> {
 
     pub const REST: Self = Self { lever_parent: [T::ZERO; 2], lever: [T::ZERO; 2], bias: [T::ZERO; 2] };
 
-    /// From the parent's centre of mass to this one, d [m].
+    /// From the parent's centre of mass to this one, d (m).
     #[inline(always)]
     pub fn shift(&self) -> LinkageVector<T> {
         minus(self.lever_parent, self.lever)

@@ -30,7 +30,7 @@ impl Reduction<f64> {
     }
 
     /// Moves `q` onto the loops, by the shortest way in the mass norm; `change` is scratch of the same length. Leaves the
-    /// bodies placed there at rates `v`. Returns the largest gap left [m].
+    /// bodies placed there at rates `v`. Returns the largest gap left (m).
     pub fn project_positions(&mut self, q: &mut [f64], v: &[f64], change: &mut [f64]) -> f64 {
         self.place(q, v);
         let mut gap = self.largest(ReductionTask::Positions);
@@ -76,7 +76,7 @@ impl Reduction<f64> {
         self.place(q, v);
     }
 
-    /// Largest residual of the loops [m, or m/s].
+    /// Largest residual of the loops (m, or m/s).
     #[inline]
     pub fn largest(&mut self, task: ReductionTask) -> f64 {
         <f64 as Traversed>::Traversal::rows(self, task)

@@ -14,9 +14,9 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub struct Reduction<T: Traversed> {
     pub(super) mechanism: Arc<MechanismConstants<T>>,
-    /// Wrench on each body: forces along x and y and moment about the centre of mass [N, N·m]. Set before reducing.
+    /// Wrench on each body: forces along x and y and moment about the centre of mass (N, N·m). Set before reducing.
     pub force: Vec<[T; 3]>,
-    /// Force on each coordinate [N or N·m]. Set before reducing.
+    /// Force on each coordinate (N or N·m). Set before reducing.
     pub torque: Vec<T>,
     /// Acceleration of each body.
     pub accelerations: Vec<[T; 3]>,
@@ -122,7 +122,7 @@ impl<T: Traversed> Reduction<T> {
         self.traversal.as_ref().map_or(0, |t| t.packed_bodies())
     }
 
-    /// Displacement and rotation of a body from its drawn place [m, m, rad].
+    /// Displacement and rotation of a body from its drawn place (m, m, rad).
     #[inline]
     pub fn pose(&self, body: usize) -> [T; 3] {
         self.placed(body).pose

@@ -13,12 +13,12 @@
 //!   down to that number, so a shuttle with any number of straight arms holds three. A row without length is redundant: it
 //!   is counted, with what it contradicts the others by.
 //!
-//! JSON: "t" [s]. "signals": samples by name in SI. "units": by name. "method". "counters": the work done. "events":
-//! crossings of --event levels and contacts of gaps, each with its time "t" [s] and "direction" up or down.
+//! JSON: "t" (s). "signals": samples by name in SI. "units": by name. "method". "counters": the work done. "events":
+//! crossings of --event levels and contacts of gaps, each with its time "t" (s) and "direction" up or down.
 //! "formulation". "estimated_error": error of the mesh, and "step_error": error of the steps, both of the amplitude.
-//! "stopped_at" [s]: with --until. "reliable_until" [s]: end of the time in which the tolerance holds after contact
+//! "stopped_at" (s): with --until. "reliable_until" (s): end of the time in which the tolerance holds after contact
 //! (null: to the end), and "after_contact": the statistics of each signal from there on. "joint_coordinates", for rcr:
-//! n, m, evaluations near singular configurations, largest gap of a loop [m]. Comp. 33, 1979). Compressing rows to the
+//! n, m, evaluations near singular configurations, largest gap of a loop (m). Comp. 33, 1979). Compressing rows to the
 //! rank of the shuttle is wrong when they are taken as equally hard; weighted by how hard they are it loses nothing.
 
 mod orthogonal;

@@ -123,7 +123,7 @@ impl Reduction<f64> {
         }
     }
 
-    /// Elastic energy at the placed configuration [J].
+    /// Elastic energy at the placed configuration (J).
     pub fn strain_energy(&self, linkage: &Linkage, q: &[f64], rest: &RestStrain<'_>) -> f64 {
         let mut energy = 0.0;
         for link in &linkage.links {
@@ -156,7 +156,7 @@ impl Reduction<f64> {
         energy
     }
 
-    /// Kinetic energy at the placed configuration [J].
+    /// Kinetic energy at the placed configuration (J).
     #[inline]
     pub fn kinetic_energy(&self, linkage: &Linkage) -> f64 {
         (linkage.links.iter().enumerate())

@@ -46,13 +46,13 @@ pub struct LinkageBody {
     pub second: Matrix2<f64>,
     /// Group and length of the heated joint.
     pub expansion: Option<(usize, f64)>,
-    /// Built-in axial rest offset [m].
+    /// Built-in axial rest offset (m).
     pub rest: f64,
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f64,
-    /// Moment of inertia [kg·m²].
+    /// Moment of inertia (kg·m²).
     pub inertia: f64,
-    /// Lever that makes a rotation comparable with a displacement [m].
+    /// Lever that makes a rotation comparable with a displacement (m).
     pub lever: f64,
 }
 

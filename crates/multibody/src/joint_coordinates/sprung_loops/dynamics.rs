@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use pulp::{Arch, Simd, WithSimd};
 
 impl TreeJoint {
-    /// Axial rest offset of the joint, or its change with `rest` [m].
+    /// Axial rest offset of the joint, or its change with `rest` (m).
     #[inline(always)]
     pub fn offset(&self, rest: &RestStrain<'_>) -> f64 {
         self.rest * rest.built_in + self.expansion.map_or(0.0, |(group, length)| length * rest.expansion[group])
@@ -75,7 +75,7 @@ impl WithSimd for Resist<'_> {
 /// Stresses of the tree's joints, eight bodies per lane.
 #[derive(Debug, Clone)]
 pub struct Stresses {
-    /// Axial rest offsets [m].
+    /// Axial rest offsets (m).
     offsets: Vec<Lane8>,
     /// By coordinates.
     out: Vec<LanePose>,

@@ -41,7 +41,7 @@ pub(super) fn dot<T: Number>(a: TreeVector<T>, b: TreeVector<T>) -> T {
 /// How a body moves with its parent's rotation and with its own coordinates.
 #[derive(Debug, Clone, Copy)]
 pub struct MotionMap<T> {
-    /// t(L): motion with the parent's rotation [m/rad].
+    /// t(L): motion with the parent's rotation (m/rad).
     pub(super) lever: TreeVector<T>,
     /// S_u, S_g, S_p.
     pub(super) columns: [TreeVector<T>; 3],
@@ -90,7 +90,7 @@ impl<T: Number> MotionMap<T> {
 pub(super) struct JointGeometry<T> {
     /// σ.
     pub(super) sign: T,
-    /// Arms as drawn, of the parent and of the body [m].
+    /// Arms as drawn, of the parent and of the body (m).
     pub(super) arms: [TreeVector<T>; 2],
     /// Cosine and sine of the drawn angle of the joint's x axis.
     pub(super) axis: TreeVector<T>,
@@ -103,9 +103,9 @@ pub(super) struct JointGeometry<T> {
 pub(super) struct RotationState<T> {
     /// Sine and cosine of half its rotation.
     pub(super) half: TreeVector<T>,
-    /// Rate [rad/s].
+    /// Rate (rad/s).
     pub(super) spin: T,
-    /// Rate of that [rad/s²].
+    /// Rate of that (rad/s²).
     pub(super) spin_rate: T,
 }
 

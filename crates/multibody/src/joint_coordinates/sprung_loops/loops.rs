@@ -14,7 +14,7 @@ struct LaneClosures {
     bodies: [[u32; LANES]; 2],
     arms: [LaneVector; 2],
     section: LaneSection,
-    /// Built-in axial rest offsets [m].
+    /// Built-in axial rest offsets (m).
     rest: Lane8,
     /// Lanes that are heated, with group and length.
     expansion: Vec<(usize, usize, f64)>,

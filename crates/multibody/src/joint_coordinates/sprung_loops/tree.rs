@@ -40,9 +40,9 @@ pub struct TreeJoint {
     pub parent: TreeParent,
     /// −1 where the joint counts its strains from this body to the parent.
     pub sign: f64,
-    /// From the parent's centre of mass to the joint, as drawn [m].
+    /// From the parent's centre of mass to the joint, as drawn (m).
     pub arm_parent: Vector2<f64>,
-    /// From the body's centre of mass to the joint, as drawn [m].
+    /// From the body's centre of mass to the joint, as drawn (m).
     pub arm: Vector2<f64>,
     /// Cosine and sine of the drawn angle of the joint's x axis.
     pub axis: Vector2<f64>,
@@ -54,7 +54,7 @@ pub struct TreeJoint {
     pub second: [f64; 3],
     /// Group and length of a heated joint.
     pub expansion: Option<(usize, f64)>,
-    /// Built-in axial rest offset [m].
+    /// Built-in axial rest offset (m).
     pub rest: f64,
     /// Projector onto the directions that a support leaves free (roots only).
     pub free: Option<Box<Block>>,

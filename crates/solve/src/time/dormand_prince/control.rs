@@ -6,7 +6,7 @@ use thiserror::Error;
 /// Bounds of an error: every component may be wrong by atol + rtol·|y| in a step, in the mean square over all.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tolerances {
-    /// Relative part [1].
+    /// Relative part (1).
     pub rtol: f64,
     /// Absolute part of each coordinate, in its unit.
     pub atol_q: Vec<f64>,
@@ -42,9 +42,9 @@ pub enum IntegrationError<E> {
     /// The accelerations could not be had, even for the shortest step; or the projection failed.
     #[error("no accelerations at {t:.6e} s, step {h:.3e} s: {source}")]
     Accelerations {
-        /// Start of the step [s].
+        /// Start of the step (s).
         t: f64,
-        /// Its length [s].
+        /// Its length (s).
         h: f64,
         /// Error of the formulation.
         source: E,
@@ -54,9 +54,9 @@ pub enum IntegrationError<E> {
         "step size fell to {h:.3e} s at {t:.6e} s after {rejected} rejections in a row; worst component {component}"
     )]
     StepTooSmall {
-        /// Start of the step [s].
+        /// Start of the step (s).
         t: f64,
-        /// Its length [s].
+        /// Its length (s).
         h: f64,
         /// Rejections in a row.
         rejected: usize,
@@ -66,7 +66,7 @@ pub enum IntegrationError<E> {
     /// The allowed number of steps was used up.
     #[error("{steps} steps brought the motion to {t:.6e} s only")]
     TooManySteps {
-        /// Time reached [s].
+        /// Time reached (s).
         t: f64,
         /// Steps taken, rejected ones included.
         steps: u64,
@@ -79,7 +79,7 @@ const MAX_REJECTED: usize = 60;
 const BETA: f64 = 0.04;
 
 impl DormandPrince {
-    /// Integrates `(q, v)` from `span.0` to `span.1` [s]. `h` is the first step to try (0: found from the
+    /// Integrates `(q, v)` from `span.0` to `span.1` (s). `h` is the first step to try (0: found from the
     /// accelerations) and receives the one that would come next. `observe` receives each accepted step and returns
     /// whether to continue. `None` is returned when the end was reached, and the time where `observe` stopped
     /// otherwise.

@@ -28,7 +28,7 @@ pub trait SecondOrder {
     /// Length of q, and of q̇.
     fn dimension(&self) -> usize;
 
-    /// `a` becomes q̈ at time `t` [s], coordinates `q` and rates `v`.
+    /// `a` becomes q̈ at time `t` (s), coordinates `q` and rates `v`.
     ///
     /// # Errors
     /// The formulation's own; the step is then tried again at a fifth of its length.
@@ -87,9 +87,9 @@ pub type PhasePoint = Motion<f64>;
 /// The continuous extension of one accepted step.
 #[derive(Debug, Clone, Copy)]
 pub struct DenseOutput<'a> {
-    /// Start of the step [s].
+    /// Start of the step (s).
     pub t: f64,
-    /// Its length [s]; negative when time runs backwards.
+    /// Its length (s); negative when time runs backwards.
     pub h: f64,
     terms: &'a [PhasePoint; 5],
 }

@@ -86,7 +86,7 @@ impl JointPortSensitivities {
         }
     }
 
-    /// Stage `i` at time `s` [s] of the ramp, of a step of length `h` [s]. `at` is the motion's own stage, `start` the
+    /// Stage `i` at time `s` (s) of the ramp, of a step of length `h` (s). `at` is the motion's own stage, `start` the
     /// sensitivities of coordinates, rates and accelerations, two motions for each source. Returns the number of solves.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn stage(
@@ -155,7 +155,7 @@ impl JointPortSensitivities {
         self.sources.len() as u64
     }
 
-    /// After the last stage of a step of length `h` [s]: the new sensitivities, and those of the bodies, whose coordinates
+    /// After the last stage of a step of length `h` (s): the new sensitivities, and those of the bodies, whose coordinates
     /// are at `at`.
     pub(super) fn finish(
         &mut self,

@@ -78,7 +78,7 @@ impl JointStages {
         same
     }
 
-    /// Where stage `i` of a step of length `h` [s] from coordinates and rates `now` and accelerations `push.q` takes
+    /// Where stage `i` of a step of length `h` (s) from coordinates and rates `now` and accelerations `push.q` takes
     /// the forces. Returns whether the step before ended there.
     pub(super) fn begin(&mut self, i: usize, h: f64, now: &Motion, push: &Motion) -> bool {
         if i == 0 {

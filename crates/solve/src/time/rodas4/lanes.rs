@@ -41,7 +41,7 @@ impl LaneRodas4 {
         self.drives[lane].load = 1.0;
     }
 
-    /// One step of each lane, of length `h` from the time `s` of its course [s]; for lanes without one all is left as it comes.
+    /// One step of each lane, of length `h` from the time `s` of its course (s); for lanes without one all is left as it comes.
     /// Returns the lanes whose matrix could not be factored: their motion is nothing.
     pub fn step(&mut self, lanes: &[Option<Lane<'_>>; LANES], s: &[f64; LANES], h: &[f64; LANES]) -> [bool; LANES] {
         self.h.0 = *h;

@@ -100,7 +100,7 @@ impl PortSensitivities {
         }
     }
 
-    /// Stage `i` at time `s` [s] of the ramp, of a step of length `h` [s] from the sensitivities `start`, where the motion
+    /// Stage `i` at time `s` (s) of the ramp, of a step of length `h` (s) from the sensitivities `start`, where the motion
     /// is at `q` under `drive`. Returns the number of solves.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn stage<S: LinearSolver>(

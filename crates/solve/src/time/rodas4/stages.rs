@@ -68,7 +68,7 @@ impl Stages {
         if i < IN_PLACE { &self.at } else { &motion.q }
     }
 
-    /// Begins stage `i` of a step of length `h` [s] from `motion`; the stage before it has been solved.
+    /// Begins stage `i` of a step of length `h` (s) from `motion`; the stage before it has been solved.
     pub(super) fn begin(&mut self, model: &Model, i: usize, h: f64, motion: &mut Motion) {
         match i {
             0 => self.begin_stage::<0>(model, h, motion),
@@ -134,7 +134,7 @@ impl Stages {
         &self.r1
     }
 
-    /// Rate of body `k` where stage `i` of a step of length `h` [s] takes the forces, which has begun.
+    /// Rate of body `k` where stage `i` of a step of length `h` (s) takes the forces, which has begun.
     pub(super) fn speed(&self, i: usize, h: f64, k: usize) -> Pose {
         let tile = &self.tiles[k / TILE];
         (0..i).fold(self.r1[k], |speed, j| speed - tile[j][k % TILE].q * (C[i][j] / h))

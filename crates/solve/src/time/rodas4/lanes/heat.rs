@@ -15,19 +15,19 @@ const COMPARED: usize = 4;
 struct LaneHeater {
     /// Which of the lags is its own.
     lag: usize,
-    /// Thermal expansion [1/K].
+    /// Thermal expansion (1/K).
     expansion: Lane8,
-    /// Rise at the start, and at last [K].
+    /// Rise at the start, and at last (K).
     start: Lane8,
     steady: Lane8,
-    /// Time constant [s]; 1 without one.
+    /// Time constant (s); 1 without one.
     time_constant: Lane8,
 }
 
 /// Exponentials of a time over a time constant, in each variant: [`Lag`].
 #[derive(Debug, Clone, Copy)]
 struct LaneLag {
-    /// [s]; 0: none.
+    /// (s); 0: none.
     time_constant: Lane8,
     decay: Lane8,
     x: Lane8,
@@ -39,7 +39,7 @@ struct LaneLag {
 pub(super) struct LaneHeat {
     heaters: Vec<LaneHeater>,
     lags: Vec<LaneLag>,
-    /// Time constants as they are, heater by heater [s].
+    /// Time constants as they are, heater by heater (s).
     time_constants: Vec<Lane8>,
 }
 
@@ -95,7 +95,7 @@ impl LaneHeat {
         }
     }
 
-    /// Goes to the time of each lane [s], where it is one.
+    /// Goes to the time of each lane (s), where it is one.
     pub(super) fn at(&mut self, s: [Option<f64>; LANES]) {
         for lag in &mut self.lags {
             for (k, s) in s.iter().enumerate() {
@@ -118,7 +118,7 @@ impl LaneHeat {
         }
     }
 
-    /// Its rate of change [1/s].
+    /// Its rate of change (1/s).
     #[inline(always)]
     pub(super) fn rates<W: SimdReal>(&self, simd: W::Simd, to: &mut [Lane8]) {
         for (heater, to) in self.heaters.iter().zip(to) {
