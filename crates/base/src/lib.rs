@@ -1,5 +1,5 @@
-//! What every crate may name: budgets of computations, diagnostics with the text that they point into, settings of parameters,
-//! suggestions for misspelled names, and disjoint sets.
+//! Budgets of computations, diagnostics with the text that they point into, settings of parameters, suggestions for misspelled names, and
+//! disjoint sets.
 //!
 //! **Architecture invariant.** This crate depends on no other crate of the workspace. It knows neither structures nor
 //! models.

@@ -37,9 +37,6 @@ impl FrontEnd for NetlistSource {
     }
 }
 
-/// Reads a bundle in one language.
-pub(crate) type ReadFunction = fn(&Bundle) -> Box<dyn FrontEnd>;
-
 /// Reads a bundle by the language of its root: SUGAR 3 where its first line that decides is Lua, else SUGAR 2.
 fn read(bundle: &Bundle) -> Box<dyn FrontEnd> {
     #[cfg(feature = "lua")]

@@ -2,7 +2,7 @@
 //! drawing came from.
 
 use crate::Structure;
-use bimorph_base::{Diagnostics, Setting};
+use bimorph_base::{Bundle, Diagnostics, Setting};
 use std::fmt::Debug;
 
 /// Result of elaborating a netlist.
@@ -24,3 +24,6 @@ pub trait FrontEnd: Debug + Send + Sync {
     /// Every error found in one run, those of reading too; warnings are among them.
     fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics>;
 }
+
+/// Reads a bundle in one language.
+pub type ReadFunction = fn(&Bundle) -> Box<dyn FrontEnd>;

@@ -27,7 +27,7 @@ mod without_circuit;
 pub use beam_rows::{ALIKE, BeamRows};
 pub use circuit::{CircuitElement, CircuitKind};
 pub use domain_element::DomainElement;
-pub use front_end::{FrontEnd, LoadedNetlist};
+pub use front_end::{FrontEnd, LoadedNetlist, ReadFunction};
 pub use gap::{BeamGap, Comb, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, PlateGap, Stop};
 pub use index::NodeIndex;
 pub use mechanical::{Beam, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};

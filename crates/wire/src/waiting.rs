@@ -12,7 +12,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// A message of the protocol.
 ///
 /// # Errors
-/// INVALID_ARGUMENT for bytes that are none.
+/// INVALID_ARGUMENT for other bytes.
 pub fn decoded<T: Message + Default>(request: &[u8]) -> Result<Request<T>, Status> {
     let read = T::decode(request).map(Request::new);
     read.map_err(|error| Status::invalid_argument(format!("expected a message of the protocol: {error}")))

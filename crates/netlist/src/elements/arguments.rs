@@ -2,12 +2,11 @@
 
 use super::super::diagnostic_sink::{DiagnosticSink, Reported};
 use super::super::drawing::StructureBuilder;
-use super::super::read::ReadFunction;
 use super::super::rotation::Rotation;
 use super::super::source::TextSpan;
 use super::super::value::{LayerValues, Value, short};
 use super::meaning::meaning;
-use bimorph_structure::NodeId;
+use bimorph_structure::{NodeId, ReadFunction};
 
 /// A length beyond this is a missing suffix rather than a part of a microsystem (m).
 const LONGEST: f64 = 0.1;

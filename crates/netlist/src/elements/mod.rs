@@ -25,9 +25,9 @@ pub(crate) use table::{ElementModel, model, models};
 
 use super::diagnostic_sink::{DiagnosticSink, Reported};
 use super::drawing::StructureBuilder;
-use super::read::ReadFunction;
 use super::source::TextSpan;
 use bimorph_base::suggest::{did_you_mean, nearest};
+use bimorph_structure::ReadFunction;
 
 /// The entry of a layer that a name which nothing reads is a slip of: near it, or the same but for its case.
 pub(crate) fn meant_entry(name: &str) -> Option<&'static str> {

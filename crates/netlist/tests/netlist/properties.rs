@@ -91,18 +91,18 @@ fn words() -> impl Strategy<Value = String> {
 
 /// An expression as a tree, with its value.
 #[derive(Debug, Clone)]
-enum Tree {
+enum ExpressionTree {
     Number(u16),
-    Negate(Box<Tree>),
-    Not(Box<Tree>),
-    Binary(usize, Box<Tree>, Box<Tree>),
+    Negate(Box<ExpressionTree>),
+    Not(Box<ExpressionTree>),
+    Binary(usize, Box<ExpressionTree>, Box<ExpressionTree>),
 }
 
 /// Sign, strength and meaning.
-type Operator = (&'static str, u8, fn(f64, f64) -> f64);
+type ExpressionOperator = (&'static str, u8, fn(f64, f64) -> f64);
 
 /// The binary operators.
-const OPERATORS: [Operator; 11] = [
+const OPERATORS: [ExpressionOperator; 11] = [
     ("|", 1, |a, b| f64::from(a != 0.0 || b != 0.0)),
     ("&", 2, |a, b| f64::from(a != 0.0 && b != 0.0)),
     ("==", 3, |a, b| f64::from(a == b)),
@@ -118,7 +118,7 @@ const OPERATORS: [Operator; 11] = [
 const UNARY: u8 = 6;
 const ATOM: u8 = 9;
 
-impl Tree {
+impl ExpressionTree {
     fn value(&self) -> f64 {
         match self {
             Self::Number(n) => f64::from(*n),
@@ -165,12 +165,16 @@ impl Tree {
     }
 }
 
-fn tree() -> impl Strategy<Value = Tree> {
-    (0u16..6).prop_map(Tree::Number).prop_recursive(5, 40, 2, |inner| {
+fn tree() -> impl Strategy<Value = ExpressionTree> {
+    (0u16..6).prop_map(ExpressionTree::Number).prop_recursive(5, 40, 2, |inner| {
         prop_oneof![
-            inner.clone().prop_map(|a| Tree::Negate(Box::new(a))),
-            inner.clone().prop_map(|a| Tree::Not(Box::new(a))),
-            (0..OPERATORS.len(), inner.clone(), inner).prop_map(|(o, a, b)| Tree::Binary(o, Box::new(a), Box::new(b))),
+            inner.clone().prop_map(|a| ExpressionTree::Negate(Box::new(a))),
+            inner.clone().prop_map(|a| ExpressionTree::Not(Box::new(a))),
+            (0..OPERATORS.len(), inner.clone(), inner).prop_map(|(o, a, b)| ExpressionTree::Binary(
+                o,
+                Box::new(a),
+                Box::new(b)
+            )),
         ]
     })
 }
@@ -184,11 +188,11 @@ fn value(text: &str) -> Option<f64> {
 }
 
 /// Divisions by zero and powers without a real value are errors of the language: they have no value to compare.
-fn regular(tree: &Tree) -> bool {
+fn regular(tree: &ExpressionTree) -> bool {
     match tree {
-        Tree::Number(_) => true,
-        Tree::Negate(a) | Tree::Not(a) => regular(a),
-        Tree::Binary(o, a, b) => {
+        ExpressionTree::Number(_) => true,
+        ExpressionTree::Negate(a) | ExpressionTree::Not(a) => regular(a),
+        ExpressionTree::Binary(o, a, b) => {
             let no_value = OPERATORS[*o].0 == "/" && b.value() == 0.0;
             regular(a) && regular(b) && !no_value && !tree.value().is_nan()
         }

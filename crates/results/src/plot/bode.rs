@@ -70,7 +70,9 @@ const MAX_CURVES: usize = 7;
 /// Decades of magnitude shown below the largest.
 const DECADES: f64 = 14.0;
 /// Resonances marked on a panel.
-const MAX_MARKED: usize = 8;
+const MAX_MARKED: usize = 6;
+/// Peaks that are closer than this are marked once (px).
+const APART: f64 = 8.0;
 /// A curve shows a resonance where it exceeds its values at a width to both sides by this factor.
 const SHOWS: f64 = 1.05;
 
@@ -184,7 +186,11 @@ fn mark_resonances(
     (to_x, to_y): (&impl Fn(f64) -> f64, &impl Fn(f64) -> f64),
 ) {
     let f = &chart.frequencies;
-    let mut places = LabelPlaces::new([LEFT, top, WIDTH - RIGHT, top + HEIGHT]);
+    let mut places = LabelPlaces::new([LEFT, top, WIDTH - RIGHT, top + HEIGHT]).close();
+    for sizes in sizes {
+        let line = f.iter().zip(sizes).filter(|(_, s)| s.is_finite() && **s > 0.0);
+        places.avoid(&line.map(|(f, s)| [to_x(*f), to_y(*s)]).collect::<Vec<_>>());
+    }
     let nearest = |at: f64| {
         let after = f.partition_point(|f| *f < at).min(f.len() - 1);
         if after > 0 && at - f[after - 1] < f[after] - at { after - 1 } else { after }
@@ -200,8 +206,15 @@ fn mark_resonances(
     };
     let inside = |r: &&BodeResonance| !f.is_empty() && (f[0]..=f[f.len() - 1]).contains(&r.frequency);
     let found = chart.resonances.iter().filter(inside).filter_map(|r| Some((r, seen(r.frequency, r.quality)?)));
-    for (resonance, (k, height)) in found.take(MAX_MARKED) {
+    let mut highest: Vec<(&BodeResonance, (usize, f64))> = found.collect();
+    highest.sort_by(|a, b| b.1.1.total_cmp(&a.1.1));
+    let mut marked: Vec<f64> = Vec::new();
+    for (resonance, (k, height)) in highest {
         let at = [to_x(f[k]), to_y(height)];
+        if marked.len() == MAX_MARKED || marked.iter().any(|x| (x - at[0]).abs() < APART) {
+            continue;
+        }
+        marked.push(at[0]);
         picture.circle(at[0], at[1], 3.0, Paint { fill: INK, stroke: "#ffffff", width: 1.0, opacity: 1.0 });
         places.keep_free(at, 4.0);
         let q = resonance.quality.map_or(String::new(), |q| format!(", Q {}", quantity(q, "")));

@@ -325,7 +325,7 @@ fn legend(
     }
     if let Some((name, t)) = hot.filter(|(_, t)| *t > coldest(drawing)) {
         parts.push(format!("hottest: {name} {}", quantity(*t, "K")));
-        colour_bar(picture, [x + length * scale + 36.0, y], [coldest(drawing), *t]);
+        colour_bar(picture, [x + length * scale + 36.0, y - 6.0], [coldest(drawing), *t]);
     }
     picture.text(WIDTH - MARGIN, y + 17.0, 12.0, Align::End, INK, &parts.join("  ·  "));
 }

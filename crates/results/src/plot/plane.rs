@@ -81,6 +81,9 @@ pub fn draw(plane: &PlaneChart) -> Picture {
     }
     let mut places = LabelPlaces::new([LEFT, TOP, LEFT + width, TOP + height]);
     plane.marks.iter().for_each(|mark| places.keep_free(at(mark.at), 6.0));
+    for curve in &plane.curves {
+        places.avoid(&curve.points.iter().map(|p| at(*p)).collect::<Vec<_>>());
+    }
     for mark in &plane.marks {
         let [x, y] = at(mark.at);
         match mark.sign {
