@@ -21,8 +21,8 @@ drive port * [s] []
 
 fn run(compiled: &CompiledModel, signals: &[&str], events: &[(&str, f64)]) -> TransientResult {
     let options = TransientOptions {
-        stop: 1e-4,
-        points: 8001,
+        stop: 5e-4,
+        points: 40_001,
         tol: 1e-7,
         signals: signals.iter().map(|name| (*name).to_owned()).collect(),
         voltages: vec![("drive".to_owned(), 9.0)],
