@@ -154,7 +154,7 @@ fn sums_of_signals() {
         let mut lines = table.lines().filter(|line| !line.starts_with('#'));
         let place = |head: &str, name: &str| head.split(',').position(|column| column == format!("{name} [m]"));
         let head = lines.next().expect("a head");
-        let cells: Vec<&str> = lines.last().expect("a row").split(',').collect();
+        let cells: Vec<&str> = lines.next_back().expect("a row").split(',').collect();
         let [y, x, sum] = ["b.y", "b.x", "3*b.y-0.5*b.x"].map(|name| {
             let at = place(head, name).unwrap_or_else(|| panic!("{words}: no {name} in {head}"));
             cells[at].parse::<f64>().expect("a number")

@@ -54,12 +54,16 @@ class Shell:
         self.count += 1
         output = self.folder / f".output{self.count}"
         assert self.process.stdin and self.process.stdout
-        self.process.stdin.write(f"{{ {command}\n}} >{output} 2>&1 </dev/null; printf 'done %s\\n' $?\n")
-        self.process.stdin.flush()
-        for line in self.process.stdout:
-            if line.startswith("done "):
-                return int(line.split()[1]), output.read_text(errors="replace")
-        return -1, output.read_text(errors="replace") + "\n(the shell ended)"
+        try:
+            self.process.stdin.write(f"{{ {command}\n}} >{output} 2>&1 </dev/null; printf 'done %s\\n' $?\n")
+            self.process.stdin.flush()
+            for line in self.process.stdout:
+                if line.startswith("done "):
+                    return int(line.split()[1]), output.read_text(errors="replace")
+        except BrokenPipeError:
+            pass
+        printed = output.read_text(errors="replace") if output.is_file() else ""
+        return -1, f"{printed}\n(the shell ended, or the page took more than {PATIENCE:.0f} s)"
 
     def end(self) -> None:
         """Ends the shell and what it started."""
@@ -97,9 +101,12 @@ class Interpreter:
     def run(self, page: str, line: int, code: str) -> tuple[str, str]:
         """Printed text, and the traceback of a failure."""
         assert self.process.stdin and self.process.stdout
-        self.process.stdin.write(json.dumps({"page": page, "line": line, "code": code}) + "\n")
-        self.process.stdin.flush()
-        reply = self.process.stdout.readline()
+        try:
+            self.process.stdin.write(json.dumps({"page": page, "line": line, "code": code}) + "\n")
+            self.process.stdin.flush()
+            reply = self.process.stdout.readline()
+        except BrokenPipeError:
+            reply = ""
         if not reply:
             self.errors.seek(0)
             return "", "Python ended: " + self.errors.read()[-2000:]
