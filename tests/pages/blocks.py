@@ -9,7 +9,7 @@ from pathlib import Path
 FENCE = re.compile(r"^(`{3,})(\S*) *(.*)$")
 FILE = re.compile(r"`([\w./-]+\.(?:net|cir|cif|py|csv|toml|lib|inc|sp))`[^`]*:$")
 NOT_RUN = re.compile(r"^<!-- not run: (.+) -->$")
-COMMAND = re.compile(r"^(bimorph |printf |grep |cat |openssl |chmod |cd |export |make |cargo |scripts/|benches/|taskset |pip |\((?:cat|echo) )")
+COMMAND = re.compile(r"^(bimorph |printf |grep |cat |openssl |chmod |cmp |ngspice |cd |export |make |cargo |scripts/|benches/|taskset |pip |\((?:cat|echo) )")
 """Words that begin a command in an indented block or in the examples of a help text."""
 
 
