@@ -155,7 +155,7 @@ fn frequency_response(table: &Table, title: Option<&str>) -> Picture {
         }
         ColumnSamples::Real(_) => None,
     };
-    let frequencies = columns.first().map(|c| c.samples.magnitudes()).unwrap_or_default();
+    let frequencies = columns.first().map(|c| c.samples.real_parts()).unwrap_or_default();
     // equal steps: a linear sweep
     let linear = match frequencies.as_slice() {
         [first, second, .., last] => (second - first) * (frequencies.len() - 1) as f64 <= 1.01 * (last - first),
