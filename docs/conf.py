@@ -19,6 +19,8 @@ myst_heading_anchors = 4
 exclude_patterns = ["extension", "requirements.txt"]
 highlight_language = "text"
 nitpicky = False
+# Options such as --band keep their dashes.
+smartquotes = False
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
