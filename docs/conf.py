@@ -13,12 +13,14 @@ author = "the Bimorph authors"
 project_copyright = author
 release = version = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
 
-extensions = ["myst_parser", "sphinx_design", "sphinx.ext.autodoc", "netlist_lexer", "protocol"]
+extensions = ["myst_parser", "sphinx_design", "sphinx.ext.autodoc", "netlist_lexer", "protocol", "outside_links"]
 myst_enable_extensions = ["colon_fence", "deflist", "attrs_inline"]
 myst_heading_anchors = 4
 exclude_patterns = ["extension", "requirements.txt"]
 highlight_language = "text"
 nitpicky = False
+# Options such as --band keep their dashes.
+smartquotes = False
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"

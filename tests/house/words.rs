@@ -68,6 +68,7 @@ const ALLOWED: &[(&str, &str, &str)] = &[
     ("crates/analysis/src/chart", "told", "the documented key of a chart"),
     ("docs/reference/analyses.md", "told", "the documented column of a chart"),
     ("crates/model/src/options/model.rs", "asks for", "the default of the band as the Python client has it, too"),
+    ("docs/reference/cli.md", "asks for", "the default of the band as the Python client has it, too"),
     ("docs/reference/options.md", "asks for", "the default of the band as the Python client has it, too"),
     ("proto/bimorph/v1/model.proto", "asks for", "the default of the band as the Python client has it, too"),
 ];

@@ -30,7 +30,7 @@ fn chevron(left: &str, right: &str) -> Sheet {
     sheet
 }
 
-/// A heated chevron drawn without labels of ours is the one of docs/reference/netlist.md. Its apex moves at 2 V as that of the
+/// A heated chevron drawn without labels of ours is the one of docs/reference/elements.md. Its apex moves at 2 V as that of the
 /// netlist by hand, within 0.5 %: pads are cut off at their edges, and the corner at the apex is rounded to 1 nm.
 #[test]
 fn a_heated_chevron() {

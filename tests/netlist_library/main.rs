@@ -1,4 +1,4 @@
-//! The planar models beside SUGAR's own: their effects, from closed forms and from the equations in docs/reference/netlist.md,
+//! The planar models beside SUGAR's own: their effects, from closed forms and from the equations in docs/reference/elements.md,
 //! and the warnings about members that leave the plane.
 
 mod arcs;

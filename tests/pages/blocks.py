@@ -9,6 +9,8 @@ from pathlib import Path
 FENCE = re.compile(r"^(`{3,})(\S*) *(.*)$")
 FILE = re.compile(r"`([\w./-]+\.(?:net|cir|cif|py|csv|toml|lib|inc|sp))`[^`]*:$")
 NOT_RUN = re.compile(r"^<!-- not run: (.+) -->$")
+WARNS = re.compile(r"^<!-- warns: (W\d{3}(?:, W\d{3})*) -->$")
+"""Warnings of the netlist that follows, which its page explains."""
 COMMAND = re.compile(r"^(bimorph |printf |grep |cat |openssl |chmod |cmp |ngspice |cd |export |make |cargo |scripts/|benches/|taskset |pip |\((?:cat|echo) )")
 """Words that begin a command in an indented block or in the examples of a help text."""
 
@@ -28,27 +30,35 @@ class Block:
     """The output shown: of Python, in the ``text`` block that follows."""
     not_run: str = ""
     """Why it is not run."""
+    warns: tuple[str, ...] = ()
+    """Codes of warnings that a netlist may have."""
 
 
 def blocks(page: Path) -> list[Block]:
     """Every block of a page."""
     lines = page.read_text().split("\n")
     found: list[Block] = []
-    before, reason, k = "", "", 0
+    before, reason, codes, k = "", "", (), 0
     while k < len(lines):
         line = lines[k]
         fence = FENCE.match(line)
         if fence:
             end = next((j for j in range(k + 1, len(lines)) if lines[j] == fence[1]), len(lines))
             _fenced(found, fence[2], k + 2, "\n".join(lines[k + 1 : end]), before, reason)
-            before, reason, k = "", "", end + 1
+            if codes:
+                found[-1].warns = codes
+            before, reason, codes, k = "", "", (), end + 1
         elif line.startswith("    ") and not before.lstrip().startswith(("*", "-")) and (k == 0 or not lines[k - 1].strip()):
             end = next((j for j in range(k, len(lines)) if lines[j].strip() and not lines[j].startswith("    ")), len(lines))
             _indented(found, k + 1, [text[4:] for text in lines[k:end]], before, reason)
             before, reason, k = "", "", end
         else:
             if line.strip():
-                remark = NOT_RUN.match(line)
+                remark, warned = NOT_RUN.match(line), WARNS.match(line)
+                if warned:
+                    codes = tuple(warned[1].split(", "))
+                    k += 1
+                    continue
                 before, reason = (before, remark[1]) if remark else (line, "")
             k += 1
     return found

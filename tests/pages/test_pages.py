@@ -20,7 +20,7 @@ HELPS = {" ".join(["bimorph", *words, "--help"]): words for words in [[], *([nam
 
 @pytest.fixture(scope="session")
 def running(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> dict[str, Future[Report]]:
-    """Every page that is asked for, side by side on the cores of this machine."""
+    """Every requested page, in parallel on the cores of this machine."""
     if not PROGRAM:
         pytest.skip("the program bimorph is not built: cargo build --release --workspace, or set BIMORPH_BIN")
     wanted = {item.callspec.params["name"] for item in request.session.items if hasattr(item, "callspec") and "name" in item.callspec.params}

@@ -282,7 +282,7 @@ fn potential_and_residual() {
 
 /// The table of the theory: energy drift, work and error of every method on the bank.
 #[test]
-#[ignore = "prints the table of docs/explanation/theory.md"]
+#[ignore = "prints the table of docs/project/benchmarks.md"]
 fn table() {
     let bank = released_bank();
     println!("{} unknowns", bank.0.parts.system.model.unknowns());

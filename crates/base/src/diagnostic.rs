@@ -19,7 +19,7 @@ pub enum Severity {
 /// One message about a place in a netlist.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// Stable code ("E012", "W003"); docs/reference/netlist.md lists them.
+    /// Stable code ("E012", "W003"); docs/reference/codes.md lists them.
     pub code: String,
     /// Error or warning.
     pub severity: Severity,

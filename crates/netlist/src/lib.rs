@@ -43,7 +43,18 @@ pub use includes::{DroppedInclude, read_bundle, read_bundle_reporting};
 pub use parse_setting::parse_setting;
 pub use read::{NetlistSource, is_program, load};
 
-/// The names of all built-in elements, in the order of docs/reference/netlist.md.
-pub fn element_names() -> impl Iterator<Item = &'static str> {
-    elements::models().map(|model| model.name)
+/// A built-in element as docs/reference/elements.md documents it.
+#[derive(Clone, Copy, Debug)]
+pub struct ElementDescription {
+    /// Its name in netlists.
+    pub name: &'static str,
+    /// Its node list, such as `[a b]`.
+    pub nodes: &'static str,
+    /// Its parameters besides the entries of a layer and ox, oy, oz.
+    pub parameters: &'static [&'static str],
+}
+
+/// All built-in elements.
+pub fn element_descriptions() -> impl Iterator<Item = ElementDescription> {
+    elements::models().map(|m| ElementDescription { name: m.name, nodes: m.node_names, parameters: m.parameters })
 }

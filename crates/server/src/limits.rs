@@ -55,7 +55,7 @@ limits! {
     netlist_bytes: ByteSize = 16 << 20;
 
     /// Largest SUGAR 3 netlist, all files together: such a netlist is a Lua program, and 0 runs none. With 1M they run
-    /// in the sandbox of docs/reference/netlist.md.
+    /// in the sandbox of docs/reference/sugar.md.
     program_bytes: BytesOrNone = 0;
 
     /// Most mechanical unknowns of one model.

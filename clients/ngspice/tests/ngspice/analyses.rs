@@ -60,7 +60,7 @@ fn number(output: &str) -> Option<f64> {
     output.lines().filter_map(of).next_back()
 }
 
-/// Where the table of docs/reference/ngspice.md stands.
+/// Where the table of docs/project/validation.md stands.
 const MARKS: [&str; 2] = ["<!-- analyses after each other -->\n", "<!-- end -->\n"];
 
 /// The table of the documentation from the cells of each version: results on all versions, or by version.
@@ -85,7 +85,7 @@ fn documented(outcomes: &[(u32, Vec<Vec<char>>)]) -> String {
     table
 }
 
-/// Each analysis gives after each other what it gives alone, to 1e-6, and the table in docs/reference/ngspice.md says so
+/// Each analysis gives after each other what it gives alone, to 1e-6, and the table in docs/project/validation.md says so
 /// (`BIMORPH_WRITE=1` writes it); `.pz` ends with a message that says what to do
 /// instead. After `.sens`, ngspice 44 and 47 begin a transient at 0 V in any circuit, of a resistor and a capacitor, too:
 /// nothing is asked of them there.
@@ -146,7 +146,7 @@ fn every_analysis_after_every_other() {
     if outcomes.len() < 3 {
         return;
     }
-    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/ngspice.md");
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/project/validation.md");
     let text = std::fs::read_to_string(&docs).unwrap();
     let (head, rest) = text.split_once(MARKS[0]).expect("the mark of the table");
     let (table, tail) = rest.split_once(MARKS[1]).expect("the end of the table");
@@ -154,7 +154,7 @@ fn every_analysis_after_every_other() {
     if std::env::var_os("BIMORPH_WRITE").is_some() {
         std::fs::write(&docs, format!("{head}{}{now}{}{tail}", MARKS[0], MARKS[1])).unwrap();
     }
-    assert_eq!(table, now, "docs/reference/ngspice.md is of another state; BIMORPH_WRITE=1 writes the table");
+    assert_eq!(table, now, "docs/project/validation.md is of another state; BIMORPH_WRITE=1 writes the table");
 }
 
 /// A sweep begins from rest, for any analysis before it. Below pull-in (5.17 V) at 4 V the plate stands at the same

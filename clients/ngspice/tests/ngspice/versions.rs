@@ -16,26 +16,20 @@ const WAVES: [(&str, f64); 6] =
 fn decks(folder: &Path) -> Vec<PathBuf> {
     let docs =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/ngspice.md")).unwrap();
-    let mut written: Vec<String> = Vec::new();
-    let mut inside = false;
-    for line in docs.lines() {
-        match line.strip_prefix("    ") {
-            Some(text) if inside || text.starts_with("* ") => {
-                if !inside {
-                    written.push(String::new());
-                }
-                inside = !text.starts_with(".end") || text.starts_with(".ends") || text.starts_with(".endc");
-                if let Some(deck) = written.last_mut() {
-                    *deck += &format!("{text}\n");
-                }
-            }
-            _ => inside = false,
-        }
-    }
-    written.retain(|deck| deck.contains("bimorph(") && deck.trim_end().ends_with(".end"));
-    assert!(!written.is_empty(), "docs/reference/ngspice.md has no whole deck");
+    let blocks = |kind: &str| -> Vec<String> {
+        let found = docs.split(&format!("```{kind}\n")).skip(1).filter_map(|rest| rest.split("```").next());
+        found.map(str::to_owned).collect()
+    };
+    let written = blocks("deck");
+    assert!(written.len() >= 5, "docs/reference/ngspice.md has {} decks", written.len());
     for (n, text) in written.iter().enumerate() {
+        assert!(text.contains("bimorph(") && text.trim_end().ends_with(".end"), "{text}");
         std::fs::write(folder.join(format!("docs_{n}.cir")), text).unwrap();
+    }
+    for text in blocks("netlist") {
+        let name = text.trim_start_matches("% ").split([':', '\n']).next().expect("a name").to_owned();
+        assert!(!folder.join(&name).exists() && name.ends_with(".net"), "{name}");
+        std::fs::write(folder.join(name), text).unwrap();
     }
     let mut found: Vec<PathBuf> = (std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()))
         .filter(|p| p.extension().is_some_and(|e| e == "cir") && !p.ends_with("comb_remote.cir"))

@@ -1,4 +1,4 @@
-//! Additions of each element to the structure, with numbers worked out by hand from its equations in docs/reference/netlist.md.
+//! Additions of each element to the structure, with numbers worked out by hand from its equations in docs/reference/elements.md.
 
 use bimorph_base::Bundle;
 use bimorph_netlist::load;

@@ -1,7 +1,6 @@
 //! Contracts of the netlist languages: rules, elements, messages, includes, and the page that describes them.
 
 mod diagnostics;
-mod docs;
 mod elements;
 mod examples;
 mod include;
