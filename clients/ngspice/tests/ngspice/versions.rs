@@ -17,7 +17,8 @@ fn decks(folder: &Path) -> Vec<PathBuf> {
     let docs =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/ngspice.md")).unwrap();
     let blocks = |kind: &str| -> Vec<String> {
-        let found = docs.split(&format!("```{kind}\n")).skip(1).filter_map(|rest| rest.split("```").next());
+        let fence = format!("```{kind}\n");
+        let found = docs.split(fence.as_str()).skip(1).filter_map(|rest| rest.split("```").next());
         found.map(str::to_owned).collect()
     };
     let written = blocks("deck");
