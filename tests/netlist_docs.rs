@@ -3,6 +3,7 @@
 
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::netlist::{Bundle, element_descriptions, load};
+use bimorph::readout::expression::Quantity;
 use bimorph::readout::signal;
 use std::collections::BTreeSet;
 use std::fs;
