@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// Options of every command that reads a netlist.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Model")]
 pub(crate) struct ModelArgs {
     /// SUGAR netlist, or a layout: .cif or .gds
     file: PathBuf,

@@ -48,7 +48,7 @@ pub(crate) struct ModesCommand {
     ports: Vec<(String, f64)>,
 
     /// Solver: the product's own model, or the baseline to compare with [default: recursion; frame with --as-sugar]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Research and comparison", hide_short_help = true)]
     solver: Option<ModelChoice>,
 
     #[command(flatten)]

@@ -6,6 +6,9 @@ use bimorph::options::{CompileOptions, MODEL, OptionDescription, OptionValue, Ra
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use std::sync::LazyLock;
 
+/// Options that research and comparisons need: under a heading of their own, and only in the long help.
+const RESEARCH: [&str; 6] = ["scheme", "formulation", "imperfection", "other_branch", "as_sugar", "without_circuit"];
+
 /// The options that were given, as they were written.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Chosen(Vec<(usize, OptionValue)>);
@@ -63,6 +66,11 @@ fn help(about: &OptionDescription) -> String {
 
 fn arg(about: &OptionDescription, flag: &'static str) -> Arg {
     let arg = Arg::new(about.name).long(flag).help(help(about));
+    let arg = if RESEARCH.contains(&about.name) {
+        arg.help_heading("Research and comparison").hide_short_help(true)
+    } else {
+        arg.help_heading("Model")
+    };
     match about.range {
         Range::Flag => arg.action(ArgAction::SetTrue),
         Range::Count(..) => arg.value_name("N").value_parser(clap::value_parser!(usize)),

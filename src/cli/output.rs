@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// Options of every command that has a result.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
 pub(crate) struct OutputArgs {
     /// Print one JSON document: SI, full precision
     #[arg(long)]

@@ -55,7 +55,7 @@ pub(crate) struct StaticCommand {
     backbend: Vec<(String, f64)>,
 
     /// Solver: the product's own model, or the baseline to compare with
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = "Research and comparison", hide_short_help = true)]
     solver: ModelChoice,
 
     #[command(flatten)]

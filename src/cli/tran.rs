@@ -105,7 +105,7 @@ pub(crate) struct TransientCommand {
     draw: Option<PathBuf>,
 
     /// Solver of the equations; all but the recursion are baselines to compare with
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = "Research and comparison", hide_short_help = true)]
     solver: SolverChoice,
 
     #[command(flatten)]
