@@ -204,7 +204,10 @@ fn chosen(result: &StaticResult, names: &[String]) -> Result<String, Failure> {
 fn sum(result: &StaticResult, text: &str) -> Result<Expression<StaticOutput>, Failure> {
     Expression::of_static(result, text).map_err(|error| match error {
         sum @ ReadoutError::BadExpression { .. } => AnalysisError::from(sum).into(),
-        _ => Failure::bad("--signals", "NODE.x, .y or .rz, BEAM.T, PORT.i or .q, or a sum of these", text.to_owned()),
+        ReadoutError::UnknownSignal { name, hint } => {
+            Failure::bad("--signals", hint.trim_start_matches("expected "), name)
+        }
+        other => AnalysisError::from(other).into(),
     })
 }
 

@@ -51,10 +51,10 @@ pub(super) fn pull_in_with(
     if !pulls(source) && !pushes {
         let names = &system.electrics.names;
         let others: Vec<&str> = (0..names.len()).filter(|k| pulls(*k)).map(|k| names[k].as_str()).collect();
-        let detail = format!(
-            "it acts on no gap; of the others do {}",
-            if others.is_empty() { "none".into() } else { others.join(", ") }
-        );
+        let detail = match others.as_slice() {
+            [] => "it drives no gap, and no other port of this netlist does, so that there is no pull-in".to_owned(),
+            others => format!("it drives no gap; ports that do: {}", others.join(", ")),
+        };
         return Err(AnalysisError::BadRequest { what: format!("port \"{}\"", names[source]), detail });
     }
     let mut off = source_vector(compiled, &[])?;

@@ -3,6 +3,7 @@
 use crate::readout::ReadoutError;
 use crate::readout::expression::{Expression, Quantity};
 use crate::statics::StaticResult;
+use bimorph_base::suggest::nearest;
 use bimorph_structure::Structure;
 use std::collections::HashSet;
 
@@ -44,8 +45,20 @@ fn split(name: &str) -> Option<(&str, &str, StaticPart, &'static str)> {
     Some((part, quantity, kind, unit))
 }
 
-fn unknown(name: &str) -> ReadoutError {
-    ReadoutError::UnknownSignal { name: name.to_owned(), hint: format!("expected {OUTPUTS}, or a sum of these") }
+fn unknown<'a>(name: &str, known: impl Iterator<Item = (&'a str, StaticPart)>) -> ReadoutError {
+    let meant = split(name).and_then(|(part, quantity, kind, _)| {
+        let alike = known.filter(|(_, of)| *of == kind).map(|(name, _)| name);
+        Some(format!(" (did you mean {}.{quantity}?)", nearest(part, alike)?))
+    });
+    let hint = format!("expected {OUTPUTS}, or a sum of these{}", meant.unwrap_or_default());
+    ReadoutError::UnknownSignal { name: name.to_owned(), hint }
+}
+
+/// The parts that a result has numbers of.
+fn parts(result: &StaticResult) -> impl Iterator<Item = (&str, StaticPart)> {
+    let nodes = result.nodes.iter().map(|(name, _)| (name.as_str(), StaticPart::Node));
+    let beams = result.temperatures_k.iter().map(|(name, _)| (name.as_str(), StaticPart::Beam));
+    nodes.chain(beams).chain(result.currents_a.iter().map(|(name, _)| (name.as_str(), StaticPart::Port)))
 }
 
 fn output(result: &StaticResult, name: &str) -> Option<StaticOutput> {
@@ -69,7 +82,7 @@ impl Expression<StaticOutput> {
     /// # Errors
     /// [`ReadoutError::UnknownSignal`], [`ReadoutError::BadExpression`].
     pub fn of_static(result: &StaticResult, text: &str) -> Result<Self, ReadoutError> {
-        Self::find(text, |name| output(result, name).ok_or_else(|| unknown(name)))
+        Self::find(text, |name| output(result, name).ok_or_else(|| unknown(name, parts(result))))
     }
 
     /// Its value.
@@ -90,7 +103,7 @@ pub fn check(structure: &Structure, texts: &[String]) -> Result<(), ReadoutError
     let known: HashSet<(&str, StaticPart)> = nodes.chain(beams).chain(ports).collect();
     let find = |name: &str| match split(name) {
         Some((part, _, kind, unit)) if known.contains(&(part, kind)) => Ok(StaticOutput { unit, value: 0.0 }),
-        _ => Err(unknown(name)),
+        _ => Err(unknown(name, known.iter().copied())),
     };
     texts.iter().try_for_each(|text| Expression::find(text, find).map(drop))
 }

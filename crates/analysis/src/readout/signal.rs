@@ -2,6 +2,7 @@
 
 use super::ReadoutError;
 use super::expression::{Expression, Quantity};
+use bimorph_base::suggest::nearest;
 use bimorph_domains::MaterialPoint;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::{self, Pose};
@@ -211,11 +212,11 @@ fn hint(compiled: &CompiledModel, name: &str) -> String {
     let beams = compiled.structure.beams.iter().map(|b| b.name.as_str());
     let known: Vec<&str> =
         nodes.into_iter().chain(beams).chain(compiled.parts.gap_names.iter().map(String::as_str)).collect();
-    let close = known.iter().copied().filter(|k| k.contains(part) || part.contains(*k)).take(5);
-    let close: Vec<&str> = close.collect();
+    let expected = "expected NODE.x|y|rz|vx|vy|vrz, BEAM.T, GAP.q|gap|C|F";
+    if let Some((near, (_, quantity))) = nearest(part, known.iter().copied()).zip(name.rsplit_once('.')) {
+        return format!("no node, beam or gap of that name; did you mean {near}.{quantity}? ({expected})");
+    }
+    let close: Vec<&str> = known.iter().copied().filter(|k| k.contains(part) || part.contains(*k)).take(5).collect();
     let shown = if close.is_empty() { known.into_iter().take(8).collect::<Vec<_>>() } else { close };
-    format!(
-        "no node, beam or gap of that name (expected NODE.x|y|rz|vx|vy|vrz, BEAM.T, GAP.q|gap|C|F; there is {})",
-        shown.join(", ")
-    )
+    format!("no node, beam or gap of that name ({expected}; there is {})", shown.join(", "))
 }
