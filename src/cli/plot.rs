@@ -137,7 +137,7 @@ pub(crate) fn chart_of(table: &Table, title: Option<&str>, panels: &[String]) ->
         title: title.unwrap_or(&table.title).to_owned(),
         x_name: first.map(|c| c.name.clone()).unwrap_or_default(),
         x_unit: first.map(|c| c.unit.clone()).unwrap_or_default(),
-        x: first.map(|c| c.samples.magnitudes()).unwrap_or_default(),
+        x: first.map(|c| c.samples.real_parts()).unwrap_or_default(),
         panels,
     }))
 }
@@ -145,7 +145,7 @@ pub(crate) fn chart_of(table: &Table, title: Option<&str>, panels: &[String]) ->
 /// Adds the signals of another raw file, which must run over the same axis.
 fn join(table: &mut Table, path: &Path) -> Result<(), Failure> {
     let (other, _) = longest(path, None)?;
-    let axis = |t: &Table| t.columns().first().map(|c| c.samples.magnitudes()).unwrap_or_default();
+    let axis = |t: &Table| t.columns().first().map(|c| c.samples.real_parts()).unwrap_or_default();
     let (own, its) = (axis(table), axis(&other));
     let end = own.last().map_or(0.0, |x| x.abs());
     let same = own.len() == its.len() && own.iter().zip(&its).all(|(a, b)| (a - b).abs() <= 1e-9 * end);

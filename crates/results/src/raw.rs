@@ -175,4 +175,15 @@ mod tests {
         assert_eq!(plots[0].column("V(OUT)").unwrap().samples, ColumnSamples::Complex(vec![[0.5, -0.5], [0.01, -0.1]]));
         assert_eq!(plots[0].columns()[0].unit, "Hz");
     }
+
+    /// ngspice never sets the imaginary part of a frequency: the axis of a complex plot is its real part.
+    #[test]
+    fn the_axis_of_a_complex_plot() {
+        let text = "Title: rc\nDate: Fri Nov 20 12:00:00  2026\nPlotname: AC Analysis\nFlags: complex\n\
+            No. Variables: 2\nNo. Points: 1\nVariables:\n\t0\tfrequency\tfrequency\n\t1\tv(out)\tvoltage\n\
+            Values:\n 0\t6.77e+04,7.3e+267\n\t3.0e+00,-4.0e+00\n";
+        let plots = read(text.as_bytes()).unwrap();
+        assert_eq!(plots[0].columns()[0].samples.real_parts(), [6.77e4]);
+        assert_eq!(plots[0].columns()[1].samples.magnitudes(), [5.0]);
+    }
 }

@@ -32,6 +32,15 @@ impl ColumnSamples {
             Self::Complex(v) => v.iter().map(|[re, im]| re.hypot(*im)).collect(),
         }
     }
+
+    /// The samples as real numbers; of complex ones the real parts. A frequency in a complex plot of ngspice has an imaginary part
+    /// that ngspice never sets.
+    pub fn real_parts(&self) -> Vec<f64> {
+        match self {
+            Self::Real(v) => v.clone(),
+            Self::Complex(v) => v.iter().map(|[re, _]| *re).collect(),
+        }
+    }
 }
 
 /// One quantity.
