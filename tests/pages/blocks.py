@@ -11,7 +11,7 @@ FILE = re.compile(r"`([\w./-]+\.(?:net|cir|cif|py|csv|toml|lib|inc|sp))`[^`]*:$"
 NOT_RUN = re.compile(r"^<!-- not run: (.+) -->$")
 WARNS = re.compile(r"^<!-- warns: (W\d{3}(?:, W\d{3})*) -->$")
 """Warnings of the netlist that follows, which its page explains."""
-COMMAND = re.compile(r"^(bimorph |printf |grep |cat |openssl |chmod |cd |export |make |cargo |scripts/|benches/|taskset |pip |\((?:cat|echo) )")
+COMMAND = re.compile(r"^(bimorph |printf |grep |cat |openssl |chmod |cmp |ngspice |cd |export |make |cargo |scripts/|benches/|taskset |pip |\((?:cat|echo) )")
 """Words that begin a command in an indented block or in the examples of a help text."""
 
 
