@@ -17,8 +17,8 @@ fn decks(folder: &Path) -> Vec<PathBuf> {
     let docs =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/ngspice.md")).unwrap();
     let blocks = |kind: &str| -> Vec<String> {
-        let found = docs.split(&format!("```{kind}\n")).skip(1).filter_map(|rest| rest.split("```").next());
-        found.map(str::to_owned).collect()
+        let fence = format!("```{kind}\n");
+        docs.split(fence.as_str()).skip(1).filter_map(|rest| rest.split("```").next()).map(str::to_owned).collect()
     };
     let written = blocks("deck");
     assert!(written.len() >= 5, "docs/reference/ngspice.md has {} decks", written.len());
