@@ -152,6 +152,7 @@ class Page:
         self.shell = Shell(folder, self.environment)
         self.python: Interpreter | None = None
         self.decks = 0
+        self.last_output = ""
         self.replies: dict[str, str] = {}
 
     def run(self, found: list[Block]) -> Report:
@@ -293,6 +294,7 @@ class Page:
         elif not block.name:
             self.python = self.python or Interpreter(self.folder, self.environment)
             output, failure = self.python.run(self.name, block.line, block.text)
+            self.last_output = output
             difference = failure or (differs(block.output, output) if block.output is not None else "")
             if difference:
                 self._fail(block.line, "Python", difference)
