@@ -2,6 +2,7 @@
 //! case where they are not found as spelled.
 
 use crate::model_card::ModelCard;
+use bimorph::analysis::readout::expression;
 use bimorph::structure::Structure;
 use std::path::{Component, Path, PathBuf};
 
@@ -40,7 +41,7 @@ pub(crate) fn ambiguous(card: &ModelCard, structure: &Structure, parameters: &[&
     let port = |name: &str| alike(name, ports()).map(|pair| found(name, pair)).or_else(|| owner(name));
     let set = |name: &str| alike(name, parameters.iter().copied()).map(|pair| found(name, pair));
     (card.ports.iter().find_map(|p| port(&p.name)))
-        .or_else(|| card.monitors.iter().find_map(|m| owner(&m.signal)))
+        .or_else(|| card.monitors.iter().find_map(|m| expression::names(&m.signal).find_map(owner)))
         .or_else(|| card.options.set.iter().find_map(|(name, _)| set(name)))
 }
 
@@ -83,9 +84,7 @@ pub(crate) fn respell(card: &mut ModelCard, structure: &Structure) {
         }
     }
     for monitor in &mut card.monitors {
-        if let Some(signal) = quantity(&monitor.signal) {
-            monitor.signal = signal;
-        }
+        monitor.signal = expression::renamed(&monitor.signal, quantity);
     }
 }
 
@@ -143,7 +142,7 @@ mod tests {
         let raw = RawCard {
             file: Some("n".into()),
             ports: words("drive other yoke.x:1e5 Frame.ax"),
-            monitors: words("yoke.x:1e6 gap.q yoke.t"),
+            monitors: words("yoke.x:1e6 gap.q yoke.t gap.c-2*gap.c:1e15"),
             set: words("width=3u w=4u"),
             ..RawCard::default()
         };
@@ -153,7 +152,7 @@ mod tests {
         let ports: Vec<_> = card.ports.iter().map(|p| (p.name.as_str(), p.scale)).collect();
         assert_eq!(ports, [("Drive", None), ("other", None), ("Yoke.x", Some(1e5)), ("frame.ax", None)]);
         let signals: Vec<_> = card.monitors.iter().map(|m| m.signal.as_str()).collect();
-        assert_eq!(signals, ["Yoke.x", "Gap.q", "Yoke.T"]);
+        assert_eq!(signals, ["Yoke.x", "Gap.q", "Yoke.T", "Gap.C-2*Gap.C"]);
         let set: Vec<_> = card.options.set.iter().map(|(n, _)| n.as_str()).collect();
         assert_eq!(set, ["Width", "w"]);
     }

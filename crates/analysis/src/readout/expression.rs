@@ -159,6 +159,24 @@ fn pieces(text: &str) -> Vec<(char, &str)> {
     pieces
 }
 
+/// The names in a sum, in its order; of a text without signs and factors the text.
+pub fn names(text: &str) -> impl Iterator<Item = &str> {
+    pieces(text).into_iter().map(|(_, piece)| piece).filter(|piece| piece.parse::<f64>().is_err())
+}
+
+/// The sum with other names; one for which `rename` has none stays.
+pub fn renamed(text: &str, rename: impl Fn(&str) -> Option<String>) -> String {
+    let mut out = String::with_capacity(text.len());
+    for (k, (operator, piece)) in pieces(text).into_iter().enumerate() {
+        if k > 0 {
+            out.push(operator);
+        }
+        let other = if piece.parse::<f64>().is_ok() { None } else { rename(piece) };
+        out.push_str(other.as_deref().unwrap_or(piece));
+    }
+    out
+}
+
 /// True where the text is a number up to its exponent, whose sign follows.
 fn exponent(text: &str) -> bool {
     let digits = text.trim_start().strip_suffix(['e', 'E']);
@@ -207,6 +225,14 @@ mod tests {
         assert_eq!(read("+2*3*a.x*1"), [own(6.0, "a.x")]);
         // a node may be called as an exponent ends
         assert_eq!(read("1e.x+e.x"), [own(1.0, "1e.x"), own(1.0, "e.x")]);
+    }
+
+    #[test]
+    fn names_are_replaced() {
+        let text = "-0.5*a.x + x1(1,-2).y/2e-3";
+        assert_eq!(names(text).filter(|name| !name.is_empty()).collect::<Vec<_>>(), ["a.x", "x1(1,-2).y"]);
+        assert_eq!(renamed(text, |name| (name == "a.x").then(|| "A.x".into())), "-0.5*A.x+x1(1,-2).y/2e-3");
+        assert_eq!(renamed("a.x", |_| None), "a.x");
     }
 
     #[test]
