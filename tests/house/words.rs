@@ -70,11 +70,13 @@ const ALLOWED: &[(&str, &str, &str)] = &[
     ("crates/model/src/options/model.rs", "asks for", "the default of the band as the Python client has it, too"),
     ("docs/reference/cli.md", "asks for", "the default of the band as the Python client has it, too"),
     ("docs/reference/options.md", "asks for", "the default of the band as the Python client has it, too"),
+    ("clients/python/src/bimorph/options.py", "asks for", "the default of the band, generated from the table"),
+    ("clients/python/src/bimorph/layout.py", "front", "the name of an element in a netlist"),
     ("proto/bimorph/v1/model.proto", "asks for", "the default of the band as the Python client has it, too"),
 ];
 
 /// Occurrences that are left in folders which were not rewritten yet: at most so many.
-const REMAINING: &[(&str, usize)] = &[("clients/python/", 59), ("scripts/", 0)];
+const REMAINING: &[(&str, usize)] = &[("clients/python/", 0), ("scripts/", 0)];
 
 /// Longest sentence of a comment in words.
 const MAX_WORDS: usize = 40;

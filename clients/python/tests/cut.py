@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 
 class Cut:
-    """Carries bytes between clients and ``target`` (host, port) until it is told otherwise."""
+    """Carries bytes between clients and ``target`` (host, port) until it is cut."""
 
     def __init__(self, target: tuple[str, int]) -> None:
         self._target = target
@@ -20,7 +20,7 @@ class Cut:
         threading.Thread(target=self._serve, daemon=True).start()
 
     def silence(self) -> None:
-        """From now on nothing passes on the connections there are, and nobody is told; new ones are whole."""
+        """From now on nothing passes on the connections there are, without a notice; new ones are whole."""
         self._dead.update(self._pairs)
 
     def reset(self) -> None:

@@ -1,4 +1,4 @@
-"""A server that asks for TLS and a token: who shows them is served, who does not is told what is missing."""
+"""A server that requires TLS and a token: a client with both is served, and the error of another names what is missing."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def address(process: subprocess.Popen[str]) -> str:
 
 @pytest.fixture(scope="module")
 def secure(program: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of a server with TLS that asks for certificates and tokens."""
+    """The address of a server with TLS that requires certificates and tokens."""
     words = ["--tls-cert", "server.pem", "--tls-key", "server.key", "--tls-client-ca", "authority.pem"]
     words = [str(KEYS / word) if "." in word else word for word in words]
     with guarded(program, tmp_path_factory.mktemp("keys"), *words) as process:
@@ -92,7 +92,7 @@ def test_a_server_of_another_authority(secure: str) -> None:
 
 
 def test_plaintext(secure: str) -> None:
-    """Plain HTTP/2 at an address of TLS is told so."""
+    """Plain HTTP/2 at an address of TLS gets an error that says so."""
     with pytest.raises(bimorph.Refused, match="https://"):
         bimorph.Client(secure.removeprefix("https://"), token=TOKEN).version()
 
@@ -106,7 +106,7 @@ def test_a_token_stays_private() -> None:
 
 
 def test_tokens_without_tls(program: str, tmp_path: Path) -> None:
-    """On this machine a token is asked for, and enough, without TLS."""
+    """On this machine a token is required, and enough, without TLS."""
     with guarded(program, tmp_path) as process:
         here = address(process)
         assert not here.startswith("https")

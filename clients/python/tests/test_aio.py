@@ -105,7 +105,7 @@ def test_a_task_that_is_cancelled_stops_its_call(both: aio.Client) -> None:
 
 def test_a_run_along_waveforms_stops(both: aio.Client) -> None:
     """What is computed step by step ends with its task, which would have gone on for minutes, between two steps or in the middle of one; the
-    session of the test itself goes on from where it was."""
+    session of the test itself continues from where it was."""
 
     async def test() -> None:
         model = await both.compile(bimorph.Netlist.text(PLATE.replace("gap=2u", "gap=2u restitution=1"), "plate.net"))
@@ -113,7 +113,7 @@ def test_a_run_along_waveforms_stops(both: aio.Client) -> None:
             await session.operating_point({"drive": 1.0})
             for points in (10**6, 2):
                 before = set(threading.enumerate())
-                # a plate that is pulled in and bounces without loss asks for short steps
+                # a plate that is pulled in and bounces without loss needs short steps
                 wave = {"drive": ([0.0, 1e-6], [0.0, 12.0])}
                 task = asyncio.create_task(model.transient(10.0, ["m.x"], points=points, inputs=wave, estimate=False))
                 await asyncio.sleep(0.2)
@@ -139,7 +139,7 @@ async def until(holds: Callable[[], bool]) -> None:
 
 
 class Gate:
-    """What a call goes through on its way: it tells that somebody came, and waits to be opened."""
+    """What a call goes through on its way: it reports an arrival, and waits to be opened."""
 
     def __init__(self) -> None:
         self.there, self.open = threading.Event(), threading.Event()
@@ -205,7 +205,7 @@ def test_a_session_that_nobody_waits_for_is_closed(
 
 
 def test_a_sweep_that_nobody_waits_for_is_cancelled(client: bimorph.Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its task was cancelled when the server had just started it: both of `submit` and `sweep`. One that was attached to goes on."""
+    """Its task was cancelled when the server had just started it: both of `submit` and `sweep`. One with an attached client continues."""
     gaps = {"gap": [1.5e-6 + 1e-8 * k for k in range(20)]}
     kept = client.submit(NET, gaps, bimorph.PullIn(30.0, "drive"))
 

@@ -59,7 +59,7 @@ def test_a_waveform_tells_how_far_it_is_off(client: bimorph.Client) -> None:
 
 
 def test_waveforms_are_checked(plate: bimorph.Model) -> None:
-    """Each fault of a waveform is told with the port's name."""
+    """Each fault of a waveform is reported with the port's name."""
     for wave, word in [(([0.0, 1.0], [1.0]), "as many"), (([0.0, 0.0], [1.0, 2.0]), "ascend"), (([0.0], [np.nan]), "finite")]:
         with pytest.raises(ValueError, match=f"'drive'.*{word}"):
             plate.transient(1e-5, ["m.x"], inputs={"drive": wave})
@@ -195,7 +195,7 @@ A1 %gd [in 0] %v [x] plate
 
 
 def test_fixtures(pytester: pytest.Pytester, program: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bench that asks for the fixtures gets a server, a client and ngspice, without a line of set-up."""
+    """A bench that uses the fixtures gets a server, a client and ngspice, without a line of set-up."""
     monkeypatch.setenv("BIMORPH_BIN", program)
     pytester.makepyfile("""
         import bimorph

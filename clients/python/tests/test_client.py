@@ -76,12 +76,12 @@ def test_what_is_beyond_is_said_aloud(client: bimorph.Client) -> None:
     with pytest.warns(bimorph.NetlistWarning, match="W012"):
         client.compile(bimorph.Netlist.text(net + "anchor p [c] []\nbeam2d p [d e] [l=200u w=2u]\nbeam2d p [c f] [l=9u w=2u]\n"))
     coarse = client.compile(bimorph.Netlist.text(net), segments=1)
-    with pytest.warns(bimorph.AccuracyWarning, match="estimated error") as told:
+    with pytest.warns(bimorph.AccuracyWarning, match="estimated error") as caught:
         coarse.static()
-    assert told[0].filename == __file__
-    with pytest.warns(bimorph.AccuracyWarning, match="estimated error") as told:
+    assert caught[0].filename == __file__
+    with pytest.warns(bimorph.AccuracyWarning, match="estimated error") as caught:
         coarse.session().close()
-    assert told[0].filename == __file__
+    assert caught[0].filename == __file__
     with warnings.catch_warnings():
         warnings.simplefilter("error", bimorph.AccuracyWarning)
         fine = client.compile(bimorph.Netlist.text(net))
@@ -295,7 +295,7 @@ def test_ports_take_forces_and_accelerations(plate: bimorph.Model) -> None:
 
 
 def test_samples(client: bimorph.Client) -> None:
-    """Samples have the moments asked for, the same seed the same values, and what cannot be drawn raises."""
+    """Samples have the requested moments, the same seed the same values, and what cannot be drawn raises."""
     netlist = bimorph.Netlist.text(PLATE, "plate.net")
     samples = bimorph.Samples({"k": bimorph.LogNormal(1.0, 0.1)}, count=64, seed=5, design="sobol")
     table = client.sweep(netlist, {}, bimorph.Modes(count=1), samples=samples)
@@ -310,25 +310,25 @@ def test_samples(client: bimorph.Client) -> None:
 
 
 def test_a_server_of_another_version_is_told_once(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Once a process, by the first call of any kind; a server of the same version is not told."""
+    """Once a process, by the first call of any kind; a server of the same version causes none."""
     with bimorph.serve(program) as server:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             with server.client() as client:
                 client.compile(bimorph.Netlist.text(PLATE))
         monkeypatch.setattr("bimorph.channel.OWN", "0.0.1")
-        with pytest.warns(UserWarning) as told:
+        with pytest.warns(UserWarning) as caught:
             for _ in range(2):
                 with server.client() as client:
                     client.compile(bimorph.Netlist.text(PLATE))
                     version = client.version()
-        assert [str(warning.message) for warning in told] == [
+        assert [str(warning.message) for warning in caught] == [
             f"server {server.address} is of version {version}, this client of 0.0.1: numbers and options may differ"
         ]
 
 
 def test_a_connection_that_is_let_go_of_is_found_by_nobody(server: bimorph.Server) -> None:
-    """Threads that make clients of one server and let go of them share its connection while one of them is there; none finds it while it closes (a
+    """Threads that make clients of one server and drop them share its connection while one of them is there; none finds it while it closes (a
     fifth of the calls said "closed channel")."""
     until, wrong = time.monotonic() + 1.0, []
 

@@ -51,7 +51,7 @@ def test_a_session_goes_on(way: Cut, kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["silence", "reset"])
 def test_a_sweep_goes_on(way: Cut, kind: str) -> None:
-    """Whoever waits for a sweep gets its whole table, whatever happened to the connection meanwhile."""
+    """A client that waits for a sweep gets its whole table, whatever happened to the connection meanwhile."""
     client = bimorph.Client(way.address, 600.0)
     text = PLATE.replace("gap=2u", "gap=gap").replace("param V=0", "param gap=2u")
     gaps = [1.5e-6 + 1e-9 * k for k in range(400)]
@@ -73,7 +73,7 @@ def test_a_sweep_goes_on(way: Cut, kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["silence", "reset"])
 def test_a_sweep_ends(way: Cut, kind: str) -> None:
-    """Whoever ends a sweep over a connection that is broken ends it; deleting what is gone raises, unless only the answer was lost."""
+    """A client ends a sweep even over a broken connection; deleting what is gone raises, unless only the answer was lost."""
     client = bimorph.Client(way.address, 600.0)
     text = PLATE.replace("gap=2u", "gap=gap").replace("param V=0", "param gap=2u")
     gaps = [1.5e-6 + 1e-12 * k for k in range(100_000)]

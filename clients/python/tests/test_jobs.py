@@ -51,7 +51,7 @@ def test_rows_come_while_it_runs(client: bimorph.Client) -> None:
 
 
 def test_sweeps_are_listed_and_shared(client: bimorph.Client) -> None:
-    """A client sees its sweeps, the last one first; who asks to share gets the one that computes the same, which outlives a `with`."""
+    """A client sees its sweeps, the last one first; a request to share gets the one that computes the same, which outlives a `with`."""
     before = {status.id for status in client.sweeps()}
     one = client.submit(NET, gaps(5), PULL_IN, share=True)
     with client.submit(NET, gaps(5), PULL_IN, share=True) as same:

@@ -150,7 +150,7 @@ def test_a_resume_that_fails_takes_nothing_away(program: str, tmp_path: Path) ->
 
 
 def test_a_call_that_takes_too_long_takes_nothing_away(program: str, tmp_path: Path) -> None:
-    """A server that is stopped does not answer; when it goes on, so does the session, and each step is in it once."""
+    """A server that is stopped does not answer; when it continues, so does the session, and each step is in it once."""
     process = start(program, tmp_path)
     try:
         client = bimorph.Client(f"unix://{tmp_path}/s", 20.0)

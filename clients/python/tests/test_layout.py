@@ -137,7 +137,7 @@ def test_a_gdsfactory_component_becomes_subnets(client: bimorph.Client) -> None:
 
 
 def test_two_nodes_never_have_one_name() -> None:
-    """Ports of the whole that a netlist would call alike are refused, both named; a node that nobody named makes way for one that somebody
+    """Ports of the whole that a netlist would call alike are refused, both named; a node without a given name makes way for one that somebody
     did, and for one that came first."""
     net: dict[str, Any] = {
         "instances": {"a": {"component": "comb_drive"}, "b": {"component": "comb_drive"}},

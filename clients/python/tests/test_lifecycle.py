@@ -137,7 +137,7 @@ def test_a_part_that_failed_is_another_task(client: bimorph.Client) -> None:
 
 
 def test_a_sweep_without_one_result_raises(client: bimorph.Client) -> None:
-    """With the reasons, whoever computes it; a part of a sweep may lack results, and one result is enough."""
+    """With the reasons, here and on a server; a part of a sweep may lack results, and one result is enough."""
     # a plate that pulls in at 1.6 V with 0.1 N/m, at 5.2 V with 1 N/m: (8/27·k·g³/(ε·A))^½
     pull_in = bimorph.PullIn(max_v=2.0)
     for sweep in (

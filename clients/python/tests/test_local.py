@@ -109,7 +109,7 @@ def test_errors_are_the_same(both: tuple[bimorph.Model, bimorph.Model], here: bi
 
 
 def test_states_go_on_on_either_side(both: tuple[bimorph.Model, bimorph.Model]) -> None:
-    """A snapshot of one is restored by the other, and goes on with the same bits; forks and kept sessions are there, too."""
+    """A snapshot of one is restored by the other, and continues with the same bits; forks and kept sessions are there, too."""
     here, there = both
     with here.session(["m.x"]) as session:
         session.step({"drive": 2.0}, DT)

@@ -118,13 +118,13 @@ def test_what_is_drawn_moves_as_its_netlist(client: bimorph.Client, tmp_path: Pa
 
 
 def test_settings_keep_their_digits() -> None:
-    """A length of 150.0005 µm is not rounded, as `get_netlist()` does to 1 nm unless told; numbers are decimal."""
+    """A length of 150.0005 µm is not rounded, as `get_netlist()` does to 1 nm by default; numbers are decimal."""
     text = layout.from_gdsfactory(resonator()).netlist().files["mechanism.net"]
     assert "length=0.0001500005" in text and "overlap=2e-05" in text
 
 
 def test_more_than_two_ports_are_one_node(client: bimorph.Client) -> None:
-    """Three beams that meet, which `get_netlist()` refuses unless told, are one node; so are ports of other widths."""
+    """Three beams that meet, which `get_netlist()` refuses by default, are one node; so are ports of other widths."""
     cells = pcells()
     c = gf.Component()
     first = c.add_ref(cells.plain_beam(length=50), name="first")

@@ -94,9 +94,9 @@ def test_an_interrupt_in_the_terminal_leaves_the_server(program: str) -> None:
         time.sleep(30)
     except KeyboardInterrupt:
         assert server.client().version()
-        print("goes on")"""
+        print("continues")"""
     ended = run(program, textwrap.indent(textwrap.dedent(ending), "    ").strip(), start_new_session=True)
-    assert ended.stdout.splitlines()[1:] == ["goes on"]
+    assert ended.stdout.splitlines()[1:] == ["continues"]
 
 
 def frequency(model: bimorph.Model) -> float:
@@ -183,7 +183,7 @@ def test_threads_share_the_server_of_their_process(program: str, monkeypatch: py
 
 
 def test_a_forked_child_has_a_server_of_its_own(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Forked where the parent's was in use: the parent's goes on, and that of the child is another one."""
+    """Forked where the parent's was in use: the parent's continues, and that of the child is another one."""
     monkeypatch.setenv("BIMORPH_BIN", program)
     parent = executors._own()
     end, child_end = multiprocessing.Pipe()

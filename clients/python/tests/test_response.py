@@ -42,7 +42,7 @@ def test_a_port_under_bias(plate: bimorph.Model) -> None:
 
 
 def test_modes_and_spacing(plate: bimorph.Model) -> None:
-    """One mode is all there is, so that its sum is exact; grids are even in what was asked for."""
+    """One mode is all there is, so that its sum is exact; grids are even in the requested way."""
     kept = plate.ac("m.fx", start=1.0, stop=100.0, points=10, spacing="linear", even=True, by_modes=True)
     assert kept.modes == 1 and kept.modal_error is not None and kept.modal_error < 1e-9
     assert np.allclose(np.diff(kept.frequencies_hz), 11.0)
@@ -58,8 +58,8 @@ def test_refusals(plate: bimorph.Model) -> None:
         ("stop", "m.fx", {"start": 1.0, "stop": 1e300}),
         ("stop", "m.fx", {"start": 2.0, "stop": 1.0}),
         ("points", "m.fx", {"start": 1.0, "stop": 2.0, "points": 2_000_000_000}),
-        ("drive", "nobody.fx", {"start": 1.0, "stop": 2.0}),
-        ("signal", "m.fx", {"signals": ["nobody.x"], "start": 1.0, "stop": 2.0}),
+        ("drive", "absent.fx", {"start": 1.0, "stop": 2.0}),
+        ("signal", "m.fx", {"signals": ["absent.x"], "start": 1.0, "stop": 2.0}),
     ]:
         with pytest.raises(bimorph.InvalidRequest, match=what):
             plate.ac(drive, **keywords)  # type: ignore[arg-type]

@@ -27,7 +27,7 @@ def model(request: pytest.FixtureRequest, plate: bimorph.Model) -> bimorph.Model
 
 
 def course(steps: int) -> tuple[Any, Any]:
-    """Times and voltages with jumps beyond pull-in and long steps, so that the device asks for pieces."""
+    """Times and voltages with jumps beyond pull-in and long steps, so that the device needs pieces."""
     lengths = np.where(np.arange(steps) % 50 == 49, 1e-4, 2e-6)
     return np.cumsum(lengths), np.array([1.0, 5.5, 3.0, 0.0])[np.arange(steps) // 3 % 4]
 
@@ -40,7 +40,7 @@ def one_by_one(model: bimorph.Model, times: Any, volts: Any, start: float = 1.0)
 
 
 def test_a_run_has_the_bits_of_its_steps(model: bimorph.Model) -> None:
-    """Signals, currents, charges and the whole last reply; the session goes on from there with the same bits. Signals may be left out."""
+    """Signals, currents, charges and the whole last reply; the session continues from there with the same bits. Signals may be left out."""
     times, volts = course(300)
     replies = one_by_one(model, times, volts)
     with model.session(["m.x", "m.vx"]) as session:
@@ -78,7 +78,7 @@ def test_a_constant_voltage_and_parts(model: bimorph.Model, monkeypatch: pytest.
 
 
 def test_a_step_that_fails_names_itself(model: bimorph.Model) -> None:
-    """A device that asks for steps without end fails at that step: those before are there, the session stands after them, and goes on. The
+    """A device that needs steps without end fails at that step: those before are there, the session stands after them, and continues. The
     error travels."""
     times, volts = 1e-6 * np.arange(1, 11), np.full(10, 2.0)
     # a jump of this size within 1 fs: pieces below a billionth of the step do not exist
@@ -141,7 +141,7 @@ def test_what_does_not_fit_is_named(plate: bimorph.Model, times: Any, voltages: 
 
 @pytest.fixture
 def interrupts() -> Iterator[None]:
-    """SIGINT raises KeyboardInterrupt, also where whoever started the tests has it ignored, as shells do for what runs in the background."""
+    """SIGINT raises KeyboardInterrupt, also where the process that started the tests ignores it, as shells do for what runs in the background."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -372,13 +372,13 @@ def test_a_batch_of_kept_sessions_is_accepted_as_a_whole(client: bimorph.Client,
         for session in sessions:
             session.kept = True
 
-        def tell(self: bimorph.Session, reply: bimorph.TrialReply) -> None:
+        def report(self: bimorph.Session, reply: bimorph.TrialReply) -> None:
             asked.append((sessions.index(self), reply.token))
             if len(asked) == 3:
                 raise bimorph.Unavailable("the third")
 
         before = states(batch)
-        monkeypatch.setattr(bimorph.Session, "_tell_accepted", tell)
+        monkeypatch.setattr(bimorph.Session, "_report_accepted", report)
         with pytest.raises(bimorph.Unavailable, match="the third"):
             batch.run([1e-6, 2e-6], {"drive": 2.0})
         assert states(batch) == before
@@ -399,7 +399,7 @@ def test_variants_are_a_batch(client: bimorph.Client) -> None:
 
 
 def test_inputs_send_their_waveforms_once(plate: bimorph.Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A transient along inputs is one call, with the bits of steps one by one, and tells how far it has come."""
+    """A transient along inputs is one call, with the bits of steps one by one, and reports its progress."""
     calls: list[str] = []
     stream = bimorph.channel.Channel.stream
 

@@ -1,4 +1,4 @@
-"""A session goes on from a snapshot or as a fork with the same bits."""
+"""A session continues from a snapshot or as a fork with the same bits."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from test_kept import start
 import bimorph
 
 LONG = 2e-3
-"""A plate that is pulled in within this time [s] asks for more pieces than a session holds states."""
+"""A plate that is pulled in within this time [s] needs more pieces than a session holds states."""
 
 
 def counted(session: bimorph.Session, most: int | None = None) -> list[int]:
@@ -31,7 +31,7 @@ def counted(session: bimorph.Session, most: int | None = None) -> list[int]:
 
 
 def test_an_accepted_trial_brings_its_voltages(plate: bimorph.Model) -> None:
-    """Ports that are not named keep what they had in the accepted state, which is what the trial was given, unless told otherwise."""
+    """Ports that are not named keep what they had in the accepted state, which is what the trial was given, by default."""
     with plate.session(["m.x"], ports=["drive", "m.x"]) as session:
         there = session.trial({"drive": 2.0, "m.x": 1e-8})
         session.accept(there)

@@ -48,7 +48,7 @@ def test_tables_of_different_sweeps_are_refused(client: bimorph.Client) -> None:
 
 
 def test_a_parameter_with_the_name_of_a_result(client: bimorph.Client) -> None:
-    """Neither hides the other: the result is called with its unit, as in CSV. A parameter that no table could show is told."""
+    """Neither hides the other: the result is called with its unit, as in CSV. A parameter that no table could show is reported."""
     netlist = bimorph.Netlist.text(CHAIN.replace("w=2u", "w=f1").replace("param n=1", "param n=1\nparam f1=2u"))
     widths = [1e-6, 2e-6]
     table = client.sweep(netlist, {"f1": widths}, bimorph.Modes(count=1))

@@ -128,7 +128,7 @@ struct Line(Mutex<Option<DeviceChannel>>);
 
 #[pymethods]
 impl Line {
-    /// The reply to a question; none to one that asks for none, or where the line is closed.
+    /// The reply to a question; none to one that expects none, or where the line is closed.
     fn ask<'py>(&self, py: Python<'py>, request: &[u8]) -> PyResult<Option<Bound<'py, PyBytes>>> {
         let reply = run(py, || {
             let mut questions = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -176,7 +176,7 @@ struct RemoteLine(Mutex<Option<client::TrialChannel>>);
 
 #[pymethods]
 impl RemoteLine {
-    /// The reply to a question within `patience` [s]; none to one that asks for none, or where the line is closed.
+    /// The reply to a question within `patience` [s]; none to one that expects none, or where the line is closed.
     fn ask<'py>(&self, py: Python<'py>, request: &[u8], patience: f64) -> PyResult<Option<Bound<'py, PyBytes>>> {
         let patience = Duration::try_from_secs_f64(patience).unwrap_or(Duration::MAX);
         let reply = wait(py, None, |wanted| {

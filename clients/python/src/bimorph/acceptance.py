@@ -27,14 +27,14 @@ def accept_together(states: Sequence[State]) -> None:
         for session, reply, _ in states:
             if session.kept:
                 asked.append(session)
-                session._tell_accepted(reply)
+                session._report_accepted(reply)
             else:
                 session._usable()
     except BaseException:
         for session in asked:
             if session.accepted is not None:
                 with contextlib.suppress(BimorphError):
-                    session._tell_accepted(session.accepted)
+                    session._report_accepted(session.accepted)
         raise
     changes = [change for session, reply, voltages in states for change in _changes(session, reply, voltages)]
     # In C throughout: no interrupt of the main thread comes between two of the assignments.
@@ -43,7 +43,7 @@ def accept_together(states: Sequence[State]) -> None:
         if not session.kept:
             # It only frees memory on the server. A stream that has ended is reported by the next call.
             with contextlib.suppress(BimorphError):
-                session._tell_accepted(reply)
+                session._report_accepted(reply)
 
 
 def _changes(session: Session, reply: TrialReply, voltages: dict[str, float]) -> list[tuple[Session, str, object]]:

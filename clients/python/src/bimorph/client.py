@@ -243,7 +243,7 @@ class Client:
             netlist = arguments.path("netlist", netlist, "a path or a Netlist")
         if not isinstance(netlist, Netlist) and Path(netlist).suffix.lower() in LAYOUTS:
             converted = self.convert(netlist)
-            for remark in converted.told():
+            for remark in converted.remarks():
                 warnings.warn(f"{netlist}: {remark}", LayoutWarning, stacklevel=4)
             netlist = converted.netlist
         read = netlist if isinstance(netlist, Netlist) else Netlist._read("netlist", netlist, include)

@@ -53,7 +53,7 @@ class Conversion:
     notes: tuple[str, ...] = ()
     """Approximations and omissions, as sentences."""
 
-    def told(self) -> list[str]:
+    def remarks(self) -> list[str]:
         """Remarks about unrecognised areas, approximations and omissions, as sentences."""
         lost = [
             f"{piece.area_m2 * 1e12:.4g} µm² of layer {piece.layer} not understood at "

@@ -56,7 +56,7 @@ class Line:
         self._put(question)
         return self._answer(question)
 
-    def tell(self, request: Any) -> None:
+    def send(self, request: Any) -> None:
         """Sends a request without a reply."""
         self._put(_Question(request, None))
 
@@ -141,7 +141,7 @@ class NativeLine:
             raise self.over or BimorphError("the stream of the session has ended; open another session")
         return device_pb2.DeviceReply.FromString(reply)
 
-    def tell(self, request: Any) -> None:
+    def send(self, request: Any) -> None:
         """Sends a request without a reply."""
         self._said(request)
 

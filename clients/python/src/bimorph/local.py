@@ -94,7 +94,7 @@ class LocalLine:
             raise self.over or BimorphError("the stream of the session has ended; open another session")
         return device_pb2.DeviceReply.FromString(reply)
 
-    def tell(self, request: Any) -> None:
+    def send(self, request: Any) -> None:
         """Sends a request without a reply."""
         if self.over is not None:
             raise self.over

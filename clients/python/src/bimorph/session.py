@@ -148,21 +148,21 @@ class Session(Runs):
     def _accept(self, reply: TrialReply, voltages: dict[str, float]) -> None:
         if self.kept:
             # On the server first, with a reply: it stores the state before as well.
-            self._tell_accepted(reply)
+            self._report_accepted(reply)
             self.accepted, self.t, self._voltages = reply, reply.t, voltages
             return
         # Here first: the server only frees memory, and an interrupt must not leave the two in different states.
         self.accepted, self.t, self._voltages = reply, reply.t, voltages
-        self._tell_accepted(reply)
+        self._report_accepted(reply)
 
-    def _tell_accepted(self, reply: TrialReply) -> None:
+    def _report_accepted(self, reply: TrialReply) -> None:
         if self.kept:
             accept = device_pb2.Accept(token=reply.token, answer=True)
             accepted = self._checked.kind(self._ask(device_pb2.DeviceRequest(accept=accept)), "accepted")
             self._checked.require(accepted.token == reply.token, "it accepts another state than that of the request")
             return
         self._own()
-        self._line.tell(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)))
+        self._line.send(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)))
 
     def operating_point(self, voltages: Mapping[str, float]) -> TrialReply:
         """Accepts the static equilibrium at these port voltages [V] and sets the time to 0 s.
@@ -198,7 +198,7 @@ class Session(Runs):
                     return reply
                 parent, done, taken = reply, done + h, taken + 1
                 if taken % _PIECES == 0 and self.accepted is not None:
-                    self._tell_accepted(self.accepted)
+                    self._report_accepted(self.accepted)
                 continue
             h = min(reply.need_dt / dt, h / 2)
             if h < _SHORTEST:

@@ -229,7 +229,7 @@ class Sweep:
         columns: list[tuple[tuple[str, str], ...]] = []
         for chunk in self._channel.stream("FetchJob", jobs_pb2.FetchJobRequest(name=self.id, first_row=first)):
             parameters = list(chunk.parameters) or parameters
-            columns += (tuple(zip(told.results, told.units)) for told in chunk.columns)
+            columns += (tuple(zip(column.results, column.units)) for column in chunk.columns)
             found = [_found(row.row, parameters, columns[row.columns] if row.row.results else ()) for row in chunk.rows]
             yield _Chunk(parameters, found)
             if chunk.HasField("job"):
