@@ -17,17 +17,16 @@ use std::path::{Path, PathBuf};
 
 /// Options of every command that reads a netlist.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Model")]
 pub(crate) struct ModelArgs {
     /// SUGAR netlist, or a layout: .cif or .gds
     file: PathBuf,
 
     /// Set a netlist parameter: a number with suffix (2.1u) or text. Repeatable
-    #[arg(long = "set", short = 's', value_name = "NAME=VALUE", value_parser = value::setting)]
+    #[arg(long = "set", short = 's', value_name = "NAME=VALUE", value_parser = value::setting, help_heading = "Model")]
     set: Vec<(String, Setting)>,
 
     /// Folder to search for files that the netlist uses. Repeatable
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = "Model")]
     include: Vec<PathBuf>,
 
     #[command(flatten)]
@@ -42,11 +41,11 @@ pub(crate) struct ModelArgs {
 pub(crate) struct LayoutArgs {
     /// Layouts only: definition of the layers; a built-in process (polymumps, soi) or a process file (.toml,
     /// docs/reference/layouts.md)
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Model")]
     process: Option<String>,
 
     /// Layouts only: the cell to read, where several are called by no other
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Model")]
     cell: Option<String>,
 }
 

@@ -13,14 +13,13 @@ use std::path::{Path, PathBuf};
 
 /// Options of every command that has a result.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Output")]
 pub(crate) struct OutputArgs {
     /// Print one JSON document: SI, full precision
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     json: bool,
 
     /// Write the result to a file; its extension says what: .raw (ngspice), .csv, .svg, .png, .html
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: Option<PathBuf>,
 }
 
