@@ -45,10 +45,10 @@ fn quoted(text: &str) -> BTreeSet<&str> {
     text.split('`').skip(1).step_by(2).collect()
 }
 
-/// Each element has one block, whose table has the parameters of the source, and which has an example of it; no block has a name that is no element.
+/// Each element has one block, whose table has the parameters of the source, and which has an example of it and a picture; no block has a name that is no element.
 #[test]
 fn every_element_has_its_block() {
-    let page = page("elements.md");
+    let (page, pictures_folder) = (page("elements.md"), place("docs/pictures/elements"));
     let (mut documented, mut blocks) = (BTreeSet::new(), 0);
     for block in page.split("\n### ").skip(1) {
         let title = block.lines().next().expect("a title");
@@ -74,6 +74,9 @@ fn every_element_has_its_block() {
         let example = body.split("```netlist\n").nth(1).unwrap_or_else(|| panic!("{title}: no example"));
         let example = example.split("```").next().expect("an end");
         assert!(example.split_whitespace().any(|word| names.contains(word)), "{title}: its example has none of it");
+        let pictures = block.split("](../pictures/elements/").skip(1).filter_map(|rest| rest.split(')').next());
+        let missing: Vec<&str> = pictures.clone().filter(|name| !pictures_folder.join(name).is_file()).collect();
+        assert!(missing.is_empty() && pictures.count() > 0, "{title}: no picture, or missing ones: {missing:?}");
         blocks += 1;
     }
     let all: BTreeSet<&str> = element_descriptions().map(|element| element.name).collect();
