@@ -22,7 +22,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  \
     bimorph check examples/bank/bank.net\n  \
     bimorph check examples/bank/bank.net --set wh=2.1u --json\n  \
-    bimorph check examples/bank/bank.net --out bank.svg     a drawing with the names of nodes")]
+    bimorph check examples/bank/bank.net --out bank.svg     # a drawing with the names of nodes")]
 pub(crate) struct CheckCommand {
     #[command(flatten)]
     model: ModelArgs,
