@@ -1,10 +1,11 @@
 # Every target does its own set-up on a fresh Debian or Ubuntu with a Rust toolchain, and says what it does.
-.PHONY: help demo test docs notebooks soak fuzz bench pictures charts wheel clean
+.PHONY: help demo test docs docs-pdf notebooks soak fuzz bench pictures charts wheel clean
 
 help:
 	@echo "make demo    build, run the bank in ngspice here and through a server, compare, draw (out/demo)"
 	@echo "make test    everything that must hold: format, lints, tests, documentation, Python, ngspice decks"
 	@echo "make docs    the manual as a site (target/docs/html), links, spelling and sentences checked"
+	@echo "make docs-pdf the manual as one PDF (target/docs/bimorph.pdf); not part of make test"
 	@echo "make notebooks the pages of docs/start and docs/tutorials as Jupyter notebooks with their results (target/docs/notebooks)"
 	@echo "make soak    a thousand sessions for a minute, ten thousand in turn, two hundred and fifty kills, hundreds of bits changed in files, a hundred killed clients, hundreds of failures of the network: what a server bears (some minutes)"
 	@echo "make fuzz    any text as netlist, any bytes as layout, as messages to a server and as snapshots, ten minutes each (FUZZ_MINUTES)"
@@ -24,6 +25,9 @@ test:
 
 docs:
 	@scripts/docs
+
+docs-pdf:
+	@scripts/docs-pdf
 
 notebooks:
 	@scripts/setup ngspice build python

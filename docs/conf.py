@@ -34,3 +34,5 @@ html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {"navigation_with_keys": True}
+if tags.has("pdf"):  # noqa: F821, from Sphinx: a plain page for scripts/docs-pdf
+    html_theme, html_theme_options, html_css_files = "basic", {}, ["print.css"]
