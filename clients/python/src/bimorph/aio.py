@@ -63,7 +63,7 @@ async def _call(call: Callable[[], T], drop: Callable[[T], object] = _nothing) -
         if not done.done():
             set(value)
 
-    def settle(set: Callable[[Any], None], value: Any) -> None:
+    def deliver(set: Callable[[Any], None], value: Any) -> None:
         try:
             loop.call_soon_threadsafe(settle, set, value)
         except RuntimeError:
@@ -79,9 +79,9 @@ async def _call(call: Callable[[], T], drop: Callable[[T], object] = _nothing) -
             if late:
                 drop(result)
             else:
-                settle(done.set_result, result)
+                deliver(done.set_result, result)
         except BaseException as error:
-            settle(done.set_exception, error)
+            deliver(done.set_exception, error)
 
     _thread(run)
     try:
