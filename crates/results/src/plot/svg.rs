@@ -130,11 +130,13 @@ impl Picture {
         );
     }
 
-    /// A line of text that stays readable over a drawing: with a white edge.
+    /// A line of text that stays readable over a drawing: with a white edge, which is drawn as a text below it, since not every viewer knows
+    /// `paint-order`.
     pub fn label(&mut self, x: f64, y: f64, size: f64, align: Align, colour: &str, text: &str) {
-        let _ = write!(self.body, "<g stroke=\"#ffffff\" stroke-width=\"3\" paint-order=\"stroke\">");
-        self.text(x, y, size, align, colour, text);
+        let _ = write!(self.body, "<g stroke=\"#ffffff\" stroke-width=\"3\">");
+        self.text(x, y, size, align, "#ffffff", text);
         let _ = writeln!(self.body, "</g>");
+        self.text(x, y, size, align, colour, text);
     }
 
     /// The finished document, with a white ground.
