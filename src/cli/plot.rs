@@ -103,7 +103,8 @@ impl PlotCommand {
         let (compiled, result, curves) = static_fitted(&compiled, &self.ports)?;
         let volts: Vec<String> = self.ports.iter().map(|(name, v)| format!("{name} = {v} V")).collect();
         let name = netlist.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let title = if volts.is_empty() { name } else { format!("{name} at {}", volts.join(", ")) };
+        let title =
+            if volts.is_empty() { name } else { format!("{name} in static equilibrium at {}", volts.join(", ")) };
         Ok(statics::picture(&compiled, &title, &result, &curves))
     }
 }
