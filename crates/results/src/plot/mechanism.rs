@@ -41,6 +41,8 @@ const MARGIN: f64 = 46.0;
 const INK: &str = "#333333";
 const REST: Paint<'static> = Paint { fill: "#d0d0d0", stroke: "#a8a8a8", width: 0.6, opacity: 1.0 };
 const MOVED: &str = "#0072B2";
+/// Nodes that are named in a picture: the cost of their labels is the square of their number.
+const MAX_NAMES: usize = 400;
 /// Fraction of the mechanism's size that the largest displacement of a mode shape becomes.
 const SHAPE: f64 = 0.07;
 
@@ -184,9 +186,10 @@ pub fn named(title: &str, structure: &Structure) -> Picture {
     prepared.paint(&mut picture, &view);
     let drawn: Vec<_> = structure.nodes.iter().filter(|node| node.mechanical && !node.name.is_empty()).collect();
     let mut places = LabelPlaces::new([4.0, 34.0, WIDTH - 4.0, height + 66.0]);
-    drawn.iter().for_each(|node| places.keep_free(view.at(node.position), 3.0));
-    let mut left_out = 0;
-    for node in &drawn {
+    let shown = &drawn[..drawn.len().min(MAX_NAMES)];
+    shown.iter().for_each(|node| places.keep_free(view.at(node.position), 3.0));
+    let mut left_out = drawn.len() - shown.len();
+    for node in shown {
         let [x, y] = view.at(node.position);
         picture.circle(x, y, 2.5, Paint { fill: "#ffffff", stroke: MOVED, width: 1.4, opacity: 1.0 });
         match places.place([x, y], 12.0, &node.name) {
