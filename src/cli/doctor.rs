@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::mpsc;
 use std::time::Duration;
+use tempfile::TempDir;
 
 /// Check what is installed and what works: the core, ngspice, the plug-in, a server, the Python client.
 ///
@@ -129,13 +130,18 @@ fn ngspice() -> Result<String, String> {
     })
 }
 
+/// A folder of this run, gone afterwards.
+fn scratch_folder() -> Result<TempDir, String> {
+    tempfile::Builder::new().prefix("bimorph-doctor-").tempdir().map_err(|e| e.to_string())
+}
+
 /// A plate on a spring in an ngspice deck.
 fn plugin() -> Result<String, String> {
     let plugin = find_plugin().map_err(|_| "not found beside this program".to_owned())?;
-    let folder = std::env::temp_dir().join(format!("bimorph-doctor-{}", std::process::id()));
     let run = || -> Result<f64, String> {
+        let folder = scratch_folder()?;
+        let folder = folder.path();
         let (deck, raw) = (folder.join("plate.cir"), folder.join("plate.raw"));
-        std::fs::create_dir(&folder).map_err(|e| e.to_string())?;
         std::fs::write(folder.join("plate.net"), PLATE).map_err(|e| e.to_string())?;
         std::fs::write(&deck, DECK).map_err(|e| e.to_string())?;
         let options = CosimOptions { deck, raw: Some(raw.clone()), capture: true, ..CosimOptions::default() };
@@ -145,14 +151,13 @@ fn plugin() -> Result<String, String> {
         let x = plots.first().and_then(|plot| plot.column("v(x)")).map(|column| column.samples.magnitudes());
         x.and_then(|x| x.first().copied()).ok_or_else(|| "ngspice wrote no operating point".to_owned())
     };
-    let moved = run();
-    let _ = std::fs::remove_dir_all(&folder);
-    moved.map(|x| format!("loads; 1 V moves a plate by {x:.4} nm ({})", plugin.display()))
+    run().map(|x| format!("loads; 1 V moves a plate by {x:.4} nm ({})", plugin.display()))
 }
 
 /// A server in this process, asked over a Unix socket for the same cantilever.
 fn server() -> Result<String, String> {
-    let path = std::env::temp_dir().join(format!("bimorph-doctor-{}.sock", std::process::id()));
+    let folder = scratch_folder()?;
+    let path = folder.path().join("socket");
     let runtime = tokio::runtime::Runtime::new().map_err(|e| e.to_string())?;
     let (stop, stopped) = tokio::sync::oneshot::channel::<()>();
     let (report, ready) = mpsc::channel();

@@ -52,6 +52,15 @@ fn paths_are_not_stolen() {
     assert_eq!(std::fs::read_to_string(&path).expect("there"), "notes");
 }
 
+/// A server that was killed while it bound its socket leaves a folder named after its process: the next of that identifier, which in a
+/// container is always 1, starts all the same.
+#[test]
+fn what_a_killed_server_left_is_no_obstacle() {
+    let dir = tempfile::tempdir().expect("a directory");
+    std::fs::create_dir(dir.path().join(format!(".{}", std::process::id()))).expect("made");
+    unix(&dir.path().join("b.sock")).device().open(&OpenRequest::default()).expect("serves");
+}
+
 /// A TCP address beyond this machine needs --insecure, and the message says why.
 #[test]
 fn open_networks_need_a_word() {

@@ -5,7 +5,7 @@ use super::compare::{self, PlotComparison, PrintedNumber};
 use super::error::{CosimError, io};
 use super::refined_deck::{TIGHTER, finer, keeping_plots, measuring};
 use super::run::{CosimOptions, CosimReport, run_whatever};
-use super::scratch::ScratchFolder;
+use super::scratch::scratch_folder;
 use bimorph_results::raw;
 use bimorph_results::table::Table;
 use std::path::Path;
@@ -32,12 +32,12 @@ pub fn check(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Co
     let deck = &options.deck;
     let bytes = std::fs::read(deck).map_err(|source| CosimError::Deck { path: deck.clone(), source })?;
     let text = options.text.clone().unwrap_or_else(|| String::from_utf8_lossy(&bytes).into_owned());
-    let scratch = ScratchFolder::new()?;
+    let scratch = scratch_folder()?;
     let changed = finer(&text, deck.parent().unwrap_or(Path::new(".")));
     let mut notes = changed.notes;
     let one = |text: &str, name: &str, share: f64| {
-        let kept = scratch.0.join(format!("{name}-kept.raw"));
-        let raw = scratch.0.join(format!("{name}.raw"));
+        let kept = scratch.path().join(format!("{name}-kept.raw"));
+        let raw = scratch.path().join(format!("{name}.raw"));
         let measuring = if options.raw.is_none() { measuring(text, &kept) } else { None };
         let run_options = CosimOptions {
             raw: measuring.is_none().then(|| raw.clone()),

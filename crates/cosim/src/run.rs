@@ -12,7 +12,7 @@ use super::error::{CosimError, io};
 use super::find::{find_ngspice, find_plugin};
 use super::includes::Included;
 use super::ngspice_output::{judge, listen};
-use super::scratch::{InitializationFile, ScratchFolder, initialise, user_settings};
+use super::scratch::{InitializationFile, initialise, scratch_folder, user_settings};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -85,7 +85,7 @@ pub(super) fn run_whatever(options: &CosimOptions, keep_going: &dyn Fn() -> bool
         Some(path) => path.canonicalize().map_err(io(|| format!("cannot read the plug-in {}", path.display())))?,
         None => find_plugin()?,
     };
-    let scratch = ScratchFolder::new()?;
+    let scratch = scratch_folder()?;
     let folder = deck.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = folder.canonicalize().map_err(|source| CosimError::Deck { path: deck.clone(), source })?;
     let user = user_settings();
@@ -96,16 +96,16 @@ pub(super) fn run_whatever(options: &CosimOptions, keep_going: &dyn Fn() -> bool
         limited: included.mentions(&["convstep", "convabsstep"]),
         includes: options.text.as_ref().map(|_| folder.as_path()),
     };
-    initialise(&scratch.0, &plugin, &start)?;
+    initialise(scratch.path(), &plugin, &start)?;
     let run_deck = match &options.text {
         Some(text) => {
-            let copy = scratch.0.join(deck.file_name().unwrap_or(deck.as_os_str()));
+            let copy = scratch.path().join(deck.file_name().unwrap_or(deck.as_os_str()));
             std::fs::write(&copy, text).map_err(io(|| format!("cannot write {}", copy.display())))?;
             copy
         }
         None => deck.clone(),
     };
-    let failure = scratch.0.join("failure");
+    let failure = scratch.path().join("failure");
     let unfinished = options.raw.as_ref().map(|raw| {
         let mut name = OsString::from(raw);
         name.push(format!(".unfinished-{}", std::process::id()));
@@ -113,7 +113,7 @@ pub(super) fn run_whatever(options: &CosimOptions, keep_going: &dyn Fn() -> bool
     });
 
     let mut command = Command::new(&ngspice);
-    command.arg("-b").env("SPICE_USERINIT_DIR", &scratch.0).env("BIMORPH_FAILURE", &failure).stdin(Stdio::null());
+    command.arg("-b").env("SPICE_USERINIT_DIR", scratch.path()).env("BIMORPH_FAILURE", &failure).stdin(Stdio::null());
     command.env("BIMORPH_DECK_DIR", &folder);
     let models: Vec<String> = included.models().map(|(name, at)| format!("{name}\t{}", at.display())).collect();
     command.env("BIMORPH_MODEL_FOLDERS", models.join("\n"));

@@ -2,19 +2,13 @@
 
 use super::error::{CosimError, io};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
+use tempfile::TempDir;
 
-/// A folder of this run, gone afterwards.
-pub(super) struct ScratchFolder(pub(super) PathBuf);
-
-impl ScratchFolder {
-    pub(super) fn new() -> Result<Self, CosimError> {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("bimorph-cosim-{}-{count}", std::process::id()));
-        std::fs::create_dir(&path).map_err(io(|| format!("cannot make the folder {}", path.display())))?;
-        Ok(Self(path))
-    }
+/// A folder of this run, of the user alone, gone afterwards. Its name is random: one with the process identifier meets the folder that a killed
+/// run of the same identifier left.
+pub(super) fn scratch_folder() -> Result<TempDir, CosimError> {
+    let made = tempfile::Builder::new().prefix("bimorph-cosim-").tempdir();
+    made.map_err(io(|| format!("cannot make a folder in {}", std::env::temp_dir().display())))
 }
 
 /// Content of the initialisation file of a run, beside loading the plug-in.
@@ -58,12 +52,6 @@ pub(super) fn initialise(folder: &Path, plugin: &Path, start: &InitializationFil
     std::fs::write(&path, lines).map_err(io(|| format!("cannot write {}", path.display())))
 }
 
-impl Drop for ScratchFolder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
 /// A folder under a name without blanks: its own, or that of a link.
 fn plain(folder: &Path, scratch: &Path) -> Result<PathBuf, CosimError> {
     if !folder.to_string_lossy().contains(char::is_whitespace) {
@@ -73,4 +61,22 @@ fn plain(folder: &Path, scratch: &Path) -> Result<PathBuf, CosimError> {
     #[cfg(unix)]
     std::os::unix::fs::symlink(folder, &link).map_err(io(|| format!("cannot write {}", link.display())))?;
     Ok(link)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a killed run of the same process identifier left behind is no obstacle, and two runs of a process have folders of their own.
+    #[test]
+    fn folders_of_killed_runs_do_not_matter() {
+        let left = std::env::temp_dir().join(format!("bimorph-cosim-{}-0", std::process::id()));
+        std::fs::create_dir_all(&left).unwrap();
+        let folders = [scratch_folder().unwrap(), scratch_folder().unwrap()];
+        assert_ne!(folders[0].path(), folders[1].path());
+        let paths = folders.each_ref().map(|folder| folder.path().to_owned());
+        drop(folders);
+        assert!(paths.iter().all(|path| !path.exists()));
+        std::fs::remove_dir(&left).unwrap();
+    }
 }

@@ -7,7 +7,7 @@ use super::shutdown::Shutdown;
 use bimorph_wire::address::Address;
 use std::fs;
 use std::io;
-use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt, PermissionsExt};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -160,9 +160,8 @@ fn clear_stale(address: &Address, path: &Path) -> Result<(), ServeError> {
 /// fails if another server took it meanwhile.
 fn bind_private(path: &Path) -> io::Result<(UnixListener, SocketFile)> {
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let room = parent.join(format!(".{}", std::process::id()));
-    fs::DirBuilder::new().mode(0o700).create(&room)?;
-    let inside = room.join("s");
+    let room = tempfile::Builder::new().prefix(".").permissions(fs::Permissions::from_mode(0o700)).tempdir_in(parent)?;
+    let inside = room.path().join("s");
     let bound = UnixListener::bind(&inside).and_then(|listener| {
         fs::set_permissions(&inside, fs::Permissions::from_mode(0o600))?;
         let made = fs::symlink_metadata(&inside)?;
@@ -170,6 +169,5 @@ fn bind_private(path: &Path) -> io::Result<(UnixListener, SocketFile)> {
         Ok((listener, SocketFile { path: path.to_owned(), device: made.dev(), inode: made.ino() }))
     });
     let _ = fs::remove_file(&inside);
-    let _ = fs::remove_dir(&room);
     bound
 }

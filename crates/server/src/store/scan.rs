@@ -1,7 +1,7 @@
 //! Content of a folder of states, read without changing it.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -62,9 +62,7 @@ fn or_here(path: &Path) -> &Path {
 
 /// Whether files can be made in a folder: one is, and is removed again.
 fn probe(folder: &Path) -> io::Result<()> {
-    let path = folder.join(format!(".bimorph-{}", std::process::id()));
-    OpenOptions::new().write(true).create_new(true).open(&path)?;
-    fs::remove_file(path)
+    tempfile::Builder::new().prefix(".bimorph-").tempfile_in(folder)?.close()
 }
 
 /// Content of a folder.
