@@ -160,7 +160,8 @@ fn clear_stale(address: &Address, path: &Path) -> Result<(), ServeError> {
 /// fails if another server took it meanwhile.
 fn bind_private(path: &Path) -> io::Result<(UnixListener, SocketFile)> {
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let room = tempfile::Builder::new().prefix(".").permissions(fs::Permissions::from_mode(0o700)).tempdir_in(parent)?;
+    let room =
+        tempfile::Builder::new().prefix(".").permissions(fs::Permissions::from_mode(0o700)).tempdir_in(parent)?;
     let inside = room.path().join("s");
     let bound = UnixListener::bind(&inside).and_then(|listener| {
         fs::set_permissions(&inside, fs::Permissions::from_mode(0o600))?;
