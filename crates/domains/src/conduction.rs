@@ -8,8 +8,10 @@
 //! mean rise                 φ̄   = (φ_a + φ_b)/2 + C/K·((θ_a + θ_b)/24 + P/(120·K))
 //! heat into the node at a   C·(θ_a/3 + θ_b/6 + P/(24·K))
 //! ```
-//! and C/(10·K) = ρ·c·l²/(10·k) between two anchors.
+//! and C/(10·K) = ρ·c·l²/(10·k) between two anchors. A beam that loses heat through gas has the functions of `fin.rs` in their place, and
+//! C times minus their slopes with the conductance to the sides: the heat that is stored acts as a conductance s·C there.
 
+use super::fin::Fin;
 use super::laplacian::Laplacian;
 use bimorph_base::sets::Sets;
 use thiserror::Error;
@@ -35,6 +37,8 @@ pub struct HeatConductor {
     pub delayed: bool,
     /// Heat capacity (J/K); 0 where it is not known.
     pub capacity: f64,
+    /// Thermal conductance of all of its length through gas to the surroundings (W/K).
+    pub gas: f64,
 }
 
 /// A heated beam whose heat cannot leave: nothing conducts from it to an anchor.
@@ -51,6 +55,8 @@ pub(super) struct Conduction {
     row: Vec<Option<usize>>,
     free: usize,
     laplacian: Laplacian,
+    /// Heater by heater, what its length does to the heat in it.
+    fins: Vec<Fin>,
 }
 
 impl Conduction {
@@ -70,15 +76,32 @@ impl Conduction {
         if let Some(heater) = without_sink(heaters, sink) {
             return Err(NoHeatSink { heater });
         }
-        let conductors = heaters.iter().map(|h| (row[h.a], row[h.b], h.conductance));
-        let laplacian = Laplacian::new(free, conductors).ok_or(NoHeatSink { heater: 0 })?;
-        Ok(Self { row, free, laplacian })
+        let fins: Vec<Fin> = heaters.iter().map(|h| Fin::new(h.conductance, h.gas)).collect();
+        let conductors = heaters.iter().zip(&fins).map(|(h, fin)| (row[h.a], row[h.b], fin.through));
+        // what leaves through gas, at each of the two ends
+        let aside = heaters.iter().zip(&fins).filter(|(_, fin)| fin.aside > 0.0);
+        let aside = aside.flat_map(|(h, fin)| [(row[h.a], None, fin.aside), (row[h.b], None, fin.aside)]);
+        let laplacian = Laplacian::new(free, conductors.chain(aside)).ok_or(NoHeatSink { heater: 0 })?;
+        Ok(Self { row, free, laplacian, fins })
     }
 
     /// Mean rise of each heater for the heat into each (K, W).
     pub(super) fn rises(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
-        let ends = self.ends(heaters, watts.iter().map(|watts| [0.5 * watts; 2]));
-        heaters.iter().zip(watts).zip(ends).map(|((h, watts), ends)| mean(h, *watts, ends)).collect()
+        let ends = self.ends(heaters, self.outflows(watts));
+        let each = heaters.iter().zip(&self.fins).zip(watts).zip(ends);
+        each.map(|(((h, fin), watts), ends)| mean(h, fin, *watts, ends)).collect()
+    }
+
+    /// Highest rise along each heater for the heat into each (K, W).
+    pub(super) fn peaks(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
+        let ends = self.ends(heaters, self.outflows(watts));
+        let each = heaters.iter().zip(&self.fins).zip(watts).zip(ends);
+        each.map(|(((h, fin), watts), ends)| fin.peak(h.conductance, *watts, ends)).collect()
+    }
+
+    /// Heat from each heater into both of its ends while those are at ambient (W).
+    fn outflows<'a>(&'a self, watts: &'a [f64]) -> impl Iterator<Item = [f64; 2]> + 'a {
+        self.fins.iter().zip(watts).map(|(fin, watts)| [0.5 * watts * fin.share; 2])
     }
 
     /// Rise at both ends of each heater for the heat from it into both (K, W).
@@ -121,27 +144,47 @@ impl Conduction {
     /// Mean delay of the rise of each heater behind the heat into all of them (s, W). A part that none comes into is heated evenly.
     pub(super) fn delays(&self, heaters: &[HeatConductor], watts: &[f64]) -> Vec<f64> {
         let watts = &self.evenly(heaters, watts);
-        let warm = self.ends(heaters, watts.iter().map(|watts| [0.5 * watts; 2]));
-        let stored = |((h, watts), [a, b]): ((&HeatConductor, &f64), &[f64; 2])| {
-            let own = watts / (24.0 * h.conductance);
-            [h.capacity * (a / 3.0 + b / 6.0 + own), h.capacity * (a / 6.0 + b / 3.0 + own)]
-        };
-        let late = self.ends(heaters, heaters.iter().zip(watts).zip(&warm).map(stored));
-        let one = |(h, watts): (&HeatConductor, &f64), warm: [f64; 2], late: [f64; 2]| {
-            let own = h.capacity / h.conductance;
-            let rise = mean(h, *watts, warm);
-            let delayed =
-                0.5 * (late[0] + late[1]) + own * ((warm[0] + warm[1]) / 24.0 + watts / (120.0 * h.conductance));
-            if rise > 0.0 { delayed / rise } else { own / 10.0 }
+        let warm = self.ends(heaters, self.outflows(watts));
+        let stored =
+            |(((h, fin), watts), ends): (((&HeatConductor, &Fin), &f64), &[f64; 2])| stored(h, fin, *watts, *ends);
+        let late = self.ends(heaters, heaters.iter().zip(&self.fins).zip(watts).zip(&warm).map(stored));
+        let one = |((h, fin), watts): ((&HeatConductor, &Fin), &f64), warm: [f64; 2], late: [f64; 2]| {
+            let rise = mean(h, fin, *watts, warm);
+            let delayed = 0.5 * (late[0] + late[1]) * fin.share + delayed_mean(h, fin, *watts, warm);
+            if rise > 0.0 { delayed / rise } else { h.capacity / h.conductance / 10.0 }
         };
         let ends = warm.into_iter().zip(late);
-        heaters.iter().zip(watts).zip(ends).map(|(heated, (warm, late))| one(heated, warm, late)).collect()
+        let each = heaters.iter().zip(&self.fins).zip(watts).zip(ends);
+        each.map(|(heated, (warm, late))| one(heated, warm, late)).collect()
     }
 }
 
 /// Mean rise of a heater between its ends (K).
-fn mean(h: &HeatConductor, watts: f64, ends: [f64; 2]) -> f64 {
-    0.5 * (ends[0] + ends[1]) + watts / (12.0 * h.conductance)
+fn mean(h: &HeatConductor, fin: &Fin, watts: f64, ends: [f64; 2]) -> f64 {
+    if h.gas == 0.0 {
+        return 0.5 * (ends[0] + ends[1]) + watts / (12.0 * h.conductance);
+    }
+    0.5 * (ends[0] + ends[1]) * fin.share + watts * fin.own
+}
+
+/// Heat over time by which a heater's flows into its ends are late (W·s), at the steady rise of its ends.
+fn stored(h: &HeatConductor, fin: &Fin, watts: f64, [a, b]: [f64; 2]) -> [f64; 2] {
+    if h.gas == 0.0 {
+        let own = watts / (24.0 * h.conductance);
+        return [h.capacity * (a / 3.0 + b / 6.0 + own), h.capacity * (a / 6.0 + b / 3.0 + own)];
+    }
+    let slope = fin.slopes(h.conductance);
+    let flow = |near: f64, far: f64| slope.aside * near + slope.through * (near - far) - 0.5 * watts * slope.share;
+    [h.capacity * flow(a, b), h.capacity * flow(b, a)]
+}
+
+/// Rise over time by which a heater's mean rise is late between ends that are not (K·s).
+fn delayed_mean(h: &HeatConductor, fin: &Fin, watts: f64, [a, b]: [f64; 2]) -> f64 {
+    if h.gas == 0.0 {
+        return h.capacity / h.conductance * ((a + b) / 24.0 + watts / (120.0 * h.conductance));
+    }
+    let slope = fin.slopes(h.conductance);
+    -h.capacity * (0.5 * (a + b) * slope.share + watts * slope.own)
 }
 
 /// A heater of a part that holds no sink.
@@ -151,6 +194,7 @@ fn without_sink(heaters: &[HeatConductor], sink: &[bool]) -> Option<usize> {
         parts.join(h.a, h.b);
     }
     let mut cooled = vec![false; sink.len()];
-    (0..sink.len()).filter(|node| sink[*node]).for_each(|node| cooled[parts.first(node)] = true);
+    let by_gas = heaters.iter().filter(|h| h.gas > 0.0).map(|h| h.a);
+    (0..sink.len()).filter(|node| sink[*node]).chain(by_gas).for_each(|node| cooled[parts.first(node)] = true);
     heaters.iter().position(|h| !cooled[parts.first(h.a)])
 }

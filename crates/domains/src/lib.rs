@@ -28,6 +28,7 @@
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
 //! | `laplacian` | potentials in a network of conductors |
 //! | [`thermal`] | mean temperature rise of beams that carry current |
+//! | `fin` | a conductor of heat that also leaves to its sides |
 //! | [`lag`] | how a rise lags behind its steady value |
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
 //! | [`inputs`] | effects of forces at points, heat into beams and frame motion; `input`: their kinds |
@@ -60,6 +61,7 @@ pub mod facing_local;
 mod facing_loss;
 mod facing_side;
 mod facing_stretches;
+mod fin;
 pub mod from_structure;
 mod input;
 pub mod inputs;

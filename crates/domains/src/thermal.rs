@@ -9,7 +9,8 @@
 //! For a beam clamped to ambient at both ends, T̄ = V²/(12·ρ_el·k), whatever its length. Beams that meet share the
 //! temperature of their node; anchors are at ambient. Since currents are linear in the source voltages u, each mean rise is
 //! a quadratic form T̄ = uᵀ·Q·u. Heat W that comes from elsewhere, spread evenly along a beam, acts as P does and adds Z·W with
-//! the same thermal resistances Z. Resistance and conductivity do not depend on temperature here.
+//! the same thermal resistances Z. Resistance and conductivity do not depend on temperature here. A beam may lose heat through gas to its
+//! surroundings at ambient: `fin.rs`.
 //!
 //! With a time constant the rise follows its steady value: [`super::lag`]. Where a beam has a heat capacity instead, that comes from
 //! `conduction.rs`.
@@ -34,6 +35,8 @@ pub struct Heating {
     sink: Vec<bool>,
     /// Heater by heater, its rise for each watt of the inputs that follow the sources (K/W).
     heat: Vec<f64>,
+    /// Input by input behind the sources, the heater that it heats.
+    heated_by: Vec<Option<usize>>,
 }
 
 impl Heating {
@@ -75,7 +78,7 @@ impl Heating {
             let delays = conduction.delays(&heaters, &watts);
             heaters.iter_mut().zip(delays).filter(|(h, _)| h.delayed).for_each(|(h, tau)| h.time_constant = tau);
         }
-        Ok(Self { heaters, sources, form, currents, sink: sink.to_vec(), heat: Vec::new() })
+        Ok(Self { heaters, sources, form, currents, sink: sink.to_vec(), ..Self::default() })
     }
 
     /// The same with inputs behind the sources, some of them heat.
@@ -93,7 +96,11 @@ impl Heating {
                 }
             }
         }
-        Self { heat, ..self.clone() }
+        let heated_by = inputs.iter().map(|input| match input {
+            Input::Heat { heater } => Some(*heater),
+            _ => None,
+        });
+        Self { heat, heated_by: heated_by.collect(), ..self.clone() }
     }
 
     /// Inputs behind the sources.
@@ -155,6 +162,20 @@ impl Heating {
         2.0 * self.mixed(k, u, unit) + self.heated(k, unit)
     }
 
+    /// Highest steady rise along each heater at source voltages `u` (K).
+    pub fn peaks(&self, u: &[f64]) -> Vec<f64> {
+        let Ok(conduction) = Conduction::new(&self.heaters, &self.sink) else { return Vec::new() };
+        let mut watts: Vec<f64> = (self.heaters.iter().zip(&self.currents))
+            .map(|(h, current)| h.resistance * current.iter().zip(u).map(|(i, u)| i * u).sum::<f64>().powi(2))
+            .collect();
+        if let Some(given) = u.get(self.sources..) {
+            for (input, watt) in self.heated_by.iter().zip(given) {
+                input.iter().for_each(|heater| watts[*heater] += watt);
+            }
+        }
+        conduction.peaks(&self.heaters, &watts)
+    }
+
     /// Steady mean rise of heater `k` at source voltages `u` (K).
     #[inline]
     pub fn steady(&self, k: usize, u: &[f64]) -> f64 {
@@ -168,6 +189,11 @@ mod tests {
     use super::*;
 
     fn bar(pieces: usize) -> Heating {
+        bar_in_gas(pieces, 0.0)
+    }
+
+    /// The same that loses heat through gas: `gas` of all of its length (W/K).
+    fn bar_in_gas(pieces: usize, gas: f64) -> Heating {
         // 200 µm × 2 µm × 2 µm, ρ = 2e-5 Ω·m, k = 41 W/(m·K), cut into equal pieces
         let (rho, k, length, area) = (2e-5, 41.0, 200e-6, 4e-12);
         let l = length / pieces as f64;
@@ -181,6 +207,7 @@ mod tests {
             time_constant: 0.0,
             delayed: true,
             capacity: 1600e3 * l * area,
+            gas: gas / pieces as f64,
         };
         let heaters: Vec<_> = (0..pieces).map(heater).collect();
         let circuit = ElectricalNetwork {
@@ -218,6 +245,29 @@ mod tests {
             let bar = bar(pieces);
             let mean = (0..pieces).map(|p| bar.steady(p, &[3.0])).sum::<f64>() / pieces as f64;
             assert!((mean / exact - 1.0).abs() < 1e-12, "{pieces}");
+        }
+    }
+
+    /// A bar of 1 kΩ with a loss through gas, in one piece or in seven, at 1 V. The mean rise is P/G·(1 − tanh(μ/2)/(μ/2)), the highest
+    /// P/G·(1 − 1/cosh(μ/2)). The delay is C times minus the logarithmic slope of the mean with G (central difference). These are closed
+    /// forms of a fin between cold ends.
+    #[test]
+    fn a_bar_in_gas() {
+        let (conductance, gas, capacity) = (41.0 * 4e-12 / 200e-6, 2.08e-5, 1600e3 * 200e-6 * 4e-12);
+        let half = |gas: f64| 0.5 * (gas / conductance).sqrt();
+        let mean = |gas: f64| 1e-3 / gas * (1.0 - half(gas).tanh() / half(gas));
+        let (low, high) = (mean(gas * (1.0 - 1e-5)), mean(gas * (1.0 + 1e-5)));
+        let delay = -capacity * (high - low) / (2e-5 * gas) / mean(gas);
+        for pieces in [1, 3, 7] {
+            let bar = bar_in_gas(pieces, gas);
+            let rise: Vec<f64> = (0..pieces).map(|p| bar.steady(p, &[1.0])).collect();
+            let found = rise.iter().sum::<f64>() / pieces as f64;
+            assert!((found / mean(gas) - 1.0).abs() < 1e-12, "{pieces}: {found}");
+            let late = bar.heaters.iter().zip(&rise).map(|(h, rise)| h.time_constant * rise).sum::<f64>();
+            let late = late / rise.iter().sum::<f64>();
+            assert!((late / delay - 1.0).abs() < 1e-8, "{pieces}: {late} {delay}");
+            let peak = bar.peaks(&[1.0]).into_iter().fold(0.0, f64::max);
+            assert!((peak / (1e-3 / gas * (1.0 - half(gas).cosh().recip())) - 1.0).abs() < 1e-12, "{pieces}: {peak}");
         }
     }
 
@@ -259,6 +309,7 @@ mod tests {
             time_constant: 0.0,
             delayed: false,
             capacity: 0.0,
+            gas: 0.0,
         };
         let circuit =
             ElectricalNetwork { nodes: 2, resistors: vec![(0, 1, 1.0)], sources: vec![(0, Some(1))], grounds: vec![1] };

@@ -30,7 +30,7 @@ pub use domain_element::DomainElement;
 pub use front_end::{FrontEnd, LoadedNetlist, ReadFunction};
 pub use gap::{BeamGap, Comb, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, PlateGap, Stop};
 pub use index::NodeIndex;
-pub use mechanical::{Beam, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};
+pub use mechanical::{Beam, GasLoss, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};
 pub use network::{Port, Resistor, VoltageSource, Wire};
 pub use node::{Node, NodeId};
 pub use placed::PlacedElement;

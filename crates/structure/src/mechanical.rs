@@ -64,6 +64,34 @@ pub struct Heater {
     pub time_constant: Option<f64>,
     /// Heat capacity ρ·c·w·h·l (J/K); 0 where no specific heat is known.
     pub capacity: f64,
+    /// Loss of heat through gas, where there is one.
+    pub gas: Option<GasLoss>,
+}
+
+/// Loss of heat from a beam through gas to a substrate at ambient temperature.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GasLoss {
+    /// Thermal conductivity of the gas (W/(m·K)).
+    pub conductivity: f64,
+    /// Distance to the substrate (m).
+    pub distance: f64,
+    /// Factor on the conduction straight below the beam (1).
+    pub shape: f64,
+}
+
+impl GasLoss {
+    /// Shape factor of a beam of width `w` and thickness `h` at the distance `z` (m): conduction from its lower face, and from both
+    /// of its sides as fitted for surface-micromachined beams.
+    ///
+    /// Reference: L. Lin, M. Chiao, "Electrothermal responses of lineshape microstructures", Sensors and Actuators A 55 (1996).
+    pub fn usual_shape(w: f64, h: f64, z: f64) -> f64 {
+        h / w * (2.0 * z / h + 1.0) + 1.0
+    }
+
+    /// Conductance of a beam of that width and length (m) to the substrate (W/K).
+    pub fn conductance(&self, width: f64, length: f64) -> f64 {
+        self.shape * self.conductivity * width / self.distance * length
+    }
 }
 
 /// A rigid body's mass at a node: a plate, or a lumped mass.

@@ -154,6 +154,10 @@ impl<'a> OfStructure<'a> {
             let mass = beam.material.density * beam.length * beam.width * beam.thickness;
             parameters.extend((mass > 0.0 && heater.capacity > 0.0).then(|| ("specificheat", heater.capacity / mass)));
             parameters.extend(heater.time_constant.map(|tau| ("tau", tau)));
+            if let Some(gas) = &heater.gas {
+                parameters.extend([("gasconductivity", gas.conductivity), ("fluid", gas.distance)]);
+                parameters.push(("shapefactor", gas.shape));
+            }
             if let Some(strength) = self.structure.yields.iter().find(|y| y.beam == index) {
                 parameters.extend([("yieldstress", strength.stress), ("softening", strength.softening)]);
             }

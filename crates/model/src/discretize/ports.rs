@@ -43,6 +43,7 @@ pub fn lay(
                 time_constant: h.time_constant.unwrap_or(0.0),
                 delayed: h.time_constant.is_none(),
                 capacity: h.capacity,
+                gas: h.gas.map_or(0.0, |gas| gas.conductance(beam.width, beam.length)),
             });
         }
     }

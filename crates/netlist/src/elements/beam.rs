@@ -179,8 +179,9 @@ pub(super) fn beam2det(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     };
     let capacity = beam.material.density * heat.unwrap_or(0.0) * length * width * height;
     beam.temperature = None;
-    beam.heater =
-        Some(Heater { resistance, conductance: conductivity * width * height / length, time_constant, capacity });
+    let gas = site.gas_loss(width, height)?;
+    let conductance = conductivity * width * height / length;
+    beam.heater = Some(Heater { resistance, conductance, time_constant, capacity, gas });
     site.drawing.electrical(&[a, b]);
     let ambient = beam.material.ambient_temperature;
     if let (Some(stress), Some(softening)) = (site.positive_if_any("yieldstress")?, site.positive_if_any("softening")?)

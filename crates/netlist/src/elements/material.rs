@@ -3,7 +3,7 @@
 use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
 use super::arguments::ElementSite;
-use bimorph_structure::{MOLTEN, Material};
+use bimorph_structure::{GasLoss, MOLTEN, Material};
 
 /// Poisson's ratio where a layer gives none (1). Planar beams do not depend on it.
 const POISSON: f64 = 0.3;
@@ -119,6 +119,24 @@ impl ElementSite<'_, '_> {
             Some(fluid) if fluid > 0.0 && viscosity > 0.0 => Ok([viscosity, fluid]),
             _ => Ok([0.0, NO_FILM]),
         }
+    }
+
+    /// Loss of heat through gas from a beam of that width and thickness (m); none where the gas has no conductivity.
+    pub(super) fn gas_loss(&mut self, width: f64, thickness: f64) -> Result<Option<GasLoss>, Reported> {
+        let conductivity = self.non_negative_or("gasconductivity", 0.0)?;
+        let shape = self.positive_if_any("shapefactor")?;
+        if conductivity == 0.0 {
+            return Ok(None);
+        }
+        let distance = match self.number("fluid")? {
+            Some(fluid) if fluid <= 0.0 => {
+                return Err(self.out_of_range("fluid", fluid, "positive where there is a `gasconductivity`"));
+            }
+            Some(fluid) => fluid,
+            None => return Err(self.missing("fluid")),
+        };
+        let shape = shape.unwrap_or_else(|| GasLoss::usual_shape(width, thickness, distance));
+        Ok(Some(GasLoss { conductivity, distance, shape }))
     }
 
     /// Permittivity (F/m).

@@ -50,6 +50,8 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "ambienttemperature" => "ambient temperature [K]",
         "thermcond" => "thermal conductivity [W/(m·K)]",
         "specificheat" => "specific heat [J/(kg·K)]",
+        "gasconductivity" => "thermal conductivity of the gas [W/(m·K)]",
+        "shapefactor" => "factor on the conduction through gas [1]",
         "yieldstress" => "yield stress at ambient temperature [Pa]",
         "softening" => "temperature without strength [K]",
         "curvature" => "rest curvature [1/m]",

@@ -305,6 +305,23 @@ fn beam2det() {
     same(given.capacity, slow.capacity);
 }
 
+/// A loss through gas: the conductance S·k·w/z·l with S = (h/w)·(2z/h + 1) + 1 by default (by hand: 2.5 at w = 4 µm, h = z = 2 µm), a
+/// given shape factor in its place, and none without a conductivity.
+#[test]
+fn gas_around_a_heated_beam() {
+    let one = |extra: &str| {
+        let text = format!(
+            "anchor p1 [a] []\neground * [a] []\nhot beam2det p1 [a b] [l=100u w=4u {extra}]\nanchor p1 [b] []\nheat port * [b a] []"
+        );
+        drawn(&text).beams[0].heater.clone().expect("heater").gas
+    };
+    assert_eq!((one("shapefactor=3"), one("gasconductivity=0 fluid=2u")), (None, None));
+    let usual = one("gasconductivity=0.026 fluid=2u").expect("gas");
+    same(usual.shape, 2.5);
+    same(usual.conductance(4e-6, 100e-6), 2.5 * 0.026 * 4e-6 / 2e-6 * 100e-6);
+    same(one("gasconductivity=0.026 fluid=2u shapefactor=4").expect("gas").shape, 4.0);
+}
+
 /// comb2d: constant force, b at 2L − l; comb2de: finite overlap between electrical nodes.
 #[test]
 fn combs() {
