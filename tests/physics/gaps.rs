@@ -88,7 +88,7 @@ fn facing_beams() {
     let text = "
         param V=0.1
         anchor p1 [a] [l=5u w=5u]
-        gap2d p1 [a b c d] [l=100u w1=2u w2=2u gap=2u V=V]
+        gap2d p1 [a b c d] [l=100u w1=2u w2=2u gap=2u V=V fringe=sugar]
         anchor p1 [c] [l=5u w=5u]
         anchor p1 [d] [l=5u w=5u]";
     let compiled = model(text, &CompileOptions::default());

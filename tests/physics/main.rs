@@ -16,6 +16,7 @@ mod excited_modes;
 mod expressions;
 mod formulations;
 mod free_coordinates;
+mod fringe;
 mod gaps;
 mod gaps_along_beams;
 mod impacts;

@@ -23,7 +23,7 @@ fn vm236(n: usize) -> CompiledModel {
         anchor p [a(0)] []
         for i=0:n-1 [
           beam2d p [a(i) a(i+1)] [l=dl w=0.5u]
-          gap2dforce p [a(i) a(i+1) c(i) c(i+1)] [l=dl w1=0.5u w2=0.5u gap=0.7u h=10u permittivity={EPS}/(1+1.12*0.7/10)]
+          gap2dforce p [a(i) a(i+1) c(i) c(i+1)] [l=dl w1=0.5u w2=0.5u gap=0.7u h=10u permittivity={EPS} fringe=none]
           anchor p [c(i)] []
         ]
         anchor p [c(n)] []

@@ -1,15 +1,16 @@
-//! A stretch of two facing beams: C = ∫ ε·h·α/g(s) ds along its length, and contact along it.
+//! A stretch of two facing beams: C = ∫ ε·h·α·(1/g(s) + e(g(s))) ds along its length, and contact along it.
 //!
 //! The gap is g(s) = g₀ + w(s), with w the cubic (Hermite) interpolation of the relative displacement and rotation of the
 //! two pairs of ends: z = (w₁, φ₁, w₂, φ₂). Parallel beams get exactly SUGAR's nodal forces and moments, pl/2 and pl²/12
 //! (its `gap2d`); tilted ones differ in second order, because here forces, stiffness and charge come from one potential.
 //! With [`FacingStretch::chord`] they do not. As in SUGAR, the gap is then measured along the straight lines between the
 //! ends, while its pressure acts through the cubics, so that the forces do not derive from an energy.
-//! α is SUGAR's fringe factor 1 + 1.12·g₀/h. Quadrature of the field is Gauss–Legendre, of the contact pressure Gauss–Lobatto,
+//! α is 1, or SUGAR's fringe factor 1 + 1.12·g₀/h. Other laws of the fringe field add e(g) to 1/g ([`super::edge_field`]). Quadrature of the field is Gauss–Legendre, of the contact pressure Gauss–Lobatto,
 //! whose points include the ends, where tilted beams touch first ([`super::quadrature`]): six and nine points on a gap of one
 //! stretch, three and five on each of several.
 
 use super::contact::Contact;
+use super::edge_field::EdgeField;
 use super::quadrature::{Abscissa, GAUSS_3, GAUSS_6, LOBATTO_5, LOBATTO_9};
 use nalgebra::{Matrix4, Vector4};
 
@@ -20,8 +21,10 @@ pub struct FacingStretch {
     pub length: f64,
     /// Gap as drawn (m).
     pub gap: f64,
-    /// ε·h·α, capacitance times gap per length (F).
+    /// ε·h·α, capacitance times gap per length without the field at the edges (F).
     pub strength: f64,
+    /// Field at the edges.
+    pub edges: EdgeField,
     /// Electrode height h (m).
     pub height: f64,
     /// Distance at which the beams touch (m).
@@ -96,13 +99,24 @@ impl FacingStretch {
         let (scaled, along) = (z.component_mul(&self.scale()), self.strength * self.length);
         for node in self.gauss() {
             let n = self.measure(node);
-            let g = self.gap + n.dot(&scaled);
-            let d = g.max(closest);
-            let (inverse, k) = (1.0 / d, along * node.weight);
-            let slope = -k * inverse * inverse;
-            let curvature = if g > closest { -2.0 * slope * inverse } else { 0.0 };
-            see(node, [k * inverse + slope * (g - d), slope, curvature]);
+            see(node, self.across(self.gap + n.dot(&scaled), along * node.weight, closest));
         }
+    }
+
+    /// Capacitance at the distance `g` of what has k = ε·h·α·length (F·m), and its first two derivatives with g; on below `closest` along the tangent.
+    #[inline(always)]
+    pub(super) fn across(&self, g: f64, k: f64, closest: f64) -> [f64; 3] {
+        let d = g.max(closest);
+        let inverse = 1.0 / d;
+        let (mut value, mut slope) = (k * inverse, -k * inverse * inverse);
+        let mut curvature = -2.0 * slope * inverse;
+        if !matches!(self.edges, EdgeField::None) {
+            let edges = self.edges.at(d);
+            value += k * edges[0];
+            slope += k * edges[1];
+            curvature += k * edges[2];
+        }
+        [value + slope * (g - d), slope, if g > closest { curvature } else { 0.0 }]
     }
 
     /// Least distance of the law of contact (m); below it the field continues along its tangent.
@@ -234,6 +248,7 @@ mod tests {
             length: 100e-6,
             gap: 2e-6,
             strength: 8.854e-12 * 2e-6,
+            edges: EdgeField::None,
             height: 2e-6,
             touch: 0.1e-6,
             chord: false,
@@ -290,6 +305,50 @@ mod tests {
             assert!((slope - c.gradient[i]).abs() < 1e-5 * c.gradient[i].abs());
             let column = (hi.gradient - lo.gradient) / (2.0 * step);
             assert!((column - c.hessian.column(i)).norm() < 1e-6 * c.hessian.column(i).norm());
+        }
+    }
+
+    /// Charge, force and stiffness belong to one energy under every law of the fringe field: gradient and Hessian are the derivatives of C, by differences of
+    /// fourth order to 1e-7. The states are bent: open, near contact and below the least distance.
+    #[test]
+    fn every_law_has_one_energy() {
+        let edges = [
+            EdgeField::None,
+            EdgeField::Parallel { factor: 0.65 / 2e-6, inverse: 1.0 / 2e-6 },
+            EdgeField::between_bars(2e-6, 1e-6, 2e-6),
+            EdgeField::over_plane(2e-6, 1e-6, 2e-6),
+        ];
+        let states = [
+            [-0.3e-6, 4e-3, 0.2e-6, -6e-3],
+            [-1.5e-6, 2e-3, -1.3e-6, 5e-3],
+            [-1.95e-6, 0.0, -1.95e-6, 0.0],
+            [3e-6, -2e-2, 1e-6, 1e-2],
+        ];
+        for (edges, state) in edges.iter().flat_map(|edges| states.map(|state| (*edges, state))) {
+            let (f, z) = (FacingStretch { edges, ..facing() }, Vector4::from(state));
+            let c = f.at(&z);
+            assert!((f.capacitance(&z) / c.value - 1.0).abs() < 1e-14);
+            assert!((f.gradient(&z) - c.gradient).norm() < 1e-14 * c.gradient.norm());
+            for i in 0..4 {
+                let step = if i % 2 == 0 { 1e-10 } else { 2e-6 };
+                let [a, b, d, e] = [-2.0, -1.0, 1.0, 2.0].map(|n| {
+                    let mut moved = z;
+                    moved[i] += n * step;
+                    f.at(&moved)
+                });
+                let slope = (a.value - e.value + 8.0 * (d.value - b.value)) / (12.0 * step);
+                let scale = if i % 2 == 0 { 1.0 } else { f.length };
+                assert!(
+                    (slope - c.gradient[i]).abs() < 1e-7 * c.gradient[0].abs() * scale,
+                    "{edges:?} {state:?} {i}: {slope} {}",
+                    c.gradient[i]
+                );
+                let column = (a.gradient - e.gradient + (d.gradient - b.gradient) * 8.0) / (12.0 * step);
+                let off = column - c.hessian.column(i);
+                let bound = 1e-7 * scale * c.hessian[(0, 0)].abs().max(1e-9 * c.gradient[0].abs() / f.gap);
+                assert!(off[0].abs() < bound && off[2].abs() < bound, "{edges:?} {state:?} {i}: {off}");
+                assert!(off[1].abs().max(off[3].abs()) < bound * f.length, "{edges:?} {state:?} {i}: {off}");
+            }
         }
     }
 

@@ -5,6 +5,7 @@ use super::approach::MaterialPoint;
 use super::contact::touching_distance;
 use super::contact_loss::{Loss, fall_at_pull_in};
 use super::domain::{Chord, Configuration, Domain};
+use super::edge_field::EdgeField;
 use super::facing::FacingStretch;
 pub use super::facing_local::FacingBeams;
 use super::facing_local::SIGNS;
@@ -24,16 +25,20 @@ impl FromStructure for FacingBeams {
             return;
         }
         let beams = BeamRows::new(drawing.structure);
+        let anchored = drawing.structure.anchored();
         for gap in drawn {
             let normal = gap.angle + gap.side * std::f64::consts::FRAC_PI_2;
             let frame = Opening { axis: Vector2::new(normal.cos(), normal.sin()), side: gap.side };
             let [a, b, c, d] = gap.nodes;
             let sides = [[a, b], [c, d]].map(|nodes| side(&beams, drawing, gap, nodes));
             let cut = stretches(&sides);
+            let fixed = [c, d].iter().all(|node| anchored[node.0]);
+            let (factor, edges) = EdgeField::of(gap, fixed, drawing.chord);
             let facing = FacingStretch {
                 length: gap.length,
                 gap: gap.gap,
-                strength: gap.permittivity * gap.height * gap.fringe,
+                strength: gap.permittivity * gap.height * factor,
+                edges,
                 height: gap.height,
                 touch: gap.touch.unwrap_or(touching_distance(gap.gap)),
                 chord: drawing.chord,

@@ -3,6 +3,7 @@
 
 use super::contact_loss::Loss;
 use super::domain::{Chord, Configuration};
+use super::edge_field::EdgeField;
 use super::facing::FacingStretch;
 use super::facing_local::{FacingBeams, Local};
 use super::facing_side::Deflection;
@@ -36,13 +37,18 @@ impl FacingStretch {
         for node in field {
             let (n, m) = (Vector4::from(node.shape).component_mul(&scale), self.measure(node).component_mul(&scale));
             let k = -0.5 * volts * volts * self.strength * self.length * node.weight;
+            let plain = matches!(self.edges, EdgeField::None);
             let energy = |g: f64| {
                 let d = g.max(closest);
-                k * (1.0 / d + (d - g) / (d * d))
+                if plain { k * (1.0 / d + (d - g) / (d * d)) } else { self.across(g, k, closest)[0] }
             };
             let slope = |g: f64| {
                 let d = g.max(closest);
-                (-k / (d * d), if g > closest { 2.0 * k / (d * d * d) } else { 0.0 })
+                if plain {
+                    return (-k / (d * d), if g > closest { 2.0 * k / (d * d * d) } else { 0.0 });
+                }
+                let [_, first, second] = self.across(g, k, closest);
+                (first, second)
             };
             let [g0, g1] = [z0, z1].map(|z| self.gap + m.dot(z));
             let (force, by_end) = quotient((g0, energy(g0)), (g1, energy(g1)), slope);
@@ -154,5 +160,50 @@ pub(super) fn add_quotient(
         let local = Local { stretch, z: middle.z, ends: [&ends[0], &ends[1]] };
         beams.add(&local, first, r);
         beams.add_stiffness(&local, (first, second), pattern, tangent);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::contact_loss::Loss;
+    use super::*;
+    use bimorph_structure::Impact;
+
+    /// Under every law of the fringe field the discrete force does the work of the potential over a step, and its derivative is that with the end of the
+    /// step (differences of 1e-6 of the gap).
+    #[test]
+    fn discrete_forces_do_the_work_of_every_law() {
+        let loss = Loss::new(&Impact { restitution: Some(1.0), speed: None });
+        for edges in [
+            EdgeField::None,
+            EdgeField::Parallel { factor: 0.65 / 2e-6, inverse: 1.0 / 2e-6 },
+            EdgeField::between_bars(2e-6, 1e-6, 2e-6),
+        ] {
+            let f = FacingStretch {
+                length: 100e-6,
+                gap: 2e-6,
+                strength: 8.854e-12 * 2e-6,
+                edges,
+                height: 2e-6,
+                touch: 0.1e-6,
+                chord: false,
+                alone: true,
+            };
+            let (z0, z1) = (Vector4::new(-0.3e-6, 4e-3, 0.2e-6, -6e-3), Vector4::new(-1.9e-6, 1e-3, -1.85e-6, 5e-3));
+            let (force, tangent) = f.discrete([&z0, &z1], (7.0, 1e-6), &loss);
+            let energy = |z: &Vector4<f64>| -24.5 * f.capacitance(z) + f.contact_energy(z);
+            let done = energy(&z1) - energy(&z0);
+            assert!((force.dot(&(z1 - z0)) / done - 1.0).abs() < 1e-12, "{edges:?}");
+            for i in 0..4 {
+                let step = if i % 2 == 0 { 2e-12 } else { 2e-8 };
+                let at = |sign: f64| {
+                    let mut z = z1;
+                    z[i] += sign * step;
+                    f.discrete([&z0, &z], (7.0, 1e-6), &loss).0
+                };
+                let column = (at(1.0) - at(-1.0)) / (2.0 * step);
+                assert!((column - tangent.column(i)).norm() < 1e-5 * column.norm(), "{edges:?} {i}");
+            }
+        }
     }
 }

@@ -32,6 +32,7 @@
 //! | [`lag`] | how a rise lags behind its steady value |
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
 //! | [`inputs`] | effects of forces at points, heat into beams and frame motion; `input`: their kinds |
+//! | [`edge_field`] | laws of the fringe field beside a gap |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
 //! | `side` | the side to which a part buckles |
 //! | [`stop`] | how a stop bears |
@@ -53,6 +54,7 @@ pub mod contact_speed;
 pub mod dashpot;
 pub mod domain;
 pub mod drive;
+pub mod edge_field;
 pub mod electrodes;
 pub mod energy;
 pub mod facing;

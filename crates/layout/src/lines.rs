@@ -26,6 +26,8 @@ pub(crate) struct ElementLine {
     pub(crate) nodes: Vec<String>,
     /// Parameters.
     pub(crate) parameters: Vec<(String, f64)>,
+    /// Parameters whose values are words.
+    pub(crate) words: Vec<(String, String)>,
 }
 
 /// A material with its thickness.
@@ -93,8 +95,10 @@ impl ElementLine {
                 "names of letters, digits, `_`, indices and dots, no words of the language, and at least one node",
             ));
         }
-        let parameters = pairs(rest.trim()).ok_or_else(|| fault("[name=value …] with numbers behind the nodes"))?;
-        Ok(Self { name: name.to_owned(), model: model.to_owned(), process: process.to_owned(), nodes, parameters })
+        let (parameters, words) =
+            pairs(rest.trim()).ok_or_else(|| fault("[name=value …] with numbers or words behind the nodes"))?;
+        let [name, model, process] = [name, model, process].map(str::to_owned);
+        Ok(Self { name, model, process, nodes, parameters, words })
     }
 }
 
@@ -106,19 +110,27 @@ impl ProcessLine {
         let name = name.trim();
         let good = is_name(name) && text.len() <= LONGEST_LABEL;
         good.then_some(())?;
-        Some(Self { name: name.to_owned(), entries: pairs(entries.trim())? })
+        let (entries, words) = pairs(entries.trim())?;
+        words.is_empty().then(|| Self { name: name.to_owned(), entries })
     }
 }
 
-/// `[a=1 b=2]`.
-fn pairs(text: &str) -> Option<Vec<(String, f64)>> {
+/// Numbers and words of a list, in its order.
+type ParameterPairs = (Vec<(String, f64)>, Vec<(String, String)>);
+
+/// `[a=1 b=2 c=word]`.
+fn pairs(text: &str) -> Option<ParameterPairs> {
     let inside = text.strip_prefix('[')?.strip_suffix(']')?;
-    let pair = |word: &str| {
-        let (name, value) = word.split_once('=')?;
-        let value: f64 = value.parse().ok()?;
-        (is_name(name) && value.is_finite()).then(|| (name.to_owned(), value))
-    };
-    inside.split_whitespace().map(pair).collect()
+    let mut found = ParameterPairs::default();
+    for word in inside.split_whitespace() {
+        let (name, value) = word.split_once('=').filter(|(name, _)| is_name(name))?;
+        match value.parse::<f64>() {
+            Ok(number) if number.is_finite() => found.0.push((name.to_owned(), number)),
+            Err(_) if is_name(value) => found.1.push((name.to_owned(), value.to_owned())),
+            _ => return None,
+        }
+    }
+    Some(found)
 }
 
 /// Words that mean something else in a netlist than a name.
@@ -143,11 +155,15 @@ pub(crate) fn is_full_name(text: &str) -> bool {
     })
 }
 
-fn write_pairs(f: &mut fmt::Formatter<'_>, pairs: &[(String, f64)]) -> fmt::Result {
+fn write_pairs(f: &mut fmt::Formatter<'_>, pairs: &[(String, f64)], words: &[(String, String)]) -> fmt::Result {
     f.write_str("[")?;
     for (k, (name, value)) in pairs.iter().enumerate() {
         let blank = if k > 0 { " " } else { "" };
         write!(f, "{blank}{name}={}", ExactNumber(*value))?;
+    }
+    for (k, (name, word)) in words.iter().enumerate() {
+        let blank = if k + pairs.len() > 0 { " " } else { "" };
+        write!(f, "{blank}{name}={word}")?;
     }
     f.write_str("]")
 }
@@ -170,16 +186,16 @@ impl fmt::Display for ExactNumber {
 
 impl fmt::Display for ElementLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, model, process, nodes, parameters } = self;
+        let Self { name, model, process, nodes, parameters, words } = self;
         write!(f, "{name} {model} {process} [{}] ", nodes.join(" "))?;
-        write_pairs(f, parameters)
+        write_pairs(f, parameters, words)
     }
 }
 
 impl fmt::Display for ProcessLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "process {} = ", self.name)?;
-        write_pairs(f, &self.entries)
+        write_pairs(f, &self.entries, &[])
     }
 }
 
@@ -193,6 +209,8 @@ mod tests {
     fn lines_read_back() {
         let text = "q.b(1).hot beam2det p1 [a(1) q.t] [l=2.06e-4 w=2e-6 oz=-1.5707963267948966 R=0 n=400]";
         assert_eq!(ElementLine::parse(text).unwrap().to_string(), text);
+        let worded = "g gap2dforce * [a b c d] [l=0.5 fringe=none]";
+        assert_eq!(ElementLine::parse(worded).unwrap().to_string(), worded);
         let process = "process p1 = [Youngsmodulus=1.65e11 density=2300]";
         assert_eq!(ProcessLine::parse(process).unwrap().to_string(), process);
         for wrong in [
@@ -200,6 +218,7 @@ mod tests {
             "a beam2d p [",
             "a beam2d [b] []",
             "a b p [] []",
+            "a b p [c] [fringe=1x]",
             "a b p [c] [l=x]",
             "a b p [c(x)] []",
             "a b p [c] [l=inf]",

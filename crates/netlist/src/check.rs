@@ -63,7 +63,7 @@ pub(crate) fn finite(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
         check_finite(&c.name, c.a, all(&[c.gaps * c.permittivity * c.height / c.gap, c.overlap, c.parasitic]));
     }
     for g in &s.beam_gaps {
-        check_finite(&g.name, g.nodes[0], all(&[g.permittivity * g.height * g.fringe, g.length, g.gap]));
+        check_finite(&g.name, g.nodes[0], all(&[g.permittivity * g.height * g.sugar_factor(), g.length, g.gap]));
     }
     for b in s.beams.iter().filter_map(|b| b.heater.as_ref().map(|h| (b, h))) {
         let conducts = RESISTANCES.contains(&b.1.resistance) && RESISTANCES.contains(&b.1.conductance);
@@ -93,10 +93,7 @@ pub(crate) fn check(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
 /// A gap whose nodes are all anchored bends nothing, unless beams lie between them.
 fn gaps_between_anchors(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     let structure = &drawing.structure;
-    let mut anchored = vec![false; structure.nodes.len()];
-    for support in structure.supports.iter().filter(|support| support.held == [true; 3]) {
-        anchored[support.node.0] = true;
-    }
+    let anchored = structure.anchored();
     let all = |gap: &&BeamGap| gap.nodes.iter().all(|node| anchored[node.0]);
     let beams = BeamRows::new(structure);
     let held: Vec<_> = structure.beam_gaps.iter().filter(all).filter(|g| beams.along(g).next().is_none()).collect();
@@ -198,6 +195,13 @@ fn facts(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
                 "W006",
                 format!("a beam of width and height 0 holds nothing: it places its nodes ({elements})"),
                 "write `pos` to say that this is meant",
+            ),
+            Fact::ReducedPermittivity => (
+                "W025",
+                format!(
+                    "`permittivity` = {number} F/m is below that of vacuum: the gap keeps SUGAR's factor 1 + 1.12·gap/h ({elements})"
+                ),
+                "for a gap without fringe field write `fringe=none` and leave out `permittivity`",
             ),
             Fact::TrialGap => (
                 "W039",

@@ -72,6 +72,8 @@ pub(crate) enum Fact {
     Weight,
     /// Beams without a section.
     NoSection,
+    /// Gaps whose permittivity is below that of vacuum.
+    ReducedPermittivity,
     /// Gaps of models that SUGAR's tree holds as trials.
     TrialGap,
     /// Nodes after the first of an anchor.

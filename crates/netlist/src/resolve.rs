@@ -134,6 +134,13 @@ impl Resolver<'_> {
     fn list(&mut self, defs: &mut [Def]) {
         self.beside = defs.iter().map(|def| Arc::clone(&def.name.name)).collect();
         for def in defs {
+            // a word stands for itself, unless a variable has its name
+            if elements::is_word(&def.name.name)
+                && let ExprKind::Variable(word, _) = &def.value.kind
+                && self.lookup(word).is_none()
+            {
+                def.value.kind = ExprKind::Text(Arc::clone(word));
+            }
             self.expression(&mut def.value);
         }
         self.beside.clear();

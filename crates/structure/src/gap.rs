@@ -29,6 +29,50 @@ pub struct Impact {
     pub speed: Option<f64>,
 }
 
+/// Law of the field at the edges of electrodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Fringe {
+    /// No field outside the facing area.
+    None,
+    /// Pressure times 1 + 0.65·g/h with the present gap g: a bar of width h over a plane (Osterberg and Senturia 1997).
+    Parallel,
+    /// The plane field around rectangular bars, from its conformal map.
+    Exact,
+    /// Pressure and charge times 1 + 1.12·gap/h with the drawn gap (SUGAR 2).
+    Sugar,
+}
+
+impl Fringe {
+    /// All laws with their names in netlists.
+    pub const NAMES: [(&'static str, Self); 4] =
+        [("none", Self::None), ("parallel", Self::Parallel), ("exact", Self::Exact), ("sugar", Self::Sugar)];
+
+    /// Laws of gap elements that were stored without one.
+    #[allow(clippy::unnecessary_wraps)]
+    fn stored() -> Option<Self> {
+        Some(Self::Sugar)
+    }
+}
+
+/// Shape of the lower electrode, seen along the gap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ElectrodeShape {
+    /// A bar as high as the upper one: both lie in one layer.
+    Bar,
+    /// A plane that is wider than the upper bar on both sides.
+    Plane,
+}
+
+impl ElectrodeShape {
+    /// Both shapes with their names in netlists.
+    pub const NAMES: [(&'static str, Self); 2] = [("bar", Self::Bar), ("plane", Self::Plane)];
+}
+
+/// Height over the upper width above which an anchored lower electrode is a plane, where the netlist names no shape (1). Bars of that ratio itself are bars.
+const FLAT: f64 = 5.0 * (1.0 + 1e-6);
+
 /// A comb drive: C = N·ε·h·o/g with overlap o = o₀ + u, u the approach of `a` towards `b` along `axis`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Comb {
@@ -107,8 +151,15 @@ pub struct BeamGap {
     pub height: f64,
     /// Permittivity ε (F/m).
     pub permittivity: f64,
-    /// Factor on capacitance and force for the fringe field, 1 + 1.12·gap/h in SUGAR (1).
-    pub fringe: f64,
+    /// Widths of the upper and the lower beam (m); 0: unknown.
+    #[serde(default)]
+    pub widths: [f64; 2],
+    /// Law of the fringe field; none: `exact`, and SUGAR's in a model as SUGAR computes.
+    #[serde(default = "Fringe::stored")]
+    pub law: Option<Fringe>,
+    /// Shape of the lower electrode, where the netlist names it.
+    #[serde(default)]
+    pub electrode: Option<ElectrodeShape>,
     /// Distance at which the beams touch (m); none: that of nearly closed gaps of their size.
     #[serde(default)]
     pub touch: Option<f64>,
@@ -117,6 +168,26 @@ pub struct BeamGap {
     pub impact: Impact,
     /// Where its voltage comes from.
     pub voltage: GapVoltage,
+}
+
+impl BeamGap {
+    /// SUGAR's factor on capacitance and force for the fringe field (1).
+    pub fn sugar_factor(&self) -> f64 {
+        1.0 + 1.12 * self.gap / self.height
+    }
+
+    /// Width of two equal beams in place of these (m): the geometric mean. Capacitance does not depend on which beam is which and
+    /// grows with the logarithm of the width, so that this is exact to first order in ln(w₁/w₂).
+    pub fn mean_width(&self) -> f64 {
+        (self.widths[0] * self.widths[1]).sqrt()
+    }
+
+    /// Shape of the lower electrode: the given one, else a plane where both its nodes are anchored (`fixed`) and the upper beam is more than
+    /// five times as high as wide. A beam over a substrate is drawn from the side in this way.
+    pub fn shape(&self, fixed: bool) -> ElectrodeShape {
+        let flat = fixed && self.widths[0] > 0.0 && self.height > FLAT * self.widths[0];
+        self.electrode.unwrap_or(if flat { ElectrodeShape::Plane } else { ElectrodeShape::Bar })
+    }
 }
 
 /// A stop: how far one node may move along an axis towards another before they touch, and against it.

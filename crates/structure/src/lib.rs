@@ -28,7 +28,9 @@ pub use beam_rows::{ALIKE, BeamRows};
 pub use circuit::{CircuitElement, CircuitKind};
 pub use domain_element::DomainElement;
 pub use front_end::{FrontEnd, LoadedNetlist, ReadFunction};
-pub use gap::{BeamGap, Comb, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, PlateGap, Stop};
+pub use gap::{
+    BeamGap, Comb, ElectrodeShape, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, PlateGap, Stop,
+};
 pub use index::NodeIndex;
 pub use mechanical::{Beam, GasLoss, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};
 pub use network::{Port, Resistor, VoltageSource, Wire};
@@ -108,6 +110,15 @@ impl Structure {
             (high - low).max(0.0)
         };
         side(0).max(side(1))
+    }
+
+    /// For each node, whether an anchor holds it in all directions.
+    pub fn anchored(&self) -> Vec<bool> {
+        let mut anchored = vec![false; self.nodes.len()];
+        for support in self.supports.iter().filter(|support| support.held == [true; 3]) {
+            anchored[support.node.0] = true;
+        }
+        anchored
     }
 
     /// The port of that name, as an index into [`Structure::ports`].

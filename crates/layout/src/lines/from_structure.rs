@@ -87,7 +87,14 @@ impl<'a> OfStructure<'a> {
         let nodes = nodes.iter().map(|id| self.node(*id)).collect();
         let parameters = parameters.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
         let (name, model, process) = (name.to_owned(), model.to_owned(), process.to_owned());
-        self.lines.push(ElementLine { name, model, process, nodes, parameters });
+        self.lines.push(ElementLine { name, model, process, nodes, parameters, words: Vec::new() });
+    }
+
+    /// Gives the last line words.
+    fn say(&mut self, words: impl IntoIterator<Item = (&'static str, &'static str)>) {
+        if let Some(line) = self.lines.last_mut() {
+            line.words.extend(words.into_iter().map(|(name, word)| (name.to_owned(), word.to_owned())));
+        }
     }
 
     /// The process with these entries, new or known.

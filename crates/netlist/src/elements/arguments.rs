@@ -115,6 +115,25 @@ impl ElementSite<'_, '_> {
         }
     }
 
+    /// One of the words that a parameter can be, if it is given or the layer has it.
+    pub(crate) fn word<T: Copy>(&mut self, name: &str, words: &[(&str, T)]) -> Result<Option<T>, Reported> {
+        let Some((value, span)) = self.find(name) else { return Ok(None) };
+        let found = match value {
+            Value::Text(text) => words.iter().find(|(word, _)| **word == **text),
+            _ => None,
+        };
+        if let Some((_, meant)) = found {
+            return Ok(Some(*meant));
+        }
+        let this = match value {
+            Value::Text(text) => format!("`{text}`"),
+            other => other.called().to_owned(),
+        };
+        let message = format!("`{name}` ({}) is {this}", meaning(name));
+        let listed: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+        Err(self.sink.error("E050", span, message, format!("give one of {}", listed.join(", "))))
+    }
+
     /// The error for a parameter that is not there.
     pub(crate) fn missing(&mut self, name: &str) -> Reported {
         let message = format!("`{}` needs `{name}` ({})", self.instance.model, meaning(name));

@@ -4,10 +4,13 @@ use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
 use super::super::value::short;
 use super::arguments::ElementSite;
-use bimorph_structure::{BeamGap, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, NodeId, PlateGap, Resistor};
+use super::material::VACUUM;
+use bimorph_structure::{
+    BeamGap, ElectrodeShape, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, NodeId, PlateGap, Resistor,
+};
 
-/// SUGAR's factor on the fringe field: α = 1 + 1.12·gap/h.
-const FRINGE: f64 = 1.12;
+/// Permittivity over that of vacuum below which a netlist cancels SUGAR's factor on the fringe field by hand (1).
+const REDUCED: f64 = 1.0 - 1e-3;
 
 impl ElementSite<'_, '_> {
     /// Widths of the upper and the lower beam (m): `w1` and `w2`, or `w` for both.
@@ -52,6 +55,11 @@ impl ElementSite<'_, '_> {
         Ok(Impact { restitution, speed })
     }
 
+    /// Law of the fringe field, where the element or its layer names one.
+    pub(super) fn fringe(&mut self) -> Result<Option<Fringe>, Reported> {
+        self.word("fringe", &Fringe::NAMES)
+    }
+
     /// The field between two facing beams. Node c lies at local y = −(gap + (w1+w2)/2) under a, d under b.
     fn facing(&mut self, voltage: GapVoltage) -> Result<(), Reported> {
         let angle = self.direction(self.instance.rotation)?;
@@ -59,6 +67,13 @@ impl ElementSite<'_, '_> {
         let [w1, w2] = self.widths()?;
         let (length, gap, height) = (self.positive("l")?, self.positive("gap")?, self.positive("h")?);
         let permittivity = self.permittivity()?;
+        let mut law = self.fringe()?;
+        if law.is_none() && permittivity < REDUCED * VACUUM {
+            let span = self.span_of("permittivity");
+            self.drawing.note_number(Fact::ReducedPermittivity, span, permittivity);
+            law = Some(Fringe::Sugar);
+        }
+        let electrode = self.word("electrode", &ElectrodeShape::NAMES)?;
         let touch = self.touch(gap)?;
         let impact = self.impact()?;
         let below = -(gap + (w1 + w2) / 2.0);
@@ -74,7 +89,9 @@ impl ElementSite<'_, '_> {
             gap,
             height,
             permittivity,
-            fringe: 1.0 + FRINGE * gap / height,
+            widths: [w1, w2],
+            law,
+            electrode,
             touch,
             impact,
             voltage,

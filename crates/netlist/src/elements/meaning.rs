@@ -54,6 +54,8 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "shapefactor" => "factor on the conduction through gas [1]",
         "yieldstress" => "yield stress at ambient temperature [Pa]",
         "softening" => "temperature without strength [K]",
+        "fringe" => "law of the fringe field",
+        "electrode" => "shape of the lower electrode",
         "curvature" => "rest curvature [1/m]",
         "radius" => "radius [m]",
         "wtop" | "wbottom" => "width of the top or the bottom [m]",

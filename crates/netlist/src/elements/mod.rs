@@ -49,6 +49,11 @@ pub(crate) fn turns(name: &str) -> bool {
     table::ANGLES.contains(&name)
 }
 
+/// True for a parameter whose value is a word.
+pub(crate) fn is_word(name: &str) -> bool {
+    table::WORDS.contains(&name)
+}
+
 /// Builds one element: checks its node count and its parameter names, then adds it to the drawing. `read` is for expressions in strings.
 pub(crate) fn build(
     instance: &ElementInstance<'_>,

@@ -49,6 +49,7 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
     "viscosity",
     "fluid",
     "permittivity",
+    "fringe",
     "sheetresistance",
     "resistivity",
     "stress",
@@ -70,6 +71,9 @@ pub(super) const ANGLES: &[&str] = &[
     "alpha", "ox1", "oy1", "oz1", "ox2", "oy2", "oz2", "qox1", "qoy1", "qoz1", "qox2", "qoy2", "qoz2", "sliderox",
     "slideroy", "slideroz",
 ];
+
+/// Parameters whose values are words, which need no quotes where no variable has their name.
+pub(super) const WORDS: &[&str] = &["fringe", "electrode"];
 
 /// Parameters that SUGAR's netlists carry on elements which do not use them.
 pub(super) const STRAY: &[&str] =
@@ -111,7 +115,8 @@ const WIRED: &[usize] = &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 /// Nodes that one anchor may hold.
 const PADS: &[usize] = &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 const SIZE: &[&str] = &["l", "w", "h"];
-const GAP: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "V", "permittivity", "touch", "restitution", "speed"];
+const GAP: &[&str] =
+    &["l", "w", "w1", "w2", "gap", "h", "V", "permittivity", "fringe", "electrode", "touch", "restitution", "speed"];
 const GAP_E: &[&str] = &[
     "l",
     "w",
@@ -127,11 +132,14 @@ const GAP_E: &[&str] = &[
     "G2",
     "resistivity",
     "permittivity",
+    "fringe",
+    "electrode",
     "touch",
     "restitution",
     "speed",
 ];
-const GAP_SHEET: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "Rs", "permittivity", "touch", "restitution", "speed"];
+const GAP_SHEET: &[&str] =
+    &["l", "w", "w1", "w2", "gap", "h", "Rs", "permittivity", "fringe", "electrode", "touch", "restitution", "speed"];
 const PLATES: &[&str] = &["A", "gap", "permittivity", "touch", "restitution", "speed"];
 const STOP: &[&str] = &["gap", "back", "k", "A", "restitution", "speed"];
 const LOAD: &[&str] = &["F", "M"];

@@ -13,7 +13,7 @@ use super::state::{LuaState, NameScope, SharedState, file_number};
 use bimorph_base::budget;
 use bimorph_base::suggest;
 use bimorph_base::{Bundle, Setting};
-use bimorph_structure::{FrontEnd, LoadedNetlist};
+use bimorph_structure::{Fringe, FrontEnd, LoadedNetlist};
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
@@ -89,7 +89,11 @@ impl FrontEnd for Sugar3 {
         }
         unasked(&mut state, set);
         let parameters = std::mem::take(&mut state.parameters).into_values().collect();
-        finish(std::mem::take(&mut state.drawing), parameters, state.sink.clone(), &self.bundle)
+        let mut drawing = std::mem::take(&mut state.drawing);
+        for gap in &mut drawing.structure.beam_gaps {
+            gap.law.get_or_insert(Fringe::Sugar);
+        }
+        finish(drawing, parameters, state.sink.clone(), &self.bundle)
     }
 }
 

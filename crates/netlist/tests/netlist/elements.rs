@@ -2,7 +2,7 @@
 
 use bimorph_base::Bundle;
 use bimorph_netlist::load;
-use bimorph_structure::{GapVoltage, NodeId, Structure};
+use bimorph_structure::{ElectrodeShape, Fringe, GapVoltage, NodeId, Structure};
 
 /// A layer with round numbers.
 const P1: &str = "process p1 = [Youngsmodulus=160e9 Poisson=0.25 density=2000 h=2u viscosity=2e-5 fluid=1u permittivity=9e-12\n\
@@ -241,8 +241,44 @@ fn gap2d() {
     same2(at(&s, "d"), [100e-6, -9.5e-6]);
     let gap = &s.beam_gaps[0];
     assert_eq!((gap.length, gap.gap, gap.height, gap.permittivity), (100e-6, 2e-6, 2e-6, 9e-12));
-    same(gap.fringe, 1.0 + 1.12);
+    assert_eq!((gap.widths, gap.law, gap.electrode), ([10e-6, 5e-6], None, None));
+    same(gap.sugar_factor(), 1.0 + 1.12);
     assert_eq!((gap.side, gap.voltage.clone()), (1.0, GapVoltage::Fixed(8.0)));
+}
+
+/// `fringe` and `electrode` are words, from the element or its layer, with quotes or without; a variable of the word's name comes first. A permittivity below that
+/// of vacuum keeps SUGAR's factor, with warning W025, unless a law is named.
+#[test]
+fn laws_of_gaps() {
+    let gap = |layer: &str, more: &str| {
+        let text = format!(
+            "process p = [Youngsmodulus=165e9 density=2300 h=2u {layer}]\nparallel = 'none'\nanchor p [a] []\n\
+             gap2d p [a b c d] [l=100u w=2u gap=2u V=1 {more}]\nanchor p [c] []\nanchor p [d] []"
+        );
+        let mut loaded = load(&Bundle::from_text("t.net", &text), &[]).unwrap_or_else(|d| panic!("{d}"));
+        let codes: Vec<String> = loaded.warnings.items.iter().map(|item| item.code.clone()).collect();
+        (loaded.structure.beam_gaps.remove(0), codes.join(" "))
+    };
+    for (layer, more, law, electrode, codes) in [
+        ("", "", None, None, ""),
+        ("", "fringe=exact electrode=plane", Some(Fringe::Exact), Some(ElectrodeShape::Plane), ""),
+        ("fringe=sugar", "electrode='bar'", Some(Fringe::Sugar), Some(ElectrodeShape::Bar), ""),
+        ("fringe=sugar", "fringe=\"parallel\"", Some(Fringe::Parallel), None, ""),
+        ("", "fringe=parallel", Some(Fringe::None), None, ""),
+        ("permittivity=8.8e-12", "", Some(Fringe::Sugar), None, "W025"),
+        ("permittivity=8.8e-12", "fringe=none", Some(Fringe::None), None, ""),
+        ("permittivity=8.8541878e-12", "", None, None, ""),
+    ] {
+        let (found, warned) = gap(layer, more);
+        assert_eq!((found.law, found.electrode, warned.as_str()), (law, electrode, codes), "{layer} {more}");
+    }
+    let wrong = "gap2d p1 [a b c d] [l=9u w=2u gap=2u V=1 fringe=palmer]";
+    let wrong =
+        load(&Bundle::from_text("t.net", &format!("process p1=[Youngsmodulus=165e9 density=2300 h=2u]\n{wrong}")), &[]);
+    let message = wrong.err().map(|d| d.items[0].clone()).expect("an error");
+    assert_eq!((message.code.as_str(), message.line), ("E050", 2));
+    assert_eq!(message.message, "`fringe` (law of the fringe field) is `palmer`");
+    assert_eq!(message.help, "give one of none, parallel, exact, sugar");
 }
 
 /// oy = pi mirrors a gap: the lower beam then lies above when seen along a–b.

@@ -2,13 +2,20 @@
 
 use super::{OfStructure, unmirrored};
 use bimorph_structure::DomainElement;
-use bimorph_structure::{Beam, GapVoltage, Impact, NodeId};
+use bimorph_structure::{Beam, BeamGap, ElectrodeShape, Fringe, GapVoltage, Impact, NodeId};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Impact losses, where the netlist gives them.
 fn impact(impact: &Impact) -> impl Iterator<Item = (&'static str, f64)> {
     let given = [("restitution", impact.restitution), ("speed", impact.speed)];
     given.into_iter().filter_map(|(name, value)| Some((name, value?)))
+}
+
+/// Law of the fringe field and shape of the electrode, where the netlist gives them.
+fn field_words(gap: &BeamGap) -> impl Iterator<Item = (&'static str, &'static str)> + use<> {
+    let law = gap.law.and_then(|law| Fringe::NAMES.iter().find(|(_, other)| *other == law));
+    let shape = gap.electrode.and_then(|shape| ElectrodeShape::NAMES.iter().find(|(_, other)| *other == shape));
+    law.map(|(word, _)| ("fringe", *word)).into_iter().chain(shape.map(|(word, _)| ("electrode", *word)))
 }
 
 impl OfStructure<'_> {
@@ -30,6 +37,7 @@ impl OfStructure<'_> {
             parameters.extend([("oz", angle), ("V", voltage), ("permittivity", gap.permittivity)]);
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "gap2d", &process, &nodes, &parameters);
+            self.say(field_words(gap));
             inside.extend(parts);
         }
         inside
@@ -74,6 +82,7 @@ impl OfStructure<'_> {
             parameters.extend([("oz", angle), ("permittivity", gap.permittivity)]);
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "gap2dforce", "*", &nodes, &parameters);
+            self.say(field_words(gap));
         }
         for gap in &structure.plate_gaps {
             if matches!(gap.voltage, GapVoltage::Fixed(_)) {

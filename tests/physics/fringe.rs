@@ -1,0 +1,192 @@
+//! The field at the edges of facing beams: factors of force and charge, pull-in by every law, and agreement of all analyses on it.
+
+use crate::{close, node};
+use bimorph::analysis::continuation::{ContinuationRequest, PathInput, trace};
+use bimorph::analysis::mesh::pull_in_fitted;
+use bimorph::analysis::pull_in::pull_in;
+use bimorph::analysis::statics::static_equilibrium;
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
+use bimorph::netlist::Bundle;
+use bimorph::solve::continuation::Branch;
+
+const EPS: f64 = 8.854e-12;
+
+fn built(text: &str, options: &CompileOptions) -> CompiledModel {
+    compile(&Bundle::from_text("fringe.net", text), options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Two bars 100 µm long, `h` high and `w` wide (µm), `gap` apart (µm); the upper one rigid on a spring of `k` N/m, the lower one anchored.
+fn bars([h, w, gap]: [f64; 3], k: f64, more: &str) -> String {
+    format!(
+        "process film = [ Youngsmodulus=165e9 density=2300 h={h}u ]
+         anchor film [post] []
+         spring2d * [post m] [ky={k} kx=1e3*{k} krz=1e-6]
+         plate2d film [m] [l=100u w={w}u]
+         left link2d * [m a] [l=50u oz=pi]
+         right link2d * [m b] [l=50u]
+         field gap2dforce film [a b c d] [l=100u w={w}u gap={gap}u {more}]
+         anchor film [c] []
+         anchor film [d] []
+         eground * [c] []
+         under wire * [c d] []
+         over wire * [a b] []
+         drive port * [a c] []"
+    )
+}
+
+/// C (F) and force (N) of those bars at 1 V, on a spring that holds them where they are drawn.
+fn at_rest(sizes: [f64; 3], more: &str) -> [f64; 2] {
+    let compiled = built(&bars(sizes, 1e6, more), &CompileOptions::default());
+    let result = static_equilibrium(&compiled, &[("drive".into(), 1.0)]).unwrap();
+    [result.charges_c[0].1, -1e6 * node(&result, "m").y]
+}
+
+/// Two bars without a substrate at 1 V, by default: C and F over ε·h·l/G and ε·h·l·V²/(2G²) at G/h = 1 with w/h = 0.2, 1 and 5, and at G/h = 0.2 with
+/// w/h = 1. Source: the exact field by conformal mapping (independent computation; boundary elements agree to 1e-5); bars of 2 × 2 µm at 2 µm have 2.466 fF
+/// and 0.3268 nN.
+#[test]
+fn bars_have_the_exact_field() {
+    for (sizes, c, f) in [
+        ([2.0, 0.4, 2.0], 2.360, 1.332),
+        ([2.0, 2.0, 2.0], 2.785, 1.476),
+        ([2.0, 10.0, 2.0], 3.520, 1.585),
+        ([2.0, 2.0, 0.4], 1.532, 1.118),
+    ] {
+        let [h, _, gap] = sizes.map(|size| size * 1e-6);
+        let [charge, force] = at_rest(sizes, "");
+        close(charge, c * EPS * h * 100e-6 / gap, 7e-3);
+        close(force, f * EPS * h * 100e-6 / (2.0 * gap * gap), 7e-3);
+    }
+    let [charge, force] = at_rest([2.0, 2.0, 2.0], "");
+    close(charge, 2.466e-15, 7e-3);
+    close(force, 3.268e-10, 7e-3);
+}
+
+/// The other laws at the drawn gap: none, 1 + 0.65·G/h on the force with its integral on the charge, and SUGAR's 1 + 1.12·G/h on both. Unequal widths count as
+/// their geometric mean, and an anchored electrode under a beam more than five times as high as wide is a plane.
+#[test]
+fn laws_that_a_gap_names() {
+    let plain = [EPS * 100e-6, EPS * 100e-6 / (2.0 * 2e-6)];
+    for (more, c, f) in [
+        ("fringe=none", 1.0, 1.0),
+        ("fringe=parallel", 1.0, 1.65),
+        ("fringe=sugar", 2.12, 2.12),
+        ("permittivity=8.854e-12/2.12", 1.0, 1.0),
+        ("permittivity=8.854e-12/2.12 fringe=none", 1.0 / 2.12, 1.0 / 2.12),
+    ] {
+        let [charge, force] = at_rest([2.0, 2.0, 2.0], more);
+        close(charge, c * plain[0], 1e-6);
+        close(force, f * plain[1], 1e-6);
+    }
+    // C of the parallel law is −0.65·ε·ln(g/h): half the gap adds 0.65·ln 2
+    let [charge, _] = at_rest([2.0, 2.0, 1.0], "fringe=parallel");
+    close(charge, (2.0 + 0.65 * 2f64.ln()) * plain[0], 1e-6);
+    let both = at_rest([2.0, 2.0, 2.0], "w1=1u w2=4u");
+    let alike = at_rest([2.0, 2.0, 2.0], "");
+    both.iter().zip(alike).for_each(|(both, alike)| close(*both, alike, 1e-12));
+    assert_eq!(at_rest([10.0, 1.9, 2.0], ""), at_rest([10.0, 1.9, 2.0], "electrode=plane"));
+    assert_eq!(at_rest([10.0, 2.0, 2.0], ""), at_rest([10.0, 2.0, 2.0], "electrode=bar"));
+    let plane = at_rest([10.0, 2.0, 2.0], "electrode=plane");
+    // exact factors of a bar over a plane at g/b = t/b = 0.2
+    close(plane[0], 1.685 * EPS * 10e-6 * 100e-6 / 2e-6, 7e-3);
+    close(plane[1], 1.174 * EPS * 10e-6 * 100e-6 / (2.0 * 4e-12), 7e-3);
+    assert!(at_rest([10.0, 2.0, 2.0], "electrode=bar")[1] < plane[1]);
+}
+
+/// Pull-in of bars of 2 × 2 µm at 2 µm on 1 N/m: 31.6 V by the exact field within 0.7 %, 25.13 V by SUGAR's factor. As SUGAR computes, that factor stays, and a
+/// law that the gap names holds there, too.
+#[test]
+fn bars_pull_in() {
+    let volts = |more: &str, as_sugar: bool| {
+        let options = CompileOptions { as_sugar, ..CompileOptions::default() };
+        pull_in(&built(&bars([2.0, 2.0, 2.0], 1.0, more), &options), None, 100.0).unwrap().pull_in_v
+    };
+    close(volts("", false), 31.6, 7e-3);
+    close(volts("fringe=sugar", false), 25.13, 1e-3);
+    close(volts("", true), volts("fringe=sugar", true), 1e-12);
+    close(volts("fringe=none", true) / volts("", true), 2.12_f64.sqrt(), 1e-6);
+}
+
+/// A cantilever of 100 × 20 × 2 µm over an electrode 4 µm away, E = 169 GPa, drawn from its side, in `n` pieces.
+fn cantilever(more: &str, n: usize) -> String {
+    format!(
+        "process metal = [ Youngsmodulus=169e9 Poisson=0.066 density=2329 h=20u {more} ]
+         anchor metal [a(0)] []
+         for i=1:{n} [
+           beam2d metal [a(i-1) a(i)] [l=100u/{n} w=2u]
+           gap2dforce metal [a(i-1) a(i) c(i-1) c(i)] [l=100u/{n} w=2u gap=4u]
+           R * [a(i-1) a(i)] [R=1]
+           R * [c(i-1) c(i)] [R=1]
+           anchor metal [c(i-1)] []
+         ]
+         anchor metal [c({n})] []
+         eground * [a(0)] []
+         drive port * [c(0) a(0)] []"
+    )
+}
+
+/// Its pull-in: 156.46 V in the exact field of a bar over a plane (a reduced model of ANSYS: 157 V), 158.63 V with 1 + 0.65·g/h on the force, 165.45 V without
+/// fringe field. Source: cubic finite elements under tip control (independent computation).
+#[test]
+fn a_cantilever_pulls_in_by_every_law() {
+    for (more, wanted, relative) in
+        [("", 156.46, 3e-3), ("fringe=parallel", 158.63, 2e-3), ("fringe=none", 165.45, 1e-3)]
+    {
+        let compiled = built(&cantilever(more, 16), &CompileOptions::default());
+        let found = pull_in_fitted(&compiled, None, 400.0).unwrap().1.pull_in_v;
+        println!("{more}: {found}");
+        close(found, wanted, relative);
+    }
+}
+
+/// `pullin`, `path` and `static` agree on pull-in within 1e-3 over random parts and every law: the limit point of the path is that voltage, 0.1 % below it
+/// the part is open, and 0.1 % above it is closed.
+#[test]
+fn analyses_agree_on_pull_in() {
+    let mut seed = 7_u64;
+    let mut random = |low: f64, high: f64| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (seed >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for _ in 0..6 {
+        let [h, w, gap] = [random(1.0, 30.0), random(1.0, 4.0), random(1.0, 5.0)];
+        let (length, angle, insulation) = (random(60.0, 200.0), random(0.0, 6.28), random(0.005, 0.1));
+        for law in ["none", "parallel", "exact", "sugar"] {
+            let text = format!(
+                "process film = [ Youngsmodulus=160e9 density=2300 h={h}u fringe={law} ]
+                 subnet part [] [] [
+                   anchor film [a] []
+                   beam2d film [a b] [l={length}u w={w}u]
+                   gap2dforce film [a b c d] [l={length}u w={w}u gap={gap}u touch={insulation}*{gap}u]
+                   R * [a b] [R=1]
+                   R * [c d] [R=1]
+                   anchor film [c] []
+                   anchor film [d] []
+                   eground * [a] []
+                   drive port * [c a] []
+                 ]
+                 x part * [] [oz={angle}]"
+            );
+            let compiled = built(&text, &CompileOptions { segments: Some(4), ..CompileOptions::default() });
+            let port = compiled.structure.ports[0].name.clone();
+            let found = pull_in(&compiled, None, 1e4).unwrap_or_else(|e| panic!("{law} {text}: {e}")).pull_in_v;
+            let request = ContinuationRequest {
+                input: PathInput::Port(&port),
+                from: 0.0,
+                to: 1.5 * found,
+                voltages: vec![],
+                signals: vec![],
+                branch: Branch::Plus,
+                points: 5000,
+            };
+            let path = trace(&compiled, &request, &mut |_| true).unwrap_or_else(|e| panic!("{law} {text}: {e}"));
+            close(path.folds[0].value, found, 1e-3);
+            let bent = |factor: f64| {
+                let result = static_equilibrium(&compiled, &[(port.clone(), factor * found)]).unwrap();
+                let tip = node(&result, "x.b");
+                tip.x.hypot(tip.y) / (gap * 1e-6)
+            };
+            assert!(bent(0.999) < 0.7 && bent(1.001) > 0.85, "{law} {text}: {} {}", bent(0.999), bent(1.001));
+        }
+    }
+}
