@@ -115,6 +115,9 @@ impl ProcessLine {
     }
 }
 
+/// Parameters whose values are words.
+const WORDED: [&str; 2] = ["fringe", "electrode"];
+
 /// Numbers and words of a list, in its order.
 type ParameterPairs = (Vec<(String, f64)>, Vec<(String, String)>);
 
@@ -126,7 +129,7 @@ fn pairs(text: &str) -> Option<ParameterPairs> {
         let (name, value) = word.split_once('=').filter(|(name, _)| is_name(name))?;
         match value.parse::<f64>() {
             Ok(number) if number.is_finite() => found.0.push((name.to_owned(), number)),
-            Err(_) if is_name(value) => found.1.push((name.to_owned(), value.to_owned())),
+            Err(_) if WORDED.contains(&name) && is_name(value) => found.1.push((name.to_owned(), value.to_owned())),
             _ => return None,
         }
     }
