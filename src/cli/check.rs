@@ -8,9 +8,10 @@ use bimorph::compile::{CompiledModel, Formulation};
 use bimorph::netlist::Setting;
 use bimorph::results::format::ResultFormat;
 use bimorph::results::plot::mechanism;
-use bimorph::structure::{DomainElement, Structure};
+use bimorph::structure::{DomainElement, ElectrodeShape, Fringe, Structure};
 use clap::Args;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -107,6 +108,7 @@ impl CheckCommand {
             let _ = write!(text, "; {} modes in the band, estimated error {error:.1e}", order.modes_in_band);
         }
         text.push('\n');
+        text.push_str(&fringe_fields(s, compiled.options.as_sugar));
         text.push_str(&formulation(&compiled));
         let warnings = compiled.warnings.items.len();
         let _ = writeln!(text, "no errors, {warnings} warning{}", if warnings == 1 { "" } else { "s" });
@@ -131,6 +133,25 @@ fn formulation(compiled: &CompiledModel) -> String {
         }
         None => String::new(),
     }
+}
+
+/// Laws of the fringe fields of gaps between beams, in a line; empty without such gaps.
+fn fringe_fields(s: &Structure, as_sugar: bool) -> String {
+    let anchored = s.anchored();
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for gap in &s.beam_gaps {
+        let fixed = gap.nodes[2..].iter().all(|node| anchored[node.0]);
+        let law = match (gap.fringe(as_sugar), gap.shape(fixed)) {
+            (Fringe::None, _) => "none",
+            (Fringe::Parallel, _) => "parallel",
+            (Fringe::Sugar, _) => "sugar",
+            (Fringe::Exact, ElectrodeShape::Bar) => "exact between bars",
+            (Fringe::Exact, ElectrodeShape::Plane) => "exact over a plane",
+        };
+        *counts.entry(law).or_default() += 1;
+    }
+    let list: Vec<String> = counts.iter().map(|(law, n)| format!("{law} ({n})")).collect();
+    if list.is_empty() { String::new() } else { format!("fringe fields of gaps between beams: {}\n", list.join(", ")) }
 }
 
 fn contents(s: &Structure) -> String {

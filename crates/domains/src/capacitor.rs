@@ -1,5 +1,8 @@
 //! Capacitance of a comb and of two parallel plates as a function of one approach u.
 
+use super::comb_field::CombField;
+use super::edge_field::EdgeField;
+
 /// C, C′ = dC/du, C″ at an approach.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Capacitance {
@@ -19,7 +22,7 @@ pub enum Capacitor {
     /// Around the end of the overlap, |o| < `blend`, a parabola joins the line to zero with continuous slope: a comb that
     /// has left its stator no longer pulls.
     Comb {
-        /// dC/du while engaged, N·ε·h/g (F/m).
+        /// dC/du while engaged, N·ε·h/g (F/m), without that of `fingers`.
         slope: f64,
         /// Overlap as drawn o₀ (m); infinite for a comb whose force does not depend on the position (SUGAR's `comb2d`),
         /// whose capacitance is then counted from the drawn position.
@@ -28,14 +31,18 @@ pub enum Capacitor {
         blend: f64,
         /// Constant part C_p (F).
         parasitic: f64,
+        /// Field of the fingers in their plane, where the law has it apart: `slope` is then that of the field above and below them.
+        fingers: Option<CombField>,
     },
-    /// Parallel plates, C = ε·A/d with d = g₀ − u (Nathanson 1967).
+    /// Parallel plates, C = ε·A·(1/d + e(d)) with d = g₀ − u (Nathanson 1967) and the fringe field e at their edges.
     ///
     /// Below `closest` the field is frozen: C continues along its tangent, so that nothing is divided by a vanishing
     /// gap while an iteration oversteps. Contact holds real plates further apart than that.
     Plates {
         /// ε·A (F·m).
         strength: f64,
+        /// Fringe fields along both sides.
+        edges: [EdgeField; 2],
         /// Gap as drawn g₀ (m).
         gap: f64,
         /// Distance below which the field is frozen (m).
@@ -48,7 +55,16 @@ impl Capacitor {
     #[inline]
     pub fn at(&self, u: f64) -> Capacitance {
         match *self {
-            Self::Comb { slope, overlap, blend, parasitic } => {
+            Self::Comb { fingers: Some(fingers), slope, overlap, blend, parasitic } => {
+                let [value, first, second] = fingers.at(overlap + u);
+                let other = Self::Comb { fingers: None, slope, overlap, blend, parasitic }.at(u);
+                Capacitance {
+                    value: other.value + value,
+                    slope: other.slope + first,
+                    curvature: other.curvature + second,
+                }
+            }
+            Self::Comb { slope, overlap, blend, parasitic, fingers: None } => {
                 if overlap.is_infinite() {
                     return Capacitance { value: parasitic + slope * u, slope, curvature: 0.0 };
                 }
@@ -66,7 +82,16 @@ impl Capacitor {
                     }
                 }
             }
-            Self::Plates { strength, gap, closest } => {
+            Self::Plates { strength, edges, gap, closest } if !matches!(edges, [EdgeField::None, EdgeField::None]) => {
+                let d = gap - u;
+                let at = d.max(closest);
+                let sides = edges.map(|edge| edge.at(at));
+                let sum = |plain: f64, k: usize| strength * (plain + sides[0][k] + sides[1][k]);
+                let slope = -sum(-1.0 / (at * at), 1);
+                let curvature = if d > closest { sum(2.0 / (at * at * at), 2) } else { 0.0 };
+                Capacitance { value: sum(1.0 / at, 0) + slope * (at - d), slope, curvature }
+            }
+            Self::Plates { strength, gap, closest, .. } => {
                 let d = gap - u;
                 if d >= closest {
                     let c = strength / d;
@@ -97,9 +122,13 @@ mod tests {
     /// Slope and curvature are the derivatives of C on every branch, and C and C′ are continuous where branches meet.
     #[test]
     fn derivatives_and_joins() {
-        let comb = Capacitor::Comb { slope: 3.0, overlap: 5.0, blend: 2.0, parasitic: 0.1 };
-        let plates = Capacitor::Plates { strength: 2.0, gap: 2.0, closest: 0.1 };
-        for (c, points) in [(comb, [-8.0, -5.5, -3.5, -1.0]), (plates, [-1.0, 0.5, 1.8, 1.95])] {
+        let comb = Capacitor::Comb { slope: 3.0, overlap: 5.0, blend: 2.0, parasitic: 0.1, fingers: None };
+        let ideal = [EdgeField::None; 2];
+        let plates = Capacitor::Plates { strength: 2.0, edges: ideal, gap: 2.0, closest: 0.1 };
+        let edges = [EdgeField::over_plane(3.0, 0.5, 2.0), EdgeField::Parallel { factor: 0.2, inverse: 0.3 }];
+        let edged = Capacitor::Plates { strength: 2.0, edges, gap: 2.0, closest: 0.1 };
+        let apart = [-1.0, 0.5, 1.8, 1.95];
+        for (c, points) in [(comb, [-8.0, -5.5, -3.5, -1.0]), (plates, apart), (edged, apart)] {
             for u in points {
                 let e = 1e-5;
                 let (lo, at, hi) = (c.at(u - e), c.at(u), c.at(u + e));
@@ -107,7 +136,7 @@ mod tests {
                 assert!((at.curvature - (hi.slope - lo.slope) / (2.0 * e)).abs() < 1e-4 * (1.0 + at.curvature));
             }
         }
-        for (c, join) in [(comb, -3.0), (comb, -7.0), (plates, 1.9)] {
+        for (c, join) in [(comb, -3.0), (comb, -7.0), (plates, 1.9), (edged, 1.9)] {
             let (lo, hi) = (c.at(join - 1e-12), c.at(join + 1e-12));
             assert!((lo.value - hi.value).abs() < 1e-8 && (lo.slope - hi.slope).abs() < 1e-6);
         }

@@ -12,7 +12,7 @@
 //!
 //! Every law here is one function with its first two derivatives, so that charge, force and stiffness belong to one energy.
 
-use bimorph_structure::{BeamGap, ElectrodeShape, Fringe};
+use bimorph_structure::{BeamGap, ElectrodeShape, Fringe, PlateGap};
 use std::f64::consts::PI;
 
 /// Powers of 1/g in A, and for each its terms a·x^p·τ^(power − p): (a, p).
@@ -49,6 +49,9 @@ pub enum EdgeField {
 }
 
 impl EdgeField {
+    /// Powers of 1/g in A.
+    pub const POWERS: [f64; 4] = [TERMS[0].0, TERMS[1].0, TERMS[2].0, TERMS[3].0];
+
     /// Of a bar of width `b` and thickness `t` over a plane at about the distance `unit` (m), relative to ε·b.
     pub fn over_plane(b: f64, t: f64, unit: f64) -> Self {
         Self::exact(b / unit, t / unit, unit, 2.0 / (PI * b))
@@ -66,8 +69,7 @@ impl EdgeField {
 
     /// The law of a gap between beams, with its factor on ε·h. `fixed`: both lower nodes are anchored; `sugar`: the model is as SUGAR computes.
     pub(super) fn of(gap: &BeamGap, fixed: bool, sugar: bool) -> (f64, Self) {
-        let law = gap.law.unwrap_or(if sugar { Fringe::Sugar } else { Fringe::Exact });
-        let edges = match law {
+        let edges = match gap.fringe(sugar) {
             Fringe::Sugar => return (gap.sugar_factor(), Self::None),
             Fringe::None => Self::None,
             Fringe::Parallel => Self::Parallel { factor: PARALLEL / gap.height, inverse: 1.0 / gap.height },
@@ -77,6 +79,34 @@ impl EdgeField {
             },
         };
         (1.0, edges)
+    }
+
+    /// Laws of the edges along both sides of a plate, relative to ε·A. Each edge has half the field that a long bar as wide as the plate across it has at both edges; corners are
+    /// left out. `sugar`: the model is as SUGAR computes, which has no such plates.
+    pub(super) fn of_plates(plate: &PlateGap, sugar: bool) -> [Self; 2] {
+        let [l, w] = plate.sides;
+        let law = plate.law.unwrap_or(if sugar { Fringe::None } else { Fringe::Exact });
+        if l == 0.0 || w == 0.0 {
+            return [Self::None; 2];
+        }
+        [w, l].map(|across| {
+            let edges = match (law, plate.electrode) {
+                (Fringe::None | Fringe::Sugar, _) => Self::None,
+                (Fringe::Parallel, _) => Self::Parallel { factor: PARALLEL / across, inverse: 1.0 / across },
+                (Fringe::Exact, Some(ElectrodeShape::Bar)) => Self::between_bars(across, plate.thickness, plate.gap),
+                (Fringe::Exact, _) => Self::over_plane(across, plate.thickness, plate.gap),
+            };
+            edges.times(l * w / plate.area)
+        })
+    }
+
+    /// The same field, `k` times as strong.
+    fn times(self, k: f64) -> Self {
+        match self {
+            Self::None => Self::None,
+            Self::Parallel { factor, inverse } => Self::Parallel { factor: k * factor, inverse },
+            Self::Exact { factor, unit, terms } => Self::Exact { factor: k * factor, unit, terms },
+        }
     }
 
     /// e (1/m), e′ (1/m²) and e″ (1/m³) at the distance `g` (m).

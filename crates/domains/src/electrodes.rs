@@ -2,15 +2,17 @@
 
 use super::approach::{Approach, MaterialPoint};
 use super::capacitor::{Capacitance, Capacitor};
+use super::comb_field::{CombField, above_and_below};
 use super::contact::{Contact, touching_distance};
 use super::contact_loss::{Loss, fall_at_pull_in};
 use super::domain::{Chord, Configuration, Domain, Law};
+use super::edge_field::EdgeField;
 use super::from_structure::{FromStructure, StructureView};
 use super::quotient::{self, quotient};
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
-use bimorph_structure::{GapVoltage, Impact};
+use bimorph_structure::{Fringe, GapVoltage, Impact};
 use nalgebra::Vector2;
 
 /// Two electrodes.
@@ -52,9 +54,26 @@ impl FromStructure for Electrodes {
     fn lay<'a>(drawing: &StructureView<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
         for comb in &drawing.structure.combs {
             let approach = drawing.approach(comb.a, comb.b, comb.axis);
-            let slope = comb.gaps * comb.permittivity * comb.height / comb.gap;
+            let strength = comb.gaps * comb.permittivity * comb.height;
             let overlap = if comb.finite { comb.overlap } else { f64::INFINITY };
-            let capacitor = Capacitor::Comb { slope, overlap, blend: comb.gap, parasitic: comb.parasitic };
+            let mut capacitor = Capacitor::Comb {
+                slope: strength / comb.gap,
+                overlap,
+                blend: comb.gap,
+                parasitic: comb.parasitic,
+                fingers: None,
+            };
+            let [length, width] = comb.finger;
+            let exact = comb.law.unwrap_or(if drawing.chord { Fringe::None } else { Fringe::Exact }) == Fringe::Exact;
+            if exact && comb.finite && width > 0.0 {
+                capacitor = Capacitor::Comb {
+                    slope: comb.gaps * comb.permittivity * above_and_below(width / comb.gap),
+                    overlap,
+                    blend: comb.gap,
+                    parasitic: comb.parasitic,
+                    fingers: Some(CombField::new(strength, [comb.gap, width, length])),
+                };
+            }
             let loss = Loss::new(&Impact::default());
             put(&comb.name, Some(&comb.voltage), Self { approach, capacitor, contact: None, loss });
         }
@@ -62,7 +81,8 @@ impl FromStructure for Electrodes {
             let approach = drawing.approach(plate.a, plate.b, plate.axis);
             let contact = Contact { touch: plate.touch.unwrap_or(touching_distance(plate.gap)), area: plate.area };
             let strength = plate.permittivity * plate.area;
-            let capacitor = Capacitor::Plates { strength, gap: plate.gap, closest: contact.least() };
+            let edges = EdgeField::of_plates(plate, drawing.chord);
+            let capacitor = Capacitor::Plates { strength, edges, gap: plate.gap, closest: contact.least() };
             let loss = Loss::new(&plate.impact);
             put(&plate.name, Some(&plate.voltage), Self { approach, capacitor, contact: Some(contact), loss });
         }

@@ -13,6 +13,7 @@
 //! | [`backbending`] | the strength of a hot arm, beyond which it is shortened for good |
 //! | [`beam_line`] | the centreline of a beam: how it bends in a motion, and how far its segments are turned |
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
+//! | [`comb_field`] | engagement, tips and fringe field of combs |
 //! | [`contact`] | pressure between surfaces that touch |
 //! | [`contact_loss`] | impact losses |
 //! | [`contact_speed`] | at which speed, from statics |
@@ -47,6 +48,7 @@ pub mod approach;
 pub mod backbending;
 pub mod beam_line;
 pub mod capacitor;
+pub mod comb_field;
 mod conduction;
 pub mod contact;
 pub mod contact_loss;

@@ -5,7 +5,9 @@
 
 use super::lumped::Law;
 use bimorph_domains::capacitor::Capacitor;
+use bimorph_domains::comb_field::CombField;
 use bimorph_domains::contact::{Contact, PRESSURE, TOUCH};
+use bimorph_domains::edge_field::EdgeField;
 use bimorph_domains::stop::{SOFT, StopKind};
 
 /// C(u) (F).
@@ -14,12 +16,23 @@ pub(super) fn capacitance(capacitor: &Capacitor, u: &str) -> String {
         Capacitor::Comb { slope, overlap, parasitic, .. } if overlap.is_infinite() => {
             format!("({parasitic:e} + {slope:e} * 1e-6 * {u})")
         }
-        Capacitor::Comb { slope, overlap, blend, parasitic } => {
+        Capacitor::Comb { slope, overlap, blend, parasitic, fingers: Some(fingers) } => {
+            let ideal = Capacitor::Comb { slope, overlap, blend, parasitic, fingers: None };
+            format!("({} + {})", capacitance(&ideal, u), finger_value(&fingers, &format!("({overlap:e} + 1e-6 * {u})")))
+        }
+        Capacitor::Comb { slope, overlap, blend, parasitic, fingers: None } => {
             let share = share(u, overlap, blend);
             let beyond = format!("max({:e} + 1e-6 * {u}, 0)", overlap - blend);
             format!("({parasitic:e} + {slope:e} * ({blend:e} * {share} * {share} + {beyond}))")
         }
-        Capacitor::Plates { strength, gap, closest } => {
+        Capacitor::Plates { strength, edges, gap, closest } if has_fringe(&edges) => {
+            let d = format!("({gap:e} - 1e-6 * {u})");
+            let at = format!("max({d}, {closest:e})");
+            let value: String = edges.iter().map(|edge| edge_value(edge, &at)).collect();
+            let below = format!("max({closest:e} - {d}, 0)");
+            format!("({strength:e} * (1 / {at}{value} + ({}) * {below}))", fall(&edges, &at))
+        }
+        Capacitor::Plates { strength, gap, closest, .. } => {
             let d = format!("({gap:e} - 1e-6 * {u})");
             format!("({strength:e} / max({d}, {closest:e}) * (2 - min({d}, {closest:e}) / {closest:e}))")
         }
@@ -30,12 +43,95 @@ pub(super) fn capacitance(capacitor: &Capacitor, u: &str) -> String {
 pub(super) fn slope(capacitor: &Capacitor, u: &str) -> String {
     match *capacitor {
         Capacitor::Comb { slope, overlap, .. } if overlap.is_infinite() => format!("{slope:e}"),
+        Capacitor::Comb { slope, overlap, blend, fingers: Some(fingers), .. } => {
+            let pull = finger_slope(&fingers, &format!("({overlap:e} + 1e-6 * {u})"));
+            format!("({slope:e} * {} + {pull})", share(u, overlap, blend))
+        }
         Capacitor::Comb { slope, overlap, blend, .. } => format!("({slope:e} * {})", share(u, overlap, blend)),
-        Capacitor::Plates { strength, gap, closest } => {
+        Capacitor::Plates { strength, edges, gap, closest } if has_fringe(&edges) => {
+            let d = format!("max({gap:e} - 1e-6 * {u}, {closest:e})");
+            format!("({strength:e} * ({}))", fall(&edges, &d))
+        }
+        Capacitor::Plates { strength, gap, closest, .. } => {
             let d = format!("max({gap:e} - 1e-6 * {u}, {closest:e})");
             format!("({strength:e} / ({d} * {d}))")
         }
     }
+}
+
+fn has_fringe(edges: &[EdgeField]) -> bool {
+    edges.iter().any(|edge| *edge != EdgeField::None)
+}
+
+/// Sum over the terms of A at the distance `d`, each times its power of 1/d to the `k`.
+fn weighted(terms: &[f64; 4], unit: f64, d: &str, k: i32) -> String {
+    let y = format!("({unit:e} / {d})");
+    let scaled: [f64; 4] = std::array::from_fn(|j| terms[j] * EdgeField::POWERS[j].powi(k));
+    let [quarter, half, one, two] = scaled;
+    format!("({quarter:e} * sqrt(sqrt({y})) + {half:e} * sqrt({y}) + {one:e} * {y} + {two:e} * {y} * {y})")
+}
+
+/// e(d) of an edge with its sign; empty where it has no field.
+fn edge_value(edge: &EdgeField, d: &str) -> String {
+    match edge {
+        EdgeField::None => String::new(),
+        EdgeField::Parallel { factor, inverse } => format!(" - {factor:e} * ln({inverse:e} * {d})"),
+        EdgeField::Exact { factor, unit, terms } => format!(" + {factor:e} * ln({})", weighted(terms, *unit, d, 0)),
+    }
+}
+
+/// 1/d² less e′(d) of both edges.
+fn fall(edges: &[EdgeField], d: &str) -> String {
+    let mut text = format!("1 / ({d} * {d})");
+    for edge in edges {
+        match edge {
+            EdgeField::None => {}
+            EdgeField::Parallel { factor, .. } => text.push_str(&format!(" + {factor:e} / {d}")),
+            EdgeField::Exact { factor, unit, terms } => {
+                let [first, sum] = [1, 0].map(|k| weighted(terms, *unit, d, k));
+                text.push_str(&format!(" + {factor:e} * {first} / ({d} * {sum})"));
+            }
+        }
+    }
+    text
+}
+
+/// n and y of [`CombField`] as texts at the overlap `o`, a text in metres.
+fn engagement(fingers: &CombField, o: &str) -> [String; 2] {
+    let [lambda, g] = [CombField::STEEPNESS, fingers.gap];
+    let n = format!("(max(-{o} / {g:e}, 0) + ln(1 + exp(-{:e} * abs({o}))) / {lambda:e})", lambda / g);
+    let y = format!("({n} / {:e})", fingers.fade);
+    [n, y]
+}
+
+/// q of the tips and their distance to the base.
+fn tips(fingers: &CombField, o: &str) -> [String; 2] {
+    let d = format!("({:e} - {o})", fingers.length);
+    [format!("exp(-{:e} * max({d}, {:e}))", fingers.decay, fingers.closest()), d]
+}
+
+/// Slope of the tips' field with the overlap, for N·ε·h = 1.
+fn tip_slope(fingers: &CombField, q: &str) -> String {
+    let [facing, beside] = fingers.tips;
+    format!("{:e} * {q} * ({facing:e} / (1 - {q}) + {beside:e}) / (1 - {q})", 2.0 * fingers.decay)
+}
+
+/// C of the fingers in their plane at the overlap `o`.
+fn finger_value(fingers: &CombField, o: &str) -> String {
+    let ([n, y], [q, d], [facing, beside]) = (engagement(fingers, o), tips(fingers, o), fingers.tips);
+    let ends = format!("{:e} * (1 + {:e} * {y} / (1 + {y})) / (1 + {y})", fingers.ends, CombField::SHAPE);
+    let tip = format!("2 * ({facing:e} * {q} / (1 - {q}) - {beside:e} * ln(1 - {q}))");
+    let below = format!("max({:e} - {d}, 0) * {}", fingers.closest(), tip_slope(fingers, &q));
+    format!("{:e} * ({o} / {:e} + {n} + {ends} + {tip} + {below})", fingers.strength, fingers.gap)
+}
+
+/// dC/du of the fingers in their plane at the overlap `o`.
+fn finger_slope(fingers: &CombField, o: &str) -> String {
+    let ([_, y], [q, _]) = (engagement(fingers, o), tips(fingers, o));
+    let open = format!("(1 / (1 + exp(min({:e} * {o}, 80))))", CombField::STEEPNESS / fingers.gap);
+    let fall = format!("({:e} * (1 - {y}) / (1 + {y}) - 1) / ((1 + {y}) * (1 + {y}))", CombField::SHAPE);
+    let engaged = format!("(1 - {open} - {:e} * {open} * {fall})", fingers.ends / fingers.fade);
+    format!("{:e} * ({:e} * {engaged} + {})", fingers.strength, 1.0 / fingers.gap, tip_slope(fingers, &q))
 }
 
 /// How far a comb is engaged, 0 to 1, over the blend at its end.
@@ -94,4 +190,104 @@ fn lossy(force: String, loss: f64, closing: &str, rate: &str) -> String {
 fn pressed(contact: &Contact, d: &str) -> String {
     let s = format!("max({:e} * ({:e} - {d}), 0)", 2.0 / contact.touch, contact.touch);
     format!("({:e} * {s} * {s} * {s} * {s})", contact.area * PRESSURE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Value of an expression of numbers, `+ - * /`, brackets and functions, from its start; the rest of the text is left.
+    fn sum(text: &mut &str) -> f64 {
+        let mut value = product(text);
+        loop {
+            *text = text.trim_start();
+            match text.chars().next() {
+                Some('+') => value += rest(text, product),
+                Some('-') => value -= rest(text, product),
+                _ => return value,
+            }
+        }
+    }
+
+    fn product(text: &mut &str) -> f64 {
+        let mut value = factor(text);
+        loop {
+            *text = text.trim_start();
+            match text.chars().next() {
+                Some('*') => value *= rest(text, factor),
+                Some('/') => value /= rest(text, factor),
+                _ => return value,
+            }
+        }
+    }
+
+    fn rest(text: &mut &str, read: fn(&mut &str) -> f64) -> f64 {
+        *text = &text[1..];
+        read(text)
+    }
+
+    fn factor(text: &mut &str) -> f64 {
+        *text = text.trim_start();
+        if text.starts_with('-') {
+            return -rest(text, factor);
+        }
+        let end = text.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(text.len());
+        let name = &text[..end];
+        if text[end..].starts_with('(') {
+            *text = &text[end..];
+            let mut values = vec![rest(text, sum)];
+            while text.starts_with(',') {
+                values.push(rest(text, sum));
+            }
+            *text = text.strip_prefix(')').unwrap_or_else(|| panic!("no bracket: {text}"));
+            return match (name, values.as_slice()) {
+                ("", [x]) => *x,
+                ("ln", [x]) => x.ln(),
+                ("exp", [x]) => x.exp(),
+                ("abs", [x]) => x.abs(),
+                ("sqrt", [x]) => x.sqrt(),
+                ("min", [x, y]) => x.min(*y),
+                ("max", [x, y]) => x.max(*y),
+                _ => panic!("no function of SPICE and Verilog-A: {name}"),
+            };
+        }
+        let end = (1..=text.len())
+            .rev()
+            .find(|end| text[..*end].parse::<f64>().is_ok())
+            .unwrap_or_else(|| panic!("no number: {text}"));
+        let value = text[..end].parse().unwrap();
+        *text = &text[end..];
+        value
+    }
+
+    /// The texts have the values of C and dC/du to rounding: of ideal and fringing plates and combs, open, close and below the range of their laws.
+    #[test]
+    fn texts_have_the_values_of_the_laws() {
+        let plates = |edges| Capacitor::Plates { strength: 8.85e-20, edges, gap: 2e-6, closest: 0.07e-6 };
+        let comb = |fingers| Capacitor::Comb { slope: 1e-10, overlap: 3e-6, blend: 2e-6, parasitic: 1e-15, fingers };
+        let exact = [EdgeField::over_plane(10e-6, 2e-6, 2e-6), EdgeField::over_plane(40e-6, 2e-6, 2e-6)];
+        let parallel = EdgeField::Parallel { factor: 0.65 / 1e-5, inverse: 1e5 };
+        for capacitor in [
+            plates([EdgeField::None; 2]),
+            plates(exact),
+            plates([parallel; 2]),
+            plates([EdgeField::None, parallel]),
+            comb(None),
+            comb(Some(CombField::new(3e-16, [2e-6, 3e-6, 20e-6]))),
+        ] {
+            for u in [-15.0, -4.0, -1.0, 0.0, 0.7, 1.9, 1.99, 9.0, 16.85] {
+                let c = capacitor.at(1e-6 * u);
+                for (text, value) in [
+                    (capacitance(&capacitor, &format!("({u:e})")), c.value),
+                    (slope(&capacitor, &format!("({u:e})")), c.slope),
+                ] {
+                    let mut left = text.as_str();
+                    let found = sum(&mut left);
+                    assert_eq!(left, "", "{text}");
+                    let scale = value.abs().max(1e-22);
+                    assert!((found - value).abs() < 1e-9 * scale, "{capacitor:?} {u}: {found} {value}\n{text}");
+                }
+            }
+        }
+    }
 }

@@ -7,7 +7,7 @@ use super::value::short;
 use bimorph_base::sets::Sets;
 use bimorph_base::suggest::did_you_mean;
 use bimorph_structure::BeamRows;
-use bimorph_structure::{BeamGap, GapVoltage, NodeId, Structure};
+use bimorph_structure::{BeamGap, ElectrodeShape, Fringe, GapVoltage, NodeId, Structure};
 use std::collections::HashSet;
 use std::ops::RangeInclusive;
 
@@ -88,6 +88,51 @@ pub(crate) fn check(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     unheld_parts(drawing, &connected, &mut parts, sink);
     floating_potentials(drawing, sink);
     gaps_between_anchors(drawing, sink);
+    fringe_fields(drawing, sink);
+}
+
+/// Fringe fields beyond the range that their law was compared with the exact field in.
+fn fringe_fields(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
+    let structure = &drawing.structure;
+    let exact = |law: Option<Fringe>| matches!(law, None | Some(Fringe::Exact));
+    let mut beyond = Vec::new();
+    let anchored = structure.anchored();
+    for gap in structure.beam_gaps.iter().filter(|gap| exact(gap.law)) {
+        let fixed = gap.nodes[2..].iter().all(|node| anchored[node.0]);
+        let (most, width) = match gap.shape(fixed) {
+            ElectrodeShape::Plane => (5.0, gap.widths[0]),
+            ElectrodeShape::Bar => (10.0, gap.mean_width()),
+        };
+        let [distance, width] = [gap.gap, width].map(|size| size / gap.height);
+        if distance > most {
+            beyond.push((
+                &gap.name,
+                gap.nodes[0],
+                format!("the gap is {} times as wide as the parts are high", short(distance)),
+            ));
+        } else if !(0.01..=10.0).contains(&width) {
+            beyond.push((&gap.name, gap.nodes[0], format!("the parts are {} times as wide as high", short(width))));
+        }
+    }
+    for plate in structure.plate_gaps.iter().filter(|plate| exact(plate.law) && plate.sides[0] > 0.0) {
+        let [distance, thickness] = [plate.gap, plate.thickness].map(|size| size / plate.sides[0].min(plate.sides[1]));
+        if distance > 5.0 || thickness > 10.0 {
+            beyond.push((&plate.name, plate.a, format!("the gap is {} times as wide as the plate", short(distance))));
+        }
+    }
+    for comb in structure.combs.iter().filter(|comb| exact(comb.law) && comb.finite && comb.finger[1] > 0.0) {
+        let [width, height] = [comb.finger[1], comb.height].map(|size| size / comb.gap);
+        if !(0.25..=5.0).contains(&width) || height < 0.5 {
+            let what = format!("fingers are {} gaps wide and {} gaps high", short(width), short(height));
+            beyond.push((&comb.name, comb.a, what));
+        }
+    }
+    if let Some((name, node, what)) = beyond.first() {
+        let more = if beyond.len() > 1 { format!(" ({} such elements in all)", beyond.len()) } else { String::new() };
+        let message = format!("the fringe field of `{name}` is beyond the range of its law: {what}{more}");
+        let help = "docs/reference/elements.md has the ranges and errors; `fringe=none` leaves the field out";
+        sink.warning("W026", drawing.first_named[node.0], message, help);
+    }
 }
 
 /// A gap whose nodes are all anchored bends nothing, unless beams lie between them.

@@ -99,6 +99,9 @@ pub struct Comb {
     /// Length and width of its fingers (m), for drawings; a width of 0 where the netlist gives none.
     #[serde(default)]
     pub finger: [f64; 2],
+    /// Law of the fringe field; none: `exact` where the width of the fingers is known, and no field in a model as SUGAR computes.
+    #[serde(default = "Fringe::stored")]
+    pub law: Option<Fringe>,
     /// False for SUGAR's `comb2d`, whose force is constant whatever the overlap.
     pub finite: bool,
     /// Where its voltage comes from.
@@ -122,6 +125,18 @@ pub struct PlateGap {
     pub gap: f64,
     /// Permittivity ε (F/m).
     pub permittivity: f64,
+    /// Sides of a rectangular plate (m); 0: unknown, and no fringe field.
+    #[serde(default)]
+    pub sides: [f64; 2],
+    /// Thickness of the plate (m).
+    #[serde(default)]
+    pub thickness: f64,
+    /// Law of the fringe field of a plate with sides; none: `exact`, and no field in a model as SUGAR computes.
+    #[serde(default)]
+    pub law: Option<Fringe>,
+    /// Shape of the other plate, where the netlist names it; a plane by default.
+    #[serde(default)]
+    pub electrode: Option<ElectrodeShape>,
     /// Distance at which the plates touch (m); none: that of nearly closed gaps of their size.
     #[serde(default)]
     pub touch: Option<f64>,
@@ -174,6 +189,11 @@ impl BeamGap {
     /// SUGAR's factor on capacitance and force for the fringe field (1).
     pub fn sugar_factor(&self) -> f64 {
         1.0 + 1.12 * self.gap / self.height
+    }
+
+    /// The law of its fringe field: the named one, else `exact`, or SUGAR's where the model is as SUGAR computes (`sugar`).
+    pub fn fringe(&self, sugar: bool) -> Fringe {
+        self.law.unwrap_or(if sugar { Fringe::Sugar } else { Fringe::Exact })
     }
 
     /// Width of two equal beams in place of these (m): the geometric mean. Capacitance does not depend on which beam is which and

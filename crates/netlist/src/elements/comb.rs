@@ -2,7 +2,7 @@
 
 use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
-use bimorph_structure::{Comb, GapVoltage};
+use bimorph_structure::{Comb, Fringe, GapVoltage};
 
 impl ElementSite<'_, '_> {
     fn comb(&mut self, finite: bool, parasitic: f64, voltage: GapVoltage) -> Result<(), Reported> {
@@ -17,6 +17,10 @@ impl ElementSite<'_, '_> {
         }
         let width = self.positive_if_any("w")?.unwrap_or(0.0);
         let permittivity = self.permittivity()?;
+        let law = if finite { self.fringe()? } else { None };
+        if width == 0.0 && law == Some(Fringe::Exact) && self.is_given("fringe") {
+            return Err(self.missing("w"));
+        }
         let axis = [angle.cos(), angle.sin()];
         let (a, b) = (self.node(0), self.node(1));
         let apart = 2.0 * finger - overlap;
@@ -33,6 +37,7 @@ impl ElementSite<'_, '_> {
             permittivity,
             parasitic,
             finger: [finger, width],
+            law,
             finite,
             voltage,
         });

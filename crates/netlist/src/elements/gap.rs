@@ -99,6 +99,26 @@ impl ElementSite<'_, '_> {
         Ok(())
     }
 
+    /// Area of a plate and its sides (m², m): `A`, `l·w`, or `A` with one or both sides. Without sides of its own the shape is unknown, and they are 0.
+    fn faces(&mut self) -> Result<(f64, [f64; 2]), Reported> {
+        let area = self.positive_if_any("A")?;
+        let mut sides = [None; 2];
+        for (side, name) in sides.iter_mut().zip(["l", "w"]) {
+            if self.is_given(name) {
+                *side = self.positive_if_any(name)?;
+            }
+        }
+        match (area, sides) {
+            (Some(area), [None, None]) => Ok((area, [0.0; 2])),
+            (Some(area), [l, w]) => {
+                let l = l.unwrap_or_else(|| area / w.unwrap_or(1.0));
+                Ok((area, [l, w.unwrap_or(area / l)]))
+            }
+            (None, [Some(l), Some(w)]) => Ok((l * w, [l, w])),
+            (None, _) => Err(self.missing("A")),
+        }
+    }
+
     fn facing_beams(&mut self) -> Result<(), Reported> {
         let [w1, w2] = self.widths()?;
         self.add_beam(format!("{}.upper", self.instance.name), [self.node(0), self.node(1)], w1)?;
@@ -186,8 +206,18 @@ pub(super) fn gap3de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
 /// plategap2d: two lumped plates; b lies at `gap` along local x from a.
 pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let angle = site.direction(site.instance.rotation)?;
-    let (area, gap) = (site.positive("A")?, site.positive("gap")?);
+    let (area, sides) = site.faces()?;
+    let gap = site.positive("gap")?;
     let permittivity = site.permittivity()?;
+    let law = site.fringe()?;
+    let electrode = site.word("electrode", &ElectrodeShape::NAMES)?;
+    let shaped = sides[0] > 0.0;
+    if !shaped && site.is_given("fringe") && law != Some(Fringe::None) {
+        let message = format!("the fringe field of `{}` depends on the sides of the plate", site.instance.name);
+        return Err(site.sink.error("E053", site.span_of("fringe"), message, "give `l` and `w`"));
+    }
+    let exact = shaped && matches!(law, None | Some(Fringe::Exact));
+    let thickness = if exact { site.positive("h")? } else { 0.0 };
     let touch = site.touch(gap)?;
     let impact = site.impact()?;
     let axis = [angle.cos(), angle.sin()];
@@ -195,7 +225,22 @@ pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported>
     let voltage = site.across(0, 1);
     site.drawing.place(site.instance.span, &[a, b], &[[0.0; 2], [gap * axis[0], gap * axis[1]]]);
     let name = site.name();
-    let plate = PlateGap { name, a, b, axis, area, gap, permittivity, touch, impact, voltage };
+    let plate = PlateGap {
+        name,
+        a,
+        b,
+        axis,
+        area,
+        gap,
+        permittivity,
+        sides,
+        thickness,
+        law,
+        electrode,
+        touch,
+        impact,
+        voltage,
+    };
     site.drawing.structure.plate_gaps.push(plate);
     Ok(())
 }

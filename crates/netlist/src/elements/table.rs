@@ -140,7 +140,8 @@ const GAP_E: &[&str] = &[
 ];
 const GAP_SHEET: &[&str] =
     &["l", "w", "w1", "w2", "gap", "h", "Rs", "permittivity", "fringe", "electrode", "touch", "restitution", "speed"];
-const PLATES: &[&str] = &["A", "gap", "permittivity", "touch", "restitution", "speed"];
+const PLATES: &[&str] =
+    &["A", "l", "w", "h", "gap", "permittivity", "fringe", "electrode", "touch", "restitution", "speed"];
 const STOP: &[&str] = &["gap", "back", "k", "A", "restitution", "speed"];
 const LOAD: &[&str] = &["F", "M"];
 
@@ -273,7 +274,7 @@ const MODELS: &[ElementModel] = &[
     own("plategap2d", &[2], "[a b]", PLATES, gap::plategap2d),
     own("wire", WIRED, "[a b …]", &[], circuit::wire),
     own("stop2d", &[1, 2], "[a] or [a b]", STOP, stop::stop2d),
-    own("comb2de", &[2], "[a b]", &["N", "gap", "l", "L", "w", "h", "Cp", "permittivity"], comb::comb2de),
+    own("comb2de", &[2], "[a b]", &["N", "gap", "l", "L", "w", "h", "Cp", "permittivity", "fringe"], comb::comb2de),
     own(
         "beam2det",
         &[2],

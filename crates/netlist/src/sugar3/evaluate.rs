@@ -93,6 +93,12 @@ impl FrontEnd for Sugar3 {
         for gap in &mut drawing.structure.beam_gaps {
             gap.law.get_or_insert(Fringe::Sugar);
         }
+        for comb in &mut drawing.structure.combs {
+            comb.law.get_or_insert(Fringe::None);
+        }
+        for plate in &mut drawing.structure.plate_gaps {
+            plate.law.get_or_insert(Fringe::None);
+        }
         finish(drawing, parameters, state.sink.clone(), &self.bundle)
     }
 }

@@ -281,6 +281,36 @@ fn laws_of_gaps() {
     assert_eq!(message.help, "give one of none, parallel, exact, sugar");
 }
 
+/// Fringe fields beyond the range of their law give W026: bars at a gap of 11 heights, a plate at six widths, fingers that are six gaps wide. A named law without
+/// that range gives none.
+#[test]
+fn ranges_of_fringe_fields() {
+    let head = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nanchor p [c] []\nanchor p [d] []\neground * [a] []\n\
+                beam2d p [a b] [l=100u w=2u]\n";
+    let warned = |element: &str| {
+        let text = format!("{head}{element}\nport p [c a] []");
+        let loaded = load(&Bundle::from_text("t.net", &text), &[]).unwrap_or_else(|d| panic!("{d}"));
+        loaded.warnings.items.iter().any(|item| item.code == "W026")
+    };
+    for (element, beyond) in [
+        ("gap2dforce p [a b c d] [l=100u w=2u gap=19u]", false),
+        ("gap2dforce p [a b c d] [l=100u w=2u gap=22u]", true),
+        ("gap2dforce p [a b c d] [l=100u w=2u gap=22u fringe=parallel]", false),
+        ("gap2dforce p [a b c d] [l=100u w=30u gap=2u]", true),
+    ] {
+        assert_eq!(warned(element), beyond, "{element}");
+    }
+    for (element, beyond) in [
+        ("plategap2d p [b e] [l=10u w=4u gap=19u]", false),
+        ("plategap2d p [b e] [l=10u w=4u gap=24u]", true),
+        ("comb2de p [b e] [N=8 gap=2u w=8u l=8u L=16u]", false),
+        ("comb2de p [b e] [N=8 gap=2u w=12u l=8u L=16u]", true),
+        ("comb2de p [b e] [N=8 gap=2u w=12u l=8u L=16u fringe=none]", false),
+    ] {
+        assert_eq!(warned(&format!("{element}\nanchor p [e] []")), beyond, "{element}");
+    }
+}
+
 /// oy = pi mirrors a gap: the lower beam then lies above when seen along a–b.
 #[test]
 fn gap_mirrored() {

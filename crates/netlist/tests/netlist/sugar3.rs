@@ -3,7 +3,7 @@
 
 use bimorph_base::{Bundle, Diagnostic, Setting};
 use bimorph_netlist::load;
-use bimorph_structure::Structure;
+use bimorph_structure::{Fringe, Structure};
 use std::time::{Duration, Instant};
 
 const LAYER: &str =
@@ -109,7 +109,12 @@ fn a_converted_netlist_and_its_twin() {
         mfgap2d {_n(\"c\"), _n(\"d\"), _n(\"e\"), _n(\"f\"); material = p1, l = 90u, w1 = 3u, w2 = 3u, gap = 2u, V = 4}\n\
         mfeground {_n(\"A\")}\nmfVsrc {_n(\"b\"), _n(\"g\"); V = 2}\nmfeground {_n(\"g\")}\nmff3d {_n(\"b\"); F = 2u, oz = (pi)/(2)}\nrelpos_treewalk()\n";
     let twin = load(&Bundle::from_text("t.net", two), &[]).unwrap_or_else(|d| panic!("{d}"));
-    same(&drawn(three), &twin.structure);
+    let found = drawn(three);
+    same(&found, &twin.structure);
+    // SUGAR 3's gap keeps SUGAR's fringe factor unless it names a law
+    assert_eq!((found.beam_gaps[0].law, twin.structure.beam_gaps[0].law), (Some(Fringe::Sugar), None));
+    let named = drawn(&three.replace("V = 4}", "V = 4, fringe = \"parallel\"}"));
+    assert_eq!(named.beam_gaps[0].law, Some(Fringe::Parallel));
 }
 
 /// Nodes with coordinates lie where they are drawn; beams without a length are measured between them; `force` acts along the axes.

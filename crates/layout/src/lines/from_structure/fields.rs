@@ -2,7 +2,7 @@
 
 use super::{OfStructure, unmirrored};
 use bimorph_structure::DomainElement;
-use bimorph_structure::{Beam, BeamGap, ElectrodeShape, Fringe, GapVoltage, Impact, NodeId};
+use bimorph_structure::{Beam, ElectrodeShape, Fringe, GapVoltage, Impact, NodeId};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Impact losses, where the netlist gives them.
@@ -12,9 +12,12 @@ fn impact(impact: &Impact) -> impl Iterator<Item = (&'static str, f64)> {
 }
 
 /// Law of the fringe field and shape of the electrode, where the netlist gives them.
-fn field_words(gap: &BeamGap) -> impl Iterator<Item = (&'static str, &'static str)> + use<> {
-    let law = gap.law.and_then(|law| Fringe::NAMES.iter().find(|(_, other)| *other == law));
-    let shape = gap.electrode.and_then(|shape| ElectrodeShape::NAMES.iter().find(|(_, other)| *other == shape));
+fn field_words(
+    law: Option<Fringe>,
+    electrode: Option<ElectrodeShape>,
+) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let law = law.and_then(|law| Fringe::NAMES.iter().find(|(_, other)| *other == law));
+    let shape = electrode.and_then(|shape| ElectrodeShape::NAMES.iter().find(|(_, other)| *other == shape));
     law.map(|(word, _)| ("fringe", *word)).into_iter().chain(shape.map(|(word, _)| ("electrode", *word)))
 }
 
@@ -37,7 +40,7 @@ impl OfStructure<'_> {
             parameters.extend([("oz", angle), ("V", voltage), ("permittivity", gap.permittivity)]);
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "gap2d", &process, &nodes, &parameters);
-            self.say(field_words(gap));
+            self.say(field_words(gap.law, gap.electrode));
             inside.extend(parts);
         }
         inside
@@ -67,6 +70,9 @@ impl OfStructure<'_> {
                 }
             };
             self.push(&comb.name, model, "*", &[comb.a, comb.b], &parameters);
+            if comb.finite {
+                self.say(field_words(comb.law, None));
+            }
         }
         for gap in structure.beam_gaps.iter().filter(|g| matches!(g.voltage, GapVoltage::Nodes(..))) {
             let [a, b, c, d] = gap.nodes;
@@ -82,7 +88,7 @@ impl OfStructure<'_> {
             parameters.extend([("oz", angle), ("permittivity", gap.permittivity)]);
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "gap2dforce", "*", &nodes, &parameters);
-            self.say(field_words(gap));
+            self.say(field_words(gap.law, gap.electrode));
         }
         for gap in &structure.plate_gaps {
             if matches!(gap.voltage, GapVoltage::Fixed(_)) {
@@ -90,8 +96,13 @@ impl OfStructure<'_> {
             }
             let mut parameters =
                 vec![("A", gap.area), ("gap", gap.gap), turned(gap.axis), ("permittivity", gap.permittivity)];
+            if gap.sides[0] > 0.0 {
+                parameters.extend([("l", gap.sides[0]), ("w", gap.sides[1])]);
+                parameters.extend((gap.thickness > 0.0).then_some(("h", gap.thickness)));
+            }
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "plategap2d", "*", &[gap.a, gap.b], &parameters);
+            self.say(field_words(gap.law, gap.electrode));
         }
         for stop in &structure.stops {
             let mut parameters = vec![("A", stop.area), turned(stop.axis)];
