@@ -4,7 +4,8 @@ use super::failure::Failure;
 use super::model::{Context, JsonMap, ModelArgs};
 use super::output;
 use bimorph::analysis::formulation;
-use bimorph::compile::{CompiledModel, Formulation};
+use bimorph::compile::{Anchors, CompiledModel, Formulation};
+use bimorph::discretize::anchor_root;
 use bimorph::netlist::Setting;
 use bimorph::results::format::ResultFormat;
 use bimorph::results::plot::mechanism;
@@ -18,7 +19,7 @@ use std::path::PathBuf;
 /// Parse and elaborate a netlist, and report every error and warning.
 ///
 /// Exit status 1 on any error. Prints the model's unknowns, and with --band their estimated error; JSON has "segments"
-/// by beam (0: rigid).
+/// by beam (0: rigid). Names the beam that rigid anchors stiffen most.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph check examples/bank/bank.net\n  \
@@ -53,6 +54,16 @@ struct CheckDocument<'a> {
     unknowns: usize,
     segments: JsonMap<'a, usize>,
     modes_in_band: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rigid_anchors: Option<RigidAnchors<'a>>,
+}
+
+/// Effect of rigid anchors on the beam that feels them most.
+#[derive(Debug, Serialize)]
+struct RigidAnchors<'a> {
+    beam: &'a str,
+    /// Share of its bending stiffness that elastic anchors would take away, about (1).
+    stiffening: f64,
 }
 
 impl CheckCommand {
@@ -85,6 +96,7 @@ impl CheckCommand {
                 unknowns,
                 segments: JsonMap(&segments),
                 modes_in_band: order.modes_in_band,
+                rigid_anchors: rigid_anchors(&compiled),
             };
             let text = serde_json::to_string(&found).map_err(|e| Failure::Stdout(e.into()))?;
             return output::print(&(text + "\n"));
@@ -109,11 +121,27 @@ impl CheckCommand {
         }
         text.push('\n');
         text.push_str(&fringe_fields(s, compiled.options.as_sugar));
+        if let Some(RigidAnchors { beam, stiffening }) = rigid_anchors(&compiled) {
+            let percent = 100.0 * stiffening;
+            let _ =
+                writeln!(text, "anchors: rigid, which stiffens `{beam}` by about {percent:.1} % (--anchors elastic)");
+        }
         text.push_str(&formulation(&compiled));
         let warnings = compiled.warnings.items.len();
         let _ = writeln!(text, "no errors, {warnings} warning{}", if warnings == 1 { "" } else { "s" });
         output::print(&text)
     }
+}
+
+/// The beam that rigid anchors stiffen most, from a thousandth on.
+fn rigid_anchors(compiled: &CompiledModel) -> Option<RigidAnchors<'_>> {
+    let s = &compiled.structure;
+    let undercut = s.supports.iter().any(|support| support.undercut.is_some());
+    if compiled.options.anchors == Anchors::Elastic || (compiled.options.anchors == Anchors::Auto && undercut) {
+        return None;
+    }
+    let (beam, stiffening) = anchor_root::stiffening(s).filter(|(_, share)| *share >= 1e-3)?;
+    Some(RigidAnchors { beam: &s.beams[beam].name, stiffening })
 }
 
 /// Effect of the formulation on the model, in a line; empty for the bodies' own coordinates.

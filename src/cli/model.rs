@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::options::Chosen;
 use super::{interrupt, progress, value};
-use bimorph::compile::{CompileOptions, CompiledModel, Junctions, ParsedStructure, compile, draw};
+use bimorph::compile::{Anchors, CompileOptions, CompiledModel, Junctions, ParsedStructure, compile, draw};
 use bimorph::input::{self, InputBundle, LayoutChoice};
 use bimorph::layout::LayoutFormat;
 use bimorph::layout::drawing::FlatLayout;
@@ -127,7 +127,14 @@ impl ModelArgs {
             let got = format!("\"{}\" with --solver frame, which has no other", options.junctions.name());
             return Err(Failure::bad("--junctions", "centreline", got));
         }
-        options.junctions = Junctions::Centreline;
+        if options.anchors == Anchors::Elastic {
+            return Err(Failure::bad(
+                "--anchors",
+                "rigid",
+                "\"elastic\" with --solver frame, whose anchors are rigid".to_owned(),
+            ));
+        }
+        (options.junctions, options.anchors) = (Junctions::Centreline, Anchors::Rigid);
         let mut compiled = compile(&self.bundle()?, &options)?;
         // that of the recursion's mesh is no frame's
         compiled.order.estimated_error = None;
@@ -262,6 +269,12 @@ impl Serialize for OrderedMap<'_, Setting> {
 /// The same for values that JSON knows.
 #[derive(Debug)]
 pub(crate) struct JsonMap<'a, T>(pub(crate) &'a [(String, T)]);
+
+impl<T> JsonMap<'_, T> {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
 
 impl<T: Serialize> Serialize for JsonMap<'_, T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

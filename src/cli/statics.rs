@@ -27,7 +27,8 @@ use std::fmt::Write;
 /// Static equilibrium: displacement of every node, temperatures, port currents and charges.
 ///
 /// The equilibrium is the one reached from rest by raising all loads and voltages together. JSON: "nodes" holds x [m],
-/// y [m] and rz [rad] from the drawn place; "temperatures_k", "currents_a", "charges_c" and "permanent_strains" by name.
+/// y [m] and rz [rad] from the drawn place; "temperatures_k", "currents_a", "charges_c" and "permanent_strains" by name, and "stresses_pa",
+/// the largest stress in each beam whose layer has a strength.
 ///
 /// The estimated error is of the displacement of each node as a vector, of a thirtieth of the largest where a node
 /// moves less. The relative error of a small component, or of a small rotation beside large displacements, may be
@@ -46,7 +47,7 @@ pub(crate) struct StaticCommand {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// Show these only, in the text and in CSV and raw files (JSON documents are whole): NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i, PORT.q, or sums such as a.x-0.5*b.x; a,b or repeated
+    /// Show these only, in the text and in CSV and raw files (JSON documents are whole): NODE.x, NODE.y, NODE.rz, BEAM.T, BEAM.stress, PORT.i, PORT.q, or sums such as a.x-0.5*b.x; a,b or repeated
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 
@@ -66,6 +67,8 @@ pub(crate) struct StaticCommand {
 struct StaticDocument<'a> {
     nodes: JsonMap<'a, NodeMotion>,
     temperatures_k: JsonMap<'a, f64>,
+    #[serde(skip_serializing_if = "JsonMap::is_empty")]
+    stresses_pa: JsonMap<'a, f64>,
     currents_a: JsonMap<'a, f64>,
     charges_c: JsonMap<'a, f64>,
     permanent_strains: JsonMap<'a, f64>,
@@ -106,6 +109,7 @@ impl StaticCommand {
         let document = StaticDocument {
             nodes: JsonMap(&result.nodes),
             temperatures_k: JsonMap(&result.temperatures_k),
+            stresses_pa: JsonMap(&result.stresses_pa),
             currents_a: JsonMap(&result.currents_a),
             charges_c: JsonMap(&result.charges_c),
             permanent_strains: JsonMap(&permanent_strains),
@@ -153,7 +157,12 @@ fn table(title: &str, result: &StaticResult, names: &[String]) -> Result<Table, 
             table.push_real(&format!("{name}.{suffix}"), unit, vec![value])?;
         }
     }
-    let lists = [(&result.temperatures_k, "T", "K"), (&result.currents_a, "i", "A"), (&result.charges_c, "q", "C")];
+    let lists = [
+        (&result.temperatures_k, "T", "K"),
+        (&result.stresses_pa, "stress", "Pa"),
+        (&result.currents_a, "i", "A"),
+        (&result.charges_c, "q", "C"),
+    ];
     for (list, suffix, unit) in lists {
         for (name, value) in list {
             table.push_real(&format!("{name}.{suffix}"), unit, vec![*value])?;
@@ -230,6 +239,7 @@ fn text(compiled: &CompiledModel, result: &StaticResult, strains: &[(String, f64
     let mut text = report::columns(&["node", "x", "y", "rz"], &rows);
     for (list, unit, head) in [
         (&result.temperatures_k, "K", ["beam", "temperature"]),
+        (&result.stresses_pa, "Pa", ["beam", "stress"]),
         (&result.currents_a, "A", ["port", "current"]),
         (&result.charges_c, "C", ["port", "charge"]),
     ] {

@@ -71,7 +71,7 @@ pub(crate) struct SweepCommand {
     #[arg(long, short = 'n')]
     count: Option<usize>,
 
-    /// Static: columns wanted, NODE.x, NODE.y, NODE.rz, PORT.i, PORT.q, BEAM.T, or sums such as a.x-0.5*b.x [default: every node]; tran: signals at the end
+    /// Static: columns wanted, NODE.x, NODE.y, NODE.rz, PORT.i, PORT.q, BEAM.T, BEAM.stress, or sums such as a.x-0.5*b.x [default: every node]; tran: signals at the end
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 

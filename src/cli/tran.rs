@@ -28,11 +28,10 @@ use std::path::PathBuf;
 /// If the steps of a run prove to have a larger error than its mesh leaves of --tol, the run is repeated with sharper
 /// ones, where that takes some seconds at most.
 ///
-/// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C], GAP.gap
-/// [m], GAP.C [F], GAP.F [N], PORT.q [C], PORT.i [A]. JSON: "frequencies_hz": ascending [Hz]. "shapes": for each mode the displacement of every
-/// node, the largest translation being 1. "residuals": approximate relative error of each shape. "estimated_errors":
-/// relative errors by the number of segments, one for each mode, signed about the drawing, null where unknown.
-/// "deflection_m": distance of their equilibrium from the drawing.
+/// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], BEAM.stress [Pa], GAP.q [C], GAP.gap
+/// [m], GAP.C [F], GAP.F [N], PORT.q [C], PORT.i [A]. JSON: "t": times [s]. "signals" and
+/// "units" by name. "events": crossings of --event. "step_error": estimated error of the steps. "reliable_until" and "after_contact": time [s] up to
+/// which single values hold --tol where parts bounce, and mean values after it.
 #[derive(Debug, Args)]
 #[command(after_help = "Methods, with their orders; steps follow --tol, or are equal with --step:\n  \
     rodas4 (4)             the default: one factorization a step; fast motions die out\n  \

@@ -1,5 +1,6 @@
 //! Results of the models, against closed forms and published or independently computed numbers.
 
+mod anchors;
 mod backbending;
 mod baselines;
 mod beams;
@@ -42,6 +43,7 @@ mod solvers;
 mod sprung_loops;
 mod sprung_loops_motion;
 mod stability_losses;
+mod stress;
 mod vm236;
 mod warnings;
 

@@ -72,6 +72,7 @@ pub fn frame_statics(
     let result = StaticResult {
         nodes,
         temperatures_k: electrical.temperatures_k,
+        stresses_pa: Vec::new(),
         currents_a: electrical.currents_a,
         charges_c: (0..electrics.ports).map(|p| (electrics.names[p].clone(), charge(p))).collect(),
         pulled_in: false,

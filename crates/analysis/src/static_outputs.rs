@@ -8,7 +8,7 @@ use bimorph_structure::Structure;
 use std::collections::HashSet;
 
 /// Names of the numbers of a static result.
-pub const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q";
+pub const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, BEAM.stress, PORT.i or PORT.q";
 
 /// A number of a static result.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +28,8 @@ impl Quantity for StaticOutput {
 enum StaticPart {
     Node,
     Beam,
+    /// A beam whose strength is known.
+    StressedBeam,
     Port,
 }
 
@@ -38,6 +40,7 @@ fn split(name: &str) -> Option<(&str, &str, StaticPart, &'static str)> {
         "x" | "y" => (StaticPart::Node, "m"),
         "rz" => (StaticPart::Node, "rad"),
         "T" => (StaticPart::Beam, "K"),
+        "stress" => (StaticPart::StressedBeam, "Pa"),
         "i" => (StaticPart::Port, "A"),
         "q" => (StaticPart::Port, "C"),
         _ => return None,
@@ -58,7 +61,11 @@ fn unknown<'a>(name: &str, known: impl Iterator<Item = (&'a str, StaticPart)>) -
 fn parts(result: &StaticResult) -> impl Iterator<Item = (&str, StaticPart)> {
     let nodes = result.nodes.iter().map(|(name, _)| (name.as_str(), StaticPart::Node));
     let beams = result.temperatures_k.iter().map(|(name, _)| (name.as_str(), StaticPart::Beam));
-    nodes.chain(beams).chain(result.currents_a.iter().map(|(name, _)| (name.as_str(), StaticPart::Port)))
+    let stressed = result.stresses_pa.iter().map(|(name, _)| (name.as_str(), StaticPart::StressedBeam));
+    nodes
+        .chain(beams)
+        .chain(stressed)
+        .chain(result.currents_a.iter().map(|(name, _)| (name.as_str(), StaticPart::Port)))
 }
 
 fn output(result: &StaticResult, name: &str) -> Option<StaticOutput> {
@@ -70,6 +77,7 @@ fn output(result: &StaticResult, name: &str) -> Option<StaticOutput> {
         "y" => node()?.y,
         "rz" => node()?.rz,
         "T" => listed(&result.temperatures_k)?,
+        "stress" => listed(&result.stresses_pa)?,
         "i" => listed(&result.currents_a)?,
         _ => listed(&result.charges_c)?,
     };
@@ -99,8 +107,10 @@ pub fn check(structure: &Structure, texts: &[String]) -> Result<(), ReadoutError
     let nodes =
         structure.nodes.iter().filter(|node| node.mechanical).map(|node| (node.name.as_str(), StaticPart::Node));
     let beams = structure.beams.iter().map(|beam| (beam.name.as_str(), StaticPart::Beam));
+    let strong = structure.beams.iter().filter(|beam| beam.material.strength.is_some());
+    let stressed = strong.map(|beam| (beam.name.as_str(), StaticPart::StressedBeam));
     let ports = structure.ports.iter().map(|port| (port.name.as_str(), StaticPart::Port));
-    let known: HashSet<(&str, StaticPart)> = nodes.chain(beams).chain(ports).collect();
+    let known: HashSet<(&str, StaticPart)> = nodes.chain(beams).chain(stressed).chain(ports).collect();
     let find = |name: &str| match split(name) {
         Some((part, _, kind, unit)) if known.contains(&(part, kind)) => Ok(StaticOutput { unit, value: 0.0 }),
         _ => Err(unknown(name, known.iter().copied())),

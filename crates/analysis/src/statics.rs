@@ -5,13 +5,14 @@ use super::loose_parts;
 use super::weak_parts;
 use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::readout::signal::{Signal, SignalView};
+use crate::readout::stress;
 use bimorph_domains::Drive;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::SolveError;
 use bimorph_solve::equilibrium::{Equilibrium, EquilibriumOptions, LossKind, Path, StabilityLoss};
 use bimorph_solve::path::{LoadPath, SourcePath};
-use bimorph_structure::MOLTEN;
+use bimorph_structure::{Beam, MOLTEN};
 use serde::Serialize;
 
 /// A static equilibrium.
@@ -21,6 +22,9 @@ pub struct StaticResult {
     pub nodes: Vec<(String, NodeMotion)>,
     /// Mean temperature of every heated or prescribed beam (K), by name.
     pub temperatures_k: Vec<(String, f64)>,
+    /// Largest stress on the faces of every beam whose strength is known (Pa), by name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stresses_pa: Vec<(String, f64)>,
     /// Current into each port (A), by name.
     pub currents_a: Vec<(String, f64)>,
     /// Charge on each port (C), by name.
@@ -127,6 +131,7 @@ pub(crate) fn result_at(compiled: &CompiledModel, point: &OperatingPoint) -> Sta
     StaticResult {
         nodes: node_motions(compiled, &point.q),
         temperatures_k: electrical.temperatures_k,
+        stresses_pa: stresses(compiled, point).map(|(beam, stress)| (beam.name.clone(), stress)).collect(),
         currents_a: electrical.currents_a,
         charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
         pulled_in,
@@ -138,6 +143,25 @@ pub(crate) fn result_at(compiled: &CompiledModel, point: &OperatingPoint) -> Sta
         iterations: point.path.iterations,
         warnings: Vec::new(),
     }
+}
+
+/// Largest stress of every beam whose strength is known (Pa).
+fn stresses<'a>(compiled: &'a CompiledModel, point: &'a OperatingPoint) -> impl Iterator<Item = (&'a Beam, f64)> {
+    let known = compiled.structure.beams.iter().enumerate();
+    let known = known.filter(|(k, beam)| beam.material.strength.is_some() && !compiled.parts.stressed[*k].rigid);
+    known.filter_map(|(k, beam)| Some((beam, stress::largest(compiled, k, &point.q, &point.rise)?.value())))
+}
+
+/// The beam whose stress exceeds its strength by the largest factor, as a sentence.
+pub(crate) fn too_stressed(compiled: &CompiledModel, point: &OperatingPoint) -> Option<String> {
+    let over = |(beam, stress): (&'_ Beam, f64)| stress / beam.material.strength.unwrap_or(f64::INFINITY);
+    let worst = stresses(compiled, point).max_by(|a, b| over(*a).total_cmp(&over(*b)))?;
+    let (beam, stress) = worst;
+    let strength = beam.material.strength.filter(|strength| stress > *strength)?;
+    Some(format!(
+        "the stress in `{}` is {stress:.3e} Pa, above the strength of its layer, {strength:.3e} Pa",
+        beam.name
+    ))
 }
 
 /// Source voltages and temperature rises, without any mechanics.

@@ -67,7 +67,7 @@ fn plain(folder: &Path, scratch: &Path) -> Result<PathBuf, CosimError> {
 mod tests {
     use super::*;
 
-    /// What a killed run of the same process identifier left behind is no obstacle, and two runs of a process have folders of their own.
+    /// A folder that a killed run of the same process identifier left behind is no obstacle, and two runs of a process have folders of their own.
     #[test]
     fn folders_of_killed_runs_do_not_matter() {
         let left = std::env::temp_dir().join(format!("bimorph-cosim-{}-0", std::process::id()));

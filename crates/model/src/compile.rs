@@ -12,7 +12,7 @@ use bimorph_structure::{FrontEnd, Structure};
 use std::sync::Arc;
 use thiserror::Error;
 
-pub use crate::options::{CompileOptions, Formulation, Junctions, Scheme};
+pub use crate::options::{Anchors, CompileOptions, Formulation, Junctions, Scheme};
 
 /// A ready model with everything it came from.
 #[derive(Debug, Clone)]
@@ -129,7 +129,7 @@ pub fn draw(source: &dyn FrontEnd, options: &CompileOptions) -> Result<ParsedStr
     let scheme = options.scheme.in_formulation(options.formulation);
     let mut options = CompileOptions { scheme, ..options.clone() };
     if options.as_sugar {
-        (options.linear, options.junctions) = (true, Junctions::Centreline);
+        (options.linear, options.junctions, options.anchors) = (true, Junctions::Centreline, Anchors::Rigid);
     }
     let loaded = source.load(&options.set).map_err(CompileError::Netlist)?;
     let structure = if options.without_circuit { loaded.structure.without_circuit() } else { loaded.structure };

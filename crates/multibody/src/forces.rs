@@ -84,8 +84,30 @@ pub struct RestStrain<'a> {
 /// Force along the axis of a joint (N), tension positive.
 #[inline]
 pub fn axial_force(model: &Model, joint: &PackedJoint, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
+    resultants(model, joint, q, rest).x
+}
+
+/// Normal force, shear force and moment of a joint (N, N, N·m).
+#[inline]
+pub fn resultants(model: &Model, joint: &PackedJoint, q: &[Pose], rest: &RestStrain<'_>) -> Vector3<f64> {
     let section = model.section(joint);
-    joint.stress(section, &HalfTurnCache::new().kinematics(model.linear, joint, section, q), rest).x
+    joint.stress(section, &HalfTurnCache::new().kinematics(model.linear, joint, section, q), rest)
+}
+
+/// Change of [`resultants`] with a change `dq` of the configuration and `rest` of the free strains.
+#[inline]
+pub fn resultants_change(
+    model: &Model,
+    joint: &PackedJoint,
+    q: &[Pose],
+    dq: &[Pose],
+    rest: &RestStrain<'_>,
+) -> Vector3<f64> {
+    let section = model.section(joint);
+    let k = HalfTurnCache::new().kinematics(model.linear, joint, section, q);
+    let (da, db) = (pose(dq, joint.place.a), pose(dq, joint.place.b));
+    let strain = k.rows() * nalgebra::Vector6::new(da.x, da.y, da.z, db.x, db.y, db.z);
+    section.stiffness * (strain - Vector3::new(joint.offset(section, rest), 0.0, 0.0))
 }
 
 /// Change of [`axial_force`] with a change `dq` of the configuration (N).

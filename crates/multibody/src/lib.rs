@@ -49,5 +49,5 @@ pub mod unstressed;
 pub use body::{Body, BodyName, Drag};
 pub use factor::{BlockMatrix, Scalar};
 pub use joint::{BodyId, Coupling, Damper, Joint};
-pub use model::{Model, State};
+pub use model::{Model, ModelOrder, State};
 pub use pattern::Pattern;

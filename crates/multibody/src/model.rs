@@ -57,16 +57,37 @@ impl State {
     }
 }
 
+/// Where the bodies and joints that a model is made of went.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModelOrder {
+    /// Place of each body in the elimination order.
+    pub bodies: Vec<usize>,
+    /// Place of each joint among [`Model::joints`].
+    pub joints: Vec<u32>,
+}
+
 impl Model {
     /// Builds a model in elimination order. `bodies` come in any order; `Free(k)` in joints, dampers and `couplings`
     /// (further pairs that forces will couple) means `bodies[k]`. Also returns where each given body went.
     pub fn new(
         bodies: Vec<Body>,
         joints: Vec<Joint>,
-        mut dampers: Vec<Damper>,
+        dampers: Vec<Damper>,
         couplings: &[(BodyId, BodyId)],
         linear: bool,
     ) -> (Self, Vec<usize>) {
+        let (model, ModelOrder { bodies, .. }) = Self::ordered(bodies, joints, dampers, couplings, linear);
+        (model, bodies)
+    }
+
+    /// The same, with the order of the joints too.
+    pub fn ordered(
+        bodies: Vec<Body>,
+        joints: Vec<Joint>,
+        mut dampers: Vec<Damper>,
+        couplings: &[(BodyId, BodyId)],
+        linear: bool,
+    ) -> (Self, ModelOrder) {
         let pairs = joints.iter().map(|j| (j.a, j.b)).chain(dampers.iter().map(|d| (d.a, d.b)));
         let mut edges: Vec<(usize, usize)> = Vec::with_capacity(joints.len() + dampers.len() + couplings.len());
         edges.extend(pairs.chain(couplings.iter().copied()).filter_map(|pair| match pair {
@@ -117,7 +138,9 @@ impl Model {
             damper_place,
             damper_matrix,
         };
-        (model, place.clone())
+        let mut joint_place = vec![0; model.joints.len()];
+        (0..).zip(&sorted).for_each(|(at, (_, k))| joint_place[*k as usize] = at);
+        (model, ModelOrder { bodies: place.clone(), joints: joint_place })
     }
 
     /// Couples joints, bodies numbered in elimination order. Their [`Coupling::pairs`] must have been among the couplings

@@ -8,8 +8,11 @@ use serde::{Deserialize, Serialize};
 pub struct Material {
     /// Young's modulus (Pa).
     pub youngs_modulus: f64,
-    /// Poisson's ratio (1).
+    /// Poisson's ratio (1); of silicon with a `crystal`, the contraction across the thickness.
     pub poisson: f64,
+    /// Shear modulus in the drawing plane (Pa); none: E/(2·(1 + ν)).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shear_modulus: Option<f64>,
     /// Mass density (kg/m³).
     pub density: f64,
     /// Dynamic viscosity of the gas around the part (Pa·s); 0 without damping.
@@ -22,6 +25,9 @@ pub struct Material {
     pub ambient_temperature: f64,
     /// Residual stress of the layer (Pa), tensile positive.
     pub stress: f64,
+    /// Stress that the material bears (Pa), where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strength: Option<f64>,
 }
 
 /// Temperature at which all structural solids have melted; tungsten does at 3695 K (K).
@@ -133,6 +139,9 @@ pub struct Support {
     pub held: [bool; 3],
     /// Angle of the local x axis (rad).
     pub angle: f64,
+    /// Distance by which the pad is etched free at its edge (m), where the layer says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub undercut: Option<f64>,
 }
 
 /// The outline of an anchor's pad, for drawings: from its node along local x, and as much to either side.

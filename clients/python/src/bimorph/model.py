@@ -121,6 +121,7 @@ class Model:
             free_motions=tuple(answer.free_motions),
             passed=tuple(_loss(one) for one in answer.passed),
             permanent_strains=by_name(answer.permanent_strains),
+            stresses_pa=by_name(answer.stresses_pa),
         )
 
     def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:

@@ -20,6 +20,11 @@ class Options(TypedDict, total=False):
     with springs there, from two-dimensional elasticity (docs/explanation/junctions.md). One of centreline,
     offset or calibrated; default: calibrated."""
 
+    anchors: Literal["auto", "rigid", "elastic"] | None
+    """How anchors hold beams. rigid: they do not give way; elastic: each beam ends in the compliance of its root,
+    a pad of its layer on a base of like stiffness; auto: elastic where the layer of the anchor has an
+    `undercut`, else rigid (docs/explanation/junctions.md). One of auto, rigid or elastic; default: auto."""
+
     linear: bool | None
     """Small displacements about the drawn geometry, as SUGAR."""
 
@@ -67,6 +72,7 @@ WIRE = {
     "tol": "tol",
     "band": "band_hz",
     "junctions": "junctions",
+    "anchors": "anchors",
     "linear": "linear",
     "undamped": "undamped",
     "scheme": "scheme",

@@ -77,6 +77,8 @@ class StaticResult:
     """Losses of stability between rest and the load, in their order."""
     permanent_strains: dict[str, float] = field(default_factory=dict)
     """Permanent strain of each beam that can yield [1], negative if it is shorter; of a call with ``backbend``."""
+    stresses_pa: dict[str, float] = field(default_factory=dict)
+    """Largest stress on the faces of each beam whose layer has a ``strength`` [Pa]."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """Displacement [m] and rotation [rad] of every node; ``attrs["units"]`` has the units."""

@@ -102,6 +102,7 @@ class Checked:
         self.names("nodes", (node.name for node in answer.nodes))
         for what, values in (
             ("temperatures_k", answer.temperatures_k),
+            ("stresses_pa", answer.stresses_pa),
             ("currents_a", answer.currents_a),
             ("charges_c", answer.charges_c),
             ("permanent_strains", answer.permanent_strains),

@@ -19,7 +19,7 @@ use super::hidden_instability::{Hidden, hidden};
 use super::refined::Refinement;
 use super::remeshed::{chosen, meshed, on};
 use super::softening;
-use super::warnings::{near_buckling, of_fingers, of_heat, of_segments, of_stress};
+use super::warnings::{near_buckling, of_fingers, of_heat, of_segments, of_strength, of_stress};
 use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::doubling::{self, Output};
@@ -344,7 +344,8 @@ pub fn operating_point_warnings(fitted: &CompiledModel, point: &OperatingPoint) 
 
 /// Warnings about a state in motion that can be evaluated at once, as for an equilibrium.
 pub fn transient_warnings(fitted: &CompiledModel, point: &OperatingPoint) -> Vec<Diagnostic> {
-    of_fingers(fitted, point).into_iter().chain(of_heat(fitted, point)).collect()
+    let reported = of_fingers(fitted, point).into_iter().chain(of_heat(fitted, point));
+    reported.chain(of_strength(fitted, point)).collect()
 }
 
 /// Warnings about an equilibrium beside its mesh: stress stiffening omitted by a linear model, and combs and

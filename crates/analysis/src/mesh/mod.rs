@@ -56,7 +56,7 @@ use pull_in::for_pull_in;
 pub use pull_in::pull_in_fitted;
 use remeshed::on;
 use section_inertia::with_section_inertia;
-use warnings::{of_fingers, of_heat, of_stress};
+use warnings::{of_fingers, of_heat, of_strength, of_stress};
 
 pub use equilibrium::{operating_point_warnings, transient_warnings};
 pub use in_circuit::{in_circuit, twice};
@@ -136,11 +136,13 @@ pub fn fitted_in_time(
 pub fn run_warnings(moving: &CompiledModel, start: Option<&CompiledModel>, voltages: &PortVoltages) -> Vec<Diagnostic> {
     let share = if moving.options.linear { left_out_in_time(moving, start, voltages) } else { None };
     let drawn = &moving.structure;
-    let some = !(drawn.combs.is_empty() && moving.parts.heaters.is_empty());
+    let strong = drawn.beams.iter().any(|beam| beam.material.strength.is_some());
+    let some = strong || !(drawn.combs.is_empty() && moving.parts.heaters.is_empty());
     let end = if some { operating_point(moving, voltages).ok() } else { None };
     let there = end.as_ref();
     let reported = of_stress(moving, share).into_iter().chain(there.and_then(|end| of_fingers(moving, end)));
-    reported.chain(there.and_then(|end| of_heat(moving, end))).collect()
+    let reported = reported.chain(there.and_then(|end| of_heat(moving, end)));
+    reported.chain(there.and_then(|end| of_strength(moving, end))).collect()
 }
 
 /// Effect of stress on a linear run, from its first state to its final equilibrium.

@@ -2,7 +2,7 @@
 
 use super::super::contact_range::comb_beyond_reported;
 use super::super::rotary_inertia_error;
-use super::super::statics::{OperatingPoint, too_hot};
+use super::super::statics::{OperatingPoint, too_hot, too_stressed};
 use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::ErrorBudget;
@@ -15,6 +15,8 @@ const SEGMENTS: &str = "W042";
 const STRESS: &str = "W041";
 /// Code of the warning that the fingers of a comb go through its other side.
 const FINGERS: &str = "W024";
+/// Code of the warning that a beam is stressed beyond its strength.
+const STRENGTH: &str = "W051";
 /// Code of the warning that nothing is solid at a temperature.
 const HEAT: &str = "W037";
 /// Code of the warning that the steps of a run are longer than what it begins with.
@@ -30,7 +32,9 @@ pub fn warnings(fitted: &CompiledModel) -> impl Iterator<Item = String> {
         .warnings
         .items
         .iter()
-        .filter(|d| [WARNING, STRESS, SEGMENTS, FINGERS, HEAT, STEPS, ROTARY, BUCKLING].contains(&d.code.as_str()))
+        .filter(|d| {
+            [WARNING, STRESS, SEGMENTS, FINGERS, HEAT, STRENGTH, STEPS, ROTARY, BUCKLING].contains(&d.code.as_str())
+        })
         .map(|d| d.message.clone())
 }
 
@@ -102,6 +106,12 @@ pub(super) fn near_buckling(point: &OperatingPoint) -> Option<Diagnostic> {
 pub(super) fn of_heat(compiled: &CompiledModel, point: &OperatingPoint) -> Option<Diagnostic> {
     let message = too_hot(compiled, point)?;
     Some(Diagnostic::warning(HEAT, message, "volts, not millivolts; `thermcond` in W/m/K, `sheetresistance` in Ω"))
+}
+
+/// Where the stress in a beam exceeds its strength.
+pub(super) fn of_strength(compiled: &CompiledModel, point: &OperatingPoint) -> Option<Diagnostic> {
+    let message = too_stressed(compiled, point)?;
+    Some(Diagnostic::warning(STRENGTH, message, "a wider or longer beam, less travel, or a stop before it"))
 }
 
 /// Where segments are too long for the field along them, with the gap that leaves out most and the error of the deflection (1).

@@ -153,7 +153,7 @@ fn offered(compiled: &CompiledModel, name: &str) -> Result<(Input, PortKind, Por
             "a beam that knows heat",
             "whose temperature is prescribed; draw it as beam2det to give it a thermal port",
         ),
-        Ok(Signal::Charge(_) | Signal::Distance(_) | Signal::Capacitance(_) | Signal::Pull(_)) => {
+        Ok(Signal::Stress(_) | Signal::Charge(_) | Signal::Distance(_) | Signal::Capacitance(_) | Signal::Pull(_)) => {
             refused("NODE.x|y|rz|vx|vy|vrz, BEAM.T or frame.ax|ay|wz", "which can be monitored but not driven")
         }
         Err(_) => {

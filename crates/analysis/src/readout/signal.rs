@@ -1,7 +1,7 @@
 //! Quantities that can be read from a state by name.
 
-use super::ReadoutError;
 use super::expression::{Expression, Quantity};
+use super::{ReadoutError, stress};
 use bimorph_base::suggest::nearest;
 use bimorph_domains::MaterialPoint;
 use bimorph_model::compile::CompiledModel;
@@ -19,6 +19,8 @@ pub enum Signal {
     Temperature(usize),
     /// A temperature that the netlist prescribes (K).
     Prescribed(f64),
+    /// Largest stress on the faces of a beam, along all of it (Pa).
+    Stress(usize),
     /// Charge of gap g (C).
     Charge(usize),
     /// Distance left in gap g (m).
@@ -43,8 +45,8 @@ pub struct SignalView<'a> {
 }
 
 impl Signal {
-    /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, the same of `BEAM[k]`, the k-th point along a beam from 0, `BEAM.T`, `GAP.q`, `GAP.gap`, `GAP.C`,
-    /// `GAP.F`.
+    /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, the same of `BEAM[k]`, the k-th point along a beam from 0, `BEAM.T`, `BEAM.stress`,
+    /// `GAP.q`, `GAP.gap`, `GAP.C`, `GAP.F`.
     ///
     /// # Errors
     /// [`ReadoutError::UnknownSignal`] with what would be understood.
@@ -68,6 +70,11 @@ impl Signal {
             "gap" => gap().map(Self::Distance),
             "C" => gap().map(Self::Capacitance),
             "F" => gap().map(Self::Pull),
+            "stress" => {
+                let beam = compiled.structure.beams.iter().position(|b| b.name == part)?;
+                let known = !compiled.parts.stressed[beam].rigid;
+                known.then_some(Self::Stress(beam))
+            }
             "T" => {
                 let beam = compiled.structure.beams.iter().position(|b| b.name == part)?;
                 match compiled.parts.heaters.iter().position(|&b| b == beam) {
@@ -93,6 +100,9 @@ impl Signal {
             Self::Rate(p, d) => point_rate(p, state.q, state.v, linear)[d],
             Self::Temperature(k) => system.electrics.heating.heaters[k].ambient + state.rise[k],
             Self::Prescribed(t) => t,
+            Self::Stress(beam) => {
+                stress::largest(compiled, beam, state.q, state.rise).map_or(0.0, |found| found.value())
+            }
             Self::Charge(g) => system.capacitance(g, state.q) * state.volts[g],
             Self::Distance(g) => system.distance(g, state.q),
             Self::Capacitance(g) => system.capacitance(g, state.q),
@@ -116,6 +126,8 @@ impl Signal {
             }
             Self::Temperature(k) => change.rise[k],
             Self::Prescribed(_) => 0.0,
+            Self::Stress(beam) => stress::largest(compiled, beam, state.q, state.rise)
+                .map_or(0.0, |found| found.slope(compiled, state.q, change.q, change.rise)),
             Self::Charge(g) => {
                 system.capacitance(g, state.q) * change.volts[g]
                     + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
@@ -138,6 +150,7 @@ impl Quantity for Signal {
             Self::Charge(_) => "C",
             Self::Capacitance(_) => "F",
             Self::Pull(_) => "N",
+            Self::Stress(_) => "Pa",
         }
     }
 }
@@ -167,10 +180,14 @@ pub fn names(compiled: &CompiledModel) -> Vec<String> {
     let moves = |i: usize| compiled.parts.nodes[i].is_some_and(|p| matches!(p.body, BodyId::Free(_)));
     let nodes = compiled.structure.nodes.iter().enumerate().filter(|(i, _)| moves(*i));
     let motions = nodes.flat_map(|(_, n)| DIRECTIONS.map(|quantity| format!("{}.{quantity}", n.name)));
-    let temperatures = compiled.structure.beams.iter().map(|b| format!("{}.T", b.name));
+    let beams = compiled.structure.beams.iter().zip(&compiled.parts.stressed);
+    let of_beams = beams.flat_map(|(b, stressed)| {
+        let known = !stressed.rigid;
+        [Some("T"), known.then_some("stress")].into_iter().flatten().map(|quantity| format!("{}.{quantity}", b.name))
+    });
     let gaps = compiled.parts.gap_names.iter();
     let of_gaps = gaps.flat_map(|gap| ["gap", "q", "C", "F"].map(|quantity| format!("{gap}.{quantity}")));
-    motions.chain(temperatures).chain(of_gaps).collect()
+    motions.chain(of_beams).chain(of_gaps).collect()
 }
 
 /// Components of the motion of a node: displacements, then rates.
@@ -212,7 +229,7 @@ fn hint(compiled: &CompiledModel, name: &str) -> String {
     let beams = compiled.structure.beams.iter().map(|b| b.name.as_str());
     let known: Vec<&str> =
         nodes.into_iter().chain(beams).chain(compiled.parts.gap_names.iter().map(String::as_str)).collect();
-    let expected = "expected NODE.x|y|rz|vx|vy|vrz, BEAM.T, GAP.q|gap|C|F";
+    let expected = "expected NODE.x|y|rz|vx|vy|vrz, BEAM.T|stress, GAP.q|gap|C|F";
     if let Some((near, (_, quantity))) = nearest(part, known.iter().copied()).zip(name.rsplit_once('.')) {
         return format!("no node, beam or gap of that name; did you mean {near}.{quantity}? ({expected})");
     }

@@ -124,6 +124,8 @@ impl<'a> OfStructure<'a> {
             ("thermalexpansion", m.thermal_expansion),
             ("ambienttemperature", m.ambient_temperature),
             ("stress", m.stress),
+            ("strength", m.strength.unwrap_or(0.0)),
+            ("shearmodulus", m.shear_modulus.unwrap_or(0.0)),
         ];
         let heated = beam.heater.is_some() || beam.temperature.is_some();
         entries.extend(optional.into_iter().filter(|(name, v)| *v != 0.0 || (heated && *name == "thermalexpansion")));
@@ -291,7 +293,9 @@ impl<'a> OfStructure<'a> {
                 }
             };
             let size = pads.get(&k).map(|[l, w]| [("l", *l), ("w", *w)]);
-            let parameters: Vec<_> = size.into_iter().flatten().chain([("oz", support.angle)]).collect();
+            let undercut = support.undercut.map(|undercut| ("undercut", undercut));
+            let parameters: Vec<_> =
+                size.into_iter().flatten().chain(undercut).chain([("oz", support.angle)]).collect();
             self.push(&support.name, model, "*", &[support.node], &parameters);
         }
     }

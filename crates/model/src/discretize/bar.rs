@@ -24,6 +24,6 @@ pub fn bar(beam: &Beam, shear: bool, rotary: bool) -> Bar {
 /// Shear flexibility 1/(G·As) of a beam's section (1/N).
 pub(super) fn shear_flexibility(beam: &Beam) -> f64 {
     let m = &beam.material;
-    let shear_modulus = m.youngs_modulus / (2.0 * (1.0 + m.poisson));
+    let shear_modulus = m.shear_modulus.unwrap_or_else(|| m.youngs_modulus / (2.0 * (1.0 + m.poisson)));
     1.0 / (SHEAR_COEFFICIENT * shear_modulus * beam.width * beam.thickness)
 }

@@ -10,6 +10,7 @@ use super::junction_springs::JunctionEnd;
 use super::rigid::{Lump, RigidGroups};
 use super::scheme::{Bar, SegmentJoint, SegmentedBeam};
 use super::sprung::second_strain;
+use super::stressed::SegmentSpan;
 use crate::options::{CompileOptions, Junctions, Scheme};
 use bimorph_domains::MaterialPoint;
 use bimorph_multibody::{BodyName, Coupling, Joint};
@@ -26,6 +27,8 @@ pub struct JointBuilder {
     pub couplings: Vec<Coupling>,
     /// The bodies of the beam at hand.
     bodies: Vec<MaterialPoint>,
+    /// For each beam so far, its joints.
+    pub of_beams: Vec<Vec<SegmentSpan>>,
     /// Beams that were cut before: those of a drawing are mostly alike.
     known: Vec<StiffenedBeam>,
 }
@@ -52,7 +55,7 @@ pub fn lay(
     bar.length -= ends[0].offset + ends[1].offset;
     let give = shear_flexibility(beam);
     let drawn_as = JointProperties { bar, give, segments, wall: rigid.grounded(beam.b.0), ends: *ends };
-    let JointBuilder { joints, couplings, bodies, known } = out;
+    let JointBuilder { joints, couplings, bodies, of_beams, known } = out;
     let StiffenedBeam { cut, strained, .. } = sprung(known, drawn_as, options);
     let segments = segments.max(1);
     let last = cut.parts.len() - 1;
@@ -79,11 +82,13 @@ pub fn lay(
         - m.stress / m.youngs_modulus;
     // what is drawn expands, junctions included
     let whole = beam.length / bar.length;
+    let mut spans = Vec::with_capacity(cut.pins.len());
     for ((pin, &(stiffness, second)), between) in cut.pins.iter().zip(strained).zip(bodies.windows(2)) {
         let (a, b) = (between[0], between[1]);
         if a.body == b.body {
             continue; // both ends on one rigid body: nothing can strain
         }
+        spans.push(SegmentSpan { joint: joints.len(), length: pin.length, rigid: pin.locked != [false; 3] });
         joints.push(Joint {
             a: a.body,
             b: b.body,
@@ -95,6 +100,7 @@ pub fn lay(
             locked: pin.locked,
         });
     }
+    of_beams.push(spans);
     let pair = |k: usize| (bodies[k].body, bodies[k + 1].body);
     for &(i, j, stiffness) in &cut.couplings {
         couplings.push(Coupling { first: pair(i), second: pair(j), stiffness });
@@ -148,7 +154,8 @@ fn sprung<'a>(
     // a rigid beam is the rods of a single segment, which its one body holds together
     let scheme = if drawn.segments == 0 { Scheme::B } else { options.scheme };
     let cut = scheme.cut(&drawn.bar, drawn.segments.max(1), drawn.wall);
-    let strained = if options.junctions == Junctions::Calibrated {
+    let elastic = drawn.ends.iter().any(|end| end.elastic);
+    let strained = if options.junctions == Junctions::Calibrated || elastic {
         let mut springs = Springs::default();
         (0..cut.pins.len()).map(|k| springs.with(&drawn, &cut, k)).collect()
     } else {

@@ -2,7 +2,7 @@
 //!
 //! | beams at a node | rows of the table |
 //! |---|---|
-//! | one, at an anchor, a plate, a rigid link or a guide that holds the angle | the clamped end |
+//! | one, at an anchor, a plate, a rigid link or a guide that holds the angle | the clamped end; at an elastic anchor [`anchor_root`] |
 //! | two | the corner, by turn and ratio of widths; turn 0 is a step of the width, and nothing without one |
 //! | three or more, two of them in line within 50° | these are a bar; each other one is a stem, each half of the bar feels every stem |
 //! | four, two and two in line | a cross |
@@ -16,6 +16,7 @@
 //! Not in the table: Poisson's ratios other than 0.3, branches of different stiffness or thickness (each takes its own),
 //! ratios of widths beyond 8 and stems that lean by more than 45° (the last row holds).
 
+use super::anchor_root;
 use super::bar::bar;
 use super::junction_mass::{self, Excess, Meetings};
 use super::junction_springs::{JunctionEnd, corner, interpolate};
@@ -23,7 +24,7 @@ use super::junction_table as table;
 use super::overlap::{IN_LINE, Strip, turn};
 use super::rigid::RigidGroups;
 use super::scheme::Bar;
-use crate::options::Junctions;
+use crate::options::{CompileOptions, Junctions};
 use bimorph_base::budget;
 use bimorph_multibody::BodyId;
 use bimorph_structure::{Beam, Structure};
@@ -91,10 +92,12 @@ pub struct JunctionEnds {
 }
 
 /// Finds the junctions of a drawing.
-pub fn find(structure: &Structure, rigid: &RigidGroups, kind: Junctions, undamped: bool) -> JunctionEnds {
+pub fn find(structure: &Structure, rigid: &RigidGroups, options: &CompileOptions) -> JunctionEnds {
+    let CompileOptions { junctions: kind, undamped, .. } = *options;
     let beams = vec![[JunctionEnd::default(); 2]; structure.beams.len()];
     let mut ends = JunctionEnds { beams, meetings: Meetings::default(), excess: Vec::new(), cut: Vec::new() };
-    if kind == Junctions::Centreline {
+    let roots = anchor_root::undercuts(structure, options.anchors);
+    if kind == Junctions::Centreline && roots.iter().all(Option::is_none) {
         return ends;
     }
     let held = rigid_nodes(structure, rigid);
@@ -105,7 +108,15 @@ pub fn find(structure: &Structure, rigid: &RigidGroups, kind: Junctions, undampe
     }
     for node in 0..structure.nodes.len() {
         let branches = at.of(node);
-        if held[node] || (branches.len() == 1 && guided[node]) {
+        if let Some(undercut) = roots[node] {
+            for b in branches {
+                let (beam, end) = (&structure.beams[b.beam], &mut ends.beams[b.beam][b.end]);
+                end.add(&anchor_root::row(beam, undercut), beam, b.width, false);
+                end.elastic = true;
+            }
+        } else if kind == Junctions::Centreline {
+            // meets in a point
+        } else if held[node] || (branches.len() == 1 && guided[node]) {
             for b in branches {
                 ends.beams[b.beam][b.end].add(&table::CLAMP, &structure.beams[b.beam], b.width, false);
             }
@@ -117,9 +128,18 @@ pub fn find(structure: &Structure, rigid: &RigidGroups, kind: Junctions, undampe
             ends.beams[b.beam][b.end].free = true;
         }
     }
+    settle_all(&structure.beams, kind, &mut ends);
+    if kind != Junctions::Centreline {
+        ends.excess = junction_mass::find(structure, &ends.beams, &ends.meetings, undamped);
+    }
+    ends
+}
+
+/// Cuts offsets down where a beam has no room for them, and settles the springs of its ends.
+fn settle_all(beams: &[Beam], kind: Junctions, ends: &mut JunctionEnds) {
     // beams of a drawing are mostly alike
     let mut known: Vec<(Bar, [JunctionEnd; 2], [JunctionEnd; 2])> = Vec::new();
-    for (k, (beam, both)) in structure.beams.iter().zip(&mut ends.beams).enumerate() {
+    for (k, (beam, both)) in beams.iter().zip(&mut ends.beams).enumerate() {
         let share = (both[0].offset + both[1].offset) / (MAX_OFFSET_FRACTION * beam.length);
         if share > 1.0 {
             ends.cut.push(k);
@@ -138,6 +158,7 @@ pub fn find(structure: &Structure, rigid: &RigidGroups, kind: Junctions, undampe
             }
             match kind {
                 Junctions::Calibrated => end.settle(beam, room),
+                _ if end.elastic => end.settle(beam, room),
                 _ => end.spring.fill(0.0),
             }
         }
@@ -145,8 +166,6 @@ pub fn find(structure: &Structure, rigid: &RigidGroups, kind: Junctions, undampe
             known.push((bar, raw, *both));
         }
     }
-    ends.excess = junction_mass::find(structure, &ends.beams, &ends.meetings, undamped);
-    ends
 }
 
 /// Nodes on anchors, plates and rigid links: beams end there where they are drawn.

@@ -24,6 +24,8 @@ pub struct JunctionEnd {
     pub offset: f64,
     /// Compliance of the spring at the edge over (N, V, M) (m/N, rad/N, rad/(N·m)), of the branch seen from the node.
     pub spring: Matrix3<f64>,
+    /// The root of the beam at an elastic anchor, which is compliant with every kind of junction.
+    pub elastic: bool,
     /// Nothing else is there: neither another beam nor something rigid.
     pub free: bool,
 }
@@ -184,12 +186,14 @@ mod tests {
         let material = Material {
             youngs_modulus: 160e9,
             poisson: 0.3,
+            shear_modulus: None,
             density: 2300.0,
             viscosity: 0.0,
             fluid: 2e-6,
             thermal_expansion: 0.0,
             ambient_temperature: 300.0,
             stress: 0.0,
+            strength: None,
         };
         let beam = Beam {
             name: "arm".into(),

@@ -12,6 +12,7 @@
 //! | [`order`] | model order: how many segments a beam gets |
 //! | [`rigid`] | nodes → rigid groups, supports → ground and held directions |
 //! | `free_rotation` | rotations that nothing uses, which are held |
+//! | [`anchor_root`] | the compliance of a beam's root at an elastic anchor |
 //! | [`junction`] | which beams meet where, and what that does to their ends |
 //! | [`junction_limits`] | where a drawing goes beyond the table of junctions |
 //! | [`junction_springs`] | offset and spring at the end of a beam |
@@ -23,9 +24,11 @@
 //! | [`beam`] | a cut beam in the drawing: bodies, masses, joints, points |
 //! | [`cubic`] | the cubic beam element, and the next term of its dynamic stiffness |
 //! | [`frame`] | the same drawing as a linear frame of cubic beam elements: a baseline |
+//! | [`stressed`] | where the stress along each beam is measured |
 //! | `stations` | where along each beam the bodies of its segments measure |
 //! | [`ports`] | resistors, heaters, sources and ports → network and quadratic forms of temperature |
 
+pub mod anchor_root;
 pub(crate) mod bar;
 pub mod beam;
 mod contact_mass;
@@ -46,8 +49,9 @@ pub mod rigid;
 pub mod scheme;
 mod sprung;
 mod stations;
+pub mod stressed;
 
-pub use crate::options::{Junctions, Scheme};
+pub use crate::options::{Anchors, Junctions, Scheme};
 pub use error::{DiscretizeError, MAX_SEGMENTS};
 use free_rotation::BodyActions;
 
@@ -77,6 +81,8 @@ pub struct Assembly {
     pub offsets: Vec<[f64; 2]>,
     /// Effects of junctions on the structure.
     ends: Arc<junction::JunctionEnds>,
+    /// For each beam, its joints, for the stress along it.
+    pub stressed: Vec<stressed::StressedBeam>,
     /// For each heater of the electrics, its beam in the structure.
     pub heaters: Vec<usize>,
     /// Name of each gap of the system, which come before what acts without two sides.
@@ -134,7 +140,7 @@ pub fn discretize_like(
     let mut heaters = Vec::new();
     let ends = match other {
         Some(other) => Arc::clone(&other.ends),
-        None => Arc::new(junction::find(structure, &rigid, options.junctions, options.undamped)),
+        None => Arc::new(junction::find(structure, &rigid, options)),
     };
     for (index, drawn) in structure.beams.iter().enumerate() {
         budget::check();
@@ -147,7 +153,7 @@ pub fn discretize_like(
     for excess in &ends.excess {
         excess.add_to(&mut rigid);
     }
-    let beam::JointBuilder { mut joints, couplings: mut coupled, .. } = laid;
+    let beam::JointBuilder { mut joints, couplings: mut coupled, of_beams, .. } = laid;
     for mass in &structure.masses {
         rigid.add_plate(mass, options.undamped);
     }
@@ -182,7 +188,8 @@ pub fn discretize_like(
         rigid.center(damper.a, damper.b, &mut damper.frame);
     }
     couplings.extend(coupled.iter().flat_map(Coupling::pairs));
-    let (model, place) = Model::new(bodies, joints, dampers, &couplings, options.linear);
+    let (model, order) = Model::ordered(bodies, joints, dampers, &couplings, options.linear);
+    let (place, stressed) = (order.bodies, stressed::beams(&structure.beams, &of_beams, &order.joints));
     for Coupling { first, second, .. } in &mut coupled {
         let placed = |id: BodyId| if let BodyId::Free(k) = id { BodyId::Free(place[k]) } else { id };
         (*first, *second) = ((placed(first.0), placed(first.1)), (placed(second.0), placed(second.1)));
@@ -204,7 +211,7 @@ pub fn discretize_like(
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n)))).collect();
     let offsets = ends.beams.iter().map(|[a, b]| [a.offset, b.offset]).collect();
-    Ok(Assembly { system, nodes, beams, offsets, ends, heaters, gap_names })
+    Ok(Assembly { system, nodes, beams, offsets, ends, stressed, heaters, gap_names })
 }
 
 impl Assembly {

@@ -82,6 +82,19 @@ choice! {
 }
 
 choice! {
+    /// How anchors hold beams.
+    Anchors {
+        /// Elastic where the layer of the anchor has an `undercut`, else rigid.
+        #[default]
+        Auto = "auto",
+        /// A node at an anchor does not move.
+        Rigid = "rigid",
+        /// A beam ends in the compliance of its root: a pad of its layer on a base of like stiffness.
+        Elastic = "elastic",
+    }
+}
+
+choice! {
     /// How bodies and joints become equations of motion.
     Formulation {
         /// The one that suits the model and the analysis.

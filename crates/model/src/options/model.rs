@@ -5,7 +5,7 @@
 //! the table in docs/reference/options.md. After a change, `BIMORPH_WRITE=1 cargo test --test options` writes what is generated
 //! from it.
 
-use super::choices::{Formulation, Junctions, Scheme};
+use super::choices::{Anchors, Formulation, Junctions, Scheme};
 use super::table::{Field, OptionDescription, OptionError, OptionValue, Range};
 use bimorph_base::Setting;
 use std::sync::LazyLock;
@@ -72,6 +72,10 @@ options! {
     /// How beams meet. centreline: in points, as in SUGAR; offset: at the edges of rigid junctions; calibrated: with springs
     /// there, from two-dimensional elasticity (docs/explanation/junctions.md).
     junctions: Junctions = Junctions::Calibrated, "junctions" = 6, [""], Range::Names(&Junctions::NAMES), "";
+
+    /// How anchors hold beams. rigid: without any motion; elastic: a beam ends in the compliance of its root, a pad on a base
+    /// of like stiffness; auto: elastic where the layer has an undercut, else rigid (docs/explanation/junctions.md).
+    anchors: Anchors = Anchors::Auto, "anchors" = 16, [""], Range::Names(&Anchors::NAMES), "";
 
     /// Small displacements about the drawn geometry, as SUGAR.
     linear: bool = false, "linear" = 4, [""], Range::Flag, "";

@@ -31,8 +31,9 @@ impl ElementSite<'_, '_> {
         for k in 1..=last {
             let b = if k == last { ends[1] } else { self.drawing.add_node(format!("{name}.{k}"), self.instance.span) };
             let [dx, dy] = self.global([points[k][0] - points[k - 1][0], points[k][1] - points[k - 1][1]]);
-            let beam =
-                Beam { name: format!("{name}.{k}"), a, b, length: dx.hypot(dy), angle: dy.atan2(dx), ..whole.clone() };
+            let (length, angle) = (dx.hypot(dy), dy.atan2(dx));
+            let material = self.material_along(&whole.material, angle)?;
+            let beam = Beam { name: format!("{name}.{k}"), a, b, length, angle, material, ..whole.clone() };
             self.drawing.add_beam(self.instance.span, beam, true);
             a = b;
         }

@@ -19,9 +19,13 @@ const STRONGEST: f64 = 0.1;
 pub(super) const VACUUM: f64 = 8.854e-12;
 
 /// Parameters of a material.
-const READ: [&str; 9] = [
+const READ: [&str; 13] = [
+    "strength",
     "Youngsmodulus",
     "Poisson",
+    "shearmodulus",
+    "crystal",
+    "crystalangle",
     "density",
     "viscosity",
     "fluid",
@@ -32,7 +36,7 @@ const READ: [&str; 9] = [
 ];
 
 impl ElementSite<'_, '_> {
-    /// The material of a flexible member. That of a layer is read once.
+    /// The material of a flexible member in the direction of the element. That of a layer is read once, unless it depends on the direction.
     pub(super) fn material(&mut self) -> Result<Material, Reported> {
         let instance = self.instance;
         if instance.arguments.given.iter().any(|argument| READ.contains(&argument.name)) {
@@ -44,14 +48,28 @@ impl ElementSite<'_, '_> {
         let noted = self.drawing.noted();
         let material = self.read_material()?;
         // a message about a layer applies to every element
-        if self.drawing.noted() == noted {
+        if self.drawing.noted() == noted && self.number("crystal")?.is_none() {
             let _ = instance.arguments.layer.material.set(material.clone());
         }
         Ok(material)
     }
 
+    /// The same for a member in the direction `angle` (rad).
+    pub(super) fn material_along(&mut self, material: &Material, angle: f64) -> Result<Material, Reported> {
+        let material = material.clone();
+        Ok(match self.wafer()? {
+            Some(wafer) => wafer.turned(material, angle),
+            None => material,
+        })
+    }
+
     fn read_material(&mut self) -> Result<Material, Reported> {
-        let youngs_modulus = self.positive("Youngsmodulus")?;
+        let (wafer, angle) = (self.wafer()?, self.instance.rotation.angle());
+        let youngs_modulus = match &wafer {
+            Some(wafer) => wafer.along(angle).youngs_modulus,
+            None => self.positive("Youngsmodulus")?,
+        };
+        let shear_modulus = self.positive_if_any("shearmodulus")?;
         let [viscosity, fluid] = self.film()?;
         let span = self.instance.span;
         if !SOLID.contains(&youngs_modulus) {
@@ -70,8 +88,9 @@ impl ElementSite<'_, '_> {
         if !(poisson > -1.0 && poisson <= 0.5) {
             return Err(self.out_of_range("Poisson", poisson, "above −1 and at most 0.5"));
         }
-        Ok(Material {
+        let material = Material {
             youngs_modulus,
+            shear_modulus,
             poisson,
             density: self.density()?,
             viscosity,
@@ -79,6 +98,11 @@ impl ElementSite<'_, '_> {
             thermal_expansion: self.number_or("thermalexpansion", 0.0)?,
             ambient_temperature: self.ambient()?,
             stress,
+            strength: self.positive_if_any("strength")?,
+        };
+        Ok(match wafer {
+            Some(wafer) => wafer.turned(material, angle),
+            None => material,
         })
     }
 

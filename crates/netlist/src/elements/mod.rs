@@ -15,6 +15,7 @@ mod pinned;
 mod placed;
 mod pressure;
 mod section;
+mod silicon;
 mod stop;
 mod support;
 mod table;

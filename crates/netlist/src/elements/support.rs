@@ -8,10 +8,11 @@ use bimorph_structure::{NodeId, Pad, Support};
 
 impl ElementSite<'_, '_> {
     fn support(&mut self, held: [bool; 3]) -> Result<(), Reported> {
+        let undercut = self.undercut()?;
         let [l, w, _] = [self.positive_if_any("l")?, self.positive_if_any("w")?, self.positive_if_any("h")?];
         let node = self.node(0);
         let angle = self.instance.rotation.angle();
-        self.hold(node, held, angle);
+        self.hold(node, held, angle, undercut);
         if let (Some(l), Some(w)) = (l, w) {
             let support = self.drawing.structure.supports.len() - 1;
             self.drawing.structure.pads.push(Pad { support, size: [l, w] });
@@ -19,18 +20,26 @@ impl ElementSite<'_, '_> {
         Ok(())
     }
 
-    fn hold(&mut self, node: NodeId, held: [bool; 3], angle: f64) {
+    /// Distance by which the pad is etched free at its edge (m), if the layer says so.
+    fn undercut(&mut self) -> Result<Option<f64>, Reported> {
+        match self.number("undercut")? {
+            Some(undercut) if undercut < 0.0 => self.non_negative_or("undercut", 0.0).map(Some),
+            given => Ok(given),
+        }
+    }
+
+    fn hold(&mut self, node: NodeId, held: [bool; 3], angle: f64, undercut: Option<f64>) {
         self.drawing.place(self.instance.span, &[node], &[[0.0; 2]]);
-        self.drawing.structure.supports.push(Support { name: self.name(), node, held, angle });
+        self.drawing.structure.supports.push(Support { name: self.name(), node, held, angle, undercut });
     }
 }
 
 /// An anchor holds every node that it is given.
 pub(super) fn anchor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.support([true, true, true])?;
-    let angle = site.instance.rotation.angle();
+    let (angle, undercut) = (site.instance.rotation.angle(), site.undercut()?);
     for k in 1..site.instance.nodes.len() {
-        site.hold(site.node(k), [true; 3], angle);
+        site.hold(site.node(k), [true; 3], angle, undercut);
         site.drawing.note(Fact::AnchorNodes, site.instance.span);
     }
     Ok(())
@@ -65,7 +74,7 @@ pub(super) fn slider2(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let width = site.positive("w")?;
     site.positive("l")?;
     site.add_beam(site.name(), [site.node(0), site.node(1)], width)?;
-    site.hold(site.node(1), [false, true, false], angle);
+    site.hold(site.node(1), [false, true, false], angle, None);
     Ok(())
 }
 

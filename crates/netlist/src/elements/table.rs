@@ -45,6 +45,9 @@ pub(crate) fn models() -> impl Iterator<Item = &'static ElementModel> {
 pub(super) const LAYER_ENTRIES: &[&str] = &[
     "Youngsmodulus",
     "Poisson",
+    "shearmodulus",
+    "crystal",
+    "crystalangle",
     "density",
     "viscosity",
     "fluid",
@@ -62,6 +65,8 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
     "shapefactor",
     "yieldstress",
     "softening",
+    "strength",
+    "undercut",
     "h",
     "layer",
 ];

@@ -150,12 +150,14 @@ mod tests {
         let material = Material {
             youngs_modulus: 1.0,
             poisson: 0.0,
+            shear_modulus: None,
             density: 1.0,
             viscosity: 0.0,
             fluid: 1.0,
             thermal_expansion: 0.0,
             ambient_temperature: 0.0,
             stress: 0.0,
+            strength: None,
         };
         let node = |x| Node { name: String::new(), position: [x, 0.0], mechanical: true, electrical: false };
         let beam = Beam {

@@ -178,6 +178,7 @@ fn named(what: &str, values: &[proto::Named]) -> Result<(), String> {
 pub(super) fn statics(reply: &proto::StaticResponse) -> Result<(), String> {
     nodes(&reply.nodes)?;
     named("temperatures_k", &reply.temperatures_k)?;
+    named("stresses_pa", &reply.stresses_pa)?;
     named("currents_a", &reply.currents_a)?;
     named("charges_c", &reply.charges_c)?;
     named("permanent_strains", &reply.permanent_strains)

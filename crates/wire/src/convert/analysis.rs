@@ -29,6 +29,7 @@ pub fn static_to_wire(result: &StaticResult, strains: &[(String, f64)]) -> proto
     proto::StaticResponse {
         nodes: nodes_to_wire(&result.nodes),
         temperatures_k: named(&result.temperatures_k),
+        stresses_pa: named(&result.stresses_pa),
         currents_a: named(&result.currents_a),
         charges_c: named(&result.charges_c),
         pulled_in: result.pulled_in,
@@ -64,6 +65,7 @@ pub fn static_from_wire(wire: proto::StaticResponse) -> StaticResult {
     StaticResult {
         nodes: nodes_from_wire(wire.nodes),
         temperatures_k: pairs(wire.temperatures_k),
+        stresses_pa: pairs(wire.stresses_pa),
         currents_a: pairs(wire.currents_a),
         charges_c: pairs(wire.charges_c),
         pulled_in: wire.pulled_in,
