@@ -6,6 +6,7 @@ mod baselines;
 mod beams;
 mod closed_branches;
 mod contact;
+mod contact_signals;
 mod contact_speed;
 mod contact_steps;
 mod dashpot;

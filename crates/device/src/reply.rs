@@ -167,7 +167,9 @@ impl DeviceSession {
                     Signal::Rate(_, 2) => nothing / self.first_step,
                     Signal::Rate(..) => nothing * system.length_scale / self.first_step,
                     Signal::Temperature(_) | Signal::Prescribed(_) => SAME_TEMPERATURE,
-                    Signal::Stress(_) => nothing * signal.value(compiled, &view),
+                    Signal::Stress(_) | Signal::Bearing(_) | Signal::Conductance(..) => {
+                        nothing * signal.value(compiled, &view)
+                    }
                     Signal::Capacitance(g) => nothing * system.capacitance(*g, view.q).abs(),
                     Signal::Pull(g) => nothing * system.pull(*g, view.q, view.volts[*g]).abs(),
                     Signal::Charge(g) => charge(system.capacitance(*g, view.q), view.volts[*g]),

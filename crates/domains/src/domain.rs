@@ -180,6 +180,12 @@ pub trait Domain {
         0.0
     }
 
+    /// Change of that force with a change `dq` of the configuration (N).
+    fn bearing_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let _ = (at, dq);
+        0.0
+    }
+
     /// Energy stored where its sides touch (J).
     fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         let _ = at;

@@ -181,6 +181,11 @@ impl Domain for Electrodes {
         self.pressed(self.approach.value(at.q, at.linear)).0
     }
 
+    fn bearing_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let slope = self.pressed(self.approach.value(at.q, at.linear)).1;
+        if slope == 0.0 { 0.0 } else { slope * self.distance_change(at, dq) }
+    }
+
     fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         self.contact.map_or(0.0, |contact| contact.energy(self.distance(at)))
     }

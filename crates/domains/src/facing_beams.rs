@@ -199,6 +199,17 @@ impl Domain for FacingBeams {
         })
     }
 
+    fn bearing_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        self.sum(at, |local| {
+            if local.stretch.facing.apart(&local.z) {
+                return 0.0;
+            }
+            let (force, stiffness) = local.stretch.facing.contact(&local.z);
+            let change = stiffness * self.change(local, |id| Model::pose(dq, id));
+            force[0].signum() * change[0] + force[2].signum() * change[2]
+        })
+    }
+
     fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         self.sum(at, |local| local.stretch.facing.contact_energy(&local.z))
     }

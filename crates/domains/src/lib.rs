@@ -15,6 +15,7 @@
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
 //! | [`comb_field`] | engagement, tips and fringe field of combs |
 //! | [`contact`] | pressure between surfaces that touch |
+//! | [`contact_resistance`] | the conductance of metals that are pressed on each other |
 //! | [`contact_loss`] | impact losses |
 //! | [`contact_speed`] | at which speed, from statics |
 //! | [`loss_derivatives`] | derivatives of the forces of that over the bodies |
@@ -52,6 +53,7 @@ pub mod comb_field;
 mod conduction;
 pub mod contact;
 pub mod contact_loss;
+pub mod contact_resistance;
 pub mod contact_speed;
 pub mod dashpot;
 pub mod domain;

@@ -161,6 +161,10 @@ impl Domain for Member {
         each!(self, m => m.bearing(at))
     }
 
+    fn bearing_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        each!(self, m => m.bearing_change(at, dq))
+    }
+
     fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         each!(self, m => m.contact_energy(at))
     }

@@ -49,6 +49,18 @@ impl System {
         volts * slope * dv + 0.5 * volts * volts * change
     }
 
+    /// Force with which the two sides of a gap bear on each other (N).
+    #[inline]
+    pub fn bearing(&self, gap: usize, q: &[Pose]) -> f64 {
+        self.members[gap].bearing(self.at(q))
+    }
+
+    /// Change of [`Self::bearing`] with a change `dq` of the configuration (N).
+    #[inline]
+    pub fn bearing_slope(&self, gap: usize, q: &[Pose], dq: &[Pose]) -> f64 {
+        self.members[gap].bearing_change(self.at(q), dq)
+    }
+
     /// `r +=` the change of a gap's forces by the shape that beams take within segments under the load along them; the sum of the
     /// changes' sizes (N).
     #[inline]

@@ -97,6 +97,12 @@ impl Domain for StopPair {
         self.stop.bearing(&self.ways, self.approach.value(at.q, at.linear)).0.abs()
     }
 
+    fn bearing_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let m = self.approach.measure(at.q, at.linear);
+        let (force, stiffness) = self.stop.bearing(&self.ways, m.value);
+        if force == 0.0 { 0.0 } else { force.signum() * stiffness * self.approach.change(&m, dq) }
+    }
+
     fn contact_energy(&self, at: Configuration<'_>) -> f64 {
         let u = self.approach.value(at.q, at.linear);
         let side = |way: Option<f64>, u: f64| way.map_or(0.0, |w| self.stop.energy(w - u));

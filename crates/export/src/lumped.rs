@@ -165,6 +165,9 @@ fn reading(signal: &Signal, coordinates: &[Coordinate], gaps: &[LumpedGap]) -> R
                 why: format!("\"{}\" is a stop, whose distance has a corner", gaps[g].name),
             }),
         },
+        Signal::Bearing(g) | Signal::Conductance(g, _) => {
+            Err(ExportError::NotLumped { why: format!("the contact force of \"{}\" has a corner", gaps[g].name) })
+        }
         Signal::Stress(_) => Err(ExportError::NotLumped { why: "the stress of a beam has a corner".to_owned() }),
         // of beams that heat, which have been refused
         Signal::Temperature(_) => Ok(LumpedOutput::Nothing),

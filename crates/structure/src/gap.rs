@@ -210,6 +210,17 @@ impl BeamGap {
     }
 }
 
+/// Metals that are pressed on each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct OhmicContact {
+    /// Hardness of the softer metal (Pa).
+    pub hardness: f64,
+    /// Resistivity (Ω·m).
+    pub resistivity: f64,
+    /// Mean free path of the electrons (m); 0: a spot much larger than it.
+    pub electron_path: f64,
+}
+
 /// A stop: how far one node may move along an axis towards another before they touch, and against it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stop {
@@ -227,6 +238,9 @@ pub struct Stop {
     pub stiffness: Option<f64>,
     /// Area on which a rigid stop bears (m²).
     pub area: f64,
+    /// Metals that conduct where it bears, if there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ohmic: Option<OhmicContact>,
     /// Impact losses.
     #[serde(default)]
     pub impact: Impact,

@@ -21,9 +21,9 @@ class Options(TypedDict, total=False):
     offset or calibrated; default: calibrated."""
 
     anchors: Literal["auto", "rigid", "elastic"] | None
-    """How anchors hold beams. rigid: they do not give way; elastic: each beam ends in the compliance of its root,
-    a pad of its layer on a base of like stiffness; auto: elastic where the layer of the anchor has an
-    `undercut`, else rigid (docs/explanation/junctions.md). One of auto, rigid or elastic; default: auto."""
+    """How anchors hold beams. rigid: without any motion; elastic: a beam ends in the compliance of its root, a pad
+    on a base of like stiffness; auto: elastic where the layer has an undercut, else rigid
+    (docs/explanation/junctions.md). One of auto, rigid or elastic; default: auto."""
 
     linear: bool | None
     """Small displacements about the drawn geometry, as SUGAR."""

@@ -153,9 +153,15 @@ fn offered(compiled: &CompiledModel, name: &str) -> Result<(Input, PortKind, Por
             "a beam that knows heat",
             "whose temperature is prescribed; draw it as beam2det to give it a thermal port",
         ),
-        Ok(Signal::Stress(_) | Signal::Charge(_) | Signal::Distance(_) | Signal::Capacitance(_) | Signal::Pull(_)) => {
-            refused("NODE.x|y|rz|vx|vy|vrz, BEAM.T or frame.ax|ay|wz", "which can be monitored but not driven")
-        }
+        Ok(
+            Signal::Stress(_)
+            | Signal::Bearing(_)
+            | Signal::Conductance(..)
+            | Signal::Charge(_)
+            | Signal::Distance(_)
+            | Signal::Capacitance(_)
+            | Signal::Pull(_),
+        ) => refused("NODE.x|y|rz|vx|vy|vrz, BEAM.T or frame.ax|ay|wz", "which can be monitored but not driven"),
         Err(_) => {
             let electrics = &compiled.parts.system.electrics;
             let available = electrics.names[..electrics.ports].to_vec();

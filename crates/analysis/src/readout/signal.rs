@@ -4,9 +4,11 @@ use super::expression::{Expression, Quantity};
 use super::{ReadoutError, stress};
 use bimorph_base::suggest::nearest;
 use bimorph_domains::MaterialPoint;
+use bimorph_domains::contact_resistance::conductance;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::{self, Pose};
 use bimorph_multibody::{BodyId, Model};
+use bimorph_structure::OhmicContact;
 
 /// A quantity of a state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +23,10 @@ pub enum Signal {
     Prescribed(f64),
     /// Largest stress on the faces of a beam, along all of it (Pa).
     Stress(usize),
+    /// Force with which the sides of gap g bear on each other (N).
+    Bearing(usize),
+    /// Conductance of the ohmic contact of gap g (S).
+    Conductance(usize, OhmicContact),
     /// Charge of gap g (C).
     Charge(usize),
     /// Distance left in gap g (m).
@@ -46,7 +52,8 @@ pub struct SignalView<'a> {
 
 impl Signal {
     /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, the same of `BEAM[k]`, the k-th point along a beam from 0, `BEAM.T`, `BEAM.stress`,
-    /// `GAP.q`, `GAP.gap`, `GAP.C`, `GAP.F`.
+    /// `GAP.q`, `GAP.gap`, `GAP.C`, `GAP.F`, `GAP.N`,
+    /// `GAP.G`.
     ///
     /// # Errors
     /// [`ReadoutError::UnknownSignal`] with what would be understood.
@@ -70,6 +77,11 @@ impl Signal {
             "gap" => gap().map(Self::Distance),
             "C" => gap().map(Self::Capacitance),
             "F" => gap().map(Self::Pull),
+            "N" => gap().map(Self::Bearing),
+            "G" => {
+                let stop = compiled.structure.stops.iter().find(|stop| stop.name == part)?;
+                Some(Self::Conductance(gap()?, stop.ohmic?))
+            }
             "stress" => {
                 let beam = compiled.structure.beams.iter().position(|b| b.name == part)?;
                 let known = !compiled.parts.stressed[beam].rigid;
@@ -103,6 +115,8 @@ impl Signal {
             Self::Stress(beam) => {
                 stress::largest(compiled, beam, state.q, state.rise).map_or(0.0, |found| found.value())
             }
+            Self::Bearing(g) => system.bearing(g, state.q),
+            Self::Conductance(g, metals) => conductance(&metals, system.bearing(g, state.q)).0,
             Self::Charge(g) => system.capacitance(g, state.q) * state.volts[g],
             Self::Distance(g) => system.distance(g, state.q),
             Self::Capacitance(g) => system.capacitance(g, state.q),
@@ -128,6 +142,10 @@ impl Signal {
             Self::Prescribed(_) => 0.0,
             Self::Stress(beam) => stress::largest(compiled, beam, state.q, state.rise)
                 .map_or(0.0, |found| found.slope(compiled, state.q, change.q, change.rise)),
+            Self::Bearing(g) => system.bearing_slope(g, state.q, change.q),
+            Self::Conductance(g, metals) => {
+                conductance(&metals, system.bearing(g, state.q)).1 * system.bearing_slope(g, state.q, change.q)
+            }
             Self::Charge(g) => {
                 system.capacitance(g, state.q) * change.volts[g]
                     + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
@@ -149,7 +167,8 @@ impl Quantity for Signal {
             Self::Temperature(_) | Self::Prescribed(_) => "K",
             Self::Charge(_) => "C",
             Self::Capacitance(_) => "F",
-            Self::Pull(_) => "N",
+            Self::Pull(_) | Self::Bearing(_) => "N",
+            Self::Conductance(..) => "S",
             Self::Stress(_) => "Pa",
         }
     }
@@ -186,7 +205,12 @@ pub fn names(compiled: &CompiledModel) -> Vec<String> {
         [Some("T"), known.then_some("stress")].into_iter().flatten().map(|quantity| format!("{}.{quantity}", b.name))
     });
     let gaps = compiled.parts.gap_names.iter();
-    let of_gaps = gaps.flat_map(|gap| ["gap", "q", "C", "F"].map(|quantity| format!("{gap}.{quantity}")));
+    let of_gaps = gaps.enumerate().flat_map(|(g, gap)| {
+        let bears = compiled.parts.system.touching(g).is_some();
+        let conducts = compiled.structure.stops.iter().any(|stop| stop.name == *gap && stop.ohmic.is_some());
+        let quantities = [Some("gap"), Some("q"), Some("C"), Some("F"), bears.then_some("N"), conducts.then_some("G")];
+        quantities.into_iter().flatten().map(|quantity| format!("{gap}.{quantity}")).collect::<Vec<_>>()
+    });
     motions.chain(of_beams).chain(of_gaps).collect()
 }
 
@@ -229,7 +253,7 @@ fn hint(compiled: &CompiledModel, name: &str) -> String {
     let beams = compiled.structure.beams.iter().map(|b| b.name.as_str());
     let known: Vec<&str> =
         nodes.into_iter().chain(beams).chain(compiled.parts.gap_names.iter().map(String::as_str)).collect();
-    let expected = "expected NODE.x|y|rz|vx|vy|vrz, BEAM.T|stress, GAP.q|gap|C|F";
+    let expected = "expected NODE.x|y|rz|vx|vy|vrz, BEAM.T|stress, GAP.q|gap|C|F|N|G";
     if let Some((near, (_, quantity))) = nearest(part, known.iter().copied()).zip(name.rsplit_once('.')) {
         return format!("no node, beam or gap of that name; did you mean {near}.{quantity}? ({expected})");
     }

@@ -2,7 +2,7 @@
 
 use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
-use bimorph_structure::Stop;
+use bimorph_structure::{OhmicContact, Stop};
 
 /// Area on which a rigid stop bears unless it is given (m²): 10 µm by 10 µm.
 const AREA: f64 = 1e-10;
@@ -18,6 +18,7 @@ pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let stiffness = site.positive_if_any("k")?;
     let area = site.positive_if_any("A")?.unwrap_or(AREA);
     let impact = site.impact()?;
+    let ohmic = ohmic(site)?;
     let nodes = site.instance.nodes.clone();
     site.drawing.mechanical(&nodes);
     let name = site.name();
@@ -30,7 +31,22 @@ pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
         ways,
         stiffness,
         area,
+        ohmic,
         impact,
     });
     Ok(())
+}
+
+/// The metals of an ohmic contact, where `hardness` and `contactresistivity` are given.
+fn ohmic(site: &mut ElementSite<'_, '_>) -> Result<Option<OhmicContact>, Reported> {
+    let found = [site.positive_if_any("hardness")?, site.positive_if_any("contactresistivity")?];
+    let electron_path = site.non_negative_or("electronpath", 0.0)?;
+    let missing = match found {
+        [Some(hardness), Some(resistivity)] => return Ok(Some(OhmicContact { hardness, resistivity, electron_path })),
+        [None, Some(_)] => "hardness",
+        [Some(_), None] => "contactresistivity",
+        [None, None] if site.is_given("electronpath") => "hardness",
+        [None, None] => return Ok(None),
+    };
+    Err(site.missing(missing))
 }

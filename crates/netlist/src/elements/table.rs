@@ -147,7 +147,8 @@ const GAP_SHEET: &[&str] =
     &["l", "w", "w1", "w2", "gap", "h", "Rs", "permittivity", "fringe", "electrode", "touch", "restitution", "speed"];
 const PLATES: &[&str] =
     &["A", "l", "w", "h", "gap", "permittivity", "fringe", "electrode", "touch", "restitution", "speed"];
-const STOP: &[&str] = &["gap", "back", "k", "A", "restitution", "speed"];
+const STOP: &[&str] =
+    &["gap", "back", "k", "A", "hardness", "contactresistivity", "electronpath", "restitution", "speed"];
 const LOAD: &[&str] = &["F", "M"];
 
 const fn sugar(
