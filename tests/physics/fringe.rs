@@ -240,3 +240,29 @@ fn combs_have_the_thrust_of_their_section() {
         close(held("comb2de", &unknown)[1], ideal, 1e-9);
     }
 }
+
+/// An insulation of 100 nm with ε_r = 3.9 counts as 25.64 nm of air: C and force of plates and bars are those at the gap less 74.36 nm. A plate on a spring pulls in at
+/// √(8·k·g³/(27·ε·A)) with that g, touches at 100 nm, and is released at √(2·k·(gap − t_d)/(ε·A))·t_d/ε_r, within the 1 % by which contact is compliant.
+#[test]
+fn insulation_shortens_the_field() {
+    let (layer, air) = ("td=0.1u er=3.9", 2e-6 - 0.1e-6 + 0.1e-6 / 3.9);
+    let [charge, force] = held("plategap2d", &format!("A=1e-8 gap=2u {layer}"));
+    close(charge, EPS * 1e-8 / air, 1e-6);
+    close(force, 0.5 * EPS * 1e-8 / (air * air), 1e-6);
+    let insulated = at_rest([2.0, 2.0, 2.0], layer);
+    let shorter = at_rest([2.0, 2.0, 1e6 * air], "");
+    insulated.iter().zip(shorter).for_each(|(a, b)| close(*a, b, 1e-6));
+    let text = format!(
+        "anchor * [f] []
+         spring2d * [f m] [kx=1]
+         mass2d * [m] [m=1e-10]
+         guide2d * [m] []
+         plategap2d * [m e] [A=1e-8 gap=2u {layer}]
+         anchor * [e] []
+         eground * [e] []
+         drive port * [m e] []"
+    );
+    let found = pull_in(&built(&text, &CompileOptions::default()), None, 100.0).unwrap();
+    close(found.pull_in_v, (8.0 * air.powi(3) / (27.0 * EPS * 1e-8)).sqrt(), 1e-6);
+    close(found.release_v.unwrap(), (2.0 * 1.9e-6 / (EPS * 1e-8)).sqrt() * 0.1e-6 / 3.9, 1e-2);
+}

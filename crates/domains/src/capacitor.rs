@@ -45,7 +45,9 @@ pub enum Capacitor {
         edges: [EdgeField; 2],
         /// Gap as drawn g₀ (m).
         gap: f64,
-        /// Distance below which the field is frozen (m).
+        /// Distance between the plates less that of the field, by an insulating layer (m).
+        shortening: f64,
+        /// Distance of the field below which it is frozen (m).
         closest: f64,
     },
 }
@@ -82,8 +84,10 @@ impl Capacitor {
                     }
                 }
             }
-            Self::Plates { strength, edges, gap, closest } if !matches!(edges, [EdgeField::None, EdgeField::None]) => {
-                let d = gap - u;
+            Self::Plates { strength, edges, gap, shortening, closest }
+                if !matches!(edges, [EdgeField::None, EdgeField::None]) =>
+            {
+                let d = gap - shortening - u;
                 let at = d.max(closest);
                 let sides = edges.map(|edge| edge.at(at));
                 let sum = |plain: f64, k: usize| strength * (plain + sides[0][k] + sides[1][k]);
@@ -91,8 +95,8 @@ impl Capacitor {
                 let curvature = if d > closest { sum(2.0 / (at * at * at), 2) } else { 0.0 };
                 Capacitance { value: sum(1.0 / at, 0) + slope * (at - d), slope, curvature }
             }
-            Self::Plates { strength, gap, closest, .. } => {
-                let d = gap - u;
+            Self::Plates { strength, gap, shortening, closest, .. } => {
+                let d = gap - shortening - u;
                 if d >= closest {
                     let c = strength / d;
                     Capacitance { value: c, slope: c / d, curvature: 2.0 * c / (d * d) }
@@ -124,9 +128,9 @@ mod tests {
     fn derivatives_and_joins() {
         let comb = Capacitor::Comb { slope: 3.0, overlap: 5.0, blend: 2.0, parasitic: 0.1, fingers: None };
         let ideal = [EdgeField::None; 2];
-        let plates = Capacitor::Plates { strength: 2.0, edges: ideal, gap: 2.0, closest: 0.1 };
+        let plates = Capacitor::Plates { strength: 2.0, edges: ideal, gap: 2.3, shortening: 0.3, closest: 0.1 };
         let edges = [EdgeField::over_plane(3.0, 0.5, 2.0), EdgeField::Parallel { factor: 0.2, inverse: 0.3 }];
-        let edged = Capacitor::Plates { strength: 2.0, edges, gap: 2.0, closest: 0.1 };
+        let edged = Capacitor::Plates { strength: 2.0, edges, gap: 2.3, shortening: 0.3, closest: 0.1 };
         let apart = [-1.0, 0.5, 1.8, 1.95];
         for (c, points) in [(comb, [-8.0, -5.5, -3.5, -1.0]), (plates, apart), (edged, apart)] {
             for u in points {

@@ -82,7 +82,10 @@ impl FromStructure for Electrodes {
             let contact = Contact { touch: plate.touch.unwrap_or(touching_distance(plate.gap)), area: plate.area };
             let strength = plate.permittivity * plate.area;
             let edges = EdgeField::of_plates(plate, drawing.chord);
-            let capacitor = Capacitor::Plates { strength, edges, gap: plate.gap, closest: contact.least() };
+            let shortening = plate.insulation.map_or(0.0, |layer| layer.shortening());
+            let least = plate.insulation.map_or(0.0, |layer| 0.5 * layer.series());
+            let closest = (contact.least() - shortening).max(least);
+            let capacitor = Capacitor::Plates { strength, edges, gap: plate.gap, shortening, closest };
             let loss = Loss::new(&plate.impact);
             put(&plate.name, Some(&plate.voltage), Self { approach, capacitor, contact: Some(contact), loss });
         }

@@ -12,6 +12,7 @@
 use super::contact::Contact;
 use super::edge_field::EdgeField;
 use super::quadrature::{Abscissa, GAUSS_3, GAUSS_6, LOBATTO_5, LOBATTO_9};
+use bimorph_structure::InsulatingLayer;
 use nalgebra::{Matrix4, Vector4};
 
 /// Constants of a stretch of facing beams.
@@ -25,6 +26,8 @@ pub struct FacingStretch {
     pub strength: f64,
     /// Field at the edges.
     pub edges: EdgeField,
+    /// Insulating layer between the beams.
+    pub insulation: Option<InsulatingLayer>,
     /// Electrode height h (m).
     pub height: f64,
     /// Distance at which the beams touch (m).
@@ -95,11 +98,24 @@ impl FacingStretch {
     /// `see` gets each point of the field's rule with what it adds to C (F), and the derivatives of that with the distance there.
     #[inline(always)]
     fn field(&self, z: &Vector4<f64>, mut see: impl FnMut(&Abscissa, [f64; 3])) {
-        let closest = self.least();
+        let (gap, closest) = self.open();
         let (scaled, along) = (z.component_mul(&self.scale()), self.strength * self.length);
         for node in self.gauss() {
             let n = self.measure(node);
-            see(node, self.across(self.gap + n.dot(&scaled), along * node.weight, closest));
+            see(node, self.across(gap + n.dot(&scaled), along * node.weight, closest));
+        }
+    }
+
+    /// Distance of the field as drawn, and that below which it continues along its tangent (m). An insulating layer shortens both, the second one to half of what the layer
+    /// counts for.
+    #[inline]
+    pub(super) fn open(&self) -> (f64, f64) {
+        match self.insulation {
+            None => (self.gap, self.least()),
+            Some(layer) => {
+                let short = layer.shortening();
+                (self.gap - short, (self.least() - short).max(0.5 * layer.series()))
+            }
         }
     }
 
@@ -249,6 +265,7 @@ mod tests {
             gap: 2e-6,
             strength: 8.854e-12 * 2e-6,
             edges: EdgeField::None,
+            insulation: None,
             height: 2e-6,
             touch: 0.1e-6,
             chord: false,

@@ -39,6 +39,7 @@ impl FromStructure for FacingBeams {
                 gap: gap.gap,
                 strength: gap.permittivity * gap.height * factor,
                 edges,
+                insulation: gap.insulation,
                 height: gap.height,
                 touch: gap.touch.unwrap_or(touching_distance(gap.gap)),
                 chord: drawing.chord,

@@ -32,7 +32,7 @@ impl FacingStretch {
     /// the contact with its `loss`.
     fn discrete(&self, [z0, z1]: [&Vector4<f64>; 2], (volts, h): (f64, f64), loss: &Loss) -> Derivatives {
         let (mut first, mut second) = (Vector4::zeros(), Matrix4::zeros());
-        let (scale, closest) = (self.scale(), self.least());
+        let (scale, (gap, closest)) = (self.scale(), self.open());
         let field = if volts == 0.0 { &[] } else { self.gauss() };
         for node in field {
             let (n, m) = (Vector4::from(node.shape).component_mul(&scale), self.measure(node).component_mul(&scale));
@@ -50,7 +50,7 @@ impl FacingStretch {
                 let [_, first, second] = self.across(g, k, closest);
                 (first, second)
             };
-            let [g0, g1] = [z0, z1].map(|z| self.gap + m.dot(z));
+            let [g0, g1] = [z0, z1].map(|z| gap + m.dot(z));
             let (force, by_end) = quotient((g0, energy(g0)), (g1, energy(g1)), slope);
             first += n * force;
             second += (n * m.transpose() + m * n.transpose()) * (0.5 * by_end);
@@ -184,6 +184,7 @@ mod tests {
                 gap: 2e-6,
                 strength: 8.854e-12 * 2e-6,
                 edges,
+                insulation: None,
                 height: 2e-6,
                 touch: 0.1e-6,
                 chord: false,

@@ -25,15 +25,15 @@ pub(super) fn capacitance(capacitor: &Capacitor, u: &str) -> String {
             let beyond = format!("max({:e} + 1e-6 * {u}, 0)", overlap - blend);
             format!("({parasitic:e} + {slope:e} * ({blend:e} * {share} * {share} + {beyond}))")
         }
-        Capacitor::Plates { strength, edges, gap, closest } if has_fringe(&edges) => {
-            let d = format!("({gap:e} - 1e-6 * {u})");
+        Capacitor::Plates { strength, edges, gap, shortening, closest } if has_fringe(&edges) => {
+            let d = format!("({:e} - 1e-6 * {u})", gap - shortening);
             let at = format!("max({d}, {closest:e})");
             let value: String = edges.iter().map(|edge| edge_value(edge, &at)).collect();
             let below = format!("max({closest:e} - {d}, 0)");
             format!("({strength:e} * (1 / {at}{value} + ({}) * {below}))", fall(&edges, &at))
         }
-        Capacitor::Plates { strength, gap, closest, .. } => {
-            let d = format!("({gap:e} - 1e-6 * {u})");
+        Capacitor::Plates { strength, gap, shortening, closest, .. } => {
+            let d = format!("({:e} - 1e-6 * {u})", gap - shortening);
             format!("({strength:e} / max({d}, {closest:e}) * (2 - min({d}, {closest:e}) / {closest:e}))")
         }
     }
@@ -48,12 +48,12 @@ pub(super) fn slope(capacitor: &Capacitor, u: &str) -> String {
             format!("({slope:e} * {} + {pull})", share(u, overlap, blend))
         }
         Capacitor::Comb { slope, overlap, blend, .. } => format!("({slope:e} * {})", share(u, overlap, blend)),
-        Capacitor::Plates { strength, edges, gap, closest } if has_fringe(&edges) => {
-            let d = format!("max({gap:e} - 1e-6 * {u}, {closest:e})");
+        Capacitor::Plates { strength, edges, gap, shortening, closest } if has_fringe(&edges) => {
+            let d = format!("max({:e} - 1e-6 * {u}, {closest:e})", gap - shortening);
             format!("({strength:e} * ({}))", fall(&edges, &d))
         }
-        Capacitor::Plates { strength, gap, closest, .. } => {
-            let d = format!("max({gap:e} - 1e-6 * {u}, {closest:e})");
+        Capacitor::Plates { strength, gap, shortening, closest, .. } => {
+            let d = format!("max({:e} - 1e-6 * {u}, {closest:e})", gap - shortening);
             format!("({strength:e} / ({d} * {d}))")
         }
     }
@@ -263,7 +263,8 @@ mod tests {
     /// The texts have the values of C and dC/du to rounding: of ideal and fringing plates and combs, open, close and below the range of their laws.
     #[test]
     fn texts_have_the_values_of_the_laws() {
-        let plates = |edges| Capacitor::Plates { strength: 8.85e-20, edges, gap: 2e-6, closest: 0.07e-6 };
+        let plates =
+            |edges| Capacitor::Plates { strength: 8.85e-20, edges, gap: 2.1e-6, shortening: 0.1e-6, closest: 0.07e-6 };
         let comb = |fingers| Capacitor::Comb { slope: 1e-10, overlap: 3e-6, blend: 2e-6, parasitic: 1e-15, fingers };
         let exact = [EdgeField::over_plane(10e-6, 2e-6, 2e-6), EdgeField::over_plane(40e-6, 2e-6, 2e-6)];
         let parallel = EdgeField::Parallel { factor: 0.65 / 1e-5, inverse: 1e5 };

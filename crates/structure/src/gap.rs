@@ -70,6 +70,27 @@ impl ElectrodeShape {
     pub const NAMES: [(&'static str, Self); 2] = [("bar", Self::Bar), ("plane", Self::Plane)];
 }
 
+/// An insulating layer on one of two electrodes: the field has the distance of as much air as the layer counts for, its thickness over its permittivity.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct InsulatingLayer {
+    /// Thickness (m).
+    pub thickness: f64,
+    /// Relative permittivity (1).
+    pub permittivity: f64,
+}
+
+impl InsulatingLayer {
+    /// Distance of the field at which the surfaces touch (m).
+    pub fn series(&self) -> f64 {
+        self.thickness / self.permittivity
+    }
+
+    /// Distance between the electrodes less that of the field (m).
+    pub fn shortening(&self) -> f64 {
+        self.thickness - self.series()
+    }
+}
+
 /// Height over the upper width above which an anchored lower electrode is a plane, where the netlist names no shape (1). Bars of that ratio itself are bars.
 const FLAT: f64 = 5.0 * (1.0 + 1e-6);
 
@@ -137,6 +158,9 @@ pub struct PlateGap {
     /// Shape of the other plate, where the netlist names it; a plane by default.
     #[serde(default)]
     pub electrode: Option<ElectrodeShape>,
+    /// Insulating layer between the plates.
+    #[serde(default)]
+    pub insulation: Option<InsulatingLayer>,
     /// Distance at which the plates touch (m); none: that of nearly closed gaps of their size.
     #[serde(default)]
     pub touch: Option<f64>,
@@ -175,6 +199,9 @@ pub struct BeamGap {
     /// Shape of the lower electrode, where the netlist names it.
     #[serde(default)]
     pub electrode: Option<ElectrodeShape>,
+    /// Insulating layer between the beams.
+    #[serde(default)]
+    pub insulation: Option<InsulatingLayer>,
     /// Distance at which the beams touch (m); none: that of nearly closed gaps of their size.
     #[serde(default)]
     pub touch: Option<f64>,

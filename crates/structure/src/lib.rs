@@ -29,8 +29,8 @@ pub use circuit::{CircuitElement, CircuitKind};
 pub use domain_element::DomainElement;
 pub use front_end::{FrontEnd, LoadedNetlist, ReadFunction};
 pub use gap::{
-    BeamGap, Comb, ElectrodeShape, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, OhmicContact, PlateGap,
-    Stop,
+    BeamGap, Comb, ElectrodeShape, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, InsulatingLayer, MIN_RESTITUTION,
+    OhmicContact, PlateGap, Stop,
 };
 pub use index::NodeIndex;
 pub use mechanical::{Beam, GasLoss, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};

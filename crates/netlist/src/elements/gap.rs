@@ -6,7 +6,8 @@ use super::super::value::short;
 use super::arguments::ElementSite;
 use super::material::VACUUM;
 use bimorph_structure::{
-    BeamGap, ElectrodeShape, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, MIN_RESTITUTION, NodeId, PlateGap, Resistor,
+    BeamGap, ElectrodeShape, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, InsulatingLayer, MIN_RESTITUTION, NodeId,
+    PlateGap, Resistor,
 };
 
 /// Permittivity over that of vacuum below which a netlist cancels SUGAR's factor on the fringe field by hand (1).
@@ -37,6 +38,25 @@ impl ElementSite<'_, '_> {
             return Err(self.sink.error("E060", self.span_of("touch"), message, help));
         }
         Ok(touch)
+    }
+
+    /// Insulating layer of the relative permittivity `er` on an electrode, and the touching distance: both are the thickness `td` where that alone is given.
+    fn insulation(&mut self, gap: f64) -> Result<(Option<InsulatingLayer>, Option<f64>), Reported> {
+        let touch = self.touch(gap)?;
+        let thickness = self.positive_if_any("td")?;
+        let Some(permittivity) = self.positive_if_any("er")? else {
+            return if thickness.is_some() { Err(self.missing("er")) } else { Ok((None, touch)) };
+        };
+        if permittivity < 1.0 {
+            return Err(self.out_of_range("er", permittivity, "1 or more"));
+        }
+        let Some(thickness) = thickness.or(touch) else { return Err(self.missing("td")) };
+        if thickness >= gap || touch.is_some_and(|touch| touch < thickness * (1.0 - 1e-9)) {
+            let message = format!("the insulation `td` is {} m thick, more than `touch` or the gap", short(thickness));
+            let help = "give `td` below `gap`; parts touch at `td`, or at `touch` where bumps keep them farther apart";
+            return Err(self.sink.error("E060", self.span_of("td"), message, help));
+        }
+        Ok((Some(InsulatingLayer { thickness, permittivity }), touch.or(Some(thickness))))
     }
 
     /// Impact losses, where they are given.
@@ -74,7 +94,7 @@ impl ElementSite<'_, '_> {
             law = Some(Fringe::Sugar);
         }
         let electrode = self.word("electrode", &ElectrodeShape::NAMES)?;
-        let touch = self.touch(gap)?;
+        let (insulation, touch) = self.insulation(gap)?;
         let impact = self.impact()?;
         let below = -(gap + (w1 + w2) / 2.0);
         let nodes: [NodeId; 4] = std::array::from_fn(|i| self.node(i));
@@ -92,6 +112,7 @@ impl ElementSite<'_, '_> {
             widths: [w1, w2],
             law,
             electrode,
+            insulation,
             touch,
             impact,
             voltage,
@@ -218,7 +239,7 @@ pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported>
     }
     let exact = shaped && matches!(law, None | Some(Fringe::Exact));
     let thickness = if exact { site.positive("h")? } else { 0.0 };
-    let touch = site.touch(gap)?;
+    let (insulation, touch) = site.insulation(gap)?;
     let impact = site.impact()?;
     let axis = [angle.cos(), angle.sin()];
     let (a, b) = (site.node(0), site.node(1));
@@ -237,6 +258,7 @@ pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported>
         thickness,
         law,
         electrode,
+        insulation,
         touch,
         impact,
         voltage,

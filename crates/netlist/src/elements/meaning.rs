@@ -62,6 +62,8 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "shapefactor" => "factor on the conduction through gas [1]",
         "yieldstress" => "yield stress at ambient temperature [Pa]",
         "softening" => "temperature without strength [K]",
+        "td" => "thickness of the insulation [m]",
+        "er" => "relative permittivity of the insulation [1]",
         "fringe" => "law of the fringe field",
         "electrode" => "shape of the lower electrode",
         "curvature" => "rest curvature [1/m]",

@@ -120,8 +120,23 @@ const WIRED: &[usize] = &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 /// Nodes that one anchor may hold.
 const PADS: &[usize] = &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 const SIZE: &[&str] = &["l", "w", "h"];
-const GAP: &[&str] =
-    &["l", "w", "w1", "w2", "gap", "h", "V", "permittivity", "fringe", "electrode", "touch", "restitution", "speed"];
+const GAP: &[&str] = &[
+    "l",
+    "w",
+    "w1",
+    "w2",
+    "gap",
+    "h",
+    "V",
+    "permittivity",
+    "fringe",
+    "electrode",
+    "td",
+    "er",
+    "touch",
+    "restitution",
+    "speed",
+];
 const GAP_E: &[&str] = &[
     "l",
     "w",
@@ -139,14 +154,31 @@ const GAP_E: &[&str] = &[
     "permittivity",
     "fringe",
     "electrode",
+    "td",
+    "er",
     "touch",
     "restitution",
     "speed",
 ];
-const GAP_SHEET: &[&str] =
-    &["l", "w", "w1", "w2", "gap", "h", "Rs", "permittivity", "fringe", "electrode", "touch", "restitution", "speed"];
+const GAP_SHEET: &[&str] = &[
+    "l",
+    "w",
+    "w1",
+    "w2",
+    "gap",
+    "h",
+    "Rs",
+    "permittivity",
+    "fringe",
+    "electrode",
+    "td",
+    "er",
+    "touch",
+    "restitution",
+    "speed",
+];
 const PLATES: &[&str] =
-    &["A", "l", "w", "h", "gap", "permittivity", "fringe", "electrode", "touch", "restitution", "speed"];
+    &["A", "l", "w", "h", "gap", "permittivity", "fringe", "electrode", "td", "er", "touch", "restitution", "speed"];
 const STOP: &[&str] =
     &["gap", "back", "k", "A", "hardness", "contactresistivity", "electronpath", "restitution", "speed"];
 const LOAD: &[&str] = &["F", "M"];

@@ -281,6 +281,35 @@ fn laws_of_gaps() {
     assert_eq!(message.help, "give one of none, parallel, exact, sugar");
 }
 
+/// An insulation has the thickness `td`, or `touch`, and parts touch at its surface or above it. Impossible ones are refused.
+#[test]
+fn insulation_of_gaps() {
+    let gap = |more: &str| {
+        let text = format!(
+            "anchor * [b] []\nspring2d * [b a] [kx=1]\nmass2d * [a] [m=1p]\nplategap2d * [a b] [A=1e-9 gap=1u {more}]"
+        );
+        load(&Bundle::from_text("t.net", &text), &[]).map(|mut loaded| loaded.structure.plate_gaps.remove(0))
+    };
+    for (more, layer, touch) in [
+        ("", None, None),
+        ("td=0.2u er=4", Some((0.2e-6, 4.0)), Some(0.2e-6)),
+        ("touch=0.2u er=4", Some((0.2e-6, 4.0)), Some(0.2e-6)),
+        ("touch=0.3u td=0.2u er=4", Some((0.2e-6, 4.0)), Some(0.3e-6)),
+    ] {
+        let found = gap(more).unwrap_or_else(|d| panic!("{d}"));
+        assert_eq!((found.insulation.map(|l| (l.thickness, l.permittivity)), found.touch), (layer, touch), "{more}");
+    }
+    for (more, code) in [
+        ("td=0.2u", "E053"),
+        ("er=4", "E053"),
+        ("td=0.2u er=0.5", "E060"),
+        ("td=1.2u er=4", "E060"),
+        ("td=0.2u touch=0.1u er=4", "E060"),
+    ] {
+        assert_eq!(gap(more).expect_err(more).items[0].code, code, "{more}");
+    }
+}
+
 /// Fringe fields beyond the range of their law give W026: bars at a gap of 11 heights, a plate at six widths, fingers that are six gaps wide. A named law without
 /// that range gives none.
 #[test]

@@ -2,13 +2,18 @@
 
 use super::{OfStructure, unmirrored};
 use bimorph_structure::DomainElement;
-use bimorph_structure::{Beam, ElectrodeShape, Fringe, GapVoltage, Impact, NodeId};
+use bimorph_structure::{Beam, ElectrodeShape, Fringe, GapVoltage, Impact, InsulatingLayer, NodeId};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Impact losses, where the netlist gives them.
 fn impact(impact: &Impact) -> impl Iterator<Item = (&'static str, f64)> {
     let given = [("restitution", impact.restitution), ("speed", impact.speed)];
     given.into_iter().filter_map(|(name, value)| Some((name, value?)))
+}
+
+/// Insulating layer of a gap, where there is one.
+fn insulation(layer: Option<InsulatingLayer>) -> impl Iterator<Item = (&'static str, f64)> {
+    layer.into_iter().flat_map(|layer| [("td", layer.thickness), ("er", layer.permittivity)])
 }
 
 /// Law of the fringe field and shape of the electrode, where the netlist gives them.
@@ -38,6 +43,7 @@ impl OfStructure<'_> {
             let mut parameters = vec![("l", gap.length), ("w1", upper.width), ("w2", lower.width), ("gap", gap.gap)];
             let (nodes, angle) = unmirrored(gap);
             parameters.extend([("oz", angle), ("V", voltage), ("permittivity", gap.permittivity)]);
+            parameters.extend(insulation(gap.insulation));
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "gap2d", &process, &nodes, &parameters);
             self.say(field_words(gap.law, gap.electrode));
@@ -86,6 +92,7 @@ impl OfStructure<'_> {
             let mut parameters = vec![("l", gap.length), ("w1", w1), ("w2", w2), ("gap", gap.gap), ("h", gap.height)];
             let (nodes, angle) = unmirrored(gap);
             parameters.extend([("oz", angle), ("permittivity", gap.permittivity)]);
+            parameters.extend(insulation(gap.insulation));
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "gap2dforce", "*", &nodes, &parameters);
             self.say(field_words(gap.law, gap.electrode));
@@ -100,6 +107,7 @@ impl OfStructure<'_> {
                 parameters.extend([("l", gap.sides[0]), ("w", gap.sides[1])]);
                 parameters.extend((gap.thickness > 0.0).then_some(("h", gap.thickness)));
             }
+            parameters.extend(insulation(gap.insulation));
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "plategap2d", "*", &[gap.a, gap.b], &parameters);
             self.say(field_words(gap.law, gap.electrode));
