@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::model::{Context, JsonMap, ModelArgs};
 use super::output;
 use bimorph::analysis::formulation;
-use bimorph::compile::{Anchors, CompiledModel, Formulation};
+use bimorph::compile::{CompiledModel, Formulation};
 use bimorph::discretize::anchor_root;
 use bimorph::netlist::Setting;
 use bimorph::results::format::ResultFormat;
@@ -136,8 +136,7 @@ impl CheckCommand {
 /// The beam that rigid anchors stiffen most, from a thousandth on.
 fn rigid_anchors(compiled: &CompiledModel) -> Option<RigidAnchors<'_>> {
     let s = &compiled.structure;
-    let undercut = s.supports.iter().any(|support| support.undercut.is_some());
-    if compiled.options.anchors == Anchors::Elastic || (compiled.options.anchors == Anchors::Auto && undercut) {
+    if anchor_root::is_elastic(s, compiled.options.anchors) {
         return None;
     }
     let (beam, stiffening) = anchor_root::stiffening(s).filter(|(_, share)| *share >= 1e-3)?;

@@ -1,7 +1,7 @@
 //! The options of a model in one line, for reports and headers of files.
 
 use bimorph_model::compile::CompiledModel;
-use bimorph_model::discretize::Scheme;
+use bimorph_model::discretize::{Scheme, anchor_root};
 use bimorph_results::plot::axis::quantity;
 use std::fmt::Write;
 
@@ -19,6 +19,9 @@ pub fn model_options(compiled: &CompiledModel) -> String {
         let _ = write!(text, ", band {}", quantity(band, "Hz"));
     }
     let _ = write!(text, ", junctions {}", options.junctions.name());
+    if anchor_root::is_elastic(&compiled.structure, options.anchors) {
+        text.push_str(", elastic anchors");
+    }
     if options.scheme != Scheme::E4 {
         let _ = write!(text, ", scheme {}", options.scheme.name());
     }

@@ -41,6 +41,11 @@ pub(super) fn undercuts(structure: &Structure, anchors: Anchors) -> Vec<Option<f
     found
 }
 
+/// Whether any anchor of a structure is elastic.
+pub fn is_elastic(structure: &Structure, anchors: Anchors) -> bool {
+    undercuts(structure, anchors).iter().any(Option::is_some)
+}
+
 /// The root of a beam on a pad that is etched free by `undercut` (m) at its edge.
 pub(super) fn row(beam: &Beam, undercut: f64) -> ComplianceRow {
     let [normal, bending] = lengths(beam.width, beam.thickness, beam.material.poisson, undercut);
