@@ -73,8 +73,8 @@ pub(crate) fn respell(card: &mut ModelCard, structure: &Structure) {
         } else {
             owner
         };
-        // Temperature, capacitance and force have a capital letter.
-        let capital = ["t", "c", "f"].contains(&quantity);
+        // temperature, capacitance, forces and conductance have a capital letter
+        let capital = ["t", "c", "f", "n", "g"].contains(&quantity);
         Some(format!("{owner}.{}", if capital { quantity.to_ascii_uppercase() } else { quantity.to_owned() }))
     };
     for port in &mut card.ports {
