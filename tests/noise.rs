@@ -67,12 +67,14 @@ fn complex(z: [f64; 2]) -> Complex<f64> {
 }
 
 /// In equilibrium S = 2·k_B·T·(H + Hᴴ), where H is what takes power: the current per volt, the velocity per force. Ports of every
-/// kind, charged, at frequencies below, at and above resonances, in a frame at rest and in one that turns at 3e4 rad/s.
+/// kind, charged, at frequencies below, at and above resonances, in a frame at rest and in one that turns at 3e4 rad/s, without and with
+/// gas that compresses between the plates.
 #[test]
 fn fluctuation_is_dissipation() {
     let names = ["drive", "t.y", "sense", "t.vx", "s.rz", "frame.wz", "s.vrz"];
-    let model = compiled(RESONATOR);
-    for turning in [0.0, 3e4] {
+    let in_gas = RESONATOR.replace("A=4e-10", "l=20u w=20u fringe=none pressure=1e4");
+    for (text, turning) in [(RESONATOR, 0.0), (RESONATOR, 3e4), (&in_gas, 0.0), (&in_gas, 3e4)] {
+        let model = compiled(text);
         let mut device = opened(&model, &names, &[]);
         let (token, _) = balanced(&mut device, &[12.0, 0.0, -3.0, 0.0, 0.0, turning, 0.0]);
         let kinds =

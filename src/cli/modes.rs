@@ -8,6 +8,7 @@ use super::{progress, report, statics, value};
 use bimorph::analysis::BeamMotions;
 use bimorph::analysis::frame::{frame, frame_modes};
 use bimorph::analysis::mesh::modes_fitted;
+use bimorph::analysis::mode_quality::{ModeLoss, mode_losses};
 use bimorph::analysis::modes::ModesResult;
 use bimorph::analysis::statics::NodeMotion;
 use bimorph::compile::CompiledModel;
@@ -47,6 +48,10 @@ pub(crate) struct ModesCommand {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
+    /// Quality factors, with the parts of drag, of gas in gaps and of heat flow across bent beams
+    #[arg(long)]
+    quality: bool,
+
     /// Solver: the product's own model, or the baseline to compare with [default: recursion; frame with --as-sugar]
     #[arg(long, value_enum, help_heading = "Research and comparison", hide_short_help = true)]
     solver: Option<ModelChoice>,
@@ -62,6 +67,9 @@ struct ModesDocument<'a> {
     residuals: &'a [f64],
     estimated_errors: &'a [Option<f64>],
     unknowns: usize,
+    /// With --quality: 1/Q of each mode by cause.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    losses: Option<&'a [ModeLoss]>,
     /// Largest displacement of a node at the equilibrium that the modes are about [m].
     deflection_m: f64,
     solver: ModelChoice,
@@ -92,7 +100,16 @@ impl ModesCommand {
         let (compiled, result, curves) = result?;
         warn_of_mesh(&drawn, &compiled);
         warn_of(&result.warnings);
+        let losses = match (self.quality, solver) {
+            (false, _) => None,
+            (true, ModelChoice::Recursion) => Some(mode_losses(&compiled, self.count, &self.ports)?),
+            (true, ModelChoice::Frame) => {
+                warn_of(&["--quality needs the product's own model: leave out --solver and --as-sugar".to_owned()]);
+                None
+            }
+        };
         let document = ModesDocument {
+            losses: losses.as_deref(),
             frequencies_hz: &result.frequencies_hz,
             shapes: result.shapes.iter().map(|shape| JsonMap(shape)).collect(),
             residuals: &result.residuals,
@@ -116,6 +133,7 @@ impl ModesCommand {
             .collect();
         let text = report::columns(&["mode", "frequency", "error", "residual"], &rows)
             + "\n"
+            + &losses.as_deref().map_or(String::new(), qualities)
             + &about(result.deflection_m)
             + &report::footing(&compiled, result.unknowns);
         if self.output.format() == Some(ResultFormat::Html) {
@@ -128,6 +146,18 @@ impl ModesCommand {
             &text,
         )
     }
+}
+
+/// Q of each mode with the percentages of its causes in 1/Q.
+fn qualities(losses: &[ModeLoss]) -> String {
+    let row = |(k, loss): (usize, &ModeLoss)| {
+        let quality = loss.quality();
+        let shown = if quality.is_finite() { format!("{quality:.4}") } else { "undamped".into() };
+        let part = |part: f64| if part > 0.0 { format!("{:.1} %", 100.0 * part * quality) } else { "–".into() };
+        vec![(k + 1).to_string(), shown, part(loss.drag), part(loss.gas), part(loss.thermoelastic)]
+    };
+    let rows: Vec<Vec<String>> = losses.iter().enumerate().map(row).collect();
+    report::columns(&["mode", "Q", "drag", "gas in gaps", "thermoelastic"], &rows) + "\n"
 }
 
 /// Reference state of the modes, where it is not the drawing.

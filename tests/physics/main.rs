@@ -43,6 +43,7 @@ mod small_parts;
 mod solvers;
 mod sprung_loops;
 mod sprung_loops_motion;
+mod squeeze_film;
 mod stability_losses;
 mod stress;
 mod vm236;

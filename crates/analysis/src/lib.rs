@@ -21,6 +21,7 @@ pub mod largest_motion;
 mod linear_stress;
 mod loose_parts;
 pub mod mesh;
+pub mod mode_quality;
 pub mod modes;
 pub mod path_parameter;
 pub mod pull_in;

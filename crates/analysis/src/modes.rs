@@ -6,6 +6,7 @@ use super::sensitivity::LinearizationPoint;
 use super::statics::{NodeMotion, notes_at, operating_point, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::readout::signal::{Signal, SignalView};
+use bimorph_domains::loss_derivatives::LossDerivatives;
 use bimorph_domains::{Domain, Drive, MaterialPoint};
 use bimorph_model::compile::{CompiledModel, HigherMode, LowestMode};
 use bimorph_model::refine::axial::axial_forces;
@@ -98,10 +99,15 @@ pub(super) fn higher(compiled: &CompiledModel, count: usize) -> Vec<HigherMode> 
     known.collect()
 }
 
-/// Quality of a mode by drag and dampers (1).
+/// Quality of a mode about the drawing by drag, dampers and gas (1).
 fn quality(compiled: &CompiledModel, shape: &[Pose], frequency_hz: f64) -> f64 {
-    let model = &compiled.parts.system.model;
+    let system = &compiled.parts.system;
+    let model = &system.model;
     let mut drag = vec![Pose::zeros(); shape.len()];
+    if let Some(mut loss) = LossDerivatives::of(system) {
+        loss.at(system, &drag, |_| Pose::zeros());
+        loss.add_damping(model, |k| shape[k], &mut drag);
+    }
     add_damping(model, shape, &mut drag);
     let power: f64 = drag.iter().zip(shape).map(|(force, rate)| force.dot(rate)).sum();
     TAU * frequency_hz * model.mass_product(shape, shape) / power.abs()
@@ -136,9 +142,13 @@ pub fn modes_with_curves(
 }
 
 /// Modes without the motion of nodes; the equilibrium that they are about, and shapes of the bodies.
-type Shapeless = (ModesResult, Vec<Pose>, Vec<Vec<Pose>>);
+pub(super) type Shapeless = (ModesResult, Vec<Pose>, Vec<Vec<Pose>>);
 
-fn shapeless(compiled: &CompiledModel, count: usize, voltages: &PortVoltages) -> Result<Shapeless, AnalysisError> {
+pub(super) fn shapeless(
+    compiled: &CompiledModel,
+    count: usize,
+    voltages: &PortVoltages,
+) -> Result<Shapeless, AnalysisError> {
     let system = &compiled.parts.system;
     let mut drive = system.electrics.drive();
     let (as_sugar, loaded) = (compiled.options.as_sugar, about_equilibrium(compiled, voltages));

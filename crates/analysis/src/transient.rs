@@ -3,6 +3,7 @@
 mod contact_energy;
 mod crossings;
 pub(super) mod error_log;
+mod film_pressure;
 pub(super) mod first_step;
 mod folded_segments;
 pub(super) mod options;

@@ -24,12 +24,6 @@ const CANCELLED: f64 = 1e-3;
 const MAX_SHAPES: usize = 256;
 
 impl System {
-    /// True where the contact of a member takes energy out of a motion.
-    #[inline]
-    pub fn loses(&self) -> bool {
-        self.members.iter().any(|member| member.loss().is_some_and(|loss| loss.is_dissipative()))
-    }
-
     /// Finds the reference speeds that the netlist does not give.
     pub fn settle_impacts(&mut self) {
         let open = |loss: Loss| loss.speed.is_none() && loss.restitution < 1.0;

@@ -16,6 +16,7 @@ use super::approach::{Approach, MaterialPoint};
 use super::capacitor::Capacitor;
 use super::contact::Contact;
 use super::contact_loss::Loss;
+use super::squeeze_film::SqueezeFilm;
 use super::stop::StopKind;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
@@ -214,7 +215,34 @@ pub trait Domain {
         0.0
     }
 
-    /// `r +=` the force that rates add to ∂Π/∂q where contact loses energy, `rate` the rate of each body.
+    /// True where forces that depend on rates take energy out of a motion: loss of contact, gas.
+    fn damps(&self) -> bool {
+        self.loss().is_some_and(|loss| loss.is_dissipative())
+    }
+
+    /// True where it does nothing else.
+    fn is_drag(&self) -> bool {
+        false
+    }
+
+    /// Mean pressure of the gas in it over the ambient one (1), `rate` the rate of each body.
+    fn film_pressure(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose) -> f64 {
+        let _ = (at, rate);
+        0.0
+    }
+
+    /// Power that gas in gaps takes from a motion `dq` per second at the angular frequency `omega` (rad/s), per ω²: Re dqᵀZ(ω)dq (N·s/m times m²).
+    fn gas_damping(&self, at: Configuration<'_>, dq: &[Pose], omega: f64) -> f64 {
+        let _ = (at, dq, omega);
+        0.0
+    }
+
+    /// The approach and the damping of a film of gas that is a function of one approach; the distance as drawn (m).
+    fn film(&self) -> Option<(&Approach, f64, SqueezeFilm)> {
+        None
+    }
+
+    /// `r +=` the force that rates add to ∂Π/∂q, `rate` the rate of each body.
     fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
         let _ = (at, rate, r);
     }

@@ -13,7 +13,7 @@ use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
 use nalgebra::{Matrix4, Vector4};
 
 /// Forces of z and their derivatives.
-type Derivatives = (Vector4<f64>, Matrix4<f64>);
+pub(super) type Derivatives = (Vector4<f64>, Matrix4<f64>);
 
 impl FacingStretch {
     /// Points of the contact's rule that are pressed: ∂g/∂z, the force (N) and its derivative with the distance (N/m).
@@ -141,10 +141,24 @@ pub(super) fn add_quotient(
     r: &mut [Pose],
     tangent: &mut BlockMatrix<f64, 3>,
 ) {
+    let law = |facing: &FacingStretch, z: [&Vector4<f64>; 2]| facing.discrete(z, (volts, chord.h), &beams.loss);
+    along_chord(beams, chord, law, pattern, r, tangent);
+}
+
+/// Adds the discrete forces of a law of the stretches, and the symmetric part of their tangent. `law` has z at both ends of the step and gives
+/// the force over z with its derivative.
+pub(super) fn along_chord(
+    beams: &FacingBeams,
+    chord: &Chord<'_>,
+    law: impl Fn(&FacingStretch, [&Vector4<f64>; 2]) -> Derivatives,
+    pattern: &Pattern,
+    r: &mut [Pose],
+    tangent: &mut BlockMatrix<f64, 3>,
+) {
     let mut walks = chord.at.map(|at| beams.walks(at));
     for stretch in &beams.stretches {
         let [start, middle, end] = walks.each_mut().map(|walks| beams.local(stretch, walks));
-        let (first, second) = stretch.facing.discrete([&start.z, &end.z], (volts, chord.h), &beams.loss);
+        let (first, second) = law(&stretch.facing, [&start.z, &end.z]);
         if first == Vector4::zeros() && second == Matrix4::zeros() {
             continue;
         }

@@ -26,6 +26,8 @@ pub struct StructureView<'a, 'p> {
     pub chord: bool,
     /// For each beam, the points along it that its segments are joined at; empty where only nodes are known.
     pub stations: &'p [Vec<Station>],
+    /// For each pair of lumped plates, the bodies whose coordinates are the states of the gas between them; empty where only nodes are known.
+    pub film_states: &'p [Vec<MaterialPoint>],
 }
 
 impl<'a> StructureView<'a, '_> {

@@ -24,6 +24,8 @@
 //! | [`from_structure`] | from a drawing to them |
 //! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
 //! | [`load`], [`moving_frame`] | dead loads, and forces that sources give; the motion of the frame |
+//! | [`comb_film`] | gas between the fingers of a comb |
+//! | [`squeeze_film`] | damping of gas that flows out of a gap; [`perforation`]: holes; [`film_series`]: states of one that compresses; [`plate_film`], [`facing_film`]: between plates, between beams |
 //! | [`facing`] | a stretch of two facing beams: pressure along a gap that varies over their length |
 //! | `facing_side`, `facing_stretches` | where facing beams measure; how the segments of both sides cut a gap |
 //! | [`quadrature`] | rules of integration along it |
@@ -50,6 +52,7 @@ pub mod backbending;
 pub mod beam_line;
 pub mod capacitor;
 pub mod comb_field;
+pub mod comb_film;
 mod conduction;
 pub mod contact;
 pub mod contact_loss;
@@ -63,10 +66,12 @@ pub mod electrodes;
 pub mod energy;
 pub mod facing;
 pub mod facing_beams;
+pub mod facing_film;
 pub mod facing_local;
 mod facing_loss;
 mod facing_side;
 mod facing_stretches;
+pub mod film_series;
 mod fin;
 pub mod from_structure;
 mod input;
@@ -78,10 +83,13 @@ pub mod loss_derivatives;
 pub mod member;
 pub mod moving_frame;
 pub mod network;
+pub mod perforation;
+pub mod plate_film;
 pub mod quadrature;
 pub mod quotient;
 mod reading;
 mod side;
+pub mod squeeze_film;
 pub mod stop;
 pub mod stop_pair;
 pub mod system;

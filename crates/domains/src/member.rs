@@ -4,6 +4,7 @@ use super::approach::{Approach, MaterialPoint};
 use super::contact_loss::Loss;
 use super::domain::{Chord, Configuration, Domain, Law};
 use super::from_structure::{FromStructure, PlacedMember, StructureView};
+use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Damper, Pattern};
 use nalgebra::Vector2;
@@ -61,6 +62,9 @@ domains! {
     FacingBeams: super::facing_beams::FacingBeams, "Two beams that face each other.";
     StopPair: super::stop_pair::StopPair, "A stop.";
     Dashpot: super::dashpot::Dashpot, "A damper to the ground.";
+    PlateFilm: super::plate_film::PlateFilm, "Gas between lumped plates.";
+    CombFilm: super::comb_film::CombFilm, "Gas between the fingers of a comb.";
+    FacingFilm: super::facing_film::FacingFilm, "Gas between two beams that face each other.";
 }
 
 impl Domain for Member {
@@ -175,6 +179,27 @@ impl Domain for Member {
 
     fn loss(&self) -> Option<Loss> {
         each!(self, m => m.loss())
+    }
+
+    fn is_drag(&self) -> bool {
+        each!(self, m => m.is_drag())
+    }
+
+    fn film_pressure(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose) -> f64 {
+        each!(self, m => m.film_pressure(at, rate))
+    }
+
+    fn gas_damping(&self, at: Configuration<'_>, dq: &[Pose], omega: f64) -> f64 {
+        each!(self, m => m.gas_damping(at, dq, omega))
+    }
+
+    fn film(&self) -> Option<(&Approach, f64, SqueezeFilm)> {
+        each!(self, m => m.film())
+    }
+
+    #[inline]
+    fn damps(&self) -> bool {
+        each!(self, m => m.damps())
     }
 
     fn set_loss(&mut self, loss: Loss) {

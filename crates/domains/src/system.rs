@@ -258,7 +258,8 @@ impl System {
         tangent: &mut BlockMatrix<f64, 3>,
     ) {
         let chord = Chord { at: q.map(|q| self.at(q)), h };
-        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
+        let acts = |(gap, volts): &(&Member, &f64)| gap.is_active(**volts) || gap.damps();
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(acts) {
             gap.add_quotient(&chord, volts, &self.model.pattern, r, tangent);
         }
     }
@@ -269,7 +270,13 @@ impl System {
         self.members.iter().any(|member| member.touching().is_some())
     }
 
-    /// `r +=` the forces that rates add where contact loses energy, `rate` the rate of each body; held directions not removed.
+    /// True where forces of a member that depend on rates take energy out of a motion.
+    #[inline]
+    pub fn loses(&self) -> bool {
+        self.members.iter().any(Domain::damps)
+    }
+
+    /// `r +=` the forces that rates add to those of members, `rate` the rate of each body; held directions not removed.
     #[inline]
     pub fn add_loss(&self, q: &[Pose], rate: impl Fn(usize) -> Pose, r: &mut [Pose]) {
         let at = self.at(q);
@@ -288,6 +295,25 @@ impl System {
         let (at, pattern) = (self.at(q), &self.model.pattern);
         let add = |any, member: &Member| member.add_loss_tangent(at, &rate, pattern, stiffness, damping) | any;
         self.members.iter().fold(false, add)
+    }
+
+    /// True where gas acts in a gap.
+    #[inline]
+    pub fn has_gas(&self) -> bool {
+        self.members.iter().any(|member| member.is_drag() && member.damps())
+    }
+
+    /// Largest mean pressure of the gas in a gap over the ambient one (1), `rate` the rate of each body.
+    pub fn film_pressure(&self, q: &[Pose], rate: impl Fn(usize) -> Pose) -> f64 {
+        let at = self.at(q);
+        self.members.iter().map(|member| member.film_pressure(at, &rate)).fold(0.0, f64::max)
+    }
+
+    /// Re dqᵀZ(ω)dq of the gas in gaps about a configuration at rest (N·s·m).
+    #[inline]
+    pub fn gas_damping(&self, q: &[Pose], dq: &[Pose], omega: f64) -> f64 {
+        let at = self.at(q);
+        self.members.iter().map(|member| member.gas_damping(at, dq, omega)).sum()
     }
 
     /// Bodies that gaps and dead loads act on, ascending.

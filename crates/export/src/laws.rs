@@ -3,7 +3,7 @@
 //! They are those of [`bimorph_domains::capacitor`], [`bimorph_domains::contact`] and [`bimorph_domains::stop`], with `min` and `max` in the place of
 //! cases, so that no branch divides by what another one keeps away from 0.
 
-use super::lumped::Law;
+use super::lumped::{Law, LumpedGap};
 use bimorph_domains::capacitor::Capacitor;
 use bimorph_domains::comb_field::CombField;
 use bimorph_domains::contact::{Contact, PRESSURE, TOUCH};
@@ -176,9 +176,19 @@ pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<Strin
     }
 }
 
-/// True where the contact force depends on the rate.
-pub(super) fn loses(law: &Law, loss: f64) -> bool {
-    loss > 0.0 && !matches!(law, Law::Field(_, None))
+/// True where a force of the gap depends on the rate.
+pub(super) fn loses(gap: &LumpedGap) -> bool {
+    gap.film.is_some() || gap.loss > 0.0 && !matches!(gap.law, Law::Field(_, None))
+}
+
+/// Force of the gas against the approach `u` at its `rate`, a text in m/s (N), as [`bimorph_domains::squeeze_film`].
+pub(super) fn drag(gap: &LumpedGap, u: &str, rate: &str) -> Option<String> {
+    let (drawn, film) = gap.film?;
+    let beyond = format!("({:e} - 1e-6 * {u})", drawn - film.touch);
+    let s = format!("max({:e} * {beyond}, 0)", -1.0 / film.closed);
+    let g = format!("({:e} / (1 + {s} + {s} * {s}) + max({beyond}, 0))", film.closed);
+    let slip = format!("(1 + {:e} * pow({g}, -1.159))", 9.638 * film.free_path.powf(1.159));
+    Some(format!("({:e} * pow({g}, -3) / {slip} * {rate})", film.strength))
 }
 
 /// A contact force with the loss of an impact ([`bimorph_domains::contact_loss`]); `closing` is the sign of the closing speed in the rate.

@@ -128,7 +128,8 @@ fn gaps(
 ) -> Result<Vec<LumpedGap>, ExportError> {
     let electrics = &system.electrics;
     // what acts without sides comes after all gaps; where it adds no force, its damping is among that of the parts
-    let acts = |(_, gap): &(usize, &Member)| gap.is_gap() || gap.is_active(1.0);
+    let acts = |(_, gap): &(usize, &Member)| gap.is_gap() || gap.is_active(1.0) && !gap.is_drag();
+    let mut films: Vec<_> = system.members.iter().filter_map(Domain::film).collect();
     let gap = |(g, gap): (usize, &Member)| {
         let Some((approach, law)) = gap.law() else {
             let why = match compiled.parts.gap_names.get(g) {
@@ -141,9 +142,16 @@ fn gaps(
         let name = compiled.parts.gap_names[g].clone();
         let along = along(coordinates, &approach.a, approach.axis) - along(coordinates, &approach.b, approach.axis);
         let loss = gap.loss().map_or(0.0, |loss| loss.coefficient());
-        Ok(LumpedGap { name, along, law, loss, by_port, constant })
+        let own = films.iter().position(|(of, ..)| *of == approach);
+        let film = own.map(|k| films.remove(k)).map(|(_, drawn, film)| (drawn, film));
+        Ok(LumpedGap { name, along, law, loss, film, by_port, constant })
     };
-    system.members.iter().enumerate().filter(acts).map(gap).collect()
+    let found = system.members.iter().enumerate().filter(acts).map(gap).collect::<Result<_, _>>()?;
+    if system.members.iter().any(|member| member.is_drag() && member.damps() && member.film().is_none()) {
+        let why = "gas acts that compresses (use filmstates=0), or that slides between fingers".to_owned();
+        return Err(ExportError::NotLumped { why });
+    }
+    Ok(found)
 }
 
 /// The output expression of a signal.

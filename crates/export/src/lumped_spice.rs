@@ -10,7 +10,7 @@
 //! | `f1` … | its force in micronewtons |
 //! | `q1` … | its charge in femtocoulombs, through a capacitor of a femtofarad: that current is dQ/dt |
 
-use super::laws::{bearing, capacitance, loses, slope};
+use super::laws::{bearing, capacitance, drag, loses, slope};
 use super::lumped::{Law, LumpedModel, LumpedOutput};
 use super::names::Pins;
 use super::parts::SubcircuitText;
@@ -117,14 +117,15 @@ impl LumpedSubcircuit<'_> {
             self.parts.line(&format!("Cq{n} r{n} 0 1e-15"));
         }
         let rate = format!("s{n}");
-        if loses(&gap.law, gap.loss) {
+        if loses(gap) {
             self.parts.sum(&rate);
             for (j, c) in self.model.coordinates.iter().enumerate() {
                 self.parts.by_voltage(("0", &rate), &format!("v{}", j + 1), 1e-6 * c.omega * gap.along[j]);
             }
         }
         let bearing = bearing(&gap.law, gap.loss, &approach, &format!("V({rate})"));
-        force.extend(bearing.map(|bearing| format!("- {bearing}")));
+        let drag = drag(gap, &approach, &format!("V({rate})"));
+        force.extend(bearing.into_iter().chain(drag).map(|resisting| format!("- {resisting}")));
         if force.is_empty() {
             return;
         }

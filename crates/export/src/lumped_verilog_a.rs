@@ -1,7 +1,7 @@
 //! The nonlinear lumped model as a Verilog-A module, by the rules of [`super::verilog_a`]: every state is a node, and nothing but
 //! `ddt` acts in time.
 
-use super::laws::{bearing, capacitance, loses, slope};
+use super::laws::{bearing, capacitance, drag, loses, slope};
 use super::lumped::{Law, LumpedModel, LumpedOutput};
 use super::names::Pins;
 use super::verilog_a::{ContributionSum, head};
@@ -13,7 +13,7 @@ pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> 
     let gaps = model.gaps.iter().enumerate().flat_map(|(g, gap)| {
         let of = |name: &str| format!("{name}{}", g + 1);
         let voltage = matches!(gap.law, Law::Field(..)).then(|| of("e"));
-        [Some(of("g")), voltage, loses(&gap.law, gap.loss).then(|| of("s"))].into_iter().flatten()
+        [Some(of("g")), voltage, loses(gap).then(|| of("s"))].into_iter().flatten()
     });
     let inner: Vec<String> = coordinates.chain(gaps).collect();
     let mut text = head(name, pins, &inner, &model.ports, about);
@@ -21,7 +21,7 @@ pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> 
         let mut sum = ContributionSum::begin(&format!("I(g{0}) <+ V(g{0})", g + 1));
         add(&mut sum, "x", &gap.along, -1.0);
         sum.end(&mut text);
-        if loses(&gap.law, gap.loss) {
+        if loses(gap) {
             let mut sum = ContributionSum::begin(&format!("I(s{0}) <+ V(s{0})", g + 1));
             for (j, (share, c)) in gap.along.iter().zip(&model.coordinates).enumerate() {
                 sum.add(-1e-6 * share * c.omega, &format!("V(v{})", j + 1));
@@ -53,9 +53,9 @@ pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> 
             if let Law::Field(capacitor, _) = &gap.law {
                 sum.add(-0.5 * share, &format!("{e} * {e} * {}", slope(capacitor, &u)));
             }
-            if let Some(bearing) = bearing(&gap.law, gap.loss, &u, &format!("V(s{})", g + 1)) {
-                sum.add(share, &bearing);
-            }
+            let rate = format!("V(s{})", g + 1);
+            let bearing = bearing(&gap.law, gap.loss, &u, &rate);
+            bearing.into_iter().chain(drag(gap, &u, &rate)).for_each(|resisting| sum.add(share, &resisting));
         }
         sum.end(&mut text);
     }

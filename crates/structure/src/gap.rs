@@ -123,6 +123,9 @@ pub struct Comb {
     /// Law of the fringe field; none: `exact` where the width of the fingers is known, and no field in a model as SUGAR computes.
     #[serde(default = "Fringe::stored")]
     pub law: Option<Fringe>,
+    /// Drag of the gas that slides between the fingers, per rate and overlap (Pa·s); 0: it does not drag.
+    #[serde(default)]
+    pub sliding: f64,
     /// False for SUGAR's `comb2d`, whose force is constant whatever the overlap.
     pub finite: bool,
     /// Where its voltage comes from.
@@ -167,9 +170,50 @@ pub struct PlateGap {
     /// Impact losses.
     #[serde(default)]
     pub impact: Impact,
+    /// Gas between the plates; none: it does not damp.
+    #[serde(default)]
+    pub gas: Option<FacingGas>,
     /// Where its voltage comes from.
     pub voltage: GapVoltage,
 }
+
+/// Gas between two parts that face each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FacingGas {
+    /// Sides of the rectangle that faces (m): those of a plate, length and height of a beam.
+    pub sides: [f64; 2],
+    /// Number of such rectangles (1).
+    pub count: f64,
+    /// Dynamic viscosity μ (Pa·s).
+    pub viscosity: f64,
+    /// Pressure p₀ (Pa).
+    pub pressure: f64,
+    /// Mean free path λ of its molecules at this pressure (m).
+    pub free_path: f64,
+    /// Thickness of the film where the parts touch (m); none: that of the default roughness on insulation, or the distance at which
+    /// they touch where the netlist gives none.
+    pub closed: Option<f64>,
+    /// States of its compression between lumped plates; 0: it does not compress.
+    #[serde(default)]
+    pub states: usize,
+    /// Holes in one of the plates.
+    #[serde(default)]
+    pub holes: Option<Perforation>,
+}
+
+/// Round holes in a square array.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Perforation {
+    /// Radius of a hole (m).
+    pub radius: f64,
+    /// Distance of neighbours (m).
+    pub pitch: f64,
+    /// Length of a hole: thickness of the plate (m).
+    pub depth: f64,
+}
+
+/// Most states of gas in a gap.
+pub const MAX_FILM_STATES: f64 = 200.0;
 
 /// Two facing beams `a`–`b` and `c`–`d` (SUGAR's gap2d family): pressure ½εV²/g(s)² and contact along their length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -208,6 +252,9 @@ pub struct BeamGap {
     /// Impact losses.
     #[serde(default)]
     pub impact: Impact,
+    /// Gas between the beams; none: it does not damp.
+    #[serde(default)]
+    pub gas: Option<FacingGas>,
     /// Where its voltage comes from.
     pub voltage: GapVoltage,
 }

@@ -29,11 +29,13 @@ pub use circuit::{CircuitElement, CircuitKind};
 pub use domain_element::DomainElement;
 pub use front_end::{FrontEnd, LoadedNetlist, ReadFunction};
 pub use gap::{
-    BeamGap, Comb, ElectrodeShape, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, InsulatingLayer, MIN_RESTITUTION,
-    OhmicContact, PlateGap, Stop,
+    BeamGap, Comb, ElectrodeShape, FacingGas, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, InsulatingLayer,
+    MAX_FILM_STATES, MIN_RESTITUTION, OhmicContact, Perforation, PlateGap, Stop,
 };
 pub use index::NodeIndex;
-pub use mechanical::{Beam, GasLoss, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};
+pub use mechanical::{
+    Beam, GasLoss, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SolidHeat, SpringDamper, Support, Yield,
+};
 pub use network::{Port, Resistor, VoltageSource, Wire};
 pub use node::{Node, NodeId};
 pub use placed::PlacedElement;

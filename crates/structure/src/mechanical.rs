@@ -28,6 +28,18 @@ pub struct Material {
     /// Stress that the material bears (Pa), where it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strength: Option<f64>,
+    /// How heat flows in it; none: unknown.
+    #[serde(default)]
+    pub heat: Option<SolidHeat>,
+}
+
+/// Thermal constants of a solid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SolidHeat {
+    /// Thermal conductivity (W/(m·K)).
+    pub conductivity: f64,
+    /// Specific heat (J/(kg·K)).
+    pub specific_heat: f64,
 }
 
 /// Temperature at which all structural solids have melted; tungsten does at 3695 K (K).

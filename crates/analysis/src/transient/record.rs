@@ -7,6 +7,7 @@ use super::super::{AnalysisError, ProgressCallback};
 use super::contact_energy::ContactEnergy;
 use super::crossings::Crossings;
 use super::error_log::{ErrorLog, SignalLoss};
+use super::film_pressure::FilmPressure;
 use super::folded_segments;
 use super::options::{TransientOptions, check};
 use super::result::{Counters, TransientResult};
@@ -73,11 +74,13 @@ pub(crate) fn record(
     let mut log = options.estimate.then(|| ErrorLog::start((compiled, options.stop), held, &signals, &motion));
     let mut stability = StabilityMonitor::new(system);
     let mut energy = ContactEnergy::start(compiled, &motion, &drive);
+    let mut gas = FilmPressure::new(system);
     let mut looks = 0;
     let (mut beyond, mut stopped_at) = (None, None);
     refuse_in_contact(compiled, options, 0.0, &motion)?;
     let mut observe = |s: f64, h: f64, before: &Motion, after: &Motion| {
         stopped_at = crossings.step(s, h, before, after);
+        gas.step(s + h, after);
         let suits = refuse_in_contact(compiled, options, s + h, after);
         let within = |()| within_contact_range(compiled, &after.q);
         let done = ((s + h) / options.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize;
@@ -136,6 +139,7 @@ pub(crate) fn record(
         warnings: begun
             .into_iter()
             .chain(stability.warning())
+            .chain(gas.warning())
             .chain(estimate.and_then(|e| e.lost).map(lost))
             .chain(unreached)
             .collect(),

@@ -2,6 +2,7 @@
 
 use super::super::linear::{ReducedPort, SignalShown};
 pub use bimorph_domains::Law;
+use bimorph_domains::squeeze_film::SqueezeFilm;
 use nalgebra::{DMatrix, DVector, Vector2};
 
 /// Way of one part along one direction.
@@ -30,6 +31,8 @@ pub struct LumpedGap {
     pub law: Law,
     /// χ of its contact (s/m); 0: elastic, or none.
     pub loss: f64,
+    /// Distance as drawn (m) and damping of the gas in it.
+    pub film: Option<(f64, SqueezeFilm)>,
     /// Voltage per voltage of each port (1).
     pub by_port: DVector<f64>,
     /// Voltage by the netlist's own sources (V).

@@ -94,7 +94,7 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<LinearF
     for spring in &structure.springs {
         lay_spring(spring, undamped, &rigid, &mut joints, &mut dampers);
     }
-    let mut gaps = rigid.gaps(structure, options.gaps == FrameGaps::Laid { chord: true }, &[]);
+    let mut gaps = rigid.gaps(structure, options.gaps == FrameGaps::Laid { chord: true }, &[], &[]);
     if options.gaps == FrameGaps::LeftOut {
         gaps.retain(|laid| !laid.member.is_gap());
     }

@@ -194,6 +194,7 @@ mod tests {
             ambient_temperature: 300.0,
             stress: 0.0,
             strength: None,
+            heat: None,
         };
         let beam = Beam {
             name: "arm".into(),

@@ -57,7 +57,7 @@ use free_rotation::BodyActions;
 
 use crate::options::CompileOptions;
 use bimorph_base::budget;
-use bimorph_domains::{BeamLine, DeadLoad, Domain, MaterialPoint, Member, PlacedMember, System};
+use bimorph_domains::{BeamLine, DeadLoad, Domain, MaterialPoint, Member, PlacedMember, Station, System};
 use bimorph_multibody::{BodyId, Coupling, Damper, Joint, Model};
 use bimorph_structure::Structure;
 use nalgebra::{Matrix2, Matrix3, Vector2};
@@ -161,7 +161,7 @@ pub fn discretize_like(
         lay_spring(spring, options.undamped, &rigid, &mut joints, &mut dampers);
     }
     let stations = stations::of_beams(structure, &beams, &ends, &rigid);
-    let gaps = rigid.gaps(structure, options.as_sugar, &stations);
+    let gaps = lay_members(structure, options, &mut rigid, &stations);
     lay_dampers(&gaps, options.undamped, &mut dampers);
     let acting = BodyActions { structure, joints: &joints, dampers: &dampers, members: &gaps, elements: &[] };
     free_rotation::hold(&acting, &mut rigid);
@@ -239,6 +239,19 @@ fn line(drawn: &bimorph_structure::Beam, points: &Arc<[MaterialPoint]>) -> BeamL
         rigidity: drawn.material.youngs_modulus * drawn.thickness * drawn.width.powi(3) / 12.0,
         width: drawn.width,
     }
+}
+
+/// Members of the mechanism, with bodies for their states. An undamped model has none that only damp.
+fn lay_members<'a>(
+    structure: &'a Structure,
+    options: &CompileOptions,
+    rigid: &mut rigid::RigidGroups,
+    stations: &[Vec<Station>],
+) -> Vec<PlacedMember<'a, Member>> {
+    let film_states = if options.undamped { Vec::new() } else { rigid.add_film_states(structure) };
+    let mut laid = rigid.gaps(structure, options.as_sugar, stations, &film_states);
+    laid.retain(|laid| !(options.undamped && laid.member.is_drag()));
+    laid
 }
 
 /// The pairs of bodies that gaps couple.

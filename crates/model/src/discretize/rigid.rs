@@ -5,12 +5,14 @@
 //! first node); after it, from the centre of mass, in which the mass matrix is diagonal and constant.
 
 use bimorph_base::sets::Sets;
+use bimorph_domains::plate_film::STATES_OF_BODY;
 use bimorph_domains::{MaterialPoint, Member, PlacedMember, Station, StructureView};
 use bimorph_multibody::planar::JointFrame;
 use bimorph_multibody::{Body, BodyId, BodyName, Drag, Joint};
 use bimorph_structure::{Beam, Mass, NodeId, Structure, Support};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Stiffness of a hinge over that of the stiffest beam or spring.
 const HINGE: f64 = 1e6;
@@ -163,14 +165,39 @@ impl RigidGroups {
     }
 
     /// Force elements across gaps. `chord`: facing beams in SUGAR's model; `stations`: points where the segments of
-    /// each beam are joined.
+    /// each beam are joined; `film_states`: see [`RigidGroups::add_film_states`].
     pub fn gaps<'a>(
         &self,
         structure: &'a Structure,
         chord: bool,
         stations: &[Vec<Station>],
+        film_states: &[Vec<MaterialPoint>],
     ) -> Vec<PlacedMember<'a, Member>> {
-        Member::lay(&StructureView { structure, point: &|node: NodeId| self.point(node.0), chord, stations })
+        Member::lay(&StructureView {
+            structure,
+            point: &|node: NodeId| self.point(node.0),
+            chord,
+            stations,
+            film_states,
+        })
+    }
+
+    /// Bodies without mass for the states of gas that compresses, for each pair of lumped plates.
+    pub fn add_film_states(&mut self, structure: &Structure) -> Vec<Vec<MaterialPoint>> {
+        let mut found = Vec::with_capacity(structure.plate_gaps.len());
+        for plate in &structure.plate_gaps {
+            let count = plate.gas.map_or(0, |gas| gas.states);
+            let name: Arc<str> = format!("{}.film", plate.name).into();
+            let mut bodies = Vec::with_capacity(count.div_ceil(STATES_OF_BODY));
+            for first in (0..count).step_by(STATES_OF_BODY) {
+                let mut body = UnfinishedBody::new(BodyName::segment(&name, bodies.len()), self.position[plate.a.0]);
+                body.hold([false, first + 1 == count, true], 0.0);
+                bodies.push(MaterialPoint { body: BodyId::Free(self.bodies.len()), arm: Vector2::zeros() });
+                self.bodies.push(body);
+            }
+            found.push(bodies);
+        }
+        found
     }
 
     /// The frame of a joint at a drawn position, whose x axis lies along `axis`.

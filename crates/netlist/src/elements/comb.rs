@@ -5,6 +5,15 @@ use super::arguments::ElementSite;
 use bimorph_structure::{Comb, Fringe, GapVoltage};
 
 impl ElementSite<'_, '_> {
+    /// Viscosity of the gas that slides in gaps of a width (m): 0 without a `pressure`.
+    fn between_fingers(&mut self, gap: f64) -> Result<f64, Reported> {
+        if self.pressure()?.is_none() {
+            return Ok(0.0);
+        }
+        let viscosity = self.non_negative_or("viscosity", 0.0)?;
+        Ok(self.sliding(viscosity, gap)?.unwrap_or(0.0))
+    }
+
     fn comb(&mut self, finite: bool, parasitic: f64, voltage: GapVoltage) -> Result<(), Reported> {
         self.warn_of_coincident_ends();
         let angle = self.direction(self.instance.rotation)?;
@@ -21,6 +30,7 @@ impl ElementSite<'_, '_> {
         if width == 0.0 && law == Some(Fringe::Exact) && self.is_given("fringe") {
             return Err(self.missing("w"));
         }
+        let sliding = self.between_fingers(gap)? * gaps * height / gap;
         let axis = [angle.cos(), angle.sin()];
         let (a, b) = (self.node(0), self.node(1));
         let apart = 2.0 * finger - overlap;
@@ -38,6 +48,7 @@ impl ElementSite<'_, '_> {
             parasitic,
             finger: [finger, width],
             law,
+            sliding,
             finite,
             voltage,
         });

@@ -6,10 +6,12 @@ use super::super::value::short;
 use super::arguments::ElementSite;
 use super::material::VACUUM;
 use bimorph_structure::{
-    BeamGap, ElectrodeShape, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, InsulatingLayer, MIN_RESTITUTION, NodeId,
-    PlateGap, Resistor,
+    BeamGap, ElectrodeShape, FacingGas, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, InsulatingLayer, MAX_FILM_STATES,
+    MIN_RESTITUTION, NodeId, Perforation, PlateGap, Resistor,
 };
 
+/// States of gas that compresses, unless a netlist says otherwise: |Z| of a square within 0.4 % to ten times its first corner, of a rectangle of 1:2 to three times.
+const FILM_STATES: f64 = 4.0;
 /// Permittivity over that of vacuum below which a netlist cancels SUGAR's factor on the fringe field by hand (1).
 const REDUCED: f64 = 1.0 - 1e-3;
 
@@ -80,6 +82,62 @@ impl ElementSite<'_, '_> {
         self.word("fringe", &Fringe::NAMES)
     }
 
+    /// Gas between parts drawn `gap` apart that face each other in rectangles with these sides (m), of an area in all (m²): where there is a `pressure` and a `viscosity`.
+    fn gas(&mut self, sides: Option<[f64; 2]>, area: f64, gap: f64) -> Result<Option<FacingGas>, Reported> {
+        let closed = self.positive_if_any("filmgap")?;
+        if let Some(closed) = closed
+            && closed >= gap
+        {
+            return Err(self.out_of_range("filmgap", closed, "below `gap`"));
+        }
+        let Some(pressure) = self.pressure()?.filter(|pressure| *pressure > 0.0) else { return Ok(None) };
+        let free_path = self.free_path(pressure)?;
+        if self.number("viscosity")?.is_none() {
+            return Err(self.missing("viscosity"));
+        }
+        let viscosity = self.non_negative_or("viscosity", 0.0)?;
+        let Some(sides) = sides else {
+            let message = format!("no gas damps `{}`: the sides of its plates are unknown", self.instance.name);
+            let help = "give `l` and `w` of the plates [m], or `pressure=0`";
+            self.sink.warning("W024", self.instance.span, message, help);
+            return Ok(None);
+        };
+        let plates = self.instance.model == "plategap2d";
+        let holes = if plates { self.holes(sides)? } else { None };
+        let states = if plates { self.film_states(holes.is_some())? } else { 0 };
+        let count = area / (sides[0] * sides[1]);
+        let gas = FacingGas { sides, count, viscosity, pressure, free_path, closed, states, holes };
+        Ok((viscosity > 0.0).then_some(gas))
+    }
+
+    /// Holes in one of two plates with these sides (m): `hole` and `pitch`, through the thickness `h`.
+    fn holes(&mut self, sides: [f64; 2]) -> Result<Option<Perforation>, Reported> {
+        let (radius, pitch) = match (self.positive_if_any("hole")?, self.positive_if_any("pitch")?) {
+            (Some(radius), Some(pitch)) => (radius, pitch),
+            (None, None) => return Ok(None),
+            (hole, _) => return Err(self.missing(if hole.is_none() { "hole" } else { "pitch" })),
+        };
+        let depth = self.positive("h")?;
+        if pitch <= 2.0 * radius || pitch > sides[0].min(sides[1]) {
+            let wanted = "above twice `hole` and at most the shorter side of the plates";
+            return Err(self.out_of_range("pitch", pitch, wanted));
+        }
+        Ok(Some(Perforation { radius, pitch, depth }))
+    }
+
+    /// States of gas that compresses between lumped plates: none with holes.
+    fn film_states(&mut self, holes: bool) -> Result<usize, Reported> {
+        let states = self.number("filmstates")?.unwrap_or(if holes { 0.0 } else { FILM_STATES });
+        if holes && states != 0.0 {
+            return Err(self.out_of_range("filmstates", states, "0 beside holes, under which gas does not compress"));
+        }
+        if states.fract() != 0.0 || !(0.0..=MAX_FILM_STATES).contains(&states) {
+            let wanted = format!("a whole number from 0 to {MAX_FILM_STATES}");
+            return Err(self.out_of_range("filmstates", states, &wanted));
+        }
+        Ok(states as usize)
+    }
+
     /// The field between two facing beams. Node c lies at local y = −(gap + (w1+w2)/2) under a, d under b.
     fn facing(&mut self, voltage: GapVoltage) -> Result<(), Reported> {
         let angle = self.direction(self.instance.rotation)?;
@@ -96,6 +154,7 @@ impl ElementSite<'_, '_> {
         let electrode = self.word("electrode", &ElectrodeShape::NAMES)?;
         let (insulation, touch) = self.insulation(gap)?;
         let impact = self.impact()?;
+        let gas = self.gas(Some([length, height]), length * height, gap)?;
         let below = -(gap + (w1 + w2) / 2.0);
         let nodes: [NodeId; 4] = std::array::from_fn(|i| self.node(i));
         let offsets = [[0.0; 2], [length, 0.0], [0.0, below], [length, below]].map(|v| self.global(v));
@@ -115,6 +174,7 @@ impl ElementSite<'_, '_> {
             insulation,
             touch,
             impact,
+            gas,
             voltage,
         });
         Ok(())
@@ -241,6 +301,7 @@ pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported>
     let thickness = if exact { site.positive("h")? } else { 0.0 };
     let (insulation, touch) = site.insulation(gap)?;
     let impact = site.impact()?;
+    let gas = site.gas(shaped.then_some(sides), area, gap)?;
     let axis = [angle.cos(), angle.sin()];
     let (a, b) = (site.node(0), site.node(1));
     let voltage = site.across(0, 1);
@@ -261,6 +322,7 @@ pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported>
         insulation,
         touch,
         impact,
+        gas,
         voltage,
     };
     site.drawing.structure.plate_gaps.push(plate);

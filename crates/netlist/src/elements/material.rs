@@ -3,12 +3,16 @@
 use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
 use super::arguments::ElementSite;
-use bimorph_structure::{GasLoss, MOLTEN, Material};
+use bimorph_structure::{GasLoss, MOLTEN, Material, SolidHeat};
 
 /// Poisson's ratio where a layer gives none (1). Planar beams do not depend on it.
 const POISSON: f64 = 0.3;
 /// Film thickness of a material without damping (m); its viscosity is 0 then, so that no number depends on it.
 const NO_FILM: f64 = 1.0;
+/// Mean free path in air at [`ATMOSPHERE`] (m).
+const FREE_PATH: f64 = 68e-9;
+/// Standard atmosphere (Pa).
+const ATMOSPHERE: f64 = 101_325.0;
 /// Young's moduli of structural solids, from rubber to diamond (Pa).
 const SOLID: std::ops::Range<f64> = 1e6..2e12;
 /// Densities of solids, from foam to osmium (kg/m³).
@@ -19,7 +23,7 @@ const STRONGEST: f64 = 0.1;
 pub(super) const VACUUM: f64 = 8.854e-12;
 
 /// Parameters of a material.
-const READ: [&str; 13] = [
+const READ: [&str; 17] = [
     "strength",
     "Youngsmodulus",
     "Poisson",
@@ -29,10 +33,14 @@ const READ: [&str; 13] = [
     "density",
     "viscosity",
     "fluid",
+    "pressure",
+    "meanfreepath",
     "stress",
     "straingradient",
     "thermalexpansion",
     "ambienttemperature",
+    "thermcond",
+    "specificheat",
 ];
 
 impl ElementSite<'_, '_> {
@@ -99,11 +107,19 @@ impl ElementSite<'_, '_> {
             ambient_temperature: self.ambient()?,
             stress,
             strength: self.positive_if_any("strength")?,
+            heat: self.solid_heat()?,
         };
         Ok(match wafer {
             Some(wafer) => wafer.turned(material, angle),
             None => material,
         })
+    }
+
+    /// Thermal constants of the solid, where both are there.
+    fn solid_heat(&mut self) -> Result<Option<SolidHeat>, Reported> {
+        let (conductivity, specific_heat) = (self.number("thermcond")?, self.number("specificheat")?);
+        let both = conductivity.zip(specific_heat).filter(|(k, c)| *k > 0.0 && *c > 0.0);
+        Ok(both.map(|(conductivity, specific_heat)| SolidHeat { conductivity, specific_heat }))
     }
 
     /// Ambient temperature (K); 0 by default, so that temperatures are rises.
@@ -133,14 +149,16 @@ impl ElementSite<'_, '_> {
         Ok(0.0)
     }
 
-    /// Viscosity (Pa·s) and thickness (m) of the gas film; no viscosity when either is missing.
+    /// Viscosity (Pa·s), with slip where there is a pressure, and thickness (m) of the gas film under a part; no viscosity when either is missing.
     pub(super) fn film(&mut self) -> Result<[f64; 2], Reported> {
         let viscosity = self.non_negative_or("viscosity", 0.0)?;
         match self.number("fluid")? {
             Some(fluid) if fluid <= 0.0 && viscosity > 0.0 => {
                 Err(self.out_of_range("fluid", fluid, "positive where there is a `viscosity`"))
             }
-            Some(fluid) if fluid > 0.0 && viscosity > 0.0 => Ok([viscosity, fluid]),
+            Some(fluid) if fluid > 0.0 && viscosity > 0.0 => {
+                Ok(self.sliding(viscosity, fluid)?.map_or([0.0, NO_FILM], |viscosity| [viscosity, fluid]))
+            }
             _ => Ok([0.0, NO_FILM]),
         }
     }
@@ -161,6 +179,35 @@ impl ElementSite<'_, '_> {
         };
         let shape = shape.unwrap_or_else(|| GasLoss::usual_shape(width, thickness, distance));
         Ok(Some(GasLoss { conductivity, distance, shape }))
+    }
+
+    /// Viscosity of gas that slides in a film of a thickness (m), with slip at both walls (Veijola and Turowski 2001); that of a continuum without a
+    /// `pressure`, none in vacuum.
+    pub(super) fn sliding(&mut self, viscosity: f64, thickness: f64) -> Result<Option<f64>, Reported> {
+        let Some(pressure) = self.pressure()? else { return Ok(Some(viscosity)) };
+        if pressure == 0.0 {
+            return Ok(None);
+        }
+        let kn = self.free_path(pressure)? / thickness;
+        Ok(Some(viscosity / (1.0 + 2.0 * kn + 0.2 * kn.powf(0.788) * (-0.1 * kn).exp())))
+    }
+
+    /// Pressure of the gas (Pa), if it is given.
+    pub(super) fn pressure(&mut self) -> Result<Option<f64>, Reported> {
+        match self.number("pressure")? {
+            Some(pressure) if pressure < 0.0 => {
+                Err(self.out_of_range("pressure", pressure, "zero (vacuum) or positive"))
+            }
+            pressure => Ok(pressure),
+        }
+    }
+
+    /// Mean free path at a pressure (m).
+    pub(super) fn free_path(&mut self, pressure: f64) -> Result<f64, Reported> {
+        match self.number("meanfreepath")? {
+            Some(free_path) if free_path < 0.0 => Err(self.out_of_range("meanfreepath", free_path, "zero or positive")),
+            free_path => Ok(free_path.unwrap_or(FREE_PATH * ATMOSPHERE / pressure)),
+        }
     }
 
     /// Permittivity (F/m).

@@ -51,6 +51,8 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
     "density",
     "viscosity",
     "fluid",
+    "pressure",
+    "meanfreepath",
     "permittivity",
     "fringe",
     "sheetresistance",
@@ -136,6 +138,7 @@ const GAP: &[&str] = &[
     "touch",
     "restitution",
     "speed",
+    "filmgap",
 ];
 const GAP_E: &[&str] = &[
     "l",
@@ -159,6 +162,7 @@ const GAP_E: &[&str] = &[
     "touch",
     "restitution",
     "speed",
+    "filmgap",
 ];
 const GAP_SHEET: &[&str] = &[
     "l",
@@ -176,9 +180,27 @@ const GAP_SHEET: &[&str] = &[
     "touch",
     "restitution",
     "speed",
+    "filmgap",
 ];
-const PLATES: &[&str] =
-    &["A", "l", "w", "h", "gap", "permittivity", "fringe", "electrode", "td", "er", "touch", "restitution", "speed"];
+const PLATES: &[&str] = &[
+    "A",
+    "l",
+    "w",
+    "h",
+    "gap",
+    "permittivity",
+    "fringe",
+    "electrode",
+    "td",
+    "er",
+    "touch",
+    "restitution",
+    "speed",
+    "filmgap",
+    "filmstates",
+    "hole",
+    "pitch",
+];
 const STOP: &[&str] =
     &["gap", "back", "k", "A", "hardness", "contactresistivity", "electronpath", "restitution", "speed"];
 const LOAD: &[&str] = &["F", "M"];

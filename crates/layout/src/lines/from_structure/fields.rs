@@ -2,7 +2,9 @@
 
 use super::{OfStructure, unmirrored};
 use bimorph_structure::DomainElement;
-use bimorph_structure::{Beam, ElectrodeShape, Fringe, GapVoltage, Impact, InsulatingLayer, NodeId};
+use bimorph_structure::{
+    Beam, ElectrodeShape, FacingGas, Fringe, GapVoltage, Impact, InsulatingLayer, NodeId, Perforation,
+};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Impact losses, where the netlist gives them.
@@ -26,6 +28,15 @@ fn field_words(
     law.map(|(word, _)| ("fringe", *word)).into_iter().chain(shape.map(|(word, _)| ("electrode", *word)))
 }
 
+/// Gas in a gap, whatever its layer says.
+fn gas(gas: Option<&FacingGas>) -> impl Iterator<Item = (&'static str, f64)> {
+    let given = gas.map(|gas| {
+        let always = [("viscosity", gas.viscosity), ("pressure", gas.pressure), ("meanfreepath", gas.free_path)];
+        always.into_iter().chain(gas.closed.map(|closed| ("filmgap", closed)))
+    });
+    given.into_iter().flatten()
+}
+
 impl OfStructure<'_> {
     /// `gap2d` at a fixed voltage brings its two beams with it; gives their names.
     pub(super) fn gaps_with_beams(&mut self) -> HashSet<String> {
@@ -45,6 +56,7 @@ impl OfStructure<'_> {
             parameters.extend([("oz", angle), ("V", voltage), ("permittivity", gap.permittivity)]);
             parameters.extend(insulation(gap.insulation));
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
+            parameters.extend(gas(gap.gas.as_ref()));
             self.push(&gap.name, "gap2d", &process, &nodes, &parameters);
             self.say(field_words(gap.law, gap.electrode));
             inside.extend(parts);
@@ -94,6 +106,7 @@ impl OfStructure<'_> {
             parameters.extend([("oz", angle), ("permittivity", gap.permittivity)]);
             parameters.extend(insulation(gap.insulation));
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
+            parameters.extend(gas(gap.gas.as_ref()));
             self.push(&gap.name, "gap2dforce", "*", &nodes, &parameters);
             self.say(field_words(gap.law, gap.electrode));
         }
@@ -109,6 +122,12 @@ impl OfStructure<'_> {
             }
             parameters.extend(insulation(gap.insulation));
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
+            parameters.extend(gap.gas.map(|gas| ("filmstates", gas.states as f64)));
+            let holes = gap.gas.and_then(|gas| gas.holes);
+            let of_holes = |h: Perforation| [("hole", h.radius), ("pitch", h.pitch)];
+            parameters.extend(holes.into_iter().flat_map(of_holes));
+            parameters.extend(holes.filter(|_| gap.thickness == 0.0).map(|h| ("h", h.depth)));
+            parameters.extend(gas(gap.gas.as_ref()));
             self.push(&gap.name, "plategap2d", "*", &[gap.a, gap.b], &parameters);
             self.say(field_words(gap.law, gap.electrode));
         }
