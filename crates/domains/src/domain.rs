@@ -7,8 +7,9 @@
 //! ```
 //! Constant damping belongs to the mechanism: a domain returns its dampers when it is built
 //! ([`super::from_structure::FromStructure::dampers`]), and every integrator, frequency response and noise has them.
-//! Other forces that depend on rates are added by [`Domain::add_loss`]. Only heat has states of its own
-//! ([`super::lag`]): temperatures follow voltages alone, so that they come before the mechanism and not with it.
+//! Other forces that depend on rates are added by [`Domain::add_loss`]. Other states of a domain are
+//! coordinates of bodies without mass, which its forces act on ([`super::plate_film`]). Heat has states apart ([`super::lag`]):
+//! temperatures follow voltages alone, so that they come before the mechanism and not with it.
 //!
 //! Nothing here is called through a pointer: [`super::member::Member`] is one of the registered domains, chosen by a `match`.
 
