@@ -48,7 +48,7 @@ fn a_bank_session_is_small_and_steps_allocate_nothing() {
     let mut rodas = Rodas4::new(system, &[]);
     let (mut motion, mut error) = (Motion::zeros(system.bodies()), Motion::zeros(system.bodies()));
     let sources = vec![1.0; system.electrics.sources()];
-    let rise = vec![0.0; system.electrics.heating.heaters.len()];
+    let rise = vec![0.0; system.electrics.heating.states()];
     let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, 1e-6);
     let mut bodies = Bodies::new(system, &ramp);
     let blocks = dhat::HeapStats::get().total_blocks;

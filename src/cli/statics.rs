@@ -27,8 +27,8 @@ use std::fmt::Write;
 /// Static equilibrium: displacement of every node, temperatures, port currents and charges.
 ///
 /// The equilibrium is the one reached from rest by raising all loads and voltages together. JSON: "nodes" holds x [m],
-/// y [m] and rz [rad] from the drawn place; "temperatures_k", "currents_a", "charges_c" and "permanent_strains" by name, and "stresses_pa",
-/// the largest stress in each beam whose layer has a strength.
+/// y [m] and rz [rad] from the drawn place; "temperatures_k" (means), "peak_temperatures_k" (highest along each heated beam),
+/// "currents_a", "charges_c" and "permanent_strains" by name. "stresses_pa": largest stress in each beam whose layer has a strength.
 ///
 /// The estimated error is of the displacement of each node as a vector, of a thirtieth of the largest where a node
 /// moves less. The relative error of a small component, or of a small rotation beside large displacements, may be
@@ -47,7 +47,7 @@ pub(crate) struct StaticCommand {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// Show these only, in the text and in CSV and raw files (JSON documents are whole): NODE.x, NODE.y, NODE.rz, BEAM.T, BEAM.stress, PORT.i, PORT.q, or sums such as a.x-0.5*b.x; a,b or repeated
+    /// Show these only, in the text and in CSV and raw files (JSON documents are whole): NODE.x, NODE.y, NODE.rz, BEAM.T, BEAM.Tmax, BEAM.stress, PORT.i, PORT.q, or sums such as a.x-0.5*b.x; a,b or repeated
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 
@@ -69,6 +69,8 @@ struct StaticDocument<'a> {
     temperatures_k: JsonMap<'a, f64>,
     #[serde(skip_serializing_if = "JsonMap::is_empty")]
     stresses_pa: JsonMap<'a, f64>,
+    #[serde(skip_serializing_if = "JsonMap::is_empty")]
+    peak_temperatures_k: JsonMap<'a, f64>,
     currents_a: JsonMap<'a, f64>,
     charges_c: JsonMap<'a, f64>,
     permanent_strains: JsonMap<'a, f64>,
@@ -110,6 +112,7 @@ impl StaticCommand {
             nodes: JsonMap(&result.nodes),
             temperatures_k: JsonMap(&result.temperatures_k),
             stresses_pa: JsonMap(&result.stresses_pa),
+            peak_temperatures_k: JsonMap(&result.peak_temperatures_k),
             currents_a: JsonMap(&result.currents_a),
             charges_c: JsonMap(&result.charges_c),
             permanent_strains: JsonMap(&permanent_strains),
@@ -159,6 +162,7 @@ fn table(title: &str, result: &StaticResult, names: &[String]) -> Result<Table, 
     }
     let lists = [
         (&result.temperatures_k, "T", "K"),
+        (&result.peak_temperatures_k, "Tmax", "K"),
         (&result.stresses_pa, "stress", "Pa"),
         (&result.currents_a, "i", "A"),
         (&result.charges_c, "q", "C"),
@@ -237,8 +241,16 @@ fn text(compiled: &CompiledModel, result: &StaticResult, strains: &[(String, f64
     };
     let rows: Vec<Vec<String>> = result.nodes.iter().map(row).collect();
     let mut text = report::columns(&["node", "x", "y", "rz"], &rows);
+    if !result.temperatures_k.is_empty() {
+        let peak = |name: &String| result.peak_temperatures_k.iter().find(|(beam, _)| beam == name);
+        let rows: Vec<Vec<String>> = (result.temperatures_k.iter())
+            .map(|(n, mean)| {
+                [n.clone(), quantity(*mean, "K"), quantity(peak(n).map_or(*mean, |(_, t)| *t), "K")].into()
+            })
+            .collect();
+        let _ = write!(text, "\n{}", report::columns(&["beam", "temperature", "highest"], &rows));
+    }
     for (list, unit, head) in [
-        (&result.temperatures_k, "K", ["beam", "temperature"]),
         (&result.stresses_pa, "Pa", ["beam", "stress"]),
         (&result.currents_a, "A", ["port", "current"]),
         (&result.charges_c, "C", ["port", "charge"]),

@@ -56,7 +56,7 @@ fn run(
     motion: &mut Motion,
     (method, stop, control): (Integrator, f64, Control),
 ) -> (Result<(), SolveError>, SolverCounters) {
-    let rise = vec![0.0; system.electrics.heating.heaters.len()];
+    let rise = vec![0.0; system.electrics.heating.states()];
     let ramp = Ramp::new(&system.electrics, volts.0, volts.1, &rise, stop);
     let solver = Solver::Recursion(Recursion);
     let (end, work) = method.advance(system, solver, &ramp, motion, 1e-9, control, &mut |_, _, _, _| true);

@@ -163,7 +163,7 @@ fn sensitivities_of_a_step_are_exact() {
     let joints = Arc::new(Joints::elastic(system).unwrap());
     let electrics = &system.electrics;
     let count = system.bodies();
-    let rise = vec![0.0; electrics.heating.heaters.len()];
+    let rise = vec![0.0; electrics.heating.states()];
     let from = [1.0, 9.0];
     let shortest = 1e-10;
     let after = |to: [f64; 2]| {

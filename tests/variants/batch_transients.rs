@@ -32,7 +32,7 @@ fn alone(compiled: &CompiledModel, volts: &[f64], stop: f64, tol: f64) -> Option
     let system = &compiled.parts.system;
     let mut sources = vec![0.0; system.electrics.sources()];
     system.electrics.fill_sources(&volts[..system.electrics.ports], &mut sources);
-    let rise = vec![0.0; system.electrics.heating.heaters.len()];
+    let rise = vec![0.0; system.electrics.heating.states()];
     let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, stop);
     let mut motion = Motion::zeros(system.bodies());
     let (mut steps, mut h) = (Vec::new(), first_step(system, stop));
@@ -56,7 +56,7 @@ fn together(variants: &[CompiledModel], volts: &[f64], stop: f64, tol: f64) -> V
             sources
         })
         .collect();
-    let rises: Vec<Vec<f64>> = electrics.iter().map(|e| vec![0.0; e.heating.heaters.len()]).collect();
+    let rises: Vec<Vec<f64>> = electrics.iter().map(|e| vec![0.0; e.heating.states()]).collect();
     let mut notes: Vec<Notes> = variants.iter().map(|_| Notes::default()).collect();
     let mut ends: Vec<Option<Motion>> = variants.iter().map(|_| None).collect();
     {

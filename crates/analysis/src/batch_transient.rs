@@ -122,7 +122,7 @@ impl Setup {
         let sources = source_vector(compiled, &options.voltages).ok()?;
         let find = |name: &String| Expression::of_run(compiled, name, &sources);
         let signals = options.signals.iter().map(find).collect::<Result<_, _>>().ok()?;
-        let rise = vec![0.0; compiled.parts.system.electrics.heating.heaters.len()];
+        let rise = vec![0.0; compiled.parts.system.electrics.heating.states()];
         Some(Self { signals, sources, rise })
     }
 

@@ -73,6 +73,7 @@ pub fn frame_statics(
         nodes,
         temperatures_k: electrical.temperatures_k,
         stresses_pa: Vec::new(),
+        peak_temperatures_k: electrical.peak_temperatures_k,
         currents_a: electrical.currents_a,
         charges_c: (0..electrics.ports).map(|p| (electrics.names[p].clone(), charge(p))).collect(),
         pulled_in: false,
@@ -124,7 +125,7 @@ pub fn frame_modes(
 fn sources(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec<f64>, Drive), AnalysisError> {
     let electrics = &compiled.parts.system.electrics;
     let sources = source_vector(compiled, voltages)?;
-    let mut rise = vec![0.0; electrics.heating.heaters.len()];
+    let mut rise = vec![0.0; electrics.heating.states()];
     let mut drive = electrics.drive();
     electrics.steady(&sources, &mut rise, &mut drive);
     Ok((sources, rise, drive))

@@ -23,6 +23,7 @@ mod loose_parts;
 pub mod mesh;
 pub mod mode_quality;
 pub mod modes;
+pub mod overheating;
 pub mod path_parameter;
 pub mod pull_in;
 pub mod readout;

@@ -8,7 +8,7 @@ use bimorph_structure::Structure;
 use std::collections::HashSet;
 
 /// Names of the numbers of a static result.
-pub const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, BEAM.stress, PORT.i or PORT.q";
+pub const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, BEAM.Tmax, BEAM.stress, PORT.i or PORT.q";
 
 /// A number of a static result.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,8 +39,8 @@ fn split(name: &str) -> Option<(&str, &str, StaticPart, &'static str)> {
     let (kind, unit) = match quantity {
         "x" | "y" => (StaticPart::Node, "m"),
         "rz" => (StaticPart::Node, "rad"),
-        "T" => (StaticPart::Beam, "K"),
         "stress" => (StaticPart::StressedBeam, "Pa"),
+        "T" | "Tmax" => (StaticPart::Beam, "K"),
         "i" => (StaticPart::Port, "A"),
         "q" => (StaticPart::Port, "C"),
         _ => return None,
@@ -78,6 +78,8 @@ fn output(result: &StaticResult, name: &str) -> Option<StaticOutput> {
         "rz" => node()?.rz,
         "T" => listed(&result.temperatures_k)?,
         "stress" => listed(&result.stresses_pa)?,
+        // a prescribed temperature is that of all of a beam
+        "Tmax" => listed(&result.peak_temperatures_k).or_else(|| listed(&result.temperatures_k))?,
         "i" => listed(&result.currents_a)?,
         _ => listed(&result.charges_c)?,
     };

@@ -2,6 +2,7 @@
 pub use super::NodeMotion;
 use super::contact_range::within_contact_range;
 use super::loose_parts;
+use super::overheating::{check_heat, current_limits};
 use super::weak_parts;
 use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::readout::signal::{Signal, SignalView};
@@ -25,6 +26,9 @@ pub struct StaticResult {
     /// Largest stress on the faces of every beam whose strength is known (Pa), by name.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stresses_pa: Vec<(String, f64)>,
+    /// Highest temperature along every heated beam (K), by name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub peak_temperatures_k: Vec<(String, f64)>,
     /// Current into each port (A), by name.
     pub currents_a: Vec<(String, f64)>,
     /// Charge on each port (C), by name.
@@ -132,6 +136,7 @@ pub(crate) fn result_at(compiled: &CompiledModel, point: &OperatingPoint) -> Sta
         nodes: node_motions(compiled, &point.q),
         temperatures_k: electrical.temperatures_k,
         stresses_pa: stresses(compiled, point).map(|(beam, stress)| (beam.name.clone(), stress)).collect(),
+        peak_temperatures_k: electrical.peak_temperatures_k,
         currents_a: electrical.currents_a,
         charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
         pulled_in,
@@ -167,6 +172,7 @@ pub(crate) fn too_stressed(compiled: &CompiledModel, point: &OperatingPoint) -> 
 /// Source voltages and temperature rises, without any mechanics.
 pub(crate) struct ElectricalSolution {
     pub(crate) temperatures_k: Vec<(String, f64)>,
+    pub(crate) peak_temperatures_k: Vec<(String, f64)>,
     pub(crate) currents_a: Vec<(String, f64)>,
 }
 
@@ -183,9 +189,11 @@ pub(crate) fn electrical(compiled: &CompiledModel, sources: &[f64], rise: &[f64]
             (b.name.clone(), heater.map_or(rest, |k| Signal::Temperature(k).value(compiled, &view)))
         })
         .collect();
-    let current = |p: usize| (0..sources.len()).map(|s| electrics.conductance[(p, s)] * sources[s]).sum::<f64>();
-    let currents_a = (0..electrics.ports).map(|p| (electrics.names[p].clone(), current(p))).collect();
-    ElectricalSolution { temperatures_k, currents_a }
+    let currents_a = electrics.names.iter().cloned().zip(electrics.port_currents(sources, rise)).collect();
+    let heaters = &electrics.heating.heaters;
+    let peaks = compiled.parts.heaters.iter().zip(heaters).zip(electrics.heating.peaks(sources));
+    let peak_temperatures_k = peaks.map(|((beam, h), peak)| (structure.beams[*beam].name.clone(), h.ambient + peak));
+    ElectricalSolution { temperatures_k, peak_temperatures_k: peak_temperatures_k.collect(), currents_a }
 }
 
 /// An equilibrium with what it was found at.
@@ -221,7 +229,7 @@ impl OperatingPoint {
         let system = &compiled.parts.system;
         let electrics = &system.electrics;
         let sources = source_vector(compiled, voltages)?;
-        let rise = vec![0.0; electrics.heating.heaters.len()];
+        let rise = vec![0.0; electrics.heating.states()];
         let mut drive = electrics.drive();
         electrics.apply(&sources, &rise, &mut drive);
         let q = vec![Pose::zeros(); system.bodies()];
@@ -297,7 +305,7 @@ pub(super) fn settled(
 ) -> OperatingPoint {
     let electrics = &compiled.parts.system.electrics;
     let mut drive = electrics.drive();
-    let mut rise = vec![0.0; electrics.heating.heaters.len()];
+    let mut rise = vec![0.0; electrics.heating.states()];
     electrics.steady(&sources, &mut rise, &mut drive);
     OperatingPoint { q, sources, rise, volts: drive.volts, path, free_motions, near_buckling: None }
 }
@@ -312,7 +320,8 @@ pub(crate) fn too_hot(compiled: &CompiledModel, point: &OperatingPoint) -> Optio
     let beam = &beams[*beam];
     (*rise > MOLTEN).then(|| {
         let there = beam.material.ambient_temperature + rise;
-        format!("`{}` comes to {there:.0} K: nothing that structures are made of is solid there", beam.name)
+        let limits = current_limits(compiled, &point.sources);
+        format!("`{}` comes to {there:.0} K: nothing that structures are made of is solid there{limits}", beam.name)
     })
 }
 
@@ -343,6 +352,7 @@ pub(crate) fn source_vector(compiled: &CompiledModel, voltages: &PortVoltages) -
     let ports: Vec<f64> = ports.into_iter().map(Option::unwrap_or_default).collect();
     let mut sources = vec![0.0; electrics.sources()];
     electrics.fill_sources(&ports, &mut sources);
+    check_heat(compiled, electrics, &sources)?;
     Ok(sources)
 }
 

@@ -12,7 +12,7 @@
 //! rate.
 //!
 //! An answer is that with nothing else changed: the current of a port whose voltage is held, the motion of one whose force
-//! is. Left out: fluctuations of temperature, and what Johnson's noise heats.
+//! is. Left out: fluctuations of temperature, and what Johnson's noise heats. Resistances that depend on temperature are those of the state.
 
 use super::output_gradient::{OutputGradient, surroundings};
 use super::session::DeviceSession;
@@ -76,7 +76,7 @@ impl DeviceSession {
                 let sum: Complex<f64> =
                     adjoint[i].iter().zip(&pushed).map(|(h, p)| h.x * p.x + h.y * p.y + h.z * p.z).sum();
                 let johnson = self.johnson(system, state, (i, j)) * 4.0 * BOLTZMANN;
-                let sum = sum * warm + johnson + self.conducted(system, (i, j)) * warm;
+                let sum = sum * warm + johnson + self.conducted(system, state, (i, j)) * warm;
                 // one half gives the other: the matrix is Hermitian to the last bit
                 out[i * answers + j] = [sum.re, if i == j { 0.0 } else { sum.im }];
                 out[j * answers + i] = [sum.re, if i == j { 0.0 } else { -sum.im }];
@@ -136,16 +136,12 @@ impl DeviceSession {
     /// Σ rise·R·I·I of two answers (K·S).
     fn johnson(&self, system: &System, state: &Snapshot, (i, j): (usize, usize)) -> f64 {
         let Some((a, b)) = self.both_electrical(i, j) else { return 0.0 };
-        let heating = &system.electrics.heating;
-        let one = |(k, rise): (usize, &f64)| {
-            rise * heating.heaters[k].resistance * heating.current(k, a) * heating.current(k, b)
-        };
-        state.rise.iter().enumerate().map(one).sum()
+        system.electrics.heated_noise(&state.rise, a, b)
     }
 
     /// Conductance between two answers (S).
-    fn conducted(&self, system: &System, (i, j): (usize, usize)) -> f64 {
-        self.both_electrical(i, j).map_or(0.0, |(a, b)| system.electrics.conductance[(a, b)])
+    fn conducted(&self, system: &System, state: &Snapshot, (i, j): (usize, usize)) -> f64 {
+        self.both_electrical(i, j).map_or(0.0, |(a, b)| system.electrics.conductance_between(&state.rise, a, b))
     }
 
     /// The sources of two answers, if both are currents.

@@ -32,7 +32,7 @@ impl DeviceSession {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
         self.values(compiled, system, reply);
-        self.partials(compiled, system, from.map(|(from, _)| (from, request.dt)), reply);
+        self.partials(compiled, system, from.map(|(from, before)| ((from, before.rise.as_slice()), request.dt)), reply);
         let (shown, bound) = self.seen(compiled, system, request, from.map(|(_, before)| before), reply);
         reply.dt_next = bound;
         let snapshot = Snapshot {
@@ -57,6 +57,7 @@ impl DeviceSession {
         let electrics = &system.electrics;
         let (ports, gaps) = (self.ports.len(), self.drive.volts.len());
         let view = self.view();
+        let hot = electrics.heating.is_hot().then(|| electrics.port_currents(&self.sources, &self.rise));
         reply.currents.clear();
         reply.charges.clear();
         reply.di_dv.clear();
@@ -66,7 +67,10 @@ impl DeviceSession {
             match answer {
                 PortResponse::Current => {
                     let row = electrics.conductance.row(port);
-                    current = row.iter().zip(&self.sources).map(|(g, u)| g * u).sum();
+                    current = match &hot {
+                        Some(currents) => currents[port],
+                        None => row.iter().zip(&self.sources).map(|(g, u)| g * u).sum(),
+                    };
                     reply.di_dv.extend(self.ports.sources.iter().map(|&other| row[other]));
                     let of = |g: usize| electrics.gap_rows[(g, port)] * system.capacitance(g, view.q) * view.volts[g];
                     charge = (0..gaps).map(of).sum();
@@ -83,13 +87,13 @@ impl DeviceSession {
         reply.outputs.extend(self.signals.iter().map(|s| s.value(compiled, &view)));
     }
 
-    /// Partials of charges, outputs and what is not electrical, from the sensitivities. `step` holds the sources at the start of
-    /// a transient step and its length (s).
+    /// Partials of charges, outputs and what is not electrical, from the sensitivities. `step` holds the sources and rises at the start
+    /// of a transient step and its length (s).
     fn partials(
         &mut self,
         compiled: &CompiledModel,
         system: &System,
-        step: Option<(&[f64], f64)>,
+        step: Option<((&[f64], &[f64]), f64)>,
         reply: &mut TrialReply,
     ) {
         let electrics = &system.electrics;
@@ -106,13 +110,24 @@ impl DeviceSession {
                 None => {
                     self.unit.fill(0.0);
                     self.unit[port] = 1.0;
-                    for (k, slope) in self.rise_slope.iter_mut().enumerate() {
-                        *slope = electrics.heating.slope(k, &self.sources, &self.unit);
-                    }
+                    electrics.heating.slopes(&self.sources, &self.rise, &self.unit, &mut self.rise_slope);
                 }
-                Some((from, dt)) => {
-                    let slopes = &mut self.rise_slope;
-                    electrics.rise_sensitivities((from, &self.sources), dt, dt, port, |k, slope| slopes[k] = slope);
+                Some(((from, start), dt)) => {
+                    let (slopes, states) = (&mut self.rise_slope, electrics.heating.states());
+                    let cold = if start.is_empty() { vec![0.0; states] } else { Vec::new() };
+                    let way = ((from, &self.sources[..]), if start.is_empty() { &cold[..] } else { start });
+                    electrics.rise_sensitivities(way, dt, dt, port, |k, slope| slopes[k] = slope);
+                }
+            }
+            if electrics.heating.is_hot() {
+                self.unit.fill(0.0);
+                self.unit[port] = 1.0;
+                let about = (&self.sources[..], &self.rise[..]);
+                let currents = electrics.port_current_slopes(about, &self.unit, &self.rise_slope);
+                for (row, &other) in self.ports.sources.iter().enumerate() {
+                    if self.ports.answers[row] == PortResponse::Current {
+                        reply.di_dv[row * ports + p] = currents[other];
+                    }
                 }
             }
             for (g, volts) in gap_row.iter().enumerate() {

@@ -96,7 +96,7 @@ impl DeviceSession {
         let n = system.bodies();
         // each port has its sensitivity in every stage of a step, and matrices of ports and signals go with every reply
         budget::lay_out_matrix(ports.len(), DOUBLES * n + 4 * ports.len() + 2 * signals.len());
-        let heaters = electrics.heating.heaters.len();
+        let heaters = electrics.heating.states();
         let first_step = first_step(system, f64::INFINITY);
         let joints = match &compiled.joints {
             Some(Ok(joints)) => Some(ports.joints(joints)),

@@ -71,7 +71,7 @@ impl DeviceSession {
             for (row, (answer, &other)) in self.ports.answers.iter().zip(&self.ports.sources).enumerate() {
                 reply.admittance[row * ports + p] = match answer {
                     // i = G + s·dq
-                    PortResponse::Current => pair(s * charges[row] + system.electrics.conductance[(other, port)]),
+                    PortResponse::Current => pair(s * charges[row] + push.currents[other]),
                     PortResponse::Motion(signal) => pair(about.signal_change(*signal, &moved)),
                     PortResponse::Rise(heater) => pair(PerturbedState::warmed(&push, *heater)),
                     PortResponse::Nothing => [0.0; 2],

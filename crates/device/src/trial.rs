@@ -8,6 +8,7 @@ use super::session::DeviceSession;
 use super::states::Snapshot;
 use super::{Status, Trial, TrialReply};
 use bimorph_analysis::contact_range::within_contact_range;
+use bimorph_analysis::overheating::{check_course, check_heat, thermal_runaway};
 use bimorph_domains::{Ramp, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
@@ -38,6 +39,10 @@ impl DeviceSession {
         let system = Self::system(&own, compiled);
         let electrics = &system.electrics;
         self.fill_sources(electrics, request.voltages);
+        if let Err(error) = check_heat(compiled, electrics, &self.sources) {
+            reply.status = Status::Fail(error.to_string());
+            return;
+        }
         let rest = vec![0.0; self.sources.len()];
         let (from, load) = parent.map_or((rest.as_slice(), 0.0), |p| (p.sources.as_slice(), 1.0));
         self.motion.q.copy_from_slice(parent.map_or(&self.zeros, |p| &p.q));
@@ -57,11 +62,15 @@ impl DeviceSession {
             return;
         }
         electrics.steady(&self.sources, &mut self.rise, &mut self.drive);
+        if let Some(runaway) = thermal_runaway(compiled, &self.sources, &self.rise) {
+            reply.status = Status::Fail(runaway);
+            return;
+        }
         // ∂q/∂V = −K⁻¹·∂r/∂V with the factor that the last Newton iteration left
         for (p, &port) in self.ports.sources.iter().enumerate() {
             self.unit.fill(0.0);
             self.unit[port] = 1.0;
-            electrics.steady_slope(&self.sources, &self.unit, &mut self.change);
+            electrics.steady_slope((&self.sources, &self.rise), &self.unit, &mut self.change);
             let s = &mut self.stepper.method.sensitivity_mut()[p];
             system.drive_force(&self.motion.q, &self.drive, &self.change, &mut s.q);
             for x in &mut s.q {
@@ -98,6 +107,10 @@ impl DeviceSession {
         self.begin(parent);
         let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
         let mut ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
+        if let Err(error) = check_course(&ramp) {
+            reply.status = Status::Fail(error.to_string());
+            return;
+        }
         let mut h = self.contact_steps.next;
         let ends = &self.contact_steps.ends;
         let bodies = &mut Bodies::weighed(system, &ramp, &self.weights);
@@ -131,11 +144,13 @@ impl DeviceSession {
             reply.status = Status::Fail(error.to_string());
             return;
         }
-        for k in 0..self.rise_slope.len() {
-            self.rise_slope[k] = ramp.rise_at(k, request.dt);
-        }
+        ramp.end_rises(&mut self.rise_slope);
         ramp.at(request.dt, &mut self.drive);
         self.rise.copy_from_slice(&self.rise_slope);
+        if let Some(runaway) = thermal_runaway(compiled, &self.sources, &self.rise) {
+            reply.status = Status::Fail(runaway);
+            return;
+        }
         let rest = Snapshot::default();
         self.answer(compiled, request, Some((&from, parent.unwrap_or(&rest))), h, reply);
         let cell = self.shaken.as_ref().map_or(f64::INFINITY, |shaken| shaken.cell);

@@ -39,6 +39,21 @@ pub struct HeatConductor {
     pub capacity: f64,
     /// Thermal conductance of all of its length through gas to the surroundings (W/K).
     pub gas: f64,
+    /// Relative change of its resistivity with the rise (1/K).
+    pub coefficient: f64,
+    /// Relative change of its thermal resistivity with the rise (1/K).
+    pub thermal_coefficient: f64,
+}
+
+impl HeatConductor {
+    /// Its heat capacity, or that with which it alone between cold ends has the given time constant (J/K).
+    pub(super) fn stored(&self) -> f64 {
+        if self.delayed {
+            return self.capacity;
+        }
+        let fin = Fin::new(self.conductance, self.gas);
+        -self.time_constant * fin.own / fin.slopes(self.conductance).own
+    }
 }
 
 /// A heated beam whose heat cannot leave: nothing conducts from it to an anchor.

@@ -33,6 +33,7 @@
 //! | `laplacian` | potentials in a network of conductors |
 //! | [`thermal`] | mean temperature rise of beams that carry current |
 //! | `fin` | a conductor of heat that also leaves to its sides |
+//! | [`hot`] | beams whose resistance depends on their temperature |
 //! | [`lag`] | how a rise lags behind its steady value |
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
 //! | [`inputs`] | effects of forces at points, heat into beams and frame motion; `input`: their kinds |
@@ -74,6 +75,7 @@ mod facing_stretches;
 pub mod film_series;
 mod fin;
 pub mod from_structure;
+pub mod hot;
 mod input;
 pub mod inputs;
 pub mod lag;

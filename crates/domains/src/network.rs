@@ -13,7 +13,7 @@ mod source_tree;
 use super::laplacian::Laplacian;
 use bimorph_base::sets::Sets;
 use nalgebra::{DMatrix, DVector};
-use source_tree::KnownPotentials;
+pub(super) use source_tree::KnownPotentials;
 use thiserror::Error;
 
 /// A network by node indices. Sources come in the order of the source vector.

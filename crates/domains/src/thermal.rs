@@ -17,9 +17,19 @@
 
 use super::conduction::Conduction;
 pub use super::conduction::{HeatConductor, NoHeatSink};
+use super::hot::{HotNetwork, ThermalRunaway};
 use super::input::Input;
-use super::network::Potentials;
-use nalgebra::DVector;
+use super::network::{ElectricalNetwork, Potentials};
+use nalgebra::{ComplexField, DVector};
+use std::sync::Arc;
+
+/// Voltage from which a runaway current is sought (V).
+const FIRST_VOLTAGE: f64 = 1e-3;
+/// Doublings of that voltage, at most.
+const MAX_DOUBLINGS: usize = 40;
+/// Change of the limit with a doubling that counts as none, and its distance from the current there (1).
+const SAME_LIMIT: f64 = 1e-6;
+const NEAR_LIMIT: f64 = 1e-2;
 
 /// Heaters with their quadratic forms.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -37,6 +47,8 @@ pub struct Heating {
     heat: Vec<f64>,
     /// Input by input behind the sources, the heater that it heats.
     heated_by: Vec<Option<usize>>,
+    /// The network with resistances that depend on temperature; none where no one does.
+    hot: Option<Arc<HotNetwork>>,
 }
 
 impl Heating {
@@ -81,6 +93,12 @@ impl Heating {
         Ok(Self { heaters, sources, form, currents, sink: sink.to_vec(), ..Self::default() })
     }
 
+    /// The same with resistances that depend on temperature, where heaters of the circuit have such.
+    pub fn with_hot(self, circuit: &ElectricalNetwork) -> Self {
+        let hot = HotNetwork::new(&self.heaters, circuit, &self.sink).map(Arc::new);
+        Self { hot, ..self }
+    }
+
     /// The same with inputs behind the sources, some of them heat.
     pub fn with_heat(&self, inputs: &[Input]) -> Self {
         let mut heat = vec![0.0; self.heaters.len() * inputs.len()];
@@ -100,7 +118,10 @@ impl Heating {
             Input::Heat { heater } => Some(*heater),
             _ => None,
         });
-        Self { heat, heated_by: heated_by.collect(), ..self.clone() }
+        let heated_by: Vec<Option<usize>> = heated_by.collect();
+        let heated = heated_by.iter().enumerate().filter_map(|(i, k)| Some((self.sources + i, (*k)?)));
+        let hot = self.hot.as_ref().map(|hot| Arc::new(hot.heated(heated.collect())));
+        Self { heat, heated_by, hot, ..self.clone() }
     }
 
     /// Inputs behind the sources.
@@ -162,8 +183,112 @@ impl Heating {
         2.0 * self.mixed(k, u, unit) + self.heated(k, unit)
     }
 
+    /// The network with resistances that depend on temperature, if any does.
+    #[inline]
+    pub(crate) fn hot(&self) -> Option<&HotNetwork> {
+        self.hot.as_deref()
+    }
+
+    /// Whether a resistance depends on temperature.
+    #[inline]
+    pub fn is_hot(&self) -> bool {
+        self.hot.is_some()
+    }
+
+    /// Length of the vector of rises: one of each heater, then those of the nodes along them where resistances depend on temperature.
+    #[inline]
+    pub fn states(&self) -> usize {
+        self.heaters.len() + self.hot.as_ref().map_or(0, |hot| hot.states())
+    }
+
+    /// Checks that source voltages `u` have a steady state.
+    ///
+    /// # Errors
+    /// [`ThermalRunaway`].
+    pub fn check(&self, u: &[f64]) -> Result<(), ThermalRunaway> {
+        let Some(hot) = &self.hot else { return Ok(()) };
+        hot.steady(u, &mut vec![0.0; hot.states()]).map(drop)
+    }
+
+    /// Current into an electrical source to which its current tends at high voltages, the other sources at `u`: no steady state exists at a
+    /// larger one (A). `None` where there is none.
+    pub fn runaway_current(&self, u: &[f64], source: usize) -> Option<f64> {
+        let hot = self.hot.as_ref()?;
+        let mut u = u.to_vec();
+        u[source] = FIRST_VOLTAGE;
+        let (mut state, mut means) = (vec![0.0; hot.states()], vec![0.0; self.heaters.len()]);
+        // for high voltages it is the limit less a part in proportion to 1/V
+        let (mut last, mut limit) = (0.0, f64::NAN);
+        for _ in 0..MAX_DOUBLINGS {
+            hot.steady(&u, &mut state).ok()?;
+            hot.means(&state, &mut means);
+            let current = hot.source_currents(&hot.flows(&means, &u, |_| 0.0), &u)[source];
+            let next = 2.0 * current - last;
+            if (next - limit).abs() <= SAME_LIMIT * next.abs() && (next - current).abs() < NEAR_LIMIT * next.abs() {
+                return Some(next);
+            }
+            (last, limit) = (current, next);
+            u[source] *= 2.0;
+        }
+        None
+    }
+
+    /// Steady rises at source voltages `u` (K), of [`Heating::states`]; not numbers where there are none.
+    #[inline]
+    pub fn rises(&self, u: &[f64], rise: &mut [f64]) {
+        let Some(hot) = &self.hot else {
+            rise.iter_mut().enumerate().for_each(|(k, rise)| *rise = self.steady(k, u));
+            return;
+        };
+        let (means, state) = rise.split_at_mut(self.heaters.len());
+        match hot.steady(u, state) {
+            Ok(_) => hot.means(state, means),
+            Err(_) => rise.fill(f64::NAN),
+        }
+    }
+
+    /// Changes of the steady rises `rise` at source voltages `u` with the sources, along `unit` (K).
+    #[inline]
+    pub fn slopes(&self, u: &[f64], rise: &[f64], unit: &[f64], out: &mut [f64]) {
+        if self.hot.is_none() {
+            out.iter_mut().enumerate().for_each(|(k, slope)| *slope = self.slope(k, u, unit));
+            return;
+        }
+        let response = self.response((u, rise), unit, 0.0f64);
+        out.iter_mut().zip(&response).for_each(|(out, x)| *out = *x);
+    }
+
+    /// Changes of the rises about a state for a unit of the sources along `unit` that goes as e^(st), resistances depending on
+    /// temperature (K).
+    pub fn response<T: ComplexField<RealField = f64> + Copy>(
+        &self,
+        (u, rise): (&[f64], &[f64]),
+        unit: &[f64],
+        s: T,
+    ) -> Vec<T> {
+        let count = self.heaters.len();
+        let mut found = vec![T::from_real(0.0); self.states()];
+        if let Some(hot) = &self.hot {
+            let (means, state) = found.split_at_mut(count);
+            hot.respond_about((u, &rise[count..]), unit, s, means, state);
+        }
+        found
+    }
+
+    /// Slowest time constant of a state whose resistances depend on temperature, at held source voltages (s); none without such.
+    pub fn slowest(&self, u: &[f64], rise: &[f64]) -> Option<f64> {
+        Some(self.hot.as_ref()?.slowest(u, &rise[self.heaters.len()..]))
+    }
+
     /// Highest steady rise along each heater at source voltages `u` (K).
     pub fn peaks(&self, u: &[f64]) -> Vec<f64> {
+        if let Some(hot) = &self.hot {
+            let mut state = vec![0.0; hot.states()];
+            return match hot.steady(u, &mut state) {
+                Ok(_) => (0..self.heaters.len()).map(|k| hot.peak(k, &state)).collect(),
+                Err(_) => Vec::new(),
+            };
+        }
         let Ok(conduction) = Conduction::new(&self.heaters, &self.sink) else { return Vec::new() };
         let mut watts: Vec<f64> = (self.heaters.iter().zip(&self.currents))
             .map(|(h, current)| h.resistance * current.iter().zip(u).map(|(i, u)| i * u).sum::<f64>().powi(2))
@@ -185,7 +310,6 @@ impl Heating {
 
 #[cfg(test)]
 mod tests {
-    use super::super::network::ElectricalNetwork;
     use super::*;
 
     fn bar(pieces: usize) -> Heating {
@@ -208,6 +332,8 @@ mod tests {
             delayed: true,
             capacity: 1600e3 * l * area,
             gas: gas / pieces as f64,
+            coefficient: 0.0,
+            thermal_coefficient: 0.0,
         };
         let heaters: Vec<_> = (0..pieces).map(heater).collect();
         let circuit = ElectricalNetwork {
@@ -310,6 +436,8 @@ mod tests {
             delayed: false,
             capacity: 0.0,
             gas: 0.0,
+            coefficient: 0.0,
+            thermal_coefficient: 0.0,
         };
         let circuit =
             ElectricalNetwork { nodes: 2, resistors: vec![(0, 1, 1.0)], sources: vec![(0, Some(1))], grounds: vec![1] };

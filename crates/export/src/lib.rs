@@ -109,6 +109,14 @@ pub enum ExportError {
         /// Its name.
         port: String,
     },
+    /// A resistance that the written models do not have.
+    #[error(
+        "beam \"{beam}\" has a TCR or a TCK, which the written models do not have; leave them out, or use the plug-in"
+    )]
+    HotResistance {
+        /// Its name.
+        beam: String,
+    },
     /// The equilibrium is unstable.
     #[error(
         "the equilibrium at these voltages is unstable in {negative} direction(s): a linear model about it would grow \

@@ -79,6 +79,18 @@ impl<'a> LinearizedMechanism<'a> {
         if let Some(k) = ports.kinds.iter().position(|kind| *kind == PortKind::Rate) {
             return Err(ExportError::Turning { port: names[k].clone() });
         }
+        if let Some(k) = compiled
+            .parts
+            .system
+            .electrics
+            .heating
+            .heaters
+            .iter()
+            .position(|h| h.coefficient != 0.0 || h.thermal_coefficient != 0.0)
+        {
+            let beam = compiled.structure.beams[compiled.parts.heaters[k]].name.clone();
+            return Err(ExportError::HotResistance { beam });
+        }
         let shown = (request.signals.iter())
             .map(|(name, scale)| {
                 let signal = Signal::find(compiled, name)?;
@@ -135,8 +147,8 @@ impl<'a> LinearizedMechanism<'a> {
             bimorph_base::budget::check();
             let mut unit = vec![0.0; electrics.sources()];
             unit[source] = 1.0;
-            let slopes: Vec<f64> =
-                (0..heaters.len()).map(|k| electrics.heating.slope(k, &self.sources, &unit)).collect();
+            let mut slopes = vec![0.0; heaters.len()];
+            electrics.heating.slopes(&self.sources, &self.rise, &unit, &mut slopes);
             let mut taus: Vec<Option<f64>> = vec![None];
             for (heater, slope) in heaters.iter().zip(&slopes) {
                 let tau = Some(heater.time_constant).filter(|tau| *tau > 0.0);

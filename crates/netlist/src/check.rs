@@ -68,7 +68,18 @@ pub(crate) fn finite(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     for b in s.beams.iter().filter_map(|b| b.heater.as_ref().map(|h| (b, h))) {
         let conducts = RESISTANCES.contains(&b.1.resistance) && RESISTANCES.contains(&b.1.conductance);
         let gas = b.1.gas.map_or(0.0, |gas| gas.conductance(b.0.width, b.0.length));
-        check_finite(&b.0.name, b.0.a, conducts && all(&[b.1.time_constant.unwrap_or(0.0), b.1.capacity, gas]));
+        check_finite(
+            &b.0.name,
+            b.0.a,
+            conducts
+                && all(&[
+                    b.1.time_constant.unwrap_or(0.0),
+                    b.1.capacity,
+                    gas,
+                    b.1.coefficient,
+                    b.1.thermal_coefficient,
+                ]),
+        );
     }
 }
 

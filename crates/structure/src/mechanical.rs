@@ -84,6 +84,10 @@ pub struct Heater {
     pub capacity: f64,
     /// Loss of heat through gas, where there is one.
     pub gas: Option<GasLoss>,
+    /// Relative change of the resistance with the temperature rise (1/K).
+    pub coefficient: f64,
+    /// Relative change of the thermal resistance with the temperature rise (1/K).
+    pub thermal_coefficient: f64,
 }
 
 /// Loss of heat from a beam through gas to a substrate at ambient temperature.

@@ -110,6 +110,7 @@ class Model:
         return StaticResult(
             nodes={n.name: NodeMotion(n.x, n.y, n.rz) for n in answer.nodes},
             temperatures_k=by_name(answer.temperatures_k),
+            peak_temperatures_k=by_name(answer.peak_temperatures_k),
             currents_a=by_name(answer.currents_a),
             charges_c=by_name(answer.charges_c),
             pulled_in=answer.pulled_in,

@@ -79,6 +79,8 @@ class StaticResult:
     """Permanent strain of each beam that can yield [1], negative if it is shorter; of a call with ``backbend``."""
     stresses_pa: dict[str, float] = field(default_factory=dict)
     """Largest stress on the faces of each beam whose layer has a ``strength`` [Pa]."""
+    peak_temperatures_k: dict[str, float] = field(default_factory=dict)
+    """Highest temperature along every heated beam [K]."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """Displacement [m] and rotation [rad] of every node; ``attrs["units"]`` has the units."""

@@ -103,6 +103,7 @@ class Checked:
         for what, values in (
             ("temperatures_k", answer.temperatures_k),
             ("stresses_pa", answer.stresses_pa),
+            ("peak_temperatures_k", answer.peak_temperatures_k),
             ("currents_a", answer.currents_a),
             ("charges_c", answer.charges_c),
             ("permanent_strains", answer.permanent_strains),

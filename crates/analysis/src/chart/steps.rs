@@ -63,7 +63,7 @@ pub(super) fn measure(
     let electrics = &system.electrics;
     let sources = source_vector(compiled, &request.spec.voltages)?;
     let mut start = Motion::zeros(system.bodies());
-    let mut rise = vec![0.0; electrics.heating.heaters.len()];
+    let mut rise = vec![0.0; electrics.heating.states()];
     if let Some(held) = model.held() {
         let begin = operating_point(held, &request.spec.voltages)?;
         start.q.copy_from_slice(&begin.q);

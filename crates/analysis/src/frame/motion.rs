@@ -28,7 +28,7 @@ pub fn frame_transient(
 ) -> Result<TransientResult, AnalysisError> {
     check(options)?;
     let (sources, _) = steady(compiled, &options.voltages)?;
-    let heaters = compiled.parts.system.electrics.heating.heaters.len();
+    let states = compiled.parts.system.electrics.heating.states();
     let zeros = vec![Pose::zeros(); frame.system.bodies()];
     let (start, rise) = match options.release {
         Some(initial) => {
@@ -42,7 +42,7 @@ pub fn frame_transient(
             let (_, rise) = steady(initial, &options.voltages)?;
             (balance(initial, &before, &rise, &[])?.0, rise)
         }
-        None => (zeros.clone(), vec![0.0; heaters]),
+        None => (zeros.clone(), vec![0.0; states]),
     };
     let find = |text: &String| Expression::find(text, |name| FrameSignal::find(compiled, frame, name));
     let signals: Vec<Expression<FrameSignal>> = options.signals.iter().map(find).collect::<Result<_, _>>()?;

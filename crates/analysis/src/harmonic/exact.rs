@@ -152,10 +152,7 @@ impl<'a> ExactResponse<'a> {
         let about = self.perturbed();
         let value = |row: &ResponseRow| match row {
             ResponseRow::Signal(signal) => about.signal_change(*signal, &moved),
-            ResponseRow::Current(port) => {
-                let conducted = system.electrics.conductance[(*port, source)];
-                s * about.charges(&[*port], &moved)[0] + conducted
-            }
+            ResponseRow::Current(port) => s * about.charges(&[*port], &moved)[0] + push.currents[*port],
         };
         let values: Vec<Complex<f64>> = self.rows.iter().map(|row| row.sum(value)).collect();
         values.iter().all(|v| v.re.is_finite() && v.im.is_finite()).then_some(values)

@@ -221,7 +221,7 @@ impl<'a> VoltageSweep<'a> {
         let system = self.system;
         let electrics = &system.electrics;
         let mut tangent = BlockMatrix::new(&system.model.pattern);
-        let mut rise = vec![0.0; electrics.heating.heaters.len()];
+        let mut rise = vec![0.0; electrics.heating.states()];
         let mut residual = [vec![Pose::zeros(); q.len()], vec![Pose::zeros(); q.len()]];
         let mut drive = electrics.drive();
         for (r, volts) in residual.iter_mut().zip([1.0, 0.0]) {

@@ -7,9 +7,10 @@ use super::ReadoutError;
 use super::expression::{Expression, Quantity};
 use super::signal::{Signal, SignalView};
 use bimorph_model::compile::CompiledModel;
+use std::sync::Arc;
 
 /// A quantity of a run.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum RunSignal {
     /// A quantity of a state.
     State(Signal),
@@ -21,6 +22,13 @@ pub enum RunSignal {
         port: usize,
         /// Current through resistances (A).
         conduction: f64,
+    },
+    /// Current into a port through resistances that depend on temperature (A), and the rate of its charge.
+    HotCurrent {
+        /// Index of the port.
+        port: usize,
+        /// Voltages of the sources (V).
+        sources: Arc<[f64]>,
     },
 }
 
@@ -39,6 +47,9 @@ impl RunSignal {
                     return Ok(Self::PortCharge(port));
                 }
                 if let Some(port) = port(".i") {
+                    if electrics.heating.is_hot() {
+                        return Ok(Self::HotCurrent { port, sources: sources.into() });
+                    }
                     let conduction =
                         sources.iter().enumerate().map(|(s, u)| electrics.conductance[(port, s)] * u).sum();
                     return Ok(Self::PortCurrent { port, conduction });
@@ -60,11 +71,16 @@ impl RunSignal {
     /// Its value in a state at held voltages.
     fn value(&self, compiled: &CompiledModel, state: &SignalView<'_>) -> f64 {
         let system = &compiled.parts.system;
-        match *self {
+        match self {
             Self::State(signal) => signal.value(compiled, state),
-            Self::PortCharge(port) => of_gaps(compiled, port, |g| system.capacitance(g, state.q) * state.volts[g]),
+            Self::PortCharge(port) => of_gaps(compiled, *port, |g| system.capacitance(g, state.q) * state.volts[g]),
             Self::PortCurrent { port, conduction } => {
-                conduction + of_gaps(compiled, port, |g| system.capacitance_slope(g, state.q, state.v) * state.volts[g])
+                conduction
+                    + of_gaps(compiled, *port, |g| system.capacitance_slope(g, state.q, state.v) * state.volts[g])
+            }
+            Self::HotCurrent { port, sources } => {
+                system.electrics.port_currents(sources, state.rise)[*port]
+                    + of_gaps(compiled, *port, |g| system.capacitance_slope(g, state.q, state.v) * state.volts[g])
             }
         }
     }
@@ -72,14 +88,19 @@ impl RunSignal {
     /// Its change with a change of the state, from one at rest.
     fn slope(&self, compiled: &CompiledModel, state: &SignalView<'_>, change: &SignalView<'_>) -> f64 {
         let system = &compiled.parts.system;
-        match *self {
+        match self {
             Self::State(signal) => signal.slope(compiled, state, change),
-            Self::PortCharge(port) => of_gaps(compiled, port, |g| {
+            Self::PortCharge(port) => of_gaps(compiled, *port, |g| {
                 system.capacitance(g, state.q) * change.volts[g]
                     + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
             }),
+            Self::HotCurrent { port, sources } => {
+                let unit = vec![0.0; sources.len()];
+                system.electrics.port_current_slopes((sources, state.rise), &unit, change.rise)[*port]
+                    + of_gaps(compiled, *port, |g| system.capacitance_slope(g, state.q, change.v) * state.volts[g])
+            }
             Self::PortCurrent { port, .. } => {
-                of_gaps(compiled, port, |g| system.capacitance_slope(g, state.q, change.v) * state.volts[g])
+                of_gaps(compiled, *port, |g| system.capacitance_slope(g, state.q, change.v) * state.volts[g])
             }
         }
     }
@@ -90,7 +111,7 @@ impl Quantity for RunSignal {
         match self {
             Self::State(signal) => signal.unit(),
             Self::PortCharge(_) => "C",
-            Self::PortCurrent { .. } => "A",
+            Self::PortCurrent { .. } | Self::HotCurrent { .. } => "A",
         }
     }
 }

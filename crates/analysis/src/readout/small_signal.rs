@@ -40,6 +40,8 @@ pub struct SourceExcitation {
     pub(crate) volts: Vec<f64>,
     /// Change of the rise of each heater (K).
     pub(crate) rise: Vec<Complex<f64>>,
+    /// Change of the current through resistances into each port (A).
+    pub currents: Vec<Complex<f64>>,
 }
 
 /// How a part of a push depends on s.
@@ -134,12 +136,16 @@ impl PerturbedState<'_> {
         let mut unit = vec![0.0; electrics.sources()];
         unit[source] = 1.0;
         // heaters lag: δT = (2Qu·δV + Z·δW)/(1 + sτ)
-        let rise: Vec<Complex<f64>> = (0..heaters.len())
-            .map(|k| {
-                let steady = electrics.heating.slope(k, self.sources, &unit);
-                Complex::from(steady) / (Complex::from(1.0) + s * heaters[k].time_constant)
-            })
-            .collect();
+        let rise: Vec<Complex<f64>> = match electrics.heating.is_hot() {
+            true => electrics.heating.response((self.sources, self.rise), &unit, s),
+            false => (0..heaters.len())
+                .map(|k| {
+                    let steady = electrics.heating.slope(k, self.sources, &unit);
+                    Complex::from(steady) / (Complex::from(1.0) + s * heaters[k].time_constant)
+                })
+                .collect(),
+        };
+        let currents = self.currents(source, &unit, &rise);
         let volts: Vec<f64> = (0..self.drive.volts.len()).map(|g| electrics.gap_rows[(g, source)]).collect();
         let turns = system.is_rate(source);
         let [re, im] = [false, true].map(|imaginary| {
@@ -167,7 +173,20 @@ impl PerturbedState<'_> {
             force
         });
         let force = re.iter().zip(&im).map(|(re, im)| re.zip_map(im, |re, im| Complex::new(-re, -im))).collect();
-        SourceExcitation { force, volts, rise }
+        SourceExcitation { force, volts, rise, currents }
+    }
+
+    /// Change of the current through resistances into each port for a unit of source `source`, with rises that change by `rise`.
+    fn currents(&self, source: usize, unit: &[f64], rise: &[Complex<f64>]) -> Vec<Complex<f64>> {
+        let electrics = &self.system.electrics;
+        if !electrics.heating.is_hot() {
+            return electrics.conductance.column(source).iter().map(|g| Complex::from(*g)).collect();
+        }
+        let about = (self.sources, self.rise);
+        let (re, im): (Vec<f64>, Vec<f64>) = rise.iter().map(|rise| (rise.re, rise.im)).unzip();
+        let [re, im] = [(unit.to_vec(), re), (vec![0.0; unit.len()], im)]
+            .map(|(unit, slopes)| electrics.port_current_slopes(about, &unit, &slopes));
+        re.into_iter().zip(im).map(|(re, im)| Complex::new(re, im)).collect()
     }
 
     /// [`PerturbedState::push`] in parts that do not depend on s: its sum over them, each times [`FrequencyDependence::factor`].
@@ -177,8 +196,11 @@ impl PerturbedState<'_> {
         let heaters = &electrics.heating.heaters;
         let mut unit = vec![0.0; electrics.sources()];
         unit[source] = 1.0;
-        let slopes: Vec<f64> = (0..heaters.len()).map(|k| electrics.heating.slope(k, self.sources, &unit)).collect();
-        let law = |k: usize| match heaters[k].time_constant {
+        let mut slopes = vec![0.0; heaters.len()];
+        electrics.heating.slopes(self.sources, self.rise, &unit, &mut slopes);
+        // many time constants where resistances depend on temperature: the slowest is the nearest pole
+        let slowest = electrics.heating.slowest(self.sources, self.rise);
+        let law = |k: usize| match slowest.unwrap_or(heaters[k].time_constant) {
             tau if tau > 0.0 => FrequencyDependence::Lagged(tau),
             _ => FrequencyDependence::AtOnce,
         };

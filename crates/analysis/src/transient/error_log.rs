@@ -179,12 +179,12 @@ fn largest_current(options: &TransientOptions<'_>, model: &CompiledModel) -> f64
     let Ok(sources) = source_vector(model, &options.voltages) else { return 0.0 };
     let system = &model.parts.system;
     let electrics = &system.electrics;
-    let (mut rise, mut drive) = (vec![0.0; electrics.heating.heaters.len()], electrics.drive());
+    let (mut rise, mut drive) = (vec![0.0; electrics.heating.states()], electrics.drive());
     electrics.steady(&sources, &mut rise, &mut drive);
     let rest = vec![Pose::zeros(); system.bodies()];
     let charge: f64 = drive.volts.iter().enumerate().map(|(g, v)| (system.capacitance(g, &rest) * v).abs()).sum();
-    let through = |p: usize| sources.iter().enumerate().map(|(s, u)| electrics.conductance[(p, s)] * u).sum::<f64>();
-    (0..electrics.ports).map(|p| through(p).abs()).fold(charge / options.stop, f64::max)
+    let through = electrics.port_currents(&sources, &rise);
+    through[..electrics.ports].iter().map(|current| current.abs()).fold(charge / options.stop, f64::max)
 }
 
 #[cfg(test)]

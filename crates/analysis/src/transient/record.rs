@@ -12,6 +12,7 @@ use super::folded_segments;
 use super::options::{TransientOptions, check};
 use super::result::{Counters, TransientResult};
 use super::samples::SampleRecorder;
+use crate::overheating::check_course;
 use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use bimorph_domains::Ramp;
@@ -63,6 +64,7 @@ pub(crate) fn record(
         options.signals.iter().map(|name| Expression::of_run(compiled, name, &sources)).collect::<Result<_, _>>()?;
     let (mut motion, rise, begun) = start(compiled, options)?;
     let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop);
+    check_course(&ramp)?;
     let mut drive = system.electrics.drive();
     ramp.at(0.0, &mut drive);
     let volts = drive.volts.clone();
@@ -196,7 +198,7 @@ fn start(
         });
     }
     let mut motion = Motion::zeros(system.bodies());
-    let mut rise = vec![0.0; system.electrics.heating.heaters.len()];
+    let mut rise = vec![0.0; system.electrics.heating.states()];
     let mut reported = Vec::new();
     if let Some(start) = options.release {
         let point = operating_point(start, &options.voltages)?;

@@ -1,5 +1,6 @@
 //! The electrical side of a mechanism, and what it makes of source voltages at one time.
 
+use super::super::hot::SourceLine;
 use super::super::input::Input;
 use super::super::lag::Lags;
 use super::super::thermal::Heating;
@@ -117,10 +118,54 @@ impl Electrics {
     /// The drive at source voltages `u` when every heater is at its steady rise, which goes to `rise` (K).
     #[inline]
     pub fn steady(&self, u: &[f64], rise: &mut [f64], drive: &mut Drive) {
-        for (k, rise) in rise.iter_mut().enumerate() {
-            *rise = self.heating.steady(k, u);
-        }
+        self.heating.rises(u, rise);
         self.apply(u, rise, drive);
+    }
+
+    /// Current into each port at source voltages `u` and rises (A).
+    #[inline]
+    pub fn port_currents(&self, u: &[f64], rise: &[f64]) -> Vec<f64> {
+        match self.heating.hot() {
+            None => (0..self.ports).map(|p| self.conductance.row(p).iter().zip(u).map(|(g, u)| g * u).sum()).collect(),
+            Some(hot) => hot.source_currents(&hot.flows(rise, u, |_| 0.0), u),
+        }
+    }
+
+    /// Conductance between two electrical sources at fixed rises (S).
+    pub fn conductance_between(&self, rise: &[f64], a: usize, b: usize) -> f64 {
+        match self.heating.hot() {
+            None => self.conductance[(a, b)],
+            Some(hot) => {
+                let unit = self.unit(b);
+                hot.source_currents(&hot.flows(rise, &unit, |_| 0.0), &unit)[a]
+            }
+        }
+    }
+
+    /// Σ rise·R·I_a·I_b over the heaters, I_a the current for a volt of source `a` at fixed rises (K·S).
+    pub fn heated_noise(&self, rise: &[f64], a: usize, b: usize) -> f64 {
+        let heating = &self.heating;
+        let heaters = heating.heaters.iter().zip(rise).enumerate();
+        let Some(hot) = heating.hot() else {
+            return heaters.map(|(k, (h, t))| t * h.resistance * heating.current(k, a) * heating.current(k, b)).sum();
+        };
+        let [a, b] = [a, b].map(|source| hot.flows(rise, &self.unit(source), |_| 0.0).current);
+        heaters.map(|(k, (h, t))| t * h.resistance * (1.0 + h.coefficient * t) * a[k] * b[k]).sum()
+    }
+
+    fn unit(&self, source: usize) -> Vec<f64> {
+        (0..self.sources()).map(|s| if s == source { 1.0 } else { 0.0 }).collect()
+    }
+
+    /// Change of [`Electrics::port_currents`] with source voltages, along `unit`, and with rises that change by `slopes` (K) (A).
+    pub fn port_current_slopes(&self, (u, rise): (&[f64], &[f64]), unit: &[f64], slopes: &[f64]) -> Vec<f64> {
+        match self.heating.hot() {
+            None => self.port_currents(unit, slopes),
+            Some(hot) => {
+                let flows = hot.flows(rise, u, |_| 0.0);
+                hot.source_currents(&hot.flow_change(rise, &flows, slopes, unit), unit)
+            }
+        }
     }
 
     /// The drive at source voltages `u` and temperature rises `rise` (K).
@@ -135,12 +180,13 @@ impl Electrics {
         drive.push.clear();
     }
 
-    /// The change of the steady drive with source `s`, at source voltages `u`.
+    /// The change of the steady drive with the sources along `unit`, at source voltages `u` and steady rises.
     #[inline]
-    pub fn steady_slope(&self, u: &[f64], unit: &[f64], slope: &mut Drive) {
+    pub fn steady_slope(&self, (u, rise): (&[f64], &[f64]), unit: &[f64], slope: &mut Drive) {
         self.gap_volts(unit, &mut slope.volts);
-        for (k, heater) in self.heating.heaters.iter().enumerate() {
-            slope.expansion[k] = heater.expansion * self.heating.slope(k, u, unit);
+        self.heating.slopes(u, rise, unit, &mut slope.expansion);
+        for (slope, heater) in slope.expansion.iter_mut().zip(&self.heating.heaters) {
+            *slope *= heater.expansion;
         }
         slope.inputs.copy_from_slice(&unit[self.voltages()..]);
         (slope.load, slope.turning) = (0.0, 0.0);
@@ -174,15 +220,21 @@ impl Electrics {
     }
 
     /// The change of the rise of each heater with the final voltage of source `port` (K/V), `s` after the sources began to go `from` one
-    /// value `to` another in `dt` (s).
+    /// value `to` another in `dt` (s), with rises `start` there (K).
     pub fn rise_sensitivities(
         &self,
-        way: (&[f64], &[f64]),
+        (way, start): ((&[f64], &[f64]), &[f64]),
         dt: f64,
         s: f64,
         port: usize,
         mut put: impl FnMut(usize, f64),
     ) {
+        let count = self.heating.heaters.len();
+        if let Some(hot) = self.heating.hot() {
+            let course = hot.course_change(SourceLine { from: way.0, to: way.1, dt }, &start[count..], port);
+            (0..count).for_each(|k| put(k, course.mean(k, s)[0]));
+            return;
+        }
         let mut lags = Lags::new(s);
         for (k, heater) in self.heating.heaters.iter().enumerate() {
             let [p1, p2] = self.heat_course_change(k, way, dt, port);

@@ -1,9 +1,11 @@
 //! Voltages, strains and inputs over the time of one step or run, from a start to an end.
 
+use super::super::hot::{HotCourse, SourceLine};
 use super::super::input::Input;
 use super::super::lag::Lags;
 use super::electrics::{Drive, Electrics};
 use bimorph_multibody::planar::Pose;
+use std::sync::OnceLock;
 
 /// Source voltages that go linearly from one value to another during a step, with the rises that follow them.
 /// Time-independent quantities are computed once.
@@ -23,13 +25,47 @@ pub struct Ramp<'a> {
     pub push: &'a [Pose],
     /// Of each heater the coefficients of its steady rise in the time since the start: [`Electrics::heat_course`].
     heat: Vec<[f64; 3]>,
+    /// The course of the rises where resistances depend on temperature.
+    course: Option<HotCourse>,
+    /// Source by source, its change with the final voltage, once it is needed.
+    changes: Vec<OnceLock<HotCourse>>,
 }
 
 impl<'a> Ramp<'a> {
     /// Sources that go `from` one value `to` another (V) in `dt` (s), with heaters at `rise` (K) before.
     #[inline]
     pub fn new(electrics: &'a Electrics, from: &'a [f64], to: &'a [f64], rise: &'a [f64], dt: f64) -> Self {
-        Self { electrics, from, to, rise, dt, push: &[], heat: electrics.heat_course((from, to), dt) }
+        let heating = &electrics.heating;
+        let line = SourceLine { from, to, dt };
+        let course = heating.hot().map(|hot| hot.course(line, &rise[heating.heaters.len()..]));
+        let changes = if course.is_some() { vec![OnceLock::new(); from.len()] } else { Vec::new() };
+        let heat = electrics.heat_course((from, to), dt);
+        Self { electrics, from, to, rise, dt, push: &[], heat, course, changes }
+    }
+
+    /// The time at which rises leave all bounds (s); none: they do not.
+    #[inline]
+    pub fn overheated(&self) -> Option<f64> {
+        self.course.as_ref()?.failed
+    }
+
+    /// Rises at the end (K), as the next step takes them.
+    #[inline]
+    pub fn end_rises(&self, out: &mut [f64]) {
+        let (means, state) = out.split_at_mut(self.electrics.heating.heaters.len());
+        means.iter_mut().enumerate().for_each(|(k, rise)| *rise = self.rise_at(k, self.dt));
+        if let Some(course) = &self.course {
+            state.copy_from_slice(&course.end);
+        }
+    }
+
+    /// Change of the mean rise of heater `k` with the final voltage of a source at time `s`, and its rate; none where it is in closed form.
+    fn hot_change(&self, k: usize, s: f64, source: usize) -> Option<[f64; 2]> {
+        let heating = &self.electrics.heating;
+        let (hot, change) = (heating.hot()?, self.changes.get(source)?);
+        let line = SourceLine { from: self.from, to: self.to, dt: self.dt };
+        let start = &self.rise[heating.heaters.len()..];
+        Some(change.get_or_init(|| hot.course_change(line, start, source)).mean(k, s))
     }
 
     /// The same with a force and a moment on each body.
@@ -53,6 +89,9 @@ impl<'a> Ramp<'a> {
     /// The same with the exponentials that other heaters have needed at this time.
     #[inline]
     fn rise_after(&self, k: usize, lags: &mut Lags) -> f64 {
+        if let Some(course) = &self.course {
+            return course.mean(k, lags.t)[0];
+        }
         let (tau, p) = (self.electrics.heating.heaters[k].time_constant, self.heat[k]);
         if tau <= 0.0 {
             return p[0] + lags.t * (p[1] + lags.t * p[2]);
@@ -74,7 +113,9 @@ impl<'a> Ramp<'a> {
         let s = lags.t;
         for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
             let p = self.heat[k];
-            let slope = if heater.time_constant > 0.0 {
+            let slope = if let Some(course) = &self.course {
+                course.mean(k, s)[1]
+            } else if heater.time_constant > 0.0 {
                 (p[0] + s * (p[1] + s * p[2]) - self.rise_after(k, lags)) / heater.time_constant
             } else {
                 p[1] + 2.0 * s * p[2]
@@ -138,8 +179,14 @@ impl<'a> Ramp<'a> {
             *v = self.electrics.gap_rows[(g, port)] * x;
         }
         let heaters = &self.electrics.heating.heaters;
-        let put = |k: usize, rise: f64| out.expansion[k] = heaters[k].expansion * rise;
-        self.electrics.rise_sensitivities((self.from, self.to), self.dt, s, port, put);
+        if self.course.is_some() {
+            for (k, heater) in heaters.iter().enumerate() {
+                out.expansion[k] = heater.expansion * self.hot_change(k, s, port).map_or(0.0, |[rise, _]| rise);
+            }
+        } else {
+            let put = |k: usize, rise: f64| out.expansion[k] = heaters[k].expansion * rise;
+            self.electrics.rise_sensitivities(((self.from, self.to), self.rise), self.dt, s, port, put);
+        }
         out.load = 0.0;
         out.push.clear();
         out.turning = if self.set_input(port, x, out) == Some(Input::Rate) { 1.0 / self.dt } else { 0.0 };
@@ -161,7 +208,9 @@ impl<'a> Ramp<'a> {
         let mut lags = Lags::new(s);
         for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
             let [p1, p2] = self.electrics.heat_course_change(k, (self.from, self.to), self.dt, port);
-            let slope = if heater.time_constant > 0.0 {
+            let slope = if let Some([_, rate]) = self.hot_change(k, s, port) {
+                rate
+            } else if heater.time_constant > 0.0 {
                 let rise = lags.of(heater.time_constant).rise(0.0, [0.0, p1, p2]);
                 (s * (p1 + s * p2) - rise) / heater.time_constant
             } else {

@@ -4,22 +4,24 @@
 use bimorph_base::sets::Sets;
 
 /// A node that a source touches, reached from the one before it.
-pub(super) struct TreeStep {
-    pub(super) node: usize,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in super::super) struct TreeStep {
+    pub(in super::super) node: usize,
     /// The source to its parent, 1 where it is at its plus and −1 where at its minus, and the node at the other end;
     /// `None`: ground.
-    pub(super) by: Option<(usize, f64, Option<usize>)>,
+    pub(in super::super) by: Option<(usize, f64, Option<usize>)>,
 }
 
 /// Constraints of sources on potentials: nodes that they connect share one unknown, and differ by the sources in
 /// between.
-pub(super) struct KnownPotentials {
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct KnownPotentials {
     /// The unknown that a node's potential stands on; none: it is at ground but for sources.
-    pub(super) row: Vec<Option<usize>>,
+    pub(in super::super) row: Vec<Option<usize>>,
     /// Number of unknowns.
-    pub(super) free: usize,
+    pub(in super::super) free: usize,
     /// Nodes that sources touch, each after its parent.
-    pub(super) order: Vec<TreeStep>,
+    pub(in super::super) order: Vec<TreeStep>,
     /// For each node that a source touches the sources between it and where its unknown is, with signs, in `sources`.
     offsets: Vec<(usize, usize)>,
     sources: Vec<(usize, f64)>,
@@ -27,7 +29,7 @@ pub(super) struct KnownPotentials {
 
 impl KnownPotentials {
     /// Of a circuit with these nodes, grounds and sources (plus, minus; none: ground), whose parts are joined in `part`; one that nothing ties to ground has its first node there.
-    pub(super) fn new(
+    pub(in super::super) fn new(
         (nodes, grounds): (usize, &[usize]),
         drawn: &[(usize, Option<usize>)],
         part: &mut Sets,
@@ -111,7 +113,7 @@ impl KnownPotentials {
     }
 
     /// The sources that a node's potential lies above its unknown, with signs.
-    pub(super) fn offset(&self, node: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(in super::super) fn offset(&self, node: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let (from, to) = self.offsets[node];
         self.sources[from..to].iter().copied()
     }

@@ -163,6 +163,8 @@ impl<'a> OfStructure<'a> {
             let mass = beam.material.density * beam.length * beam.width * beam.thickness;
             parameters.extend((mass > 0.0 && heater.capacity > 0.0).then(|| ("specificheat", heater.capacity / mass)));
             parameters.extend(heater.time_constant.map(|tau| ("tau", tau)));
+            let laws = [("TCR", heater.coefficient), ("TCK", heater.thermal_coefficient)];
+            parameters.extend(laws.into_iter().filter(|(_, x)| *x != 0.0));
             if let Some(gas) = &heater.gas {
                 parameters.extend([("gasconductivity", gas.conductivity), ("fluid", gas.distance)]);
                 parameters.push(("shapefactor", gas.shape));

@@ -39,6 +39,17 @@ pub enum DiscretizeError {
         /// Name of a beam in that part.
         beam: String,
     },
+    /// A gap on a divider of resistances that depend on temperature.
+    #[error(
+        "the voltage of gap {gap} depends on the temperature of beams with a TCR, such as {beam}; connect both of its sides to ports, \
+         sources or ground without such a beam between, or leave `TCR` out"
+    )]
+    HotGap {
+        /// Name of the gap.
+        gap: String,
+        /// Name of a beam with such a resistance.
+        beam: String,
+    },
     /// More segments than can be laid out.
     #[error("{segments} segments in all, at most {MAX_SEGMENTS}; take a lower band, a larger tol, or fewer segments")]
     TooFine {

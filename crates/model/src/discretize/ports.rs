@@ -6,7 +6,7 @@
 use super::error::DiscretizeError;
 use super::rigid::RigidGroups;
 use bimorph_domains::drive::Electrics;
-use bimorph_domains::network::{CircuitError, ElectricalNetwork};
+use bimorph_domains::network::{CircuitError, ElectricalNetwork, Potentials};
 use bimorph_domains::thermal::{HeatConductor, Heating};
 use bimorph_domains::{Member, PlacedMember};
 use bimorph_structure::{GapVoltage, Structure};
@@ -44,6 +44,8 @@ pub fn lay(
                 delayed: h.time_constant.is_none(),
                 capacity: h.capacity,
                 gas: h.gas.map_or(0.0, |gas| gas.conductance(beam.width, beam.length)),
+                coefficient: h.coefficient,
+                thermal_coefficient: h.thermal_coefficient,
             });
         }
     }
@@ -100,8 +102,47 @@ pub fn lay(
         sink[net[n]] = true;
     }
     let heating = Heating::new(heaters, &potentials, sources, &sink)
-        .map_err(|e| DiscretizeError::NoHeatSink { beam: structure.beams[heated[e.heater]].name.clone() })?;
+        .map_err(|e| DiscretizeError::NoHeatSink { beam: structure.beams[heated[e.heater]].name.clone() })?
+        .with_hot(&circuit);
+    if heating.is_hot() {
+        fixed_gap_voltages(structure, &heating, &circuit, (&potentials, &net), gaps)?;
+    }
     let mut conductance = DMatrix::zeros(ports, sources);
     conductance.view_mut((0, 0), (ports, driven)).copy_from(&potentials.conductance.rows(0, ports));
     Ok(Electrics { ports, fixed, names, gap_rows, conductance, heating, inputs: Vec::new() })
+}
+
+/// Relative change of resistances by which gap voltages are tested (1).
+const PROBE: f64 = 0.5;
+/// Change of a gap's voltage that is rounding, for a volt of a source (1).
+const SAME: f64 = 1e-9;
+
+/// Refuses gaps whose voltages depend on resistances that depend on temperature.
+fn fixed_gap_voltages(
+    structure: &Structure,
+    heating: &Heating,
+    circuit: &ElectricalNetwork,
+    (potentials, net): (&Potentials, &[usize]),
+    gaps: &[PlacedMember<'_, Member>],
+) -> Result<(), DiscretizeError> {
+    let mut probe = circuit.clone();
+    let first = probe.resistors.len() - heating.heaters.len();
+    for (k, (resistor, heater)) in probe.resistors[first..].iter_mut().zip(&heating.heaters).enumerate() {
+        if heater.coefficient != 0.0 {
+            // each by its own factor: equal ones leave dividers as they are
+            resistor.2 *= 1.0 + PROBE * (1.0 + (k % 7) as f64 / 7.0);
+        }
+    }
+    let Ok(hot) = probe.solve() else { return Ok(()) };
+    for gap in gaps {
+        let Some(GapVoltage::Nodes(a, b)) = gap.voltage else { continue };
+        let (a, b) = (net[a.0], net[b.0]);
+        if (potentials.difference(a, b) - hot.difference(a, b)).amax() > SAME {
+            let beam = heating.heaters.iter().position(|h| h.coefficient != 0.0);
+            let beam = beam.and_then(|k| structure.beams.iter().filter(|b| b.heater.is_some()).nth(k));
+            let beam = beam.map_or_else(String::new, |beam| beam.name.clone());
+            return Err(DiscretizeError::HotGap { gap: gap.name.to_owned(), beam });
+        }
+    }
+    Ok(())
 }

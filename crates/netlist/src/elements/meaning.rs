@@ -66,6 +66,8 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "specificheat" => "specific heat [J/(kg·K)]",
         "gasconductivity" => "thermal conductivity of the gas [W/(m·K)]",
         "shapefactor" => "factor on the conduction through gas [1]",
+        "TCK" => "relative change of the thermal resistivity with temperature [1/K]",
+        "TCR" => "relative change of the resistance with temperature [1/K]",
         "yieldstress" => "yield stress at ambient temperature [Pa]",
         "softening" => "temperature without strength [K]",
         "td" => "thickness of the insulation [m]",

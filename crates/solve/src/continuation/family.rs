@@ -78,7 +78,7 @@ impl LoadFamily {
             system: from.clone(),
             drive: e.drive(),
             sources: from_sources.to_vec(),
-            rise: vec![0.0; e.heating.heaters.len()],
+            rise: vec![0.0; e.heating.states()],
             ends: [end(from, from_sources), end(to, to_sources)],
             before: vec![Pose::zeros(); from.bodies()],
             still: field_free_point(from, from_sources, to_sources),

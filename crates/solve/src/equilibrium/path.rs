@@ -57,13 +57,31 @@ impl<'a> SourcePath<'a> {
         let attracts = (0..electrics.gap_rows.nrows()).any(|g| gap(g, to) != 0.0);
         let from_rest = from.iter().all(|v| *v == 0.0) && !(attracts && load[0] != load[1]);
         let heating = &electrics.heating;
-        let rise = |k: usize| {
-            let end = heating.steady(k, to);
-            (if from_rest { [0.0, end, 0.0] } else { heating.between(k, from, to) }, end)
+        // where resistances depend on temperature there are no such coefficients
+        let rise = |k: usize| match heating.is_hot() {
+            true => ([0.0; 3], 0.0),
+            false => {
+                let end = heating.steady(k, to);
+                (if from_rest { [0.0, end, 0.0] } else { heating.between(k, from, to) }, end)
+            }
         };
         let volts = (0..electrics.gap_rows.nrows()).map(|g| [gap(g, from), gap(g, to)]).collect();
         let rise = (0..heating.heaters.len()).map(rise).collect();
         Self { electrics, from, to, load, from_rest, volts, rise }
+    }
+
+    /// Source voltages at `s` with the steady rises there, and the change of the voltages with `s`.
+    fn hot(&self, s: f64) -> [Vec<f64>; 3] {
+        let e = self.electrics;
+        let ([share, rate], voltages) = (self.share(s), e.voltages());
+        let one = |(i, (from, to)): (usize, (&f64, &f64))| match i < voltages {
+            true => (from + share * (to - from), rate * (to - from)),
+            false => (from + s * (to - from), to - from),
+        };
+        let (u, change): (Vec<f64>, Vec<f64>) = self.from.iter().zip(self.to).enumerate().map(one).unzip();
+        let mut rise = vec![0.0; e.heating.states()];
+        e.heating.rises(&u, &mut rise);
+        [u, rise, change]
     }
 
     /// The share of the voltages at `s`, and its slope.
@@ -97,6 +115,12 @@ impl LoadPath for SourcePath<'_> {
         {
             *expansion = heater.expansion * if s >= 1.0 { *end } else { a + s * (b + s * c) };
         }
+        if e.heating.is_hot() {
+            let [_, rise, _] = self.hot(s);
+            for ((expansion, heater), rise) in drive.expansion.iter_mut().zip(&e.heating.heaters).zip(&rise) {
+                *expansion = heater.expansion * rise;
+            }
+        }
         drive.load = self.load[0] + s * (self.load[1] - self.load[0]);
         for (k, value) in drive.inputs.iter_mut().enumerate() {
             let (from, to) = (self.from[e.voltages() + k], self.to[e.voltages() + k]);
@@ -122,6 +146,11 @@ impl LoadPath for SourcePath<'_> {
         for ((expansion, heater), ([_, b, c], _)) in slope.expansion.iter_mut().zip(&e.heating.heaters).zip(&self.rise)
         {
             *expansion = heater.expansion * (b + 2.0 * s * c);
+        }
+        if e.heating.is_hot() {
+            let [u, rise, change] = self.hot(s);
+            e.heating.slopes(&u, &rise, &change, &mut slope.expansion);
+            slope.expansion.iter_mut().zip(&e.heating.heaters).for_each(|(slope, h)| *slope *= h.expansion);
         }
         slope.load = self.load[1] - self.load[0];
         for (k, value) in slope.inputs.iter_mut().enumerate() {

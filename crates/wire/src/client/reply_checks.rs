@@ -179,6 +179,7 @@ pub(super) fn statics(reply: &proto::StaticResponse) -> Result<(), String> {
     nodes(&reply.nodes)?;
     named("temperatures_k", &reply.temperatures_k)?;
     named("stresses_pa", &reply.stresses_pa)?;
+    named("peak_temperatures_k", &reply.peak_temperatures_k)?;
     named("currents_a", &reply.currents_a)?;
     named("charges_c", &reply.charges_c)?;
     named("permanent_strains", &reply.permanent_strains)

@@ -41,6 +41,7 @@ pub fn static_to_wire(result: &StaticResult, strains: &[(String, f64)]) -> proto
         estimated_error: result.estimated_error,
         warnings: result.warnings.clone(),
         permanent_strains: named(strains),
+        peak_temperatures_k: named(&result.peak_temperatures_k),
     }
 }
 
@@ -66,6 +67,7 @@ pub fn static_from_wire(wire: proto::StaticResponse) -> StaticResult {
         nodes: nodes_from_wire(wire.nodes),
         temperatures_k: pairs(wire.temperatures_k),
         stresses_pa: pairs(wire.stresses_pa),
+        peak_temperatures_k: pairs(wire.peak_temperatures_k),
         currents_a: pairs(wire.currents_a),
         charges_c: pairs(wire.charges_c),
         pulled_in: wire.pulled_in,

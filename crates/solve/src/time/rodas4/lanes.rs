@@ -24,6 +24,7 @@ impl LaneRodas4 {
     pub fn fits(&self, system: &System) -> bool {
         self.model.fits(&system.model)
             && system.electrics.inputs.is_empty()
+            && !system.electrics.heating.is_hot()
             && (!self.losses.is_empty() || !system.loses())
             && self.heat.count() == system.electrics.heating.heaters.len()
             && self.drives[0].volts.len() == system.members.len()

@@ -82,7 +82,9 @@ impl LaneRodas4 {
     /// Storage for a mechanism, with its numbers in every lane; none for a linear model, for one with inputs beside voltages,
     /// and on a processor without vectors.
     pub fn new(system: &System) -> Option<Self> {
-        let model = LaneModel::new(&system.model).filter(|_| has_lanes() && system.electrics.inputs.is_empty())?;
+        let electrics = &system.electrics;
+        let suits = has_lanes() && electrics.inputs.is_empty() && !electrics.heating.is_hot();
+        let model = LaneModel::new(&system.model).filter(|_| suits)?;
         let (n, pattern) = (system.bodies(), &system.model.pattern);
         let acted = system.acted_on();
         let between = |&row: &usize| acted.iter().filter_map(move |&column| block(pattern, row, column));

@@ -1,0 +1,397 @@
+//! One beam whose resistance depends on its temperature: quadratic elements along it, reduced to its ends.
+//!
+//! Let s go from 0 to 1 along the beam. K is its conductance from end to end, G that to the surroundings, R₀ its resistance and C its
+//! heat capacity. The rise T(s) and the current I satisfy
+//! ```text
+//! C·∂T/∂t = K·∂(κ(T)·∂T/∂s)/∂s − G·T + I²·R₀·r(T),      V = I·R₀·∫r(T)ds
+//! r(T) = 1 + TCR·T,      κ(T) = 1/(1 + TCK·T)
+//! ```
+//! in weak form on elements with a node in their middle, integrated by three Gauss points. Newton's matrix of the inner nodes has two
+//! bands on either side. Its solution for the rises of the ends, the current and the residual leaves three equations: the heat that the
+//! ends receive, and the voltage.
+
+use super::element::{DERIVATIVES, POINTS, SHAPES};
+use nalgebra::ComplexField;
+
+/// A beam that carries current, whose resistance depends on its temperature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct HotBeam {
+    /// Thermal conductance from end to end (W/K).
+    pub(super) conductance: f64,
+    /// Thermal conductance to the surroundings (W/K).
+    pub(super) gas: f64,
+    /// Resistance at ambient temperature (Ω).
+    pub(super) resistance: f64,
+    /// Relative change of the resistivity with the rise (1/K).
+    pub(super) coefficient: f64,
+    /// Relative change of the thermal resistivity with the rise (1/K).
+    pub(super) thermal_coefficient: f64,
+    /// Heat capacity (J/K).
+    pub(super) capacity: f64,
+    /// Elements.
+    pub(super) elements: usize,
+    /// Where its inner nodes begin in the vector of rises.
+    pub(super) first: usize,
+}
+
+/// Entries of a row of Newton's matrix of the inner nodes: two below the diagonal, itself, two above.
+type Row<T> = [T; 5];
+
+/// Newton's equations of a beam about a state, with the matrix of the inner nodes factored.
+#[derive(Debug, Clone)]
+pub(super) struct Reduced<T> {
+    rows: Vec<Row<T>>,
+    /// Solutions of the inner nodes for a unit rise of each end and a unit of current.
+    inner: Vec<[T; 3]>,
+    /// Entries between the inner nodes and the ends: the row of each end.
+    ends: [Vec<T>; 2],
+    /// Change of the heat flow at each node with the current (W/A).
+    by_current: Vec<T>,
+    /// I times the change of the resistance with the rise of each node (V/K).
+    by_rise: Vec<T>,
+    /// Slopes of the heat into both ends and of the current with the rises of the ends and the voltage: what the network assembles.
+    pub(super) outer: [[T; 3]; 3],
+    /// Differential resistance (Ω).
+    resistance: T,
+    /// Negative pivots of the inner nodes and the voltage, by their real parts.
+    pub(super) negative: usize,
+}
+
+/// Residuals of a beam at a state, without the heat between beams.
+#[derive(Debug, Clone, Default)]
+pub(super) struct BeamResidual {
+    /// Heat balance of each node (W).
+    pub(super) heat: Vec<f64>,
+    /// Resistance (Ω).
+    pub(super) resistance: f64,
+}
+
+/// A change of the state of a beam, from its ends, its voltage, and residuals that it removes.
+pub(super) struct BeamChange<'a, T> {
+    /// Changes of the rises of both ends (K).
+    pub(super) ends: [T; 2],
+    /// Change of the voltage (V).
+    pub(super) volts: T,
+    /// Solutions of the inner nodes for the residuals.
+    pub(super) inner: &'a [T],
+    /// Voltage that is missing (V).
+    pub(super) missing: T,
+}
+
+fn real<T: ComplexField<RealField = f64> + Copy>(x: f64) -> T {
+    T::from_real(x)
+}
+
+impl HotBeam {
+    /// Conductivity over that at ambient temperature, and its slope (1, 1/K).
+    fn conductivity(&self, t: f64) -> [f64; 2] {
+        let kappa = 1.0 / (1.0 + self.thermal_coefficient * t);
+        [kappa, -self.thermal_coefficient * kappa * kappa]
+    }
+
+    /// Number of inner nodes.
+    pub(super) fn inner(&self) -> usize {
+        2 * self.elements - 1
+    }
+
+    /// The rise at node `j` of 0 to 2·elements.
+    fn at(&self, j: usize, ends: [f64; 2], inner: &[f64]) -> f64 {
+        match j {
+            0 => ends[0],
+            j if j > inner.len() => ends[1],
+            j => inner[j - 1],
+        }
+    }
+
+    /// Calls `see` for each Gauss point with its first node, its weight in s, its shape functions and derivatives, the rise and its slope.
+    fn points(&self, ends: [f64; 2], inner: &[f64], mut see: impl FnMut(usize, f64, &[f64; 3], &[f64; 3], [f64; 2])) {
+        for e in 0..self.elements {
+            let nodes = [0, 1, 2].map(|i| self.at(2 * e + i, ends, inner));
+            for (point, (shape, slope)) in POINTS.iter().zip(SHAPES.iter().zip(&DERIVATIVES)) {
+                let dot = |f: &[f64; 3]| f[0] * nodes[0] + f[1] * nodes[1] + f[2] * nodes[2];
+                see(2 * e, point.1, shape, slope, [dot(shape), dot(slope)]);
+            }
+        }
+    }
+
+    /// Resistance at these rises (Ω).
+    pub(super) fn resistance(&self, ends: [f64; 2], inner: &[f64]) -> f64 {
+        self.resistance * (1.0 + self.coefficient * self.mean(ends, inner))
+    }
+
+    /// Mean rise: Simpson's rule is exact for parabolas.
+    pub(super) fn mean(&self, ends: [f64; 2], inner: &[f64]) -> f64 {
+        let odd: f64 = inner.iter().step_by(2).sum();
+        let even: f64 = inner.iter().skip(1).step_by(2).sum();
+        (ends[0] + ends[1] + 4.0 * odd + 2.0 * even) / (6.0 * self.elements as f64)
+    }
+
+    /// Weight of the rise of node `j` in the mean (1).
+    pub(super) fn weight(&self, j: usize) -> f64 {
+        let count = self.elements as f64;
+        match j {
+            j if j % 2 == 1 => 4.0 / (6.0 * count),
+            j if j == 0 || j == 2 * self.elements => 1.0 / (6.0 * count),
+            _ => 2.0 / (6.0 * count),
+        }
+    }
+
+    /// Highest and lowest rise: those of the parabolas, not of the nodes.
+    pub(super) fn extremes(&self, ends: [f64; 2], inner: &[f64]) -> [f64; 2] {
+        let mut found = [f64::NEG_INFINITY, f64::INFINITY];
+        let mut see = |t: f64| found = [found[0].max(t), found[1].min(t)];
+        for e in 0..self.elements {
+            let [a, m, b] = [0, 1, 2].map(|i| self.at(2 * e + i, ends, inner));
+            [a, m, b].into_iter().for_each(&mut see);
+            // a + x·p + x²·q
+            let (p, q) = (4.0 * m - 3.0 * a - b, 2.0 * (a - 2.0 * m + b));
+            let x = -p / (2.0 * q);
+            if x > 0.0 && x < 1.0 {
+                see(a + 0.5 * x * p);
+            }
+        }
+        found
+    }
+
+    /// Residuals at rises and a current; `rates` of all nodes where the capacity counts (K/s).
+    pub(super) fn residual(
+        &self,
+        (ends, inner): ([f64; 2], &[f64]),
+        rates: Option<([f64; 2], &[f64])>,
+        current: f64,
+        out: &mut BeamResidual,
+    ) {
+        let count = self.elements as f64;
+        out.heat.clear();
+        out.heat.resize(inner.len() + 2, 0.0);
+        let joule = current * current * self.resistance;
+        self.points(ends, inner, |first, weight, shape, slope, [t, dt]| {
+            let flow = self.conductance * self.conductivity(t)[0] * count * dt * weight;
+            let source = (self.gas * t - joule * (1.0 + self.coefficient * t)) * weight / count;
+            for i in 0..3 {
+                out.heat[first + i] += flow * slope[i] + source * shape[i];
+            }
+        });
+        if let Some(rates) = rates {
+            self.add_stored(rates, &mut out.heat);
+        }
+        out.resistance = self.resistance(ends, inner);
+    }
+
+    /// Heat that its capacity takes at each node at these rates (W, K/s).
+    pub(super) fn stored(&self, rates: ([f64; 2], &[f64]), out: &mut Vec<f64>) {
+        out.clear();
+        out.resize(rates.1.len() + 2, 0.0);
+        self.add_stored(rates, out);
+    }
+
+    fn add_stored(&self, (ends, inner): ([f64; 2], &[f64]), out: &mut [f64]) {
+        self.points(ends, inner, |first, weight, shape, _, [rate, _]| {
+            for i in 0..3 {
+                out[first + i] += self.capacity * rate * shape[i] * weight / self.elements as f64;
+            }
+        });
+    }
+
+    /// Newton's equations at rises and a current, `sigma` the slope of the rates with the rises (1/s), reduced to the ends.
+    pub(super) fn reduce<T: ComplexField<RealField = f64> + Copy>(
+        &self,
+        (ends, inner): ([f64; 2], &[f64]),
+        current: f64,
+        sigma: T,
+        out: &mut Reduced<T>,
+    ) {
+        let (n, zero) = (inner.len(), real::<T>(0.0));
+        let count = self.elements as f64;
+        out.rows.clear();
+        out.rows.resize(n, [zero; 5]);
+        for row in &mut out.ends {
+            row.clear();
+            row.resize(n + 2, zero);
+        }
+        out.by_current.clear();
+        out.by_current.resize(n + 2, zero);
+        out.by_rise.clear();
+        out.by_rise
+            .extend((0..n + 2).map(|j| real::<T>(current * self.resistance * self.coefficient * self.weight(j))));
+        out.inner.clear();
+        out.inner.resize(n, [zero; 3]);
+        let joule = current * current * self.resistance * self.coefficient;
+        let heat = 2.0 * current * self.resistance;
+        self.points(ends, inner, |first, weight, shape, slope, [t, dt]| {
+            let [kappa, falls] = self.conductivity(t);
+            let stored = sigma * real(self.capacity * weight / count);
+            for i in 0..3 {
+                let node = first + i;
+                out.by_current[node] -= real::<T>(heat * (1.0 + self.coefficient * t) * shape[i] * weight / count);
+                for j in 0..3 {
+                    let held =
+                        self.conductance * count * slope[i] * (kappa * slope[j] + falls * dt * shape[j]) * weight
+                            + (self.gas - joule) * shape[i] * shape[j] * weight / count;
+                    let entry = real::<T>(held) + stored * real(shape[i] * shape[j]);
+                    let other = first + j;
+                    match node {
+                        0 => out.ends[0][other] += entry,
+                        node if node == n + 1 => out.ends[1][other] += entry,
+                        node if other == 0 => out.inner[node - 1][0] -= entry,
+                        node if other == n + 1 => out.inner[node - 1][1] -= entry,
+                        node => out.rows[node - 1][2 + other - node] += entry,
+                    }
+                }
+            }
+        });
+        for (row, by) in out.inner.iter_mut().zip(&out.by_current[1..=n]) {
+            row[2] = -*by;
+        }
+        out.factor();
+        for column in 0..3 {
+            out.solve(|x| &mut x[column]);
+        }
+        out.condense(self.resistance(ends, inner));
+    }
+}
+
+impl<T: ComplexField<RealField = f64> + Copy> Reduced<T> {
+    /// Before [`HotBeam::reduce`].
+    pub(super) fn empty() -> Self {
+        let zero = real(0.0);
+        Self {
+            rows: Vec::new(),
+            inner: Vec::new(),
+            ends: [Vec::new(), Vec::new()],
+            by_current: Vec::new(),
+            by_rise: Vec::new(),
+            outer: [[zero; 3]; 3],
+            resistance: zero,
+            negative: 0,
+        }
+    }
+
+    /// Factors the matrix of the inner nodes, without exchanges of rows: negative pivots are instabilities.
+    fn factor(&mut self) {
+        self.negative = 0;
+        for k in 0..self.rows.len() {
+            let [_, _, pivot, right, far] = self.rows[k];
+            self.negative += usize::from(pivot.real() < 0.0);
+            if let Some(next) = self.rows.get_mut(k + 1) {
+                let l = next[1] / pivot;
+                next[1] = l;
+                next[2] -= l * right;
+                next[3] -= l * far;
+            }
+            if let Some(next) = self.rows.get_mut(k + 2) {
+                let l = next[0] / pivot;
+                next[0] = l;
+                next[1] -= l * right;
+                next[2] -= l * far;
+            }
+        }
+    }
+
+    fn solve(&mut self, of: impl Fn(&mut [T; 3]) -> &mut T) {
+        let Self { rows, inner, .. } = self;
+        let n = rows.len();
+        for k in 0..n {
+            let x = *of(&mut inner[k]);
+            if k + 1 < n {
+                *of(&mut inner[k + 1]) -= rows[k + 1][1] * x;
+            }
+            if k + 2 < n {
+                *of(&mut inner[k + 2]) -= rows[k + 2][0] * x;
+            }
+        }
+        for k in (0..n).rev() {
+            let mut x = *of(&mut inner[k]);
+            if k + 1 < n {
+                x -= rows[k][3] * *of(&mut inner[k + 1]);
+            }
+            if k + 2 < n {
+                x -= rows[k][4] * *of(&mut inner[k + 2]);
+            }
+            *of(&mut inner[k]) = x / rows[k][2];
+        }
+    }
+
+    /// The inverse of the matrix of the inner nodes times a vector, in place.
+    pub(super) fn solve_inner(&self, x: &mut [T]) {
+        let (rows, n) = (&self.rows, self.rows.len());
+        for k in 0..n {
+            let value = x[k];
+            if k + 1 < n {
+                x[k + 1] -= rows[k + 1][1] * value;
+            }
+            if k + 2 < n {
+                x[k + 2] -= rows[k + 2][0] * value;
+            }
+        }
+        for k in (0..n).rev() {
+            let mut value = x[k];
+            if k + 1 < n {
+                value -= rows[k][3] * x[k + 1];
+            }
+            if k + 2 < n {
+                value -= rows[k][4] * x[k + 2];
+            }
+            x[k] = value / rows[k][2];
+        }
+    }
+
+    /// I·∂R/∂T times changes of the inner nodes.
+    fn voltage_of(&self, x: impl Iterator<Item = T>) -> T {
+        self.by_rise[1..].iter().zip(x).fold(real(0.0), |sum, (p, x)| sum + *p * x)
+    }
+
+    /// Heat at an end by changes of the inner nodes.
+    fn heat_of(&self, end: usize, x: impl Iterator<Item = T>) -> T {
+        self.ends[end][1..].iter().zip(x).fold(real(0.0), |sum, (a, x)| sum + *a * x)
+    }
+
+    /// The three equations of the ends and the voltage.
+    fn condense(&mut self, resistance: f64) {
+        let n = self.rows.len();
+        let column = |c: usize| self.inner.iter().map(move |x| x[c]);
+        let last = [0, n + 1];
+        self.resistance = real::<T>(resistance) + self.voltage_of(column(2));
+        let mut outer = [[real(0.0); 3]; 3];
+        // the current for a unit rise of each end, and for a volt
+        for end in 0..2 {
+            outer[2][end] = -(self.by_rise[last[end]] + self.voltage_of(column(end))) / self.resistance;
+        }
+        outer[2][2] = self.resistance.recip();
+        for end in 0..2 {
+            let by_current = self.by_current[last[end]] + self.heat_of(end, column(2));
+            for other in 0..2 {
+                outer[end][other] =
+                    self.ends[end][last[other]] + self.heat_of(end, column(other)) + by_current * outer[2][other];
+            }
+            outer[end][2] = by_current * outer[2][2];
+        }
+        self.negative += usize::from(self.resistance.real() < 0.0);
+        self.outer = outer;
+    }
+
+    /// The share of a residual in the three equations: heat of both ends, and the current (W, A). `inner` is the solution for the residual
+    /// of the inner nodes, and `missing` the voltage that is missing.
+    pub(super) fn residual_share(&self, inner: &[T], missing: T) -> [T; 3] {
+        let n = self.rows.len();
+        let last = [0, n + 1];
+        let volts = self.voltage_of(inner.iter().copied());
+        let current = (missing - volts) / self.resistance;
+        let share = |end: usize| {
+            let by_current = self.by_current[last[end]] + self.heat_of(end, self.inner.iter().map(|x| x[2]));
+            self.heat_of(end, inner.iter().copied()) + by_current * current
+        };
+        [share(0), share(1), current]
+    }
+
+    /// The change of the current, and that of the inner nodes, which goes to `out`.
+    pub(super) fn change(&self, of: &BeamChange<'_, T>, out: &mut [T]) -> T {
+        let own = self.residual_share(of.inner, of.missing)[2];
+        let outer = &self.outer[2];
+        let current = own + outer[0] * of.ends[0] + outer[1] * of.ends[1] + outer[2] * of.volts;
+        for ((out, given), unit) in out.iter_mut().zip(of.inner).zip(&self.inner) {
+            *out = *given + unit[0] * of.ends[0] + unit[1] * of.ends[1] + unit[2] * current;
+        }
+        current
+    }
+}

@@ -1,0 +1,221 @@
+//! A bar of 200 × 2 × 2 µm between ends at ambient, against closed forms: rise = (cos(λ(x − L/2))/cos(λL/2) − 1)/ξ with λ² = J²·ρ₀·ξ/k,
+//! and its counterpart with a loss through gas, computed independently.
+
+use super::super::network::ElectricalNetwork;
+use super::super::thermal::{HeatConductor, Heating};
+use nalgebra::Complex;
+
+/// ρ 2e-5 Ω·m, k 32 W/(m·K), ρ·c 2330·700 J/(m³·K), a TCR of 1.25e-3/K; `gas` of all of its length (W/K), in equal pieces, fed through a
+/// resistor (Ω).
+fn bar(pieces: usize, gas: f64, series: f64) -> Heating {
+    let (length, area) = (200e-6 / pieces as f64, 4e-12);
+    let heater = |i: usize| HeatConductor {
+        a: i,
+        b: i + 1,
+        resistance: 2e-5 * length / area,
+        conductance: 32.0 * area / length,
+        expansion: 0.0,
+        ambient: 0.0,
+        time_constant: 0.0,
+        delayed: true,
+        capacity: 2330.0 * 700.0 * length * area,
+        gas: gas / pieces as f64,
+        coefficient: 1.25e-3,
+        thermal_coefficient: 0.0,
+    };
+    let heaters: Vec<HeatConductor> = (0..pieces).map(heater).collect();
+    let feed = if series > 0.0 { vec![(pieces, pieces + 1, series)] } else { Vec::new() };
+    let source = if series > 0.0 { pieces + 1 } else { pieces };
+    let circuit = ElectricalNetwork {
+        nodes: pieces + 2,
+        resistors: feed.into_iter().chain(heaters.iter().map(|h| (h.a, h.b, h.resistance))).collect(),
+        sources: vec![(source, None)],
+        grounds: vec![0],
+    };
+    let mut sink = vec![false; pieces + 2];
+    (sink[0], sink[pieces]) = (true, true);
+    Heating::new(heaters, &circuit.solve().unwrap(), 1, &sink).unwrap().with_hot(&circuit)
+}
+
+/// Mean rise, highest rise and current at these volts.
+fn at(heating: &Heating, volts: f64) -> [f64; 3] {
+    let mut rise = vec![0.0; heating.states()];
+    heating.rises(&[volts], &mut rise);
+    let mean = rise[..heating.heaters.len()].iter().sum::<f64>() / heating.heaters.len() as f64;
+    let hot = heating.hot().unwrap();
+    let current = hot.source_currents(&hot.flows(&rise, &[volts], |_| 0.0), &[volts])[0];
+    [mean, heating.peaks(&[volts]).into_iter().fold(0.0, f64::max), current]
+}
+
+/// Mean and highest rise and current at 1 mA (by its 1.20238213 V) and at 1 V, and with gas at 1 mA (by its 1.04098483 V), to 1e-4; also
+/// in pieces.
+#[test]
+fn like_the_closed_form() {
+    for pieces in [1, 2, 5] {
+        let gas = 4.0 * 0.026 * 200e-6;
+        for (heating, volts, wanted) in [
+            (bar(pieces, 0.0, 0.0), 1.20238213, [161.905701, 244.886773, 1e-3]),
+            (bar(pieces, 0.0, 0.0), 1.0, [116.570329, 175.961065, 0.872819002e-3]),
+            (bar(pieces, gas, 0.0), 1.04098483, [32.787863, 44.723975, 1e-3]),
+        ] {
+            let found = at(&heating, volts);
+            for (found, wanted) in found.into_iter().zip(wanted) {
+                assert!((found / wanted - 1.0).abs() < 1e-4, "{pieces}, {volts} V: {found} {wanted}");
+            }
+        }
+    }
+}
+
+/// However high the voltage, the current stays below 2.2479407 mA, where λL = π, and tends to it; rises are positive there. That limit is
+/// found to 2e-5, also through a resistor.
+#[test]
+fn the_current_tends_to_that_of_a_runaway() {
+    let heating = bar(1, 0.0, 0.0);
+    for series in [0.0, 100.0] {
+        let limit = bar(1, 0.0, series).runaway_current(&[0.0], 0).unwrap();
+        assert!((limit / 2.2479407e-3 - 1.0).abs() < 2e-5, "{limit}");
+    }
+    let [mean, _, current] = at(&heating, 1e4);
+    assert!(
+        mean > 1e4 && current < 2.2479407e-3 * (1.0 + 1e-4) && current > 2.2479407e-3 * (1.0 - 2e-3),
+        "{mean} {current}"
+    );
+}
+
+/// A conductivity that falls as 1/(1 + 2e-3·rise) at a constant resistivity: at 1 mA, here 1 V, the highest rise is 238.952098 K, to 1e-5, by
+/// Kirchhoff's transformation. Slopes agree with differences to 1e-7.
+#[test]
+fn conductivity_falls_with_temperature() {
+    let mut heaters = bar(1, 0.0, 0.0).heaters;
+    (heaters[0].coefficient, heaters[0].thermal_coefficient) = (0.0, 2e-3);
+    let circuit = ElectricalNetwork {
+        nodes: 2,
+        resistors: vec![(0, 1, heaters[0].resistance)],
+        sources: vec![(1, None)],
+        grounds: vec![0],
+    };
+    let heating = Heating::new(heaters, &circuit.solve().unwrap(), 1, &[true, true]).unwrap().with_hot(&circuit);
+    let [_, peak, current] = at(&heating, 1.0);
+    assert!((peak / 238.952098 - 1.0).abs() < 1e-5 && (current / 1e-3 - 1.0).abs() < 1e-12, "{peak} {current}");
+    let mean = |volts: f64| at(&heating, volts)[0];
+    let mut rise = vec![0.0; heating.states()];
+    heating.rises(&[1.0], &mut rise);
+    let mut slopes = vec![0.0; 1];
+    heating.slopes(&[1.0], &rise, &[1.0], &mut slopes);
+    let difference = (8.0 * (mean(1.001) - mean(0.999)) - (mean(1.002) - mean(0.998))) / 12e-3;
+    assert!((slopes[0] / difference - 1.0).abs() < 1e-7, "{} {difference}", slopes[0]);
+}
+
+/// A negative TCR of ξ = −2e-3/K at a held voltage has no temperature above 2·√(ρ₀·k/|ξ|) = 1.13137 V, where the rise of 500 K takes the
+/// resistance away. Closed form: V = 2·√(ρ₀·k/|ξ|)·tanh(|λ|L/2). The error reports the voltage to 1e-3.
+#[test]
+fn a_negative_coefficient_runs_away() {
+    let mut heating = bar(1, 0.0, 0.0);
+    let mut heaters = heating.heaters.clone();
+    heaters[0].coefficient = -2e-3;
+    let circuit = ElectricalNetwork {
+        nodes: 2,
+        resistors: vec![(0, 1, heaters[0].resistance)],
+        sources: vec![(1, None)],
+        grounds: vec![0],
+    };
+    heating = Heating::new(heaters, &circuit.solve().unwrap(), 1, &[true, true]).unwrap().with_hot(&circuit);
+    assert!(heating.check(&[0.5]).is_ok());
+    let super::ThermalRunaway { share, rise, .. } = heating.check(&[5.0]).unwrap_err();
+    let limit = 5.0 * share.sqrt();
+    assert!((limit / 1.131371 - 1.0).abs() < 1e-3 && rise < 500.0, "{limit} {rise}");
+    assert!(heating.check(&[limit * 0.999]).is_ok() && heating.check(&[limit * 1.001]).is_err());
+}
+
+/// Slopes of the steady rises and currents with the voltage, also through a resistor, agree with differences to 1e-7.
+#[test]
+fn slopes_are_derivatives() {
+    for heating in [bar(1, 0.0, 0.0), bar(3, 2.08e-5, 0.0), bar(3, 0.0, 700.0)] {
+        let hot = heating.hot().unwrap();
+        let values = |volts: f64| {
+            let mut rise = vec![0.0; heating.states()];
+            heating.rises(&[volts], &mut rise);
+            let current = hot.source_currents(&hot.flows(&rise, &[volts], |_| 0.0), &[volts])[0];
+            (rise, current)
+        };
+        let (rise, _) = values(1.3);
+        let mut slopes = vec![0.0; heating.states()];
+        heating.slopes(&[1.3], &rise, &[1.0], &mut slopes);
+        let flows = hot.flows(&rise, &[1.3], |_| 0.0);
+        let current = hot.source_currents(&hot.flow_change(&rise, &flows, &slopes, &[1.0]), &[1.0])[0];
+        let ([a, b], [c, d]) = ([1.3 + 1e-3, 1.3 - 1e-3].map(values), [1.3 + 5e-4, 1.3 - 5e-4].map(values));
+        let best = |wide: f64, narrow: f64| (4.0 * narrow / 1e-3 - wide / 2e-3) / 3.0;
+        let highest = slopes.iter().fold(0.0f64, |most, s| most.max(s.abs()));
+        for k in 0..slopes.len() {
+            let difference = best(a.0[k] - b.0[k], c.0[k] - d.0[k]);
+            assert!((slopes[k] - difference).abs() < 1e-7 * highest, "{k}: {} {difference}", slopes[k]);
+        }
+        let difference = best(a.1 - b.1, c.1 - d.1);
+        assert!((current / difference - 1.0).abs() < 1e-7, "{current} {difference}");
+    }
+}
+
+/// A small step of the voltage decays with the slowest time constant ρ·c·L²/(π²·k) = 206.5686 µs, with gas 48.11822 µs, to 1e-3, and ends at
+/// the steady rise. At low voltage the current does not couple.
+#[test]
+fn slowest_time_constants() {
+    for (gas, tau) in [(0.0, 206.5686e-6), (4.0 * 0.026 * 200e-6, 48.11822e-6)] {
+        let heating = bar(1, gas, 0.0);
+        let hot = heating.hot().unwrap();
+        let u = [1e-3];
+        let mut steady = vec![0.0; hot.states()];
+        hot.steady(&u, &mut steady).unwrap();
+        let course = hot.course(super::SourceLine { from: &u, to: &u, dt: 6.0 * tau }, &vec![0.0; hot.states()]);
+        assert_eq!(course.failed, None);
+        let mut means = [0.0];
+        hot.means(&steady, &mut means);
+        let left = |t: f64| means[0] - course.mean(0, t)[0];
+        let found = 2.0 * tau / (left(2.0 * tau) / left(4.0 * tau)).ln();
+        assert!((found / tau - 1.0).abs() < 1e-3, "{found} {tau}");
+        let slowest = hot.slowest(&u, &steady);
+        assert!((slowest / tau - 1.0).abs() < 1e-4, "{slowest} {tau}");
+        // by the rates between the ends of steps
+        let rate = course.mean(0, 3.0 * tau)[1];
+        let difference = (course.mean(0, 3.0 * tau + 1e-9)[0] - course.mean(0, 3.0 * tau - 1e-9)[0]) / 2e-9;
+        assert!((rate / difference - 1.0).abs() < 1e-5, "{rate} {difference}");
+    }
+}
+
+/// The change of a course with its final voltage agrees with differences to 1e-6, at its end and within it.
+#[test]
+fn changes_of_a_course_are_derivatives() {
+    let heating = bar(2, 2.08e-5, 300.0);
+    let hot = heating.hot().unwrap();
+    let (from, dt) = ([0.4], 30e-6);
+    let mut start = vec![0.0; hot.states()];
+    hot.steady(&from, &mut start).unwrap();
+    let line = |to: f64| (to, hot.course(super::SourceLine { from: &from, to: &[to], dt }, &start));
+    let change = hot.course_change(super::SourceLine { from: &from, to: &[1.1], dt }, &start, 0);
+    let (up, down) = (line(1.1 + 1e-4).1, line(1.1 - 1e-4).1);
+    for t in [dt, 0.4 * dt] {
+        for k in 0..2 {
+            let difference = (up.mean(k, t)[0] - down.mean(k, t)[0]) / 2e-4;
+            let found = change.mean(k, t)[0];
+            assert!((found / difference - 1.0).abs() < 1e-6, "{t} {k}: {found} {difference}");
+        }
+    }
+}
+
+/// The response at a frequency tends to the steady slope at low ones, and at 1/τ has the admittance of the diffusion between cold ends:
+/// mean rise ∝ (1 − tanh(z)/z)/z² with z = (L/2)·√(iωρc/k), relative to 1/3, to 1e-3. Closed form at small currents.
+#[test]
+fn response_in_frequency() {
+    let heating = bar(1, 0.0, 0.0);
+    let mut rise = vec![0.0; heating.states()];
+    let u = [1e-3];
+    heating.rises(&u, &mut rise);
+    let at = |omega: f64| heating.response((&u, &rise), &[1.0], Complex::new(0.0, omega))[0];
+    let mut slopes = vec![0.0; 1];
+    heating.slopes(&u, &rise, &[1.0], &mut slopes);
+    assert!((at(1e-3).re / slopes[0] - 1.0).abs() < 1e-9);
+    for omega in [1e3, 5e3, 5e4] {
+        let z = Complex::new(0.0, omega * 2330.0 * 700.0 / 32.0).sqrt() * 100e-6;
+        let exact = (Complex::from(1.0) - z.tanh() / z) / (z * z) * 3.0;
+        assert!((at(omega) / slopes[0] / exact - 1.0).norm() < 1e-3, "{omega}");
+    }
+}

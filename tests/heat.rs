@@ -1,0 +1,166 @@
+//! Heated beams with a resistance that depends on temperature and with loss of heat through gas, from the netlist to what circuits see.
+//!
+//! The bar of 200 × 2 × 2 µm between ends at ambient has a closed form: rise = (cos(λ(x − L/2))/cos(λL/2) − 1)/ξ, λ² = J²·ρ₀·ξ/k. Its
+//! numbers, and those with gas, are from an independent computation.
+
+use bimorph::analysis::statics::static_equilibrium;
+use bimorph::analysis::transient::{TransientOptions, transient};
+use bimorph::compile::{CompileOptions, CompiledModel, compile};
+use bimorph::device::local::LocalDevice;
+use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Status, Trial, TrialReply};
+use bimorph::netlist::{Bundle, read_bundle};
+use std::path::Path;
+use std::sync::Arc;
+
+fn bar(layer: &str, more: &str) -> Arc<CompiledModel> {
+    let text = format!(
+        "process si = [ Youngsmodulus=160e9 density=2330 h=2u resistivity=2e-5 thermcond=32 thermalexpansion=2.7e-6 {layer} ]
+anchor si [cold] []
+arm beam2det si [cold far] [l=200u w=2u]
+anchor si [far] []
+eground * [cold] []
+{more}"
+    );
+    Arc::new(
+        compile(&Bundle::from_text("bar.net", &text), &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}")),
+    )
+}
+
+/// Mean and highest temperature of each beam of the example (K), and its current (A).
+const WANTED: [(&str, f64, f64); 4] =
+    [("hot", 432.003, 474.598), ("bar", 341.736, 344.515), ("cold", 321.639, 338.960), ("flex", 324.326, 334.524)];
+const CURRENT: f64 = 1.3092012e-03;
+
+const PORT: &str = "feed port * [far cold] []";
+const AIR: &str = "TCR=1.25e-3 gasconductivity=0.026 fluid=2u shapefactor=4";
+
+/// Mean rise, highest rise and current at 1 V, at 2 V and at the voltage of 1 mA, alone and in air, to 1e-4 of the closed forms. Without a TCR
+/// the bar at 2 V is V²/(12·ρ·k) = 520.833 K warm, 1.5 times that in its middle. A conductivity that falls with temperature has the highest rise
+/// of Kirchhoff's transformation.
+#[test]
+fn steady_temperatures() {
+    let any = f64::NAN;
+    for (layer, volts, wanted) in [
+        ("TCR=1.25e-3", 1.0, [116.570329, 175.961065, 0.872819002e-3]),
+        ("TCR=1.25e-3", 1.20238213, [161.905701, 244.886773, 1e-3]),
+        ("TCR=1.25e-3", 2.0, [377.23, any, any]),
+        (AIR, 1.04098483, [32.787863, 44.723975, 1e-3]),
+        ("TCK=2e-3", 1.0, [any, 238.952098, 1e-3]),
+        ("", 2.0, [520.833333, 781.25, 2e-3]),
+    ] {
+        let found = static_equilibrium(&bar(layer, PORT), &[("feed".into(), volts)]).unwrap_or_else(|e| panic!("{e}"));
+        let found = [found.temperatures_k[0].1, found.peak_temperatures_k[0].1, found.currents_a[0].1];
+        for (found, wanted) in found.into_iter().zip(wanted).filter(|(_, wanted)| !wanted.is_nan()) {
+            assert!((found / wanted - 1.0).abs() < 1e-4, "{layer}, {volts} V: {found} {wanted}");
+        }
+    }
+}
+
+/// The example of a hot-arm actuator in air at 4 V has the temperatures and the current of a finite-volume model with cells of 0.25 µm
+/// (independent computation), to 5e-4 of the rise. The tip bends towards the cold arm.
+#[test]
+fn a_hot_arm_in_air() {
+    let path = format!("{}/examples/hot_arm/hot_arm.net", env!("CARGO_MANIFEST_DIR"));
+    let compiled = compile(&read_bundle(Path::new(&path), &[]).unwrap(), &CompileOptions::default())
+        .unwrap_or_else(|e| panic!("{e}"));
+    let found = static_equilibrium(&compiled, &[("heat".into(), 4.0)]).unwrap_or_else(|e| panic!("{e}"));
+    for (name, mean, peak) in WANTED {
+        let of = |list: &[(String, f64)]| list.iter().find(|(beam, _)| beam == name).unwrap().1;
+        let (rise, highest) = (of(&found.temperatures_k) - 293.0, of(&found.peak_temperatures_k) - 293.0);
+        assert!((rise / (mean - 293.0) - 1.0).abs() < 5e-4, "{name}: {rise}");
+        // the hottest point of other beams is an end, where cells have no node
+        assert!(name != "hot" || (highest / (peak - 293.0) - 1.0).abs() < 2e-4, "{name}: {highest}");
+    }
+    assert!((found.currents_a[0].1 / CURRENT - 1.0).abs() < 1e-4, "{}", found.currents_a[0].1);
+    let tip = found.nodes.iter().find(|(name, _)| name == "c").unwrap().1;
+    assert!(tip.y < -0.1e-6, "{}", tip.y);
+}
+
+/// A run from cold ends at the steady rise and current, to 1e-4.
+#[test]
+fn a_run_ends_at_the_steady_state() {
+    let compiled = bar(&format!("{AIR} specificheat=700"), PORT);
+    let voltages = vec![("feed".to_owned(), 1.5)];
+    let steady = static_equilibrium(&compiled, &voltages).unwrap();
+    let options = TransientOptions {
+        stop: 1e-3,
+        signals: vec!["arm.T".into(), "feed.i".into()],
+        points: 101,
+        voltages,
+        ..TransientOptions::default()
+    };
+    let run = transient(&compiled, &options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{e}"));
+    let [temperature, current] = [0, 1].map(|k| &run.signals[k].2);
+    assert_eq!(temperature[0], 0.0);
+    assert!(temperature.windows(2).all(|w| w[1] >= w[0] * (1.0 - 1e-6)));
+    assert!((temperature[100] / steady.temperatures_k[0].1 - 1.0).abs() < 1e-4, "{}", temperature[100]);
+    // cold at first: V/R₀
+    assert!((current[0] / 1.5e-3 - 1.0).abs() < 1e-9, "{}", current[0]);
+    assert!((current[100] / steady.currents_a[0].1 - 1.0).abs() < 1e-4, "{}", current[100]);
+}
+
+/// Partials of the current and of the temperature with the voltage agree with differences to 1e-6 in a static trial and in a short step. In a
+/// long one, whose sub-steps follow the voltage, they do to 1e-5, the tolerance of those. The admittance at a low frequency is the static partial.
+#[test]
+fn partials_of_a_circuit() {
+    for (layer, more) in [
+        ("TCR=1.25e-3 specificheat=700".to_owned(), PORT),
+        (format!("{AIR} specificheat=700"), PORT),
+        (format!("{AIR} specificheat=700"), "R * [far out] [R=500]\nfeed port * [out cold] []"),
+        ("TCR=1.25e-3".to_owned(), PORT),
+    ] {
+        let compiled = bar(&layer, more);
+        let mut device = LocalDevice::new(Arc::clone(&compiled));
+        device.open(&OpenRequest { ports: Vec::new(), signals: vec!["arm.T".into()], noise: None }).unwrap();
+        let mut ask = |mode, parent, dt, volts: f64| {
+            let mut reply = TrialReply::default();
+            device.trial(&Trial { mode, parent, t: dt, dt, voltages: &[volts] }, &mut reply).unwrap();
+            assert_eq!(reply.status, Status::Ok);
+            reply
+        };
+        let rest = ask(Mode::Static, None, 0.0, 1.0);
+        for (mode, dt, within) in
+            [(Mode::Static, 0.0, 1e-6), (Mode::Transient, 1e-7, 1e-6), (Mode::Transient, 5e-5, 1e-5)]
+        {
+            let at = ask(mode, rest.token, dt, 1.2);
+            let (up, down) = (ask(mode, rest.token, dt, 1.2 + 1e-3), ask(mode, rest.token, dt, 1.2 - 1e-3));
+            let current = (up.currents[0] - down.currents[0]) / 2e-3;
+            assert!((at.di_dv[0] / current - 1.0).abs() < within, "{layer} {dt}: {} {current}", at.di_dv[0]);
+            let rise = (up.outputs[0] - down.outputs[0]) / 2e-3;
+            assert!((at.doutputs_dv[0] / rise - 1.0).abs() < within, "{layer} {dt}: {} {rise}", at.doutputs_dv[0]);
+            assert_eq!(ask(mode, rest.token, dt, 1.2), at);
+        }
+        let at = ask(Mode::Static, None, 0.0, 1.2);
+        let mut response = SmallSignal::default();
+        device.linearize(at.token.unwrap(), 1e-2, &mut response).unwrap();
+        let [re, im] = response.admittance[0];
+        assert!((re / at.di_dv[0] - 1.0).abs() < 1e-6 && im.abs() < 1e-3 * re, "{layer}: {re} {im}");
+    }
+}
+
+/// A negative TCR that takes the resistance away is one error with the beam and the fraction of 2 V that is
+/// 2·√(ρ·k/|TCR|) = 1.13137 V, to 1e-3.
+#[test]
+fn runaway_is_one_error() {
+    let compiled = bar("TCR=-2e-3", PORT);
+    let error = static_equilibrium(&compiled, &[("feed".into(), 2.0)]).unwrap_err().to_string();
+    assert!(error.contains("thermal runaway of `arm`") && error.contains("above 0.566"), "{error}");
+    assert!(static_equilibrium(&compiled, &[("feed".into(), 1.13)]).is_ok());
+}
+
+/// A gap between two heated beams in series, whose voltage depends on their temperatures, is refused with its name.
+#[test]
+fn gaps_on_hot_dividers_are_refused() {
+    let text = "process si = [ Youngsmodulus=160e9 density=2330 h=2u resistivity=2e-5 thermcond=32 thermalexpansion=2.7e-6 TCR=1e-3 ]
+anchor si [a] []
+left beam2det si [a c] [l=100u w=2u]
+right beam2det si [c b] [l=100u w=2u]
+anchor si [b] []
+plate plategap2d si [c e] [A=1e-9 gap=2u oz=-pi/2]
+anchor si [e] []
+eground * [a] []
+eground * [e] []
+feed port * [b a] []";
+    let error = compile(&Bundle::from_text("divider.net", text), &CompileOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("plate") && error.contains("TCR"), "{error}");
+}
