@@ -126,7 +126,7 @@ impl HotNetwork {
             let last = t + h >= line.dt * (1.0 - 1e-12);
             let length = if last { line.dt - t } else { h };
             let error = stepper.step(t, length, &now);
-            if !(error <= 1.0) {
+            if error > 1.0 || error.is_nan() {
                 h = length * if error.is_finite() { (0.8 / error.powf(0.25)).clamp(0.1, 0.8) } else { 0.1 };
                 if h < SHORTEST * line.dt {
                     found[0].failed = Some(t);
@@ -170,7 +170,7 @@ impl HotNetwork {
             self.take_stored(&stored, &mut forcing.heat);
             self.respond(&mut equations, &forcing, &mut x, &mut moved);
             let longest = x.iter().fold(0.0f64, |most, x| most.max(x.abs()));
-            if !(longest > 0.0) {
+            if longest <= 0.0 || longest.is_nan() {
                 return 0.0;
             }
             x.iter_mut().for_each(|x| *x /= longest);
