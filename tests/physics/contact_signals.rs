@@ -29,7 +29,7 @@ fn value(compiled: &CompiledModel, point: &OperatingPoint, q: &[Pose], name: &st
 #[test]
 fn a_closed_relay_conducts() {
     let compiled = model(RELAY, &CompileOptions::default());
-    let at = |volts: f64| operating_point(&compiled, &vec![("gate".to_owned(), volts)]).unwrap();
+    let at = |volts: f64| operating_point(&compiled, &[("gate".to_owned(), volts)]).unwrap();
     let open = at(5.0);
     assert_eq!([value(&compiled, &open, &open.q, "tip.N"), value(&compiled, &open, &open.q, "tip.G")], [0.0; 2]);
     let closed = at(20.0);
@@ -64,7 +64,7 @@ gate port * [c a] []
         (beams, 60.0, ["field.N", "field.N"]),
     ] {
         let compiled = model(text, &CompileOptions { segments: Some(3), ..CompileOptions::default() });
-        let point = operating_point(&compiled, &vec![("gate".to_owned(), volts)]).unwrap();
+        let point = operating_point(&compiled, &[("gate".to_owned(), volts)]).unwrap();
         let some = |k: usize| Pose::new((k as f64 + 0.7).sin(), (3.0 * k as f64 + 0.2).cos(), 1e4 * (k as f64).cos());
         let dq: Vec<Pose> = (0..point.q.len()).map(|k| some(k) * 1e-6).collect();
         let still = vec![Pose::zeros(); dq.len()];

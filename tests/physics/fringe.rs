@@ -150,7 +150,7 @@ fn analyses_agree_on_pull_in() {
     };
     for _ in 0..6 {
         let [h, w, gap] = [random(1.0, 30.0), random(1.0, 4.0), random(1.0, 5.0)];
-        let (length, angle, insulation) = (random(60.0, 200.0), random(0.0, 6.28), random(0.005, 0.1));
+        let (length, angle, insulation) = (random(60.0, 200.0), random(0.0, std::f64::consts::TAU), random(0.005, 0.1));
         for law in ["none", "parallel", "exact", "sugar"] {
             let text = format!(
                 "process film = [ Youngsmodulus=160e9 density=2300 h={h}u fringe={law} ]

@@ -92,9 +92,9 @@ fn runs_and_warnings_know_it() {
     assert_eq!((name.as_str(), unit.as_str(), values[0]), ("arm.stress", "Pa", 0.0));
     assert!(values.iter().any(|stress| *stress > 1e8), "{values:?}");
     let (_, result, _) =
-        bimorph::analysis::mesh::static_fitted(&compiled, &vec![]).unwrap_or_else(|error| panic!("{error}"));
+        bimorph::analysis::mesh::static_fitted(&compiled, &[]).unwrap_or_else(|error| panic!("{error}"));
     let stress = result.stresses_pa[0].1;
     assert!(stress > 1.2e9, "{stress:e}");
-    let (fitted, ..) = bimorph::analysis::mesh::static_fitted(&compiled, &vec![]).unwrap();
+    let (fitted, ..) = bimorph::analysis::mesh::static_fitted(&compiled, &[]).unwrap();
     assert!(fitted.warnings.items.iter().any(|warning| warning.code == "W051" && warning.message.contains("`arm`")));
 }

@@ -18,6 +18,9 @@ const SAME_TEMPERATURE: f64 = 1e-6;
 /// ngspice's iteration (V, 1).
 const SAME_VOLTAGE: [f64; 2] = [1e-6, 1e-6];
 
+/// Values of the sources and rises (K) at the start of a transient step.
+type StepStart<'a> = (&'a [f64], &'a [f64]);
+
 impl DeviceSession {
     /// Fills in the reply from `motion`, `rise`, `sources` and `sensitivity`, and stores the state. `from` holds the
     /// sources at the start of a transient step, and what was seen up to there; `dt_next` becomes what is seen now.
@@ -93,7 +96,7 @@ impl DeviceSession {
         &mut self,
         compiled: &CompiledModel,
         system: &System,
-        step: Option<((&[f64], &[f64]), f64)>,
+        step: Option<(StepStart<'_>, f64)>,
         reply: &mut TrialReply,
     ) {
         let electrics = &system.electrics;

@@ -146,9 +146,9 @@ fn slopes_are_derivatives() {
         let ([a, b], [c, d]) = ([1.3 + 1e-3, 1.3 - 1e-3].map(values), [1.3 + 5e-4, 1.3 - 5e-4].map(values));
         let best = |wide: f64, narrow: f64| (4.0 * narrow / 1e-3 - wide / 2e-3) / 3.0;
         let highest = slopes.iter().fold(0.0f64, |most, s| most.max(s.abs()));
-        for k in 0..slopes.len() {
+        for (k, slope) in slopes.iter().enumerate() {
             let difference = best(a.0[k] - b.0[k], c.0[k] - d.0[k]);
-            assert!((slopes[k] - difference).abs() < 1e-7 * highest, "{k}: {} {difference}", slopes[k]);
+            assert!((slope - difference).abs() < 1e-7 * highest, "{k}: {slope} {difference}");
         }
         let difference = best(a.1 - b.1, c.1 - d.1);
         assert!((current / difference - 1.0).abs() < 1e-7, "{current} {difference}");

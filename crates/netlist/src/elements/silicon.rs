@@ -127,7 +127,7 @@ mod tests {
         ];
         for (degrees, e, g) in wanted {
             for turn in [0.0, 90.0, 180.0, -90.0] {
-                let found = wafer.along((degrees + 45.0 + turn as f64).to_radians());
+                let found = wafer.along(f64::to_radians(degrees + 45.0 + turn));
                 close(found.youngs_modulus, e * 1e9, 1e-4);
                 close(found.shear_modulus, g * 1e9, 1e-4);
             }
