@@ -1,6 +1,6 @@
 //! Beams whose resistance depends on their temperature: potentials and temperatures in one network.
 //!
-//! Each beam is a row of quadratic elements ([`beam`]). At given source voltages the rises of all nodes, the currents in the beams and the
+//! Each beam is a row of quadratic elements (`beam`). At given source voltages the rises of all nodes, the currents in the beams and the
 //! potentials are the unknowns of one Newton iteration; beams are reduced to their ends, and the rest is a sparse system of the nodes.
 //! ```text
 //! heat into each node from its beams = 0      current out of each node = 0      V = I·R(T) along each beam
@@ -8,7 +8,7 @@
 //! A solution is accepted where the determinant has the sign that it has in the cold state, and no rise is below ambient: beyond a
 //! thermal runaway the equations have solutions that no part reaches.
 //!
-//! In time the rises follow the heat balance with capacities ([`course`]); potentials follow at once.
+//! In time the rises follow the heat balance with capacities (`course`); potentials follow at once.
 
 mod beam;
 mod course;
