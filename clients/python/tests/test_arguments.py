@@ -87,6 +87,7 @@ OPTIONS: dict[str, Accepts] = {
     "tol": either(nothing, number(1e-300, 0.999)),
     "band": either(nothing, number(0.0, 1e12, open_low=True)),
     "junctions": nothing,
+    "anchors": nothing,
     "linear": either(nothing, flag),
     "undamped": either(nothing, flag),
     "scheme": nothing,
