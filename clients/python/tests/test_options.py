@@ -20,6 +20,7 @@ def test_every_option_reaches_the_server(client: bimorph.Client) -> None:
         {"tol": 1e-4},
         {"band": 1e6},
         {"junctions": "offset"},
+        {"anchors": "elastic"},
         {"linear": True},
         {"undamped": True},
         {"scheme": "d1"},
@@ -45,6 +46,7 @@ def test_every_option_reaches_the_server(client: bimorph.Client) -> None:
         ("segments", 0, "from 1 to 100000"),
         ("segments", 100_001, "from 1 to 100000"),
         ("junctions", "welded", '"centreline", "offset" or "calibrated"'),
+        ("anchors", "glued", '"auto", "rigid" or "elastic"'),
     ],
 )
 def test_ranges(client: bimorph.Client, name: str, value: Any, expected: str) -> None:
