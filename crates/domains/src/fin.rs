@@ -16,6 +16,9 @@ const SMALL: f64 = 0.5;
 /// Half of μ from which on the middle does not notice the ends, to the last bit of doubles (1).
 const FAR: f64 = 300.0;
 
+/// Largest μ² that does not change the highest rise, to the last bits of doubles (1).
+const NO_LOSS: f64 = 1e-14;
+
 /// Coefficients of tanh(x)/x in powers of x².
 const TANH: [f64; 9] = [
     1.0,
@@ -89,7 +92,7 @@ impl Fin {
     /// Highest rise along it with these rises at its ends for the heat `watts` into it (K).
     pub(super) fn peak(&self, conductance: f64, watts: f64, [a, b]: [f64; 2]) -> f64 {
         let ends = a.max(b);
-        if self.y == 0.0 {
+        if self.y < NO_LOSS {
             let bend = watts / (2.0 * conductance);
             if bend <= 0.0 || (b - a).abs() >= bend {
                 return ends;
@@ -102,11 +105,15 @@ impl Fin {
         if half > FAR {
             return ends.max(far);
         }
-        let (alpha, beta) = ((far - 0.5 * (a + b)) / half.cosh(), 0.5 * (a - b) / half.sinh());
+        let mean = 0.5 * (a + b);
+        let deficit = far - mean;
+        let (alpha, beta) = (deficit / half.cosh(), 0.5 * (a - b) / half.sinh());
         if alpha <= 0.0 || beta.abs() >= alpha * half.tanh() {
             return ends;
         }
-        ends.max(far - ((alpha - beta) * (alpha + beta)).sqrt())
+        // far − √(α² − β²), without the difference of what a small loss makes large
+        let above = (deficit * half.tanh()).powi(2) + beta * beta;
+        ends.max(mean + above / (deficit + ((alpha - beta) * (alpha + beta)).sqrt()))
     }
 }
 
@@ -134,6 +141,23 @@ fn dipped(y: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The highest rise tends to that of a parabola as the loss goes to zero, with ends at equal and at different rises: the relative change is
+    /// 5·y/48 of the rise between equal ends.
+    #[test]
+    fn a_small_loss_changes_the_highest_rise_little() {
+        for ends in [[0.0, 0.0], [1.0, 1.4]] {
+            let parabola = Fin::new(3.0, 0.0).peak(3.0, 24.0, ends);
+            for y in [1e-4, 1e-8, 1e-12, 1e-13, 1e-15, 1e-30, 1e-300] {
+                let peak = Fin::new(3.0, 3.0 * y).peak(3.0, 24.0, ends);
+                assert!(
+                    peak <= parabola * (1.0 + 1e-14) && peak > parabola * (1.0 - y - 1e-14),
+                    "{y:e}: {peak} {parabola}"
+                );
+            }
+            assert!(parabola > ends[1]);
+        }
+    }
 
     /// The values of each function and of its slope agree with those of the closed forms, evaluated by central differences of 5e-4
     /// relative with Richardson's extrapolation, on both sides of the change of formula.
