@@ -63,7 +63,13 @@ impl PackedJoint {
     /// Axial rest offset (m).
     #[inline]
     fn offset(&self, section: &JointSection, rest: &RestStrain<'_>) -> f64 {
-        self.rest * rest.built_in + section.expansion.map_or(0.0, |(group, length)| length * rest.expansion[group])
+        self.offset_with(section, rest.built_in, |group| rest.expansion[group])
+    }
+
+    /// The same with the free strain of a group as a function.
+    #[inline]
+    fn offset_with(&self, section: &JointSection, built_in: f64, expansion: impl Fn(usize) -> f64) -> f64 {
+        self.rest * built_in + section.expansion.map_or(0.0, |(group, length)| length * expansion(group))
     }
 
     #[inline(always)]
@@ -84,30 +90,39 @@ pub struct RestStrain<'a> {
 /// Force along the axis of a joint (N), tension positive.
 #[inline]
 pub fn axial_force(model: &Model, joint: &PackedJoint, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
-    resultants(model, joint, q, rest).x
+    resultants(model, joint, q, rest.built_in, |group| rest.expansion[group]).x
 }
 
-/// Normal force, shear force and moment of a joint (N, N, N·m).
+/// Normal force, shear force and moment of a joint (N, N, N·m), with the fraction of the built-in offsets that acts and the free strain of each
+/// group of joints (1).
 #[inline]
-pub fn resultants(model: &Model, joint: &PackedJoint, q: &[Pose], rest: &RestStrain<'_>) -> Vector3<f64> {
+pub fn resultants(
+    model: &Model,
+    joint: &PackedJoint,
+    q: &[Pose],
+    built_in: f64,
+    expansion: impl Fn(usize) -> f64,
+) -> Vector3<f64> {
     let section = model.section(joint);
-    joint.stress(section, &HalfTurnCache::new().kinematics(model.linear, joint, section, q), rest)
+    let k = HalfTurnCache::new().kinematics(model.linear, joint, section, q);
+    let offset = joint.offset_with(section, built_in, expansion);
+    section.stiffness * Vector3::new(k.strain.x - offset, k.strain.y, k.strain.z)
 }
 
-/// Change of [`resultants`] with a change `dq` of the configuration and `rest` of the free strains.
+/// Change of [`resultants`] with a change `dq` of the configuration and `expansion` of the free strains.
 #[inline]
 pub fn resultants_change(
     model: &Model,
     joint: &PackedJoint,
     q: &[Pose],
     dq: &[Pose],
-    rest: &RestStrain<'_>,
+    expansion: impl Fn(usize) -> f64,
 ) -> Vector3<f64> {
     let section = model.section(joint);
     let k = HalfTurnCache::new().kinematics(model.linear, joint, section, q);
     let (da, db) = (pose(dq, joint.place.a), pose(dq, joint.place.b));
     let strain = k.rows() * nalgebra::Vector6::new(da.x, da.y, da.z, db.x, db.y, db.z);
-    section.stiffness * (strain - Vector3::new(joint.offset(section, rest), 0.0, 0.0))
+    section.stiffness * (strain - Vector3::new(joint.offset_with(section, 0.0, expansion), 0.0, 0.0))
 }
 
 /// Change of [`axial_force`] with a change `dq` of the configuration (N).

@@ -2,7 +2,7 @@
 
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::stressed::StressedBeam;
-use bimorph_multibody::forces::{self, RestStrain};
+use bimorph_multibody::forces;
 use bimorph_multibody::planar::Pose;
 use nalgebra::Vector3;
 
@@ -25,19 +25,18 @@ pub(crate) fn largest<'a>(
 ) -> Option<LargestStress<'a>> {
     let system = &compiled.parts.system;
     let beam = &compiled.parts.stressed[beam];
-    let expansion = expansions(compiled, rise);
-    let rest = RestStrain { expansion: &expansion, built_in: 1.0 };
     let at = |&(k, length): &(u32, f64)| {
-        let resultants = forces::resultants(&system.model, &system.model.joints[k as usize], q, &rest);
+        let resultants =
+            forces::resultants(&system.model, &system.model.joints[k as usize], q, 1.0, expansion(compiled, rise));
         LargestStress { beam, joint: (k, 0.5 * length), resultants }
     };
     beam.joints.iter().map(at).reduce(|most, next| if next.value() > most.value() { next } else { most })
 }
 
 /// Free strain of each heater at its rise (1).
-fn expansions(compiled: &CompiledModel, rise: &[f64]) -> Vec<f64> {
+fn expansion<'a>(compiled: &'a CompiledModel, rise: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
     let heaters = &compiled.parts.system.electrics.heating.heaters;
-    heaters.iter().zip(rise).map(|(heater, rise)| heater.expansion * rise).collect()
+    move |k| heaters[k].expansion * rise[k]
 }
 
 impl LargestStress<'_> {
@@ -53,9 +52,8 @@ impl LargestStress<'_> {
     /// Its change with a change of displacements and rises.
     pub(crate) fn slope(&self, compiled: &CompiledModel, q: &[Pose], dq: &[Pose], rise: &[f64]) -> f64 {
         let model = &compiled.parts.system.model;
-        let expansion = expansions(compiled, rise);
-        let rest = RestStrain { expansion: &expansion, built_in: 0.0 };
-        let change = forces::resultants_change(model, &model.joints[self.joint.0 as usize], q, dq, &rest);
+        let joint = &model.joints[self.joint.0 as usize];
+        let change = forces::resultants_change(model, joint, q, dq, expansion(compiled, rise));
         self.weighed(&change.component_mul(&self.resultants.map(f64::signum)))
     }
 }
