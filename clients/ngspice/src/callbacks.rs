@@ -129,7 +129,7 @@ pub(crate) unsafe extern "C" fn setup(
 fn offer_names() {
     let mut registry = registry();
     let mut names = registry.names.take().unwrap_or_default();
-    if let Some(table) = names.renew(&registry) {
+    if let Some(table) = names.renew(registry.instances()) {
         // SAFETY: the host is setting a circuit up and waits.
         unsafe { DEVICE.set_instance_parameters(&table) };
     }

@@ -5,7 +5,7 @@
 //! instance that does not have one says so.
 
 use crate::abi::{SpiceParameter, kind};
-use crate::registry::Registry;
+use crate::instance::Instance;
 use std::collections::HashSet;
 use std::ffi::{CString, c_int};
 
@@ -42,12 +42,14 @@ impl LookNames {
     ///
     /// The host keeps no copy, but it may hold an address during a lookup: a published table is never freed. There is a
     /// new one for another set of names alone.
-    pub(crate) fn renew(&mut self, registry: &Registry) -> Option<ParameterTable> {
+    pub(crate) fn renew<'a>(
+        &mut self,
+        instances: impl Iterator<Item = &'a Instance> + Clone,
+    ) -> Option<ParameterTable> {
         let mut seen = HashSet::new();
         let (mut own, mut spelled, mut shown) = (Vec::new(), Vec::new(), Vec::new());
-        let instances = || registry.instances();
-        let first = instances().flat_map(|i| i.shown()).map(|name| (name, true));
-        for (name, show) in first.chain(instances().flat_map(|i| i.quantities()).map(|name| (name, false))) {
+        let first = instances.clone().flat_map(|i| i.shown()).map(|name| (name, true));
+        for (name, show) in first.chain(instances.flat_map(|i| i.quantities()).map(|name| (name, false))) {
             let word = written(&name);
             if seen.insert(word.clone()) {
                 own.push(name);

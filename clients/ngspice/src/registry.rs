@@ -112,7 +112,7 @@ pub(crate) fn close(key: usize) {
 
 impl Registry {
     /// Every instance that is set up, in the order of the circuit.
-    pub(crate) fn instances(&self) -> impl Iterator<Item = &Instance> {
+    pub(crate) fn instances(&self) -> impl Iterator<Item = &Instance> + Clone {
         self.entries.iter().map(|entry| &entry.instance)
     }
 

@@ -7,11 +7,10 @@ use crate::abi::{
     Bound42, Complex, ConnectionInfo, ParameterInfo42, ParameterInfo43, ParameterInfoTail, ParameterValue,
     SpiceParameter, kind, port,
 };
-use crate::callbacks;
 use crate::deck_options::{DeckValue, Declared, declared};
 use crate::layout::{HostLayout, HostLayoutError, TABLE_WORDS};
 use crate::model_card::DEADLINE;
-use crate::query_table;
+use crate::query_table::ParameterTable;
 use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::sync::OnceLock;
@@ -208,6 +207,28 @@ fn connection<const N: usize>(
     }
 }
 
+/// The functions of the device, by the names that they have in the host's table.
+pub(crate) struct DeviceFunctions {
+    pub(crate) model_param: *const c_void,
+    pub(crate) load: *const c_void,
+    pub(crate) setup: *const c_void,
+    pub(crate) unsetup: *const c_void,
+    pub(crate) pole_zero_setup: *const c_void,
+    pub(crate) trunc: *const c_void,
+    pub(crate) small_signal_load: *const c_void,
+    pub(crate) accept: *const c_void,
+    pub(crate) model_delete: *const c_void,
+    pub(crate) delete: *const c_void,
+    pub(crate) ask: *const c_void,
+    pub(crate) model_ask: *const c_void,
+    pub(crate) convergence_test: *const c_void,
+    pub(crate) distortion: *const c_void,
+    pub(crate) noise: *const c_void,
+    pub(crate) bind: *const c_void,
+    pub(crate) bind_complex: *const c_void,
+    pub(crate) bind_real: *const c_void,
+}
+
 /// The device table, with room for any host's.
 pub(crate) struct DeviceTable(UnsafeCell<[usize; TABLE_WORDS]>);
 
@@ -240,7 +261,7 @@ impl DeviceTable {
     ///
     /// # Safety
     /// The host is loading the plug-in.
-    pub(crate) unsafe fn declare(&self) {
+    pub(crate) unsafe fn declare(&self, evaluate: unsafe extern "C" fn(*mut c_void)) {
         let declarations = declarations();
         // SAFETY: the public part of the table has this layout from 39 to 47.
         unsafe {
@@ -251,7 +272,7 @@ impl DeviceTable {
             self.put(40, &raw const ZERO); // instance parameters
             self.put(56, &raw const declarations.count);
             self.put(64, declarations.spice.as_ptr());
-            self.put(72, callbacks::evaluate as unsafe extern "C" fn(*mut c_void));
+            self.put(72, evaluate);
             self.put(80, declarations.connections.len() as c_int);
             self.put(88, declarations.connections.as_ptr());
             self.put(96, declarations.count);
@@ -262,7 +283,7 @@ impl DeviceTable {
     ///
     /// # Safety
     /// The host has called the plug-in and waits for it; it reads these two words during a lookup.
-    pub(crate) unsafe fn set_instance_parameters(&self, parameters: &query_table::ParameterTable) {
+    pub(crate) unsafe fn set_instance_parameters(&self, parameters: &ParameterTable) {
         // SAFETY: by contract; what they point to stays for good.
         unsafe {
             self.put(40, std::ptr::from_ref(parameters.count));
@@ -277,7 +298,11 @@ impl DeviceTable {
     ///
     /// # Safety
     /// The host has registered this table and is still loading the plug-in.
-    pub(crate) unsafe fn complete(&self, version: Option<u32>) -> Result<HostLayout, HostLayoutError> {
+    pub(crate) unsafe fn complete(
+        &self,
+        version: Option<u32>,
+        functions: &DeviceFunctions,
+    ) -> Result<HostLayout, HostLayoutError> {
         // SAFETY: by contract no other code uses the table now; the host wrote addresses of its own integers.
         let layout = unsafe { HostLayout::detect(&*self.0.get(), |at| *(at as *const c_int), version)? };
         let declarations = declarations();
@@ -289,26 +314,26 @@ impl DeviceTable {
             } else {
                 self.put(104, declarations.parameters42.as_ptr());
             }
-            self.put(at + 8, callbacks::model_param as *const c_void);
-            self.put(at + 16, callbacks::load as *const c_void);
-            self.put(at + 24, callbacks::setup as *const c_void);
-            self.put(at + 32, callbacks::unsetup as *const c_void);
-            self.put(at + 40, callbacks::pole_zero_setup as *const c_void);
-            self.put(at + 56, callbacks::trunc as *const c_void);
-            self.put(at + 72, callbacks::small_signal_load as *const c_void);
-            self.put(at + 80, callbacks::accept as *const c_void);
-            self.put(at + 96, callbacks::model_delete as *const c_void);
-            self.put(at + 104, callbacks::delete as *const c_void);
-            self.put(at + 120, callbacks::ask as *const c_void);
-            self.put(at + 128, callbacks::model_ask as *const c_void);
-            self.put(at + 144, callbacks::convergence_test as *const c_void);
-            self.put(at + 200, callbacks::distortion as *const c_void);
-            self.put(at + 208, callbacks::noise as *const c_void);
+            self.put(at + 8, functions.model_param);
+            self.put(at + 16, functions.load);
+            self.put(at + 24, functions.setup);
+            self.put(at + 32, functions.unsetup);
+            self.put(at + 40, functions.pole_zero_setup);
+            self.put(at + 56, functions.trunc);
+            self.put(at + 72, functions.small_signal_load);
+            self.put(at + 80, functions.accept);
+            self.put(at + 96, functions.model_delete);
+            self.put(at + 104, functions.delete);
+            self.put(at + 120, functions.ask);
+            self.put(at + 128, functions.model_ask);
+            self.put(at + 144, functions.convergence_test);
+            self.put(at + 200, functions.distortion);
+            self.put(at + 208, functions.noise);
             // After the table of a host without KLU, which never reads there.
             let bind = layout.sizes() + 16;
-            self.put(bind, callbacks::bind as *const c_void);
-            self.put(bind + 8, callbacks::bind_complex as *const c_void);
-            self.put(bind + 16, callbacks::bind_real as *const c_void);
+            self.put(bind, functions.bind);
+            self.put(bind + 8, functions.bind_complex);
+            self.put(bind + 16, functions.bind_real);
         }
         Ok(layout)
     }
