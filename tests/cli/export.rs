@@ -126,6 +126,33 @@ fn the_nonlinear_form() {
     assert_eq!(module.stdout.matches('(').count(), module.stdout.matches(')').count());
 }
 
+/// Four chevrons in a row, each with its own drive beams between anchors, coupled by stiff links: eight modes lie within 2 %
+/// of each other, and the search for a file continues until one is within the tolerance.
+#[test]
+fn modes_close_together_have_a_file() {
+    let text =
+        "process si = [Youngsmodulus=165e9 density=2300 h=10u thermalexpansion=2.7e-6 resistivity=2e-4 thermcond=60
+      specificheat=712 ambienttemperature=300 viscosity=1.8e-5 fluid=2u]
+    for i=1:4 [
+      anchor si [a(i)] [l=10u w=10u]
+      beam2det si [a(i) c(i)] [l=300u w=4u oz=deg(2)]
+      beam2det si [c(i) b(i)] [l=300u w=4u oz=-deg(2)]
+      anchor si [b(i)] [l=10u w=10u]
+      R * [drive a(i)] [R=1]
+      R * [b(i) gnd] [R=1]
+    ]
+    for i=1:3 [ beam2d si [c(i) c(i+1)] [l=12u w=20u oz=pi/2] ]
+    eground * [gnd] []
+    heat port * [drive] []
+    ";
+    let bench = Bench::new(&[("row.net", text)]);
+    for within in ["1e-3", "1e-4", "1e-6"] {
+        let words = format!("export row.net --spice --port heat=3 --signals c(2).y:1M --out row.lib --within {within}");
+        let error = number(&bench.json(&words)["error"]);
+        assert!(error <= within.parse::<f64>().unwrap(), "{error}");
+    }
+}
+
 /// Where no voltage couples motion and circuit, a warning says so, and the circuit's part remains: R = 2400 Ω of two
 /// beams of 60 squares of 20 Ω.
 #[test]
@@ -168,6 +195,7 @@ fn refusals() {
         ("export chevron.net --spice --nonlinear", "beam \"left\" heats"),
         ("export c.net --verilog-a --nonlinear --ports b.y", "can turn"),
         ("export plate.net --spice --nonlinear --ports frame.wz", "frame.wz"),
+        ("export plate.net --osdi --openvaf none", "--openvaf: none does not exist"),
     ] {
         let before = bench.files();
         let ran = bench.run(words);
@@ -180,6 +208,9 @@ fn refusals() {
         "export chevron.net",
         "export chevron.net --spice --verilog-a",
         "export chevron.net --spice --json",
+        "export chevron.net --spice --osdi",
+        "export chevron.net --verilog-a --osdi",
+        "export chevron.net --verilog-a --openvaf openvaf-r",
     ] {
         assert_eq!(bench.run(words).status, 2, "{words}");
     }

@@ -24,7 +24,7 @@ PATIENCE = 120.0
 """Longest time that a page may take [s]."""
 EXIT = re.compile(r"#.*\bexit status (\d+)\s*$")
 """The remark behind a command that is meant to fail."""
-ELSEWHERE = re.compile(r"^(make|cargo|scripts/|benches/|taskset|systemctl|pip|sbatch|kubectl|podman|docker|git|apt|sudo|cd bimorph)\b")
+ELSEWHERE = re.compile(r"^(make|cargo|scripts/|benches/|taskset|systemctl|pip|sbatch|kubectl|podman|docker|git|apt|sudo|cd bimorph)\b|^bimorph export .*--osdi\b")
 """Commands that install, build, measure, or belong to other machines: other tests run these, and what they name must be there."""
 PORTS = (50051, 9464)
 """Ports of pages and settings, in whose place a server of a test takes free ones."""

@@ -8,7 +8,12 @@ pub fn find_ngspice() -> Option<PathBuf> {
     if let Some(path) = std::env::var_os("NGSPICE") {
         return Some(path.into());
     }
-    let name = format!("ngspice{}", std::env::consts::EXE_SUFFIX);
+    in_path("ngspice")
+}
+
+/// The first program of this name in `PATH`.
+pub(super) fn in_path(program: &str) -> Option<PathBuf> {
+    let name = format!("{program}{}", std::env::consts::EXE_SUFFIX);
     std::env::split_paths(&std::env::var_os("PATH")?).map(|d| d.join(&name)).find(|p| p.is_file())
 }
 

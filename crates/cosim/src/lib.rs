@@ -14,6 +14,7 @@
 //! | [`refined_deck`] | the finer deck |
 //! | `oscillation` | frequency and amplitude of what oscillates in both |
 //! | [`compare`] | how far two results are apart |
+//! | [`osdi`] | the compiler of exported Verilog-A modules |
 //!
 //! **Architecture invariant.** Below are [`bimorph_results`] and [`bimorph_structure`]. Nothing here solves: ngspice does,
 //! through the plug-in.
@@ -26,6 +27,7 @@ mod find;
 mod includes;
 mod ngspice_output;
 mod oscillation;
+pub mod osdi;
 mod printed;
 pub mod refined_deck;
 mod run;

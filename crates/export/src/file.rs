@@ -1,7 +1,7 @@
 //! The file of an export as text, with a summary of the model in it: what the command writes and a server sends.
 
 use super::compare::{ModelFit, fit};
-use super::linear::SignalShown;
+use super::linear::{ReducedPort, SignalShown};
 use super::model_options::model_options;
 use super::names::{self, Pins};
 use super::{ExportError, ExportRequest, lumped, lumped_spice, lumped_verilog_a, spice, verilog_a};
@@ -90,6 +90,18 @@ impl FileRequest {
     /// # Errors
     /// See [`ExportError`].
     pub fn write(&self, compiled: &Arc<CompiledModel>, source: &str) -> Result<ExportedFile, ExportError> {
+        Ok(self.write_with_ports(compiled, source)?.0)
+    }
+
+    /// As [`FileRequest::write`], with the ports of the model in the order of the pins.
+    ///
+    /// # Errors
+    /// See [`ExportError`].
+    pub fn write_with_ports(
+        &self,
+        compiled: &Arc<CompiledModel>,
+        source: &str,
+    ) -> Result<(ExportedFile, Vec<ReducedPort>), ExportError> {
         let name = match &self.name {
             Some(name) => names::checked(name)?.to_owned(),
             None => names::from_file(source.rsplit_once('.').map_or(source, |(stem, _)| stem)),
@@ -97,7 +109,12 @@ impl FileRequest {
         if self.nonlinear { self.whole(compiled, source, name) } else { self.linear(compiled, source, name) }
     }
 
-    fn linear(&self, compiled: &Arc<CompiledModel>, source: &str, name: String) -> Result<ExportedFile, ExportError> {
+    fn linear(
+        &self,
+        compiled: &Arc<CompiledModel>,
+        source: &str,
+        name: String,
+    ) -> Result<(ExportedFile, Vec<ReducedPort>), ExportError> {
         let fitted = fit(compiled, &self.model)?;
         let model = &fitted.model;
         let pins = Pins::of(&model.ports, &model.signals)?;
@@ -119,11 +136,17 @@ impl FileRequest {
             band_hz: fitted.band,
             unknowns: fitted.unknowns,
         });
-        Ok(ExportedFile { text, name, pins: pins.all().map(str::to_owned).collect(), content, warnings })
+        let pins = pins.all().map(str::to_owned).collect();
+        Ok((ExportedFile { text, name, pins, content, warnings }, fitted.model.ports))
     }
 
     /// The nonlinear model.
-    fn whole(&self, compiled: &CompiledModel, source: &str, name: String) -> Result<ExportedFile, ExportError> {
+    fn whole(
+        &self,
+        compiled: &CompiledModel,
+        source: &str,
+        name: String,
+    ) -> Result<(ExportedFile, Vec<ReducedPort>), ExportError> {
         let model = lumped::lump(compiled, &self.model)?;
         let pins = Pins::of(&model.ports, &model.signals)?;
         let version = env!("CARGO_PKG_VERSION");
@@ -140,7 +163,8 @@ impl FileRequest {
             FileLanguage::VerilogA => lumped_verilog_a::write(&model, &pins, &name, &about),
         };
         let content = FileContent::Nonlinear { directions, gaps };
-        Ok(ExportedFile { text, name, pins: pins.all().map(str::to_owned).collect(), content, warnings: Vec::new() })
+        let pins = pins.all().map(str::to_owned).collect();
+        Ok((ExportedFile { text, name, pins, content, warnings: Vec::new() }, model.ports))
     }
 
     /// Limitations of the file that its numbers do not show.

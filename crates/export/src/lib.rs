@@ -8,6 +8,7 @@
 //! | [`compare`] | how far it is from the exact small-signal answer, and how many modes that takes |
 //! | [`spice`] | it as a subcircuit |
 //! | [`verilog_a`] | it as a Verilog-A module |
+//! | [`osdi_deck`] | a deck of ngspice around such a module, compiled as OSDI |
 //! | [`lumped`] | the whole nonlinear model of rigid parts that only slide |
 //! | `laws` | gap functions as text |
 //! | [`lumped_spice`], [`lumped_verilog_a`] | that model as a subcircuit and as a module |
@@ -30,6 +31,7 @@ pub mod lumped_verilog_a;
 mod mechanism;
 pub mod model_options;
 pub mod names;
+pub mod osdi_deck;
 mod parts;
 pub mod reduce;
 pub mod spice;
