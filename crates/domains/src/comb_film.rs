@@ -66,19 +66,7 @@ impl FromStructure for CombFilm {
 impl Domain for CombFilm {
     type Given = f64;
 
-    fn is_gap(&self) -> bool {
-        false
-    }
-
-    fn is_active(&self, _: f64) -> bool {
-        false
-    }
-
-    fn damps(&self) -> bool {
-        true
-    }
-
-    fn is_drag(&self) -> bool {
+    fn is_gas(&self) -> bool {
         true
     }
 
@@ -90,12 +78,6 @@ impl Domain for CombFilm {
     fn bodies(&self, see: impl FnMut(BodyId)) {
         self.approach.bodies().into_iter().for_each(see);
     }
-
-    fn add_force(&self, _: Configuration<'_>, _: f64, _: &mut [Pose]) {}
-
-    fn add_force_change(&self, _: Configuration<'_>, _: f64, _: f64, _: &mut [Pose]) {}
-
-    fn add_tangent(&self, _: Configuration<'_>, _: f64, _: &Pattern, _: &mut BlockMatrix<f64, 3>) {}
 
     fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
         let m = self.approach.measure(at.q, at.linear);
@@ -122,10 +104,6 @@ impl Domain for CombFilm {
         r: &mut [Pose],
         tangent: &mut BlockMatrix<f64, 3>,
     ) {
-        let law = |u0: f64, u1: f64| {
-            let (force, by_u, by_rate) = self.drag((0.5 * (u0 + u1), (u1 - u0) / chord.h));
-            (force, 0.5 * by_u + by_rate / chord.h)
-        };
-        quotient::add(&self.approach, chord, law, pattern, r, tangent);
+        quotient::add_drag(&self.approach, chord, |now| self.drag(now), pattern, r, tangent);
     }
 }

@@ -1,10 +1,10 @@
 //! A dashpot: a linear damper between a node and the ground.
 
 use super::approach::MaterialPoint;
-use super::domain::{Configuration, Domain};
+use super::domain::Domain;
 use super::from_structure::{FromStructure, StructureView};
-use bimorph_multibody::planar::{JointFrame, Pose};
-use bimorph_multibody::{BlockMatrix, BodyId, Damper, Pattern};
+use bimorph_multibody::planar::JointFrame;
+use bimorph_multibody::{BodyId, Damper};
 use bimorph_structure::{DomainElement, GapVoltage};
 use nalgebra::{Vector2, Vector3};
 
@@ -52,10 +52,4 @@ impl Domain for Dashpot {
     }
 
     fn bodies(&self, _: impl FnMut(BodyId)) {}
-
-    fn add_force(&self, _: Configuration<'_>, _: f64, _: &mut [Pose]) {}
-
-    fn add_force_change(&self, _: Configuration<'_>, _: f64, _: f64, _: &mut [Pose]) {}
-
-    fn add_tangent(&self, _: Configuration<'_>, _: f64, _: &Pattern, _: &mut BlockMatrix<f64, 3>) {}
 }

@@ -21,7 +21,7 @@ use super::squeeze_film::SqueezeFilm;
 use super::stop::StopKind;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector6};
 
 /// Where the bodies are.
 #[derive(Debug, Clone, Copy)]
@@ -39,6 +39,18 @@ pub struct Chord<'a> {
     pub at: [Configuration<'a>; 3],
     /// Length (s).
     pub h: f64,
+}
+
+/// Half of the change of the force on a state with displacements of two bodies, while the force on the bodies does not change with the state: the skew part
+/// of a derivative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SkewCoupling {
+    /// Body and direction of the state.
+    pub state: (usize, usize),
+    /// The two bodies.
+    pub bodies: [BodyId; 2],
+    /// Of their coordinates (N/m, N/m, N each).
+    pub half: Vector6<f64>,
 }
 
 /// A law of one approach, as other simulators can write it down.
@@ -68,11 +80,15 @@ pub trait Domain {
         }
     }
 
-    /// `r += ∂Π/∂q`, held directions not removed.
-    fn add_force(&self, at: Configuration<'_>, given: Self::Given, r: &mut [Pose]);
+    /// `r += ∂Π/∂q`, held directions not removed; nothing without a potential.
+    fn add_force(&self, at: Configuration<'_>, given: Self::Given, r: &mut [Pose]) {
+        let _ = (at, given, r);
+    }
 
     /// `r += (∂²Π/∂q∂u)·change`: how the forces at `given` change with it.
-    fn add_force_change(&self, at: Configuration<'_>, given: Self::Given, change: Self::Given, r: &mut [Pose]);
+    fn add_force_change(&self, at: Configuration<'_>, given: Self::Given, change: Self::Given, r: &mut [Pose]) {
+        let _ = (at, given, change, r);
+    }
 
     /// `tangent += ∂²Π/∂q²`, on a pattern that couples its bodies.
     fn add_tangent(
@@ -81,7 +97,9 @@ pub trait Domain {
         given: Self::Given,
         pattern: &Pattern,
         tangent: &mut BlockMatrix<f64, 3>,
-    );
+    ) {
+        let _ = (at, given, pattern, tangent);
+    }
 
     /// Both: [`Domain::add_force`] and [`Domain::add_tangent`].
     fn add_force_and_tangent(
@@ -97,13 +115,13 @@ pub trait Domain {
 
     /// True where it has two sides with a distance between them, and is called a gap.
     fn is_gap(&self) -> bool {
-        true
+        !self.is_gas()
     }
 
-    /// False where it adds no force, wherever the bodies are.
+    /// False where it adds no force of a potential, wherever the bodies are.
     fn is_active(&self, given: Self::Given) -> bool {
         let _ = given;
-        true
+        !self.is_gas()
     }
 
     /// Calls `lever` for each point with a force of fixed direction, and the force (N): terms that the tangent of a
@@ -218,11 +236,11 @@ pub trait Domain {
 
     /// True where forces that depend on rates take energy out of a motion: loss of contact, gas.
     fn damps(&self) -> bool {
-        self.loss().is_some_and(|loss| loss.is_dissipative())
+        self.is_gas() || self.loss().is_some_and(|loss| loss.is_dissipative())
     }
 
-    /// True where it does nothing else.
-    fn is_drag(&self) -> bool {
+    /// True of a film of gas, which acts on motions alone.
+    fn is_gas(&self) -> bool {
         false
     }
 
@@ -259,6 +277,11 @@ pub trait Domain {
     ) -> bool {
         let _ = (at, rate, pattern, stiffness, damping);
         false
+    }
+
+    /// Calls `see` with the skew part of those derivatives, of which the matrices have the symmetric one.
+    fn skew_couplings(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, see: impl FnMut(SkewCoupling)) {
+        let _ = (at, rate, see);
     }
 
     /// Adds its discrete force over a step, loss included, and the symmetric part of the tangent with the end of the step.

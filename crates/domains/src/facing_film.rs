@@ -73,19 +73,7 @@ impl FromStructure for FacingFilm {
 impl Domain for FacingFilm {
     type Given = f64;
 
-    fn is_gap(&self) -> bool {
-        false
-    }
-
-    fn is_active(&self, _: f64) -> bool {
-        false
-    }
-
-    fn damps(&self) -> bool {
-        true
-    }
-
-    fn is_drag(&self) -> bool {
+    fn is_gas(&self) -> bool {
         true
     }
 
@@ -116,12 +104,6 @@ impl Domain for FacingFilm {
     fn pairs(&self, see: impl FnMut(BodyId, BodyId)) {
         self.beams.pairs(see);
     }
-
-    fn add_force(&self, _: Configuration<'_>, _: f64, _: &mut [Pose]) {}
-
-    fn add_force_change(&self, _: Configuration<'_>, _: f64, _: f64, _: &mut [Pose]) {}
-
-    fn add_tangent(&self, _: Configuration<'_>, _: f64, _: &Pattern, _: &mut BlockMatrix<f64, 3>) {}
 
     fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
         self.beams.along(at, |local| self.beams.add(local, self.drag_at(local, rate).0.0, r));

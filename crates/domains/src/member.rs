@@ -2,7 +2,7 @@
 
 use super::approach::{Approach, MaterialPoint};
 use super::contact_loss::Loss;
-use super::domain::{Chord, Configuration, Domain, Law};
+use super::domain::{Chord, Configuration, Domain, Law, SkewCoupling};
 use super::from_structure::{FromStructure, PlacedMember, StructureView};
 use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
@@ -181,8 +181,8 @@ impl Domain for Member {
         each!(self, m => m.loss())
     }
 
-    fn is_drag(&self) -> bool {
-        each!(self, m => m.is_drag())
+    fn is_gas(&self) -> bool {
+        each!(self, m => m.is_gas())
     }
 
     fn film_pressure(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose) -> f64 {
@@ -225,6 +225,11 @@ impl Domain for Member {
         damping: &mut BlockMatrix<f64, 3>,
     ) -> bool {
         each!(self, m => m.add_loss_tangent(at, rate, pattern, stiffness, damping))
+    }
+
+    #[inline]
+    fn skew_couplings(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, see: impl FnMut(SkewCoupling)) {
+        each!(self, m => m.skew_couplings(at, rate, see));
     }
 
     fn add_quotient(

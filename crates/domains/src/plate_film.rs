@@ -6,7 +6,7 @@
 //! A relative rotation of the plates has a moment of its own, of gas that does not compress.
 
 use super::approach::{Approach, MaterialPoint};
-use super::domain::{Chord, Configuration, Domain};
+use super::domain::{Chord, Configuration, Domain, SkewCoupling};
 use super::film_series::{FilmTerm, root, series};
 use super::from_structure::{FromStructure, StructureView};
 use super::quotient;
@@ -174,20 +174,12 @@ impl FromStructure for PlateFilm {
 impl Domain for PlateFilm {
     type Given = f64;
 
-    fn is_gap(&self) -> bool {
-        false
+    fn is_gas(&self) -> bool {
+        true
     }
 
     fn is_active(&self, _: f64) -> bool {
         !self.states.is_empty()
-    }
-
-    fn damps(&self) -> bool {
-        true
-    }
-
-    fn is_drag(&self) -> bool {
-        true
     }
 
     fn film(&self) -> Option<(&Approach, f64, SqueezeFilm)> {
@@ -250,8 +242,6 @@ impl Domain for PlateFilm {
         self.approach.add_force(&m, first, r);
     }
 
-    fn add_force_change(&self, _: Configuration<'_>, _: f64, _: f64, _: &mut [Pose]) {}
-
     fn add_tangent(&self, at: Configuration<'_>, _: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
         if self.states.is_empty() {
             return;
@@ -284,8 +274,8 @@ impl Domain for PlateFilm {
         }
     }
 
-    /// The flow out of a state depends on the approach, and the force along the approach not on that flow: the derivative with displacements is the
-    /// symmetric part. That of the moment of tilt with the approach is left out.
+    /// The flow out of a state depends on the approach, and the force along the approach not on that flow: the matrix has the symmetric part of the
+    /// derivative with displacements, and [`Domain::skew_couplings`] the rest. That of the moment of tilt with the approach is left out.
     fn add_loss_tangent(
         &self,
         at: Configuration<'_>,
@@ -317,6 +307,17 @@ impl Domain for PlateFilm {
         true
     }
 
+    fn skew_couplings(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, mut see: impl FnMut(SkewCoupling)) {
+        if self.states.is_empty() {
+            return;
+        }
+        let m = self.approach.measure(at.q, at.linear);
+        self.flows(at.q, m.value, |k, i, [.., by_u]| {
+            let half = m.gradient * (0.5 * by_u * rate(k)[i]);
+            see(SkewCoupling { state: (k, i), bodies: self.approach.bodies(), half });
+        });
+    }
+
     /// Its work over a step is what it stores and what is never negative: discrete gradients of the stored energy, and the flow at the middle of
     /// the step.
     fn add_quotient(
@@ -333,11 +334,7 @@ impl Domain for PlateFilm {
         self.add_moment(per * self.rotation(|k| end.q[k] - start.q[k]), r);
         self.add_moment_tangent(per, pattern, tangent);
         if self.states.is_empty() {
-            let law = |u0: f64, u1: f64| {
-                let (force, by_u, by_rate) = self.drag((0.5 * (u0 + u1), (u1 - u0) / chord.h));
-                (force, 0.5 * by_u + by_rate / chord.h)
-            };
-            quotient::add(&self.approach, chord, law, pattern, r, tangent);
+            quotient::add_drag(&self.approach, chord, |now| self.drag(now), pattern, r, tangent);
             return;
         }
         let mut m = self.approach.measure(middle.q, middle.linear);

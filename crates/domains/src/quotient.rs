@@ -64,3 +64,20 @@ pub(super) fn add(
     m.bend = m.bend.map(|bend| 0.5 * bend);
     locate(pattern, approach.a.body, approach.b.body).add(tangent, &m.hessian(force, slope));
 }
+
+/// The same of a force along the approach that depends on it and its rate: at the middle of the step and the mean rate, so that its work over the step has the
+/// sign of that force. `drag` gives it with its derivatives with both.
+pub(super) fn add_drag(
+    approach: &Approach,
+    chord: &Chord<'_>,
+    drag: impl Fn((f64, f64)) -> (f64, f64, f64),
+    pattern: &Pattern,
+    r: &mut [Pose],
+    tangent: &mut BlockMatrix<f64, 3>,
+) {
+    let law = |u0: f64, u1: f64| {
+        let (force, by_u, by_rate) = drag((0.5 * (u0 + u1), (u1 - u0) / chord.h));
+        (force, 0.5 * by_u + by_rate / chord.h)
+    };
+    add(approach, chord, law, pattern, r, tangent);
+}

@@ -4,7 +4,7 @@
 
 use super::approach::MaterialPoint;
 use super::beam_line::BeamLine;
-use super::domain::{Chord, Configuration, Domain};
+use super::domain::{Chord, Configuration, Domain, SkewCoupling};
 use super::drive::{Drive, Electrics};
 use super::load::DeadLoad;
 use super::member::Member;
@@ -297,10 +297,23 @@ impl System {
         self.members.iter().fold(false, add)
     }
 
+    /// Calls `see` with the skew part of the derivatives of those forces with displacements.
+    #[inline]
+    pub fn skew_couplings(&self, q: &[Pose], rate: impl Fn(usize) -> Pose, mut see: impl FnMut(SkewCoupling)) {
+        let at = self.at(q);
+        self.members.iter().for_each(|member| member.skew_couplings(at, &rate, &mut see));
+    }
+
     /// True where gas acts in a gap.
     #[inline]
     pub fn has_gas(&self) -> bool {
-        self.members.iter().any(|member| member.is_drag() && member.damps())
+        self.members.iter().any(Domain::is_gas)
+    }
+
+    /// True where gas has states of its own.
+    #[inline]
+    pub fn compresses_gas(&self) -> bool {
+        self.members.iter().any(|member| member.is_gas() && member.is_active(0.0))
     }
 
     /// Largest mean pressure of the gas in a gap over the ambient one (1), `rate` the rate of each body.

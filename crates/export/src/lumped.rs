@@ -128,7 +128,7 @@ fn gaps(
 ) -> Result<Vec<LumpedGap>, ExportError> {
     let electrics = &system.electrics;
     // what acts without sides comes after all gaps; where it adds no force, its damping is among that of the parts
-    let acts = |(_, gap): &(usize, &Member)| gap.is_gap() || gap.is_active(1.0) && !gap.is_drag();
+    let acts = |(_, gap): &(usize, &Member)| gap.is_gap() || gap.is_active(1.0) && !gap.is_gas();
     let mut films: Vec<_> = system.members.iter().filter_map(Domain::film).collect();
     let gap = |(g, gap): (usize, &Member)| {
         let Some((approach, law)) = gap.law() else {
@@ -147,7 +147,7 @@ fn gaps(
         Ok(LumpedGap { name, along, law, loss, film, by_port, constant })
     };
     let found = system.members.iter().enumerate().filter(acts).map(gap).collect::<Result<_, _>>()?;
-    if system.members.iter().any(|member| member.is_drag() && member.damps() && member.film().is_none()) {
+    if system.members.iter().any(|member| member.is_gas() && member.film().is_none()) {
         let why = "gas acts that compresses (use filmstates=0), or that slides between fingers".to_owned();
         return Err(ExportError::NotLumped { why });
     }

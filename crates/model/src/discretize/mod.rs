@@ -250,7 +250,7 @@ fn lay_members<'a>(
 ) -> Vec<PlacedMember<'a, Member>> {
     let film_states = if options.undamped { Vec::new() } else { rigid.add_film_states(structure) };
     let mut laid = rigid.gaps(structure, options.as_sugar, stations, &film_states);
-    laid.retain(|laid| !(options.undamped && laid.member.is_drag()));
+    laid.retain(|laid| !(options.undamped && laid.member.is_gas()));
     laid
 }
 

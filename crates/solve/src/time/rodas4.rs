@@ -30,7 +30,7 @@ use super::method::{Method, SolverCounters, StepFailure};
 use crate::equations::Bodies;
 use crate::equations::linear::{LinearSolver, Recursion};
 use crate::time::gyration::{Gyration, held_out, skew};
-use crate::time::stage_loss::StageLoss;
+use crate::time::stage_loss::{StageLoss, StepMatrix};
 use bimorph_domains::{Drive, System};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, forces};
@@ -151,6 +151,9 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
                 }
                 forces::add_inertia(model, 1.0 / (gh * gh), 1.0 / gh, &mut self.w);
                 model.project_matrix(&mut self.w);
+                if let Some(loss) = &mut self.loss {
+                    loss.shear(model, &mut self.w);
+                }
                 self.solver.factor(&model.pattern, &mut self.w)?;
                 self.work.factorizations += 1;
                 self.work.forces += 6;
@@ -159,19 +162,18 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
                 loss.add_tangent(tangent);
             }
             let force = &mut self.stages.force;
-            self.solver.solve(&model.pattern, &self.w, force);
+            let loss = self.loss.as_deref();
+            let matrix = StepMatrix { solver: &self.solver, pattern: &model.pattern, w: &self.w, loss };
+            matrix.solve(force);
             let mut solves = 1;
             if let Some(turning) = turning {
-                turning.start.complete(model, gh, turning.terms, &mut self.scratch, force, |x| {
-                    self.solver.solve(&model.pattern, &self.w, x);
-                });
+                turning.start.complete(model, gh, turning.terms, &mut self.scratch, force, |x| matrix.solve(x));
                 solves += turning.terms as u64;
             }
             let q = self.stages.at(i, motion);
-            let matrix = (&self.solver, &self.w);
-            let beside = (turning.map(|turning| (&self.stages, turning)), self.loss.as_deref());
+            let turning = turning.map(|turning| (&self.stages, turning));
             solves +=
-                self.ports.stage(system, ramp, (i, at, h), (q, &self.drive), matrix, beside, &mut self.sensitivity);
+                self.ports.stage(system, ramp, (i, at, h), (q, &self.drive), &matrix, turning, &mut self.sensitivity);
             self.work.solves += solves;
         }
         self.stages.finish(model, h, motion, Some(error));
@@ -194,9 +196,10 @@ impl<'s, S: LinearSolver> Propagates<'s> for Rodas4<S> {
     }
 
     fn error(&mut self, bodies: &mut Bodies<'s>, (s, h): (f64, f64), ends: [&Motion; 2], _: &[Motion]) -> &Motion {
-        let Self { solver, w, drive, defect, .. } = self;
+        let Self { solver, w, drive, defect, loss, .. } = self;
         let Bodies { system, ramp, .. } = *bodies;
         let defect = defect.get_or_insert_with(|| Box::new(DefectEstimate::zeros(system.bodies())));
-        defect.advance(system, (ramp, drive), (&*solver, w), (s, h), ends)
+        let matrix = StepMatrix { solver: &*solver, pattern: &system.model.pattern, w, loss: loss.as_deref() };
+        defect.advance(system, (ramp, drive), &matrix, (s, h), ends)
     }
 }

@@ -122,6 +122,9 @@ impl JointPortSensitivities {
                 loss.add_change(model, |k| self.changes.of(k)[1], &mut self.wrench);
             }
             self.tangent.multiply_add(&model.pattern, &self.share, &mut self.wrench);
+            if let Some(loss) = loss {
+                loss.add_skew(&self.share, &mut self.wrench);
+            }
             ramp.sensitivity(s, source, &mut self.change);
             closures.add_drive_force(poses, drive, &self.change, &mut self.wrench);
             self.changes.gather(tree, &self.force, &self.wrench, &mut self.share);

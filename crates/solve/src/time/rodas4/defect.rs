@@ -4,9 +4,10 @@ use super::tableau::GAMMA;
 use crate::equations::linear::LinearSolver;
 use crate::method::Motion;
 use crate::time::defect::{Impulses, NODES, POWERS, cubic_start, quartic};
+use crate::time::stage_loss::StepMatrix;
 use bimorph_domains::{Drive, Ramp, System};
+use bimorph_multibody::forces;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, forces};
 
 /// An acceleration is that of a resolved motion where it would change the rate in a step by no more than this many times the rates at the
 /// ends.
@@ -51,7 +52,7 @@ impl DefectEstimate {
         &mut self,
         system: &System,
         (ramp, drive): (&Ramp<'_>, &mut Drive),
-        (solver, w): (&S, &BlockMatrix<f64, 3>),
+        matrix: &StepMatrix<'_, S>,
         (s, h): (f64, f64),
         [before, after]: [&Motion; 2],
     ) -> &Motion {
@@ -73,12 +74,12 @@ impl DefectEstimate {
             system.add_residual(&at.q, drive, rho);
             rho.iter().enumerate().for_each(|(k, rho)| impulses.add(k, node, h, *rho));
         }
-        self.propagate(system, (solver, w), gh);
+        self.propagate(system, matrix, gh);
         &self.error
     }
 
     /// [`crate::time::defect::propagate`] in one sweep over the bodies between two solves.
-    fn propagate<S: LinearSolver>(&mut self, system: &System, (solver, w): (&S, &BlockMatrix<f64, 3>), gh: f64) {
+    fn propagate<S: LinearSolver>(&mut self, system: &System, matrix: &StepMatrix<'_, S>, gh: f64) {
         let model = &system.model;
         let Self { error, impulses, at, rho, .. } = self;
         // between two sweeps the vector is z in the displacements and z/(γh) − drift in the rates
@@ -96,7 +97,7 @@ impl DefectEstimate {
             }
             forces::add_dampers(model, |k| drift[k], rho);
             model.project(rho);
-            solver.solve(&model.pattern, w, rho);
+            matrix.solve(rho);
             model.project(rho);
         }
         for ((z, drift), (e_q, e_v)) in rho.iter().zip(&*drift).zip(error.q.iter_mut().zip(&mut error.v)) {

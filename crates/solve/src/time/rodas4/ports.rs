@@ -5,7 +5,7 @@ use super::tableau::GAMMA;
 use crate::equations::linear::LinearSolver;
 use crate::method::Motion;
 use crate::time::gyration::{Gyration, held_out, skew};
-use crate::time::stage_loss::StageLoss;
+use crate::time::stage_loss::StepMatrix;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, Model, Pattern};
@@ -109,8 +109,8 @@ impl PortSensitivities {
         ramp: &Ramp<'_>,
         (i, s, h): (usize, f64, f64),
         (q, drive): (&[Pose], &Drive),
-        (solver, w): (&S, &BlockMatrix<f64, 3>),
-        (turning, loss): (Option<(&Stages, FrameRotation)>, Option<&StageLoss>),
+        matrix: &StepMatrix<'_, S>,
+        turning: Option<(&Stages, FrameRotation)>,
         start: &mut [Motion],
     ) -> u64 {
         let model = &system.model;
@@ -120,7 +120,7 @@ impl PortSensitivities {
             if let Some((_, turning)) = turning {
                 stages.add_gyration(model, (i, h), turning.now, turning.start);
             }
-            if let Some(loss) = loss {
+            if let Some(loss) = matrix.loss {
                 let mut force = std::mem::take(&mut stages.force);
                 loss.add_change(model, |k| stages.speed(i, h, k), &mut force);
                 loss.start.add_damping(model, |k| -stages.r1()[k], &mut force);
@@ -128,6 +128,9 @@ impl PortSensitivities {
             }
             let (at, force) = stages.place(i, start);
             self.tangent.multiply_add(&model.pattern, at, force);
+            if let Some(loss) = matrix.loss {
+                loss.add_skew(at, force);
+            }
             ramp.sensitivity(s, source, &mut self.change);
             if let Some((motion, turning)) = turning {
                 let change = system.frame(&self.change).map(Gyration::new).unwrap_or_default();
@@ -139,11 +142,9 @@ impl PortSensitivities {
                 }
             }
             system.add_drive_force(q, drive, &self.change, force);
-            solver.solve(&model.pattern, w, force);
+            matrix.solve(force);
             if let Some((_, turning)) = turning {
-                turning.start.complete(model, GAMMA * h, turning.terms, &mut self.scratch, force, |x| {
-                    solver.solve(&model.pattern, w, x);
-                });
+                turning.start.complete(model, GAMMA * h, turning.terms, &mut self.scratch, force, |x| matrix.solve(x));
                 solves += turning.terms;
             }
         }

@@ -79,11 +79,12 @@ fn block(pattern: &Pattern, row: usize, column: usize) -> Option<usize> {
 }
 
 impl LaneRodas4 {
-    /// Storage for a mechanism, with its numbers in every lane; none for a linear model, for one with inputs beside voltages,
-    /// and on a processor without vectors.
+    /// Storage for a mechanism, with its numbers in every lane; none for a linear model, for one with inputs beside voltages or
+    /// with gas that compresses, and on a processor without vectors.
     pub fn new(system: &System) -> Option<Self> {
         let electrics = &system.electrics;
-        let suits = has_lanes() && electrics.inputs.is_empty() && !electrics.heating.is_hot();
+        let suits =
+            has_lanes() && electrics.inputs.is_empty() && !electrics.heating.is_hot() && !system.compresses_gas();
         let model = LaneModel::new(&system.model).filter(|_| suits)?;
         let (n, pattern) = (system.bodies(), &system.model.pattern);
         let acted = system.acted_on();
