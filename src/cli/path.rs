@@ -5,6 +5,7 @@ use super::model::{Context, JsonMap, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::{progress, report, statics, value};
 use bimorph::analysis::continuation::{ContinuationResult, CriticalPoint};
+use bimorph::analysis::critical_names::{BIFURCATION, critical_points};
 use bimorph::analysis::largest_motion::path_with_signals;
 use bimorph::analysis::path_parameter::{PathModels, PathOptions, PathParameter, UnknownPathParameter};
 use bimorph::analysis::statics::NodeMotion;
@@ -192,14 +193,7 @@ impl PathCommand {
         compiled: &CompiledModel,
         result: &'r ContinuationResult,
     ) -> Vec<(&'r CriticalPoint, &'static str)> {
-        let electrics = &compiled.parts.system.electrics;
-        let attracts = compiled
-            .structure
-            .port(&self.along.name)
-            .is_some_and(|port| (0..electrics.gap_rows.nrows()).any(|gap| electrics.gap_rows[(gap, port)] != 0.0));
-        let rises = (self.along.to - self.along.from).signum();
-        let folds = result.folds.iter().map(|point| (point, limit_point(result, point, rises, attracts)));
-        folds.chain(result.bifurcations.iter().map(|point| (point, BIFURCATION))).collect()
+        critical_points(compiled, &self.along.name, (self.along.to - self.along.from).signum(), result)
     }
 
     fn picture(&self, compiled: &CompiledModel, result: &ContinuationResult, unit: &str) -> Picture {
@@ -288,25 +282,6 @@ impl PathCommand {
             report::footing(compiled, result.unknowns)
         );
         text
-    }
-}
-
-/// Name of a bifurcation.
-const BIFURCATION: &str = "bifurcation";
-
-/// Name of a limit point: what a part does that is driven past it. `rises` is the sign of the change from start to end, and `attracts` says
-/// that the parameter is a voltage across gaps.
-fn limit_point(result: &ContinuationResult, point: &CriticalPoint, rises: f64, attracts: bool) -> &'static str {
-    let k = point.point;
-    let (before, after) = (k.checked_sub(1), (k + 1 < result.values.len()).then_some(k + 1));
-    let stable = |k: Option<usize>| k.is_some_and(|k| result.negative[k] == 0);
-    let is_maximum = before.is_some_and(|k| rises * (point.value - result.values[k]) > 0.0);
-    match (is_maximum && stable(before), !is_maximum && stable(after), attracts) {
-        (true, _, true) => "pull-in",
-        (_, true, true) => "release",
-        (true, _, false) => "snap-through",
-        (_, true, false) => "snap-back",
-        _ => "limit point",
     }
 }
 

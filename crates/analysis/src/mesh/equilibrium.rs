@@ -7,6 +7,7 @@
 //! of the mechanism by a thirtieth of the largest displacement. The finer mesh starts from the state of the coarser
 //! one, so that both are on one branch.
 
+use super::super::beam_states::{BeamState, beam_states};
 pub(super) use super::super::chart::error::SMALL;
 use super::super::gap_shape;
 use super::super::linear_stress::left_out;
@@ -323,12 +324,45 @@ pub fn static_fitted(
     compiled: &CompiledModel,
     voltages: &PortVoltages,
 ) -> Result<(CompiledModel, StaticResult, BeamMotions), AnalysisError> {
+    let (fitted, point) = point_fitted(compiled, voltages)?;
+    let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
+    Ok((fitted, result, curves))
+}
+
+/// The same, with the state of every beam.
+///
+/// # Errors
+/// See [`super::static_fitted`].
+pub fn static_with_beams(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<StaticWithBeams, AnalysisError> {
+    let (fitted, point) = point_fitted(compiled, voltages)?;
+    let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
+    let beams = beam_states(&fitted, &point);
+    Ok(StaticWithBeams { fitted, result, curves, beams })
+}
+
+/// An equilibrium with the state of every beam.
+#[derive(Debug, Clone)]
+pub struct StaticWithBeams {
+    /// The model on the mesh for it.
+    pub fitted: CompiledModel,
+    /// The equilibrium.
+    pub result: StaticResult,
+    /// Displacement of points along every beam.
+    pub curves: BeamMotions,
+    /// State of every beam; none of beams with rigid directions.
+    pub beams: Vec<Option<BeamState>>,
+}
+
+/// The equilibrium on the mesh for it, with its warnings.
+fn point_fitted(
+    compiled: &CompiledModel,
+    voltages: &PortVoltages,
+) -> Result<(CompiledModel, OperatingPoint), AnalysisError> {
     let (order, point) = order(compiled, voltages, compiled.order.segments.clone())?;
     let mut fitted = on(compiled, order)?;
     let reported = static_warnings(&fitted, &point);
     fitted.warnings.items.extend(reported);
-    let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
-    Ok((fitted, result, curves))
+    Ok((fitted, point))
 }
 
 /// Warnings about an equilibrium of a circuit, each with its size: an error that grows (1), or 1. Beside what

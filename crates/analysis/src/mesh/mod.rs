@@ -46,7 +46,7 @@ use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::mesh_search::Mesh;
 use bimorph_multibody::planar::Pose;
-pub use equilibrium::static_fitted;
+pub use equilibrium::{StaticWithBeams, static_fitted, static_with_beams};
 use excited_modes::motion_warnings;
 use frequencies::for_modes;
 pub use frequencies::modes_fitted;

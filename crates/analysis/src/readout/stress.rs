@@ -40,6 +40,11 @@ fn expansion<'a>(compiled: &'a CompiledModel, rise: &'a [f64]) -> impl Fn(usize)
 }
 
 impl LargestStress<'_> {
+    /// Normal force, shear force and moment there (N, N, N·m).
+    pub(crate) fn resultants(&self) -> [f64; 3] {
+        [self.resultants.x, self.resultants.y, self.resultants.z]
+    }
+
     /// The stress (Pa).
     pub(crate) fn value(&self) -> f64 {
         self.weighed(&self.resultants.abs())
