@@ -153,6 +153,22 @@ impl DiagnosticSink {
     }
 }
 
+impl DiagnosticSink {
+    /// File and line, from 1, of each span.
+    pub(crate) fn lines(&self, bundle: &Bundle, spans: &[TextSpan]) -> Vec<(String, usize)> {
+        // line starts of each file, found once
+        let starts: Vec<Vec<usize>> = (self.files.iter())
+            .map(|name| bundle.files.get(name).map_or("", String::as_str))
+            .map(|text| text.match_indices('\n').map(|(at, _)| at + 1).collect())
+            .collect();
+        let one = |span: &TextSpan| match (self.files.get(usize::from(span.file)), starts.get(usize::from(span.file))) {
+            (Some(name), Some(starts)) => (name.clone(), starts.partition_point(|at| *at <= span.start as usize) + 1),
+            _ => (bundle.root.clone(), 0),
+        };
+        spans.iter().map(one).collect()
+    }
+}
+
 /// A place in a netlist that was made of a layout is one in the drawing, without a line.
 fn in_drawing(bundle: &Bundle, at: (String, usize, usize, usize)) -> (String, usize, usize, usize) {
     let (file, line, ..) = &at;

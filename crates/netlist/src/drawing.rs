@@ -124,6 +124,8 @@ pub(crate) struct StructureBuilder {
     pub(crate) port_names: FxHashSet<String>,
     /// Where each node was first named.
     pub(crate) first_named: Vec<TextSpan>,
+    /// Where each beam was drawn.
+    pub(crate) beam_spans: Vec<TextSpan>,
 }
 
 impl StructureBuilder {
@@ -132,6 +134,7 @@ impl StructureBuilder {
         let mut drawing = Self::default();
         drawing.structure.nodes.reserve(ROOM);
         drawing.structure.beams.reserve(ROOM);
+        drawing.beam_spans.reserve(ROOM);
         drawing.placements.reserve(2 * ROOM);
         drawing.placed.reserve(4 * ROOM);
         drawing.first_named.reserve(ROOM);
@@ -186,6 +189,7 @@ impl StructureBuilder {
             self.unmeasured.push(Unmeasured { span, beam: self.structure.beams.len() });
         }
         self.structure.beams.push(beam);
+        self.beam_spans.push(span);
     }
 
     /// How many facts have been noted.

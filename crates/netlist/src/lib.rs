@@ -41,7 +41,7 @@ mod value;
 
 pub use includes::{DroppedInclude, read_bundle, read_bundle_reporting};
 pub use parse_setting::parse_setting;
-pub use read::{NetlistSource, is_program, load};
+pub use read::{NetlistSource, beam_places, is_program, load};
 
 /// A built-in element as docs/reference/elements.md documents it.
 #[derive(Clone, Copy, Debug)]

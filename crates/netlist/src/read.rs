@@ -37,6 +37,12 @@ impl FrontEnd for NetlistSource {
     }
 }
 
+/// File and line, from 1, in which each beam of a SUGAR 2 netlist is drawn, in the order of the structure. Empty for other languages, and where the
+/// netlist has errors.
+pub fn beam_places(bundle: &Bundle, set: &[(String, Setting)]) -> Vec<(String, usize)> {
+    if is_program(bundle) { Vec::new() } else { Sugar2::new(bundle).beam_places(set) }
+}
+
 /// Reads a bundle by the language of its root: SUGAR 3 where its first line that decides is Lua, else SUGAR 2.
 fn read(bundle: &Bundle) -> Box<dyn FrontEnd> {
     #[cfg(feature = "lua")]

@@ -57,6 +57,18 @@ fn draws(statements: &[Statement]) -> bool {
     })
 }
 
+impl Sugar2 {
+    /// Where each beam is drawn, for parameters set from outside; empty where the netlist has errors.
+    pub(crate) fn beam_places(&self, set: &[(String, Setting)]) -> Vec<(String, usize)> {
+        let mut sink = self.sink.clone();
+        if sink.failed() {
+            return Vec::new();
+        }
+        let drawing = Elaborator::run(&self.program, set, &mut sink).drawing;
+        sink.lines(&self.bundle, &drawing.beam_spans)
+    }
+}
+
 impl FrontEnd for Sugar2 {
     fn load(&self, set: &[(String, Setting)]) -> Result<LoadedNetlist, Diagnostics> {
         let (bundle, program) = (&self.bundle, &self.program);
