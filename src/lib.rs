@@ -52,6 +52,9 @@ pub mod compile {
     }
 }
 
+#[cfg(feature = "server")]
+pub use bimorph_view as view;
+
 #[cfg(feature = "remote")]
 pub mod service {
     //! The protocol with its clients and, with the feature `server`, the server.

@@ -8,7 +8,7 @@ use bimorph::structure::Structure;
 use std::path::Path;
 
 /// Most polygons of a picture.
-const MAX_POLYGONS: usize = 20_000;
+pub(super) const MAX_POLYGONS: usize = 20_000;
 
 /// Draws polygons pale, the mechanism on them in colour, and what is in no part of it red.
 pub(super) fn draw(file: &Path, drawing: &FlatLayout, structure: &Structure, converted: &Converted) -> Picture {
@@ -24,7 +24,7 @@ pub(super) fn draw(file: &Path, drawing: &FlatLayout, structure: &Structure, con
 }
 
 /// Where the netlist's origin lies in the drawing [m].
-fn shift(converted: &Converted, structure: &Structure) -> [f64; 2] {
+pub(super) fn shift(converted: &Converted, structure: &Structure) -> [f64; 2] {
     let known = converted.landmark.as_ref().and_then(|(name, place)| {
         let at = structure.nodes[structure.node(name)?.0].position;
         Some([place[0] - at[0], place[1] - at[1]])

@@ -24,6 +24,7 @@ use bimorph::service::address::AddressError;
 use bimorph::service::client::ClientError;
 use bimorph::service::server::ServeError;
 use bimorph::service::settings::SettingError;
+use bimorph::view::ViewServerError;
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 use thiserror::Error;
@@ -85,6 +86,8 @@ pub(crate) enum Failure {
     Osdi(#[from] OsdiError),
     #[error(transparent)]
     Serve(#[from] ServeError),
+    #[error(transparent)]
+    Bench(#[from] ViewServerError),
     #[error(transparent)]
     Setting(#[from] SettingError),
     #[error(transparent)]

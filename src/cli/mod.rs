@@ -45,6 +45,7 @@ mod sweep_output;
 mod tran;
 mod tran_report;
 mod value;
+mod view;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -80,6 +81,7 @@ enum Command {
     Merge(merge::MergeCommand),
     Chart(chart::ChartCommand),
     Plot(plot::PlotCommand),
+    View(view::ViewCommand),
     Doctor(doctor::DoctorCommand),
 }
 
@@ -110,6 +112,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Merge(command) => command.run(),
         Command::Chart(command) => command.run(),
         Command::Plot(command) => command.run(),
+        Command::View(command) => command.run(),
         Command::Doctor(command) => command.run(),
     };
     match done {

@@ -91,6 +91,11 @@ impl ModelArgs {
         Ok(source.bundle)
     }
 
+    /// The file as named on the command line.
+    pub(crate) fn file(&self) -> &Path {
+        &self.file
+    }
+
     /// How a layout is to be read.
     pub(crate) fn asked(&self) -> LayoutChoice {
         self.layout.asked()

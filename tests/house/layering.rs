@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// Crates from the bottom up, each with the crates that it may depend on.
-const CRATES: [(&str, &[&str]); 16] = [
+const CRATES: [(&str, &[&str]); 17] = [
     ("base", &[]),
     ("structure", &["base"]),
     ("multibody", &["base"]),
@@ -21,6 +21,7 @@ const CRATES: [(&str, &[&str]); 16] = [
     ("export", &["base", "multibody", "domains", "solve", "results", "model", "analysis", "device"]),
     ("jobs", &["base", "structure", "netlist", "model", "analysis"]),
     ("cosim", &["structure", "results"]),
+    ("view", &["base", "structure", "netlist", "layout", "results", "model", "analysis", "device", "jobs", "cosim"]),
     ("wire", &["base", "solve", "layout", "model", "analysis", "device", "export", "jobs"]),
     ("server", &["base", "netlist", "layout", "model", "analysis", "device", "export", "jobs", "wire"]),
 ];
