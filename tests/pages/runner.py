@@ -191,7 +191,9 @@ class Page:
         if "JOB" in command and "job" in self.replies:
             command = command.replace("JOB", self.replies["job"])
         if re.match(r"bimorph serve\b", command) and "--help" not in command and not wanted:
-            command = self._in_background(command)
+            command = self._in_background(command, "listening on")
+        if re.match(r"bimorph view\b", command) and "--help" not in command and "--export" not in command and not wanted:
+            command = self._in_background(command, "http://127.0.0.1")
         code, output = self.shell.run(command)
         job = re.search(r"\bjobs/[0-9a-f]{32}\b", output)
         if job:
@@ -210,11 +212,11 @@ class Page:
             text = text.replace(port, free)
         return text
 
-    def _in_background(self, command: str) -> str:
-        """A server is started, and has to say where it listens."""
+    def _in_background(self, command: str, ready: str) -> str:
+        """A server is started, and has to say where it listens: `ready` is in its output then."""
         log = self.folder / f".server{self.shell.count}"
         command = re.sub(r"(\s#.*)?(\s&)?\s*$", "", command)
-        wait = f"for k in $(seq 200); do grep -q 'listening on' {log} && break; kill -0 $! 2>/dev/null || break; sleep 0.05; done; cat {log}; grep -q 'listening on' {log}"
+        wait = f"for k in $(seq 200); do grep -q '{ready}' {log} && break; kill -0 $! 2>/dev/null || break; sleep 0.05; done; cat {log}; grep -q '{ready}' {log}"
         return f"{command} >{log} 2>&1 & {wait}"
 
     def _named(self, line: int, command: str) -> None:
