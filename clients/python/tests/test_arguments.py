@@ -185,6 +185,7 @@ def models(model: bimorph.Model, session: bimorph.Session) -> dict[str, Case]:
     """Methods of a model."""
     ac = {"drive": "m.fx", "start": 1e3, "stop": 2e3, "points": 3}
     return {
+        "Model.view": Case(lambda **given: model.view(**given).close(), {}, {"voltages": VOLTAGES, "height": integer(200, 4000)}, model.view),
         "Model.static": Case(model.static, {}, {"voltages": VOLTAGES, "backbend": VOLTAGES}),
         "Model.modes": Case(model.modes, {"count": 1}, {"count": integer(1, 1000), "voltages": VOLTAGES}),
         "Model.ac": Case(

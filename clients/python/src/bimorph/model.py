@@ -26,6 +26,7 @@ from .ticket import Snapshot
 from .together import together
 from .v1 import analysis_pb2, device_pb2, model_pb2
 from .verified import Checked
+from .viewing import view_of
 from .waveforms import Waveform, checked, drive, with_error_estimate
 
 METHODS = ("rodas4", "avf", "midpoint", "tr-bdf2", "generalized-alpha", "newmark", "radau5", "rk45", "sdirk4")
@@ -97,6 +98,14 @@ class Model:
 
     def __repr__(self) -> str:
         return f"Model({self.id[:8]}…, ports={list(self.ports)}, {self.unknowns} unknowns)"
+
+    def view(self, voltages: Voltages | None = None, *, height: int = 720) -> Any:
+        """The live bench of the model as a widget of a notebook, ``height`` pixels high: the mechanism moves while its parameters are turned.
+
+        ``voltages`` are those of the ports to begin with [V]. It needs anywidget. The analyses run in a process ``bimorph view`` beside the kernel,
+        with the netlist and the options of this model; the ``close()`` of the widget ends it.
+        """
+        return view_of(self._source, arguments.volts("voltages", voltages), arguments.integer("height", height, 200, 4000))
 
     def static(self, voltages: Voltages | None = None, *, backbend: Voltages | None = None) -> StaticResult:
         """Static equilibrium at these port voltages [V], followed from rest.
