@@ -59,6 +59,10 @@ def test_other_origins_and_hosts(bench: Any) -> None:
     for headers in wrong:
         assert request(page, "POST", ask, ASK, {**TYPE, **headers})[0] == 403, headers
     assert request(page, "POST", ask, ASK, {**TYPE, "Origin": f"http://{own}", "Sec-Fetch-Site": "same-origin"})[0] == 200
+    link = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Dest": "document"}
+    assert request(page, "GET", urlparse(page.url).path, None, link)[0] == 200, "a link in a terminal of the browser leads here"
+    assert request(page, "POST", ask, ASK, {**TYPE, **link})[0] == 403
+    assert request(page, "GET", urlparse(page.url).path, None, {**link, "Sec-Fetch-Dest": "iframe"})[0] == 403
     with socket.create_connection((page.host, page.port)) as raw:
         raw.sendall(f"GET {urlparse(page.url).path} HTTP/1.1\r\nHost: {own}\r\nHost: evil.example\r\n\r\n".encode())
         assert b" 400 " in raw.recv(100)

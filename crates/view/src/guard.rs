@@ -22,6 +22,8 @@ pub(crate) struct Origins<'a> {
     pub(crate) host: Option<&'a str>,
     pub(crate) origin: Option<&'a str>,
     pub(crate) site: Option<&'a str>,
+    /// Opens a page in a tab of its own, as a link does.
+    pub(crate) navigates: bool,
 }
 
 impl PageGuard {
@@ -49,7 +51,8 @@ impl PageGuard {
         let hosts = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", self.port));
         let host = from.host.is_some_and(|host| hosts.iter().any(|own| own == host));
         let own = |origin: &str| origin.strip_prefix("http://").is_some_and(|o| hosts.iter().any(|own| own == o));
-        let site = from.site.is_none_or(|site| matches!(site, "same-origin" | "none"));
+        // a link on another page may lead here, but that page reads nothing and shows nothing of it
+        let site = from.navigates || from.site.is_none_or(|site| matches!(site, "same-origin" | "none"));
         host && from.origin.is_none_or(own) && site
     }
 }
@@ -62,7 +65,7 @@ mod tests {
     #[test]
     fn only_the_own_page() {
         let guard = PageGuard::new(8080).unwrap();
-        let from = |host, origin, site| guard.admits(&Origins { host, origin, site });
+        let from = |host, origin, site| guard.admits(&Origins { host, origin, site, navigates: false });
         assert!(from(Some("127.0.0.1:8080"), None, None));
         assert!(from(Some("localhost:8080"), Some("http://localhost:8080"), Some("same-origin")));
         assert!(!from(None, None, None));
@@ -71,6 +74,9 @@ mod tests {
         assert!(!from(Some("127.0.0.1:8080"), Some("http://example.org"), None));
         assert!(!from(Some("127.0.0.1:8080"), Some("null"), None));
         assert!(!from(Some("127.0.0.1:8080"), None, Some("cross-site")));
+        let link = |host, origin| guard.admits(&Origins { host, origin, site: Some("cross-site"), navigates: true });
+        assert!(link(Some("127.0.0.1:8080"), None));
+        assert!(!link(Some("example.org:8080"), None) && !link(Some("127.0.0.1:8080"), Some("http://example.org")));
         let path = guard.url().split_once(":8080").unwrap().1.to_owned() + "ask";
         assert_eq!(guard.place(&path), Some("ask"));
         let wrong = format!("/{}/ask", "0".repeat(32));

@@ -161,8 +161,9 @@ impl Service {
     async fn reply(self: &Arc<Self>, request: Request<Incoming>) -> Response<ReplyBody> {
         let headers = request.headers();
         let text = |name: &str| single(headers, name);
+        let navigates = request.method() == Method::GET && text("sec-fetch-dest") == Ok(Some("document"));
         let from = match (text("host"), text("origin"), text("sec-fetch-site")) {
-            (Ok(host), Ok(origin), Ok(site)) => Origins { host, origin, site },
+            (Ok(host), Ok(origin), Ok(site)) => Origins { host, origin, site, navigates },
             _ => return plain(StatusCode::BAD_REQUEST, "a header is given twice or is no text\n"),
         };
         if !self.guard.admits(&from) {
