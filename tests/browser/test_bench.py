@@ -217,7 +217,7 @@ def test_a_beam_leads_to_its_line(bench: Any) -> None:
     text = (ROOT / "examples/column/column.net").read_text().split("\n")[place[1] - 1].strip()
     assert "beam2d" in text
     shown = page.run("return page.beam.innerText")
-    assert text in shown and "normal force" in shown and "share of strain energy" in shown
+    assert text in shown and "normal force" in shown and "% of all" in shown
     page.run("page.beam.querySelector('button').click()")
     assert page.run("return page.editor.text.value.slice(page.editor.text.selectionStart, page.editor.text.selectionEnd).trim()") == text
     # a column bears its load along its axis

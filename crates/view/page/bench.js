@@ -354,8 +354,9 @@ class Page {
     const name = s.figure.names[k], state = s.beams[k], place = s.figure.places[k];
     const heat = s.temperatures_k.find(([other]) => other === name), peak = s.peaks_k.find(([other]) => other === name);
     const rows = [];
-    if (state) rows.push(["normal force", quantity(state[0], "N")], ["shear force", quantity(state[1], "N")], ["moment", quantity(state[2], "N·m")], ["largest stress", quantity(state[3], "Pa")], ["share of strain energy", `${(100 * state[4]).toFixed(2)} %`]);
-    if (heat) rows.push(["temperature", `${quantity(heat[1], "K")}${peak ? `, highest ${quantity(peak[1], "K")}` : ""}`]);
+    if (state) rows.push(["normal force", quantity(state[0], "N")], ["shear force", quantity(state[1], "N")], ["moment", quantity(state[2], "N·m")], ["largest stress", quantity(state[3], "Pa")], ["strain energy", `${(100 * state[4]).toFixed(2)} % of all`]);
+    if (heat) rows.push(["temperature", quantity(heat[1], "K")]);
+    if (peak) rows.push(["highest", quantity(peak[1], "K")]);
     const line = place ? el("button", { type: "button", class: "line", onclick: () => { this.showEditor(true); this.editor.go(s.figure.files[place[0]], place[1]); } }, `${s.figure.files[place[0]]}:${place[1]}`) : null;
     const text = place ? (this.description.files[s.figure.files[place[0]]] ?? "").split("\n")[place[1] - 1] ?? "" : "";
     return fill(this.beam, el("h2", {}, `Beam ${name}`), line, text ? el("pre", {}, text.trim()) : null, table(rows.length ? rows : [["rigid", "no strain"]]));
