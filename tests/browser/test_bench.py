@@ -136,6 +136,26 @@ def test_a_transient(bench: Any) -> None:
     assert "expected" in page.run("return page.tabs[3].waves[0].message.innerText")
 
 
+def test_a_drawn_waveform(bench: Any) -> None:
+    """Clicks into the drawing of a port make corners of a waveform, and a click on a corner takes it away; the run follows them."""
+    page = bench("examples/comb_resonator/comb_resonator.net").open()
+    page.tab("transient")
+    page.wait("return page.tabs[3].answer")
+    page.run("const t = page.tabs[3]; t.stop.value = '40u'; t.signals.value = 'shuttle.x'; t.stop.dispatchEvent(new Event('change')); t.waves[0].input.value = '10'; t.waves[0].read(true)")
+    click = (
+        "const wave = page.tabs[3].waves[0], box = wave.surface.canvas.getBoundingClientRect();"
+        "wave.surface.draw(); wave.surface.canvas.dispatchEvent(new MouseEvent('click', {clientX: box.left + arguments[0] * box.width, clientY: box.top + arguments[1] * box.height, bubbles: true}));"
+        "wave.surface.draw(); return [wave.input.value, wave.corners]"
+    )
+    text, corners = page.run(click, 0.5, 0.5)
+    assert text.startswith("PWL(0 10 ") and len(corners) == 2
+    text, corners = page.run(click, 0.75, 0.9)
+    assert len(corners) == 3 and corners[1][0] == pytest.approx(20e-6, rel=0.05) and corners[0][0] < corners[1][0] < corners[2][0]
+    page.wait("const a = page.tabs[3].answer; return a && a.signals[0][0] === 'shuttle.x' && Math.abs(a.t.at(-1) - 40e-6) < 1e-12 && Math.max(...a.signals[0][2].map(Math.abs)) > 0")
+    x, y = page.run("const w = page.tabs[3].waves[0], b = w.surface.canvas.getBoundingClientRect(); return [w.xAxis.at(w.corners[1][0]) / b.width, w.yAxis.at(w.corners[1][1]) / b.height]")
+    assert len(page.run(click, x, y)[1]) == 2
+
+
 def test_a_response(bench: Any) -> None:
     """The response tab has the values and resonances of `bimorph ac`, and marks the peak."""
     page = bench("examples/bank/bank.net").open()
