@@ -14,18 +14,12 @@
 //! come to bear one after another, as in J. A. Greenwood, J. B. P. Williamson, Proc. R. Soc. A 295 (1966) 300; P is chosen
 //! so that micromachined parts rest within a few nanometres of where they touch.
 
-/// Default distance at which surfaces touch (m); see [`touching_distance`].
-pub const TOUCH: f64 = 0.1e-6;
+pub use bimorph_structure::{TOUCH, touching_distance};
+
 /// Pressure P that the law is measured in (Pa).
 pub const PRESSURE: f64 = 1e12;
 /// Largest s for which the law holds (1).
 pub const DEEPEST: f64 = 0.5;
-
-/// Where surfaces touch that were drawn `gap` apart (m): [`TOUCH`], and in smaller gaps half of what was drawn.
-#[inline]
-pub fn touching_distance(gap: f64) -> f64 {
-    TOUCH.min(0.5 * gap)
-}
 
 /// Surfaces that face each other.
 #[derive(Debug, Clone, Copy, PartialEq)]

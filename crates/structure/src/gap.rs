@@ -12,6 +12,15 @@ pub enum GapVoltage {
     Nodes(NodeId, NodeId),
 }
 
+/// Default distance at which surfaces touch (m); see [`touching_distance`].
+pub const TOUCH: f64 = 0.1e-6;
+
+/// Where surfaces touch that were drawn `gap` apart (m): [`TOUCH`], and in smaller gaps half of what was drawn.
+#[inline]
+pub fn touching_distance(gap: f64) -> f64 {
+    TOUCH.min(0.5 * gap)
+}
+
 /// Least restitution of an impact (1).
 pub const MIN_RESTITUTION: f64 = 0.01;
 

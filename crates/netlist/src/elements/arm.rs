@@ -58,7 +58,7 @@ pub(super) fn beam3dlink(site: &mut ElementSite<'_, '_>) -> Result<(), Reported>
     if site.has_no_section()? {
         return tracer(site);
     }
-    let width = site.positive("w")?;
+    let width = site.etched("w")?;
     let length = site.positive("l")?;
     if site.leaves_plane() {
         let beam = site.instance.rotation.apply([length, 0.0, 0.0]);
@@ -71,7 +71,7 @@ pub(super) fn beam3dlink(site: &mut ElementSite<'_, '_>) -> Result<(), Reported>
 
 /// beam_link_grav: the same with its weight, which is left out.
 pub(super) fn beam_link_grav(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
-    let volume = site.positive("l")? * site.positive("w")? * site.positive("h")?;
+    let volume = site.positive("l")? * site.etched("w")? * site.positive("h")?;
     let weight = GRAVITY * volume * site.density()?;
     site.drawing.note_number(Fact::Weight, site.instance.span, weight);
     beam3dlink(site)

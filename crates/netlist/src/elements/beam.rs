@@ -3,6 +3,7 @@
 use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
 use super::arguments::ElementSite;
+use super::etched::EquivalentRectangle;
 use bimorph_structure::{Beam, Heater, Load, NodeId, Resistor, Yield};
 
 /// A layer's `thermcond` below this is no conductivity of a solid structural material (W/(m·K)). The MUMPs process
@@ -17,18 +18,16 @@ struct RectangularSection {
 }
 
 impl ElementSite<'_, '_> {
-    /// The section, turned as the element is: a quarter turn about its axis swaps width and thickness.
+    /// The section of a mean width, turned as the element is: a quarter turn about its axis swaps width and thickness.
     fn section(&mut self, width: f64) -> Result<RectangularSection, Reported> {
         let angle = self.direction(self.instance.rotation)?;
-        let height = self.positive("h")?;
-        match self.instance.rotation.side() {
-            Some(0) => Ok(RectangularSection { width: height, thickness: width, angle }),
-            Some(_) => Ok(RectangularSection { width, thickness: height, angle }),
-            None => {
-                let message = format!("the section of `{}` is tilted against the drawing plane", self.instance.name);
-                Err(self.error("E061", message, "turn it about its axis (`ox`) by quarter turns only"))
-            }
-        }
+        let (height, lean) = (self.positive("h")?, self.lean()?);
+        let Some(side) = self.instance.rotation.side() else {
+            let message = format!("the section of `{}` is tilted against the drawing plane", self.instance.name);
+            return Err(self.error("E061", message, "turn it about its axis (`ox`) by quarter turns only"));
+        };
+        let EquivalentRectangle { width, thickness } = EquivalentRectangle::of(width, height, lean, side == 0);
+        Ok(RectangularSection { width, thickness, angle })
     }
 
     /// A beam between two nodes; without a length it is measured from the node positions.
@@ -71,13 +70,18 @@ impl ElementSite<'_, '_> {
         Ok(())
     }
 
-    /// A rest curvature (1/m), positive towards local y, as the pair of end moments E·I·curvature that
+    /// A rest curvature (1/m), positive towards local y, or that of a `stressgradient`, as the pair of end moments E·I·curvature that
     /// is the same thing: the moment is constant along the beam and does not turn with it.
     fn bow(&mut self, beam: &Beam) -> Result<(), Reported> {
-        let Some(curvature) = self.number("curvature")?.filter(|c| *c != 0.0) else { return Ok(()) };
+        let gradient = self.number_or("stressgradient", 0.0)?;
+        let curvature = self.number("curvature")?.unwrap_or(-gradient / beam.material.youngs_modulus);
+        if curvature == 0.0 {
+            return Ok(());
+        }
         let Some(side) = self.instance.rotation.side().filter(|side| *side != 0) else {
-            let message = format!("`curvature` bends `{}` out of the drawing plane and is left out", beam.name);
-            let span = self.span_of("curvature");
+            let cause = if self.number("curvature")?.is_some() { "curvature" } else { "stressgradient" };
+            let message = format!("`{cause}` bends `{}` out of the drawing plane and is left out", beam.name);
+            let span = self.span_of(cause);
             self.sink.warning("W020", span, message, "models are planar (x, y, rotation about z)");
             return Ok(());
         };
@@ -123,7 +127,7 @@ pub(super) fn beam2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     if site.has_no_section()? {
         return super::arm::tracer(site);
     }
-    let width = site.positive("w")?;
+    let width = site.etched("w")?;
     site.add_beam(site.name(), [site.node(0), site.node(1)], width)
 }
 
@@ -135,7 +139,7 @@ pub(super) fn beam3d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
 /// beam2de, beam3de: a resistor along a beam.
 pub(super) fn beam2de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (a, b) = (site.node(0), site.node(1));
-    let width = site.positive("w")?;
+    let width = site.etched("w")?;
     let resistance = site.resistance("R", "G", width)?;
     site.add_beam(site.name(), [a, b], width)?;
     site.drawing.electrical(&[a, b]);
@@ -151,7 +155,7 @@ pub(super) fn beam3de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
 /// beam2de_b: a resistor of Rs·l/w along a beam.
 pub(super) fn beam2de_b(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (a, b) = (site.node(0), site.node(1));
-    let (length, width) = (site.positive("l")?, site.positive("w")?);
+    let (length, width) = (site.positive("l")?, site.etched("w")?);
     let resistance = site.positive("Rs")? * length / width;
     site.add_beam(site.name(), [a, b], width)?;
     site.drawing.electrical(&[a, b]);
@@ -162,7 +166,7 @@ pub(super) fn beam2de_b(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> 
 /// The electro-thermal beam.
 pub(super) fn beam2det(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let (a, b) = (site.node(0), site.node(1));
-    let (length, width, height) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
+    let (length, width, height) = (site.positive("l")?, site.etched("w")?, site.positive("h")?);
     let resistance = site.resistance("R", "G", width)?;
     let conductivity = site.positive("thermcond")?;
     if !site.is_given("thermcond") && conductivity < SMALL_CONDUCTIVITY {

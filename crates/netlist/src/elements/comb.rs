@@ -17,14 +17,14 @@ impl ElementSite<'_, '_> {
     fn comb(&mut self, finite: bool, parasitic: f64, voltage: GapVoltage) -> Result<(), Reported> {
         self.warn_of_coincident_ends();
         let angle = self.direction(self.instance.rotation)?;
-        let (gaps, gap, height) = (self.positive("N")?, self.positive("gap")?, self.positive("h")?);
+        let (gaps, gap, height) = (self.positive("N")?, self.etched_gap("gap")?, self.positive("h")?);
         let (overlap, finger) = (self.non_negative_or("l", 0.0)?, self.positive("L")?);
         if overlap > finger {
             let span = self.span_of("l");
             let message = "the overlap `l` of a comb is longer than its fingers `L`".to_owned();
             return Err(self.sink.error("E060", span, message, ""));
         }
-        let width = self.positive_if_any("w")?.unwrap_or(0.0);
+        let width = self.etched_if_any("w")?.unwrap_or(0.0);
         let permittivity = self.permittivity()?;
         let law = if finite { self.fringe()? } else { None };
         if width == 0.0 && law == Some(Fringe::Exact) && self.is_given("fringe") {
@@ -35,6 +35,8 @@ impl ElementSite<'_, '_> {
         let (a, b) = (self.node(0), self.node(1));
         let apart = 2.0 * finger - overlap;
         self.drawing.place(self.instance.span, &[a, b], &[[0.0; 2], [apart * axis[0], apart * axis[1]]]);
+        // tips recede on both sides, and so does the base behind them
+        let overlap = overlap + self.etching()?;
         self.drawing.structure.combs.push(Comb {
             name: self.name(),
             a,

@@ -73,6 +73,7 @@ pub(super) fn arc(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
         return Err(site.error("E060", message, "a width up to twice the radius; a plate is drawn with `plate2d`"));
     }
     site.flat()?;
+    let width = site.etched_from("w", width)?;
     let chords = CHORDS.max((alpha.abs() / TURN).ceil() as usize);
     let at = |k: usize| {
         let (s, c) = (alpha * k as f64 / chords as f64).sin_cos();
@@ -85,7 +86,7 @@ pub(super) fn arc(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
 /// A beam that is bent as drawn: its far end is displaced by (qx2, qy2) and its ends lean by qoz1 and qoz2.
 pub(super) fn predisplaced(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::OutOfPlane, site.instance.span);
-    let (length, width) = (site.positive("l")?, site.positive("w")?);
+    let (length, width) = (site.positive("l")?, site.etched("w")?);
     for across in ["qz2", "qoy1", "qoy2"] {
         if site.number_or(across, 0.0)? != 0.0 {
             let message = format!("`{across}` bends `{}` out of the drawing plane", site.instance.name);
@@ -121,7 +122,7 @@ const MAX_PIECES: usize = 400;
 /// A beam whose width goes from `w1` to `w2` along it, as pieces over which the width changes by one factor, each of the width whose compliance in
 /// bending is that of the piece: `1/w³ = ∫ dx/w(x)³ / l`.
 pub(super) fn taper(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
-    let (length, w1, w2) = (site.positive("l")?, site.positive("w1")?, site.positive("w2")?);
+    let (length, w1, w2) = (site.positive("l")?, site.etched("w1")?, site.etched("w2")?);
     let direction = site.direction(site.instance.rotation)?;
     let name = site.name();
     let steep = (w2 / w1).ln();

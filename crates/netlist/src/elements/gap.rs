@@ -18,10 +18,10 @@ const REDUCED: f64 = 1.0 - 1e-3;
 impl ElementSite<'_, '_> {
     /// Widths of the upper and the lower beam (m): `w1` and `w2`, or `w` for both.
     fn widths(&mut self) -> Result<[f64; 2], Reported> {
-        let both = self.positive_if_any("w")?;
+        let both = self.etched_if_any("w")?;
         let mut widths = [0.0; 2];
         for (width, name) in widths.iter_mut().zip(["w1", "w2"]) {
-            *width = match (self.positive_if_any(name)?, both) {
+            *width = match (self.etched_if_any(name)?, both) {
                 (Some(w), _) | (None, Some(w)) => w,
                 (None, None) => return Err(self.missing(name)),
             };
@@ -113,11 +113,14 @@ impl ElementSite<'_, '_> {
     /// Holes in one of two plates with these sides (m): `hole` and `pitch`, through the thickness `h`.
     fn holes(&mut self, sides: [f64; 2]) -> Result<Option<Perforation>, Reported> {
         let (radius, pitch) = match (self.positive_if_any("hole")?, self.positive_if_any("pitch")?) {
-            (Some(radius), Some(pitch)) => (radius, pitch),
+            (Some(radius), Some(pitch)) => (radius - 0.5 * self.etching()?, pitch),
             (None, None) => return Ok(None),
             (hole, _) => return Err(self.missing(if hole.is_none() { "hole" } else { "pitch" })),
         };
         let depth = self.positive("h")?;
+        if radius <= 0.0 {
+            return Err(self.out_of_range("hole", radius, "positive as etched"));
+        }
         if pitch <= 2.0 * radius || pitch > sides[0].min(sides[1]) {
             let wanted = "above twice `hole` and at most the shorter side of the plates";
             return Err(self.out_of_range("pitch", pitch, wanted));
@@ -143,7 +146,7 @@ impl ElementSite<'_, '_> {
         let angle = self.direction(self.instance.rotation)?;
         let side = self.side()?;
         let [w1, w2] = self.widths()?;
-        let (length, gap, height) = (self.positive("l")?, self.positive("gap")?, self.positive("h")?);
+        let (length, gap, height) = (self.positive("l")?, self.etched_gap("gap")?, self.positive("h")?);
         let permittivity = self.permittivity()?;
         let mut law = self.fringe()?;
         if law.is_none() && permittivity < REDUCED * VACUUM {
@@ -152,7 +155,11 @@ impl ElementSite<'_, '_> {
             law = Some(Fringe::Sugar);
         }
         let electrode = self.word("electrode", &ElectrodeShape::NAMES)?;
+        if electrode == Some(ElectrodeShape::Plane) {
+            self.drawn_from_above()?;
+        }
         let (insulation, touch) = self.insulation(gap)?;
+        let touch = self.inclined_touch(touch, gap)?;
         let impact = self.impact()?;
         let gas = self.gas(Some([length, height]), length * height, gap)?;
         let below = -(gap + (w1 + w2) / 2.0);
@@ -180,8 +187,21 @@ impl ElementSite<'_, '_> {
         Ok(())
     }
 
-    /// Area of a plate and its sides (m², m): `A`, `l·w`, or `A` with one or both sides. Without sides of its own the shape is unknown, and they are 0.
-    fn faces(&mut self) -> Result<(f64, [f64; 2]), Reported> {
+    /// Area of a plate and its sides as etched (m², m). All edges of a plate over a plane recede; of one that faces another with its side, the ends of `l`.
+    fn faces(&mut self, over_plane: bool) -> Result<(f64, [f64; 2]), Reported> {
+        let (area, [l, w]) = self.drawn_faces()?;
+        if self.etching()? == 0.0 {
+            return Ok((area, [l, w]));
+        }
+        if l == 0.0 {
+            return if over_plane { Ok((self.etched_body(area, 0.0)?[0], [0.0; 2])) } else { Ok((area, [0.0; 2])) };
+        }
+        let left = [self.etched_from("l", l)?, if over_plane { self.etched_from("w", w)? } else { w }];
+        Ok((area * (left[0] / l) * (left[1] / w), left))
+    }
+
+    /// The same as drawn: `A`, `l·w`, or `A` with one or both sides. Without sides of its own the shape is unknown, and they are 0.
+    fn drawn_faces(&mut self) -> Result<(f64, [f64; 2]), Reported> {
         let area = self.positive_if_any("A")?;
         let mut sides = [None; 2];
         for (side, name) in sides.iter_mut().zip(["l", "w"]) {
@@ -287,11 +307,13 @@ pub(super) fn gap3de(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
 /// plategap2d: two lumped plates; b lies at `gap` along local x from a.
 pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let angle = site.direction(site.instance.rotation)?;
-    let (area, sides) = site.faces()?;
-    let gap = site.positive("gap")?;
+    let electrode = site.word("electrode", &ElectrodeShape::NAMES)?;
+    let over_plane = electrode == Some(ElectrodeShape::Plane) || site.number("hole")?.is_some();
+    let (area, sides) = site.faces(over_plane)?;
+    let apart = site.positive("gap")?;
+    let gap = if over_plane { apart } else { site.etched_gap("gap")? };
     let permittivity = site.permittivity()?;
     let law = site.fringe()?;
-    let electrode = site.word("electrode", &ElectrodeShape::NAMES)?;
     let shaped = sides[0] > 0.0;
     if !shaped && site.is_given("fringe") && law != Some(Fringe::None) {
         let message = format!("the fringe field of `{}` depends on the sides of the plate", site.instance.name);
@@ -300,12 +322,13 @@ pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported>
     let exact = shaped && matches!(law, None | Some(Fringe::Exact));
     let thickness = if exact { site.positive("h")? } else { 0.0 };
     let (insulation, touch) = site.insulation(gap)?;
+    let touch = if over_plane { touch } else { site.inclined_touch(touch, gap)? };
     let impact = site.impact()?;
     let gas = site.gas(shaped.then_some(sides), area, gap)?;
     let axis = [angle.cos(), angle.sin()];
     let (a, b) = (site.node(0), site.node(1));
     let voltage = site.across(0, 1);
-    site.drawing.place(site.instance.span, &[a, b], &[[0.0; 2], [gap * axis[0], gap * axis[1]]]);
+    site.drawing.place(site.instance.span, &[a, b], &[[0.0; 2], [apart * axis[0], apart * axis[1]]]);
     let name = site.name();
     let plate = PlateGap {
         name,

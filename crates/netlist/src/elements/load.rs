@@ -50,7 +50,7 @@ fn add(site: &mut ElementSite<'_, '_>, moment: f64, moment_given: bool) -> Resul
 /// beam whose end is displaced by q = (qx, qy, qoz in degrees). As in SUGAR, the moments do not balance the couple of
 /// the forces.
 pub(super) fn prestressed(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
-    let (l, w, h) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
+    let (l, w, h) = (site.positive("l")?, site.etched("w")?, site.positive("h")?);
     let modulus = site.material()?.youngs_modulus;
     let angle = site.direction(site.instance.rotation)?;
     let side = site.side()?;
@@ -63,7 +63,8 @@ pub(super) fn prestressed(site: &mut ElementSite<'_, '_>) -> Result<(), Reported
     }
     let (qx, qy) = (site.number_or("qx", 0.0)?, site.number_or("qy", 0.0)?);
     let qoz = site.number_or("qoz", 0.0)?.to_radians();
-    let bending = modulus * h * w.powi(3) / 12.0;
+    let lean = site.lean()?;
+    let bending = modulus * h * w * (w * w + lean * lean) / 12.0;
     let along = modulus * w * h / l * qx;
     let across = bending * (12.0 * qy / l.powi(3) - 6.0 * qoz / (l * l));
     let moment = bending * (4.0 * qoz / l - 6.0 * qy / (l * l));

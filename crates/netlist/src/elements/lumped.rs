@@ -6,7 +6,7 @@ use bimorph_structure::{Mass, SpringDamper};
 
 /// A rigid plate centred at its node, with a Couette film under it.
 pub(super) fn plate2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
-    let (l, w, h) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
+    let (l, w, h) = (site.etched("l")?, site.etched("w")?, site.positive("h")?);
     let mass = site.density()? * l * w * h;
     let [viscosity, fluid] = site.film()?;
     let angle = site.direction(site.instance.rotation)?;
@@ -40,6 +40,7 @@ pub(super) fn body2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
         let wanted = format!("at least A²/(2·pi) = {least:.4e}, that of a disk of this area");
         return Err(site.out_of_range("Ip", polar, &wanted));
     }
+    let [area, polar] = site.etched_body(area, polar)?;
     site.drawing.place(site.instance.span, &[node], &[[0.0; 2]]);
     site.drawing.structure.masses.push(Mass {
         name: site.name(),

@@ -6,6 +6,7 @@ mod beam;
 mod circuit;
 mod comb;
 mod curve;
+mod etched;
 mod gap;
 mod load;
 mod lumped;

@@ -10,7 +10,7 @@ use bimorph_structure::{Mass, SpringDamper};
 
 /// A bar between two pins.
 pub(super) fn bar(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
-    let (length, width, height) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
+    let (length, width, height) = (site.positive("l")?, site.etched("w")?, site.positive("h")?);
     let angle = site.direction(site.instance.rotation)?;
     let material = site.material()?;
     let [a, b] = [site.node(0), site.node(1)];

@@ -15,6 +15,7 @@ impl ElementSite<'_, '_> {
         self.side()?;
         let width = (12.0 * second / area).sqrt();
         let mut beam = self.beam(self.name(), [self.node(0), self.node(1)], width, Some(length))?;
+        beam.width = width;
         beam.thickness = area / width;
         self.drawing.add_beam(self.instance.span, beam, true);
         Ok(())
@@ -23,7 +24,8 @@ impl ElementSite<'_, '_> {
 
 /// trapezoidalbeam: the width goes from `wbottom` to `wtop` through the thickness.
 pub(super) fn trapezoidal(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
-    let (bottom, top, height) = (site.positive("wbottom")?, site.positive("wtop")?, site.positive("h")?);
+    let (bottom, top) = (site.etched_upright("wbottom")?, site.etched_upright("wtop")?);
+    let height = site.positive("h")?;
     site.drawing.note(Fact::Trapezoid, site.instance.span);
     // ∫ w(z)³/12 dz of a width that is linear in z
     let second = height / 48.0 * (bottom + top) * (bottom * bottom + top * top);
@@ -32,6 +34,7 @@ pub(super) fn trapezoidal(site: &mut ElementSite<'_, '_>) -> Result<(), Reported
 
 /// softjointlr, hinge3: a beam whose second moment is a hundredth.
 pub(super) fn soft_joint(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
-    let (width, height) = (site.positive("w")?, site.positive("h")?);
-    site.add_equivalent(width * height, SOFT * height * width.powi(3) / 12.0)
+    let (width, height, lean) = (site.etched("w")?, site.positive("h")?, site.lean()?);
+    let second = if lean == 0.0 { width.powi(3) } else { width * (width * width + lean * lean) };
+    site.add_equivalent(width * height, SOFT * height * second / 12.0)
 }

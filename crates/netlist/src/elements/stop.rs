@@ -10,7 +10,7 @@ const AREA: f64 = 1e-10;
 /// stop2d: a may move by `gap` along local x, and by `back` against it, relative to b or to where it was drawn.
 pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let angle = site.direction(site.instance.rotation)?;
-    let ways = [site.positive_if_any("gap")?, site.positive_if_any("back")?];
+    let ways = [site.etched_travel("gap")?, site.etched_travel("back")?];
     if ways == [None; 2] {
         let message = "`stop2d` needs a way: `gap` or `back`, or both";
         return Err(site.error("E053", message.into(), "give `gap=` along local x, `back=` against it [m]"));

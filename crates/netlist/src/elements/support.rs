@@ -71,7 +71,7 @@ pub(super) fn slider2(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
         [site.number_or("sliderox", 0.0)?, site.number_or("slideroy", 0.0)?, site.number_or("slideroz", 0.0)?];
     let slope = Rotation::IDENTITY.turned(ox, oy, oz);
     let angle = site.direction(slope)?;
-    let width = site.positive("w")?;
+    let width = site.etched("w")?;
     site.positive("l")?;
     site.add_beam(site.name(), [site.node(0), site.node(1)], width)?;
     site.hold(site.node(1), [false, true, false], angle, None);

@@ -71,6 +71,9 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
     "softening",
     "strength",
     "undercut",
+    "overetch",
+    "sidewall",
+    "stressgradient",
     "h",
     "layer",
 ];
@@ -327,7 +330,7 @@ const MODELS: &[ElementModel] = &[
     own("arc2d", &[2], "[a b]", ARC, curve::arc),
     own("taper2d", &[2], "[a b]", &["l", "w1", "w2", "h", "T"], curve::taper),
     own("plate2d", &[1], "[c]", SIZE, lumped::plate2d),
-    own("body2d", &[1], "[c]", &["A", "Ip", "l", "w", "h"], lumped::body2d),
+    own("body2d", &[1], "[c]", &["A", "Ip", "l", "w", "h", "perimeter"], lumped::body2d),
     own("mass2d", &[1], "[n]", &["m", "J", "b", "brz"], lumped::mass2d),
     own("link2d", &[2], "[a b]", &["l"], lumped::link2d),
     own("spring2d", &[2], "[a b]", &["kx", "ky", "krz", "l"], lumped::spring2d),

@@ -5,6 +5,7 @@ mod elements;
 mod examples;
 mod include;
 mod language;
+mod process;
 mod properties;
 #[cfg(feature = "lua")]
 mod sugar3;
