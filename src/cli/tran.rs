@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::model::{JsonMap, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::SolverChoice;
-use super::tran_report::{TransientDocument, picture, table, text};
+use super::tran_report::{ShockDocument, TransientDocument, picture, table, text};
 use super::{draw_motion, progress, value};
 use bimorph::analysis::ProgressCallback;
 use bimorph::analysis::chart::released;
@@ -16,6 +16,7 @@ use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
 use bimorph::compile::{CompiledModel, Formulation};
+use bimorph::domains::Shock;
 use bimorph::multibody::joint_coordinates::sprung_loops::UnsupportedModel;
 use bimorph::netlist::NetlistSource;
 use bimorph::options::OptionValue;
@@ -32,6 +33,7 @@ use std::path::PathBuf;
 /// [m], GAP.C [F], GAP.F, GAP.N [N], STOP.G [S], PORT.q [C], PORT.i [A]. JSON: "t": times [s]. "signals" and
 /// "units" by name. "events": crossings of --event. "step_error": estimated error of the steps. "reliable_until" and "after_contact": time [s] up to
 /// which single values hold --tol where parts bounce, and mean values after it.
+/// "largest_stress": of the run, where a layer has a `strength` or a --shock acts.
 #[derive(Debug, Args)]
 #[command(after_help = "Methods, with their orders; steps follow --tol, or are equal with --step:\n  \
     rodas4 (4)             the default: one factorization a step; fast motions die out\n  \
@@ -78,6 +80,10 @@ pub(crate) struct TransientCommand {
     /// Hold a port at a voltage [V] from t = 0; others are at 0 V. Repeatable
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
+
+    /// Half-sine acceleration of the frame from t = 0: its peak [m/s², or 500g], its duration [s] and its direction [degrees from x, default: 0]
+    #[arg(long, value_name = "PEAK,SECONDS[,DEGREES]", value_parser = value::shock, allow_negative_numbers = true)]
+    shock: Option<Shock>,
 
     /// Integration method [default: rodas4; in joint coordinates whose loops do not close by springs rk45]
     #[arg(long, value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(Integrator::NAMES))]
@@ -140,6 +146,7 @@ impl TransientCommand {
             tol: compiled.options.errors().requested(),
             voltages: self.ports.clone(),
             release: start,
+            shock: self.shock,
             method,
             step: self.step,
             events: self.events.clone(),
@@ -181,6 +188,8 @@ impl TransientCommand {
             stopped_at: result.stopped_at,
             reliable_until: result.reliable_until,
             after_contact: &result.after_contact,
+            shock: self.shock.map(|shock| ShockDocument { peak_m_s2: shock.peak, duration_s: shock.duration }),
+            largest_stress: result.largest_stress.as_ref(),
             solver: self.solver,
             release: self.release.as_deref(),
             port_voltages_v: JsonMap(&self.ports),
@@ -205,6 +214,7 @@ impl TransientCommand {
         }
         if self.solver == SolverChoice::Frame {
             let given = [
+                ("--shock", self.shock.is_some()),
                 ("--method", self.method.is_some()),
                 ("--step", self.step.is_some()),
                 ("--rho", self.rho.is_some()),
@@ -212,7 +222,7 @@ impl TransientCommand {
                 ("--until", self.until.is_some()),
             ];
             if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
-                let got = "--solver frame, which moves by Newmark's rule with steps of its own".to_owned();
+                let got = "--solver frame, which moves from rest by Newmark's rule with steps of its own".to_owned();
                 return Err(Failure::bad(option, "--solver recursion", got));
             }
         }
@@ -237,6 +247,7 @@ impl TransientCommand {
             points: self.points,
             voltages: self.ports.clone(),
             release,
+            shock: self.shock,
             method,
             step: self.step,
             until: self.until.clone(),

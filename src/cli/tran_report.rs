@@ -5,7 +5,7 @@ use super::model::{Context, JsonMap};
 use super::report;
 use super::solver::SolverChoice;
 use bimorph::analysis::joint_transient::JointReport;
-use bimorph::analysis::transient::{Counters, CrossingEvent, Statistics, TransientResult};
+use bimorph::analysis::transient::{Counters, CrossingEvent, Statistics, StressMaximum, TransientResult};
 use bimorph::compile::CompiledModel;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::chart::{self, Panel, PanelChart, Series};
@@ -13,6 +13,13 @@ use bimorph::results::plot::svg::Picture;
 use bimorph::results::table::Table;
 use bimorph::solve::time::event::Direction;
 use serde::Serialize;
+
+/// A half-sine shock: its peak along x and y, and its duration.
+#[derive(Debug, Serialize)]
+pub(super) struct ShockDocument {
+    pub(super) peak_m_s2: [f64; 2],
+    pub(super) duration_s: f64,
+}
 
 #[derive(Debug, Serialize)]
 pub(super) struct TransientDocument<'a> {
@@ -30,6 +37,10 @@ pub(super) struct TransientDocument<'a> {
     pub(super) stopped_at: Option<f64>,
     pub(super) reliable_until: Option<f64>,
     pub(super) after_contact: &'a [Statistics],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) shock: Option<ShockDocument>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) largest_stress: Option<&'a StressMaximum>,
     pub(super) solver: SolverChoice,
     pub(super) release: Option<&'a str>,
     pub(super) port_voltages_v: JsonMap<'a, f64>,
@@ -115,6 +126,13 @@ pub(super) fn text(
         let [mean, error, rms] = [s.mean, s.mean_error, s.rms].map(|x| quantity(x, unit(&s.signal)));
         let [from, to] = [s.from, s.to].map(|t| quantity(t, "s"));
         events.push_str(&format!("{} from {from} to {to}: mean {mean} ± {error}, rms about it {rms}\n", s.signal));
+    }
+    if let Some(StressMaximum { beam, stress_pa, t, strength_pa }) = &result.largest_stress {
+        let margin = strength_pa.map_or_else(String::new, |strength| {
+            format!(", {:.2} % of its strength {}", 100.0 * stress_pa / strength, quantity(strength, "Pa"))
+        });
+        let (stress, t) = (quantity(*stress_pa, "Pa"), quantity(*t, "s"));
+        events.push_str(&format!("largest stress: {beam} {stress} at {t}{margin}\n"));
     }
     let work = match joints {
         None => format!("{} factorizations, {} solves", c.factorizations, c.solves),

@@ -1,6 +1,7 @@
 //! Values on the command line: numbers with netlist suffixes, `NAME=VALUE`, lists of names.
 
 use bimorph::analysis::transient::Until;
+use bimorph::domains::Shock;
 use bimorph::jobs::sweep;
 use bimorph::netlist::{Setting, parse_setting};
 
@@ -35,6 +36,39 @@ pub(crate) fn until(text: &str) -> Result<Until, String> {
             Err(_) => Err(format!("expected contact, release or SIGNAL=VALUE, got \"{text}\"")),
         },
     }
+}
+
+/// Standard gravity (m/s²).
+const GRAVITY: f64 = 9.806_65;
+
+/// A half-sine shock: `PEAK,DURATION` or `PEAK,DURATION,DEGREES`, the peak in m/s² or, with a `g` behind it, in standard gravity.
+pub(crate) fn shock(text: &str) -> Result<Shock, String> {
+    let expected = || format!("expected PEAK,DURATION or PEAK,DURATION,DEGREES, such as 500g,0.5m,90, got \"{text}\"");
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let (peak, duration, degrees) = match parts[..] {
+        [peak, duration] => (peak, duration, "0"),
+        [peak, duration, degrees] => (peak, duration, degrees),
+        _ => return Err(expected()),
+    };
+    let peak = match peak.strip_suffix('g') {
+        Some(count) => number(count).map(|count| GRAVITY * count),
+        None => number(peak),
+    };
+    let (Ok(peak), Ok(duration), Ok(degrees)) = (peak, number(duration), number(degrees)) else {
+        return Err(expected());
+    };
+    if duration <= 0.0 {
+        return Err(format!("expected a positive duration [s], got \"{text}\""));
+    }
+    // a quarter turn has no part along the other axis
+    let quarter = degrees / 90.0;
+    let axis = if quarter.fract() == 0.0 {
+        [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]][quarter.rem_euclid(4.0) as usize]
+    } else {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        [cos, sin]
+    };
+    Ok(Shock { peak: axis.map(|part| peak * part), duration })
 }
 
 fn pair(text: &str) -> Result<(String, String), String> {

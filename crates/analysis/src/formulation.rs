@@ -79,9 +79,10 @@ pub fn of_run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> (Chos
     let plain = method == Integrator::Rodas4
         && options.step.is_none()
         && options.solver == SolverKind::Recursion
-        && options.release.is_none();
+        && options.release.is_none()
+        && options.shock.is_none();
     if !plain {
-        let why = "a release, a method, equal steps or a solver was given".into();
+        let why = "a release, a shock, a method, equal steps or a solver was given".into();
         return (ChosenFormulation { formulation: Formulation::Compliant, why }, method);
     }
     let chosen = suited(compiled, Some(options.stop));

@@ -46,6 +46,12 @@ pub fn joint_transient(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: ProgressCallback<'_>,
 ) -> Result<(TransientResult, JointReport), AnalysisError> {
+    if options.shock.is_some() {
+        return Err(AnalysisError::BadRequest {
+            what: "shock".into(),
+            detail: "a shock acts in the bodies' own coordinates; take formulation compliant".into(),
+        });
+    }
     if options.method == Integrator::Rodas4 {
         return on_tree(compiled, formulation, options, sample, watch);
     }

@@ -6,7 +6,9 @@ pub(super) mod error_log;
 mod film_pressure;
 pub(super) mod first_step;
 mod folded_segments;
+mod in_frame;
 pub(super) mod options;
+mod peak_stress;
 pub(super) mod record;
 pub(super) mod result;
 mod samples;
@@ -26,7 +28,7 @@ use bimorph_solve::time::rodas4::Rodas4;
 pub use first_step::first_step;
 pub use options::{TransientOptions, Until};
 use record::{Propagator, record};
-pub use result::{Counters, CrossingEvent, Statistics, TransientResult};
+pub use result::{Counters, CrossingEvent, Statistics, StressMaximum, TransientResult};
 
 /// The bodies' own coordinates, joints as springs.
 struct Compliant<'a> {
@@ -77,6 +79,8 @@ pub fn transient(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: ProgressCallback<'_>,
 ) -> Result<TransientResult, AnalysisError> {
+    let framed = in_frame::in_frame(compiled, options);
+    let compiled = framed.as_ref().unwrap_or(compiled);
     let system = &compiled.parts.system;
     let (suited, method) = formulation::of_run(compiled, options);
     match suited.formulation {

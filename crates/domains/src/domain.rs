@@ -21,6 +21,7 @@ use super::squeeze_film::SqueezeFilm;
 use super::stop::StopKind;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_structure::Adhesion;
 use nalgebra::{Vector2, Vector6};
 
 /// Where the bodies are.
@@ -58,8 +59,10 @@ pub struct SkewCoupling {
 pub enum Law {
     /// A field, and what bears where its conductors touch.
     Field(Capacitor, Option<Contact>),
-    /// A stop with the ways to its two sides (m).
-    Stop([Option<f64>; 2], StopKind),
+    /// A stop with the ways to its two sides (m), and its adhesion.
+    Stop([Option<f64>; 2], StopKind, Option<Adhesion>),
+    /// Quadratic and cubic stiffness of a spring that the approach shortens (N/m², N/m³).
+    Spring([f64; 2]),
 }
 
 /// One thing that acts on bodies. Forces are those of the residual: minus the wrench on each body.
@@ -239,6 +242,11 @@ pub trait Domain {
         self.is_gas() || self.loss().is_some_and(|loss| loss.is_dissipative())
     }
 
+    /// True where friction acts across its approach.
+    fn slides(&self) -> bool {
+        false
+    }
+
     /// True of a film of gas, which acts on motions alone.
     fn is_gas(&self) -> bool {
         false
@@ -300,5 +308,10 @@ pub trait Domain {
     /// The approach and the law, where it is a function of one approach.
     fn law(&self) -> Option<(&Approach, Law)> {
         None
+    }
+
+    /// Approaches and laws, where it is a sum of functions of one approach each; empty: it is none.
+    fn laws(&self) -> Vec<(Approach, Law)> {
+        self.law().map(|(approach, law)| (*approach, law)).into_iter().collect()
     }
 }

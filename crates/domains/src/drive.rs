@@ -3,6 +3,8 @@
 
 mod electrics;
 mod ramp;
+mod shock;
 
 pub use electrics::{Drive, Electrics};
 pub use ramp::Ramp;
+pub use shock::Shock;

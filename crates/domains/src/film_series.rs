@@ -113,6 +113,7 @@ mod tests {
             closed: None,
             states: 0,
             holes: None,
+            slit: None,
         };
         let (g, omega) = (5e-6, 2.0 * PI * 1e5);
         for (count, within) in [(4, 3e-3), (41, 1.1e-6)] {

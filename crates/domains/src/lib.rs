@@ -10,6 +10,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`approach`] | the scalar a gap measures between two material points, and its derivatives |
+//! | [`attraction`], [`friction`] | adhesion and friction of stops |
 //! | [`backbending`] | the strength of a hot arm, beyond which it is shortened for good |
 //! | [`beam_line`] | the centreline of a beam: how it bends in a motion, and how far its segments are turned |
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
@@ -23,6 +24,7 @@
 //! | [`dashpot`] | a damper to the ground |
 //! | [`from_structure`] | from a drawing to them |
 //! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
+//! | [`polynomial_spring`] | quadratic and cubic terms of lumped springs |
 //! | [`load`], [`moving_frame`] | dead loads, and forces that sources give; the motion of the frame |
 //! | [`comb_film`] | gas between the fingers of a comb |
 //! | [`squeeze_film`] | damping of gas that flows out of a gap; [`perforation`]: holes; [`film_series`]: states of one that compresses; [`plate_film`], [`facing_film`]: between plates, between beams |
@@ -49,6 +51,7 @@
 //! forces, tangents, charges and energies at a state.
 
 pub mod approach;
+pub mod attraction;
 pub mod backbending;
 pub mod beam_line;
 pub mod capacitor;
@@ -74,6 +77,7 @@ mod facing_side;
 mod facing_stretches;
 pub mod film_series;
 mod fin;
+pub mod friction;
 pub mod from_structure;
 pub mod hot;
 mod input;
@@ -87,6 +91,7 @@ pub mod moving_frame;
 pub mod network;
 pub mod perforation;
 pub mod plate_film;
+pub mod polynomial_spring;
 pub mod quadrature;
 pub mod quotient;
 mod reading;
@@ -100,7 +105,7 @@ pub mod thermal;
 pub use approach::MaterialPoint;
 pub use beam_line::BeamLine;
 pub use domain::{Configuration, Domain, Law};
-pub use drive::{Drive, Ramp};
+pub use drive::{Drive, Ramp, Shock};
 pub use from_structure::{PlacedMember, Station, StructureView};
 pub use input::Input;
 pub use lag::Lags;

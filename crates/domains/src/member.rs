@@ -65,6 +65,7 @@ domains! {
     PlateFilm: super::plate_film::PlateFilm, "Gas between lumped plates.";
     CombFilm: super::comb_film::CombFilm, "Gas between the fingers of a comb.";
     FacingFilm: super::facing_film::FacingFilm, "Gas between two beams that face each other.";
+    PolynomialSpring: super::polynomial_spring::PolynomialSpring, "Quadratic and cubic terms of a spring.";
 }
 
 impl Domain for Member {
@@ -181,6 +182,10 @@ impl Domain for Member {
         each!(self, m => m.loss())
     }
 
+    fn slides(&self) -> bool {
+        each!(self, m => m.slides())
+    }
+
     fn is_gas(&self) -> bool {
         each!(self, m => m.is_gas())
     }
@@ -245,5 +250,9 @@ impl Domain for Member {
 
     fn law(&self) -> Option<(&Approach, Law)> {
         each!(self, m => m.law())
+    }
+
+    fn laws(&self) -> Vec<(Approach, Law)> {
+        each!(self, m => m.laws())
     }
 }

@@ -1,16 +1,19 @@
-//! A stop between two bodies, or a body and the ground, without a field: the law of [`super::stop`] along one approach.
+//! A stop between two bodies, or a body and the ground, without a field: the law of [`super::stop`] along one approach, with adhesion
+//! ([`super::attraction`]) and friction across it ([`super::friction`]).
 
-use super::approach::{Approach, MaterialPoint};
+use super::approach::{Approach, ApproachDerivatives, MaterialPoint};
+use super::attraction::attraction;
 use super::contact::TOUCH;
 use super::contact_loss::Loss;
 use super::domain::{Chord, Configuration, Domain, Law};
+use super::friction;
 use super::from_structure::{FromStructure, StructureView};
 use super::quotient::{self, quotient};
 use super::stop::{StopKind, lost, nearer};
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
-use bimorph_structure::GapVoltage;
+use bimorph_structure::{Adhesion, Friction, GapVoltage};
 use nalgebra::Vector2;
 
 /// A stop.
@@ -24,6 +27,52 @@ pub struct StopPair {
     pub stop: StopKind,
     /// Impact losses.
     pub loss: Loss,
+    /// Adhesion, on both sides.
+    pub adhesion: Option<Adhesion>,
+    /// Friction of what slides along it.
+    pub friction: Option<Friction>,
+}
+
+impl StopPair {
+    /// First and second derivative of the potential with the approach `u` (m): force against it (N), stiffness (N/m).
+    fn resisting(&self, u: f64) -> (f64, f64) {
+        let (first, second) = self.stop.bearing(&self.ways, u);
+        let Some(adhesion) = &self.adhesion else { return (first, second) };
+        let side = |way: Option<f64>, u: f64| way.map_or((0.0, 0.0, 0.0), |w| attraction(adhesion, w - u));
+        let (ahead, back) = (side(self.ways[0], u), side(self.ways[1], -u));
+        (first - ahead.0 + back.0, second + ahead.1 + back.1)
+    }
+
+    /// Energy of the adhesion (J), negative.
+    fn bound(&self, u: f64) -> f64 {
+        let Some(adhesion) = &self.adhesion else { return 0.0 };
+        let side = |way: Option<f64>, u: f64| way.map_or(0.0, |w| -attraction(adhesion, w - u).2);
+        side(self.ways[0], u) + side(self.ways[1], -u)
+    }
+
+    /// Force with which its sides bear on each other while they close at `rate` (m/s) (N).
+    fn pressed(&self, u: f64, rate: f64) -> f64 {
+        let lost = if self.loss.is_dissipative() { lost(&self.stop, &self.loss, &self.ways, (u, rate)).0 } else { 0.0 };
+        (self.stop.bearing(&self.ways, u).0 + lost).abs()
+    }
+
+    /// The approach along it, to the left of its axis.
+    fn along(&self) -> Approach {
+        Approach { axis: Vector2::new(-self.approach.axis.y, self.approach.axis.x), ..self.approach }
+    }
+
+    /// The friction of a part that bears on it, with its motion along it and the contact force (N).
+    fn sliding(
+        &self,
+        at: Configuration<'_>,
+        rate: &impl Fn(usize) -> Pose,
+    ) -> Option<(Friction, Approach, ApproachDerivatives, f64)> {
+        let friction = self.friction?;
+        let m = self.approach.measure(at.q, at.linear);
+        let normal = self.pressed(m.value, self.approach.rate(&m, rate));
+        let along = self.along();
+        (normal > 0.0).then(|| (friction, along, along.measure(at.q, at.linear), normal))
+    }
 }
 
 impl FromStructure for StopPair {
@@ -35,7 +84,8 @@ impl FromStructure for StopPair {
             let approach = Approach { a: (drawing.point)(stop.a), b, axis };
             let law = stop.stiffness.map_or(StopKind::Rigid(stop.area), StopKind::Elastic);
             let loss = Loss::new(&stop.impact);
-            put(&stop.name, None, Self { approach, ways: stop.ways, stop: law, loss });
+            let (adhesion, friction) = (stop.adhesion, stop.friction);
+            put(&stop.name, None, Self { approach, ways: stop.ways, stop: law, loss, adhesion, friction });
         }
     }
 
@@ -53,7 +103,7 @@ impl Domain for StopPair {
 
     fn add_force(&self, at: Configuration<'_>, _: f64, r: &mut [Pose]) {
         let m = self.approach.measure(at.q, at.linear);
-        let first = self.stop.bearing(&self.ways, m.value).0;
+        let first = self.resisting(m.value).0;
         if first != 0.0 {
             self.approach.add_force(&m, first, r);
         }
@@ -63,15 +113,20 @@ impl Domain for StopPair {
 
     fn add_tangent(&self, at: Configuration<'_>, _: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
         let m = self.approach.measure(at.q, at.linear);
-        let (first, second) = self.stop.bearing(&self.ways, m.value);
-        if first != 0.0 {
+        let (first, second) = self.resisting(m.value);
+        if first != 0.0 || second != 0.0 {
             let h = m.hessian(first, second);
             locate(pattern, self.approach.a.body, self.approach.b.body).add(tangent, &h);
         }
     }
 
     fn load_points(&self, at: Configuration<'_>, _: f64, lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
-        self.approach.load_points(self.stop.bearing(&self.ways, self.approach.value(at.q, true)).0, lever);
+        self.approach.load_points(self.resisting(self.approach.value(at.q, true)).0, lever);
+    }
+
+    /// Of the adhesion.
+    fn energy(&self, at: Configuration<'_>, _: f64) -> f64 {
+        self.bound(self.approach.value(at.q, at.linear))
     }
 
     /// The way left to the nearer side.
@@ -118,6 +173,14 @@ impl Domain for StopPair {
         Some(self.loss)
     }
 
+    fn slides(&self) -> bool {
+        self.friction.is_some()
+    }
+
+    fn damps(&self) -> bool {
+        self.loss.is_dissipative() || self.friction.is_some()
+    }
+
     fn set_loss(&mut self, loss: Loss) {
         self.loss = loss;
     }
@@ -134,6 +197,9 @@ impl Domain for StopPair {
             let now = (m.value, self.approach.rate(&m, rate));
             self.approach.add_force(&m, lost(&self.stop, &self.loss, &self.ways, now).0, r);
         }
+        if let Some((friction, along, m, normal)) = self.sliding(at, rate) {
+            friction::add_force(&friction, (&along, &m), rate, normal, r);
+        }
     }
 
     fn add_loss_tangent(
@@ -144,16 +210,21 @@ impl Domain for StopPair {
         stiffness: &mut BlockMatrix<f64, 3>,
         damping: &mut BlockMatrix<f64, 3>,
     ) -> bool {
-        if !self.loss.is_dissipative() || self.distance(at) >= 0.0 {
+        if !self.damps() || self.distance(at) >= 0.0 {
             return false;
         }
-        self.approach.add_rate_tangent(
-            (at.q, at.linear),
-            rate,
-            |now| lost(&self.stop, &self.loss, &self.ways, now),
-            pattern,
-            [stiffness, damping],
-        );
+        if self.loss.is_dissipative() {
+            self.approach.add_rate_tangent(
+                (at.q, at.linear),
+                rate,
+                |now| lost(&self.stop, &self.loss, &self.ways, now),
+                pattern,
+                [&mut *stiffness, &mut *damping],
+            );
+        }
+        if let Some((friction, along, m, normal)) = self.sliding(at, rate) {
+            friction::add_tangent(&friction, (&along, &m), rate, normal, pattern, [stiffness, damping]);
+        }
         true
     }
 
@@ -180,9 +251,22 @@ impl Domain for StopPair {
             (ahead.0 - back.0, ahead.1 + back.1)
         };
         quotient::add(&self.approach, chord, law, pattern, r, tangent);
+        if self.adhesion.is_some() {
+            let pulled = |u: f64| {
+                let ((with, stiff), (without, plain)) = (self.resisting(u), self.stop.bearing(&self.ways, u));
+                (with - without, stiff - plain)
+            };
+            let law = |u0: f64, u1: f64| quotient((u0, self.bound(u0)), (u1, self.bound(u1)), pulled);
+            quotient::add(&self.approach, chord, law, pattern, r, tangent);
+        }
+        if let Some(friction) = self.friction {
+            let [start, middle, end] = chord.at.map(|at| self.approach.value(at.q, at.linear));
+            let normal = self.pressed(middle, (end - start) / chord.h);
+            friction::add_quotient(&friction, &self.along(), chord, normal, pattern, (r, tangent));
+        }
     }
 
     fn law(&self) -> Option<(&Approach, Law)> {
-        Some((&self.approach, Law::Stop(self.ways, self.stop)))
+        Some((&self.approach, Law::Stop(self.ways, self.stop, self.adhesion)))
     }
 }

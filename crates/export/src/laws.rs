@@ -4,6 +4,7 @@
 //! cases, so that no branch divides by what another one keeps away from 0.
 
 use super::lumped::{Law, LumpedGap};
+use bimorph_domains::attraction::Adhesion;
 use bimorph_domains::capacitor::Capacitor;
 use bimorph_domains::comb_field::CombField;
 use bimorph_domains::contact::{Contact, PRESSURE, TOUCH};
@@ -152,7 +153,10 @@ pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<Strin
                 rate,
             ))
         }
-        Law::Stop(ways, stop) => {
+        Law::Spring([quadratic, cubic]) => {
+            Some(format!("({:e} * {u} * {u} * {u} - {:e} * {u} * {u})", 1e-18 * cubic, 1e-12 * quadratic))
+        }
+        Law::Stop(ways, stop, adhesion) => {
             let side = |way: Option<f64>, [sign, closing]: [&str; 2]| {
                 let left = format!("({:e} {sign} 1e-6 * {u})", way?);
                 let elastic = match stop {
@@ -164,7 +168,11 @@ pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<Strin
                         format!("({k:e} * {p} * {p} / ({p} + {SOFT:e}))")
                     }
                 };
-                Some(lossy(elastic, loss, closing, rate))
+                let pressing = lossy(elastic, loss, closing, rate);
+                Some(match adhesion {
+                    Some(adhesion) => format!("({pressing} - {})", attracted(adhesion, &left)),
+                    None => pressing,
+                })
             };
             match (side(ways[0], ["-", "+"]), side(ways[1], ["+", "-"])) {
                 (Some(ahead), Some(back)) => Some(format!("({ahead} - {back})")),
@@ -194,6 +202,12 @@ pub(super) fn drag(gap: &LumpedGap, u: &str, rate: &str) -> Option<String> {
 /// A contact force with the loss of an impact ([`bimorph_domains::contact_loss`]); `closing` is the sign of the closing speed in the rate.
 fn lossy(force: String, loss: f64, closing: &str, rate: &str) -> String {
     if loss > 0.0 { format!("({force} * max(1 {closing} {loss:e} * {rate}, 0))") } else { force }
+}
+
+/// The adhesion at the distance `d`, a text in metres ([`bimorph_domains::attraction`]).
+fn attracted(adhesion: &Adhesion, d: &str) -> String {
+    let x = format!("min(max({:e} * {d}, 0), 1)", 1.0 / adhesion.range);
+    format!("{:e} * (1 - {x} * {x} * (3 - 2 * {x}))", adhesion.force)
 }
 
 /// The force of a contact at the distance `d`, a text in metres.
@@ -298,6 +312,28 @@ mod tests {
                     let scale = value.abs().max(1e-22);
                     assert!((found - value).abs() < 1e-9 * scale, "{capacitor:?} {u}: {found} {value}\n{text}");
                 }
+            }
+        }
+    }
+
+    /// A nonlinear spring, and a stop with adhesion on both sides, have the force against the approach of their domains.
+    #[test]
+    fn springs_and_adhesion() {
+        let adhesion = Adhesion { force: 2e-6, range: 20e-9 };
+        let ways = [Some(0.5e-6), Some(0.3e-6)];
+        let stop = StopKind::Elastic(1e3);
+        for u in [-0.301, -0.29, 0.0, 0.2, 0.487, 0.4999, 0.502] {
+            let (ahead, back) = (0.5e-6 - 1e-6 * u, 0.3e-6 + 1e-6 * u);
+            let side = |left: f64| stop.force(left).0 - bimorph_domains::attraction::attraction(&adhesion, left).0;
+            let spring = -1e5 * (1e-6 * u) * (1e-6 * u) + 4e10 * (1e-6 * u).powi(3);
+            for (law, value) in
+                [(Law::Stop(ways, stop, Some(adhesion)), side(ahead) - side(back)), (Law::Spring([1e5, 4e10]), spring)]
+            {
+                let text = bearing(&law, 0.0, &format!("({u:e})"), "0").unwrap_or_default();
+                let mut left = text.as_str();
+                let found = sum(&mut left);
+                assert_eq!(left, "", "{text}");
+                assert!((found - value).abs() < 1e-9 * value.abs().max(1e-9), "{u}: {found} {value}\n{text}");
             }
         }
     }

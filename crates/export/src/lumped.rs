@@ -130,23 +130,31 @@ fn gaps(
     // what acts without sides comes after all gaps; where it adds no force, its damping is among that of the parts
     let acts = |(_, gap): &(usize, &Member)| gap.is_gap() || gap.is_active(1.0) && !gap.is_gas();
     let mut films: Vec<_> = system.members.iter().filter_map(Domain::film).collect();
-    let gap = |(g, gap): (usize, &Member)| {
-        let Some((approach, law)) = gap.law() else {
+    let mut found = Vec::new();
+    for (g, gap) in system.members.iter().enumerate().filter(acts) {
+        let laws = gap.laws();
+        // parts that slide do not turn: a spring about z has no force
+        if laws.is_empty() && gap.is_gap() {
             let why = match compiled.parts.gap_names.get(g) {
                 Some(name) => format!("gap \"{name}\" lies along beams"),
                 None => "a force acts on it that is neither that of a field nor of a stop".to_owned(),
             };
             return Err(ExportError::NotLumped { why });
-        };
-        let (by_port, constant) = by_port(electrics, ports, &|s| electrics.gap_rows[(g, s)]);
-        let name = compiled.parts.gap_names[g].clone();
-        let along = along(coordinates, &approach.a, approach.axis) - along(coordinates, &approach.b, approach.axis);
-        let loss = gap.loss().map_or(0.0, |loss| loss.coefficient());
-        let own = films.iter().position(|(of, ..)| *of == approach);
-        let film = own.map(|k| films.remove(k)).map(|(_, drawn, film)| (drawn, film));
-        Ok(LumpedGap { name, along, law, loss, film, by_port, constant })
-    };
-    let found = system.members.iter().enumerate().filter(acts).map(gap).collect::<Result<_, _>>()?;
+        }
+        if gap.slides() {
+            let why = "friction acts across a stop (leave out `friction`)".to_owned();
+            return Err(ExportError::NotLumped { why });
+        }
+        for (approach, law) in laws {
+            let (by_port, constant) = by_port(electrics, ports, &|s| electrics.gap_rows[(g, s)]);
+            let name = compiled.parts.gap_names.get(g).map_or("of a nonlinear spring", String::as_str).to_owned();
+            let along = along(coordinates, &approach.a, approach.axis) - along(coordinates, &approach.b, approach.axis);
+            let loss = gap.loss().map_or(0.0, |loss| loss.coefficient());
+            let own = films.iter().position(|(of, ..)| **of == approach);
+            let film = own.map(|k| films.remove(k)).map(|(_, drawn, film)| (drawn, film));
+            found.push(LumpedGap { name, along, law, loss, film, by_port, constant });
+        }
+    }
     if system.members.iter().any(|member| member.is_gas() && member.film().is_none()) {
         let why = "gas acts that compresses (use filmstates=0), or that slides between fingers".to_owned();
         return Err(ExportError::NotLumped { why });
@@ -169,7 +177,7 @@ fn reading(signal: &Signal, coordinates: &[Coordinate], gaps: &[LumpedGap]) -> R
                 Ok(LumpedOutput::Distance(g, capacitor.distance(0.0), 1.0))
             }
             Law::Field(capacitor, _) => Ok(LumpedOutput::Distance(g, capacitor.distance(0.0), -1.0)),
-            Law::Stop(..) => Err(ExportError::NotLumped {
+            Law::Stop(..) | Law::Spring(_) => Err(ExportError::NotLumped {
                 why: format!("\"{}\" is a stop, whose distance has a corner", gaps[g].name),
             }),
         },

@@ -208,6 +208,18 @@ pub struct FacingGas {
     /// Holes in one of the plates.
     #[serde(default)]
     pub holes: Option<Perforation>,
+    /// Slit over a substrate through which gas leaves one edge of the film between beams.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slit: Option<FilmSlit>,
+}
+
+/// A slit at the lower edge of a film.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FilmSlit {
+    /// Distance from the substrate to the parts (m).
+    pub height: f64,
+    /// Length of the way under the narrower part (m).
+    pub length: f64,
 }
 
 /// Round holes in a square array.
@@ -327,4 +339,28 @@ pub struct Stop {
     /// Impact losses.
     #[serde(default)]
     pub impact: Impact,
+    /// Adhesion where it touches.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adhesion: Option<Adhesion>,
+    /// Friction of a part that slides along it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<Friction>,
+}
+
+/// Attraction of surfaces that touch.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Adhesion {
+    /// Force that tears them apart (N).
+    pub force: f64,
+    /// Distance at which the attraction ends (m).
+    pub range: f64,
+}
+
+/// Coulomb's friction, regularised.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Friction {
+    /// Coefficient of friction (1).
+    pub coefficient: f64,
+    /// Speed below which surfaces stick (m/s).
+    pub slip_speed: f64,
 }

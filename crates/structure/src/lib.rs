@@ -29,8 +29,9 @@ pub use circuit::{CircuitElement, CircuitKind};
 pub use domain_element::DomainElement;
 pub use front_end::{FrontEnd, LoadedNetlist, ReadFunction};
 pub use gap::{
-    BeamGap, Comb, ElectrodeShape, FacingGas, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, InsulatingLayer,
-    MAX_FILM_STATES, MIN_RESTITUTION, OhmicContact, Perforation, PlateGap, Stop, TOUCH, touching_distance,
+    Adhesion, BeamGap, Comb, ElectrodeShape, FacingGas, FilmSlit, Friction, Fringe, GapVoltage, IMPACT_SPEEDS, Impact,
+    InsulatingLayer, MAX_FILM_STATES, MIN_RESTITUTION, OhmicContact, Perforation, PlateGap, Stop, TOUCH,
+    touching_distance,
 };
 pub use index::NodeIndex;
 pub use mechanical::{

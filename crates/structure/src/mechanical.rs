@@ -169,7 +169,7 @@ pub struct Pad {
     pub size: [f64; 2],
 }
 
-/// A linear spring or viscous damper with three directions in a frame that turns with the mean of its two ends.
+/// A spring or viscous damper with three directions in a frame that turns with the mean of its two ends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpringDamper {
     /// Full element name.
@@ -184,6 +184,9 @@ pub struct SpringDamper {
     pub stiffness: [f64; 3],
     /// Damping along local x (N·s/m), local y (N·s/m), about z (N·m·s/rad).
     pub damping: [f64; 3],
+    /// Quadratic and cubic stiffness along local x (N/m², N/m³), local y, about z (N·m/rad², N·m/rad³), where there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub polynomial: Option<[[f64; 2]; 3]>,
 }
 
 /// A dead load at a node: it keeps its global direction.

@@ -23,7 +23,7 @@ use super::remeshed::{chosen, meshed};
 use super::signal_amplitudes::SignalAmplitudes;
 use super::warnings::{of_rotary, of_steps};
 use bimorph_base::Diagnostic;
-use bimorph_domains::Drive;
+use bimorph_domains::{Drive, Shock};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::DiscretizeError;
 use bimorph_model::options::CompileOptions;
@@ -240,7 +240,7 @@ fn excited(
     system.add_stress_stiffness(&to.q, &drive, &mut stiffness);
     let found = lowest_modes(system, (&to.q, &drive), &stiffness, count)?;
 
-    let mut way = pushed(&model, &from, &drive, &stiffness)
+    let mut way = pushed(&model, &from, options.shock.as_ref(), &drive, &stiffness)
         .unwrap_or_else(|| from.q.iter().zip(&to.q).map(|(a, b)| a - b).collect());
     let size = reach(&model, &way);
     if size == 0.0 {
@@ -282,15 +282,24 @@ fn excited(
 /// K⁻¹·r with the unbalanced forces r at the start of the run, under its further drive; `None` for a floating part. For
 /// small motions this is the way to where the run goes to; for large ones the shortening of what bends is no stretch in
 /// it.
+///
+/// A shock counts as a step of its largest acceleration, which brings at least as much motion.
 fn pushed(
     model: &CompiledModel,
     from: &OperatingPoint,
+    shock: Option<&Shock>,
     drive: &Drive,
     stiffness: &BlockMatrix<f64, 3>,
 ) -> Option<Vec<Pose>> {
     let system = &model.parts.system;
     let mut x = vec![Pose::zeros(); system.bodies()];
     system.residual(&from.q, drive, &mut x);
+    if let Some(Shock { peak: [x_peak, y_peak], .. }) = shock {
+        for (x, body) in x.iter_mut().zip(&system.model.bodies) {
+            *x += Pose::new(body.mass * x_peak, body.mass * y_peak, 0.0);
+        }
+        system.model.project(&mut x);
+    }
     let mut factor = stiffness.clone();
     system.model.project_matrix(&mut factor);
     if system.model.loose_parts().is_empty() {
@@ -313,7 +322,7 @@ pub(super) fn linear_way(model: &CompiledModel, from: &OperatingPoint, to: &Oper
     let mut stiffness = BlockMatrix::new(&system.model.pattern);
     let mut residual = to.q.clone();
     system.tangent(&to.q, &drive, &mut stiffness, &mut residual);
-    pushed(model, from, &drive, &stiffness)
+    pushed(model, from, None, &drive, &stiffness)
 }
 
 /// Largest displacement of a node (m), of a small motion `x`.

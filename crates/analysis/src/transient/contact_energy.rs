@@ -26,10 +26,18 @@ pub(super) struct ContactEnergy<'a> {
 }
 
 impl<'a> ContactEnergy<'a> {
-    /// From the start of a run; none where nothing can touch, heat does work, or forces are the derivatives of no energy.
-    pub(super) fn start(compiled: &'a CompiledModel, motion: &Motion, drive: &Drive) -> Option<Self> {
+    /// From the start of a run; none where nothing can touch, heat or a shock does work, or forces are the derivatives of no energy.
+    pub(super) fn start(
+        compiled: &'a CompiledModel,
+        options: &TransientOptions<'_>,
+        motion: &Motion,
+        drive: &Drive,
+    ) -> Option<Self> {
         let system = &compiled.parts.system;
-        let conserved = compiled.parts.heaters.is_empty() && !compiled.options.as_sugar && !system.turns();
+        let conserved = compiled.parts.heaters.is_empty()
+            && options.shock.is_none()
+            && !compiled.options.as_sugar
+            && !system.turns();
         (conserved && system.can_touch()).then(|| Self {
             system,
             drive: drive.clone(),

@@ -2,6 +2,7 @@
 
 use super::super::AnalysisError;
 use super::super::integrator::Integrator;
+use bimorph_domains::Shock;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::ErrorBudget;
 use bimorph_model::options::analysis::TRAN_POINTS;
@@ -44,6 +45,8 @@ pub struct TransientOptions<'a> {
     pub voltages: Vec<(String, f64)>,
     /// A variant of the same netlist whose static equilibrium is the initial state; none: at rest as drawn.
     pub release: Option<&'a CompiledModel>,
+    /// Acceleration of the frame from the start on; in the bodies' own coordinates.
+    pub shock: Option<Shock>,
     /// Integrator.
     pub method: Integrator,
     /// Length of equal steps (s); none: steps follow `tol`.
@@ -73,6 +76,7 @@ impl Default for TransientOptions<'_> {
             tol: 1e-3,
             voltages: Vec::new(),
             release: None,
+            shock: None,
             method: Integrator::default(),
             step: None,
             events: Vec::new(),
@@ -107,6 +111,11 @@ pub(crate) fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError>
         && !(0.0..=1.0).contains(&rho)
     {
         return bad("rho", format!("{rho} is not between 0 and 1"));
+    }
+    if let Some(Shock { peak, duration }) = options.shock
+        && !(duration.is_finite() && duration > 0.0 && peak.iter().all(|peak| peak.is_finite()))
+    {
+        return bad("shock", format!("{peak:?} m/s² during {duration} s is no acceleration over a positive time"));
     }
     if let Some((name, level)) = options.events.iter().find(|(_, level)| !level.is_finite()) {
         return bad("event", format!("{name}={level}: the level is not finite"));

@@ -10,6 +10,7 @@ use super::error_log::{ErrorLog, SignalLoss};
 use super::film_pressure::FilmPressure;
 use super::folded_segments;
 use super::options::{TransientOptions, check};
+use super::peak_stress::PeakStress;
 use super::result::{Counters, TransientResult};
 use super::samples::SampleRecorder;
 use crate::overheating::check_course;
@@ -63,7 +64,7 @@ pub(crate) fn record(
     let signals: Vec<Expression<RunSignal>> =
         options.signals.iter().map(|name| Expression::of_run(compiled, name, &sources)).collect::<Result<_, _>>()?;
     let (mut motion, rise, begun) = start(compiled, options)?;
-    let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop);
+    let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop).shocked(options.shock);
     check_course(&ramp)?;
     let mut drive = system.electrics.drive();
     ramp.at(0.0, &mut drive);
@@ -75,7 +76,8 @@ pub(crate) fn record(
     let mut samples = SampleRecorder::start(asked, held, &signals, sample, &motion);
     let mut log = options.estimate.then(|| ErrorLog::start((compiled, options.stop), held, &signals, &motion));
     let mut stability = StabilityMonitor::new(system);
-    let mut energy = ContactEnergy::start(compiled, &motion, &drive);
+    let mut energy = ContactEnergy::start(compiled, options, &motion, &drive);
+    let mut stress = PeakStress::new(compiled, held, options.shock.is_some());
     let mut gas = FilmPressure::new(system);
     let mut looks = 0;
     let (mut beyond, mut stopped_at) = (None, None);
@@ -83,6 +85,7 @@ pub(crate) fn record(
     let mut observe = |s: f64, h: f64, before: &Motion, after: &Motion| {
         stopped_at = crossings.step(s, h, before, after);
         gas.step(s + h, after);
+        stress.step(s + h, after);
         let suits = refuse_in_contact(compiled, options, s + h, after);
         let within = |()| within_contact_range(compiled, &after.q);
         let done = ((s + h) / options.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize;
@@ -123,14 +126,7 @@ pub(crate) fn record(
     Ok(TransientResult {
         t: samples.t,
         signals: named.map(|((name, s), values)| (name.clone(), s.unit().to_owned(), values)).collect(),
-        counters: Counters {
-            steps: work.steps,
-            rejected: work.rejected,
-            factorizations: work.factorizations,
-            solves: work.solves,
-            forces: work.forces,
-            iterations: work.iterations,
-        },
+        counters: counters(work),
         unknowns: compiled.unknowns(),
         estimated_error: compiled.order.estimated_error,
         step_error: estimate.as_ref().map(|estimate| estimate.error),
@@ -138,14 +134,21 @@ pub(crate) fn record(
         reliable_until: None,
         after_contact: Vec::new(),
         events: crossings.events,
+        largest_stress: stress.largest(),
         warnings: begun
             .into_iter()
             .chain(stability.warning())
             .chain(gas.warning())
+            .chain(stress.warning())
             .chain(estimate.and_then(|e| e.lost).map(lost))
             .chain(unreached)
             .collect(),
     })
+}
+
+fn counters(work: SolverCounters) -> Counters {
+    let SolverCounters { steps, rejected, factorizations, solves, forces, iterations, .. } = work;
+    Counters { steps, rejected, factorizations, solves, forces, iterations }
 }
 
 /// Refuses the motion at time `t` (s) where parts touch and the method gains energy in contact.

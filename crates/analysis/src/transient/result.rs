@@ -35,6 +35,20 @@ pub struct CrossingEvent {
     pub contact: bool,
 }
 
+/// The largest stress on the faces of a beam, in proportion to the strengths of the layers where they have one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StressMaximum {
+    /// The beam.
+    pub beam: String,
+    /// Stress (Pa).
+    pub stress_pa: f64,
+    /// When (s).
+    pub t: f64,
+    /// Strength of its layer (Pa).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strength_pa: Option<f64>,
+}
+
 /// Statistics of a signal over the part of a run whose single values do not hold, by windows of equal length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Statistics {
@@ -80,6 +94,9 @@ pub struct TransientResult {
     pub after_contact: Vec<Statistics>,
     /// Requested crossings and contacts of gaps, in order of time.
     pub events: Vec<CrossingEvent>,
+    /// The largest stress of the run, where a layer has a strength or a shock acts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest_stress: Option<StressMaximum>,
     /// Warnings about the result.
     pub warnings: Vec<String>,
 }

@@ -4,6 +4,7 @@ use super::super::hot::{HotCourse, SourceLine};
 use super::super::input::Input;
 use super::super::lag::Lags;
 use super::electrics::{Drive, Electrics};
+use super::shock::Shock;
 use bimorph_multibody::planar::Pose;
 use std::sync::OnceLock;
 
@@ -23,6 +24,8 @@ pub struct Ramp<'a> {
     pub dt: f64,
     /// Force and moment on each body throughout the step; empty: none.
     pub push: &'a [Pose],
+    /// Acceleration of the frame beside that of the sources; its inputs must be among those of the electrical side.
+    pub shock: Option<Shock>,
     /// Of each heater the coefficients of its steady rise in the time since the start: [`Electrics::heat_course`].
     heat: Vec<[f64; 3]>,
     /// The course of the rises where resistances depend on temperature.
@@ -40,7 +43,7 @@ impl<'a> Ramp<'a> {
         let course = heating.hot().map(|hot| hot.course(line, &rise[heating.heaters.len()..]));
         let changes = if course.is_some() { vec![OnceLock::new(); from.len()] } else { Vec::new() };
         let heat = electrics.heat_course((from, to), dt);
-        Self { electrics, from, to, rise, dt, push: &[], heat, course, changes }
+        Self { electrics, from, to, rise, dt, push: &[], shock: None, heat, course, changes }
     }
 
     /// The time at which rises leave all bounds (s); none: they do not.
@@ -72,6 +75,20 @@ impl<'a> Ramp<'a> {
     #[inline]
     pub fn pushed(self, push: &'a [Pose]) -> Self {
         Self { push, ..self }
+    }
+
+    /// The same with a shock.
+    #[inline]
+    pub fn shocked(self, shock: Option<Shock>) -> Self {
+        Self { shock, ..self }
+    }
+
+    /// Acceleration and its rate that a shock adds to input `k` at time `s` (m/s², m/s³).
+    fn shock_at(&self, k: usize, s: f64) -> [f64; 2] {
+        match (&self.shock, self.electrics.inputs[k]) {
+            (Some(shock), Input::Acceleration { axis }) => shock.at(axis, s),
+            _ => [0.0; 2],
+        }
     }
 
     /// Rise of heater `k` that the sources at the start lead to (K).
@@ -151,7 +168,7 @@ impl<'a> Ramp<'a> {
         drive.turning = 0.0;
         for (k, value) in drive.inputs.iter_mut().enumerate() {
             let change = self.to[first + k] - self.from[first + k];
-            *value = self.from[first + k] + x * change;
+            *value = self.from[first + k] + x * change + self.shock_at(k, s)[0];
             if self.electrics.inputs[k] == Input::Rate {
                 drive.turning += change / self.dt;
             }
@@ -165,7 +182,7 @@ impl<'a> Ramp<'a> {
         self.expansion_rates(lags, |k, strain| rate.expansion[k] = strain);
         let first = self.electrics.voltages();
         for (k, value) in rate.inputs.iter_mut().enumerate() {
-            *value = (self.to[first + k] - self.from[first + k]) / self.dt;
+            *value = (self.to[first + k] - self.from[first + k]) / self.dt + self.shock_at(k, lags.t)[1];
         }
         (rate.load, rate.turning) = (0.0, 0.0);
         rate.push.clear();

@@ -268,11 +268,16 @@ impl<'a> OfStructure<'a> {
             };
             let nodes = [spring.a, spring.b];
             let damped = spring.damping != [0.0; 3];
-            if spring.stiffness != [0.0; 3] || !damped {
-                self.push(&spring.name, "spring2d", "*", &nodes, &given(["kx", "ky", "krz"], spring.stiffness));
+            if spring.stiffness != [0.0; 3] || spring.polynomial.is_some() || !damped {
+                let names = ["kx2", "kx3", "ky2", "ky3", "krz2", "krz3"];
+                let terms = spring.polynomial.into_iter().flatten().flatten();
+                let nonlinear = names.into_iter().zip(terms).filter(|(_, value)| *value != 0.0);
+                let parameters: Vec<_> =
+                    given(["kx", "ky", "krz"], spring.stiffness).into_iter().chain(nonlinear).collect();
+                self.push(&spring.name, "spring2d", "*", &nodes, &parameters);
             }
             if damped {
-                let both = spring.stiffness != [0.0; 3];
+                let both = spring.stiffness != [0.0; 3] || spring.polynomial.is_some();
                 let name = if both { format!("{}_damper", spring.name) } else { spring.name.clone() };
                 self.push(&name, "damper2d", "*", &nodes, &given(["bx", "by", "brz"], spring.damping));
             }

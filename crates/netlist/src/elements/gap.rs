@@ -6,8 +6,8 @@ use super::super::value::short;
 use super::arguments::ElementSite;
 use super::material::VACUUM;
 use bimorph_structure::{
-    BeamGap, ElectrodeShape, FacingGas, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, InsulatingLayer, MAX_FILM_STATES,
-    MIN_RESTITUTION, NodeId, Perforation, PlateGap, Resistor,
+    BeamGap, ElectrodeShape, FacingGas, FilmSlit, Fringe, GapVoltage, IMPACT_SPEEDS, Impact, InsulatingLayer,
+    MAX_FILM_STATES, MIN_RESTITUTION, NodeId, Perforation, PlateGap, Resistor,
 };
 
 /// States of gas that compresses, unless a netlist says otherwise: |Z| of a square within 0.4 % to ten times its first corner, of a rectangle of 1:2 to three times.
@@ -106,7 +106,15 @@ impl ElementSite<'_, '_> {
         let holes = if plates { self.holes(sides)? } else { None };
         let states = if plates { self.film_states(holes.is_some())? } else { 0 };
         let count = area / (sides[0] * sides[1]);
-        let gas = FacingGas { sides, count, viscosity, pressure, free_path, closed, states, holes };
+        let height = if plates { None } else { self.positive_if_any("slit")? };
+        let slit = match height {
+            Some(height) => {
+                let [w1, w2] = self.widths()?;
+                Some(FilmSlit { height, length: w1.min(w2) })
+            }
+            None => None,
+        };
+        let gas = FacingGas { sides, count, viscosity, pressure, free_path, closed, states, holes, slit };
         Ok((viscosity > 0.0).then_some(gas))
     }
 

@@ -79,18 +79,29 @@ pub(super) fn link2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
 
 pub(super) fn spring2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let stiffness = [site.number_or("kx", 0.0)?, site.number_or("ky", 0.0)?, site.number_or("krz", 0.0)?];
-    site.spring_damper(stiffness, [0.0; 3], "kx, ky or krz")
+    let mut terms = [[0.0; 2]; 3];
+    for (terms, names) in terms.iter_mut().zip([["kx2", "kx3"], ["ky2", "ky3"], ["krz2", "krz3"]]) {
+        *terms = [site.number_or(names[0], 0.0)?, site.number_or(names[1], 0.0)?];
+    }
+    let polynomial = (terms != [[0.0; 2]; 3]).then_some(terms);
+    site.spring_damper((stiffness, polynomial), [0.0; 3], "kx, ky or krz")
 }
 
 pub(super) fn damper2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let damping =
         [site.non_negative_or("bx", 0.0)?, site.non_negative_or("by", 0.0)?, site.non_negative_or("brz", 0.0)?];
-    site.spring_damper([0.0; 3], damping, "bx, by or brz")
+    site.spring_damper(([0.0; 3], None), damping, "bx, by or brz")
 }
 
 impl ElementSite<'_, '_> {
-    fn spring_damper(&mut self, stiffness: [f64; 3], damping: [f64; 3], names: &str) -> Result<(), Reported> {
-        if stiffness == [0.0; 3] && damping == [0.0; 3] {
+    /// With a stiffness and its quadratic and cubic terms.
+    fn spring_damper(
+        &mut self,
+        (stiffness, polynomial): ([f64; 3], Option<[[f64; 2]; 3]>),
+        damping: [f64; 3],
+        names: &str,
+    ) -> Result<(), Reported> {
+        if stiffness == [0.0; 3] && damping == [0.0; 3] && polynomial.is_none() {
             let message = format!("`{}` does nothing: all its coefficients are 0", self.instance.name);
             self.sink.warning("W006", self.instance.span, message, format!("give {names}"));
         }
@@ -99,7 +110,15 @@ impl ElementSite<'_, '_> {
         let l = self.non_negative_or("l", 0.0)?;
         let (a, b) = (self.node(0), self.node(1));
         self.drawing.place(self.instance.span, &[a, b], &[[0.0; 2], [l * angle.cos(), l * angle.sin()]]);
-        self.drawing.structure.springs.push(SpringDamper { name: self.name(), a, b, angle, stiffness, damping });
+        self.drawing.structure.springs.push(SpringDamper {
+            name: self.name(),
+            a,
+            b,
+            angle,
+            stiffness,
+            damping,
+            polynomial,
+        });
         Ok(())
     }
 }

@@ -41,6 +41,7 @@ pub(super) fn bar(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
             angle,
             stiffness: [stiffness, stiffness, 0.0],
             damping: [0.0; 3],
+            polynomial: None,
         });
     }
     Ok(())

@@ -2,10 +2,15 @@
 
 use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
-use bimorph_structure::{OhmicContact, Stop};
+use bimorph_structure::{Adhesion, Friction, OhmicContact, Stop};
 
 /// Area on which a rigid stop bears unless it is given (m²): 10 µm by 10 µm.
 const AREA: f64 = 1e-10;
+
+/// Range of the adhesion unless it is given (m).
+const ADHESION_RANGE: f64 = 10e-9;
+/// Speed below which parts stick unless it is given (m/s).
+const SLIP_SPEED: f64 = 1e-5;
 
 /// stop2d: a may move by `gap` along local x, and by `back` against it, relative to b or to where it was drawn.
 pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
@@ -19,6 +24,13 @@ pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let area = site.positive_if_any("A")?.unwrap_or(AREA);
     let impact = site.impact()?;
     let ohmic = ohmic(site)?;
+    let range = site.positive_if_any("adhesionrange")?.unwrap_or(ADHESION_RANGE);
+    let adhesion = site.positive_if_any("adhesion")?.map(|force| Adhesion { force, range });
+    let slip_speed = site.positive_if_any("slipspeed")?.unwrap_or(SLIP_SPEED);
+    let friction = site.positive_if_any("friction")?.map(|coefficient| Friction { coefficient, slip_speed });
+    if let Some(way) = ways.into_iter().flatten().find(|way| *way <= range && adhesion.is_some()) {
+        return Err(site.out_of_range("adhesionrange", range, &format!("below the travel of {way:e} m")));
+    }
     let nodes = site.instance.nodes.clone();
     site.drawing.mechanical(&nodes);
     let name = site.name();
@@ -33,6 +45,8 @@ pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
         area,
         ohmic,
         impact,
+        adhesion,
+        friction,
     });
     Ok(())
 }

@@ -144,6 +144,7 @@ const GAP: &[&str] = &[
     "restitution",
     "speed",
     "filmgap",
+    "slit",
 ];
 const GAP_E: &[&str] = &[
     "l",
@@ -168,6 +169,7 @@ const GAP_E: &[&str] = &[
     "restitution",
     "speed",
     "filmgap",
+    "slit",
 ];
 const GAP_SHEET: &[&str] = &[
     "l",
@@ -186,6 +188,7 @@ const GAP_SHEET: &[&str] = &[
     "restitution",
     "speed",
     "filmgap",
+    "slit",
 ];
 const PLATES: &[&str] = &[
     "A",
@@ -206,8 +209,21 @@ const PLATES: &[&str] = &[
     "hole",
     "pitch",
 ];
-const STOP: &[&str] =
-    &["gap", "back", "k", "A", "hardness", "contactresistivity", "electronpath", "restitution", "speed"];
+const STOP: &[&str] = &[
+    "gap",
+    "back",
+    "k",
+    "A",
+    "hardness",
+    "contactresistivity",
+    "electronpath",
+    "restitution",
+    "speed",
+    "adhesion",
+    "adhesionrange",
+    "friction",
+    "slipspeed",
+];
 const LOAD: &[&str] = &["F", "M"];
 
 const fn sugar(
@@ -333,7 +349,13 @@ const MODELS: &[ElementModel] = &[
     own("body2d", &[1], "[c]", &["A", "Ip", "l", "w", "h", "perimeter"], lumped::body2d),
     own("mass2d", &[1], "[n]", &["m", "J", "b", "brz"], lumped::mass2d),
     own("link2d", &[2], "[a b]", &["l"], lumped::link2d),
-    own("spring2d", &[2], "[a b]", &["kx", "ky", "krz", "l"], lumped::spring2d),
+    own(
+        "spring2d",
+        &[2],
+        "[a b]",
+        &["kx", "ky", "krz", "kx2", "kx3", "ky2", "ky3", "krz2", "krz3", "l"],
+        lumped::spring2d,
+    ),
     own("damper2d", &[2], "[a b]", &["bx", "by", "brz", "l"], lumped::damper2d),
     own("guide2d", &[1], "[n]", &[], support::guide2d),
     own("plategap2d", &[2], "[a b]", PLATES, gap::plategap2d),

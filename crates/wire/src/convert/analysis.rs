@@ -275,6 +275,7 @@ pub fn transient_from_wire(
         reliable_until,
         after_contact: after_contact.into_iter().map(statistics_from_wire).collect(),
         events: events.into_iter().map(event).collect(),
+        largest_stress: None,
         warnings,
     }
 }

@@ -32,7 +32,8 @@ fn field_words(
 fn gas(gas: Option<&FacingGas>) -> impl Iterator<Item = (&'static str, f64)> {
     let given = gas.map(|gas| {
         let always = [("viscosity", gas.viscosity), ("pressure", gas.pressure), ("meanfreepath", gas.free_path)];
-        always.into_iter().chain(gas.closed.map(|closed| ("filmgap", closed)))
+        let slit = gas.slit.map(|slit| ("slit", slit.height));
+        always.into_iter().chain(gas.closed.map(|closed| ("filmgap", closed))).chain(slit)
     });
     given.into_iter().flatten()
 }
@@ -135,6 +136,9 @@ impl OfStructure<'_> {
             let mut parameters = vec![("A", stop.area), turned(stop.axis)];
             let optional = [("gap", stop.ways[0]), ("back", stop.ways[1]), ("k", stop.stiffness)];
             parameters.extend(optional.into_iter().filter_map(|(n, v)| Some((n, v?))).chain(impact(&stop.impact)));
+            let adhesion = stop.adhesion.map(|a| [("adhesion", a.force), ("adhesionrange", a.range)]);
+            let friction = stop.friction.map(|f| [("friction", f.coefficient), ("slipspeed", f.slip_speed)]);
+            parameters.extend([adhesion, friction].into_iter().flatten().flatten());
             let nodes: Vec<NodeId> = [Some(stop.a), stop.b].into_iter().flatten().collect();
             self.push(&stop.name, "stop2d", "*", &nodes, &parameters);
         }
