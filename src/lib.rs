@@ -20,6 +20,7 @@ pub use bimorph_analysis::{self as analysis, readout};
 pub use bimorph_base::budget;
 pub use bimorph_cosim as cosim;
 pub use bimorph_device as device;
+pub use bimorph_document as document;
 pub use bimorph_domains as domains;
 pub use bimorph_export as export;
 pub use bimorph_jobs::{self as jobs, content};

@@ -7,6 +7,7 @@ use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
 use bimorph::cosim::deck::DeckError;
 use bimorph::cosim::osdi::OsdiError;
+use bimorph::document::UnwritableStructure;
 use bimorph::export::ExportError;
 use bimorph::input::FrontError;
 use bimorph::jobs::sweep::SweepError;
@@ -94,6 +95,8 @@ pub(crate) enum Failure {
     Front(FrontError),
     #[error(transparent)]
     Layout(#[from] LayoutError),
+    #[error("no document: {0}")]
+    Document(#[from] UnwritableStructure),
     #[error(transparent)]
     Mask(#[from] MaskError),
     #[error(transparent)]

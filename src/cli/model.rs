@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// Options of every command that reads a netlist.
 #[derive(Debug, Args)]
 pub(crate) struct ModelArgs {
-    /// SUGAR netlist, or a layout: .cif or .gds
+    /// SUGAR netlist, layout (.cif or .gds) or JSON document of a structure
     file: PathBuf,
 
     /// Set a netlist parameter: a number with suffix (2.1u) or text. Repeatable

@@ -150,7 +150,8 @@ fn files_do_not_name_each_other_in_circles() {
     let mut circles: BTreeSet<Vec<String>> = BTreeSet::new();
     let (mut modules, mut names) = (0, 0);
     let plug_in = Path::new(env!("CARGO_MANIFEST_DIR")).join("clients/ngspice/src");
-    for root in sources().into_iter().chain([plug_in]) {
+    let c = Path::new(env!("CARGO_MANIFEST_DIR")).join("clients/c/src");
+    for root in sources().into_iter().chain([plug_in, c]) {
         let source = Source::read(&root);
         let edges: BTreeMap<Module, BTreeSet<Module>> =
             source.texts.keys().map(|module| (module.clone(), source.named(module))).collect();

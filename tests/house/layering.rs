@@ -6,13 +6,14 @@ use std::fs;
 use std::path::Path;
 
 /// Crates from the bottom up, each with the crates that it may depend on.
-const CRATES: [(&str, &[&str]); 17] = [
+const CRATES: [(&str, &[&str]); 18] = [
     ("base", &[]),
     ("structure", &["base"]),
+    ("document", &["base", "structure"]),
     ("multibody", &["base"]),
     ("domains", &["base", "structure", "multibody"]),
     ("solve", &["base", "multibody", "domains"]),
-    ("netlist", &["base", "structure"]),
+    ("netlist", &["base", "structure", "document"]),
     ("layout", &["base", "structure", "netlist"]),
     ("results", &["structure"]),
     ("model", &["base", "structure", "multibody", "domains", "solve"]),

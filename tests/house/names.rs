@@ -12,7 +12,7 @@ const SHARED: &[(&str, &str)] = &[("Stop", "the stop of a netlist, and Python's 
 const MAX_SHARED_DEFINITIONS: usize = 2 * SHARED.len();
 
 /// Sources of the library, the command and the clients.
-const FOLDERS: [&str; 4] = ["src", "crates", "clients/ngspice/src", "clients/python/native/src"];
+const FOLDERS: [&str; 5] = ["src", "crates", "clients/c/src", "clients/ngspice/src", "clients/python/native/src"];
 
 /// The type that a line defines, if it stands at the left margin: rustfmt indents everything that is not top-level.
 fn defined(line: &str) -> Option<&str> {

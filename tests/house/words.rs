@@ -181,7 +181,9 @@ fn scripted(text: &str) -> Vec<(usize, String)> {
 /// Prose of a file, with line numbers, and whether that consists of the comments of Rust.
 fn texts(place: &str, text: &str) -> Vec<(usize, String)> {
     match place.rsplit('.').next() {
-        Some("rs") if place.starts_with("src/") || place.starts_with("clients/ngspice/src/") => {
+        Some("rs")
+            if ["src/", "clients/c/src/", "clients/ngspice/src/"].iter().any(|folder| place.starts_with(folder)) =>
+        {
             comments(text).into_iter().chain(literals(text)).collect()
         }
         Some("rs") => comments(text),
@@ -200,6 +202,7 @@ fn searched(root: &Path) -> Vec<(String, String)> {
     let folders = [
         "src",
         "crates",
+        "clients/c",
         "clients/ngspice",
         "clients/python/src",
         "clients/python/native/src",

@@ -142,6 +142,7 @@ class Page:
         library = Path(program).with_name("libbimorph_ngspice.so")
         self.environment = {
             **os.environ,
+            "BIMORPH": str(ROOT),
             "PATH": os.pathsep.join([str(path), os.environ["PATH"]]),
             "PYTHONPATH": os.pathsep.join([*package, *filter(None, [os.environ.get("PYTHONPATH", "")])]),
             "BIMORPH_BIN": program,

@@ -17,7 +17,7 @@
 //! [`instance`] has requests and outcomes, [`companion`] converts charges to currents, [`bimorph::device::scale`] volts
 //! to micrometres, and [`history`] stores accepted points.
 //!
-//! This is the only crate of the project with `unsafe` code; each block says why it holds.
+//! This crate and `clients/c` are the only ones of the project with `unsafe` code; each block says why it holds.
 
 #![deny(unsafe_op_in_unsafe_fn)]
 #![warn(clippy::undocumented_unsafe_blocks)]

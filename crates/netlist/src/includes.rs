@@ -101,6 +101,9 @@ impl IncludeReader<'_> {
 
 /// The files that a text uses, in the order in which its language meets them.
 fn uses_of(text: &str) -> Vec<String> {
+    if bimorph_document::is_document(text) {
+        return Vec::new();
+    }
     match foreign::kind(text, 0) {
         foreign::FileKind::Lua(_) => sugar3::uses_of(text),
         _ => lexer::uses_of(text),

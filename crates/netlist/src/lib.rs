@@ -6,15 +6,16 @@
 //! `foreign` recognizes the language of a file. SUGAR 2, one module a step: `lexer` makes tokens, `parser`, `statement`
 //! and `expression` the tree with all includes in place, `resolve` binds names, `elaborate` and `instance` run
 //! definitions, loops and subnets. SUGAR 3, which is Lua, is run by `sugar3`. Both front ends build elements with
-//! `elements`. `finish` calls `place` for node positions and `check` for loose ends. docs/reference/netlist.md describes the
+//! `elements`. A structure as a JSON document is read by `document`. `finish` calls `place` for node positions and `check` for loose ends. docs/reference/netlist.md describes the
 //! languages.
 //!
-//! **Architecture invariant.** Below are [`bimorph_base`] and [`bimorph_structure`]. Nothing here touches the disk after a
+//! **Architecture invariant.** Below are [`bimorph_base`], [`bimorph_structure`] and [`bimorph_document`]. Nothing here touches the disk after a
 //! bundle is read, nothing solves, and nothing knows bodies or joints.
 
 mod ast;
 mod check;
 mod diagnostic_sink;
+mod document;
 mod drawing;
 mod elaborate;
 mod elements;
@@ -41,7 +42,7 @@ mod value;
 
 pub use includes::{DroppedInclude, read_bundle, read_bundle_reporting};
 pub use parse_setting::parse_setting;
-pub use read::{NetlistSource, beam_places, is_program, load};
+pub use read::{NetlistSource, beam_places, document, is_program, load};
 
 /// A built-in element as docs/reference/elements.md documents it.
 #[derive(Clone, Copy, Debug)]

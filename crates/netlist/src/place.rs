@@ -119,7 +119,8 @@ fn unconnected_parts(drawing: &StructureBuilder, starts: &[usize], sink: &mut Di
     }
 }
 
-fn open_loops(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
+/// Warns of elements that miss the drawn place of a node.
+pub(crate) fn open_loops(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
     let mut open = Vec::new();
     for placement in &drawing.placements {
         let placed = drawing.placed_by(placement);

@@ -9,7 +9,7 @@ use super::meaning::meaning;
 use bimorph_structure::{NodeId, ReadFunction};
 
 /// A length beyond this is a missing suffix rather than a part of a microsystem (m).
-const LONGEST: f64 = 0.1;
+pub(crate) const LONGEST: f64 = 0.1;
 
 /// One parameter as given.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! Material constants of an element, from its own list and its layer.
 
 use super::super::diagnostic_sink::Reported;
-use super::super::drawing::Fact;
+use super::super::drawing::{Fact, StructureBuilder};
 use super::arguments::ElementSite;
 use bimorph_structure::{GasLoss, MOLTEN, Material, SolidHeat};
 
@@ -42,6 +42,24 @@ const READ: [&str; 17] = [
     "thermcond",
     "specificheat",
 ];
+
+/// Notes the constants of beams that are those of no solid, as in GPa by mistake.
+pub(crate) fn odd_layers(drawing: &mut StructureBuilder) {
+    for k in 0..drawing.structure.beams.len() {
+        let beam = &drawing.structure.beams[k];
+        let (span, material) = (drawing.first_named[beam.a.0], &beam.material);
+        let [modulus, density, stress] = [material.youngs_modulus, material.density, material.stress];
+        if !SOLID.contains(&modulus) {
+            drawing.note_number(Fact::OddModulus, span, modulus);
+        }
+        if density > 0.0 && !DENSE.contains(&density) {
+            drawing.note_number(Fact::OddDensity, span, density);
+        }
+        if stress.abs() > STRONGEST * modulus {
+            drawing.note_number(Fact::OddStress, span, stress);
+        }
+    }
+}
 
 impl ElementSite<'_, '_> {
     /// The material of a flexible member in the direction of the element. That of a layer is read once, unless it depends on the direction.

@@ -10,7 +10,7 @@ mod etched;
 mod gap;
 mod load;
 mod lumped;
-mod material;
+pub(crate) mod material;
 mod meaning;
 mod pinned;
 mod placed;
@@ -22,7 +22,7 @@ mod support;
 mod table;
 pub(crate) mod upright;
 
-pub(crate) use arguments::{Argument, Arguments, ElementInstance, ElementSite};
+pub(crate) use arguments::{Argument, Arguments, ElementInstance, ElementSite, LONGEST};
 pub(crate) use table::{ElementModel, model, models};
 
 use super::diagnostic_sink::{DiagnosticSink, Reported};

@@ -1,6 +1,7 @@
 //! Contracts of the netlist languages: rules, elements, messages, includes, and the page that describes them.
 
 mod diagnostics;
+mod document;
 mod elements;
 mod examples;
 mod include;
