@@ -31,9 +31,13 @@ pub(crate) trait DocumentRecord: DocumentValue {
     fn object_schema() -> ObjectSchema;
 }
 
-/// The schema of the field that `of` reads.
-pub(crate) fn field_schema<R, T: DocumentValue>(_: fn(&R) -> &T, field: DocumentField) -> FieldSchema {
-    FieldSchema { field, schema: T::schema(&field), required: T::left_out().is_none() }
+/// The schema of the field that a function reads; `left_out` is its value where it is not given.
+pub(crate) fn field_schema<R, T: DocumentValue>(
+    _: fn(&R) -> &T,
+    field: DocumentField,
+    left_out: Option<T>,
+) -> FieldSchema {
+    FieldSchema { field, schema: T::schema(&field), required: left_out.is_none() }
 }
 
 /// An object being read.
@@ -56,15 +60,16 @@ impl<'n, 't> ObjectReader<'n, 't> {
         Ok(Self { node, at })
     }
 
-    /// The value of a field.
+    /// The value of a field, or that of one that is left out.
     pub(crate) fn field<T: DocumentValue>(
         &self,
         field: &DocumentField,
+        left_out: Option<T>,
         nodes: &NodeNames<'_>,
     ) -> Result<T, DocumentError> {
         match self.node.get(field.name) {
             Some(value) => T::read(value, &ValuePath::Field(self.at, field.name), field, nodes),
-            None => T::left_out().ok_or_else(|| {
+            None => left_out.ok_or_else(|| {
                 let unit = if field.unit.is_empty() { String::new() } else { format!(" ({})", field.unit) };
                 let message = format!("the field \"{}\"{unit} is missing: {}", field.name, field.about);
                 self.at.fault(FIELDS, self.node, message, "")
@@ -74,15 +79,12 @@ impl<'n, 't> ObjectReader<'n, 't> {
 }
 
 impl DocumentWriter<'_> {
-    /// A field of an object, unless it is left out.
+    /// A field of an object.
     pub(crate) fn field<T: DocumentValue>(
         &mut self,
         field: &DocumentField,
         value: &T,
     ) -> Result<(), UnwritableStructure> {
-        if value.is_left_out() {
-            return Ok(());
-        }
         self.comma();
         self.text.push('"');
         self.text.push_str(field.name);
@@ -91,18 +93,18 @@ impl DocumentWriter<'_> {
     }
 }
 
-/// An object with its fields, in the order in which they are written: `name: "unit", range, "what it is";`. One whose fields can all be left out can be
-/// left out itself.
+/// An object with its fields, in the order in which they are written: `name: "unit", range, "what it is";`, or `name = default: …` for a number that is left out
+/// where it has this value. An object whose fields can all be left out can be left out itself.
 macro_rules! record {
-    ($type:ident: $about:literal { $($name:ident: $unit:literal, $range:expr, $what:literal;)+ }) => {
+    ($type:ident: $about:literal { $($name:ident $(= $default:literal)?: $unit:literal, $range:expr, $what:literal;)+ }) => {
         impl DocumentValue for $type {
             fn write(&self, to: &mut DocumentWriter<'_>, _: &DocumentField) -> Result<(), UnwritableStructure> {
                 let Self { $($name),+ } = self;
                 to.text.push('{');
-                $(to.field(
-                    &DocumentField { name: stringify!($name), unit: $unit, range: $range, about: $what },
-                    $name,
-                )?;)+
+                $(if !record!(@is_left_out $name $(, $default)?) {
+                    let field = DocumentField { name: stringify!($name), unit: $unit, range: $range, about: $what };
+                    to.field(&field, $name)?;
+                })+
                 to.text.push('}');
                 Ok(())
             }
@@ -116,6 +118,7 @@ macro_rules! record {
                 let object = ObjectReader::new(node, at, &[$(stringify!($name)),+])?;
                 Ok(Self { $($name: object.field(
                     &DocumentField { name: stringify!($name), unit: $unit, range: $range, about: $what },
+                    record!(@left_out $($default)?),
                     nodes,
                 )?),+ })
             }
@@ -125,11 +128,12 @@ macro_rules! record {
             }
 
             fn left_out() -> Option<Self> {
-                Some(Self { $($name: DocumentValue::left_out()?),+ })
+                Some(Self { $($name: record!(@left_out $($default)?)?),+ })
             }
 
             fn is_left_out(&self) -> bool {
-                $(self.$name.is_left_out())&&+
+                let Self { $($name),+ } = self;
+                $(record!(@is_left_out $name $(, $default)?))&&+
             }
         }
 
@@ -138,11 +142,16 @@ macro_rules! record {
                 let fields = vec![$(field_schema(
                     |record: &$type| &record.$name,
                     DocumentField { name: stringify!($name), unit: $unit, range: $range, about: $what },
+                    record!(@left_out $($default)?),
                 )),+];
                 ObjectSchema { name: stringify!($type), about: $about, fields }
             }
         }
     };
+    (@left_out) => { DocumentValue::left_out() };
+    (@left_out $default:literal) => { Some($default) };
+    (@is_left_out $name:ident) => { $name.is_left_out() };
+    (@is_left_out $name:ident, $default:literal) => { $name.to_bits() == f64::to_bits($default) };
 }
 
 pub(crate) use record;

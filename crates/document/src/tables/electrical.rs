@@ -65,10 +65,10 @@ record! {
         height: "m", Positive, "Height of the fingers h";
         overlap: "m", NonNegative, "Overlap as drawn o";
         permittivity: "F/m", Positive, "Permittivity ε";
-        parasitic: "F", NonNegative, "Capacitance that does not depend on the motion";
+        parasitic = 0.0: "F", NonNegative, "Capacitance that does not depend on the motion; left out: 0";
         finger: "m", NonNegative, "Length and width of the fingers; a width of 0: unknown";
         law: "", Any, "Law of the fringe field; left out: exact where the width is known";
-        sliding: "Pa·s", NonNegative, "Drag of the gas between the fingers, per rate and overlap";
+        sliding = 0.0: "Pa·s", NonNegative, "Drag of the gas between the fingers, per rate and overlap; left out: 0";
         finite: "", Any, "False: the force is constant whatever the overlap";
         voltage: "V", Any, "A fixed voltage, or the nodes between which it lies";
     }

@@ -65,8 +65,8 @@ record! {
         time_constant: "s", NonNegative, "Time constant of the mean rise; 0: at once; left out: from the heat capacities";
         capacity: "J/K", NonNegative, "Heat capacity; 0: unknown";
         gas: "", Any, "Loss of heat through gas";
-        coefficient: "1/K", Any, "Relative change of the resistance with the rise";
-        thermal_coefficient: "1/K", Any, "Relative change of the thermal resistance with the rise";
+        coefficient = 0.0: "1/K", Any, "Relative change of the resistance with the rise; left out: 0";
+        thermal_coefficient = 0.0: "1/K", Any, "Relative change of the thermal resistance with the rise; left out: 0";
     }
 }
 
