@@ -322,7 +322,7 @@ mod tests {
         let adhesion = Adhesion { force: 2e-6, range: 20e-9 };
         let ways = [Some(0.5e-6), Some(0.3e-6)];
         let stop = StopKind::Elastic(1e3);
-        for u in [-0.301, -0.29, 0.0, 0.2, 0.487, 0.4999, 0.502] {
+        for u in [-0.301_f64, -0.29, 0.0, 0.2, 0.487, 0.4999, 0.502] {
             let (ahead, back) = (0.5e-6 - 1e-6 * u, 0.3e-6 + 1e-6 * u);
             let side = |left: f64| stop.force(left).0 - bimorph_domains::attraction::attraction(&adhesion, left).0;
             let spring = -1e5 * (1e-6 * u) * (1e-6 * u) + 4e10 * (1e-6 * u).powi(3);
