@@ -87,13 +87,15 @@ impl System {
         self.touching(gap).is_some_and(|[touch, _]| self.distance(gap, q) < touch)
     }
 
-    /// Scale of the force balance where parts touch (N): the largest contact force. At a contact with almost no load, a
-    /// thousandth of the attraction there. 0 where nothing touches. `volts` of each gap.
+    /// Scale of the force balance where parts touch (N): the largest contact force. At a contact with almost no load, and up to a thousandth of
+    /// the touching distance before one, a thousandth of the attraction there. 0 where nothing touches. `volts` of each gap.
     #[inline]
     pub fn contact_scale(&self, q: &[Pose], volts: &[f64]) -> f64 {
         let of = |(g, (gap, volts)): (usize, (&Member, &f64))| {
             let bearing = gap.bearing(self.at(q));
-            if bearing > 0.0 { bearing.max(1e-3 * self.pull(g, q, *volts).abs()) } else { 0.0 }
+            // contact begins so softly that Newton's method may come to a stand on its open side
+            let near = || gap.touching().is_some_and(|[touch, _]| gap.distance(self.at(q)) < (1.0 + 1e-3) * touch);
+            if bearing > 0.0 || near() { bearing.max(1e-3 * self.pull(g, q, *volts).abs()) } else { 0.0 }
         };
         self.members.iter().zip(volts).enumerate().map(of).fold(0.0, f64::max)
     }
