@@ -81,6 +81,9 @@ impl Domain for FacingBeams {
     }
 
     fn add_force(&self, at: Configuration<'_>, volts: f64, r: &mut [Pose]) {
+        if volts == 0.0 && self.surely_apart(at) {
+            return;
+        }
         self.along(at, |local| {
             if volts != 0.0 || !local.stretch.facing.apart(&local.z) {
                 self.add(local, local.stretch.facing.load(&local.z, volts), r);
@@ -110,6 +113,9 @@ impl Domain for FacingBeams {
         pattern: &Pattern,
         (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
     ) {
+        if volts == 0.0 && self.surely_apart(at) {
+            return;
+        }
         self.along(at, |local| {
             if let Some(both) = local.stretch.facing.load_and_stiffness(&local.z, volts) {
                 self.add(local, both.0, r);
@@ -194,6 +200,9 @@ impl Domain for FacingBeams {
     }
 
     fn bearing(&self, at: Configuration<'_>) -> f64 {
+        if self.surely_apart(at) {
+            return 0.0;
+        }
         self.sum(at, |local| {
             let force = local.stretch.facing.contact(&local.z).0;
             force[0].abs() + force[2].abs()
@@ -212,10 +221,16 @@ impl Domain for FacingBeams {
     }
 
     fn contact_energy(&self, at: Configuration<'_>) -> f64 {
+        if self.surely_apart(at) {
+            return 0.0;
+        }
         self.sum(at, |local| local.stretch.facing.contact_energy(&local.z))
     }
 
     fn contact_work(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        if self.surely_apart(at) {
+            return 0.0;
+        }
         self.sum(at, |local| match local.stretch.facing.apart(&local.z) {
             true => 0.0,
             false => local.stretch.facing.contact(&local.z).0.dot(&self.change(local, |id| Model::pose(dq, id))),

@@ -100,7 +100,7 @@ fn lost(beams: &FacingBeams, local: &Local<'_>, rate: &impl Fn(usize) -> Pose) -
 
 /// See [`super::domain::Domain::add_loss`].
 pub(super) fn add(beams: &FacingBeams, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
-    if !beams.loss.is_dissipative() {
+    if !beams.loss.is_dissipative() || beams.surely_apart(at) {
         return;
     }
     beams.along(at, |local| {
@@ -120,7 +120,7 @@ pub(super) fn add_tangent(
     [stiffness, damping]: [&mut BlockMatrix<f64, 3>; 2],
 ) -> bool {
     let mut acts = false;
-    if beams.loss.is_dissipative() {
+    if beams.loss.is_dissipative() && !beams.surely_apart(at) {
         beams.along(at, |local| {
             if let Some((force, by_rate)) = lost(beams, local, rate) {
                 beams.add_stiffness(local, force, pattern, stiffness);
