@@ -165,7 +165,8 @@ fn etch_holes_are_taken_off_a_plate() {
 }
 
 /// A comb between a shuttle and a pad: 9 fingers in the gaps of 10 make 18 gaps, 2 µm wide, overlapping by 20 µm; what the fingers weigh
-/// stays. Half a finger's width off the middle there are gaps of two sizes, and so two combs.
+/// stays. Half a finger's width off the middle there are gaps of two sizes, and so two combs. The netlist has the width of the fingers, with which a comb has its
+/// fringe field.
 #[test]
 fn combs() {
     for (degrees, aside) in [(0.0, 0.0), (37.0, 0.0), (0.0, 0.5)] {
@@ -187,17 +188,20 @@ fn combs() {
         for comb in &found.combs {
             assert_eq!(comb.fingers, [9, if aside > 0.0 { 9 } else { 10 }]);
             assert!((comb.overlap - 20e-6).abs() < 2e-9, "{comb:?}");
+            assert!((comb.width - 2e-6).abs() < 2e-9, "{comb:?}");
             assert!(aside > 0.0 || (comb.gap - 2e-6).abs() < 2e-9, "{comb:?}");
         }
         // the bar that carries them bends; they are bodies on it
         let area: f64 = found.bodies.iter().map(|b| b.area).sum();
         assert!((area / (9.0 * 80e-12) - 1.0).abs() < 1e-3, "{area}");
         let compiled = compile(&Bundle::from_text("comb.net", &netlist(&found)), &CompileOptions::default());
-        assert_eq!(compiled.unwrap_or_else(|e| panic!("{e}")).structure.combs.len(), found.combs.len());
+        let compiled = compiled.unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(compiled.structure.combs.len(), found.combs.len());
+        assert!(compiled.structure.combs.iter().all(|comb| (comb.finger[1] - 2e-6).abs() < 2e-9));
     }
 }
 
-/// A plate 2 µm before an electrode 60 µm wide, and a clamped beam beside one 100 µm long: area and gap by hand; the beam's field is in
+/// A plate 2 µm before an electrode 60 µm wide, and a clamped beam beside one 100 µm long: sides and gap by hand; the beam's field is in
 /// pieces along it. Both load, and the drawn gap is where the netlist puts its nodes.
 #[test]
 fn facing_edges() {
@@ -208,7 +212,12 @@ fn facing_edges() {
     sheet.pad([182.0, -30.0], [200.0, 30.0]);
     let found = extracted(sheet.drawing());
     assert_eq!(found.plates.len(), 1, "{:?}", found.plates);
-    assert!((found.plates[0].area / (60e-6 * 2e-6) - 1.0).abs() < 1e-9 && (found.plates[0].gap - 2e-6).abs() < 1e-12);
+    let plates = &found.plates[0];
+    assert!((plates.sides[0] - 60e-6).abs() < 1e-12 && (plates.sides[1] - 2e-6).abs() < 1e-12, "{plates:?}");
+    // both parts are deeper than ten times the thickness
+    assert!((plates.gap - 2e-6).abs() < 1e-12 && (plates.depth - 20e-6).abs() < 1e-9, "{plates:?}");
+    let text = netlist(&found);
+    assert!(text.contains("[l=60u w=2u h=20u gap=2u electrode=bar"), "{text}");
     for degrees in [0.0, 37.0] {
         let mut sheet = Sheet::new(degrees, [0.0; 2]);
         sheet.pad([-15.0, -5.0], [0.0, 5.0]);

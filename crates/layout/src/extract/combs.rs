@@ -49,6 +49,8 @@ pub(super) struct FingerArray {
     pub(super) fingers: [usize; 2],
     pub(super) gap: f64,
     pub(super) overlap: f64,
+    /// Mean width of a finger.
+    pub(super) width: f64,
     /// Area of each part's fingers; none where another comb has them already.
     pub(super) masses: [Moments; 2],
     /// Isolated parts in the shape of its fingers.
@@ -213,6 +215,7 @@ fn comb(all: &[Finger], group: &[&NeighbourFingers], taken: &mut [bool]) -> Fing
         fingers,
         gap: mean(&|p| p.gap),
         overlap: mean(&|p| p.overlap),
+        width: mean(&|p| 0.5 * p.fingers.iter().map(|k| all[*k].width).sum::<f64>()),
         masses,
         loose: Vec::new(),
     }

@@ -183,6 +183,8 @@ pub struct ExtractedComb {
     pub gap: f64,
     /// Overlap as drawn (m).
     pub overlap: f64,
+    /// Mean width of a finger (m).
+    pub width: f64,
 }
 
 /// Two plates that face each other.
@@ -192,8 +194,10 @@ pub struct Plates {
     pub layer: usize,
     /// Nodes on both sides, across the gap.
     pub nodes: [usize; 2],
-    /// Area (m²).
-    pub area: f64,
+    /// Sides of the area that faces: along the gap, and the thickness of the layer (m).
+    pub sides: [f64; 2],
+    /// Depth of the parts behind it: the geometric mean of both, and at most ten thicknesses, beyond which the field does not depend on it (m).
+    pub depth: f64,
     /// Gap (m).
     pub gap: f64,
 }

@@ -140,6 +140,7 @@ impl ExtractionSink<'_> {
             fingers: order.map(|i| comb.fingers[i]),
             gap: comb.gap * self.unit,
             overlap: comb.overlap * self.unit,
+            width: comb.width * self.unit,
         });
     }
 }

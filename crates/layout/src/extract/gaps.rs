@@ -29,6 +29,8 @@ struct Face {
     b: [f64; 2],
     /// Width of the limb whose side it is; none for a body.
     limb: Option<f64>,
+    /// Mean depth of the part behind it.
+    depth: f64,
 }
 
 /// A place where something pulls at a part.
@@ -43,8 +45,8 @@ pub(super) struct Pull {
 /// A capacitor.
 #[derive(Debug, Clone)]
 pub(super) enum Gap {
-    /// Lumped plates: places on both parts across the gap, length, gap.
-    Plates { pulls: [Pull; 2], length: f64, gap: f64 },
+    /// Lumped plates: places on both parts across the gap, length, mean depth of the parts behind it, gap.
+    Plates { pulls: [Pull; 2], length: f64, depth: f64, gap: f64 },
     /// Along a beam: places along it, those across the gap, widths, gap.
     Beams { upper: Vec<Pull>, lower: Vec<Pull>, width: [f64; 2], gap: f64 },
 }
@@ -133,7 +135,7 @@ fn capacitor(f: &Face, g: &Face, u: [f64; 2], [from, to]: [f64; 2], gap: f64, be
     let Some(w) = f.limb.filter(|_| bends) else {
         let middle = 0.5 * (from + to);
         let pulls = [pull(f.part, at(middle, 0.0), false), pull(g.part, at(middle, gap), false)];
-        return Gap::Plates { pulls, length: to - from, gap };
+        return Gap::Plates { pulls, length: to - from, depth: (f.depth * g.depth).sqrt(), gap };
     };
     let other = g.limb.filter(|_| other_bends);
     let width = [w, other.unwrap_or(w)];
@@ -164,8 +166,8 @@ fn faces(k: usize, part: &Part) -> Vec<Face> {
         let d = limb.direction();
         let r = [0.5 * width * d[1], -0.5 * width * d[0]];
         let shifted = |p: [f64; 2], s: f64| place([p[0] + s * r[0], p[1] + s * r[1]]);
-        faces.push(Face { part: k, a: shifted(p, 1.0), b: shifted(q, 1.0), limb: Some(width) });
-        faces.push(Face { part: k, a: shifted(q, -1.0), b: shifted(p, -1.0), limb: Some(width) });
+        faces.push(Face { part: k, a: shifted(p, 1.0), b: shifted(q, 1.0), limb: Some(width), depth: width });
+        faces.push(Face { part: k, a: shifted(q, -1.0), b: shifted(p, -1.0), limb: Some(width), depth: width });
     }
     for joint in found.joints.iter().filter(|joint| matches!(joint.kind, JointRole::Body(_))) {
         let mut of_side: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
@@ -185,7 +187,9 @@ fn faces(k: usize, part: &Part) -> Vec<Face> {
         for (side, [from, to]) in of_side.into_iter().filter(|(_, [from, to])| to > from) {
             let [a, b] = axis.side(side);
             let at = |t: f64| place([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
-            faces.push(Face { part: k, a: at(from), b: at(to), limb: None });
+            let (a, b) = (at(from), at(to));
+            let depth = joint.cell.area / (b[0] - a[0]).hypot(b[1] - a[1]);
+            faces.push(Face { part: k, a, b, limb: None, depth });
         }
     }
     faces.retain(|f| f.a != f.b);

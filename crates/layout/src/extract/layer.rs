@@ -26,6 +26,9 @@ use std::sync::Arc;
 /// Bytes for each point of a layer while its axis is made.
 const BYTES_PER_POINT: usize = 1200;
 
+/// Largest depth of plates, in thicknesses of their layer: end of the range of the fringe field's law (1).
+const DEEPEST: f64 = 10.0;
+
 /// By what fraction of a part its pieces may miss its area (1).
 const BALANCE: f64 = 1e-9;
 
@@ -186,10 +189,12 @@ pub(super) fn extract(
     for gap in &gaps {
         let mut node = |pull: &Pull| pulled[pull.part].as_mut().and_then(Iterator::next);
         match gap {
-            gaps::Gap::Plates { pulls, length, gap } => {
+            gaps::Gap::Plates { pulls, length, depth, gap } => {
                 if let [Some(a), Some(b)] = [node(&pulls[0]), node(&pulls[1])] {
-                    let area = length * unit * layer.thickness;
-                    sink.result.plates.push(Plates { layer: sink.layer, nodes: [a, b], area, gap: gap * unit });
+                    let sides = [length * unit, layer.thickness];
+                    let depth = (depth * unit).min(DEEPEST * layer.thickness);
+                    let nodes = [a, b];
+                    sink.result.plates.push(Plates { layer: sink.layer, nodes, sides, depth, gap: gap * unit });
                 }
             }
             gaps::Gap::Beams { upper, lower, width, gap } => {

@@ -254,6 +254,7 @@ impl Words {
             RowValue::Angle(x) => format!("deg({})", degrees(*x)),
             RowValue::Plain(x) => number(*x),
             RowValue::Count(n) => n.to_string(),
+            RowValue::Word(word) => (*word).to_owned(),
         })
     }
 

@@ -78,6 +78,8 @@ pub(super) enum RowValue {
     Plain(f64),
     /// A whole number.
     Count(usize),
+    /// A word.
+    Word(&'static str),
 }
 
 impl RowValue {
@@ -85,11 +87,15 @@ impl RowValue {
         match self {
             Self::Long(x) | Self::Wide(x) | Self::Metres(x) | Self::Turn(x) | Self::Angle(x) | Self::Plain(x) => *x,
             Self::Count(n) => *n as f64,
+            Self::Word(_) => 0.0,
         }
     }
 
     /// One but for rounding.
     fn same(&self, other: &Self) -> bool {
+        if let (Self::Word(a), Self::Word(b)) = (self, other) {
+            return a == b;
+        }
         let (a, b) = (self.number(), other.number());
         let turns = matches!(self, Self::Turn(_));
         let off = if turns { (a - b).sin().abs().max(1.0 - (a - b).cos()) } else { (a - b).abs() };
@@ -218,6 +224,7 @@ impl<'a> RowBuilder<'a> {
                 let values = vec![
                     ("N", RowValue::Count(comb.gaps)),
                     ("gap", RowValue::Metres(comb.gap)),
+                    ("w", RowValue::Metres(comb.width)),
                     ("l", RowValue::Metres(comb.overlap)),
                     // the other side lies at 2·L − l
                     ("L", RowValue::Metres(0.5 * (d[0].hypot(d[1]) + comb.overlap))),
@@ -231,8 +238,14 @@ impl<'a> RowBuilder<'a> {
                 let [a, b] = plates.nodes;
                 let nodes = if backwards(self.between(frame, a, b)) { [b, a] } else { [a, b] };
                 let d = self.between(frame, nodes[0], nodes[1]);
-                let values =
-                    vec![("A", RowValue::Plain(plates.area)), ("gap", RowValue::Metres(plates.gap)), ("oz", turn(d))];
+                let values = vec![
+                    ("l", RowValue::Metres(plates.sides[0])),
+                    ("w", RowValue::Metres(plates.sides[1])),
+                    ("h", RowValue::Metres(plates.depth)),
+                    ("gap", RowValue::Metres(plates.gap)),
+                    ("electrode", RowValue::Word("bar")),
+                    ("oz", turn(d)),
+                ];
                 row("plategap2d", name(plates.layer), nodes.to_vec(), values)
             }
             Item::Facing(k) => {

@@ -18,6 +18,11 @@ fn insulation(layer: Option<InsulatingLayer>) -> impl Iterator<Item = (&'static 
     layer.into_iter().flat_map(|layer| [("td", layer.thickness), ("er", layer.permittivity)])
 }
 
+/// Offset voltage of a gap, where it has one.
+fn offset(volts: f64) -> Option<(&'static str, f64)> {
+    (volts != 0.0).then_some(("voffset", volts))
+}
+
 /// Law of the fringe field and shape of the electrode, where the netlist gives them.
 fn field_words(
     law: Option<Fringe>,
@@ -55,7 +60,7 @@ impl OfStructure<'_> {
             let mut parameters = vec![("l", gap.length), ("w1", upper.width), ("w2", lower.width), ("gap", gap.gap)];
             let (nodes, angle) = unmirrored(gap);
             parameters.extend([("oz", angle), ("V", voltage), ("permittivity", gap.permittivity)]);
-            parameters.extend(insulation(gap.insulation));
+            parameters.extend(insulation(gap.insulation).chain(offset(gap.offset)));
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             parameters.extend(gas(gap.gas.as_ref()));
             self.push(&gap.name, "gap2d", &process, &nodes, &parameters);
@@ -73,6 +78,7 @@ impl OfStructure<'_> {
         for comb in &structure.combs {
             let mut parameters = vec![("N", comb.gaps), ("gap", comb.gap), ("l", comb.overlap), ("L", comb.finger[0])];
             parameters.extend([("h", comb.height), turned(comb.axis), ("permittivity", comb.permittivity)]);
+            parameters.extend(offset(comb.offset));
             if comb.finger[1] > 0.0 {
                 parameters.push(("w", comb.finger[1]));
             }
@@ -105,7 +111,7 @@ impl OfStructure<'_> {
             let mut parameters = vec![("l", gap.length), ("w1", w1), ("w2", w2), ("gap", gap.gap), ("h", gap.height)];
             let (nodes, angle) = unmirrored(gap);
             parameters.extend([("oz", angle), ("permittivity", gap.permittivity)]);
-            parameters.extend(insulation(gap.insulation));
+            parameters.extend(insulation(gap.insulation).chain(offset(gap.offset)));
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             parameters.extend(gas(gap.gas.as_ref()));
             self.push(&gap.name, "gap2dforce", "*", &nodes, &parameters);
@@ -121,7 +127,7 @@ impl OfStructure<'_> {
                 parameters.extend([("l", gap.sides[0]), ("w", gap.sides[1])]);
                 parameters.extend((gap.thickness > 0.0).then_some(("h", gap.thickness)));
             }
-            parameters.extend(insulation(gap.insulation));
+            parameters.extend(insulation(gap.insulation).chain(offset(gap.offset)));
             parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             parameters.extend(gap.gas.map(|gas| ("filmstates", gas.states as f64)));
             let holes = gap.gas.and_then(|gas| gas.holes);
