@@ -5,9 +5,12 @@ use bimorph::analysis::continuation::{ContinuationRequest, PathInput, trace};
 use bimorph::analysis::mesh::pull_in_fitted;
 use bimorph::analysis::pull_in::pull_in;
 use bimorph::analysis::statics::static_equilibrium;
-use bimorph::compile::{CompileOptions, CompiledModel, compile};
+use bimorph::compile::{CompileOptions, CompiledModel, FringeFields, compile};
+use bimorph::device::local::LocalDevice;
+use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::netlist::Bundle;
 use bimorph::solve::continuation::Branch;
+use std::sync::Arc;
 
 const EPS: f64 = 8.854e-12;
 
@@ -191,6 +194,40 @@ fn analyses_agree_on_pull_in() {
     }
 }
 
+/// A plate that a long spring holds far from a thin layer is released at 1.5 % of its pull-in voltage. The path passes both limit points where `pullin` has them, and they are those of
+/// rigid plates, √(8·k·g³/(27·ε·A)) and √(2·k·(g − t)·t²/(ε·A)), within the penetration of the contact.
+#[test]
+fn a_path_reaches_a_low_release() {
+    let (k, g, t, area) = (0.106_447, 2.899_08e-6, 0.016_886_4e-6, 288.644e-6 * 202.051e-6);
+    let text = format!(
+        "anchor * [f] []
+         spring2d * [f m] [kx={k}]
+         mass2d * [m] [m=1e-10]
+         guide2d * [m] []
+         field plategap2d * [m e] [A={area} gap={g} touch={t}]
+         anchor * [e] []
+         eground * [e] []
+         drive port * [m e] []"
+    );
+    let compiled = built(&text, &CompileOptions::default());
+    let found = pull_in(&compiled, None, 100.0).unwrap();
+    let request = ContinuationRequest {
+        input: PathInput::Port("drive"),
+        from: 0.0,
+        to: 1.05 * found.pull_in_v,
+        voltages: vec![],
+        signals: vec![],
+        branch: Branch::Plus,
+        points: 2000,
+    };
+    let path = trace(&compiled, &request, &mut |_| true).unwrap();
+    assert_eq!((path.end, path.folds.len()), ("arrived", 2));
+    close(path.folds[0].value, found.pull_in_v, 1e-9);
+    close(path.folds[1].value, found.release_v.unwrap(), 1e-9);
+    close(path.folds[0].value, (8.0 * k * g.powi(3) / (27.0 * EPS * area)).sqrt(), 1e-6);
+    close(path.folds[1].value, (2.0 * k * (g - t) * t * t / (EPS * area)).sqrt(), 5e-3);
+}
+
 /// Charge (C) and force (N) at 1 V of a part that a stiff spring holds, between `m` and the fixed node `e` along x.
 fn held(element: &str, more: &str) -> [f64; 2] {
     let text = format!(
@@ -265,4 +302,153 @@ fn insulation_shortens_the_field() {
     let found = pull_in(&built(&text, &CompileOptions::default()), None, 100.0).unwrap();
     close(found.pull_in_v, (8.0 * air.powi(3) / (27.0 * EPS * 1e-8)).sqrt(), 1e-6);
     close(found.release_v.unwrap(), (2.0 * 1.9e-6 / (EPS * 1e-8)).sqrt() * 0.1e-6 / 3.9, 1e-2);
+}
+
+/// The option `fringe` gives gaps, plates and combs its law in place of their own: bits of the charge and of the deflection are those of the same law in the
+/// netlist, as SUGAR computes, too. Parts whose sizes are unknown have no field, and the warning about the range of a replaced law is dropped.
+#[test]
+fn an_option_prescribes_the_law() {
+    let gap = |drawn: &str, options: &CompileOptions| {
+        let compiled = built(&bars([2.0, 2.0, 2.0], 1.0, drawn), options);
+        let result = static_equilibrium(&compiled, &[("drive".into(), 9.0)]).unwrap();
+        [result.charges_c[0].1, node(&result, "m").y]
+    };
+    let plain = CompileOptions::default();
+    let all = [FringeFields::None, FringeFields::Parallel, FringeFields::Exact, FringeFields::Sugar];
+    for fringe in all {
+        let named = format!("fringe={}", fringe.name());
+        let option = CompileOptions { fringe, ..plain.clone() };
+        for drawn in ["", "fringe=none", "fringe=exact", "fringe=sugar"] {
+            assert_eq!(gap(drawn, &option), gap(&named, &plain), "{drawn} {named}");
+            let as_sugar = |options: CompileOptions| CompileOptions { as_sugar: true, ..options };
+            assert_eq!(gap(drawn, &as_sugar(option.clone())), gap(&named, &as_sugar(plain.clone())), "{drawn} {named}");
+        }
+    }
+    let element = |text: &str, fringe: FringeFields| {
+        let text = format!(
+            "process film = [ Youngsmodulus=165e9 density=2300 h=4u ]
+             anchor * [f] []
+             spring2d * [f m] [kx=1]
+             mass2d * [m] [m=1e-10]
+             guide2d * [m] []
+             {text}
+             anchor * [e] []
+             eground * [e] []
+             drive port * [m e] []"
+        );
+        let compiled = built(&text, &CompileOptions { fringe, ..CompileOptions::default() });
+        (static_equilibrium(&compiled, &[("drive".into(), 1.0)]).unwrap().charges_c[0].1, compiled.warnings.items.len())
+    };
+    let plate = "field plategap2d film [m e] [l=50u w=20u gap=4u]";
+    let edged = plate.replace("gap=4u", "gap=4u fringe=none");
+    let comb = "field comb2de film [m e] [N=20 gap=4u l=40u L=100u w=4u]";
+    for text in [plate, comb] {
+        let none = element(&text.replace("gap=4u", "gap=4u fringe=none"), FringeFields::Auto);
+        assert_eq!(element(text, FringeFields::None), none);
+        assert!(element(text, FringeFields::Auto).0 > 1.05 * none.0);
+        assert_eq!(element(text, FringeFields::Exact), element(text, FringeFields::Auto));
+    }
+    assert_eq!(element(&edged, FringeFields::Exact), element(plate, FringeFields::Auto));
+    let unknown = "field plategap2d * [m e] [A=1e-9 gap=4u]";
+    assert_eq!(element(unknown, FringeFields::Exact), element(unknown, FringeFields::Auto));
+    let beyond = "field comb2de film [m e] [N=20 gap=4u l=40u L=100u w=40u]";
+    assert_eq!([FringeFields::Auto, FringeFields::None].map(|law| element(beyond, law).1), [1, 0]);
+}
+
+/// A plate on a spring with the offset voltage `volts` in its gap, touching at 0.2 µm.
+fn charged(volts: f64) -> CompiledModel {
+    let text = format!(
+        "anchor * [f] []
+         spring2d * [f m] [kx=1]
+         mass2d * [m] [m=1e-10]
+         damper2d * [f m] [bx=1e-6]
+         guide2d * [m] []
+         field plategap2d * [m e] [A=1e-8 gap=2u touch=0.2u voffset={volts}]
+         anchor * [e] []
+         eground * [e] []
+         drive port * [m e] []"
+    );
+    built(&text, &CompileOptions::default())
+}
+
+/// Replies of a device at its port voltage (V): the static one, and that of a step of 1 µs from there.
+fn replies(compiled: &CompiledModel, volts: f64) -> [TrialReply; 2] {
+    let mut device = LocalDevice::new(Arc::new(compiled.clone()));
+    device.open(&OpenRequest { ports: Vec::new(), signals: vec!["m.x".into()], noise: None }).unwrap();
+    let mut replies = [TrialReply::default(), TrialReply::default()];
+    let at = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[volts] };
+    device.trial(&at, &mut replies[0]).unwrap();
+    let step = Trial { mode: Mode::Transient, parent: replies[0].token, t: 1e-6, dt: 1e-6, ..at };
+    device.trial(&step, &mut replies[1]).unwrap();
+    replies
+}
+
+/// Trapped charge shifts the voltage of a gap: at V with the offset v a plate rests, carries charge and responds, in statics and in a step, as at V + v without.
+/// Pull-in √(8·k·g³/(27·ε·A)) and release are lower by v, a sentence reports pull-in with a falling voltage, and a part that the offset alone holds stays closed.
+#[test]
+fn trapped_charge_shifts_the_voltage() {
+    let bare = charged(0.0);
+    for (offset, volts) in [(1.5, 0.0), (1.5, 1.0), (-0.7, 2.0), (-2.0, -0.5)] {
+        let (shifted, plain) = (replies(&charged(offset), volts), replies(&bare, volts + offset));
+        for (a, b) in shifted.iter().zip(&plain) {
+            for (a, b) in [(&a.charges, &b.charges), (&a.dq_dv, &b.dq_dv), (&a.outputs, &b.outputs)] {
+                a.iter().zip(b).for_each(|(a, b)| close(*a, *b, 1e-9));
+            }
+        }
+    }
+    let ideal = (8.0 * 8e-18 / (27.0 * EPS * 1e-8)).sqrt();
+    let without = pull_in(&bare, None, 50.0).unwrap();
+    close(without.pull_in_v, ideal, 1e-6);
+    assert!(without.warnings.is_empty());
+    for offset in [0.4, -0.4] {
+        let found = pull_in(&charged(offset), None, 50.0).unwrap();
+        close(found.pull_in_v, ideal - offset, 1e-6);
+        close(found.release_v.unwrap(), without.release_v.unwrap() - offset, 1e-6);
+        let wanted = format!("offset voltages act: with a falling voltage it pulls in at {:.4}", -(ideal + offset));
+        assert!(found.warnings[0].starts_with(&wanted), "{wanted} {:?}", found.warnings);
+    }
+    let held = pull_in(&charged(3.0), None, 50.0).unwrap();
+    assert_eq!((held.release_v, held.held), (None, true));
+}
+
+/// Published beams without fringe field, with 1 + 0.65·g/h and in the exact field, by the option. A cantilever of 300 × 20 × 2 µm over 2 µm, E = 153 GPa: 6.1845 V and 6.0526 V
+/// (beam equation, independent computation; the closed form of Osterberg and Senturia, J. Microelectromech. Syst. 6 (1997) 107: 6.0554 V). A clamped beam of 100 × 20 × 2 µm
+/// over 4 µm, E = 169 GPa, linear, with stretching, and with 100 MPa beside it: 1068.5, 1370.7 and 1519.6 V (beam equation, independent computation). ANSYS has 992, 1270 and
+/// 1408 V with the field of its elements (beam model in VHDL-AMS by V. Kolchuzhin): 7 to 8 % below these, and within 3 % of the exact field.
+#[test]
+fn published_beams_pull_in() {
+    let beam = |sizes: [f64; 3], modulus: f64, clamped: bool, stress: f64| {
+        let [length, w, gap] = sizes;
+        let far = if clamped { "anchor metal [b] []" } else { "" };
+        format!(
+            "process metal = [ Youngsmodulus={modulus}e9 Poisson=0.066 density=2329 h=20u stress={stress} ]
+             anchor metal [a] []
+             {far}
+             beam2d metal [a b] [l={length}u w={w}u]
+             gap2dforce metal [a b c d] [l={length}u w={w}u gap={gap}u]
+             anchor metal [c] []
+             anchor metal [d] []
+             R * [a b] [R=1]
+             R * [c d] [R=1]
+             eground * [a] []
+             drive port * [c a] []"
+        )
+    };
+    let volts = |text: &str, fringe: FringeFields, linear: bool| {
+        let compiled = built(text, &CompileOptions { fringe, linear, ..CompileOptions::default() });
+        pull_in_fitted(&compiled, None, 3000.0).unwrap().1.pull_in_v
+    };
+    let cantilever = beam([300.0, 2.0, 2.0], 153.0, false, 0.0);
+    close(volts(&cantilever, FringeFields::None, false), 6.1845, 1e-3);
+    close(volts(&cantilever, FringeFields::Parallel, false), 6.0526, 1e-3);
+    close(volts(&cantilever, FringeFields::Parallel, false), 6.0554, 1e-3);
+    for (stress, linear, plain, published) in
+        [(0.0, true, 1068.5, 992.0), (0.0, false, 1370.7, 1270.0), (1e8, false, 1519.6, 1408.0)]
+    {
+        let text = beam([100.0, 2.0, 4.0], 169.0, true, stress);
+        close(volts(&text, FringeFields::None, linear), plain, 3e-3);
+        let exact = volts(&text, FringeFields::Exact, linear);
+        close(exact, published, 3e-2);
+        assert!(published / plain < 0.932 && exact < 0.957 * plain, "{exact}");
+    }
 }

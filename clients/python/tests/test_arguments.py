@@ -88,6 +88,7 @@ OPTIONS: dict[str, Accepts] = {
     "band": either(nothing, number(0.0, 1e12, open_low=True)),
     "junctions": nothing,
     "anchors": nothing,
+    "fringe": nothing,
     "linear": either(nothing, flag),
     "undamped": either(nothing, flag),
     "scheme": nothing,

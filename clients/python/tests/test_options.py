@@ -21,6 +21,7 @@ def test_every_option_reaches_the_server(client: bimorph.Client) -> None:
         {"band": 1e6},
         {"junctions": "offset"},
         {"anchors": "elastic"},
+        {"fringe": "none"},
         {"linear": True},
         {"undamped": True},
         {"scheme": "d1"},
@@ -47,6 +48,7 @@ def test_every_option_reaches_the_server(client: bimorph.Client) -> None:
         ("segments", 100_001, "from 1 to 100000"),
         ("junctions", "welded", '"centreline", "offset" or "calibrated"'),
         ("anchors", "glued", '"auto", "rigid" or "elastic"'),
+        ("fringe", "palmer", '"auto", "none", "parallel", "exact" or "sugar"'),
     ],
 )
 def test_ranges(client: bimorph.Client, name: str, value: Any, expected: str) -> None:

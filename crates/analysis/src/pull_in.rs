@@ -62,6 +62,7 @@ pub(super) fn pull_in_with(
     let name = system.electrics.names[source].clone();
     let estimated_error = compiled.order.estimated_error;
     let mut sweep = VoltageSweep::new(compiled, off, source);
+    sweep.opposite = opposite(compiled, &sweep, max);
     let q = sweep.at_rest()?;
     let result = |pull_in_v: f64, held: bool, sweep: &VoltageSweep<'_>| PullInResult {
         port: name,
@@ -85,6 +86,19 @@ pub(super) fn pull_in_with(
             })
         }
     }
+}
+
+/// The voltage of the opposite polarity that pulls the part in, as a sentence, where an offset voltage of a gap makes both differ.
+fn opposite(compiled: &CompiledModel, sweep: &VoltageSweep<'_>, max: f64) -> Option<String> {
+    compiled.structure.gap_offsets().next()?;
+    let mut sweep = sweep.reversed();
+    let found = sweep.at_rest().and_then(|q| sweep.close(q, max));
+    Some(match found {
+        Ok(PostPullIn::Falls { volts: fold } | PostPullIn::Rests { fold, .. }) => {
+            format!("offset voltages act: with a falling voltage it pulls in at {:.6} V", -fold)
+        }
+        Err(_) => format!("offset voltages act: no pull-in was found from 0 V down to {:.6} V", -max),
+    })
 }
 
 /// Index of the source to sweep.

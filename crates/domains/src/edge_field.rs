@@ -92,6 +92,7 @@ impl EdgeField {
         [w, l].map(|across| {
             let edges = match (law, plate.electrode) {
                 (Fringe::None | Fringe::Sugar, _) => Self::None,
+                (Fringe::Exact, _) if plate.thickness == 0.0 => Self::None,
                 (Fringe::Parallel, _) => Self::Parallel { factor: PARALLEL / across, inverse: 1.0 / across },
                 (Fringe::Exact, Some(ElectrodeShape::Bar)) => Self::between_bars(across, plate.thickness, plate.gap),
                 (Fringe::Exact, _) => Self::over_plane(across, plate.thickness, plate.gap),

@@ -8,11 +8,11 @@ use bimorph_base::{Diagnostic, Diagnostics, Setting};
 use bimorph_multibody::joint_coordinates::sprung_loops::UnsupportedModel;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::equations::Joints;
-use bimorph_structure::{FrontEnd, Structure};
+use bimorph_structure::{Fringe, FrontEnd, Structure};
 use std::sync::Arc;
 use thiserror::Error;
 
-pub use crate::options::{Anchors, CompileOptions, Formulation, Junctions, Scheme};
+pub use crate::options::{Anchors, CompileOptions, Formulation, FringeFields, Junctions, Scheme};
 
 /// A ready model with everything it came from.
 #[derive(Debug, Clone)]
@@ -132,13 +132,14 @@ pub fn draw(source: &dyn FrontEnd, options: &CompileOptions) -> Result<ParsedStr
         (options.linear, options.junctions, options.anchors) = (true, Junctions::Centreline, Anchors::Rigid);
     }
     let loaded = source.load(&options.set).map_err(CompileError::Netlist)?;
-    let structure = if options.without_circuit { loaded.structure.without_circuit() } else { loaded.structure };
-    Ok(ParsedStructure {
-        structure: Arc::new(structure),
-        parameters: loaded.parameters,
-        warnings: loaded.warnings,
-        options,
-    })
+    let mut structure = if options.without_circuit { loaded.structure.without_circuit() } else { loaded.structure };
+    let mut warnings = loaded.warnings;
+    if let Some(law) = options.fringe.law() {
+        structure.prescribe_fringe(law);
+        // of the range of the law that is replaced, and of the factor that it cancels
+        warnings.items.retain(|d| !(d.code == "W025" || d.code == "W026" && law != Fringe::Exact));
+    }
+    Ok(ParsedStructure { structure: Arc::new(structure), parameters: loaded.parameters, warnings, options })
 }
 
 impl ParsedStructure {

@@ -1,5 +1,6 @@
 //! Interactions of two parts across a gap: combs, plates, facing beams, and stops.
 
+use super::Structure;
 use super::node::NodeId;
 use serde::{Deserialize, Serialize};
 
@@ -137,6 +138,9 @@ pub struct Comb {
     pub sliding: f64,
     /// False for SUGAR's `comb2d`, whose force is constant whatever the overlap.
     pub finite: bool,
+    /// Voltage that trapped charge adds to that of its nodes, from the second side to the first (V).
+    #[serde(default)]
+    pub offset: f64,
     /// Where its voltage comes from.
     pub voltage: GapVoltage,
 }
@@ -161,7 +165,7 @@ pub struct PlateGap {
     /// Sides of a rectangular plate (m); 0: unknown, and no fringe field.
     #[serde(default)]
     pub sides: [f64; 2],
-    /// Thickness of the plate (m).
+    /// Thickness of the plate (m); 0: unknown, and no field in `exact`.
     #[serde(default)]
     pub thickness: f64,
     /// Law of the fringe field of a plate with sides; none: `exact`, and no field in a model as SUGAR computes.
@@ -182,6 +186,9 @@ pub struct PlateGap {
     /// Gas between the plates; none: it does not damp.
     #[serde(default)]
     pub gas: Option<FacingGas>,
+    /// Voltage that trapped charge adds to that of its nodes, from the second side to the first (V).
+    #[serde(default)]
+    pub offset: f64,
     /// Where its voltage comes from.
     pub voltage: GapVoltage,
 }
@@ -276,6 +283,9 @@ pub struct BeamGap {
     /// Gas between the beams; none: it does not damp.
     #[serde(default)]
     pub gas: Option<FacingGas>,
+    /// Voltage that trapped charge adds to that of its nodes, from the second side to the first (V).
+    #[serde(default)]
+    pub offset: f64,
     /// Where its voltage comes from.
     pub voltage: GapVoltage,
 }
@@ -302,6 +312,23 @@ impl BeamGap {
     pub fn shape(&self, fixed: bool) -> ElectrodeShape {
         let flat = fixed && self.widths[0] > 0.0 && self.height > FLAT * self.widths[0];
         self.electrode.unwrap_or(if flat { ElectrodeShape::Plane } else { ElectrodeShape::Bar })
+    }
+}
+
+impl Structure {
+    /// Gaps, plates and combs with an offset voltage (V), by name.
+    pub fn gap_offsets(&self) -> impl Iterator<Item = (&str, f64)> {
+        let gaps = self.beam_gaps.iter().map(|gap| (gap.name.as_str(), gap.offset));
+        let plates = self.plate_gaps.iter().map(|plate| (plate.name.as_str(), plate.offset));
+        let combs = self.combs.iter().map(|comb| (comb.name.as_str(), comb.offset));
+        gaps.chain(plates).chain(combs).filter(|(_, offset)| *offset != 0.0)
+    }
+
+    /// Gives all gaps, plates and combs the same law of their fringe fields.
+    pub fn prescribe_fringe(&mut self, law: Fringe) {
+        let gaps = self.beam_gaps.iter_mut().map(|gap| &mut gap.law);
+        let plates = self.plate_gaps.iter_mut().map(|plate| &mut plate.law);
+        gaps.chain(plates).chain(self.combs.iter_mut().map(|comb| &mut comb.law)).for_each(|own| *own = Some(law));
     }
 }
 

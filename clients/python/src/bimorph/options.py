@@ -25,6 +25,11 @@ class Options(TypedDict, total=False):
     on a base of like stiffness; auto: elastic where the layer has an undercut, else rigid
     (docs/explanation/junctions.md). One of auto, rigid or elastic; default: auto."""
 
+    fringe: Literal["auto", "none", "parallel", "exact", "sugar"] | None
+    """Law of the fringe fields of all gaps, plates and combs, in place of those that the netlist names. none,
+    parallel, exact or sugar (docs/reference/elements.md#fringe-fields-of-gaps); auto: as the netlist says, by
+    default exact. One of auto, none, parallel, exact, sugar; default: auto."""
+
     linear: bool | None
     """Small displacements about the drawn geometry, as SUGAR."""
 
@@ -73,6 +78,7 @@ WIRE = {
     "band": "band_hz",
     "junctions": "junctions",
     "anchors": "anchors",
+    "fringe": "fringe",
     "linear": "linear",
     "undamped": "undamped",
     "scheme": "scheme",

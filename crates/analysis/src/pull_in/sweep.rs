@@ -40,6 +40,10 @@ pub(super) struct VoltageSweep<'a> {
     /// Source voltages with the swept one at 0 V.
     off: Vec<f64>,
     source: usize,
+    /// Sign of the swept voltage: −1 where it falls from 0 V.
+    sign: f64,
+    /// Pull-in of the opposite polarity, as a sentence.
+    pub(super) opposite: Option<String>,
     equilibrium: Equilibrium,
     /// Stability losses before any voltage, as a sentence.
     jumped: Option<&'static str>,
@@ -60,6 +64,8 @@ impl<'a> VoltageSweep<'a> {
             system,
             off,
             source,
+            sign: 1.0,
+            opposite: None,
             equilibrium: Equilibrium::new(system, EquilibriumOptions::with_side(compiled.options.other_branch)),
             jumped: None,
             rest: Vec::new(),
@@ -68,9 +74,14 @@ impl<'a> VoltageSweep<'a> {
         }
     }
 
+    /// The same with the opposite polarity.
+    pub(super) fn reversed(&self) -> Self {
+        Self { sign: -self.sign, ..Self::new(self.compiled, self.off.clone(), self.source) }
+    }
+
     fn sources(&self, volts: f64) -> Vec<f64> {
         let mut u = self.off.clone();
-        u[self.source] = volts;
+        u[self.source] = self.sign * volts;
         u
     }
 
@@ -156,7 +167,8 @@ impl<'a> VoltageSweep<'a> {
                 Some(format!("before that it jumps at {} without closing a gap, and continues from there", named(some)))
             }
         };
-        self.jumped.map(str::to_owned).into_iter().chain(passed).chain(self.of_closed.clone()).collect()
+        let jumped = self.jumped.map(str::to_owned);
+        jumped.into_iter().chain(passed).chain(self.of_closed.clone()).chain(self.opposite.clone()).collect()
     }
 
     /// The voltage at which contact begins or ends where no fold was found, between `holds` and `falls`: by bisection on whether

@@ -1,7 +1,7 @@
 //! Resistors, heated beams, sources and ports → potentials, port conductances and quadratic forms of temperature.
 //!
-//! Sources are numbered ports first, then the netlist's voltage sources, then one for each gap with a fixed voltage (which
-//! touches no node).
+//! Sources are numbered ports first, then the netlist's voltage sources, then one for each gap with a fixed voltage, and one
+//! for each with an offset voltage (both touch no node).
 
 use super::error::DiscretizeError;
 use super::rigid::RigidGroups;
@@ -11,6 +11,7 @@ use bimorph_domains::thermal::{HeatConductor, Heating};
 use bimorph_domains::{Member, PlacedMember};
 use bimorph_structure::{GapVoltage, Structure};
 use nalgebra::{DMatrix, RowDVector};
+use std::collections::HashMap;
 
 /// Builds the electrical side; `heated` lists the beams that are heaters, in heater order, and `gaps` what
 /// acts across gaps.
@@ -89,6 +90,7 @@ pub fn lay(
         };
         rows.push((g, row));
     }
+    let shifted = offset_sources(structure, gaps, (&mut fixed, &mut names));
     let sources = ports + fixed.len();
     let mut gap_rows = DMatrix::zeros(gaps.len(), sources);
     for (g, row) in rows {
@@ -97,6 +99,7 @@ pub fn lay(
             Err(own) => gap_rows[(g, own)] = 1.0,
         }
     }
+    shifted.into_iter().for_each(|(g, own)| gap_rows[(g, ports + own)] = 1.0);
     let mut sink = vec![false; structure.nodes.len()];
     for n in (0..structure.nodes.len()).filter(|n| structure.nodes[*n].mechanical && rigid.grounded(*n)) {
         sink[net[n]] = true;
@@ -110,6 +113,24 @@ pub fn lay(
     let mut conductance = DMatrix::zeros(ports, sources);
     conductance.view_mut((0, 0), (ports, driven)).copy_from(&potentials.conductance.rows(0, ports));
     Ok(Electrics { ports, fixed, names, gap_rows, conductance, heating, inputs: Vec::new() })
+}
+
+/// Adds a source for each gap in which trapped charge acts as one in series; the gaps, with the numbers of their sources among the `fixed` ones.
+fn offset_sources(
+    structure: &Structure,
+    gaps: &[PlacedMember<'_, Member>],
+    (fixed, names): (&mut Vec<f64>, &mut Vec<String>),
+) -> Vec<(usize, usize)> {
+    let offsets: HashMap<&str, f64> = structure.gap_offsets().collect();
+    let mut shifted = Vec::new();
+    for (g, gap) in gaps.iter().enumerate().filter(|(_, gap)| gap.voltage.is_some()) {
+        if let Some(volts) = offsets.get(gap.name) {
+            shifted.push((g, fixed.len()));
+            fixed.push(*volts);
+            names.push(format!("{}.voffset", gap.name));
+        }
+    }
+    shifted
 }
 
 /// Relative change of resistances by which gap voltages are tested (1).

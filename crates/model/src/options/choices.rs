@@ -1,5 +1,6 @@
-//! Options that take one of a few names: how beams are cut, how they meet, and what becomes of bodies and joints.
+//! Options that take one of a few names: how beams are cut, how they meet, the field at their edges, and what becomes of bodies and joints.
 
+use bimorph_structure::Fringe;
 use serde::{Deserialize, Serialize};
 
 /// An enum whose variants have names: the same in files, on the command line, on the wire, in decks and in Python.
@@ -91,6 +92,36 @@ choice! {
         Rigid = "rigid",
         /// A beam ends in the compliance of its root: a pad of its layer on a base of like stiffness.
         Elastic = "elastic",
+    }
+}
+
+choice! {
+    /// Law of the fringe fields of all gaps.
+    FringeFields {
+        /// The law that each gap or its layer names, else the default of its element.
+        #[default]
+        Auto = "auto",
+        /// No field outside the facing areas.
+        None = "none",
+        /// 1 + 0.65·g/h on the pressure.
+        Parallel = "parallel",
+        /// The exact plane field.
+        Exact = "exact",
+        /// SUGAR's factor of the drawn gap.
+        Sugar = "sugar",
+    }
+}
+
+impl FringeFields {
+    /// The law that it prescribes.
+    pub fn law(self) -> Option<Fringe> {
+        match self {
+            Self::Auto => None,
+            Self::None => Some(Fringe::None),
+            Self::Parallel => Some(Fringe::Parallel),
+            Self::Exact => Some(Fringe::Exact),
+            Self::Sugar => Some(Fringe::Sugar),
+        }
     }
 }
 

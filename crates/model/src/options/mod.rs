@@ -15,7 +15,7 @@ pub mod error_budget;
 pub mod model;
 pub mod table;
 
-pub use choices::{Anchors, Formulation, Junctions, Scheme};
+pub use choices::{Anchors, Formulation, FringeFields, Junctions, Scheme};
 pub use error_budget::ErrorBudget;
 pub use model::{CompileOptions, MODEL, ModelOption};
 pub use table::{OptionDescription, OptionError, OptionValue, Range};

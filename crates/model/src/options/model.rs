@@ -5,7 +5,7 @@
 //! the table in docs/reference/options.md. After a change, `BIMORPH_WRITE=1 cargo test --test options` writes what is generated
 //! from it.
 
-use super::choices::{Anchors, Formulation, Junctions, Scheme};
+use super::choices::{Anchors, Formulation, FringeFields, Junctions, Scheme};
 use super::table::{Field, OptionDescription, OptionError, OptionValue, Range};
 use bimorph_base::Setting;
 use std::sync::LazyLock;
@@ -76,6 +76,10 @@ options! {
     /// How anchors hold beams. rigid: without any motion; elastic: a beam ends in the compliance of its root, a pad on a base
     /// of like stiffness; auto: elastic where the layer has an undercut, else rigid (docs/explanation/junctions.md).
     anchors: Anchors = Anchors::Auto, "anchors" = 16, [""], Range::Names(&Anchors::NAMES), "";
+
+    /// Law of the fringe fields of all gaps, plates and combs, in place of those that the netlist names. none, parallel, exact or sugar
+    /// (docs/reference/elements.md#fringe-fields-of-gaps); auto: as the netlist says, by default exact.
+    fringe: FringeFields = FringeFields::Auto, "fringe" = 17, [""], Range::Names(&FringeFields::NAMES), "";
 
     /// Small displacements about the drawn geometry, as SUGAR.
     linear: bool = false, "linear" = 4, [""], Range::Flag, "";

@@ -3,7 +3,7 @@
 //! A front end reads user input as an [`OptionValue`] and passes it to [`OptionDescription::check`]; help, declarations
 //! and tables come from here.
 
-use super::choices::{Anchors, Formulation, Junctions, Scheme};
+use super::choices::{Anchors, Formulation, FringeFields, Junctions, Scheme};
 use std::fmt;
 use thiserror::Error;
 
@@ -212,4 +212,4 @@ macro_rules! named_field {
     )+};
 }
 
-named_field!(Scheme, Junctions, Anchors, Formulation);
+named_field!(Scheme, Junctions, Anchors, FringeFields, Formulation);

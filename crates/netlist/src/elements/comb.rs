@@ -30,6 +30,7 @@ impl ElementSite<'_, '_> {
         if width == 0.0 && law == Some(Fringe::Exact) && self.is_given("fringe") {
             return Err(self.missing("w"));
         }
+        let offset = self.offset()?;
         let sliding = self.between_fingers(gap)? * gaps * height / gap;
         let axis = [angle.cos(), angle.sin()];
         let (a, b) = (self.node(0), self.node(1));
@@ -52,6 +53,7 @@ impl ElementSite<'_, '_> {
             law,
             sliding,
             finite,
+            offset,
             voltage,
         });
         Ok(())

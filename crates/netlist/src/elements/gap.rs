@@ -77,6 +77,11 @@ impl ElementSite<'_, '_> {
         Ok(Impact { restitution, speed })
     }
 
+    /// Offset voltage of trapped charge (V).
+    pub(super) fn offset(&mut self) -> Result<f64, Reported> {
+        Ok(self.number("voffset")?.unwrap_or(0.0))
+    }
+
     /// Law of the fringe field, where the element or its layer names one.
     pub(super) fn fringe(&mut self) -> Result<Option<Fringe>, Reported> {
         self.word("fringe", &Fringe::NAMES)
@@ -170,6 +175,7 @@ impl ElementSite<'_, '_> {
         let touch = self.inclined_touch(touch, gap)?;
         let impact = self.impact()?;
         let gas = self.gas(Some([length, height]), length * height, gap)?;
+        let offset = self.offset()?;
         let below = -(gap + (w1 + w2) / 2.0);
         let nodes: [NodeId; 4] = std::array::from_fn(|i| self.node(i));
         let offsets = [[0.0; 2], [length, 0.0], [0.0, below], [length, below]].map(|v| self.global(v));
@@ -190,6 +196,7 @@ impl ElementSite<'_, '_> {
             touch,
             impact,
             gas,
+            offset,
             voltage,
         });
         Ok(())
@@ -328,13 +335,14 @@ pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported>
         return Err(site.sink.error("E053", site.span_of("fringe"), message, "give `l` and `w`"));
     }
     let exact = shaped && matches!(law, None | Some(Fringe::Exact));
-    let thickness = if exact { site.positive("h")? } else { 0.0 };
+    let thickness = if exact { site.positive("h")? } else { site.positive_if_any("h")?.unwrap_or(0.0) };
     let (insulation, touch) = site.insulation(gap)?;
     let touch = if over_plane { touch } else { site.inclined_touch(touch, gap)? };
     let impact = site.impact()?;
     let gas = site.gas(shaped.then_some(sides), area, gap)?;
     let axis = [angle.cos(), angle.sin()];
     let (a, b) = (site.node(0), site.node(1));
+    let offset = site.offset()?;
     let voltage = site.across(0, 1);
     site.drawing.place(site.instance.span, &[a, b], &[[0.0; 2], [apart * axis[0], apart * axis[1]]]);
     let name = site.name();
@@ -354,6 +362,7 @@ pub(super) fn plategap2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported>
         touch,
         impact,
         gas,
+        offset,
         voltage,
     };
     site.drawing.structure.plate_gaps.push(plate);

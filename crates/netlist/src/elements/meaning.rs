@@ -84,6 +84,7 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "softening" => "temperature without strength [K]",
         "td" => "thickness of the insulation [m]",
         "er" => "relative permittivity of the insulation [1]",
+        "voffset" => "offset voltage of trapped charge [V]",
         "fringe" => "law of the fringe field",
         "electrode" => "shape of the lower electrode",
         "curvature" => "rest curvature [1/m]",
