@@ -198,7 +198,7 @@ fn analyses_agree_on_pull_in() {
 /// rigid plates, √(8·k·g³/(27·ε·A)) and √(2·k·(g − t)·t²/(ε·A)), within the penetration of the contact.
 #[test]
 fn a_path_reaches_a_low_release() {
-    let (k, g, t, area) = (0.106_447, 2.899_08e-6, 0.016_886_4e-6, 288.644e-6 * 202.051e-6);
+    let (k, g, t, area): (f64, f64, f64, f64) = (0.106_447, 2.899_08e-6, 0.016_886_4e-6, 288.644e-6 * 202.051e-6);
     let text = format!(
         "anchor * [f] []
          spring2d * [f m] [kx={k}]
