@@ -70,6 +70,7 @@ record! {
         law: "", Any, "Law of the fringe field; left out: exact where the width is known";
         sliding = 0.0: "Pa·s", NonNegative, "Drag of the gas between the fingers, per rate and overlap; left out: 0";
         finite: "", Any, "False: the force is constant whatever the overlap";
+        offset = 0.0: "V", Any, "Voltage that trapped charge adds in series; left out: 0";
         voltage: "V", Any, "A fixed voltage, or the nodes between which it lies";
     }
 }
@@ -91,6 +92,7 @@ record! {
         touch: "m", Positive, "Distance at which the plates touch; left out: that of nearly closed gaps";
         impact: "", Any, "Impact losses";
         gas: "", Any, "Gas between the plates; left out: it does not damp";
+        offset = 0.0: "V", Any, "Voltage that trapped charge adds in series; left out: 0";
         voltage: "V", Any, "A fixed voltage, or the nodes between which it lies";
     }
 }
@@ -112,6 +114,7 @@ record! {
         touch: "m", Positive, "Distance at which the beams touch; left out: that of nearly closed gaps";
         impact: "", Any, "Impact losses";
         gas: "", Any, "Gas between the beams; left out: it does not damp";
+        offset = 0.0: "V", Any, "Voltage that trapped charge adds in series; left out: 0";
         voltage: "V", Any, "A fixed voltage, or the nodes between which it lies";
     }
 }
