@@ -94,7 +94,9 @@ pub fn of_run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> (Chos
 pub fn locked_model(formulation: Formulation, model: &Model) -> Cow<'_, Model> {
     match formulation {
         Formulation::Rcr => Cow::Owned(model.rotary()),
-        Formulation::Auto | Formulation::Compliant | Formulation::RcrElastic => Cow::Borrowed(model),
+        Formulation::Auto | Formulation::Compliant | Formulation::RcrElastic | Formulation::Reduced => {
+            Cow::Borrowed(model)
+        }
     }
 }
 

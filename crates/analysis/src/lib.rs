@@ -29,6 +29,7 @@ pub mod overheating;
 pub mod path_parameter;
 pub mod pull_in;
 pub mod readout;
+pub mod reduced;
 mod rotary_inertia_error;
 mod sensitivity;
 mod stability;

@@ -24,7 +24,7 @@ use super::transient::{TransientOptions, TransientResult, transient};
 use super::{AnalysisError, ProgressCallback};
 use crate::formulation;
 use bimorph_model::compile::CompiledModel;
-use bimorph_model::options::ErrorBudget;
+use bimorph_model::options::{ErrorBudget, Formulation};
 use companion::{companion, compared};
 pub use run::RunFunction;
 use run::{AT_THE_END, MAX_AGAIN, MAX_STORED_SAMPLES};
@@ -88,6 +88,7 @@ fn held<T>(
 fn propagates(options: &TransientOptions<'_>, model: &CompiledModel) -> bool {
     let system = &model.parts.system;
     formulation::of_run(model, options).1 == Integrator::Rodas4
+        && model.options.formulation != Formulation::Reduced
         && options.step.is_none()
         && options.points >= 2
         && !options.signals.is_empty()

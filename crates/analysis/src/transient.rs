@@ -16,6 +16,7 @@ mod samples;
 use super::formulation::{self, Formulation};
 use super::integrator::Integrator;
 use super::joint_transient::joint_transient;
+use super::reduced::reduced_transient;
 use super::{AnalysisError, ProgressCallback};
 use bimorph_domains::{Ramp, System};
 use bimorph_model::compile::CompiledModel;
@@ -88,6 +89,9 @@ pub fn transient(
             let options = TransientOptions { method, ..options.clone() };
             joint_transient(compiled, formulation, &options, sample, watch).map(|(r, _)| r)
         }
+        Formulation::Reduced => reduced_transient(compiled, options, sample, watch, &mut |sample, watch| {
+            record(compiled, options, &mut Compliant { system, options }, sample, watch)
+        }),
         _ => record(compiled, options, &mut Compliant { system, options }, sample, watch),
     }
 }

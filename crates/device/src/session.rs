@@ -14,7 +14,7 @@ use bimorph_analysis::transient::first_step;
 use bimorph_base::budget;
 use bimorph_domains::drive::Electrics;
 use bimorph_domains::{Drive, System};
-use bimorph_model::compile::CompiledModel;
+use bimorph_model::compile::{CompiledModel, Formulation};
 use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::equations::bodies::NormWeights;
@@ -70,6 +70,13 @@ const DOUBLES: usize = 64;
 
 impl DeviceSession {
     pub(super) fn open(compiled: &CompiledModel, request: &OpenRequest) -> Result<(Self, Description), DeviceError> {
+        if compiled.options.formulation == Formulation::Reduced {
+            return Err(DeviceError::BadRequest {
+                what: "formulation",
+                expected: "compliant, rcr or rcr-elastic in a circuit; static and tran have reduced models".into(),
+                got: Formulation::Reduced.name().to_owned(),
+            });
+        }
         let ports = OpenedPorts::find(compiled, &request.ports)?;
         let own = ports.system.clone();
         let system = own.as_deref().unwrap_or(&compiled.parts.system);

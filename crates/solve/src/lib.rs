@@ -6,6 +6,7 @@
 //! | [`continuation`] | equilibrium paths by arc length: folds, bifurcations, branches |
 //! | [`frequency`] | natural frequencies, and the response at one frequency |
 //! | [`time`] | motion: integrators, their drivers, and events |
+//! | [`reduced`] | reduced models in joint coordinates |
 //! | [`baseline`] | other solvers and models, to compare with |
 //!
 //! **Architecture invariant.** Below are [`bimorph_domains`] and [`bimorph_multibody`]. Solvers read no options of the
@@ -16,6 +17,7 @@ pub mod continuation;
 pub mod equations;
 pub mod equilibrium;
 pub mod frequency;
+pub mod reduced;
 pub mod time;
 
 // the same modules by the names that they had before there were folders

@@ -67,10 +67,11 @@ class Options(TypedDict, total=False):
     """The mechanism without the circuit that is drawn around it (R, C, L, sources, amplifiers): its electrical
     nodes are ports by their names, for a deck that has the circuit."""
 
-    formulation: Literal["auto", "compliant", "rcr", "rcr-elastic"] | None
+    formulation: Literal["auto", "compliant", "rcr", "rcr-elastic", "reduced"] | None
     """How bodies become equations. compliant: every body's own coordinates; rcr: joint coordinates on a tree,
     loops closed inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method;
-    auto: what suits. One of auto, compliant, rcr, rcr-elastic; default: compliant."""
+    reduced: few joint coordinates (static, tran); auto: what suits. One of auto, compliant, rcr, rcr-elastic,
+    reduced; default: compliant."""
 
 
 WIRE = {

@@ -11,6 +11,7 @@ use super::super::beam_states::{BeamState, beam_states};
 pub(super) use super::super::chart::error::SMALL;
 use super::super::gap_shape;
 use super::super::linear_stress::left_out;
+use super::super::reduced;
 use super::super::statics::{
     OperatingPoint, StaticResult, beam_motions, operating_point, operating_point_near, result_at,
 };
@@ -22,7 +23,7 @@ use super::remeshed::{chosen, meshed, on};
 use super::softening;
 use super::warnings::{near_buckling, of_fingers, of_heat, of_segments, of_strength, of_stress};
 use bimorph_base::Diagnostic;
-use bimorph_model::compile::CompiledModel;
+use bimorph_model::compile::{CompiledModel, Formulation};
 use bimorph_model::refine::doubling::{self, Output};
 use bimorph_model::refine::mesh_search::Mesh;
 use bimorph_model::refine::transfer::carried;
@@ -324,8 +325,8 @@ pub fn static_fitted(
     compiled: &CompiledModel,
     voltages: &PortVoltages,
 ) -> Result<(CompiledModel, StaticResult, BeamMotions), AnalysisError> {
-    let (fitted, point) = point_fitted(compiled, voltages)?;
-    let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
+    let (fitted, point, directions) = point_fitted(compiled, voltages)?;
+    let (result, curves) = (result_of(&fitted, &point, directions), beam_motions(&fitted, &point.q));
     Ok((fitted, result, curves))
 }
 
@@ -334,8 +335,8 @@ pub fn static_fitted(
 /// # Errors
 /// See [`super::static_fitted`].
 pub fn static_with_beams(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<StaticWithBeams, AnalysisError> {
-    let (fitted, point) = point_fitted(compiled, voltages)?;
-    let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
+    let (fitted, point, directions) = point_fitted(compiled, voltages)?;
+    let (result, curves) = (result_of(&fitted, &point, directions), beam_motions(&fitted, &point.q));
     let beams = beam_states(&fitted, &point);
     Ok(StaticWithBeams { fitted, result, curves, beams })
 }
@@ -353,16 +354,37 @@ pub struct StaticWithBeams {
     pub beams: Vec<Option<BeamState>>,
 }
 
-/// The equilibrium on the mesh for it, with its warnings.
+/// The equilibrium on the mesh for it, with its warnings; and the directions of the reduced model where that has it.
 fn point_fitted(
     compiled: &CompiledModel,
     voltages: &PortVoltages,
-) -> Result<(CompiledModel, OperatingPoint), AnalysisError> {
+) -> Result<(CompiledModel, OperatingPoint, Option<usize>), AnalysisError> {
     let (order, point) = order(compiled, voltages, compiled.order.segments.clone())?;
     let mut fitted = on(compiled, order)?;
     let reported = static_warnings(&fitted, &point);
     fitted.warnings.items.extend(reported);
-    Ok((fitted, point))
+    if fitted.options.formulation != Formulation::Reduced {
+        return Ok((fitted, point, None));
+    }
+    let tol = fitted.options.errors().requested();
+    let warned = |message: String| Diagnostic::warning(reduced::WARNING, message, "");
+    match reduced::equilibrium(&fitted, &point) {
+        Ok(found) => {
+            fitted.warnings.items.extend(reduced::beyond(found.error, tol).map(warned));
+            fitted.order.estimated_error = fitted.order.estimated_error.map(|mesh| mesh + found.error);
+            Ok((fitted, found.point, Some(found.directions)))
+        }
+        Err(why) => {
+            fitted.warnings.items.push(warned(reduced::taken(&why)));
+            Ok((fitted, point, None))
+        }
+    }
+}
+
+/// The result at an equilibrium, with the number of directions where it is that of a reduced model.
+fn result_of(fitted: &CompiledModel, point: &OperatingPoint, directions: Option<usize>) -> StaticResult {
+    let result = result_at(fitted, point);
+    StaticResult { unknowns: directions.unwrap_or(result.unknowns), ..result }
 }
 
 /// Warnings about an equilibrium of a circuit, each with its size: an error that grows (1), or 1. Beside what

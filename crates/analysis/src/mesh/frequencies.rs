@@ -1,6 +1,7 @@
 //! The mesh for modes: the highest requested one decides, and about a loaded state that state and its frequencies too.
 
 use super::super::modes::{ModesResult, about_equilibrium, modes_with_curves};
+use super::super::reduced::not_reduced;
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::equilibrium;
 use super::mode_pairs;
@@ -30,6 +31,7 @@ pub fn modes_fitted(
     count: usize,
     voltages: &PortVoltages,
 ) -> Result<(CompiledModel, ModesResult, Vec<BeamMotions>), AnalysisError> {
+    not_reduced(compiled, "modes")?;
     let (order, (result, curves)) = for_modes(compiled, count, voltages)?;
     let fitted = on(compiled, order)?;
     let estimated_error = fitted.order.estimated_error;

@@ -19,6 +19,7 @@
 use super::super::harmonic::exact::ExactResponse;
 use super::super::harmonic::modal::{self, ModalSum};
 use super::super::harmonic::{BEYOND, GUARDS, HarmonicOptions, HarmonicResult, harmonic};
+use super::super::reduced::not_reduced;
 use super::super::{AnalysisError, ProgressCallback};
 use super::equilibrium::static_warnings;
 use super::refined::refining;
@@ -59,6 +60,7 @@ pub fn harmonic_fitted(
     options: &HarmonicOptions,
     watch: ProgressCallback<'_>,
 ) -> Result<(CompiledModel, HarmonicResult), AnalysisError> {
+    not_reduced(compiled, "ac")?;
     options.check()?;
     let fitted = fitted(compiled, options)?;
     let mut result = harmonic(&fitted, options, watch)?;

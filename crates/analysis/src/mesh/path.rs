@@ -5,6 +5,7 @@
 
 use super::super::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, PathInput, trace};
 use super::super::linear_stress::left_out;
+use super::super::reduced::not_reduced;
 use super::super::statics::operating_point;
 use super::super::{AnalysisError, PortVoltages, ProgressCallback};
 use super::equilibrium::{ROUNDING, SMALL, size};
@@ -32,6 +33,7 @@ pub fn path_fitted(
     request: &ContinuationRequest<'_>,
     watch: ProgressCallback<'_>,
 ) -> Result<(CompiledModel, ContinuationResult), AnalysisError> {
+    not_reduced(compiled, "path")?;
     refining(compiled, |compiled| path_from(compiled, request, &mut *watch))
 }
 

@@ -3,6 +3,7 @@
 use super::super::AnalysisError;
 use super::super::linear_stress::left_out;
 use super::super::pull_in::{PullInResult, pull_in, pull_in_with};
+use super::super::reduced::not_reduced;
 use super::super::statics::operating_point;
 use super::refined::refining;
 use super::remeshed::{chosen, meshed, on};
@@ -30,6 +31,7 @@ pub fn pull_in_fitted(
     port: Option<&str>,
     max: f64,
 ) -> Result<(CompiledModel, PullInResult), AnalysisError> {
+    not_reduced(compiled, "pullin")?;
     let (order, found) = for_pull_in(compiled, port, max)?;
     let mut fitted = on(compiled, order)?;
     let known = found.into_iter().find(|(segments, _)| *segments == fitted.order.segments);

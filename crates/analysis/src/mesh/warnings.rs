@@ -1,6 +1,7 @@
 //! Warnings from fitting a model to a request.
 
 use super::super::contact_range::comb_beyond_reported;
+use super::super::reduced::WARNING as REDUCED;
 use super::super::rotary_inertia_error;
 use super::super::statics::{OperatingPoint, too_hot, too_stressed};
 use bimorph_base::Diagnostic;
@@ -33,7 +34,8 @@ pub fn warnings(fitted: &CompiledModel) -> impl Iterator<Item = String> {
         .items
         .iter()
         .filter(|d| {
-            [WARNING, STRESS, SEGMENTS, FINGERS, HEAT, STRENGTH, STEPS, ROTARY, BUCKLING].contains(&d.code.as_str())
+            [WARNING, STRESS, SEGMENTS, FINGERS, HEAT, STRENGTH, STEPS, ROTARY, BUCKLING, REDUCED]
+                .contains(&d.code.as_str())
         })
         .map(|d| d.message.clone())
 }

@@ -15,7 +15,7 @@ use bimorph_analysis::static_outputs::{self, OUTPUTS};
 use bimorph_analysis::{AnalysisError, statics};
 use bimorph_base::budget;
 use bimorph_base::{Setting, Severity};
-use bimorph_model::compile::{CompileError, CompileOptions, draw};
+use bimorph_model::compile::{CompileError, CompileOptions, Formulation, draw};
 use bimorph_netlist::NetlistSource;
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -121,6 +121,11 @@ pub(super) fn check_names(
     let refused =
         |what: &str, expected: String, got: String| Err(SweepError::BadSpec { what: what.into(), expected, got });
     let settings = spec.settings(0);
+    let formulation = at(&chosen(options, &settings), &settings).formulation;
+    if formulation == Formulation::Reduced && !matches!(spec.analysis, SweepAnalysis::Transient { .. }) {
+        let expected = "compliant in sweeps of this analysis; sweeps of tran take reduced models, too".to_owned();
+        return refused("formulation", expected, formulation.name().to_owned());
+    }
     let drawn = match draw(source, &at(&chosen(options, &settings), &settings)) {
         Ok(drawn) => drawn,
         Err(CompileError::Netlist(diagnostics)) => {

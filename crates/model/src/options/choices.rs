@@ -138,6 +138,8 @@ choice! {
         Rcr = "rcr",
         /// The same with every direction as a coordinate that the discretization leaves elastic, whatever the method.
         RcrElastic = "rcr-elastic",
+        /// A few directions of the strains of a tree's joints, trained for what acts in the analysis.
+        Reduced = "reduced",
     }
 }
 

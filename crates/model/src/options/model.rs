@@ -118,7 +118,8 @@ options! {
     without_circuit: bool = false, "without_circuit" = 14, [""], Range::Flag, "";
 
     /// How bodies become equations. compliant: every body's own coordinates; rcr: joint coordinates on a tree, loops closed
-    /// inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method; auto: what suits.
+    /// inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method; reduced: few joint coordinates
+    /// (static, tran); auto: what suits.
     formulation: Formulation = Formulation::Compliant, "formulation" = 11, [""], Range::Names(&Formulation::NAMES), "";
 }
 

@@ -26,6 +26,7 @@
 //! |---|---|
 //! | [`rodas4`] | the default: a Rosenbrock method with one factorization a step, and its sensitivities |
 //! | [`joint_rodas4`] | the same in joint coordinates with loops closed by springs |
+//! | [`reduced_rodas4`] | the same over the coordinates of a reduced model |
 //! | [`formulated`] | either, by the formulation of a model |
 //! | [`radau5`] | Radau IIA of order 5: one real and one complex block factorization a step |
 //! | [`average_field`] | average vector field, which keeps the energy |
@@ -52,6 +53,7 @@ pub mod joint_rodas4;
 pub mod method;
 mod pace;
 pub mod radau5;
+pub mod reduced_rodas4;
 pub mod rodas4;
 mod stage_loss;
 pub mod tableau;

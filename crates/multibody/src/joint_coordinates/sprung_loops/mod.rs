@@ -19,9 +19,11 @@
 //! | [`geometric`] | the stiffness that a force brings |
 //! | [`factor`] | factorization of a symmetric form over the coordinates, leaf → root |
 //! | [`solve`] | solves with its factors |
+//! | [`directions`] | many motions of the coordinates at once |
 
 pub mod columns;
 pub mod derivatives;
+pub mod directions;
 pub mod dual;
 pub mod dynamics;
 pub mod factor;

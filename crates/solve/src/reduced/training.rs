@@ -1,0 +1,318 @@
+//! The directions of a mechanism for a box of inputs and a tolerance.
+//!
+//! 1. Taylor terms of the statics at rest ([`super::taylor`]), made orthonormal in the energy at rest.
+//! 2. Their polynomial at points of the box, compressed by the singular value decomposition in that energy.
+//! 3. Moments K₀⁻¹·(M·K₀⁻¹)ʲ·f of every input, for motion.
+//! 4. Reduced statics at corners and points of the box, checked by a Newton step of the full model. Where the estimate fails, or the
+//!    branch ends, equilibria of the full model join the directions, and the check is repeated.
+//!
+//! Every step is deterministic: points, signs and orders depend on the mechanism, the box and the tolerance alone.
+
+use super::ReductionError;
+use super::check::{FullCheck, StateCheck};
+use super::energy::{EnergyProduct, EnergyVector};
+use super::inputs::{InputBox, MAX_INPUTS};
+use super::space::ReducedSpace;
+use super::statics::ReducedStatics;
+use super::taylor::{DriveRay, TaylorTerms};
+use crate::equations::Joints;
+use crate::equilibrium::{Equilibrium, EquilibriumOptions};
+use bimorph_domains::{Drive, System};
+use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::planar::Pose;
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Points of the box at which the polynomial is sampled.
+const POINTS: usize = 300;
+/// Points of the box at which the reduced statics are checked, beside its corners.
+const CHECKS: usize = 8;
+/// Rounds of checks.
+const ROUNDS: usize = 5;
+/// Singular values below this fraction of the tolerance, relative to the largest, are left out: for statics, whose check adds what is
+/// lacking, and for motion, which passes through states that no equilibrium has.
+const KEPT: [f64; 2] = [0.3, 0.02];
+/// Fraction of the tolerance that the statics of the box may be off.
+const STATIC_SHARE: f64 = 0.3;
+/// Part of a moment or of an equilibrium that must be new (1).
+const NEW: f64 = 1e-5;
+/// Part of a Taylor term that must be new (1): below, it is rounding of the samples.
+const INDEPENDENT: f64 = 1e-9;
+/// Fraction of the strains that a reduced model may have as directions.
+const WORTH: usize = 5;
+/// Directions that are always allowed, however few strains there are.
+const FEW: usize = 8;
+
+/// Requirements on a training.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrainingOptions {
+    /// Relative error of displacements (1).
+    pub tol: f64,
+    /// Moments of each input; 0 for statics.
+    pub moments: usize,
+}
+
+/// A system with the box of its inputs: what moves, or what it is released from. All have the bodies and joints of one tree.
+#[derive(Debug, Clone)]
+pub struct TrainingCase<'a> {
+    /// The system.
+    pub system: &'a System,
+    /// Its inputs.
+    pub inputs: InputBox,
+}
+
+/// A trained space.
+#[derive(Debug, Clone)]
+pub struct Training {
+    /// The space.
+    pub space: ReducedSpace,
+    /// Largest relative error of the statics in the box, by the last check (1).
+    pub error: f64,
+    /// Directions that came from full equilibria.
+    pub added: usize,
+    /// Independent inputs.
+    pub inputs: usize,
+}
+
+/// The directions of a mechanism on its tree for the boxes of its cases.
+///
+/// # Errors
+/// [`ReductionError`].
+pub fn train(
+    joints: &Arc<Joints>,
+    cases: &[TrainingCase<'_>],
+    options: TrainingOptions,
+) -> Result<Training, ReductionError> {
+    let count = cases.iter().map(|case| case.inputs.inputs.len()).sum();
+    if count == 0 {
+        return Err(ReductionError::NoInput);
+    }
+    if count > MAX_INPUTS {
+        return Err(ReductionError::TooManyInputs { count, most: MAX_INPUTS });
+    }
+    let mut trainer = Trainer { joints, cases, options, product: EnergyProduct::at_rest(joints), basis: Vec::new() };
+    let mut samples = Vec::new();
+    let acting = || cases.iter().filter(|case| !case.inputs.inputs.is_empty());
+    for case in acting() {
+        samples.extend(trainer.expand(case)?);
+    }
+    for case in acting() {
+        trainer.add_moments(case)?;
+    }
+    trainer.affordable()?;
+    let (mut added, mut space) = (0, trainer.space(&samples, &[]));
+    let mut rounds = 0;
+    loop {
+        let (error, worst, states) = trainer.check(&space);
+        let before = trainer.basis.len();
+        for s in worst.into_iter().flatten().filter(|_| rounds < ROUNDS) {
+            trainer.product.extend(&mut trainer.basis, s, NEW);
+        }
+        let more = trainer.basis.len() - before;
+        space = trainer.space(&samples, &states);
+        if more == 0 {
+            return Ok(Training { space, error, added, inputs: count });
+        }
+        (added, rounds) = (added + more, rounds + 1);
+        trainer.affordable()?;
+    }
+}
+
+struct Trainer<'a> {
+    joints: &'a Arc<Joints>,
+    cases: &'a [TrainingCase<'a>],
+    options: TrainingOptions,
+    product: EnergyProduct<'a>,
+    basis: Vec<EnergyVector>,
+}
+
+/// Equilibria that the directions lack, over the coordinates of the tree.
+type Lacking = Option<Vec<Vec<Pose>>>;
+
+impl Trainer<'_> {
+    /// Steps 1 and 2. Returns the samples over the coordinates of the tree.
+    fn expand(&mut self, case: &TrainingCase<'_>) -> Result<Vec<Vec<Pose>>, ReductionError> {
+        let taylor = TaylorTerms::at_rest(case.system, &self.joints.tree, &case.inputs)?;
+        let points = case.inputs.points(POINTS, false);
+        let mut frame: Vec<EnergyVector> = Vec::new();
+        // terms at the size that they have at the end of the box, so that small ones are dropped against large ones
+        let columns: Vec<Vec<f64>> =
+            taylor.terms.iter().map(|term| self.product.extend(&mut frame, term.clone(), INDEPENDENT)).collect();
+        let (r, n) = (frame.len(), points.len());
+        if r == 0 {
+            return Ok(Vec::new()); // loads of nothing
+        }
+        bimorph_base::budget::lay_out_matrix(r, n + columns.len());
+        let values: Vec<Vec<f64>> = points.iter().map(|u| taylor.monomials(u)).collect();
+        let weights: DMatrix<f64> = DMatrix::from_fn(r, n, |i, k| {
+            columns.iter().zip(&values[k]).map(|(column, value)| column.get(i).map_or(0.0, |c| c * value)).sum()
+        });
+        let decomposed = nalgebra::SVD::new(weights.clone(), true, false);
+        let (Some(u), sigma) = (decomposed.u, decomposed.singular_values) else { return Err(ReductionError::NoInput) };
+        let mut order: Vec<usize> = (0..sigma.len()).collect();
+        order.sort_by(|a, b| sigma[*b].total_cmp(&sigma[*a]));
+        let most = order.first().map_or(0.0, |k| sigma[*k]);
+        let blend = |weight: &dyn Fn(usize) -> f64| {
+            let mut sum = vec![Pose::zeros(); case.system.bodies()];
+            for (i, vector) in frame.iter().enumerate() {
+                let weight = weight(i);
+                sum.iter_mut().zip(&vector.x).for_each(|(sum, x)| *sum += x * weight);
+            }
+            sum
+        };
+        let least = KEPT[usize::from(self.options.moments > 0)] * self.options.tol * most;
+        let kept = order.into_iter().filter(|k| sigma[*k] > least && sigma[*k] > 0.0);
+        let shapes: Vec<Vec<Pose>> = kept
+            .map(|k| {
+                let largest = (0..r).map(|i| u[(i, k)]).fold(0.0f64, |a, b| if b.abs() > a.abs() { b } else { a });
+                blend(&|i| u[(i, k)] * largest.signum())
+            })
+            .collect();
+        let samples = (0..n).map(|k| blend(&|i| weights[(i, k)])).collect();
+        for shape in shapes {
+            self.product.extend(&mut self.basis, shape, NEW);
+        }
+        Ok(samples)
+    }
+
+    /// Step 3.
+    fn add_moments(&mut self, case: &TrainingCase<'_>) -> Result<(), ReductionError> {
+        let (system, inputs) = (case.system, &case.inputs);
+        let model = &system.model;
+        let rest = vec![Pose::zeros(); system.bodies()];
+        let (mut tangent, mut at_rest) = (BlockMatrix::new(&model.pattern), rest.clone());
+        system.tangent(&rest, &inputs.none, &mut tangent, &mut at_rest);
+        model.project_matrix(&mut tangent);
+        let mut held = Vec::new();
+        let factored = model.factor_holding(&mut tangent, &mut held);
+        if let Some(pivot) = factored.err().or_else(|| held.first().copied()) {
+            return Err(ReductionError::Free { body: model.bodies[pivot.body].name.to_string() });
+        }
+        for i in 0..inputs.inputs.len() {
+            let values: Vec<f64> = (0..inputs.inputs.len()).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
+            let mut y = rest.clone();
+            system.residual(&rest, &inputs.drive(&values), &mut y);
+            y.iter_mut().zip(&at_rest).for_each(|(y, r)| *y = r - *y);
+            tangent.solve(&model.pattern, &mut y);
+            for _ in 0..self.options.moments {
+                y.iter_mut().enumerate().for_each(|(j, y)| *y = model.mass(j).component_mul(y));
+                model.project(&mut y);
+                tangent.solve(&model.pattern, &mut y);
+                let size = y.iter().map(|y| y.amax()).fold(0.0, f64::max);
+                if size == 0.0 {
+                    break;
+                }
+                y.iter_mut().for_each(|y| *y /= size);
+                let mut s = rest.clone();
+                self.joints.tree.rates_at(&rest, &y, &mut s);
+                self.product.extend(&mut self.basis, s, NEW);
+            }
+        }
+        Ok(())
+    }
+
+    /// Rejects what would cost more than the full model.
+    fn affordable(&self) -> Result<(), ReductionError> {
+        let (directions, strains) = (self.basis.len(), self.joints.tree.coordinates);
+        if directions > (strains / WORTH).max(FEW) || directions > strains {
+            return Err(ReductionError::TooMany { directions, strains });
+        }
+        Ok(())
+    }
+
+    /// The space of the directions, with the reach of the samples and of further states (over the coordinates of the tree).
+    fn space(&self, samples: &[Vec<Pose>], states: &[Vec<Pose>]) -> ReducedSpace {
+        let (mut reach, mut amplitude) = (vec![0.0f64; self.basis.len()], 0.0f64);
+        for s in samples.iter().chain(states) {
+            let s = self.product.of(s.clone());
+            let mut squares = 0.0;
+            for (reach, b) in reach.iter_mut().zip(&self.basis) {
+                let z = self.product.product(b, &s);
+                *reach = reach.max(z.abs());
+                squares += z * z;
+            }
+            amplitude = amplitude.max(squares.sqrt());
+        }
+        let largest = reach.iter().fold(0.0f64, |a, b| a.max(*b));
+        // a moment that no equilibrium has moves as far as the smallest that counts
+        reach.iter_mut().for_each(|reach| *reach = reach.max(self.options.tol * largest));
+        let directions = self.basis.iter().map(|b| b.x.clone()).collect();
+        ReducedSpace::new(Arc::clone(self.joints), directions, reach, amplitude)
+    }
+
+    /// Step 4: the largest error in the boxes, the equilibria that are lacking at the worst point, and all reduced states.
+    fn check(&self, space: &ReducedSpace) -> (f64, Lacking, Vec<Vec<Pose>>) {
+        let mut statics = ReducedStatics::new(space);
+        let (mut error, mut worst, mut states) = (0.0f64, None, Vec::new());
+        for case in self.cases {
+            // the forces over z are those of one system alone: others have other loads
+            self.check_case(&space.of_system(case.system), case, &mut statics, (&mut error, &mut worst, &mut states));
+        }
+        (error, worst, states)
+    }
+
+    fn check_case(
+        &self,
+        space: &ReducedSpace,
+        case: &TrainingCase<'_>,
+        statics: &mut ReducedStatics,
+        (error, worst, states): (&mut f64, &mut Lacking, &mut Vec<Vec<Pose>>),
+    ) {
+        let (system, inputs) = (case.system, &case.inputs);
+        let mut full = FullCheck::new(system);
+        let share = STATIC_SHARE * self.options.tol;
+        for u in inputs.points(CHECKS, true) {
+            let drive = inputs.drive(&u);
+            if drive == inputs.none {
+                continue;
+            }
+            let mut z = vec![0.0; space.size()];
+            let path = statics.follow(space, &DriveRay { none: &inputs.none, to: &drive }, &mut z);
+            let at = &statics.forces.placed.at;
+            let found = match path.reached >= 1.0 {
+                true => full.of(system, at, &drive, None),
+                false => StateCheck { error: f64::INFINITY, negative: 1 },
+            };
+            let stable = found.negative == 0;
+            if stable {
+                let mut s = vec![Pose::zeros(); system.bodies()];
+                space.strains(&z, &mut s);
+                states.push(s);
+                *error = error.max(found.error);
+            }
+            let estimate = if stable { found.error } else { f64::INFINITY };
+            if estimate > share && (estimate >= *error || worst.is_none()) {
+                let lacking = self.lacking(case, &mut full, at, &drive, stable);
+                if lacking.is_some() {
+                    *worst = lacking;
+                }
+            }
+        }
+    }
+
+    /// Equilibria of the full model at a drive: next to the reduced state, or the end of the branch from rest and where it falls from there.
+    fn lacking(&self, case: &TrainingCase<'_>, full: &mut FullCheck, q: &[Pose], drive: &Drive, near: bool) -> Lacking {
+        let system = case.system;
+        let strains = |q: &[Pose]| {
+            let mut s = vec![Pose::zeros(); q.len()];
+            self.joints.tree.coordinates_at(q, &mut s);
+            s
+        };
+        let mut at = q.to_vec();
+        if near && full.corrected(system, &mut at, drive) {
+            return Some(vec![strains(&at)]);
+        }
+        let path = DriveRay { none: &case.inputs.none, to: drive };
+        let mut found = Vec::new();
+        for stop_at_fold in [true, false] {
+            let mut q = vec![Pose::zeros(); system.bodies()];
+            let options = EquilibriumOptions { stop_at_fold, ..Default::default() };
+            let Ok(path) = Equilibrium::new(system, options).follow(system, &path, &mut q) else { break };
+            found.push(strains(&q));
+            if stop_at_fold && path.reached == 1.0 {
+                break;
+            }
+        }
+        (!found.is_empty()).then_some(found)
+    }
+}
