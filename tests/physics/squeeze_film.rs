@@ -220,7 +220,7 @@ fn derivatives() {
                     (one(h) * 4.0 - one(2.0 * h)) / 3.0
                 };
                 let mut by_rate = [Pose::zeros()];
-                derivatives.add_damping(model, |_| unit, &mut by_rate);
+                derivatives.add_damping(|_| unit, &mut by_rate);
                 let numeric = differences(&|h| force(&q, &(v + unit * h)), 1e-3 * scale);
                 let largest = derivatives.damping().unwrap().diagonal[0].norm();
                 assert!((numeric - by_rate[0]).norm() <= 1e-7 * largest, "{i}: {numeric} {}", by_rate[0]);
@@ -340,7 +340,7 @@ fn derivatives_of_states() {
         stiffness.multiply_add_of(pattern, |k| unit[k], &mut by_place);
         derivatives.add_skew(&unit, &mut by_place);
         let mut by_rate = vec![Pose::zeros(); count];
-        derivatives.add_damping(&system.model, |k| unit[k], &mut by_rate);
+        derivatives.add_damping(|k| unit[k], &mut by_rate);
         let differences = |of: &dyn Fn(f64) -> Vec<Pose>, h: f64, k: usize| {
             let one = |h: f64| (of(h)[k] - of(-h)[k]) / (2.0 * h);
             (one(h) * 4.0 - one(2.0 * h)) / 3.0

@@ -106,7 +106,7 @@ fn quality(compiled: &CompiledModel, shape: &[Pose], frequency_hz: f64) -> f64 {
     let mut drag = vec![Pose::zeros(); shape.len()];
     if let Some(mut loss) = LossDerivatives::of(system) {
         loss.at(system, &drag, |_| Pose::zeros());
-        loss.add_damping(model, |k| shape[k], &mut drag);
+        loss.add_damping(|k| shape[k], &mut drag);
     }
     add_damping(model, shape, &mut drag);
     let power: f64 = drag.iter().zip(shape).map(|(force, rate)| force.dot(rate)).sum();

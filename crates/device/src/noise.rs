@@ -71,7 +71,7 @@ impl DeviceSession {
         out.resize(answers * answers, [0.0; 2]);
         for j in 0..answers {
             budget::check();
-            let pushed = damped(&system.model, &adjoint[j], |x, y| self.harmonic.add_loss(system, x, y));
+            let pushed = damped(&system.model, &adjoint[j], |x, y| self.harmonic.add_loss(x, y));
             for i in 0..=j {
                 let sum: Complex<f64> =
                     adjoint[i].iter().zip(&pushed).map(|(h, p)| h.x * p.x + h.y * p.y + h.z * p.z).sum();

@@ -1,9 +1,10 @@
 //! Derivatives of the forces that depend on rates (of contact that loses energy, [`super::contact_loss`], and of gas) over the bodies of a system.
 
-use super::domain::SkewCoupling;
+use super::domain::{Domain, SkewCoupling};
 use super::system::System;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Model};
+use bimorph_multibody::{BlockMatrix, BodyId};
+use nalgebra::Matrix3;
 
 /// Derivatives with displacements and with rates.
 #[derive(Debug, Clone)]
@@ -12,6 +13,8 @@ pub struct LossDerivatives {
     damping: BlockMatrix<f64, 3>,
     /// The skew part of the derivatives with displacements; `stiffness` is the symmetric one.
     skew: Vec<SkewCoupling>,
+    /// Bodies that such forces act on, ascending, and of each the blocks below its diagonal with their rows: all other blocks are zero.
+    columns: Vec<(usize, Vec<(usize, usize)>)>,
     /// They are not zero.
     acts: bool,
 }
@@ -19,23 +22,27 @@ pub struct LossDerivatives {
 impl LossDerivatives {
     /// Storage, all zero.
     #[inline]
-    pub fn new(model: &Model) -> Self {
-        let zeros = BlockMatrix::new(&model.pattern);
-        Self { stiffness: zeros.clone(), damping: zeros, skew: Vec::new(), acts: false }
+    pub fn new(system: &System) -> Self {
+        let zeros = BlockMatrix::new(&system.model.pattern);
+        Self { stiffness: zeros.clone(), damping: zeros, skew: Vec::new(), columns: columns(system), acts: false }
     }
 
     /// Storage; none for a system without such forces.
     #[inline]
     pub fn of(system: &System) -> Option<Self> {
-        system.loses().then(|| Self::new(&system.model))
+        system.loses().then(|| Self::new(system))
     }
 
     /// Takes them at displacements `q` and the rate of each body.
     #[inline]
     pub fn at(&mut self, system: &System, q: &[Pose], rate: impl Fn(usize) -> Pose) {
         if self.acts {
-            self.stiffness.clear();
-            self.damping.clear();
+            for matrix in [&mut self.stiffness, &mut self.damping] {
+                for (body, below) in &self.columns {
+                    matrix.diagonal[*body] = Matrix3::zeros();
+                    below.iter().for_each(|(block, _)| matrix.below[*block] = Matrix3::zeros());
+                }
+            }
         }
         self.acts = system.add_loss_tangent(q, &rate, &mut self.stiffness, &mut self.damping);
         self.skew.clear();
@@ -64,24 +71,40 @@ impl LossDerivatives {
     #[inline]
     pub fn add_to(&self, [beta, gamma]: [f64; 2], to: &mut BlockMatrix<f64, 3>) {
         self.add_stiffness(beta, to);
-        if self.acts {
-            self.damping.add_to(gamma, to);
-        }
+        self.add_blocks(&self.damping, gamma, to);
     }
 
     /// `to +=` the derivatives with displacements times `beta`, but for the skew part.
     #[inline]
     pub fn add_stiffness(&self, beta: f64, to: &mut BlockMatrix<f64, 3>) {
-        if self.acts {
-            self.stiffness.add_to(beta, to);
+        self.add_blocks(&self.stiffness, beta, to);
+    }
+
+    fn add_blocks(&self, from: &BlockMatrix<f64, 3>, factor: f64, to: &mut BlockMatrix<f64, 3>) {
+        if !self.acts {
+            return;
+        }
+        for (body, below) in &self.columns {
+            to.diagonal[*body] += from.diagonal[*body] * factor;
+            below.iter().for_each(|(block, _)| to.below[*block] += from.below[*block] * factor);
         }
     }
 
     /// `force +=` the damping at the rate of each body.
     #[inline]
-    pub fn add_damping(&self, model: &Model, rate: impl Fn(usize) -> Pose, force: &mut [Pose]) {
-        if self.acts {
-            self.damping.multiply_add_of(&model.pattern, rate, force);
+    pub fn add_damping(&self, rate: impl Fn(usize) -> Pose, force: &mut [Pose]) {
+        if !self.acts {
+            return;
+        }
+        let BlockMatrix { diagonal, below: blocks, .. } = &self.damping;
+        for (body, below) in &self.columns {
+            let own = rate(*body);
+            let mut sum = diagonal[*body] * own;
+            for (block, row) in below {
+                sum += blocks[*block].tr_mul(&rate(*row));
+                force[*row] += blocks[*block] * own;
+            }
+            force[*body] += sum;
         }
     }
 
@@ -98,4 +121,36 @@ impl LossDerivatives {
             }
         }
     }
+}
+
+/// The blocks of the pattern that members with such forces touch, column by column.
+fn columns(system: &System) -> Vec<(usize, Vec<(usize, usize)>)> {
+    let pattern = &system.model.pattern;
+    let mut entries = Vec::new();
+    for member in system.members.iter().filter(|member| member.damps()) {
+        member.bodies(|body| {
+            if let BodyId::Free(k) = body {
+                entries.push((k, None));
+            }
+        });
+        member.pairs(|a, b| {
+            if let (BodyId::Free(a), BodyId::Free(b)) = (a, b)
+                && let Some(block) = pattern.block(a.max(b), a.min(b)).filter(|_| a != b)
+            {
+                entries.push((a.min(b), Some((block, a.max(b)))));
+            }
+        });
+    }
+    entries.sort_unstable();
+    entries.dedup();
+    let mut columns: Vec<(usize, Vec<(usize, usize)>)> = Vec::new();
+    for (body, below) in entries {
+        if columns.last().is_none_or(|(last, _)| *last != body) {
+            columns.push((body, Vec::new()));
+        }
+        if let (Some((_, blocks)), Some(below)) = (columns.last_mut(), below) {
+            blocks.push(below);
+        }
+    }
+    columns
 }

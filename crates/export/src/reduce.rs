@@ -83,7 +83,7 @@ impl LinearizedMechanism<'_> {
             drag.fill(Pose::zeros());
             add_damping(&system.model, &shapes[k], &mut drag);
             if let Some(loss) = &loss {
-                loss.add_damping(&system.model, |j| shapes[k][j], &mut drag);
+                loss.add_damping(|j| shapes[k][j], &mut drag);
             }
             for j in 0..n {
                 model.damping[(j, k)] = dot(&shapes[j], &drag) * (length[k] * omega[k]) / (length[j] * omega[j]);

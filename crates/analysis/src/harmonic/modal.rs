@@ -150,7 +150,7 @@ impl ModalSum {
             bimorph_base::budget::check();
             drag.fill(Pose::zeros());
             add_damping(model, &found.shapes[k], &mut drag);
-            exact.harmonic.add_loss(system, &found.shapes[k], &mut drag);
+            exact.harmonic.add_loss(&found.shapes[k], &mut drag);
             for j in 0..n {
                 damping[(j, k)] = dot(&found.shapes[j], &drag);
             }

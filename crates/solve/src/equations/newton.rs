@@ -285,7 +285,7 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
         }
         forces::add_damping(model, &self.at, &mut self.force);
         if let Some(loss) = &self.loss {
-            loss.add_damping(model, |k| self.at[k], &mut self.force);
+            loss.add_damping(|k| self.at[k], &mut self.force);
         }
         model.project(&mut self.force);
         if let Some(matrix) = &self.matrix {

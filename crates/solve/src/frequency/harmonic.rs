@@ -57,9 +57,9 @@ impl Harmonic {
     }
 
     /// `y +=` the force of that damping at rates `x`.
-    pub fn add_loss(&self, system: &System, x: &[Pose], y: &mut [Pose]) {
+    pub fn add_loss(&self, x: &[Pose], y: &mut [Pose]) {
         if let Some(loss) = &self.loss {
-            loss.add_damping(&system.model, |k| x[k], y);
+            loss.add_damping(|k| x[k], y);
         }
     }
 

@@ -210,7 +210,7 @@ impl JointRodas4 {
         }
         if let Some(loss) = loss.as_ref().filter(|_| loses) {
             force.fill(Pose::zeros());
-            loss.start.add_damping(&closures.model, |k| stages.drift(k), force);
+            loss.start.add_damping(|k| stages.drift(k), force);
             for (wrench, force) in wrench.iter_mut().zip(force) {
                 *wrench = Four::from(wrench.pose() + *force);
             }

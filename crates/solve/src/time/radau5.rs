@@ -142,7 +142,7 @@ impl Radau5 {
         }
         forces::add_damping(model, &x.q, rhs);
         if let Some(loss) = &self.loss {
-            loss.add_damping(model, |k| x.q[k], rhs);
+            loss.add_damping(|k| x.q[k], rhs);
         }
         model.project(rhs);
         self.real.solve(&model.pattern, rhs);
@@ -162,8 +162,8 @@ impl Radau5 {
         forces::add_damping(model, &re.q, &mut self.at.q);
         forces::add_damping(model, &im.q, &mut self.at.v);
         if let Some(loss) = &self.loss {
-            loss.add_damping(model, |k| re.q[k], &mut self.at.q);
-            loss.add_damping(model, |k| im.q[k], &mut self.at.v);
+            loss.add_damping(|k| re.q[k], &mut self.at.q);
+            loss.add_damping(|k| im.q[k], &mut self.at.v);
         }
         for (k, out) in self.pair.iter_mut().enumerate() {
             let mass = model.mass(k);

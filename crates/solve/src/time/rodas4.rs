@@ -130,7 +130,7 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
             let lose = |force: &mut [Pose]| {
                 if let Some(loss) = loss {
                     loss.add_forces(system, i == 0, stages.at(i, from), |k| stages.speed(i, h, k), force);
-                    loss.start.add_damping(model, |k| -stages.r1()[k], force);
+                    loss.start.add_damping(|k| -stages.r1()[k], force);
                 }
             };
             let q = stages.at(i, from);

@@ -137,9 +137,9 @@ impl StageLoss {
     }
 
     /// Adds what the rates of a sensitivity bring to the force of the stage at hand.
-    pub(super) fn add_change(&self, model: &Model, rate: impl Fn(usize) -> Pose, force: &mut [Pose]) {
+    pub(super) fn add_change(&self, rate: impl Fn(usize) -> Pose, force: &mut [Pose]) {
         if let Some(now) = &self.now {
-            now.add_damping(model, rate, force);
+            now.add_damping(rate, force);
         }
     }
 }

@@ -119,7 +119,7 @@ impl JointPortSensitivities {
                 forces::add_dampers(model, |k| self.changes.of(k)[1], &mut self.wrench);
             }
             if let Some(loss) = loss {
-                loss.add_change(model, |k| self.changes.of(k)[1], &mut self.wrench);
+                loss.add_change(|k| self.changes.of(k)[1], &mut self.wrench);
             }
             self.tangent.multiply_add(&model.pattern, &self.share, &mut self.wrench);
             if let Some(loss) = loss {
@@ -147,7 +147,7 @@ impl JointPortSensitivities {
                 forces::add_dampers(model, |k| stages.drift(k), &mut self.wrench);
             }
             if let Some(loss) = loss {
-                loss.start.add_damping(model, |k| stages.drift(k), &mut self.wrench);
+                loss.start.add_damping(|k| stages.drift(k), &mut self.wrench);
             }
             for (to, from) in self.right.iter_mut().zip(&self.share).chain(self.moved.iter_mut().zip(&self.wrench)) {
                 *to = Four::from(*from);

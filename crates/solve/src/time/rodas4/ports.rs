@@ -122,8 +122,8 @@ impl PortSensitivities {
             }
             if let Some(loss) = matrix.loss {
                 let mut force = std::mem::take(&mut stages.force);
-                loss.add_change(model, |k| stages.speed(i, h, k), &mut force);
-                loss.start.add_damping(model, |k| -stages.r1()[k], &mut force);
+                loss.add_change(|k| stages.speed(i, h, k), &mut force);
+                loss.start.add_damping(|k| -stages.r1()[k], &mut force);
                 stages.force = force;
             }
             let (at, force) = stages.place(i, start);

@@ -37,7 +37,7 @@ impl LaneRodas4 {
                     losses[k].at(lane.system, q, |b| rate_of[b]);
                 }
                 lane.system.add_loss(q, |b| rate_of[b], r);
-                losses[k].add_damping(&lane.system.model, |b| -r1_of[b], r);
+                losses[k].add_damping(|b| -r1_of[b], r);
             }
             for &b in acted.iter() {
                 (0..3).for_each(|i| force[b][i].set_lane(k, r[b][i]));

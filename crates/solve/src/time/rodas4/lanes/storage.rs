@@ -115,7 +115,7 @@ impl LaneRodas4 {
             q: vec![Pose::zeros(); n],
             r: vec![Pose::zeros(); n],
             tangent: BlockMatrix::new(pattern),
-            losses: vec![LossDerivatives::new(&system.model); if system.can_touch() { LANES } else { 0 }],
+            losses: vec![LossDerivatives::new(system); if system.can_touch() { LANES } else { 0 }],
             rates: [(); 2].map(|()| vec![Pose::zeros(); n]),
             model,
         })
