@@ -122,7 +122,7 @@ fn huge_numbers() {
                         let request = proto::StaticRequest { model: model.clone(), ..Default::default() };
                         let ended = wire.r#static(request).await.map_or_else(|s| s.code(), |_| Code::Ok);
                         assert!(!matches!(ended, Code::Internal | Code::Unknown), "{text} {ended:?}");
-                        let request = proto::ModesRequest { model, count: 2, voltages: vec![] };
+                        let request = proto::ModesRequest { model, count: 2, voltages: vec![], quality: false };
                         let ended = wire.modes(request).await.map_or_else(|s| s.code(), |_| Code::Ok);
                         assert!(!matches!(ended, Code::Internal | Code::Unknown), "{text} {ended:?}");
                     }
@@ -176,11 +176,11 @@ fn abandoned_analyses() {
         // released from a load: a run at rest would end in a few steps
         let held = compiled(wire, (text.replace("param F=0", "param F=1n"), options.clone())).await;
         let model = compiled(wire, (text, options)).await;
-        let large = proto::ModesRequest { model: model.clone(), count: 1000, voltages: vec![] };
+        let large = proto::ModesRequest { model: model.clone(), count: 1000, voltages: vec![], quality: false };
         assert_eq!(wire.modes(large).await.expect_err("hours of memory").code(), Code::ResourceExhausted);
         let patience = Duration::from_millis(1500);
         for _ in 0..3 {
-            let modes = proto::ModesRequest { model: model.clone(), count: 100, voltages: vec![] };
+            let modes = proto::ModesRequest { model: model.clone(), count: 100, voltages: vec![], quality: false };
             let (mut a, mut b) = (wire.clone(), wire.clone());
             let (model, release_model) = (model.clone(), held.clone());
             let signals = vec!["n40.y".to_owned()];

@@ -133,7 +133,7 @@ fn calls(wire: &Wire, [large, many]: &[String; 2]) -> Vec<(&'static str, Asking)
                 ..Default::default()
             }
         ),
-        call!("Modes", modes, proto::ModesRequest { model: model(), count: 300, voltages: vec![] }),
+        call!("Modes", modes, proto::ModesRequest { model: model(), count: 300, voltages: vec![], quality: false }),
         call!("FrequencyResponse", frequency_response, response),
         ("Transient", motion),
     ]

@@ -43,7 +43,9 @@ async fn compiled(client: &mut Known, bundle: Option<proto::Bundle>) -> String {
 /// One call of a kind, whatever comes of it.
 async fn heavy(client: &mut Known, kind: &str, model: String, salt: usize) {
     match kind {
-        "modes" => drop(client.modes(proto::ModesRequest { model, count: 200, voltages: vec![] }).await),
+        "modes" => {
+            drop(client.modes(proto::ModesRequest { model, count: 200, voltages: vec![], quality: false }).await)
+        }
         "static" => drop(client.r#static(proto::StaticRequest { model, ..Default::default() }).await),
         "transient" => {
             let signals = vec!["n3_3.y".to_owned()];

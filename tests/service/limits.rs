@@ -41,7 +41,7 @@ fn limits_are_named() {
         let open = proto::OpenRequest { model: model.clone(), ..Default::default() };
         client.open(open.clone()).await.expect("the first");
         exhausted(&client.open(open).await.expect_err("the second"), "sessions");
-        let modes = proto::ModesRequest { model: model.clone(), count: 4, voltages: vec![] };
+        let modes = proto::ModesRequest { model: model.clone(), count: 4, voltages: vec![], quality: false };
         exhausted(&client.modes(modes).await.expect_err("too many"), "modes");
         let transient = proto::TransientRequest { model, stop_s: 1.0, points: 101, ..Default::default() };
         exhausted(&client.transient(transient).await.expect_err("too many"), "transient_values");

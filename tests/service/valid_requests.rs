@@ -43,7 +43,7 @@ fn of_models(model: &dyn Fn() -> String) -> Vec<Sound> {
         ),
         ("Describe", proto::DescribeRequest { model: model() }.encode_to_vec()),
         ("Static", proto::StaticRequest { model: model(), voltages: volts(), ..Default::default() }.encode_to_vec()),
-        ("Modes", proto::ModesRequest { model: model(), count: 2, voltages: volts() }.encode_to_vec()),
+        ("Modes", proto::ModesRequest { model: model(), count: 2, voltages: volts(), quality: false }.encode_to_vec()),
         (
             "FrequencyResponse",
             proto::FrequencyResponseRequest {

@@ -188,7 +188,7 @@ def models(model: bimorph.Model, session: bimorph.Session) -> dict[str, Case]:
     return {
         "Model.view": Case(lambda **given: model.view(**given).close(), {}, {"voltages": VOLTAGES, "height": integer(200, 4000)}, model.view),
         "Model.static": Case(model.static, {}, {"voltages": VOLTAGES, "backbend": VOLTAGES}),
-        "Model.modes": Case(model.modes, {"count": 1}, {"count": integer(1, 1000), "voltages": VOLTAGES}),
+        "Model.modes": Case(model.modes, {"count": 1}, {"count": integer(1, 1000), "voltages": VOLTAGES, "quality": flag}),
         "Model.ac": Case(
             model.ac,
             ac,

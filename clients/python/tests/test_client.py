@@ -56,6 +56,23 @@ def test_modes_and_pull_in(plate: bimorph.Model) -> None:
     assert result.pull_in_v == pytest.approx(PULL_IN, rel=1e-3)
 
 
+def test_losses_of_modes(client: bimorph.Client) -> None:
+    """Plates of 100 µm × 100 µm over 4 µm in air, 4 N/m, 1e-9 kg: 1/Q = c/(m·ω₀), c = 1.111e-5 N·s/m by hand from 0.421731·μ·l⁴/(Q·g³), all of it by gas."""
+    text = """
+        process air = [ viscosity=1.83e-5 pressure=101325 ]
+        anchor * [f] []
+        spring2d * [f a] [kx=4]
+        mass2d * [a] [m=1e-9]
+        guide2d * [a] []
+        anchor * [b] []
+        plategap2d air [a b] [l=100u w=100u gap=4u fringe=none]"""
+    model = client.compile(bimorph.Netlist.text(text))
+    assert model.modes(1).losses == ()
+    (loss,) = model.modes(1, quality=True).losses
+    assert loss.gas == pytest.approx(1.111e-5 / (1e-9 * math.sqrt(4 / 1e-9)), rel=1e-3)
+    assert loss.drag == loss.thermoelastic == 0.0 and loss.quality == pytest.approx(1 / loss.gas)
+
+
 def test_transient_streams_its_samples(plate: bimorph.Model) -> None:
     """Held at 1 V from rest, the plate swings about its equilibrium; progress never goes back."""
     seen: list[float] = []

@@ -10,6 +10,7 @@ use super::work::{CancellingStream, guarded};
 use bimorph_analysis::integrator::Integrator;
 use bimorph_analysis::largest_motion::path_with_signals;
 use bimorph_analysis::mesh;
+use bimorph_analysis::mode_quality::mode_losses;
 use bimorph_analysis::path_parameter::{PathModels, PathParameter};
 use bimorph_analysis::statics::check_voltages;
 use bimorph_analysis::transient::TransientOptions;
@@ -69,7 +70,7 @@ impl BimorphService {
         if count > self.0.limits.modes {
             return Err(status::limit("modes", self.0.limits.modes, count));
         }
-        let most = self.0.limits.mode_work;
+        let (most, quality) = (self.0.limits.mode_work, request.quality);
         let job = move |model: &NamedModel| {
             let work = model.unknowns().saturating_mul(count.saturating_mul(count));
             if work > most {
@@ -78,7 +79,12 @@ impl BimorphService {
             let (fitted, mut result, _) =
                 mesh::modes_fitted(&model.compiled, count, &voltages).map_err(status::analysis)?;
             result.warnings.extend(mesh::warnings(&fitted));
-            Ok(results::modes_to_wire(&result))
+            let mut answer = results::modes_to_wire(&result);
+            if quality {
+                let losses = mode_losses(&fitted, count, &voltages).map_err(status::analysis)?;
+                answer.losses = losses.iter().map(results::mode_loss_to_wire).collect();
+            }
+            Ok(answer)
         };
         self.analyse(&request.model, job).await
     }

@@ -36,6 +36,7 @@ from .paths import CriticalPoint, PathResult
 from .results import (
     Crossing,
     FrequencyResponse,
+    ModeLoss,
     ModesResult,
     NodeMotion,
     PullInResult,
@@ -79,6 +80,7 @@ __all__ = [
     "LogNormal",
     "Model",
     "Modes",
+    "ModeLoss",
     "ModesResult",
     "Netlist",
     "NetlistError",

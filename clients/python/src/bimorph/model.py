@@ -19,7 +19,7 @@ from .messages import Voltages, by_name, diagnostic, estimate_of, named, setting
 from .naming import by_argument, each
 from .paths import Branch, PathResult
 from .response import SPACINGS, response_of
-from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, StabilityLoss, StaticResult, TransientResult
+from .results import FrequencyResponse, ModeLoss, ModesResult, NodeMotion, PullInResult, StabilityLoss, StaticResult, TransientResult
 from .session import Session, opened_just_now
 from .stopping import apart
 from .ticket import Snapshot
@@ -134,9 +134,14 @@ class Model:
             stresses_pa=by_name(answer.stresses_pa),
         )
 
-    def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
-        """The ``count`` lowest modes about the equilibrium at these port voltages [V]."""
-        request = analysis_pb2.ModesRequest(model=self.id, count=arguments.integer("count", count, 1), voltages=named(voltages))
+    def modes(self, count: int = 6, voltages: Voltages | None = None, quality: bool = False) -> ModesResult:
+        """The ``count`` lowest modes about the equilibrium at these port voltages [V]. With ``quality`` the result has their losses by cause."""
+        request = analysis_pb2.ModesRequest(
+            model=self.id,
+            count=arguments.integer("count", count, 1),
+            voltages=named(voltages),
+            quality=arguments.flag("quality", quality),
+        )
         answer = self._call("Modes", request)
         self._checked("modes").modes(answer)
         shapes = [
@@ -152,6 +157,7 @@ class Model:
             answer.deflection_m,
             issue(answer.warnings),
             estimate_of(answer),
+            tuple(ModeLoss(loss.frequency_hz, loss.drag, loss.gas, loss.thermoelastic) for loss in answer.losses),
         )
 
     def ac(

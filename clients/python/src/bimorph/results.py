@@ -109,6 +109,26 @@ class StaticResult:
 
 
 @dataclass(frozen=True)
+class ModeLoss:
+    """1/Q of a mode by cause [1]."""
+
+    frequency_hz: float
+    """Frequency without damping [Hz]."""
+    drag: float
+    """Drag under parts, and dampers."""
+    gas: float
+    """Gas in gaps."""
+    thermoelastic: float
+    """Heat that flows across bent beams."""
+
+    @property
+    def quality(self) -> float:
+        """Q [1]; infinite without any loss."""
+        total = self.drag + self.gas + self.thermoelastic
+        return 1.0 / total if total > 0.0 else math.inf
+
+
+@dataclass(frozen=True)
 class ModesResult:
     """Undamped modes."""
 
@@ -128,6 +148,8 @@ class ModesResult:
     """Warnings about the result."""
     estimated_error: float | None = None
     """Largest estimated relative error by the mesh, of all frequencies and of the operating point [1]; None without an estimate."""
+    losses: tuple[ModeLoss, ...] = ()
+    """Losses of the modes by cause, with ``quality``."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """Frequency [Hz], residual and estimated error, by number from 1."""

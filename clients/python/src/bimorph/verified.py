@@ -123,6 +123,10 @@ class Checked:
         for shape in answer.shapes:
             for what, values in (("x", shape.x), ("y", shape.y), ("rz", shape.rz)):
                 self.numbers(what, values, len(answer.nodes))
+        if answer.losses:
+            self.require(len(answer.losses) == len(found), f"losses: expected {len(found)}, got {len(answer.losses)}")
+        parts = [part for loss in answer.losses for part in (loss.drag, loss.gas, loss.thermoelastic)]
+        self.numbers("losses", parts, len(parts))
 
     def response(self, answer: Any, signals: Sequence[str]) -> None:
         """Checks a frequency response: a value of each signal at each frequency."""

@@ -148,7 +148,7 @@ impl Client {
     /// [`ClientError`].
     pub fn modes(&mut self, model: &str, count: usize, voltages: &PortVoltages) -> Result<ModesResult, ClientError> {
         let count = u32::try_from(count).unwrap_or(u32::MAX);
-        let request = proto::ModesRequest { model: model.to_owned(), count, voltages: named(voltages) };
+        let request = proto::ModesRequest { model: model.to_owned(), count, voltages: named(voltages), quality: false };
         let mut rpc = self.link.rpc.clone();
         let reply = self.call(rpc.modes(request))?;
         self.checked(reply_checks::modes(&reply))?;

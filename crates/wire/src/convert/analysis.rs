@@ -2,6 +2,7 @@
 
 use super::{Violation, named, number, pairs};
 use crate::proto;
+use bimorph_analysis::mode_quality::ModeLoss;
 use bimorph_analysis::modes::ModesResult;
 use bimorph_analysis::pull_in::PullInResult;
 use bimorph_analysis::statics::{NodeMotion, StaticResult};
@@ -99,10 +100,17 @@ pub fn modes_to_wire(result: &ModesResult) -> proto::ModesResponse {
         deflection_m: result.deflection_m,
         warnings: result.warnings.clone(),
         estimated_error: result.estimated_error,
+        losses: Vec::new(),
     }
 }
 
-/// Modes back.
+/// The loss of a mode as it travels.
+pub fn mode_loss_to_wire(loss: &ModeLoss) -> proto::ModeLoss {
+    let ModeLoss { frequency_hz, drag, gas, thermoelastic } = *loss;
+    proto::ModeLoss { frequency_hz, drag, gas, thermoelastic }
+}
+
+/// Modes back, without their losses.
 pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
     let proto::ModesResponse {
         frequencies_hz,
@@ -114,6 +122,7 @@ pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
         deflection_m,
         warnings,
         estimated_error,
+        losses: _,
     } = wire;
     let shape = |s: proto::Shape| {
         let motions = s.x.iter().zip(&s.y).zip(&s.rz).map(|((&x, &y), &rz)| NodeMotion { x, y, rz });
