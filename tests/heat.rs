@@ -164,3 +164,63 @@ feed port * [b a] []";
     let error = compile(&Bundle::from_text("divider.net", text), &CompileOptions::default()).unwrap_err().to_string();
     assert!(error.contains("plate") && error.contains("TCR"), "{error}");
 }
+
+/// Radiation needs an absolute ambient temperature and an emissivity from 0 to 1: one error with the line. A beam in vacuum that radiates is colder than one that does not, and a heat capacity that grows
+/// with temperature delays the rise without a change of its end.
+#[test]
+fn radiation_and_heat_capacity() {
+    let refused = |layer: &str, wanted: &str| {
+        let text = format!(
+            "process si = [ Youngsmodulus=160e9 density=2330 h=2u resistivity=2e-5 thermcond=32 thermalexpansion=2.7e-6 {layer} ]
+            anchor si [a] []
+            beam2det si [a b] [l=200u w=2u]
+            anchor si [b] []
+            eground * [a] []"
+        );
+        let error = compile(&Bundle::from_text("bar.net", &text), &CompileOptions::default()).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{error}");
+    };
+    refused("emissivity=0.5", "`ambienttemperature`");
+    refused("emissivity=1.5 ambienttemperature=300", "emissivity");
+    let steady = |layer: &str| {
+        static_equilibrium(&bar(layer, PORT), &[("feed".into(), 2.0)]).unwrap_or_else(|e| panic!("{e}")).temperatures_k
+            [0]
+        .1
+    };
+    let [dark, bright] =
+        ["", "emissivity=0.9"].map(|more| steady(&format!("TCR=1e-9 ambienttemperature=300 specificheat=700 {more}")));
+    // linear in small losses: the mean of 4·σ·ε·2(w + h)·l·T³ over the parabola, against the conduction
+    assert!(bright < dark * (1.0 - 1e-3) && bright > dark * (1.0 - 2e-2), "{bright} {dark}");
+    let half = |layer: &str| {
+        let options = TransientOptions {
+            stop: 4e-3,
+            signals: vec!["arm.T".into()],
+            points: 401,
+            voltages: vec![("feed".into(), 2.0)],
+            ..TransientOptions::default()
+        };
+        let run =
+            transient(&bar(layer, PORT), &options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{e}"));
+        let t = &run.signals[0].2;
+        (t[10], t[400])
+    };
+    let (early, end) = half("TCC=1e-9 specificheat=700");
+    let (late, same) = half("TCC=1e-3 specificheat=700");
+    assert!(late < 0.95 * early && (same / end - 1.0).abs() < 1e-3, "{early} {late} {end} {same}");
+}
+
+/// A bar in air between anchors at 320 K over a substrate at 350 K, with an ambient of 300 K, has a mean rise of 50 − 30·tanh(μ/2)/(μ/2) K without voltage, to 1e-4. Here μ² = G/K with
+/// G = 20.8 µW/K and K = 0.64 µW/K (a fin, by hand). A run without voltage stays there.
+#[test]
+fn three_temperatures() {
+    let layer = "gasconductivity=0.026 fluid=2u shapefactor=4 ambienttemperature=300 substratetemperature=350 anchortemperature=320 specificheat=700";
+    let half = 0.5 * (20.8f64 / 0.64).sqrt();
+    let wanted = 300.0 + 50.0 - 30.0 * half.tanh() / half;
+    let compiled = bar(layer, PORT);
+    let found = static_equilibrium(&compiled, &[]).unwrap_or_else(|e| panic!("{e}")).temperatures_k[0].1;
+    assert!(((found - 300.0) / (wanted - 300.0) - 1.0).abs() < 1e-4, "{found} {wanted}");
+    let options =
+        TransientOptions { stop: 1e-4, signals: vec!["arm.T".into()], points: 11, ..TransientOptions::default() };
+    let run = transient(&compiled, &options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{e}"));
+    assert!(run.signals[0].2.iter().all(|t| (t / found - 1.0).abs() < 1e-9), "{:?}", run.signals[0].2);
+}

@@ -224,12 +224,12 @@ impl OperatingPoint {
         drive
     }
 
-    /// At rest as drawn and cold, with the voltages on: where a run begins.
+    /// At rest as drawn and without heat of currents, with the voltages on: where a run begins.
     pub(crate) fn rest(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<Self, AnalysisError> {
         let system = &compiled.parts.system;
         let electrics = &system.electrics;
         let sources = source_vector(compiled, voltages)?;
-        let rise = vec![0.0; electrics.heating.states()];
+        let rise = electrics.heating.rest();
         let mut drive = electrics.drive();
         electrics.apply(&sources, &rise, &mut drive);
         let q = vec![Pose::zeros(); system.bodies()];

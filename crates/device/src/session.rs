@@ -131,7 +131,7 @@ impl DeviceSession {
             first_step,
             equilibrium: Equilibrium::new(system, EquilibriumOptions::with_side(compiled.options.other_branch)),
             motion: Motion::zeros(n),
-            rise: vec![0.0; heaters],
+            rise: electrics.heating.rest(),
             rise_slope: vec![0.0; heaters],
             sources: vec![0.0; electrics.sources()],
             unit: vec![0.0; electrics.sources()],

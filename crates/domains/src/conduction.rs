@@ -17,7 +17,7 @@ use bimorph_base::sets::Sets;
 use thiserror::Error;
 
 /// A conductor of heat and current between two nodes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct HeatConductor {
     /// First node.
     pub a: usize,
@@ -43,9 +43,22 @@ pub struct HeatConductor {
     pub coefficient: f64,
     /// Relative change of its thermal resistivity with the rise (1/K).
     pub thermal_coefficient: f64,
+    /// Relative change of its heat capacity with the rise (1/K).
+    pub capacity_coefficient: f64,
+    /// Power that it radiates, over the fourth power of its temperature (W/K⁴).
+    pub radiation: f64,
+    /// Rise above ambient of the substrate to which the gas conducts (K).
+    pub substrate: f64,
 }
 
 impl HeatConductor {
+    /// Whether any of its properties depends on temperature, or its substrate is not at ambient: it takes the network of [`super::hot`].
+    pub fn depends_on_temperature(&self) -> bool {
+        let laws =
+            [self.coefficient, self.thermal_coefficient, self.capacity_coefficient, self.radiation, self.substrate];
+        laws.iter().any(|x| *x != 0.0)
+    }
+
     /// Its heat capacity, or that with which it alone between cold ends has the given time constant (J/K).
     pub(super) fn stored(&self) -> f64 {
         if self.delayed {

@@ -1,4 +1,4 @@
-//! Beams whose resistance depends on their temperature: potentials and temperatures in one network.
+//! Beams with properties that depend on their temperature: potentials and temperatures in one network.
 //!
 //! Each beam is a row of quadratic elements (`beam`). At given source voltages the rises of all nodes, the currents in the beams and the
 //! potentials are the unknowns of one Newton iteration; beams are reduced to their ends, and the rest is a sparse system of the nodes.
@@ -35,6 +35,8 @@ use thiserror::Error;
 const MIN_ELEMENTS: usize = 12;
 /// Elements for each unit of √(G/K): 1e-5 of the rise.
 const PER_DECAY: f64 = 2.3;
+/// Rise up to which these elements resolve the layers of radiation (K).
+const GLOWING: f64 = 1000.0;
 /// Elements of a beam, at most.
 const MAX_ELEMENTS: usize = 256;
 /// Newton iterations from one point of a path to the next.
@@ -68,6 +70,10 @@ pub(crate) struct HotNetwork {
     ends: Vec<[usize; 2]>,
     /// Unknown of the rise of each node; none: ambient.
     rise: Vec<Option<usize>>,
+    /// Rise of each node at a given temperature; 0 of all others (K).
+    held: Vec<f64>,
+    /// Lowest rise that heating from rest leads to: 0, or that of a colder anchor or substrate (K).
+    lowest: f64,
     /// Number of those unknowns; the potentials follow.
     nodes: usize,
     /// Rises in a state: those of nodes, then the inner ones of each beam.
@@ -130,10 +136,17 @@ fn unit_imaginary<T: ComplexField<RealField = f64> + Copy>() -> T {
 
 impl HotNetwork {
     /// Of heaters, which are the last resistors of the circuit. `None` where nothing depends on temperature.
-    pub(crate) fn new(heaters: &[HeatConductor], circuit: &ElectricalNetwork, sink: &[bool]) -> Option<Self> {
-        if heaters.iter().all(|h| h.coefficient == 0.0 && h.thermal_coefficient == 0.0) {
+    pub(crate) fn new(
+        heaters: &[HeatConductor],
+        circuit: &ElectricalNetwork,
+        (sink, held): (&[bool], &[f64]),
+    ) -> Option<Self> {
+        if !heaters.iter().any(HeatConductor::depends_on_temperature) && held.iter().all(|rise| *rise == 0.0) {
             return None;
         }
+        let mut given = vec![0.0; circuit.nodes];
+        given.iter_mut().zip(held).zip(sink).filter(|(_, sink)| **sink).for_each(|((to, rise), _)| *to = *rise);
+        let lowest = given.iter().copied().chain(heaters.iter().map(|h| h.substrate)).fold(0.0, f64::min);
         let mut rise = vec![None; circuit.nodes];
         let mut nodes = 0;
         for node in heaters.iter().flat_map(|h| [h.a, h.b]) {
@@ -144,7 +157,8 @@ impl HotNetwork {
         }
         let mut states = nodes;
         let bar = |h: &HeatConductor| {
-            let fine = (PER_DECAY * (h.gas / h.conductance).sqrt()).ceil() as usize;
+            let sides = h.gas + 4.0 * h.radiation * (h.ambient + GLOWING).powi(3);
+            let fine = (PER_DECAY * (sides / h.conductance).sqrt()).ceil() as usize;
             let bar = HotBeam {
                 conductance: h.conductance,
                 gas: h.gas,
@@ -152,6 +166,10 @@ impl HotNetwork {
                 coefficient: h.coefficient,
                 thermal_coefficient: h.thermal_coefficient,
                 capacity: h.stored(),
+                capacity_coefficient: h.capacity_coefficient,
+                radiation: h.radiation,
+                ambient: h.ambient,
+                substrate: h.substrate,
                 elements: fine.clamp(MIN_ELEMENTS, MAX_ELEMENTS),
                 first: states,
             };
@@ -188,6 +206,8 @@ impl HotNetwork {
             ends: heaters.iter().map(|h| [h.a, h.b]).collect(),
             bars,
             rise,
+            held: given,
+            lowest,
             nodes,
             states,
             known,
@@ -214,8 +234,19 @@ impl HotNetwork {
         self.bars.iter().any(|bar| bar.capacity == 0.0)
     }
 
-    fn ends_of<T: ComplexField<RealField = f64> + Copy>(&self, k: usize, state: &[T]) -> [T; 2] {
-        self.ends[k].map(|node| self.rise[node].map_or(real(0.0), |row| state[row]))
+    /// Whether a steady state without any source is not at ambient everywhere.
+    pub(crate) fn is_held_off_ambient(&self) -> bool {
+        self.held.iter().any(|rise| *rise != 0.0) || self.bars.iter().any(|bar| bar.substrate != 0.0)
+    }
+
+    /// Changes of the rises at both ends of beam `k`.
+    fn changes_of<T: ComplexField<RealField = f64> + Copy>(&self, k: usize, change: &[T]) -> [T; 2] {
+        self.ends[k].map(|node| self.rise[node].map_or(real(0.0), |row| change[row]))
+    }
+
+    /// Rises at both ends of beam `k` (K).
+    fn ends_of(&self, k: usize, state: &[f64]) -> [f64; 2] {
+        self.ends[k].map(|node| self.rise[node].map_or(self.held[node], |row| state[row]))
     }
 
     fn inner_of<'a, T>(&self, k: usize, state: &'a [T]) -> &'a [T] {
@@ -246,10 +277,10 @@ impl HotNetwork {
         of(a) - of(b)
     }
 
-    /// Newton's equations about rises and currents, `sigma` the slope of the rates with the rises (1/s).
+    /// Newton's equations about rises, their `rates` where they change, and currents; `sigma` is the slope of the rates with the rises (1/s).
     pub(crate) fn linearize<T: ComplexField<RealField = f64> + Copy>(
         &self,
-        state: &[f64],
+        (state, rates): (&[f64], Option<&[f64]>),
         currents: &[f64],
         sigma: T,
         to: &mut HotEquations<T>,
@@ -260,7 +291,9 @@ impl HotNetwork {
         to.negative = 0;
         for (k, bar) in self.bars.iter().enumerate() {
             budget::check();
-            bar.reduce((self.ends_of(k, state), self.inner_of(k, state)), currents[k], sigma, &mut to.bars[k]);
+            let rates = rates.map(|rates| (self.changes_of(k, rates), self.inner_of(k, rates)));
+            let at = ((self.ends_of(k, state), self.inner_of(k, state)), rates);
+            bar.reduce(at, currents[k], sigma, &mut to.bars[k]);
             let reduced = &to.bars[k];
             to.negative += reduced.negative;
             let [a, b] = self.ends[k];
@@ -364,7 +397,7 @@ impl HotNetwork {
         for (k, (bar, reduced)) in self.bars.iter().zip(&*bars).enumerate() {
             let range = bar.first..bar.first + bar.inner();
             let change = BeamChange {
-                ends: self.ends_of(k, state),
+                ends: self.changes_of(k, state),
                 volts: self.unknown(self.ends[k], &flows.potential),
                 inner: &inner[range.clone()],
                 missing: forcing.volts[k],
@@ -391,13 +424,13 @@ impl HotNetwork {
             rhs: Vec::new(),
             negative: 0,
         };
-        self.linearize(state, &flows.current, s, &mut equations);
+        self.linearize((state, None), &flows.current, s, &mut equations);
         let mut moved = Flows { current: Vec::new(), potential: Vec::new() };
         self.respond(&mut equations, &self.forcing_of(unit), change, &mut moved);
         for (k, mean) in means.iter_mut().enumerate() {
             let part = |of: fn(T) -> f64| {
                 let inner: Vec<f64> = self.inner_of(k, change).iter().map(|x| of(*x)).collect();
-                self.bars[k].mean(self.ends_of(k, change).map(of), &inner)
+                self.bars[k].mean(self.changes_of(k, change).map(of), &inner)
             };
             *mean = T::from_real(part(T::real)) + unit_imaginary::<T>() * T::from_real(part(T::imaginary));
         }
@@ -413,7 +446,7 @@ impl HotNetwork {
         }
         for (k, bar) in self.bars.iter().enumerate() {
             let at = (self.ends_of(k, state), self.inner_of(k, state));
-            let rates = rates.map(|rates| (self.ends_of(k, rates), self.inner_of(k, rates)));
+            let rates = rates.map(|rates| (self.changes_of(k, rates), self.inner_of(k, rates)));
             let current = flows.current[k];
             bar.residual(at, rates, current, &mut own);
             self.take(k, &own.heat, &mut to.heat);
@@ -465,7 +498,7 @@ impl HotNetwork {
                 rate.iter_mut().zip(&*state).zip(start).for_each(|((rate, t), start)| *rate = sigma * (t - start));
             }
             self.residual((state, flows), rates.map(|_| &*rate), u, &mut forcing);
-            self.linearize(state, &flows.current, sigma, equations);
+            self.linearize((state, rates.map(|_| &*rate)), &flows.current, sigma, equations);
             self.respond(equations, &forcing, &mut change, &mut flow);
             let (mut most, mut highest) = (0.0f64, 0.0f64);
             for (t, change) in state.iter_mut().zip(&change) {
@@ -494,15 +527,16 @@ impl HotNetwork {
         let highest = state.iter().fold(0.0f64, |most, t| most.max(t.abs()));
         resolved
             && equations.negative.is_multiple_of(2)
-            && state.iter().all(|t| *t >= -BELOW_AMBIENT * highest)
+            && state.iter().all(|t| *t >= self.lowest - BELOW_AMBIENT * highest)
             && self.without_resistance(state).is_none()
     }
 
-    /// A beam whose resistivity or thermal conductivity is not positive somewhere, with the rise there (K).
+    /// A beam whose resistivity, thermal conductivity or heat capacity is not positive somewhere, with the rise there (K).
     fn without_resistance(&self, state: &[f64]) -> Option<(usize, f64)> {
         self.bars.iter().enumerate().find_map(|(k, bar)| {
             let extremes = bar.extremes(self.ends_of(k, state), self.inner_of(k, state));
-            let lost = |t: &f64| !(1.0 + bar.coefficient * t > 0.0 && 1.0 + bar.thermal_coefficient * t > 0.0);
+            let laws = [bar.coefficient, bar.thermal_coefficient, bar.capacity_coefficient];
+            let lost = |t: &f64| laws.iter().any(|law| !(1.0 + law * t > 0.0));
             let found = extremes.into_iter().find(lost)?;
             Some((k, found))
         })

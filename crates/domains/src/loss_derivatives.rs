@@ -123,11 +123,12 @@ impl LossDerivatives {
     }
 }
 
-/// The blocks of the pattern that members with such forces touch, column by column.
+/// The blocks of the pattern that members touch which may have such forces, column by column.
 fn columns(system: &System) -> Vec<(usize, Vec<(usize, usize)>)> {
     let pattern = &system.model.pattern;
     let mut entries = Vec::new();
-    for member in system.members.iter().filter(|member| member.damps()) {
+    // those of another variant may lose energy where these contacts do not
+    for member in system.members.iter().filter(|member| member.damps() || member.touching().is_some()) {
         member.bodies(|body| {
             if let BodyId::Free(k) = body {
                 entries.push((k, None));

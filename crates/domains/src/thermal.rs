@@ -93,10 +93,20 @@ impl Heating {
         Ok(Self { heaters, sources, form, currents, sink: sink.to_vec(), ..Self::default() })
     }
 
-    /// The same with resistances that depend on temperature, where heaters of the circuit have such.
-    pub fn with_hot(self, circuit: &ElectricalNetwork) -> Self {
-        let hot = HotNetwork::new(&self.heaters, circuit, &self.sink).map(Arc::new);
+    /// The same with properties that depend on temperature, where heaters of the circuit have such. `held[node]` is the rise of a node at a given
+    /// temperature; 0: ambient (K).
+    pub fn with_hot(self, circuit: &ElectricalNetwork, held: &[f64]) -> Self {
+        let hot = HotNetwork::new(&self.heaters, circuit, (&self.sink, held)).map(Arc::new);
         Self { hot, ..self }
+    }
+
+    /// Steady rises without any voltage or input (K), of [`Heating::states`]: where a run begins.
+    pub fn rest(&self) -> Vec<f64> {
+        let mut rise = vec![0.0; self.states()];
+        if self.hot.as_ref().is_some_and(|hot| hot.is_held_off_ambient()) {
+            self.rises(&vec![0.0; self.sources + self.inputs()], &mut rise);
+        }
+        rise
     }
 
     /// The same with inputs behind the sources, some of them heat.
@@ -332,8 +342,7 @@ mod tests {
             delayed: true,
             capacity: 1600e3 * l * area,
             gas: gas / pieces as f64,
-            coefficient: 0.0,
-            thermal_coefficient: 0.0,
+            ..HeatConductor::default()
         };
         let heaters: Vec<_> = (0..pieces).map(heater).collect();
         let circuit = ElectricalNetwork {
@@ -436,8 +445,7 @@ mod tests {
             delayed: false,
             capacity: 0.0,
             gas: 0.0,
-            coefficient: 0.0,
-            thermal_coefficient: 0.0,
+            ..HeatConductor::default()
         };
         let circuit =
             ElectricalNetwork { nodes: 2, resistors: vec![(0, 1, 1.0)], sources: vec![(0, Some(1))], grounds: vec![1] };

@@ -8,6 +8,7 @@ use bimorph_analysis::readout::ports::OpenedPorts;
 use bimorph_analysis::readout::signal::Signal;
 use bimorph_analysis::statics::operating_point;
 use bimorph_device::PortKind;
+use bimorph_domains::thermal::HeatConductor;
 use bimorph_domains::{Drive, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::BlockMatrix;
@@ -79,15 +80,10 @@ impl<'a> LinearizedMechanism<'a> {
         if let Some(k) = ports.kinds.iter().position(|kind| *kind == PortKind::Rate) {
             return Err(ExportError::Turning { port: names[k].clone() });
         }
-        if let Some(k) = compiled
-            .parts
-            .system
-            .electrics
-            .heating
-            .heaters
-            .iter()
-            .position(|h| h.coefficient != 0.0 || h.thermal_coefficient != 0.0)
-        {
+        let heating = &compiled.parts.system.electrics.heating;
+        let dependent = heating.heaters.iter().position(HeatConductor::depends_on_temperature);
+        // anchors alone may have temperatures of their own
+        if let Some(k) = dependent.or(heating.is_hot().then_some(0)) {
             let beam = compiled.structure.beams[compiled.parts.heaters[k]].name.clone();
             return Err(ExportError::HotResistance { beam });
         }

@@ -78,6 +78,7 @@ pub(crate) fn finite(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
                     gas,
                     b.1.coefficient,
                     b.1.thermal_coefficient,
+                    b.1.capacity_coefficient,
                 ]),
         );
     }

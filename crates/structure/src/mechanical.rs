@@ -88,9 +88,29 @@ pub struct Heater {
     pub coefficient: f64,
     /// Relative change of the thermal resistance with the temperature rise (1/K).
     pub thermal_coefficient: f64,
+    /// Relative change of the heat capacity with the temperature rise (1/K).
+    #[serde(default)]
+    pub capacity_coefficient: f64,
+    /// Emissivity of its surface (1).
+    #[serde(default)]
+    pub emissivity: f64,
+    /// Temperature of the substrate to which the gas conducts (K); none: ambient.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub substrate: Option<f64>,
 }
 
-/// Loss of heat from a beam through gas to a substrate at ambient temperature.
+/// Power that a black body radiates, per area and fourth power of its temperature (W/(m²·K⁴)).
+const STEFAN_BOLTZMANN: f64 = 5.670_374_419e-8;
+
+impl Beam {
+    /// Power that the heated beam radiates from all of its sides over the fourth power of its temperature (W/K⁴).
+    pub fn radiation(&self) -> f64 {
+        let emissivity = self.heater.as_ref().map_or(0.0, |heater| heater.emissivity);
+        STEFAN_BOLTZMANN * emissivity * 2.0 * (self.width + self.thickness) * self.length
+    }
+}
+
+/// Loss of heat from a beam through gas to a substrate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GasLoss {
     /// Thermal conductivity of the gas (W/(m·K)).
@@ -158,6 +178,9 @@ pub struct Support {
     /// Distance by which the pad is etched free at its edge (m), where the layer says so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub undercut: Option<f64>,
+    /// Its temperature (K); none: ambient.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<f64>,
 }
 
 /// The outline of an anchor's pad, for drawings: from its node along local x, and as much to either side.

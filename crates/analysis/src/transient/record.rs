@@ -201,7 +201,7 @@ fn start(
         });
     }
     let mut motion = Motion::zeros(system.bodies());
-    let mut rise = vec![0.0; system.electrics.heating.states()];
+    let mut rise = system.electrics.heating.rest();
     let mut reported = Vec::new();
     if let Some(start) = options.release {
         let point = operating_point(start, &options.voltages)?;

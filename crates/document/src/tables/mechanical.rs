@@ -67,11 +67,14 @@ record! {
         gas: "", Any, "Loss of heat through gas";
         coefficient = 0.0: "1/K", Any, "Relative change of the resistance with the rise; left out: 0";
         thermal_coefficient = 0.0: "1/K", Any, "Relative change of the thermal resistance with the rise; left out: 0";
+        capacity_coefficient = 0.0: "1/K", Any, "Relative change of the heat capacity with the rise; left out: 0";
+        emissivity = 0.0: "1", NonNegative, "Emissivity of the surface; left out: 0";
+        substrate: "K", NonNegative, "Temperature of the substrate; left out: ambient";
     }
 }
 
 record! {
-    GasLoss: "Loss of heat through gas to a substrate at ambient temperature." {
+    GasLoss: "Loss of heat through gas to a substrate." {
         conductivity: "W/(m·K)", Positive, "Thermal conductivity of the gas";
         distance: "m", Positive, "Distance of the substrate";
         shape: "1", Positive, "Factor on the conduction straight below the beam";
@@ -104,6 +107,7 @@ record! {
         held: "", Any, "Held directions: local x, local y, rotation";
         angle: "rad", Any, "Angle of local x";
         undercut: "m", NonNegative, "Distance by which the pad is etched free at its edge";
+        temperature: "K", NonNegative, "Temperature; left out: ambient";
     }
 }
 

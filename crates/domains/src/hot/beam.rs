@@ -1,10 +1,10 @@
-//! One beam whose resistance depends on its temperature: quadratic elements along it, reduced to its ends.
+//! One beam with properties that depend on its temperature: quadratic elements along it, reduced to its ends.
 //!
 //! Let s go from 0 to 1 along the beam. K is its conductance from end to end, G that to the surroundings, R₀ its resistance and C its
-//! heat capacity. The rise T(s) and the current I satisfy
+//! heat capacity. B·T⁴ is the power that it radiates at the absolute temperature T, T₀ that of the surroundings, and T_s the rise of the substrate. The rise T(s) and the current I satisfy
 //! ```text
-//! C·∂T/∂t = K·∂(κ(T)·∂T/∂s)/∂s − G·T + I²·R₀·r(T),      V = I·R₀·∫r(T)ds
-//! r(T) = 1 + TCR·T,      κ(T) = 1/(1 + TCK·T)
+//! C·c(T)·∂T/∂t = K·∂(κ(T)·∂T/∂s)/∂s − G·(T − T_s) − B·((T₀ + T)⁴ − T₀⁴) + I²·R₀·r(T),      V = I·R₀·∫r(T)ds
+//! r(T) = 1 + TCR·T,      κ(T) = 1/(1 + TCK·T),      c(T) = 1 + TCC·T
 //! ```
 //! in weak form on elements with a node in their middle, integrated by three Gauss points. Newton's matrix of the inner nodes has two
 //! bands on either side. Its solution for the rises of the ends, the current and the residual leaves three equations: the heat that the
@@ -26,8 +26,16 @@ pub(super) struct HotBeam {
     pub(super) coefficient: f64,
     /// Relative change of the thermal resistivity with the rise (1/K).
     pub(super) thermal_coefficient: f64,
-    /// Heat capacity (J/K).
+    /// Heat capacity at ambient temperature (J/K).
     pub(super) capacity: f64,
+    /// Relative change of the heat capacity with the rise (1/K).
+    pub(super) capacity_coefficient: f64,
+    /// Radiated power over the fourth power of the temperature (W/K⁴).
+    pub(super) radiation: f64,
+    /// Temperature of the surroundings (K).
+    pub(super) ambient: f64,
+    /// Rise of the substrate to which the gas conducts (K).
+    pub(super) substrate: f64,
     /// Elements.
     pub(super) elements: usize,
     /// Where its inner nodes begin in the vector of rises.
@@ -66,6 +74,9 @@ pub(super) struct BeamResidual {
     pub(super) resistance: f64,
 }
 
+/// Rises of the ends and of the inner nodes of a beam, or their rates.
+type Nodes<'a> = ([f64; 2], &'a [f64]);
+
 /// A change of the state of a beam, from its ends, its voltage, and residuals that it removes.
 pub(super) struct BeamChange<'a, T> {
     /// Changes of the rises of both ends (K).
@@ -87,6 +98,18 @@ impl HotBeam {
     fn conductivity(&self, t: f64) -> [f64; 2] {
         let kappa = 1.0 / (1.0 + self.thermal_coefficient * t);
         [kappa, -self.thermal_coefficient * kappa * kappa]
+    }
+
+    /// Power that leaves to the surroundings at a rise, as if all of the beam had it, and its slope (W, W/K).
+    fn aside(&self, t: f64) -> [f64; 2] {
+        let conducted = self.gas * (t - self.substrate);
+        if self.radiation == 0.0 {
+            return [conducted, self.gas];
+        }
+        let there = self.ambient + t;
+        // (T₀ + t)⁴ − T₀⁴ without cancellation
+        let power = t * (there + self.ambient) * (there * there + self.ambient * self.ambient);
+        [conducted + self.radiation * power, self.gas + 4.0 * self.radiation * there.powi(3)]
     }
 
     /// Number of inner nodes.
@@ -156,8 +179,8 @@ impl HotBeam {
     /// Residuals at rises and a current; `rates` of all nodes where the capacity counts (K/s).
     pub(super) fn residual(
         &self,
-        (ends, inner): ([f64; 2], &[f64]),
-        rates: Option<([f64; 2], &[f64])>,
+        (ends, inner): Nodes<'_>,
+        rates: Option<Nodes<'_>>,
         current: f64,
         out: &mut BeamResidual,
     ) {
@@ -167,36 +190,46 @@ impl HotBeam {
         let joule = current * current * self.resistance;
         self.points(ends, inner, |first, weight, shape, slope, [t, dt]| {
             let flow = self.conductance * self.conductivity(t)[0] * count * dt * weight;
-            let source = (self.gas * t - joule * (1.0 + self.coefficient * t)) * weight / count;
+            let source = (self.aside(t)[0] - joule * (1.0 + self.coefficient * t)) * weight / count;
             for i in 0..3 {
                 out.heat[first + i] += flow * slope[i] + source * shape[i];
             }
         });
         if let Some(rates) = rates {
-            self.add_stored(rates, &mut out.heat);
+            self.add_stored((ends, inner), rates, &mut out.heat);
         }
         out.resistance = self.resistance(ends, inner);
     }
 
-    /// Heat that its capacity takes at each node at these rates (W, K/s).
-    pub(super) fn stored(&self, rates: ([f64; 2], &[f64]), out: &mut Vec<f64>) {
+    /// Heat that its capacity takes at each node at rises and rates (W, K/s).
+    pub(super) fn stored(&self, at: Nodes<'_>, rates: Nodes<'_>, out: &mut Vec<f64>) {
         out.clear();
         out.resize(rates.1.len() + 2, 0.0);
-        self.add_stored(rates, out);
+        self.add_stored(at, rates, out);
     }
 
-    fn add_stored(&self, (ends, inner): ([f64; 2], &[f64]), out: &mut [f64]) {
+    fn add_stored(&self, at: Nodes<'_>, (ends, inner): Nodes<'_>, out: &mut [f64]) {
         self.points(ends, inner, |first, weight, shape, _, [rate, _]| {
+            let capacity = self.capacity_at(first, at, shape);
             for i in 0..3 {
-                out[first + i] += self.capacity * rate * shape[i] * weight / self.elements as f64;
+                out[first + i] += capacity * rate * shape[i] * weight / self.elements as f64;
             }
         });
     }
 
-    /// Newton's equations at rises and a current, `sigma` the slope of the rates with the rises (1/s), reduced to the ends.
+    /// Heat capacity at a point of the element that begins with node `first` (J/K).
+    fn capacity_at(&self, first: usize, (ends, inner): Nodes<'_>, shape: &[f64; 3]) -> f64 {
+        if self.capacity_coefficient == 0.0 {
+            return self.capacity;
+        }
+        let rise: f64 = (0..3).map(|i| shape[i] * self.at(first + i, ends, inner)).sum();
+        self.capacity * (1.0 + self.capacity_coefficient * rise)
+    }
+
+    /// Newton's equations at rises, their rates where they change, and a current; `sigma` is the slope of the rates with the rises (1/s). Reduced to the ends.
     pub(super) fn reduce<T: ComplexField<RealField = f64> + Copy>(
         &self,
-        (ends, inner): ([f64; 2], &[f64]),
+        ((ends, inner), rates): (Nodes<'_>, Option<Nodes<'_>>),
         current: f64,
         sigma: T,
         out: &mut Reduced<T>,
@@ -220,14 +253,19 @@ impl HotBeam {
         let heat = 2.0 * current * self.resistance;
         self.points(ends, inner, |first, weight, shape, slope, [t, dt]| {
             let [kappa, falls] = self.conductivity(t);
-            let stored = sigma * real(self.capacity * weight / count);
+            let stored = sigma * real(self.capacity_at(first, (ends, inner), shape) * weight / count);
+            let warming = rates.filter(|_| self.capacity_coefficient != 0.0).map_or(0.0, |(ends, inner)| {
+                let rate: f64 = (0..3).map(|i| shape[i] * self.at(first + i, ends, inner)).sum();
+                self.capacity * self.capacity_coefficient * rate
+            });
+            let sides = self.aside(t)[1] + warming - joule;
             for i in 0..3 {
                 let node = first + i;
                 out.by_current[node] -= real::<T>(heat * (1.0 + self.coefficient * t) * shape[i] * weight / count);
                 for j in 0..3 {
                     let held =
                         self.conductance * count * slope[i] * (kappa * slope[j] + falls * dt * shape[j]) * weight
-                            + (self.gas - joule) * shape[i] * shape[j] * weight / count;
+                            + sides * shape[i] * shape[j] * weight / count;
                     let entry = real::<T>(held) + stored * real(shape[i] * shape[j]);
                     let other = first + j;
                     match node {

@@ -134,10 +134,10 @@ impl HotNetwork {
                 }
                 continue;
             }
-            let after = [(&stepper.state, &stepper.rate), (&stepper.change, &stepper.change_rate)]
-                .map(|(values, rates)| self.both(values, rates));
+            let after =
+                [self.both(&stepper.state, &stepper.rate), self.both_changes(&stepper.change, &stepper.change_rate)];
             if begins {
-                before = [self.both(&now.state, &now.state), self.both(&now.change, &now.change)];
+                before = [self.both(&now.state, &now.state), self.both_changes(&now.change, &now.change)];
             }
             t = if last { line.dt } else { t + length };
             for ((course, before), after) in found.iter_mut().zip(&before).zip(&after) {
@@ -162,12 +162,12 @@ impl HotNetwork {
     pub(crate) fn slowest(&self, u: &[f64], state: &[f64]) -> f64 {
         let flows = self.conduct(state, u);
         let mut equations = HotEquations::default();
-        self.linearize(state, &flows.current, 0.0, &mut equations);
+        self.linearize((state, None), &flows.current, 0.0, &mut equations);
         let (mut x, mut moved, mut last) = (vec![1.0; self.states], Flows::default(), 0.0);
         for _ in 0..MAX_ITERATIONS {
             let mut forcing = self.forcing();
             let stored: Vec<f64> = x.iter().map(|x| -x).collect();
-            self.take_stored(&stored, &mut forcing.heat);
+            self.take_stored(state, &stored, &mut forcing.heat);
             self.respond(&mut equations, &forcing, &mut x, &mut moved);
             let longest = x.iter().fold(0.0f64, |most, x| most.max(x.abs()));
             if longest <= 0.0 || longest.is_nan() {
@@ -183,16 +183,26 @@ impl HotNetwork {
     }
 
     /// Mean rises and rates of all beams.
-    fn both(&self, values: &[f64], rates: &[f64]) -> Vec<[f64; 2]> {
-        let mean = |k: usize, of: &[f64]| self.bars[k].mean(self.ends_of(k, of), self.inner_of(k, of));
-        (0..self.bars.len()).map(|k| [mean(k, values), mean(k, rates)]).collect()
+    fn both(&self, state: &[f64], rates: &[f64]) -> Vec<[f64; 2]> {
+        let mut found = self.both_changes(state, rates);
+        for (k, [mean, _]) in found.iter_mut().enumerate() {
+            *mean = self.bars[k].mean(self.ends_of(k, state), self.inner_of(k, state));
+        }
+        found
     }
 
-    /// Subtracts the heat that capacities take at these rates (K/s).
-    fn take_stored(&self, rates: &[f64], from: &mut [f64]) {
+    /// Changes of the mean rises and rates of all beams.
+    fn both_changes(&self, changes: &[f64], rates: &[f64]) -> Vec<[f64; 2]> {
+        let mean = |k: usize, of: &[f64]| self.bars[k].mean(self.changes_of(k, of), self.inner_of(k, of));
+        (0..self.bars.len()).map(|k| [mean(k, changes), mean(k, rates)]).collect()
+    }
+
+    /// Subtracts the heat that capacities take at a state and these rates (K/s).
+    fn take_stored(&self, state: &[f64], rates: &[f64], from: &mut [f64]) {
         let mut own = super::BeamResidual::default();
         for (k, bar) in self.bars.iter().enumerate() {
-            bar.stored((self.ends_of(k, rates), self.inner_of(k, rates)), &mut own.heat);
+            let at = (self.ends_of(k, state), self.inner_of(k, state));
+            bar.stored(at, (self.changes_of(k, rates), self.inner_of(k, rates)), &mut own.heat);
             self.take(k, &own.heat, from);
         }
     }
@@ -300,7 +310,7 @@ impl<'a> Stepper<'a> {
     fn differentiate(&mut self, (stage, h, x): (usize, f64, f64), flows: &Flows<f64>, from: &HotStage) {
         let sigma = 1.0 / (GAMMA * h);
         let network = self.network;
-        network.linearize(&self.state, &flows.current, sigma, &mut self.equations);
+        network.linearize((&self.state, Some(&self.rates[stage])), &flows.current, sigma, &mut self.equations);
         combine(&from.change, &self.change_rates, &A[stage][..stage.min(4)], h, &mut self.start);
         let mut forcing = self.direct.clone();
         for value in forcing.heat.iter_mut().chain(&mut forcing.volts).chain(&mut forcing.current) {
@@ -308,7 +318,7 @@ impl<'a> Stepper<'a> {
         }
         // minus the heat that −σ·T* stores
         let stored: Vec<f64> = self.start.iter().map(|start| -sigma * start).collect();
-        network.take_stored(&stored, &mut forcing.heat);
+        network.take_stored(&self.state, &stored, &mut forcing.heat);
         let mut change = Flows::default();
         network.respond(&mut self.equations, &forcing, &mut self.change, &mut change);
         for ((rate, t), start) in self.change_rates[stage].iter_mut().zip(&self.change).zip(&self.start) {

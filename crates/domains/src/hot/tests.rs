@@ -3,6 +3,7 @@
 
 use super::super::network::ElectricalNetwork;
 use super::super::thermal::{HeatConductor, Heating};
+use super::element::POINTS;
 use nalgebra::Complex;
 
 /// ρ 2e-5 Ω·m, k 32 W/(m·K), ρ·c 2330·700 J/(m³·K), a TCR of 1.25e-3/K; `gas` of all of its length (W/K), in equal pieces, fed through a
@@ -21,7 +22,7 @@ fn bar(pieces: usize, gas: f64, series: f64) -> Heating {
         capacity: 2330.0 * 700.0 * length * area,
         gas: gas / pieces as f64,
         coefficient: 1.25e-3,
-        thermal_coefficient: 0.0,
+        ..HeatConductor::default()
     };
     let heaters: Vec<HeatConductor> = (0..pieces).map(heater).collect();
     let feed = if series > 0.0 { vec![(pieces, pieces + 1, series)] } else { Vec::new() };
@@ -34,7 +35,7 @@ fn bar(pieces: usize, gas: f64, series: f64) -> Heating {
     };
     let mut sink = vec![false; pieces + 2];
     (sink[0], sink[pieces]) = (true, true);
-    Heating::new(heaters, &circuit.solve().unwrap(), 1, &sink).unwrap().with_hot(&circuit)
+    Heating::new(heaters, &circuit.solve().unwrap(), 1, &sink).unwrap().with_hot(&circuit, &[])
 }
 
 /// Mean rise, highest rise and current at these volts.
@@ -94,7 +95,7 @@ fn conductivity_falls_with_temperature() {
         sources: vec![(1, None)],
         grounds: vec![0],
     };
-    let heating = Heating::new(heaters, &circuit.solve().unwrap(), 1, &[true, true]).unwrap().with_hot(&circuit);
+    let heating = Heating::new(heaters, &circuit.solve().unwrap(), 1, &[true, true]).unwrap().with_hot(&circuit, &[]);
     let [_, peak, current] = at(&heating, 1.0);
     assert!((peak / 238.952098 - 1.0).abs() < 1e-5 && (current / 1e-3 - 1.0).abs() < 1e-12, "{peak} {current}");
     let mean = |volts: f64| at(&heating, volts)[0];
@@ -119,7 +120,7 @@ fn a_negative_coefficient_runs_away() {
         sources: vec![(1, None)],
         grounds: vec![0],
     };
-    heating = Heating::new(heaters, &circuit.solve().unwrap(), 1, &[true, true]).unwrap().with_hot(&circuit);
+    heating = Heating::new(heaters, &circuit.solve().unwrap(), 1, &[true, true]).unwrap().with_hot(&circuit, &[]);
     assert!(heating.check(&[0.5]).is_ok());
     let super::ThermalRunaway { share, rise, .. } = heating.check(&[5.0]).unwrap_err();
     let limit = 5.0 * share.sqrt();
@@ -218,4 +219,151 @@ fn response_in_frequency() {
         let exact = (Complex::from(1.0) - z.tanh() / z) / (z * z) * 3.0;
         assert!((at(omega) / slopes[0] / exact - 1.0).norm() < 1e-3, "{omega}");
     }
+}
+
+/// A beam at the ends at ambient with the properties of `bar`, changed by `with`, fed by one source.
+fn changed(with: impl FnOnce(&mut HeatConductor)) -> Heating {
+    let mut heaters = bar(1, 0.0, 0.0).heaters;
+    with(&mut heaters[0]);
+    let circuit = ElectricalNetwork {
+        nodes: 2,
+        resistors: vec![(0, 1, heaters[0].resistance)],
+        sources: vec![(1, None)],
+        grounds: vec![0],
+    };
+    Heating::new(heaters, &circuit.solve().unwrap(), 1, &[true, true]).unwrap().with_hot(&circuit, &[])
+}
+
+/// Radiation of a beam that conducts hardly any heat: in its middle the power I²R/l of 1 W over its surface is σ·ε·(T⁴ − T₀⁴) (closed form), to 1e-9. With conduction the slopes with the voltage agree
+/// with differences to 1e-7.
+#[test]
+fn beams_radiate() {
+    // emissivity 0.7 of 200 µm × 8 µm
+    let radiation = 5.670_374_419e-8 * 0.7 * 8e-6 * 200e-6;
+    let dark = changed(|h| (h.coefficient, h.conductance, h.radiation, h.ambient) = (0.0, 1e-10, radiation, 300.0));
+    let volts = (3e-4f64 * dark.heaters[0].resistance).sqrt();
+    let [_, peak, _] = at(&dark, volts);
+    let exact = (3e-4 / radiation + 300f64.powi(4)).powf(0.25) - 300.0;
+    assert!((peak / exact - 1.0).abs() < 1e-9, "{peak} {exact}");
+    let bright = changed(|h| (h.radiation, h.ambient) = (radiation, 300.0));
+    let mut rise = vec![0.0; bright.states()];
+    bright.rises(&[1.5], &mut rise);
+    let mut slopes = vec![0.0; bright.states()];
+    bright.slopes(&[1.5], &rise, &[1.0], &mut slopes);
+    let mean = |volts: f64| at(&bright, volts)[0];
+    let difference = (8.0 * (mean(1.501) - mean(1.499)) - (mean(1.502) - mean(1.498))) / 12e-3;
+    assert!((slopes[0] / difference - 1.0).abs() < 1e-7, "{} {difference}", slopes[0]);
+    assert!(mean(1.5) < at(&changed(|_| ()), 1.5)[0]);
+}
+
+/// Energy audit of heat: over a pulse of 1.2 V and the cooling after it the electrical work is the heat stored, ∫C·c(T)dT, and the heat lost to ends, gas and surroundings, within 1e-6 of
+/// the work. All of TCR, TCK, TCC, gas and radiation act. Steps of the course are short here, so that Simpson's rule over them is exact enough.
+#[test]
+fn heat_is_stored_or_lost() {
+    let heating = changed(|h| {
+        (h.thermal_coefficient, h.capacity_coefficient, h.gas) = (8e-4, 5e-4, 2e-5);
+        (h.radiation, h.ambient) = (6e-17, 300.0);
+    });
+    let hot = heating.hot().unwrap();
+    let bar = hot.bars[0];
+    // work and losses of a state (W); heat that is stored, and the part of it at the ends (J)
+    let powers = |state: &[f64], volts: f64| {
+        let current = hot.conduct(state, &[volts]).current[0];
+        let mut own = super::BeamResidual::default();
+        bar.residual(([0.0; 2], state), None, current, &mut own);
+        // what the ends receive but for what is stored at them
+        let received = -own.heat[0] - own.heat[state.len() + 1];
+        let node = |j: usize| if j == 0 || j > state.len() { 0.0 } else { state[j - 1] };
+        let (mut aside, mut stored, mut at_ends) = (0.0, 0.0, 0.0);
+        for e in 0..bar.elements {
+            for (x, weight) in POINTS {
+                let shape = [(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)];
+                let t: f64 = (0..3).map(|i| shape[i] * node(2 * e + i)).sum();
+                let part = weight / bar.elements as f64;
+                let heat = part * bar.capacity * (t + 0.5 * 5e-4 * t * t);
+                aside += part * (2e-5 * t + 6e-17 * ((300.0 + t).powi(4) - 300f64.powi(4)));
+                stored += heat;
+                at_ends += if e == 0 { shape[0] * heat } else { 0.0 };
+                at_ends += if e + 1 == bar.elements { shape[2] * heat } else { 0.0 };
+            }
+        }
+        // the current flows from node 0, at ground, to node 1
+        ([-current * volts, aside + received], stored, at_ends)
+    };
+    let mut state = vec![0.0; hot.states()];
+    let (mut work, mut lost, mut worst) = (0.0, 0.0, 0.0f64);
+    for volts in [1.2, 0.0] {
+        let (given, mut dt) = ([volts], 1e-9);
+        for _ in 0..500 {
+            let line = |dt: f64| super::SourceLine { from: &given, to: &given, dt };
+            let half = hot.course(line(0.5 * dt), &state).end;
+            let end = hot.course(line(0.5 * dt), &half).end;
+            let [(p0, _, ends0), (pm, ..), (p1, stored, ends1)] =
+                [&state, &half, &end].map(|state| powers(state, volts));
+            let mean = |i: usize| dt * (p0[i] + 4.0 * pm[i] + p1[i]) / 6.0;
+            work += mean(0);
+            lost += mean(1) - (ends1 - ends0);
+            worst = worst.max((work - lost - stored).abs());
+            state = end;
+            dt = f64::min(1.05 * dt, 0.5e-6);
+        }
+    }
+    println!("work {work:e} J, lost {lost:e} J, difference {:e}", worst / work);
+    assert!(worst < 1e-6 * work, "{worst:e} of {work:e}");
+}
+
+/// The change of a course of one step with its final voltage agrees with differences to 1e-6 where the heat capacity depends on temperature and the beam radiates.
+#[test]
+fn changes_with_capacity_and_radiation_are_derivatives() {
+    let heating = changed(|h| {
+        (h.capacity_coefficient, h.radiation, h.ambient) = (1e-3, 6e-17, 300.0);
+    });
+    let hot = heating.hot().unwrap();
+    let (from, dt) = ([0.4], 2e-6);
+    let mut start = vec![0.0; hot.states()];
+    hot.steady(&from, &mut start).unwrap();
+    let mean = |to: f64| hot.course(super::SourceLine { from: &from, to: &[to], dt }, &start).mean(0, dt)[0];
+    let found = hot.course_change(super::SourceLine { from: &from, to: &[1.1], dt }, &start, 0).mean(0, dt)[0];
+    let one = |h: f64| (mean(1.1 + h) - mean(1.1 - h)) / (2.0 * h);
+    let difference = (4.0 * one(1e-2) - one(2e-2)) / 3.0;
+    assert!((found / difference - 1.0).abs() < 1e-6, "{found} {difference}");
+}
+
+/// Anchors at a rise of 50 and −10 K without any heat: linear between them (closed form). A substrate at 30 K warms a bar between ends at ambient to a mean of
+/// 30·(1 − tanh(μ/2)/(μ/2)), and its middle to 30·(1 − 1/cosh(μ/2)) (a fin between cold ends). A run begins and stays there, with slopes that agree with differences to 1e-7.
+#[test]
+fn anchors_and_substrate_have_temperatures() {
+    let heaters = |gas: f64, substrate: f64| {
+        let mut heaters = bar(1, 0.0, 0.0).heaters;
+        (heaters[0].gas, heaters[0].substrate) = (gas, substrate);
+        heaters
+    };
+    let with = |heaters: Vec<HeatConductor>, held: &[f64]| {
+        let circuit = ElectricalNetwork {
+            nodes: 2,
+            resistors: vec![(0, 1, heaters[0].resistance)],
+            sources: vec![(1, None)],
+            grounds: vec![0],
+        };
+        Heating::new(heaters, &circuit.solve().unwrap(), 1, &[true, true]).unwrap().with_hot(&circuit, held)
+    };
+    let ends = with(heaters(0.0, 0.0), &[50.0, -10.0]);
+    let rest = ends.rest();
+    assert!((rest[0] - 20.0).abs() < 1e-9 && (ends.peaks(&[0.0])[0] - 50.0).abs() < 1e-9, "{rest:?}");
+    let gas = 2.08e-5;
+    let warm = with(heaters(gas, 30.0), &[0.0, 0.0]);
+    let half = 0.5 * f64::sqrt(gas / (32.0 * 4e-12 / 200e-6));
+    let rest = warm.rest();
+    assert!((rest[0] / (30.0 * (1.0 - half.tanh() / half)) - 1.0).abs() < 1e-4, "{}", rest[0]);
+    assert!((warm.peaks(&[0.0])[0] / (30.0 * (1.0 - half.cosh().recip())) - 1.0).abs() < 1e-4);
+    let hot = warm.hot().unwrap();
+    let still = hot.course(super::SourceLine { from: &[0.0], to: &[0.0], dt: 1e-4 }, &rest[1..]);
+    assert!((still.mean(0, 1e-4)[0] / rest[0] - 1.0).abs() < 1e-9 && still.mean(0, 5e-5)[1].abs() < 1e-3 * rest[0]);
+    let mut rise = vec![0.0; ends.states()];
+    ends.rises(&[1.0], &mut rise);
+    let mut slopes = vec![0.0; ends.states()];
+    ends.slopes(&[1.0], &rise, &[1.0], &mut slopes);
+    let mean = |volts: f64| at(&ends, volts)[0];
+    let difference = (8.0 * (mean(1.001) - mean(0.999)) - (mean(1.002) - mean(0.998))) / 12e-3;
+    assert!((slopes[0] / difference - 1.0).abs() < 1e-7, "{} {difference}", slopes[0]);
 }

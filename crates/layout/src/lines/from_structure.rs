@@ -163,8 +163,14 @@ impl<'a> OfStructure<'a> {
             let mass = beam.material.density * beam.length * beam.width * beam.thickness;
             parameters.extend((mass > 0.0 && heater.capacity > 0.0).then(|| ("specificheat", heater.capacity / mass)));
             parameters.extend(heater.time_constant.map(|tau| ("tau", tau)));
-            let laws = [("TCR", heater.coefficient), ("TCK", heater.thermal_coefficient)];
+            let laws = [
+                ("TCR", heater.coefficient),
+                ("TCK", heater.thermal_coefficient),
+                ("TCC", heater.capacity_coefficient),
+                ("emissivity", heater.emissivity),
+            ];
             parameters.extend(laws.into_iter().filter(|(_, x)| *x != 0.0));
+            parameters.extend(heater.substrate.map(|temperature| ("substratetemperature", temperature)));
             if let Some(gas) = &heater.gas {
                 parameters.extend([("gasconductivity", gas.conductivity), ("fluid", gas.distance)]);
                 parameters.push(("shapefactor", gas.shape));
@@ -301,8 +307,9 @@ impl<'a> OfStructure<'a> {
             };
             let size = pads.get(&k).map(|[l, w]| [("l", *l), ("w", *w)]);
             let undercut = support.undercut.map(|undercut| ("undercut", undercut));
+            let warm = support.temperature.map(|temperature| ("anchortemperature", temperature));
             let parameters: Vec<_> =
-                size.into_iter().flatten().chain(undercut).chain([("oz", support.angle)]).collect();
+                size.into_iter().flatten().chain(undercut).chain(warm).chain([("oz", support.angle)]).collect();
             self.push(&support.name, model, "*", &[support.node], &parameters);
         }
     }

@@ -47,6 +47,9 @@ pub fn lay(
                 gas: h.gas.map_or(0.0, |gas| gas.conductance(beam.width, beam.length)),
                 coefficient: h.coefficient,
                 thermal_coefficient: h.thermal_coefficient,
+                capacity_coefficient: h.capacity_coefficient,
+                radiation: beam.radiation(),
+                substrate: h.substrate.map_or(0.0, |substrate| substrate - beam.material.ambient_temperature),
             });
         }
     }
@@ -104,9 +107,10 @@ pub fn lay(
     for n in (0..structure.nodes.len()).filter(|n| structure.nodes[*n].mechanical && rigid.grounded(*n)) {
         sink[net[n]] = true;
     }
+    let held = anchor_rises(structure, &heaters, &net);
     let heating = Heating::new(heaters, &potentials, sources, &sink)
         .map_err(|e| DiscretizeError::NoHeatSink { beam: structure.beams[heated[e.heater]].name.clone() })?
-        .with_hot(&circuit);
+        .with_hot(&circuit, &held);
     if heating.is_hot() {
         fixed_gap_voltages(structure, &heating, &circuit, (&potentials, &net), gaps)?;
     }
@@ -131,6 +135,18 @@ fn offset_sources(
         }
     }
     shifted
+}
+
+/// Rise of the anchors of each net above the ambient temperature of the heaters (K); 0: none is given.
+fn anchor_rises(structure: &Structure, heaters: &[HeatConductor], net: &[usize]) -> Vec<f64> {
+    let mut held = vec![0.0; structure.nodes.len()];
+    let Some(ambient) = heaters.first().map(|heater| heater.ambient) else { return held };
+    for support in &structure.supports {
+        if let Some(temperature) = support.temperature {
+            held[net[support.node.0]] = temperature - ambient;
+        }
+    }
+    held
 }
 
 /// Relative change of resistances by which gap voltages are tested (1).

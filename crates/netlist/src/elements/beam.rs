@@ -185,11 +185,20 @@ pub(super) fn beam2det(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     beam.temperature = None;
     let gas = site.gas_loss(width, height)?;
     let conductance = conductivity * width * height / length;
-    let [coefficient, thermal_coefficient] = [site.number_or("TCR", 0.0)?, site.number_or("TCK", 0.0)?];
-    beam.heater =
-        Some(Heater { resistance, conductance, time_constant, capacity, gas, coefficient, thermal_coefficient });
-    site.drawing.electrical(&[a, b]);
     let ambient = beam.material.ambient_temperature;
+    beam.heater = Some(Heater {
+        resistance,
+        conductance,
+        time_constant,
+        capacity,
+        gas,
+        coefficient: site.number_or("TCR", 0.0)?,
+        thermal_coefficient: site.number_or("TCK", 0.0)?,
+        capacity_coefficient: site.number_or("TCC", 0.0)?,
+        emissivity: site.emissivity(ambient)?,
+        substrate: site.absolute("substratetemperature")?,
+    });
+    site.drawing.electrical(&[a, b]);
     if let (Some(stress), Some(softening)) = (site.positive_if_any("yieldstress")?, site.positive_if_any("softening")?)
     {
         if softening <= ambient {

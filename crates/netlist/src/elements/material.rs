@@ -199,6 +199,28 @@ impl ElementSite<'_, '_> {
         Ok(Some(GasLoss { conductivity, distance, shape }))
     }
 
+    /// A temperature (K), if it is given.
+    pub(super) fn absolute(&mut self, name: &str) -> Result<Option<f64>, Reported> {
+        match self.number(name)? {
+            Some(temperature) if temperature < 0.0 => {
+                Err(self.out_of_range(name, temperature, "an absolute temperature, zero or positive"))
+            }
+            temperature => Ok(temperature),
+        }
+    }
+
+    /// Emissivity (1); 0 by default. A part that radiates needs an absolute ambient temperature (K).
+    pub(super) fn emissivity(&mut self, ambient: f64) -> Result<f64, Reported> {
+        let emissivity = self.number_or("emissivity", 0.0)?;
+        if !(0.0..=1.0).contains(&emissivity) {
+            return Err(self.out_of_range("emissivity", emissivity, "from 0 to 1"));
+        }
+        if emissivity > 0.0 && ambient == 0.0 {
+            return Err(self.missing("ambienttemperature"));
+        }
+        Ok(emissivity)
+    }
+
     /// Viscosity of gas that slides in a film of a thickness (m), with slip at both walls (Veijola and Turowski 2001); that of a continuum without a
     /// `pressure`, none in vacuum.
     pub(super) fn sliding(&mut self, viscosity: f64, thickness: f64) -> Result<Option<f64>, Reported> {

@@ -30,18 +30,22 @@ impl ElementSite<'_, '_> {
 
     fn hold(&mut self, node: NodeId, held: [bool; 3], angle: f64, undercut: Option<f64>) {
         self.drawing.place(self.instance.span, &[node], &[[0.0; 2]]);
-        self.drawing.structure.supports.push(Support { name: self.name(), node, held, angle, undercut });
+        let name = self.name();
+        self.drawing.structure.supports.push(Support { name, node, held, angle, undercut, temperature: None });
     }
 }
 
 /// An anchor holds every node that it is given.
 pub(super) fn anchor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
+    let first = site.drawing.structure.supports.len();
     site.support([true, true, true])?;
     let (angle, undercut) = (site.instance.rotation.angle(), site.undercut()?);
     for k in 1..site.instance.nodes.len() {
         site.hold(site.node(k), [true; 3], angle, undercut);
         site.drawing.note(Fact::AnchorNodes, site.instance.span);
     }
+    let temperature = site.absolute("anchortemperature")?;
+    site.drawing.structure.supports[first..].iter_mut().for_each(|support| support.temperature = temperature);
     Ok(())
 }
 
