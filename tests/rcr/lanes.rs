@@ -2,7 +2,8 @@
 
 use crate::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::joint_coordinates::constrained_loops::{Lanes, Linkage, Real, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
+use bimorph::multibody::scalar::{Lanes, StoredReal};
 
 /// A ladder of `cells` cells whose rungs are `width` wide.
 fn ladder(cells: usize, width: f64) -> Linkage {

@@ -6,6 +6,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
+//! | [`scalar`] | numbers: one, lanes of variants, with derivatives, double-double |
 //! | [`order`] | the leaf → root elimination order of the body graph |
 //! | [`layout`] | order and pattern of a graph, looked up where it was laid out just before |
 //! | [`pattern`] | where each block of the factor lies, fill of the loops included, and the update schedule |
@@ -22,7 +23,6 @@
 //! | [`forces`] | elastic forces, energy and tangent of a model at a configuration |
 //! | [`unstressed`] | the stiffness in the present geometry without stress |
 //! | [`precise`] | the product of that tangent with a displacement in extended precision |
-//! | [`double`] | double-double numbers |
 //!
 //! **Architecture invariant.** Only [`bimorph_base`] lies below. Bodies and joints have no voltages, charges or
 //! temperatures, and no names of netlist elements.
@@ -30,7 +30,6 @@
 pub mod agitation;
 pub mod batch;
 pub mod body;
-pub mod double;
 pub mod factor;
 pub mod forces;
 pub mod joint;
@@ -42,6 +41,7 @@ pub mod order;
 pub mod pattern;
 pub mod planar;
 pub mod precise;
+pub mod scalar;
 pub mod section;
 pub mod sine;
 pub mod unstressed;

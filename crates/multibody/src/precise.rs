@@ -4,12 +4,12 @@
 //! of width 1 : 100 by some parts in a thousand. Strains taken joint by joint, with the slopes as they are, have no such
 //! loss: slopes rounded to f64 are those of a geometry that differs by parts in 10¹⁶.
 
-use super::double::{Double, DoublePose};
 use super::forces::RestStrain;
 use super::joint::{BodyId, Coupling};
 use super::model::Model;
 use super::planar::Pose;
 use super::planar::factored::FactoredTangent;
+use super::scalar::{Double, DoublePose};
 use super::section::{NONE, PairSlot};
 
 /// ∂²U/∂q² of the joints of a model at one configuration.

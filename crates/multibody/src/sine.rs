@@ -4,7 +4,7 @@
 //! Reference: the minimax polynomials of K. C. Ng, FreeBSD msun `k_sin.c` and `k_cos.c` (1993), which carry |x| ≤ π/4 with an
 //! error of the series below 2⁻⁵⁸.
 
-use crate::batch::Number;
+use crate::scalar::Real;
 use std::f64::consts::FRAC_PI_4;
 
 /// Largest angle of [`small`] (rad).
@@ -33,7 +33,7 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
 
 /// [`sin_cos`] for |x| ≤ [`SMALL`], of a number or of one in every lane.
 #[inline(always)]
-pub fn small<T: Number>(x: T) -> (T, T) {
+pub fn small<T: Real>(x: T) -> (T, T) {
     let z = x * x;
     let w = z * z;
     let s = z * (z * SIN[3] + SIN[2]) + SIN[1] + z * w * (z * SIN[5] + SIN[4]);

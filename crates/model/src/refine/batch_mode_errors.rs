@@ -11,9 +11,8 @@ use super::span::{BeamSpan, spans};
 use crate::discretize::Assembly;
 use crate::options::CompileOptions;
 use bimorph_multibody::BodyId;
-use bimorph_multibody::batch::{
-    Kernel, LANES, Lane8, LanePose, Real, SimdReal, ZERO_POSE, across, forces, load, store,
-};
+use bimorph_multibody::batch::{Kernel, LANES, Lane8, LanePose, SimdReal, ZERO_POSE, across, forces, load, store};
+use bimorph_multibody::scalar::StoredReal;
 use bimorph_solve::frequency::batch::{LaneModes, RitzMatrices, dot, weigh};
 use bimorph_solve::frequency::mac;
 use bimorph_structure::Structure;

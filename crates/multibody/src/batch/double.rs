@@ -1,6 +1,6 @@
 //! Double-double numbers in every lane: [`crate::double`].
 
-use super::Number;
+use crate::scalar::Real;
 
 /// `high + low` in every lane.
 #[derive(Debug, Clone, Copy)]
@@ -13,7 +13,7 @@ pub struct LaneDouble<T> {
 
 /// The sum and its rounding error (Knuth).
 #[inline(always)]
-fn two_sum<T: Number>(a: T, b: T) -> LaneDouble<T> {
+fn two_sum<T: Real>(a: T, b: T) -> LaneDouble<T> {
     let high = a + b;
     let back = high - a;
     LaneDouble { high, low: (a - (high - back)) + (b - back) }
@@ -21,14 +21,14 @@ fn two_sum<T: Number>(a: T, b: T) -> LaneDouble<T> {
 
 /// The sum and its rounding error where |a| ≥ |b| (Dekker).
 #[inline(always)]
-fn quick_two_sum<T: Number>(a: T, b: T) -> LaneDouble<T> {
+fn quick_two_sum<T: Real>(a: T, b: T) -> LaneDouble<T> {
     let high = a + b;
     LaneDouble { high, low: b - (high - a) }
 }
 
 /// The upper half of the digits (Veltkamp), and the lower.
 #[inline(always)]
-fn split<T: Number>(a: T) -> (T, T) {
+fn split<T: Real>(a: T) -> (T, T) {
     let shifted = a * 134_217_729.0;
     let high = shifted - (shifted - a);
     (high, a - high)
@@ -36,13 +36,13 @@ fn split<T: Number>(a: T) -> (T, T) {
 
 /// The product and its rounding error (Dekker).
 #[inline(always)]
-fn two_product<T: Number>(a: T, b: T) -> LaneDouble<T> {
+fn two_product<T: Real>(a: T, b: T) -> LaneDouble<T> {
     let high = a * b;
     let ((ah, al), (bh, bl)) = (split(a), split(b));
     LaneDouble { high, low: ((ah * bh - high) + ah * bl + al * bh) + al * bl }
 }
 
-impl<T: Number> LaneDouble<T> {
+impl<T: Real> LaneDouble<T> {
     /// A number without anything left.
     #[inline(always)]
     pub fn of(high: T) -> Self {
@@ -74,7 +74,7 @@ impl<T: Number> LaneDouble<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::double::Double;
+    use crate::scalar::Double;
 
     /// Sums and products have the bits of a double-double number alone.
     #[test]

@@ -1,6 +1,7 @@
 //! Strains of a joint, its forces and its tangent: [`crate::planar`] over lanes.
 
-use super::{Lane8, LaneBlock, LanePose, Number, SimdReal, ZERO_POSE, add, load};
+use super::{Lane8, LaneBlock, LanePose, SimdReal, ZERO_POSE, add, load};
+use crate::scalar::Real;
 
 /// Two numbers of the plane.
 pub type LaneVector<T = Lane8> = [T; 2];
@@ -25,7 +26,7 @@ impl LaneTurn {
     }
 }
 
-impl<T: Number> LaneTurn<T> {
+impl<T: Real> LaneTurn<T> {
     #[inline(always)]
     fn rotation_minus_identity(&self, v: &LaneVector<T>) -> LaneVector<T> {
         [self.less * v[0] - self.whole * v[1], self.whole * v[0] + self.less * v[1]]
@@ -68,7 +69,7 @@ impl LanePlaced {
     }
 }
 
-impl<T: Number> LanePlaced<T> {
+impl<T: Real> LanePlaced<T> {
     /// A body at `q` with the sine and cosine of half its rotation.
     #[inline(always)]
     pub fn turned(q: LanePose<T>, sin: T, cos: T) -> Self {
@@ -96,7 +97,7 @@ impl LaneSection {
     }
 }
 
-impl<T: Number> LaneSection<T> {
+impl<T: Real> LaneSection<T> {
     /// Stress of a strain.
     #[inline(always)]
     pub fn stress(&self, e: &LanePose<T>) -> LanePose<T> {
@@ -128,35 +129,35 @@ pub struct LanePair<T = Lane8> {
 }
 
 #[inline(always)]
-fn perpendicular<T: Number>(v: &LaneVector<T>) -> LaneVector<T> {
+fn perpendicular<T: Real>(v: &LaneVector<T>) -> LaneVector<T> {
     [-v[1], v[0]]
 }
 
 #[inline(always)]
-fn dot<T: Number>(a: &LaneVector<T>, b: &LaneVector<T>) -> T {
+fn dot<T: Real>(a: &LaneVector<T>, b: &LaneVector<T>) -> T {
     a[0] * b[0] + a[1] * b[1]
 }
 
 #[inline(always)]
-fn dot3<T: Number>(a: &LanePose<T>, b: &LanePose<T>) -> T {
+fn dot3<T: Real>(a: &LanePose<T>, b: &LanePose<T>) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// a·x + b·y.
 #[inline(always)]
-fn combine<T: Number>(a: &LaneVector<T>, x: T, b: &LaneVector<T>, y: T) -> LaneVector<T> {
+fn combine<T: Real>(a: &LaneVector<T>, x: T, b: &LaneVector<T>, y: T) -> LaneVector<T> {
     [a[0] * x + b[0] * y, a[1] * x + b[1] * y]
 }
 
 #[inline(always)]
-fn multiply<T: Number>(k: &[T; 6], x: &LanePose<T>) -> LanePose<T> {
+fn multiply<T: Real>(k: &[T; 6], x: &LanePose<T>) -> LanePose<T> {
     let [uu, ug, up, gg, gp, pp] = *k;
     [uu * x[0] + ug * x[1] + up * x[2], ug * x[0] + gg * x[1] + gp * x[2], up * x[0] + gp * x[1] + pp * x[2]]
 }
 
 /// Strains of a joint with these arms between two bodies.
 #[inline(always)]
-pub fn kinematics<T: Number>(
+pub fn kinematics<T: Real>(
     section: &LaneSection<T>,
     (arm_a, arm_b): (&LaneVector<T>, &LaneVector<T>),
     LanePlaced { q: qa, turn: a }: &LanePlaced<T>,
@@ -174,7 +175,7 @@ pub fn kinematics<T: Number>(
     LaneKinematics { strain, axial: u, shear: g, bent, opening, radius_a, radius_b, e1 }
 }
 
-impl<T: Number> LaneKinematics<T> {
+impl<T: Real> LaneKinematics<T> {
     /// Forces on bodies a and b.
     #[inline(always)]
     pub fn forces(&self, stress: &LanePose<T>) -> (LanePose<T>, LanePose<T>) {

@@ -24,18 +24,17 @@ pub mod joint;
 pub mod matrix;
 pub mod model;
 mod precise;
-mod real;
 mod simd;
 
-pub use super::joint_coordinates::constrained_loops::Real;
 pub use double::LaneDouble;
 pub use matrix::LaneMatrix;
 pub use model::LaneModel;
 pub use precise::{LanePrecise, PrecisePose};
-pub use real::Number;
 #[cfg(test)]
 pub(crate) use simd::one_by_one;
 pub use simd::{Kernel, LANES, Lane8, SimdReal, across, add, everywhere, load, store};
+
+use super::scalar::Real;
 
 /// Displacement, rate or force of a body in each variant: x, y, θ.
 pub type LanePose<T = Lane8> = [T; 3];
@@ -59,7 +58,7 @@ pub const BLANK: LaneBlock = [ZERO_POSE; 3];
 
 /// `y += x·s`.
 #[inline(always)]
-pub fn add_scaled<T: Number>(y: &mut LanePose<T>, x: &LanePose<T>, s: T) {
+pub fn add_scaled<T: Real>(y: &mut LanePose<T>, x: &LanePose<T>, s: T) {
     for i in 0..3 {
         y[i] += x[i] * s;
     }
@@ -67,7 +66,7 @@ pub fn add_scaled<T: Number>(y: &mut LanePose<T>, x: &LanePose<T>, s: T) {
 
 /// Block times vector.
 #[inline(always)]
-pub fn times<T: Number>(block: &LaneBlock<T>, x: &LanePose<T>) -> LanePose<T> {
+pub fn times<T: Real>(block: &LaneBlock<T>, x: &LanePose<T>) -> LanePose<T> {
     let mut y = *x;
     for i in 0..3 {
         y[i] = block[2][i] * x[2] + (block[1][i] * x[1] + block[0][i] * x[0]);
@@ -77,7 +76,7 @@ pub fn times<T: Number>(block: &LaneBlock<T>, x: &LanePose<T>) -> LanePose<T> {
 
 /// Product of two blocks.
 #[inline(always)]
-pub fn product<T: Number>(a: &LaneBlock<T>, b: &LaneBlock<T>) -> LaneBlock<T> {
+pub fn product<T: Real>(a: &LaneBlock<T>, b: &LaneBlock<T>) -> LaneBlock<T> {
     [times(a, &b[0]), times(a, &b[1]), times(a, &b[2])]
 }
 

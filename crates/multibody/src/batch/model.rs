@@ -1,8 +1,9 @@
 //! Bodies and joints of a batch of variants.
 
 use super::joint::{LaneSection, LaneVector};
-use super::{BLANK, Lane8, LaneBlock, LanePose, Number, Real, SimdReal, ZERO_POSE, load};
+use super::{BLANK, Lane8, LaneBlock, LanePose, SimdReal, ZERO_POSE, load};
 use crate::planar::Block;
+use crate::scalar::{Real, StoredReal};
 use crate::section::{JointSection, PackedJoint, PairSlot};
 use crate::{Body, BodyId, Model, Pattern};
 use nalgebra::Matrix3;
@@ -205,7 +206,7 @@ impl LaneBody {
     }
 }
 
-impl<T: Number> LaneBody<T> {
+impl<T: Real> LaneBody<T> {
     /// Force of the drag at a rate.
     #[inline(always)]
     pub fn drag_force(&self, v: &LanePose<T>) -> LanePose<T> {

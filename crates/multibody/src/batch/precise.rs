@@ -1,10 +1,11 @@
 //! The product of a tangent with a displacement in extended precision: [`crate::precise`] over lanes.
 
 use super::double::LaneDouble;
-use super::{LANES, Lane8, LanePose, Real, SimdReal, load};
+use super::{LANES, Lane8, LanePose, SimdReal, load};
 use crate::Model;
 use crate::forces::{RestStrain, factored};
 use crate::planar::Pose;
+use crate::scalar::StoredReal;
 use crate::section::{NONE, PairSlot};
 
 /// Numbers of a pair's tangent: the slopes u, g, of both turns, the stiffness, and the rest.

@@ -5,8 +5,7 @@
 //! operations, which took half of the time. (For the same reason there are loops here, and no closures over arrays: those are not always
 //! inlined, and a call of one vector instruction costs more than it.) Operations are those of `f64`, lane by lane; none is fused.
 
-use super::real::Number;
-use crate::joint_coordinates::constrained_loops::Lanes;
+use crate::scalar::{Lanes, Real};
 use crate::sine;
 use pulp::{Arch, Simd, WithSimd};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -17,7 +16,7 @@ pub const LANES: usize = 8;
 pub type Lane8 = Lanes<LANES>;
 
 /// A number in every lane, in registers.
-pub trait SimdReal: Number {
+pub trait SimdReal: Real {
     /// The instructions at hand.
     type Simd: Copy;
     /// `x` in every lane.
@@ -145,7 +144,7 @@ impl<S: Simd, const M: usize> SubAssign for Registers<S, M> {
     }
 }
 
-impl<S: Simd, const M: usize> Number for Registers<S, M> {
+impl<S: Simd, const M: usize> Real for Registers<S, M> {
     #[inline(always)]
     fn splat_like(self, x: f64) -> Self {
         Self::splat(self.simd, x)

@@ -7,7 +7,7 @@
 
 use super::joint::{JointKinematics, Symmetric};
 use super::perpendicular;
-use crate::double::Double;
+use crate::scalar::Double;
 use nalgebra::{Vector2, Vector3};
 
 /// A pair's tangent: rowsᵀ·`stiffness`·rows + the rest.

@@ -12,8 +12,9 @@ pub use storage::LaneEquilibrium;
 use super::path::LoadPath;
 use super::{EquilibriumOptions, LEAP, STALLED};
 use bimorph_domains::{Domain, Drive, System};
-use bimorph_multibody::batch::{LANES, Lane8, LanePose, Real, across};
+use bimorph_multibody::batch::{LANES, Lane8, LanePose, across};
 use bimorph_multibody::planar::Pose;
+use bimorph_multibody::scalar::StoredReal;
 use kernels::{EquilibriumKernel, EquilibriumPass};
 
 /// A variant, its path, and the equilibrium (or near it) where that begins.

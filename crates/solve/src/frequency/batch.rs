@@ -24,8 +24,9 @@ pub use vectors::{dot, weigh};
 
 use super::eigen::Modes;
 use bimorph_domains::System;
-use bimorph_multibody::batch::{LANES, Lane8, LanePose, Real, across};
+use bimorph_multibody::batch::{LANES, Lane8, LanePose, across};
 use bimorph_multibody::planar::Pose;
+use bimorph_multibody::scalar::StoredReal;
 use kernels::{ModesKernel, ModesPass};
 use storage::Which;
 

@@ -9,9 +9,9 @@
 //! extra-precise iterative refinement", ACM Trans. Math. Software 32 (2006).
 
 use bimorph_domains::{Drive, System};
-use bimorph_multibody::double::{Double, DoublePose};
 use bimorph_multibody::planar::{Block, Pose};
 use bimorph_multibody::precise::PreciseTangent;
+use bimorph_multibody::scalar::{Double, DoublePose};
 use bimorph_multibody::{BlockMatrix, Model};
 
 /// Corrections of one solve at most.

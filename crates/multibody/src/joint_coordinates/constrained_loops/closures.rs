@@ -8,8 +8,8 @@ use super::data::{ReductionInput, ReductionTask, Workspace};
 use super::mechanism::ClosureShape;
 use super::plane_vector::{LinkageVector, minus, perpendicular, plus};
 use super::poses::BodyKinematics;
-use super::scalar::Real;
 use super::schedule::NONE;
+use crate::scalar::StoredReal;
 use std::ops::Range;
 
 /// One direction of a closure: its value, rate, rows over bodies a and b, and the velocity part of its second derivative.
@@ -22,7 +22,7 @@ pub(super) struct Strain<T> {
     pub bias: T,
 }
 
-impl<T: Real> ClosureShape<T> {
+impl<T: StoredReal> ClosureShape<T> {
     /// The constraints of the closure at two placed bodies, its axial offset being `rest`; those beyond their number are not
     /// filled.
     #[inline(always)]
@@ -132,7 +132,7 @@ impl<T: Real> ClosureShape<T> {
     }
 }
 
-impl<T: Real> Workspace<T> {
+impl<T: StoredReal> Workspace<T> {
     /// Writes the constraint rows of the closures of `range`. Returns the largest residual of a row.
     #[inline(always)]
     pub(super) fn write_rows(&mut self, given: ReductionInput<'_, T>, range: Range<usize>) -> T {
@@ -168,7 +168,7 @@ impl<T: Real> Workspace<T> {
     }
 }
 
-impl<T: Real> Strain<T> {
+impl<T: StoredReal> Strain<T> {
     const NONE: Self = Self { value: T::ZERO, rate: T::ZERO, a: [T::ZERO; 3], b: [T::ZERO; 3], bias: T::ZERO };
 
     #[inline(always)]

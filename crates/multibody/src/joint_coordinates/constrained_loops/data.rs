@@ -2,9 +2,9 @@
 
 use super::mechanism::{MechanismConstants, lane};
 use super::poses::MechanismKinematics;
-use super::scalar::Real;
 use super::schedule::BodyElimination;
 use super::tree::{Closure, Linkage};
+use crate::scalar::StoredReal;
 
 /// Right-hand side of a reduction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,7 +103,7 @@ pub(super) struct FrontScratch<T> {
     pub r: Vec<T>,
 }
 
-impl<T: Real> Offsets<T> {
+impl<T: StoredReal> Offsets<T> {
     /// As built, for one variant per lane.
     pub(super) fn new(variants: &[&Linkage]) -> Self {
         let linkage = variants[0];
@@ -125,16 +125,16 @@ impl<T: Real> Offsets<T> {
     }
 }
 
-impl<T: Real> FrontAccumulator<T> {
+impl<T: StoredReal> FrontAccumulator<T> {
     const CLEAN: Self = Self { inertia: [T::ZERO; 6], momentum: [T::ZERO; 3] };
 }
 
-impl<T: Real> PinContribution<T> {
+impl<T: StoredReal> PinContribution<T> {
     pub(super) const NOTHING: Self =
         Self { inertia: [T::ZERO; 3], force: [T::ZERO; 2], moment: T::ZERO, lever: [T::ZERO; 2] };
 }
 
-impl<T: Real> Workspace<T> {
+impl<T: StoredReal> Workspace<T> {
     pub(super) fn new(mechanism: &MechanismConstants<T>, coordinates: usize) -> Self {
         let schedule = &mechanism.schedule;
         let most = |f: &dyn Fn(BodyElimination) -> usize| schedule.turns().map(f).max().unwrap_or(0);

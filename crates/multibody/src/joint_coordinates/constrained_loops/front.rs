@@ -14,7 +14,7 @@
 //! not at all. The smallest pivot against the joint's lever is the caller's measure of how near a loop is to a singular
 //! configuration.
 
-use super::scalar::Real;
+use crate::scalar::StoredReal;
 
 /// One front, in row-major order: M is k × k (lower triangle), rows are h × (k + 1) with γ last.
 #[derive(Debug)]
@@ -29,7 +29,7 @@ pub(super) struct Front<'a, T> {
     pub unit: &'a [T],
 }
 
-impl<T: Real> Front<'_, T> {
+impl<T: StoredReal> Front<'_, T> {
     /// Takes out the coordinates. `coefficients` is freedom × k, `base` and (for several coordinates) `combined`, the
     /// orthogonal combination of them that was taken out, belong to the outward pass. Returns the worst of unit/pivot.
     #[inline(always)]
@@ -197,7 +197,7 @@ impl<T: Real> Front<'_, T> {
 
 /// Multiplies the rows of `a` by 1 − β·v·vᵀ from the right.
 #[inline(always)]
-fn reflect<T: Real>(a: &mut [[T; 3]; 3], v: &[T; 3], beta: T, nd: usize) {
+fn reflect<T: StoredReal>(a: &mut [[T; 3]; 3], v: &[T; 3], beta: T, nd: usize) {
     for row in a.iter_mut().take(nd) {
         let mut sum = T::ZERO;
         for i in 0..nd {
@@ -211,7 +211,7 @@ fn reflect<T: Real>(a: &mut [[T; 3]; 3], v: &[T; 3], beta: T, nd: usize) {
 }
 
 #[inline(always)]
-fn transpose<T: Real>(a: &mut [[T; 3]; 3]) {
+fn transpose<T: StoredReal>(a: &mut [[T; 3]; 3]) {
     for i in 0..3 {
         for j in 0..i {
             let x = a[i][j];

@@ -6,10 +6,10 @@
 use super::data::{FrontScratch, ReductionInput, ReductionTask, StageInertia, Workspace};
 use super::front::Front;
 use super::mechanism::MechanismConstants;
-use super::scalar::Real;
 use super::schedule::{BodyElimination, NONE};
+use crate::scalar::StoredReal;
 
-impl<T: Real> Workspace<T> {
+impl<T: StoredReal> Workspace<T> {
     /// Assembles a body's front, takes its coordinates out, and hands the rest on.
     #[inline(never)]
     pub(super) fn any_inward(&mut self, given: ReductionInput<'_, T>, body: usize) {

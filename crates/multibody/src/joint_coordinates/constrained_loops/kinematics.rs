@@ -13,12 +13,12 @@
 use super::mechanism::{Arms, JointShape, MechanismConstants};
 use super::plane_vector::{LinkageVector, minus, perpendicular, plus, times};
 use super::poses::{BodyKinematics, MechanismKinematics, ParentOffset};
-use super::scalar::Real;
+use crate::scalar::StoredReal;
 use std::ops::Range;
 
 /// A body that nothing holds: its coordinates are its pose, its axes the directions themselves.
 #[inline(always)]
-fn place_free<T: Real>(out: &mut BodyKinematics<T>, q: &[T], v: &[T], axes: &mut [[T; 3]]) {
+fn place_free<T: StoredReal>(out: &mut BodyKinematics<T>, q: &[T], v: &[T], axes: &mut [[T; 3]]) {
     for (k, axis) in axes.iter_mut().enumerate() {
         *axis = [T::ZERO; 3];
         axis[k] = T::ONE;
@@ -29,7 +29,11 @@ fn place_free<T: Real>(out: &mut BodyKinematics<T>, q: &[T], v: &[T], axes: &mut
 
 /// A pin: rotation alone, no axial second-order strain.
 #[inline(always)]
-fn place_pin<T: Real>(arms: &Arms<T>, parent: &BodyKinematics<T>, out: &mut BodyKinematics<T>) -> ParentOffset<T> {
+fn place_pin<T: StoredReal>(
+    arms: &Arms<T>,
+    parent: &BodyKinematics<T>,
+    out: &mut BodyKinematics<T>,
+) -> ParentOffset<T> {
     let (wp, w) = (parent.rate[2], out.rate[2]);
     let (swung, swung_parent) =
         (out.rotation_minus_identity(arms.arm), parent.rotation_minus_identity(arms.arm_parent));
@@ -44,7 +48,7 @@ fn place_pin<T: Real>(arms: &Arms<T>, parent: &BodyKinematics<T>, out: &mut Body
 }
 
 /// A joint with any directions; `rest` is the axial offset of a locked one.
-fn place_joint<T: Real>(
+fn place_joint<T: StoredReal>(
     (arms, sign, joint, rest): (&Arms<T>, T, &JointShape<T>, T),
     parent: &BodyKinematics<T>,
     out: &mut BodyKinematics<T>,
@@ -112,7 +116,7 @@ fn place_joint<T: Real>(
 /// Bodies whose sines are taken together.
 const BLOCK: usize = 16;
 
-impl<T: Real> MechanismKinematics<T> {
+impl<T: StoredReal> MechanismKinematics<T> {
     /// Places the bodies of `range`, root → leaf, in blocks: angles first, so that the sines of a block are evaluated
     /// in vector instructions. `rests` are the axial offsets of locked joints.
     #[inline(always)]

@@ -3,10 +3,10 @@
 //! It is constant after [`MechanismConstants::new`], so that all users of one mechanism share it.
 
 use super::plane_vector::LinkageVector;
-use super::scalar::Real;
 use super::schedule::{Plan, Schedule};
 use super::tree::{Closure, Linkage, LinkageBody, LinkageParent};
 use crate::Joint;
+use crate::scalar::StoredReal;
 
 /// Constant data of a mechanism.
 #[derive(Debug)]
@@ -79,7 +79,7 @@ pub(super) struct ClosureShape<T> {
     pub pin: bool,
 }
 
-impl<T: Real> MechanismConstants<T> {
+impl<T: StoredReal> MechanismConstants<T> {
     /// Builds one variant per lane; all have the same tree and loops. Fewer variants than lanes are repeated.
     pub(super) fn new(variants: &[&Linkage], plan: Plan) -> Self {
         let linkage = variants[0];
@@ -113,7 +113,7 @@ impl<T: Real> MechanismConstants<T> {
 }
 
 /// One lane with a number of each variant.
-pub(super) fn lane<T: Real>(of: &[&LinkageBody], f: &dyn Fn(&LinkageBody) -> f64) -> T {
+pub(super) fn lane<T: StoredReal>(of: &[&LinkageBody], f: &dyn Fn(&LinkageBody) -> f64) -> T {
     let mut out = T::ZERO;
     for k in 0..T::LANES {
         out.set_lane(k, f(of[k % of.len()]));
@@ -121,7 +121,7 @@ pub(super) fn lane<T: Real>(of: &[&LinkageBody], f: &dyn Fn(&LinkageBody) -> f64
     out
 }
 
-impl<T: Real> JointShape<T> {
+impl<T: StoredReal> JointShape<T> {
     fn new(of: &[&LinkageBody]) -> Self {
         let lane = |f: &dyn Fn(&LinkageBody) -> f64| lane(of, f);
         Self {
@@ -133,13 +133,13 @@ impl<T: Real> JointShape<T> {
     }
 }
 
-impl<T: Real> LaneInertia<T> {
+impl<T: StoredReal> LaneInertia<T> {
     fn new(of: &[&LinkageBody]) -> Self {
         Self { mass: lane(of, &|l| l.mass), moment: lane(of, &|l| l.inertia) }
     }
 }
 
-impl<T: Real> Arms<T> {
+impl<T: StoredReal> Arms<T> {
     fn new(of: &[&LinkageBody]) -> Self {
         let lane = |f: &dyn Fn(&LinkageBody) -> f64| lane(of, f);
         Self {
@@ -149,7 +149,7 @@ impl<T: Real> Arms<T> {
     }
 }
 
-impl<T: Real> ClosureShape<T> {
+impl<T: StoredReal> ClosureShape<T> {
     fn new(of: &[(&Closure, f64)]) -> Self {
         let lane = |f: &dyn Fn(&Closure, f64) -> f64| {
             let mut out = T::ZERO;

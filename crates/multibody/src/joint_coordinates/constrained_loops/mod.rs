@@ -7,7 +7,6 @@
 //! | [`tree`] | the spanning tree and the loops: n coordinates, m constraints |
 //! | [`rotary`] | the paper's model: joints that only turn |
 //! | `coordinates` | joint coordinates of given poses |
-//! | [`scalar`], `lanes` | what it runs over: one number, or lanes of variants |
 //! | `plane_vector` | vectors of the plane |
 //! | `schedule` | symbolic phase: front of each body, constraint rows passing it, arena offsets |
 //! | `mechanism` | constant data: geometry and inertia over lanes, and the schedule |
@@ -39,7 +38,6 @@ mod fast;
 mod front;
 mod general;
 mod kinematics;
-mod lanes;
 mod mechanism;
 mod pin;
 mod plane_vector;
@@ -48,7 +46,6 @@ mod projection;
 mod recursion;
 mod reduction;
 pub mod rotary;
-pub mod scalar;
 mod schedule;
 mod singular;
 mod springs;
@@ -57,11 +54,8 @@ mod traversal;
 pub mod tree;
 
 pub use data::ReductionTask;
-pub use lanes::Lanes;
-pub use lanes::has_lanes;
 pub use reduction::{Reduction, Traversed};
 pub use rotary::CoordinateCounts;
-pub use scalar::Real;
 pub use singular::Singularity;
 pub use stages::AddedInertia;
 pub use tree::{Closure, Linkage, LinkageBody, LinkageParent};

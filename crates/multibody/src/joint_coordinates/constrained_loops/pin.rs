@@ -17,7 +17,7 @@
 use super::data::{FrontAccumulator, PinContribution, ReductionInput, Workspace};
 use super::mechanism::LaneInertia;
 use super::poses::ParentOffset;
-use super::scalar::Real;
+use crate::scalar::StoredReal;
 
 /// A body on a pin.
 #[derive(Debug, Clone, Copy)]
@@ -31,7 +31,7 @@ pub(super) struct PinElimination<'a, T> {
     pub torque: T,
 }
 
-impl<T: Real> PinContribution<T> {
+impl<T: StoredReal> PinContribution<T> {
     /// Takes the coordinate of the body out, to which this was handed, and what has gathered in `node`. Returns base and
     /// slope of its angular acceleration, and what it hands on. `FORCED`: with forces and velocity parts.
     #[inline(always)]
@@ -112,7 +112,7 @@ impl<T: Real> PinContribution<T> {
 
 /// Acceleration of a body on a pin, and of its coordinate, from base, slope and the acceleration `up` of its parent.
 #[inline(always)]
-pub(super) fn outward<const FORCED: bool, T: Real>(
+pub(super) fn outward<const FORCED: bool, T: StoredReal>(
     (base, slope): (T, [T; 2]),
     sign: T,
     hanging: &ParentOffset<T>,
@@ -129,7 +129,7 @@ pub(super) fn outward<const FORCED: bool, T: Real>(
     ([a[0] + ly * angular, a[1] - lx * angular, angular], out)
 }
 
-impl<T: Real> Workspace<T> {
+impl<T: StoredReal> Workspace<T> {
     /// Takes the coordinate of one body on a pin out.
     #[inline(always)]
     pub(super) fn pin_inward<const FORCED: bool>(&mut self, given: ReductionInput<'_, T>, body: usize) {

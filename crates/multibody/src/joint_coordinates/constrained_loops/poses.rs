@@ -2,7 +2,7 @@
 
 use super::mechanism::MechanismConstants;
 use super::plane_vector::{LinkageVector, minus, turned};
-use super::scalar::Real;
+use crate::scalar::StoredReal;
 
 /// Where a body is and how it moves: what its children and the closures need of it.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +35,7 @@ pub struct MechanismKinematics<T> {
     pub axes: Vec<[T; 3]>,
 }
 
-impl<T: Real> BodyKinematics<T> {
+impl<T: StoredReal> BodyKinematics<T> {
     pub const REST: Self = Self { pose: [T::ZERO; 3], rate: [T::ZERO; 3], half: [T::ZERO, T::ONE] };
 
     /// Takes `from` as one of the lanes.
@@ -73,7 +73,7 @@ impl<T: Real> BodyKinematics<T> {
     }
 }
 
-impl<T: Real> ParentOffset<T> {
+impl<T: StoredReal> ParentOffset<T> {
     /// One of the lanes.
     #[inline]
     pub fn lane(&self, lane: usize) -> ParentOffset<f64> {
@@ -96,7 +96,7 @@ impl<T: Real> ParentOffset<T> {
     }
 }
 
-impl<T: Real> MechanismKinematics<T> {
+impl<T: StoredReal> MechanismKinematics<T> {
     /// Bodies at rest where they are drawn, of a mechanism with `coordinates` coordinates.
     pub(super) fn new(mechanism: &MechanismConstants<T>, coordinates: usize) -> Self {
         Self {

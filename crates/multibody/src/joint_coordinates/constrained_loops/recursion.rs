@@ -11,11 +11,11 @@
 //! multi-rigid-body dynamic systems", Multibody System Dynamics 9 (2003) 185–212.
 
 use super::data::{ReductionInput, ReductionTask, Workspace};
-use super::scalar::Real;
 use super::schedule::EliminationKind;
+use crate::scalar::StoredReal;
 use std::ops::Range;
 
-impl<T: Real> Workspace<T> {
+impl<T: StoredReal> Workspace<T> {
     /// Takes the coordinates of the bodies of `range` out, leaf → root.
     #[inline(always)]
     pub(super) fn inward(&mut self, given: ReductionInput<'_, T>, range: Range<usize>) {

@@ -3,10 +3,10 @@
 use super::data::{Offsets, ReductionInput, ReductionTask, Workspace};
 use super::mechanism::MechanismConstants;
 use super::poses::{BodyKinematics, MechanismKinematics};
-use super::scalar::Real;
 use super::schedule::Plan;
 use super::singular::RowPool;
 use super::tree::Linkage;
+use crate::scalar::StoredReal;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ pub struct Reduction<T: Traversed> {
 }
 
 /// Scalar type that selects the traversal (serial or packed).
-pub trait Traversed: Real {
+pub trait Traversed: StoredReal {
     /// One body after the other, or a faster way.
     type Traversal: Traversal<Self>;
 

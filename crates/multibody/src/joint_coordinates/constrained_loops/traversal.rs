@@ -2,10 +2,10 @@
 
 use super::data::{Offsets, ReductionTask};
 use super::fast;
-use super::lanes::Lanes;
 use super::poses::{BodyKinematics, MechanismKinematics};
 use super::reduction::{Reduction, Traversal, Traversed};
 use super::tree::Linkage;
+use crate::scalar::Lanes;
 
 impl<T: Traversed> Reduction<T> {
     /// Places all bodies for coordinates `q` and rates `v`.

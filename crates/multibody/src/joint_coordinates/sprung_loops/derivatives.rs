@@ -1,10 +1,10 @@
 //! The exact change of where the bodies are, and of what they feel: the kinematics over values with their derivatives.
 
-use super::dual::Dual;
 use super::kinematics::{JointState, MotionMap, RelativeOffset, RotationState, Triple, offset_from_parent};
 use super::poses::{LaneJointStates, place_of};
 use super::tree::{Tree, TreeParent};
 use crate::planar::Pose;
+use crate::scalar::Dual;
 
 /// Intermediate state of a body: pose, rate and acceleration, and its rotation.
 #[derive(Debug, Clone, Copy)]

@@ -15,8 +15,8 @@
 //! Rotations and their rates are sums along the tree. Once they are known, no body depends on another here, so that
 //! eight of them are computed per vector ([`super::poses`]).
 
-use crate::batch::Number;
 use crate::planar::Pose;
+use crate::scalar::Real;
 
 /// A pair of numbers.
 pub(super) type TreeVector<T> = [T; 2];
@@ -29,12 +29,12 @@ pub(super) fn triple(x: &Pose) -> Triple<f64> {
 }
 
 #[inline(always)]
-fn perpendicular<T: Number>(v: TreeVector<T>) -> TreeVector<T> {
+fn perpendicular<T: Real>(v: TreeVector<T>) -> TreeVector<T> {
     [-v[1], v[0]]
 }
 
 #[inline(always)]
-pub(super) fn dot<T: Number>(a: TreeVector<T>, b: TreeVector<T>) -> T {
+pub(super) fn dot<T: Real>(a: TreeVector<T>, b: TreeVector<T>) -> T {
     a[0] * b[0] + a[1] * b[1]
 }
 
@@ -51,7 +51,7 @@ impl MotionMap<f64> {
     pub(super) const REST: Self = Self { lever: [0.0; 2], columns: [[0.0; 2]; 3] };
 }
 
-impl<T: Number> MotionMap<T> {
+impl<T: Real> MotionMap<T> {
     /// The body's motion from the parent's and from the coordinates' motion `s`.
     #[inline(always)]
     pub(super) fn apply(&self, sign: f64, parent: &Triple<T>, s: &Triple<T>) -> Triple<T> {
@@ -109,7 +109,7 @@ pub(super) struct RotationState<T> {
     pub(super) spin_rate: T,
 }
 
-impl<T: Number> RotationState<T> {
+impl<T: Real> RotationState<T> {
     /// (R − 1)·v without cancellation.
     #[inline(always)]
     fn rotation_minus_identity(&self, v: TreeVector<T>) -> TreeVector<T> {
@@ -140,7 +140,7 @@ pub(super) struct RelativeOffset<T> {
 
 /// A body with rotation `own` on a parent with rotation `parent`.
 #[inline(always)]
-pub(super) fn offset_from_parent<T: Number>(
+pub(super) fn offset_from_parent<T: Real>(
     shape: &JointGeometry<T>,
     parent: &RotationState<T>,
     own: &RotationState<T>,

@@ -11,8 +11,7 @@
 //! | [`tree`] | parents of bodies, moving directions; closures |
 //! | [`kinematics`] | kinematics of a body relative to its parent, and the maps of motion |
 //! | [`poses`] | poses, rates and accelerations, root → leaf, eight bodies per vector |
-//! | [`dual`] | a value with its derivative |
-//! | [`derivatives`] | the change of where bodies are, over those |
+//! | [`derivatives`] | the change of where bodies are, over values with their derivatives |
 //! | [`columns`] | blocks and vectors in registers |
 //! | [`dynamics`] | forces over the coordinates, leaf → root; coordinates of a pose |
 //! | [`loops`] | forces of the joints that close loops |
@@ -24,7 +23,6 @@
 pub mod columns;
 pub mod derivatives;
 pub mod directions;
-pub mod dual;
 pub mod dynamics;
 pub mod factor;
 pub mod geometric;

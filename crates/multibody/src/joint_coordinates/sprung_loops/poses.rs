@@ -8,8 +8,9 @@ use super::kinematics::{
     JointGeometry, JointState, MotionMap, RelativeOffset, RotationState, TreeVector, offset_from_parent,
 };
 use super::tree::{Tree, TreeParent};
-use crate::batch::{Kernel, LANES, Lane8, Number, SimdReal, ZERO_POSE, everywhere, load, store};
+use crate::batch::{Kernel, LANES, Lane8, SimdReal, ZERO_POSE, everywhere, load, store};
 use crate::planar::Pose;
+use crate::scalar::Real;
 
 /// Coordinates, rates and accelerations of eight bodies.
 pub type LaneJointStates = JointState<Lane8>;
@@ -266,7 +267,7 @@ impl JointGeometry<Lane8> {
     }
 
     /// Of one body.
-    pub(super) fn of<T: Number>(&self, lane: usize, one: T) -> JointGeometry<T> {
+    pub(super) fn of<T: Real>(&self, lane: usize, one: T) -> JointGeometry<T> {
         let like = |x: &Lane8| one.splat_like(x.0[lane]);
         let pair = |x: &TreeVector<Lane8>| [like(&x[0]), like(&x[1])];
         let second = &self.second;

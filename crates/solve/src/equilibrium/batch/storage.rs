@@ -3,8 +3,8 @@
 use bimorph_domains::System;
 use bimorph_multibody::batch::joint::LanePlaced;
 use bimorph_multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, ZERO_POSE};
-use bimorph_multibody::joint_coordinates::constrained_loops::has_lanes;
 use bimorph_multibody::planar::Pose;
+use bimorph_multibody::scalar::has_lanes;
 use bimorph_multibody::{BlockMatrix, Pattern};
 
 /// As many variants as there are lanes, with storage.

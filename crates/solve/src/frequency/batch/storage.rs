@@ -4,8 +4,8 @@ use super::ritz::{MAX_ROWS, RitzMatrices};
 use bimorph_domains::System;
 use bimorph_multibody::batch::joint::LanePlaced;
 use bimorph_multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, LanePrecise, PrecisePose, ZERO_POSE};
-use bimorph_multibody::joint_coordinates::constrained_loops::has_lanes;
 use bimorph_multibody::planar::Pose;
+use bimorph_multibody::scalar::has_lanes;
 
 /// Which factor.
 #[derive(Debug, Clone, Copy, PartialEq)]

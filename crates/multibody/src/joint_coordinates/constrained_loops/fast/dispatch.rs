@@ -1,6 +1,6 @@
 //! The recursion in the widest instructions of the processor at hand.
 //!
-//! The code is one and the same over either number ([`crate::joint_coordinates::constrained_loops::scalar`]). It is compiled for each instruction
+//! The code is one and the same over either number ([`crate::scalar`]). It is compiled for each instruction
 //! set and chosen at run time (AVX-512, AVX2, NEON or the base set); as nothing is fused, the bits do not depend on the
 //! choice.
 

@@ -3,10 +3,10 @@
 
 use super::small::SmallFront;
 use crate::joint_coordinates::constrained_loops::data::{ReductionInput, ReductionTask, Workspace};
-use crate::joint_coordinates::constrained_loops::scalar::Real;
 use crate::joint_coordinates::constrained_loops::schedule::NONE;
+use crate::scalar::StoredReal;
 
-impl<T: Real> Workspace<T> {
+impl<T: StoredReal> Workspace<T> {
     /// Takes the coordinate of a body with a small front out.
     #[inline(always)]
     pub(in crate::joint_coordinates::constrained_loops) fn small_inward(

@@ -18,11 +18,11 @@ mod subtrees;
 
 use super::dispatch::{self, across};
 use crate::joint_coordinates::constrained_loops::data::{Offsets, ReductionTask};
-use crate::joint_coordinates::constrained_loops::lanes::Lanes;
 use crate::joint_coordinates::constrained_loops::poses::{BodyKinematics, MechanismKinematics};
 use crate::joint_coordinates::constrained_loops::reduction::{Reduction, Traversal, Traversed};
-use crate::joint_coordinates::constrained_loops::scalar::Real;
 use crate::joint_coordinates::constrained_loops::tree::Linkage;
+use crate::scalar::Lanes;
+use crate::scalar::StoredReal;
 use pulp::{Simd, WithSimd};
 use std::ops::Range;
 use std::slice::from_ref;

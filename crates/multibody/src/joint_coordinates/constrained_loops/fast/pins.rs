@@ -2,8 +2,8 @@
 
 use crate::joint_coordinates::constrained_loops::data::{PinContribution, ReductionInput, Workspace};
 use crate::joint_coordinates::constrained_loops::pin::{PinElimination, outward};
-use crate::joint_coordinates::constrained_loops::scalar::Real;
 use crate::joint_coordinates::constrained_loops::schedule::{EliminationKind, Schedule};
+use crate::scalar::StoredReal;
 use std::ops::Range;
 
 /// Pins searched at a time: their data stay in cache until they are eliminated.
@@ -25,7 +25,7 @@ fn run_before(schedule: &Schedule, range: Range<usize>) -> Range<usize> {
     first.map_or(start, |k| start + k + 1)..end
 }
 
-impl<T: Real> Workspace<T> {
+impl<T: StoredReal> Workspace<T> {
     /// Takes the coordinates of the run of pins out that begins `range`. Returns the body after the run. `FORCED`: with
     /// forces and velocity parts.
     #[inline(always)]

@@ -3,9 +3,9 @@
 
 use super::super::tableau::{C, GAMMA};
 use super::storage::{IN_PLACE, Lane, LaneRodas4};
-use bimorph_multibody::batch::Real;
 use bimorph_multibody::batch::{LANES, LanePose};
 use bimorph_multibody::planar::Pose;
+use bimorph_multibody::scalar::StoredReal;
 
 impl LaneRodas4 {
     /// Contributions of gaps and dead loads to the forces of stage `i`, and in the first stage to the tangent.

@@ -5,7 +5,8 @@
 use bimorph_domains::Ramp;
 use bimorph_domains::lag::Lag;
 use bimorph_domains::thermal::HeatConductor;
-use bimorph_multibody::batch::{LANES, Lane8, Real, SimdReal};
+use bimorph_multibody::batch::{LANES, Lane8, SimdReal};
+use bimorph_multibody::scalar::StoredReal;
 
 /// Time constants that a heater is compared with: those of the last heaters.
 const COMPARED: usize = 4;

@@ -1,8 +1,9 @@
 //! Motion of a batch of variants, and its norm.
 
 use crate::time::method::Motion;
-use bimorph_multibody::batch::{LANES, Lane8, LaneModel, LanePose, Real, SimdReal, ZERO_POSE, load};
+use bimorph_multibody::batch::{LANES, Lane8, LaneModel, LanePose, SimdReal, ZERO_POSE, load};
 use bimorph_multibody::planar::Pose;
+use bimorph_multibody::scalar::StoredReal;
 
 /// Displacements and rates in each variant.
 #[derive(Debug, Clone)]

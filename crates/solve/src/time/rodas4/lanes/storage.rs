@@ -6,8 +6,8 @@ use bimorph_domains::loss_derivatives::LossDerivatives;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::batch::joint::LanePlaced;
 use bimorph_multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, SimdReal, ZERO_POSE, load};
-use bimorph_multibody::joint_coordinates::constrained_loops::has_lanes;
 use bimorph_multibody::planar::Pose;
+use bimorph_multibody::scalar::has_lanes;
 use bimorph_multibody::{BlockMatrix, Pattern};
 
 /// From this stage on the motion itself carries the argument.

@@ -2,11 +2,11 @@
 
 use super::subtrees::equal;
 use super::{FirstOfSubtree, PackContribution, PackedReal, Packing, Packs, RemainingStep, SubtreePack, WIDTH};
-use crate::joint_coordinates::constrained_loops::lanes::has_lanes;
 use crate::joint_coordinates::constrained_loops::reduction::Reduction;
-use crate::joint_coordinates::constrained_loops::scalar::Real;
 use crate::joint_coordinates::constrained_loops::schedule::{NONE, Schedule};
 use crate::joint_coordinates::constrained_loops::tree::{Closure, Linkage, LinkageBody, LinkageParent};
+use crate::scalar::StoredReal;
+use crate::scalar::has_lanes;
 use crate::{BodyId, Pattern};
 use std::ops::Range;
 use std::sync::Arc;

@@ -1,28 +1,14 @@
-//! Numbers that the recursion runs over: one `f64`, or a lane of them for as many variants of one mechanism.
+//! Numbers as they are stored: one `f64`, or a lane of them for as many variants of one mechanism.
 //!
-//! Both go through the same additions and multiplications in the same order, without fused operations and with the same
-//! sine and cosine, so that a lane's bits are those of the serial run, whatever the width of the processor's vectors.
+//! Both go through the same additions and multiplications in the same order, so that a lane's bits are those of the serial run,
+//! whatever the width of the processor's vectors.
 
+use super::Real;
 use crate::sine::{REDUCED, reduced};
 use std::fmt::Debug;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Scalar trait of the recursion.
-pub trait Real:
-    Copy
-    + Debug
-    + Send
-    + Sync
-    + PartialEq
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-    + AddAssign
-    + SubAssign
-    + 'static
-{
+/// A real number with constants, functions and access to its lanes.
+pub trait StoredReal: Real + Debug + Send + Sync + PartialEq + 'static {
     /// How many variants it holds.
     const LANES: usize;
     /// 0 in every lane.
@@ -37,7 +23,7 @@ pub trait Real:
     fn set_lane(&mut self, k: usize, x: f64);
     /// Sine and cosine.
     fn sin_cos(self) -> (Self, Self);
-    /// Replaces each angle in `sin` by its sine and writes its cosine to `cos`: the bits of [`Real::sin_cos`].
+    /// Replaces each angle in `sin` by its sine and writes its cosine to `cos`: the bits of [`StoredReal::sin_cos`].
     #[inline(always)]
     fn sin_cos_each(sin: &mut [Self], cos: &mut [Self]) {
         for (s, c) in sin.iter_mut().zip(cos) {
@@ -54,7 +40,7 @@ pub trait Real:
     fn abs(self) -> Self;
 }
 
-impl Real for f64 {
+impl StoredReal for f64 {
     const LANES: usize = 1;
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
@@ -84,7 +70,7 @@ impl Real for f64 {
         }
         for (s, c) in ones.iter_mut().zip(cos_ones) {
             // not f64's own method, which is the platform's
-            (*s, *c) = Real::sin_cos(*s);
+            (*s, *c) = StoredReal::sin_cos(*s);
         }
     }
     #[inline(always)]
@@ -105,7 +91,7 @@ impl Real for f64 {
     }
 }
 
-/// Sines and cosines of `N` angles in vector instructions, each with the bits of [`Real::sin_cos`] of that angle alone.
+/// Sines and cosines of `N` angles in vector instructions, each with the bits of [`StoredReal::sin_cos`] of that angle alone.
 #[inline(always)]
 pub(super) fn sines_and_cosines<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
     let (mut sin, mut cos) = (*angles, *angles);
@@ -118,7 +104,7 @@ pub(super) fn sines_and_cosines<const N: usize>(angles: &[f64; N]) -> ([f64; N],
     }
     if far {
         for k in 0..N {
-            (sin[k], cos[k]) = Real::sin_cos(angles[k]);
+            (sin[k], cos[k]) = StoredReal::sin_cos(angles[k]);
         }
     }
     (sin, cos)

@@ -1,6 +1,10 @@
-//! Lanes of numbers: a batch of variants, in vector instructions.
+//! Lanes of numbers: a batch of variants.
 
-use super::scalar::{Real, sines_and_cosines};
+// loops over lanes are indexed, which compilers turn into vector instructions
+#![allow(clippy::needless_range_loop)]
+
+use super::Real;
+use super::stored::{StoredReal, sines_and_cosines};
 use pulp::Arch;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -34,6 +38,23 @@ lanewise!(Sub, sub);
 lanewise!(Mul, mul);
 lanewise!(Div, div);
 
+macro_rules! with_one_number {
+    ($trait:ident, $method:ident) => {
+        impl<const N: usize> $trait<f64> for Lanes<N> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(mut self, other: f64) -> Self {
+                for k in 0..N {
+                    self.0[k] = $trait::$method(self.0[k], other);
+                }
+                self
+            }
+        }
+    };
+}
+with_one_number!(Add, add);
+with_one_number!(Mul, mul);
+
 impl<const N: usize> Neg for Lanes<N> {
     type Output = Self;
     #[inline(always)]
@@ -64,6 +85,13 @@ impl<const N: usize> SubAssign for Lanes<N> {
 }
 
 impl<const N: usize> Real for Lanes<N> {
+    #[inline(always)]
+    fn splat_like(self, x: f64) -> Self {
+        Self([x; N])
+    }
+}
+
+impl<const N: usize> StoredReal for Lanes<N> {
     const LANES: usize = N;
     const ZERO: Self = Self([0.0; N]);
     const ONE: Self = Self([1.0; N]);
@@ -124,7 +152,7 @@ mod tests {
         for k in 0..40_000 {
             let small = (k as f64 - 20_000.0) * 1.234_567_89e-3;
             for x in [small, small * 1e-9, small * 3.9e3] {
-                let (s, c) = Real::sin_cos(x);
+                let (s, c) = StoredReal::sin_cos(x);
                 assert!((s - x.sin()).abs() <= 1.2e-16 && (c - x.cos()).abs() <= 1.2e-16, "{x}: {s} {c}");
                 assert!(x.abs() > 1e-3 || (s - x.sin()).abs() <= 2.3e-16 * x.abs());
                 let (ls, lc) = Lanes([x, 0.3, -x, 7.0]).sin_cos();
@@ -142,7 +170,7 @@ mod tests {
             let (mut sin, mut cos) = (angles.clone(), angles.clone());
             f64::sin_cos_each(&mut sin, &mut cos);
             for ((x, s), c) in angles.into_iter().zip(sin).zip(cos) {
-                let alone = Real::sin_cos(x);
+                let alone = StoredReal::sin_cos(x);
                 assert_eq!((s.to_bits(), c.to_bits()), (alone.0.to_bits(), alone.1.to_bits()), "{x}");
             }
         }
@@ -153,6 +181,6 @@ mod tests {
     fn far_angles_go_through_the_standard_library() {
         let (s, c) = Lanes([1e7, 0.5]).sin_cos();
         assert_eq!((s.0[0], c.0[0]), 1e7f64.sin_cos());
-        assert_eq!((s.0[1], c.0[1]), Real::sin_cos(0.5));
+        assert_eq!((s.0[1], c.0[1]), StoredReal::sin_cos(0.5));
     }
 }

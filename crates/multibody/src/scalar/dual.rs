@@ -1,6 +1,6 @@
 //! A value with its derivative: a number that the kinematics run over, for the exact change of everything with one parameter.
 
-use crate::batch::Number;
+use super::Real;
 use crate::sine;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -87,7 +87,7 @@ impl Add<f64> for Dual {
     }
 }
 
-impl Number for Dual {
+impl Real for Dual {
     #[inline(always)]
     fn splat_like(self, x: f64) -> Self {
         Self::constant(x)
