@@ -12,13 +12,11 @@
 //! | [`joint`] | strains, forces and tangents of joints | [`super::planar`] |
 //! | [`forces`] | their sums over a mechanism | [`super::forces`] |
 //! | [`matrix`] | the factorization and solves | [`super::factor`] |
-//! | `double` | numbers of twice the digits | [`super::double`] |
 //! | `precise` | products with the tangent in them | [`super::precise`] |
 
 // fixed-size blocks are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
 
-mod double;
 pub mod forces;
 pub mod joint;
 pub mod matrix;
@@ -26,7 +24,6 @@ pub mod model;
 mod precise;
 mod simd;
 
-pub use double::LaneDouble;
 pub use matrix::LaneMatrix;
 pub use model::LaneModel;
 pub use precise::{LanePrecise, PrecisePose};

@@ -7,29 +7,22 @@
 
 use super::joint::{JointKinematics, Symmetric};
 use super::perpendicular;
-use crate::scalar::Double;
-use nalgebra::{Vector2, Vector3};
+use crate::scalar::{Double, Real};
+use nalgebra::Vector3;
 
-/// A pair's tangent: rowsᵀ·`stiffness`·rows + the rest.
+/// Numbers of a pair's tangent.
+pub(crate) const NUMBERS: usize = 21;
+
+/// A pair's tangent rowsᵀ·stiffness·rows + the rest: ∂(e_u, g)/∂(x_b − x_a) as two rows, ∂strain/∂θ of body a and of body b, the
+/// stiffness, and of the rest the part of translation with either rotation, and of the rotations of a twice, of a and b, of b twice.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct FactoredTangent {
-    /// ∂(e_u, g)/∂(x_b − x_a).
-    u: Vector2<f64>,
-    g: Vector2<f64>,
-    /// ∂strain/∂θ of the bodies.
-    turn_a: Vector3<f64>,
-    turn_b: Vector3<f64>,
-    stiffness: Symmetric,
-    /// Rest: translation with either rotation; rotations of a twice, of a and b, of b twice.
-    half: Vector2<f64>,
-    turn: [f64; 3],
-}
+pub(crate) struct FactoredTangent<T = f64>(pub(crate) [T; NUMBERS]);
 
 /// Reaction to a change of two bodies' poses: the force on body b (on a with the other sign), and both moments.
-pub(crate) struct PairForce {
-    pub(crate) force: [Double; 2],
-    pub(crate) moment_a: Double,
-    pub(crate) moment_b: Double,
+pub(crate) struct PairForce<T = f64> {
+    pub(crate) force: [Double<T>; 2],
+    pub(crate) moment_a: Double<T>,
+    pub(crate) moment_b: Double<T>,
 }
 
 impl JointKinematics {
@@ -42,53 +35,39 @@ impl JointKinematics {
         let n = self.e1 * stress.x + perpendicular(self.e1) * (stress.y + double * self.bent.x);
         let quarter = 0.25 * n.dot(&self.opening);
         let between = 0.5 * (n.dot(&self.radius_b) - n.dot(&self.radius_a));
-        FactoredTangent {
-            u: s.u,
-            g: s.g,
-            turn_a: s.turn_a,
-            turn_b: s.turn_b,
-            stiffness: Symmetric([uu, ug, up, gg + bend_gg, gp + bend_gp, pp + bend_pp]),
-            half: perpendicular(n) * 0.5,
-            turn: [-quarter, between - quarter, -quarter],
-        }
+        let (a, b, half) = (s.turn_a, s.turn_b, perpendicular(n) * 0.5);
+        #[rustfmt::skip]
+        let numbers = [
+            s.u.x, s.u.y, s.g.x, s.g.y,
+            a.x, a.y, a.z, b.x, b.y, b.z,
+            uu, ug, up, gg + bend_gg, gp + bend_gp, pp + bend_pp,
+            half.x, half.y, -quarter, between - quarter, -quarter,
+        ];
+        FactoredTangent(numbers)
     }
 }
 
-impl FactoredTangent {
-    /// All of its numbers: the slopes u, g, of the turns of a and of b, the stiffness, and both parts of the rest.
-    pub(crate) fn numbers(&self) -> [f64; 21] {
-        let mut numbers = [0.0; 21];
-        let all = (self.u.iter().chain(&self.g).chain(&self.turn_a).chain(&self.turn_b))
-            .chain(&self.stiffness.0)
-            .chain(&self.half)
-            .chain(&self.turn);
-        for (to, from) in numbers.iter_mut().zip(all) {
-            *to = *from;
-        }
-        numbers
-    }
-
+impl<T: Real> FactoredTangent<T> {
     /// Its product with x_b − x_a and the rotations θ_a, θ_b.
-    #[inline]
-    pub(crate) fn times(&self, [dx, dy]: [Double; 2], a: Double, b: Double) -> PairForce {
+    #[inline(always)]
+    pub(crate) fn times(&self, [dx, dy]: [Double<T>; 2], a: Double<T>, b: Double<T>) -> PairForce<T> {
+        let [ux, uy, gx, gy, au, ag, ap, bu, bg, bp, uu, ug, up, gg, gp, pp, hx, hy, aa, ab, bb] = self.0;
         let strain = [
-            dx * self.u.x + dy * self.u.y + a * self.turn_a.x + b * self.turn_b.x,
-            dx * self.g.x + dy * self.g.y + a * self.turn_a.y + b * self.turn_b.y,
-            a * self.turn_a.z + b * self.turn_b.z,
+            dx * ux + dy * uy + a * au + b * bu, //
+            dx * gx + dy * gy + a * ag + b * bg,
+            a * ap + b * bp,
         ];
-        let [uu, ug, up, gg, gp, pp] = self.stiffness.0;
-        let row = |c: [f64; 3]| strain[0] * c[0] + strain[1] * c[1] + strain[2] * c[2];
+        let row = |c: [T; 3]| strain[0] * c[0] + strain[1] * c[1] + strain[2] * c[2];
         let stress = [row([uu, ug, up]), row([ug, gg, gp]), row([up, gp, pp])];
-        let both = a + b;
-        let lever = |t: &Vector3<f64>| stress[0] * t.x + stress[1] * t.y + stress[2] * t.z;
-        let aside = dx * self.half.x + dy * self.half.y;
+        let lever = |c: [T; 3]| stress[0] * c[0] + stress[1] * c[1] + stress[2] * c[2];
+        let (both, aside) = (a + b, dx * hx + dy * hy);
         PairForce {
             force: [
-                stress[0] * self.u.x + stress[1] * self.g.x + both * self.half.x,
-                stress[0] * self.u.y + stress[1] * self.g.y + both * self.half.y,
+                stress[0] * ux + stress[1] * gx + both * hx, //
+                stress[0] * uy + stress[1] * gy + both * hy,
             ],
-            moment_a: lever(&self.turn_a) + aside + a * self.turn[0] + b * self.turn[1],
-            moment_b: lever(&self.turn_b) + aside + a * self.turn[1] + b * self.turn[2],
+            moment_a: lever([au, ag, ap]) + aside + a * aa + b * ab,
+            moment_b: lever([bu, bg, bp]) + aside + a * ab + b * bb,
         }
     }
 }

@@ -6,7 +6,8 @@
 use super::storage::{LaneModes, Which};
 use super::vectors::{dot, mass_product, scale, weigh};
 use bimorph_multibody::batch::forces::{self, LaneRestStrain};
-use bimorph_multibody::batch::{Kernel, LaneDouble, SimdReal, load, store};
+use bimorph_multibody::batch::{Kernel, SimdReal, load, store};
+use bimorph_multibody::scalar::Double;
 
 /// A part that goes over all lanes.
 #[derive(Debug, Clone, Copy)]
@@ -108,14 +109,13 @@ impl LaneModes {
             store([none; 2], product);
         }
         precise.multiply_add::<W>(simd, &x[k], product);
-        let mut sum = LaneDouble::of(none);
-        let mut size = LaneDouble::of(none);
+        let (mut sum, mut size) = (Double::from(none), Double::from(none));
         for ((x, product), body) in x[k].iter().zip(&*product).zip(&model.bodies) {
             let (x, m) = (load::<W, 3>(simd, x), load::<W, 3>(simd, &body.mass));
             for i in 0..3 {
                 let [high, low] = load::<W, 2>(simd, &product[i]);
-                sum = sum.plus(LaneDouble { high, low }.times(x[i]));
-                size = size.plus(LaneDouble::of(x[i]).times(x[i]).times(m[i]));
+                sum += Double { high, low } * x[i];
+                size += Double::from(x[i]) * x[i] * m[i];
             }
         }
         let found = sum.high / size.high;
@@ -125,8 +125,7 @@ impl LaneModes {
             let mut rest = x;
             for i in 0..3 {
                 let [high, low] = load::<W, 2>(simd, &product[i]);
-                let inertia = LaneDouble::of(x[i]).times(m[i]).times(found);
-                rest[i] = LaneDouble { high, low }.minus(inertia).high;
+                rest[i] = (Double { high, low } - Double::from(x[i]) * m[i] * found).high;
             }
             store(rest, to);
         }
