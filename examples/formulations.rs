@@ -186,7 +186,7 @@ fn energies(system: &System, states: &[&Vec<Pose>], ramp: &Ramp<'_>, stop: f64) 
         let energy = |k: usize| {
             let joint = model.joint(k);
             let second = [joint.second[(0, 0)], joint.second[(0, 1)], joint.second[(1, 1)]];
-            let mut e = joint.frame.kinematics(&pose(joint.a), &pose(joint.b), &second).strain;
+            let mut e = nalgebra::Vector3::from(joint.frame.kinematics(&pose(joint.a), &pose(joint.b), &second).strain);
             e.x -= joint.expansion.map_or(0.0, |(group, length)| length * drive.expansion[group]);
             let stress = joint.stiffness * e;
             [stress.x * e.x, stress.dot(&e)]

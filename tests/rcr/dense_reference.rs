@@ -7,7 +7,7 @@
 use bimorph::multibody::joint_coordinates::constrained_loops::Reduction;
 use bimorph::multibody::planar::{Pose, Symmetric};
 use bimorph::multibody::{BodyId, Joint, Model};
-use nalgebra::{DMatrix, DVector, Rotation2, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Rotation2, Vector6};
 
 /// Accelerations of all bodies under `force`, at the configuration that `placed` holds; none where they are not unique.
 pub(crate) fn accelerations(
@@ -60,7 +60,7 @@ pub(crate) fn accelerations(
             if !joint.locked[i] {
                 continue;
             }
-            let unit = Vector3::from_fn(|r, _| if r == i { 1.0 } else { 0.0 });
+            let unit = std::array::from_fn(|r| if r == i { 1.0 } else { 0.0 });
             let second = strain.tangent(&Symmetric::default(), &unit, &bend).matrix();
             let scale = if i == 2 { scale } else { 1.0 };
             for (id, first) in [(joint.a, 0), (joint.b, 3)] {

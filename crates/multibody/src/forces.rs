@@ -3,10 +3,11 @@
 use super::joint::Coupling;
 use super::model::Model;
 use super::planar::factored::FactoredTangent;
-use super::planar::{HalfTurn, JointKinematics, PairTangent, Pose, Symmetric};
+use super::planar::vector::dot3;
+use super::planar::{Block, HalfTurn, JointKinematics, PairTangent, Pose, Symmetric, Vec3};
 use super::section::{JointSection, NONE, PackedJoint, PairSlot};
 use super::{BlockMatrix, BodyId};
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// Half turns of the two bodies that were met last. Along a beam each body is met twice in a row, and a sine and cosine
 /// is dearer than everything else that a body costs.
@@ -73,8 +74,9 @@ impl PackedJoint {
     }
 
     #[inline(always)]
-    fn stress(&self, section: &JointSection, k: &JointKinematics, rest: &RestStrain<'_>) -> Vector3<f64> {
-        section.stiffness * Vector3::new(k.strain.x - self.offset(section, rest), k.strain.y, k.strain.z)
+    fn stress(&self, section: &JointSection, k: &JointKinematics, rest: &RestStrain<'_>) -> Vec3<f64> {
+        let [u, g, p] = k.strain;
+        section.stiffness.times([u - self.offset(section, rest), g, p])
     }
 }
 
@@ -106,7 +108,8 @@ pub fn resultants(
     let section = model.section(joint);
     let k = HalfTurnCache::new().kinematics(model.linear, joint, section, q);
     let offset = joint.offset_with(section, built_in, expansion);
-    section.stiffness * Vector3::new(k.strain.x - offset, k.strain.y, k.strain.z)
+    let [u, g, p] = k.strain;
+    section.stiffness.times([u - offset, g, p]).into()
 }
 
 /// Change of [`resultants`] with a change `dq` of the configuration and `expansion` of the free strains.
@@ -121,8 +124,8 @@ pub fn resultants_change(
     let section = model.section(joint);
     let k = HalfTurnCache::new().kinematics(model.linear, joint, section, q);
     let (da, db) = (pose(dq, joint.place.a), pose(dq, joint.place.b));
-    let strain = k.rows() * nalgebra::Vector6::new(da.x, da.y, da.z, db.x, db.y, db.z);
-    section.stiffness * (strain - Vector3::new(joint.offset_with(section, 0.0, expansion), 0.0, 0.0))
+    let [u, g, p]: Vec3<f64> = (k.rows() * Vector6::new(da.x, da.y, da.z, db.x, db.y, db.z)).into();
+    section.stiffness.times([u - joint.offset_with(section, 0.0, expansion), g, p]).into()
 }
 
 /// Change of [`axial_force`] with a change `dq` of the configuration (N).
@@ -131,7 +134,7 @@ pub fn axial_change(model: &Model, joint: &PackedJoint, q: &[Pose], dq: &[Pose])
     let section = model.section(joint);
     let k = HalfTurnCache::new().kinematics(model.linear, joint, section, q);
     let (da, db) = (pose(dq, joint.place.a), pose(dq, joint.place.b));
-    (section.stiffness * (k.rows() * nalgebra::Vector6::new(da.x, da.y, da.z, db.x, db.y, db.z))).x
+    section.stiffness.times((k.rows() * Vector6::new(da.x, da.y, da.z, db.x, db.y, db.z)).into())[0]
 }
 
 /// `r +=` the forces that a change `offset` (m) of one joint's rest offset brings.
@@ -139,7 +142,7 @@ pub fn axial_change(model: &Model, joint: &PackedJoint, q: &[Pose], dq: &[Pose])
 pub fn add_offset_change(model: &Model, joint: &PackedJoint, q: &[Pose], offset: f64, r: &mut [Pose]) {
     let section = model.section(joint);
     let k = HalfTurnCache::new().kinematics(model.linear, joint, section, q);
-    scatter(joint.place, k.forces(&(section.stiffness * Vector3::new(-offset, 0.0, 0.0))), r);
+    scatter(joint.place, k.forces(&section.stiffness.times([-offset, 0.0, 0.0])), r);
 }
 
 /// `r += ∂U/∂q`, the elastic forces at displacement `q`.
@@ -265,8 +268,9 @@ pub fn strain_energy(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
     let energy = |joint: &PackedJoint| {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q);
-        let strain = k.strain - Vector3::new(joint.offset(section, rest), 0.0, 0.0);
-        0.5 * strain.dot(&(section.stiffness * strain))
+        let [u, g, p] = k.strain;
+        let strain = [u - joint.offset(section, rest), g, p];
+        0.5 * dot3(strain, section.stiffness.times(strain))
     };
     let coupled = |c: &Coupling| c.stiffness * turn_between(q, c.first) * turn_between(q, c.second);
     model.joints.iter().map(energy).sum::<f64>() + model.couplings.iter().map(coupled).sum::<f64>()
@@ -289,7 +293,7 @@ pub fn add_rest_change(model: &Model, q: &[Pose], change: &RestStrain<'_>, r: &m
         let offset = joint.offset(section, change);
         if offset != 0.0 {
             let k = turns.kinematics(model.linear, joint, section, q);
-            scatter(joint.place, k.forces(&(section.stiffness * Vector3::new(-offset, 0.0, 0.0))), r);
+            scatter(joint.place, k.forces(&section.stiffness.times([-offset, 0.0, 0.0])), r);
         }
     }
 }
@@ -311,7 +315,7 @@ pub fn add_dampers(model: &Model, v: impl Fn(usize) -> Pose, r: &mut [Pose]) {
     };
     for (damper, matrix) in model.dampers.iter().zip(&model.damper_matrix) {
         let (va, vb) = (rate(damper.a), rate(damper.b));
-        let pair = nalgebra::Vector6::new(va.x, va.y, va.z, vb.x, vb.y, vb.z);
+        let pair = Vector6::new(va.x, va.y, va.z, vb.x, vb.y, vb.z);
         let f = matrix * pair;
         for (id, part) in [(damper.a, f.fixed_rows::<3>(0)), (damper.b, f.fixed_rows::<3>(3))] {
             if let BodyId::Free(k) = id {
@@ -340,12 +344,12 @@ pub fn add_inertia(model: &Model, m: f64, c: f64, matrix: &mut BlockMatrix<f64, 
 }
 
 #[inline(always)]
-pub(super) fn scatter(place: PairSlot, (a, b): (Pose, Pose), r: &mut [Pose]) {
+pub(super) fn scatter(place: PairSlot, (a, b): (Vec3<f64>, Vec3<f64>), r: &mut [Pose]) {
     if place.a != NONE {
-        r[place.a as usize] += a;
+        r[place.a as usize] += Pose::from(a);
     }
     if place.b != NONE {
-        r[place.b as usize] += b;
+        r[place.b as usize] += Pose::from(b);
     }
 }
 
@@ -354,15 +358,14 @@ impl PairSlot {
     #[inline(always)]
     pub(crate) fn add_pair(self, matrix: &mut BlockMatrix<f64, 3>, h: &PairTangent) {
         if self.a != NONE {
-            matrix.diagonal[self.a as usize] += h.aa();
+            matrix.diagonal[self.a as usize] += Block::from(h.aa());
         }
         if self.b != NONE {
-            matrix.diagonal[self.b as usize] += h.bb();
+            matrix.diagonal[self.b as usize] += Block::from(h.bb());
         }
         if self.block != NONE {
             // the block's row is the body eliminated later
-            let ab = h.ab();
-            matrix.below[self.block as usize] += if self.a > self.b { ab } else { ab.transpose() };
+            matrix.below[self.block as usize] += Block::from(if self.a > self.b { h.ab() } else { h.ba() });
         }
     }
 

@@ -1,5 +1,5 @@
-//! Everything that knows a plane from space: poses and points on bodies here, joint strains and their derivatives in
-//! `joint`.
+//! Everything that knows a plane from space: poses and points on bodies here, vectors over any scalar in `vector`, joint strains
+//! and their derivatives in `joint`.
 //!
 //! A body's pose is its displacement from the drawn place, q = (x, y, θ) of its centre of mass, so that rest is q = 0 and
 //! a displacement of 1e-15 m is not lost against a coordinate of 1e-4 m. `arm` is a vector fixed to a body, from its
@@ -7,8 +7,10 @@
 
 pub(crate) mod factored;
 mod joint;
+pub(crate) mod vector;
 
 pub use joint::{JointFrame, JointKinematics, PairTangent, Symmetric};
+pub use vector::{HalfTurn, Vec2, Vec3};
 
 use super::sine::sin_cos;
 use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
@@ -38,42 +40,15 @@ pub fn rotate(theta: f64, v: Vector2<f64>) -> Vector2<f64> {
 /// (R(θ) − 1)·v without cancellation at small angles.
 #[inline]
 pub fn rotation_minus_identity(theta: f64, v: Vector2<f64>) -> Vector2<f64> {
-    HalfTurn::new(theta).rotation_minus_identity(v)
-}
-
-/// Sine and cosine of half of a body's rotation θ, with R(θ) − 1.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct HalfTurn {
-    sin: f64,
-    cos: f64,
-    /// cos θ − 1.
-    less: f64,
-    /// sin θ.
-    whole: f64,
+    HalfTurn::new(theta).rotation_minus_identity(v.into()).into()
 }
 
 impl HalfTurn {
-    /// Of a body at rest.
-    pub(crate) const REST: Self = Self { sin: 0.0, cos: 1.0, less: 0.0, whole: 0.0 };
-
+    /// Of a body with this rotation (rad).
     #[inline]
     pub(crate) fn new(theta: f64) -> Self {
         let (sin, cos) = sin_cos(0.5 * theta);
-        Self { sin, cos, less: -2.0 * sin * sin, whole: 2.0 * sin * cos }
-    }
-
-    /// (R(θ) − 1)·v without cancellation at small angles.
-    #[inline]
-    fn rotation_minus_identity(&self, v: Vector2<f64>) -> Vector2<f64> {
-        Vector2::new(self.less * v.x - self.whole * v.y, self.whole * v.x + self.less * v.y)
-    }
-
-    /// R((θₐ + θ_b)/2)·v.
-    #[inline]
-    fn mean(&self, other: &Self, v: Vector2<f64>) -> Vector2<f64> {
-        let c = self.cos * other.cos - self.sin * other.sin;
-        let s = self.sin * other.cos + self.cos * other.sin;
-        Vector2::new(c * v.x - s * v.y, s * v.x + c * v.y)
+        Self::of([sin, cos])
     }
 }
 

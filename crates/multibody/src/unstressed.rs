@@ -29,7 +29,7 @@ pub fn add_stresses(model: &Model, q: &[Pose], mut stress: impl FnMut(usize) -> 
     for (number, joint) in model.joints.iter().enumerate() {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q).unstrained();
-        scatter(joint.place, k.forces(&stress(number)), r);
+        scatter(joint.place, k.forces(&stress(number).into()), r);
     }
 }
 
@@ -37,5 +37,5 @@ pub fn add_stresses(model: &Model, q: &[Pose], mut stress: impl FnMut(usize) -> 
 #[inline]
 pub fn strains(model: &Model, q: &[Pose]) -> impl Iterator<Item = Vector3<f64>> {
     let mut turns = HalfTurnCache::new();
-    model.joints.iter().map(move |joint| turns.kinematics(model.linear, joint, model.section(joint), q).strain)
+    model.joints.iter().map(move |joint| turns.kinematics(model.linear, joint, model.section(joint), q).strain.into())
 }

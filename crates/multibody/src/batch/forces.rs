@@ -1,9 +1,10 @@
 //! Elastic forces, tangent, damping and inertia over lanes: [`crate::forces`].
 
-use super::joint::{LaneKinematics, LanePair, LanePlaced, LaneSection, kinematics};
+use super::joint::{LanePlaced, LaneSection};
 use super::model::{LaneJoint, LaneModel, SharedSections};
 use super::{Lane8, LaneBlock, LaneMatrix, LanePose, SimdReal, add, load, load_block, store, times};
 use crate::BodyId;
+use crate::planar::{JointKinematics, PairTangent};
 use crate::section::{NONE, PairSlot};
 
 /// Axial rest offsets, or their change.
@@ -26,7 +27,7 @@ pub fn place<W: SimdReal>(simd: W::Simd, q: &[LanePose], placed: &mut [LanePlace
 /// A joint at work: what it shares with others, its kinematics, and its axial rest offset.
 struct StrainedJoint<W> {
     section: LaneSection<W>,
-    k: LaneKinematics<W>,
+    k: JointKinematics<W>,
     offset: W,
 }
 
@@ -42,15 +43,15 @@ impl<W: SimdReal> StrainedJoint<W> {
         // ground is the largest index, and stands last
         let at = |body: u32| placed[(body as usize).min(placed.len() - 1)].load::<W>(simd);
         let section = shared.section.load::<W>(simd);
-        let arms = (&load(simd, &joint.arm_a), &load(simd, &joint.arm_b));
-        let k = kinematics(&section, arms, &at(joint.place.a), &at(joint.place.b));
+        let arms = [load(simd, &joint.arm_a), load(simd, &joint.arm_b)];
+        let k = section.kinematics(arms, &at(joint.place.a), &at(joint.place.b));
         Self { section, k, offset: offset(simd, joint, shared, rest) }
     }
 
     #[inline(always)]
     fn stress(&self) -> LanePose<W> {
         let [u, g, p] = self.k.strain;
-        self.section.stress(&[u - self.offset, g, p])
+        self.section.stiffness.times([u - self.offset, g, p])
     }
 }
 
@@ -94,7 +95,7 @@ pub fn add_tangent<W: SimdReal>(
         let strained = StrainedJoint::<W>::new(simd, joint, &model.sections[joint.section as usize], placed, rest);
         let stress = strained.stress();
         scatter(simd, joint.place, &strained.k.forces(&stress), r);
-        add_pair(simd, joint.place, tangent, &strained.k.tangent(&strained.section, &stress));
+        add_pair(simd, joint.place, tangent, &strained.section.tangent(&strained.k, &stress));
     }
     add_couplings::<W>(simd, model, q, r);
     add_coupling_tangent(model, tangent);
@@ -119,7 +120,7 @@ pub fn add_rest_change<W: SimdReal>(
         }
         let strained = StrainedJoint::<W>::new(simd, joint, shared, placed, change);
         let none = W::splat(simd, 0.0);
-        let (a, b) = strained.k.forces(&strained.section.stress(&[-offset, none, none]));
+        let (a, b) = strained.k.forces(&strained.section.stiffness.times([-offset, none, none]));
         for (body, force) in [(joint.place.a, a), (joint.place.b, b)] {
             if body != NONE {
                 for (r, force) in r[body as usize].iter_mut().zip(force) {
@@ -221,16 +222,25 @@ fn scatter<W: SimdReal>(simd: W::Simd, place: PairSlot, (a, b): &(LanePose<W>, L
     }
 }
 
+/// `block += more`, columns.
 #[inline(always)]
-fn add_pair<W: SimdReal>(simd: W::Simd, place: PairSlot, matrix: &mut LaneMatrix, h: &LanePair<W>) {
+fn add_block<W: SimdReal>(simd: W::Simd, block: &mut LaneBlock, more: LaneBlock<W>) {
+    for (column, more) in block.iter_mut().zip(&more) {
+        add(simd, column, more);
+    }
+}
+
+#[inline(always)]
+fn add_pair<W: SimdReal>(simd: W::Simd, place: PairSlot, matrix: &mut LaneMatrix, h: &PairTangent<W>) {
     if place.a != NONE {
-        h.add_aa(simd, &mut matrix.diagonal[place.a as usize]);
+        add_block(simd, &mut matrix.diagonal[place.a as usize], h.aa());
     }
     if place.b != NONE {
-        h.add_bb(simd, &mut matrix.diagonal[place.b as usize]);
+        add_block(simd, &mut matrix.diagonal[place.b as usize], h.bb());
     }
     if place.block != NONE {
-        h.add_ab(simd, &mut matrix.below[place.block as usize], place.a < place.b);
+        let block = if place.a < place.b { h.ba() } else { h.ab() };
+        add_block(simd, &mut matrix.below[place.block as usize], block);
     }
 }
 

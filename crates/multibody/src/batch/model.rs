@@ -1,8 +1,8 @@
 //! Bodies and joints of a batch of variants.
 
-use super::joint::{LaneSection, LaneVector};
+use super::joint::LaneSection;
 use super::{BLANK, Lane8, LaneBlock, LanePose, SimdReal, ZERO_POSE, load};
-use crate::planar::Block;
+use crate::planar::{Block, Vec2};
 use crate::scalar::{Real, StoredReal};
 use crate::section::{JointSection, PackedJoint, PairSlot};
 use crate::{Body, BodyId, Model, Pattern};
@@ -17,7 +17,7 @@ pub struct LaneBody<T = Lane8> {
     /// Drag on translation (N·s/m).
     pub drag: T,
     /// Its first moment (N·s).
-    pub first: LaneVector<T>,
+    pub first: Vec2<T>,
     /// Its second moment (N·m·s).
     pub second: T,
 }
@@ -27,8 +27,8 @@ pub struct LaneBody<T = Lane8> {
 pub(crate) struct LaneJoint {
     pub(crate) place: PairSlot,
     pub(crate) section: u32,
-    pub(crate) arm_a: LaneVector,
-    pub(crate) arm_b: LaneVector,
+    pub(crate) arm_a: Vec2<Lane8>,
+    pub(crate) arm_b: Vec2<Lane8>,
     pub(crate) rest: Lane8,
 }
 
@@ -85,7 +85,7 @@ impl LaneModel {
         }
         let none = Lane8::NONE;
         let body = LaneBody { mass: ZERO_POSE, drag: none, first: [none; 2], second: none };
-        let section = LaneSection { axis: [none; 2], stiffness: [none; 6], second: [none; 3] };
+        let section = LaneSection::NONE;
         let joint = |j: &PackedJoint| LaneJoint {
             place: j.place,
             section: j.section() as u32,
@@ -156,7 +156,7 @@ impl LaneModel {
             let section = model.section(from);
             let shared = &mut self.sections[to.section as usize];
             set(lane, &mut shared.section.axis, section.axis.as_slice());
-            set(lane, &mut shared.section.stiffness, &section.stiffness.0);
+            set(lane, &mut shared.section.stiffness.0, &section.stiffness.0);
             set(lane, &mut shared.section.second, &section.second);
             if let (Some((_, to)), Some((_, length))) = (&mut shared.expansion, section.expansion) {
                 to.set_lane(lane, length);

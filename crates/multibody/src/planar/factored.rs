@@ -5,10 +5,9 @@
 //! causes no strain, but the entries of the block cancel to rounding only. Rounding of the stiffest joint exceeds the
 //! whole stiffness of the softest. Strains that are taken first, with digits to spare, are right.
 
-use super::joint::{JointKinematics, Symmetric};
-use super::perpendicular;
+use super::Vec3;
+use super::joint::{JointKinematics, Slopes, Symmetric};
 use crate::scalar::{Double, Real};
-use nalgebra::Vector3;
 
 /// Numbers of a pair's tangent.
 pub(crate) const NUMBERS: usize = 21;
@@ -25,23 +24,17 @@ pub(crate) struct PairForce<T = f64> {
     pub(crate) moment_b: Double<T>,
 }
 
-impl JointKinematics {
+impl<T: Real> JointKinematics<T> {
     /// The tangent of [`JointKinematics::tangent`]: `stress` is (N, V, M), `second` is Q.
-    pub(crate) fn factored(&self, stiffness: &Symmetric, stress: &Vector3<f64>, second: &[f64; 3]) -> FactoredTangent {
-        let s = self.slopes();
-        let double = 2.0 * stress.x;
-        let [uu, ug, up, gg, gp, pp] = stiffness.0;
-        let [bend_gg, bend_gp, bend_pp] = second.map(|q| double * q);
-        let n = self.e1 * stress.x + perpendicular(self.e1) * (stress.y + double * self.bent.x);
-        let quarter = 0.25 * n.dot(&self.opening);
-        let between = 0.5 * (n.dot(&self.radius_b) - n.dot(&self.radius_a));
-        let (a, b, half) = (s.turn_a, s.turn_b, perpendicular(n) * 0.5);
+    pub(crate) fn factored(&self, stiffness: &Symmetric<T>, stress: &Vec3<T>, second: &[T; 3]) -> FactoredTangent<T> {
+        let Slopes { u, g, turn_a: a, turn_b: b } = self.slopes();
+        let (Symmetric([uu, ug, up, gg, gp, pp]), half, turn) = self.stressed(stiffness, stress, second);
         #[rustfmt::skip]
         let numbers = [
-            s.u.x, s.u.y, s.g.x, s.g.y,
-            a.x, a.y, a.z, b.x, b.y, b.z,
-            uu, ug, up, gg + bend_gg, gp + bend_gp, pp + bend_pp,
-            half.x, half.y, -quarter, between - quarter, -quarter,
+            u[0], u[1], g[0], g[1],
+            a[0], a[1], a[2], b[0], b[1], b[2],
+            uu, ug, up, gg, gp, pp,
+            half[0], half[1], turn[0], turn[1], turn[2],
         ];
         FactoredTangent(numbers)
     }

@@ -15,8 +15,10 @@
 //! Strains depend on translations through the opening alone, so their derivatives with respect to the position of body a
 //! are those of body b with the other sign, and ten numbers make up the 6×6 tangent of a pair.
 
-use super::{Block, HalfTurn, PairRow, Pose, perpendicular};
-use nalgebra::{Matrix3, Matrix6, Vector2, Vector3, Vector6};
+use super::vector::{combined, dot, dot3, minus, plus, right_angle};
+use super::{HalfTurn, PairRow, Pose, Vec2, Vec3};
+use crate::scalar::Real;
+use nalgebra::{Matrix6, Vector2, Vector3, Vector6};
 
 /// Geometry of a joint: where it sits and how its frame is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +33,7 @@ pub struct JointFrame {
 
 /// A symmetric 3×3 matrix over the strains (u, g, p): uu, ug, up, gg, gp, pp.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Symmetric(pub [f64; 6]);
+pub struct Symmetric<T = f64>(pub [T; 6]);
 
 impl Symmetric {
     /// `factor` times it.
@@ -51,86 +53,95 @@ impl Symmetric {
     }
 }
 
-impl std::ops::Mul<Vector3<f64>> for Symmetric {
-    type Output = Vector3<f64>;
-
-    #[inline]
-    fn mul(self, x: Vector3<f64>) -> Vector3<f64> {
+impl<T: Real> Symmetric<T> {
+    /// Its product with `x`: the stress (N, V, M) of a strain.
+    #[inline(always)]
+    pub fn times(&self, x: Vec3<T>) -> Vec3<T> {
         let [uu, ug, up, gg, gp, pp] = self.0;
-        Vector3::new(uu * x.x + ug * x.y + up * x.z, ug * x.x + gg * x.y + gp * x.z, up * x.x + gp * x.y + pp * x.z)
+        [uu * x[0] + ug * x[1] + up * x[2], ug * x[0] + gg * x[1] + gp * x[2], up * x[0] + gp * x[1] + pp * x[2]]
     }
 }
 
-/// Second derivatives of an energy of a pair of bodies that depends on their translations through x_b − x_a alone.
+/// Second derivatives of an energy of a pair of bodies that depends on their translations through x_b − x_a alone. Blocks are given
+/// column by column.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PairTangent {
+pub struct PairTangent<T = f64> {
     /// Translation of b twice: xx, xy, yy.
-    shift: [f64; 3],
+    shift: [T; 3],
     /// Translation of b and rotation of a, of b.
-    shift_a: Vector2<f64>,
-    shift_b: Vector2<f64>,
+    shift_a: Vec2<T>,
+    shift_b: Vec2<T>,
     /// Rotations: of a twice, of a and b, of b twice.
-    turn: [f64; 3],
+    turn: [T; 3],
 }
 
-impl PairTangent {
+impl<T: Real> PairTangent<T> {
     /// Block of body a twice.
-    #[inline]
-    pub fn aa(&self) -> Block {
-        let ([xx, xy, yy], c) = (self.shift, self.shift_a);
-        Matrix3::new(xx, xy, -c.x, xy, yy, -c.y, -c.x, -c.y, self.turn[0])
+    #[inline(always)]
+    pub fn aa(&self) -> [Vec3<T>; 3] {
+        let ([xx, xy, yy], [x, y]) = (self.shift, self.shift_a);
+        [[xx, xy, -x], [xy, yy, -y], [-x, -y, self.turn[0]]]
     }
 
     /// Block of body b twice.
-    #[inline]
-    pub fn bb(&self) -> Block {
-        let ([xx, xy, yy], c) = (self.shift, self.shift_b);
-        Matrix3::new(xx, xy, c.x, xy, yy, c.y, c.x, c.y, self.turn[2])
+    #[inline(always)]
+    pub fn bb(&self) -> [Vec3<T>; 3] {
+        let ([xx, xy, yy], [x, y]) = (self.shift, self.shift_b);
+        [[xx, xy, x], [xy, yy, y], [x, y, self.turn[2]]]
     }
 
     /// Block with rows of body a and columns of body b.
-    #[inline]
-    pub fn ab(&self) -> Block {
-        let ([xx, xy, yy], a, b) = (self.shift, self.shift_a, self.shift_b);
-        Matrix3::new(-xx, -xy, -b.x, -xy, -yy, -b.y, a.x, a.y, self.turn[1])
+    #[inline(always)]
+    pub fn ab(&self) -> [Vec3<T>; 3] {
+        let ([xx, xy, yy], [ax, ay], [bx, by]) = (self.shift, self.shift_a, self.shift_b);
+        [[-xx, -xy, ax], [-xy, -yy, ay], [-bx, -by, self.turn[1]]]
     }
 
+    /// Block with rows of body b and columns of body a.
+    #[inline(always)]
+    pub fn ba(&self) -> [Vec3<T>; 3] {
+        let ([xx, xy, yy], [ax, ay], [bx, by]) = (self.shift, self.shift_a, self.shift_b);
+        [[-xx, -xy, -bx], [-xy, -yy, -by], [ax, ay, self.turn[1]]]
+    }
+}
+
+impl PairTangent {
     /// The whole, a then b.
     #[inline]
     pub fn matrix(&self) -> Matrix6<f64> {
         let mut h = Matrix6::zeros();
-        h.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.aa());
-        h.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.ab());
-        h.fixed_view_mut::<3, 3>(3, 0).copy_from(&self.ab().transpose());
-        h.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.bb());
+        h.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.aa().into());
+        h.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.ab().into());
+        h.fixed_view_mut::<3, 3>(3, 0).copy_from(&self.ba().into());
+        h.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.bb().into());
         h
     }
 }
 
 /// Strains of a joint with what their derivatives need.
 #[derive(Debug, Clone, Copy)]
-pub struct JointKinematics {
+pub struct JointKinematics<T = f64> {
     /// e_u (m), g (m), p (rad).
-    pub strain: Vector3<f64>,
+    pub strain: Vec3<T>,
     /// u and g where the derivatives are taken (m).
-    axial: f64,
-    shear: f64,
+    axial: T,
+    shear: T,
     /// Q·(g, p), half of ∂e_u/∂(g, p).
-    pub(super) bent: Vector2<f64>,
-    pub(super) opening: Vector2<f64>,
-    pub(super) radius_a: Vector2<f64>,
-    pub(super) radius_b: Vector2<f64>,
-    pub(super) e1: Vector2<f64>,
+    bent: Vec2<T>,
+    opening: Vec2<T>,
+    radius_a: Vec2<T>,
+    radius_b: Vec2<T>,
+    e1: Vec2<T>,
 }
 
 /// Derivatives of the strains.
-pub(super) struct Slopes {
+pub(super) struct Slopes<T> {
     /// ∂(e_u, g)/∂(x, y) of body b; for body a with the other sign; ∂p/∂(x, y) = 0.
-    pub(super) u: Vector2<f64>,
-    pub(super) g: Vector2<f64>,
+    pub(super) u: Vec2<T>,
+    pub(super) g: Vec2<T>,
     /// ∂strain/∂θ of the bodies.
-    pub(super) turn_a: Vector3<f64>,
-    pub(super) turn_b: Vector3<f64>,
+    pub(super) turn_a: Vec3<T>,
+    pub(super) turn_b: Vec3<T>,
 }
 
 impl JointFrame {
@@ -148,15 +159,8 @@ impl JointFrame {
         (qb, b): (&Pose, &HalfTurn),
         second: &[f64; 3],
     ) -> JointKinematics {
-        // one sine and cosine of half an angle for each body serve everything: R − 1 of the body, and R of the mean
-        let (swing_a, swing_b) = (a.rotation_minus_identity(self.arm_a), b.rotation_minus_identity(self.arm_b));
-        let (ra, rb) = (self.arm_a + swing_a, self.arm_b + swing_b);
-        let opening = Vector2::new(qb.x - qa.x, qb.y - qa.y) + swing_b - swing_a;
-        let e1 = a.mean(b, self.axis);
-        let (u, g, p) = (opening.dot(&e1), opening.dot(&perpendicular(e1)), qb.z - qa.z);
-        let bent = Vector2::new(second[0] * g + second[1] * p, second[1] * g + second[2] * p);
-        let strain = Vector3::new(u + bent.x * g + bent.y * p, g, p);
-        JointKinematics { strain, axial: u, shear: g, bent, opening, radius_a: ra, radius_b: rb, e1 }
+        let arms = [self.arm_a.into(), self.arm_b.into()];
+        JointKinematics::new(arms, self.axis.into(), second, ((*qa).into(), a), ((*qb).into(), b))
     }
 
     /// Strains linearized about the drawn geometry: small displacements, as SUGAR.
@@ -164,31 +168,116 @@ impl JointFrame {
     pub fn linear(&self, qa: &Pose, qb: &Pose) -> JointKinematics {
         let rest = (&Pose::zeros(), &HalfTurn::REST);
         let mut k = self.turned(rest, rest, &[0.0; 3]);
-        k.strain = k.rows() * Vector6::new(qa.x, qa.y, qa.z, qb.x, qb.y, qb.z);
+        k.strain = (k.rows() * Vector6::new(qa.x, qa.y, qa.z, qb.x, qb.y, qb.z)).into();
         k
     }
 }
 
-impl JointKinematics {
+impl<T: Real> JointKinematics<T> {
+    /// Exact strains of a joint with these arms of its bodies, drawn axis and Q, between two bodies at given poses with their turns.
     #[inline(always)]
-    pub(super) fn slopes(&self) -> Slopes {
-        let (g, half_g, half_u) = (perpendicular(self.e1), 0.5 * self.shear, 0.5 * self.axial);
-        let (ta, tb) = (perpendicular(self.radius_a), perpendicular(self.radius_b));
+    pub(crate) fn new(
+        [arm_a, arm_b]: [Vec2<T>; 2],
+        axis: Vec2<T>,
+        second: &[T; 3],
+        (qa, a): (Vec3<T>, &HalfTurn<T>),
+        (qb, b): (Vec3<T>, &HalfTurn<T>),
+    ) -> Self {
+        // one sine and cosine of half an angle for each body serve everything: R − 1 of the body, and R of the mean
+        let (swing_a, swing_b) = (a.rotation_minus_identity(arm_a), b.rotation_minus_identity(arm_b));
+        let (radius_a, radius_b) = (plus(arm_a, swing_a), plus(arm_b, swing_b));
+        let opening = minus(plus(minus([qb[0], qb[1]], [qa[0], qa[1]]), swing_b), swing_a);
+        let e1 = a.mean(b, axis);
+        let (u, g, p) = (dot(opening, e1), dot(opening, right_angle(e1)), qb[2] - qa[2]);
+        let bent = [second[0] * g + second[1] * p, second[1] * g + second[2] * p];
+        let strain = [u + bent[0] * g + bent[1] * p, g, p];
+        Self { strain, axial: u, shear: g, bent, opening, radius_a, radius_b, e1 }
+    }
+
+    #[inline(always)]
+    pub(super) fn slopes(&self) -> Slopes<T> {
+        let (g, half_g, half_u) = (right_angle(self.e1), self.shear * 0.5, self.axial * 0.5);
+        let one = self.shear.splat_like(1.0);
+        let (ta, tb) = (right_angle(self.radius_a), right_angle(self.radius_b));
         // the frame turns by half (u: +g/2, g: −u/2), the point turns with its body
-        let (u_a, u_b) = (half_g - self.e1.dot(&ta), half_g + self.e1.dot(&tb));
-        let (g_a, g_b) = (-half_u - g.dot(&ta), -half_u + g.dot(&tb));
-        let twice = self.bent * 2.0;
+        let (u_a, u_b) = (half_g - dot(self.e1, ta), half_g + dot(self.e1, tb));
+        let (g_a, g_b) = (-half_u - dot(g, ta), -half_u + dot(g, tb));
+        let twice = [self.bent[0] * 2.0, self.bent[1] * 2.0];
         Slopes {
-            u: self.e1 + g * twice.x,
+            u: [self.e1[0] + g[0] * twice[0], self.e1[1] + g[1] * twice[0]],
             g,
-            turn_a: Vector3::new(u_a + g_a * twice.x - twice.y, g_a, -1.0),
-            turn_b: Vector3::new(u_b + g_b * twice.x + twice.y, g_b, 1.0),
+            turn_a: [u_a + g_a * twice[0] - twice[1], g_a, -one],
+            turn_b: [u_b + g_b * twice[0] + twice[1], g_b, one],
         }
     }
 
+    /// The generalized forces rowsᵀ·stress on bodies a and b: the force n at the joint's two material points, and a moment.
+    #[inline(always)]
+    pub fn forces(&self, stress: &Vec3<T>) -> (Vec3<T>, Vec3<T>) {
+        // the second-order strain passes the axial force on to shear and moment
+        let double = stress[0] * 2.0;
+        let (shear, moment) = (stress[1] + double * self.bent[0], stress[2] + double * self.bent[1]);
+        let n = combined(self.e1, stress[0], right_angle(self.e1), shear);
+        // the frame turns by half with each body
+        let frame = (self.shear * stress[0] - self.axial * shear) * 0.5;
+        let (at_a, at_b) = (dot(right_angle(self.radius_a), n), dot(right_angle(self.radius_b), n));
+        ([-n[0], -n[1], frame - at_a - moment], [n[0], n[1], frame + at_b + moment])
+    }
+
+    /// rowsᵀ·`stiffness`·rows: the tangent without the joint's stress.
+    #[inline(always)]
+    pub fn elastic(&self, stiffness: &Symmetric<T>) -> PairTangent<T> {
+        let Slopes { u, g, turn_a, turn_b } = self.slopes();
+        let [uu, ug, _, gg, ..] = stiffness.0;
+        let (to_u, to_g) = (combined(u, uu, g, ug), combined(u, ug, g, gg));
+        let (a, b) = (stiffness.times(turn_a), stiffness.times(turn_b));
+        PairTangent {
+            shift: [u[0] * to_u[0] + g[0] * to_g[0], u[0] * to_u[1] + g[0] * to_g[1], u[1] * to_u[1] + g[1] * to_g[1]],
+            shift_a: combined(u, a[0], g, a[1]),
+            shift_b: combined(u, b[0], g, b[1]),
+            turn: [dot3(turn_a, a), dot3(turn_a, b), dot3(turn_b, b)],
+        }
+    }
+
+    /// The parts of the tangent under `stress` (N, V, M): the stiffness over the strains, the rest between translation and either
+    /// rotation, and the rest over the rotations of a twice, of a and b, of b twice.
+    #[inline(always)]
+    pub(super) fn stressed(
+        &self,
+        stiffness: &Symmetric<T>,
+        stress: &Vec3<T>,
+        second: &[T; 3],
+    ) -> (Symmetric<T>, Vec2<T>, [T; 3]) {
+        // the axial force bends: 2·N·Q acts between g and p as a stiffness does
+        let double = stress[0] * 2.0;
+        let [uu, ug, up, gg, gp, pp] = stiffness.0;
+        let [q_gg, q_gp, q_pp] = *second;
+        let stiffness = [uu, ug, up, gg + double * q_gg, gp + double * q_gp, pp + double * q_pp];
+        // the force on b, as in `forces`
+        let n = combined(self.e1, stress[0], right_angle(self.e1), stress[1] + double * self.bent[0]);
+        let [x, y] = right_angle(n);
+        let quarter = dot(n, self.opening) * 0.25;
+        let between = (dot(n, self.radius_b) - dot(n, self.radius_a)) * 0.5;
+        (Symmetric(stiffness), [x * 0.5, y * 0.5], [-quarter, between - quarter, -quarter])
+    }
+
+    /// The whole tangent under `stress` (N, V, M): rowsᵀ·stiffness·rows + ∂²(strain · stress)/∂q². `second` is Q.
+    #[inline(always)]
+    pub fn tangent(&self, stiffness: &Symmetric<T>, stress: &Vec3<T>, second: &[T; 3]) -> PairTangent<T> {
+        let (stiffness, half, turn) = self.stressed(stiffness, stress, second);
+        let mut h = self.elastic(&stiffness);
+        (h.shift_a, h.shift_b) = (plus(h.shift_a, half), plus(h.shift_b, half));
+        for (h, turn) in h.turn.iter_mut().zip(turn) {
+            *h += turn;
+        }
+        h
+    }
+}
+
+impl JointKinematics {
     /// The same frame and arms, all strains zero.
     pub(crate) fn unstrained(&self) -> Self {
-        Self { strain: Vector3::zeros(), axial: 0.0, shear: 0.0, bent: Vector2::zeros(), ..*self }
+        Self { strain: [0.0; 3], axial: 0.0, shear: 0.0, bent: [0.0; 2], ..*self }
     }
 
     /// ∂strain/∂(q_a, q_b).
@@ -196,58 +285,10 @@ impl JointKinematics {
     pub fn rows(&self) -> PairRow {
         let Slopes { u, g, turn_a: a, turn_b: b } = self.slopes();
         PairRow::from_row_slice(&[
-            -u.x, -u.y, a.x, u.x, u.y, b.x, //
-            -g.x, -g.y, a.y, g.x, g.y, b.y, //
-            0.0, 0.0, a.z, 0.0, 0.0, b.z,
+            -u[0], -u[1], a[0], u[0], u[1], b[0], //
+            -g[0], -g[1], a[1], g[0], g[1], b[1], //
+            0.0, 0.0, a[2], 0.0, 0.0, b[2],
         ])
-    }
-
-    /// The generalized forces rowsᵀ·stress on bodies a and b: the force n at the joint's two material points, and a moment.
-    #[inline(always)]
-    pub fn forces(&self, stress: &Vector3<f64>) -> (Pose, Pose) {
-        // the second-order strain passes the axial force on to shear and moment
-        let double = 2.0 * stress.x;
-        let (shear, moment) = (stress.y + double * self.bent.x, stress.z + double * self.bent.y);
-        let n = self.e1 * stress.x + perpendicular(self.e1) * shear;
-        // the frame turns by half with each body
-        let frame = 0.5 * (self.shear * stress.x - self.axial * shear);
-        let (at_a, at_b) = (perpendicular(self.radius_a).dot(&n), perpendicular(self.radius_b).dot(&n));
-        (Pose::new(-n.x, -n.y, frame - at_a - moment), Pose::new(n.x, n.y, frame + at_b + moment))
-    }
-
-    /// rowsᵀ·`stiffness`·rows: the tangent without the joint's stress.
-    #[inline(always)]
-    pub fn elastic(&self, stiffness: &Symmetric) -> PairTangent {
-        let s = self.slopes();
-        let [uu, ug, _, gg, ..] = stiffness.0;
-        let (to_u, to_g) = (s.u * uu + s.g * ug, s.u * ug + s.g * gg);
-        let (a, b) = (*stiffness * s.turn_a, *stiffness * s.turn_b);
-        PairTangent {
-            shift: [s.u.x * to_u.x + s.g.x * to_g.x, s.u.x * to_u.y + s.g.x * to_g.y, s.u.y * to_u.y + s.g.y * to_g.y],
-            shift_a: s.u * a.x + s.g * a.y,
-            shift_b: s.u * b.x + s.g * b.y,
-            turn: [s.turn_a.dot(&a), s.turn_a.dot(&b), s.turn_b.dot(&b)],
-        }
-    }
-
-    /// The whole tangent under `stress` (N, V, M): rowsᵀ·stiffness·rows + ∂²(strain · stress)/∂q². `second` is Q.
-    #[inline(always)]
-    pub fn tangent(&self, stiffness: &Symmetric, stress: &Vector3<f64>, second: &[f64; 3]) -> PairTangent {
-        // the axial force bends: 2·N·Q acts between g and p as a stiffness does
-        let double = 2.0 * stress.x;
-        let [uu, ug, up, gg, gp, pp] = stiffness.0;
-        let [bend_gg, bend_gp, bend_pp] = second.map(|q| double * q);
-        let mut h = self.elastic(&Symmetric([uu, ug, up, gg + bend_gg, gp + bend_gp, pp + bend_pp]));
-        // the force on b, as in `forces`
-        let n = self.e1 * stress.x + perpendicular(self.e1) * (stress.y + double * self.bent.x);
-        let half = perpendicular(n) * 0.5;
-        h.shift_a += half;
-        h.shift_b += half;
-        let quarter = 0.25 * n.dot(&self.opening);
-        h.turn[0] -= quarter;
-        h.turn[2] -= quarter;
-        h.turn[1] += 0.5 * (n.dot(&self.radius_b) - n.dot(&self.radius_a)) - quarter;
-        h
     }
 }
 
@@ -276,21 +317,23 @@ mod tests {
         let at = |q: &Vector6<f64>| {
             frame.kinematics(&q.fixed_rows::<3>(0).into_owned(), &q.fixed_rows::<3>(3).into_owned(), &second)
         };
+        let stress = |k: &JointKinematics| stiffness.times((Vector3::from(k.strain) - rest).into());
         let force = |k: &JointKinematics| {
-            let (a, b) = k.forces(&(stiffness * (k.strain - rest)));
-            Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
+            let (a, b) = k.forces(&stress(k));
+            Vector6::new(a[0], a[1], a[2], b[0], b[1], b[2])
         };
         let q = Vector6::new(qa.x, qa.y, qa.z, qb.x, qb.y, qb.z);
         let here = at(&q);
-        let stress = stiffness * (here.strain - rest);
-        assert!((here.rows().transpose() * stress - force(&here)).norm() < 1e-15 * stress.norm());
+        let stress = stress(&here);
+        let by_rows = here.rows().transpose() * Vector3::from(stress);
+        assert!((by_rows - force(&here)).norm() < 1e-15 * Vector3::from(stress).norm());
         let tangent = here.tangent(&stiffness, &stress, &second).matrix();
         for i in 0..6 {
             let (mut lo, mut hi) = (q, q);
             lo[i] -= 1e-6;
             hi[i] += 1e-6;
             let (lo, hi) = (at(&lo), at(&hi));
-            let d = (hi.strain - lo.strain) / 2e-6;
+            let d = (Vector3::from(hi.strain) - Vector3::from(lo.strain)) / 2e-6;
             assert!((d - here.rows().column(i)).norm() < 1e-8);
             let h = (force(&hi) - force(&lo)) / 2e-6;
             assert!((h - tangent.column(i)).norm() < 1e-8, "{i}: {h} {}", tangent.column(i));
@@ -302,7 +345,7 @@ mod tests {
     #[test]
     fn linear_forces_keep_the_drawn_frame() {
         let (frame, _, qa, qb) = sample();
-        let stress = Vector3::new(1.3, -0.7, 0.4);
+        let stress = [1.3, -0.7, 0.4];
         let (at_rest, displaced) = (frame.linear(&Pose::zeros(), &Pose::zeros()), frame.linear(&qa, &qb));
         assert_eq!(displaced.rows(), at_rest.rows());
         assert_eq!(displaced.forces(&stress), at_rest.forces(&stress));
@@ -319,6 +362,6 @@ mod tests {
         let moved = rotation_minus_identity(theta, xb);
         let qa = Pose::new(shift.x, shift.y, theta);
         let qb = Pose::new(shift.x + moved.x, shift.y + moved.y, theta);
-        assert!(frame.kinematics(&qa, &qb, &second).strain.norm() < 1e-15);
+        assert!(Vector3::from(frame.kinematics(&qa, &qb, &second).strain).norm() < 1e-15);
     }
 }

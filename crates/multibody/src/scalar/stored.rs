@@ -3,6 +3,9 @@
 //! Both go through the same additions and multiplications in the same order, so that a lane's bits are those of the serial run,
 //! whatever the width of the processor's vectors.
 
+// loops over lanes are indexed, which compilers turn into vector instructions
+#![allow(clippy::needless_range_loop)]
+
 use super::Real;
 use crate::sine::{REDUCED, reduced};
 use std::fmt::Debug;

@@ -6,9 +6,9 @@
 
 use super::data::{ReductionInput, ReductionTask, Workspace};
 use super::mechanism::ClosureShape;
-use super::plane_vector::{LinkageVector, minus, perpendicular, plus};
 use super::poses::BodyKinematics;
 use super::schedule::NONE;
+use crate::planar::vector::{dot, minus, plus, right_angle};
 use crate::scalar::StoredReal;
 use std::ops::Range;
 
@@ -80,13 +80,12 @@ impl<T: StoredReal> ClosureShape<T> {
     #[inline(always)]
     pub(super) fn strains(&self, a: &BodyKinematics<T>, b: &BodyKinematics<T>) -> [Strain<T>; 3] {
         let (half, two) = (T::splat(0.5), T::splat(2.0));
-        let dot = |x: LinkageVector<T>, y: LinkageVector<T>| x[0] * y[0] + x[1] * y[1];
         let (sa, sb) = (a.rotation_minus_identity(self.arm_a), b.rotation_minus_identity(self.arm_b));
         let (ra, rb) = (plus(self.arm_a, sa), plus(self.arm_b, sb));
-        let (ta, tb) = (perpendicular(ra), perpendicular(rb));
+        let (ta, tb) = (right_angle(ra), right_angle(rb));
         let d = [(b.pose[0] - a.pose[0]) + (sb[0] - sa[0]), (b.pose[1] - a.pose[1]) + (sb[1] - sa[1])];
         let e1 = a.mean(b, self.axis);
-        let e2 = perpendicular(e1);
+        let e2 = right_angle(e1);
         let (u, g, p) = (dot(d, e1), dot(d, e2), b.pose[2] - a.pose[2]);
         let (wa, wb) = (a.rate[2], b.rate[2]);
         let dd =

@@ -11,8 +11,9 @@
 //! the acceleration when q̈ = 0 and the parent's is zero.
 
 use super::mechanism::{Arms, JointShape, MechanismConstants};
-use super::plane_vector::{LinkageVector, minus, perpendicular, plus, times};
 use super::poses::{BodyKinematics, MechanismKinematics, ParentOffset};
+use crate::planar::Vec2;
+use crate::planar::vector::{minus, plus, right_angle, scaled};
 use crate::scalar::StoredReal;
 use std::ops::Range;
 
@@ -78,28 +79,28 @@ fn place_joint<T: StoredReal>(
     let lever = plus(arms.arm, swung);
     let lever_parent = plus(arms.arm_parent, swung_parent);
     let e1 = out.mean(parent, joint.axis);
-    let e2 = perpendicular(e1);
-    let along = |w: LinkageVector<T>| plus(times(w[0], e1), times(w[1], e2));
+    let e2 = right_angle(e1);
+    let along = |w: Vec2<T>| plus(scaled(w[0], e1), scaled(w[1], e2));
     let (rw, rdw, rddw) = (along(w), along(dw), along(ddw));
-    let opening = times(sign, rw);
+    let opening = scaled(sign, rw);
     let shift = minus(plus(lever_parent, opening), lever);
     let d = minus(plus(swung_parent, opening), swung);
     (out.pose[0], out.pose[1]) = (parent.pose[0] + d[0], parent.pose[1] + d[1]);
     let wp = parent.rate[2];
     let frame_rate = wp + sign * T::splat(0.5) * de[2];
-    let (to_joint, from_joint) = (perpendicular(lever_parent), perpendicular(lever));
-    let opening_rate = plus(times(frame_rate, perpendicular(rw)), rdw);
-    let x = minus(plus(times(wp, to_joint), times(sign, opening_rate)), times(omega, from_joint));
+    let (to_joint, from_joint) = (right_angle(lever_parent), right_angle(lever));
+    let opening_rate = plus(scaled(frame_rate, right_angle(rw)), rdw);
+    let x = minus(plus(scaled(wp, to_joint), scaled(sign, opening_rate)), scaled(omega, from_joint));
     (out.rate[0], out.rate[1]) = (parent.rate[0] + x[0], parent.rate[1] + x[1]);
-    let turning = plus(minus(times(two * frame_rate, perpendicular(rdw)), times(frame_rate * frame_rate, rw)), rddw);
-    let bias = minus(plus(times(omega * omega, lever), times(sign, turning)), times(wp * wp, lever_parent));
+    let turning = plus(minus(scaled(two * frame_rate, right_angle(rdw)), scaled(frame_rate * frame_rate, rw)), rddw);
+    let bias = minus(plus(scaled(omega * omega, lever), scaled(sign, turning)), scaled(wp * wp, lever_parent));
     let slope = [two * bent[0], two * bent[1]];
     let columns = [
         [sign * e1[0], sign * e1[1], T::ZERO],
         [sign * (e2[0] - slope[0] * e1[0]), sign * (e2[1] - slope[0] * e1[1]), T::ZERO],
         {
-            let half = times(T::splat(0.5), perpendicular(rw));
-            let x = minus(minus(half, times(sign, from_joint)), times(sign * slope[1], e1));
+            let half = scaled(T::splat(0.5), right_angle(rw));
+            let x = minus(minus(half, scaled(sign, from_joint)), scaled(sign * slope[1], e1));
             [x[0], x[1], sign]
         },
     ];

@@ -2,10 +2,10 @@
 //!
 //! It is constant after [`MechanismConstants::new`], so that all users of one mechanism share it.
 
-use super::plane_vector::LinkageVector;
 use super::schedule::{Plan, Schedule};
 use super::tree::{Closure, Linkage, LinkageBody, LinkageParent};
 use crate::Joint;
+use crate::planar::Vec2;
 use crate::scalar::StoredReal;
 
 /// Constant data of a mechanism.
@@ -42,15 +42,15 @@ pub(super) struct LaneInertia<T> {
 /// From the centres of mass of a link's parent and of itself to their joint, as drawn (m), over lanes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Arms<T> {
-    pub arm_parent: LinkageVector<T>,
-    pub arm: LinkageVector<T>,
+    pub arm_parent: Vec2<T>,
+    pub arm: Vec2<T>,
 }
 
 /// Data of joints other than pins.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct JointShape<T> {
     /// Its axial direction, as drawn.
-    pub axis: LinkageVector<T>,
+    pub axis: Vec2<T>,
     /// Second-order axial strain Q: gg, gp, pp.
     pub second: [T; 3],
     /// Directions that move.
@@ -63,10 +63,10 @@ pub(super) struct JointShape<T> {
 #[derive(Debug, Clone)]
 pub(super) struct ClosureShape<T> {
     /// From the centres of mass of its two bodies to the joint, as drawn (m).
-    pub arm_a: LinkageVector<T>,
-    pub arm_b: LinkageVector<T>,
+    pub arm_a: Vec2<T>,
+    pub arm_b: Vec2<T>,
     /// Its axial direction, as drawn.
-    pub axis: LinkageVector<T>,
+    pub axis: Vec2<T>,
     /// Second-order axial strain Q: gg, gp, pp.
     pub second: [T; 3],
     /// Length that converts a rotation to a displacement (m).

@@ -7,7 +7,6 @@
 //! | [`tree`] | the spanning tree and the loops: n coordinates, m constraints |
 //! | [`rotary`] | the paper's model: joints that only turn |
 //! | `coordinates` | joint coordinates of given poses |
-//! | `plane_vector` | vectors of the plane |
 //! | `schedule` | symbolic phase: front of each body, constraint rows passing it, arena offsets |
 //! | `mechanism` | constant data: geometry and inertia over lanes, and the schedule |
 //! | `poses` | poses and rates of bodies, and offsets from their parents |
@@ -40,7 +39,6 @@ mod general;
 mod kinematics;
 mod mechanism;
 mod pin;
-mod plane_vector;
 mod poses;
 mod projection;
 mod recursion;

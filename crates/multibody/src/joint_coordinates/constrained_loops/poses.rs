@@ -1,7 +1,8 @@
 //! Poses and rates of bodies, and their offsets from their parents, over lanes.
 
 use super::mechanism::MechanismConstants;
-use super::plane_vector::{LinkageVector, minus, turned};
+use crate::planar::vector::minus;
+use crate::planar::{HalfTurn, Vec2};
 use crate::scalar::StoredReal;
 
 /// Where a body is and how it moves: what its children and the closures need of it.
@@ -12,18 +13,18 @@ pub struct BodyKinematics<T> {
     /// Rate.
     pub rate: [T; 3],
     /// Sine and cosine of half the rotation.
-    pub half: LinkageVector<T>,
+    pub half: Vec2<T>,
 }
 
 /// Offset of a placed body from its parent, for the inward and outward passes of the reduction.
 #[derive(Debug, Clone, Copy)]
 pub struct ParentOffset<T> {
     /// From the parent's centre of mass to the pin, R_p·arm_p; where there is no pin, to this body's centre of mass (m).
-    pub lever_parent: LinkageVector<T>,
+    pub lever_parent: Vec2<T>,
     /// From this body's centre of mass to the pin, R·arm; zero without a pin (m).
-    pub lever: LinkageVector<T>,
+    pub lever: Vec2<T>,
     /// Velocity part c of the acceleration (m/s²).
-    pub bias: LinkageVector<T>,
+    pub bias: Vec2<T>,
 }
 
 /// Poses and rates of all bodies, and their offsets.
@@ -59,17 +60,14 @@ impl<T: StoredReal> BodyKinematics<T> {
 
     /// (R − 1)·v without cancellation at small angles.
     #[inline(always)]
-    pub fn rotation_minus_identity(&self, v: LinkageVector<T>) -> LinkageVector<T> {
-        let [less, s] = turned(self.half);
-        [less * v[0] - s * v[1], s * v[0] + less * v[1]]
+    pub fn rotation_minus_identity(&self, v: Vec2<T>) -> Vec2<T> {
+        HalfTurn::of(self.half).rotation_minus_identity(v)
     }
 
     /// R((θ + θ_other)/2)·v.
     #[inline(always)]
-    pub fn mean(&self, other: &Self, v: LinkageVector<T>) -> LinkageVector<T> {
-        let c = self.half[1] * other.half[1] - self.half[0] * other.half[0];
-        let s = self.half[0] * other.half[1] + self.half[1] * other.half[0];
-        [c * v[0] - s * v[1], s * v[0] + c * v[1]]
+    pub fn mean(&self, other: &Self, v: Vec2<T>) -> Vec2<T> {
+        HalfTurn::of(self.half).mean(&HalfTurn::of(other.half), v)
     }
 }
 
@@ -77,7 +75,7 @@ impl<T: StoredReal> ParentOffset<T> {
     /// One of the lanes.
     #[inline]
     pub fn lane(&self, lane: usize) -> ParentOffset<f64> {
-        let pair = |x: LinkageVector<T>| x.map(|x| x.lane(lane));
+        let pair = |x: Vec2<T>| x.map(|x| x.lane(lane));
         ParentOffset { lever_parent: pair(self.lever_parent), lever: pair(self.lever), bias: pair(self.bias) }
     }
 
@@ -85,7 +83,7 @@ impl<T: StoredReal> ParentOffset<T> {
 
     /// From the parent's centre of mass to this one, d (m).
     #[inline(always)]
-    pub fn shift(&self) -> LinkageVector<T> {
+    pub fn shift(&self) -> Vec2<T> {
         minus(self.lever_parent, self.lever)
     }
 

@@ -1,22 +1,24 @@
 //! The exact change of where the bodies are, and of what they feel: the kinematics over values with their derivatives.
 
-use super::kinematics::{JointState, MotionMap, RelativeOffset, RotationState, Triple, offset_from_parent};
+use super::kinematics::{JointState, MotionMap, RelativeOffset, RotationState, offset_from_parent};
 use super::poses::{LaneJointStates, place_of};
 use super::tree::{Tree, TreeParent};
-use crate::planar::Pose;
+use crate::planar::{HalfTurn, Pose, Vec3};
 use crate::scalar::Dual;
 
 /// Intermediate state of a body: pose, rate and acceleration, and its rotation.
 #[derive(Debug, Clone, Copy)]
 struct ChangingBody {
-    moved: [Triple<Dual>; 3],
+    moved: [Vec3<Dual>; 3],
     turned: RotationState<Dual>,
 }
 
-const ZERO_COORDINATES: [Triple<Dual>; 3] = [[Dual::ZERO; 3]; 3];
+const ZERO_COORDINATES: [Vec3<Dual>; 3] = [[Dual::ZERO; 3]; 3];
+const REST: HalfTurn<Dual> =
+    HalfTurn { sin: Dual::ZERO, cos: Dual::constant(1.0), less: Dual::ZERO, whole: Dual::ZERO };
 const GROUND: ChangingBody = ChangingBody {
     moved: ZERO_COORDINATES,
-    turned: RotationState { half: [Dual::ZERO, Dual::constant(1.0)], spin: Dual::ZERO, spin_rate: Dual::ZERO },
+    turned: RotationState { turn: REST, spin: Dual::ZERO, spin_rate: Dual::ZERO },
 };
 
 /// Where the bodies are, with its change. One entry for each body.
@@ -25,7 +27,7 @@ pub struct Changes {
     places: Vec<ChangingBody>,
     maps: Vec<MotionMap<Dual>>,
     /// Sums of wrenches towards the root.
-    sums: Vec<Triple<Dual>>,
+    sums: Vec<Vec3<Dual>>,
 }
 
 impl Changes {
@@ -97,9 +99,9 @@ impl Changes {
 
 fn turned(theta: Dual, spin: Dual, spin_rate: Dual) -> RotationState<Dual> {
     let (sin, cos) = (theta * 0.5).sin_cos();
-    RotationState { half: [sin, cos], spin, spin_rate }
+    RotationState { turn: HalfTurn::of([sin, cos]), spin, spin_rate }
 }
 
-fn both((value, change): (&Pose, &Pose)) -> Triple<Dual> {
+fn both((value, change): (&Pose, &Pose)) -> Vec3<Dual> {
     [0, 1, 2].map(|i| Dual { value: value[i], change: change[i] })
 }

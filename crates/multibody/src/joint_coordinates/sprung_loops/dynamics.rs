@@ -7,8 +7,7 @@ use super::poses::{LaneJointStates, TreeKinematics, place_of, tiles};
 use super::tree::{Tree, TreeJoint, TreeParent};
 use crate::batch::{Kernel, Lane8, LanePose, SimdReal, ZERO_POSE, everywhere, load, store};
 use crate::forces::RestStrain;
-use crate::planar::{JointFrame, Pose};
-use nalgebra::Vector3;
+use crate::planar::{JointFrame, Pose, Symmetric};
 use pulp::{Arch, Simd, WithSimd};
 
 impl TreeJoint {
@@ -21,7 +20,7 @@ impl TreeJoint {
     /// Stress of the joint at coordinates `s`.
     #[inline(always)]
     pub fn stress(&self, s: &Pose, rest: &RestStrain<'_>) -> Pose {
-        self.stiffness * Vector3::new(s.x - self.offset(rest), s.y, s.z)
+        self.stiffness.times([s.x - self.offset(rest), s.y, s.z]).into()
     }
 }
 
@@ -120,9 +119,8 @@ impl Kernel for Stress<'_> {
         let Stresses { offsets, out } = self.stresses;
         for (((at, offset), springs), out) in self.at.iter().zip(offsets).zip(&self.tree.springs).zip(out) {
             let [u, g, p] = load::<W, 3>(simd, &at.q);
-            let u = u - W::load(simd, offset);
-            let [uu, ug, up, gg, gp, pp] = load::<W, 6>(simd, springs);
-            store([uu * u + ug * g + up * p, ug * u + gg * g + gp * p, up * u + gp * g + pp * p], out);
+            let springs = Symmetric(load::<W, 6>(simd, springs));
+            store(springs.times([u - W::load(simd, offset), g, p]), out);
         }
     }
 }
@@ -173,7 +171,7 @@ impl TreeJoint {
 
     fn strains(&self, parent: &Pose, body: &Pose) -> Pose {
         let (a, b) = if self.sign < 0.0 { (body, parent) } else { (parent, body) };
-        self.frame().kinematics(a, b, &self.second).strain
+        self.frame().kinematics(a, b, &self.second).strain.into()
     }
 
     fn strain_rates(&self, (parent, body): (&Pose, &Pose), (moving, own): (&Pose, &Pose)) -> Pose {

@@ -4,10 +4,11 @@
 //! the subtree of body c. The last sum has four variables a joint, and its coefficients are those of the bias of
 //! [`super::kinematics`], which is the same second derivative.
 
-use super::kinematics::{MotionMap, dot};
+use super::kinematics::MotionMap;
 use super::poses::TreeKinematics;
 use super::tree::{Tree, TreeJoint, TreeParent};
 use crate::planar::Pose;
+use crate::planar::vector::dot;
 use nalgebra::Matrix3;
 
 /// Second derivatives of one joint's work over (e_u, g, p) and the rotation of its parent.

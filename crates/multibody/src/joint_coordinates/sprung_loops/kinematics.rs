@@ -15,36 +15,22 @@
 //! Rotations and their rates are sums along the tree. Once they are known, no body depends on another here, so that
 //! eight of them are computed per vector ([`super::poses`]).
 
-use crate::planar::Pose;
+use crate::planar::vector::{dot, right_angle};
+use crate::planar::{HalfTurn, Pose, Vec2, Vec3};
 use crate::scalar::Real;
 
-/// A pair of numbers.
-pub(super) type TreeVector<T> = [T; 2];
-/// Three numbers: of the plane, or of a joint.
-pub(super) type Triple<T> = [T; 3];
-
 #[inline(always)]
-pub(super) fn triple(x: &Pose) -> Triple<f64> {
+pub(super) fn triple(x: &Pose) -> Vec3<f64> {
     [x.x, x.y, x.z]
-}
-
-#[inline(always)]
-fn perpendicular<T: Real>(v: TreeVector<T>) -> TreeVector<T> {
-    [-v[1], v[0]]
-}
-
-#[inline(always)]
-pub(super) fn dot<T: Real>(a: TreeVector<T>, b: TreeVector<T>) -> T {
-    a[0] * b[0] + a[1] * b[1]
 }
 
 /// How a body moves with its parent's rotation and with its own coordinates.
 #[derive(Debug, Clone, Copy)]
 pub struct MotionMap<T> {
     /// t(L): motion with the parent's rotation (m/rad).
-    pub(super) lever: TreeVector<T>,
+    pub(super) lever: Vec2<T>,
     /// S_u, S_g, S_p.
-    pub(super) columns: [TreeVector<T>; 3],
+    pub(super) columns: [Vec2<T>; 3],
 }
 
 impl MotionMap<f64> {
@@ -54,14 +40,14 @@ impl MotionMap<f64> {
 impl<T: Real> MotionMap<T> {
     /// The body's motion from the parent's and from the coordinates' motion `s`.
     #[inline(always)]
-    pub(super) fn apply(&self, sign: f64, parent: &Triple<T>, s: &Triple<T>) -> Triple<T> {
+    pub(super) fn apply(&self, sign: f64, parent: &Vec3<T>, s: &Vec3<T>) -> Vec3<T> {
         let [x, y] = self.along(parent[2], s);
         [parent[0] + x, parent[1] + y, parent[2] + s[2] * sign]
     }
 
     /// Displacement beyond the parent's with the parent's rotation and the coordinates' motion `s`.
     #[inline(always)]
-    fn along(&self, turn: T, s: &Triple<T>) -> TreeVector<T> {
+    fn along(&self, turn: T, s: &Vec3<T>) -> Vec2<T> {
         let [u, g, p] = &self.columns;
         let mut out = self.lever;
         for i in 0..2 {
@@ -72,7 +58,7 @@ impl<T: Real> MotionMap<T> {
 
     /// Part of a wrench on the body in the coordinates.
     #[inline(always)]
-    pub(super) fn gather(&self, sign: f64, wrench: &Triple<T>) -> Triple<T> {
+    pub(super) fn gather(&self, sign: f64, wrench: &Vec3<T>) -> Vec3<T> {
         let f = [wrench[0], wrench[1]];
         let [u, g, p] = self.columns;
         [dot(u, f), dot(g, f), dot(p, f) + wrench[2] * sign]
@@ -80,7 +66,7 @@ impl<T: Real> MotionMap<T> {
 
     /// The wrench as the parent feels it.
     #[inline(always)]
-    pub(super) fn pass(&self, wrench: &Triple<T>) -> Triple<T> {
+    pub(super) fn pass(&self, wrench: &Vec3<T>) -> Vec3<T> {
         [wrench[0], wrench[1], wrench[2] + dot(self.lever, [wrench[0], wrench[1]])]
     }
 }
@@ -91,43 +77,33 @@ pub(super) struct JointGeometry<T> {
     /// σ.
     pub(super) sign: T,
     /// Arms as drawn, of the parent and of the body (m).
-    pub(super) arms: [TreeVector<T>; 2],
+    pub(super) arms: [Vec2<T>; 2],
     /// Cosine and sine of the drawn angle of the joint's x axis.
-    pub(super) axis: TreeVector<T>,
+    pub(super) axis: Vec2<T>,
     /// Q over (g, p) as (gg, gp, pp).
-    pub(super) second: Triple<T>,
+    pub(super) second: Vec3<T>,
 }
 
 /// How a body is turned, and turns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RotationState<T> {
-    /// Sine and cosine of half its rotation.
-    pub(super) half: TreeVector<T>,
+    /// Its rotation.
+    pub(super) turn: HalfTurn<T>,
     /// Rate (rad/s).
     pub(super) spin: T,
     /// Rate of that (rad/s²).
     pub(super) spin_rate: T,
 }
 
-impl<T: Real> RotationState<T> {
-    /// (R − 1)·v without cancellation.
-    #[inline(always)]
-    fn rotation_minus_identity(&self, v: TreeVector<T>) -> TreeVector<T> {
-        let [sin, cos] = self.half;
-        let (less, whole) = (sin * sin * -2.0, sin * cos * 2.0);
-        [less * v[0] - whole * v[1], whole * v[0] + less * v[1]]
-    }
-}
-
 /// Coordinates, rates and accelerations of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointState<T> {
     /// Coordinates.
-    pub q: Triple<T>,
+    pub q: Vec3<T>,
     /// Their rates.
-    pub v: Triple<T>,
+    pub v: Vec3<T>,
     /// Their accelerations.
-    pub z: Triple<T>,
+    pub z: Vec3<T>,
 }
 
 /// A body less its parent, in x and y.
@@ -135,7 +111,7 @@ pub struct JointState<T> {
 pub(super) struct RelativeOffset<T> {
     pub(super) map: MotionMap<T>,
     /// Displacement, rate and acceleration.
-    pub(super) beyond: [TreeVector<T>; 3],
+    pub(super) beyond: [Vec2<T>; 3],
 }
 
 /// A body with rotation `own` on a parent with rotation `parent`.
@@ -148,22 +124,20 @@ pub(super) fn offset_from_parent<T: Real>(
 ) -> RelativeOffset<T> {
     let s = shape.sign;
     let ([stretch, g, p], [arm_parent, arm]) = (at.q, shape.arms);
-    let (swing_parent, swing) = (parent.rotation_minus_identity(arm_parent), own.rotation_minus_identity(arm));
+    let (swing_parent, swing) =
+        (parent.turn.rotation_minus_identity(arm_parent), own.turn.rotation_minus_identity(arm));
     // the frame turns with the mean of both
-    let ([sin_m, cos_m], [sin_c, cos_c]) = (parent.half, own.half);
-    let cos = cos_c * cos_m - sin_c * sin_m;
-    let sin = sin_c * cos_m + cos_c * sin_m;
-    let e1 = [cos * shape.axis[0] - sin * shape.axis[1], sin * shape.axis[0] + cos * shape.axis[1]];
-    let e2 = perpendicular(e1);
+    let e1 = own.turn.mean(&parent.turn, shape.axis);
+    let e2 = right_angle(e1);
     let [gg, gp, pp] = shape.second;
     let bent = [g * gg + p * gp, g * gp + p * pp];
     let u = stretch - (bent[0] * g + bent[1] * p);
     let d = [e1[0] * u + e2[0] * g, e1[1] * u + e2[1] * g];
-    let t = perpendicular(d);
+    let t = right_angle(d);
     let r_parent = [swing_parent[0] + arm_parent[0], swing_parent[1] + arm_parent[1]];
     let r = [swing[0] + arm[0], swing[1] + arm[1]];
-    let tr = perpendicular(r);
-    let lever = perpendicular([r_parent[0] - r[0] + d[0] * s, r_parent[1] - r[1] + d[1] * s]);
+    let tr = right_angle(r);
+    let lever = right_angle([r_parent[0] - r[0] + d[0] * s, r_parent[1] - r[1] + d[1] * s]);
     let mut columns = [e1, e2, t];
     let mut displaced = swing;
     for i in 0..2 {

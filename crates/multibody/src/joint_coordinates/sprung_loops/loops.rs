@@ -2,17 +2,17 @@
 
 use super::poses::TreeKinematics;
 use crate::Model;
-use crate::batch::joint::{LanePlaced, LaneSection, LaneVector, kinematics};
+use crate::batch::joint::{LanePlaced, LaneSection};
 use crate::batch::{Kernel, LANES, Lane8, LanePose, SimdReal, ZERO_POSE, everywhere, load, store};
 use crate::forces::RestStrain;
-use crate::planar::Pose;
+use crate::planar::{Pose, Vec2};
 use crate::section::{NONE, PackedJoint};
 
 /// Up to eight joints. A lane without one lies between ground and ground, and is as soft as nothing.
 #[derive(Debug, Clone)]
 struct LaneClosures {
     bodies: [[u32; LANES]; 2],
-    arms: [LaneVector; 2],
+    arms: [Vec2<Lane8>; 2],
     section: LaneSection,
     /// Built-in axial rest offsets (m).
     rest: Lane8,
@@ -40,9 +40,8 @@ impl Loops {
 
 impl LaneClosures {
     fn new(model: &Model, joints: &[PackedJoint]) -> Self {
-        let none = [Lane8::NONE; 2];
-        let section = LaneSection { axis: none, stiffness: [Lane8::NONE; 6], second: [Lane8::NONE; 3] };
-        let (bodies, arms, rest) = ([[NONE; LANES]; 2], [none; 2], Lane8::NONE);
+        let (section, arms, rest) = (LaneSection::NONE, [[Lane8::NONE; 2]; 2], Lane8::NONE);
+        let bodies = [[NONE; LANES]; 2];
         let mut all = Self { bodies, arms, section, rest, expansion: Vec::new() };
         for (k, joint) in joints.iter().enumerate() {
             let section = model.section(joint);
@@ -51,7 +50,7 @@ impl LaneClosures {
                 (all.arms[0][i].0[k], all.arms[1][i].0[k]) = (joint.arm_a[i], joint.arm_b[i]);
                 all.section.axis[i].0[k] = section.axis[i];
             }
-            for (to, from) in all.section.stiffness.iter_mut().zip(section.stiffness.0) {
+            for (to, from) in all.section.stiffness.0.iter_mut().zip(section.stiffness.0) {
                 to.0[k] = from;
             }
             for (to, from) in all.section.second.iter_mut().zip(section.second) {
@@ -83,10 +82,9 @@ impl Kernel for Forces<'_> {
             }
             let (a, b) = (place::<W>(simd, placed, &joints.bodies[0]), place::<W>(simd, placed, &joints.bodies[1]));
             let section = joints.section.load::<W>(simd);
-            let (arm_a, arm_b) = (load(simd, &joints.arms[0]), load(simd, &joints.arms[1]));
-            let k = kinematics(&section, (&arm_a, &arm_b), &a, &b);
+            let k = section.kinematics([load(simd, &joints.arms[0]), load(simd, &joints.arms[1])], &a, &b);
             let [u, g, p] = k.strain;
-            let (force_a, force_b) = k.forces(&section.stress(&[u - W::load(simd, &offsets), g, p]));
+            let (force_a, force_b) = k.forces(&section.stiffness.times([u - W::load(simd, &offsets), g, p]));
             add::<W>(force_a, &joints.bodies[0], r);
             add::<W>(force_b, &joints.bodies[1], r);
         }
@@ -102,7 +100,7 @@ fn place<W: SimdReal>(simd: W::Simd, placed: &TreeKinematics, bodies: &[u32; LAN
         (q[0].0[k], q[1].0[k], q[2].0[k]) = (at.x, at.y, at.z);
         [sin.0[k], cos.0[k]] = placed.half(body as usize);
     }
-    LanePlaced::turned(load(simd, &q), W::load(simd, &sin), W::load(simd, &cos))
+    LanePlaced::turned(load(simd, &q), load(simd, &[sin, cos]))
 }
 
 /// Adds forces in lanes to those of their bodies.

@@ -4,12 +4,10 @@
 //! the other. Then each body of a tile computes its offset from its parent in a lane of its own
 //! ([`super::kinematics`]). Finally displacements are summed. Lanes beyond the last body hold nothing.
 
-use super::kinematics::{
-    JointGeometry, JointState, MotionMap, RelativeOffset, RotationState, TreeVector, offset_from_parent,
-};
+use super::kinematics::{JointGeometry, JointState, MotionMap, RelativeOffset, RotationState, offset_from_parent};
 use super::tree::{Tree, TreeParent};
 use crate::batch::{Kernel, LANES, Lane8, SimdReal, ZERO_POSE, everywhere, load, store};
-use crate::planar::Pose;
+use crate::planar::{HalfTurn, Pose, Vec2};
 use crate::scalar::Real;
 
 /// Coordinates, rates and accelerations of eight bodies.
@@ -219,7 +217,7 @@ impl TreeKinematics {
     fn sum(&mut self, tree: &Tree, t: usize, given: &LaneJointStates) {
         for (k, up) in tree.upward[t * LANES..].iter().take(LANES).enumerate().rev() {
             let j = t * LANES + k;
-            let beyond = |i: usize| -> TreeVector<f64> {
+            let beyond = |i: usize| -> Vec2<f64> {
                 let of = &self.tiles[t].beyond;
                 [of[2 * i].0[k], of[2 * i + 1].0[k]]
             };
@@ -252,7 +250,7 @@ impl TreeKinematics {
 #[inline(always)]
 fn turned<W: SimdReal>(simd: W::Simd, half: &[Lane8; 2], spin: &[Lane8; 2]) -> RotationState<W> {
     let [spin, spin_rate] = load(simd, spin);
-    RotationState { half: load(simd, half), spin, spin_rate }
+    RotationState { turn: HalfTurn::of(load(simd, half)), spin, spin_rate }
 }
 
 impl JointGeometry<Lane8> {
@@ -269,7 +267,7 @@ impl JointGeometry<Lane8> {
     /// Of one body.
     pub(super) fn of<T: Real>(&self, lane: usize, one: T) -> JointGeometry<T> {
         let like = |x: &Lane8| one.splat_like(x.0[lane]);
-        let pair = |x: &TreeVector<Lane8>| [like(&x[0]), like(&x[1])];
+        let pair = |x: &Vec2<Lane8>| [like(&x[0]), like(&x[1])];
         let second = &self.second;
         JointGeometry {
             sign: like(&self.sign),

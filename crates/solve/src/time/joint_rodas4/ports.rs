@@ -134,7 +134,7 @@ impl JointPortSensitivities {
                 let (tile, lane) = place_of(j);
                 let [mut strain, ..] = own[tile].of(lane);
                 strain.x -= link.offset(&rest);
-                *share = -(*share + link.stiffness * strain) - springs[j] * rate;
+                *share = -(*share + Pose::from(link.stiffness.times(strain.into()))) - springs[j] * rate;
             }
             // inertia and damping at the start of the step
             stages.move_bodies(i, h, true);
