@@ -95,14 +95,47 @@ pub(super) const WORDS: &[&str] = &["fringe", "electrode"];
 pub(super) const STRAY: &[&str] =
     &["R", "R1", "R2", "Rs", "R_insulator", "G", "G1", "G2", "V", "l", "w", "w1", "w2", "h", "x", "y", "z", "T"];
 
+/// Number of names in some lists.
+const fn count(lists: &[&[&str]]) -> usize {
+    let (mut k, mut all) = (0, 0);
+    while k < lists.len() {
+        all += lists[k].len();
+        k += 1;
+    }
+    all
+}
+
+/// The names of some lists, one list after the other.
+const fn joined<const N: usize>(lists: &[&[&'static str]]) -> [&'static str; N] {
+    let (mut all, mut next, mut k) = ([""; N], 0, 0);
+    while k < lists.len() {
+        let mut i = 0;
+        while i < lists[k].len() {
+            all[next] = lists[k][i];
+            next += 1;
+            i += 1;
+        }
+        k += 1;
+    }
+    all
+}
+
+/// Parameters that several elements share, in one list with those of their own.
+macro_rules! joined {
+    ($($list:expr),*) => {{
+        const LISTS: &[&[&str]] = &[$($list),*];
+        &joined::<{ count(LISTS) }>(LISTS)
+    }};
+}
+
 const BEAM: &[&str] = &["l", "w", "h", "T", "curvature"];
-const BEAM_E: &[&str] = &["l", "w", "h", "T", "curvature", "R", "G", "resistivity"];
-const LINK: &[&str] = &["l", "w", "h", "T", "L1", "ox1", "oy1", "oz1", "L2", "ox2", "oy2", "oz2"];
-const ARC: &[&str] = &["radius", "alpha", "w", "h", "T", "L1", "ox1", "oy1", "oz1", "L2", "ox2", "oy2", "oz2"];
-const PREDISPLACED: &[&str] = &[
-    "l", "w", "h", "T", "qx2", "qy2", "qz2", "qox1", "qoy1", "qoz1", "qox2", "qoy2", "qoz2", "L1", "ox1", "oy1", "oz1",
-    "L2", "ox2", "oy2", "oz2",
-];
+const BEAM_E: &[&str] = joined!(BEAM, &["R", "G", "resistivity"]);
+/// Rigid arms at both ends.
+const ARMS: &[&str] = &["L1", "ox1", "oy1", "oz1", "L2", "ox2", "oy2", "oz2"];
+const LINK: &[&str] = joined!(&["l", "w", "h", "T"], ARMS);
+const ARC: &[&str] = joined!(&["radius", "alpha", "w", "h", "T"], ARMS);
+const PREDISPLACED: &[&str] =
+    joined!(&["l", "w", "h", "T", "qx2", "qy2", "qz2", "qox1", "qoy1", "qoz1", "qox2", "qoy2", "qoz2"], ARMS);
 const PRESTRESSED: &[&str] = &["l", "w", "h", "qx", "qy", "qz", "qox", "qoy", "qoz"];
 const SLIDER: &[&str] = &["l", "w", "h", "T", "sliderox", "slideroy", "slideroz"];
 /// Drawing attributes that any circuit element may have.
@@ -131,92 +164,15 @@ const WIRED: &[usize] = &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 /// Nodes that one anchor may hold.
 const PADS: &[usize] = &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 const SIZE: &[&str] = &["l", "w", "h"];
-const GAP: &[&str] = &[
-    "l",
-    "w",
-    "w1",
-    "w2",
-    "gap",
-    "h",
-    "V",
-    "permittivity",
-    "fringe",
-    "electrode",
-    "td",
-    "er",
-    "voffset",
-    "touch",
-    "restitution",
-    "speed",
-    "filmgap",
-    "slit",
-];
-const GAP_E: &[&str] = &[
-    "l",
-    "w",
-    "w1",
-    "w2",
-    "gap",
-    "h",
-    "R",
-    "R1",
-    "R2",
-    "G",
-    "G1",
-    "G2",
-    "resistivity",
-    "permittivity",
-    "fringe",
-    "electrode",
-    "td",
-    "er",
-    "voffset",
-    "touch",
-    "restitution",
-    "speed",
-    "filmgap",
-    "slit",
-];
-const GAP_SHEET: &[&str] = &[
-    "l",
-    "w",
-    "w1",
-    "w2",
-    "gap",
-    "h",
-    "Rs",
-    "permittivity",
-    "fringe",
-    "electrode",
-    "td",
-    "er",
-    "voffset",
-    "touch",
-    "restitution",
-    "speed",
-    "filmgap",
-    "slit",
-];
-const PLATES: &[&str] = &[
-    "A",
-    "l",
-    "w",
-    "h",
-    "gap",
-    "permittivity",
-    "fringe",
-    "electrode",
-    "td",
-    "er",
-    "voffset",
-    "touch",
-    "restitution",
-    "speed",
-    "filmgap",
-    "filmstates",
-    "hole",
-    "pitch",
-];
+/// The gas, the field and the contact of a clearance between two faces.
+const CLEARANCE: &[&str] =
+    &["permittivity", "fringe", "electrode", "td", "er", "voffset", "touch", "restitution", "speed", "filmgap"];
+/// The two bars of a gap.
+const BARS: &[&str] = &["l", "w", "w1", "w2", "gap", "h"];
+const GAP: &[&str] = joined!(BARS, &["V"], CLEARANCE, &["slit"]);
+const GAP_E: &[&str] = joined!(BARS, &["R", "R1", "R2", "G", "G1", "G2", "resistivity"], CLEARANCE, &["slit"]);
+const GAP_SHEET: &[&str] = joined!(BARS, &["Rs"], CLEARANCE, &["slit"]);
+const PLATES: &[&str] = joined!(&["A", "l", "w", "h", "gap"], CLEARANCE, &["filmstates", "hole", "pitch"]);
 const STOP: &[&str] = &[
     "gap",
     "back",
