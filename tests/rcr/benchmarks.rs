@@ -2,7 +2,8 @@
 
 use crate::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, LinkageParent, Reduction};
+use bimorph::multibody::joint_coordinates::TreeParent;
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction};
 use bimorph::solve::dormand_prince::{DormandPrince, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 use std::f64::consts::FRAC_PI_2;
@@ -12,9 +13,9 @@ fn rates(linkage: &Linkage, omega: &[f64]) -> Vec<f64> {
     let mut v = vec![0.0; linkage.coordinates];
     for (body, link) in linkage.links.iter().enumerate() {
         let up = match link.parent {
-            LinkageParent::Body(p) => omega[p],
-            LinkageParent::Ground => 0.0,
-            LinkageParent::Free => panic!("a free root"),
+            TreeParent::Body(p) => omega[p as usize],
+            TreeParent::Ground => 0.0,
+            TreeParent::Free => panic!("a free root"),
         };
         v[link.first] = link.sign * (omega[body] - up);
     }

@@ -3,7 +3,8 @@
 
 use super::mechanism::Mechanism;
 use bimorph::multibody::BodyId;
-use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, LinkageParent, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::TreeParent;
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 
@@ -35,8 +36,8 @@ fn four_bar() -> FourBar {
     let mut v = vec![0.0; linkage.coordinates];
     for (body, link) in linkage.links.iter().enumerate() {
         let up = match link.parent {
-            LinkageParent::Body(p) => turning(p),
-            LinkageParent::Ground | LinkageParent::Free => 0.0,
+            TreeParent::Body(p) => turning(p as usize),
+            TreeParent::Ground | TreeParent::Free => 0.0,
         };
         v[link.first] = link.sign * (turning(body) - up);
     }

@@ -5,7 +5,8 @@ use super::mechanism::Stream;
 use super::symbolic::{Chosen, Symbolic};
 use bimorph::multibody::Model;
 use bimorph::multibody::forces::RestStrain;
-use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, LinkageParent, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::TreeParent;
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use bimorph::solve::dormand_prince::{DormandPrince, SecondOrder, Tolerances};
 use bimorph::solve::joint_motion::JointMotion;
 
@@ -34,7 +35,7 @@ impl Case {
         let n = self.linkage.coordinates;
         let mut q: Vec<f64> = (0..n).map(|_| size * s.next()).collect();
         for link in &self.linkage.links {
-            if link.parent == LinkageParent::Free {
+            if link.parent == TreeParent::Free {
                 q[link.first] *= LEVER;
                 q[link.first + 1] *= LEVER;
             }
@@ -104,13 +105,13 @@ impl SecondOrder for Blind<'_> {
         // springs of the tree as moments on the bodies
         let mut force = r.force.clone();
         for (body, link) in case.linkage.links.iter().enumerate() {
-            if link.parent == LinkageParent::Free {
+            if link.parent == TreeParent::Free {
                 continue;
             }
             let moment = link.sign * r.torque[link.first];
             force[body][2] += moment;
-            if let LinkageParent::Body(p) = link.parent {
-                force[p][2] -= moment;
+            if let TreeParent::Body(p) = link.parent {
+                force[p as usize][2] -= moment;
             }
         }
         let bodies = case.symbolic(self.chosen, r, &force).accelerations();
@@ -120,9 +121,9 @@ impl SecondOrder for Blind<'_> {
         }
         for (body, link) in case.linkage.links.iter().enumerate() {
             match link.parent {
-                LinkageParent::Free => a[link.first..link.first + 3].copy_from_slice(&of[body]),
-                LinkageParent::Ground => a[link.first] = link.sign * of[body][2],
-                LinkageParent::Body(p) => a[link.first] = link.sign * (of[body][2] - of[p][2]),
+                TreeParent::Free => a[link.first..link.first + 3].copy_from_slice(&of[body]),
+                TreeParent::Ground => a[link.first] = link.sign * of[body][2],
+                TreeParent::Body(p) => a[link.first] = link.sign * (of[body][2] - of[p as usize][2]),
             }
         }
         if a.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(()) }
@@ -152,7 +153,7 @@ fn integrate<P: SecondOrder>(case: &Case, problem: &mut P, q: &mut [f64]) -> Run
     let mut v = vec![0.0; n];
     let mut atol_q = vec![1e-10; n];
     for link in &case.linkage.links {
-        if link.parent == LinkageParent::Free {
+        if link.parent == TreeParent::Free {
             atol_q[link.first] = 1e-14;
             atol_q[link.first + 1] = 1e-14;
         }

@@ -12,7 +12,8 @@ use super::integrator::Integrator;
 use super::transient::options::TransientOptions;
 use bimorph_domains::System;
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::joint_coordinates::constrained_loops::{Linkage, LinkageParent};
+use bimorph_multibody::joint_coordinates::TreeParent;
+use bimorph_multibody::joint_coordinates::constrained_loops::Linkage;
 use bimorph_multibody::{BodyId, Model};
 use bimorph_solve::baseline::SolverKind;
 use bimorph_solve::fastest::fastest;
@@ -137,7 +138,7 @@ pub fn linkage(formulation: Formulation, system: &System) -> Result<Linkage, Ana
 pub fn coordinate_scales(linkage: &Linkage, length: f64) -> Vec<f64> {
     let mut scale = vec![length; linkage.coordinates];
     for link in &linkage.links {
-        let moving = (0..3).filter(|&i| link.parent == LinkageParent::Free || link.moving[i]);
+        let moving = (0..3).filter(|&i| link.parent == TreeParent::Free || link.moving[i]);
         for (next, i) in moving.enumerate() {
             if i == 2 {
                 scale[link.first + next] = length / link.lever;

@@ -1,6 +1,7 @@
 //! Joint coordinates of given poses.
 
-use super::tree::{Linkage, LinkageParent};
+use super::tree::Linkage;
+use crate::joint_coordinates::TreeParent;
 use crate::planar::{JointFrame, Pose};
 
 impl Linkage {
@@ -10,9 +11,9 @@ impl Linkage {
         for (body, link) in self.links.iter().enumerate() {
             let here = poses[body];
             let parent = match link.parent {
-                LinkageParent::Body(p) => poses[p],
-                LinkageParent::Ground => Pose::zeros(),
-                LinkageParent::Free => {
+                TreeParent::Body(p) => poses[p as usize],
+                TreeParent::Ground => Pose::zeros(),
+                TreeParent::Free => {
                     q[link.first..link.first + 3].copy_from_slice(here.as_slice());
                     continue;
                 }

@@ -3,8 +3,9 @@
 //! It is constant after [`MechanismConstants::new`], so that all users of one mechanism share it.
 
 use super::schedule::{Plan, Schedule};
-use super::tree::{Closure, Linkage, LinkageBody, LinkageParent};
+use super::tree::{Closure, Linkage, LinkageBody};
 use crate::Joint;
+use crate::joint_coordinates::TreeParent;
 use crate::planar::Vec2;
 use crate::scalar::StoredReal;
 
@@ -128,7 +129,7 @@ impl<T: StoredReal> JointShape<T> {
             axis: [lane(&|l| l.frame.axis.x), lane(&|l| l.frame.axis.y)],
             second: [lane(&|l| l.second[(0, 0)]), lane(&|l| l.second[(0, 1)]), lane(&|l| l.second[(1, 1)])],
             moving: of[0].moving,
-            free: of[0].parent == LinkageParent::Free,
+            free: of[0].parent == TreeParent::Free,
         }
     }
 }

@@ -56,4 +56,4 @@ pub use reduction::{Reduction, Traversed};
 pub use rotary::CoordinateCounts;
 pub use singular::Singularity;
 pub use stages::AddedInertia;
-pub use tree::{Closure, Linkage, LinkageBody, LinkageParent};
+pub use tree::{Closure, Linkage, LinkageBody};

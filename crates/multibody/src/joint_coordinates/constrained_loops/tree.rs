@@ -1,35 +1,24 @@
 //! The spanning tree and the loops of a model: relative joint coordinates and closures.
 //!
-//! The tree follows the elimination order of the body graph, which [`crate::order`] computes leaf → root. A
-//! body's parent is one that is eliminated later, or ground. A body whose neighbours are all eliminated before it (the
-//! shuttle of a bank) is a root that moves freely and has three coordinates of its own. The joints that are left over
-//! close loops.
+//! The tree is that of [`spanning_tree`](super::super::spanning_tree). A root moves freely and has three coordinates of its own. The
+//! joints that are left over close loops.
 //!
 //! A joint has three directions (axial u, shear g, rotation p, see [`crate::planar`]), each free, elastic or
 //! locked. On the tree the directions that are not locked are the n generalized coordinates, with the strains of the joint
 //! as their values; a closure's locked directions are the m constraints. The paper's joint types 1–3 lock u and g, its
 //! type 4 locks g and p.
 
+use crate::joint_coordinates::TreeParent;
+use crate::joint_coordinates::spanning_tree::{Attachment, JointsOfBodies};
 use crate::planar::JointFrame;
 use crate::{BodyId, Joint, Model, Pattern};
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-
-/// Parent of a body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LinkageParent {
-    /// A joint to ground.
-    Ground,
-    /// A joint to a body that is eliminated later.
-    Body(usize),
-    /// Nothing: its own displacement and rotation are its coordinates.
-    Free,
-}
+use nalgebra::{Matrix2, Matrix3, Vector3};
 
 /// A body with the joint to its parent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkageBody {
     /// Its parent.
-    pub parent: LinkageParent,
+    pub parent: TreeParent,
     /// Geometry of the joint, `a` the parent and `b` this body.
     pub frame: JointFrame,
     /// −1 where the model's joint counts its strains from this body to the parent.
@@ -57,6 +46,27 @@ pub struct LinkageBody {
 }
 
 impl LinkageBody {
+    /// `body` on the joint to its parent, or free.
+    fn new(body: usize, joint: Option<&Joint>) -> Self {
+        let Attachment { parent, frame, sign } =
+            joint.map_or_else(Attachment::free, |joint| Attachment::by(joint, body));
+        Self {
+            parent,
+            frame,
+            sign,
+            pin: false,
+            moving: joint.map_or([true; 3], |joint| joint.locked.map(|l| !l)),
+            first: 0,
+            stiffness: joint.map_or_else(Matrix3::zeros, |joint| joint.stiffness),
+            second: joint.map_or_else(Matrix2::zeros, |joint| joint.second),
+            expansion: joint.and_then(|joint| joint.expansion),
+            rest: joint.map_or(0.0, |joint| joint.rest),
+            mass: 0.0,
+            inertia: 0.0,
+            lever: 0.0,
+        }
+    }
+
     /// Number of coordinates.
     #[inline]
     pub fn freedom(&self) -> usize {
@@ -145,19 +155,9 @@ impl Linkage {
     /// Spans the tree of `model`. Directions are locked where [`Joint::locked`] says so.
     pub fn new(model: &Model) -> Self {
         let count = model.bodies.len();
-        let mut hanging: Vec<Vec<usize>> = vec![Vec::new(); count];
         let mut lever = vec![0.0f64; count];
-        let all: Vec<Joint> = (0..model.joints.len()).map(|k| model.joint(k)).collect();
-        for (k, joint) in all.iter().enumerate() {
-            if joint.a == joint.b {
-                continue;
-            }
-            let first = match (joint.a, joint.b) {
-                (BodyId::Free(a), BodyId::Free(b)) => a.min(b),
-                (BodyId::Free(a), _) | (_, BodyId::Free(a)) => a,
-                (BodyId::Ground, BodyId::Ground) => continue,
-            };
-            hanging[first].push(k);
+        let joints = JointsOfBodies::new(model);
+        for joint in joints.of.iter().flatten().map(|&k| &joints.all[k]) {
             for (id, arm) in [(joint.a, joint.frame.arm_a), (joint.b, joint.frame.arm_b)] {
                 if let BodyId::Free(b) = id {
                     lever[b] = lever[b].max(arm.norm());
@@ -168,21 +168,9 @@ impl Linkage {
         let mut links = Vec::with_capacity(count);
         let mut closures = Vec::new();
         let mut coordinates = 0;
-        for (body, joints) in hanging.iter().enumerate() {
-            // the stiffest joint spans the tree: fewest coordinates, fewest constraints
-            let chosen = joints.iter().copied().min_by_key(|&k| {
-                let joint = &all[k];
-                let moving = joint.locked.iter().filter(|&&l| !l).count();
-                let other = match if joint.a == BodyId::Free(body) { joint.b } else { joint.a } {
-                    BodyId::Free(b) => b,
-                    BodyId::Ground => usize::MAX,
-                };
-                (moving, other)
-            });
-            let mut link = match chosen {
-                Some(k) => attach_to_parent(body, &all[k]),
-                None => free(),
-            };
+        for (body, of) in joints.of.iter().enumerate() {
+            let chosen = joints.to_parent(body, |k| joints.all[k].locked);
+            let mut link = LinkageBody::new(body, chosen.map(|k| &joints.all[k]));
             link.pin = link.turns_about_a_point();
             link.first = coordinates;
             link.mass = model.bodies[body].mass;
@@ -196,11 +184,8 @@ impl Linkage {
             };
             coordinates += link.freedom();
             links.push(link);
-            for &k in joints {
-                if Some(k) != chosen {
-                    closures.push(Closure::Joint(all[k].clone()));
-                }
-            }
+            let loops = of.iter().filter(|k| Some(**k) != chosen);
+            closures.extend(loops.map(|&k| Closure::Joint(joints.all[k].clone())));
             if let Some(projector) = &model.bodies[body].free {
                 closures.push(Closure::Held { body, rows: held_rows(projector) });
             }
@@ -220,52 +205,6 @@ impl Linkage {
     #[inline]
     pub fn body_of(&self, coordinate: usize) -> usize {
         self.links.partition_point(|link| link.first <= coordinate).saturating_sub(1)
-    }
-}
-
-/// The body that `joint` connects to `body` becomes its parent.
-fn attach_to_parent(body: usize, joint: &Joint) -> LinkageBody {
-    let reversed = joint.a == BodyId::Free(body);
-    let (parent, arm_a, arm_b) = if reversed {
-        (joint.b, joint.frame.arm_b, joint.frame.arm_a)
-    } else {
-        (joint.a, joint.frame.arm_a, joint.frame.arm_b)
-    };
-    LinkageBody {
-        parent: match parent {
-            BodyId::Ground => LinkageParent::Ground,
-            BodyId::Free(p) => LinkageParent::Body(p),
-        },
-        frame: JointFrame { arm_a, arm_b, axis: joint.frame.axis },
-        sign: if reversed { -1.0 } else { 1.0 },
-        pin: false,
-        moving: joint.locked.map(|l| !l),
-        first: 0,
-        stiffness: joint.stiffness,
-        second: joint.second,
-        expansion: joint.expansion,
-        rest: joint.rest,
-        mass: 0.0,
-        inertia: 0.0,
-        lever: 0.0,
-    }
-}
-
-fn free() -> LinkageBody {
-    LinkageBody {
-        parent: LinkageParent::Free,
-        frame: JointFrame { arm_a: Vector2::zeros(), arm_b: Vector2::zeros(), axis: Vector2::x() },
-        sign: 1.0,
-        pin: false,
-        moving: [true; 3],
-        first: 0,
-        stiffness: Matrix3::zeros(),
-        second: Matrix2::zeros(),
-        expansion: None,
-        rest: 0.0,
-        mass: 0.0,
-        inertia: 0.0,
-        lever: 0.0,
     }
 }
 

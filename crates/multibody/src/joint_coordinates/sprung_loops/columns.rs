@@ -1,7 +1,8 @@
 //! Blocks of three by three, and vectors of three, in registers of four: operands of a factorization and its solves.
 
 use super::kinematics::MotionMap;
-use super::tree::{TreeJoint, TreeParent};
+use super::tree::TreeJoint;
+use crate::joint_coordinates::TreeParent;
 use crate::planar::Pose;
 use nalgebra::Matrix3;
 use pulp::{Arch, Simd, WithSimd};

@@ -2,7 +2,8 @@
 
 use super::kinematics::{JointState, MotionMap, RelativeOffset, RotationState, offset_from_parent};
 use super::poses::{LaneJointStates, place_of};
-use super::tree::{Tree, TreeParent};
+use super::tree::Tree;
+use crate::joint_coordinates::TreeParent;
 use crate::planar::{HalfTurn, Pose, Vec3};
 use crate::scalar::Dual;
 

@@ -4,9 +4,10 @@
 use super::columns::Four;
 use super::kinematics::triple;
 use super::poses::{LaneJointStates, TreeKinematics, place_of, tiles};
-use super::tree::{Tree, TreeJoint, TreeParent};
+use super::tree::{Tree, TreeJoint};
 use crate::batch::{Kernel, Lane8, LanePose, SimdReal, ZERO_POSE, everywhere, load, store};
 use crate::forces::RestStrain;
+use crate::joint_coordinates::TreeParent;
 use crate::planar::{JointFrame, Pose, Symmetric};
 use pulp::{Arch, Simd, WithSimd};
 

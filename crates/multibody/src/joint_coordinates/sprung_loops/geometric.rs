@@ -6,7 +6,8 @@
 
 use super::kinematics::MotionMap;
 use super::poses::TreeKinematics;
-use super::tree::{Tree, TreeJoint, TreeParent};
+use super::tree::{Tree, TreeJoint};
+use crate::joint_coordinates::TreeParent;
 use crate::planar::Pose;
 use crate::planar::vector::dot;
 use nalgebra::Matrix3;

@@ -33,4 +33,4 @@ pub mod solve;
 pub mod tree;
 
 pub use factor::JointMatrix;
-pub use tree::{Tree, TreeJoint, TreeParent, UnsupportedModel};
+pub use tree::{Tree, TreeJoint, UnsupportedModel};

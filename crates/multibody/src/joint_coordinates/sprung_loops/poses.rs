@@ -5,8 +5,9 @@
 //! ([`super::kinematics`]). Finally displacements are summed. Lanes beyond the last body hold nothing.
 
 use super::kinematics::{JointGeometry, JointState, MotionMap, RelativeOffset, RotationState, offset_from_parent};
-use super::tree::{Tree, TreeParent};
+use super::tree::Tree;
 use crate::batch::{Kernel, LANES, Lane8, SimdReal, ZERO_POSE, everywhere, load, store};
+use crate::joint_coordinates::TreeParent;
 use crate::planar::{HalfTurn, Pose, Vec2};
 use crate::scalar::Real;
 

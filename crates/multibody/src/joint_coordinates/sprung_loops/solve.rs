@@ -12,7 +12,8 @@
 
 use super::columns::{ColumnBlock, Four, in_fours};
 use super::kinematics::{MotionMap, triple};
-use super::tree::{Tree, TreeJoint, TreeParent};
+use super::tree::{Tree, TreeJoint};
+use crate::joint_coordinates::TreeParent;
 use crate::planar::Pose;
 use pulp::{Simd, WithSimd};
 use std::ops::Range;

@@ -1,9 +1,6 @@
 //! The spanning tree of a model: parents of bodies, and moving directions of the joints between them.
 //!
-//! The tree follows the elimination order of the body graph, leaf → root. A body's parent is ground or a body that is
-//! eliminated later. A body whose neighbours are all eliminated before it (the shuttle of a bank) is a root with three
-//! coordinates of its own. Of the joints of a body, the tree takes the one with the most locked directions, then the
-//! one that moves most bodies together; the others close loops. **A closure keeps all its springs**, so that a loop of
+//! The tree is that of [`spanning_tree`](super::super::spanning_tree). **A closure keeps all its springs**, so that a loop of
 //! elastic beams brings no constraint: its springs are one more term of the recursion, as a gap is. The couplings of
 //! tree and closures are those of the graph, and so the pattern of the factor is that of the model in absolute
 //! coordinates.
@@ -13,25 +10,16 @@
 
 use super::kinematics::JointGeometry;
 use crate::batch::{LANES, Lane8};
+use crate::joint_coordinates::TreeParent;
+use crate::joint_coordinates::spanning_tree::{Attachment, JointsOfBodies};
 use crate::planar::{Block, JointFrame, Pose, Symmetric};
 use crate::section::PackedJoint;
-use crate::{BodyId, Joint, Model, Pattern};
+use crate::{Body, BodyId, Joint, Model, Pattern};
 use nalgebra::Vector2;
 use thiserror::Error;
 
 /// Directions (u, g, p) of a joint that are coordinates.
 pub type FreeDirections = [bool; 3];
-
-/// Parent of a body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TreeParent {
-    /// A joint to ground.
-    Ground,
-    /// A joint to a body that is eliminated later.
-    Body(u32),
-    /// Nothing: its own displacement and rotation are its coordinates.
-    Free,
-}
 
 /// A body's joint to its parent.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,44 +130,20 @@ impl Tree {
     /// Spans the tree of `model`. `lock` says of joint `k` (in the order of the model's joints) which directions may be
     /// locked beyond those that are drawn so; they are where the joint goes into the tree.
     pub fn new(model: &Model, lock: impl Fn(usize) -> [bool; 3]) -> Self {
-        let count = model.bodies.len();
-        let mut hanging: Vec<Vec<usize>> = vec![Vec::new(); count];
-        let all: Vec<Joint> = (0..model.joints.len()).map(|k| model.joint(k)).collect();
-        for (k, joint) in all.iter().enumerate() {
-            match (joint.a, joint.b) {
-                (BodyId::Free(a), BodyId::Free(b)) if a != b => hanging[a.min(b)].push(k),
-                (BodyId::Free(a), BodyId::Ground) | (BodyId::Ground, BodyId::Free(a)) => hanging[a].push(k),
-                _ => {}
-            }
-        }
+        let joints = JointsOfBodies::new(model);
         let locked = |k: usize| {
-            let (drawn, may) = (all[k].locked, lock(k));
+            let (drawn, may) = (joints.all[k].locked, lock(k));
             [0, 1, 2].map(|i| drawn[i] || may[i])
         };
-        let mut in_tree = vec![false; all.len()];
-        let mut links = Vec::with_capacity(count);
-        for (body, joints) in hanging.iter().enumerate() {
+        let mut in_tree = vec![false; joints.all.len()];
+        let mut link = |(body, of): (usize, &Body)| {
             // supports hold directions of the plane, not of a joint: such a body keeps its own coordinates
-            let supported = model.bodies[body].free.clone();
-            let chosen = match supported {
-                Some(_) => None,
-                None => joints.iter().copied().min_by_key(|&k| {
-                    let moving = locked(k).iter().filter(|&&l| !l).count();
-                    let other = match if all[k].a == BodyId::Free(body) { all[k].b } else { all[k].a } {
-                        BodyId::Free(b) => b,
-                        BodyId::Ground => usize::MAX,
-                    };
-                    (moving, other)
-                }),
-            };
-            links.push(match chosen {
-                Some(k) => {
-                    in_tree[k] = true;
-                    attach_to_parent(body, &all[k], locked(k).map(|l| !l))
-                }
-                None => root(supported),
-            });
-        }
+            let chosen = if of.free.is_some() { None } else { joints.to_parent(body, locked) };
+            let Some(k) = chosen else { return root(of.free.clone()) };
+            in_tree[k] = true;
+            attach_to_parent(body, &joints.all[k], locked(k).map(|l| !l))
+        };
+        let links = model.bodies.iter().enumerate().map(&mut link).collect();
         let left = model.joints.iter().zip(&in_tree).filter(|(_, in_tree)| !**in_tree);
         let closures = left.map(|(joint, _)| *joint).collect();
         Self::laid(links, closures, Pattern::clone(&model.pattern))
@@ -235,43 +199,38 @@ impl TreeJoint {
     }
 }
 
-/// The body that `joint` connects to `body` becomes its parent.
+/// `body` on its joint to its parent.
 fn attach_to_parent(body: usize, joint: &Joint, moving: FreeDirections) -> TreeJoint {
-    let reversed = joint.a == BodyId::Free(body);
-    let JointFrame { arm_a, arm_b, axis } = joint.frame;
-    let (parent, arm_parent, arm) = if reversed { (joint.b, arm_b, arm_a) } else { (joint.a, arm_a, arm_b) };
     let k = |i: usize, j: usize| if moving[i] && moving[j] { joint.stiffness[(i, j)] } else { 0.0 };
     TreeJoint {
-        parent: match parent {
-            BodyId::Ground => TreeParent::Ground,
-            BodyId::Free(p) => TreeParent::Body(p as u32),
-        },
-        sign: if reversed { -1.0 } else { 1.0 },
-        arm_parent,
-        arm,
-        axis,
         moving,
         stiffness: Symmetric([k(0, 0), k(0, 1), k(0, 2), k(1, 1), k(1, 2), k(2, 2)]),
         second: [joint.second[(0, 0)], joint.second[(0, 1)], joint.second[(1, 1)]],
         expansion: joint.expansion,
         rest: joint.rest,
-        free: None,
+        ..bare(Attachment::by(joint, body))
     }
 }
 
 fn root(free: Option<Box<Block>>) -> TreeJoint {
+    TreeJoint { free, ..bare(Attachment::free()) }
+}
+
+/// A joint without springs.
+fn bare(Attachment { parent, frame, sign }: Attachment) -> TreeJoint {
+    let JointFrame { arm_a: arm_parent, arm_b: arm, axis } = frame;
     TreeJoint {
-        parent: TreeParent::Free,
-        sign: 1.0,
-        arm_parent: Vector2::zeros(),
-        arm: Vector2::zeros(),
-        axis: Vector2::x(),
+        parent,
+        sign,
+        arm_parent,
+        arm,
+        axis,
         moving: [true; 3],
         stiffness: Symmetric::default(),
         second: [0.0; 3],
         expansion: None,
         rest: 0.0,
-        free,
+        free: None,
     }
 }
 

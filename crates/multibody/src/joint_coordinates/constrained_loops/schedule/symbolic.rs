@@ -2,8 +2,9 @@
 
 use super::slots::Slots;
 use super::{ClosureEntry, EliminationKind, EliminationStep, NONE, PackedElimination, Plan, Schedule};
+use crate::joint_coordinates::TreeParent;
 use crate::joint_coordinates::constrained_loops::fast::SmallFront;
-use crate::joint_coordinates::constrained_loops::tree::{Closure, Linkage, LinkageParent};
+use crate::joint_coordinates::constrained_loops::tree::{Closure, Linkage};
 use crate::{BodyId, Pattern};
 
 impl Schedule {
@@ -139,8 +140,8 @@ impl<'a> SymbolicSweep<'a> {
             gathers: false,
             hands_on: false,
             parent: match link.parent {
-                LinkageParent::Body(p) => narrow(p),
-                LinkageParent::Ground | LinkageParent::Free => u32::MAX,
+                TreeParent::Body(p) => p,
+                TreeParent::Ground | TreeParent::Free => u32::MAX,
             },
             turns: link.moving[2],
             coupled,
@@ -164,7 +165,8 @@ impl<'a> SymbolicSweep<'a> {
     fn touched(&mut self, body: usize) -> (usize, Vec<usize>) {
         let mut bodies = std::mem::take(&mut self.support[body]);
         let mut parent = NONE;
-        if let LinkageParent::Body(p) = self.linkage.links[body].parent {
+        if let TreeParent::Body(p) = self.linkage.links[body].parent {
+            let p = p as usize;
             parent = slot_of(&self.linkage.pattern, body, p);
             if self.incoming[body] > 0 {
                 bodies.push(p);

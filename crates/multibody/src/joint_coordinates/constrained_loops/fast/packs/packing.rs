@@ -2,9 +2,10 @@
 
 use super::subtrees::equal;
 use super::{FirstOfSubtree, PackContribution, PackedReal, Packing, Packs, RemainingStep, SubtreePack, WIDTH};
+use crate::joint_coordinates::TreeParent;
 use crate::joint_coordinates::constrained_loops::reduction::Reduction;
 use crate::joint_coordinates::constrained_loops::schedule::{NONE, Schedule};
-use crate::joint_coordinates::constrained_loops::tree::{Closure, Linkage, LinkageBody, LinkageParent};
+use crate::joint_coordinates::constrained_loops::tree::{Closure, Linkage, LinkageBody};
 use crate::scalar::StoredReal;
 use crate::scalar::has_lanes;
 use crate::{BodyId, Pattern};
@@ -237,8 +238,8 @@ impl PackLayout {
             for body in of.body..of.body + pack.size.body {
                 let mut link = linkage.links[body].clone();
                 link.first = pack.at.coordinate + link.first - of.coordinate;
-                if let LinkageParent::Body(parent) = &mut link.parent {
-                    *parent = self.seat(linkage, pack, lane, *parent);
+                if let TreeParent::Body(parent) = &mut link.parent {
+                    *parent = self.seat(linkage, pack, lane, *parent as usize) as u32;
                 }
                 links.push(link);
             }
@@ -258,7 +259,7 @@ impl PackLayout {
             }
         }
         links.extend(self.shared.iter().map(|of| LinkageBody {
-            parent: LinkageParent::Free,
+            parent: TreeParent::Free,
             pin: false,
             moving: [false; 3],
             first: self.coordinates,

@@ -8,8 +8,9 @@
 //! same fronts, counted from the subtree; only geometry, masses and stiffnesses may differ. Bodies are numbered by
 //! their kind and by their subtrees, leaf → root, so that a mechanism is compared in one sweep.
 
+use crate::joint_coordinates::TreeParent;
 use crate::joint_coordinates::constrained_loops::schedule::{ClosureEntry, NONE, Schedule};
-use crate::joint_coordinates::constrained_loops::tree::{Closure, Linkage, LinkageParent};
+use crate::joint_coordinates::constrained_loops::tree::{Closure, Linkage};
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -121,9 +122,9 @@ fn describe(linkage: &Linkage, schedule: &Schedule, body: usize, closures: Range
     let flags = |of: [bool; 3]| of.iter().fold(0, |bits, &b| 2 * bits + u32::from(b));
     let slot = |s: usize| if s == NONE { u32::MAX } else { s as u32 };
     let hangs = match link.parent {
-        LinkageParent::Ground => 0,
-        LinkageParent::Free => 1,
-        LinkageParent::Body(_) => 2,
+        TreeParent::Ground => 0,
+        TreeParent::Free => 1,
+        TreeParent::Body(_) => 2,
     };
     let turn = schedule.turn(body);
     key.extend([hangs, slot(turn.parent), turn.front as u32, u32::from(link.pin), flags(link.moving)]);
