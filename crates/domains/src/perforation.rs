@@ -107,4 +107,19 @@ mod tests {
             assert!((numeric / plate.strength(g)[1] - 1.0).abs() < 1e-7, "{g:e}");
         }
     }
+
+    /// The series of a thin film joins its closed form (1e-8), and its derivative is that of central differences, which are right to 3e-6.
+    #[test]
+    fn the_series_joins_the_closed_form() {
+        let [below, above] = [THIN * (1.0 - 1e-12), THIN].map(super::strip);
+        assert!(
+            (below[0] / above[0] - 1.0).abs() < 1e-8 && (below[1] / above[1] - 1.0).abs() < 1e-8,
+            "{below:?} {above:?}"
+        );
+        for z in [0.2 * THIN, 0.9 * THIN, 5.0 * THIN, 30.0] {
+            let e = 1e-3 * z;
+            let numeric = (super::strip(z + e)[0] - super::strip(z - e)[0]) / (2.0 * e);
+            assert!((numeric / super::strip(z)[1] - 1.0).abs() < 3e-6, "{z}");
+        }
+    }
 }

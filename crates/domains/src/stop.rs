@@ -123,4 +123,28 @@ mod tests {
             }
         }
     }
+
+    /// A stop with two sides: the force is the derivative of the energy of both, the loss has the derivatives of central differences
+    /// (1e-6), and the nearer side is the one with less way.
+    #[test]
+    fn two_sides() {
+        let (stop, ways) = (StopKind::Elastic(2e3), [Some(3e-9), Some(5e-9)]);
+        let loss = Loss::new(&bimorph_structure::Impact { restitution: Some(0.3), speed: Some(0.1) });
+        let energy = |u: f64| stop.energy(3e-9 - u) + stop.energy(5e-9 + u);
+        let slope = |f: &dyn Fn(f64) -> f64, x: f64, e: f64| (f(x + e) - f(x - e)) / (2.0 * e);
+        for (u, rate) in [(9e-9, 0.02), (9e-9, -0.01), (-9e-9, 0.02), (-9e-9, -0.03)] {
+            let (force, stiffness) = stop.bearing(&ways, u);
+            assert!((slope(&energy, u, 1e-13) / force - 1.0).abs() < 1e-6);
+            assert!((slope(&|u| stop.bearing(&ways, u).0, u, 1e-13) / stiffness - 1.0).abs() < 1e-6);
+            let (_, by_u, by_rate) = lost(&stop, &loss, &ways, (u, rate));
+            let added = |u: f64, rate: f64| lost(&stop, &loss, &ways, (u, rate)).0;
+            assert!((slope(&|u| added(u, rate), u, 1e-13) / by_u - 1.0).abs() < 1e-6, "{u} {rate}");
+            assert!((slope(&|rate| added(u, rate), rate, 1e-6) / by_rate - 1.0).abs() < 1e-6, "{u} {rate}");
+            // it opposes the motion, on either side
+            assert!(added(u, rate) * rate > 0.0);
+        }
+        assert_eq!(stop.bearing(&ways, 0.0), (0.0, 0.0));
+        assert_eq!((nearer(&ways, 0.0), nearer(&ways, -3e-9)), ((3e-9, -1.0), (2e-9, 1.0)));
+        assert_eq!((nearer(&[None, ways[1]], 1e-9).1, nearer(&[ways[0], None], -1e-9).1), (1.0, -1.0));
+    }
 }

@@ -431,6 +431,56 @@ mod tests {
         assert_eq!(beside.heaters[0].time_constant, 1e-6);
     }
 
+    /// Heat W that comes from elsewhere raises the mean of a clamped bar by W/(12·K), and reaches other pieces as theirs reaches its own
+    /// (reciprocity, 1e-12). An input that is no heat raises nothing.
+    #[test]
+    fn heat_from_elsewhere() {
+        let one = bar(1).with_heat(&[Input::Rate, Input::Heat { heater: 0 }]);
+        let per_watt = 1.0 / (12.0 * one.heaters[0].conductance);
+        assert_eq!((one.per_watt(0, 0), one.per_watt(0, 1)), (0.0, 0.0));
+        assert!((one.per_watt(0, 2) / per_watt - 1.0).abs() < 1e-12);
+        let expected = bar(1).steady(0, &[3.0]) + 2e-3 * per_watt;
+        assert!((one.steady(0, &[3.0, 7.0, 2e-3]) / expected - 1.0).abs() < 1e-12);
+        let three = bar(3).with_heat(&[Input::Heat { heater: 2 }, Input::Heat { heater: 0 }]);
+        assert!((three.per_watt(0, 1) / three.per_watt(2, 2) - 1.0).abs() < 1e-12);
+        assert!(three.per_watt(2, 1) > three.per_watt(1, 1) && three.per_watt(1, 1) > three.per_watt(0, 1));
+    }
+
+    /// Three pieces of a bar between two sources: the rise is the sum of the entries of its form times voltages, the way between two
+    /// states is the quadratic through them, and the slope is its derivative (a central difference, exact for a quadratic: 1e-9).
+    #[test]
+    fn quadratic_in_the_sources() {
+        let circuit = ElectricalNetwork {
+            nodes: 4,
+            resistors: bar(3).heaters.iter().map(|h| (h.a, h.b, h.resistance)).collect(),
+            sources: vec![(0, None), (2, None)],
+            grounds: vec![3],
+        };
+        let sink = [true, false, false, true];
+        let heating = Heating::new(bar(3).heaters, &circuit.solve().unwrap(), 2, &sink).unwrap();
+        let heating = heating.with_heat(&[Input::Heat { heater: 1 }]);
+        let (from, to) = ([1.0, -0.5, 1e-3], [2.5, 0.7, 3e-3]);
+        let along = |x: f64| -> Vec<f64> { (0..3).map(|i| from[i] + x * (to[i] - from[i])).collect() };
+        let unit: Vec<f64> = (0..3).map(|i| to[i] - from[i]).collect();
+        for k in 0..3 {
+            let by_entries: f64 = (0..2)
+                .flat_map(|i| (0..2).map(move |j| (i, j)))
+                .map(|(i, j)| heating.entry(k, i, j) * to[i] * to[j])
+                .sum();
+            let rise = heating.steady(k, &to);
+            assert!(((by_entries + heating.per_watt(k, 2) * to[2]) / rise - 1.0).abs() < 1e-12);
+            let [c0, c1, c2] = heating.between(k, &from, &to);
+            for x in [0.0, 0.3, 1.0] {
+                assert!(((c0 + x * (c1 + x * c2)) / heating.steady(k, &along(x)) - 1.0).abs() < 1e-12, "{k} {x}");
+            }
+            let numeric = (heating.steady(k, &along(0.6)) - heating.steady(k, &along(0.4))) / 0.2;
+            assert!((heating.slope(k, &along(0.5), &unit) / numeric - 1.0).abs() < 1e-9, "{k}");
+        }
+        // the current of the first source reaches the second through two pieces in series
+        assert!((heating.current(0, 0) * 2.0 * heating.heaters[0].resistance - 1.0).abs() < 1e-12);
+        assert_eq!(heating.current(2, 0), 0.0);
+    }
+
     /// A heater without a path for its heat is refused.
     #[test]
     fn no_sink() {
