@@ -83,12 +83,9 @@ impl Equations for Bodies<'_> {
             false => own(x).hypot(drag(x).sqrt()),
         };
         let mass = mass + h * dragged.iter().map(|(_, _, c)| c).sum::<f64>();
-        let (eq, ev) = (norm(&error.q), norm(&error.v));
         let reach = norm(&before.q).max(norm(&after.q)) + FLOOR * system.length_scale * mass.sqrt();
-        let share = (eq * eq + h * h * ev * ev).sqrt() / (tol * reach);
-        // a sum: the larger of the two would hide what is not a number
-        let share = share.hypot(contact_error(system, (before, after), error, tol));
-        if share.is_nan() { f64::INFINITY } else { share }
+        let contact = contact_error(system, (before, after), error, tol);
+        relative_error([norm(&error.q), norm(&error.v)], h, tol * reach, contact)
     }
 
     fn worst(&self, error: &[Pose]) -> DegreeOfFreedom {
@@ -108,6 +105,13 @@ impl Equations for Bodies<'_> {
     fn named(&self, (body, direction): DegreeOfFreedom) -> (String, &'static str) {
         (self.system.model.bodies[body].name.to_string(), DIRECTIONS[direction])
     }
+}
+
+/// The error of a step of length `h` (s) over what it `may` be: of displacements and rates in the norm of masses, and of contact.
+pub(crate) fn relative_error([q, v]: [f64; 2], h: f64, may: f64, contact: f64) -> f64 {
+    // a sum: the larger of the two would hide what is not a number
+    let error = ((q * q + h * h * v * v).sqrt() / may).hypot(contact);
+    if error.is_nan() { f64::INFINITY } else { error }
 }
 
 /// Fraction of the energy error that counts where contact dissipates energy, since the error decays as well.

@@ -9,7 +9,7 @@
 use super::method::Motion;
 use super::pace::StepController;
 use super::rodas4::lanes::{Lane, LaneRodas4};
-use crate::equations::bodies::{FLOOR, contact_error, dragged};
+use crate::equations::bodies::{self, FLOOR, contact_error, dragged};
 use bimorph_domains::{Ramp, System};
 use bimorph_multibody::batch::LANES;
 
@@ -185,9 +185,6 @@ fn relative_error(method: &LaneRodas4, k: usize, system: &System, run: &RunningL
         return 0.0;
     }
     let norms = &method.norms;
-    let (eq, ev) = (norms.error_q[k], norms.error_v[k]);
     let reach = norms.before[k].max(norms.after[k]) + FLOOR * system.length_scale * run.mass.sqrt();
-    let error = (eq * eq + h * h * ev * ev).sqrt() / (run.tol * reach);
-    let error = error.hypot(contact);
-    if error.is_nan() { f64::INFINITY } else { error }
+    bodies::relative_error([norms.error_q[k], norms.error_v[k]], h, run.tol * reach, contact)
 }

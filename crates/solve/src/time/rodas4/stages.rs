@@ -6,7 +6,7 @@
 //!
 //! Signs: forces are summed as they stand in M·q̈ + C·q̇ + r = 0, so the solve finds minus the increment.
 
-use super::tableau::{A, C, GAMMA, GAMMA_I};
+use super::tableau::{A, C, GAMMA, GAMMA_I, IN_PLACE};
 use crate::method::Motion;
 use crate::time::gyration::{Gyration, skew};
 use bimorph_multibody::planar::Pose;
@@ -39,9 +39,6 @@ pub(super) struct Stages {
     r1: Vec<Pose>,
     tiles: Vec<TileIncrements>,
 }
-
-/// From this stage on the motion itself carries the argument: the last stages add increments to it, as the result does.
-const IN_PLACE: usize = 4;
 
 impl Stages {
     /// Storage for a model.

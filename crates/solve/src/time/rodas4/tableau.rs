@@ -6,6 +6,8 @@
 pub(crate) const GAMMA: f64 = 0.25;
 /// Stage positions α_i and γ_i.
 pub(crate) const ALPHA: [f64; 6] = [0.0, 0.386, 0.21, 0.63, 1.0, 1.0];
+/// From this stage on the motion itself carries the argument: the last stages add increments to it, as the result does.
+pub(super) const IN_PLACE: usize = 4;
 /// True for a stage at another time than the one before it, or than the start.
 pub(crate) fn moves_on(i: usize) -> bool {
     i > 0 && ALPHA[i] != ALPHA[i - 1]

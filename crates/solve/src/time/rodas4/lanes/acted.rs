@@ -1,8 +1,9 @@
 //! Elements that act on few bodies of a variant and have branches of their own: gaps and dead loads, variant by
 //! variant.
 
+use super::super::tableau::IN_PLACE;
 use super::super::tableau::{C, GAMMA};
-use super::storage::{IN_PLACE, Lane, LaneRodas4};
+use super::storage::{Lane, LaneRodas4};
 use bimorph_multibody::batch::{LANES, LanePose};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::scalar::StoredReal;

@@ -3,9 +3,9 @@
 // blocks of fixed size are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
 
-use super::super::tableau::{A, C, GAMMA, GAMMA_I};
+use super::super::tableau::{A, C, GAMMA, GAMMA_I, IN_PLACE};
 use super::motion::{Norms, mass_norm};
-use super::storage::{IN_PLACE, LaneIncrement, LaneRodas4};
+use super::storage::{LaneIncrement, LaneRodas4};
 use bimorph_multibody::batch::forces::{self, LaneRestStrain};
 use bimorph_multibody::batch::{
     Kernel, LaneModel, LanePose, SimdReal, ZERO_POSE, add, add_scaled, load, load_block, store, times,

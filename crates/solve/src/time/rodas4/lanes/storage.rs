@@ -10,9 +10,6 @@ use bimorph_multibody::planar::Pose;
 use bimorph_multibody::scalar::has_lanes;
 use bimorph_multibody::{BlockMatrix, Pattern};
 
-/// From this stage on the motion itself carries the argument.
-pub(super) const IN_PLACE: usize = 4;
-
 /// Run of a lane.
 #[derive(Debug, Clone)]
 pub struct Lane<'a> {
