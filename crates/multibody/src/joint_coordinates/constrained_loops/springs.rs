@@ -3,12 +3,13 @@
 //! The coordinates of the tree are the strains of its joints, so their forces are −K·(e − e₀) as they stand. An elastic
 //! direction of a closure acts on its two bodies through its rows.
 
+use super::closures::Strain;
 use super::poses::BodyKinematics;
 use super::reduction::{Reduction, Traversal};
 use super::stages::AddedInertia;
-use super::tree::{Closure, Linkage};
-use crate::BodyId;
+use super::tree::{Closure, Linkage, LinkageBody};
 use crate::forces::RestStrain;
+use crate::{BodyId, Joint};
 use nalgebra::{Matrix3, Vector3};
 
 impl Reduction<f64> {
@@ -36,18 +37,7 @@ impl Reduction<f64> {
             if link.stiffness.iter().all(|&k| k == 0.0) {
                 continue;
             }
-            let mut e = Vector3::zeros();
-            let mut next = link.first;
-            for i in 0..3 {
-                if link.moving[i] {
-                    e[i] = q[next];
-                    next += 1;
-                }
-            }
-            if link.moving[0] {
-                e.x -= offset(link.rest, link.expansion, rest);
-            }
-            let stress = link.stiffness * e;
+            let stress = link.stiffness * tree_strain(link, q, rest);
             let mut next = link.first;
             for i in 0..3 {
                 if link.moving[i] {
@@ -58,19 +48,11 @@ impl Reduction<f64> {
         }
         for (c, closure) in linkage.closures.iter().enumerate() {
             let Closure::Joint(joint) = closure else { continue };
-            if !(0..3).any(|i| !joint.locked[i] && joint.stiffness[(i, i)] != 0.0) {
+            if !is_elastic(joint) {
                 continue;
             }
-            let at = |id| match id {
-                BodyId::Free(k) => self.placed(k),
-                BodyId::Ground => BodyKinematics::REST,
-            };
-            let strains = self.mechanism.closures[c].strains(&at(joint.a), &at(joint.b));
-            let mut e = Vector3::from_fn(|i, _| if joint.locked[i] { 0.0 } else { strains[i].value });
-            if !joint.locked[0] {
-                e.x -= offset(joint.rest, joint.expansion, rest);
-            }
-            let stress = joint.stiffness * e;
+            let strains = self.closure_strains(c, joint);
+            let stress = joint.stiffness * closure_strain(joint, &strains, rest);
             for (i, strain) in strains.iter().enumerate() {
                 if joint.locked[i] {
                     continue;
@@ -92,14 +74,10 @@ impl Reduction<f64> {
         added.add_joints(linkage, factor);
         for (c, closure) in linkage.closures.iter().enumerate() {
             let Closure::Joint(joint) = closure else { continue };
-            if !(0..3).any(|i| !joint.locked[i] && joint.stiffness[(i, i)] != 0.0) {
+            if !is_elastic(joint) {
                 continue;
             }
-            let at = |id| match id {
-                BodyId::Free(k) => self.placed(k),
-                BodyId::Ground => BodyKinematics::REST,
-            };
-            let strains = self.mechanism.closures[c].strains(&at(joint.a), &at(joint.b));
+            let strains = self.closure_strains(c, joint);
             let [ra, rb] = [0, 1].map(|side| {
                 Matrix3::from_fn(|i, d| match (joint.locked[i], side) {
                     (true, _) => 0.0,
@@ -123,34 +101,25 @@ impl Reduction<f64> {
         }
     }
 
+    /// Strains of closure `c`, a joint, at the placed configuration.
+    fn closure_strains(&self, c: usize, joint: &Joint) -> [Strain<f64>; 3] {
+        let at = |id| match id {
+            BodyId::Free(k) => self.placed(k),
+            BodyId::Ground => BodyKinematics::REST,
+        };
+        self.mechanism.closures[c].strains(&at(joint.a), &at(joint.b))
+    }
+
     /// Elastic energy at the placed configuration (J).
     pub fn strain_energy(&self, linkage: &Linkage, q: &[f64], rest: &RestStrain<'_>) -> f64 {
         let mut energy = 0.0;
         for link in &linkage.links {
-            let mut e = Vector3::zeros();
-            let mut next = link.first;
-            for i in 0..3 {
-                if link.moving[i] {
-                    e[i] = q[next];
-                    next += 1;
-                }
-            }
-            if link.moving[0] {
-                e.x -= offset(link.rest, link.expansion, rest);
-            }
+            let e = tree_strain(link, q, rest);
             energy += 0.5 * e.dot(&(link.stiffness * e));
         }
         for (c, closure) in linkage.closures.iter().enumerate() {
             let Closure::Joint(joint) = closure else { continue };
-            let at = |id| match id {
-                BodyId::Free(k) => self.placed(k),
-                BodyId::Ground => BodyKinematics::REST,
-            };
-            let strains = self.mechanism.closures[c].strains(&at(joint.a), &at(joint.b));
-            let mut e = Vector3::from_fn(|i, _| if joint.locked[i] { 0.0 } else { strains[i].value });
-            if !joint.locked[0] {
-                e.x -= offset(joint.rest, joint.expansion, rest);
-            }
+            let e = closure_strain(joint, &self.closure_strains(c, joint), rest);
             energy += 0.5 * e.dot(&(joint.stiffness * e));
         }
         energy
@@ -166,6 +135,32 @@ impl Reduction<f64> {
             })
             .sum()
     }
+}
+
+/// Elastic strains of a joint of the tree; 0 in locked directions.
+fn tree_strain(link: &LinkageBody, q: &[f64], rest: &RestStrain<'_>) -> Vector3<f64> {
+    let mut e = Vector3::zeros();
+    for (at, i) in (link.first..).zip((0..3).filter(|&i| link.moving[i])) {
+        e[i] = q[at];
+    }
+    if link.moving[0] {
+        e.x -= offset(link.rest, link.expansion, rest);
+    }
+    e
+}
+
+/// Elastic strains of a joint that closes a loop; 0 in locked directions.
+fn closure_strain(joint: &Joint, strains: &[Strain<f64>; 3], rest: &RestStrain<'_>) -> Vector3<f64> {
+    let mut e = Vector3::from_fn(|i, _| if joint.locked[i] { 0.0 } else { strains[i].value });
+    if !joint.locked[0] {
+        e.x -= offset(joint.rest, joint.expansion, rest);
+    }
+    e
+}
+
+/// True for a joint with a spring in a direction that is not locked.
+fn is_elastic(joint: &Joint) -> bool {
+    (0..3).any(|i| !joint.locked[i] && joint.stiffness[(i, i)] != 0.0)
 }
 
 fn offset(built_in: f64, expansion: Option<(usize, f64)>, rest: &RestStrain<'_>) -> f64 {
