@@ -64,3 +64,32 @@ impl<T: Real> FactoredTangent<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planar::{JointFrame, Pose};
+    use nalgebra::{Vector2, Vector6};
+
+    /// The product with what a tangent is made of is that with its 6×6 matrix, to the rounding of the matrix (1e-14).
+    #[test]
+    fn the_product_is_that_of_the_matrix() {
+        let frame = JointFrame {
+            arm_a: Vector2::new(0.7, -0.3),
+            arm_b: Vector2::new(-0.4, 0.9),
+            axis: Vector2::new(0.4f64.cos(), 0.4f64.sin()),
+        };
+        let (second, stress) = ([0.6, 0.1, -0.08], [1.3, -0.7, 0.4]);
+        let stiffness = Symmetric([1.9, 0.3, -0.2, 1.4, 0.5, 1.1]);
+        let k = frame.kinematics(&Pose::new(0.1, -0.2, 0.3), &Pose::new(0.15, 0.1, -0.5), &second);
+        let x = Vector6::new(0.3, -0.7, 0.2, 0.5, 0.1, -0.4);
+        let at = |i: usize| Double::from(x[i]);
+        let pair = k.factored(&stiffness, &stress, &second).times([at(3) - at(0), at(4) - at(1)], at(2), at(5));
+        let [fx, fy] = pair.force.map(|f| f.high);
+        let found = Vector6::new(-fx, -fy, pair.moment_a.high, fx, fy, pair.moment_b.high);
+        let expected = k.tangent(&stiffness, &stress, &second).matrix() * x;
+        assert!((found - expected).norm() < 1e-14, "{found} {expected}");
+        let twice = k.elastic(&stiffness.scaled(2.0)).matrix() * x;
+        assert!((twice - k.elastic(&stiffness).matrix() * x * 2.0).norm() < 1e-14);
+    }
+}

@@ -296,6 +296,7 @@ impl JointKinematics {
 mod tests {
     use super::*;
     use crate::planar::rotation_minus_identity;
+    use crate::scalar::Dual;
 
     fn sample() -> (JointFrame, [f64; 3], Pose, Pose) {
         let frame = JointFrame {
@@ -338,6 +339,34 @@ mod tests {
             let h = (force(&hi) - force(&lo)) / 2e-6;
             assert!((h - tangent.column(i)).norm() < 1e-8, "{i}: {h} {}", tangent.column(i));
         }
+    }
+
+    /// The law over values with their derivatives: strains change as rows·dq does and forces as tangent·dq does, to rounding
+    /// (1e-14).
+    #[test]
+    fn derivatives_are_exact() {
+        let (frame, second, qa, qb) = sample();
+        let stiffness = Symmetric([1.9, 0.3, -0.2, 1.4, 0.5, 1.1]);
+        let dq = Vector6::new(0.3, -0.7, 0.2, 0.5, 0.1, -0.4);
+        let body = |q: &Pose, from: usize| [0, 1, 2].map(|i| Dual { value: q[i], change: dq[from + i] });
+        let turn = |theta: Dual| {
+            let (sin, cos) = (theta * 0.5).sin_cos();
+            HalfTurn::of([sin, cos])
+        };
+        let still = |v: Vector2<f64>| [v.x, v.y].map(Dual::constant);
+        let (a, b) = (body(&qa, 0), body(&qb, 3));
+        let arms = [still(frame.arm_a), still(frame.arm_b)];
+        let second_order = second.map(Dual::constant);
+        let k = JointKinematics::new(arms, still(frame.axis), &second_order, (a, &turn(a[2])), (b, &turn(b[2])));
+        let here = frame.kinematics(&qa, &qb, &second);
+        assert_eq!(k.strain.map(|e| e.value), here.strain);
+        let strain = Vector3::from(k.strain.map(|e| e.change));
+        assert!((strain - here.rows() * dq).norm() < 1e-14);
+        let stress = Symmetric(stiffness.0.map(Dual::constant)).times(k.strain);
+        let (on_a, on_b) = k.forces(&stress);
+        let force = Vector6::from_iterator(on_a.into_iter().chain(on_b).map(|f| f.change));
+        let tangent = here.tangent(&stiffness, &stress.map(|s| s.value), &second).matrix();
+        assert!((force - tangent * dq).norm() < 1e-14, "{force} {}", tangent * dq);
     }
 
     /// Linearized forces have the derivatives of the drawn place at any displacement: rowsᵀ·stress, in which the opening has
