@@ -95,6 +95,29 @@ mod tests {
         assert!((x - 0.3).abs() < 1e-15, "{x}");
     }
 
+    /// Inverse interpolation takes far fewer values than bisection, which would take 52: 8 for the cosine, whatever the order of the ends.
+    #[test]
+    fn roots_take_few_values() {
+        for (a, b) in [(1.0f64, 2.0f64), (2.0, 1.0)] {
+            let mut values = 0;
+            let counted = |x: f64| {
+                values += 1;
+                x.cos()
+            };
+            root(counted, (a, a.cos()), (b, b.cos()));
+            assert!(values <= 10, "{values}");
+        }
+    }
+
+    /// A quantity that stays at zero over a place of a step crosses once, where it leaves it on the other side.
+    #[test]
+    fn zero_is_no_sign() {
+        let mut found = Vec::new();
+        let mut detector = Detector::new(1.0);
+        detector.step(|x| if x < 0.6 { 0.5 - x } else { -1.0 }, |x, direction| found.push((x, direction)));
+        assert_eq!(found, [(0.5, Direction::Down)]);
+    }
+
     /// A sine over steps of 0.7 crosses at each multiple of π, once, with alternating direction; it begins at zero, which is no
     /// crossing.
     #[test]

@@ -65,3 +65,47 @@ pub(super) fn equal((start, end): (f64, f64), length: f64) -> impl Iterator<Item
     let at = move |k: usize| if k == count { end } else { start + span * (k as f64 / count as f64) };
     (0..count).map(move |k| (at(k), at(k + 1)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The last two steps share what is left, a step that ends within rounding of the end is the last one, and one that was cut short
+    /// keeps the longer one that was wanted.
+    #[test]
+    fn steps_cover_the_span() {
+        let mut pace = StepController::new((2.0, 12.0), 6.0, 4.0);
+        assert_eq!((pace.step(), pace.after(3.0), pace.after(10.0 - 1e-14)), (5.0, 5.0, 12.0));
+        pace.accept(5.0, 1.0);
+        assert_eq!((pace.t, pace.h, pace.step(), pace.is_over()), (7.0, 6.0, 5.0, false));
+        pace.accept(5.0, 1.0);
+        assert_eq!((pace.t, pace.is_over()), (12.0, true));
+        assert_eq!(StepController::new((2.0, 12.0), 100.0, 4.0).step(), 10.0);
+        let parts: Vec<(f64, f64)> = equal((1.0, 4.0), 0.9).collect();
+        assert_eq!(parts, [(1.0, 1.75), (1.75, 2.5), (2.5, 3.25), (3.25, 4.0)]);
+        assert_eq!(equal((1.0, 4.0), 1.0).count(), 3);
+    }
+
+    /// The next step is 0.9·err^(−1/p) times the last, between 0.2 and 5 times after an accepted one and 0.1 and 0.8 times after a rejected
+    /// one; 41 rejections in a row, or a step that does not move time, end the run (Hairer & Wanner 1996, §IV.8).
+    #[test]
+    fn steps_follow_errors() {
+        let next = |error: f64| {
+            let mut pace = StepController::new((0.0, 100.0), 2.0, 4.0);
+            pace.accept(2.0, error);
+            pace.h
+        };
+        assert_eq!([next(1.0), next(0.0625), next(1e-9)], [1.8, 3.6, 10.0]);
+        let shorter = |error: f64| {
+            let mut pace = StepController::new((2.0, 100.0), 2.0, 4.0);
+            (pace.reject(2.0, error, 0.5), pace.h)
+        };
+        let found = [16.0, 1.1, 1e9, f64::INFINITY].map(shorter);
+        assert_eq!(found, [(true, 0.9), (true, 1.6), (true, 0.2), (true, 1.0)]);
+        let mut pace = StepController::new((2.0, 100.0), 1.0, 4.0);
+        assert_eq!((0..100).take_while(|_| pace.reject(1.0, 16.0, 0.5)).count(), 40);
+        pace.accept(1.0, 1.0);
+        assert_eq!(pace.rejected, 0);
+        assert!(!pace.reject(1e-17, 16.0, 0.5));
+    }
+}

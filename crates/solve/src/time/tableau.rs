@@ -91,6 +91,17 @@ impl Alpha {
 mod tests {
     use super::*;
 
+    /// The parameters of generalized-α have order 2, γ = ½ − α_m + α_f, and β = ¼(1 − α_m + α_f)² (J. Chung, G. M. Hulbert, J. Appl. Mech. 60
+    /// (1993), eqs. 17, 20, 25): for ρ = 1 both α are ½, for ρ = 0 they are −1 and 0. Newmark's rule has β = ¼ and γ = ½.
+    #[test]
+    fn parameters_of_generalized_alpha() {
+        assert_eq!(Alpha::damping(1.0), Alpha { m: 0.5, f: 0.5, beta: 0.25, gamma: 0.5 });
+        assert_eq!(Alpha::damping(0.0), Alpha { m: -1.0, f: 0.0, beta: 1.0, gamma: 1.5 });
+        let half = Alpha::damping(0.5);
+        assert!((half.m, half.f) == (0.0, 0.5 / 1.5) && (half.gamma - 5.0 / 6.0).abs() < 1e-15);
+        assert_eq!(Alpha::newmark(), Alpha { m: 0.0, f: 0.0, beta: 0.25, gamma: 0.5 });
+    }
+
     /// Nodes are the sums of their rows; the end fulfils the conditions of its order, and the error weights add to nothing and,
     /// of a method of order p, kill every power below p.
     #[test]
