@@ -432,7 +432,8 @@ mod tests {
     }
 
     /// Heat W that comes from elsewhere raises the mean of a clamped bar by W/(12·K), and reaches other pieces as theirs reaches its own
-    /// (reciprocity, 1e-12). An input that is no heat raises nothing.
+    /// (reciprocity, 1e-12). Of three pieces of conductance K the last raises itself and the middle one by W/(4·K), the first by W/(12·K). An
+    /// input that is no heat raises nothing.
     #[test]
     fn heat_from_elsewhere() {
         let one = bar(1).with_heat(&[Input::Rate, Input::Heat { heater: 0 }]);
@@ -443,7 +444,11 @@ mod tests {
         assert!((one.steady(0, &[3.0, 7.0, 2e-3]) / expected - 1.0).abs() < 1e-12);
         let three = bar(3).with_heat(&[Input::Heat { heater: 2 }, Input::Heat { heater: 0 }]);
         assert!((three.per_watt(0, 1) / three.per_watt(2, 2) - 1.0).abs() < 1e-12);
-        assert!(three.per_watt(2, 1) > three.per_watt(1, 1) && three.per_watt(1, 1) > three.per_watt(0, 1));
+        // half of it flows to the node that the last two pieces share, whose rise is W/(3·K)
+        let piece = 1.0 / three.heaters[0].conductance;
+        for (k, parts) in [(2, 4.0), (1, 4.0), (0, 12.0)] {
+            assert!((three.per_watt(k, 1) / (piece / parts) - 1.0).abs() < 1e-12, "{k}");
+        }
     }
 
     /// Three pieces of a bar between two sources: the rise is the sum of the entries of its form times voltages, the way between two

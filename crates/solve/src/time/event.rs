@@ -95,7 +95,7 @@ mod tests {
         assert!((x - 0.3).abs() < 1e-15, "{x}");
     }
 
-    /// Inverse interpolation takes far fewer values than bisection, which would take 52: 8 for the cosine, whatever the order of the ends.
+    /// Inverse interpolation takes far fewer values than bisection, which would take 52: at most 10 for the cosine, whatever the order of the ends.
     #[test]
     fn roots_take_few_values() {
         for (a, b) in [(1.0f64, 2.0f64), (2.0, 1.0)] {
