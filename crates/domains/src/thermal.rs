@@ -451,8 +451,8 @@ mod tests {
         }
     }
 
-    /// Three pieces of a bar between two sources: the rise is the sum of the entries of its form times voltages, the way between two
-    /// states is the quadratic through them, and the slope is its derivative (a central difference, exact for a quadratic: 1e-9).
+    /// Three pieces of a bar between two sources. The rise is the sum of the entries of its form times voltages. The way between two
+    /// states is the quadratic through them, and the slope is its derivative: a central difference is exact for a quadratic (1e-9).
     #[test]
     fn quadratic_in_the_sources() {
         let circuit = ElectricalNetwork {

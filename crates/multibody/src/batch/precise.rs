@@ -38,11 +38,12 @@ impl LanePrecise {
     pub fn multiply_add<W: SimdReal>(&self, simd: W::Simd, x: &[LanePose], y: &mut [PrecisePose]) {
         let none = W::splat(simd, 0.0);
         for (place, numbers) in &self.joints {
-            let at = |body: u32| -> [Double<W>; 3] {
-                if body == NONE { [none; 3] } else { load(simd, &x[body as usize]) }.map(Double::from)
-            };
+            let at = |body: u32| if body == NONE { [none; 3] } else { load(simd, &x[body as usize]) };
             let (a, b) = (at(place.a), at(place.b));
-            let pair = FactoredTangent(load::<W, NUMBERS>(simd, numbers)).times([b[0] - a[0], b[1] - a[1]], a[2], b[2]);
+            let dx = Double::from(b[0]) - Double::from(a[0]);
+            let dy = Double::from(b[1]) - Double::from(a[1]);
+            let tangent = FactoredTangent(load::<W, NUMBERS>(simd, numbers));
+            let pair = tangent.times([dx, dy], Double::from(a[2]), Double::from(b[2]));
             let [fx, fy] = pair.force;
             for (body, force) in [(place.a, [-fx, -fy, pair.moment_a]), (place.b, [fx, fy, pair.moment_b])] {
                 if body != NONE {

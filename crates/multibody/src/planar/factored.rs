@@ -12,8 +12,9 @@ use crate::scalar::{Double, Real};
 /// Numbers of a pair's tangent.
 pub(crate) const NUMBERS: usize = 21;
 
-/// A pair's tangent rowsᵀ·stiffness·rows + the rest: ∂(e_u, g)/∂(x_b − x_a) as two rows, ∂strain/∂θ of body a and of body b, the
-/// stiffness, and of the rest the part of translation with either rotation, and of the rotations of a twice, of a and b, of b twice.
+/// A pair's tangent, rowsᵀ·stiffness·rows + the rest, by its numbers: ∂(e_u, g)/∂(x_b − x_a) as two rows, ∂strain/∂θ of body a and of
+/// body b, the stiffness. They end with the rest, first between translation and either rotation, then of the rotations of a twice, of a
+/// and b, of b twice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FactoredTangent<T = f64>(pub(crate) [T; NUMBERS]);
 
@@ -50,19 +51,23 @@ impl<T: Real> FactoredTangent<T> {
             dx * gx + dy * gy + a * ag + b * bg,
             a * ap + b * bp,
         ];
-        let row = |c: [T; 3]| strain[0] * c[0] + strain[1] * c[1] + strain[2] * c[2];
-        let stress = [row([uu, ug, up]), row([ug, gg, gp]), row([up, gp, pp])];
-        let lever = |c: [T; 3]| stress[0] * c[0] + stress[1] * c[1] + stress[2] * c[2];
+        let stress = [sum(strain, [uu, ug, up]), sum(strain, [ug, gg, gp]), sum(strain, [up, gp, pp])];
         let (both, aside) = (a + b, dx * hx + dy * hy);
         PairForce {
             force: [
                 stress[0] * ux + stress[1] * gx + both * hx, //
                 stress[0] * uy + stress[1] * gy + both * hy,
             ],
-            moment_a: lever([au, ag, ap]) + aside + a * aa + b * ab,
-            moment_b: lever([bu, bg, bp]) + aside + a * ab + b * bb,
+            moment_a: sum(stress, [au, ag, ap]) + aside + a * aa + b * ab,
+            moment_b: sum(stress, [bu, bg, bp]) + aside + a * ab + b * bb,
         }
     }
+}
+
+/// x·c, which closures over lanes would not always inline.
+#[inline(always)]
+fn sum<T: Real>(x: [Double<T>; 3], c: Vec3<T>) -> Double<T> {
+    x[0] * c[0] + x[1] * c[1] + x[2] * c[2]
 }
 
 #[cfg(test)]

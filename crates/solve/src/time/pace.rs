@@ -87,7 +87,7 @@ mod tests {
     }
 
     /// The next step is 0.9·err^(−1/p) times the last, between 0.2 and 5 times after an accepted one and 0.1 and 0.8 times after a rejected
-    /// one; 41 rejections in a row, or a step that does not move time, end the run (Hairer & Wanner 1996, §IV.8).
+    /// one (Hairer & Wanner 1996, §IV.8). 41 rejections in a row, or a step that does not move time, end the run.
     #[test]
     fn steps_follow_errors() {
         let next = |error: f64| {
