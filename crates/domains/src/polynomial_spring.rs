@@ -8,10 +8,10 @@ use super::approach::{Approach, MaterialPoint};
 use super::domain::{Configuration, Domain, Law};
 use super::from_structure::{FromStructure, StructureView};
 use bimorph_multibody::model::locate;
-use bimorph_multibody::planar::{JointFrame, JointKinematics, Pose, Symmetric};
+use bimorph_multibody::planar::{JointFrame, JointKinematics, Pose, Symmetric, Vec3};
 use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
 use bimorph_structure::GapVoltage;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 
 /// k₂ and k₃ along local x (N/m², N/m³), along local y, and about z (N·m/rad², N·m/rad³).
 pub type SpringTerms = [[f64; 2]; 3];
@@ -37,14 +37,14 @@ impl PolynomialSpring {
     }
 
     /// Forces over the strains.
-    fn stress(&self, strain: &Vector3<f64>) -> Vector3<f64> {
-        Vector3::from_fn(|i, _| {
+    fn stress(&self, strain: &Vec3<f64>) -> Vec3<f64> {
+        std::array::from_fn(|i| {
             let ([k2, k3], d) = (self.terms[i], strain[i]);
             d * d * (k2 + k3 * d)
         })
     }
 
-    fn stiffness(&self, strain: &Vector3<f64>) -> Symmetric {
+    fn stiffness(&self, strain: &Vec3<f64>) -> Symmetric {
         let [u, g, p] = std::array::from_fn(|i| {
             let ([k2, k3], d) = (self.terms[i], strain[i]);
             d * (2.0 * k2 + 3.0 * k3 * d)
@@ -90,7 +90,7 @@ impl Domain for PolynomialSpring {
         let (on_a, on_b) = strained.forces(&self.stress(&strained.strain));
         for (id, part) in [(self.a.body, on_a), (self.b.body, on_b)] {
             if let BodyId::Free(k) = id {
-                r[k] += part;
+                r[k] += Pose::from(part);
             }
         }
     }
