@@ -11,7 +11,8 @@
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
-use bimorph::multibody::joint_coordinates::constrained_loops::{Lanes, Linkage, Real, Reduction, ReductionTask};
+use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
+use bimorph::multibody::scalar::{Lanes, StoredReal};
 use std::hint::black_box;
 use std::time::Instant;
 use topologies::Topology;
