@@ -10,8 +10,9 @@
 use super::columns::Four;
 use super::geometric::Geometric;
 use super::poses::TreeKinematics;
-use super::tree::{Tree, TreeParent};
+use super::tree::Tree;
 use crate::batch::{Kernel, LANES, LanePose, SimdReal, ZERO_POSE, everywhere, load, store};
+use crate::joint_coordinates::TreeParent;
 use crate::planar::Pose;
 use crate::{BlockMatrix, Pattern};
 use nalgebra::DMatrix;
