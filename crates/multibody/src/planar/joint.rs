@@ -62,6 +62,15 @@ impl<T: Real> Symmetric<T> {
     }
 }
 
+impl std::ops::Mul<Vector3<f64>> for Symmetric {
+    type Output = Vector3<f64>;
+
+    #[inline]
+    fn mul(self, x: Vector3<f64>) -> Vector3<f64> {
+        self.times(x.into()).into()
+    }
+}
+
 /// Second derivatives of an energy of a pair of bodies that depends on their translations through x_b − x_a alone. Blocks are given
 /// column by column.
 #[derive(Debug, Clone, Copy, PartialEq)]
