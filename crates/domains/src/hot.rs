@@ -536,7 +536,8 @@ impl HotNetwork {
         self.bars.iter().enumerate().find_map(|(k, bar)| {
             let extremes = bar.extremes(self.ends_of(k, state), self.inner_of(k, state));
             let laws = [bar.coefficient, bar.thermal_coefficient, bar.capacity_coefficient];
-            let lost = |t: &f64| laws.iter().any(|law| !(1.0 + law * t > 0.0));
+            let positive = |t: f64| laws.iter().all(|law| 1.0 + law * t > 0.0);
+            let lost = |t: &f64| !positive(*t);
             let found = extremes.into_iter().find(lost)?;
             Some((k, found))
         })
