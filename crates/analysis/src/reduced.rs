@@ -110,6 +110,10 @@ pub(crate) fn equilibrium(compiled: &CompiledModel, point: &OperatingPoint) -> R
     Ok(ReducedEquilibrium { point, directions: space.size(), error })
 }
 
+/// A run of the full model, for given samples and progress.
+pub type FullRun<'a> =
+    dyn FnMut(&mut dyn FnMut(f64, &[f64]), ProgressCallback<'_>) -> Result<TransientResult, AnalysisError> + 'a;
+
 /// Integrates the motion in a reduced model, as [`transient`](super::transient::transient) otherwise; with the full model and a warning
 /// where that is taken.
 ///
@@ -120,7 +124,7 @@ pub fn reduced_transient(
     options: &TransientOptions<'_>,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: ProgressCallback<'_>,
-    full: &mut dyn FnMut(&mut dyn FnMut(f64, &[f64]), ProgressCallback<'_>) -> Result<TransientResult, AnalysisError>,
+    full: &mut FullRun<'_>,
 ) -> Result<TransientResult, AnalysisError> {
     if options.solver != SolverKind::Recursion || options.method != Integrator::Rodas4 {
         return Err(AnalysisError::BadRequest {

@@ -39,7 +39,8 @@ fn apart(one: &StaticResult, other: &StaticResult) -> f64 {
 /// the tolerance. Their unknowns are fewer than a fifth of its own. The reported error contains that of the reduction.
 #[test]
 fn equilibria_are_those_of_the_full_model() {
-    let cases: [(&str, &[(&str, f64)], &[(&str, f64)]); 3] = [
+    type Values = &'static [(&'static str, f64)];
+    let cases: [(&str, Values, Values); 3] = [
         ("quarter_stage/quarter_stage.net", &[("F", 50e-6), ("angle", 0.7)], &[]),
         ("bank/bank.net", &[], &[("heat", 2.0), ("sense", 5.0)]),
         ("switch/switch.net", &[], &[("drive", 17.0)]),

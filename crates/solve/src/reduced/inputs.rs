@@ -110,10 +110,13 @@ impl InputBox {
     }
 }
 
+/// Members of a group, each with its value of largest magnitude.
+type ProportionalGroup = Vec<(usize, f64)>;
+
 /// Members that are not zero all along, in groups that vary in proportion; each member with its value of largest magnitude.
-fn groups(count: usize, course: impl Fn(usize) -> Vec<f64>) -> Vec<Vec<(usize, f64)>> {
+fn groups(count: usize, course: impl Fn(usize) -> Vec<f64>) -> Vec<ProportionalGroup> {
     let largest = |x: &[f64]| x.iter().fold(0.0f64, |most, x| if x.abs() > most.abs() { *x } else { most });
-    let mut groups: Vec<(Vec<f64>, Vec<(usize, f64)>)> = Vec::new();
+    let mut groups: Vec<(Vec<f64>, ProportionalGroup)> = Vec::new();
     for k in 0..count {
         let values = course(k);
         let most = largest(&values);
