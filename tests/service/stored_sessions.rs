@@ -318,7 +318,7 @@ fn an_accept_that_is_not_kept_is_reported() {
     static GATE: Gate = Gate::open();
     let folder = tempfile::tempdir().expect("a folder");
     // room for the netlist and no state
-    let server = start_kept(folder.path(), Limits { state_bytes: 500, ..limits() }, gated!(GATE));
+    let server = start_kept(folder.path(), Limits { state_bytes: 530, ..limits() }, gated!(GATE));
     block_on(async {
         let mut client = server.client().await;
         let session = open(&mut client).await.session;
