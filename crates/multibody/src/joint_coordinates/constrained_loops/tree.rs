@@ -1,6 +1,6 @@
 //! The spanning tree and the loops of a model: relative joint coordinates and closures.
 //!
-//! The tree is that of [`spanning_tree`](super::super::spanning_tree). A root moves freely and has three coordinates of its own. The
+//! The tree is that of `spanning_tree.rs`. A root moves freely and has three coordinates of its own. The
 //! joints that are left over close loops.
 //!
 //! A joint has three directions (axial u, shear g, rotation p, see [`crate::planar`]), each free, elastic or

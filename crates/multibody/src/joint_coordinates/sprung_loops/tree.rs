@@ -1,6 +1,6 @@
 //! The spanning tree of a model: parents of bodies, and moving directions of the joints between them.
 //!
-//! The tree is that of [`spanning_tree`](super::super::spanning_tree). **A closure keeps all its springs**, so that a loop of
+//! The tree is that of `spanning_tree.rs`. **A closure keeps all its springs**, so that a loop of
 //! elastic beams brings no constraint: its springs are one more term of the recursion, as a gap is. The couplings of
 //! tree and closures are those of the graph, and so the pattern of the factor is that of the model in absolute
 //! coordinates.
