@@ -312,8 +312,8 @@ fn heat_is_stored_or_lost() {
     assert!(worst < 1e-6 * work, "{worst:e} of {work:e}");
 }
 
-/// The change of a course with its final voltage agrees with differences where the heat capacity depends on temperature and the beam radiates: to 1e-8 over
-/// one step, and to 5e-6 over some, whose lengths follow the voltage by less than their tolerance.
+/// The change of a course with its final voltage agrees with differences where the heat capacity depends on temperature and the beam radiates.
+/// One step agrees to 1e-8. Several steps agree to 5e-6, since their lengths follow the voltage within their tolerance.
 #[test]
 fn changes_with_capacity_and_radiation_are_derivatives() {
     let heating = changed(|h| {
