@@ -3,7 +3,9 @@
 use super::failure::Failure;
 use super::options::Chosen;
 use super::{interrupt, progress, value};
-use bimorph::compile::{Anchors, CompileOptions, CompiledModel, Junctions, ParsedStructure, compile, draw};
+use bimorph::compile::{
+    Anchors, CompileOptions, CompiledModel, Formulation, Junctions, ParsedStructure, compile, draw,
+};
 use bimorph::input::{self, InputBundle, LayoutChoice};
 use bimorph::layout::LayoutFormat;
 use bimorph::layout::drawing::FlatLayout;
@@ -123,6 +125,11 @@ impl ModelArgs {
     /// Compiles the netlist and shows its warnings on standard error.
     pub(crate) fn compile(&self) -> Result<CompiledModel, Failure> {
         self.compiled(&self.options()?)
+    }
+
+    /// The same model in another formulation. Its warnings have been shown.
+    pub(crate) fn compile_again_in(&self, formulation: Formulation) -> Result<CompiledModel, Failure> {
+        Ok(compile(&self.bundle()?, &CompileOptions { formulation, ..self.options()? })?)
     }
 
     /// The same for a frame of cubic beams, whose centrelines meet in points.

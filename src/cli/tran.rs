@@ -8,14 +8,14 @@ use super::tran_report::{ShockDocument, TransientDocument, picture, table, text}
 use super::{draw_motion, progress, value};
 use bimorph::analysis::ProgressCallback;
 use bimorph::analysis::chart::released;
-use bimorph::analysis::formulation;
+use bimorph::analysis::formulation::{self, ChosenFormulation};
 use bimorph::analysis::frame::{frame, frame_transient};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
-use bimorph::compile::{CompiledModel, Formulation};
+use bimorph::compile::{CompiledModel, Formulation, Scheme};
 use bimorph::domains::Shock;
 use bimorph::multibody::joint_coordinates::sprung_loops::UnsupportedModel;
 use bimorph::netlist::NetlistSource;
@@ -120,11 +120,16 @@ pub(crate) struct TransientCommand {
 impl TransientCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.check()?;
-        let formulation = self.model.options()?.formulation;
-        let initial = match self.solver {
+        let mut formulation = self.model.options()?.formulation;
+        let mut initial = match self.solver {
             SolverChoice::Frame => self.model.compile_frame()?,
             _ => self.model.compile()?,
         };
+        let in_joints = self.in_joints(&initial)?;
+        let in_joints = in_joints.map(|(compiled, chosen)| {
+            (formulation, initial) = (chosen.formulation, compiled);
+            chosen
+        });
         let released = match &self.release {
             Some(name) => Some(released(&NetlistSource::new(&self.model.bundle()?), &initial, name)?),
             None => None,
@@ -173,7 +178,8 @@ impl TransientCommand {
             signals.push((name.clone(), values.clone()));
             units.push((name.clone(), unit.clone()));
         }
-        let taken = suited.map(|(suited, _)| format!("{}: {}", suited.formulation.name(), suited.why));
+        let taken = suited.map(|(suited, _)| suited).or(in_joints);
+        let taken = taken.map(|suited| format!("{}: {}", suited.formulation.name(), suited.why));
         let document = TransientDocument {
             t: &result.t,
             signals: JsonMap(&signals),
@@ -201,6 +207,24 @@ impl TransientCommand {
             text += &format!("formulation auto took {taken}\n");
         }
         self.output.finish(|| table(&title, &result), || Ok(picture(&title, &result)), &document, &text)
+    }
+
+    /// The model in joint coordinates where `auto` takes them, since runs take fewer steps there. A method, a scheme, equal steps, a baseline's solver and
+    /// a shock are those of the bodies.
+    fn in_joints(&self, drawn: &CompiledModel) -> Result<Option<(CompiledModel, ChosenFormulation)>, Failure> {
+        let options = self.model.options()?;
+        let plain = self.method.is_none()
+            && self.step.is_none()
+            && self.shock.is_none()
+            && matches!(self.solver, SolverChoice::Recursion)
+            && options.scheme == Scheme::Auto;
+        if options.formulation != Formulation::Auto || !plain {
+            return Ok(None);
+        }
+        let Some(why) = formulation::outweighed_tree(drawn) else { return Ok(None) };
+        let compiled = self.model.compile_again_in(Formulation::Rcr)?;
+        let suits = matches!(compiled.joints, Some(Ok(_)));
+        Ok(suits.then(|| (compiled, ChosenFormulation { formulation: Formulation::Rcr, why })))
     }
 
     /// Each option within its range, before anything is compiled.

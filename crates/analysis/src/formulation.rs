@@ -6,6 +6,10 @@
 //! bodies' own coordinates then need stiff springs in the rigid directions, and short steps. The recursion needs
 //! neither, and its explicit steps cost a few evaluations without any factorization: rcr with rk45, as long as the
 //! steps are few. In circuits and services, whose steps the caller sets, compliant.
+//!
+//! Rigid parts on flexures are the other case. Where they outweigh the flexures and close no loop, large rotations are linear in the
+//! joint coordinates and curved in those of the bodies. Steps in joint coordinates are as long as those of small rotations then:
+//! rcr with the method of the bodies ([`outweighed_tree`]). Loops cancel the advantage.
 
 use super::AnalysisError;
 use super::integrator::Integrator;
@@ -32,6 +36,41 @@ pub struct ChosenFormulation {
     pub formulation: Formulation,
     /// Why, in words.
     pub why: String,
+}
+
+/// Why a run in joint coordinates takes fewer steps than one of the bodies, in words: rigid parts outweigh the flexures of an open tree.
+pub fn outweighed_tree(compiled: &CompiledModel) -> Option<String> {
+    let model = &compiled.parts.system.model;
+    if model.linear {
+        return None;
+    }
+    let beams = compiled.structure.beams.iter().zip(&compiled.order.segments).filter(|(_, segments)| **segments > 0);
+    let flexures: f64 = beams.map(|(b, _)| b.material.density * b.length * b.width * b.thickness).sum();
+    let moving: f64 = model.bodies.iter().map(|body| body.mass).sum();
+    let rigid = moving - flexures;
+    if flexures == 0.0 || rigid < flexures {
+        return None;
+    }
+    is_forest(model).then(|| {
+        format!(
+            "rigid parts of {:.1} times the mass of the flexures close no loop: fewer steps in joint coordinates",
+            rigid / flexures
+        )
+    })
+}
+
+/// Whether the joints close no loop: no body has two of them to ground or to bodies that are eliminated later.
+fn is_forest(model: &Model) -> bool {
+    let mut taken = vec![false; model.bodies.len()];
+    (0..model.joints.len()).all(|k| {
+        let joint = model.joint(k);
+        let first = match (joint.a, joint.b) {
+            (BodyId::Free(a), BodyId::Free(b)) => a.min(b),
+            (BodyId::Free(a), BodyId::Ground) | (BodyId::Ground, BodyId::Free(a)) => a,
+            (BodyId::Ground, BodyId::Ground) => return true,
+        };
+        !std::mem::replace(&mut taken[first], true)
+    })
 }
 
 /// Choice of `auto` for a run of `stop` (s), or for steps of the caller (`None`).
