@@ -24,10 +24,11 @@ mod stages;
 mod tableau;
 
 use super::method::{Method, Motion, SolverCounters, StepFailure};
-use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I, moves_on};
+use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I};
+use super::rosenbrock::{self, CONSISTENT, RosenbrockStep};
 use super::stage_loss::StageLoss;
 use crate::equations::{Bodies, Joints};
-use bimorph_domains::Drive;
+use bimorph_domains::{Drive, Ramp};
 use bimorph_multibody::forces;
 use bimorph_multibody::joint_coordinates::sprung_loops::JointMatrix;
 use bimorph_multibody::joint_coordinates::sprung_loops::columns::Four;
@@ -39,10 +40,6 @@ use error::JointDefectEstimate;
 use ports::JointPortSensitivities;
 use stages::JointStages;
 use std::sync::Arc;
-
-/// Fraction of the shortest time at which accelerations are made consistent: directions without inertia follow their springs,
-/// all others their inertia.
-const CONSISTENT: f64 = 1e-3;
 
 /// The method with its storage.
 #[derive(Debug, Clone)]
@@ -226,6 +223,74 @@ impl JointRodas4 {
     }
 }
 
+/// A step in joint coordinates under way.
+struct JointStep<'a> {
+    rodas: &'a mut JointRodas4,
+    ramp: &'a Ramp<'a>,
+    /// Its start and length (s).
+    s: f64,
+    h: f64,
+    motion: &'a mut Motion,
+    error: &'a mut Motion,
+    /// The stage at hand begins where the step before ended.
+    stays: bool,
+}
+
+impl RosenbrockStep for JointStep<'_> {
+    fn begin(&mut self) -> Result<(), StepFailure> {
+        self.ramp.at_and_rate(self.s, &mut self.rodas.drive, &mut self.rodas.rate);
+        self.rodas.drive.load = 1.0;
+        Ok(())
+    }
+
+    fn drive_at(&mut self, alpha: f64) {
+        self.ramp.at(self.s + alpha * self.h, &mut self.rodas.drive);
+        self.rodas.drive.load = 1.0;
+    }
+
+    fn argument(&mut self, i: usize) {
+        let JointRodas4 { stages, carried, .. } = &mut *self.rodas;
+        self.stays = stages.begin(i, self.h, &carried[0], &carried[1]);
+    }
+
+    fn residual(&mut self, i: usize) {
+        self.rodas.residual(i == 0, self.stays);
+    }
+
+    fn factor(&mut self) -> Result<(), StepFailure> {
+        self.rodas.factor(GAMMA * self.h)?;
+        let JointRodas4 { joints, w, placed, carried, stages, ports, forcing, drive, rate, .. } = &mut *self.rodas;
+        stages.set_out(&joints.tree, w, &carried[0], &carried[1]);
+        joints.closures.drive_force(&placed.at, drive, rate, forcing);
+        ports.begin(joints, self.ramp, self.s, &placed.at, (drive, rate));
+        Ok(())
+    }
+
+    fn solve(&mut self, i: usize) {
+        let (at, h, rate) = (self.s + ALPHA[i] * self.h, self.h, GAMMA_I[i] * self.h);
+        self.rodas.inertia(i, h);
+        let JointRodas4 { joints, w, placed, carried, stages, ports, right, wrench, drive, loss, work, .. } =
+            &mut *self.rodas;
+        w.solve(wrench, right);
+        let stage = (&*stages, placed.at.as_slice(), &*drive);
+        work.solves += 1 + ports.stage(joints, self.ramp, (i, at, h, rate), stage, (w, loss.as_deref()), &carried[2..]);
+        stages.keep(i, right, wrench);
+    }
+
+    fn finish(&mut self) {
+        let JointRodas4 { joints, placed, carried, stages, ports, sensitivity, .. } = &mut *self.rodas;
+        stages.last(self.h, &mut self.error.q, &mut self.error.v);
+        let (own, sensitivities) = carried.split_at_mut(2);
+        if let [now, push] = own {
+            stages.finish(self.h, now, push);
+        }
+        placed.place(&joints.tree, &stages.argument);
+        self.motion.q.copy_from_slice(&placed.at);
+        self.motion.v.copy_from_slice(&placed.rate);
+        ports.finish(&joints.tree, self.h, stages, sensitivities, sensitivity);
+    }
+}
+
 impl Method<Bodies<'_>> for JointRodas4 {
     fn error_order(&self) -> f64 {
         4.0
@@ -262,42 +327,8 @@ impl Method<Bodies<'_>> for JointRodas4 {
         motion: &mut Motion,
         error: &mut Motion,
     ) -> Result<(), StepFailure> {
-        let (gh, ramp) = (GAMMA * h, bodies.ramp);
-        for i in 0..6 {
-            let (at, rate) = (s + ALPHA[i] * h, GAMMA_I[i] * h);
-            if i == 0 {
-                ramp.at_and_rate(s, &mut self.drive, &mut self.rate);
-            } else if moves_on(i) {
-                ramp.at(at, &mut self.drive);
-            }
-            self.drive.load = 1.0;
-            let stays = self.stages.begin(i, h, &self.carried[0], &self.carried[1]);
-            self.residual(i == 0, stays);
-            if i == 0 {
-                self.factor(gh)?;
-                self.stages.set_out(&self.joints.tree, &self.w, &self.carried[0], &self.carried[1]);
-                self.joints.closures.drive_force(&self.placed.at, &self.drive, &self.rate, &mut self.forcing);
-                self.ports.begin(&self.joints, ramp, s, &self.placed.at, (&self.drive, &self.rate));
-            }
-            self.inertia(i, h);
-            self.w.solve(&mut self.wrench, &mut self.right);
-            let stage = (&self.stages, self.placed.at.as_slice(), &self.drive);
-            let matrices = (&self.w, self.loss.as_deref());
-            let solves = self.ports.stage(&self.joints, ramp, (i, at, h, rate), stage, matrices, &self.carried[2..]);
-            self.stages.keep(i, &self.right, &self.wrench);
-            self.work.solves += 1 + solves;
-        }
-        // stiffly accurate: the last argument plus its increment is the new value, the increment the error
-        self.stages.last(h, &mut error.q, &mut error.v);
-        let (own, sensitivities) = self.carried.split_at_mut(2);
-        if let [now, push] = own {
-            self.stages.finish(h, now, push);
-        }
-        self.placed.place(&self.joints.tree, &self.stages.argument);
-        motion.q.copy_from_slice(&self.placed.at);
-        motion.v.copy_from_slice(&self.placed.rate);
-        self.ports.finish(&self.joints.tree, h, &self.stages, sensitivities, &mut self.sensitivity);
-        Ok(())
+        let step = &mut JointStep { rodas: self, ramp: bodies.ramp, s, h, motion, error, stays: false };
+        rosenbrock::take(step)
     }
 
     fn carried(&mut self) -> &mut [Motion] {

@@ -24,6 +24,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
+//! | `rosenbrock` | the stages of Rodas4, in any of the coordinates below |
 //! | [`rodas4`] | the default: a Rosenbrock method with one factorization a step, and its sensitivities |
 //! | [`joint_rodas4`] | the same in joint coordinates with loops closed by springs |
 //! | [`reduced_rodas4`] | the same over the coordinates of a reduced model |
@@ -55,5 +56,6 @@ mod pace;
 pub mod radau5;
 pub mod reduced_rodas4;
 pub mod rodas4;
+mod rosenbrock;
 mod stage_loss;
 pub mod tableau;

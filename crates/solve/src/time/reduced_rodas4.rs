@@ -16,13 +16,14 @@
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 (RODAS).
 
 use super::method::{Method, Motion, SolverCounters, StepFailure};
-use super::rodas4::tableau::{A, ALPHA, C, GAMMA, GAMMA_I, moves_on};
+use super::rodas4::tableau::{A, ALPHA, C, GAMMA, GAMMA_I};
+use super::rosenbrock::{self, CONSISTENT, RosenbrockStep};
 use super::stage_loss::StageLoss;
 use crate::equations::{Bodies, Joints};
 use crate::reduced::check::FullCheck;
 use crate::reduced::energy::{EnergyProduct, EnergyVector};
 use crate::reduced::{ReducedForces, ReducedSpace};
-use bimorph_domains::{Drive, System};
+use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::joint_coordinates::sprung_loops::columns::Four;
 use bimorph_multibody::joint_coordinates::sprung_loops::directions::DirectionRows;
@@ -30,11 +31,6 @@ use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, forces};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::sync::Arc;
-
-/// Stages of the method.
-const STAGES: usize = 6;
-/// Fraction of the shortest time at which accelerations are made consistent.
-const CONSISTENT: f64 = 1e-3;
 
 /// Accepted steps between two estimates of the error by the reduction.
 const EVERY: u64 = 20;
@@ -68,6 +64,12 @@ impl ReducedMotion {
         Self { z: vec![0.0; m], v: vec![0.0; m], w: vec![0.0; m] }
     }
 
+    fn copy(&mut self, from: &Self) {
+        for (to, from) in self.all().into_iter().zip([&from.z, &from.v, &from.w]) {
+            to.copy_from_slice(from);
+        }
+    }
+
     fn all(&mut self) -> [&mut Vec<f64>; 3] {
         [&mut self.z, &mut self.v, &mut self.w]
     }
@@ -95,6 +97,10 @@ pub struct ReducedRodas4 {
     force: Vec<f64>,
     forcing: Vec<f64>,
     right: DVector<f64>,
+    /// r₁ and r₂ of the stage at hand, and room for their products with M and C.
+    r1: DVector<f64>,
+    r2: DVector<f64>,
+    product: DVector<f64>,
     room: Vec<Pose>,
     gathered: Vec<Four>,
     drive: Drive,
@@ -117,7 +123,7 @@ impl ReducedRodas4 {
             forces: ReducedForces::new(&space),
             now: ReducedMotion::zeros(m),
             at: ReducedMotion::zeros(m),
-            increments: vec![ReducedMotion::zeros(m); STAGES],
+            increments: vec![ReducedMotion::zeros(m); ALPHA.len()],
             carried: vec![Motion::zeros(packed); 2],
             mass: DMatrix::zeros(m, m),
             damping: DMatrix::zeros(m, m),
@@ -129,6 +135,9 @@ impl ReducedRodas4 {
             force: vec![0.0; m],
             forcing: vec![0.0; m],
             right: DVector::zeros(m),
+            r1: DVector::zeros(m),
+            r2: DVector::zeros(m),
+            product: DVector::zeros(m),
             room: vec![Pose::zeros(); count],
             gathered: vec![Four::ZERO; count],
             drive: closures.electrics.drive(),
@@ -205,9 +214,13 @@ impl ReducedRodas4 {
                 add(&|product, moved| product.multiply(&model.pattern, drag, moved), &mut self.stiffness);
             }
         }
-        let mut w = &self.mass / (gh * gh) + &self.stiffness;
+        let m = self.mass.nrows();
+        let mut w = self.factor.take().map_or_else(|| DMatrix::zeros(m, m), Cholesky::unpack_dirty);
+        w.copy_from(&self.mass);
+        w /= gh * gh;
+        w += &self.stiffness;
         if self.damped {
-            w += &self.damping / gh;
+            self.damping.iter().zip(w.iter_mut()).for_each(|(c, w)| *w += c / gh);
         }
         self.factor = Cholesky::new(w);
         self.work.factorizations += 1;
@@ -238,33 +251,33 @@ impl ReducedRodas4 {
 
     fn solve_stage(&mut self, i: usize, h: f64) {
         let (gh, shift) = (GAMMA * h, GAMMA_I[i] * h);
-        let m = self.space.size();
-        let (r1, r2) = {
-            let (mut r1, mut r2) = (DVector::from_column_slice(&self.at.v), DVector::from_column_slice(&self.at.w));
-            for (j, u) in self.increments[..i].iter().enumerate() {
-                for k in 0..m {
-                    r1[k] += C[i][j] / h * u.z[k];
-                    r2[k] += C[i][j] / h * u.v[k];
-                }
+        let Self { increments, at, mass, damping, force, forcing, right, r1, r2, product, .. } = self;
+        let (before, after) = increments.split_at_mut(i);
+        r1.as_mut_slice().copy_from_slice(&at.v);
+        r2.as_mut_slice().copy_from_slice(&at.w);
+        for (c, u) in C[i].iter().zip(&*before) {
+            for (r, u) in [(&mut *r1, &u.z), (&mut *r2, &u.v)] {
+                r.iter_mut().zip(u).for_each(|(r, u)| *r += c / h * u);
             }
-            (r1, r2)
-        };
-        self.right = &self.mass * (&r1 / gh + &r2);
-        if self.damped {
-            self.right += &self.damping * &r1;
         }
-        for k in 0..m {
-            self.right[k] -= self.force[k] + shift * self.forcing[k];
+        product.iter_mut().zip(r1.iter()).zip(r2.iter()).for_each(|((x, r1), r2)| *x = r1 / gh + r2);
+        right.gemv(1.0, &*mass, &*product, 0.0);
+        if self.damped {
+            product.gemv(1.0, &*damping, &*r1, 0.0);
+            *right += &*product;
+        }
+        for (right, (force, forcing)) in right.iter_mut().zip(force.iter().zip(&*forcing)) {
+            *right -= force + shift * forcing;
         }
         if let Some(factor) = &self.factor {
-            factor.solve_mut(&mut self.right);
+            factor.solve_mut(right);
         }
         self.work.solves += 1;
-        let u = &mut self.increments[i];
-        for k in 0..m {
-            u.z[k] = self.right[k];
-            u.v[k] = u.z[k] / gh - r1[k];
-            u.w[k] = u.v[k] / gh - r2[k];
+        let u = &mut after[0];
+        for (k, (z, (r1, r2))) in right.iter().zip(r1.iter().zip(r2.iter())).enumerate() {
+            u.z[k] = *z;
+            u.v[k] = u.z[k] / gh - r1;
+            u.w[k] = u.v[k] / gh - r2;
         }
     }
 
@@ -299,6 +312,70 @@ pub fn projected(space: &ReducedSpace, motion: &Motion) -> [Vec<f64>; 2] {
     })
 }
 
+/// A step of a reduced model under way.
+struct ReducedStep<'a> {
+    rodas: &'a mut ReducedRodas4,
+    ramp: &'a Ramp<'a>,
+    /// Its start and length (s).
+    s: f64,
+    h: f64,
+    motion: &'a mut Motion,
+    error: &'a mut Motion,
+}
+
+impl RosenbrockStep for ReducedStep<'_> {
+    fn begin(&mut self) -> Result<(), StepFailure> {
+        self.ramp.at_and_rate(self.s, &mut self.rodas.drive, &mut self.rodas.rate);
+        self.rodas.drive.load = 1.0;
+        Ok(())
+    }
+
+    fn drive_at(&mut self, alpha: f64) {
+        self.ramp.at(self.s + alpha * self.h, &mut self.rodas.drive);
+        self.rodas.drive.load = 1.0;
+    }
+
+    fn argument(&mut self, i: usize) {
+        let ReducedRodas4 { now, at, increments, .. } = &mut *self.rodas;
+        at.copy(now);
+        for (j, u) in increments[..i].iter().enumerate() {
+            for (to, u) in at.all().into_iter().zip([&u.z, &u.v, &u.w]) {
+                to.iter_mut().zip(u).for_each(|(to, u)| *to += A[i][j] * u);
+            }
+        }
+    }
+
+    fn residual(&mut self, i: usize) {
+        self.rodas.residual(i == 0);
+    }
+
+    fn factor(&mut self) -> Result<(), StepFailure> {
+        self.rodas.factor(GAMMA * self.h)?;
+        self.rodas.fill_forcing();
+        Ok(())
+    }
+
+    fn solve(&mut self, i: usize) {
+        self.rodas.solve_stage(i, self.h);
+    }
+
+    fn finish(&mut self) {
+        let ReducedRodas4 { space, forces, now, at, increments, room, .. } = &mut *self.rodas;
+        let last = &increments[ALPHA.len() - 1];
+        for ((now, at), u) in now.all().into_iter().zip(at.all()).zip([&last.z, &last.v, &last.w]) {
+            now.iter_mut().zip(at.iter()).zip(u).for_each(|((now, at), u)| *now = at + u);
+        }
+        forces.place(space, [&now.z, &now.v, &now.w]);
+        self.motion.q.copy_from_slice(&forces.placed.at);
+        self.motion.v.copy_from_slice(&forces.placed.rate);
+        for (u, to) in [(&last.z, &mut self.error.q), (&last.v, &mut self.error.v)] {
+            space.strains(u, room);
+            forces.placed.spread(&space.joints.tree, room, to);
+        }
+        self.rodas.keep();
+    }
+}
+
 impl Method<Bodies<'_>> for ReducedRodas4 {
     fn error_order(&self) -> f64 {
         4.0
@@ -310,7 +387,7 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         self.now.w.fill(0.0);
         bodies.ramp.at(0.0, &mut self.drive);
         self.drive.load = 1.0;
-        self.at.clone_from(&self.now);
+        self.at.copy(&self.now);
         self.residual(true);
         let gh = CONSISTENT * self.shortest;
         self.factor(gh)?;
@@ -333,43 +410,7 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         error: &mut Motion,
     ) -> Result<(), StepFailure> {
         self.put_back();
-        let (gh, ramp) = (GAMMA * h, bodies.ramp);
-        for i in 0..STAGES {
-            if i == 0 {
-                ramp.at_and_rate(s, &mut self.drive, &mut self.rate);
-            } else if moves_on(i) {
-                ramp.at(s + ALPHA[i] * h, &mut self.drive);
-            }
-            self.drive.load = 1.0;
-            self.at.clone_from(&self.now);
-            for (j, u) in self.increments[..i].iter().enumerate() {
-                let [z, v, w] = self.at.all();
-                for (to, u) in [(z, &u.z), (v, &u.v), (w, &u.w)] {
-                    to.iter_mut().zip(u).for_each(|(to, u)| *to += A[i][j] * u);
-                }
-            }
-            self.residual(i == 0);
-            if i == 0 {
-                self.factor(gh)?;
-                self.fill_forcing();
-            }
-            self.solve_stage(i, h);
-        }
-        // stiffly accurate: the last argument plus its increment is the new value, the increment the error
-        let last = &self.increments[STAGES - 1];
-        for ((now, at), u) in self.now.all().into_iter().zip(self.at.all()).zip([&last.z, &last.v, &last.w]) {
-            now.iter_mut().zip(at.iter()).zip(u).for_each(|((now, at), u)| *now = at + u);
-        }
-        self.forces.place(&self.space, [&self.now.z, &self.now.v, &self.now.w]);
-        motion.q.copy_from_slice(&self.forces.placed.at);
-        motion.v.copy_from_slice(&self.forces.placed.rate);
-        let tree = &self.space.joints.tree;
-        for (u, to) in [(&last.z, &mut error.q), (&last.v, &mut error.v)] {
-            self.space.strains(u, &mut self.room);
-            self.forces.placed.spread(tree, &self.room, to);
-        }
-        self.keep();
-        Ok(())
+        rosenbrock::take(&mut ReducedStep { rodas: self, ramp: bodies.ramp, s, h, motion, error })
     }
 
     fn accepted(&mut self, bodies: &mut Bodies<'_>, (t, h): (f64, f64), ends: [&Motion; 2], _: &[Motion]) {

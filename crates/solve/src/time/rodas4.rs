@@ -18,6 +18,7 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 and table 7.1 (RODAS).
 
+mod body_stage;
 mod defect;
 pub mod lanes;
 mod ports;
@@ -30,14 +31,15 @@ use super::method::{Method, SolverCounters, StepFailure};
 use crate::equations::Bodies;
 use crate::equations::linear::{LinearSolver, Recursion};
 use crate::time::gyration::{Gyration, held_out, skew};
+use crate::time::rosenbrock::{self, RosenbrockStep};
 use crate::time::stage_loss::{StageLoss, StepMatrix};
-use bimorph_domains::{Drive, System};
+use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, forces};
 use defect::DefectEstimate;
 use ports::{FrameRotation, PortSensitivities};
 use stages::Stages;
-use tableau::{ALPHA, GAMMA, moves_on};
+use tableau::{ALPHA, GAMMA};
 
 /// The method with its storage.
 #[derive(Debug, Clone)]
@@ -84,6 +86,122 @@ impl<S: LinearSolver> Rodas4<S> {
     }
 }
 
+/// A step of the bodies under way.
+struct BodyStep<'a, S> {
+    rodas: &'a mut Rodas4<S>,
+    system: &'a System,
+    ramp: &'a Ramp<'a>,
+    /// Its start and length (s).
+    s: f64,
+    h: f64,
+    motion: &'a mut Motion,
+    error: &'a mut Motion,
+    /// Where an input turns the frame.
+    turning: Option<FrameRotation>,
+}
+
+impl<S: LinearSolver> RosenbrockStep for BodyStep<'_, S> {
+    fn begin(&mut self) -> Result<(), StepFailure> {
+        let Self { system, ramp, s, h, motion, .. } = self;
+        let Rodas4 { stages, drive, rate, ports, sensitivity, .. } = &mut *self.rodas;
+        ramp.at_and_rate(*s, drive, rate);
+        drive.load = 1.0;
+        system.drive_force(&motion.q, drive, rate, &mut stages.forcing);
+        ports.begin(system, ramp, *s, &motion.q, (drive, rate));
+        let Some(frame) = system.frame(drive).filter(|_| system.turns()) else { return Ok(()) };
+        let start = Gyration::new(frame);
+        self.turning = Some(FrameRotation { start, now: start, terms: start.terms(GAMMA * *h)? });
+        let rate = system.frame(rate).map(Gyration::new).unwrap_or_default();
+        for ((force, body), v) in stages.forcing.iter_mut().zip(&system.model.bodies).zip(&motion.v) {
+            *force += held_out(body, skew(body, rate.rate, v));
+        }
+        ports.begin_turning(system, ramp, *s, (&motion.v, rate), sensitivity);
+        Ok(())
+    }
+
+    fn drive_at(&mut self, alpha: f64) {
+        self.ramp.at(self.s + alpha * self.h, &mut self.rodas.drive);
+    }
+
+    fn argument(&mut self, i: usize) {
+        let Self { system, h, motion, turning, .. } = self;
+        let Rodas4 { stages, drive, .. } = &mut *self.rodas;
+        stages.begin(&system.model, i, *h, motion);
+        if let Some(turning) = turning {
+            turning.now = system.frame(drive).map(Gyration::new).unwrap_or_default();
+            stages.add_gyration(&system.model, (i, *h), turning.now, turning.start);
+        }
+    }
+
+    fn residual(&mut self, i: usize) {
+        let (system, h, from) = (self.system, self.h, &*self.motion);
+        let Rodas4 { stages, drive, loss, ports, defect, w, .. } = &mut *self.rodas;
+        // what contact loses needs the stages beside their force
+        let mut force = std::mem::take(&mut stages.force);
+        let lose = |force: &mut [Pose]| {
+            if let Some(loss) = loss {
+                loss.add_forces(system, i == 0, stages.at(i, from), |k| stages.speed(i, h, k), force);
+                loss.start.add_damping(|k| -stages.r1()[k], force);
+            }
+        };
+        let q = stages.at(i, from);
+        if i == 0 {
+            defect.iter_mut().for_each(|defect| defect.before_forces(&force));
+            system.add_tangent_and(q, drive, w, &mut force, lose);
+            defect.iter_mut().for_each(|defect| defect.after_forces(&force));
+            ports.keep_tangent(w);
+        } else if let Some(tangent) = ports.tangent() {
+            system.add_tangent_and(q, drive, tangent, &mut force, lose);
+        } else {
+            system.add_residual_and(q, drive, &mut force, lose);
+        }
+        stages.force = force;
+        if let (Some(loss), Some(tangent)) = (&*loss, ports.tangent()) {
+            loss.add_tangent(tangent);
+        }
+    }
+
+    fn factor(&mut self) -> Result<(), StepFailure> {
+        let (model, gh) = (&self.system.model, GAMMA * self.h);
+        let Rodas4 { solver, w, loss, work, .. } = &mut *self.rodas;
+        if let Some(loss) = loss {
+            loss.add_matrix(gh, w);
+        }
+        forces::add_inertia(model, 1.0 / (gh * gh), 1.0 / gh, w);
+        model.project_matrix(w);
+        if let Some(loss) = loss {
+            loss.shear(model, w);
+        }
+        solver.factor(&model.pattern, w)?;
+        work.factorizations += 1;
+        work.forces += 6;
+        Ok(())
+    }
+
+    fn solve(&mut self, i: usize) {
+        let Self { system, ramp, h, motion, turning, .. } = self;
+        let (model, gh, at) = (&system.model, GAMMA * *h, self.s + ALPHA[i] * *h);
+        let Rodas4 { solver, w, stages, drive, ports, loss, scratch, sensitivity, work, .. } = &mut *self.rodas;
+        let matrix = StepMatrix { solver: &*solver, pattern: &model.pattern, w, loss: loss.as_deref() };
+        matrix.solve(&mut stages.force);
+        work.solves += 1;
+        if let Some(turning) = turning {
+            turning.start.complete(model, gh, turning.terms, scratch, &mut stages.force, |x| matrix.solve(x));
+            work.solves += turning.terms as u64;
+        }
+        let turning = turning.map(|turning| (&*stages, turning));
+        let place = (stages.at(i, motion), &*drive);
+        work.solves += ports.stage(system, ramp, (i, at, *h), place, &matrix, turning, sensitivity);
+    }
+
+    fn finish(&mut self) {
+        let (model, h) = (&self.system.model, self.h);
+        let Rodas4 { stages, ports, sensitivity, .. } = &mut *self.rodas;
+        stages.finish(model, h, self.motion, Some(&mut *self.error));
+        ports.finish(model, h, sensitivity);
+    }
+}
+
 impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
     fn error_order(&self) -> f64 {
         4.0
@@ -98,87 +216,7 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
         error: &mut Motion,
     ) -> Result<(), StepFailure> {
         let Bodies { system, ramp, .. } = *bodies;
-        let model = &system.model;
-        let gh = GAMMA * h;
-        ramp.at_and_rate(s, &mut self.drive, &mut self.rate);
-        self.drive.load = 1.0;
-        system.drive_force(&motion.q, &self.drive, &self.rate, &mut self.stages.forcing);
-        self.ports.begin(system, ramp, s, &motion.q, (&self.drive, &self.rate));
-        let mut turning = None;
-        if let Some(frame) = system.frame(&self.drive).filter(|_| system.turns()) {
-            let start = Gyration::new(frame);
-            turning = Some(FrameRotation { start, now: start, terms: start.terms(gh)? });
-            let rate = system.frame(&self.rate).map(Gyration::new).unwrap_or_default();
-            for ((force, body), v) in self.stages.forcing.iter_mut().zip(&model.bodies).zip(&motion.v) {
-                *force += held_out(body, skew(body, rate.rate, v));
-            }
-            self.ports.begin_turning(system, ramp, s, (&motion.v, rate), &self.sensitivity);
-        }
-        for (i, alpha) in ALPHA.into_iter().enumerate() {
-            let at = s + alpha * h;
-            if moves_on(i) {
-                ramp.at(at, &mut self.drive);
-            }
-            self.stages.begin(model, i, h, motion);
-            if let Some(turning) = &mut turning {
-                turning.now = system.frame(&self.drive).map(Gyration::new).unwrap_or_default();
-                self.stages.add_gyration(model, (i, h), turning.now, turning.start);
-            }
-            // what contact loses needs the stages beside their force
-            let mut force = std::mem::take(&mut self.stages.force);
-            let (stages, loss, from) = (&self.stages, &mut self.loss, &*motion);
-            let lose = |force: &mut [Pose]| {
-                if let Some(loss) = loss {
-                    loss.add_forces(system, i == 0, stages.at(i, from), |k| stages.speed(i, h, k), force);
-                    loss.start.add_damping(|k| -stages.r1()[k], force);
-                }
-            };
-            let q = stages.at(i, from);
-            if i == 0 {
-                self.defect.iter_mut().for_each(|defect| defect.before_forces(&force));
-                system.add_tangent_and(q, &self.drive, &mut self.w, &mut force, lose);
-                self.defect.iter_mut().for_each(|defect| defect.after_forces(&force));
-            } else if let Some(tangent) = self.ports.tangent() {
-                system.add_tangent_and(q, &self.drive, tangent, &mut force, lose);
-            } else {
-                system.add_residual_and(q, &self.drive, &mut force, lose);
-            }
-            self.stages.force = force;
-            if i == 0 {
-                self.ports.keep_tangent(&self.w);
-                if let Some(loss) = &self.loss {
-                    loss.add_matrix(gh, &mut self.w);
-                }
-                forces::add_inertia(model, 1.0 / (gh * gh), 1.0 / gh, &mut self.w);
-                model.project_matrix(&mut self.w);
-                if let Some(loss) = &mut self.loss {
-                    loss.shear(model, &mut self.w);
-                }
-                self.solver.factor(&model.pattern, &mut self.w)?;
-                self.work.factorizations += 1;
-                self.work.forces += 6;
-            }
-            if let (Some(loss), Some(tangent)) = (&self.loss, self.ports.tangent()) {
-                loss.add_tangent(tangent);
-            }
-            let force = &mut self.stages.force;
-            let loss = self.loss.as_deref();
-            let matrix = StepMatrix { solver: &self.solver, pattern: &model.pattern, w: &self.w, loss };
-            matrix.solve(force);
-            let mut solves = 1;
-            if let Some(turning) = turning {
-                turning.start.complete(model, gh, turning.terms, &mut self.scratch, force, |x| matrix.solve(x));
-                solves += turning.terms as u64;
-            }
-            let q = self.stages.at(i, motion);
-            let turning = turning.map(|turning| (&self.stages, turning));
-            solves +=
-                self.ports.stage(system, ramp, (i, at, h), (q, &self.drive), &matrix, turning, &mut self.sensitivity);
-            self.work.solves += solves;
-        }
-        self.stages.finish(model, h, motion, Some(error));
-        self.ports.finish(model, h, &mut self.sensitivity);
-        Ok(())
+        rosenbrock::take(&mut BodyStep { rodas: self, system, ramp, s, h, motion, error, turning: None })
     }
 
     fn carried(&mut self) -> &mut [Motion] {

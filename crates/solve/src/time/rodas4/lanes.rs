@@ -14,8 +14,8 @@ pub use storage::{Lane, LaneRodas4};
 
 use kernels::{StepKernel, StepPass};
 
-use super::tableau::{ALPHA, moves_on};
-use crate::time::method::Motion;
+use crate::time::method::{Motion, StepFailure};
+use crate::time::rosenbrock::{self, RosenbrockStep};
 use bimorph_domains::{Ramp, System};
 use bimorph_multibody::batch::{LANES, across};
 
@@ -45,31 +45,10 @@ impl LaneRodas4 {
     /// One step of each lane, of length `h` from the time `s` of its course (s); for lanes without one all is left as it comes.
     /// Returns the lanes whose matrix could not be factored: their motion is nothing.
     pub fn step(&mut self, lanes: &[Option<Lane<'_>>; LANES], s: &[f64; LANES], h: &[f64; LANES]) -> [bool; LANES] {
-        self.h.0 = *h;
-        self.heat.at(of_lanes(lanes, s));
-        self.run(StepPass::Forcing);
-        for (i, alpha) in ALPHA.into_iter().enumerate() {
-            if moves_on(i) {
-                let mut at = *s;
-                for (at, h) in at.iter_mut().zip(h) {
-                    *at += alpha * h;
-                }
-                self.heat.at(of_lanes(lanes, &at));
-                self.run(StepPass::Expand);
-            }
-            self.run(StepPass::Begin(i));
-            if i == 0 {
-                self.run(StepPass::Tangent);
-                self.act(lanes, i);
-                self.run(StepPass::Factor);
-            } else {
-                self.run(StepPass::Elastic(i));
-                self.act(lanes, i);
-            }
-            self.run(StepPass::Solve);
+        match rosenbrock::take(&mut LaneStep { rodas: self, lanes, s, h }) {
+            Ok(()) => self.vanished,
+            Err(_) => [true; LANES],
         }
-        self.run(StepPass::Finish);
-        self.vanished
     }
 
     /// Takes one lane back to where its last step began.
@@ -79,6 +58,56 @@ impl LaneRodas4 {
 
     fn run(&mut self, task: StepPass) {
         across(StepKernel(self, task));
+    }
+}
+
+/// A step of all lanes under way.
+struct LaneStep<'a, 's> {
+    rodas: &'a mut LaneRodas4,
+    lanes: &'a [Option<Lane<'s>>; LANES],
+    /// Start and length in each lane (s).
+    s: &'a [f64; LANES],
+    h: &'a [f64; LANES],
+}
+
+impl RosenbrockStep for LaneStep<'_, '_> {
+    fn begin(&mut self) -> Result<(), StepFailure> {
+        self.rodas.h.0 = *self.h;
+        self.rodas.heat.at(of_lanes(self.lanes, self.s));
+        self.rodas.run(StepPass::Forcing);
+        Ok(())
+    }
+
+    fn drive_at(&mut self, alpha: f64) {
+        let mut at = *self.s;
+        for (at, h) in at.iter_mut().zip(self.h) {
+            *at += alpha * h;
+        }
+        self.rodas.heat.at(of_lanes(self.lanes, &at));
+        self.rodas.run(StepPass::Expand);
+    }
+
+    fn argument(&mut self, i: usize) {
+        self.rodas.run(StepPass::Begin(i));
+    }
+
+    fn residual(&mut self, i: usize) {
+        self.rodas.run(if i == 0 { StepPass::Tangent } else { StepPass::Elastic(i) });
+        self.rodas.act(self.lanes, i);
+    }
+
+    /// A lane without a factor is marked, and the others go on.
+    fn factor(&mut self) -> Result<(), StepFailure> {
+        self.rodas.run(StepPass::Factor);
+        Ok(())
+    }
+
+    fn solve(&mut self, _: usize) {
+        self.rodas.run(StepPass::Solve);
+    }
+
+    fn finish(&mut self) {
+        self.rodas.run(StepPass::Finish);
     }
 }
 

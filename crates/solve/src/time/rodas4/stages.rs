@@ -3,27 +3,20 @@
 //! On large models a step is as fast as the memory that it reads and writes. All operations of a body between the solve
 //! of one stage and the forces of the next are therefore done in one sweep. The increments of a tile of bodies are
 //! contiguous, so that the sweep reads one run of memory for any number of previous stages.
-//!
-//! Signs: forces are summed as they stand in M·q̈ + C·q̇ + r = 0, so the solve finds minus the increment.
 
-use super::tableau::{A, C, GAMMA, GAMMA_I, IN_PLACE};
+use super::body_stage::{BodyStage, BodyState, BodyTerms, StageScale, body_stage, increment};
+use super::tableau::{C, GAMMA, IN_PLACE};
 use crate::method::Motion;
 use crate::time::gyration::{Gyration, skew};
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::batch::LaneBlock;
+use bimorph_multibody::planar::{Pose, Vec3};
 use bimorph_multibody::{Body, Model, forces};
 
 /// Bodies of a tile.
 const TILE: usize = 16;
 
-/// Change of the displacement and rate of one body.
-#[derive(Debug, Clone, Copy)]
-struct BodyIncrement {
-    q: Pose,
-    v: Pose,
-}
-
 /// Increments of a tile of bodies in each stage but the last, whose increments go into the result at once.
-type TileIncrements = [[BodyIncrement; TILE]; 5];
+type TileIncrements = [[BodyState<f64>; TILE]; 5];
 
 /// The stages of one motion.
 #[derive(Debug, Clone)]
@@ -45,7 +38,7 @@ impl Stages {
     pub(super) fn new(model: &Model) -> Self {
         let bodies = model.bodies.len();
         let zeros = vec![Pose::zeros(); bodies];
-        let none = BodyIncrement { q: Pose::zeros(), v: Pose::zeros() };
+        let none = BodyState { q: [0.0; 3], v: [0.0; 3] };
         Self {
             force: zeros.clone(),
             forcing: zeros.clone(),
@@ -78,8 +71,7 @@ impl Stages {
     }
 
     fn begin_stage<const I: usize>(&mut self, model: &Model, h: f64, motion: &mut Motion) {
-        let (gh, rate) = (GAMMA * h, GAMMA_I[I] * h);
-        let c = C[I].map(|c| c / h);
+        let scale = StageScale::of::<I>(h);
         let tiles = self.tiles.iter_mut().zip(model.bodies.chunks(TILE));
         let forces = self.force.chunks_mut(TILE).zip(self.forcing.chunks(TILE)).zip(self.r1.chunks_mut(TILE));
         let motion = self.at.chunks_mut(TILE).zip(motion.q.chunks_mut(TILE).zip(motion.v.chunks_mut(TILE)));
@@ -90,37 +82,28 @@ impl Stages {
                 (0..TILE).zip(bodies.iter().zip(forces.zip(motion)))
             {
                 if let Some(last) = I.checked_sub(1) {
-                    tile[last][k] = increment(body, force, r1, gh);
+                    tile[last][k] = change(body, force, r1, scale.gh);
                 }
-                // the argument
-                let mut place = (*q, *v);
-                for j in if I > IN_PLACE { IN_PLACE..I } else { 0..I } {
-                    place.0 += tile[j][k].q * A[I][j];
-                    place.1 += tile[j][k].v * A[I][j];
-                }
+                let terms = BodyTerms {
+                    mass: body.mass_diagonal().into(),
+                    drag: |v: &Vec3<f64>| -> Vec3<f64> { body.drag.force(&(*v).into()).into() },
+                    forcing: (*forcing).into(),
+                };
+                let start = BodyState { q: (*q).into(), v: (*v).into() };
+                let stage: BodyStage<f64> = body_stage::<_, I>(&scale, start, |j| tile[j][k], terms);
+                let BodyState { q: place_q, v: place_v } = stage.place;
                 if I < IN_PLACE {
-                    *at = place.0;
+                    *at = place_q.into();
                 } else {
-                    (*q, *v) = place;
+                    (*q, *v) = (place_q.into(), place_v.into());
                 }
-                // the velocity half
-                let mut lag = Pose::zeros();
-                for j in 0..I {
-                    lag += tile[j][k].q * c[j];
-                }
-                *r1 = place.1 + lag;
-                let mut momentum = *r1 / gh;
-                for j in 0..I {
-                    momentum += tile[j][k].v * c[j];
-                }
-                // damping at the argument's rate less that of r₁
-                *force = forcing * rate - body.drag.force(&lag) - body.mass_diagonal().component_mul(&momentum);
+                (*r1, *force) = (stage.r1.into(), stage.force.into());
             }
         }
         if !model.dampers.is_empty() {
             let lag = |k: usize| {
                 let tile = &self.tiles[k / TILE];
-                (0..I).fold(Pose::zeros(), |lag, j| lag - tile[j][k % TILE].q * c[j])
+                (0..I).fold(Pose::zeros(), |lag, j| lag - Pose::from(tile[j][k % TILE].q) * scale.c[j])
             };
             forces::add_dampers(model, lag, &mut self.force);
         }
@@ -134,7 +117,7 @@ impl Stages {
     /// Rate of body `k` where stage `i` of a step of length `h` (s) takes the forces, which has begun.
     pub(super) fn speed(&self, i: usize, h: f64, k: usize) -> Pose {
         let tile = &self.tiles[k / TILE];
-        (0..i).fold(self.r1[k], |speed, j| speed - tile[j][k % TILE].q * (C[i][j] / h))
+        (0..i).fold(self.r1[k], |speed, j| speed - Pose::from(tile[j][k % TILE].q) * (C[i][j] / h))
     }
 
     /// Adds Coriolis' force to that of stage `i`, with the frame's motion of `now` and, in the matrix, of the `start` of the
@@ -150,33 +133,34 @@ impl Stages {
     /// the last stage's argument plus its increment is the new value, the increment the error.
     pub(super) fn finish(&self, model: &Model, h: f64, motion: &mut Motion, error: Option<&mut Motion>) {
         let bodies = model.bodies.iter().zip(self.force.iter().zip(&self.r1));
-        let last = bodies.map(|(body, (force, r1))| increment(body, force, r1, GAMMA * h));
+        let last = bodies.map(|(body, (force, r1))| {
+            let BodyState { q, v } = change(body, force, r1, GAMMA * h);
+            [Pose::from(q), Pose::from(v)]
+        });
         let motion = motion.q.iter_mut().zip(&mut motion.v);
         match error {
             Some(error) => {
-                for ((last, (q, v)), (error_q, error_v)) in last.zip(motion).zip(error.q.iter_mut().zip(&mut error.v)) {
-                    *q += last.q;
-                    *v += last.v;
-                    (*error_q, *error_v) = (last.q, last.v);
+                for (([last_q, last_v], (q, v)), (error_q, error_v)) in
+                    last.zip(motion).zip(error.q.iter_mut().zip(&mut error.v))
+                {
+                    *q += last_q;
+                    *v += last_v;
+                    (*error_q, *error_v) = (last_q, last_v);
                 }
             }
             None => {
-                for (last, (q, v)) in last.zip(motion) {
-                    *q += last.q;
-                    *v += last.v;
+                for ([last_q, last_v], (q, v)) in last.zip(motion) {
+                    *q += last_q;
+                    *v += last_v;
                 }
             }
         }
     }
 }
 
-/// Increment of a stage whose solve left `solved`.
+/// Increment of a stage of `body` whose solve left `solved`.
 #[inline(always)]
-fn increment(body: &Body, solved: &Pose, r1: &Pose, gh: f64) -> BodyIncrement {
-    let q = -solved;
-    let v = q / gh - r1;
-    match &body.free {
-        Some(free) => BodyIncrement { q: **free * q, v: **free * v },
-        None => BodyIncrement { q, v },
-    }
+fn change(body: &Body, solved: &Pose, r1: &Pose, gh: f64) -> BodyState<f64> {
+    let free = body.free.as_ref().map(|free| move || -> LaneBlock<f64> { (**free).into() });
+    increment(&(*solved).into(), &(*r1).into(), gh, free)
 }

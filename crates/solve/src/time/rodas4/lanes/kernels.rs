@@ -3,13 +3,12 @@
 // blocks of fixed size are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
 
-use super::super::tableau::{A, C, GAMMA, GAMMA_I, IN_PLACE};
+use super::super::body_stage::{BodyState, BodyTerms, StageScale, body_stage, increment};
+use super::super::tableau::{GAMMA, IN_PLACE};
 use super::motion::{Norms, mass_norm};
-use super::storage::{LaneIncrement, LaneRodas4};
+use super::storage::LaneRodas4;
 use bimorph_multibody::batch::forces::{self, LaneRestStrain};
-use bimorph_multibody::batch::{
-    Kernel, LaneModel, LanePose, SimdReal, ZERO_POSE, add, add_scaled, load, load_block, store, times,
-};
+use bimorph_multibody::batch::{Kernel, LaneModel, LanePose, SimdReal, ZERO_POSE, add, load, load_block, store};
 
 /// A part of a step that goes over all lanes.
 #[derive(Debug, Clone, Copy)]
@@ -42,55 +41,32 @@ impl LaneRodas4 {
 
     #[inline(always)]
     fn begin<W: SimdReal, const I: usize>(&mut self, simd: W::Simd) {
-        let h = W::load(simd, &self.h);
-        let (gh, rate) = (h * GAMMA, h * GAMMA_I[I]);
-        let mut c = [h; 5];
-        for (c, of) in c.iter_mut().zip(C[I]) {
-            *c = W::splat(simd, of) / h;
-        }
+        let scale = StageScale::of::<I>(W::load(simd, &self.h));
         let Self { model, motion, force, forcing, at, r1, increments, lags, .. } = self;
         for k in 0..model.bodies.len() {
             let (body, kept) = (model.bodies[k].load::<W>(simd), &mut increments[k]);
             if let Some(last) = I.checked_sub(1) {
-                let change = increment::<W>(simd, model, k, &force[k], &r1[k], gh);
-                store(change.q, &mut kept[last].q);
-                store(change.v, &mut kept[last].v);
+                let last_change = change::<W>(simd, model, k, &force[k], &r1[k], scale.gh);
+                last_change.store(&mut kept[last]);
             }
-            let kept = |j: usize| kept[j].load::<W>(simd);
-            let (mut place_q, mut place_v) = (load(simd, &motion.q[k]), load(simd, &motion.v[k]));
-            for j in if I > IN_PLACE { IN_PLACE..I } else { 0..I } {
-                add_scaled(&mut place_q, &kept(j).q, W::splat(simd, A[I][j]));
-                add_scaled(&mut place_v, &kept(j).v, W::splat(simd, A[I][j]));
-            }
+            let start = BodyState { q: load(simd, &motion.q[k]), v: load(simd, &motion.v[k]) };
+            let drag = |v: &LanePose<W>| body.drag_force(v);
+            let terms = BodyTerms { mass: body.mass, drag, forcing: load::<W, 3>(simd, &forcing[k]) };
+            let stage = body_stage::<W, I>(&scale, start, |j| kept[j].load::<W>(simd), terms);
             if I < IN_PLACE {
-                store(place_q, &mut at[k]);
+                store(stage.place.q, &mut at[k]);
             } else {
-                store(place_q, &mut motion.q[k]);
-                store(place_v, &mut motion.v[k]);
+                store(stage.place.q, &mut motion.q[k]);
+                store(stage.place.v, &mut motion.v[k]);
             }
-            let mut lag = [W::splat(simd, 0.0); 3];
-            for j in 0..I {
-                add_scaled(&mut lag, &kept(j).q, c[j]);
-            }
-            let (mut own, mut momentum) = (lag, lag);
-            for i in 0..3 {
-                own[i] = place_v[i] + lag[i];
-                momentum[i] = own[i] / gh;
-            }
-            store(own, &mut r1[k]);
-            for j in 0..I {
-                add_scaled(&mut momentum, &kept(j).v, c[j]);
-            }
-            let (drag, forcing) = (body.drag_force(&lag), load::<W, 3>(simd, &forcing[k]));
-            for i in 0..3 {
-                (forcing[i] * rate - drag[i] - body.mass[i] * momentum[i]).store(&mut force[k][i]);
-            }
+            store(stage.r1, &mut r1[k]);
+            store(stage.force, &mut force[k]);
         }
         for (k, lag) in lags.iter_mut().enumerate() {
             let mut sum = [W::splat(simd, 0.0); 3];
             for j in 0..I {
                 for i in 0..3 {
-                    sum[i] -= W::load(simd, &increments[k][j].q[i]) * c[j];
+                    sum[i] -= W::load(simd, &increments[k][j].q[i]) * scale.c[j];
                 }
             }
             store(sum, lag);
@@ -134,7 +110,7 @@ impl LaneRodas4 {
     fn finish<W: SimdReal>(&mut self, simd: W::Simd) {
         let gh = W::load(simd, &self.h) * GAMMA;
         for k in 0..self.model.bodies.len() {
-            let last = increment::<W>(simd, &self.model, k, &self.force[k], &self.r1[k], gh);
+            let last = change::<W>(simd, &self.model, k, &self.force[k], &self.r1[k], gh);
             add(simd, &mut self.motion.q[k], &last.q);
             add(simd, &mut self.motion.v[k], &last.v);
             store(last.q, &mut self.error.q[k]);
@@ -173,25 +149,14 @@ impl Kernel for StepKernel<'_> {
 
 /// Increment of a stage of body `k` whose solve left `solved`.
 #[inline(always)]
-fn increment<W: SimdReal>(
+fn change<W: SimdReal>(
     simd: W::Simd,
     model: &LaneModel,
     k: usize,
     solved: &LanePose,
     r1: &LanePose,
     gh: W,
-) -> LaneIncrement<W> {
-    let (solved, r1) = (load::<W, 3>(simd, solved), load::<W, 3>(simd, r1));
-    let (mut q, mut v) = (solved, r1);
-    for i in 0..3 {
-        q[i] = -solved[i];
-        v[i] = q[i] / gh - r1[i];
-    }
-    match &model.held[k] {
-        Some((free, _)) => {
-            let free = load_block::<W>(simd, free);
-            LaneIncrement { q: times(&free, &q), v: times(&free, &v) }
-        }
-        None => LaneIncrement { q, v },
-    }
+) -> BodyState<W> {
+    let free = model.held[k].as_ref().map(|(free, _)| move || load_block::<W>(simd, free));
+    increment(&load(simd, solved), &load(simd, r1), gh, free)
 }

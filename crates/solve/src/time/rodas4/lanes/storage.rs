@@ -1,11 +1,12 @@
 //! Storage of a batched step.
 
+use super::super::body_stage::BodyState;
 use super::heat::LaneHeat;
 use super::motion::{LaneMotion, Norms};
 use bimorph_domains::loss_derivatives::LossDerivatives;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::batch::joint::LanePlaced;
-use bimorph_multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, SimdReal, ZERO_POSE, load};
+use bimorph_multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, SimdReal, ZERO_POSE, load, store};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::scalar::has_lanes;
 use bimorph_multibody::{BlockMatrix, Pattern};
@@ -19,17 +20,18 @@ pub struct Lane<'a> {
     pub ramp: Ramp<'a>,
 }
 
-/// Change of the displacement and rate of one body.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct LaneIncrement<T = Lane8> {
-    pub(super) q: LanePose<T>,
-    pub(super) v: LanePose<T>,
+impl BodyState<Lane8> {
+    #[inline(always)]
+    pub(super) fn load<W: SimdReal>(&self, simd: W::Simd) -> BodyState<W> {
+        BodyState { q: load(simd, &self.q), v: load(simd, &self.v) }
+    }
 }
 
-impl LaneIncrement {
+impl<W: SimdReal> BodyState<W> {
     #[inline(always)]
-    pub(super) fn load<W: SimdReal>(&self, simd: W::Simd) -> LaneIncrement<W> {
-        LaneIncrement { q: load(simd, &self.q), v: load(simd, &self.v) }
+    pub(super) fn store(self, to: &mut BodyState<Lane8>) {
+        store(self.q, &mut to.q);
+        store(self.v, &mut to.v);
     }
 }
 
@@ -50,7 +52,7 @@ pub struct LaneRodas4 {
     pub(super) forcing: Vec<LanePose>,
     pub(super) at: Vec<LanePose>,
     pub(super) r1: Vec<LanePose>,
-    pub(super) increments: Vec<[LaneIncrement; 5]>,
+    pub(super) increments: Vec<[BodyState<Lane8>; 5]>,
     /// Rates by which dampers lag, for each body; empty without dampers.
     pub(super) lags: Vec<LanePose>,
     pub(super) placed: Vec<LanePlaced>,
@@ -86,7 +88,7 @@ impl LaneRodas4 {
         let (n, pattern) = (system.bodies(), &system.model.pattern);
         let acted = system.acted_on();
         let between = |&row: &usize| acted.iter().filter_map(move |&column| block(pattern, row, column));
-        let none = LaneIncrement { q: ZERO_POSE, v: ZERO_POSE };
+        let none = BodyState { q: ZERO_POSE, v: ZERO_POSE };
         let heaters = system.electrics.heating.heaters.len();
         Some(Self {
             w: LaneMatrix::new(pattern),
