@@ -85,7 +85,7 @@ pub fn joint_transient(
         scale,
     };
     let rotary = rotary::rotary_inertia_warning(compiled, formulation, options);
-    let options = TransientOptions { release: start.as_ref(), ..options.clone() };
+    let options = options.with_release(start.as_ref());
     let mut result = record(compiled, &options, &mut carrier, sample, watch)?;
     result.warnings.extend(rotary);
     result.warnings.extend(open(carrier.report.largest_gap_m, options.errors().requested() * system.length_scale));

@@ -140,12 +140,7 @@ impl PathModels {
             PathParameter::Netlist => {}
         }
         let source = source()?;
-        let at = |value: f64| {
-            let mut set = compiled.options.clone();
-            set.set.retain(|(parameter, _)| *parameter != options.along);
-            set.set.push((options.along.clone(), Setting::Number(value)));
-            draw(&source, &set)?.compile()
-        };
+        let at = |value: f64| draw(&source, &compiled.options.with_parameter(&options.along, value))?.compile();
         Ok(Self::Netlist(Box::new([at(options.from)?, at(options.to)?])))
     }
 

@@ -72,7 +72,7 @@ fn held<T>(
         let first = companion(options, model.unknowns(), run, watch)?;
         return compared(options, model, first, run, sample, watch);
     }
-    let estimated = TransientOptions { estimate: true, ..options.clone() };
+    let estimated = options.with_estimate();
     let made = first(&estimated, model, run, sample, watch)?;
     let made = sharper(made, &estimated, model, run, watch)?;
     made.kept.send(sample);

@@ -86,7 +86,7 @@ pub fn transient(
     let (suited, method) = formulation::of_run(compiled, options);
     match suited.formulation {
         formulation @ (Formulation::Rcr | Formulation::RcrElastic) => {
-            let options = TransientOptions { method, ..options.clone() };
+            let options = options.with_method(method);
             joint_transient(compiled, formulation, &options, sample, watch).map(|(r, _)| r)
         }
         Formulation::Reduced => reduced_transient(compiled, options, sample, watch, &mut |sample, watch| {

@@ -49,7 +49,7 @@ impl Fnv {
             }
         }
         // Debug output of plain numbers and flags is exact (shortest text that reads back).
-        self.text(&format!("{:?}", CompileOptions { set: Vec::new(), ..options.clone() }));
+        self.text(&format!("{:?}", options.without_settings()));
     }
 
     /// The hash.

@@ -70,6 +70,12 @@ impl CompiledModel {
         }
     }
 
+    /// The same model for analyses with another tolerance (1).
+    #[must_use]
+    pub fn with_tolerance(&self, tolerance: f64) -> Self {
+        Self { options: self.options.with_tolerance(tolerance), ..self.clone() }
+    }
+
     /// The same drawing on another mesh.
     ///
     /// # Errors
@@ -127,7 +133,7 @@ pub struct ParsedStructure {
 pub fn draw(source: &dyn FrontEnd, options: &CompileOptions) -> Result<ParsedStructure, CompileError> {
     options.check()?;
     let scheme = options.scheme.in_formulation(options.formulation);
-    let mut options = CompileOptions { scheme, ..options.clone() };
+    let mut options = options.with_scheme(scheme);
     if options.as_sugar {
         (options.linear, options.junctions, options.anchors) = (true, Junctions::Centreline, Anchors::Rigid);
     }

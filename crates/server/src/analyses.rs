@@ -14,7 +14,6 @@ use bimorph_analysis::mode_quality::mode_losses;
 use bimorph_analysis::path_parameter::{PathModels, PathParameter};
 use bimorph_analysis::statics::check_voltages;
 use bimorph_analysis::transient::TransientOptions;
-use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::OptionValue;
 use bimorph_model::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use bimorph_netlist::NetlistSource;
@@ -244,11 +243,8 @@ impl BimorphService {
             let job = || {
                 let release = release.as_ref().map(|model| &*model.compiled);
                 // the mesh, too, holds the tolerance of the run
-                let sharper = (tol < model.compiled.options.errors().requested()).then(|| {
-                    let mut sharper = CompiledModel::clone(&model.compiled);
-                    sharper.options = sharper.options.with_tolerance(tol);
-                    sharper
-                });
+                let sharper =
+                    (tol < model.compiled.options.errors().requested()).then(|| model.compiled.with_tolerance(tol));
                 let options = TransientOptions {
                     stop,
                     signals,

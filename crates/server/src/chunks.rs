@@ -137,7 +137,7 @@ pub(super) fn send_transient(
         outlet.borrow().wanted()
     };
     let result = fitted_in_time(compiled, options).and_then(|(moving, start)| {
-        let options = TransientOptions { release: start.as_ref(), ..options.clone() };
+        let options = options.with_release(start.as_ref());
         let run: step_error::RunFunction<'_, ()> =
             &mut |options, sample, watch| transient(&moving, options, sample, watch).map(|r| (r, ()));
         let (mut result, ()) = with_step_error(&options, &moving, run, &mut sample, &mut watch)?;

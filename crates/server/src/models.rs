@@ -249,7 +249,6 @@ fn hash(bundle: &Bundle, options: &CompileOptions) -> u128 {
 mod tests {
     //! Ids depend on every part of what is compiled, and on nothing else.
     use super::*;
-    use bimorph_base::Setting;
 
     #[test]
     fn ids_are_content() {
@@ -259,8 +258,8 @@ mod tests {
         assert_eq!(id, hash(&bundle.clone(), &options.clone()));
         assert_ne!(id, hash(&Bundle::from_text("b.net", "anchor * [f] []"), &options));
         assert_ne!(id, hash(&Bundle::from_text("a.net", "anchor * [g] []"), &options));
-        assert_ne!(id, hash(&bundle, &CompileOptions { tol: 1e-4, ..options.clone() }));
-        let set = |value| CompileOptions { set: vec![("w".into(), Setting::Number(value))], ..options.clone() };
+        assert_ne!(id, hash(&bundle, &options.with_tolerance(1e-4)));
+        let set = |value| options.with_parameter("w", value);
         assert_ne!(hash(&bundle, &set(1.0)), hash(&bundle, &set(2.0)));
     }
 }

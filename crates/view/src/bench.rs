@@ -4,7 +4,7 @@ use crate::answer::Answer;
 use crate::answers;
 use crate::question::{Ask, BenchState, Question};
 use crate::refusal::Refusal;
-use bimorph_base::{Bundle, Setting};
+use bimorph_base::Bundle;
 use bimorph_model::compile::{CompileOptions, CompiledModel, draw};
 use bimorph_netlist::NetlistSource;
 use std::borrow::Cow;
@@ -111,11 +111,7 @@ impl Bench {
 
     /// Options of a model in a state of the bench.
     pub(crate) fn compile_options(&self, state: &BenchState) -> CompileOptions {
-        let mut options = self.options.options.clone();
-        let given = state.settings();
-        options.set.retain(|(name, _)| given.iter().all(|(other, _)| other != name));
-        options.set.extend(given);
-        options
+        self.options.options.with_settings(&state.settings())
     }
 
     /// The model in a state of the bench, on the mesh that the options specify.
@@ -127,10 +123,7 @@ impl Bench {
     /// The same with one parameter at another value.
     pub(crate) fn compiled_with(&self, state: &BenchState, name: &str, value: f64) -> Result<CompiledModel, Refusal> {
         let source = self.source(state)?;
-        let mut options = self.compile_options(state);
-        options.set.retain(|(other, _)| other != name);
-        options.set.push((name.to_owned(), Setting::Number(value)));
-        Ok(draw(&*source, &options)?.compile()?)
+        Ok(draw(&*source, &self.compile_options(state).with_parameter(name, value))?.compile()?)
     }
 
     /// Answers a request; `progress` receives the completed fraction and returns whether to continue.

@@ -115,7 +115,7 @@ fn analyse(
     watch: ProgressCallback<'_>,
 ) -> Result<CompletedAnalysis, ChartError> {
     let begun = Instant::now();
-    let options = CompileOptions { tol, ..options.clone() };
+    let options = options.with_tolerance(tol);
     let drawn = ChartVariant::new(source, &options, options.band, spec.release.as_deref())?;
     let mut measured = RunMeasurement::default();
     let (found, told, unknowns) = match analysis {

@@ -21,8 +21,7 @@ impl ChartVariant {
         band: Option<f64>,
         release: Option<&str>,
     ) -> Result<Self, ChartError> {
-        let options = CompileOptions { band, ..options.clone() };
-        let initial = draw(source, &options)?.compile()?;
+        let initial = draw(source, &options.with_band(band))?.compile()?;
         let released = release.map(|name| released(source, &initial, name)).transpose()?;
         Ok(Self { initial, released })
     }
@@ -57,7 +56,7 @@ impl FormulationModels {
     ) -> Result<Self, ChartError> {
         let bodies = ChartVariant::new(source, options, band, release)?;
         let compiled = |&one: &Formulation| {
-            let options = CompileOptions { formulation: one.compiled_as()?, ..options.clone() };
+            let options = options.with_formulation(one.compiled_as()?);
             // what bodies can be made of may not suit joints: points that say so
             Some((one, ChartVariant::new(source, &options, band, release).map_err(|e| e.to_string())))
         };
@@ -83,8 +82,5 @@ pub fn released(source: &dyn FrontEnd, initial: &CompiledModel, name: &str) -> R
         let detail = format!("no numeric parameter of that name; the netlist has {}", known.join(", "));
         return Err(AnalysisError::BadRequest { what: format!("release \"{name}\""), detail }.into());
     }
-    let mut options = initial.options.clone();
-    options.set.retain(|(parameter, _)| parameter != name);
-    options.set.push((name.to_owned(), Setting::Number(0.0)));
-    Ok(draw(source, &options)?.compile()?)
+    Ok(draw(source, &initial.options.with_parameter(name, 0.0))?.compile()?)
 }

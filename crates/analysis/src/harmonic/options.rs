@@ -34,6 +34,12 @@ pub struct HarmonicOptions {
 }
 
 impl HarmonicOptions {
+    /// For other output signals.
+    #[must_use]
+    pub fn with_signals(&self, signals: &[String]) -> Self {
+        Self { signals: signals.to_vec(), ..self.clone() }
+    }
+
     /// Refuses what cannot be computed, before anything is laid out for it.
     ///
     /// # Errors

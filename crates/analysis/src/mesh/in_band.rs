@@ -74,8 +74,7 @@ pub(super) fn fitted(compiled: &CompiledModel, options: &HarmonicOptions) -> Res
 }
 
 fn fitted_from(compiled: &CompiledModel, options: &HarmonicOptions) -> Result<CompiledModel, AnalysisError> {
-    let fewer =
-        HarmonicOptions { signals: options.signals.iter().take(MAX_SIGNALS).cloned().collect(), ..options.clone() };
+    let fewer = options.with_signals(&options.signals[..options.signals.len().min(MAX_SIGNALS)]);
     // every name is looked up once, whatever is compared
     let exact = ExactResponse::new(compiled, options)?;
     drop(exact);

@@ -83,20 +83,17 @@ pub fn twice(compiled: &CompiledModel, tol: f64) -> Result<CompiledModel, Analys
     let scheme = compiled.options.scheme;
     let twice = |&n: &usize| if n == 0 { 0 } else { scheme.segments(2 * n) };
     let segments = compiled.order.segments.iter().map(twice).collect();
-    let mut finer = remeshed(compiled, Mesh { segments, estimated_error: None, ..compiled.order.clone() })?;
-    finer.options = finer.options.with_tolerance(tol);
-    Ok(finer)
+    let finer = remeshed(compiled, Mesh { segments, estimated_error: None, ..compiled.order.clone() })?;
+    Ok(finer.with_tolerance(tol))
 }
 
 /// The model on the mesh that holds `looser` times the tolerance, where that is not too fine.
 fn within_most(compiled: &CompiledModel, looser: f64) -> Option<CompiledModel> {
     let tol = compiled.options.errors().requested();
-    let mut asked = compiled.clone();
-    asked.options = asked.options.with_tolerance(looser * tol);
-    let mut found =
+    let asked = compiled.with_tolerance(looser * tol);
+    let found =
         bounded(2 * MAX_UNKNOWNS, || sought(&asked)).flatten().filter(|finer| finer.unknowns() <= MAX_UNKNOWNS)?;
-    found.options = found.options.with_tolerance(tol);
-    Some(found)
+    Some(found.with_tolerance(tol))
 }
 
 /// The model on the mesh for both; none where there is no such equilibrium or mode.

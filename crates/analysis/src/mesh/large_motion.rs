@@ -66,7 +66,7 @@ pub(super) fn order(
     let goal = moving.options.errors().large_motion();
     let closes = ends_in_contact(moving, options);
     let until = if closes { options.until.clone().or(Some(Until::Contact)) } else { options.until.clone() };
-    let options = &TransientOptions { until, ..options.clone() };
+    let options = &options.with_end(until);
     if !closes && !bends(moving, options, &order)? {
         let found =
             (left > moving.options.errors().requested()).then(|| compared(moving, options, &order.segments)).flatten();
@@ -178,14 +178,11 @@ fn sample_run(moving: &CompiledModel, options: &TransientOptions<'_>, segments: 
     let model = meshed(moving, segments).ok()?;
     let start = options.release.map(|start| meshed(start, segments)).transpose().ok()?;
     let loose = TransientOptions {
-        tol: moving.options.errors().mesh_run(),
         points: points(options),
         release: start.as_deref(),
         method: Integrator::default(),
         step: None,
-        events: Vec::new(),
-        keep: false,
-        ..options.clone()
+        ..options.for_comparison(moving.options.errors().mesh_run())
     };
     let mut columns = vec![Vec::new(); options.signals.len()];
     let mut keep = |_: f64, values: &[f64]| {

@@ -182,13 +182,8 @@ pub(super) fn companion<T>(
     if options.signals.is_empty() || options.points < 2 || !looser {
         return Ok((None, false));
     }
-    let looser = TransientOptions {
-        tol,
-        step: options.step.map(|step| 2.0 * step),
-        events: Vec::new(),
-        keep: false,
-        ..options.clone()
-    };
+    let step = options.step.map(|step| 2.0 * step);
+    let looser = TransientOptions { step, ..options.for_comparison(tol) };
     let mut picked = SelectedSamples::new(options);
     let mut keep = |_: f64, values: &[f64]| picked.add(values);
     let (mut steps, mut stopped) = (0.0, false);

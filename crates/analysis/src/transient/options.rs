@@ -123,16 +123,52 @@ pub(crate) fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError>
     Ok(())
 }
 
+/// The same options with one of them changed: no other place copies them to change one.
+impl<'a> TransientOptions<'a> {
+    /// With another tolerance (1).
+    #[must_use]
+    pub fn with_tolerance(&self, tolerance: f64) -> Self {
+        Self { tol: tolerance, ..self.clone() }
+    }
+
+    /// With another integrator.
+    #[must_use]
+    pub fn with_method(&self, method: Integrator) -> Self {
+        Self { method, ..self.clone() }
+    }
+
+    /// With another condition that ends the run.
+    #[must_use]
+    pub fn with_end(&self, until: Option<Until>) -> Self {
+        Self { until, ..self.clone() }
+    }
+
+    /// With the estimate of the error of the steps.
+    #[must_use]
+    pub fn with_estimate(&self) -> Self {
+        Self { estimate: true, ..self.clone() }
+    }
+
+    /// From the equilibrium of `release`; none: from rest as drawn.
+    #[must_use]
+    pub fn with_release<'b>(&self, release: Option<&'b CompiledModel>) -> TransientOptions<'b>
+    where
+        'a: 'b,
+    {
+        TransientOptions { release, ..self.clone() }
+    }
+
+    /// For a run that is compared with this one: at another tolerance (1), without events, and whose samples only the callback receives.
+    #[must_use]
+    pub(crate) fn for_comparison(&self, tolerance: f64) -> Self {
+        Self { tol: tolerance, events: Vec::new(), keep: false, ..self.clone() }
+    }
+}
+
 impl TransientOptions<'_> {
     /// The division of the tolerance.
     pub fn errors(&self) -> ErrorBudget {
         ErrorBudget::of(self.tol)
-    }
-
-    /// The same options with another tolerance.
-    #[must_use]
-    pub fn with_tolerance(&self, tolerance: f64) -> Self {
-        Self { tol: tolerance, ..self.clone() }
     }
 
     /// Control of the step length.

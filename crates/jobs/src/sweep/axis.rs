@@ -4,7 +4,6 @@ use super::error::{SweepError, bad};
 use super::values::Values;
 use bimorph_base::Setting;
 use bimorph_model::options::{CompileOptions, MODEL, ModelOption, OptionValue, Range};
-use std::collections::HashSet;
 
 /// Suffix of a port's name that makes the name of an axis of its voltages: `heat.v`. No netlist parameter has a point
 /// in its name.
@@ -85,12 +84,8 @@ impl SweepParameter {
 
 /// Options with the values that parameters of the netlist have at a point.
 pub(super) fn at(options: &CompileOptions, settings: &[(String, Setting)]) -> CompileOptions {
-    let mut options = options.clone();
-    let parameter = |name: &str| matches!(varied(name), Varied::Parameter);
-    let swept: HashSet<&str> = settings.iter().map(|(name, _)| name.as_str()).collect();
-    options.set.retain(|(name, _)| !swept.contains(name.as_str()));
-    options.set.extend(settings.iter().filter(|(name, _)| parameter(name)).cloned());
-    options
+    let parameter = |(name, _): &&(String, Setting)| matches!(varied(name), Varied::Parameter);
+    options.with_settings(&settings.iter().filter(parameter).cloned().collect::<Vec<_>>())
 }
 
 /// Options with those that vary as they are at a point.

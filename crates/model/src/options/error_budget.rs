@@ -140,12 +140,6 @@ impl CompileOptions {
     pub fn errors(&self) -> ErrorBudget {
         ErrorBudget::of(self.tol)
     }
-
-    /// The same options with another tolerance.
-    #[must_use]
-    pub fn with_tolerance(&self, tolerance: f64) -> Self {
-        Self { tol: tolerance, ..self.clone() }
-    }
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ const HIGHEST: f64 = 1e13;
 /// See [`DiscretizeError`].
 pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> Result<Mesh, DiscretizeError> {
     let bare = mechanics(structure);
-    let options = &CompileOptions { band: None, ..options.clone() };
+    let options = &options.with_band(None);
     let mut segments = order::a_priori(&bare, options)?;
     let mut chosen = None;
     for _ in 0..MAX_PASSES {

@@ -48,7 +48,7 @@ pub fn choose(structure: &Structure, options: &CompileOptions, band: f64) -> Res
 /// See [`DiscretizeError`].
 pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &MeshTarget) -> Result<Mesh, DiscretizeError> {
     let (bare, band) = (mechanics(structure), aim.band);
-    let options = &CompileOptions { band: Some(band), ..options.clone() };
+    let options = &options.with_band(Some(band));
     let groups = Groups::new(&bare.beams);
     let floor: Vec<usize> = (bare.beams.iter())
         .map(|b| options.scheme.segments((order::waves(b, band) / LONGEST).ceil().max(1.0) as usize))
@@ -123,7 +123,7 @@ fn by_another_scheme(
     options: &CompileOptions,
     aim: &MeshTarget,
 ) -> Result<Mesh, DiscretizeError> {
-    let finer = CompileOptions { scheme: Scheme::E4, ..options.with_tolerance(options.errors().confirmation()) };
+    let finer = options.with_tolerance(options.errors().confirmation()).with_scheme(Scheme::E4);
     let tolerances = aim.tolerances.iter().map(|tol| ErrorBudget::of(*tol).confirmation()).collect();
     let order = choose_for(structure, &finer, &MeshTarget { tolerances, ..aim.clone() })?;
     Ok(Mesh { estimated_error: None, ..order })

@@ -1,0 +1,66 @@
+//! The same options with one of them changed: no other place copies the options of a model to change one.
+
+use super::{CompileOptions, Formulation, Scheme};
+use bimorph_base::Setting;
+
+impl CompileOptions {
+    /// With another tolerance (1).
+    #[must_use]
+    pub fn with_tolerance(&self, tolerance: f64) -> Self {
+        Self { tol: tolerance, ..self.clone() }
+    }
+
+    /// With another band (Hz); none: what the analysis asks for.
+    #[must_use]
+    pub fn with_band(&self, band: Option<f64>) -> Self {
+        Self { band, ..self.clone() }
+    }
+
+    /// With another scheme of beams.
+    #[must_use]
+    pub fn with_scheme(&self, scheme: Scheme) -> Self {
+        Self { scheme, ..self.clone() }
+    }
+
+    /// In another formulation.
+    #[must_use]
+    pub fn with_formulation(&self, formulation: Formulation) -> Self {
+        Self { formulation, ..self.clone() }
+    }
+
+    /// With these parameters of the netlist at these values, behind the others.
+    #[must_use]
+    pub fn with_settings(&self, settings: &[(String, Setting)]) -> Self {
+        let mut changed = self.clone();
+        changed.set.retain(|(name, _)| settings.iter().all(|(other, _)| other != name));
+        changed.set.extend_from_slice(settings);
+        changed
+    }
+
+    /// Without the parameters of the netlist.
+    #[must_use]
+    pub fn without_settings(&self) -> Self {
+        Self { set: Vec::new(), ..self.clone() }
+    }
+
+    /// With one parameter of the netlist at this number (SI).
+    #[must_use]
+    pub fn with_parameter(&self, name: &str, value: f64) -> Self {
+        self.with_settings(&[(name.to_owned(), Setting::Number(value))])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A parameter that is set again has its last value, behind the others, and no other option changes.
+    #[test]
+    fn a_parameter_is_set_once() {
+        let options = CompileOptions { tol: 1e-5, ..CompileOptions::default() };
+        let options = options.with_parameter("w", 2e-6).with_parameter("l", 1e-4).with_parameter("w", 3e-6);
+        let set = [("l", 1e-4), ("w", 3e-6)].map(|(name, value)| (name.to_owned(), Setting::Number(value)));
+        assert_eq!(options.set, set);
+        assert_eq!(options.without_settings(), CompileOptions::default().with_tolerance(1e-5));
+    }
+}
