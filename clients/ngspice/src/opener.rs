@@ -130,7 +130,7 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
         reported::of_netlist(&card.file, card.options.without_circuit, &own.warnings.items);
         return Ok(Box::new(LocalDevice::new(own)));
     }
-    let tol = card.share * card.options.tol;
+    let tol = card.options.errors().scaled(card.share).requested();
     let Some(address) = &card.remote else {
         let finer = mesh::twice(&own, tol).map_err(|source| OpenError::Finer { file: card.file.clone(), source })?;
         return Ok(Box::new(LocalDevice::new(Arc::new(finer))));

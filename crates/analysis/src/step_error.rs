@@ -23,8 +23,9 @@ pub(super) use super::transient::error_log::least;
 use super::transient::{TransientOptions, TransientResult, transient};
 use super::{AnalysisError, ProgressCallback};
 use crate::formulation;
+use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
-use bimorph_model::options::{ErrorBudget, Formulation};
+use bimorph_model::options::Formulation;
 use companion::{companion, compared};
 pub use run::RunFunction;
 use run::{AT_THE_END, MAX_AGAIN, MAX_STORED_SAMPLES};
@@ -164,7 +165,7 @@ fn sharper<T>(
         if made.result.counters.steps as f64 * ratio.powf(-0.25) * unknowns > MAX_AGAIN {
             break;
         }
-        let options = options.with_tolerance(ratio * made.tol);
+        let options = options.with_tolerance(ErrorBudget::of(made.tol).scaled(ratio).requested());
         let (mut kept, mut picked) = (BufferedSamples::default(), SelectedSamples::new(&options));
         let mut keep = |t: f64, values: &[f64]| {
             picked.add(values);

@@ -174,7 +174,7 @@ impl DeviceSession {
         match before {
             None => (StepHistory::start(seen), f64::INFINITY),
             Some(before) => {
-                let (tol, signals) = (compiled.options.errors().requested(), self.signals.len());
+                let (errors, signals) = (compiled.options.errors(), self.signals.len());
                 let nothing = compiled.options.errors().step() * FLOOR;
                 let charge = |capacitance: f64, volts: f64| {
                     capacitance.abs() * (SAME_VOLTAGE[0] + SAME_VOLTAGE[1] * volts.abs())
@@ -205,7 +205,7 @@ impl DeviceSession {
                         PortResponse::Rise(_) | PortResponse::Nothing => SAME_TEMPERATURE,
                     },
                 };
-                before.shown.step(request.dt, seen, tol, floor, follow)
+                before.shown.step(request.dt, seen, errors, floor, follow)
             }
         }
     }

@@ -13,17 +13,8 @@
 //! ringing that is faster than the steps shows in d by its height: where that may be seen, the steps become short
 //! enough to follow it.
 
+use bimorph_base::ErrorBudget;
 use serde::{Deserialize, Serialize};
-
-/// Fraction of its range by which a quantity may depart from the line for either term, in units of the compilation's
-/// tolerance (1). At the default it is 0.2 %, or 28 points for a cycle of full amplitude, which then stays within 0.5
-/// %.
-const BEND_FRACTION: f64 = 2.0;
-
-/// The same of a charge (1). Only its change matters: with even steps the trapezoidal rule keeps that within 0.2 % of
-/// its range, with 28 points a cycle. (Without them an oscillator that its own current drives takes 43 points a cycle
-/// where it takes 36.)
-const BEND_FRACTION_OF_CHARGES: f64 = 3.6;
 
 /// How the circuit's steps follow a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,12 +52,12 @@ impl StepHistory {
     }
 
     /// After a step of `dt` (s), and the longest next step (s) at which each quantity keeps to the line within its share
-    /// of `tol` (1) or within `floor`, in its own unit.
+    /// of the tolerance or within `floor`, in its own unit.
     pub fn step(
         &self,
         dt: f64,
         values: Vec<f64>,
-        tol: f64,
+        errors: ErrorBudget,
         floor: impl Fn(usize) -> f64,
         follow: impl Fn(usize) -> SteppingRule,
     ) -> (Self, f64) {
@@ -84,8 +75,8 @@ impl StepHistory {
             next.slopes.push(slope);
             let Some(slope_before) = self.slopes.get(n) else { continue };
             let follow = follow(n);
-            let share = if follow == SteppingRule::Differentiated { BEND_FRACTION_OF_CHARGES } else { BEND_FRACTION };
-            let allowed = share * tol * (next.high[n] - next.low[n]) + floor(n);
+            let share = if follow == SteppingRule::Differentiated { errors.bend_of_charges() } else { errors.bend() };
+            let allowed = share * (next.high[n] - next.low[n]) + floor(n);
             let bend = (slope - slope_before) / (self.steps[0] + dt);
             next.bends.push(bend);
             bound = bound.min(2.0 * (allowed / bend.abs()).sqrt());
@@ -93,7 +84,7 @@ impl StepHistory {
                 // A divided difference stands for the middle of its three points.
                 let change = 3.0 * (bend - bend_before) / (self.steps[1] + self.steps[0] + dt);
                 // of a sine even steps are as long where it turns as where it bends most
-                let turns = if follow == SteppingRule::Line { 1.0 } else { (16.0 * share * tol).sqrt().min(1.0) };
+                let turns = if follow == SteppingRule::Line { 1.0 } else { (16.0 * share).sqrt().min(1.0) };
                 bound = bound.min((turns * 4.0 * allowed / change.abs()).cbrt());
             }
         }
@@ -151,7 +142,8 @@ mod tests {
         let (mut shown, mut t, mut dt) = (StepHistory::start(vec![1.0]), 0.0, 1e-3);
         let (mut worst, mut points) = (0.0f64, 0);
         while t < 40.0 {
-            let (after, bound) = shown.step(dt, vec![f64::cos(t + dt)], tol, |_| 0.0, |_| SteppingRule::Line);
+            let (after, bound) =
+                shown.step(dt, vec![f64::cos(t + dt)], ErrorBudget::of(tol), |_| 0.0, |_| SteppingRule::Line);
             if t > 20.0 {
                 let line = 0.5 * (f64::cos(t) + f64::cos(t + dt));
                 worst = worst.max((f64::cos(t + 0.5 * dt) - line).abs() / 2.0);

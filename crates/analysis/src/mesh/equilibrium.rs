@@ -215,7 +215,7 @@ impl<'a> EquilibriumSearch<'a> {
         };
         let limit = |value: Option<f64>| {
             let value = value.unwrap_or(f64::NAN);
-            Output { value, scale: softening::scale(value, self.compiled.options.errors().requested()) }
+            Output { value, scale: softening::scale(value, self.compiled.options.errors()) }
         };
         let mut outputs = outputs(&model, &point);
         outputs.extend([limit(left), limit(beyond(&point))]);

@@ -23,11 +23,11 @@ use super::remeshed::{chosen, meshed};
 use super::signal_amplitudes::SignalAmplitudes;
 use super::warnings::{of_rotary, of_steps};
 use bimorph_base::Diagnostic;
+use bimorph_base::ErrorBudget;
 use bimorph_domains::{Drive, Shock};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::DiscretizeError;
 use bimorph_model::options::CompileOptions;
-use bimorph_model::options::ErrorBudget;
 use bimorph_model::refine::doubling::{self, Output};
 use bimorph_model::refine::lowest_modes;
 use bimorph_model::refine::mesh_search::{self, Mesh, MeshTarget};
@@ -40,8 +40,6 @@ use std::f64::consts::TAU;
 /// Modes computed first, and at most.
 const FIRST_MODES: usize = 6;
 const MAX_MODES: usize = 48;
-/// Fraction of the tolerance below which an amplitude is negligible.
-const NEGLIGIBLE: f64 = 0.3;
 /// Fraction of the mesh-independent error that each mode may add: the residual outside the modes, and missing rotary
 /// inertia where that is large.
 const UNRESOLVED_SHARE: f64 = 0.3;
@@ -85,7 +83,7 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
             still = merged(&still, &end);
         }
     }
-    let tol = moving.options.errors().requested();
+    let errors = moving.options.errors();
     let mut count = FIRST_MODES;
     loop {
         let mesh = match given {
@@ -96,20 +94,21 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
             }
         };
         let (modes, left) = excited(moving, options, &mesh.segments, count)?;
-        if left > NEGLIGIBLE * tol && modes.len() >= count && count < MAX_MODES {
+        if left > errors.negligible_amplitude() && modes.len() >= count && count < MAX_MODES {
             count = (2 * count).min(MAX_MODES);
             continue;
         }
         // the motion outside the modes may have an error of its whole amplitude
-        let left = if left > NEGLIGIBLE * tol { 2f64.sqrt() * left } else { 0.0 };
+        let left = if left > errors.negligible_amplitude() { 2f64.sqrt() * left } else { 0.0 };
         // no mesh holds the tolerance where these do not
         let beside = left.max(turned(&modes, options.stop));
-        let looser = if given { 1.0 } else { (UNRESOLVED_SHARE * beside / tol).max(1.0) };
-        let Some(highest) = modes.iter().rposition(|m| m.amplitude > NEGLIGIBLE * looser * tol) else {
+        let looser = if given { 1.0 } else { (UNRESOLVED_SHARE * beside / errors.requested()).max(1.0) };
+        let relaxed = errors.scaled(looser);
+        let Some(highest) = modes.iter().rposition(|m| m.amplitude > relaxed.negligible_amplitude()) else {
             return Ok((still, left));
         };
         let of_modes = modes[..=highest].iter();
-        let tolerances: Vec<f64> = of_modes.map(|m| tolerance(m, options.stop, looser * tol)).collect();
+        let tolerances: Vec<f64> = of_modes.map(|m| tolerance(m, options.stop, relaxed.requested())).collect();
         let mut analyse = |segments: &[usize]| frequencies(moving, voltages, segments, &tolerances);
         if given {
             let swings: Vec<f64> = modes[..=highest].iter().map(|m| 2f64.sqrt() * m.amplitude).collect();

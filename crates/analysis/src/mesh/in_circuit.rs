@@ -89,11 +89,11 @@ pub fn twice(compiled: &CompiledModel, tol: f64) -> Result<CompiledModel, Analys
 
 /// The model on the mesh that holds `looser` times the tolerance, where that is not too fine.
 fn within_most(compiled: &CompiledModel, looser: f64) -> Option<CompiledModel> {
-    let tol = compiled.options.errors().requested();
-    let asked = compiled.with_tolerance(looser * tol);
+    let errors = compiled.options.errors();
+    let asked = compiled.with_tolerance(errors.scaled(looser).requested());
     let found =
         bounded(2 * MAX_UNKNOWNS, || sought(&asked)).flatten().filter(|finer| finer.unknowns() <= MAX_UNKNOWNS)?;
-    Some(found.with_tolerance(tol))
+    Some(found.with_tolerance(errors.requested()))
 }
 
 /// The model on the mesh for both; none where there is no such equilibrium or mode.

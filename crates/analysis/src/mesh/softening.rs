@@ -19,6 +19,7 @@
 //! not seen.
 
 use super::super::statics::OperatingPoint;
+use bimorph_base::ErrorBudget;
 use bimorph_domains::Drive;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::BlockMatrix;
@@ -79,9 +80,9 @@ pub(super) fn agree(coarse: Option<f64>, fine: Option<f64>) -> bool {
 
 /// Scale for comparing the remaining stiffness, or the distance beyond a fold, at a tolerance: a larger difference
 /// means that two meshes disagree.
-pub(super) fn scale(left: f64, tol: f64) -> f64 {
+pub(super) fn scale(left: f64, errors: ErrorBudget) -> f64 {
     // a comparison divides by ¾ of the scale and allows ¾ of the tolerance
-    KNOWN * left.abs() / (0.75 * 0.75 * tol)
+    KNOWN * left.abs() / errors.comparison_of_scales()
 }
 
 /// The softest motion, for its masses.

@@ -5,8 +5,8 @@ use super::super::reduced::WARNING as REDUCED;
 use super::super::rotary_inertia_error;
 use super::super::statics::{OperatingPoint, too_hot, too_stressed};
 use bimorph_base::Diagnostic;
+use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
-use bimorph_model::options::ErrorBudget;
 
 /// Code of the warning that a mesh does not hold the tolerance.
 pub const WARNING: &str = "W040";

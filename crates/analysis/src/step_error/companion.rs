@@ -31,8 +31,6 @@ const SHARE_OF_SECOND: f64 = 1.0;
 const RESERVE: f64 = 1.2;
 /// Times the steps of a run that one at a tenth of its tolerance takes, of the methods that are run again.
 const MORE: f64 = 2.0;
-/// Largest ratio of the requested tolerance to that of the steps.
-const MAX_SHARPER: f64 = 99.0;
 /// Output times that a companion must reach, at least.
 const MIN_SAMPLES: usize = 16;
 
@@ -64,7 +62,7 @@ pub(super) fn compared<T>(
     let room = options.errors().left_for_steps(made.result.estimated_error);
     while made.result.step_error.is_some_and(|error| error > room)
         && MORE * made.result.counters.steps as f64 * unknowns <= MAX_AGAIN
-        && now.errors().requested() > options.errors().requested() / MAX_SHARPER
+        && now.errors().requested() > options.errors().sharpest_run()
     {
         let sharper = options.with_tolerance(now.errors().sharper_run());
         let mut others = BufferedSamples::default();

@@ -2,9 +2,9 @@
 
 use super::super::AnalysisError;
 use super::super::integrator::Integrator;
+use bimorph_base::ErrorBudget;
 use bimorph_domains::Shock;
 use bimorph_model::compile::CompiledModel;
-use bimorph_model::options::ErrorBudget;
 use bimorph_model::options::analysis::TRAN_POINTS;
 use bimorph_solve::baseline::SolverKind;
 use bimorph_solve::time::adaptive::Control;

@@ -85,7 +85,7 @@ impl<'a> SharedMeshes<'a> {
 
     /// The mesh that holds a fraction of the tolerance for one variant.
     fn search(&self, first: &CompiledModel, share: f64) -> Option<Vec<usize>> {
-        let sharper = first.with_tolerance(share * first.options.errors().requested());
+        let sharper = first.with_tolerance(first.options.errors().scaled(share).requested());
         let order = mesh::order(&sharper, &self.analysis.request()?).ok()?;
         order.estimated_error.is_some_and(|error| sharper.options.errors().holds(error)).then_some(order.segments)
     }

@@ -1,16 +1,21 @@
-//! The same options with one of them changed: no other place copies the options of a model to change one.
+//! Options of a model with one of them changed, and the division of their tolerance. No other place copies options to change one.
 
 use super::{CompileOptions, Formulation, Scheme};
-use bimorph_base::Setting;
+use bimorph_base::{ErrorBudget, Setting};
 
 impl CompileOptions {
+    /// The division of the tolerance.
+    pub fn errors(&self) -> ErrorBudget {
+        ErrorBudget::of(self.tol)
+    }
+
     /// With another tolerance (1).
     #[must_use]
     pub fn with_tolerance(&self, tolerance: f64) -> Self {
         Self { tol: tolerance, ..self.clone() }
     }
 
-    /// With another band (Hz); none: what the analysis asks for.
+    /// With another band (Hz); none: the analysis decides.
     #[must_use]
     pub fn with_band(&self, band: Option<f64>) -> Self {
         Self { band, ..self.clone() }

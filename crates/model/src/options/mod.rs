@@ -6,18 +6,16 @@
 //! | [`model`] | the table of the options of a model |
 //! | [`analysis`] | options of single analyses |
 //! | [`table`] | description of an option, and the check of a value |
-//! | `changed` | the same options with one of them changed |
+//! | `changed` | the division of the tolerance, and the same options with one of them changed |
 //! | [`choices`] | the names that some options take |
-//! | [`error_budget`] | what each source of error may use of the tolerance |
 
 pub mod analysis;
 mod changed;
 pub mod choices;
-pub mod error_budget;
 pub mod model;
 pub mod table;
 
+pub use bimorph_base::ErrorBudget;
 pub use choices::{Anchors, Formulation, FringeFields, Junctions, Scheme};
-pub use error_budget::ErrorBudget;
 pub use model::{CompileOptions, MODEL, ModelOption};
 pub use table::{OptionDescription, OptionError, OptionValue, Range};

@@ -22,7 +22,8 @@ pub use super::mesh_target::{Mesh, MeshTarget};
 use super::mode_errors::ModeErrors;
 use super::rigid_beams::stiffen;
 use crate::discretize::{DiscretizeError, order};
-use crate::options::{CompileOptions, ErrorBudget, Scheme};
+use crate::options::{CompileOptions, Scheme};
+use bimorph_base::ErrorBudget;
 use bimorph_structure::Structure;
 
 /// Largest kh of a segment at the edge of the band.

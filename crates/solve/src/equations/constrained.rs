@@ -19,6 +19,7 @@
 use super::anderson::Anderson;
 use super::loads::Loads;
 use super::{Control, DegreeOfFreedom, Equations, Motion, SolverCounters, Stage, Staged, StepFailure};
+use bimorph_base::ErrorBudget;
 use bimorph_multibody::joint_coordinates::constrained_loops::{
     AddedInertia, Linkage, Reduction, ReductionTask, Singularity,
 };
@@ -33,8 +34,6 @@ const SLOW: f64 = 0.7;
 const STALLED: f64 = 1e-10;
 /// Fraction of the size of a coordinate below which its relative error does not count.
 const FLOOR: f64 = 1e-4;
-/// Error of a stage over that of the step.
-const STAGE_SHARE: f64 = 1e-2;
 /// Error of a stage against the motion in equal steps.
 const EQUAL: f64 = 1e-10;
 /// Fraction of the projection of moving loops at the end of a step that counts as error. Each step is late by the
@@ -174,7 +173,7 @@ impl<L: Loads> Equations for Constrained<'_, L> {
 
     fn begin(&mut self, control: Control) {
         (self.hurried, self.exact) = match control {
-            Control::Tolerance(tol) => (true, STAGE_SHARE * tol),
+            Control::Tolerance(tol) => (true, ErrorBudget::of(tol).stage()),
             Control::Fixed(_) => (false, EQUAL),
         };
     }

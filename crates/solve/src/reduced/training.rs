@@ -17,6 +17,7 @@ use super::statics::ReducedStatics;
 use super::taylor::{DriveRay, TaylorTerms};
 use crate::equations::Joints;
 use crate::equilibrium::{Equilibrium, EquilibriumOptions};
+use bimorph_base::ErrorBudget;
 use bimorph_domains::{Drive, System};
 use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::planar::Pose;
@@ -29,11 +30,6 @@ const POINTS: usize = 300;
 const CHECKS: usize = 8;
 /// Rounds of checks.
 const ROUNDS: usize = 5;
-/// Singular values below this fraction of the tolerance, relative to the largest, are left out: for statics, whose check adds what is
-/// lacking, and for motion, which passes through states that no equilibrium has.
-const KEPT: [f64; 2] = [0.3, 0.02];
-/// Fraction of the tolerance that the statics of the box may be off.
-const STATIC_SHARE: f64 = 0.3;
 /// Part of a moment or of an equilibrium that must be new (1).
 const NEW: f64 = 1e-5;
 /// Part of a Taylor term that must be new (1): below, it is rounding of the samples.
@@ -160,7 +156,7 @@ impl Trainer<'_> {
             }
             sum
         };
-        let least = KEPT[usize::from(self.options.moments > 0)] * self.options.tol * most;
+        let least = ErrorBudget::of(self.options.tol).singular_values(self.options.moments > 0) * most;
         let kept = order.into_iter().filter(|k| sigma[*k] > least && sigma[*k] > 0.0);
         let shapes: Vec<Vec<Pose>> = kept
             .map(|k| {
@@ -260,7 +256,7 @@ impl Trainer<'_> {
     ) {
         let (system, inputs) = (case.system, &case.inputs);
         let mut full = FullCheck::new(system);
-        let share = STATIC_SHARE * self.options.tol;
+        let share = ErrorBudget::of(self.options.tol).reduced_statics();
         for u in inputs.points(CHECKS, true) {
             let drive = inputs.drive(&u);
             if drive == inputs.none {

@@ -3,8 +3,6 @@
 //! A result has errors of its mesh, of its modes and of its steps. Each estimate has been compared with the true error, and where it was found
 //! smaller than that, it may use only a part of the tolerance (docs/project/accuracy.md). Everything else asks here and multiplies no tolerance itself.
 
-use super::CompileOptions;
-
 /// A relative tolerance, and its division.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorBudget {
@@ -37,12 +35,35 @@ impl ErrorBudget {
     const COMPANION: f64 = 10.0;
     /// Loosest tolerance of a companion run, and of a run that chooses a mesh.
     const LOOSEST: [f64; 2] = [0.3, 0.1];
+    /// Ratio of the requested tolerance to the sharpest that the steps of a repeated run take.
+    const MOST_SHARPER: f64 = 99.0;
+    /// Fraction of the tolerance below which the amplitude of a mode is negligible.
+    const NEGLIGIBLE_AMPLITUDE: f64 = 0.3;
+    /// Fraction of the tolerance for the equations of an implicit stage.
+    const STAGE: f64 = 1e-2;
+    /// Fraction of the tolerance for the statics of a reduced model.
+    const REDUCED_STATICS: f64 = 0.3;
+    /// Fraction of the tolerance below which singular values, relative to the largest, are left out of a reduced model: for statics, whose
+    /// check adds what is lacking, and for motion, which passes through states that no equilibrium has.
+    const SINGULAR_VALUES: [f64; 2] = [0.3, 0.02];
+    /// Multiple of the tolerance, of its range, by which a quantity of a circuit may depart from the line of its step. At the default it is
+    /// 0.2 %, or 28 points for a cycle of full amplitude, which then stays within 0.5 %.
+    const BEND: f64 = 2.0;
+    /// The same of a charge. Only its change matters: with even steps the trapezoidal rule keeps that within 0.2 % of its range, with 28
+    /// points a cycle. (Without them an oscillator that its own current drives takes 43 points a cycle where it takes 36.)
+    const BEND_OF_CHARGES: f64 = 3.6;
     /// Estimates above this multiple of the tolerance are reported: the display has two digits.
     const REPORTED: f64 = 1.05;
 
     /// The division of a tolerance.
     pub fn of(tolerance: f64) -> Self {
         Self { requested: tolerance }
+    }
+
+    /// The division of a multiple or a fraction of this tolerance.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { requested: factor * self.requested }
     }
 
     /// The tolerance as requested (1).
@@ -126,19 +147,52 @@ impl ErrorBudget {
         self.requested / Self::COMPANION
     }
 
+    /// The sharpest tolerance that the steps of a repeated run take.
+    pub fn sharpest_run(self) -> f64 {
+        self.requested / Self::MOST_SHARPER
+    }
+
+    /// The amplitude below which a mode is negligible.
+    pub fn negligible_amplitude(self) -> f64 {
+        Self::NEGLIGIBLE_AMPLITUDE * self.requested
+    }
+
+    /// For the equations of an implicit stage, where the steps have this tolerance.
+    pub fn stage(self) -> f64 {
+        Self::STAGE * self.requested
+    }
+
+    /// For the statics of a reduced model.
+    pub fn reduced_statics(self) -> f64 {
+        Self::REDUCED_STATICS * self.requested
+    }
+
+    /// The singular value, relative to the largest, below which a reduced model leaves a direction out; `moves`: it is for motion too.
+    pub fn singular_values(self, moves: bool) -> f64 {
+        Self::SINGULAR_VALUES[usize::from(moves)] * self.requested
+    }
+
+    /// For the departure of a quantity, over its range, from the line of a step of a circuit.
+    pub fn bend(self) -> f64 {
+        Self::BEND * self.requested
+    }
+
+    /// The same for a charge.
+    pub fn bend_of_charges(self) -> f64 {
+        Self::BEND_OF_CHARGES * self.requested
+    }
+
+    /// For a comparison whose scale is itself divided by the fraction of [`ErrorBudget::comparison`].
+    pub fn comparison_of_scales(self) -> f64 {
+        Self::COMPARISON * Self::COMPARISON * self.requested
+    }
+
     /// For the steps, beside a mesh with this error.
     pub fn left_for_steps(self, mesh: Option<f64>) -> f64 {
         match mesh {
             Some(mesh) if mesh <= self.requested => (self.requested - mesh).max(Self::LEAST_FOR_STEPS * self.requested),
             _ => self.requested,
         }
-    }
-}
-
-impl CompileOptions {
-    /// The division of the tolerance.
-    pub fn errors(&self) -> ErrorBudget {
-        ErrorBudget::of(self.tol)
     }
 }
 
