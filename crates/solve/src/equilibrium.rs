@@ -15,29 +15,26 @@
 pub mod batch;
 mod fall;
 mod loss;
+mod newton_test;
 pub mod path;
 mod refusal;
 
 pub use loss::{LossKind, StabilityLoss};
 
 use super::SolveError;
-use bimorph_domains::{Domain, Drive, System};
+use bimorph_domains::{Drive, System};
 use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::Pose;
+use newton_test::{Corrections, leaps};
 use path::LoadPath;
 
-/// Corrections below this fraction of the displacement that no longer shrink are rounding.
-const STALLED: f64 = 1e-5;
 /// Largest residual force in such a place, as a fraction of the largest contact force, where parts touch. Contact softens towards
 /// the touch, and Newton's method then takes a quarter of the way each time: that is no rounding.
 const UNBALANCED: f64 = 1e-6;
 
 /// Smallest load step where the present load is next to nothing, as a fraction of the path.
 const MIN_STEP: f64 = 1e-10;
-
-/// Fraction of the distance of electrodes that one step may change. A plate on a spring folds at a third.
-const LEAP: f64 = 0.5;
 
 /// How an equilibrium is searched. `Default` is the only place where the numbers stand.
 #[derive(Debug, Clone, PartialEq)]
@@ -232,7 +229,7 @@ impl Equilibrium {
     fn correct(&mut self, system: &System, path: &dyn LoadPath, s: f64, from: &[Pose], done: &mut Path) -> Corrected {
         let predicted = size(system, &self.step);
         path.at(s, &mut self.drive);
-        let mut last = f64::INFINITY;
+        let mut corrections = Corrections::new(system.length_scale);
         for _ in 0..self.options.iterations {
             bimorph_base::budget::check();
             done.iterations += 1;
@@ -245,44 +242,29 @@ impl Equilibrium {
             std::mem::swap(&mut self.step, &mut self.residual);
             self.tangent.solve(&system.model.pattern, &mut self.step);
             let correction = size(system, &self.step);
-            if !correction.is_finite() || (correction > last && correction > 1e-3 * system.length_scale) {
+            if corrections.diverge(correction) {
                 return Corrected::No;
             }
             for (trial, step) in self.trial.iter_mut().zip(&self.step) {
                 *trial -= step;
             }
-            let reach = size(system, &self.trial).max(1e-6 * system.length_scale);
-            // converged, or as close as rounding lets it come: quadratic convergence that has come to a stand
-            let stalled = correction <= STALLED * reach
-                && correction > 0.1 * last
-                && balanced(system.contact_scale(&self.trial, &self.drive.volts), unbalanced);
-            last = correction;
-            if correction <= self.options.tolerance * reach || stalled {
+            let reach = size(system, &self.trial);
+            let settled = corrections.settle(correction, (reach, self.options.tolerance), || {
+                balanced(system.contact_scale(&self.trial, &self.drive.volts), unbalanced)
+            });
+            if settled {
                 if inertia.negative > 0 {
                     return Corrected::No;
                 }
                 let corrected = distance(system, &self.trial, &self.prediction);
-                return match corrected <= 0.5 * predicted + 1e-3 * system.length_scale {
-                    true if self.leaps(system, from) => Corrected::Leaps,
+                return match corrections.is_near(corrected, predicted) {
+                    true if leaps(system, &self.drive.volts, from, || &self.trial[..]) => Corrected::Leaps,
                     true => Corrected::Stable,
                     false => Corrected::No,
                 };
             }
         }
         Corrected::No
-    }
-
-    /// True where the distance of electrodes changes by more than half of it in one step: a tangent step through the
-    /// fold may reach the closed branch accidentally.
-    fn leaps(&self, system: &System, from: &[Pose]) -> bool {
-        let far = |(gap, volts): (usize, &f64)| {
-            if *volts == 0.0 || !system.members[gap].is_electrostatic() {
-                return false;
-            }
-            let (before, after) = (system.distance(gap, from), system.distance(gap, &self.trial));
-            (after - before).abs() > LEAP * before.max(after)
-        };
-        self.drive.volts.iter().enumerate().any(far)
     }
 }
 

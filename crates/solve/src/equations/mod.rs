@@ -16,9 +16,11 @@
 //! | [`linear`] | linear solvers for that tangent |
 //! | [`constrained`] | joint coordinates, loops reduced in the recursion as constraints |
 //! | [`loads`] | loads in joint coordinates |
+//! | `acted_bodies` | bodies of a batch that gaps and loads act on, variant by variant |
 //! | `anderson` | acceleration of an iteration that contracts slowly |
 //! | [`joints`] | joint coordinates, loops closed by springs: a tree, and the system of what is left to the bodies |
 
+pub(crate) mod acted_bodies;
 mod anderson;
 pub mod bodies;
 pub mod constrained;

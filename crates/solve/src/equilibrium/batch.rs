@@ -9,9 +9,11 @@ mod storage;
 
 pub use storage::LaneEquilibrium;
 
+use super::EquilibriumOptions;
+use super::newton_test::{Corrections, leaps};
 use super::path::LoadPath;
-use super::{EquilibriumOptions, LEAP, STALLED};
-use bimorph_domains::{Domain, Drive, System};
+use crate::equations::acted_bodies::pose_in_lane;
+use bimorph_domains::{Drive, System};
 use bimorph_multibody::batch::{LANES, Lane8, LanePose, across};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::scalar::StoredReal;
@@ -104,9 +106,9 @@ impl LaneEquilibrium {
         self.run(EquilibriumPass::Change);
         for lane in 0..LANES {
             let system = way(lane).system;
-            self.take(lane);
-            system.add_body_drive_force(&self.q, &drives[lane], &slopes[lane], &mut self.r);
-            self.give(lane);
+            self.acted.take(lane, &self.trial, &self.force);
+            system.add_body_drive_force(&self.acted.q, &drives[lane], &slopes[lane], &mut self.acted.r);
+            self.acted.give(lane, &mut self.force);
         }
         self.run(EquilibriumPass::Predict);
         self.prediction.copy_from_slice(&self.trial);
@@ -122,7 +124,8 @@ impl LaneEquilibrium {
         course: &mut [LaneStatus; LANES],
     ) {
         let options = EquilibriumOptions::default();
-        let mut last = [f64::INFINITY; LANES];
+        let mut progress: [Corrections; LANES] =
+            std::array::from_fn(|lane| Corrections::new(way(lane).system.length_scale));
         expand(&mut self.expansion, drives);
         for iteration in 1..=options.iterations {
             for (goes, course) in self.goes.0.iter_mut().zip(&*course) {
@@ -139,30 +142,24 @@ impl LaneEquilibrium {
             let away = self.sizes(way, |m, k, i, lane| m.trial[k][i].0[lane] - m.prediction[k][i].0[lane]);
             for lane in (0..LANES).filter(|&lane| course[lane] == LaneStatus::Goes).collect::<Vec<_>>() {
                 let (system, correction) = (way(lane).system, corrections[lane]);
-                let scale = system.length_scale;
-                if self.vanished[lane]
-                    || !correction.is_finite()
-                    || (correction > last[lane] && correction > 1e-3 * scale)
-                {
+                if self.vanished[lane] || progress[lane].diverge(correction) {
                     course[lane] = LaneStatus::GivenUp;
                     continue;
                 }
-                let reach = reaches[lane].max(1e-6 * scale);
-                let stalled = correction <= STALLED * reach && correction > 0.1 * last[lane];
-                last[lane] = correction;
-                // where parts touch, a stalled iteration has to balance, too: a single one continues
-                if stalled && correction > options.tolerance * reach {
-                    let touching = !system.members.is_empty()
+                // where parts touch, a stalled iteration has to balance, too: a single one decides that
+                let mut undecided = false;
+                let settled = progress[lane].settle(correction, (reaches[lane], options.tolerance), || {
+                    undecided = !system.members.is_empty()
                         && system.contact_scale(&self.lane(&self.trial, lane), &drives[lane].volts) > 0.0;
-                    if touching {
-                        course[lane] = LaneStatus::GivenUp;
-                        continue;
-                    }
-                }
-                if correction <= options.tolerance * reach || stalled {
+                    true
+                });
+                if undecided {
+                    course[lane] = LaneStatus::GivenUp;
+                } else if settled {
                     let stable = self.negative.lane(lane) == 0.0;
-                    let near = away[lane] <= 0.5 * predicted[lane] + 1e-3 * scale;
-                    let sound = stable && near && !self.leaps(lane, way(lane), &drives[lane]);
+                    let near = progress[lane].is_near(away[lane], predicted[lane]);
+                    let end = || self.lane(&self.trial, lane);
+                    let sound = stable && near && !leaps(system, &drives[lane].volts, way(lane).q, end);
                     course[lane] = if sound { LaneStatus::Arrived(iteration) } else { LaneStatus::GivenUp };
                 }
             }
@@ -180,60 +177,19 @@ impl LaneEquilibrium {
             if self.goes.0[lane] == 0.0 || !system.is_acted_on(drive) {
                 continue;
             }
-            self.take(lane);
-            system.add_body_forces(&self.q, drive, &mut self.r);
-            self.give(lane);
-            let Self { tangent, own, acted, blocks, q, .. } = self;
-            for (lanes, own, which) in
-                [(&mut tangent.diagonal, &mut own.diagonal, &*acted), (&mut tangent.below, &mut own.below, &*blocks)]
-            {
-                for &b in which {
-                    (0..9).for_each(|e| own[b][(e % 3, e / 3)] = lanes[b][e / 3][e % 3].lane(lane));
-                }
-            }
-            system.add_body_tangent(q, drive, own);
-            for (lanes, own, which) in
-                [(&mut tangent.diagonal, &own.diagonal, &*acted), (&mut tangent.below, &own.below, &*blocks)]
-            {
-                for &b in which {
-                    (0..9).for_each(|e| lanes[b][e / 3][e % 3].set_lane(lane, own[b][(e % 3, e / 3)]));
-                }
-            }
+            let Self { tangent, acted, trial, force, .. } = self;
+            acted.take(lane, trial, force);
+            system.add_body_forces(&acted.q, drive, &mut acted.r);
+            acted.give(lane, force);
+            acted.take_tangent(lane, tangent);
+            system.add_body_tangent(&acted.q, drive, &mut acted.tangent);
+            acted.give_tangent(lane, tangent);
         }
         self.run(EquilibriumPass::Factor);
     }
 
-    /// Displacement of a lane's bodies that are acted on, and the force on them.
-    fn take(&mut self, lane: usize) {
-        let pose = |p: &LanePose| Pose::new(p[0].lane(lane), p[1].lane(lane), p[2].lane(lane));
-        for &b in &self.acted {
-            (self.q[b], self.r[b]) = (pose(&self.trial[b]), pose(&self.force[b]));
-        }
-    }
-
-    fn give(&mut self, lane: usize) {
-        for &b in &self.acted {
-            (0..3).for_each(|i| self.force[b][i].set_lane(lane, self.r[b][i]));
-        }
-    }
-
     fn lane(&self, x: &[LanePose], lane: usize) -> Vec<Pose> {
-        x.iter().map(|p| Pose::new(p[0].lane(lane), p[1].lane(lane), p[2].lane(lane))).collect()
-    }
-
-    /// As `leaps` of [`super::Equilibrium`].
-    fn leaps(&self, lane: usize, way: &BatchPath<'_>, drive: &Drive) -> bool {
-        let system = way.system;
-        let closes = |(gap, volts): &(usize, &f64)| **volts != 0.0 && system.members[*gap].is_electrostatic();
-        let mut closing = drive.volts.iter().enumerate().filter(closes).peekable();
-        if closing.peek().is_none() {
-            return false;
-        }
-        let trial = self.lane(&self.trial, lane);
-        closing.any(|(gap, _)| {
-            let (before, after) = (system.distance(gap, way.q), system.distance(gap, &trial));
-            (after - before).abs() > LEAP * before.max(after)
-        })
+        x.iter().map(|p| pose_in_lane(p, lane)).collect()
     }
 
     /// Largest displacement of a body in each lane, as `size` of one variant.

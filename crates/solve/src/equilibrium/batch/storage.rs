@@ -1,11 +1,10 @@
 //! Storage for a batch of equilibria.
 
+use crate::equations::acted_bodies::ActedBodies;
 use bimorph_domains::System;
 use bimorph_multibody::batch::joint::LanePlaced;
 use bimorph_multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, ZERO_POSE};
-use bimorph_multibody::planar::Pose;
 use bimorph_multibody::scalar::has_lanes;
-use bimorph_multibody::{BlockMatrix, Pattern};
 
 /// As many variants as there are lanes, with storage.
 #[derive(Debug, Clone)]
@@ -26,17 +25,8 @@ pub struct LaneEquilibrium {
     pub(super) goes: Lane8,
     pub(super) negative: Lane8,
     pub(super) vanished: [bool; LANES],
-    /// Bodies that gaps and loads act on, and the blocks between them.
-    pub(super) acted: Vec<usize>,
-    pub(super) blocks: Vec<usize>,
+    pub(super) acted: ActedBodies,
     pub(super) gaps: usize,
-    pub(super) q: Vec<Pose>,
-    pub(super) r: Vec<Pose>,
-    pub(super) own: BlockMatrix<f64, 3>,
-}
-
-fn block(pattern: &Pattern, row: usize, column: usize) -> Option<usize> {
-    if row > column { pattern.block(row, column) } else { None }
 }
 
 impl LaneEquilibrium {
@@ -44,8 +34,6 @@ impl LaneEquilibrium {
     pub fn new(first: &System) -> Option<Self> {
         let model = LaneModel::new(&first.model).filter(|_| has_lanes() && first.electrics.inputs.is_empty())?;
         let (n, pattern) = (first.bodies(), &first.model.pattern);
-        let acted = first.acted_on();
-        let between = |&row: &usize| acted.iter().filter_map(move |&column| block(pattern, row, column));
         let heaters = first.electrics.heating.heaters.len();
         Some(Self {
             tangent: LaneMatrix::new(pattern),
@@ -60,12 +48,8 @@ impl LaneEquilibrium {
             goes: Lane8::of(1.0),
             negative: Lane8::NONE,
             vanished: [false; LANES],
-            blocks: acted.iter().flat_map(between).collect(),
-            acted,
+            acted: ActedBodies::new(first),
             gaps: first.members.len(),
-            q: vec![Pose::zeros(); n],
-            r: vec![Pose::zeros(); n],
-            own: BlockMatrix::new(pattern),
             model,
         })
     }
@@ -76,6 +60,6 @@ impl LaneEquilibrium {
             && system.electrics.inputs.is_empty()
             && self.expansion.len() == system.electrics.heating.heaters.len()
             && self.gaps == system.members.len()
-            && self.acted == system.acted_on()
+            && self.acted.fits(system)
     }
 }

@@ -28,7 +28,7 @@ impl LaneRodas4 {
             && (!self.losses.is_empty() || !system.loses())
             && self.heat.count() == system.electrics.heating.heaters.len()
             && self.drives[0].volts.len() == system.members.len()
-            && self.acted == system.acted_on()
+            && self.acted.fits(system)
     }
 
     /// Puts the numbers of a variant that fits, and its motion, into one lane. The sources of its ramp must hold their

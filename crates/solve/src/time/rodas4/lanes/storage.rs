@@ -3,13 +3,13 @@
 use super::super::body_stage::BodyState;
 use super::heat::LaneHeat;
 use super::motion::{LaneMotion, Norms};
+use crate::equations::acted_bodies::ActedBodies;
 use bimorph_domains::loss_derivatives::LossDerivatives;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::batch::joint::LanePlaced;
 use bimorph_multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, SimdReal, ZERO_POSE, load, store};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::scalar::has_lanes;
-use bimorph_multibody::{BlockMatrix, Pattern};
 
 /// Run of a lane.
 #[derive(Debug, Clone)]
@@ -61,20 +61,12 @@ pub struct LaneRodas4 {
     pub(super) rate: Vec<Lane8>,
     pub(super) vanished: [bool; LANES],
     pub(super) h: Lane8,
-    pub(super) acted: Vec<usize>,
-    pub(super) acted_blocks: Vec<usize>,
+    pub(super) acted: ActedBodies,
     pub(super) drives: Vec<Drive>,
-    pub(super) q: Vec<Pose>,
-    pub(super) r: Vec<Pose>,
-    pub(super) tangent: BlockMatrix<f64, 3>,
     /// Contact losses, lane by lane; empty where parts cannot touch.
     pub(super) losses: Vec<LossDerivatives>,
     /// r₁ and rates of one lane.
     pub(super) rates: [Vec<Pose>; 2],
-}
-
-fn block(pattern: &Pattern, row: usize, column: usize) -> Option<usize> {
-    if row > column { pattern.block(row, column) } else { None }
 }
 
 impl LaneRodas4 {
@@ -86,8 +78,6 @@ impl LaneRodas4 {
             has_lanes() && electrics.inputs.is_empty() && !electrics.heating.is_hot() && !system.compresses_gas();
         let model = LaneModel::new(&system.model).filter(|_| suits)?;
         let (n, pattern) = (system.bodies(), &system.model.pattern);
-        let acted = system.acted_on();
-        let between = |&row: &usize| acted.iter().filter_map(move |&column| block(pattern, row, column));
         let none = BodyState { q: ZERO_POSE, v: ZERO_POSE };
         let heaters = system.electrics.heating.heaters.len();
         Some(Self {
@@ -108,12 +98,8 @@ impl LaneRodas4 {
             rate: vec![Lane8::NONE; heaters],
             vanished: [false; LANES],
             h: Lane8::of(1.0),
-            acted_blocks: acted.iter().flat_map(between).collect(),
-            acted,
+            acted: ActedBodies::new(system),
             drives: vec![system.electrics.drive(); LANES],
-            q: vec![Pose::zeros(); n],
-            r: vec![Pose::zeros(); n],
-            tangent: BlockMatrix::new(pattern),
             losses: vec![LossDerivatives::new(system); if system.can_touch() { LANES } else { 0 }],
             rates: [(); 2].map(|()| vec![Pose::zeros(); n]),
             model,
