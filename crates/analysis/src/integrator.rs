@@ -1,6 +1,7 @@
 //! The integrators by name, and the one place where a name becomes a type.
 
 use bimorph_domains::{Ramp, System};
+use bimorph_multibody::planar::Pose;
 use bimorph_solve::SolveError;
 use bimorph_solve::baseline::Solver;
 use bimorph_solve::equations::newton::Newton;
@@ -8,6 +9,7 @@ use bimorph_solve::equations::{Bodies, Equations, Staged, Unknown};
 use bimorph_solve::time::adaptive::{Adaptive, Advance, Control, Observer};
 use bimorph_solve::time::alpha::GeneralizedAlpha;
 use bimorph_solve::time::average_field::AverageField;
+use bimorph_solve::time::defect::{Estimated, Propagates, SeeError};
 use bimorph_solve::time::dirk::Dirk;
 use bimorph_solve::time::doubling::Doubling;
 use bimorph_solve::time::explicit::{self, Rk45};
@@ -186,6 +188,21 @@ impl IntegrationRule {
     }
 }
 
+impl IntegrationRun<'_, '_, Pose> {
+    /// Runs a method over bodies, with the error of the motion where something sees it.
+    pub(crate) fn with_errors<'s, M: Propagates<'s>>(
+        self,
+        bodies: &mut Bodies<'s>,
+        method: M,
+        errors: Option<SeeError<'_>>,
+    ) -> (Result<Advance, SolveError>, SolverCounters) {
+        match errors {
+            Some(see) => self.with(bodies, Estimated::new(method, see)),
+            None => self.with(bodies, method),
+        }
+    }
+}
+
 /// Data of a run that do not depend on the method.
 pub struct IntegrationRun<'a, 'b, X> {
     /// Where it begins; becomes where it ends.
@@ -199,13 +216,23 @@ pub struct IntegrationRun<'a, 'b, X> {
 }
 
 impl<X: Unknown> IntegrationRun<'_, '_, X> {
-    fn with<E: Equations<Unknown = X>, M: Method<E>>(
+    /// Runs a method, and returns it with its storage.
+    pub(crate) fn stepped<E: Equations<Unknown = X>, M: Method<E>>(
         mut self,
         equations: &mut E,
         method: M,
-    ) -> (Result<Advance, SolveError>, SolverCounters) {
+    ) -> (Result<Advance, SolveError>, Adaptive<M, X>) {
         let mut stepper = Adaptive::new(equations.unknowns(), method);
         let end = stepper.advance(equations, self.motion, &mut self.h, self.control, usize::MAX, self.observe);
+        (end, stepper)
+    }
+
+    fn with<E: Equations<Unknown = X>, M: Method<E>>(
+        self,
+        equations: &mut E,
+        method: M,
+    ) -> (Result<Advance, SolveError>, SolverCounters) {
+        let (end, stepper) = self.stepped(equations, method);
         (end, stepper.work())
     }
 

@@ -4,7 +4,7 @@
 //! beyond where motion overshoots. Where it would not pay (a tolerance of 1e-4 or below, more directions than a fifth of the
 //! strains) or cannot be trained, the full model is taken, and a warning says why.
 
-use super::integrator::Integrator;
+use super::integrator::{IntegrationRun, Integrator};
 use super::statics::{OperatingPoint, operating_point, source_vector};
 use super::transient::first_step;
 use super::transient::options::TransientOptions;
@@ -21,7 +21,7 @@ use bimorph_solve::reduced::space::spanned;
 use bimorph_solve::reduced::statics::ReducedStatics;
 use bimorph_solve::reduced::taylor::DriveRay;
 use bimorph_solve::reduced::{InputBox, ReducedSpace, ReductionError, Training, TrainingCase, TrainingOptions, train};
-use bimorph_solve::time::adaptive::{Adaptive, Advance, Observer};
+use bimorph_solve::time::adaptive::{Advance, Observer};
 use bimorph_solve::time::defect::SeeError;
 use bimorph_solve::time::method::{Motion, SolverCounters};
 use bimorph_solve::time::reduced_rodas4::ReducedRodas4;
@@ -246,12 +246,11 @@ impl Propagator for ReducedPropagator<'_> {
         _: Option<SeeError<'_>>,
     ) -> Result<(Advance, SolverCounters), AnalysisError> {
         let system = &self.compiled.parts.system;
-        let mut h = first_step(system, self.options.stop);
+        let h = first_step(system, self.options.stop);
+        let run = IntegrationRun { motion, h, control: self.options.control(), observe };
         let method = ReducedRodas4::new(Arc::clone(self.space), h).with_estimate(system);
-        let mut stepper = Adaptive::new(system.bodies(), method);
-        let mut bodies = Bodies::new(system, ramp);
-        let end = stepper.advance(&mut bodies, motion, &mut h, self.options.control(), usize::MAX, observe)?;
+        let (end, stepper) = run.stepped(&mut Bodies::new(system, ramp), method);
         (self.error, self.excess) = (stepper.method.error(), stepper.method.excess);
-        Ok((end, stepper.work()))
+        Ok((end?, stepper.work()))
     }
 }

@@ -14,7 +14,7 @@ pub(super) mod result;
 mod samples;
 
 use super::formulation::{self, Formulation};
-use super::integrator::Integrator;
+use super::integrator::{IntegrationRun, Integrator};
 use super::joint_transient::joint_transient;
 use super::reduced::reduced_transient;
 use super::{AnalysisError, ProgressCallback};
@@ -22,8 +22,8 @@ use bimorph_domains::{Ramp, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_solve::baseline::{Solver, SolverKind};
 use bimorph_solve::equations::Bodies;
-use bimorph_solve::time::adaptive::{Adaptive, Advance, Observer};
-use bimorph_solve::time::defect::{Estimated, SeeError};
+use bimorph_solve::time::adaptive::{Advance, Observer};
+use bimorph_solve::time::defect::SeeError;
 use bimorph_solve::time::method::{Motion, SolverCounters};
 use bimorph_solve::time::rodas4::Rodas4;
 pub use first_step::first_step;
@@ -59,11 +59,10 @@ impl Propagator for Compliant<'_> {
         let solver = Solver::new(options.solver, &self.system.model.pattern)?;
         let h = first_step(self.system, options.stop);
         if let Some(see) = errors.filter(|_| options.method == Integrator::Rodas4 && !self.system.turns()) {
-            let method = Estimated::new(Rodas4::with_solver(solver, self.system, &[]), see);
-            let mut stepper = Adaptive::new(self.system.bodies(), method);
-            let (mut bodies, mut h) = (Bodies::new(self.system, ramp), h);
-            let end = stepper.advance(&mut bodies, motion, &mut h, options.control(), usize::MAX, observe)?;
-            return Ok((end, stepper.work()));
+            let run = IntegrationRun { motion, h, control: options.control(), observe };
+            let method = Rodas4::with_solver(solver, self.system, &[]);
+            let (end, work) = run.with_errors(&mut Bodies::new(self.system, ramp), method, Some(see));
+            return Ok((end?, work));
         }
         let (end, work) = options.method.advance(self.system, solver, ramp, motion, h, options.control(), observe);
         Ok((end?, work))

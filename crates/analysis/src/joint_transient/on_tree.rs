@@ -2,6 +2,7 @@
 //! configuration.
 
 use super::super::formulation::Formulation;
+use super::super::integrator::IntegrationRun;
 use super::super::transient::first_step::first_step;
 use super::super::transient::options::TransientOptions;
 use super::super::transient::record::{Propagator, record};
@@ -12,8 +13,8 @@ use bimorph_domains::{Ramp, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_solve::baseline::SolverKind;
 use bimorph_solve::equations::{Bodies, Joints};
-use bimorph_solve::time::adaptive::{Adaptive, Advance, Observer};
-use bimorph_solve::time::defect::{Estimated, SeeError};
+use bimorph_solve::time::adaptive::{Advance, Observer};
+use bimorph_solve::time::defect::SeeError;
 use bimorph_solve::time::joint_rodas4::JointRodas4;
 use bimorph_solve::time::method::{Motion, SolverCounters};
 use std::sync::Arc;
@@ -77,16 +78,10 @@ impl Propagator for TreePropagator<'_> {
                 ),
             });
         }
-        let mut h = first_step(self.system, options.stop);
+        let h = first_step(self.system, options.stop);
+        let run = IntegrationRun { motion, h, control: options.control(), observe };
         let method = JointRodas4::new(Arc::clone(self.joints), h, &[]);
-        let mut bodies = Bodies::new(self.system, ramp);
-        if let Some(see) = errors {
-            let mut stepper = Adaptive::new(self.system.bodies(), Estimated::new(method, see));
-            let end = stepper.advance(&mut bodies, motion, &mut h, options.control(), usize::MAX, observe)?;
-            return Ok((end, stepper.work()));
-        }
-        let mut stepper = Adaptive::new(self.system.bodies(), method);
-        let end = stepper.advance(&mut bodies, motion, &mut h, options.control(), usize::MAX, observe)?;
-        Ok((end, stepper.work()))
+        let (end, work) = run.with_errors(&mut Bodies::new(self.system, ramp), method, errors);
+        Ok((end?, work))
     }
 }
