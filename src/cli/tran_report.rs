@@ -5,13 +5,14 @@ use super::model::{Context, JsonMap};
 use super::report;
 use super::solver::SolverChoice;
 use bimorph::analysis::joint_transient::JointReport;
-use bimorph::analysis::transient::{Counters, CrossingEvent, Statistics, StressMaximum, TransientResult};
+use bimorph::analysis::transient::{CrossingEvent, Statistics, StressMaximum, TransientResult};
 use bimorph::compile::CompiledModel;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::chart::{self, Panel, PanelChart, Series};
 use bimorph::results::plot::svg::Picture;
 use bimorph::results::table::Table;
 use bimorph::solve::time::event::Direction;
+use bimorph::solve::time::method::SolverCounters;
 use serde::Serialize;
 
 /// A half-sine shock: its peak along x and y, and its duration.
@@ -27,7 +28,7 @@ pub(super) struct TransientDocument<'a> {
     pub(super) signals: JsonMap<'a, Vec<f64>>,
     pub(super) units: JsonMap<'a, String>,
     pub(super) method: &'a str,
-    pub(super) counters: Counters,
+    pub(super) counters: SolverCounters,
     pub(super) events: &'a [CrossingEvent],
     pub(super) joint_coordinates: Option<JointReport>,
     /// The formulation that auto chose, and the reason.

@@ -29,7 +29,7 @@ use bimorph_solve::time::rodas4::Rodas4;
 pub use first_step::first_step;
 pub use options::{TransientOptions, Until};
 use record::{Propagator, record};
-pub use result::{Counters, CrossingEvent, Statistics, StressMaximum, TransientResult};
+pub use result::{CrossingEvent, Statistics, StressMaximum, TransientResult};
 
 /// The bodies' own coordinates, joints as springs.
 struct Compliant<'a> {

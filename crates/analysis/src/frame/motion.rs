@@ -1,7 +1,7 @@
 //! Motion of a linear frame in time, by Newmark's rule.
 
 use super::super::transient::options::{TransientOptions, check};
-use super::super::transient::result::{Counters, TransientResult};
+use super::super::transient::result::TransientResult;
 use super::super::{AnalysisError, ProgressCallback};
 use super::{balance, force, singular, steady};
 use crate::readout::ReadoutError;
@@ -13,6 +13,7 @@ use bimorph_model::discretize::frame::LinearFrame;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::baseline::frame_motion::Newmark;
 use bimorph_solve::baseline::sparse::Sparse;
+use bimorph_solve::time::method::SolverCounters;
 
 /// Steps between two output times are doubled until the motion settles, up to this many.
 const MAX_STEPS: usize = 1 << 14;
@@ -49,8 +50,8 @@ pub fn frame_transient(
     let electrics = &compiled.parts.system.electrics;
     let ramp = Ramp::new(electrics, &sources, &sources, &rise, options.stop);
     let spacing = options.stop / (options.points - 1) as f64;
-    let mut counters = Counters::default();
-    let mut run = |between: usize, counters: &mut Counters| -> Result<Vec<Vec<f64>>, AnalysisError> {
+    let mut counters = SolverCounters::default();
+    let mut run = |between: usize, counters: &mut SolverCounters| -> Result<Vec<Vec<f64>>, AnalysisError> {
         let solver = Sparse::new(&frame.system.pattern)?;
         let h = spacing / between as f64;
         let mut rule = Newmark::new(solver, &frame.system, h).map_err(|p| singular(frame, p))?;

@@ -11,7 +11,7 @@ use super::film_pressure::FilmPressure;
 use super::folded_segments;
 use super::options::{TransientOptions, check};
 use super::peak_stress::PeakStress;
-use super::result::{Counters, TransientResult};
+use super::result::TransientResult;
 use super::samples::SampleRecorder;
 use crate::overheating::check_course;
 use crate::readout::expression::Expression;
@@ -126,7 +126,7 @@ pub(crate) fn record(
     Ok(TransientResult {
         t: samples.t,
         signals: named.map(|((name, s), values)| (name.clone(), s.unit().to_owned(), values)).collect(),
-        counters: counters(work),
+        counters: work,
         unknowns: compiled.unknowns(),
         estimated_error: compiled.order.estimated_error,
         step_error: estimate.as_ref().map(|estimate| estimate.error),
@@ -144,11 +144,6 @@ pub(crate) fn record(
             .chain(unreached)
             .collect(),
     })
-}
-
-fn counters(work: SolverCounters) -> Counters {
-    let SolverCounters { steps, rejected, factorizations, solves, forces, iterations, .. } = work;
-    Counters { steps, rejected, factorizations, solves, forces, iterations }
 }
 
 /// Refuses the motion at time `t` (s) where parts touch and the method gains energy in contact.

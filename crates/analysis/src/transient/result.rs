@@ -1,24 +1,8 @@
 //! Result of a transient: sampled signals, crossings of levels, and the work.
 
 use bimorph_solve::time::event::Direction;
+use bimorph_solve::time::method::SolverCounters;
 use serde::Serialize;
-
-/// Work done by an integration.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Counters {
-    /// Accepted steps.
-    pub steps: u64,
-    /// Rejected steps.
-    pub rejected: u64,
-    /// Factorizations.
-    pub factorizations: u64,
-    /// Solves with a factor.
-    pub solves: u64,
-    /// Evaluations of the forces, with or without their tangent.
-    pub forces: u64,
-    /// Newton iterations.
-    pub iterations: u64,
-}
 
 /// A signal that crossed a level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -78,7 +62,7 @@ pub struct TransientResult {
     /// Samples of each signal, in the requested order: (name, unit, values).
     pub signals: Vec<(String, String, Vec<f64>)>,
     /// Work done.
-    pub counters: Counters,
+    pub counters: SolverCounters,
     /// Mechanical unknowns.
     pub unknowns: usize,
     /// Largest estimated relative error by the mesh (1); none without an estimate.

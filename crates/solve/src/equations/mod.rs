@@ -35,9 +35,10 @@ pub use joints::Joints;
 pub use motion::{Motion, Unknown};
 
 use bimorph_multibody::factor::ZeroPivot;
+use serde::Serialize;
 
 /// Work done.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct SolverCounters {
     /// Accepted steps.
     pub steps: u64,

@@ -6,9 +6,10 @@ use bimorph_analysis::mode_quality::ModeLoss;
 use bimorph_analysis::modes::ModesResult;
 use bimorph_analysis::pull_in::PullInResult;
 use bimorph_analysis::statics::{NodeMotion, StaticResult};
-use bimorph_analysis::transient::{Counters, CrossingEvent, Statistics, TransientResult, Until};
+use bimorph_analysis::transient::{CrossingEvent, Statistics, TransientResult, Until};
 use bimorph_solve::equilibrium::{LossKind, StabilityLoss};
 use bimorph_solve::event::Direction;
+use bimorph_solve::method::SolverCounters;
 
 fn size(n: u64) -> usize {
     usize::try_from(n).unwrap_or(usize::MAX)
@@ -176,7 +177,7 @@ pub fn pull_in_from_wire(wire: proto::PullInResponse) -> PullInResult {
 
 /// The end of a transient as it travels.
 pub fn summary_to_wire(result: &TransientResult) -> proto::TransientSummary {
-    let Counters { steps, rejected, factorizations, solves, forces, iterations } = result.counters;
+    let SolverCounters { steps, rejected, factorizations, solves, forces, iterations } = result.counters;
     let events = result.events.iter().map(|e| proto::Crossing {
         signal: e.signal.clone(),
         level: e.level,
@@ -276,7 +277,7 @@ pub fn transient_from_wire(
     TransientResult {
         t,
         signals: signals.collect(),
-        counters: Counters { steps, rejected, factorizations, solves, forces, iterations },
+        counters: SolverCounters { steps, rejected, factorizations, solves, forces, iterations },
         unknowns: size(unknowns),
         estimated_error,
         step_error,
