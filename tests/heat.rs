@@ -224,3 +224,164 @@ fn three_temperatures() {
     let run = transient(&compiled, &options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{e}"));
     assert!(run.signals[0].2.iter().all(|t| (t / found - 1.0).abs() < 1e-9), "{:?}", run.signals[0].2);
 }
+
+/// Silicon's thermal expansion (1/K) (Okada and Tokumaru, J. Appl. Phys. 56, 1984), in a table each 50 K from 250 to 1300 K.
+fn silicon() -> String {
+    let expansion = |t: f64| 1e-6 * (3.725 * (1.0 - (-5.88e-3 * (t - 124.0)).exp()) + 5.548e-4 * t);
+    let points = (0..=21).map(|k| 250.0 + 50.0 * f64::from(k)).map(|t| format!("{t}, {:e}", expansion(t)));
+    format!("table({})", points.collect::<Vec<_>>().join(", "))
+}
+
+/// A bar without the constants of [`bar`], which a layer gives.
+fn curved(layer: &str) -> Result<Arc<CompiledModel>, String> {
+    let text = format!(
+        "process si = [ Youngsmodulus=160e9 density=2330 h=2u
+{layer} ]
+anchor si [cold] []
+arm beam2det si [cold far] [l=200u w=2u]
+anchor si [far] []
+eground * [cold] []
+{PORT}"
+    );
+    compile(&Bundle::from_text("bar.net", &text), &CompileOptions::default()).map(Arc::new).map_err(|e| e.to_string())
+}
+
+const PLAIN: &str = "resistivity=2e-5 thermcond=32 thermalexpansion=2.7e-6";
+
+/// A polynomial has the temperatures and the current of the TCR that it is to 1e-12, a table of k₀/(1 + β·T) each 20 K the highest rise of
+/// Kirchhoff's transformation (238.952 K) to 1e-4.
+#[test]
+fn curves_stand_for_coefficients() {
+    let steady = |model: &CompiledModel| {
+        let found = static_equilibrium(model, &[("feed".into(), 1.0)]).unwrap_or_else(|e| panic!("{e}"));
+        [found.temperatures_k[0].1, found.peak_temperatures_k[0].1, found.currents_a[0].1]
+    };
+    let linear = steady(&bar("TCR=1.25e-3 TCC=1e-3 specificheat=700", PORT));
+    let curve =
+        "resistivity=polynomial(2e-5, 2.5e-8) thermcond=32 thermalexpansion=2.7e-6 specificheat=polynomial(700, 0.7)";
+    for (found, wanted) in steady(&curved(curve).unwrap()).into_iter().zip(linear) {
+        assert!((found / wanted - 1.0).abs() < 1e-12, "{found} {wanted}");
+    }
+    let points = (0..=20).map(|k| 20.0 * f64::from(k)).map(|t| format!("{t}, {:e}", 32.0 / (1.0 + 2e-3 * t)));
+    let table =
+        format!("resistivity=2e-5 thermcond=table({}) thermalexpansion=2.7e-6", points.collect::<Vec<_>>().join(", "));
+    let found = steady(&curved(&table).unwrap());
+    assert!((found[1] / 238.952098 - 1.0).abs() < 1e-4 && (found[2] / 1e-3 - 1.0).abs() < 1e-9, "{found:?}");
+}
+
+/// Expansion that depends on temperature acts by its mean along the beam. A bar between anchors at 0.5 V, with the rise 4·T·s·(1 − s) and T = 48.828125 K, is
+/// pressed by E·(a·2T/3 + b/2·8T²/15), to 1e-9 of the ratio to one with the expansion a alone. A run ends there, within its tolerance.
+#[test]
+fn expansion_with_temperature() {
+    let layer =
+        |expansion: &str| format!("resistivity=2e-5 thermcond=32 specificheat=700 thermalexpansion={expansion}");
+    let stress = |expansion: &str| {
+        let mut device = LocalDevice::new(curved(&layer(expansion)).unwrap());
+        device.open(&OpenRequest { ports: Vec::new(), signals: vec!["arm.stress".into()], noise: None }).unwrap();
+        let mut reply = TrialReply::default();
+        let trial = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[0.5] };
+        device.trial(&trial, &mut reply).unwrap();
+        reply.outputs[0]
+    };
+    let top = 48.828125f64;
+    let (constant, grown) = (2.7e-6 * 2.0 * top / 3.0, 2e-8 * 8.0 * top * top / 15.0);
+    let [alone, both] = [stress("2.7e-6"), stress("polynomial(2.7e-6, 4e-8)")];
+    assert!((both / alone * constant / (constant + grown) - 1.0).abs() < 1e-9, "{alone} {both}");
+    // the roots at the anchors are 2.5e-4 stiffer than a beam that begins in a point
+    assert!((alone / (160e9 * constant) - 1.0).abs() < 5e-4, "{alone}");
+    let options = TransientOptions {
+        stop: 2e-3,
+        signals: vec!["arm.stress".into()],
+        points: 11,
+        voltages: vec![("feed".to_owned(), 0.5)],
+        ..TransientOptions::default()
+    };
+    let model = curved(&layer("polynomial(2.7e-6, 4e-8)")).unwrap();
+    let run = transient(&model, &options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{e}"));
+    assert!((run.signals[0].2[10] / both - 1.0).abs() < 1e-3, "{} {both}", run.signals[0].2[10]);
+}
+
+/// Partials of the current, of the mean temperature and of the stress with the voltage agree with differences where every property has a table, in static
+/// trials and short steps to 1e-6, in long ones to 1e-5. The response at a low frequency is the static partial to 1e-6.
+#[test]
+fn partials_of_curves() {
+    let layer = "resistivity=table(0, 2e-5, 100, 2.2e-5, 250, 2.7e-5, 600, 4e-5, 1000, 6e-5)
+        thermcond=table(0, 32, 150, 27, 400, 20, 1000, 14) specificheat=table(0, 700, 200, 800, 500, 870, 1000, 900)
+        thermalexpansion=table(0, 2.6e-7, 100, 3.1e-7, 300, 3.6e-7, 1000, 4.1e-7)";
+    let mut device = LocalDevice::new(curved(layer).unwrap());
+    let signals = vec!["arm.T".into(), "arm.stress".into()];
+    device.open(&OpenRequest { ports: Vec::new(), signals, noise: None }).unwrap();
+    let mut ask = |mode, parent, dt, volts: f64| {
+        let mut reply = TrialReply::default();
+        device.trial(&Trial { mode, parent, t: dt, dt, voltages: &[volts] }, &mut reply).unwrap();
+        assert_eq!(reply.status, Status::Ok);
+        reply
+    };
+    let rest = ask(Mode::Static, None, 0.0, 1.0);
+    for (mode, dt, within) in [(Mode::Static, 0.0, 1e-6), (Mode::Transient, 1e-7, 1e-6), (Mode::Transient, 5e-5, 1e-5)]
+    {
+        let at = ask(mode, rest.token, dt, 1.2);
+        let (up, down) = (ask(mode, rest.token, dt, 1.2 + 1e-3), ask(mode, rest.token, dt, 1.2 - 1e-3));
+        let current = (up.currents[0] - down.currents[0]) / 2e-3;
+        assert!((at.di_dv[0] / current - 1.0).abs() < within, "{dt}: {} {current}", at.di_dv[0]);
+        for k in 0..2 {
+            let change = (up.outputs[k] - down.outputs[k]) / 2e-3;
+            assert!((at.doutputs_dv[k] / change - 1.0).abs() < within, "{dt} {k}: {} {change}", at.doutputs_dv[k]);
+        }
+    }
+    let at = ask(Mode::Static, None, 0.0, 1.2);
+    let mut response = SmallSignal::default();
+    device.linearize(at.token.unwrap(), 1e-2, &mut response).unwrap();
+    let [re, im] = response.admittance[0];
+    assert!((re / at.di_dv[0] - 1.0).abs() < 1e-6 && im.abs() < 1e-3 * re, "{re} {im}");
+    for k in 0..2 {
+        let [re, im] = response.outputs[k];
+        assert!((re / at.doutputs_dv[k] - 1.0).abs() < 1e-6 && im.abs() < 1e-3 * re.abs(), "{k}: {re} {im}");
+    }
+}
+
+/// A free silicon beam of 200 µm at 1000 K is longer than at 300 K by the integral of Okada's and Tokumaru's expansion (2.6385e-3 of it, by hand), to 1e-4.
+#[test]
+fn silicon_expands() {
+    let part = |t: f64| 1e-6 * (3.725 * (t + (-5.88e-3 * (t - 124.0)).exp() / 5.88e-3) + 2.774e-4 * t * t);
+    let strain = part(1000.0) - part(300.0);
+    assert!((strain / 2.6385e-3 - 1.0).abs() < 1e-4, "{strain}");
+    let text = format!(
+        "process si = [ Youngsmodulus=160e9 density=2330 h=2u ambienttemperature=300 thermalexpansion={} ]
+anchor si [a] []
+beam2d si [a b] [l=200u w=2u T=1000]",
+        silicon()
+    );
+    let model = compile(&Bundle::from_text("silicon.net", &text), &CompileOptions::default()).unwrap();
+    let tip = static_equilibrium(&model, &[]).unwrap().nodes.iter().find(|(name, _)| name == "b").unwrap().1;
+    assert!((tip.x / (200e-6 * strain) - 1.0).abs() < 1e-4, "{} {}", tip.x, 200e-6 * strain);
+}
+
+/// Tables that do not increase, are negative or do not cover the ambient temperature, a given temperature or a temperature that current leads to are one error
+/// each, with the property and its layer, or the beam.
+#[test]
+fn tables_are_checked() {
+    let refused = |layer: &str, wanted: &[&str]| {
+        let error = curved(layer).unwrap_err();
+        assert!(wanted.iter().all(|part| error.contains(part)) && error.matches("error[").count() < 2, "{error}");
+    };
+    let with =
+        |thermcond: &str, more: &str| format!("resistivity=2e-5 thermcond={thermcond} thermalexpansion=2.7e-6 {more}");
+    refused(&with("table(0, 32, 0, 30)", ""), &["bar.net:2", "must increase"]);
+    refused(&with("table(0, 32, 100, -1)", ""), &["bar.net:4", "`thermcond`", "layer `si`", "positive", "100 K"]);
+    refused(&with("table(200, 32, 400, 30)", ""), &["bar.net:4", "layer `si`", "200 to 400 K", "ambient temperature"]);
+    refused(&with("polynomial(-1, 2)", ""), &["bar.net:4", "`thermcond`", "positive"]);
+    refused(&with("table(0, 32, 400, 30)", "TCK=1e-3"), &["`TCK`"]);
+    refused(&format!("{PLAIN} specificheat=700 emissivity=table(0, 1, 1, 1)"), &["`emissivity`", "curve"]);
+    let model = curved(&with("table(0, 32, 100, 30, 150, 29)", "specificheat=700")).unwrap();
+    let voltages = vec![("feed".to_owned(), 2.0)];
+    let error = static_equilibrium(&model, &voltages).unwrap_err().to_string();
+    assert!(error.contains("`thermcond` goes from 0 to 150 K, which `arm` leaves"), "{error}");
+    let mut device = LocalDevice::new(model);
+    device.open(&OpenRequest { ports: Vec::new(), signals: Vec::new(), noise: None }).unwrap();
+    let mut reply = TrialReply::default();
+    let trial = Trial { mode: Mode::Transient, parent: None, t: 1e-3, dt: 1e-3, voltages: &[2.0] };
+    device.trial(&trial, &mut reply).unwrap();
+    let Status::Fail(error) = &reply.status else { panic!("{:?}", reply.status) };
+    assert!(error.contains("`thermcond` goes from 0 to 150 K, and `arm` reaches"), "{error}");
+}

@@ -31,6 +31,7 @@ mod mechanisms;
 mod mesh;
 mod mode_errors;
 mod motion;
+mod moving_anchors;
 mod near_limit_points;
 mod orientation;
 mod paths;

@@ -27,8 +27,8 @@ pub struct BeamState {
 /// The state of every beam, in the order of the structure; none of a beam with rigid directions, whose forces do not follow from strains.
 pub fn beam_states(compiled: &CompiledModel, point: &OperatingPoint) -> Vec<Option<BeamState>> {
     let model = &compiled.parts.system.model;
-    let heaters = &compiled.parts.system.electrics.heating.heaters;
-    let expansion = |k: usize| heaters[k].expansion * point.rise[k];
+    let heating = &compiled.parts.system.electrics.heating;
+    let expansion = |k: usize| heating.strain(k, &point.rise);
     let one = |(beam, stressed): (usize, &bimorph_model::discretize::stressed::StressedBeam)| {
         if stressed.rigid {
             return None;

@@ -149,10 +149,11 @@ fn steady(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<(Vec<f64>
 /// Forces of loads, built-in strains and heat.
 fn force(compiled: &CompiledModel, frame: &LinearFrame, rise: &[f64], out: &mut [Pose]) {
     out.copy_from_slice(&frame.load);
-    let heaters = &compiled.parts.system.electrics.heating.heaters;
-    for ((heater, rise), unit) in heaters.iter().zip(rise).zip(&frame.expansion) {
+    let heating = &compiled.parts.system.electrics.heating;
+    for (k, unit) in frame.expansion.iter().enumerate() {
+        let strain = heating.strain(k, rise);
         for (f, unit) in out.iter_mut().zip(unit) {
-            *f += unit * (heater.expansion * rise);
+            *f += unit * strain;
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::AnalysisError;
 use bimorph_domains::Ramp;
 use bimorph_domains::drive::Electrics;
+use bimorph_domains::thermal::TableEnd;
 use bimorph_model::compile::CompiledModel;
 use bimorph_structure::MOLTEN;
 
@@ -13,25 +14,43 @@ use bimorph_structure::MOLTEN;
 pub fn check_heat(compiled: &CompiledModel, electrics: &Electrics, sources: &[f64]) -> Result<(), AnalysisError> {
     electrics.heating.check(sources).map_err(|error| {
         let name = &compiled.structure.beams[compiled.parts.heaters[error.heater]].name;
-        let detail = format!(
-            "thermal runaway of `{name}`: no stable temperature above {:.5} of these voltages, where it is {:.0} K above ambient; lower \
-             the voltages, or check `TCR`",
-            error.share.sqrt(),
-            error.rise
-        );
+        let detail = match &error.end {
+            Some(end) => format!("{}, which `{name}` leaves above {:.5} of these voltages", uncovered(end), error.share.sqrt()),
+            None => format!(
+                "thermal runaway of `{name}`: no stable temperature above {:.5} of these voltages, where it is {:.0} K above ambient; lower \
+                 the voltages, or check `TCR`",
+                error.share.sqrt(),
+                error.rise
+            ),
+        };
         AnalysisError::NoEquilibrium { detail, coarse: Vec::new() }
     })
+}
+
+/// A table that ends, as the beginning of a sentence.
+fn uncovered(end: &TableEnd) -> String {
+    let [low, high] = end.range;
+    format!("the table of `{}` goes from {low} to {high} K", end.property)
 }
 
 /// Checks that rises stay within bounds over a step or a run.
 ///
 /// # Errors
 /// [`AnalysisError::StepFailed`] with the time.
-pub fn check_course(ramp: &Ramp<'_>) -> Result<(), AnalysisError> {
-    ramp.overheated().map_or(Ok(()), |t| {
-        let detail = "thermal runaway: the temperature of a beam with a `TCR` grows without bound".into();
-        Err(AnalysisError::StepFailed { t, dt: ramp.dt - t, detail })
-    })
+pub fn check_course(compiled: &CompiledModel, ramp: &Ramp<'_>) -> Result<(), AnalysisError> {
+    let Some((t, end)) = ramp.overheated() else { return Ok(()) };
+    let name = |k: usize| compiled.structure.beams[compiled.parts.heaters[k]].name.as_str();
+    let detail = match end {
+        Some((k, end)) => {
+            format!("{}, and `{}` reaches {:.1} K; add points", uncovered(&end), name(k), end.temperature)
+        }
+        None => {
+            let limits = current_limits(compiled, ramp.to);
+            let name = ramp.hottest().map_or("a beam", name);
+            format!("thermal runaway of `{name}`: its temperature grows without bound{limits}")
+        }
+    };
+    Err(AnalysisError::StepFailed { t, dt: ramp.dt - t, detail })
 }
 
 /// Ports whose current has no steady state above a limit, as part of a sentence; empty where there are none.

@@ -107,7 +107,7 @@ impl DeviceSession {
         self.begin(parent);
         let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
         let mut ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
-        if let Err(error) = check_course(&ramp) {
+        if let Err(error) = check_course(compiled, &ramp) {
             reply.status = Status::Fail(error.to_string());
             return;
         }

@@ -118,6 +118,21 @@ impl Relations<'_> {
             let above = one.softening > ambient;
             self.require(above, ("yields", k, "softening"), "expected more than the ambient temperature of the beam")?;
         }
+        for (k, beam) in s.beams.iter().enumerate() {
+            let heater = beam.heater.iter();
+            let of_heater = heater.flat_map(|h| [&h.resistance_curve, &h.conductance_curve, &h.capacity_curve]);
+            for curve in of_heater.chain([&beam.material.expansion_curve]).flatten() {
+                if let Some(fault) = curve.fault() {
+                    self.require(false, ("beams", k, ""), &format!("a curve over temperature: {fault}"))?;
+                }
+                let covers = curve.covers(beam.material.ambient_temperature);
+                self.require(
+                    covers,
+                    ("beams", k, ""),
+                    "a table over temperature does not cover the ambient temperature",
+                )?;
+            }
+        }
         for (k, mass) in s.masses.iter().enumerate() {
             let sides = mass.outline[..2].iter().all(|side| *side >= 0.0);
             self.require(sides, ("masses", k, "outline"), "sides are at least 0")?;

@@ -12,10 +12,10 @@ use crate::value::{DocumentField, DocumentValue, DocumentWriter, NodeNames, Numb
 use bimorph_base::suggest::did_you_mean;
 use bimorph_base::{Setting, budget};
 use bimorph_structure::{
-    Adhesion, Beam, BeamGap, CircuitElement, Comb, FacingGas, FilmSlit, Friction, GasLoss, Heater, Impact,
-    InsulatingLayer, Link, Load, Mass, Material, Node, NodeId, NodeIndex, OhmicContact, Pad, Perforation,
-    PlacedElement, PlateGap, Port, Resistor, SolidHeat, SpringDamper, Stop, Structure, Support, VoltageSource, Wire,
-    Yield,
+    Adhesion, AnchorMotion, Beam, BeamGap, CircuitElement, Comb, FacingGas, FilmSlit, Friction, GasLoss, Heater,
+    Impact, InsulatingLayer, Link, Load, Mass, Material, Node, NodeId, NodeIndex, OhmicContact, Pad, Perforation,
+    PlacedElement, PlateGap, Port, PropertyCurve, Resistor, SolidHeat, SpringDamper, Stop, Structure, Support,
+    VoltageSource, Wire, Yield,
 };
 use std::collections::HashMap;
 
@@ -116,7 +116,7 @@ pub(crate) fn object_schemas() -> Vec<ObjectSchema> {
     macro_rules! of {
         ($($type:ident)+) => { vec![$($type::object_schema()),+] };
     }
-    of!(Node Material SolidHeat Beam Heater GasLoss Mass Link Support Pad SpringDamper Load Yield
+    of!(Node Material SolidHeat PropertyCurve Beam Heater GasLoss Mass Link Support AnchorMotion Pad SpringDamper Load Yield
         Impact InsulatingLayer FacingGas Perforation FilmSlit Comb PlateGap BeamGap OhmicContact Adhesion Friction Stop PlacedElement
         Resistor Wire VoltageSource CircuitElement Port)
 }

@@ -12,12 +12,14 @@
 //! C times minus their slopes with the conductance to the sides: the heat that is stored acts as a conductance s·C there.
 
 use super::fin::Fin;
+use super::heat_curves::HeatCurves;
 use super::laplacian::Laplacian;
 use bimorph_base::sets::Sets;
+use std::sync::Arc;
 use thiserror::Error;
 
 /// A conductor of heat and current between two nodes.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct HeatConductor {
     /// First node.
     pub a: usize,
@@ -49,6 +51,8 @@ pub struct HeatConductor {
     pub radiation: f64,
     /// Rise above ambient of the substrate to which the gas conducts (K).
     pub substrate: f64,
+    /// Properties that have curves over temperature; none: no one has.
+    pub curves: Option<Arc<HeatCurves>>,
 }
 
 impl HeatConductor {
@@ -56,7 +60,12 @@ impl HeatConductor {
     pub fn depends_on_temperature(&self) -> bool {
         let laws =
             [self.coefficient, self.thermal_coefficient, self.capacity_coefficient, self.radiation, self.substrate];
-        laws.iter().any(|x| *x != 0.0)
+        laws.iter().any(|x| *x != 0.0) || self.curves.is_some()
+    }
+
+    /// Whether its resistance depends on temperature.
+    pub fn changes_resistance(&self) -> bool {
+        self.coefficient != 0.0 || self.curves.as_ref().is_some_and(|curves| curves.resistance.is_some())
     }
 
     /// Its heat capacity, or that with which it alone between cold ends has the given time constant (J/K).

@@ -15,12 +15,14 @@ mod course;
 mod element;
 mod elimination;
 mod flows;
+mod means;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use course::{HotCourse, SourceLine};
 
 use super::conduction::HeatConductor;
+use super::heat_curves::TableEnd;
 use super::network::{ElectricalNetwork, KnownPotentials};
 use beam::{BeamChange, BeamResidual, HotBeam, Reduced};
 use bimorph_base::budget;
@@ -47,19 +49,23 @@ const CONVERGED: [f64; 2] = [1e-12, 1e-13];
 const SMALLEST_STEP: f64 = 1e-5;
 /// Decays of the heat within an element that its parabola resolves, where the resistance falls with temperature (1).
 const RESOLVED: f64 = 1.0;
+/// Distance from the end of a table at which the last state ends there, as a fraction of its range (1).
+const NEAR_END: f64 = 1e-3;
 /// Rise below ambient that rounding makes of none, as a fraction of the highest (1).
 const BELOW_AMBIENT: f64 = 1e-6;
 
-/// No stable steady state beyond a fraction of the heat.
+/// No stable steady state beyond a fraction of the heat: a thermal runaway, or a table of a property that ends.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("heater {heater} has no stable temperature beyond {share} of the heat")]
-pub struct ThermalRunaway {
+pub struct NoSteadyHeat {
     /// The hottest beam there.
     pub heater: usize,
     /// Fraction of the squares of the source voltages that has one (1).
     pub share: f64,
     /// Its highest rise there (K).
     pub rise: f64,
+    /// The table that ends there; none: a thermal runaway.
+    pub end: Option<TableEnd>,
 }
 
 /// Beams, resistors and sources.
@@ -83,6 +89,8 @@ pub(crate) struct HotNetwork {
     sources: usize,
     /// Heat among the inputs: its place in the source vector, and the beam.
     heated: Vec<(usize, usize)>,
+    /// Whether any property has a curve over temperature.
+    curved: bool,
     all: Arc<Unknowns>,
     electrical: Arc<Unknowns>,
 }
@@ -170,6 +178,8 @@ impl HotNetwork {
                 radiation: h.radiation,
                 ambient: h.ambient,
                 substrate: h.substrate,
+                expansion: h.expansion,
+                curves: h.curves.clone(),
                 elements: fine.clamp(MIN_ELEMENTS, MAX_ELEMENTS),
                 first: states,
             };
@@ -214,6 +224,7 @@ impl HotNetwork {
             resistors,
             sources: circuit.sources.len(),
             heated: Vec::new(),
+            curved: heaters.iter().any(|h| h.curves.is_some()),
             all: Arc::new(Unknowns(all)),
             electrical: Arc::new(Unknowns(electrical)),
         })
@@ -252,13 +263,6 @@ impl HotNetwork {
     fn inner_of<'a, T>(&self, k: usize, state: &'a [T]) -> &'a [T] {
         let bar = &self.bars[k];
         &state[bar.first..bar.first + bar.inner()]
-    }
-
-    /// Mean rise of each beam (K).
-    pub(crate) fn means(&self, state: &[f64], out: &mut [f64]) {
-        for (k, out) in out.iter_mut().take(self.bars.len()).enumerate() {
-            *out = self.bars[k].mean(self.ends_of(k, state), self.inner_of(k, state));
-        }
     }
 
     /// Highest rise along beam `k` (K).
@@ -427,13 +431,7 @@ impl HotNetwork {
         self.linearize((state, None), &flows.current, s, &mut equations);
         let mut moved = Flows { current: Vec::new(), potential: Vec::new() };
         self.respond(&mut equations, &self.forcing_of(unit), change, &mut moved);
-        for (k, mean) in means.iter_mut().enumerate() {
-            let part = |of: fn(T) -> f64| {
-                let inner: Vec<f64> = self.inner_of(k, change).iter().map(|x| of(*x)).collect();
-                self.bars[k].mean(self.changes_of(k, change).map(of), &inner)
-            };
-            *mean = T::from_real(part(T::real)) + unit_imaginary::<T>() * T::from_real(part(T::imaginary));
-        }
+        self.mean_changes(state, change, means);
     }
 
     /// Minus the residuals of a state, as a forcing; `rates` of the rises where capacities count (K/s).
@@ -520,8 +518,13 @@ impl HotNetwork {
     /// Whether a steady state is one that heating from cold leads to.
     fn is_reached(&self, state: &[f64], flows: &Flows<f64>, equations: &HotEquations<f64>) -> bool {
         // where its resistance vanishes, all heat of a beam is in layers at its ends that no mesh resolves
-        let resolved = self.bars.iter().zip(&flows.current).all(|(bar, current)| {
-            let decays = -bar.coefficient * bar.resistance * current * current / bar.conductance;
+        let resolved = self.bars.iter().enumerate().zip(&flows.current).all(|((k, bar), current)| {
+            let falls = || {
+                let extremes = bar.extremes(self.ends_of(k, state), self.inner_of(k, state));
+                extremes.map(|t| bar.resistivity(t)[1]).into_iter().fold(0.0, f64::min)
+            };
+            let coefficient = if bar.curves.is_some() { falls() } else { bar.coefficient };
+            let decays = -coefficient * bar.resistance * current * current / bar.conductance;
             decays.max(0.0).sqrt() <= RESOLVED * bar.elements as f64
         });
         let highest = state.iter().fold(0.0f64, |most, t| most.max(t.abs()));
@@ -529,14 +532,23 @@ impl HotNetwork {
             && equations.negative.is_multiple_of(2)
             && state.iter().all(|t| *t >= self.lowest - BELOW_AMBIENT * highest)
             && self.without_resistance(state).is_none()
+            && self.end_of_table(state, 0.0).is_none()
+    }
+
+    /// A beam that a table does not cover at a state, and the table.
+    pub(crate) fn end_of_table(&self, state: &[f64], near: f64) -> Option<(usize, TableEnd)> {
+        self.bars.iter().enumerate().find_map(|(k, bar)| {
+            let rises = bar.extremes(self.ends_of(k, state), self.inner_of(k, state));
+            Some((k, bar.curves.as_ref()?.end_of_table(rises, near)?))
+        })
     }
 
     /// A beam whose resistivity, thermal conductivity or heat capacity is not positive somewhere, with the rise there (K).
     fn without_resistance(&self, state: &[f64]) -> Option<(usize, f64)> {
         self.bars.iter().enumerate().find_map(|(k, bar)| {
             let extremes = bar.extremes(self.ends_of(k, state), self.inner_of(k, state));
-            let laws = [bar.coefficient, bar.thermal_coefficient, bar.capacity_coefficient];
-            let positive = |t: f64| laws.iter().all(|law| 1.0 + law * t > 0.0);
+            let laws = |t: f64| [bar.resistivity(t)[0], bar.conductivity(t)[0], bar.capacity_law(t)[0]];
+            let positive = |t: f64| laws(t).iter().all(|law| *law > 0.0 && law.is_finite());
             let lost = |t: &f64| !positive(*t);
             let found = extremes.into_iter().find(lost)?;
             Some((k, found))
@@ -546,8 +558,8 @@ impl HotNetwork {
     /// The steady state at source voltages `u`, heated from cold.
     ///
     /// # Errors
-    /// [`ThermalRunaway`].
-    pub(crate) fn steady(&self, u: &[f64], state: &mut [f64]) -> Result<Flows<f64>, ThermalRunaway> {
+    /// [`NoSteadyHeat`].
+    pub(crate) fn steady(&self, u: &[f64], state: &mut [f64]) -> Result<Flows<f64>, NoSteadyHeat> {
         let mut equations = HotEquations::default();
         let (mut reached, mut step) = (0.0, 1.0);
         let mut here = vec![0.0; self.states];
@@ -576,9 +588,12 @@ impl HotNetwork {
     }
 
     /// Why there is no steady state beyond the last one.
-    fn failure(&self, state: &[f64], share: f64) -> ThermalRunaway {
+    fn failure(&self, state: &[f64], share: f64) -> NoSteadyHeat {
+        if let Some((heater, end)) = self.end_of_table(state, NEAR_END) {
+            return NoSteadyHeat { heater, share, rise: self.peak(heater, state), end: Some(end) };
+        }
         let peaks = (0..self.bars.len()).map(|k| self.peak(k, state));
         let (heater, rise) = peaks.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0));
-        ThermalRunaway { heater, share, rise }
+        NoSteadyHeat { heater, share, rise, end: None }
     }
 }

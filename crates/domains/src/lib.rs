@@ -79,6 +79,7 @@ pub mod film_series;
 mod fin;
 pub mod friction;
 pub mod from_structure;
+mod heat_curves;
 pub mod hot;
 mod input;
 pub mod inputs;

@@ -17,7 +17,9 @@
 
 use super::conduction::Conduction;
 pub use super::conduction::{HeatConductor, NoHeatSink};
-use super::hot::{HotNetwork, ThermalRunaway};
+pub use super::heat_curves::{HeatCurves, RelativeCurve, TableEnd};
+use super::hot::HotNetwork;
+pub use super::hot::NoSteadyHeat;
 use super::input::Input;
 use super::network::{ElectricalNetwork, Potentials};
 use nalgebra::{ComplexField, DVector};
@@ -205,17 +207,38 @@ impl Heating {
         self.hot.is_some()
     }
 
-    /// Length of the vector of rises: one of each heater, then those of the nodes along them where resistances depend on temperature.
+    /// Length of the vector of rises: the means of each heater, then the rises of the nodes along them where properties depend on temperature.
     #[inline]
     pub fn states(&self) -> usize {
-        self.heaters.len() + self.hot.as_ref().map_or(0, |hot| hot.states())
+        self.means() + self.hot.as_ref().map_or(0, |hot| hot.states())
+    }
+
+    /// Its length without those nodes: the mean rise of each heater (K); where properties have curves, then the mean free strain of each (1), and then the
+    /// mean change of the resistance of each over that at ambient temperature (1).
+    #[inline]
+    pub fn means(&self) -> usize {
+        self.heaters.len() * self.hot.as_ref().map_or(1, |hot| hot.values_of_a_beam())
+    }
+
+    /// Free strain of heater `k` at a vector of rises, or its change with a change of them (1).
+    #[inline]
+    pub fn strain(&self, k: usize, rise: &[f64]) -> f64 {
+        match &self.hot {
+            Some(hot) => hot.strain(k, rise),
+            None => self.heaters[k].expansion * rise[k],
+        }
+    }
+
+    /// Resistance of heater `k` at a vector of rises (Ω).
+    pub fn resistance(&self, k: usize, rise: &[f64]) -> f64 {
+        self.hot.as_ref().map_or(self.heaters[k].resistance, |hot| hot.resistance(k, rise))
     }
 
     /// Checks that source voltages `u` have a steady state.
     ///
     /// # Errors
-    /// [`ThermalRunaway`].
-    pub fn check(&self, u: &[f64]) -> Result<(), ThermalRunaway> {
+    /// [`NoSteadyHeat`].
+    pub fn check(&self, u: &[f64]) -> Result<(), NoSteadyHeat> {
         let Some(hot) = &self.hot else { return Ok(()) };
         hot.steady(u, &mut vec![0.0; hot.states()]).map(drop)
     }
@@ -226,7 +249,7 @@ impl Heating {
         let hot = self.hot.as_ref()?;
         let mut u = u.to_vec();
         u[source] = FIRST_VOLTAGE;
-        let (mut state, mut means) = (vec![0.0; hot.states()], vec![0.0; self.heaters.len()]);
+        let (mut state, mut means) = (vec![0.0; hot.states()], vec![0.0; self.means()]);
         // for high voltages it is the limit less a part in proportion to 1/V
         let (mut last, mut limit) = (0.0, f64::NAN);
         for _ in 0..MAX_DOUBLINGS {
@@ -250,7 +273,7 @@ impl Heating {
             rise.iter_mut().enumerate().for_each(|(k, rise)| *rise = self.steady(k, u));
             return;
         };
-        let (means, state) = rise.split_at_mut(self.heaters.len());
+        let (means, state) = rise.split_at_mut(self.means());
         match hot.steady(u, state) {
             Ok(_) => hot.means(state, means),
             Err(_) => rise.fill(f64::NAN),
@@ -276,7 +299,7 @@ impl Heating {
         unit: &[f64],
         s: T,
     ) -> Vec<T> {
-        let count = self.heaters.len();
+        let count = self.means();
         let mut found = vec![T::from_real(0.0); self.states()];
         if let Some(hot) = &self.hot {
             let (means, state) = found.split_at_mut(count);
@@ -287,7 +310,7 @@ impl Heating {
 
     /// Slowest time constant of a state whose resistances depend on temperature, at held source voltages (s); none without such.
     pub fn slowest(&self, u: &[f64], rise: &[f64]) -> Option<f64> {
-        Some(self.hot.as_ref()?.slowest(u, &rise[self.heaters.len()..]))
+        Some(self.hot.as_ref()?.slowest(u, &rise[self.means()..]))
     }
 
     /// Highest steady rise along each heater at source voltages `u` (K).
@@ -412,14 +435,14 @@ mod tests {
     fn delays_need_no_current() {
         let driven = bar(4);
         let heaters: Vec<HeatConductor> =
-            driven.heaters.iter().map(|h| HeatConductor { time_constant: 0.0, ..*h }).collect();
+            driven.heaters.iter().map(|h| HeatConductor { time_constant: 0.0, ..h.clone() }).collect();
         let sink = [true, false, false, false, true];
         let none = ElectricalNetwork { nodes: 5, resistors: Vec::new(), sources: Vec::new(), grounds: Vec::new() };
         let alone = Heating::new(heaters.clone(), &none.solve().unwrap(), 0, &sink).unwrap();
         let given: Vec<HeatConductor> = heaters
             .iter()
             .enumerate()
-            .map(|(k, h)| HeatConductor { delayed: k != 0, time_constant: 1e-6, ..*h })
+            .map(|(k, h)| HeatConductor { delayed: k != 0, time_constant: 1e-6, ..h.clone() })
             .collect();
         let beside = Heating::new(given, &none.solve().unwrap(), 0, &sink).unwrap();
         for k in 1..4 {

@@ -113,7 +113,7 @@ pub enum ExportError {
     },
     /// A resistance that the written models do not have.
     #[error(
-        "beam \"{beam}\" has properties that depend on temperature (TCR, TCK, TCC, emissivity) or a substrate or anchors at another one than ambient, which the written models do not have; leave them out, or use the plug-in"
+        "beam \"{beam}\" has properties that depend on temperature (curves, TCR, TCK, TCC, emissivity) or a substrate or anchors at another one than ambient, which the written models do not have; leave them out, or use the plug-in"
     )]
     HotResistance {
         /// Its name.

@@ -26,7 +26,7 @@ pub(crate) struct ElementLine {
     pub(crate) nodes: Vec<String>,
     /// Parameters.
     pub(crate) parameters: Vec<(String, f64)>,
-    /// Parameters whose values are words.
+    /// Parameters whose values are words, or curves over temperature.
     pub(crate) words: Vec<(String, String)>,
 }
 
@@ -129,11 +129,19 @@ fn pairs(text: &str) -> Option<ParameterPairs> {
         let (name, value) = word.split_once('=').filter(|(name, _)| is_name(name))?;
         match value.parse::<f64>() {
             Ok(number) if number.is_finite() => found.0.push((name.to_owned(), number)),
-            Err(_) if WORDED.contains(&name) && is_name(value) => found.1.push((name.to_owned(), value.to_owned())),
+            Err(_) if WORDED.contains(&name) && is_name(value) || is_curve(value) => {
+                found.1.push((name.to_owned(), value.to_owned()));
+            }
             _ => return None,
         }
     }
     Some(found)
+}
+
+/// A curve over temperature: `table(1,2,3,4)` or `polynomial(1,2)`.
+fn is_curve(text: &str) -> bool {
+    let numbers = ["table(", "polynomial("].iter().find_map(|name| text.strip_prefix(name)?.strip_suffix(')'));
+    numbers.is_some_and(|numbers| numbers.split(',').all(|x| x.parse::<f64>().is_ok_and(f64::is_finite)))
 }
 
 /// Words that mean something else in a netlist than a name.

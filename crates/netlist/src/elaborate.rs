@@ -227,7 +227,7 @@ impl<'p> Elaborator<'p> {
         let setting = match &value {
             Value::Number(x) => Setting::Number(*x),
             Value::Text(text) => Setting::Text(text.to_string()),
-            Value::Undefined | Value::Failed => return value,
+            Value::Curve(_) | Value::Undefined | Value::Failed => return value,
         };
         match self.parameter_at.entry(name) {
             Entry::Occupied(at) => self.parameters[*at.get()].1 = setting,

@@ -1,11 +1,37 @@
 //! The functions of the language. Angles are in radians.
 
 use super::value::Value;
+use bimorph_structure::PropertyCurve;
+use std::sync::Arc;
 
 /// Every function's name.
 pub(crate) const NAMES: &[&str] = &[
-    "abs", "acos", "asin", "assert", "atan", "atan2", "ceil", "cond", "cos", "deg", "exp", "floor", "isdef", "log",
-    "log10", "max", "min", "mod", "print", "round", "sign", "sin", "sqrt", "tan",
+    "abs",
+    "acos",
+    "asin",
+    "assert",
+    "atan",
+    "atan2",
+    "ceil",
+    "cond",
+    "cos",
+    "deg",
+    "exp",
+    "floor",
+    "isdef",
+    "log",
+    "log10",
+    "max",
+    "min",
+    "mod",
+    "polynomial",
+    "print",
+    "round",
+    "sign",
+    "sin",
+    "sqrt",
+    "table",
+    "tan",
 ];
 
 /// A function of one number.
@@ -53,12 +79,36 @@ pub(crate) fn apply(name: &str, arguments: &[Value]) -> Result<Value, String> {
             _ => Err(wrong(name, "one number", arguments)),
         };
     }
+    if matches!(name, "polynomial" | "table") {
+        return curve(name, arguments);
+    }
     match binary(name) {
         Some(f) => match arguments {
             [Value::Number(a), Value::Number(b)] => defined(f(*a, *b), name),
             _ => Err(wrong(name, "two numbers", arguments)),
         },
         None => Err(format!("unknown function `{name}`")),
+    }
+}
+
+/// A property against temperature: a table of pairs, or a polynomial.
+fn curve(name: &str, arguments: &[Value]) -> Result<Value, String> {
+    let number = |value: &Value| if let Value::Number(x) = value { Some(*x) } else { None };
+    let numbers: Option<Vec<f64>> = arguments.iter().map(number).collect();
+    let curve = match (numbers, name) {
+        (Some(polynomial), "polynomial") if !polynomial.is_empty() => {
+            PropertyCurve { polynomial, ..PropertyCurve::default() }
+        }
+        (Some(numbers), "table") if numbers.len() >= 4 && numbers.len().is_multiple_of(2) => {
+            let table = numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+            PropertyCurve { table, ..PropertyCurve::default() }
+        }
+        (_, "polynomial") => return Err(wrong(name, "coefficients", arguments)),
+        _ => return Err(wrong(name, "two or more pairs of a temperature [K] and a value", arguments)),
+    };
+    match curve.fault() {
+        Some(fault) => Err(format!("`{name}`: {fault}")),
+        None => Ok(Value::Curve(Arc::new(curve))),
     }
 }
 

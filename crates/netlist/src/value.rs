@@ -1,6 +1,6 @@
 //! Values of netlist expressions.
 
-use bimorph_structure::Material;
+use bimorph_structure::{Material, PropertyCurve};
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
@@ -9,6 +9,8 @@ use std::sync::{Arc, OnceLock};
 pub(crate) enum Value {
     Number(f64),
     Text(Arc<str>),
+    /// A property against temperature.
+    Curve(Arc<PropertyCurve>),
     /// An argument that was left open (`?`).
     #[default]
     Undefined,
@@ -22,6 +24,7 @@ impl Value {
         match self {
             Self::Number(_) => "a number",
             Self::Text(_) => "a string",
+            Self::Curve(_) => "a curve over temperature",
             Self::Undefined => "undefined",
             Self::Failed => "invalid",
         }
@@ -40,6 +43,11 @@ impl std::fmt::Display for Value {
         match self {
             Self::Number(x) => f.write_str(&short(*x)),
             Self::Text(text) => f.write_str(text),
+            Self::Curve(curve) => {
+                let numbers = curve.table.iter().flatten().chain(&curve.polynomial).map(|x| short(*x));
+                let name = if curve.table.is_empty() { "polynomial" } else { "table" };
+                write!(f, "{name}({})", numbers.collect::<Vec<_>>().join(", "))
+            }
             Self::Undefined => f.write_str("*undef*"),
             Self::Failed => f.write_str("*error*"),
         }

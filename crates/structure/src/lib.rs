@@ -22,6 +22,7 @@ mod mechanical;
 mod network;
 mod node;
 mod placed;
+mod property_curve;
 mod without_circuit;
 
 pub use beam_rows::{ALIKE, BeamRows};
@@ -35,11 +36,13 @@ pub use gap::{
 };
 pub use index::NodeIndex;
 pub use mechanical::{
-    Beam, GasLoss, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SolidHeat, SpringDamper, Support, Yield,
+    AnchorMotion, Beam, GasLoss, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SolidHeat, SpringDamper, Support,
+    Yield,
 };
 pub use network::{Port, Resistor, VoltageSource, Wire};
 pub use node::{Node, NodeId};
 pub use placed::PlacedElement;
+pub use property_curve::{CurveFault, PropertyCurve};
 
 use serde::{Deserialize, Serialize};
 
@@ -98,6 +101,12 @@ pub struct Structure {
 }
 
 impl Structure {
+    /// Whether any anchor is displaced.
+    pub fn moves_anchors(&self) -> bool {
+        let displaced = |s: &Support| s.motion.is_some_and(|m| m.at(self.nodes[s.node.0].position) != [0.0; 2]);
+        self.supports.iter().any(displaced)
+    }
+
     /// The node of that full name. Cost: constant, after the first call.
     pub fn node(&self, name: &str) -> Option<NodeId> {
         self.index.find(&self.nodes, name)

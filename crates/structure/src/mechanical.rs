@@ -1,6 +1,7 @@
 //! Mechanical elements: beams with their material and heat, masses, links, supports, springs, and loads.
 
 use super::node::NodeId;
+use super::property_curve::PropertyCurve;
 use serde::{Deserialize, Serialize};
 
 /// Material constants of the layer an element is made of. Values an element overrides are already in place.
@@ -19,8 +20,11 @@ pub struct Material {
     pub viscosity: f64,
     /// Thickness of the gas film under the part (m).
     pub fluid: f64,
-    /// Coefficient of thermal expansion (1/K).
+    /// Coefficient of thermal expansion, at ambient temperature where it depends on temperature (1/K).
     pub thermal_expansion: f64,
+    /// The coefficient against temperature (1/K); none: it is the same at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expansion_curve: Option<PropertyCurve>,
     /// Temperature at which the drawn length is stress-free (K).
     pub ambient_temperature: f64,
     /// Residual stress of the layer (Pa), tensile positive.
@@ -31,6 +35,16 @@ pub struct Material {
     /// How heat flows in it; none: unknown.
     #[serde(default)]
     pub heat: Option<SolidHeat>,
+}
+
+impl Material {
+    /// Strain of a free part at a temperature (1).
+    pub fn free_strain(&self, temperature: f64) -> f64 {
+        match &self.expansion_curve {
+            Some(curve) => curve.integral(self.ambient_temperature, temperature),
+            None => self.thermal_expansion * (temperature - self.ambient_temperature),
+        }
+    }
 }
 
 /// Thermal constants of a solid.
@@ -91,6 +105,15 @@ pub struct Heater {
     /// Relative change of the heat capacity with the temperature rise (1/K).
     #[serde(default)]
     pub capacity_coefficient: f64,
+    /// Curves in whose proportion the resistance, the thermal conductance and the heat capacity change with temperature; none: by the coefficients.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resistance_curve: Option<PropertyCurve>,
+    /// See `resistance_curve`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub conductance_curve: Option<PropertyCurve>,
+    /// See `resistance_curve`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub capacity_curve: Option<PropertyCurve>,
     /// Emissivity of its surface (1).
     #[serde(default)]
     pub emissivity: f64,
@@ -181,6 +204,25 @@ pub struct Support {
     /// Its temperature (K); none: ambient.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<f64>,
+    /// How the anchor moves; none: it stays as drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<AnchorMotion>,
+}
+
+/// Motion of an anchor: with a substrate that is strained about the origin of the drawing, and by a given displacement.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct AnchorMotion {
+    /// Strain of the substrate along x and y (1).
+    pub strain: [f64; 2],
+    /// Displacement along x and y (m).
+    pub displacement: [f64; 2],
+}
+
+impl AnchorMotion {
+    /// Displacement of an anchor at a place (m).
+    pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [self.strain[0] * x + self.displacement[0], self.strain[1] * y + self.displacement[1]]
+    }
 }
 
 /// The outline of an anchor's pad, for drawings: from its node along local x, and as much to either side.

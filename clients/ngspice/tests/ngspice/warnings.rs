@@ -65,3 +65,44 @@ fn phase_errors_are_reported() {
         }
     }
 }
+
+/// A current above that of a thermal runaway ends an operating point, a sweep of the current and a transient with one message: the beam, and the largest current with a steady temperature. That of a
+/// bar of 200 × 2 × 2 µm with ρ 2e-5 Ω·m, k 32 W/(m·K) and a TCR of 1.25e-3/K is 2.247941 mA: A·π/L·√(k/(ρ·TCR)). 2.2 mA has a steady temperature.
+#[test]
+fn runaway_currents_are_reported() {
+    let net = "process si = [ Youngsmodulus=160e9 density=2330 h=2u resistivity=2e-5 thermcond=32 thermalexpansion=2.7e-6 TCR=1.25e-3 specificheat=700 ]
+anchor si [cold] []
+arm beam2det si [cold far] [l=200u w=2u]
+anchor si [far] []
+eground * [cold] []
+feed port * [far cold] []
+";
+    for (version, ngspice) in versions() {
+        let folder = all_decks();
+        std::fs::write(folder.path().join("arm.net"), net).unwrap();
+        let deck = folder.path().join("arm.cir");
+        let ended = |source: &str, analysis: &str| {
+            let text = format!(
+                "* a current into a bar\nI1 0 p {source}\nA1 %gd [p 0] %v [t] bar\n\
+                 .model bar bimorph(file=\"arm.net\" ports=[\"feed\"] monitors=[\"arm.T\"])\n{analysis}\n.end\n"
+            );
+            std::fs::write(&deck, text).unwrap();
+            let options = CosimOptions {
+                deck: deck.clone(),
+                ngspice: Some(ngspice.clone()),
+                capture: true,
+                ..CosimOptions::default()
+            };
+            cosim::run(&options, &|| true).err().map(|error| error.to_string())
+        };
+        for (source, analysis) in [("3m", ".op"), ("0", ".dc I1 0 3m 0.05m"), ("PWL(0 0 1u 3m)", ".tran 0.5u 500u")] {
+            let error = ended(source, analysis).unwrap_or_else(|| panic!("ngspice {version}: {analysis} has a result"));
+            let current = error.split_once("no current above ").and_then(|(_, rest)| rest.split_once(" A into `feed`"));
+            let current: f64 =
+                current.and_then(|(x, _)| x.parse().ok()).unwrap_or_else(|| panic!("{analysis}: {error}"));
+            assert!(error.contains("thermal runaway of `arm`") && error.matches("runaway").count() == 1, "{error}");
+            assert!((current / 2.247941e-3 - 1.0).abs() < 1e-4, "ngspice {version}: {analysis}: {current}");
+        }
+        assert_eq!(ended("2.2m", ".op"), None, "ngspice {version}");
+    }
+}

@@ -150,9 +150,8 @@ impl PerturbedState<'_> {
         let turns = system.is_rate(source);
         let [re, im] = [false, true].map(|imaginary| {
             let mut change = electrics.drive();
-            for ((strain, heater), rise) in change.expansion.iter_mut().zip(heaters).zip(&rise) {
-                *strain = heater.expansion * if imaginary { rise.im } else { rise.re };
-            }
+            let part: Vec<f64> = rise.iter().map(|rise| if imaginary { rise.im } else { rise.re }).collect();
+            electrics.expand(&part, &mut change.expansion);
             change.load = 0.0;
             if !imaginary {
                 change.volts.copy_from_slice(&volts);
@@ -196,11 +195,11 @@ impl PerturbedState<'_> {
         let heaters = &electrics.heating.heaters;
         let mut unit = vec![0.0; electrics.sources()];
         unit[source] = 1.0;
-        let mut slopes = vec![0.0; heaters.len()];
+        let mut slopes = vec![0.0; electrics.heating.means()];
         electrics.heating.slopes(self.sources, self.rise, &unit, &mut slopes);
         // many time constants where resistances depend on temperature: the slowest is the nearest pole
         let slowest = electrics.heating.slowest(self.sources, self.rise);
-        let law = |k: usize| match slowest.unwrap_or(heaters[k].time_constant) {
+        let law = |k: usize| match slowest.unwrap_or_else(|| heaters[k].time_constant) {
             tau if tau > 0.0 => FrequencyDependence::Lagged(tau),
             _ => FrequencyDependence::AtOnce,
         };
@@ -214,12 +213,10 @@ impl PerturbedState<'_> {
             laws.push(FrequencyDependence::Rate);
         }
         let one = |own: FrequencyDependence| {
-            let rise: Vec<f64> = (0..heaters.len()).map(|k| if law(k) == own { slopes[k] } else { 0.0 }).collect();
+            let rise: Vec<f64> = (0..slopes.len()).map(|k| if law(k) == own { slopes[k] } else { 0.0 }).collect();
             let mut change = electrics.drive();
             change.load = 0.0;
-            for ((strain, heater), rise) in change.expansion.iter_mut().zip(heaters).zip(&rise) {
-                *strain = heater.expansion * rise;
-            }
+            electrics.expand(&rise, &mut change.expansion);
             if own == FrequencyDependence::AtOnce {
                 for (g, volts) in change.volts.iter_mut().enumerate() {
                     *volts = electrics.gap_rows[(g, source)];

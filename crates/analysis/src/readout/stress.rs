@@ -35,8 +35,8 @@ pub(crate) fn largest<'a>(
 
 /// Free strain of each heater at its rise (1).
 fn expansion<'a>(compiled: &'a CompiledModel, rise: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
-    let heaters = &compiled.parts.system.electrics.heating.heaters;
-    move |k| heaters[k].expansion * rise[k]
+    let heating = &compiled.parts.system.electrics.heating;
+    move |k| heating.strain(k, rise)
 }
 
 impl LargestStress<'_> {

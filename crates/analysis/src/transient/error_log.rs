@@ -74,7 +74,7 @@ impl<'a> ErrorLog<'a> {
             stride: stop / ENOUGH,
             next: 0.0,
             exact: Motion::zeros(system.bodies()),
-            rise: vec![0.0; system.electrics.heating.heaters.len()],
+            rise: vec![0.0; system.electrics.heating.means()],
             t: Vec::new(),
             values: vec![Vec::new(); signals.len()],
             errors: vec![Vec::new(); signals.len()],

@@ -25,7 +25,7 @@ impl<'a> PeakStress<'a> {
     pub(super) fn new(compiled: &'a CompiledModel, (ramp, volts): (&'a Ramp<'a>, &'a [f64]), all: bool) -> Self {
         let beams = &compiled.structure.beams;
         let followed = |k: &usize| !compiled.parts.stressed[*k].rigid && (all || beams[*k].material.strength.is_some());
-        let rise = vec![0.0; compiled.parts.system.electrics.heating.heaters.len()];
+        let rise = vec![0.0; compiled.parts.system.electrics.heating.means()];
         Self { compiled, ramp, volts, beams: (0..beams.len()).filter(followed).collect(), rise, largest: None }
     }
 

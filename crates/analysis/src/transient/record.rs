@@ -16,9 +16,12 @@ use super::samples::SampleRecorder;
 use crate::overheating::check_course;
 use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
-use bimorph_domains::Ramp;
+use bimorph_domains::{Ramp, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::Body;
+use bimorph_multibody::planar::Pose;
+use bimorph_solve::equilibrium::{Equilibrium, EquilibriumOptions};
+use bimorph_solve::path::SourcePath;
 use bimorph_solve::time::adaptive::{Advance, Observer};
 use bimorph_solve::time::defect::SeeError;
 use bimorph_solve::time::method::{Motion, SolverCounters};
@@ -65,7 +68,7 @@ pub(crate) fn record(
         options.signals.iter().map(|name| Expression::of_run(compiled, name, &sources)).collect::<Result<_, _>>()?;
     let (mut motion, rise, begun) = start(compiled, options)?;
     let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop).shocked(options.shock);
-    check_course(&ramp)?;
+    check_course(compiled, &ramp)?;
     let mut drive = system.electrics.drive();
     ramp.at(0.0, &mut drive);
     let volts = drive.volts.clone();
@@ -181,7 +184,17 @@ fn lost(SignalLoss { signal, t, chaotic }: SignalLoss) -> String {
     }
 }
 
-/// Initial state of a run, temperature rises of its heaters (K), and warnings: at rest as drawn, or in the equilibrium
+/// Takes a system to the equilibrium of its built-in strains and moved anchors, without dead loads and voltages: anchors that jumped would send waves along
+/// the beams.
+fn built_in(system: &System, q: &mut [Pose]) -> Result<(), AnalysisError> {
+    let unloaded = System { loads: Vec::new(), ..system.clone() };
+    let off = vec![0.0; system.electrics.sources()];
+    let path = SourcePath::new(&unloaded.electrics, &off, &off, [0.0, 1.0]);
+    Equilibrium::new(&unloaded, EquilibriumOptions::default()).follow(&unloaded, &path, q)?;
+    Ok(())
+}
+
+/// Initial state of a run, temperature rises of its heaters (K), and warnings: at rest as drawn, in the equilibrium of moved anchors, or in that
 /// of a released load.
 fn start(
     compiled: &CompiledModel,
@@ -210,6 +223,8 @@ fn start(
         motion.q.copy_from_slice(&point.q);
         rise.copy_from_slice(&point.rise);
         reported = notes_at(start, &point);
+    } else if compiled.structure.moves_anchors() {
+        built_in(system, &mut motion.q)?;
     }
     Ok((
         motion,

@@ -50,7 +50,7 @@ impl<'a> SampleRecorder<'a> {
             next: 1,
             spacing: options.stop / (options.points - 1) as f64,
             now: Motion::zeros(system.bodies()),
-            rise: vec![0.0; system.electrics.heating.heaters.len()],
+            rise: vec![0.0; system.electrics.heating.means()],
             row: vec![0.0; signals.len()],
             t: Vec::with_capacity(kept),
             columns: signals.iter().map(|_| Vec::with_capacity(kept)).collect(),

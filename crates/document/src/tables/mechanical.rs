@@ -7,8 +7,8 @@ use crate::record::{DocumentRecord, ObjectReader, ObjectSchema, field_schema, re
 use crate::value::NumberRange::{Any, NonNegative, Positive, Within};
 use crate::value::{DocumentField, DocumentValue, DocumentWriter, NodeNames};
 use bimorph_structure::{
-    Adhesion, Beam, Friction, GasLoss, Heater, Link, Load, Mass, Material, Node, OhmicContact, Pad, PlacedElement,
-    SolidHeat, SpringDamper, Stop, Support, Yield,
+    Adhesion, AnchorMotion, Beam, Friction, GasLoss, Heater, Link, Load, Mass, Material, Node, OhmicContact, Pad,
+    PlacedElement, PropertyCurve, SolidHeat, SpringDamper, Stop, Support, Yield,
 };
 
 record! {
@@ -28,7 +28,8 @@ record! {
         density: "kg/m³", NonNegative, "Mass density";
         viscosity: "Pa·s", NonNegative, "Dynamic viscosity of the gas around the part; 0: no damping";
         fluid: "m", Positive, "Thickness of the gas film under the part";
-        thermal_expansion: "1/K", Any, "Coefficient of thermal expansion";
+        thermal_expansion: "1/K", Any, "Coefficient of thermal expansion, at ambient temperature";
+        expansion_curve: "", Any, "The coefficient against temperature; left out: the same at all";
         ambient_temperature: "K", NonNegative, "Temperature at which the drawn length is free of stress";
         stress: "Pa", Any, "Residual stress, tensile positive";
         strength: "Pa", Positive, "Stress that the material bears, where it is known";
@@ -68,8 +69,18 @@ record! {
         coefficient = 0.0: "1/K", Any, "Relative change of the resistance with the rise; left out: 0";
         thermal_coefficient = 0.0: "1/K", Any, "Relative change of the thermal resistance with the rise; left out: 0";
         capacity_coefficient = 0.0: "1/K", Any, "Relative change of the heat capacity with the rise; left out: 0";
+        resistance_curve: "", Any, "Curve in whose proportion the resistance changes with temperature; left out: by the coefficient";
+        conductance_curve: "", Any, "The same of the thermal conductance";
+        capacity_curve: "", Any, "The same of the heat capacity";
         emissivity = 0.0: "1", NonNegative, "Emissivity of the surface; left out: 0";
         substrate: "K", NonNegative, "Temperature of the substrate; left out: ambient";
+    }
+}
+
+record! {
+    PropertyCurve: "A property against temperature. One of the two lists is empty." {
+        table: "K, SI", Any, "Temperatures, increasing, with the values there; between them, a monotone cubic";
+        polynomial: "SI", Any, "Coefficients of the powers of the temperature, from the constant on";
     }
 }
 
@@ -108,6 +119,14 @@ record! {
         angle: "rad", Any, "Angle of local x";
         undercut: "m", NonNegative, "Distance by which the pad is etched free at its edge";
         temperature: "K", NonNegative, "Temperature; left out: ambient";
+        motion: "", Any, "How the anchor moves; left out: it stays as drawn";
+    }
+}
+
+record! {
+    AnchorMotion: "Motion of an anchor with a strained substrate, and by a given displacement." {
+        strain: "1", Any, "Strain of the substrate along x and y, about the origin";
+        displacement: "m", Any, "Displacement along x and y";
     }
 }
 

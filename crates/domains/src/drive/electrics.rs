@@ -150,7 +150,7 @@ impl Electrics {
             return heaters.map(|(k, (h, t))| t * h.resistance * heating.current(k, a) * heating.current(k, b)).sum();
         };
         let [a, b] = [a, b].map(|source| hot.flows(rise, &self.unit(source), |_| 0.0).current);
-        heaters.map(|(k, (h, t))| t * h.resistance * (1.0 + h.coefficient * t) * a[k] * b[k]).sum()
+        heaters.map(|(k, (_, t))| t * hot.resistance(k, rise) * a[k] * b[k]).sum()
     }
 
     fn unit(&self, source: usize) -> Vec<f64> {
@@ -172,22 +172,25 @@ impl Electrics {
     #[inline]
     pub fn apply(&self, u: &[f64], rise: &[f64], drive: &mut Drive) {
         self.gap_volts(u, &mut drive.volts);
-        for (k, heater) in self.heating.heaters.iter().enumerate() {
-            drive.expansion[k] = heater.expansion * rise[k];
-        }
+        self.expand(rise, &mut drive.expansion);
         drive.inputs.copy_from_slice(&u[self.voltages()..]);
         drive.turning = 0.0;
         drive.push.clear();
+    }
+
+    /// Free strains of all heaters at a vector of rises, or their changes with changes of them.
+    #[inline]
+    pub fn expand(&self, rise: &[f64], strains: &mut [f64]) {
+        strains.iter_mut().enumerate().for_each(|(k, strain)| *strain = self.heating.strain(k, rise));
     }
 
     /// The change of the steady drive with the sources along `unit`, at source voltages `u` and steady rises.
     #[inline]
     pub fn steady_slope(&self, (u, rise): (&[f64], &[f64]), unit: &[f64], slope: &mut Drive) {
         self.gap_volts(unit, &mut slope.volts);
-        self.heating.slopes(u, rise, unit, &mut slope.expansion);
-        for (slope, heater) in slope.expansion.iter_mut().zip(&self.heating.heaters) {
-            *slope *= heater.expansion;
-        }
+        let mut slopes = vec![0.0; self.heating.means()];
+        self.heating.slopes(u, rise, unit, &mut slopes);
+        self.expand(&slopes, &mut slope.expansion);
         slope.inputs.copy_from_slice(&unit[self.voltages()..]);
         (slope.load, slope.turning) = (0.0, 0.0);
     }
@@ -229,7 +232,7 @@ impl Electrics {
         port: usize,
         mut put: impl FnMut(usize, f64),
     ) {
-        let count = self.heating.heaters.len();
+        let count = self.heating.means();
         if let Some(hot) = self.heating.hot() {
             let course = hot.course_change(SourceLine { from: way.0, to: way.1, dt }, &start[count..], port);
             (0..count).for_each(|k| put(k, course.mean(k, s)[0]));

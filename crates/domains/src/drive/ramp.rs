@@ -1,5 +1,6 @@
 //! Voltages, strains and inputs over the time of one step or run, from a start to an end.
 
+use super::super::heat_curves::TableEnd;
 use super::super::hot::{HotCourse, SourceLine};
 use super::super::input::Input;
 use super::super::lag::Lags;
@@ -40,22 +41,31 @@ impl<'a> Ramp<'a> {
     pub fn new(electrics: &'a Electrics, from: &'a [f64], to: &'a [f64], rise: &'a [f64], dt: f64) -> Self {
         let heating = &electrics.heating;
         let line = SourceLine { from, to, dt };
-        let course = heating.hot().map(|hot| hot.course(line, &rise[heating.heaters.len()..]));
+        let course = heating.hot().map(|hot| hot.course(line, &rise[heating.means()..]));
         let changes = if course.is_some() { vec![OnceLock::new(); from.len()] } else { Vec::new() };
         let heat = electrics.heat_course((from, to), dt);
         Self { electrics, from, to, rise, dt, push: &[], shock: None, heat, course, changes }
     }
 
-    /// The time at which rises leave all bounds (s); none: they do not.
+    /// The time at which rises leave all bounds (s), with the heater and the table that ends there, if it is one; none: they do not.
     #[inline]
-    pub fn overheated(&self) -> Option<f64> {
-        self.course.as_ref()?.failed
+    pub fn overheated(&self) -> Option<(f64, Option<(usize, TableEnd)>)> {
+        let course = self.course.as_ref()?;
+        Some((course.failed?, course.end_of_table))
+    }
+
+    /// The heater with the highest mean rise at the end of the course.
+    pub fn hottest(&self) -> Option<usize> {
+        let (hot, course) = (self.electrics.heating.hot()?, self.course.as_ref()?);
+        let mut means = vec![0.0; self.electrics.heating.means()];
+        hot.means(&course.end, &mut means);
+        (0..self.electrics.heating.heaters.len()).max_by(|a, b| means[*a].total_cmp(&means[*b]))
     }
 
     /// Rises at the end (K), as the next step takes them.
     #[inline]
     pub fn end_rises(&self, out: &mut [f64]) {
-        let (means, state) = out.split_at_mut(self.electrics.heating.heaters.len());
+        let (means, state) = out.split_at_mut(self.electrics.heating.means());
         means.iter_mut().enumerate().for_each(|(k, rise)| *rise = self.rise_at(k, self.dt));
         if let Some(course) = &self.course {
             state.copy_from_slice(&course.end);
@@ -67,8 +77,14 @@ impl<'a> Ramp<'a> {
         let heating = &self.electrics.heating;
         let (hot, change) = (heating.hot()?, self.changes.get(source)?);
         let line = SourceLine { from: self.from, to: self.to, dt: self.dt };
-        let start = &self.rise[heating.heaters.len()..];
+        let start = &self.rise[heating.means()..];
         Some(change.get_or_init(|| hot.course_change(line, start, source)).mean(k, s))
+    }
+
+    /// Which value of the course is the free strain of heater `k`; none where that is its mean rise times a constant.
+    fn strain_series(&self, k: usize) -> Option<usize> {
+        let heating = &self.electrics.heating;
+        (heating.means() > heating.heaters.len()).then(|| heating.heaters.len() + k)
     }
 
     /// The same with a force and a moment on each body.
@@ -119,8 +135,13 @@ impl<'a> Ramp<'a> {
     /// The free strain of each heater at the time of `lags` after the start.
     #[inline]
     pub fn expansions(&self, lags: &mut Lags, mut put: impl FnMut(usize, f64)) {
-        for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
-            put(k, heater.expansion * self.rise_after(k, lags));
+        let heaters = &self.electrics.heating.heaters;
+        for (k, heater) in heaters.iter().enumerate() {
+            let strain = match self.strain_series(k) {
+                Some(series) => self.rise_after(series, lags),
+                None => heater.expansion * self.rise_after(k, lags),
+            };
+            put(k, strain);
         }
     }
 
@@ -130,6 +151,10 @@ impl<'a> Ramp<'a> {
         let s = lags.t;
         for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
             let p = self.heat[k];
+            if let (Some(course), Some(series)) = (&self.course, self.strain_series(k)) {
+                put(k, course.mean(series, s)[1]);
+                continue;
+            }
             let slope = if let Some(course) = &self.course {
                 course.mean(k, s)[1]
             } else if heater.time_constant > 0.0 {
@@ -198,7 +223,9 @@ impl<'a> Ramp<'a> {
         let heaters = &self.electrics.heating.heaters;
         if self.course.is_some() {
             for (k, heater) in heaters.iter().enumerate() {
-                out.expansion[k] = heater.expansion * self.hot_change(k, s, port).map_or(0.0, |[rise, _]| rise);
+                let change = |k: usize| self.hot_change(k, s, port).map_or(0.0, |[rise, _]| rise);
+                let curved = self.strain_series(k);
+                out.expansion[k] = curved.map_or_else(|| heater.expansion * change(k), change);
             }
         } else {
             let put = |k: usize, rise: f64| out.expansion[k] = heaters[k].expansion * rise;
@@ -225,6 +252,10 @@ impl<'a> Ramp<'a> {
         let mut lags = Lags::new(s);
         for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
             let [p1, p2] = self.electrics.heat_course_change(k, (self.from, self.to), self.dt, port);
+            if let Some([_, rate]) = self.strain_series(k).and_then(|series| self.hot_change(series, s, port)) {
+                out.expansion[k] = rate;
+                continue;
+            }
             let slope = if let Some([_, rate]) = self.hot_change(k, s, port) {
                 rate
             } else if heater.time_constant > 0.0 {

@@ -6,15 +6,18 @@
 //! C·c(T)·∂T/∂t = K·∂(κ(T)·∂T/∂s)/∂s − G·(T − T_s) − B·((T₀ + T)⁴ − T₀⁴) + I²·R₀·r(T),      V = I·R₀·∫r(T)ds
 //! r(T) = 1 + TCR·T,      κ(T) = 1/(1 + TCK·T),      c(T) = 1 + TCC·T
 //! ```
-//! in weak form on elements with a node in their middle, integrated by three Gauss points. Newton's matrix of the inner nodes has two
+//! in weak form on elements with a node in their middle, integrated by three Gauss points. Where a property has a curve, that stands for r, κ or c, and
+//! the mean strain ∫∫α(T)dT ds and the mean of r are integrated by the same points. Newton's matrix of the inner nodes has two
 //! bands on either side. Its solution for the rises of the ends, the current and the residual leaves three equations: the heat that the
 //! ends receive, and the voltage.
 
+use super::super::heat_curves::{HeatCurves, linear_or, reciprocal_or};
 use super::element::{DERIVATIVES, POINTS, SHAPES};
 use nalgebra::ComplexField;
+use std::sync::Arc;
 
 /// A beam that carries current, whose resistance depends on its temperature.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct HotBeam {
     /// Thermal conductance from end to end (W/K).
     pub(super) conductance: f64,
@@ -36,6 +39,10 @@ pub(super) struct HotBeam {
     pub(super) ambient: f64,
     /// Rise of the substrate to which the gas conducts (K).
     pub(super) substrate: f64,
+    /// Thermal expansion, where it has no curve (1/K).
+    pub(super) expansion: f64,
+    /// Properties that have curves; none: no one has.
+    pub(super) curves: Option<Arc<HeatCurves>>,
     /// Elements.
     pub(super) elements: usize,
     /// Where its inner nodes begin in the vector of rises.
@@ -94,10 +101,76 @@ fn real<T: ComplexField<RealField = f64> + Copy>(x: f64) -> T {
 }
 
 impl HotBeam {
+    /// Resistivity over that at ambient temperature, and its slope (1, 1/K).
+    pub(super) fn resistivity(&self, t: f64) -> [f64; 2] {
+        linear_or(self.coefficient, self.curves.as_ref().and_then(|c| c.resistance.as_ref()), t)
+    }
+
     /// Conductivity over that at ambient temperature, and its slope (1, 1/K).
-    fn conductivity(&self, t: f64) -> [f64; 2] {
-        let kappa = 1.0 / (1.0 + self.thermal_coefficient * t);
-        [kappa, -self.thermal_coefficient * kappa * kappa]
+    pub(super) fn conductivity(&self, t: f64) -> [f64; 2] {
+        reciprocal_or(self.thermal_coefficient, self.curves.as_ref().and_then(|c| c.conductance.as_ref()), t)
+    }
+
+    /// Heat capacity over that at ambient temperature, and its slope (1, 1/K).
+    pub(super) fn capacity_law(&self, t: f64) -> [f64; 2] {
+        linear_or(self.capacity_coefficient, self.curves.as_ref().and_then(|c| c.capacity.as_ref()), t)
+    }
+
+    /// Whether its heat capacity depends on temperature.
+    fn capacity_changes(&self) -> bool {
+        self.capacity_coefficient != 0.0 || self.curves.as_ref().is_some_and(|c| c.capacity.is_some())
+    }
+
+    /// Free strain at a rise, and its slope (1, 1/K).
+    fn strain(&self, t: f64) -> [f64; 2] {
+        match self.curves.as_ref().and_then(|c| c.expansion.as_ref()) {
+            Some((curve, ambient)) => [curve.integral(*ambient, ambient + t), curve.at(ambient + t)[0]],
+            None => [self.expansion * t, self.expansion],
+        }
+    }
+
+    /// Mean free strain, and the mean change of the resistance over that at ambient temperature (1).
+    pub(super) fn mean_laws(&self, ends: [f64; 2], inner: &[f64]) -> [f64; 2] {
+        let mut means = [0.0; 2];
+        self.points(ends, inner, |_, weight, _, _, [t, _]| {
+            let part = weight / self.elements as f64;
+            means[0] += self.strain(t)[0] * part;
+            means[1] += (self.resistivity(t)[0] - 1.0) * part;
+        });
+        means
+    }
+
+    /// Second derivative of the mean free strain along two changes of the rises.
+    pub(super) fn strain_bend(&self, (ends, inner): Nodes<'_>, changes: [Nodes<'_>; 2]) -> f64 {
+        let mut bend = 0.0;
+        let Some((curve, ambient)) = self.curves.as_ref().and_then(|c| c.expansion.as_ref()) else { return bend };
+        self.points(ends, inner, |first, weight, shape, _, [t, _]| {
+            let [a, b] =
+                changes.map(|(ends, inner)| (0..3).map(|i| shape[i] * self.at(first + i, ends, inner)).sum::<f64>());
+            bend += curve.at(ambient + t)[1] * a * b * weight / self.elements as f64;
+        });
+        bend
+    }
+
+    /// The change of both with changes of the rises.
+    pub(super) fn mean_law_changes<T: ComplexField<RealField = f64> + Copy>(
+        &self,
+        (ends, inner): Nodes<'_>,
+        (end_changes, changes): ([T; 2], &[T]),
+    ) -> [T; 2] {
+        let mut means = [real(0.0); 2];
+        let change = |j: usize| match j {
+            0 => end_changes[0],
+            j if j > changes.len() => end_changes[1],
+            j => changes[j - 1],
+        };
+        self.points(ends, inner, |first, weight, shape, _, [t, _]| {
+            let dt = (0..3).fold(real::<T>(0.0), |sum, i| sum + change(first + i) * real(shape[i]));
+            let part = weight / self.elements as f64;
+            means[0] += dt * real(self.strain(t)[1] * part);
+            means[1] += dt * real(self.resistivity(t)[1] * part);
+        });
+        means
     }
 
     /// Power that leaves to the surroundings at a rise, as if all of the beam had it, and its slope (W, W/K).
@@ -139,7 +212,10 @@ impl HotBeam {
 
     /// Resistance at these rises (Ω).
     pub(super) fn resistance(&self, ends: [f64; 2], inner: &[f64]) -> f64 {
-        self.resistance * (1.0 + self.coefficient * self.mean(ends, inner))
+        match self.curves {
+            Some(_) => self.resistance * (1.0 + self.mean_laws(ends, inner)[1]),
+            None => self.resistance * (1.0 + self.coefficient * self.mean(ends, inner)),
+        }
     }
 
     /// Mean rise: Simpson's rule is exact for parabolas.
@@ -190,7 +266,7 @@ impl HotBeam {
         let joule = current * current * self.resistance;
         self.points(ends, inner, |first, weight, shape, slope, [t, dt]| {
             let flow = self.conductance * self.conductivity(t)[0] * count * dt * weight;
-            let source = (self.aside(t)[0] - joule * (1.0 + self.coefficient * t)) * weight / count;
+            let source = (self.aside(t)[0] - joule * self.resistivity(t)[0]) * weight / count;
             for i in 0..3 {
                 out.heat[first + i] += flow * slope[i] + source * shape[i];
             }
@@ -219,11 +295,11 @@ impl HotBeam {
 
     /// Heat capacity at a point of the element that begins with node `first` (J/K).
     fn capacity_at(&self, first: usize, (ends, inner): Nodes<'_>, shape: &[f64; 3]) -> f64 {
-        if self.capacity_coefficient == 0.0 {
+        if !self.capacity_changes() {
             return self.capacity;
         }
         let rise: f64 = (0..3).map(|i| shape[i] * self.at(first + i, ends, inner)).sum();
-        self.capacity * (1.0 + self.capacity_coefficient * rise)
+        self.capacity * self.capacity_law(rise)[0]
     }
 
     /// Newton's equations at rises, their rates where they change, and a current; `sigma` is the slope of the rates with the rises (1/s). Reduced to the ends.
@@ -245,23 +321,33 @@ impl HotBeam {
         out.by_current.clear();
         out.by_current.resize(n + 2, zero);
         out.by_rise.clear();
-        out.by_rise
-            .extend((0..n + 2).map(|j| real::<T>(current * self.resistance * self.coefficient * self.weight(j))));
+        if self.curves.is_some() {
+            out.by_rise.resize(n + 2, zero);
+        } else {
+            out.by_rise
+                .extend((0..n + 2).map(|j| real::<T>(current * self.resistance * self.coefficient * self.weight(j))));
+        }
         out.inner.clear();
         out.inner.resize(n, [zero; 3]);
-        let joule = current * current * self.resistance * self.coefficient;
+        let joule = current * current * self.resistance;
         let heat = 2.0 * current * self.resistance;
         self.points(ends, inner, |first, weight, shape, slope, [t, dt]| {
             let [kappa, falls] = self.conductivity(t);
             let stored = sigma * real(self.capacity_at(first, (ends, inner), shape) * weight / count);
-            let warming = rates.filter(|_| self.capacity_coefficient != 0.0).map_or(0.0, |(ends, inner)| {
+            let warming = rates.filter(|_| self.capacity_changes()).map_or(0.0, |(ends, inner)| {
                 let rate: f64 = (0..3).map(|i| shape[i] * self.at(first + i, ends, inner)).sum();
-                self.capacity * self.capacity_coefficient * rate
+                self.capacity * self.capacity_law(t)[1] * rate
             });
-            let sides = self.aside(t)[1] + warming - joule;
+            let [resistivity, grows] = self.resistivity(t);
+            let sides = self.aside(t)[1] + warming - joule * grows;
+            if self.curves.is_some() {
+                for i in 0..3 {
+                    out.by_rise[first + i] += real::<T>(current * self.resistance * grows * shape[i] * weight / count);
+                }
+            }
             for i in 0..3 {
                 let node = first + i;
-                out.by_current[node] -= real::<T>(heat * (1.0 + self.coefficient * t) * shape[i] * weight / count);
+                out.by_current[node] -= real::<T>(heat * resistivity * shape[i] * weight / count);
                 for j in 0..3 {
                     let held =
                         self.conductance * count * slope[i] * (kappa * slope[j] + falls * dt * shape[j]) * weight

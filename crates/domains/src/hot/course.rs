@@ -5,6 +5,7 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential HotEquations II" (1996), §IV.6: SDIRK of order 4, L-stable, table 6.5.
 
+use super::super::heat_curves::TableEnd;
 use super::{Flows, Forcing, HotEquations, HotNetwork};
 
 /// Diagonal of the tableau.
@@ -42,13 +43,15 @@ const UNBOUNDED: f64 = 1e6;
 pub(crate) struct HotCourse {
     /// Ends of its steps (s).
     times: Vec<f64>,
-    /// Step by step, beam by beam: coefficients of the mean rise in the fraction of the step (K).
+    /// Step by step, value by value of [`HotNetwork::means`]: coefficients in the fraction of the step (K).
     means: Vec<[f64; 4]>,
-    beams: usize,
+    values: usize,
     /// State at its end, or where it failed (K).
     pub(crate) end: Vec<f64>,
     /// Time at which the rises leave all bounds (s).
     pub(crate) failed: Option<f64>,
+    /// The beam and the table that does not cover its temperature then; none: they grow without bound.
+    pub(crate) end_of_table: Option<(usize, TableEnd)>,
 }
 
 /// Source voltages that go linearly from one value to another.
@@ -72,10 +75,10 @@ impl HotCourse {
         Some((step, ((t - start) / h).clamp(0.0, 1.0), h))
     }
 
-    /// Mean rise of beam `k` at time `t`, and its rate (K, K/s).
+    /// Value `k` of [`HotNetwork::means`] at time `t`, and its rate (K, K/s).
     pub(crate) fn mean(&self, k: usize, t: f64) -> [f64; 2] {
-        let Some((step, x, h)) = self.place(t) else { return [0.0; 2] };
-        let [a, b, c, d] = self.means[step * self.beams + k];
+        let Some((step, x, h)) = self.place(t).filter(|_| k < self.values) else { return [0.0; 2] };
+        let [a, b, c, d] = self.means[step * self.values + k];
         [a + x * (b + x * (c + x * d)), (b + x * (2.0 * c + 3.0 * x * d)) / h]
     }
 
@@ -112,15 +115,15 @@ impl HotNetwork {
     }
 
     fn integrate(&self, line: SourceLine<'_>, start: &[f64], source: Option<usize>) -> (HotCourse, HotCourse) {
-        let beams = self.bars.len();
-        let mut found = [0, 1].map(|_| HotCourse { beams, ..HotCourse::default() });
+        let values = self.values_of_a_beam() * self.bars.len();
+        let mut found = [0, 1].map(|_| HotCourse { values, ..HotCourse::default() });
         let mut now = HotStage { state: start.to_vec(), change: vec![0.0; self.states] };
         let mut stepper = Stepper::new(self, line, source);
         if self.is_instant() {
             stepper.jump(&mut now);
         }
         let (mut t, mut h) = (0.0, line.dt);
-        let mut before = [0, 1].map(|_| vec![[0.0; 2]; beams]);
+        let mut before = [0, 1].map(|_| vec![[0.0; 2]; values]);
         let mut begins = true;
         while t < line.dt {
             let last = t + h >= line.dt * (1.0 - 1e-12);
@@ -134,10 +137,16 @@ impl HotNetwork {
                 }
                 continue;
             }
-            let after =
-                [self.both(&stepper.state, &stepper.rate), self.both_changes(&stepper.change, &stepper.change_rate)];
+            let after = [
+                self.both(&stepper.state, &stepper.rate),
+                self.both_changes((&stepper.state, &stepper.rate), &stepper.change, &stepper.change_rate),
+            ];
             if begins {
-                before = [self.both(&now.state, &now.state), self.both_changes(&now.change, &now.change)];
+                let still = vec![0.0; self.states];
+                before = [
+                    self.both(&now.state, &now.state),
+                    self.both_changes((&now.state, &still), &now.change, &now.change),
+                ];
             }
             t = if last { line.dt } else { t + length };
             for ((course, before), after) in found.iter_mut().zip(&before).zip(&after) {
@@ -148,7 +157,8 @@ impl HotNetwork {
             now.state.copy_from_slice(&stepper.state);
             now.change.copy_from_slice(&stepper.change);
             h = length * (0.9 / error.max(1e-8).powf(0.25)).clamp(0.2, 5.0);
-            if now.state.iter().any(|t| t.abs() > UNBOUNDED) {
+            found[0].end_of_table = self.end_of_table(&now.state, 0.0);
+            if found[0].end_of_table.is_some() || now.state.iter().any(|t| t.abs() > UNBOUNDED) {
                 found[0].failed = Some(t);
                 break;
             }
@@ -182,19 +192,32 @@ impl HotNetwork {
         last
     }
 
-    /// Mean rises and rates of all beams.
+    /// Means and their rates at a state.
     fn both(&self, state: &[f64], rates: &[f64]) -> Vec<[f64; 2]> {
-        let mut found = self.both_changes(state, rates);
-        for (k, [mean, _]) in found.iter_mut().enumerate() {
-            *mean = self.bars[k].mean(self.ends_of(k, state), self.inner_of(k, state));
-        }
-        found
+        let count = self.values_of_a_beam() * self.bars.len();
+        let (mut means, mut changes) = (vec![0.0; count], vec![0.0; count]);
+        self.means(state, &mut means);
+        self.mean_changes(state, rates, &mut changes);
+        means.into_iter().zip(changes).map(|(mean, rate)| [mean, rate]).collect()
     }
 
-    /// Changes of the mean rises and rates of all beams.
-    fn both_changes(&self, changes: &[f64], rates: &[f64]) -> Vec<[f64; 2]> {
-        let mean = |k: usize, of: &[f64]| self.bars[k].mean(self.changes_of(k, of), self.inner_of(k, of));
-        (0..self.bars.len()).map(|k| [mean(k, changes), mean(k, rates)]).collect()
+    /// Changes of the means and of their rates at a state with its rates.
+    fn both_changes(&self, (state, rates): (&[f64], &[f64]), changes: &[f64], change_rates: &[f64]) -> Vec<[f64; 2]> {
+        let count = self.values_of_a_beam() * self.bars.len();
+        let [mut means, mut slopes] = [changes, change_rates].map(|of| {
+            let mut out = vec![0.0; count];
+            self.mean_changes(state, of, &mut out);
+            out
+        });
+        if count > self.bars.len() {
+            // the slope of the strain moves with the state; nothing takes the rate of the resistance
+            for (k, bar) in self.bars.iter().enumerate() {
+                let at = (self.ends_of(k, state), self.inner_of(k, state));
+                let both = [rates, changes].map(|of| (self.changes_of(k, of), self.inner_of(k, of)));
+                slopes[self.bars.len() + k] += bar.strain_bend(at, both);
+            }
+        }
+        means.drain(..).zip(slopes).map(|(mean, rate)| [mean, rate]).collect()
     }
 
     /// Subtracts the heat that capacities take at a state and these rates (K/s).

@@ -5,14 +5,18 @@ use super::{Flows, HotNetwork, NodeMatrix};
 impl HotNetwork {
     /// Currents and potentials at a state and source voltages.
     pub(super) fn conduct(&self, state: &[f64], u: &[f64]) -> Flows<f64> {
-        let mut means = vec![0.0; self.bars.len()];
+        let mut means = vec![0.0; self.values_of_a_beam() * self.bars.len()];
         self.means(state, &mut means);
         self.flows(&means, u, |_| 0.0)
     }
 
     /// Change of currents and potentials with the mean rises (K) and the source voltages (V), at mean rises and currents.
     pub(crate) fn flow_change(&self, means: &[f64], flows: &Flows<f64>, rises: &[f64], du: &[f64]) -> Flows<f64> {
-        self.flows(means, du, |k| -flows.current[k] * self.bars[k].resistance * self.bars[k].coefficient * rises[k])
+        let beams = self.bars.len();
+        self.flows(means, du, |k| {
+            let cold = -flows.current[k] * self.bars[k].resistance;
+            if self.curved { cold * rises[2 * beams + k] } else { cold * self.bars[k].coefficient * rises[k] }
+        })
     }
 
     /// Currents and potentials at mean rises and source voltages, with a source in each beam: from `a` to `b` (V).
@@ -21,9 +25,8 @@ impl HotNetwork {
         let mut matrix = NodeMatrix::default();
         matrix.clear(layout);
         let mut potential = vec![0.0; self.known.free];
-        let hot: Vec<(f64, f64)> = (self.bars.iter().enumerate())
-            .map(|(k, bar)| (bar.resistance * (1.0 + bar.coefficient * means[k]), inside(k)))
-            .collect();
+        let hot: Vec<(f64, f64)> =
+            (self.bars.iter().enumerate()).map(|(k, _)| (self.resistance(k, means), inside(k))).collect();
         let bars = self.ends.iter().zip(&hot).map(|(ends, (r, inside))| (*ends, *r, *inside));
         for ([a, b], r, inside) in self.resistors.iter().map(|&(a, b, r)| ([a, b], r, 0.0)).chain(bars) {
             let given = (self.offset([a, b], u) + inside) / r;

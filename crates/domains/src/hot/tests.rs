@@ -122,7 +122,7 @@ fn a_negative_coefficient_runs_away() {
     };
     heating = Heating::new(heaters, &circuit.solve().unwrap(), 1, &[true, true]).unwrap().with_hot(&circuit, &[]);
     assert!(heating.check(&[0.5]).is_ok());
-    let super::ThermalRunaway { share, rise, .. } = heating.check(&[5.0]).unwrap_err();
+    let super::NoSteadyHeat { share, rise, .. } = heating.check(&[5.0]).unwrap_err();
     let limit = 5.0 * share.sqrt();
     assert!((limit / 1.131371 - 1.0).abs() < 1e-3 && rise < 500.0, "{limit} {rise}");
     assert!(heating.check(&[limit * 0.999]).is_ok() && heating.check(&[limit * 1.001]).is_err());
@@ -265,7 +265,7 @@ fn heat_is_stored_or_lost() {
         (h.radiation, h.ambient) = (6e-17, 300.0);
     });
     let hot = heating.hot().unwrap();
-    let bar = hot.bars[0];
+    let bar = &hot.bars[0];
     // work and losses of a state (W); heat that is stored, and the part of it at the ends (J)
     let powers = |state: &[f64], volts: f64| {
         let current = hot.conduct(state, &[volts]).current[0];

@@ -3,11 +3,14 @@
 mod circuit;
 mod fields;
 
-use super::{ElementLine, ElementLines, ProcessLine};
+use super::{ElementLine, ElementLines, ExactNumber, ProcessLine};
 use bimorph_base::sets::Sets;
-use bimorph_structure::{Beam, BeamGap, Mass, NodeId, Structure};
+use bimorph_structure::{Beam, BeamGap, Mass, NodeId, PropertyCurve, Structure};
 use std::collections::{HashMap, HashSet};
 use std::f64::consts::TAU;
+
+/// Difference of a property from the value of its curve at ambient temperature that is rounding (1).
+const SAME: f64 = 1e-12;
 
 /// Parts that no line stands for.
 pub(crate) type Left = Vec<String>;
@@ -60,6 +63,30 @@ fn places(model: &str) -> bool {
 fn unmirrored(gap: &BeamGap) -> ([NodeId; 4], f64) {
     let [a, b, c, d] = gap.nodes;
     if gap.side < 0.0 { ([b, a, d, c], gap.angle + std::f64::consts::PI) } else { (gap.nodes, gap.angle) }
+}
+
+/// Replaces numbers of a beam by the curves over temperature that it has. The resistance stays: curves change it in proportion.
+fn curves(beam: &Beam, line: &mut ElementLine) {
+    let ambient = beam.material.ambient_temperature;
+    let mut put = |name: &str, curve: &Option<PropertyCurve>| {
+        let Some(curve) = curve else { return };
+        let own = line.parameters.iter().position(|(other, _)| other == name).map(|k| line.parameters.remove(k).1);
+        let factor = own.map_or(1.0, |value| value / curve.at(ambient)[0]);
+        // the same number but for rounding: as it was given
+        let curve = if (factor - 1.0).abs() < SAME { curve.clone() } else { curve.scaled(factor) };
+        let numbers: Vec<String> =
+            curve.table.iter().flatten().chain(&curve.polynomial).map(|x| ExactNumber(*x).to_string()).collect();
+        let function = if curve.table.is_empty() { "polynomial" } else { "table" };
+        line.words.push((name.to_owned(), format!("{function}({})", numbers.join(","))));
+    };
+    if let Some(heater) = &beam.heater {
+        put("resistivity", &heater.resistance_curve);
+        put("thermcond", &heater.conductance_curve);
+        put("specificheat", &heater.capacity_curve);
+    }
+    if beam.heater.is_some() || beam.temperature.is_some() {
+        put("thermalexpansion", &beam.material.expansion_curve);
+    }
 }
 
 struct OfStructure<'a> {
@@ -184,6 +211,9 @@ impl<'a> OfStructure<'a> {
             self.used_resistors.insert(k);
         }
         self.push(&beam.name, model, &process, &[beam.a, beam.b], &parameters);
+        if let Some(line) = self.lines.last_mut() {
+            curves(beam, line);
+        }
     }
 
     /// Plates whose mass is that of a layer, else lumped masses with the drag beside them.
@@ -308,8 +338,12 @@ impl<'a> OfStructure<'a> {
             let size = pads.get(&k).map(|[l, w]| [("l", *l), ("w", *w)]);
             let undercut = support.undercut.map(|undercut| ("undercut", undercut));
             let warm = support.temperature.map(|temperature| ("anchortemperature", temperature));
-            let parameters: Vec<_> =
-                size.into_iter().flatten().chain(undercut).chain(warm).chain([("oz", support.angle)]).collect();
+            let names = ["packagestrainx", "packagestrainy", "anchorx", "anchory"];
+            let motion = support.motion.map(|m| names.into_iter().zip(m.strain.into_iter().chain(m.displacement)));
+            let parameters: Vec<_> = (size.into_iter().flatten().chain(undercut).chain(warm))
+                .chain(motion.into_iter().flatten())
+                .chain([("oz", support.angle)])
+                .collect();
             self.push(&support.name, model, "*", &[support.node], &parameters);
         }
     }

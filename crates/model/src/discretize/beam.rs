@@ -78,8 +78,7 @@ pub fn lay(
         add_rod(beam, end.offset, along * inwards, drag_per_mass, point, rigid);
     }
     let m = &beam.material;
-    let strain = beam.temperature.map_or(0.0, |t| m.thermal_expansion * (t - m.ambient_temperature))
-        - m.stress / m.youngs_modulus;
+    let strain = beam.temperature.map_or(0.0, |t| m.free_strain(t)) - m.stress / m.youngs_modulus;
     // what is drawn expands, junctions included
     let whole = beam.length / bar.length;
     let mut spans = Vec::with_capacity(cut.pins.len());

@@ -22,7 +22,7 @@ use bimorph_multibody::linear_system::{LinearSystem, add_pair};
 use bimorph_multibody::planar::{JointFrame, Pose};
 use bimorph_multibody::{BodyId, BodyName, Joint};
 use bimorph_structure::{Beam, Structure};
-use nalgebra::{Matrix3, Matrix6, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector2, Vector3, Vector6};
 use std::sync::Arc;
 
 /// How many elements a beam gets.
@@ -130,8 +130,7 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<LinearF
         let ends = [(moved(piece.from.body), 0), (moved(piece.to.body), 3)];
         let material = &piece.beam.material;
         let strain =
-            piece.beam.temperature.map_or(0.0, |t| material.thermal_expansion * (t - material.ambient_temperature))
-                - material.stress / material.youngs_modulus;
+            piece.beam.temperature.map_or(0.0, |t| material.free_strain(t)) - material.stress / material.youngs_modulus;
         let heater = heated.binary_search(&piece.index).ok();
         for (id, row) in ends {
             if let BodyId::Free(body) = id {
@@ -146,6 +145,14 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<LinearF
     for joint in &joints {
         let k = pair_matrix(&joint.frame, &joint.stiffness);
         add(&mut system, joint.a, joint.b, &k, &Matrix6::zeros(), 0.0);
+        if joint.rest != 0.0 {
+            let push = rows(&joint.frame).transpose() * joint.stiffness * Vector3::new(joint.rest, 0.0, 0.0);
+            for (id, row) in [(moved(joint.a), 0), (moved(joint.b), 3)] {
+                if let BodyId::Free(body) = id {
+                    load[body] += push.fixed_rows::<3>(row);
+                }
+            }
+        }
     }
     for damper in &dampers {
         let c = pair_matrix(&damper.frame, &Matrix3::from_diagonal(&damper.coefficients));
@@ -244,8 +251,13 @@ fn carry(arm: Vector2<f64>) -> Matrix3<f64> {
     Matrix3::new(1.0, 0.0, -arm.y, 0.0, 1.0, arm.x, 0.0, 0.0, 1.0)
 }
 
-fn pair_matrix(frame: &JointFrame, coefficients: &Matrix3<f64>) -> Matrix6<f64> {
+/// Strains of a joint per displacement of its two bodies.
+fn rows(frame: &JointFrame) -> Matrix3x6<f64> {
     let rest = Pose::zeros();
-    let rows = frame.kinematics(&rest, &rest, &[0.0; 3]).rows();
+    frame.kinematics(&rest, &rest, &[0.0; 3]).rows()
+}
+
+fn pair_matrix(frame: &JointFrame, coefficients: &Matrix3<f64>) -> Matrix6<f64> {
+    let rows = rows(frame);
     rows.transpose() * coefficients * rows
 }

@@ -26,7 +26,6 @@ use super::rigid::RigidGroups;
 use super::scheme::Bar;
 use crate::options::{CompileOptions, Junctions};
 use bimorph_base::budget;
-use bimorph_multibody::BodyId;
 use bimorph_structure::{Beam, Structure};
 use std::f64::consts::PI;
 
@@ -170,7 +169,7 @@ fn settle_all(beams: &[Beam], kind: Junctions, ends: &mut JunctionEnds) {
 
 /// Nodes on anchors, plates and rigid links: beams end there where they are drawn.
 fn rigid_nodes(structure: &Structure, rigid: &RigidGroups) -> Vec<bool> {
-    let mut held: Vec<bool> = (0..structure.nodes.len()).map(|n| rigid.point(n).body == BodyId::Ground).collect();
+    let mut held: Vec<bool> = (0..structure.nodes.len()).map(|n| rigid.grounded(n)).collect();
     for link in &structure.links {
         held[link.a.0] = true;
         held[link.b.0] = true;

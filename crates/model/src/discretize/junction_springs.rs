@@ -191,6 +191,7 @@ mod tests {
             viscosity: 0.0,
             fluid: 2e-6,
             thermal_expansion: 0.0,
+            expansion_curve: None,
             ambient_temperature: 300.0,
             stress: 0.0,
             strength: None,

@@ -7,11 +7,12 @@ use super::error::DiscretizeError;
 use super::rigid::RigidGroups;
 use bimorph_domains::drive::Electrics;
 use bimorph_domains::network::{CircuitError, ElectricalNetwork, Potentials};
-use bimorph_domains::thermal::{HeatConductor, Heating};
+use bimorph_domains::thermal::{HeatConductor, HeatCurves, Heating, RelativeCurve};
 use bimorph_domains::{Member, PlacedMember};
-use bimorph_structure::{GapVoltage, Structure};
+use bimorph_structure::{Beam, GapVoltage, Heater, PropertyCurve, Structure};
 use nalgebra::{DMatrix, RowDVector};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Builds the electrical side; `heated` lists the beams that are heaters, in heater order, and `gaps` what
 /// acts across gaps.
@@ -30,29 +31,8 @@ pub fn lay(
     let mut fixed: Vec<f64> = structure.voltage_sources.iter().map(|s| s.voltage).collect();
 
     let net: Vec<usize> = structure.nets().into_iter().map(|node| node.0).collect();
-    let mut heaters = Vec::with_capacity(heated.len());
-    for &index in heated {
-        let beam = &structure.beams[index];
-        if let Some(h) = &beam.heater {
-            heaters.push(HeatConductor {
-                a: net[beam.a.0],
-                b: net[beam.b.0],
-                resistance: h.resistance,
-                conductance: h.conductance,
-                expansion: beam.material.thermal_expansion,
-                ambient: beam.material.ambient_temperature,
-                time_constant: h.time_constant.unwrap_or(0.0),
-                delayed: h.time_constant.is_none(),
-                capacity: h.capacity,
-                gas: h.gas.map_or(0.0, |gas| gas.conductance(beam.width, beam.length)),
-                coefficient: h.coefficient,
-                thermal_coefficient: h.thermal_coefficient,
-                capacity_coefficient: h.capacity_coefficient,
-                radiation: beam.radiation(),
-                substrate: h.substrate.map_or(0.0, |substrate| substrate - beam.material.ambient_temperature),
-            });
-        }
-    }
+    let conductors = heated.iter().filter_map(|index| conductor(&structure.beams[*index], &net));
+    let heaters: Vec<HeatConductor> = conductors.collect();
     let circuit = ElectricalNetwork {
         nodes: structure.nodes.len(),
         resistors: (structure.resistors.iter().map(|r| (net[r.a.0], net[r.b.0], r.resistance)))
@@ -119,6 +99,42 @@ pub fn lay(
     Ok(Electrics { ports, fixed, names, gap_rows, conductance, heating, inputs: Vec::new() })
 }
 
+/// A heated beam as a conductor of heat and current.
+fn conductor(beam: &Beam, net: &[usize]) -> Option<HeatConductor> {
+    let h = beam.heater.as_ref()?;
+    Some(HeatConductor {
+        a: net[beam.a.0],
+        b: net[beam.b.0],
+        resistance: h.resistance,
+        conductance: h.conductance,
+        expansion: beam.material.thermal_expansion,
+        ambient: beam.material.ambient_temperature,
+        time_constant: h.time_constant.unwrap_or(0.0),
+        delayed: h.time_constant.is_none(),
+        capacity: h.capacity,
+        gas: h.gas.map_or(0.0, |gas| gas.conductance(beam.width, beam.length)),
+        coefficient: h.coefficient,
+        thermal_coefficient: h.thermal_coefficient,
+        capacity_coefficient: h.capacity_coefficient,
+        radiation: beam.radiation(),
+        substrate: h.substrate.map_or(0.0, |substrate| substrate - beam.material.ambient_temperature),
+        curves: heat_curves(beam, h),
+    })
+}
+
+/// Properties of a heated beam that have curves over temperature; none: no one has.
+fn heat_curves(beam: &Beam, heater: &Heater) -> Option<Arc<HeatCurves>> {
+    let ambient = beam.material.ambient_temperature;
+    let relative = |curve: &Option<PropertyCurve>| curve.as_ref().map(|curve| RelativeCurve::new(curve, ambient));
+    let curves = HeatCurves {
+        resistance: relative(&heater.resistance_curve),
+        conductance: relative(&heater.conductance_curve),
+        capacity: relative(&heater.capacity_curve),
+        expansion: beam.material.expansion_curve.clone().map(|curve| (curve, ambient)),
+    };
+    (!curves.is_empty()).then(|| Arc::new(curves))
+}
+
 /// Adds a source for each gap in which trapped charge acts as one in series; the gaps, with the numbers of their sources among the `fixed` ones.
 fn offset_sources(
     structure: &Structure,
@@ -165,7 +181,7 @@ fn fixed_gap_voltages(
     let mut probe = circuit.clone();
     let first = probe.resistors.len() - heating.heaters.len();
     for (k, (resistor, heater)) in probe.resistors[first..].iter_mut().zip(&heating.heaters).enumerate() {
-        if heater.coefficient != 0.0 {
+        if heater.changes_resistance() {
             // each by its own factor: equal ones leave dividers as they are
             resistor.2 *= 1.0 + PROBE * (1.0 + (k % 7) as f64 / 7.0);
         }
@@ -175,7 +191,7 @@ fn fixed_gap_voltages(
         let Some(GapVoltage::Nodes(a, b)) = gap.voltage else { continue };
         let (a, b) = (net[a.0], net[b.0]);
         if (potentials.difference(a, b) - hot.difference(a, b)).amax() > SAME {
-            let beam = heating.heaters.iter().position(|h| h.coefficient != 0.0);
+            let beam = heating.heaters.iter().position(HeatConductor::changes_resistance);
             let beam = beam.and_then(|k| structure.beams.iter().filter(|b| b.heater.is_some()).nth(k));
             let beam = beam.map_or_else(String::new, |beam| beam.name.clone());
             return Err(DiscretizeError::HotGap { gap: gap.name.to_owned(), beam });

@@ -50,6 +50,8 @@ pub struct UnfinishedBody {
     drag: Lump,
     held: Vec<Vector2<f64>>,
     fixed_angle: bool,
+    /// An anchor that moves: without inertia and drag.
+    anchored: bool,
 }
 
 /// Groups of nodes and the bodies they become.
@@ -72,7 +74,7 @@ impl RigidGroups {
         }
         let mut anchored = vec![false; count];
         for support in &structure.supports {
-            if support.held == [true; 3] {
+            if support.held == [true; 3] && support.motion.is_none() {
                 anchored[joined.first(support.node.0)] = true;
             }
         }
@@ -98,7 +100,10 @@ impl RigidGroups {
         let mut assembly = Self { bodies, group, position };
         for support in &structure.supports {
             if let BodyId::Free(k) = assembly.group[support.node.0] {
-                assembly.bodies[k].hold(support.held, support.angle);
+                match support.motion {
+                    Some(_) => assembly.bodies[k].anchor(),
+                    None => assembly.bodies[k].hold(support.held, support.angle),
+                }
             }
         }
         assembly
@@ -114,9 +119,12 @@ impl RigidGroups {
         }
     }
 
-    /// True when the node is part of the ground.
+    /// True when the node is part of the ground, or of an anchor that moves.
     pub fn grounded(&self, node: usize) -> bool {
-        self.group[node] == BodyId::Ground
+        match self.group[node] {
+            BodyId::Ground => true,
+            BodyId::Free(k) => self.bodies[k].anchored,
+        }
     }
 
     /// Drawn position of a point (m).
@@ -132,28 +140,34 @@ impl RigidGroups {
 
     /// Adds a mass and its drag to the body of a point; `lump` is about that point.
     pub fn add_mass(&mut self, point: MaterialPoint, lump: &Lump, drag_per_mass: f64) {
-        if let BodyId::Free(k) = point.body {
-            self.bodies[k].mass.add(lump, point.arm, 1.0);
-            self.bodies[k].drag.add(lump, point.arm, drag_per_mass);
+        if let Some(body) = self.moving(point) {
+            body.mass.add(lump, point.arm, 1.0);
+            body.drag.add(lump, point.arm, drag_per_mass);
         }
     }
 
     /// Adds drag to the body of a point; `lump` is about that point.
     pub fn add_drag(&mut self, point: MaterialPoint, lump: &Lump) {
-        if let BodyId::Free(k) = point.body {
-            self.bodies[k].drag.add(lump, point.arm, 1.0);
+        if let Some(body) = self.moving(point) {
+            body.drag.add(lump, point.arm, 1.0);
         }
+    }
+
+    /// The body of a point that is neither ground nor an anchor, whose inertia and drag have no effect.
+    fn moving(&mut self, point: MaterialPoint) -> Option<&mut UnfinishedBody> {
+        let BodyId::Free(k) = point.body else { return None };
+        Some(&mut self.bodies[k]).filter(|body| !body.anchored)
     }
 
     /// Adds a plate or lumped mass.
     pub fn add_plate(&mut self, plate: &Mass, undamped: bool) {
         let point = self.point(plate.node.0);
-        if let BodyId::Free(k) = point.body {
+        if let Some(body) = self.moving(point) {
             let lump = Lump { amount: plate.mass, first: Vector2::zeros(), second: plate.inertia };
             let drag = Lump { amount: plate.drag[0], first: Vector2::zeros(), second: plate.drag[1] };
-            self.bodies[k].mass.add(&lump, point.arm, 1.0);
+            body.mass.add(&lump, point.arm, 1.0);
             if !undamped {
-                self.bodies[k].drag.add(&drag, point.arm, 1.0);
+                body.drag.add(&drag, point.arm, 1.0);
             }
         }
     }
@@ -217,7 +231,7 @@ impl RigidGroups {
 
     /// Supports that hold a translation but let the body turn: a joint to ground a million times stiffer than the stiffest beam
     /// or spring as drawn, whatever the mesh. (Held directions of the centre of mass would be wrong: the node moves when the
-    /// body turns.)
+    /// body turns.) Anchors that move have such joints, too.
     pub fn hold_hinges(&self, structure: &Structure, joints: &mut Vec<Joint>) {
         let along = |beam: &Beam| beam.material.youngs_modulus * beam.width * beam.thickness / beam.length;
         let springs = structure.springs.iter().flat_map(|s| [s.stiffness[0].abs(), s.stiffness[1].abs()]);
@@ -251,6 +265,29 @@ impl RigidGroups {
                 expansion: None,
                 rest: 0.0,
                 locked: [support.held[0], support.held[1], false],
+            });
+        }
+        self.move_anchors(structure, stiffness, joints);
+    }
+
+    /// Anchors that move: joints to ground as stiff as hinges, with the displacement as their rest offset, so that it acts as built-in strain does.
+    /// Those of one rigid part share its mean displacement.
+    fn move_anchors(&self, structure: &Structure, stiffness: f64, joints: &mut Vec<Joint>) {
+        let ground = MaterialPoint { body: BodyId::Ground, arm: Vector2::zeros() };
+        for support in &structure.supports {
+            let point = self.point(support.node.0);
+            let (Some(motion), BodyId::Free(_)) = (support.motion, point.body) else { continue };
+            let displacement = Vector2::from(motion.at(structure.nodes[support.node.0].position));
+            let axis = displacement.try_normalize(0.0).unwrap_or(Vector2::x());
+            joints.push(Joint {
+                a: BodyId::Ground,
+                b: point.body,
+                frame: self.frame_at(ground, point, self.position[support.node.0], axis),
+                stiffness: Matrix3::from_diagonal(&[stiffness, stiffness, 0.0].into()),
+                second: Matrix2::zeros(),
+                expansion: None,
+                rest: displacement.norm(),
+                locked: [false; 3],
             });
         }
     }
@@ -289,7 +326,7 @@ fn holds_all_of(one: &Support, other: &Support) -> bool {
 impl UnfinishedBody {
     fn new(name: BodyName, reference: Vector2<f64>) -> Self {
         let (mass, drag) = (Lump::default(), Lump::default());
-        Self { name, reference, mass, drag, held: Vec::new(), fixed_angle: false }
+        Self { name, reference, mass, drag, held: Vec::new(), fixed_angle: false, anchored: false }
     }
 
     fn hold(&mut self, held: [bool; 3], angle: f64) {
@@ -301,6 +338,11 @@ impl UnfinishedBody {
             self.held.push(Vector2::new(-s, c));
         }
         self.fixed_angle |= held[2];
+    }
+
+    /// Makes it an anchor that moves.
+    fn anchor(&mut self) {
+        (self.anchored, self.fixed_angle) = (true, true);
     }
 
     /// Calls `see` with the point that a mass or a drag acts on, from the reference point (m); `None` where it resists

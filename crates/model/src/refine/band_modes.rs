@@ -35,6 +35,7 @@ pub(super) fn mechanics(structure: &Structure) -> Structure {
         springs: structure.springs.clone(),
         ..Structure::default()
     };
+    bare.supports.iter_mut().for_each(|support| support.motion = None);
     for beam in &mut bare.beams {
         beam.heater = None;
         beam.temperature = None;

@@ -6,10 +6,15 @@ use super::super::rotation::Rotation;
 use super::super::source::TextSpan;
 use super::super::value::{LayerValues, Value, short};
 use super::meaning::meaning;
-use bimorph_structure::{NodeId, ReadFunction};
+use bimorph_structure::{NodeId, PropertyCurve, ReadFunction};
+use std::sync::Arc;
 
 /// A length beyond this is a missing suffix rather than a part of a microsystem (m).
 pub(crate) const LONGEST: f64 = 0.1;
+
+/// Parameters that can depend on temperature.
+pub(crate) const CURVES: [&str; 5] =
+    ["resistivity", "sheetresistance", "specificheat", "thermalexpansion", "thermcond"];
 
 /// One parameter as given.
 #[derive(Debug, Clone)]
@@ -94,12 +99,83 @@ impl ElementSite<'_, '_> {
         match self.find(name) {
             None => Ok(None),
             Some((Value::Number(x), _)) if x.is_finite() => Ok(Some(*x)),
+            Some((Value::Curve(curve), span)) if CURVES.contains(&name) => {
+                let curve = Arc::clone(curve);
+                self.at_ambient(name, &curve, span).map(Some)
+            }
             Some((value, span)) => {
                 let what = if let Value::Number(x) = value { short(*x) } else { value.called().to_owned() };
+                let help = match value {
+                    Value::Curve(_) => format!("what can depend on temperature: {}", CURVES.join(" ")),
+                    _ => String::new(),
+                };
                 let message = format!("`{name}` ({}) must be a finite number, this is {what}", meaning(name));
-                Err(self.sink.error("E050", span, message, ""))
+                Err(self.sink.error("E050", span, message, help))
             }
         }
+    }
+
+    /// A property against temperature, if it is given so. That of the expansion may have any sign, others are positive.
+    pub(super) fn curve(&mut self, name: &str) -> Result<Option<PropertyCurve>, Reported> {
+        let Some((Value::Curve(curve), span)) = self.find(name) else { return Ok(None) };
+        let curve = Arc::clone(curve);
+        let ambient = self.at_ambient(name, &curve, span)?;
+        if ambient <= 0.0 && name != "thermalexpansion" {
+            return Err(self.out_of_range(name, ambient, "positive at ambient temperature"));
+        }
+        let lowest = curve.table.iter().find(|point| point[1] <= 0.0);
+        if let Some([temperature, value]) = lowest.filter(|_| name != "thermalexpansion") {
+            let message = format!(
+                "{} must be positive, the table has {} at {} K",
+                self.of_layer(name),
+                short(*value),
+                short(*temperature)
+            );
+            return Err(self.sink.error("E060", span, message, ""));
+        }
+        Ok(Some(PropertyCurve::clone(&curve)))
+    }
+
+    /// A curve's value at ambient temperature.
+    fn at_ambient(&mut self, name: &str, curve: &PropertyCurve, span: TextSpan) -> Result<f64, Reported> {
+        if let Some(fault) = curve.fault() {
+            let message = format!("{}: {fault}", self.of_layer(name));
+            return Err(self.sink.error("E060", span, message, "give pairs of a temperature [K] and a value"));
+        }
+        let ambient = self.number_or("ambienttemperature", 0.0)?;
+        self.covered(name, curve, ambient, "ambient temperature", span)?;
+        Ok(curve.at(ambient)[0])
+    }
+
+    /// Refuses a table that does not reach a temperature (K).
+    pub(super) fn covered(
+        &mut self,
+        name: &str,
+        curve: &PropertyCurve,
+        temperature: f64,
+        which: &str,
+        span: TextSpan,
+    ) -> Result<(), Reported> {
+        let Some([low, high]) = curve.range().filter(|_| !curve.covers(temperature)) else { return Ok(()) };
+        let message = format!(
+            "the table of {} goes from {} to {} K and does not cover the {which} of {} K",
+            self.of_layer(name),
+            short(low),
+            short(high),
+            short(temperature)
+        );
+        let help = match temperature {
+            0.0 => "give `ambienttemperature=`: without it, temperatures are rises from 0 K",
+            _ => "add points to the table",
+        };
+        Err(self.sink.error("E060", span, message, help))
+    }
+
+    /// A parameter with its meaning and the layer of the element.
+    fn of_layer(&self, name: &str) -> String {
+        let layer = self.instance.arguments.layer_name.filter(|_| !self.is_given(name));
+        let layer = layer.map_or_else(String::new, |layer| format!(" of the layer `{layer}`"));
+        format!("`{name}` ({}){layer}", meaning(name))
     }
 
     /// A number with a value for when it is absent.

@@ -4,7 +4,7 @@ use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
 use super::arguments::ElementSite;
 use super::etched::EquivalentRectangle;
-use bimorph_structure::{Beam, Heater, Load, NodeId, Resistor, Yield};
+use bimorph_structure::{Beam, Heater, Load, NodeId, PropertyCurve, Resistor, Yield};
 
 /// A layer's `thermcond` below this is no conductivity of a solid structural material (W/(m·K)). The MUMPs process
 /// file of SUGAR has 2.33, which is the digits of silicon's expansion coefficient.
@@ -112,6 +112,22 @@ impl ElementSite<'_, '_> {
 }
 
 impl ElementSite<'_, '_> {
+    /// The curve in whose proportion the resistance of a beam changes with temperature, also where that is given by `R` or `G`.
+    fn resistance_curve(&mut self) -> Result<Option<PropertyCurve>, Reported> {
+        let name = if self.number("resistivity")?.is_some() { "resistivity" } else { "sheetresistance" };
+        self.changing(name, "TCR")
+    }
+
+    /// A property against temperature, where it is given so and not by its coefficient, too.
+    fn changing(&mut self, name: &str, coefficient: &str) -> Result<Option<PropertyCurve>, Reported> {
+        let curve = self.curve(name)?;
+        if curve.is_some() && self.number(coefficient)?.is_some() {
+            let message = format!("`{name}` is a curve over temperature, and `{coefficient}` is given, too");
+            return Err(self.error("E060", message, format!("leave out `{coefficient}`")));
+        }
+        Ok(curve)
+    }
+
     /// True for a beam that is given the width or the height 0: in SUGAR it has no stiffness and no mass, and places its nodes.
     pub(super) fn has_no_section(&mut self) -> Result<bool, Reported> {
         let none = |size: Option<f64>| size == Some(0.0);
@@ -186,6 +202,9 @@ pub(super) fn beam2det(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let gas = site.gas_loss(width, height)?;
     let conductance = conductivity * width * height / length;
     let ambient = beam.material.ambient_temperature;
+    let resistance_curve = site.resistance_curve()?;
+    let conductance_curve = site.changing("thermcond", "TCK")?;
+    let capacity_curve = site.changing("specificheat", "TCC")?;
     beam.heater = Some(Heater {
         resistance,
         conductance,
@@ -195,6 +214,9 @@ pub(super) fn beam2det(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
         coefficient: site.number_or("TCR", 0.0)?,
         thermal_coefficient: site.number_or("TCK", 0.0)?,
         capacity_coefficient: site.number_or("TCC", 0.0)?,
+        resistance_curve,
+        conductance_curve,
+        capacity_curve,
         emissivity: site.emissivity(ambient)?,
         substrate: site.absolute("substratetemperature")?,
     });

@@ -122,6 +122,7 @@ impl ElementSite<'_, '_> {
             viscosity,
             fluid,
             thermal_expansion: self.number_or("thermalexpansion", 0.0)?,
+            expansion_curve: self.curve("thermalexpansion")?,
             ambient_temperature: self.ambient()?,
             stress,
             strength: self.positive_if_any("strength")?,
@@ -260,6 +261,10 @@ impl ElementSite<'_, '_> {
         let Some(temperature) = self.number("T")? else { return Ok(None) };
         if self.number("thermalexpansion")?.is_none() {
             return Err(self.missing("thermalexpansion"));
+        }
+        if let Some(curve) = &material.expansion_curve {
+            let span = self.span_of("thermalexpansion");
+            self.covered("thermalexpansion", curve, temperature, "temperature `T`", span)?;
         }
         if temperature < 0.0 && material.ambient_temperature > 0.0 {
             return Err(self.out_of_range("T", temperature, "an absolute temperature, zero or positive"));

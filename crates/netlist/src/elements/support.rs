@@ -4,7 +4,10 @@ use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
 use super::super::rotation::Rotation;
 use super::arguments::ElementSite;
-use bimorph_structure::{NodeId, Pad, Support};
+use bimorph_structure::{AnchorMotion, NodeId, Pad, Support};
+
+/// Strain of a substrate beyond the strength of any (1).
+const LARGEST_STRAIN: f64 = 0.1;
 
 impl ElementSite<'_, '_> {
     fn support(&mut self, held: [bool; 3]) -> Result<(), Reported> {
@@ -28,10 +31,34 @@ impl ElementSite<'_, '_> {
         }
     }
 
+    /// How an anchor moves, if anything says so.
+    fn motion(&mut self) -> Result<Option<AnchorMotion>, Reported> {
+        let both = self.number("packagestrain")?;
+        let strain = [self.number("packagestrainx")?.or(both), self.number("packagestrainy")?.or(both)];
+        let displacement = [self.number("anchorx")?, self.number("anchory")?];
+        for (name, strain) in ["packagestrainx", "packagestrainy"].into_iter().zip(strain) {
+            if let Some(strain) = strain.filter(|strain| strain.abs() > LARGEST_STRAIN) {
+                let given = if self.number(name)?.is_some() { name } else { "packagestrain" };
+                return Err(self.out_of_range(given, strain, "at most 0.1"));
+            }
+        }
+        let moves = strain.iter().chain(&displacement).any(Option::is_some);
+        let or_none = |of: [Option<f64>; 2]| of.map(|x| x.unwrap_or(0.0));
+        Ok(moves.then(|| AnchorMotion { strain: or_none(strain), displacement: or_none(displacement) }))
+    }
+
     fn hold(&mut self, node: NodeId, held: [bool; 3], angle: f64, undercut: Option<f64>) {
         self.drawing.place(self.instance.span, &[node], &[[0.0; 2]]);
         let name = self.name();
-        self.drawing.structure.supports.push(Support { name, node, held, angle, undercut, temperature: None });
+        self.drawing.structure.supports.push(Support {
+            name,
+            node,
+            held,
+            angle,
+            undercut,
+            temperature: None,
+            motion: None,
+        });
     }
 }
 
@@ -45,7 +72,10 @@ pub(super) fn anchor(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
         site.drawing.note(Fact::AnchorNodes, site.instance.span);
     }
     let temperature = site.absolute("anchortemperature")?;
-    site.drawing.structure.supports[first..].iter_mut().for_each(|support| support.temperature = temperature);
+    let motion = site.motion()?;
+    for support in &mut site.drawing.structure.supports[first..] {
+        (support.temperature, support.motion) = (temperature, motion);
+    }
     Ok(())
 }
 

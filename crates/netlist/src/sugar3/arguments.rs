@@ -2,8 +2,9 @@
 
 use super::super::elements;
 use super::super::value::Value;
-use bimorph_structure::NodeId;
+use bimorph_structure::{NodeId, PropertyCurve};
 use mlua::{Table, UserData, UserDataFields, Value as LuaValue};
+use std::sync::Arc;
 
 /// A node as Lua holds it.
 #[derive(Debug, Clone)]
@@ -121,6 +122,12 @@ fn numbers(table: &Table) -> mlua::Result<Vec<(String, Value)>> {
         let (LuaValue::String(key), value) = pair? else { continue };
         match (number(&value), value) {
             (Some(x), _) => entries.push((key.to_string_lossy(), Value::Number(x))),
+            (None, LuaValue::Table(points)) if elements::CURVES.contains(&key.to_string_lossy().as_str()) => {
+                if let Some(table) = pairs(&points)? {
+                    let curve = PropertyCurve { table, ..PropertyCurve::default() };
+                    entries.push((key.to_string_lossy(), Value::Curve(Arc::new(curve))));
+                }
+            }
             // an element that reads it says that it is no number
             (None, LuaValue::String(text)) if elements::is_entry(&key.to_string_lossy()) => {
                 entries.push((key.to_string_lossy(), Value::Text(text.to_string_lossy().into())));
@@ -133,6 +140,18 @@ fn numbers(table: &Table) -> mlua::Result<Vec<(String, Value)>> {
     }
     entries.sort_by(|a, b| a.0.cmp(&b.0));
     Ok(entries)
+}
+
+/// The pairs of numbers in a table of tables; none of any other.
+fn pairs(points: &Table) -> mlua::Result<Option<Vec<[f64; 2]>>> {
+    let mut found = Vec::new();
+    for k in 1..=points.raw_len().min(MAX_ITEMS) {
+        let LuaValue::Table(pair) = points.raw_get::<LuaValue>(k)? else { return Ok(None) };
+        let [x, y] = [pair.raw_get::<LuaValue>(1)?, pair.raw_get::<LuaValue>(2)?];
+        let (Some(x), Some(y)) = (number(&x), number(&y)) else { return Ok(None) };
+        found.push([x, y]);
+    }
+    Ok(Some(found))
 }
 
 /// A number, whole or not.

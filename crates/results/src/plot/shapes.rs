@@ -155,6 +155,7 @@ mod tests {
             viscosity: 0.0,
             fluid: 1.0,
             thermal_expansion: 0.0,
+            expansion_curve: None,
             ambient_temperature: 0.0,
             stress: 0.0,
             strength: None,
