@@ -341,8 +341,8 @@ impl HotBeam {
             let [resistivity, grows] = self.resistivity(t);
             let sides = self.aside(t)[1] + warming - joule * grows;
             if self.curves.is_some() {
-                for i in 0..3 {
-                    out.by_rise[first + i] += real::<T>(current * self.resistance * grows * shape[i] * weight / count);
+                for (by_rise, shape) in out.by_rise[first..].iter_mut().zip(shape) {
+                    *by_rise += real::<T>(current * self.resistance * grows * shape * weight / count);
                 }
             }
             for i in 0..3 {

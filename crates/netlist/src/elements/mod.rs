@@ -22,7 +22,9 @@ mod support;
 mod table;
 pub(crate) mod upright;
 
-pub(crate) use arguments::{Argument, Arguments, CURVES, ElementInstance, ElementSite, LONGEST};
+#[cfg(feature = "lua")]
+pub(crate) use arguments::CURVES;
+pub(crate) use arguments::{Argument, Arguments, ElementInstance, ElementSite, LONGEST};
 pub(crate) use table::{ElementModel, model, models};
 
 use super::diagnostic_sink::{DiagnosticSink, Reported};
