@@ -5,6 +5,7 @@ mod backbending;
 mod baselines;
 mod beams;
 mod closed_branches;
+mod combs;
 mod contact;
 mod contact_signals;
 mod contact_speed;

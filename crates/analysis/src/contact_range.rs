@@ -3,23 +3,38 @@
 
 use super::AnalysisError;
 use bimorph_domains::Domain;
+use bimorph_domains::domain::SideRoom;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 
-/// Refuses a configuration in which a gap is closed beyond the range of its law, see [`bimorph_domains::contact`].
+/// Refuses a configuration in which a gap is closed beyond the range of its law, see [`bimorph_domains::contact`], or fingers of a comb touch at their sides.
 ///
 /// # Errors
-/// [`AnalysisError::ContactRange`] with the gap.
+/// [`AnalysisError::ContactRange`] with the gap, [`AnalysisError::SidePullIn`] with the comb.
 pub fn within_contact_range(compiled: &CompiledModel, q: &[Pose]) -> Result<(), AnalysisError> {
     let system = &compiled.parts.system;
     match system.overrun(q) {
-        None => Ok(()),
+        None => match comb_aside(compiled, q) {
+            None => Ok(()),
+            Some((comb, [aside, room])) => Err(AnalysisError::SidePullIn { comb: comb.to_owned(), aside, room }),
+        },
         Some((gap, left)) => Err(AnalysisError::ContactRange {
             gap: compiled.parts.gap_names[gap].clone(),
             left,
             least: system.touching(gap).map_or(0.0, |[_, least]| least),
         }),
     }
+}
+
+/// The comb whose fingers touch at their sides at `q`: its name, how far they lie aside and how far they can (m).
+pub(crate) fn comb_aside<'a>(compiled: &'a CompiledModel, q: &[Pose]) -> Option<(&'a str, [f64; 2])> {
+    let system = &compiled.parts.system;
+    let touching = system.members.iter().zip(&compiled.parts.gap_names).filter_map(|(member, name)| {
+        let (across, SideRoom { drawn, room }) = member.side_room()?;
+        let aside = (drawn + across.value(q, system.model.linear)).abs();
+        (aside > room).then_some((name.as_str(), [aside, room]))
+    });
+    touching.max_by(|a, b| (a.1[0] - a.1[1]).total_cmp(&(b.1[0] - b.1[1])))
 }
 
 /// Warning about that comb.

@@ -96,6 +96,19 @@ pub enum AnalysisError {
         /// Least distance within the range (m).
         least: f64,
     },
+    /// The fingers of a comb are drawn to the side until they touch.
+    #[error(
+        "the fingers of the comb \"{comb}\" are drawn {aside:.3e} m to the side and touch at {room:.3e} m: the side force exceeds what holds them. Lower \
+         the voltage, make the part stiffer across its fingers, or draw wider gaps or a `stop2d` across"
+    )]
+    SidePullIn {
+        /// Name of the comb.
+        comb: String,
+        /// Distance from the middle of the gaps (m).
+        aside: f64,
+        /// Distance at which the sides touch (m).
+        room: f64,
+    },
     /// An iteration did not settle.
     #[error("not converged: {detail}")]
     NotConverged {

@@ -66,6 +66,15 @@ impl Approach {
         (self.a.displacement(q, linear) - self.b.displacement(q, linear)).dot(&self.axis)
     }
 
+    /// Bound of |u| at displacements `q` (m), a norm of `q`. A body that rotates by θ moves a point at the arm r by at most |θ|·|r|.
+    pub(super) fn bound(&self, q: &[Pose]) -> f64 {
+        let moved = |point: &MaterialPoint| {
+            let (pose, arm) = (Model::pose(q, point.body), point.arm);
+            (pose.x * self.axis.x + pose.y * self.axis.y).abs() + (arm.x.abs() + arm.y.abs()) * pose.z.abs()
+        };
+        moved(&self.a) + moved(&self.b)
+    }
+
     /// u with its derivatives.
     #[inline]
     pub fn measure(&self, q: &[Pose], linear: bool) -> ApproachDerivatives {

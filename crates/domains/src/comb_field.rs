@@ -59,7 +59,7 @@ impl CombField {
         let half_pitch = 0.5 * width + gap;
         let s = 0.5 * width / half_pitch;
         let tips = [PI * s, 2.0 / PI * (1.0 - 1.307 * s.powf(2.385))];
-        let fade = ENGAGEMENT[1] * ends.powf(ENGAGEMENT[2]);
+        let [fade, ..] = Self::fading(ends);
         Self { strength, gap, length, ends, fade, decay: PI / half_pitch, tips }
     }
 
@@ -77,18 +77,42 @@ impl CombField {
 
     /// Λ, Λ′ and Λ″ at z.
     fn engaged(&self, z: f64) -> [f64; 3] {
-        let ([lambda, .., k], b, c) = (ENGAGEMENT, self.fade, self.ends);
+        let (b, c) = (self.fade, self.ends);
+        let [n, opening, bend] = Self::apart(z);
+        let (open, g) = (-opening, Self::fringe(n / b));
+        let first = 1.0 - open - c * g[1] * open / b;
+        let second = bend * (1.0 + c * g[1] / b) + c * g[2] * open * open / (b * b);
+        [n + z + c * g[0], first, second]
+    }
+
+    /// n and its derivatives with z.
+    pub(super) fn apart(z: f64) -> [f64; 3] {
+        let [lambda, ..] = ENGAGEMENT;
         let small = (-lambda * z.abs()).exp();
         let n = small.ln_1p() / lambda + (-z).max(0.0);
         // 1 − dp/dz, and dp/dz times that
         let open = if z > 0.0 { small } else { 1.0 } / (1.0 + small);
         let both = small / ((1.0 + small) * (1.0 + small));
-        let y = n / b;
+        [n, -open, lambda * both]
+    }
+
+    /// G and its derivatives.
+    pub(super) fn fringe(y: f64) -> [f64; 3] {
+        let [.., k] = ENGAGEMENT;
         let r = 1.0 / (1.0 + y);
-        let g = [r + k * y * r * r, r * r * (k * (1.0 - y) * r - 1.0), r * r * r * (2.0 + k * (2.0 * y - 4.0) * r)];
-        let first = 1.0 - open - c * g[1] * open / b;
-        let second = lambda * both * (1.0 + c * g[1] / b) + c * g[2] * open * open / (b * b);
-        [n + z + c * g[0], first, second]
+        [r + k * y * r * r, r * r * (k * (1.0 - y) * r - 1.0), r * r * r * (2.0 + k * (2.0 * y - 4.0) * r)]
+    }
+
+    /// b and its derivatives with c.
+    pub(super) fn fading(c: f64) -> [f64; 3] {
+        let [_, scale, power, _] = ENGAGEMENT;
+        let b = scale * c.powf(power);
+        [b, power * b / c, power * (power - 1.0) * b / (c * c)]
+    }
+
+    /// Δ at the overlap `o` (m), and its derivatives with that.
+    pub(super) fn at_tips(&self, o: f64) -> [f64; 3] {
+        self.tips(self.length - o)
     }
 
     /// Δ and its derivatives with the overlap at the distance `d` (m) of the tips.

@@ -65,6 +65,15 @@ pub enum Law {
     Spring([f64; 2]),
 }
 
+/// How far the fingers of a comb lie aside of the middle of their gaps, and how far they can (m).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SideRoom {
+    /// As drawn.
+    pub drawn: f64,
+    /// Until their sides touch.
+    pub room: f64,
+}
+
 /// One thing that acts on bodies. Forces are those of the residual: minus the wrench on each body.
 pub trait Domain {
     /// Its input: the voltage across a gap (V), the fraction of the dead loads that acts (1), a force (N), the motion
@@ -192,9 +201,26 @@ pub trait Domain {
         None
     }
 
+    /// Bound of the way by which displacements `q` from the drawing bring its two sides together (m), a norm of `q`; infinite where none is known.
+    fn closing_bound(&self, q: &[Pose]) -> f64 {
+        let _ = q;
+        f64::INFINITY
+    }
+
+    /// True where a bound leaves its sides apart: cheap, and exact enough for most states of an open gap. False says nothing.
+    fn surely_apart(&self, at: Configuration<'_>) -> bool {
+        let _ = at;
+        false
+    }
+
     /// Remaining travel until the gap is closed completely (m).
     fn clearance(&self, at: Configuration<'_>) -> f64 {
         self.distance(at)
+    }
+
+    /// The motion of fingers across their gaps, where they have a side force.
+    fn side_room(&self) -> Option<(&Approach, SideRoom)> {
+        None
     }
 
     /// Force with which its sides bear on each other (N).

@@ -12,6 +12,7 @@
 //!
 //! Every law here is one function with its first two derivatives, so that charge, force and stiffness belong to one energy.
 
+use bimorph_multibody::batch::SimdReal;
 use bimorph_structure::{BeamGap, ElectrodeShape, Fringe, PlateGap};
 use std::f64::consts::PI;
 
@@ -130,6 +131,49 @@ impl EdgeField {
                 let second = (0.0625 * quarter + 0.25 * half + one + 4.0 * two) / sum;
                 let slope = -factor * first / g;
                 [factor * sum.ln(), slope, factor * (second - first * first + first) / (g * g)]
+            }
+        }
+    }
+}
+
+impl EdgeField {
+    /// The first derivative of [`EdgeField::derivatives`] alone.
+    #[inline(always)]
+    pub(super) fn slope<W: SimdReal>(&self, inverse: W) -> W {
+        let square = inverse * inverse;
+        match *self {
+            Self::None => -square,
+            Self::Parallel { factor, .. } => -square + inverse * -factor,
+            Self::Exact { factor, unit, terms } => {
+                let y = inverse * unit;
+                let root = y.sqrt();
+                let [quarter, half, one, two] =
+                    [root.sqrt() * terms[0], root * terms[1], y * terms[2], y * y * terms[3]];
+                let over = y.splat_like(1.0) / (quarter + half + one + two);
+                let first = (quarter * 0.25 + half * 0.5 + one + two * 2.0) * over;
+                -square + first * inverse * -factor
+            }
+        }
+    }
+
+    /// First and second derivative of 1/g + e(g) in lanes, at the inverse of the distance g (1/m).
+    #[inline(always)]
+    pub(super) fn derivatives<W: SimdReal>(&self, inverse: W) -> [W; 2] {
+        let square = inverse * inverse;
+        let (slope, curvature) = (-square, square * inverse * 2.0);
+        match *self {
+            Self::None => [slope, curvature],
+            Self::Parallel { factor, .. } => [slope + inverse * -factor, curvature + square * factor],
+            Self::Exact { factor, unit, terms } => {
+                let y = inverse * unit;
+                let root = y.sqrt();
+                let [quarter, half, one, two] =
+                    [root.sqrt() * terms[0], root * terms[1], y * terms[2], y * y * terms[3]];
+                let over = y.splat_like(1.0) / (quarter + half + one + two);
+                let first = (quarter * 0.25 + half * 0.5 + one + two * 2.0) * over;
+                let second = (quarter * 0.0625 + half * 0.25 + one + two * 4.0) * over;
+                let bent = second - first * first + first;
+                [slope + first * inverse * -factor, curvature + bent * square * factor]
             }
         }
     }

@@ -1,8 +1,7 @@
-//! A comb, or two lumped plates: a field that depends on one approach, and what bears where plates touch.
+//! Two lumped plates: a field that depends on one approach, and what bears where plates touch.
 
 use super::approach::{Approach, MaterialPoint};
 use super::capacitor::{Capacitance, Capacitor};
-use super::comb_field::{CombField, above_and_below};
 use super::contact::{Contact, touching_distance};
 use super::contact_loss::{Loss, fall_at_pull_in};
 use super::domain::{Chord, Configuration, Domain, Law};
@@ -12,7 +11,7 @@ use super::quotient::{self, quotient};
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
-use bimorph_structure::{Fringe, GapVoltage, Impact};
+use bimorph_structure::GapVoltage;
 use nalgebra::Vector2;
 
 /// Two electrodes.
@@ -50,33 +49,7 @@ impl Electrodes {
 }
 
 impl FromStructure for Electrodes {
-    /// Combs, then plates.
     fn lay<'a>(drawing: &StructureView<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
-        for comb in &drawing.structure.combs {
-            let approach = drawing.approach(comb.a, comb.b, comb.axis);
-            let strength = comb.gaps * comb.permittivity * comb.height;
-            let overlap = if comb.finite { comb.overlap } else { f64::INFINITY };
-            let mut capacitor = Capacitor::Comb {
-                slope: strength / comb.gap,
-                overlap,
-                blend: comb.gap,
-                parasitic: comb.parasitic,
-                fingers: None,
-            };
-            let [length, width] = comb.finger;
-            let exact = comb.law.unwrap_or(if drawing.chord { Fringe::None } else { Fringe::Exact }) == Fringe::Exact;
-            if exact && comb.finite && width > 0.0 {
-                capacitor = Capacitor::Comb {
-                    slope: comb.gaps * comb.permittivity * above_and_below(width / comb.gap),
-                    overlap,
-                    blend: comb.gap,
-                    parasitic: comb.parasitic,
-                    fingers: Some(CombField::new(strength, [comb.gap, width, length])),
-                };
-            }
-            let loss = Loss::new(&Impact::default());
-            put(&comb.name, Some(&comb.voltage), Self { approach, capacitor, contact: None, loss });
-        }
         for plate in &drawing.structure.plate_gaps {
             let approach = drawing.approach(plate.a, plate.b, plate.axis);
             let contact = Contact { touch: plate.touch.unwrap_or(touching_distance(plate.gap)), area: plate.area };
@@ -160,24 +133,23 @@ impl Domain for Electrodes {
     }
 
     fn is_electrostatic(&self) -> bool {
-        matches!(self.capacitor, Capacitor::Plates { .. })
+        true
     }
 
-    /// Overlap of a comb, gap of plates.
     fn distance(&self, at: Configuration<'_>) -> f64 {
         self.capacitor.distance(self.approach.value(at.q, at.linear))
     }
 
     fn distance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
-        let along = self.approach.change(&self.approach.measure(at.q, at.linear), dq);
-        match self.capacitor {
-            Capacitor::Comb { .. } => along,
-            Capacitor::Plates { .. } => -along,
-        }
+        -self.approach.change(&self.approach.measure(at.q, at.linear), dq)
     }
 
     fn touching(&self) -> Option<[f64; 2]> {
         self.contact.map(|c| [c.touch, c.least()])
+    }
+
+    fn closing_bound(&self, q: &[Pose]) -> f64 {
+        self.approach.bound(q)
     }
 
     fn bearing(&self, at: Configuration<'_>) -> f64 {

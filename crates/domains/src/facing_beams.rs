@@ -7,12 +7,14 @@ use super::contact_loss::{Loss, fall_at_pull_in};
 use super::domain::{Chord, Configuration, Domain};
 use super::edge_field::EdgeField;
 use super::facing::FacingStretch;
+use super::facing_field::FieldForces;
 pub use super::facing_local::FacingBeams;
 use super::facing_local::SIGNS;
 use super::facing_loss;
 use super::facing_side::{Opening, back};
 use super::facing_stretches::{CubicStretch, side, stretches};
 use super::from_structure::{FromStructure, StructureView};
+use bimorph_multibody::batch::everywhere;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
 use bimorph_structure::{BeamRows, GapVoltage};
@@ -51,7 +53,7 @@ impl FromStructure for FacingBeams {
                 weights: cut.weights,
             });
             let (stretches, loss) = (stretches.collect(), Loss::new(&gap.impact));
-            put(&gap.name, Some(&gap.voltage), Self { frame, sides, stretches, loss });
+            put(&gap.name, Some(&gap.voltage), Self::new(frame, sides, stretches, loss));
         }
     }
 
@@ -59,7 +61,14 @@ impl FromStructure for FacingBeams {
         for station in self.sides.iter_mut().flat_map(|side| &mut side.stations) {
             station.point = to(station.point);
         }
-        self
+        Self::new(self.frame, self.sides, self.stretches, self.loss)
+    }
+}
+
+impl FacingBeams {
+    /// Field at a voltage and contact, added to nothing.
+    fn pull_at<'a>(&'a self, at: Configuration<'a>, volts: f64) -> FieldForces<'a> {
+        FieldForces { beams: self, at, factor: -0.5 * volts * volts, contact: true, r: None, tangent: None }
     }
 }
 
@@ -84,6 +93,9 @@ impl Domain for FacingBeams {
         if volts == 0.0 && self.surely_apart(at) {
             return;
         }
+        if !self.tiles.is_empty() {
+            return everywhere(FieldForces { r: Some(r), ..self.pull_at(at, volts) });
+        }
         self.along(at, |local| {
             if volts != 0.0 || !local.stretch.facing.apart(&local.z) {
                 self.add(local, local.stretch.facing.load(&local.z, volts), r);
@@ -92,13 +104,20 @@ impl Domain for FacingBeams {
     }
 
     fn add_force_change(&self, at: Configuration<'_>, volts: f64, change: f64, r: &mut [Pose]) {
+        let factor = -volts * change;
+        if !self.tiles.is_empty() {
+            return everywhere(FieldForces { factor, contact: false, r: Some(r), ..self.pull_at(at, volts) });
+        }
         self.along(at, |local| {
-            let first = local.stretch.facing.gradient(&local.z) * (-volts * change);
+            let first = local.stretch.facing.gradient(&local.z) * factor;
             self.add(local, first, r);
         });
     }
 
     fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+        if !self.tiles.is_empty() {
+            return everywhere(FieldForces { tangent: Some((pattern, tangent)), ..self.pull_at(at, volts) });
+        }
         self.along(at, |local| {
             if let Some(both) = local.stretch.facing.load_and_stiffness(&local.z, volts) {
                 self.add_stiffness(local, both, pattern, tangent);
@@ -115,6 +134,13 @@ impl Domain for FacingBeams {
     ) {
         if volts == 0.0 && self.surely_apart(at) {
             return;
+        }
+        if !self.tiles.is_empty() {
+            return everywhere(FieldForces {
+                r: Some(r),
+                tangent: Some((pattern, tangent)),
+                ..self.pull_at(at, volts)
+            });
         }
         self.along(at, |local| {
             if let Some(both) = local.stretch.facing.load_and_stiffness(&local.z, volts) {
@@ -197,6 +223,15 @@ impl Domain for FacingBeams {
     fn touching(&self) -> Option<[f64; 2]> {
         let facing = &self.stretches.first()?.facing;
         Some([facing.touch, facing.least()])
+    }
+
+    fn closing_bound(&self, q: &[Pose]) -> f64 {
+        self.bound(q)
+    }
+
+    fn surely_apart(&self, at: Configuration<'_>) -> bool {
+        let Some(facing) = self.stretches.first().map(|stretch| &stretch.facing) else { return true };
+        facing.gap - self.bound(at.q) >= facing.touch
     }
 
     fn bearing(&self, at: Configuration<'_>) -> f64 {

@@ -5,6 +5,7 @@ use super::contact_loss::Loss;
 use super::domain::Configuration;
 use super::facing_side::{Deflection, Flank, Opening, Walk, back, onto, values};
 use super::facing_stretches::CubicStretch;
+use super::facing_tiles::Tile;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
 use nalgebra::{Matrix4, Vector4};
@@ -18,6 +19,8 @@ pub struct FacingBeams {
     pub sides: [Flank; 2],
     /// From a to b.
     pub(super) stretches: Vec<CubicStretch>,
+    /// The same in tiles; none where a stretch lies alone or is measured along chords.
+    pub(super) tiles: Vec<Tile>,
     /// Energy loss of an impact.
     pub loss: Loss,
 }
@@ -35,6 +38,12 @@ pub(super) struct Local<'a> {
 pub(super) const SIGNS: [f64; 2] = [1.0, -1.0];
 
 impl FacingBeams {
+    pub(super) fn new(frame: Opening, sides: [Flank; 2], stretches: Vec<CubicStretch>, loss: Loss) -> Self {
+        let tiled = stretches.iter().all(|stretch| !(stretch.facing.alone || stretch.facing.chord));
+        let tiles = if tiled { Tile::all(&sides, &stretches) } else { Vec::new() };
+        Self { frame, sides, stretches, tiles, loss }
+    }
+
     /// Both sides at a configuration, to be followed from start to end.
     #[inline]
     pub(super) fn walks<'a>(&'a self, at: Configuration<'a>) -> [Walk<'a>; 2] {
@@ -42,12 +51,10 @@ impl FacingBeams {
         [walk(&self.sides[0]), walk(&self.sides[1])]
     }
 
-    /// True where a bound of all displacements leaves the sides apart: cheap, and exact enough for most states of an open gap. False says nothing.
-    pub(super) fn surely_apart(&self, at: Configuration<'_>) -> bool {
-        let Some(facing) = self.stretches.first().map(|stretch| &stretch.facing) else { return true };
+    /// Bound of the displacements of both sides together (m).
+    pub(super) fn bound(&self, q: &[Pose]) -> f64 {
         // the Bernstein coefficients of a cubic lie within a third of its length times the slopes of the displacements at its ends
-        let moved: f64 = self.moving().map(|side| self.frame.bound(&self.sides[side].stations, at.q)).sum();
-        facing.gap - moved >= facing.touch
+        self.moving().map(|side| self.frame.bound(&self.sides[side], q)).sum()
     }
 
     /// The next stretch along them.

@@ -2,7 +2,7 @@
 //! discrete forces of field and contact over a step ([`super::quotient`]).
 
 use super::contact_loss::Loss;
-use super::domain::{Chord, Configuration};
+use super::domain::{Chord, Configuration, Domain};
 use super::edge_field::EdgeField;
 use super::facing::FacingStretch;
 use super::facing_local::{FacingBeams, Local};

@@ -29,16 +29,19 @@ pub(super) struct Deflection {
 
 impl Opening {
     /// A bound of the displacement along the axis of all points between stations (m). A body that rotates by θ moves a point at the arm r by at most |θ|·|r|.
-    pub(super) fn bound(&self, stations: &[Station], q: &[Pose]) -> f64 {
-        let longest = stations.windows(2).map(|ends| ends[1].at - ends[0].at).fold(0.0, f64::max);
-        let moved = |station: &Station| {
-            let BodyId::Free(k) = station.point.body else { return 0.0 };
-            let (pose, arm) = (&q[k], station.point.arm);
-            (pose.x * self.axis.x + pose.y * self.axis.y).abs()
-                + (arm.x.abs() + arm.y.abs() + longest / 3.0) * pose.z.abs()
-        };
+    pub(super) fn bound(&self, side: &Flank, q: &[Pose]) -> f64 {
+        let (mut most, mut sum) = (0.0, 0.0);
+        for station in &side.stations {
+            if let BodyId::Free(k) = station.point.body {
+                let (pose, arm) = (&q[k], station.point.arm);
+                let turned = (arm.x.abs() + arm.y.abs() + side.third) * pose.z.abs();
+                let moved = (pose.x * self.axis.x + pose.y * self.axis.y).abs() + turned;
+                most = if moved > most { moved } else { most };
+                sum += moved;
+            }
+        }
         // a comparison with NaN must not hide it
-        stations.iter().map(moved).fold(0.0, |most, moved| if moved > most || moved.is_nan() { moved } else { most })
+        if sum < f64::INFINITY { most } else { sum }
     }
 
     /// Deflection of a point in a configuration.
@@ -92,9 +95,18 @@ pub struct Flank {
     pub fixed: bool,
     /// h⁴/24EI of each segment between two stations (m²/N); empty where nothing bends.
     pub yields: Vec<f64>,
+    /// A third of the longest segment (m).
+    third: f64,
 }
 
 impl Flank {
+    /// A side with these stations; see [`Flank::yields`].
+    pub(super) fn new(stations: Vec<Station>, yields: Vec<f64>) -> Self {
+        let third = stations.windows(2).map(|ends| ends[1].at - ends[0].at).fold(0.0, f64::max) / 3.0;
+        let fixed = stations.iter().all(|station| station.point.body == BodyId::Ground);
+        Self { stations, fixed, yields, third }
+    }
+
     /// Deflection of a segment beyond its cubic, towards the other side, at distance `at` from the start of the gap
     /// (m), under the load per length `load` (N/m).
     pub(super) fn bent(&self, segment: usize, at: f64, load: f64) -> f64 {
@@ -189,7 +201,8 @@ mod tests {
                 .collect();
             let turned = random(1.0).abs().powi(4) * 1.5;
             let mut q: Vec<Pose> = (0..4).map(|_| Pose::new(random(3e-6), random(3e-6), random(turned))).collect();
-            let bound = frame.bound(&stations, &q);
+            let side = Flank::new(stations.clone(), Vec::new());
+            let bound = frame.bound(&side, &q);
             for linear in [true, false] {
                 let at: Vec<Deflection> =
                     stations.iter().map(|station| frame.deflection(&station.point, &q, linear)).collect();
@@ -203,7 +216,7 @@ mod tests {
                 }
             }
             q[1].z = f64::NAN;
-            assert!(frame.bound(&stations, &q).is_nan());
+            assert!(frame.bound(&side, &q).is_nan());
         }
     }
 }

@@ -10,7 +10,6 @@ use super::facing::FacingStretch;
 use super::facing_side::{EndWeights, Flank};
 use super::from_structure::{Station, StructureView};
 use super::quadrature::{hermite, hermite_slope};
-use bimorph_multibody::BodyId;
 use bimorph_structure::{ALIKE, BeamGap, BeamRows, NodeId};
 use nalgebra::Matrix4;
 
@@ -20,8 +19,7 @@ pub(super) fn side(beams: &BeamRows<'_>, drawing: &StructureView<'_, '_>, gap: &
     let [start, end] = nodes.map(|node| (drawing.point)(node));
     let ends = || vec![Station { at: 0.0, point: start }, Station { at: gap.length, point: end }];
     let cut = !drawing.chord && !drawing.stations.is_empty();
-    let fixed = |stations: &[Station]| stations.iter().all(|station| station.point.body == BodyId::Ground);
-    let straight = || Flank { fixed: fixed(&ends()), stations: ends(), yields: Vec::new() };
+    let straight = || Flank::new(ends(), Vec::new());
     let Some(row) = (if cut { beams.row(gap, nodes) } else { None }) else { return straight() };
     let mut yields = Vec::new();
     let mut stations = vec![Station { at: 0.0, point: start }];
@@ -45,7 +43,7 @@ pub(super) fn side(beams: &BeamRows<'_>, drawing: &StructureView<'_, '_>, gap: &
     let last = stations.len() - 1;
     stations[last] = Station { at: gap.length, point: end };
     let rigid = stations.iter().all(|station| station.point.body == start.body);
-    if rigid { straight() } else { Flank { fixed: false, stations, yields } }
+    if rigid { straight() } else { Flank::new(stations, yields) }
 }
 
 /// A part of the gap over which both sides are single cubics.

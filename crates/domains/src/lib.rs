@@ -14,22 +14,25 @@
 //! | [`backbending`] | the strength of a hot arm, beyond which it is shortened for good |
 //! | [`beam_line`] | the centreline of a beam: how it bends in a motion, and how far its segments are turned |
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
-//! | [`comb_field`] | engagement, tips and fringe field of combs |
+//! | [`comb_field`], [`comb_sides`] | engagement, tips and fringe field of combs; the same over how far fingers lie aside, with a substrate |
+//! | [`jet`] | a value with its derivatives over two variables |
 //! | [`contact`] | pressure between surfaces that touch |
 //! | [`contact_resistance`] | the conductance of metals that are pressed on each other |
 //! | [`contact_loss`] | impact losses |
 //! | [`contact_speed`] | at which speed, from statics |
+//! | [`contact_ways`] | whether parts may touch within a step |
 //! | [`loss_derivatives`] | derivatives of the forces of that over the bodies |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
 //! | [`dashpot`] | a damper to the ground |
 //! | [`from_structure`] | from a drawing to them |
-//! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
+//! | [`comb_drive`], [`electrodes`], [`facing_beams`], [`stop_pair`] | combs; plates; beams that face each other; stops |
 //! | [`polynomial_spring`] | quadratic and cubic terms of lumped springs |
 //! | [`load`], [`moving_frame`] | dead loads, and forces that sources give; the motion of the frame |
 //! | [`comb_film`] | gas between the fingers of a comb |
 //! | [`squeeze_film`] | damping of gas that flows out of a gap; [`perforation`]: holes; [`film_series`]: states of one that compresses; [`plate_film`], [`facing_film`]: between plates, between beams |
 //! | [`facing`] | a stretch of two facing beams: pressure along a gap that varies over their length |
-//! | `facing_side`, `facing_stretches` | where facing beams measure; how the segments of both sides cut a gap |
+//! | `facing_side`, `facing_stretches`, `facing_tiles` | where facing beams measure; how the segments of both sides cut a gap; stretches in lanes |
+//! | `facing_field` | forces and tangent along facing beams, a stretch in each lane |
 //! | [`quadrature`] | rules of integration along it |
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
 //! | `laplacian` | potentials in a network of conductors |
@@ -55,13 +58,16 @@ pub mod attraction;
 pub mod backbending;
 pub mod beam_line;
 pub mod capacitor;
+pub mod comb_drive;
 pub mod comb_field;
 pub mod comb_film;
+pub mod comb_sides;
 mod conduction;
 pub mod contact;
 pub mod contact_loss;
 pub mod contact_resistance;
 pub mod contact_speed;
+pub mod contact_ways;
 pub mod dashpot;
 pub mod domain;
 pub mod drive;
@@ -70,11 +76,13 @@ pub mod electrodes;
 pub mod energy;
 pub mod facing;
 pub mod facing_beams;
+mod facing_field;
 pub mod facing_film;
 pub mod facing_local;
 mod facing_loss;
 mod facing_side;
 mod facing_stretches;
+mod facing_tiles;
 pub mod film_series;
 mod fin;
 pub mod friction;
@@ -83,6 +91,7 @@ mod heat_curves;
 pub mod hot;
 mod input;
 pub mod inputs;
+pub mod jet;
 pub mod lag;
 mod laplacian;
 pub mod load;

@@ -2,7 +2,7 @@
 
 use super::approach::{Approach, MaterialPoint};
 use super::contact_loss::Loss;
-use super::domain::{Chord, Configuration, Domain, Law, SkewCoupling};
+use super::domain::{Chord, Configuration, Domain, Law, SideRoom, SkewCoupling};
 use super::from_structure::{FromStructure, PlacedMember, StructureView};
 use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
@@ -58,7 +58,8 @@ macro_rules! domains {
 }
 
 domains! {
-    Electrodes: super::electrodes::Electrodes, "A comb or lumped plates.";
+    CombDrive: super::comb_drive::CombDrive, "A comb.";
+    Electrodes: super::electrodes::Electrodes, "Lumped plates.";
     FacingBeams: super::facing_beams::FacingBeams, "Two beams that face each other.";
     StopPair: super::stop_pair::StopPair, "A stop.";
     Dashpot: super::dashpot::Dashpot, "A damper to the ground.";
@@ -158,8 +159,20 @@ impl Domain for Member {
         each!(self, m => m.touching())
     }
 
+    fn closing_bound(&self, q: &[Pose]) -> f64 {
+        each!(self, m => m.closing_bound(q))
+    }
+
+    fn surely_apart(&self, at: Configuration<'_>) -> bool {
+        each!(self, m => m.surely_apart(at))
+    }
+
     fn clearance(&self, at: Configuration<'_>) -> f64 {
         each!(self, m => m.clearance(at))
+    }
+
+    fn side_room(&self) -> Option<(&Approach, SideRoom)> {
+        each!(self, m => m.side_room())
     }
 
     fn bearing(&self, at: Configuration<'_>) -> f64 {

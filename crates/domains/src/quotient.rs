@@ -14,7 +14,7 @@ use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
 
 /// Change of a distance below which Simpson's rule stands for the quotient (m).
-const SMALL: f64 = 1e-12;
+pub(super) const SMALL: f64 = 1e-12;
 
 impl Chord<'_> {
     /// sin(Δθ/2)/(Δθ/2) of a body; 1 in a linear model.

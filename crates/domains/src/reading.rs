@@ -105,6 +105,9 @@ impl System {
     pub fn overrun(&self, q: &[Pose]) -> Option<(usize, f64)> {
         (0..self.members.len()).find_map(|g| {
             let [_, least] = self.touching(g)?;
+            if self.members[g].surely_apart(self.at(q)) {
+                return None;
+            }
             let left = self.distance(g, q);
             (left < least).then_some((g, left))
         })

@@ -134,6 +134,10 @@ impl Domain for StopPair {
         nearer(&self.ways, self.approach.value(at.q, at.linear)).0
     }
 
+    fn closing_bound(&self, q: &[Pose]) -> f64 {
+        self.approach.bound(q)
+    }
+
     fn distance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
         let slope = nearer(&self.ways, self.approach.value(at.q, at.linear)).1;
         slope * self.approach.change(&self.approach.measure(at.q, at.linear), dq)

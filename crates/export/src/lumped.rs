@@ -29,6 +29,9 @@ pub use model::{Coordinate, Law, LumpedGap, LumpedModel, LumpedOutput};
 use nalgebra::{DMatrix, DVector};
 use sliding::{FREE_RATE, along, axis, coordinates, dampers, springs};
 
+/// Part of a motion across the fingers of a comb that is rounding of its direction (1).
+const ALONG: f64 = 1e-9;
+
 /// The lumped model of a request; its operating point, modes and errors are not used.
 ///
 /// # Errors
@@ -139,6 +142,13 @@ fn gaps(
                 Some(name) => format!("gap \"{name}\" lies along beams"),
                 None => "a force acts on it that is neither that of a field nor of a stop".to_owned(),
             };
+            return Err(ExportError::NotLumped { why });
+        }
+        if let Some((across, _)) = gap.side_room()
+            && (along(coordinates, &across.a, across.axis) - along(coordinates, &across.b, across.axis)).amax() > ALONG
+        {
+            let comb = &compiled.parts.gap_names[g];
+            let why = format!("the fingers of \"{comb}\" can move across their gaps (hold the part with a `guide2d`)");
             return Err(ExportError::NotLumped { why });
         }
         if gap.slides() {

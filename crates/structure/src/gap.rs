@@ -133,6 +133,12 @@ pub struct Comb {
     /// Law of the fringe field; none: `exact` where the width of the fingers is known, and no field in a model as SUGAR computes.
     #[serde(default = "Fringe::stored")]
     pub law: Option<Fringe>,
+    /// Distance of the fingers of `a` from the middle of their gaps as drawn, to the left of the axis (m).
+    #[serde(default)]
+    pub misalignment: f64,
+    /// Distance of a conducting substrate under the fingers, at the potential of one side (m); 0: there is none.
+    #[serde(default)]
+    pub substrate: f64,
     /// Drag of the gas that slides between the fingers, per rate and overlap (Pa·s); 0: it does not drag.
     #[serde(default)]
     pub sliding: f64,
@@ -322,6 +328,14 @@ impl Structure {
         let plates = self.plate_gaps.iter().map(|plate| (plate.name.as_str(), plate.offset));
         let combs = self.combs.iter().map(|comb| (comb.name.as_str(), comb.offset));
         gaps.chain(plates).chain(combs).filter(|(_, offset)| *offset != 0.0)
+    }
+
+    /// The voltages of all gaps, plates and combs, by name.
+    pub fn gap_voltages(&self) -> impl Iterator<Item = (&str, &GapVoltage)> {
+        let gaps = self.beam_gaps.iter().map(|gap| (gap.name.as_str(), &gap.voltage));
+        let plates = self.plate_gaps.iter().map(|plate| (plate.name.as_str(), &plate.voltage));
+        let combs = self.combs.iter().map(|comb| (comb.name.as_str(), &comb.voltage));
+        gaps.chain(plates).chain(combs)
     }
 
     /// Gives all gaps, plates and combs the same law of their fringe fields.

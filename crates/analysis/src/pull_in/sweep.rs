@@ -1,8 +1,8 @@
 //! One source raised from rest until a gap closes.
 
 use super::super::AnalysisError;
-use super::super::contact_range::within_contact_range;
-use bimorph_domains::System;
+use super::super::contact_range::{comb_aside, within_contact_range};
+use bimorph_domains::{Domain, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::planar::Pose;
@@ -117,7 +117,15 @@ impl<'a> VoltageSweep<'a> {
             let before = last.1;
             q.copy_from_slice(&before);
             let beyond = fold * (1.0 + PAST);
-            match self.fall(&mut q, beyond) {
+            let fallen = self.fall(&mut q, beyond);
+            if let Some((comb, _)) = comb_aside(self.compiled, &q) {
+                self.of_closed.push(format!(
+                    "the fingers of the comb `{comb}` are drawn to the side there until they touch, and nothing stops them: a stiffer suspension across \
+                     the fingers or wider gaps raise this voltage"
+                ));
+                return Ok(PostPullIn::Falls { volts: fold });
+            }
+            match fallen {
                 // nothing here could ever hold the part
                 Err(_) if (0..self.system.members.len()).all(|g| self.system.touching(g).is_none()) => {
                     return Ok(PostPullIn::Falls { volts: fold });
@@ -153,10 +161,20 @@ impl<'a> VoltageSweep<'a> {
                 format!("the part, unstable where it is drawn or on its way from there, rests on `{}`", gap(shut))
             }
             Some(shut) => format!("`{}` is closed already before that", gap(shut)),
-            None => "raise the largest voltage; a comb's force does not grow as it closes: it pulls nothing in".into(),
+            None if self.only_combs() => "the force of combs along their fingers does not grow as they close, and the fingers stay in their gaps up to \
+                 that voltage"
+                .into(),
+            None => "raise the largest voltage".into(),
         };
         let detail = format!("{name} pulls nothing in up to {max} V; {way_out}");
         AnalysisError::NoEquilibrium { detail, coarse: Vec::new() }
+    }
+
+    /// True where the source drives the fields of combs alone.
+    fn only_combs(&self) -> bool {
+        let driven = |g: &usize| self.system.electrics.gap_rows[(*g, self.source)] != 0.0;
+        let mut gaps = (0..self.system.members.len()).filter(driven).peekable();
+        gaps.peek().is_some() && gaps.all(|g| !self.system.members[g].is_electrostatic())
     }
 
     /// Sentences about jumps during the sweep and about the closed branch.

@@ -8,6 +8,7 @@ use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use crate::readout::signal::{Signal, SignalView};
 use bimorph_domains::Ramp;
+use bimorph_domains::contact_ways::ContactWays;
 use bimorph_model::compile::CompiledModel;
 use bimorph_solve::dense::interpolate;
 use bimorph_solve::time::event::{Detector, Direction};
@@ -71,6 +72,9 @@ pub(super) struct Crossings<'a> {
     within: Motion,
     rise: Vec<f64>,
     until: Option<Until>,
+    ways: ContactWays,
+    /// Bound of the largest part of its way to contact that anything comes within the last step (1).
+    nearest: f64,
     /// Events, in order of time.
     pub(super) events: Vec<CrossingEvent>,
 }
@@ -92,14 +96,27 @@ impl<'a> Crossings<'a> {
         }
         let within = Motion::zeros(compiled.parts.system.bodies());
         let until = options.until.clone();
-        Ok(Self { compiled, ramp, volts, watched, within, rise: rise.to_vec(), until, events: Vec::new() })
+        let ways = ContactWays::new(&compiled.parts.system);
+        let (rise, events) = (rise.to_vec(), Vec::new());
+        Ok(Self { compiled, ramp, volts, watched, within, rise, until, ways, nearest: f64::INFINITY, events })
+    }
+
+    /// True where nothing came further than a part of its way to contact (1) within the last step, by a bound.
+    pub(super) fn stays_within(&self, part: f64) -> bool {
+        self.nearest < part
     }
 
     /// Finds the crossings in a step of length `h` from time `s`, up to one that ends the run. Returns the time of that (s).
     pub(super) fn step(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> Option<f64> {
         let (compiled, ramp, volts) = (self.compiled, self.ramp, self.volts);
         let first = self.events.len();
+        let step = [(&before.q[..], &before.v[..]), (&after.q[..], &after.v[..])];
+        self.nearest = self.ways.used(&compiled.parts.system, step, h);
+        let stays = self.stays_within(1.0);
         for w in &mut self.watched {
+            if w.contact && stays && w.detector.is_above() {
+                continue;
+            }
             let value = |x: f64| {
                 interpolate(before, after, h, x, &mut self.within);
                 for (k, r) in self.rise.iter_mut().enumerate() {

@@ -29,6 +29,9 @@ use bimorph_solve::time::method::{Motion, SolverCounters};
 /// Times of a run at which its stability is checked, the end included.
 pub(crate) const STABILITY_CHECKS: usize = 16;
 
+/// Part of a way to contact (1) below which equal steps are too short for an impact in a stage.
+const NEAR: f64 = 0.5;
+
 /// Propagates a motion from the start of a ramp to its end.
 pub(crate) trait Propagator {
     /// Moves the start to a state from which the formulation can continue.
@@ -92,7 +95,7 @@ pub(crate) fn record(
         let suits = refuse_in_contact(compiled, options, s + h, after);
         let within = |()| within_contact_range(compiled, &after.q);
         let done = ((s + h) / options.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize;
-        let look = options.step.is_some() || done > looks;
+        let look = done > looks || options.step.is_some() && !crossings.stays_within(NEAR);
         let kept = |()| energy.as_mut().map_or(Ok(()), |energy| energy.step(options, s + h, after, look));
         // energy first: steps that are too long throw parts through each other
         if let Err(error) = suits.and_then(kept).and_then(within).or_else(|error| stopped_at.map(|_| ()).ok_or(error)) {

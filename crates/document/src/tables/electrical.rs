@@ -68,6 +68,8 @@ record! {
         parasitic = 0.0: "F", NonNegative, "Capacitance that does not depend on the motion; left out: 0";
         finger: "m", NonNegative, "Length and width of the fingers; a width of 0: unknown";
         law: "", Any, "Law of the fringe field; left out: exact where the width is known";
+        misalignment = 0.0: "m", Any, "Distance of the fingers of a from the middle of their gaps, to the left of the axis; left out: 0";
+        substrate = 0.0: "m", NonNegative, "Distance of a conducting substrate at the potential of one side; left out: none";
         sliding = 0.0: "Pa·s", NonNegative, "Drag of the gas between the fingers, per rate and overlap; left out: 0";
         finite: "", Any, "False: the force is constant whatever the overlap";
         offset = 0.0: "V", Any, "Voltage that trapped charge adds in series; left out: 0";

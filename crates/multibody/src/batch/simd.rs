@@ -29,8 +29,12 @@ pub trait SimdReal: Real {
     fn abs(self) -> Self;
     /// √x.
     fn sqrt(self) -> Self;
+    /// The larger one; `other` where either is not a number.
+    fn max(self, other: Self) -> Self;
     /// `mark`, but not a number in lanes where this is at most `bound`.
     fn mark_nan(self, bound: Self, mark: Self) -> Self;
+    /// `this` in lanes that are above `bound`, 0 elsewhere.
+    fn above(self, bound: Self, this: Self) -> Self;
     /// `this` in lanes that are zero, `other` elsewhere.
     fn if_zero(self, this: Self, other: Self) -> Self;
 
@@ -190,6 +194,25 @@ impl<S: Simd, const M: usize> SimdReal for Registers<S, M> {
     }
 
     #[inline(always)]
+    fn max(mut self, other: Self) -> Self {
+        for i in 0..M {
+            let above = self.simd.less_than_f64s(other.x[i], self.x[i]);
+            self.x[i] = self.simd.select_f64s(above, self.x[i], other.x[i]);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn above(self, bound: Self, mut this: Self) -> Self {
+        let (simd, zero) = (self.simd, self.simd.splat_f64s(0.0));
+        for i in 0..M {
+            let above = simd.less_than_f64s(bound.x[i], self.x[i]);
+            this.x[i] = simd.select_f64s(above, this.x[i], zero);
+        }
+        this
+    }
+
+    #[inline(always)]
     fn mark_nan(self, bound: Self, mut mark: Self) -> Self {
         let (simd, nan) = (self.simd, self.simd.splat_f64s(f64::NAN));
         for i in 0..M {
@@ -267,7 +290,7 @@ mod tests {
     struct Check([f64; LANES], [f64; LANES]);
 
     impl WithSimd for Check {
-        type Output = [[f64; LANES]; 11];
+        type Output = [[f64; LANES]; 13];
 
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
@@ -281,11 +304,12 @@ mod tests {
     }
 
     #[inline(always)]
-    fn operations<W: SimdReal>(simd: W::Simd, a: &[f64; LANES], b: &[f64; LANES]) -> [[f64; LANES]; 11] {
+    fn operations<W: SimdReal>(simd: W::Simd, a: &[f64; LANES], b: &[f64; LANES]) -> [[f64; LANES]; 13] {
         let (x, y) = (W::load(simd, &Lanes(*a)), W::load(simd, &Lanes(*b)));
         let (sin, cos) = x.sin_cos(simd);
-        let all =
-            [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, x.abs().sqrt(), y.if_zero(x, x + y), sin, cos];
+        let (sum, scaled) = (x + y, x * 0.3 + 0.7);
+        let (chosen, larger, above) = (y.if_zero(x, sum), x.max(y), x.above(y, sum));
+        let all = [sum, x - y, x * y, x / y, -x, x.abs(), scaled, x.abs().sqrt(), chosen, sin, cos, larger, above];
         all.map(|x| {
             let mut to = Lane8::of(0.0);
             x.store(&mut to);
@@ -294,7 +318,7 @@ mod tests {
     }
 
     /// The instruction sets of this processor that kernels are compiled for, and none.
-    fn everywhere(a: [f64; LANES], b: [f64; LANES]) -> Vec<[[f64; LANES]; 11]> {
+    fn everywhere(a: [f64; LANES], b: [f64; LANES]) -> Vec<[[f64; LANES]; 13]> {
         let mut found = vec![Arch::new().dispatch(Check(a, b)), pulp::Scalar::new().vectorize(Check(a, b))];
         #[cfg(target_arch = "x86_64")]
         if let Some(simd) = pulp::x86::V3::try_new() {
@@ -313,8 +337,10 @@ mod tests {
                     let (x, y) = (a[k], b[k]);
                     let (sin, cos) = crate::sine::sin_cos(x);
                     let chosen = if y == 0.0 { x } else { x + y };
+                    let (scaled, above) = (x * 0.3 + 0.7, if x > y { x + y } else { 0.0 });
+                    let root = x.abs().sqrt();
                     let alone =
-                        [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, x.abs().sqrt(), chosen, sin, cos];
+                        [x + y, x - y, x * y, x / y, -x, x.abs(), scaled, root, chosen, sin, cos, x.max(y), above];
                     for (found, alone) in found.iter().zip(alone) {
                         assert_eq!(found[k].to_bits(), alone.to_bits(), "{x} {y}");
                     }

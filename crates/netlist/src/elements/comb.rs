@@ -2,7 +2,7 @@
 
 use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
-use bimorph_structure::{Comb, Fringe, GapVoltage};
+use bimorph_structure::{Comb, Fringe, GapVoltage, touching_distance};
 
 impl ElementSite<'_, '_> {
     /// Viscosity of the gas that slides in gaps of a width (m): 0 without a `pressure`.
@@ -12,6 +12,23 @@ impl ElementSite<'_, '_> {
         }
         let viscosity = self.non_negative_or("viscosity", 0.0)?;
         Ok(self.sliding(viscosity, gap)?.unwrap_or(0.0))
+    }
+
+    /// Misalignment of the fingers in gaps of a width, and distance of the substrate (m), 0 without one.
+    fn place_of_fingers(&mut self, gap: f64, width: f64) -> Result<(f64, f64), Reported> {
+        let misalignment = self.number_or("misalign", 0.0)?;
+        if misalignment.abs() > gap - touching_distance(gap) {
+            return Err(self.out_of_range(
+                "misalign",
+                misalignment,
+                "so far that the fingers do not touch, within ± gap",
+            ));
+        }
+        let substrate = self.positive_if_any("substrate")?.unwrap_or(0.0);
+        if substrate > 0.0 && width == 0.0 {
+            return Err(self.missing("w"));
+        }
+        Ok((misalignment, substrate))
     }
 
     fn comb(&mut self, finite: bool, parasitic: f64, voltage: GapVoltage) -> Result<(), Reported> {
@@ -31,6 +48,7 @@ impl ElementSite<'_, '_> {
             return Err(self.missing("w"));
         }
         let offset = self.offset()?;
+        let (misalignment, substrate) = if finite { self.place_of_fingers(gap, width)? } else { (0.0, 0.0) };
         let sliding = self.between_fingers(gap)? * gaps * height / gap;
         let axis = [angle.cos(), angle.sin()];
         let (a, b) = (self.node(0), self.node(1));
@@ -51,6 +69,8 @@ impl ElementSite<'_, '_> {
             parasitic,
             finger: [finger, width],
             law,
+            misalignment,
+            substrate,
             sliding,
             finite,
             offset,

@@ -98,6 +98,15 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "qx2" | "qy2" | "qz2" | "qx" | "qy" | "qz" => "displacement of the end [m]",
         "qox" | "qoy" | "qoz" => "rotation of the end [°]",
         "sv" => "amplitude of small signals [V]",
+        _ => of_combs_and_anchors(name),
+    }
+}
+
+fn of_combs_and_anchors(name: &str) -> &'static str {
+    match name {
+        "misalign" => "distance of the fingers from the middle of their gaps [m]",
+        "substrate" => "distance of the substrate [m]",
+        "anchorquality" => "Q that the anchors leave a mode [1]",
         _ => "angle [rad]",
     }
 }

@@ -74,6 +74,7 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
     "yieldstress",
     "softening",
     "strength",
+    "anchorquality",
     "undercut",
     "packagestrain",
     "packagestrainx",
@@ -334,7 +335,7 @@ const MODELS: &[ElementModel] = &[
         "comb2de",
         &[2],
         "[a b]",
-        &["N", "gap", "l", "L", "w", "h", "Cp", "permittivity", "fringe", "voffset"],
+        &["N", "gap", "l", "L", "w", "h", "Cp", "misalign", "substrate", "permittivity", "fringe", "voffset"],
         comb::comb2de,
     ),
     own(

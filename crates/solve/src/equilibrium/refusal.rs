@@ -4,7 +4,9 @@ use super::fall::FallFailure;
 use super::loss::MAX_LOSSES;
 use super::{Equilibrium, Path};
 use crate::SolveError;
+use bimorph_domains::domain::SideRoom;
 use bimorph_domains::{BeamLine, Domain, System};
+use bimorph_multibody::BodyId;
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::Pose;
 use std::sync::Arc;
@@ -36,7 +38,8 @@ impl Equilibrium {
         q: &[Pose],
     ) -> SolveError {
         let coarse = Self::coarse_beams(system, q);
-        let reason = (self.touching_without_contact(system, q))
+        let reason = (Self::fingers_aside(system, q))
+            .or_else(|| self.touching_without_contact(system, q))
             .or_else(|| Self::overbent(system, q))
             .or_else(|| Self::beyond_beams(system, q))
             .or_else(|| self.unheld(system, q))
@@ -69,6 +72,24 @@ impl Equilibrium {
             format!(" (the part as drawn loses its stability at {first:.4} of the load)")
         });
         SolveError::Lost { share, passed, reason, coarse }
+    }
+
+    fn fingers_aside(system: &System, q: &[Pose]) -> Option<String> {
+        let name = |id: BodyId| match id {
+            BodyId::Free(k) => system.model.bodies[k].name.to_string(),
+            BodyId::Ground => String::new(),
+        };
+        system.members.iter().find_map(|member| {
+            let (across, SideRoom { drawn, room }) = member.side_room()?;
+            let aside = (drawn + across.value(q, system.model.linear)).abs();
+            (aside > room).then(|| {
+                let part = [across.a.body, across.b.body].map(name).concat();
+                format!(
+                    "the fingers of the comb at \"{part}\" are drawn to the side until they touch: the side force exceeds what holds them (a stiffer part \
+                     across the fingers, wider gaps, or a `stop2d`)"
+                )
+            })
+        })
     }
 
     fn touching_without_contact(&self, system: &System, q: &[Pose]) -> Option<String> {

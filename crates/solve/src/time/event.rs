@@ -31,6 +31,11 @@ impl Detector {
         Self { above: (value != 0.0).then_some(value > 0.0) }
     }
 
+    /// True where the quantity was above zero at the end of the last step.
+    pub fn is_above(&self) -> bool {
+        self.above == Some(true)
+    }
+
     /// Searches one step: `value(x)` is the quantity at the fraction x of it. Each crossing goes to `found` as the
     /// share where it happens and its direction, in order.
     pub fn step(&mut self, mut value: impl FnMut(f64) -> f64, mut found: impl FnMut(f64, Direction)) {

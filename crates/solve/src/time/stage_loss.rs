@@ -90,8 +90,11 @@ impl StageLoss {
         if first {
             self.start.at(system, q, &rate);
         }
-        if let Some(now) = &mut self.now {
-            now.at(system, q, &rate);
+        match &mut self.now {
+            Some(now) => now.at(system, q, &rate),
+            // without derivatives there is no force
+            None if first && !self.start.is_nonzero() => return,
+            None => {}
         }
         system.add_loss(q, rate, force);
     }

@@ -88,9 +88,9 @@ impl OfStructure<'_> {
                     "comb2d"
                 }
                 GapVoltage::Nodes(..) => {
-                    if comb.parasitic != 0.0 {
-                        parameters.push(("Cp", comb.parasitic));
-                    }
+                    let optional =
+                        [("Cp", comb.parasitic), ("misalign", comb.misalignment), ("substrate", comb.substrate)];
+                    parameters.extend(optional.into_iter().filter(|(_, value)| *value != 0.0));
                     "comb2de"
                 }
             };

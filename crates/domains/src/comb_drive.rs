@@ -1,0 +1,290 @@
+//! A comb drive: the field of its fingers over their overlap and over how far they lie aside of the middle of their gaps ([`super::comb_sides`]).
+//!
+//! Both displacements are those of the bodies, along fixed directions: the overlap at the nodes, the distance aside in the middle of the overlap as drawn. A rotation
+//! therefore moves the fingers aside, and they stay parallel. Where the field pulls fingers to the side faster than springs hold them, the comb loses its stability.
+//!
+//! Reference: R. Legtenberg, A. W. Groeneveld, M. Elwenspoek, "Comb-drive actuators for large displacements", J. Micromech. Microeng. 6 (1996) 320–329.
+
+use super::approach::{Approach, ApproachDerivatives, MaterialPoint};
+use super::capacitor::Capacitor;
+use super::comb_field::{CombField, above_and_below};
+use super::comb_sides::{CombSides, substrate_share};
+use super::contact::touching_distance;
+use super::domain::{Chord, Configuration, Domain, Law, SideRoom};
+use super::from_structure::{FromStructure, StructureView};
+use super::jet::Jet;
+use super::quotient::{SMALL, quotient};
+use bimorph_multibody::model::locate;
+use bimorph_multibody::planar::Pose;
+use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_structure::{Comb, Fringe, GapVoltage};
+use nalgebra::Vector2;
+
+/// A comb drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CombDrive {
+    /// The approach of its sides along the fingers.
+    pub approach: Approach,
+    /// C(u) of fingers in the middle of their gaps.
+    pub capacitor: Capacitor,
+    /// The motion across the fingers, and the field with it; none: SUGAR's comb, which has no side force.
+    pub sides: Option<(Approach, CombSides, SideRoom)>,
+}
+
+/// Displacements along and across the fingers at a configuration.
+struct Seen {
+    along: ApproachDerivatives,
+    across: Option<ApproachDerivatives>,
+    /// C over both.
+    field: Jet,
+}
+
+impl CombDrive {
+    fn new(comb: &Comb, approach: Approach, sugar: bool) -> Self {
+        let strength = comb.gaps * comb.permittivity;
+        let [length, width] = comb.finger;
+        let exact = comb.law.unwrap_or(if sugar { Fringe::None } else { Fringe::Exact }) == Fringe::Exact;
+        let fingers = (exact && comb.finite && width > 0.0)
+            .then(|| (width, CombField::new(strength * comb.height, [comb.gap, width, length])));
+        let rho = width / comb.gap;
+        let substrate = if comb.substrate > 0.0 { substrate_share(rho, comb.substrate / comb.gap) } else { 0.0 };
+        let slope = match fingers {
+            Some(_) => strength * (above_and_below(rho) - substrate),
+            None => strength * comb.height / comb.gap,
+        };
+        let capacitor = Capacitor::Comb {
+            slope,
+            overlap: if comb.finite { comb.overlap } else { f64::INFINITY },
+            blend: comb.gap,
+            parasitic: comb.parasitic,
+            fingers: fingers.map(|(_, field)| field),
+        };
+        let closest = touching_distance(comb.gap);
+        let sides = (comb.finite && !sugar).then(|| {
+            // the middle of the overlap as drawn
+            let middle = approach.axis * (length - 0.5 * comb.overlap).max(0.0);
+            let (a, b) = (approach.a.beyond(middle), approach.b.beyond(-middle));
+            let across = Approach { a, b, axis: Vector2::new(-approach.axis.y, approach.axis.x) };
+            let field = CombSides {
+                strength,
+                height: comb.height,
+                gap: comb.gap,
+                fingers,
+                substrate,
+                closest,
+                parasitic: comb.parasitic,
+            };
+            (across, field, SideRoom { drawn: comb.misalignment, room: comb.gap - closest })
+        });
+        Self { approach, capacitor, sides }
+    }
+
+    fn overlap(&self) -> f64 {
+        self.capacitor.distance(0.0)
+    }
+
+    /// C over the approach `u` and the displacement `y` across (m).
+    fn field(&self, u: f64, y: f64) -> Jet {
+        if let Some((_, field, side)) = &self.sides {
+            return field.at(self.overlap() + u, side.drawn + y);
+        }
+        let c = self.capacitor.at(u);
+        Jet { value: c.value, first: [c.slope, 0.0], second: [c.curvature, 0.0, 0.0] }
+    }
+
+    fn seen(&self, at: Configuration<'_>) -> Seen {
+        let along = self.approach.measure(at.q, at.linear);
+        let across = self.sides.as_ref().map(|(across, ..)| across.measure(at.q, at.linear));
+        let field = self.field(along.value, across.map_or(0.0, |m| m.value));
+        Seen { along, across, field }
+    }
+
+    /// `r +=` the forces of a potential with these derivatives along and across.
+    fn add(&self, seen: &Seen, first: [f64; 2], r: &mut [Pose]) {
+        self.approach.add_force(&seen.along, first[0], r);
+        if let (Some((across, ..)), Some(m)) = (&self.sides, &seen.across)
+            && first[1] != 0.0
+        {
+            across.add_force(m, first[1], r);
+        }
+    }
+
+    /// Adds the Hessian of a potential with these derivatives.
+    fn add_hessian(
+        &self,
+        seen: &Seen,
+        first: [f64; 2],
+        second: [f64; 3],
+        pattern: &Pattern,
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        let mut h = seen.along.hessian(first[0], second[0]);
+        if let Some(across) = &seen.across {
+            h += across.hessian(first[1], second[2]);
+            if second[1] != 0.0 {
+                let mixed = seen.along.gradient * across.gradient.transpose() * second[1];
+                h += mixed + mixed.transpose();
+            }
+        }
+        locate(pattern, self.approach.a.body, self.approach.b.body).add(tangent, &h);
+    }
+
+    /// Changes of both displacements with a change of the configuration.
+    fn changes(&self, seen: &Seen, dq: &[Pose]) -> [f64; 2] {
+        let across =
+            self.sides.as_ref().zip(seen.across.as_ref()).map_or(0.0, |((across, ..), m)| across.change(m, dq));
+        [self.approach.change(&seen.along, dq), across]
+    }
+}
+
+impl FromStructure for CombDrive {
+    fn lay<'a>(drawing: &StructureView<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
+        for comb in &drawing.structure.combs {
+            let approach = drawing.approach(comb.a, comb.b, comb.axis);
+            put(&comb.name, Some(&comb.voltage), Self::new(comb, approach, drawing.chord));
+        }
+    }
+
+    fn moved(self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self {
+        let sides = self.sides.map(|(across, field, side)| (across.moved(to), field, side));
+        Self { approach: self.approach.moved(to), sides, ..self }
+    }
+}
+
+impl Domain for CombDrive {
+    type Given = f64;
+
+    fn bodies(&self, see: impl FnMut(BodyId)) {
+        self.approach.bodies().into_iter().for_each(see);
+    }
+
+    fn is_active(&self, volts: f64) -> bool {
+        volts != 0.0
+    }
+
+    fn add_force(&self, at: Configuration<'_>, volts: f64, r: &mut [Pose]) {
+        let (seen, factor) = (self.seen(at), -0.5 * volts * volts);
+        self.add(&seen, seen.field.first.map(|x| factor * x), r);
+    }
+
+    fn add_force_change(&self, at: Configuration<'_>, volts: f64, change: f64, r: &mut [Pose]) {
+        let (seen, factor) = (self.seen(at), -volts * change);
+        self.add(&seen, seen.field.first.map(|x| factor * x), r);
+    }
+
+    fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+        let (seen, factor) = (self.seen(at), -0.5 * volts * volts);
+        let Jet { first, second, .. } = seen.field * factor;
+        self.add_hessian(&seen, first, second, pattern, tangent);
+    }
+
+    fn add_force_and_tangent(
+        &self,
+        at: Configuration<'_>,
+        volts: f64,
+        pattern: &Pattern,
+        (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
+    ) {
+        let (seen, factor) = (self.seen(at), -0.5 * volts * volts);
+        let Jet { first, second, .. } = seen.field * factor;
+        self.add(&seen, first, r);
+        self.add_hessian(&seen, first, second, pattern, tangent);
+    }
+
+    fn load_points(&self, at: Configuration<'_>, volts: f64, mut lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
+        let at = Configuration { linear: true, ..at };
+        let (seen, factor) = (self.seen(at), -0.5 * volts * volts);
+        self.approach.load_points(factor * seen.field.first[0], &mut lever);
+        if let Some((across, ..)) = &self.sides {
+            across.load_points(factor * seen.field.first[1], lever);
+        }
+    }
+
+    fn capacitance(&self, at: Configuration<'_>) -> f64 {
+        self.seen(at).field.value
+    }
+
+    fn capacitance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let seen = self.seen(at);
+        let [u, y] = self.changes(&seen, dq);
+        seen.field.first[0] * u + seen.field.first[1] * y
+    }
+
+    fn pull(&self, at: Configuration<'_>) -> f64 {
+        self.seen(at).field.first[0]
+    }
+
+    fn pull_and_change(&self, at: Configuration<'_>, dq: &[Pose]) -> (f64, f64) {
+        let seen = self.seen(at);
+        let [u, y] = self.changes(&seen, dq);
+        (seen.field.first[0], seen.field.second[0] * u + seen.field.second[1] * y)
+    }
+
+    /// The overlap.
+    fn distance(&self, at: Configuration<'_>) -> f64 {
+        self.capacitor.distance(self.approach.value(at.q, at.linear))
+    }
+
+    fn distance_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        self.approach.change(&self.approach.measure(at.q, at.linear), dq)
+    }
+
+    fn side_room(&self) -> Option<(&Approach, SideRoom)> {
+        self.sides.as_ref().map(|(across, _, side)| (across, *side))
+    }
+
+    /// Each displacement has the mean quotient of both orders in which the two can change.
+    fn add_quotient(
+        &self,
+        chord: &Chord<'_>,
+        volts: f64,
+        pattern: &Pattern,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        let [start, middle, end] = chord.at;
+        let factor = -0.5 * volts * volts;
+        let [u, y] = [&Some(self.approach), &self.sides.as_ref().map(|(across, ..)| *across)].map(|approach| {
+            [start, end].map(|at| approach.as_ref().map_or(0.0, |approach| approach.value(at.q, at.linear)))
+        });
+        // over (u, y) at both ends of either
+        let at = |i: usize, k: usize| self.field(u[i], y[k]) * factor;
+        let [[f00, f01], [f10, f11]] = [[at(0, 0), at(0, 1)], [at(1, 0), at(1, 1)]];
+        let along = |k: usize, (a, b): (Jet, Jet)| {
+            let law = |u: f64| {
+                let field = self.field(u, y[k]) * factor;
+                (field.first[0], field.second[0])
+            };
+            quotient((u[0], a.value), (u[1], b.value), law)
+        };
+        let across = |i: usize, (a, b): (Jet, Jet)| {
+            let law = |y: f64| {
+                let field = self.field(u[i], y) * factor;
+                (field.first[1], field.second[2])
+            };
+            quotient((y[0], a.value), (y[1], b.value), law)
+        };
+        let mean = |a: (f64, f64), b: (f64, f64)| (0.5 * (a.0 + b.0), 0.5 * (a.1 + b.1));
+        let (force, slope) = mean(along(0, (f00, f10)), along(1, (f01, f11)));
+        let (aside, bend) = mean(across(0, (f00, f01)), across(1, (f10, f11)));
+        let mixed = |by: f64, a: f64, b: f64| if by.abs() < SMALL { 0.5 * f11.second[1] } else { 0.5 * (b - a) / by };
+        let mixed =
+            0.5 * (mixed(u[1] - u[0], f01.first[1], f11.first[1]) + mixed(y[1] - y[0], f10.first[0], f11.first[0]));
+        let own = |approach: &Approach| {
+            let mut m = approach.measure(middle.q, middle.linear);
+            m.gradient[2] *= chord.sinc(approach.a.body);
+            m.gradient[5] *= chord.sinc(approach.b.body);
+            m.bend = m.bend.map(|bend| 0.5 * bend);
+            m
+        };
+        let across = self.sides.as_ref().map(|(across, ..)| own(across));
+        let seen = Seen { along: own(&self.approach), across, field: Jet::default() };
+        self.add(&seen, [force, aside], r);
+        self.add_hessian(&seen, [force, aside], [slope, mixed, bend], pattern, tangent);
+    }
+
+    /// That of fingers in the middle of their gaps.
+    fn law(&self) -> Option<(&Approach, Law)> {
+        Some((&self.approach, Law::Field(self.capacitor, None)))
+    }
+}

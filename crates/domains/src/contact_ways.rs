@@ -1,0 +1,42 @@
+//! Whether parts may touch within a step, by bounds of displacements: most steps of most runs are far from contact, which needs no search.
+//!
+//! A bound b of the way by which displacements close a gap is a norm. Within a step the motion is Hermite's cubic between both ends, so that
+//! ```text
+//! b(q(x)) ≤ max(b(q₀), b(q₁)) + (4/27)·h·(b(v₀) + b(v₁))
+//! ```
+
+use super::domain::Domain;
+use super::system::System;
+use bimorph_multibody::planar::Pose;
+
+/// The ways of the parts of a system until they touch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactWays {
+    /// Member, its way as drawn, and the bound at the end of the last step (m).
+    ways: Vec<(usize, f64, Option<f64>)>,
+}
+
+/// Displacements and rates at an end of a step.
+pub type StepEnd<'a> = (&'a [Pose], &'a [Pose]);
+
+impl ContactWays {
+    /// Of a system.
+    pub fn new(system: &System) -> Self {
+        let rest = vec![Pose::zeros(); system.bodies()];
+        let way = |g| system.touching(g).map(|[touch, _]| (g, system.distance(g, &rest) - touch, None));
+        Self { ways: (0..system.members.len()).filter_map(way).collect() }
+    }
+
+    /// Bound of the largest part of a way that parts come within a step of length `h` (s) (1), which begins where the last one ended. Below 1 none touches.
+    pub fn used(&mut self, system: &System, [before, after]: [StepEnd<'_>; 2], h: f64) -> f64 {
+        let used = |(g, way, last): &mut (usize, f64, Option<f64>)| {
+            let bound = |q: &[Pose]| system.members[*g].closing_bound(q);
+            let (start, end) = (last.unwrap_or_else(|| bound(before.0)), bound(after.0));
+            *last = Some(end);
+            let most = 0.5 * (start + end) + 0.5 * (start - end).abs();
+            (most + h * (bound(before.1) + bound(after.1))) / way.max(0.0)
+        };
+        // what is no number must not be lost
+        self.ways.iter_mut().map(used).fold(0.0, |most, used| if used <= most { most } else { used })
+    }
+}

@@ -1,0 +1,113 @@
+//! Facing beams in tiles of eight stretches, laid out in lanes: what their stations are and how long the stretches are.
+//!
+//! Eight stretches in a row lie between at most nine stations of either side. The first of these is the last of the tile before, so that eight lanes hold both.
+
+use super::approach::MaterialPoint;
+use super::facing_side::{EndWeights, Flank};
+use super::facing_stretches::CubicStretch;
+use bimorph_multibody::BodyId;
+use bimorph_multibody::batch::{LANES, Lane8};
+
+/// Stretches of a tile.
+pub(super) const STRETCHES: usize = LANES;
+/// Stations of a side of a tile.
+pub(super) const STATIONS: usize = STRETCHES + 1;
+/// No body: ground, or a lane without a station.
+const NONE: u32 = u32::MAX;
+
+/// Stretches in a row.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Tile {
+    /// Their place among all.
+    pub(super) stretches: std::ops::Range<usize>,
+    /// Their lengths; 0 in lanes without a stretch.
+    pub(super) length: Lane8,
+    /// The stations of each side that moves.
+    pub(super) sides: [Option<TileSide>; 2],
+}
+
+/// The stations of one side of a tile.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct TileSide {
+    /// Bodies that bear them.
+    pub(super) bodies: [u32; STATIONS],
+    /// The first of them.
+    pub(super) first: MaterialPoint,
+    /// From the centre of mass of its body to each of the others as drawn.
+    pub(super) arm: [Lane8; 2],
+    /// The first is the last of the tile before.
+    pub(super) follows: bool,
+    /// Where the stretches are not the segments between the stations: how they follow.
+    pub(super) cut: Option<Box<[SegmentPart; STRETCHES]>>,
+}
+
+/// A stretch as a part of a segment.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct SegmentPart {
+    /// Number of the station where the segment begins.
+    pub(super) from: usize,
+    /// From the ends of the segment to those of the stretch.
+    pub(super) weights: EndWeights,
+}
+
+impl Tile {
+    /// The tiles of all stretches between two sides.
+    pub(super) fn all(sides: &[Flank; 2], stretches: &[CubicStretch]) -> Vec<Self> {
+        let mut tiles = Vec::with_capacity(stretches.len().div_ceil(STRETCHES));
+        let (mut begin, mut before) = (0, [None; 2]);
+        while begin < stretches.len() {
+            // segments so short that a cut stands for both their ends are skipped by stretches
+            let fits = |end: &usize| {
+                let spans = |side: usize| stretches[end - 1].segments[side] - stretches[begin].segments[side];
+                (0..2).all(|side| sides[side].fixed || spans(side) < STRETCHES)
+            };
+            let most = stretches.len().min(begin + STRETCHES);
+            let end = (begin + 1..=most).rev().find(fits).unwrap_or(begin + 1);
+            let (length, own) = (Lane8::NONE, &stretches[begin..end]);
+            let mut tile = Self { stretches: begin..end, length, sides: [None, None] };
+            for (lane, stretch) in own.iter().enumerate() {
+                tile.length.0[lane] = stretch.facing.length;
+            }
+            for (side, flank) in sides.iter().enumerate().filter(|(_, flank)| !flank.fixed) {
+                tile.sides[side] = Some(TileSide::new(flank, own, side, before[side]));
+                let [first, last] = [begin, end - 1].map(|stretch| stretches[stretch].segments[side]);
+                // in the last lane
+                before[side] = (last + 1 - first == STRETCHES).then_some(last + 1);
+            }
+            tiles.push(tile);
+            begin = end;
+        }
+        tiles
+    }
+}
+
+impl TileSide {
+    /// `before` is the station in the last lane of the tile before.
+    fn new(flank: &Flank, stretches: &[CubicStretch], side: usize, before: Option<usize>) -> Self {
+        let first = stretches[0].segments[side];
+        let (mut bodies, mut arm) = ([NONE; STATIONS], [Lane8::NONE; 2]);
+        let last = stretches[stretches.len() - 1].segments[side] + 1;
+        for (k, station) in flank.stations[first..=last].iter().enumerate() {
+            if let BodyId::Free(body) = station.point.body {
+                bodies[k] = body as u32;
+                if let Some(lane) = k.checked_sub(1) {
+                    (arm[0].0[lane], arm[1].0[lane]) = (station.point.arm.x, station.point.arm.y);
+                }
+            }
+        }
+        let part = |lane: usize| {
+            let stretch = stretches.get(lane)?;
+            Some(SegmentPart { from: stretch.segments[side] - first, weights: stretch.weights[side].clone() })
+        };
+        let whole = |lane| part(lane).is_none_or(|part| part.from == lane && part.weights.is_none());
+        let cut =
+            (!(0..STRETCHES).all(whole)).then(|| Box::new(std::array::from_fn(|lane| part(lane).unwrap_or_default())));
+        Self { bodies, first: flank.stations[first].point, arm, follows: before == Some(first), cut }
+    }
+
+    /// The body of a station; none: ground, or no station.
+    #[inline(always)]
+    pub(super) fn body(&self, k: usize) -> Option<usize> {
+        (self.bodies[k] != NONE).then_some(self.bodies[k] as usize)
+    }
+}
