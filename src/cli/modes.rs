@@ -48,7 +48,7 @@ pub(crate) struct ModesCommand {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// Quality factors, with the parts of drag, of gas in gaps and of heat flow across bent beams
+    /// Quality factors, with the parts of drag, gas in gaps, heat flow across bent beams, resistances and anchors
     #[arg(long)]
     quality: bool,
 
@@ -154,10 +154,11 @@ fn qualities(losses: &[ModeLoss]) -> String {
         let quality = loss.quality();
         let shown = if quality.is_finite() { format!("{quality:.4}") } else { "undamped".into() };
         let part = |part: f64| if part > 0.0 { format!("{:.1} %", 100.0 * part * quality) } else { "–".into() };
-        vec![(k + 1).to_string(), shown, part(loss.drag), part(loss.gas), part(loss.thermoelastic)]
+        let parts = [loss.drag, loss.gas, loss.thermoelastic, loss.electrical, loss.anchors];
+        [(k + 1).to_string(), shown].into_iter().chain(parts.map(part)).collect()
     };
     let rows: Vec<Vec<String>> = losses.iter().enumerate().map(row).collect();
-    report::columns(&["mode", "Q", "drag", "gas in gaps", "thermoelastic"], &rows) + "\n"
+    report::columns(&["mode", "Q", "drag", "gas in gaps", "thermoelastic", "electrical", "anchors"], &rows) + "\n"
 }
 
 /// Reference state of the modes, where it is not the drawing.

@@ -82,7 +82,7 @@ def test_a_mode_moves(bench: Any) -> None:
     page.wait("return page.tabs[1].answer")
     expected = command("modes", "examples/bank/bank.net", "--count", "6", "--quality")
     assert page.run("return page.tabs[1].answer.frequencies_hz") == expected["frequencies_hz"]
-    quality = 1 / sum(expected["losses"][0][part] for part in ("drag", "gas", "thermoelastic"))
+    quality = 1 / sum(expected["losses"][0][part] for part in ("drag", "gas", "thermoelastic", "electrical", "anchors"))
     assert page.run("return page.tabs[1].answer.qualities[0]") == pytest.approx(quality, rel=1e-12)
     picture = "return document.querySelector('.figure canvas').toDataURL()"
     first = page.run(picture)

@@ -31,6 +31,7 @@ mod large_motion;
 mod mechanisms;
 mod mesh;
 mod mode_errors;
+mod mode_quality;
 mod motion;
 mod moving_anchors;
 mod near_limit_points;

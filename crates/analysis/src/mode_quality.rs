@@ -5,19 +5,29 @@
 //! 1/Q = Σ 1/Q_i,      drag: φᵀCφ/(ω·m),      gas in gaps: Re φᵀZ(ω)φ/(ω·m),      m = φᵀMφ
 //! thermoelastic: Σ_beams 2U/(ω²·m)·Δ·f(ξ),    Δ = E·α²·T₀/(ρ·c_p),    ξ = w·√(ω·ρ·c_p/(2k))
 //! f(ξ) = 6/ξ² − 6/ξ³·(sinh ξ + sin ξ)/(cosh ξ + cos ξ)
+//! electrical: Re iᴴRi/(ω³·m),      i = iω·(V∘∂C·φ + C∘v),      v = −R·i
+//! anchors: Σ_beams 2U/(ω²·m)/Q_a
 //! ```
 //! C is the drag and the dampers, Z the impedance of the gas at the frequency of the mode, and U the energy that the mode bends a beam with. The heat of a bent
 //! beam flows across its width w. The shape is that without damping: the sum is right to the order of 1/Q².
 //!
+//! i is the current through each gap under its voltage V at the operating point, and R the resistances of the netlist between electrodes, with all sources held. Of one gap
+//! behind a resistance this is Q = ω·m/(η²·R)·(1 + (ωRC)²), η = V·∂C/∂x (Tilmans 1996). Q_a is given for a layer.
+//!
 //! References: R. Lifshitz, M. L. Roukes, "Thermoelastic damping in micro- and nanomechanical systems", Phys. Rev. B 61 (2000) 5600–5609; C. Zener, "Internal
-//! friction in solids", Phys. Rev. 52 (1937) 230–235.
+//! friction in solids", Phys. Rev. 52 (1937) 230–235; H. A. C. Tilmans, "Equivalent circuit representation of electromechanical transducers: I. Lumped-parameter
+//! systems", J. Micromech. Microeng. 6 (1996) 157–176.
 
-use super::modes::shapeless;
+use super::modes::{about_equilibrium, shapeless};
+use super::statics::source_vector;
 use super::{AnalysisError, PortVoltages};
+use bimorph_domains::Drive;
 use bimorph_model::compile::CompiledModel;
+use bimorph_model::discretize::ports::{ElectrodeResistances, electrode_resistances};
 use bimorph_multibody::forces::add_damping;
 use bimorph_multibody::planar::Pose;
 use bimorph_structure::{Beam, SolidHeat};
+use nalgebra::{Complex, DMatrix, DVector};
 use serde::Serialize;
 use std::f64::consts::TAU;
 
@@ -35,12 +45,16 @@ pub struct ModeLoss {
     pub gas: f64,
     /// Heat that flows across bent beams.
     pub thermoelastic: f64,
+    /// Current through resistances of the netlist.
+    pub electrical: f64,
+    /// Waves that leave through anchors, as layers give them.
+    pub anchors: f64,
 }
 
 impl ModeLoss {
     /// Q (1); infinite without any loss.
     pub fn quality(&self) -> f64 {
-        1.0 / (self.drag + self.gas + self.thermoelastic)
+        1.0 / (self.drag + self.gas + self.thermoelastic + self.electrical + self.anchors)
     }
 }
 
@@ -56,24 +70,79 @@ pub fn mode_losses(
     let (found, q, shapes) = shapeless(compiled, count, voltages)?;
     let system = &compiled.parts.system;
     let model = &system.model;
+    let (electrodes, drive) = electrodes(compiled, voltages)?;
     let of = |(frequency_hz, shape): (f64, &Vec<Pose>)| {
         bimorph_base::budget::check();
         let (omega, mass) = (TAU * frequency_hz, model.mass_product(shape, shape));
         let mut force = vec![Pose::zeros(); shape.len()];
         add_damping(model, shape, &mut force);
         let drag: f64 = force.iter().zip(shape).map(|(force, rate)| force.dot(rate)).sum();
-        let bent = system.beams.iter().zip(&compiled.structure.beams).map(|(line, beam)| {
-            let (energy, _) = line.bending(&q, shape, model.linear);
-            2.0 * energy / (omega * omega * mass) * thermoelastic(beam, omega)
-        });
+        let (mut bent, mut anchors) = (0.0, 0.0);
+        for (line, beam) in system.beams.iter().zip(&compiled.structure.beams) {
+            let part = 2.0 * line.bending(&q, shape, model.linear).0 / (omega * omega * mass);
+            bent += part * thermoelastic(beam, omega);
+            anchors += part / beam.material.anchor_quality.unwrap_or(f64::INFINITY);
+        }
+        let lossless = compiled.options.undamped;
         ModeLoss {
             frequency_hz,
             drag: drag / (omega * mass),
             gas: system.gas_damping(&q, shape, omega) / (omega * mass),
-            thermoelastic: if compiled.options.undamped { 0.0 } else { bent.sum() },
+            thermoelastic: if lossless { 0.0 } else { bent },
+            electrical: if lossless {
+                0.0
+            } else {
+                dissipated(compiled, (&electrodes, &drive), (&q, shape), omega) / mass
+            },
+            anchors: if lossless { 0.0 } else { anchors },
         }
     };
     Ok(found.frequencies_hz.iter().copied().zip(&shapes).map(of).collect())
+}
+
+/// Resistances between electrodes at the operating point, and the voltages there.
+fn electrodes(
+    compiled: &CompiledModel,
+    voltages: &PortVoltages,
+) -> Result<(ElectrodeResistances, Drive), AnalysisError> {
+    let (parts, electrics) = (&compiled.parts, &compiled.parts.system.electrics);
+    let sources = source_vector(compiled, voltages)?;
+    let (mut rise, mut drive) = (electrics.heating.rest(), electrics.drive());
+    if about_equilibrium(compiled, voltages) {
+        electrics.steady(&sources, &mut rise, &mut drive);
+    }
+    let warm: Vec<f64> = (0..parts.heaters.len()).map(|k| electrics.heating.resistance(k, &rise)).collect();
+    let found = electrode_resistances(&compiled.structure, &parts.gap_names, &parts.heaters, &warm);
+    let refused = |error| AnalysisError::BadRequest { what: "resistances".into(), detail: format!("{error}") };
+    Ok((found.map_err(refused)?, drive))
+}
+
+/// Power that resistances take from the motion `shape` about `q`, times 2/ω³ (kg·m²): with the mass of the mode 1/Q.
+fn dissipated(
+    compiled: &CompiledModel,
+    (electrodes, drive): (&ElectrodeResistances, &Drive),
+    (q, shape): (&[Pose], &[Pose]),
+    omega: f64,
+) -> f64 {
+    let system = &compiled.parts.system;
+    let ElectrodeResistances { gaps, between } = electrodes;
+    if between.amax() == 0.0 || gaps.iter().all(|g| drive.volts[*g] == 0.0) {
+        return 0.0;
+    }
+    let jw = Complex::new(0.0, omega);
+    let moved = |g: &usize| jw * (drive.volts[*g] * system.capacitance_slope(*g, q, shape));
+    let motional = DVector::from_iterator(gaps.len(), gaps.iter().map(moved));
+    let capacitance: Vec<f64> = gaps.iter().map(|g| system.capacitance(*g, q)).collect();
+    // i = motional + jω·C·v with v = −R·i
+    let n = gaps.len();
+    bimorph_base::budget::lay_out_matrix(2 * n, n);
+    let matrix = DMatrix::from_fn(n, n, |i, k| {
+        Complex::from(if i == k { 1.0 } else { 0.0 }) + jw * (capacitance[i] * between[(i, k)])
+    });
+    let Some(current) = matrix.lu().solve(&motional) else { return 0.0 };
+    let drop = between.map(Complex::from) * &current;
+    let power: f64 = current.iter().zip(drop.iter()).map(|(i, v)| (i.conj() * v).re).sum();
+    power / omega.powi(3)
 }
 
 /// Δ·f(ξ) of a beam at an angular frequency (rad/s); 0 where its layer has no conductivity or specific heat.

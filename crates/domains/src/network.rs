@@ -56,11 +56,8 @@ pub enum CircuitError {
 }
 
 impl ElectricalNetwork {
-    /// Solves the network. A part that nothing ties to ground has its first node at 0 V.
-    ///
-    /// # Errors
-    /// [`CircuitError`].
-    pub fn solve(&self) -> Result<Potentials, CircuitError> {
+    /// Potentials that sources fix, and the conductors between the others.
+    fn reduced(&self) -> Result<(KnownPotentials, Laplacian), CircuitError> {
         // spanning forest: sources first, to find loops of sources; then resistors, to find parts without ground
         let mut part = Sets::new(self.nodes + 1);
         let ground = self.nodes;
@@ -77,12 +74,21 @@ impl ElectricalNetwork {
             part.join(a, b);
         }
         let known = KnownPotentials::new((self.nodes, &self.grounds), &self.sources, &mut part, ground);
+        let conductors = self.resistors.iter().map(|&(a, b, r)| (known.row[a], known.row[b], 1.0 / r));
+        let laplacian = Laplacian::new(known.free, conductors).ok_or_else(|| self.out_of_range())?;
+        Ok((known, laplacian))
+    }
+
+    /// Solves the network. A part that nothing ties to ground has its first node at 0 V.
+    ///
+    /// # Errors
+    /// [`CircuitError`].
+    pub fn solve(&self) -> Result<Potentials, CircuitError> {
+        let (known, laplacian) = self.reduced()?;
         let count = self.sources.len();
         let free = known.free;
         // right-hand sides with their solutions, potentials with what sources fix of them, and conductances
         bimorph_base::budget::lay_out_matrix(free + 2 * self.nodes + 2 * count, count);
-        let conductors = self.resistors.iter().map(|&(a, b, r)| (known.row[a], known.row[b], 1.0 / r));
-        let laplacian = Laplacian::new(free, conductors).ok_or_else(|| self.out_of_range())?;
         let mut flows = vec![0.0; free * count];
         for &(a, b, r) in &self.resistors {
             bimorph_base::budget::check();
@@ -109,6 +115,28 @@ impl ElectricalNetwork {
             }
         }
         Ok(Potentials { conductance: self.conductance(&known, &potential), potential })
+    }
+
+    /// Resistances between pairs of nodes (Ω): the voltage of each pair for a current that flows into the first node of another and out of its second,
+    /// with all sources at 0 V.
+    ///
+    /// # Errors
+    /// [`CircuitError`].
+    pub fn resistances(&self, pairs: &[[usize; 2]]) -> Result<DMatrix<f64>, CircuitError> {
+        let (known, laplacian) = self.reduced()?;
+        let free = known.free;
+        bimorph_base::budget::lay_out_matrix(free + pairs.len(), pairs.len());
+        let mut flows = vec![0.0; free * pairs.len()];
+        for (k, pair) in pairs.iter().enumerate() {
+            for (node, sign) in pair.iter().zip([1.0, -1.0]) {
+                if let Some(row) = known.row[*node] {
+                    flows[k * free + row] += sign;
+                }
+            }
+        }
+        laplacian.solve(&mut flows);
+        let potential = |node: usize, k: usize| known.row[node].map_or(0.0, |row| flows[k * free + row]);
+        Ok(DMatrix::from_fn(pairs.len(), pairs.len(), |i, k| potential(pairs[i][0], k) - potential(pairs[i][1], k)))
     }
 
     fn out_of_range(&self) -> CircuitError {
@@ -176,6 +204,28 @@ mod tests {
         assert!((p.potential[(1, 0)] - 0.75).abs() < 1e-14);
         assert!((p.conductance[(0, 0)] - 0.25e-3).abs() < 1e-17);
         assert_eq!(p.potential[(3, 0)], 0.0);
+    }
+
+    /// Resistances between pairs of nodes: those of a star of 1, 2 and 3 Ω between a source and ground, by hand. A pair that sources hold has none, and a floating one,
+    /// whose parts nothing joins, has none either.
+    #[test]
+    fn resistances_of_a_star() {
+        let circuit = ElectricalNetwork {
+            nodes: 6,
+            resistors: vec![(0, 3, 1.0), (1, 3, 2.0), (2, 3, 3.0)],
+            sources: vec![(0, Some(2))],
+            grounds: vec![2],
+        };
+        let found = circuit.resistances(&[[1, 2], [3, 2], [0, 2], [1, 0], [4, 5]]).unwrap();
+        // the middle sees 1 Ω and 3 Ω in parallel, and node 1 has 2 Ω in front of that
+        let expected = [[2.75, 0.75, 0.0, 2.75, 0.0], [0.75, 0.75, 0.0, 0.75, 0.0]];
+        for (row, expected) in expected.iter().enumerate() {
+            for (column, expected) in expected.iter().enumerate() {
+                assert!((found[(row, column)] - expected).abs() < 1e-14, "{found}");
+                assert!((found[(column, row)] - expected).abs() < 1e-14, "{found}");
+            }
+        }
+        assert!(found.row(2).amax() == 0.0 && found.row(4).amax() == 0.0, "{found}");
     }
 
     /// Sources in a chain above ground, one that floats between resistors, and one to ground the other way round: potentials and currents as

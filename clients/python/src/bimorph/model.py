@@ -157,7 +157,7 @@ class Model:
             answer.deflection_m,
             issue(answer.warnings),
             estimate_of(answer),
-            tuple(ModeLoss(loss.frequency_hz, loss.drag, loss.gas, loss.thermoelastic) for loss in answer.losses),
+            tuple(ModeLoss(loss.frequency_hz, loss.drag, loss.gas, loss.thermoelastic, loss.electrical, loss.anchors) for loss in answer.losses),
         )
 
     def ac(

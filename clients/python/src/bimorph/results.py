@@ -120,11 +120,15 @@ class ModeLoss:
     """Gas in gaps."""
     thermoelastic: float
     """Heat that flows across bent beams."""
+    electrical: float
+    """Current through resistances of the netlist."""
+    anchors: float
+    """Waves that leave through anchors, as layers give them."""
 
     @property
     def quality(self) -> float:
         """Q [1]; infinite without any loss."""
-        total = self.drag + self.gas + self.thermoelastic
+        total = self.drag + self.gas + self.thermoelastic + self.electrical + self.anchors
         return 1.0 / total if total > 0.0 else math.inf
 
 

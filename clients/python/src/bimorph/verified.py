@@ -125,7 +125,11 @@ class Checked:
                 self.numbers(what, values, len(answer.nodes))
         if answer.losses:
             self.require(len(answer.losses) == len(found), f"losses: expected {len(found)}, got {len(answer.losses)}")
-        parts = [part for loss in answer.losses for part in (loss.drag, loss.gas, loss.thermoelastic)]
+        parts = [
+            part
+            for loss in answer.losses
+            for part in (loss.drag, loss.gas, loss.thermoelastic, loss.electrical, loss.anchors)
+        ]
         self.numbers("losses", parts, len(parts))
 
     def response(self, answer: Any, signals: Sequence[str]) -> None:

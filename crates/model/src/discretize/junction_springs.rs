@@ -195,6 +195,7 @@ mod tests {
             ambient_temperature: 300.0,
             stress: 0.0,
             strength: None,
+            anchor_quality: None,
             heat: None,
         };
         let beam = Beam {

@@ -33,16 +33,7 @@ pub fn lay(
     let net: Vec<usize> = structure.nets().into_iter().map(|node| node.0).collect();
     let conductors = heated.iter().filter_map(|index| conductor(&structure.beams[*index], &net));
     let heaters: Vec<HeatConductor> = conductors.collect();
-    let circuit = ElectricalNetwork {
-        nodes: structure.nodes.len(),
-        resistors: (structure.resistors.iter().map(|r| (net[r.a.0], net[r.b.0], r.resistance)))
-            .chain(heaters.iter().map(|h| (h.a, h.b, h.resistance)))
-            .collect(),
-        sources: (structure.ports.iter().map(|p| (net[p.plus.0], p.minus.map(|n| net[n.0]))))
-            .chain(structure.voltage_sources.iter().map(|s| (net[s.plus.0], Some(net[s.minus.0]))))
-            .collect(),
-        grounds: structure.electrical_grounds.iter().map(|n| net[n.0]).collect(),
-    };
+    let circuit = network(structure, &net, heaters.iter().map(|h| (h.a, h.b, h.resistance)));
     let potentials = circuit.solve().map_err(|e| match e {
         CircuitError::SourceLoop { source_index } => {
             DiscretizeError::SourceLoop { source_name: names[source_index].clone() }
@@ -133,6 +124,56 @@ fn heat_curves(beam: &Beam, heater: &Heater) -> Option<Arc<HeatCurves>> {
         expansion: beam.material.expansion_curve.clone().map(|curve| (curve, ambient)),
     };
     (!curves.is_empty()).then(|| Arc::new(curves))
+}
+
+/// The network of a structure whose nodes lie on the nets `net`, its heated beams last among the resistors.
+fn network(
+    structure: &Structure,
+    net: &[usize],
+    heated: impl Iterator<Item = (usize, usize, f64)>,
+) -> ElectricalNetwork {
+    ElectricalNetwork {
+        nodes: structure.nodes.len(),
+        resistors: (structure.resistors.iter().map(|r| (net[r.a.0], net[r.b.0], r.resistance))).chain(heated).collect(),
+        sources: (structure.ports.iter().map(|p| (net[p.plus.0], p.minus.map(|n| net[n.0]))))
+            .chain(structure.voltage_sources.iter().map(|s| (net[s.plus.0], Some(net[s.minus.0]))))
+            .collect(),
+        grounds: structure.electrical_grounds.iter().map(|n| net[n.0]).collect(),
+    }
+}
+
+/// Resistances between the electrodes of gaps, with all sources at 0 V.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElectrodeResistances {
+    /// Gaps whose voltage is that of nodes, by their numbers.
+    pub gaps: Vec<usize>,
+    /// Voltage of a gap for a current through another (Ω).
+    pub between: DMatrix<f64>,
+}
+
+/// Resistances between the electrodes of the gaps of these names; `warm` of each of the beams that are `heated` (Ω).
+///
+/// # Errors
+/// [`CircuitError`].
+pub fn electrode_resistances(
+    structure: &Structure,
+    names: &[String],
+    heated: &[usize],
+    warm: &[f64],
+) -> Result<ElectrodeResistances, CircuitError> {
+    let net: Vec<usize> = structure.nets().into_iter().map(|node| node.0).collect();
+    let beams = heated.iter().map(|index| &structure.beams[*index]);
+    let warm = beams.zip(warm).map(|(beam, resistance)| (net[beam.a.0], net[beam.b.0], *resistance));
+    let voltages: HashMap<&str, &GapVoltage> = structure.gap_voltages().collect();
+    let (mut gaps, mut pairs) = (Vec::new(), Vec::new());
+    for (g, name) in names.iter().enumerate() {
+        if let Some(GapVoltage::Nodes(a, b)) = voltages.get(name.as_str()) {
+            gaps.push(g);
+            pairs.push([net[a.0], net[b.0]]);
+        }
+    }
+    let between = network(structure, &net, warm).resistances(&pairs)?;
+    Ok(ElectrodeResistances { gaps, between })
 }
 
 /// Adds a source for each gap in which trapped charge acts as one in series; the gaps, with the numbers of their sources among the `fixed` ones.

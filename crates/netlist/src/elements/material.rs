@@ -23,8 +23,9 @@ const STRONGEST: f64 = 0.1;
 pub(super) const VACUUM: f64 = 8.854e-12;
 
 /// Parameters of a material.
-const READ: [&str; 17] = [
+const READ: [&str; 18] = [
     "strength",
+    "anchorquality",
     "Youngsmodulus",
     "Poisson",
     "shearmodulus",
@@ -126,6 +127,7 @@ impl ElementSite<'_, '_> {
             ambient_temperature: self.ambient()?,
             stress,
             strength: self.positive_if_any("strength")?,
+            anchor_quality: self.positive_if_any("anchorquality")?,
             heat: self.solid_heat()?,
         };
         Ok(match wafer {

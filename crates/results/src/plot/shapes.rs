@@ -159,6 +159,7 @@ mod tests {
             ambient_temperature: 0.0,
             stress: 0.0,
             strength: None,
+            anchor_quality: None,
             heat: None,
         };
         let node = |x| Node { name: String::new(), position: [x, 0.0], mechanical: true, electrical: false };

@@ -107,8 +107,8 @@ pub fn modes_to_wire(result: &ModesResult) -> proto::ModesResponse {
 
 /// The loss of a mode as it travels.
 pub fn mode_loss_to_wire(loss: &ModeLoss) -> proto::ModeLoss {
-    let ModeLoss { frequency_hz, drag, gas, thermoelastic } = *loss;
-    proto::ModeLoss { frequency_hz, drag, gas, thermoelastic }
+    let ModeLoss { frequency_hz, drag, gas, thermoelastic, electrical, anchors } = *loss;
+    proto::ModeLoss { frequency_hz, drag, gas, thermoelastic, electrical, anchors }
 }
 
 /// Modes back, without their losses.
