@@ -301,6 +301,32 @@ fn expansion_with_temperature() {
     assert!((run.signals[0].2[10] / both - 1.0).abs() < 1e-3, "{} {both}", run.signals[0].2[10]);
 }
 
+/// The electrothermal actuator of N. D. Mankame and G. K. Ananthasuresh (J. Micromech. Microeng. 11 (2001) 452, ANSYS VM223) at 15 V: the tip moves by 27 µm, of which a model
+/// of beams has 24 to 27. Properties are those of VM223, its mean expansions from 300 K turned into those at each temperature. Films of gas are taken at the mean of
+/// the temperatures of each beam and the air, and its radiation acts to ambient.
+#[test]
+fn an_actuator_in_films_of_gas() {
+    let text = "process silicon = [ Youngsmodulus=169e9 Poisson=0.3 density=2330 h=20u resistivity=4.2e-4 ambienttemperature=300 emissivity=0.7
+  thermalexpansion=table(300, 2.568e-6, 400, 3.725e-6, 500, 4.213e-6, 600, 4.421e-6, 700, 4.523e-6, 800, 4.594e-6, 900, 4.662e-6, 1000, 4.741e-6)
+  thermcond=table(300, 146.4, 400, 98.3, 500, 73.2, 600, 57.5, 700, 49.2, 800, 41.8, 900, 37.6, 1000, 34.5) ]
+anchor silicon [a] []
+anchor silicon [b] []
+hot  beam2det silicon [a c] [l=2185u w=40u gasconductivity=0.0529 fluid=40u shapefactor=1]
+link beam2det silicon [d c] [l=222.5u w=90u oz=pi/2 gasconductivity=0.0527 fluid=90u shapefactor=1]
+cold beam2det silicon [e d] [l=1855u w=255u gasconductivity=0.0554 fluid=255u shapefactor=1]
+root beam2det silicon [f e] [l=107.5u w=90u oz=-pi/2 gasconductivity=0.05 fluid=90u shapefactor=1]
+flex beam2det silicon [b f] [l=330u w=40u gasconductivity=0.0420 fluid=40u shapefactor=1]
+tip link2d * [d t] [l=135.2u oz=-1.2315]
+eground * [b] []
+drive port * [a b] []
+";
+    let compiled = compile(&Bundle::from_text("actuator.net", text), &CompileOptions::default()).unwrap();
+    let found = static_equilibrium(&compiled, &[("drive".into(), 15.0)]).unwrap_or_else(|e| panic!("{e}"));
+    let tip = found.nodes.iter().find(|(name, _)| name == "t").unwrap().1;
+    let moved = 1e6 * tip.x.hypot(tip.y);
+    assert!((moved / 27.0 - 1.0).abs() < 0.2, "{moved} µm");
+}
+
 /// Partials of the current, of the mean temperature and of the stress with the voltage agree with differences where every property has a table, in static
 /// trials and short steps to 1e-6, in long ones to 1e-5. The response at a low frequency is the static partial to 1e-6.
 #[test]

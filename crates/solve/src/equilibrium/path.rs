@@ -117,9 +117,7 @@ impl LoadPath for SourcePath<'_> {
         }
         if e.heating.is_hot() {
             let [_, rise, _] = self.hot(s);
-            for ((expansion, heater), rise) in drive.expansion.iter_mut().zip(&e.heating.heaters).zip(&rise) {
-                *expansion = heater.expansion * rise;
-            }
+            e.expand(&rise, &mut drive.expansion);
         }
         drive.load = self.load[0] + s * (self.load[1] - self.load[0]);
         for (k, value) in drive.inputs.iter_mut().enumerate() {
@@ -149,8 +147,9 @@ impl LoadPath for SourcePath<'_> {
         }
         if e.heating.is_hot() {
             let [u, rise, change] = self.hot(s);
-            e.heating.slopes(&u, &rise, &change, &mut slope.expansion);
-            slope.expansion.iter_mut().zip(&e.heating.heaters).for_each(|(slope, h)| *slope *= h.expansion);
+            let mut slopes = vec![0.0; e.heating.means()];
+            e.heating.slopes(&u, &rise, &change, &mut slopes);
+            e.expand(&slopes, &mut slope.expansion);
         }
         slope.load = self.load[1] - self.load[0];
         for (k, value) in slope.inputs.iter_mut().enumerate() {
