@@ -1,12 +1,15 @@
 //! The reduced model of [`bimorph::export`] against the device that it stands for, at frequencies of the test's own.
 
+use bimorph::analysis::readout::ports::OpenedPorts;
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::scale::PortScale;
 use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Trial, TrialReply};
 use bimorph::export::compare::{ModelFit, fit};
+use bimorph::export::flexible::{FlexibleModel, FlexibleOutput, flexible};
 use bimorph::export::{ExportError, ExportRequest};
 use bimorph::netlist::{Bundle, read_bundle};
+use bimorph::solve::reduced::polynomial::statics::equilibrium;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -25,6 +28,7 @@ fn request(ports: &[&str], signals: &[&str], bias: &[(&str, f64)]) -> ExportRequ
         count: None,
         to: None,
         within: 1e-4,
+        ranges: Vec::new(),
     }
 }
 
@@ -170,4 +174,73 @@ fn next_to_pull_in() {
     assert!(soft < 0.5 * 15_915.5, "{soft}");
     let frame = fit(&compiled, &request(&["frame.wz"], &[], &[]));
     assert!(matches!(frame, Err(ExportError::Turning { .. })), "{frame:?}");
+}
+
+/// A clamped beam of 200 µm × 2 µm with a force at its middle, through which it stretches: stiffness grows by more than half up to 60 µN.
+const STRETCHED: &str = "process p = [ Youngsmodulus=160e9 density=2330 h=10u ]
+anchor p [a] []
+beam2d p [a m] [l=100u w=2u]
+beam2d p [m b] [l=100u w=2u]
+anchor p [b] []
+";
+
+/// The flexible model of a netlist for a range of one port, and the values of its one signal at static drives of that port.
+fn flexible_values(
+    model: &Arc<CompiledModel>,
+    (port, range): (&str, [f64; 2]),
+    (signal, within): (&str, f64),
+    drives: &[f64],
+) -> (FlexibleModel, Vec<[f64; 2]>) {
+    let mut request = request(&[port], &[signal], &[]);
+    (request.within, request.ranges) = (within, vec![(port.to_owned(), range)]);
+    let written = flexible(model, &request).unwrap();
+    let mut device = LocalDevice::new(Arc::clone(model));
+    let ports = vec![port.to_owned()];
+    device.open(&OpenRequest { ports: ports.clone(), signals: vec![signal.to_owned()], noise: None }).unwrap();
+    let opened = OpenedPorts::find(model, &ports).unwrap();
+    let system = opened.system.as_deref().unwrap_or(&model.parts.system);
+    let electrics = &system.electrics;
+    let of = &written.fitted.model;
+    let probe = written.rows.iter().rev().find_map(|row| match row {
+        FlexibleOutput::Probe(p) => Some(*p),
+        _ => None,
+    });
+    let values = drives.iter().map(|given| {
+        let mut reply = TrialReply::default();
+        let trial = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[*given] };
+        device.trial(&trial, &mut reply).unwrap();
+        let mut u = vec![0.0; electrics.sources()];
+        electrics.fill_sources(&vec![0.0; electrics.ports], &mut u);
+        u[opened.sources[0]] = *given;
+        let mut drive = electrics.drive();
+        electrics.steady(&u, &mut vec![0.0; electrics.heating.states()], &mut drive);
+        let mut x = vec![0.0; of.size()];
+        assert!(equilibrium(of, &drive, &mut x), "{given}");
+        [of.probes.values(&of.monomials.values(&x))[probe.unwrap()], reply.outputs[0]]
+    });
+    let values = values.collect();
+    (written, values)
+}
+
+/// Equilibria of the polynomials are those of the device within 1e-3 of the largest one in the range: a beam that stretches under forces of both
+/// signs, and the bank under the voltage of its heaters. Both have fewer than a fifth of the strains as coordinates.
+#[test]
+fn polynomials_have_the_equilibria_of_the_device() {
+    let text = Arc::new(compile(&Bundle::from_text("beam.net", STRETCHED), &CompileOptions::default()).unwrap());
+    let bank = compiled("examples/bank/bank.net", CompileOptions::default());
+    let force: [f64; 4] = [-55e-6, -20e-6, 10e-6, 60e-6];
+    let cases = [
+        (text, ("m.y", [-60e-6, 60e-6]), "m.y", force.to_vec()),
+        (bank, ("heat", [0.0, 2.0]), "yoke.y", vec![0.4, 1.1, 1.7, 2.0]),
+    ];
+    for (model, port, signal, drives) in cases {
+        let (written, values) = flexible_values(&model, port, (signal, 1e-3), &drives);
+        let fitted = &written.fitted;
+        assert!(fitted.error <= 1e-3, "{signal}: {:e}", fitted.error);
+        assert!(5 * fitted.model.size() <= written.strains.max(40), "{}", fitted.model.size());
+        let most = values.iter().map(|[_, full]| full.abs()).fold(0.0, f64::max);
+        for [found, full] in values {
+            assert!((found - full).abs() <= 1e-3 * most, "{signal}: {found:e} {full:e}");
+        }
+    }
 }

@@ -49,9 +49,14 @@ pub(crate) struct ExportCommand {
     #[arg(long, value_name = "PATH", conflicts_with_all = ["spice", "verilog_a"])]
     openvaf: Option<PathBuf>,
 
-    /// Write the whole nonlinear model instead, without an operating point: of rigid parts that only slide on linear springs
+    /// Write a nonlinear model instead, without an operating point: the whole one of rigid parts that only slide on linear springs, otherwise
+    /// a reduced one for the ranges of --range, as Verilog-A
     #[arg(long, conflicts_with_all = ["bias", "to", "count", "json"])]
     nonlinear: bool,
+
+    /// Range of what is given to a port, for which a reduced nonlinear model is made [V, N, W, …]; others are at 0. Repeatable
+    #[arg(long = "range", value_name = "NAME=LOW:HIGH", requires = "nonlinear", value_parser = value::range)]
+    ranges: Vec<(String, [f64; 2])>,
 
     /// Operating point: hold a port at a voltage [V]; others are at 0 V. Repeatable
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
@@ -70,9 +75,10 @@ pub(crate) struct ExportCommand {
     #[arg(long, value_name = "HZ", value_parser = value::number)]
     to: Option<f64>,
 
-    /// Largest relative deviation from the exact small-signal answer up to --to
-    #[arg(long, default_value_t = ExportRequest::WITHIN, value_name = "NUMBER", value_parser = value::number)]
-    within: f64,
+    /// Largest relative deviation from the exact small-signal answer up to --to, of a reduced nonlinear model from the equilibria in its
+    /// ranges [default: 1e-4, 1e-3]
+    #[arg(long, value_name = "NUMBER", value_parser = value::number)]
+    within: Option<f64>,
 
     /// Keep exactly the N lowest modes [default: as many as --within takes]
     #[arg(long, short = 'n', value_name = "N")]
@@ -146,6 +152,20 @@ impl ExportCommand {
                     "{name} {pins}\n{directions} direction(s) in which parts slide, {gaps} gap(s), nonlinear\n"
                 ));
             }
+            FileContent::Reduced(reduced) => {
+                let (name, pins) = (&file.name, file.pins.join(" "));
+                return print(&format!(
+                    "{name} {pins}\n{} coordinates for {} strains, polynomials of degree {}, {} lags of heat, nonlinear\n\
+                     within {:.1e} of the full model in {} equilibria in the ranges\n{}\n",
+                    reduced.coordinates,
+                    reduced.strains,
+                    reduced.degree,
+                    reduced.lags,
+                    reduced.error,
+                    reduced.compared,
+                    mesh_note(compiled)
+                ));
+            }
         };
         if !self.json {
             return print(&(summary(linear, file) + &mesh_note(compiled) + "\n"));
@@ -170,8 +190,10 @@ impl ExportCommand {
         if let Some(to) = self.to.filter(|to| to.is_nan() || *to <= 0.0) {
             return Err(Failure::bad("--to", "a frequency above 0 Hz", to.to_string()));
         }
-        if self.within.is_nan() || self.within < ExportRequest::MIN_WITHIN || self.within >= 1.0 {
-            return Err(Failure::bad("--within", "a number of at least 1e-9, below 1", self.within.to_string()));
+        let default = if self.nonlinear { ExportRequest::NONLINEAR_WITHIN } else { ExportRequest::WITHIN };
+        let within = self.within.unwrap_or(default);
+        if within.is_nan() || within < ExportRequest::MIN_WITHIN || within >= 1.0 {
+            return Err(Failure::bad("--within", "a number of at least 1e-9, below 1", within.to_string()));
         }
         if let Some(count) = self.count.filter(|n| *n == 0 || *n > ExportRequest::MAX_COUNT) {
             return Err(Failure::bad("--count", "a number of modes, 1 to 1000", count.to_string()));
@@ -187,7 +209,8 @@ impl ExportCommand {
             bias: self.bias.clone(),
             count: self.count,
             to: self.to,
-            within: self.within,
+            within,
+            ranges: self.ranges.clone(),
         };
         let language = if self.spice { FileLanguage::Spice } else { FileLanguage::VerilogA };
         Ok(FileRequest { language, nonlinear: self.nonlinear, name: self.name.clone(), model })

@@ -26,6 +26,15 @@ pub(crate) fn volts(text: &str) -> Result<(String, f64), String> {
     Ok((name, number(&value)?))
 }
 
+/// `NAME=LOW:HIGH`.
+pub(crate) fn range(text: &str) -> Result<(String, [f64; 2]), String> {
+    let (name, value) = pair(text)?;
+    let expected = || format!("expected NAME=LOW:HIGH with LOW below HIGH, such as drive=0:20, got \"{text}\"");
+    let (low, high) = value.split_once(':').ok_or_else(expected)?;
+    let (low, high) = (number(low)?, number(high)?);
+    if low < high { Ok((name, [low, high])) } else { Err(expected()) }
+}
+
 /// End condition of a run: `contact`, `release` or `SIGNAL=VALUE`.
 pub(crate) fn until(text: &str) -> Result<Until, String> {
     match text {

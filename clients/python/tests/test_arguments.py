@@ -228,10 +228,11 @@ def models(model: bimorph.Model, session: bimorph.Session) -> dict[str, Case]:
                 "signals": either(empty_list, empty_mapping),
                 "voltages": VOLTAGES,
                 "to": either(nothing, number(0.0, 1e12, open_low=True)),
-                "within": never,
+                "within": either(nothing, number(1e-9, 0.999)),
                 "count": either(nothing, integer(1, 1000)),
                 "name": either(nothing, lambda value: text(value) and value.isidentifier()),
                 "nonlinear": lambda value: value is False,
+                "ranges": either(nothing, empty_mapping),
             },
         ),
         "Model.transient": Case(

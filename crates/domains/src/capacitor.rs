@@ -109,6 +109,16 @@ impl Capacitor {
         }
     }
 
+    /// Whether it has any capacitance: points where conductors touch stand for none.
+    pub fn acts(&self) -> bool {
+        !matches!(self, Self::Plates { strength: 0.0, .. })
+    }
+
+    /// Sign with which the approach changes the distance, as text, and the distance as drawn (m).
+    pub fn way(&self) -> (&'static str, f64) {
+        (if matches!(self, Self::Comb { .. }) { "+" } else { "-" }, self.distance(0.0))
+    }
+
     /// Distance left between the conductors (m), where that has a meaning.
     #[inline]
     pub fn distance(&self, u: f64) -> f64 {

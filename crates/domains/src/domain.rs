@@ -14,14 +14,11 @@
 //! Nothing here is called through a pointer: [`super::member::Member`] is one of the registered domains, chosen by a `match`.
 
 use super::approach::{Approach, MaterialPoint};
-use super::capacitor::Capacitor;
-use super::contact::Contact;
 use super::contact_loss::Loss;
+use super::point_law::{Law, PointLaw};
 use super::squeeze_film::SqueezeFilm;
-use super::stop::StopKind;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
-use bimorph_structure::Adhesion;
 use nalgebra::{Vector2, Vector6};
 
 /// Where the bodies are.
@@ -52,17 +49,6 @@ pub struct SkewCoupling {
     pub bodies: [BodyId; 2],
     /// Of their coordinates (N/m, N/m, N each).
     pub half: Vector6<f64>,
-}
-
-/// A law of one approach, as other simulators can write it down.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Law {
-    /// A field, and what bears where its conductors touch.
-    Field(Capacitor, Option<Contact>),
-    /// A stop with the ways to its two sides (m), and its adhesion.
-    Stop([Option<f64>; 2], StopKind, Option<Adhesion>),
-    /// Quadratic and cubic stiffness of a spring that the approach shortens (N/m², N/m³).
-    Spring([f64; 2]),
 }
 
 /// How far the fingers of a comb lie aside of the middle of their gaps, and how far they can (m).
@@ -339,5 +325,21 @@ pub trait Domain {
     /// Approaches and laws, where it is a sum of functions of one approach each; empty: it is none.
     fn laws(&self) -> Vec<(Approach, Law)> {
         self.law().map(|(approach, law)| (*approach, law)).into_iter().collect()
+    }
+
+    /// The laws of its points, where its potential and its drag are sums of functions of one approach each; empty: they are not.
+    fn point_laws(&self) -> Vec<PointLaw> {
+        let loss = self.loss().map_or(0.0, |loss| loss.coefficient());
+        let own = self.laws().into_iter().map(|(_, law)| PointLaw { law: Some(law), loss, film: None });
+        let film = self.film().map(|(_, drawn, film)| PointLaw { law: None, loss: 0.0, film: Some((drawn, film)) });
+        own.chain(film).collect()
+    }
+
+    /// Calls `put` with the approach of each of these points (m).
+    fn point_approaches(&self, at: Configuration<'_>, mut put: impl FnMut(f64)) {
+        self.laws().iter().for_each(|(approach, _)| put(approach.value(at.q, at.linear)));
+        if let Some((approach, ..)) = self.film() {
+            put(approach.value(at.q, at.linear));
+        }
     }
 }

@@ -9,8 +9,10 @@
 //! whose points include the ends, where tilted beams touch first ([`super::quadrature`]): six and nine points on a gap of one
 //! stretch, three and five on each of several.
 
+use super::capacitor::Capacitor;
 use super::contact::Contact;
 use super::edge_field::EdgeField;
+use super::point_law::{Law, PointLaw};
 use super::quadrature::{Abscissa, GAUSS_3, GAUSS_6, LOBATTO_5, LOBATTO_9};
 use bimorph_structure::InsulatingLayer;
 use nalgebra::{Matrix4, Vector4};
@@ -151,6 +153,27 @@ impl FacingStretch {
     #[inline]
     pub(super) fn distance(&self, node: &Abscissa, z: &Vector4<f64>) -> f64 {
         self.gap + Vector4::from(node.shape).dot(&z.component_mul(&self.scale()))
+    }
+
+    /// Approach at a point of a rule: by how much the distance is smaller than drawn (m).
+    #[inline]
+    pub(super) fn approach(&self, node: &Abscissa, z: &Vector4<f64>) -> f64 {
+        self.gap - self.distance(node, z)
+    }
+
+    /// The laws of the points of the field's rule, then of the contact's, which loses energy by χ = `loss` (s/m).
+    pub(super) fn point_laws(&self, loss: f64) -> Vec<PointLaw> {
+        let (open, closest) = self.open();
+        let plates = |strength: f64| Capacitor::Plates {
+            strength,
+            edges: [self.edges, EdgeField::None],
+            gap: self.gap,
+            shortening: self.gap - open,
+            closest,
+        };
+        let field = self.gauss().iter().map(|node| Law::Field(plates(self.strength * self.length * node.weight), None));
+        let contact = self.lobatto().iter().map(|node| Law::Field(plates(0.0), Some(self.piece(node.weight))));
+        field.map(PointLaw::of).chain(contact.map(|law| PointLaw { loss, ..PointLaw::of(law) })).collect()
     }
 
     /// The rule of the field.

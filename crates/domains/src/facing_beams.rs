@@ -14,6 +14,7 @@ use super::facing_loss;
 use super::facing_side::{Opening, back};
 use super::facing_stretches::{CubicStretch, side, stretches};
 use super::from_structure::{FromStructure, StructureView};
+use super::point_law::PointLaw;
 use bimorph_multibody::batch::everywhere;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
@@ -309,5 +310,20 @@ impl Domain for FacingBeams {
         tangent: &mut BlockMatrix<f64, 3>,
     ) {
         facing_loss::add_quotient(self, chord, volts, pattern, r, tangent);
+    }
+
+    /// Those of the field, then those of the contact, stretch by stretch; none along chords, whose forces do not derive from an energy.
+    fn point_laws(&self) -> Vec<PointLaw> {
+        if self.stretches.iter().any(|stretch| stretch.facing.chord) {
+            return Vec::new();
+        }
+        self.stretches.iter().flat_map(|stretch| stretch.facing.point_laws(self.loss.coefficient())).collect()
+    }
+
+    fn point_approaches(&self, at: Configuration<'_>, mut put: impl FnMut(f64)) {
+        self.along(at, |local| {
+            let facing = &local.stretch.facing;
+            facing.gauss().iter().chain(facing.lobatto()).for_each(|node| put(facing.approach(node, &local.z)));
+        });
     }
 }

@@ -9,6 +9,7 @@ use super::facing::FacingStretch;
 use super::facing_local::{FacingBeams, Local};
 use super::facing_loss::{Derivatives, along_chord};
 use super::from_structure::{FromStructure, StructureView};
+use super::point_law::PointLaw;
 use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
@@ -124,6 +125,25 @@ impl Domain for FacingFilm {
             self.beams.add_stiffness(local, (Vector4::zeros(), by_rate), pattern, damping);
         });
         true
+    }
+
+    fn point_laws(&self) -> Vec<PointLaw> {
+        let of = |facing: &FacingStretch| {
+            let (film, drawn, length) = (self.film, facing.gap, facing.length);
+            facing.gauss().iter().map(move |node| PointLaw {
+                law: None,
+                loss: 0.0,
+                film: Some((drawn, film.part(length * node.weight))),
+            })
+        };
+        self.beams.stretches.iter().flat_map(|stretch| of(&stretch.facing)).collect()
+    }
+
+    fn point_approaches(&self, at: Configuration<'_>, mut put: impl FnMut(f64)) {
+        self.beams.along(at, |local| {
+            let facing = &local.stretch.facing;
+            facing.gauss().iter().for_each(|node| put(facing.approach(node, &local.z)));
+        });
     }
 
     /// Its work over a step is never negative: c at the middle of the step times the mean rate.

@@ -26,6 +26,7 @@
 //! | [`dashpot`] | a damper to the ground |
 //! | [`from_structure`] | from a drawing to them |
 //! | [`comb_drive`], [`electrodes`], [`facing_beams`], [`stop_pair`] | combs; plates; beams that face each other; stops |
+//! | [`point_law`] | laws of single scalars, of which gaps are sums |
 //! | [`polynomial_spring`] | quadratic and cubic terms of lumped springs |
 //! | [`load`], [`moving_frame`] | dead loads, and forces that sources give; the motion of the frame |
 //! | [`comb_film`] | gas between the fingers of a comb |
@@ -101,6 +102,7 @@ pub mod moving_frame;
 pub mod network;
 pub mod perforation;
 pub mod plate_film;
+pub mod point_law;
 pub mod polynomial_spring;
 pub mod quadrature;
 pub mod quotient;
@@ -114,11 +116,12 @@ pub mod thermal;
 
 pub use approach::MaterialPoint;
 pub use beam_line::BeamLine;
-pub use domain::{Configuration, Domain, Law};
+pub use domain::{Configuration, Domain};
 pub use drive::{Drive, Ramp, Shock};
 pub use from_structure::{PlacedMember, Station, StructureView};
 pub use input::Input;
 pub use lag::Lags;
 pub use load::DeadLoad;
 pub use member::Member;
+pub use point_law::{Law, PointLaw};
 pub use system::System;

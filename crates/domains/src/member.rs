@@ -2,8 +2,9 @@
 
 use super::approach::{Approach, MaterialPoint};
 use super::contact_loss::Loss;
-use super::domain::{Chord, Configuration, Domain, Law, SideRoom, SkewCoupling};
+use super::domain::{Chord, Configuration, Domain, SideRoom, SkewCoupling};
 use super::from_structure::{FromStructure, PlacedMember, StructureView};
+use super::point_law::{Law, PointLaw};
 use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, BodyId, Damper, Pattern};
@@ -267,5 +268,13 @@ impl Domain for Member {
 
     fn laws(&self) -> Vec<(Approach, Law)> {
         each!(self, m => m.laws())
+    }
+
+    fn point_laws(&self) -> Vec<PointLaw> {
+        each!(self, m => m.point_laws())
+    }
+
+    fn point_approaches(&self, at: Configuration<'_>, put: impl FnMut(f64)) {
+        each!(self, m => m.point_approaches(at, put));
     }
 }

@@ -5,8 +5,9 @@
 //! over the three strains d of the spring: along local x and y, and the rotation. Its linear terms are a joint of the mechanism, whose strains these are.
 
 use super::approach::{Approach, MaterialPoint};
-use super::domain::{Configuration, Domain, Law};
+use super::domain::{Configuration, Domain};
 use super::from_structure::{FromStructure, StructureView};
+use super::point_law::Law;
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::{JointFrame, JointKinematics, Pose, Symmetric, Vec3};
 use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};

@@ -68,6 +68,12 @@ impl System {
         self.members[gap].add_shape_force(self.at(q), volts, r)
     }
 
+    /// Calls `put` with the approaches of the points of a member (m), see [`Domain::point_approaches`].
+    #[inline]
+    pub fn point_approaches(&self, member: usize, q: &[Pose], put: impl FnMut(f64)) {
+        self.members[member].point_approaches(self.at(q), put);
+    }
+
     /// Distance at which the parts of a gap touch, and the least one that its law of contact knows (m); none: they never do.
     #[inline]
     pub fn touching(&self, gap: usize) -> Option<[f64; 2]> {

@@ -1,10 +1,11 @@
 //! The file of an export as text, with a summary of the model in it: what the command writes and a server sends.
 
 use super::compare::{ModelFit, fit};
+use super::flexible::{FlexibleModel, flexible};
 use super::linear::{ReducedPort, SignalShown};
 use super::model_options::model_options;
 use super::names::{self, Pins};
-use super::{ExportError, ExportRequest, lumped, lumped_spice, lumped_verilog_a, spice, verilog_a};
+use super::{ExportError, ExportRequest, flexible_verilog_a, lumped, lumped_spice, lumped_verilog_a, spice, verilog_a};
 use bimorph_analysis::mesh::beyond;
 use bimorph_model::compile::CompiledModel;
 use std::f64::consts::TAU;
@@ -28,7 +29,8 @@ pub enum FileLanguage {
 pub struct FileRequest {
     /// Its language.
     pub language: FileLanguage,
-    /// The whole nonlinear model, without an operating point, in place of the linear one about it.
+    /// A nonlinear model, without an operating point, in place of the linear one about it: the whole of rigid parts that slide, otherwise a
+    /// reduced one for the ranges of the request.
     pub nonlinear: bool,
     /// Name of the subcircuit or module; none: that of the netlist.
     pub name: Option<String>,
@@ -63,6 +65,27 @@ pub enum FileContent {
         /// Gaps.
         gaps: usize,
     },
+    /// A reduced nonlinear model.
+    Reduced(ReducedSummary),
+}
+
+/// Summary of a reduced nonlinear model.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReducedSummary {
+    /// Coordinates.
+    pub coordinates: usize,
+    /// Degree of the polynomials.
+    pub degree: usize,
+    /// Strains of the full model.
+    pub strains: usize,
+    /// Lags of heat.
+    pub lags: usize,
+    /// Largest relative error of equilibria in the ranges (1).
+    pub error: f64,
+    /// Equilibria of the full model that were compared.
+    pub compared: usize,
+    /// Range of each port, in the order of the pins (V, N, W, …).
+    pub ranges: Vec<[f64; 2]>,
 }
 
 /// Summary of a linear model.
@@ -147,7 +170,13 @@ impl FileRequest {
         source: &str,
         name: String,
     ) -> Result<(ExportedFile, Vec<ReducedPort>), ExportError> {
-        let model = lumped::lump(compiled, &self.model)?;
+        let model = match lumped::lump(compiled, &self.model) {
+            Err(ExportError::NotLumped { why }) if !self.model.ranges.is_empty() => match self.language {
+                FileLanguage::VerilogA => return self.reduced(compiled, source, name),
+                FileLanguage::Spice => return Err(ExportError::NotLumped { why: format!("{why}, as a subcircuit") }),
+            },
+            model => model?,
+        };
         let pins = Pins::of(&model.ports, &model.signals)?;
         let version = env!("CARGO_PKG_VERSION");
         let (directions, gaps) = (model.coordinates.len(), model.gaps.len());
@@ -165,6 +194,43 @@ impl FileRequest {
         let content = FileContent::Nonlinear { directions, gaps };
         let pins = pins.all().map(str::to_owned).collect();
         Ok((ExportedFile { text, name, pins, content, warnings: Vec::new() }, model.ports))
+    }
+
+    /// The nonlinear model of flexible parts.
+    fn reduced(
+        &self,
+        compiled: &CompiledModel,
+        source: &str,
+        name: String,
+    ) -> Result<(ExportedFile, Vec<ReducedPort>), ExportError> {
+        let model = flexible(compiled, &self.model)?;
+        let pins = Pins::of(&model.ports, &model.signals)?;
+        let of = &model.fitted.model;
+        let points = of.approaches.mix.nrows();
+        let polynomials = of.closures.strains.coefficients.nrows() + of.approaches.shapes.coefficients.nrows();
+        let terms = (1 + of.size()).saturating_mul(polynomials + model.rows.len()).saturating_mul(of.monomials.count());
+        bimorph_base::budget::lay_out(LINE.saturating_mul(terms.saturating_add(4 * points)));
+        let mut warnings: Vec<String> = beyond(compiled.options.errors(), mesh_error(compiled)).into_iter().collect();
+        if model.fitted.error > self.model.within {
+            warnings.push(format!(
+                "equilibria in the ranges deviate by {:.1e} from the full model, more than --within {:.1e}; take a narrower --range, or a \
+                 smaller --within, which adds coordinates",
+                model.fitted.error, self.model.within
+            ));
+        }
+        let about = about_reduced(compiled, &model, source, &warnings);
+        let text = flexible_verilog_a::write(&model, &pins, &name, &about);
+        let content = FileContent::Reduced(ReducedSummary {
+            coordinates: of.size(),
+            degree: of.monomials.degree(),
+            strains: model.strains,
+            lags: model.heat.lags.len(),
+            error: model.fitted.error,
+            compared: model.fitted.compared,
+            ranges: model.ranges.clone(),
+        });
+        let pins = pins.all().map(str::to_owned).collect();
+        Ok((ExportedFile { text, name, pins, content, warnings }, model.ports))
     }
 
     /// Limitations of the file that its numbers do not show.
@@ -221,6 +287,40 @@ impl FileRequest {
         about.extend(model.signals.iter().map(meaning));
         about
     }
+}
+
+/// The lines at the head of a reduced nonlinear model.
+fn about_reduced(compiled: &CompiledModel, model: &FlexibleModel, source: &str, warnings: &[String]) -> Vec<String> {
+    let (of, version) = (&model.fitted.model, env!("CARGO_PKG_VERSION"));
+    let range = |(port, [low, high]): (&ReducedPort, &[f64; 2])| {
+        let ((what, unit), plain) = (port.kind.given(), |unit: &str| unit.replace('·', " ").replace('²', "^2"));
+        format!("range of port {}: {what} {low:e} to {high:e} {}", port.name, plain(unit))
+    };
+    let mut about = vec![
+        format!("{source}, reduced nonlinear model, written by bimorph {version} export"),
+        format!("full model: {} strains, {}", model.strains, model_options(compiled).trim_end()),
+        mesh_note(compiled),
+    ];
+    about.extend(model.ports.iter().zip(&model.ranges).map(range));
+    about.extend([
+        format!(
+            "{} coordinates, polynomials of degree {}, {} strains of closures, {} shapes of gaps, {} lags of heat",
+            of.size(),
+            of.monomials.degree(),
+            of.closures.strains.coefficients.nrows(),
+            of.approaches.shapes.coefficients.nrows(),
+            model.heat.lags.len()
+        ),
+        format!(
+            "largest relative deviation from the full model in {} equilibria in these ranges: displacements {:.1e}, capacitances {:.1e}",
+            model.fitted.compared, model.fitted.errors[0], model.fitted.errors[1]
+        ),
+        format!("constant masses: that of the slowest coordinate changes by {:.1e} in them", of.mass_change),
+        format!("slowest coordinate at rest: {:e} Hz", 1.0 / (TAU * of.mass[0].sqrt())),
+    ]);
+    about.extend(warnings.iter().map(|warning| format!("warning: {warning}")));
+    about.extend(model.signals.iter().map(meaning));
+    about
 }
 
 /// Meaning of a volt of a signal.

@@ -7,8 +7,9 @@ use super::lumped::{Law, LumpedGap};
 use bimorph_domains::attraction::Adhesion;
 use bimorph_domains::capacitor::Capacitor;
 use bimorph_domains::comb_field::CombField;
-use bimorph_domains::contact::{Contact, PRESSURE, TOUCH};
+use bimorph_domains::contact::{Contact, DEEPEST, PRESSURE, TOUCH};
 use bimorph_domains::edge_field::EdgeField;
+use bimorph_domains::squeeze_film::SqueezeFilm;
 use bimorph_domains::stop::{SOFT, StopKind};
 
 /// C(u) (F).
@@ -190,8 +191,8 @@ pub(super) fn loses(gap: &LumpedGap) -> bool {
 }
 
 /// Force of the gas against the approach `u` at its `rate`, a text in m/s (N), as [`bimorph_domains::squeeze_film`].
-pub(super) fn drag(gap: &LumpedGap, u: &str, rate: &str) -> Option<String> {
-    let (drawn, film) = gap.film?;
+pub(super) fn drag(film: Option<(f64, SqueezeFilm)>, u: &str, rate: &str) -> Option<String> {
+    let (drawn, film) = film?;
     let beyond = format!("({:e} - 1e-6 * {u})", drawn - film.touch);
     let s = format!("max({:e} * {beyond}, 0)", -1.0 / film.closed);
     let g = format!("({:e} / (1 + {s} + {s} * {s}) + max({beyond}, 0))", film.closed);
@@ -210,10 +211,12 @@ fn attracted(adhesion: &Adhesion, d: &str) -> String {
     format!("{:e} * (1 - {x} * {x} * (3 - 2 * {x}))", adhesion.force)
 }
 
-/// The force of a contact at the distance `d`, a text in metres.
+/// The force of a contact at the distance `d`, a text in metres. Beyond the range of the law it continues along its tangent, from where a
+/// simulator's iterations come back sooner.
 fn pressed(contact: &Contact, d: &str) -> String {
     let s = format!("max({:e} * ({:e} - {d}), 0)", 2.0 / contact.touch, contact.touch);
-    format!("({:e} * {s} * {s} * {s} * {s})", contact.area * PRESSURE)
+    let within = format!("min({s}, {DEEPEST:e})");
+    format!("({:e} * {within} * {within} * {within} * (4 * {s} - 3 * {within}))", contact.area * PRESSURE)
 }
 
 #[cfg(test)]

@@ -10,8 +10,10 @@
 //! | [`verilog_a`] | it as a Verilog-A module |
 //! | [`osdi_deck`] | a deck of ngspice around such a module, compiled as OSDI |
 //! | [`lumped`] | the whole nonlinear model of rigid parts that only slide |
+//! | [`flexible`] | the nonlinear model of flexible parts, trained for ranges of the ports |
 //! | `laws` | gap functions as text |
-//! | [`lumped_spice`], [`lumped_verilog_a`] | that model as a subcircuit and as a module |
+//! | [`lumped_spice`], [`lumped_verilog_a`] | the model of rigid parts as a subcircuit and as a module |
+//! | [`flexible_verilog_a`] | that of flexible parts as a module |
 //! | [`names`], `parts` | pins, and parts of a subcircuit |
 //! | [`file`](mod@file), [`model_options`](mod@model_options) | a file with its header, and a summary of the model in it |
 //!
@@ -23,6 +25,8 @@
 pub mod basis;
 pub mod compare;
 pub mod file;
+pub mod flexible;
+pub mod flexible_verilog_a;
 mod laws;
 pub mod linear;
 pub mod lumped;
@@ -57,13 +61,18 @@ pub struct ExportRequest {
     pub count: Option<usize>,
     /// Highest frequency that the model is for (Hz); none: that of the second mode that ports and signals see.
     pub to: Option<f64>,
-    /// Largest relative deviation from the exact small-signal answer (1).
+    /// Largest relative deviation from the exact small-signal answer, of a nonlinear model from the equilibria in its ranges (1).
     pub within: f64,
+    /// Range of what is given to each port by name, in its unit (V, N, W, …), for which a nonlinear model of flexible parts is made; others
+    /// are at 0.
+    pub ranges: Vec<(String, [f64; 2])>,
 }
 
 impl ExportRequest {
     /// Largest relative deviation by default (1).
     pub const WITHIN: f64 = 1e-4;
+    /// The same of a nonlinear model of flexible parts (1).
+    pub const NONLINEAR_WITHIN: f64 = 1e-3;
     /// Smallest one that can be requested (1); the largest is below 1.
     pub const MIN_WITHIN: f64 = 1e-9;
     /// Most modes that can be requested.
@@ -74,7 +83,7 @@ impl Default for ExportRequest {
     /// Every electrical port, all at 0 V.
     fn default() -> Self {
         let (ports, signals, bias) = (Vec::new(), Vec::new(), Vec::new());
-        Self { ports, signals, bias, count: None, to: None, within: Self::WITHIN }
+        Self { ports, signals, bias, count: None, to: None, within: Self::WITHIN, ranges: Vec::new() }
     }
 }
 
@@ -145,12 +154,29 @@ pub enum ExportError {
     },
     /// The nonlinear form is one of rigid parts that slide.
     #[error(
-        "--nonlinear writes rigid parts that only slide, on linear springs, but {why}; leave --nonlinear out for the linear \
-         model about an operating point, or use the plug-in"
+        "--nonlinear without --range writes rigid parts that only slide, on linear springs, but {why}; give --verilog-a or --osdi and the \
+         --range of a port for a reduced model, leave --nonlinear out for the linear one about an operating point, or use the plug-in"
     )]
     NotLumped {
         /// The reason.
         why: String,
+    },
+    /// No polynomials for what acts.
+    #[error(
+        "--nonlinear writes no reduced model of this mechanism: {why}; leave --nonlinear out for the linear model about an operating \
+         point, or use the plug-in"
+    )]
+    NotFlexible {
+        /// The reason, with a way out where there is one.
+        why: String,
+    },
+    /// A range of what is no port of the file.
+    #[error("--range: \"{name}\" is no port of the file, which has {ports}; name one of them, or add it with --ports")]
+    BadRange {
+        /// The given name.
+        name: String,
+        /// The ports.
+        ports: String,
     },
     /// Two names would be the same in the file.
     #[error("\"{first}\" and \"{second}\" would both be called {name} in the file; leave one out")]

@@ -23,7 +23,7 @@ use bimorph_device::PortKind;
 use bimorph_device::scale::PortScale;
 use bimorph_domains::capacitor::Capacitor;
 use bimorph_domains::drive::Electrics;
-use bimorph_domains::{Domain, Input, Member, System};
+use bimorph_domains::{Domain, Input, Member, PointLaw, System};
 use bimorph_model::compile::CompiledModel;
 pub use model::{Coordinate, Law, LumpedGap, LumpedModel, LumpedOutput};
 use nalgebra::{DMatrix, DVector};
@@ -167,6 +167,11 @@ fn gaps(
     }
     if system.members.iter().any(|member| member.is_gas() && member.film().is_none()) {
         let why = "gas acts that compresses (use filmstates=0), or that slides between fingers".to_owned();
+        return Err(ExportError::NotLumped { why });
+    }
+    let plain = |member: &Member| member.point_laws().iter().all(PointLaw::is_plain);
+    if !system.members.iter().all(plain) {
+        let why = "gas flows through holes or a slit, whose law is not written (leave out the gas)".to_owned();
         return Err(ExportError::NotLumped { why });
     }
     Ok(found)

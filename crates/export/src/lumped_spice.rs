@@ -124,7 +124,7 @@ impl LumpedSubcircuit<'_> {
             }
         }
         let bearing = bearing(&gap.law, gap.loss, &approach, &format!("V({rate})"));
-        let drag = drag(gap, &approach, &format!("V({rate})"));
+        let drag = drag(gap.film, &approach, &format!("V({rate})"));
         force.extend(bearing.into_iter().chain(drag).map(|resisting| format!("- {resisting}")));
         if force.is_empty() {
             return;

@@ -16,7 +16,7 @@ pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> 
         [Some(of("g")), voltage, loses(gap).then(|| of("s"))].into_iter().flatten()
     });
     let inner: Vec<String> = coordinates.chain(gaps).collect();
-    let mut text = head(name, pins, &inner, &model.ports, about);
+    let mut text = head(name, pins, &inner, &[], &model.ports, about);
     for (g, gap) in model.gaps.iter().enumerate() {
         let mut sum = ContributionSum::begin(&format!("I(g{0}) <+ V(g{0})", g + 1));
         add(&mut sum, "x", &gap.along, -1.0);
@@ -55,7 +55,7 @@ pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> 
             }
             let rate = format!("V(s{})", g + 1);
             let bearing = bearing(&gap.law, gap.loss, &u, &rate);
-            bearing.into_iter().chain(drag(gap, &u, &rate)).for_each(|resisting| sum.add(share, &resisting));
+            bearing.into_iter().chain(drag(gap.film, &u, &rate)).for_each(|resisting| sum.add(share, &resisting));
         }
         sum.end(&mut text);
     }

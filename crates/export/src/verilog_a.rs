@@ -17,7 +17,7 @@ pub fn write(fitted: &ModelFit, pins: &Pins, name: &str, about: &[String]) -> St
         .flat_map(|k| [format!("x{k}"), format!("w{k}")])
         .chain((1..=model.lags.len()).map(|l| format!("h{l}")))
         .collect();
-    let mut text = head(name, pins, &inner, &model.ports, about);
+    let mut text = head(name, pins, &inner, &[], &model.ports, about);
     for (l, lag) in model.lags.iter().enumerate() {
         let h = format!("h{}", l + 1);
         let _ = writeln!(text, "    I({h}) <+ ddt({:e} * V({h})) + V({h}) - {};", lag.tau, input(model, lag.port));
@@ -66,8 +66,15 @@ pub fn write(fitted: &ModelFit, pins: &Pins, name: &str, about: &[String]) -> St
     text
 }
 
-/// All text up to the first contribution: description, pins, inner nodes and branches.
-pub(super) fn head(name: &str, pins: &Pins, inner: &[String], ports: &[ReducedPort], about: &[String]) -> String {
+/// All text up to the first contribution: description, pins, inner nodes, branches and variables.
+pub(super) fn head(
+    name: &str,
+    pins: &Pins,
+    inner: &[String],
+    reals: &[String],
+    ports: &[ReducedPort],
+    about: &[String],
+) -> String {
     let mut text = String::new();
     for line in about {
         let _ = writeln!(text, "// {line}");
@@ -81,6 +88,9 @@ pub(super) fn head(name: &str, pins: &Pins, inner: &[String], ports: &[ReducedPo
     for (k, port) in ports.iter().enumerate() {
         let [plus, minus] = &pins.ports[k];
         let _ = writeln!(text, "  branch ({plus}, {minus}) b{}; // {}: {}", k + 1, port.name, port.meaning());
+    }
+    if !reals.is_empty() {
+        let _ = writeln!(text, "  real {};", reals.join(", "));
     }
     let _ = writeln!(text, "\n  analog begin");
     text

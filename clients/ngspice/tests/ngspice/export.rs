@@ -93,6 +93,7 @@ impl Scene {
             count: None,
             to: None,
             within: 1e-4,
+            ranges: Vec::new(),
         }
     }
 

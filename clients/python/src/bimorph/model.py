@@ -252,23 +252,25 @@ class Model:
         signals: Scales = (),
         voltages: Voltages | None = None,
         to: float | None = None,
-        within: float = 1e-4,
+        within: float | None = None,
         count: int | None = None,
         name: str | None = None,
         nonlinear: bool = False,
+        ranges: Mapping[str, tuple[float, float]] | None = None,
     ) -> ExportResult:
         """The model as text for other simulators: a SPICE subcircuit or a Verilog-A module, as ``bimorph export`` writes it.
 
-        By default it is the linear model about the equilibrium at ``voltages`` [V]. It deviates by at most ``within`` from the exact small-signal
+        By default it is the linear model about the equilibrium at ``voltages`` [V]. It deviates by at most ``within`` (1e-4) from the exact small-signal
         response up to the frequency ``to`` [Hz], by default that of the second mode that ports and signals see. It has as many modes as that
         requires, or exactly the ``count`` lowest. ``nonlinear`` is the whole model of rigid parts that only slide on linear springs, without an
-        operating point.
+        operating point. Of flexible parts it is a reduced one for the ``ranges`` of ports, as ``{"drive": (0, 20)}`` in V, N or W. Its equilibria there
+        deviate by at most ``within`` (1e-3) from the full model, or a warning says by how much.
 
         ``ports`` are those of the file in its order, by default all of the netlist: ``NODE.x``, ``NODE.vx``, ``BEAM.T`` and ``frame.ax`` too.
         ``signals`` are shown as voltages. Both are names, or names with a scale in volts per unit, as ``{"yoke.y": 1e6}``. ``name`` is that of
         the subcircuit or module.
         """
-        request = exports.request_of(self.id, language, ports, signals, voltages, to, within, count, name, nonlinear)
+        request = exports.request_of(self.id, language, ports, signals, voltages, to, within, count, name, nonlinear, ranges)
         answer = self._call("Export", request)
         self._checked("export").export(answer)
         issue(answer.warnings)

@@ -13,6 +13,7 @@
 //! | [`training`] | the directions of a mechanism for a box of inputs and a tolerance |
 //! | [`statics`] | static equilibrium over z |
 //! | [`check`] | the error of a reduced state, by the residual of the full model |
+//! | [`polynomial`] | the model as polynomials of z, for export |
 //!
 //! References: A. Y. T. Leung and others reduce by derivatives of modes; here the derivatives are those of the statics in the
 //! inputs, see S. R. Idelsohn, A. Cardona, "A reduction method for nonlinear structural dynamic analysis", Comput. Methods
@@ -21,6 +22,7 @@
 pub mod check;
 pub mod energy;
 pub mod inputs;
+pub mod polynomial;
 pub mod space;
 pub mod statics;
 pub mod taylor;

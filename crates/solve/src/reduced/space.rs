@@ -94,6 +94,11 @@ impl ReducedSpace {
         self.directions.len()
     }
 
+    /// Φᵀ·K_T·Φ, the energy of the tree's springs (1).
+    pub fn tree_energy(&self) -> &DMatrix<f64> {
+        &self.tree_energy
+    }
+
     /// Strains s = Φ·z.
     #[inline]
     pub fn strains(&self, z: &[f64], s: &mut [Pose]) {

@@ -261,6 +261,9 @@ pub(super) fn export(reply: &proto::ExportResponse) -> Result<(), String> {
             finite("band", &[linear.from_hz, linear.to_hz])
         }
         Some(proto::export_response::Content::Nonlinear(_)) => Ok(()),
+        Some(proto::export_response::Content::Reduced(reduced)) => {
+            reduced.ranges.iter().try_for_each(|range| finite("ranges", &[range.low, range.high]))
+        }
         None => Err("content: expected a linear or a nonlinear model".to_owned()),
     }
 }

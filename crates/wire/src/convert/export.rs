@@ -3,7 +3,7 @@
 use super::{Violation, named, options, voltages};
 use crate::proto;
 use bimorph_export::ExportRequest;
-use bimorph_export::file::{ExportedFile, FileContent, FileLanguage, FileRequest, LinearSummary};
+use bimorph_export::file::{ExportedFile, FileContent, FileLanguage, FileRequest, LinearSummary, ReducedSummary};
 use bimorph_model::options::OptionValue;
 use bimorph_model::options::analysis::AC_TO;
 use proto::export_request::Language;
@@ -48,7 +48,28 @@ pub fn request_to_wire(model: &str, request: &FileRequest) -> proto::ExportReque
         within: asked.within,
         count: asked.count.map_or(0, short),
         name: request.name.clone().unwrap_or_default(),
+        ranges: asked.ranges.iter().map(|(name, range)| port_range(name, *range)).collect(),
     }
+}
+
+fn port_range(name: &str, [low, high]: [f64; 2]) -> proto::PortRange {
+    proto::PortRange { name: name.to_owned(), low, high }
+}
+
+/// Checked ranges of ports.
+fn ranges(wire: Vec<proto::PortRange>) -> Result<Vec<(String, [f64; 2])>, Violation> {
+    let one = |(i, wire): (usize, proto::PortRange)| {
+        let proto::PortRange { name, low, high } = wire;
+        if low.is_finite() && high.is_finite() && low < high {
+            Ok((name, [low, high]))
+        } else {
+            Err(Violation::new(
+                format!("ranges[{i}]"),
+                format!("expected finite numbers, low below high, got {low} and {high}"),
+            ))
+        }
+    };
+    wire.into_iter().enumerate().map(one).collect()
 }
 
 /// Names with their scales.
@@ -80,7 +101,8 @@ pub fn request_from_wire(wire: proto::ExportRequest) -> Result<FileRequest, Viol
             Some(to)
         }
     };
-    let within = if wire.within == 0.0 { ExportRequest::WITHIN } else { wire.within };
+    let default = if wire.nonlinear { ExportRequest::NONLINEAR_WITHIN } else { ExportRequest::WITHIN };
+    let within = if wire.within == 0.0 { default } else { wire.within };
     let least = ExportRequest::MIN_WITHIN;
     if !(least..1.0).contains(&within) {
         return Err(Violation::new(
@@ -98,6 +120,8 @@ pub fn request_from_wire(wire: proto::ExportRequest) -> Result<FileRequest, Viol
         if let Some((field, _)) = given.iter().find(|(_, given)| *given) {
             return Err(Violation::new(*field, "expected none with nonlinear: that model has no operating point"));
         }
+    } else if !wire.ranges.is_empty() {
+        return Err(Violation::new("ranges", "expected none without nonlinear: a linear model has an operating point"));
     }
     let signals = scales("signals", wire.signals)?;
     let model = ExportRequest {
@@ -107,6 +131,7 @@ pub fn request_from_wire(wire: proto::ExportRequest) -> Result<FileRequest, Viol
         count,
         to,
         within,
+        ranges: ranges(wire.ranges)?,
     };
     let name = (!wire.name.is_empty()).then_some(wire.name);
     Ok(FileRequest { language, nonlinear: wire.nonlinear, name, model })
@@ -128,6 +153,22 @@ pub fn reply_to_wire(reply: ExportReply) -> proto::ExportResponse {
         }),
         FileContent::Nonlinear { directions, gaps } => {
             Content::Nonlinear(proto::NonlinearExport { directions: short(directions), gaps: short(gaps) })
+        }
+        FileContent::Reduced(reduced) => {
+            // a positive and a negative pin of each port come first
+            let named = reduced.ranges.iter().enumerate().map(|(k, range)| {
+                let pin = file.pins.get(2 * k).map_or("", String::as_str);
+                port_range(pin.strip_prefix("p_").unwrap_or(pin), *range)
+            });
+            Content::Reduced(proto::ReducedExport {
+                coordinates: short(reduced.coordinates),
+                degree: short(reduced.degree),
+                strains: reduced.strains as u64,
+                lags: short(reduced.lags),
+                error: reduced.error,
+                compared: short(reduced.compared),
+                ranges: named.collect(),
+            })
         }
     };
     proto::ExportResponse {
@@ -158,6 +199,15 @@ pub fn reply_from_wire(wire: proto::ExportResponse) -> Result<ExportReply, Viola
         Content::Nonlinear(model) => {
             FileContent::Nonlinear { directions: model.directions as usize, gaps: model.gaps as usize }
         }
+        Content::Reduced(model) => FileContent::Reduced(ReducedSummary {
+            coordinates: model.coordinates as usize,
+            degree: model.degree as usize,
+            strains: size(model.strains),
+            lags: model.lags as usize,
+            error: model.error,
+            compared: model.compared as usize,
+            ranges: model.ranges.iter().map(|range| [range.low, range.high]).collect(),
+        }),
     };
     let file = ExportedFile { text: wire.text, name: wire.name, pins: wire.pins, content, warnings: wire.warnings };
     Ok(ExportReply { file, estimated_error: wire.estimated_error })
@@ -177,9 +227,15 @@ mod tests {
             count: Some(4),
             to: Some(1e5),
             within: 1e-3,
+            ranges: Vec::new(),
         };
         let request = FileRequest { language: FileLanguage::VerilogA, name: Some("a".into()), model, nonlinear: false };
         assert_eq!(request_from_wire(request_to_wire("0", &request)), Ok(request.clone()));
+        let flexible = ExportRequest { ranges: vec![("drive".into(), [0.0, 20.0])], ..ExportRequest::default() };
+        let flexible = FileRequest { nonlinear: true, model: flexible, ..request.clone() };
+        assert_eq!(request_from_wire(request_to_wire("0", &flexible)), Ok(flexible.clone()));
+        let linear = request_to_wire("0", &FileRequest { nonlinear: false, ..flexible });
+        assert_eq!(request_from_wire(linear).map_err(|violation| violation.field), Err("ranges".into()));
         let whole = request_to_wire("0", &FileRequest { nonlinear: true, ..request });
         assert_eq!(request_from_wire(whole).map_err(|violation| violation.field), Err("voltages".into()));
         assert_eq!(request_from_wire(proto::ExportRequest::default()), Ok(FileRequest::default()));

@@ -1,0 +1,345 @@
+//! The nonlinear model of flexible parts as a Verilog-A module, by the rules of [`super::verilog_a`]: every state is a node, variables are
+//! assigned before they are read, and nothing but `ddt` acts in time.
+//!
+//! | name | what it is |
+//! |---|---|
+//! | node `x1` … | a coordinate; 1 V is its largest amplitude in training |
+//! | node `v1` … | its rate over its angular frequency |
+//! | node `h1` … | a lag of heat in kelvin |
+//! | `q1`, `r1` … | coordinates and their rates in 1/s |
+//! | `e1` … | strains of closures less their rest values; `e1_1`: derivative with `x1` |
+//! | `y1` … | shapes of gaps in micrometres; `z1`: their rates |
+//! | `w1_1` … | derivatives of the works of loads |
+//! | `p1` … | displacements that are read |
+//! | `u`, `s`, `f` | approach (µm), rate (m/s) and force (N) of one point of a gap |
+//! | `f1` … | forces over the shapes (N) |
+//! | `g1`, `c1`, `k1`, `d1` | voltage, capacitance, its slope and smallest distance of a gap |
+
+use super::flexible::text::PolynomialText;
+use super::flexible::{FlexibleModel, FlexibleOutput};
+use super::laws::{bearing, capacitance, drag, slope};
+use super::names::Pins;
+use super::verilog_a::{ContributionSum, head};
+use bimorph_domains::{Law, PointLaw};
+use bimorph_solve::reduced::polynomial::PolynomialModel;
+use bimorph_solve::reduced::polynomial::monomials::Polynomials;
+use std::fmt::Write;
+
+/// Part of the largest share below which a shape has none in a point (1).
+const NONE: f64 = 1e-9;
+/// Largest angular frequency that scales a rate, over the least (1).
+const FASTEST: f64 = 1e4;
+
+/// The file: a descriptive header, and the module `name`.
+pub fn write(model: &FlexibleModel, pins: &Pins, name: &str, about: &[String]) -> String {
+    let mut module = FlexibleModule { model, of: &model.fitted.model, body: String::new(), reals: Vec::new() };
+    module.coordinates();
+    module.heat();
+    module.closures();
+    module.gaps();
+    module.works();
+    module.probes();
+    module.motion();
+    for row in 0..model.rows.len() {
+        module.row(row, pins);
+    }
+    let coordinates = (1..=module.of.size()).flat_map(|j| [format!("x{j}"), format!("v{j}")]);
+    let lags = (0..model.heat.lags.len()).filter(|l| module.lags(*l)).map(|l| format!("h{}", l + 1));
+    let inner: Vec<String> = coordinates.chain(lags).collect();
+    let FlexibleModule { body, reals, .. } = module;
+    let mut text = head(name, pins, &inner, &reals, &model.ports, about);
+    text.push_str(&body);
+    text.push_str("  end\nendmodule\n");
+    text
+}
+
+struct FlexibleModule<'a> {
+    model: &'a FlexibleModel,
+    of: &'a PolynomialModel,
+    body: String,
+    reals: Vec<String>,
+}
+
+impl FlexibleModule<'_> {
+    /// A variable with its value.
+    fn set(&mut self, name: &str, value: &str) {
+        if !self.reals.iter().any(|known| known == name) {
+            self.reals.push(name.to_owned());
+        }
+        let _ = writeln!(self.body, "    {name} = {value};");
+    }
+
+    /// Seconds per unit of a rate.
+    fn second(&self, j: usize) -> f64 {
+        let slowest = self.of.mass.iter().copied().fold(0.0, f64::max).sqrt();
+        self.of.mass[j].sqrt().max(slowest / FASTEST)
+    }
+
+    fn lags(&self, l: usize) -> bool {
+        self.model.heat.lags[l].tau > 0.0
+    }
+
+    /// Value of a lag (K).
+    fn lag(&self, l: usize) -> String {
+        if self.lags(l) { format!("V(h{})", l + 1) } else { format!("h{}", l + 1) }
+    }
+
+    fn coordinates(&mut self) {
+        for j in 0..self.of.size() {
+            self.set(&format!("q{}", j + 1), &format!("V(x{})", j + 1));
+        }
+        let moving = if self.moves() { self.of.size() } else { 0 };
+        for j in 0..moving {
+            self.set(&format!("r{}", j + 1), &format!("{:e} * V(v{})", 1.0 / self.second(j), j + 1));
+        }
+    }
+
+    /// Whether rates are read by a law or an output.
+    fn moves(&self) -> bool {
+        let loses = |law: &PointLaw| law.film.is_some() || law.loss > 0.0;
+        self.of.approaches.members.iter().flat_map(|points| &points.laws).any(loses)
+            || self.model.rows.iter().any(|row| matches!(row, FlexibleOutput::ProbeRate(_)))
+    }
+
+    fn heat(&mut self) {
+        let model = self.model;
+        for (l, lag) in model.heat.lags.iter().enumerate() {
+            let h = format!("h{}", l + 1);
+            if lag.tau > 0.0 {
+                let _ = writeln!(self.body, "    I({h}) <+ ddt({:e} * V({h})) + V({h}) - {};", lag.tau, lag.steady);
+            } else {
+                self.set(&h, &lag.steady);
+            }
+        }
+    }
+
+    /// Value and derivatives of a polynomial.
+    fn polynomial(&mut self, name: &str, of: &Polynomials, row: usize, scale: f64, value: bool) {
+        let text = PolynomialText::new(of, row, scale, &self.of.reach);
+        if value {
+            self.set(name, &text.text());
+        }
+        for j in 0..self.of.size() {
+            self.set(&format!("{name}_{}", j + 1), &text.derivative(j).text());
+        }
+    }
+
+    fn closures(&mut self) {
+        let of = self.of;
+        let closures = &of.closures;
+        let by_lag = self.by_lag(&closures.thermal);
+        for c in 0..closures.strains.coefficients.nrows() {
+            let name = format!("e{}", c + 1);
+            self.polynomial(&name, &closures.strains, c, 1.0, true);
+            let mut rest = name.clone();
+            for l in 0..self.model.heat.lags.len() {
+                if by_lag[(c, l)] != 0.0 {
+                    let _ = write!(rest, " - ({:e}) * {}", by_lag[(c, l)], self.lag(l));
+                }
+            }
+            if closures.built_in[c] != 0.0 {
+                let _ = write!(rest, " - ({:e})", closures.built_in[c]);
+            }
+            if rest != name {
+                self.set(&name, &rest);
+            }
+        }
+    }
+
+    /// Effect of each lag per kelvin, of effects per unit of the free strain of each heater.
+    fn by_lag(&self, thermal: &nalgebra::DMatrix<f64>) -> nalgebra::DMatrix<f64> {
+        let heat = &self.model.heat;
+        let mut strains = heat.shares.clone();
+        strains.row_iter_mut().zip(&self.model.expansion).for_each(|(mut row, alpha)| row *= *alpha);
+        thermal * strains
+    }
+
+    fn gaps(&mut self) {
+        let of = self.of;
+        let approaches = &of.approaches;
+        let shapes = approaches.shapes.coefficients.nrows();
+        for l in 0..shapes {
+            self.polynomial(&format!("y{}", l + 1), &approaches.shapes, l, 1e6, true);
+        }
+        let loses = |law: &PointLaw| law.film.is_some() || law.loss > 0.0;
+        if approaches.members.iter().flat_map(|points| &points.laws).any(loses) {
+            for l in 0..shapes {
+                let terms: Vec<String> = (1..=self.of.size()).map(|j| format!("y{0}_{j} * r{j}", l + 1)).collect();
+                self.set(&format!("z{}", l + 1), &terms.join(" + "));
+            }
+        }
+        for l in 0..shapes {
+            self.set(&format!("f{}", l + 1), "0");
+        }
+        for m in 0..approaches.members.len() {
+            self.gap(m);
+        }
+    }
+
+    /// The points of one member.
+    fn gap(&mut self, m: usize) {
+        let of = self.of;
+        let (points, n) = (&of.approaches.members[m], m + 1);
+        let _ = writeln!(self.body, "    // {}", self.model.names[m]);
+        let field = |law: &PointLaw| matches!(law.law, Some(Law::Field(capacitor, _)) if capacitor.acts());
+        let charged = points.laws.iter().any(field);
+        if charged {
+            let volts = self.model.volts[m].clone().unwrap_or_else(|| "0".to_owned());
+            self.set(&format!("g{n}"), &volts);
+            self.set(&format!("c{n}"), "0");
+            self.set(&format!("k{n}"), "0");
+        }
+        let shows = self.model.rows.contains(&FlexibleOutput::Distance(m));
+        let touching = |law: &PointLaw| matches!(law.law, Some(Law::Field(_, Some(_))));
+        let bears = points.laws.iter().any(touching);
+        let mut first = true;
+        for (k, law) in points.laws.iter().enumerate() {
+            let shares = self.shares(points.first + k);
+            let sum = |name: &str| {
+                let terms: Vec<String> =
+                    shares.iter().map(|(l, share)| format!("{share:e} * {name}{}", l + 1)).collect();
+                if terms.is_empty() { "0".to_owned() } else { terms.join(" + ").replace("+ -", "- ") }
+            };
+            self.set("u", &sum("y"));
+            if law.film.is_some() || law.loss > 0.0 {
+                self.set("s", &format!("1e-6 * ({})", sum("z")));
+            }
+            let mut force: Vec<String> = Vec::new();
+            if let Some(Law::Field(capacitor, _)) = &law.law {
+                if capacitor.acts() {
+                    self.set(&format!("c{n}"), &format!("c{n} + {}", capacitance(capacitor, "u")));
+                    self.set("s0", &slope(capacitor, "u"));
+                    self.set(&format!("k{n}"), &format!("k{n} + s0"));
+                    force.push(format!("- 0.5 * g{n} * g{n} * s0"));
+                }
+                if shows && (!bears || touching(law)) {
+                    let (sign, drawn) = capacitor.way();
+                    let way = format!("{drawn:e} {sign} 1e-6 * u");
+                    let least = if first { way } else { format!("min(d{n}, {way})") };
+                    self.set(&format!("d{n}"), &least);
+                    first = false;
+                }
+            }
+            force.extend(
+                law.law.iter().filter_map(|of| bearing(of, law.loss, "u", "s")).map(|text| format!("+ {text}")),
+            );
+            force.extend(drag(law.film, "u", "s").map(|text| format!("+ {text}")));
+            if !force.is_empty() {
+                self.set("f", &force.join(" "));
+                for (l, share) in &shares {
+                    self.set(&format!("f{}", l + 1), &format!("f{} + ({share:e}) * f", l + 1));
+                }
+            }
+        }
+    }
+
+    /// Shapes with their share in the approach of a point.
+    fn shares(&self, point: usize) -> Vec<(usize, f64)> {
+        let row = self.of.approaches.mix.row(point);
+        let largest = row.amax();
+        (0..row.len()).map(|l| (l, row[l])).filter(|(_, share)| share.abs() > NONE * largest).collect()
+    }
+
+    /// Loads that act: their place among the works, and their size.
+    fn loads(&self) -> Vec<(usize, String)> {
+        let inputs = self.model.inputs.iter().enumerate().filter_map(|(k, text)| Some((k + 1, text.clone()?)));
+        let acts = |of: &(usize, String)| self.of.work.coefficients.row(of.0).amax() > 0.0;
+        std::iter::once((0, "1".to_owned())).chain(inputs).filter(acts).collect()
+    }
+
+    fn works(&mut self) {
+        let of = self.of;
+        for (k, _) in self.loads() {
+            self.polynomial(&format!("w{}", k + 1), &of.work, k, 1.0, false);
+        }
+    }
+
+    fn probes(&mut self) {
+        let of = self.of;
+        for p in 0..of.probes.coefficients.nrows() {
+            self.polynomial(&format!("p{}", p + 1), &of.probes, p, 1.0, true);
+        }
+    }
+
+    /// The equations of the coordinates.
+    fn motion(&mut self) {
+        let (of, m) = (self.of, self.of.size());
+        let thermal = self.by_lag(&of.thermal);
+        let unit = 1.0 / of.energy_unit();
+        let (loads, strains) = (self.loads(), of.closures.strains.coefficients.nrows());
+        for j in 0..m {
+            let (n, second) = (j + 1, self.second(j));
+            ContributionSum::begin(&format!("I(x{n}) <+ ddt({second:e} * V(x{n})) - V(v{n})")).end(&mut self.body);
+            let mut sum = ContributionSum::begin(&format!("I(v{n}) <+ ddt({:e} * V(v{n}))", of.mass[j] / second));
+            for k in 0..m {
+                sum.add(significant(of.damping[(j, k)], of.damping.amax()) / self.second(k), &format!("V(v{})", k + 1));
+                sum.add(significant(of.stiffness[(j, k)], of.stiffness.amax()), &format!("q{}", k + 1));
+            }
+            sum.add(-of.built_in[j], "1");
+            for l in 0..self.model.heat.lags.len() {
+                sum.add(-thermal[(j, l)], &self.lag(l));
+            }
+            for c in 1..=strains {
+                sum.term(&format!("e{c} * e{c}_{n}"));
+            }
+            for l in 1..=of.approaches.shapes.coefficients.nrows() {
+                sum.term(&format!("{:e} * f{l} * y{l}_{n}", 1e-6 * unit));
+            }
+            for (k, size) in &loads {
+                sum.term(&format!("-{unit:e} * {size} * w{}_{n}", k + 1));
+            }
+            sum.end(&mut self.body);
+        }
+    }
+
+    fn row(&mut self, row: usize, pins: &Pins) {
+        let model = self.model;
+        let scale = model.scales[row];
+        let output = &model.rows[row];
+        let left = match row.checked_sub(model.ports.len()) {
+            Some(k) => format!("V({})", pins.signals[k]),
+            None if matches!(output, FlexibleOutput::Current(..)) => format!("I(b{})", row + 1),
+            None => format!("V(b{})", row + 1),
+        };
+        let mut sum = ContributionSum::begin(&format!("{left} <+ 0"));
+        match output {
+            FlexibleOutput::Nothing => return,
+            FlexibleOutput::Current(conducted, shares) => {
+                conducted.iter().for_each(|text| sum.term(text));
+                for (m, share) in shares.iter().enumerate().filter(|(m, share)| **share != 0.0 && self.is_charged(*m)) {
+                    sum.term(&format!("ddt({share:e} * c{0} * g{0})", m + 1));
+                }
+            }
+            FlexibleOutput::Probe(p) => sum.add(scale, &format!("p{}", p + 1)),
+            FlexibleOutput::ProbeRate(p) => {
+                (1..=self.of.size()).for_each(|j| sum.add(scale, &format!("p{}_{j} * r{j}", p + 1)));
+            }
+            FlexibleOutput::Temperature(ambient, heater) => {
+                sum.add(scale * ambient, "1");
+                for l in 0..model.heat.lags.len() {
+                    sum.add(scale * model.heat.shares[(*heater, l)], &self.lag(l));
+                }
+            }
+            FlexibleOutput::Charge(m) if self.is_charged(*m) => sum.add(scale, &format!("c{0} * g{0}", m + 1)),
+            FlexibleOutput::Capacitance(m) if self.is_charged(*m) => sum.add(scale, &format!("c{}", m + 1)),
+            FlexibleOutput::Pull(m) if self.is_charged(*m) => {
+                sum.add(0.5 * scale, &format!("g{0} * g{0} * k{0}", m + 1));
+            }
+            FlexibleOutput::Charge(_) | FlexibleOutput::Capacitance(_) | FlexibleOutput::Pull(_) => {}
+            FlexibleOutput::Distance(m) => sum.add(scale, &format!("d{}", m + 1)),
+            FlexibleOutput::Constant(value) => sum.add(scale * value, "1"),
+        }
+        sum.end(&mut self.body);
+    }
+
+    /// Whether a member has a field.
+    fn is_charged(&self, m: usize) -> bool {
+        let field = |law: &PointLaw| matches!(law.law, Some(Law::Field(capacitor, _)) if capacitor.acts());
+        self.of.approaches.members[m].laws.iter().any(field)
+    }
+}
+
+/// A number, or 0 where it is rounding beside the largest.
+fn significant(x: f64, largest: f64) -> f64 {
+    if x.abs() > 1e-13 * largest { x } else { 0.0 }
+}

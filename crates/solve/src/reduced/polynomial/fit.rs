@@ -1,0 +1,333 @@
+//! The polynomials of a trained space: least squares at the states that it was trained for and about them.
+//!
+//! 1. Coordinates in which the masses and the tangent at rest are diagonal.
+//! 2. Equilibria of the full model at corners and points of the box of inputs ([`super::samples`]).
+//! 3. Points of the trained box of coordinates, and points about these equilibria. The functions of [`super::shapes`] are evaluated there
+//!    with exact kinematics. Every fifth point is kept apart for the error of the fit.
+//! 4. The first derivatives at rest, so that the tangent there is exact; least squares by a QR factorization for the rest.
+//! 5. Singular vectors: closures in the energy, approaches in the distance. Left out are those that change no equilibrium by more than a
+//!    small part of the tolerance.
+
+use super::super::inputs::low_discrepancy;
+use super::super::space::{ReducedForces, ReducedSpace, dot};
+use super::cubature::thinned;
+use super::monomials::{Monomials, Polynomials};
+use super::samples::FullEquilibrium;
+use super::shapes::{Probe, ShapeFunctions};
+use super::{Approaches, ClosureStrains, PolynomialModel};
+use bimorph_domains::System;
+use bimorph_multibody::forces::add_damping;
+use bimorph_multibody::joint_coordinates::sprung_loops::poses::TreeKinematics;
+use bimorph_multibody::planar::Pose;
+use nalgebra::{DMatrix, DVector, SVD, SymmetricEigen};
+use std::sync::Arc;
+
+/// Points of the box of coordinates and points about the equilibria, per monomial.
+const WIDE: usize = 1;
+const NEAR: usize = 3;
+/// How far points about the equilibria lie from them, as a fraction of the trained box (1).
+const ABOUT: f64 = 0.2;
+/// How far motions go beyond the equilibria, where the training went as far (1).
+const BEYOND: f64 = 2.0;
+/// Least reach of a coordinate, as a fraction of the amplitude (1): coefficients of what hardly moves are known from there alone.
+const LEAST: f64 = 0.1;
+/// Step of differences at rest, as a fraction of the amplitude (1): their error is some 1e-8 of a curvature.
+const STEP: f64 = 1e-4;
+/// Size of a state, over the trained one, that others count at least as (1).
+const AT_REST: f64 = 0.1;
+/// Every so many points are kept apart.
+const APART: usize = 5;
+/// Root mean square of a strain of closures that is left out, over the root of the tolerance (√E).
+const CLOSURES: f64 = 0.03;
+/// The same of a shape of approaches, over the tolerance, relative to the largest (1).
+const SHAPES: f64 = 3e-3;
+
+/// Samples and matrices of a space, of which polynomials are made.
+pub(super) struct Fit<'a> {
+    pub(super) space: &'a ReducedSpace,
+    pub(super) system: &'a System,
+    pub(super) shapes: ShapeFunctions<'a>,
+    /// z of equilibria.
+    equilibria: Vec<Vec<f64>>,
+    rotation: DMatrix<f64>,
+    mass: Vec<f64>,
+    damping: DMatrix<f64>,
+    mass_change: f64,
+    /// Largest |z_k| of the points of the fit.
+    reach: Vec<f64>,
+    /// Largest |z| of the equilibria.
+    amplitude: f64,
+}
+
+impl<'a> Fit<'a> {
+    /// Of a space of this system and what is read.
+    pub(super) fn new(
+        space: &'a ReducedSpace,
+        system: &'a System,
+        sampled: &[FullEquilibrium],
+        probes: &'a [&'a Probe<'a>],
+    ) -> Self {
+        let made = sampled.iter().filter(|equilibrium| equilibrium.makes);
+        let equilibria: Vec<Vec<f64>> = made.map(|equilibrium| equilibrium.z.clone()).collect();
+        let m = space.size();
+        let rest = matrices(space, &vec![0.0; m]);
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(rest.0.clone());
+        let mut order: Vec<usize> = (0..m).collect();
+        order.sort_by(|a, b| eigenvalues[*b].total_cmp(&eigenvalues[*a]));
+        let signed = |k: usize| {
+            let column = eigenvectors.column(k);
+            let largest = column.iter().fold(0.0f64, |a, b| if b.abs() > a.abs() { *b } else { a });
+            column * largest.signum()
+        };
+        let rotation = DMatrix::from_columns(&order.iter().map(|k| signed(*k)).collect::<Vec<_>>());
+        // that of the slowest coordinate: others are small beside their springs
+        let slowest = rotation.column(0).into_owned();
+        let mass_of = |mass: &DMatrix<f64>| slowest.dot(&(mass * &slowest));
+        let change = |z: &Vec<f64>| (mass_of(&matrices(space, z).0) / mass_of(&rest.0) - 1.0).abs();
+        let mass_change = equilibria.iter().map(change).fold(0.0, f64::max);
+        let least = eigenvalues.amax() * f64::EPSILON;
+        let amplitude = equilibria.iter().map(|z| z.iter().map(|z| z * z).sum::<f64>().sqrt()).fold(0.0, f64::max);
+        // samples of the training may lie beyond contact, where the mechanism cannot go
+        let reach = |k: usize| {
+            let reached = equilibria.iter().map(|z| z[k].abs()).fold(0.0, f64::max);
+            space.reach[k].min(BEYOND * reached).max(reached).max(LEAST * amplitude)
+        };
+        let reach = (0..m).map(reach).collect();
+        Self {
+            space,
+            system,
+            shapes: ShapeFunctions::new(&space.joints, system, probes),
+            equilibria,
+            damping: rotation.tr_mul(&(&rest.1 * &rotation)),
+            mass: order.iter().map(|k| eigenvalues[*k].max(least)).collect(),
+            mass_change,
+            reach,
+            amplitude,
+            rotation,
+        }
+    }
+
+    /// The model of a degree, for a tolerance, with groups of members that have one voltage.
+    pub(super) fn model(&self, degree: usize, tol: f64, groups: &[Vec<usize>]) -> PolynomialModel {
+        let monomials = Arc::new(Monomials::new(self.space.size(), degree));
+        let scale = self.amplitude.max(f64::MIN_POSITIVE);
+        let mut states = self.states(monomials.count());
+        states.iter_mut().for_each(|z| *z = (self.rotation.tr_mul(&*z)) / scale);
+        let reach: Vec<f64> = (0..self.space.size())
+            .map(|k| states.iter().map(|x| x[k].abs()).fold(f64::MIN_POSITIVE, f64::max))
+            .collect();
+        let counts = self.shapes.counts();
+        let rows: usize = counts.iter().sum();
+        bimorph_base::budget::lay_out_matrix(states.len(), rows + 2 * monomials.count());
+        let mut forces = ReducedForces::new(self.space);
+        let mut values = DMatrix::zeros(states.len(), rows);
+        for (k, x) in states.iter().enumerate() {
+            bimorph_base::budget::check();
+            let z = &self.rotation * x * scale;
+            forces.place_at_rest(self.space, z.as_slice());
+            values.row_mut(k).copy_from_slice(&self.shapes.values(&forces.placed.at));
+        }
+        // closures in units of the energy
+        values.columns_mut(0, counts[0]).scale_mut(1.0 / scale);
+        let of_monomials = |apart: bool| {
+            let chosen: Vec<usize> = (0..states.len()).filter(|k| (k % APART == APART - 1) == apart).collect();
+            let table = DMatrix::from_fn(chosen.len(), monomials.count(), |k, c| {
+                monomials.factors[c].iter().map(|i| states[chosen[k]][*i] / reach[*i]).product::<f64>()
+            });
+            (table, DMatrix::from_fn(chosen.len(), rows, |k, c| values[(chosen[k], c)]))
+        };
+        let (table, given) = of_monomials(false);
+        let m = self.space.size();
+        let mut coefficients = DMatrix::zeros(monomials.count(), rows);
+        let mut linear = self.slopes(scale, counts);
+        reach.iter().zip(linear.row_iter_mut()).for_each(|(reach, mut row)| row *= *reach);
+        let curved = given - table.columns(0, m) * &linear;
+        let of_higher = table.columns(m, table.ncols() - m).into_owned();
+        let size: Vec<f64> = (0..table.nrows()).map(|k| table.view((k, 0), (1, m)).amax()).collect();
+        coefficients.rows_mut(0, m).copy_from(&linear);
+        coefficients.rows_mut(m, table.ncols() - m).copy_from(&weighted_least_squares(of_higher, curved, &size));
+        let (kept, wanted) = of_monomials(true);
+        let fit_error = largest_error(&(&kept * &coefficients), &wanted);
+        let root = (table.nrows() as f64).sqrt();
+        let typical = table * &coefficients / root;
+        for (c, factors) in monomials.factors.iter().enumerate() {
+            let size: f64 = factors.iter().map(|i| reach[*i]).product();
+            coefficients.row_mut(c).scale_mut(1.0 / size);
+        }
+        let all = Polynomials { monomials: Arc::clone(&monomials), coefficients: coefficients.transpose() };
+        let [c, a, w, p] = counts;
+        let least = CLOSURES * tol.sqrt();
+        let closed = principal(&typical.columns(0, c).into_owned(), |_| least);
+        let near = principal(&typical.columns(c, a).into_owned(), |largest| SHAPES * tol * largest);
+        let (thermal, built_in) = self.shapes.rests();
+        let closures = ClosureStrains {
+            strains: all.rows(0, c).mixed(&closed.transpose()),
+            thermal: closed.tr_mul(&thermal) / scale,
+            built_in: closed.tr_mul(&DVector::from_vec(built_in)) / scale,
+        };
+        let approaches = Approaches {
+            members: self.shapes.members.clone(),
+            shapes: all.rows(c, a).mixed(&near.transpose()),
+            mix: near,
+        };
+        let of_gaps: Vec<Vec<f64>> = (self.equilibria.iter())
+            .flat_map(|z| [0.6, 0.9, 1.0].map(|share| DVector::from_column_slice(z) * share))
+            .map(|z| (self.rotation.tr_mul(&z) / scale).as_slice().to_vec())
+            .collect();
+        let approaches = thinned(&approaches, groups, &of_gaps, &monomials, tol);
+        let (stiffness, thermal, built_in) = self.tree_forces(scale);
+        PolynomialModel {
+            scale,
+            rotation: self.rotation.clone(),
+            reach,
+            stiffness,
+            thermal,
+            built_in,
+            closures,
+            approaches,
+            work: all.rows(c + a, w),
+            probes: all.rows(c + a + w, p),
+            mass: self.mass.clone(),
+            damping: self.damping.clone(),
+            mass_change: self.mass_change,
+            fit_error,
+            monomials,
+        }
+    }
+
+    /// Derivatives of all functions with x at rest, coordinates × functions: central differences of exact kinematics.
+    fn slopes(&self, scale: f64, counts: [usize; 4]) -> DMatrix<f64> {
+        let mut forces = ReducedForces::new(self.space);
+        let mut at = |k: usize, step: f64| {
+            let z = self.rotation.column(k) * (scale * step);
+            forces.place_at_rest(self.space, z.as_slice());
+            DVector::from_vec(self.shapes.values(&forces.placed.at))
+        };
+        let m = self.space.size();
+        let mut slopes = DMatrix::zeros(m, counts.iter().sum());
+        for k in 0..m {
+            let change = (at(k, STEP) - at(k, -STEP)) / (2.0 * STEP);
+            slopes.row_mut(k).copy_from(&change.transpose());
+        }
+        slopes.columns_mut(0, counts[0]).scale_mut(1.0 / scale);
+        slopes
+    }
+
+    /// z of the points of the fit for so many monomials: those about equilibria, and those of the trained box.
+    fn states(&self, monomials: usize) -> Vec<DVector<f64>> {
+        let m = self.space.size();
+        let within = |x: &[f64], share: f64| {
+            DVector::from_iterator(m, x.iter().zip(&self.reach).map(move |(x, reach)| share * (2.0 * x - 1.0) * reach))
+        };
+        let count = (monomials * (WIDE + NEAR)).max(4 * APART);
+        let points = low_discrepancy(m, count);
+        let mut states: Vec<DVector<f64>> = self.equilibria.iter().map(|z| DVector::from_column_slice(z)).collect();
+        for (k, x) in points.iter().enumerate() {
+            let near = (k % (WIDE + NEAR) != 0).then(|| k / (WIDE + NEAR) % self.equilibria.len().max(1));
+            states.push(match near.and_then(|k| self.equilibria.get(k)) {
+                Some(z) => DVector::from_column_slice(z) + within(x, ABOUT),
+                None => within(x, 1.0),
+            });
+        }
+        states
+    }
+
+    /// K_T, t and t₀ over x.
+    fn tree_forces(&self, scale: f64) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
+        let (m, links) = (self.space.size(), &self.space.joints.tree.links);
+        let heaters = self.system.electrics.heating.heaters.len();
+        let (mut thermal, mut built_in) = (DMatrix::zeros(m, heaters), DVector::zeros(m));
+        for (k, direction) in self.space.directions.iter().enumerate() {
+            for (link, x) in links.iter().zip(direction) {
+                let along = (link.stiffness * *x).x;
+                if let Some((heater, length)) = link.expansion {
+                    thermal[(k, heater)] += along * length;
+                }
+                built_in[k] += along * link.rest;
+            }
+        }
+        let turn = |x: &DMatrix<f64>| self.rotation.tr_mul(x);
+        let stiffness = turn(&(self.space.tree_energy() * &self.rotation));
+        (stiffness, turn(&thermal) / scale, self.rotation.tr_mul(&built_in) / scale)
+    }
+}
+
+/// Masses and damping over z at a state (s², s).
+fn matrices(space: &ReducedSpace, z: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
+    let model = &space.joints.closures.model;
+    let mut forces = ReducedForces::new(space);
+    forces.place_at_rest(space, z);
+    let placed: &TreeKinematics = &forces.placed;
+    let moved: Vec<Vec<Pose>> = (space.directions.iter())
+        .map(|direction| {
+            let mut moved = vec![Pose::zeros(); direction.len()];
+            placed.spread(&space.joints.tree, direction, &mut moved);
+            moved
+        })
+        .collect();
+    let m = space.size();
+    let mass = DMatrix::from_fn(m, m, |k, l| model.mass_product(&moved[k], &moved[l]));
+    let dragged: Vec<Vec<Pose>> = (moved.iter())
+        .map(|moved| {
+            let mut drag = vec![Pose::zeros(); moved.len()];
+            add_damping(model, moved, &mut drag);
+            drag
+        })
+        .collect();
+    let damping = DMatrix::from_fn(m, m, |k, l| dot(&moved[k], &dragged[l]));
+    ((&mass + mass.transpose()) * 0.5, damping)
+}
+
+/// The coefficients with which `table` comes closest to `given`, one column each. Rows count as their states are near rest, by their sizes, so that
+/// small motions are as right in proportion as large ones.
+fn weighted_least_squares(mut table: DMatrix<f64>, mut given: DMatrix<f64>, sizes: &[f64]) -> DMatrix<f64> {
+    for (k, size) in sizes.iter().enumerate() {
+        let weight = 1.0 / (AT_REST + size);
+        table.row_mut(k).scale_mut(weight);
+        given.row_mut(k).scale_mut(weight);
+    }
+    let columns = table.ncols();
+    let factored = table.qr();
+    let mut right = given;
+    factored.q_tr_mul(&mut right);
+    let mut found = right.rows(0, columns).into_owned();
+    let r = factored.r();
+    // a coordinate that no state moves has a column of zeros: it keeps coefficients of 0
+    let least = r.diagonal().amax() * 1e-13;
+    for k in (0..columns).rev() {
+        for c in 0..found.ncols() {
+            let known: f64 = (k + 1..columns).map(|i| r[(k, i)] * found[(i, c)]).sum();
+            found[(k, c)] = if r[(k, k)].abs() > least { (found[(k, c)] - known) / r[(k, k)] } else { 0.0 };
+        }
+    }
+    found
+}
+
+/// Largest error of a column, relative to the largest value in it.
+fn largest_error(found: &DMatrix<f64>, wanted: &DMatrix<f64>) -> f64 {
+    let of = |c: usize| {
+        let most = wanted.column(c).amax();
+        if most > 0.0 { (found.column(c) - wanted.column(c)).amax() / most } else { 0.0 }
+    };
+    (0..wanted.ncols()).map(of).fold(0.0, f64::max)
+}
+
+/// Orthonormal directions over the columns of a table in which its rows lie but for parts of a root mean square below `least` of the largest.
+fn principal(typical: &DMatrix<f64>, least: impl Fn(f64) -> f64) -> DMatrix<f64> {
+    let n = typical.ncols();
+    if n == 0 || typical.nrows() == 0 {
+        return DMatrix::zeros(n, 0);
+    }
+    let decomposed = SVD::new(typical.transpose(), true, false);
+    let (Some(u), sigma) = (decomposed.u, decomposed.singular_values) else { return DMatrix::identity(n, n) };
+    let mut order: Vec<usize> = (0..sigma.len()).collect();
+    order.sort_by(|a, b| sigma[*b].total_cmp(&sigma[*a]));
+    let least = least(order.first().map_or(0.0, |k| sigma[*k]));
+    let signed = |k: usize| {
+        let column = u.column(k);
+        let largest = column.iter().fold(0.0f64, |a, b| if b.abs() > a.abs() { *b } else { a });
+        column * largest.signum()
+    };
+    let columns: Vec<DVector<f64>> = order.into_iter().filter(|k| sigma[*k] > least).map(signed).collect();
+    if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) }
+}

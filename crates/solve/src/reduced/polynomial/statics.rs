@@ -1,0 +1,164 @@
+//! Equilibria of the polynomials, and their error against the full model.
+//!
+//! The full model is followed to points of the box of inputs, through pull-in where that comes. From its state Newton's method goes to the
+//! equilibrium of the polynomials next to it. The error is the largest of displacements by exact kinematics there, of what is read, and
+//! of capacitances.
+
+use super::super::inputs::InputBox;
+use super::super::space::{ReducedForces, ReducedSpace};
+use super::super::statics::solve;
+use super::PolynomialModel;
+use super::fit::Fit;
+use super::samples::{FullEquilibrium, equilibria};
+use super::shapes::Probe;
+use bimorph_domains::{Drive, System};
+use bimorph_multibody::planar::Pose;
+use nalgebra::{DMatrix, DVector};
+
+/// Newton iterations, and the correction at which they end (1).
+const ITERATIONS: usize = 60;
+const CONVERGED: f64 = 1e-11;
+/// Corrections below this fraction that no longer shrink are rounding (1).
+const STALLED: f64 = 1e-8;
+/// Part of the largest displacement or reading that others count at least as (1): an error where one passes through 0 is one of that.
+const SMALL: f64 = 0.1;
+/// Difference of the shares of two voltages that counts as none (1).
+const SAME: f64 = 1e-9;
+/// Degrees of the polynomials, and the most coordinates of the higher one.
+const DEGREES: [usize; 2] = [2, 3];
+const CUBIC: usize = 12;
+
+/// A polynomial model with its error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedPolynomials {
+    /// The model.
+    pub model: PolynomialModel,
+    /// Largest relative error of equilibria in the box of inputs (1).
+    pub error: f64,
+    /// The same of displacements and readings alone, and of capacitances alone.
+    pub errors: [f64; 2],
+    /// Equilibria of the full model that were compared.
+    pub compared: usize,
+}
+
+/// A tested equilibrium with its readings.
+struct Reference<'a> {
+    at: &'a FullEquilibrium,
+    read: Vec<f64>,
+    capacitances: Vec<f64>,
+}
+
+/// The polynomials of a trained space: of degree 3 where those of degree 2 do not come within `tol`. Members in `apart` stay as they are; others
+/// that have one voltage become one.
+pub fn fitted(
+    space: &ReducedSpace,
+    system: &System,
+    inputs: &InputBox,
+    probes: &[&Probe<'_>],
+    (tol, apart): (f64, &[usize]),
+) -> FittedPolynomials {
+    let groups = groups(system, apart);
+    let space = space.of_system(system);
+    let sampled = equilibria(&space, system, inputs);
+    let fit = Fit::new(&space, system, &sampled, probes);
+    let references: Vec<Reference<'_>> = (sampled.iter().filter(|equilibrium| equilibrium.tests))
+        .map(|at| Reference {
+            at,
+            read: probes.iter().map(|probe| probe(&at.q)).collect(),
+            capacitances: (0..system.members.len()).map(|g| system.capacitance(g, &at.q)).collect(),
+        })
+        .collect();
+    let mut best: Option<(PolynomialModel, [f64; 2])> = None;
+    let worse = |errors: &[f64; 2]| errors[0].max(errors[1]);
+    for degree in DEGREES {
+        if degree > DEGREES[0] && space.size() > CUBIC {
+            break;
+        }
+        let model = fit.model(degree, tol, &groups);
+        let found = errors(&model, &space, &references);
+        if best.as_ref().is_none_or(|(_, least)| worse(&found) < worse(least)) {
+            best = Some((model, found));
+        }
+        if best.as_ref().is_some_and(|(_, found)| worse(found) <= tol) {
+            break;
+        }
+    }
+    let (model, errors) = best.unwrap_or_else(|| (fit.model(DEGREES[0], tol, &groups), [f64::INFINITY; 2]));
+    FittedPolynomials { model, error: worse(&errors), errors, compared: references.len() }
+}
+
+/// Members by their voltage, but for those that stay apart.
+fn groups(system: &System, apart: &[usize]) -> Vec<Vec<usize>> {
+    let rows = &system.electrics.gap_rows;
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for g in 0..system.members.len() {
+        let like = |of: usize| (rows.row(of) - rows.row(g)).amax() <= SAME * rows.row(g).amax();
+        match groups.iter_mut().find(|group| !apart.contains(&g) && !apart.contains(&group[0]) && like(group[0])) {
+            Some(group) => group.push(g),
+            None => groups.push(vec![g]),
+        }
+    }
+    groups
+}
+
+/// The largest errors of a model's equilibria, of displacements and readings and of capacitances; infinite where it has none next to one of
+/// the full model.
+fn errors(model: &PolynomialModel, space: &ReducedSpace, references: &[Reference<'_>]) -> [f64; 2] {
+    let mut forces = ReducedForces::new(space);
+    let scale = space.joints.closures.length_scale;
+    let extent = |x: &[Pose]| x.iter().map(|x| x.xy().norm().max(x.z.abs() * scale)).fold(0.0, f64::max);
+    let most = |p: usize| references.iter().map(|reference| reference.read[p].abs()).fold(0.0, f64::max);
+    let farthest = references.iter().map(|reference| extent(&reference.at.q)).fold(1e-6 * scale, f64::max);
+    let (mut worst, mut charged) = (0.0f64, 0.0f64);
+    for reference in references {
+        bimorph_base::budget::check();
+        let mut x: Vec<f64> =
+            (model.rotation.tr_mul(&DVector::from_column_slice(&reference.at.z)) / model.scale).as_slice().to_vec();
+        if !equilibrium(model, &reference.at.drive, &mut x) {
+            return [f64::INFINITY; 2];
+        }
+        let z = &model.rotation * DVector::from_column_slice(&x) * model.scale;
+        forces.place_at_rest(space, z.as_slice());
+        let off: Vec<Pose> = forces.placed.at.iter().zip(&reference.at.q).map(|(a, b)| a - b).collect();
+        worst = worst.max(extent(&off) / extent(&reference.at.q).max(SMALL * farthest));
+        let values = model.monomials.values(&x);
+        for (p, read) in model.probes.values(&values).iter().enumerate() {
+            let size = reference.read[p].abs().max(SMALL * most(p));
+            if size > 0.0 {
+                worst = worst.max((read - reference.read[p]).abs() / size);
+            }
+        }
+        let approach = model.approaches(&values);
+        for points in &model.approaches.members {
+            let whole: f64 = points.merged.iter().map(|g| reference.capacitances[*g]).sum();
+            let found: f64 =
+                points.laws.iter().enumerate().map(|(k, law)| law.capacitance(approach[points.first + k])).sum();
+            if whole > 0.0 {
+                charged = charged.max((found / whole - 1.0).abs());
+            }
+        }
+    }
+    [worst, charged]
+}
+
+/// Newton's method from `x`; true where it ends at a stable equilibrium.
+pub fn equilibrium(model: &PolynomialModel, drive: &Drive, x: &mut [f64]) -> bool {
+    let m = x.len();
+    let mut tangent = DMatrix::zeros(m, m);
+    let mut last = f64::INFINITY;
+    for _ in 0..ITERATIONS {
+        let force = model.force(x, drive, Some(&mut tangent));
+        let Some((change, negative)) = solve(&tangent, &force) else { return false };
+        let size = change.norm();
+        if !size.is_finite() {
+            return false;
+        }
+        x.iter_mut().zip(change.iter()).for_each(|(x, dx)| *x -= dx);
+        let stalled = size <= STALLED && size > 0.1 * last;
+        last = size;
+        if size <= CONVERGED || stalled {
+            return negative == 0;
+        }
+    }
+    false
+}

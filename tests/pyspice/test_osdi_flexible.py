@@ -1,0 +1,160 @@
+"""Nonlinear models of flexible parts, `bimorph export --osdi --nonlinear --range`, in ngspice 44, 47 and VACASK, against the plug-in.
+
+Tolerances: 1e-3 of the plug-in is --within of the export; 1e-4 between hosts is ten times what their own tolerances (reltol 1e-6) leave.
+"""
+
+import os
+import subprocess
+
+import numpy as np
+import pytest
+from test_osdi import COMMAND, ROOT, TOOLS, hosts, read_raw
+
+# The plug-in has the mesh of this tolerance, as the file has.
+TOL = 1e-4
+SWITCH = ROOT / "examples/switch/switch.net"
+BANK = ROOT / "examples/bank/bank.net"
+BEAM = """process p = [ Youngsmodulus=160e9 density=2330 h=10u ]
+anchor p [a] []
+beam2d p [a m] [l=100u w=2u]
+beam2d p [m b] [l=100u w=2u]
+anchor p [b] []
+"""
+OPTIONS = ".options reltol=1e-6 vntol=1e-9 abstol=1e-18\n"
+
+
+def export(netlist, folder, ranges, signals, ports=()):
+    """Writes part.osdi; the first line that the command prints after the pins."""
+    words = [COMMAND, "export", netlist, "--osdi", "--openvaf", TOOLS / "openvaf-r", "--nonlinear", "--name", "part", "--out", folder / "part.osdi", "--tol", str(TOL)]
+    words += [word for name, ends in ranges.items() for word in ("--range", f"{name}={ends}")]
+    words += ["--signals", ",".join(signals)] + (["--ports", ",".join(ports)] if ports else [])
+    ran = subprocess.run(words, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    return ran
+
+
+def instances(netlist, folder, ports, signals, kind="%gd"):
+    """The device as an OSDI instance and as one of the plug-in: what loads it, and its lines."""
+    quoted = lambda words: " ".join(f'"{word}"' for word in words)  # noqa: E731
+    nodes, shown = " ".join(f"n{k} 0" for k in range(len(ports))), " ".join(f"s{k}" for k in range(len(signals)))
+    plug_in = f"A1 {kind} [{nodes}] %v [{shown}] part\n.model part bimorph(file=\"{netlist}\" ports=[{quoted(ports)}] monitors=[{quoted(signals)}] tol={TOL})\n"
+    return ("", plug_in), (f"pre_osdi {folder / 'part'}.osdi\n", f"N1 {nodes} {shown} part\n.model part part\n")
+
+
+def run(program, folder, sources, device, control, plug_in=False):
+    """Runs a deck; waveforms of the file of each analysis by its name in `control`."""
+    folder.mkdir()
+    loads, lines = device
+    commands = "".join(f"{command}\nwrite {name}.raw all\n" for name, command in control.items())
+    (folder / "deck.cir").write_text(f"* part\n{sources}{lines}{OPTIONS}.control\nset filetype=binary\n{loads}{commands}quit\n.endc\n.end\n")
+    words = [COMMAND, "cosim", "deck.cir"] if plug_in else [program, "-b", "deck.cir"]
+    ran = subprocess.run(words, cwd=folder, capture_output=True, text=True, env={**os.environ, "NGSPICE": str(program)})
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    return {name: read_raw(folder / f"{name}.raw") for name in control}
+
+
+def programs():
+    versions = hosts()
+    if not versions:
+        pytest.skip("no ngspice with OSDI: scripts/ngspice-versions could not fetch it")
+    return versions
+
+
+def everywhere(netlist, folder, ports, signals, sources, control):
+    """The plots of every host: the plug-in's, and those of the file by version of ngspice."""
+    plug_in, osdi = instances(netlist, folder, ports, signals)
+    versions = programs()
+    full = run(versions[max(versions)], folder / "plug-in", sources, plug_in, control, plug_in=True)
+    return full, {version: run(program, folder / f"ngspice{version}", sources, osdi, control) for version, program in versions.items()}
+
+
+def apart(one, two, name):
+    """Largest distance of two waveforms over the range of the second."""
+    return np.max(np.abs(one[name] - two[name])) / np.ptp(two[name])
+
+
+def crossing(plot, level):
+    """When the first signal falls through a level for the first time."""
+    time, wave = plot["time"], plot["v(s0)"]
+    k = int(np.argmax(wave < level))
+    return time[k - 1] + (time[k] - time[k - 1]) * (level - wave[k - 1]) / (wave[k] - wave[k - 1])
+
+
+def in_vacask(folder, nodes, sources, analyses):
+    """Runs the file in VACASK; waveforms by analysis."""
+    folder.mkdir()
+    text = f'part\nload "{folder.parent / "part.osdi"}"\nmodel part part\nmodel v vsource\nmodel i isource\nx1 ({nodes}) part\n{sources}control\n'
+    text += "  options reltol=1e-6 vntol=1e-9 abstol=1e-18\n" + "".join(f"  analysis {name} {words}\n" for name, words in analyses.items()) + "endc\n"
+    (folder / "run.sim").write_text(text)
+    ran = subprocess.run([TOOLS / "vacask", "run.sim"], cwd=folder, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    return {name: read_raw(folder / f"{name}.raw") for name in analyses}
+
+
+def test_a_switch_pulls_in_and_releases(tmp_path):
+    """A sweep up and down has pull-in between 17.5 and 18 V and release between 11 and 11.5 V (17.84 and 11.21 V, ANSYS VM236), and open and closed
+    states of the plug-in. Closed states below pull-in are none of those that the polynomials are made of, and agree to 3e-3."""
+    signals = ["a(8).y:1e6"]
+    export(SWITCH, tmp_path, {"drive": "0:20"}, signals)
+    control = {"up": "dc Vdrive 0 20 0.5", "down": "dc Vdrive 20 0 -0.5"}
+    full, written = everywhere(SWITCH, tmp_path, ["drive"], signals, "Vdrive n0 0 0\n", control)
+    for version, plots in written.items():
+        for name in control:
+            worst = apart(plots[name], full[name], "v(s0)")
+            print(f"switch in ngspice {version}: {name} {worst:.1e}")
+            assert worst <= {"up": 1e-3, "down": 3e-3}[name], (version, name, worst)
+            closed = np.flatnonzero(plots[name]["v(s0)"] < -0.5)
+            # the sweeps have 41 voltages: from 18 V up, and from 20 V down to 11.5 V
+            assert (closed[0], len(closed)) == {"up": (36, 5), "down": (0, 18)}[name]
+
+
+def test_a_switch_closes_in_time(tmp_path):
+    """A step to 19 V reaches -0.4 um when the plug-in does, and rests where it rests."""
+    signals = ["a(8).y:1e6"]
+    export(SWITCH, tmp_path, {"drive": "0:20"}, signals)
+    control = {"tran": "tran 2n 4u 0 2n"}
+    full, written = everywhere(SWITCH, tmp_path, ["drive"], signals, "Vdrive n0 0 PULSE(0 19 0 10n 10n 10 20)\n", control)
+    other = full["tran"]
+    for version, plots in written.items():
+        own = plots["tran"]
+        late, rest = abs(crossing(own, -0.4) / crossing(other, -0.4) - 1.0), abs(own["v(s0)"][-1] / other["v(s0)"][-1] - 1.0)
+        print(f"switch in ngspice {version}: closing time {late:.1e}, rest {rest:.1e}")
+        assert late <= 1e-3 and rest <= 1e-3, (version, late, rest)
+
+
+def test_a_beam_stretches(tmp_path):
+    """A clamped beam under a force at its middle has the displacement of the plug-in up to 60 uN of both signs, where it is stiffer by more than half."""
+    netlist = tmp_path / "beam.net"
+    netlist.write_text(BEAM)
+    export(netlist, tmp_path, {"m.y": "-60u:60u"}, ["m.y:1e6"], ["m.y"])
+    plug_in, osdi = instances(netlist, tmp_path, ["m.y"], ["m.y:1e6"], "%hd")
+    versions = programs()
+    control = {"dc": "dc If -60u 60u 5u"}
+    sources = "If 0 n0 0\n"
+    full = run(versions[max(versions)], tmp_path / "plug-in", sources, plug_in, control, plug_in=True)
+    for version, program in versions.items():
+        plots = run(program, tmp_path / f"ngspice{version}", sources, osdi, control)
+        worst = apart(plots["dc"], full["dc"], "v(s0)")
+        print(f"beam in ngspice {version}: {worst:.1e}")
+        assert worst <= 1e-3, (version, worst)
+    wave = full["dc"]["v(s0)"]
+    assert abs(wave[0]) < 0.7 * 12 * abs(wave[11])
+
+
+def test_a_bank_is_heated(tmp_path):
+    """The bank of hot-arm actuators has the displacement and the temperature of the plug-in in `.op`, over voltages of its heaters, and through a pulse of
+    them."""
+    signals = ["yoke.y:1e6", "b1.hot.T"]
+    export(BANK, tmp_path, {"heat": "0:2", "sense": "0:20"}, signals)
+    sources = "Vheat n0 0 DC 1 PULSE(0 1.5 0 1u 1u 10 20)\nVsense n1 0 10\n"
+    control = {"op": "op", "dc": "dc Vheat 0 2 0.1", "tran": "tran 0.5u 300u 0 0.5u"}
+    full, written = everywhere(BANK, tmp_path, ["heat", "sense"], signals, sources, control)
+    for version, plots in written.items():
+        for name in ("v(s0)", "v(s1)", "i(vheat)"):
+            op = abs(plots["op"][name][0] / full["op"][name][0] - 1.0)
+            dc = apart(plots["dc"], full["dc"], name)
+            at = np.linspace(2e-6, 300e-6, 300)
+            one, two = (np.interp(at, plot["tran"]["time"], plot["tran"][name]) for plot in (plots, full))
+            tran = np.max(np.abs(one - two)) / max(np.ptp(two), 1e-3 * np.max(np.abs(two)))
+            print(f"bank in ngspice {version}: {name} .op {op:.1e}, .dc {dc:.1e}, .tran {tran:.1e}")
+            assert op <= 1e-3 and dc <= 1e-3 and tran <= 1e-3, (version, name, op, dc, tran)
