@@ -192,7 +192,7 @@ impl ExportCommand {
         }
         let default = if self.nonlinear { ExportRequest::NONLINEAR_WITHIN } else { ExportRequest::WITHIN };
         let within = self.within.unwrap_or(default);
-        if within.is_nan() || within < ExportRequest::MIN_WITHIN || within >= 1.0 {
+        if !(ExportRequest::MIN_WITHIN..1.0).contains(&within) {
             return Err(Failure::bad("--within", "a number of at least 1e-9, below 1", within.to_string()));
         }
         if let Some(count) = self.count.filter(|n| *n == 0 || *n > ExportRequest::MAX_COUNT) {

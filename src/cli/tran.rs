@@ -224,7 +224,7 @@ impl TransientCommand {
         let Some(why) = formulation::outweighed_tree(drawn) else { return Ok(None) };
         let compiled = self.model.compile_again_in(Formulation::Rcr)?;
         let suits = matches!(compiled.joints, Some(Ok(_)));
-        Ok(suits.then(|| (compiled, ChosenFormulation { formulation: Formulation::Rcr, why })))
+        Ok(suits.then_some((compiled, ChosenFormulation { formulation: Formulation::Rcr, why })))
     }
 
     /// Each option within its range, before anything is compiled.

@@ -179,6 +179,7 @@ impl SnapshotReader<'_> {
 mod tests {
     //! States come back with the same bits, and nothing else is taken for them.
     use super::*;
+    use bimorph_base::ErrorBudget;
     use crate::{Mode, Trial};
 
     fn some() -> (OpenRequest, States) {
@@ -189,7 +190,7 @@ mod tests {
         };
         let mut states = States::default();
         let mut parent = None;
-        for k in 0..3 {
+        for k in 0..3i32 {
             let pose = |x: f64| vec![Pose::new(x, f64::NAN, -0.0), Pose::new(f64::INFINITY, 1e-320, x)];
             let carried = if k == 2 { vec![Motion { q: pose(7.0), v: pose(8.0) }] } else { vec![] };
             let state = Snapshot {
@@ -200,7 +201,13 @@ mod tests {
                 elapsed: 3e-6,
                 next_step: f64::INFINITY,
                 shown: StepHistory::start(vec![1.0, 2.0])
-                    .step(1e-6, vec![1.5, 2.5], 1e-3, |_| 1e-9, |_| crate::step_history::SteppingRule::Line)
+                    .step(
+                        1e-6,
+                        vec![1.5, 2.5],
+                        ErrorBudget::of(1e-3),
+                        |_| 1e-9,
+                        |_| crate::step_history::SteppingRule::Line,
+                    )
                     .0,
                 carried,
             };

@@ -163,7 +163,8 @@ mod tests {
         let mut shown = StepHistory::start(vec![293.0, 0.0]);
         for k in 1..100 {
             let noise = if k % 2 == 0 { 1e-9 } else { -1e-9 };
-            let (after, bound) = shown.step(1e-6, vec![293.0, noise], 1e-3, |_| 1e-6, |_| SteppingRule::Line);
+            let (after, bound) =
+                shown.step(1e-6, vec![293.0, noise], ErrorBudget::of(1e-3), |_| 1e-6, |_| SteppingRule::Line);
             assert!(bound > 1e-5, "{bound:e}");
             shown = after;
         }
