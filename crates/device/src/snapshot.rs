@@ -179,8 +179,8 @@ impl SnapshotReader<'_> {
 mod tests {
     //! States come back with the same bits, and nothing else is taken for them.
     use super::*;
-    use bimorph_base::ErrorBudget;
     use crate::{Mode, Trial};
+    use bimorph_base::ErrorBudget;
 
     fn some() -> (OpenRequest, States) {
         let opened = OpenRequest {

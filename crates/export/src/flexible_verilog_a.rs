@@ -30,6 +30,14 @@ const NONE: f64 = 1e-9;
 /// Largest angular frequency that scales a rate, over the least (1).
 const FASTEST: f64 = 1e4;
 
+/// Mass over that of the slowest coordinate below which a coordinate is 32 times as fast or more, and follows its forces at once (1).
+const FOLLOWS: f64 = 1e-3;
+
+/// Whether coordinate `j` has no inertia in a file: simulators would have to follow oscillations that ports do not see.
+pub(super) fn follows_at_once(of: &PolynomialModel, j: usize) -> bool {
+    of.mass[j] < FOLLOWS * of.mass.iter().copied().fold(0.0, f64::max)
+}
+
 /// The file: a descriptive header, and the module `name`.
 pub fn write(model: &FlexibleModel, pins: &Pins, name: &str, about: &[String]) -> String {
     let mut module = FlexibleModule { model, of: &model.fitted.model, body: String::new(), reals: Vec::new() };
@@ -270,9 +278,16 @@ impl FlexibleModule<'_> {
         for j in 0..m {
             let (n, second) = (j + 1, self.second(j));
             ContributionSum::begin(&format!("I(x{n}) <+ ddt({second:e} * V(x{n})) - V(v{n})")).end(&mut self.body);
-            let mut sum = ContributionSum::begin(&format!("I(v{n}) <+ ddt({:e} * V(v{n}))", of.mass[j] / second));
+            let inertia = match follows_at_once(of, j) {
+                true => "0".to_owned(),
+                false => format!("ddt({:e} * V(v{n}))", of.mass[j] / second),
+            };
+            let mut sum = ContributionSum::begin(&format!("I(v{n}) <+ {inertia}"));
             for k in 0..m {
-                sum.add(significant(of.damping[(j, k)], of.damping.amax()) / self.second(k), &format!("V(v{})", k + 1));
+                if !follows_at_once(of, j) && !follows_at_once(of, k) {
+                    let damping = significant(of.damping[(j, k)], of.damping.amax());
+                    sum.add(damping / self.second(k), &format!("V(v{})", k + 1));
+                }
                 sum.add(significant(of.stiffness[(j, k)], of.stiffness.amax()), &format!("q{}", k + 1));
             }
             sum.add(-of.built_in[j], "1");
