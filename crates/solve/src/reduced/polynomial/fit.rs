@@ -1,7 +1,7 @@
 //! The polynomials of a trained space: least squares at the states that it was trained for and about them.
 //!
 //! 1. Coordinates in which the masses and the tangent at rest are diagonal.
-//! 2. Equilibria of the full model at corners and points of the box of inputs ([`super::samples`]).
+//! 2. Equilibria of the full model at corners and points of the box of inputs (`samples`).
 //! 3. Points of the trained box of coordinates, and points about these equilibria. The functions of [`super::shapes`] are evaluated there
 //!    with exact kinematics. Every fifth point is kept apart for the error of the fit.
 //! 4. The first derivatives at rest, so that the tangent there is exact; least squares by a QR factorization for the rest.
