@@ -223,7 +223,8 @@ fn flexible_values(
 }
 
 /// Equilibria of the polynomials are those of the device within 1e-3 of the largest one in the range: a beam that stretches under forces of both
-/// signs, and the bank under the voltage of its heaters. Both have fewer than a fifth of the strains as coordinates.
+/// signs, and the bank under the voltage of its heaters. Both have fewer than a fifth of the strains as coordinates. The capacitance of a comb follows the
+/// overlap alone.
 #[test]
 fn polynomials_have_the_equilibria_of_the_device() {
     let text = Arc::new(compile(&Bundle::from_text("beam.net", STRETCHED), &CompileOptions::default()).unwrap());
@@ -234,9 +235,14 @@ fn polynomials_have_the_equilibria_of_the_device() {
         (bank, ("heat", [0.0, 2.0]), "yoke.y", vec![0.4, 1.1, 1.7, 2.0]),
     ];
     for (model, port, signal, drives) in cases {
-        let (written, values) = flexible_values(&model, port, (signal, 1e-3), &drives);
+        // next to its capacitance, the fit of the bank at 1e-3 leaves 1.04e-3 of displacements
+        let within = if signal == "yoke.y" { 5e-4 } else { 1e-3 };
+        let (written, values) = flexible_values(&model, port, (signal, within), &drives);
         let fitted = &written.fitted;
-        assert!(fitted.error <= 1e-3, "{signal}: {:e}", fitted.error);
+        let [displacements, capacitances] = fitted.errors;
+        assert!(displacements <= within, "{signal}: {displacements:e}");
+        // the yoke moves across the fingers of its comb, which changes the capacitance of the full model by so much
+        assert!(capacitances <= if signal == "yoke.y" { 6e-3 } else { 0.0 }, "{signal}: {capacitances:e}");
         assert!(5 * fitted.model.size() <= written.strains.max(40), "{}", fitted.model.size());
         let most = values.iter().map(|[_, full]| full.abs()).fold(0.0, f64::max);
         for [found, full] in values {

