@@ -156,7 +156,9 @@ fn formulation(compiled: &CompiledModel) -> String {
         Some(Err(unfit)) => format!("formulation {name}: not by springs: {unfit}\n"),
         None if compiled.options.formulation == Formulation::Auto => {
             let suited = formulation::suited(compiled, None);
-            format!("formulation auto takes {}: {}\n", suited.formulation.name(), suited.why)
+            let moving = formulation::outweighed_tree(compiled)
+                .map_or_else(String::new, |why| format!("; tran takes rcr: {why}"));
+            format!("formulation auto takes {}: {}{moving}\n", suited.formulation.name(), suited.why)
         }
         None => String::new(),
     }

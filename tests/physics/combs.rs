@@ -53,6 +53,15 @@ fn fingers_snap_to_the_side() {
     }
 }
 
+/// A force that pushes the fingers of 2 µm gaps 3 µm aside is an error under a voltage. Without one the part moves by F/k_y as if it had no comb.
+#[test]
+fn touching_fingers_are_refused_under_a_voltage() {
+    let pushed = shuttle(1.0, 30.0, "]\n        f2d * [m] [F=90u oz=pi/2");
+    close(place(&static_equilibrium(&pushed, &volts(0.0)).unwrap())[1], 3e-6, 1e-9);
+    let refused = static_equilibrium(&pushed, &volts(1.0));
+    assert!(refused.as_ref().is_err_and(|e| e.to_string().contains("under a voltage, and touch at")), "{refused:?}");
+}
+
 /// Below that voltage the stiffness across is k_y − N·ε·h·o·V²/g³ (differentiated by hand): the square of the frequency across falls by it, that along does not change.
 #[test]
 fn voltage_softens_across_the_fingers() {

@@ -68,13 +68,12 @@ def test_pulse(bench):
 
 
 def test_motional_current(bench):
-    """The current of a comb at 40 V is 40·(N·ε·h/g)·velocity of its rotor: charge and motion agree to 5 %, of which 4.2 % is the motion of the rotor across the
-    fingers."""
-    run = bench.run(
-        deck("PULSE(0 2 20u 1u 1u 300u 1m)", ".tran 1u 400u 0 0.5u").replace('"yoke.y:1e6"', '"rotor.y:1e6"')
-    )
-    t, y = run["time"], run["y"] * 1e-6
+    """The charge of a comb at 40 V is 40·N·ε·h/g times its overlap, and 1/(1 − x²/g²) for its distance x from the middle of the gaps: charge and motion agree."""
+    text = deck("PULSE(0 2 20u 1u 1u 300u 1m)", ".tran 1u 400u 0 0.5u")
+    run = bench.run(text.replace('"yoke.y:1e6" "b1.hot.T"', '"rotor.y:1e6" "rotor.x:1e6"'))
+    t, y, x = run["time"], run["y"] * 1e-6, run["t"] * 1e-6
     # A source's branch current flows from its plus node through the source.
     charge = np.concatenate([[0], np.cumsum(np.diff(t) * -(run["vbias#branch"][1:] + run["vbias#branch"][:-1]) / 2)])
-    expected = 40 * 60 * 8.854e-12 * 2e-6 / 1e-6 * -(y - y[0])
-    assert np.max(np.abs(charge - expected)) < 5e-2 * np.ptp(expected)
+    expected = 40 * 60 * 8.854e-12 * 2e-6 / 1e-6 * (8e-6 - y) / (1 - (x / 1e-6) ** 2)
+    expected -= expected[0]
+    assert charge == pytest.approx(expected, abs=2e-2 * np.ptp(expected))

@@ -101,7 +101,7 @@ impl Alternation {
                         "the current of port `{name}` alternates from point to point by {share:.1e} of its range: the trapezoidal rule keeps an \
                          error of a current with the other sign at each step"
                     ),
-                    "`.options method=gear` or `xmu=0.45` damps it, and steps half as long make less of it",
+                    "`.options method=gear` or `xmu=0.4` damps it, and steps half as long make less of it",
                 ));
             }
         }

@@ -69,7 +69,9 @@ impl BatchStatics {
             for (laid, arrived) in some.iter().zip(lanes.follow(&ways)) {
                 let (compiled, _) = path(laid);
                 points[laid.number] = arrived.and_then(|arrived| {
-                    within_contact_range(compiled, &arrived.q).ok()?;
+                    let electrics = &compiled.parts.system.electrics;
+                    within_contact_range(compiled, &arrived.q, |gap| electrics.is_energised(gap, &laid.sources))
+                        .ok()?;
                     let path = Path { iterations: arrived.iterations, passed: Vec::new(), reached: 1.0 };
                     Some(settled(compiled, arrived.q, laid.sources.clone(), path, Vec::new()))
                 });

@@ -180,7 +180,7 @@ impl Watcher for RunFinisher<'_> {
     }
 
     fn observe(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> bool {
-        if self.contacts && within_contact_range(self.compiled, &after.q).is_err() {
+        if self.contacts && within_contact_range(self.compiled, &after.q, |gap| self.drive.volts[gap] != 0.0).is_err() {
             return false;
         }
         if self.ends(s, h) && self.values.is_empty() {

@@ -7,14 +7,19 @@ use bimorph_domains::domain::SideRoom;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 
-/// Refuses a configuration in which a gap is closed beyond the range of its law, see [`bimorph_domains::contact`], or fingers of a comb touch at their sides.
+/// Refuses a configuration in which a gap is closed beyond the range of its law, see [`bimorph_domains::contact`], or fingers of a comb touch at their sides
+/// under a voltage. `energised` says which gaps have one. Without it fingers that touch cause a warning, as those beyond the other side do.
 ///
 /// # Errors
 /// [`AnalysisError::ContactRange`] with the gap, [`AnalysisError::SidePullIn`] with the comb.
-pub fn within_contact_range(compiled: &CompiledModel, q: &[Pose]) -> Result<(), AnalysisError> {
+pub fn within_contact_range(
+    compiled: &CompiledModel,
+    q: &[Pose],
+    energised: impl Fn(usize) -> bool,
+) -> Result<(), AnalysisError> {
     let system = &compiled.parts.system;
     match system.overrun(q) {
-        None => match comb_aside(compiled, q) {
+        None => match comb_aside(compiled, q, energised) {
             None => Ok(()),
             Some((comb, [aside, room])) => Err(AnalysisError::SidePullIn { comb: comb.to_owned(), aside, room }),
         },
@@ -26,10 +31,15 @@ pub fn within_contact_range(compiled: &CompiledModel, q: &[Pose]) -> Result<(), 
     }
 }
 
-/// The comb whose fingers touch at their sides at `q`: its name, how far they lie aside and how far they can (m).
-pub(crate) fn comb_aside<'a>(compiled: &'a CompiledModel, q: &[Pose]) -> Option<(&'a str, [f64; 2])> {
+/// Of the combs among these gaps the one whose fingers touch at their sides at `q`: its name, how far they lie aside and how far they can (m).
+pub(crate) fn comb_aside<'a>(
+    compiled: &'a CompiledModel,
+    q: &[Pose],
+    among: impl Fn(usize) -> bool,
+) -> Option<(&'a str, [f64; 2])> {
     let system = &compiled.parts.system;
-    let touching = system.members.iter().zip(&compiled.parts.gap_names).filter_map(|(member, name)| {
+    let gaps = system.members.iter().zip(&compiled.parts.gap_names).enumerate().filter(|(g, _)| among(*g));
+    let touching = gaps.filter_map(|(_, (member, name))| {
         let (across, SideRoom { drawn, room }) = member.side_room()?;
         let aside = (drawn + across.value(q, system.model.linear)).abs();
         (aside > room).then_some((name.as_str(), [aside, room]))
@@ -39,10 +49,17 @@ pub(crate) fn comb_aside<'a>(compiled: &'a CompiledModel, q: &[Pose]) -> Option<
 
 /// Warning about that comb.
 pub(crate) fn comb_beyond_reported(compiled: &CompiledModel, q: &[Pose]) -> Option<String> {
-    let (name, [way, room]) = comb_beyond(compiled, q)?;
+    if let Some((name, [way, room])) = comb_beyond(compiled, q) {
+        return Some(format!(
+            "the comb `{name}` closes by {:.3} µm, and its fingers have {:.3} µm to the other side: nothing stops them there",
+            1e6 * way,
+            1e6 * room
+        ));
+    }
+    let (name, [aside, room]) = comb_aside(compiled, q, |_| true)?;
     Some(format!(
-        "the comb `{name}` closes by {:.3} µm, and its fingers have {:.3} µm to the other side: nothing stops them there",
-        1e6 * way,
+        "the fingers of the comb `{name}` lie {:.3} µm aside of the middle of their gaps, and touch at {:.3} µm: nothing stops them there",
+        1e6 * aside,
         1e6 * room
     ))
 }

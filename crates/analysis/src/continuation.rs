@@ -133,8 +133,9 @@ pub fn trace(
         return Err(AnalysisError::Cancelled);
     }
 
+    let energised = |gap: usize| sources.iter().any(|u| system.electrics.is_energised(gap, u));
     for point in &traced.points {
-        within_contact_range(compiled, &point.q)?;
+        within_contact_range(compiled, &point.q, energised)?;
     }
     let value = |s: f64| if s == 1.0 { request.to } else { request.from + s * (request.to - request.from) };
     let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(traced.points.len()); signals.len()];

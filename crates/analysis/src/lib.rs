@@ -96,10 +96,10 @@ pub enum AnalysisError {
         /// Least distance within the range (m).
         least: f64,
     },
-    /// The fingers of a comb are drawn to the side until they touch.
+    /// The fingers of a comb touch at their sides under a voltage.
     #[error(
-        "the fingers of the comb \"{comb}\" are drawn {aside:.3e} m to the side and touch at {room:.3e} m: the side force exceeds what holds them. Lower \
-         the voltage, make the part stiffer across its fingers, or draw wider gaps or a `stop2d` across"
+        "the fingers of the comb \"{comb}\" lie {aside:.3e} m aside of the middle of their gaps under a voltage, and touch at {room:.3e} m. Lower \
+         the voltage or what moves the part across its fingers, make it stiffer across them, or draw wider gaps or a `stop2d` across"
     )]
     SidePullIn {
         /// Name of the comb.

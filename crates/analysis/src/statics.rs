@@ -275,6 +275,7 @@ fn settle(
     let path = SourcePath::new(electrics, from, &sources, loads);
     let mut end = electrics.drive();
     path.at(1.0, &mut end);
+    let energised = |gap: usize| end.volts[gap] != 0.0;
     let (path, held_weakly) = match weak_parts::held(system) {
         Some((held, parts)) => {
             let found = solver.follow(&held, &path, &mut q)?;
@@ -283,13 +284,15 @@ fn settle(
         None => match solver.follow(system, &path, &mut q) {
             Ok(found) => (found, Vec::new()),
             // a gap pressed beyond its law is the reason where there is one
-            Err(error) => return Err(within_contact_range(compiled, &q).err().unwrap_or_else(|| error.into())),
+            Err(error) => {
+                return Err(within_contact_range(compiled, &q, energised).err().unwrap_or_else(|| error.into()));
+            }
         },
     };
     if let Some(loose) = loose_parts::unbalanced(system, &q, &end) {
         return Err(SolveError::singular(system, loose).into());
     }
-    within_contact_range(compiled, &q)?;
+    within_contact_range(compiled, &q, energised)?;
     let mut free_motions = loose_parts::free_motions(system, solver.held());
     free_motions.extend(held_weakly);
     Ok(settled(compiled, q, sources, path, free_motions))

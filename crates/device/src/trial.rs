@@ -48,16 +48,19 @@ impl DeviceSession {
         self.motion.q.copy_from_slice(parent.map_or(&self.zeros, |p| &p.q));
         self.motion.v.fill(Pose::zeros());
         let path = SourcePath::new(electrics, from, &self.sources, [load, 1.0]);
+        let sources = &self.sources;
+        let energised = |gap: usize| electrics.is_energised(gap, sources);
         match self.equilibrium.follow(system, &path, &mut self.motion.q) {
             Ok(found) => reply.jumped = !found.passed.is_empty(),
             Err(error) => {
                 // a gap pressed beyond its law is the reason where there is one
-                let error = within_contact_range(compiled, &self.motion.q).err().unwrap_or_else(|| error.into());
+                let error =
+                    within_contact_range(compiled, &self.motion.q, energised).err().unwrap_or_else(|| error.into());
                 reply.status = Status::Fail(error.to_string());
                 return;
             }
         }
-        if let Err(error) = within_contact_range(compiled, &self.motion.q) {
+        if let Err(error) = within_contact_range(compiled, &self.motion.q, energised) {
             reply.status = Status::Fail(error.to_string());
             return;
         }
@@ -140,7 +143,8 @@ impl DeviceSession {
                 }
             }
         }
-        if let Err(error) = within_contact_range(compiled, &self.motion.q) {
+        let energised = |gap: usize| electrics.is_energised(gap, &self.sources);
+        if let Err(error) = within_contact_range(compiled, &self.motion.q, energised) {
             reply.status = Status::Fail(error.to_string());
             return;
         }

@@ -67,7 +67,10 @@ impl VoltageSweep<'_> {
             // measured in the voltage that holds it
             let traced = self.trace_by(UPWARDS, &q, [volts, 2.0 * volts], max / volts - 1.0)?;
             if traced.end == PathEnd::Arrived
-                || traced.points.iter().any(|p| within_contact_range(self.compiled, &p.q).is_err())
+                || traced
+                    .points
+                    .iter()
+                    .any(|p| within_contact_range(self.compiled, &p.q, |gap| self.drives(gap)).is_err())
             {
                 break;
             }
@@ -76,7 +79,10 @@ impl VoltageSweep<'_> {
             let beyond = limit * (1.0 + PAST);
             q.copy_from_slice(&before);
             let lost = traced.end != PathEnd::Unstable;
-            if beyond >= max || self.fall(&mut q, beyond).is_err() || within_contact_range(self.compiled, &q).is_err() {
+            if beyond >= max
+                || self.fall(&mut q, beyond).is_err()
+                || within_contact_range(self.compiled, &q, |gap| self.drives(gap)).is_err()
+            {
                 if lost && beyond < max {
                     self.of_closed.push(format!(
                         "the closed branch was followed up to {limit:.4} V only: what snaps beyond is not known"

@@ -85,6 +85,11 @@ impl<'a> VoltageSweep<'a> {
         u
     }
 
+    /// Whether the source is across a gap.
+    pub(super) fn drives(&self, gap: usize) -> bool {
+        self.system.electrics.gap_rows[(gap, self.source)] != 0.0
+    }
+
     pub(super) fn touching(&self, q: &[Pose]) -> Vec<bool> {
         (0..self.system.members.len()).map(|g| self.system.touches(g, q)).collect()
     }
@@ -118,7 +123,7 @@ impl<'a> VoltageSweep<'a> {
             q.copy_from_slice(&before);
             let beyond = fold * (1.0 + PAST);
             let fallen = self.fall(&mut q, beyond);
-            if let Some((comb, _)) = comb_aside(self.compiled, &q) {
+            if let Some((comb, _)) = comb_aside(self.compiled, &q, |gap| self.drives(gap)) {
                 self.of_closed.push(format!(
                     "the fingers of the comb `{comb}` are drawn to the side there until they touch, and nothing stops them: a stiffer suspension across \
                      the fingers or wider gaps raise this voltage"
@@ -132,7 +137,7 @@ impl<'a> VoltageSweep<'a> {
                 }
                 fallen => fallen?,
             }
-            within_contact_range(self.compiled, &q)?;
+            within_contact_range(self.compiled, &q, |gap| self.drives(gap))?;
             let (system, touched) = (self.system, self.touching(&before));
             let apart = |q: &[Pose]| (0..touched.len()).all(|g| touched[g] || !system.touches(g, q));
             if !apart(&q) {
@@ -172,8 +177,7 @@ impl<'a> VoltageSweep<'a> {
 
     /// True where the source drives the fields of combs alone.
     fn only_combs(&self) -> bool {
-        let driven = |g: &usize| self.system.electrics.gap_rows[(*g, self.source)] != 0.0;
-        let mut gaps = (0..self.system.members.len()).filter(driven).peekable();
+        let mut gaps = (0..self.system.members.len()).filter(|g| self.drives(*g)).peekable();
         gaps.peek().is_some() && gaps.all(|g| !self.system.members[g].is_electrostatic())
     }
 

@@ -93,7 +93,7 @@ pub(crate) fn record(
         gas.step(s + h, after);
         stress.step(s + h, after);
         let suits = refuse_in_contact(compiled, options, s + h, after);
-        let within = |()| within_contact_range(compiled, &after.q);
+        let within = |()| within_contact_range(compiled, &after.q, |gap| volts[gap] != 0.0);
         let done = ((s + h) / options.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize;
         let look = done > looks || options.step.is_some() && !crossings.stays_within(NEAR);
         let kept = |()| energy.as_mut().map_or(Ok(()), |energy| energy.step(options, s + h, after, look));

@@ -248,8 +248,15 @@ impl Electrics {
 
     #[inline]
     fn gap_volts(&self, u: &[f64], volts: &mut [f64]) {
-        for (g, v) in volts.iter_mut().enumerate() {
-            *v = (0..u.len()).map(|s| self.gap_rows[(g, s)] * u[s]).sum();
-        }
+        volts.iter_mut().enumerate().for_each(|(gap, v)| *v = self.volts_across(gap, u));
+    }
+
+    fn volts_across(&self, gap: usize, u: &[f64]) -> f64 {
+        u.iter().enumerate().map(|(s, u)| self.gap_rows[(gap, s)] * u).sum()
+    }
+
+    /// Whether there is a voltage across a gap at source voltages `u`.
+    pub fn is_energised(&self, gap: usize, u: &[f64]) -> bool {
+        self.volts_across(gap, u) != 0.0
     }
 }

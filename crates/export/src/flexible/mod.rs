@@ -277,9 +277,16 @@ fn trained(
     let joints = spanned(system).map_err(refused)?;
     let case = TrainingCase { system, inputs: inputs.clone() };
     let training = train(&joints, &[case], TrainingOptions { tol: within, moments: MOMENTS }).map_err(refused)?;
+    if training.space.size() == 0 {
+        return Err(refused(ReductionError::NoInput));
+    }
     let found = fitted(&training.space, system, inputs, probes, (within, apart));
     if found.compared == 0 {
         return Err(ExportError::NotFlexible { why: "the full model has no equilibrium in these ranges".to_owned() });
+    }
+    if !found.error.is_finite() {
+        let why = "its polynomials have no equilibrium next to one of the full model; take a narrower --range, or a smaller --within";
+        return Err(ExportError::NotFlexible { why: why.to_owned() });
     }
     Ok((found, joints.tree.coordinates))
 }
