@@ -23,7 +23,7 @@ const CRATES: [(&str, &[&str]); 18] = [
     ("jobs", &["base", "structure", "netlist", "model", "analysis"]),
     ("cosim", &["structure", "results"]),
     ("view", &["base", "structure", "netlist", "layout", "results", "model", "analysis", "device", "jobs", "cosim"]),
-    ("wire", &["base", "solve", "layout", "model", "analysis", "device", "export", "jobs"]),
+    ("wire", &["base", "solve", "model", "analysis", "device", "export", "jobs"]),
     ("server", &["base", "netlist", "layout", "model", "analysis", "device", "export", "jobs", "wire"]),
 ];
 

@@ -10,11 +10,18 @@ use bimorph_multibody::planar::Pose;
 use bimorph_solve::time::method::Motion;
 
 /// Magic bytes: a name and the version of this format.
-const HEAD: [u8; 8] = *b"bimorph\x02";
+const HEAD: [u8; 8] = *b"bimorph\x03";
+/// Those of format 2, whose histories of steps count no alternations.
+const HEAD_2: [u8; 8] = *b"bimorph\x02";
 
 /// Writes what is open and its states.
 pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
-    let mut out = SnapshotWriter(HEAD.to_vec());
+    write_format(HEAD, StepHistory::PARTS, opened, states)
+}
+
+/// The same with `head`, and the first `parts` of each history.
+fn write_format(head: [u8; 8], parts: usize, opened: &OpenRequest, states: &States) -> Vec<u8> {
+    let mut out = SnapshotWriter(head.to_vec());
     for names in [&opened.ports, &opened.signals] {
         out.count(names.len());
         for name in names {
@@ -37,7 +44,7 @@ pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
         out.numbers(&state.sources);
         out.word(state.next_step.to_bits());
         out.word(state.elapsed.to_bits());
-        for numbers in state.shown.numbers() {
+        for numbers in &state.shown.numbers()[..parts] {
             out.numbers(numbers);
         }
         out.count(state.carried.len());
@@ -89,7 +96,11 @@ struct SnapshotReader<'a>(&'a [u8]);
 
 impl SnapshotReader<'_> {
     fn all(&mut self) -> Option<(OpenRequest, States)> {
-        self.0 = self.0.strip_prefix(&HEAD)?;
+        let (parts, rest) = match (self.0.strip_prefix(&HEAD), self.0.strip_prefix(&HEAD_2)) {
+            (Some(rest), _) => (StepHistory::PARTS, rest),
+            (None, rest) => (StepHistory::PARTS_OF_FORMAT_2, rest?),
+        };
+        self.0 = rest;
         let opened = OpenRequest { ports: self.names()?, signals: self.names()?, noise: self.noise()? };
         let mut states = States::default();
         for _ in 0..self.count(8)? {
@@ -102,11 +113,11 @@ impl SnapshotReader<'_> {
                 next_step: f64::from_bits(self.word()?),
                 elapsed: f64::from_bits(self.word()?),
                 shown: {
-                    let mut parts = [const { Vec::new() }; StepHistory::PARTS];
-                    for part in &mut parts {
+                    let mut history = [const { Vec::new() }; StepHistory::PARTS];
+                    for part in &mut history[..parts] {
                         *part = self.numbers()?;
                     }
-                    StepHistory::from_numbers(parts)?
+                    StepHistory::from_numbers(history)?
                 },
                 carried: {
                     let mut carried = Vec::new();
@@ -226,6 +237,16 @@ mod tests {
         let (read_opened, read_states) = read(&bytes).expect("its own bytes");
         assert_eq!(read_opened, opened);
         assert_eq!(write(&read_opened, &read_states), bytes, "with the same bits, in the same order");
+    }
+
+    /// Snapshots of format 2 come back with histories that have counted no alternations.
+    #[test]
+    fn states_of_format_2_come_back() {
+        let (opened, states) = some();
+        let bytes = write_format(HEAD_2, StepHistory::PARTS_OF_FORMAT_2, &opened, &states);
+        let (read_opened, read_states) = read(&bytes).expect("bytes of format 2");
+        assert_eq!(read_opened, opened);
+        assert_eq!(write_format(HEAD_2, StepHistory::PARTS_OF_FORMAT_2, &read_opened, &read_states), bytes);
     }
 
     #[test]

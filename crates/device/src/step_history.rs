@@ -12,9 +12,23 @@
 //! the circuit (a parametric resonance), and a current with an error of the square of its step would vary with them. A
 //! ringing that is faster than the steps shows in d by its height: where that may be seen, the steps become short
 //! enough to follow it.
+//!
+//! The trapezoidal rule keeps an error of a current with the other sign at each step, and a loop of the circuit may feed
+//! it back. Such an alternation has the same height at every step length, so shorter steps do not end it. A quantity
+//! that still alternates from point to point after [`MIN_ALTERNATIONS`] steps that became [`MAX_SHORTENING`] times
+//! shorter follows its mean: d is then that of the mean height of the last two points.
 
 use bimorph_base::ErrorBudget;
 use serde::{Deserialize, Serialize};
+
+/// Steps in a row at which d changes its sign before an alternation counts as one of the integration rule.
+const MIN_ALTERNATIONS: f64 = 4.0;
+/// By how much steps become shorter meanwhile (1). A motion that alternates at first is resolved by 16 points a cycle then.
+const MAX_SHORTENING: f64 = 8.0;
+/// Value of `alternations` of a quantity whose alternation is one of the integration rule.
+const OF_THE_RULE: f64 = -1.0;
+/// Smallest height of an alternation, as a fraction of that of the step before (1). That of a motion falls with the square of the step.
+const MIN_HEIGHT: f64 = 0.5;
 
 /// How the circuit's steps follow a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,13 +56,17 @@ pub struct StepHistory {
     low: Vec<f64>,
     /// Largest values so far.
     high: Vec<f64>,
+    /// Steps in a row at which d changed its sign, or [`OF_THE_RULE`]; empty before the second step.
+    alternations: Vec<f64>,
+    /// Longest of these steps (s).
+    longest: Vec<f64>,
 }
 
 impl StepHistory {
     /// At the start of a transient.
     pub fn start(values: Vec<f64>) -> Self {
         let (low, high) = (values.clone(), values.clone());
-        Self { now: values, slopes: Vec::new(), bends: Vec::new(), steps: [0.0; 2], low, high }
+        Self { now: values, low, high, ..Self::default() }
     }
 
     /// After a step of `dt` (s), and the longest next step (s) at which each quantity keeps to the line within its share
@@ -66,8 +84,7 @@ impl StepHistory {
         }
         let mut bound = f64::INFINITY;
         let (low, high) = (self.low.clone(), self.high.clone());
-        let mut next =
-            Self { now: values, slopes: Vec::new(), bends: Vec::new(), steps: [dt, self.steps[0]], low, high };
+        let mut next = Self { now: values, steps: [dt, self.steps[0]], low, high, ..Self::default() };
         for (n, &y) in next.now.iter().enumerate() {
             next.low[n] = next.low[n].min(y);
             next.high[n] = next.high[n].max(y);
@@ -79,6 +96,13 @@ impl StepHistory {
             let allowed = share * (next.high[n] - next.low[n]) + floor(n);
             let bend = (slope - slope_before) / (self.steps[0] + dt);
             next.bends.push(bend);
+            let (alternations, longest) = self.alternation(n, dt, bend);
+            next.alternations.push(alternations);
+            next.longest.push(longest);
+            if alternations == OF_THE_RULE {
+                bound = bound.min(2.0 * (allowed / self.bend_of_mean(n, dt, bend).abs()).sqrt());
+                continue;
+            }
             bound = bound.min(2.0 * (allowed / bend.abs()).sqrt());
             if let Some(bend_before) = self.bends.get(n) {
                 // A divided difference stands for the middle of its three points.
@@ -91,22 +115,47 @@ impl StepHistory {
         (next, bound)
     }
 
+    /// `alternations` and `longest` of quantity `n` after a step of `dt` (s) that ends with the second difference `bend`.
+    fn alternation(&self, n: usize, dt: f64, bend: f64) -> (f64, f64) {
+        match (self.bends.get(n), self.alternations.get(n), self.longest.get(n)) {
+            (Some(before), Some(&count), Some(&longest))
+                if before * bend < 0.0 && (bend * dt).abs() > MIN_HEIGHT * (before * self.steps[1]).abs() =>
+            {
+                let longest = longest.max(dt);
+                let lasting = count == OF_THE_RULE || (count >= MIN_ALTERNATIONS && longest >= MAX_SHORTENING * dt);
+                (if lasting { OF_THE_RULE } else { count + 1.0 }, longest)
+            }
+            _ => (0.0, dt),
+        }
+    }
+
+    /// Second difference of the mean height of the last two points; `bend` is that of the last.
+    fn bend_of_mean(&self, n: usize, dt: f64, bend: f64) -> f64 {
+        let before = self.bends.get(n).copied().unwrap_or(bend);
+        // values ±δ in turn have d = 2·δ/(h₁·h₂)
+        0.5 * (bend + before * self.steps[1] / dt)
+    }
+
     /// Lists of numbers that [`StepHistory::numbers`] gives.
-    pub const PARTS: usize = 6;
+    pub const PARTS: usize = 8;
+    /// Of them, those that snapshots of format 2 hold.
+    pub const PARTS_OF_FORMAT_2: usize = 6;
 
     /// Everything it holds, to be put away; [`StepHistory::from_numbers`] takes it back.
     pub fn numbers(&self) -> [&[f64]; Self::PARTS] {
-        [&self.now, &self.slopes, &self.bends, &self.steps, &self.low, &self.high]
+        let Self { now, slopes, bends, steps, low, high, alternations, longest } = self;
+        [now, slopes, bends, steps, low, high, alternations, longest]
     }
 
     /// Inverse of [`StepHistory::numbers`]; `None` for inconsistent lists.
     pub fn from_numbers(parts: [Vec<f64>; Self::PARTS]) -> Option<Self> {
-        let [now, slopes, bends, steps, low, high] = parts;
+        let [now, slopes, bends, steps, low, high, alternations, longest] = parts;
         let fits = |list: &[f64]| list.is_empty() || list.len() == now.len();
-        if !fits(&slopes) || !fits(&bends) || low.len() != now.len() || high.len() != now.len() {
+        let fit = [&slopes, &bends, &alternations, &longest].into_iter().all(|list| fits(list));
+        if !fit || low.len() != now.len() || high.len() != now.len() {
             return None;
         }
-        Some(Self { slopes, bends, steps: steps.try_into().ok()?, low, high, now })
+        Some(Self { slopes, bends, steps: steps.try_into().ok()?, low, high, alternations, longest, now })
     }
 
     /// Values at this state.
@@ -126,7 +175,13 @@ impl StepHistory {
 
     /// Doubles held.
     pub fn doubles(&self) -> usize {
-        self.now.len() + self.slopes.len() + self.bends.len() + self.low.len() + self.high.len()
+        self.now.len()
+            + self.slopes.len()
+            + self.bends.len()
+            + self.low.len()
+            + self.high.len()
+            + self.alternations.len()
+            + self.longest.len()
     }
 }
 
@@ -168,5 +223,37 @@ mod tests {
             assert!(bound > 1e-5, "{bound:e}");
             shown = after;
         }
+    }
+
+    /// An alternation of the trapezoidal rule, of the same height at every step length, shortens the steps some
+    /// thousand times at most. They grow again to those of the motion under it.
+    #[test]
+    fn alternations_of_the_rule_do_not_shorten_steps_for_ever() {
+        let (mut shown, mut t, mut dt) = (StepHistory::start(vec![0.0]), 0.0, 1e-2);
+        let mut shortest = dt;
+        for k in 0..300 {
+            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+            let value = f64::sin(t + dt) + 0.1 * sign;
+            let (after, bound) = shown.step(dt, vec![value], ErrorBudget::of(1e-3), |_| 0.0, |_| SteppingRule::Line);
+            (shown, t) = (after, t + dt);
+            dt = bound.min(2.0 * dt).min(1.0);
+            shortest = shortest.min(dt);
+        }
+        assert!(shortest > 1e-6, "{shortest:e}");
+        assert!(t > 10.0, "{t}");
+    }
+
+    /// A ringing at half the rate of the first points is followed: the steps become short enough for 16 points a cycle.
+    #[test]
+    fn ringing_faster_than_the_steps_is_resolved() {
+        let omega = std::f64::consts::PI / 1e-2;
+        let (mut shown, mut t, mut dt) = (StepHistory::start(vec![1.0]), 0.0, 1e-2);
+        for _ in 0..100 {
+            let value = f64::cos(omega * (t + dt));
+            let (after, bound) = shown.step(dt, vec![value], ErrorBudget::of(1e-3), |_| 0.0, |_| SteppingRule::Line);
+            (shown, t) = (after, t + dt);
+            dt = bound.min(2.0 * dt).min(1e-2);
+        }
+        assert!(dt < 2.0 * 1e-2 / 16.0, "{dt:e}");
     }
 }

@@ -36,6 +36,7 @@ mod fair_semaphore;
 mod framing;
 pub mod in_process;
 mod jobs;
+mod layouts;
 pub mod limits;
 pub mod log;
 pub mod metrics;

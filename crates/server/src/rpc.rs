@@ -2,6 +2,7 @@
 
 use super::analyses::TransientStream;
 use super::jobs::{JobStream, RowStream, SweepStream, TableStream};
+use super::layouts;
 use super::models::check_size;
 use super::reply_size::answerable;
 use super::runs::RunStream;
@@ -60,7 +61,7 @@ impl proto::bimorph_server::Bimorph for BimorphService {
         if bytes > most {
             return Err(status::limit("netlist_bytes", most, bytes));
         }
-        let answer = self.0.desk.run(move || text::convert(&request).map_err(status::violation)).await?;
+        let answer = self.0.desk.run(move || layouts::convert(&request).map_err(status::violation)).await?;
         Ok(Response::new(answer))
     }
 

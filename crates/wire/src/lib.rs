@@ -11,7 +11,7 @@
 //!
 //! The feature `tls` serves both ends. The feature `server` adds the server's stubs and the channels of other languages.
 //!
-//! **Architecture invariant.** Below are [`bimorph_device`], [`bimorph_export`], [`bimorph_jobs`] and [`bimorph_layout`]. No crate
+//! **Architecture invariant.** Below are [`bimorph_device`], [`bimorph_export`] and [`bimorph_jobs`]. No crate
 //! below knows gRPC, and nothing here listens.
 
 pub mod address;
