@@ -3,6 +3,7 @@
 mod circles;
 mod layering;
 mod names;
+mod pages;
 mod sizes;
 mod words;
 
