@@ -119,7 +119,7 @@ impl ModelArgs {
 
     /// The options of the compilation, checked.
     pub(crate) fn options(&self) -> Result<CompileOptions, Failure> {
-        Ok(CompileOptions { set: self.set.clone(), ..self.chosen.options()? })
+        Ok(self.chosen.options()?.with_settings(&self.set))
     }
 
     /// Compiles the netlist and shows its warnings on standard error.
@@ -129,12 +129,12 @@ impl ModelArgs {
 
     /// The same model in another formulation. Its warnings have been shown.
     pub(crate) fn compile_again_in(&self, formulation: Formulation) -> Result<CompiledModel, Failure> {
-        Ok(compile(&self.bundle()?, &CompileOptions { formulation, ..self.options()? })?)
+        Ok(compile(&self.bundle()?, &self.options()?.with_formulation(formulation))?)
     }
 
     /// The same for a frame of cubic beams, whose centrelines meet in points.
     pub(crate) fn compile_frame(&self) -> Result<CompiledModel, Failure> {
-        let mut options = self.options()?;
+        let options = self.options()?;
         if self.chosen.given("junctions") && options.junctions != Junctions::Centreline {
             let got = format!("\"{}\" with --solver frame, which has no other", options.junctions.name());
             return Err(Failure::bad("--junctions", "centreline", got));
@@ -146,8 +146,7 @@ impl ModelArgs {
                 "\"elastic\" with --solver frame, whose anchors are rigid".to_owned(),
             ));
         }
-        (options.junctions, options.anchors) = (Junctions::Centreline, Anchors::Rigid);
-        let mut compiled = compile(&self.bundle()?, &options)?;
+        let mut compiled = compile(&self.bundle()?, &options.with_centrelines())?;
         // that of the recursion's mesh is no frame's
         compiled.order.estimated_error = None;
         compiled.warnings.items.push(baseline());

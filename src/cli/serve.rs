@@ -3,7 +3,6 @@
 use super::failure::Failure;
 use bimorph::service::address::Address;
 use bimorph::service::log;
-use bimorph::service::server::ServeOptions;
 use bimorph::service::settings::{ENVIRONMENT, SETTINGS, ServerOption, SettingSource, Settings};
 use bimorph::service::until_signal::run_until_signal;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
@@ -43,7 +42,7 @@ impl ServeCommand {
                 }
             }
         };
-        Ok(run_until_signal(ServeOptions { while_stdin: self.while_stdin, ready: Box::new(ready), ..options })?)
+        Ok(run_until_signal(options.with_process(self.while_stdin, Box::new(ready)))?)
     }
 }
 

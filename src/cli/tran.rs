@@ -166,7 +166,7 @@ impl TransientCommand {
             Some((suited, method)) => (suited.formulation, *method),
             None => (formulation, method),
         };
-        let (mut result, joints) = self.run_motion(compiled, formulation, &TransientOptions { method, ..options })?;
+        let (mut result, joints) = self.run_motion(compiled, formulation, &options.with_method(method))?;
         warn_of(&result.warnings);
         let drawn = result.signals.split_off(wanted);
         if let Some(path) = &self.draw {

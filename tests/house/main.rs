@@ -1,10 +1,11 @@
-//! Rules of the source itself: layers, no circles of files, sizes, unique names of types, words.
+//! Rules of the source itself: layers, no circles of files, sizes, unique names of types, words, tolerances.
 
 mod circles;
 mod layering;
 mod names;
 mod pages;
 mod sizes;
+mod tolerances;
 mod words;
 
 use std::fs;

@@ -5,6 +5,7 @@ use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::domains::Ramp;
 use bimorph::equations::Bodies;
 use bimorph::netlist::{Bundle, Setting, read_bundle};
+use bimorph::options::ErrorBudget;
 use bimorph::solve::time::adaptive::{Adaptive, Control};
 use bimorph::solve::time::batch::{self, BatchRun, Ended, Watcher};
 use bimorph::solve::time::method::Motion;
@@ -59,6 +60,7 @@ fn together(variants: &[CompiledModel], volts: &[f64], stop: f64, tol: f64) -> V
     let rises: Vec<Vec<f64>> = electrics.iter().map(|e| vec![0.0; e.heating.states()]).collect();
     let mut notes: Vec<Notes> = variants.iter().map(|_| Notes::default()).collect();
     let mut ends: Vec<Option<Motion>> = variants.iter().map(|_| None).collect();
+    let errors = ErrorBudget::of(tol);
     {
         let mut queue = variants.iter().zip(&mut notes).enumerate();
         let mut next = || {
@@ -67,7 +69,7 @@ fn together(variants: &[CompiledModel], volts: &[f64], stop: f64, tol: f64) -> V
             let (volts, rise) = (&sources[number], &rises[number]);
             let ramp = Ramp::new(&system.electrics, volts, volts, rise, stop);
             let motion = Motion::zeros(system.bodies());
-            Some((number, BatchRun { system, ramp, motion, h: first_step(system, stop), tol, watcher: notes }))
+            Some((number, BatchRun { system, ramp, motion, h: first_step(system, stop), errors, watcher: notes }))
         };
         let mut done = |number: usize, ended: Ended| {
             if let Ended::Done(motion, _) = ended {

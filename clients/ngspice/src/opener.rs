@@ -136,9 +136,9 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
         return Ok(Box::new(LocalDevice::new(Arc::new(finer))));
     };
     // a server takes one number for all beams
-    card.options.tol = tol;
+    card.options = card.options.with_tolerance(tol);
     if let Some(most) = own.order.segments.iter().max().filter(|most| **most > 0) {
-        (card.options.segments, card.options.band) = (Some(2 * most), None);
+        card.options = card.options.with_segments(2 * most);
     }
     connect(address, &bundle, card)
 }

@@ -11,8 +11,6 @@ use super::transient::{Statistics, TransientOptions, TransientResult};
 
 /// Code of the warning that single values hold no more.
 pub const WARNING: &str = "W049";
-/// Tolerances between a run and its companion up to which single values hold (1).
-const APART: f64 = 10.0;
 /// Windows of a run in which it is compared with its companion: an impact that comes a little later makes a peak in the difference of two
 /// rates, which says nothing of what follows.
 const COMPARED: usize = 20;
@@ -96,9 +94,8 @@ fn allowed(
     let swings: Vec<(&str, f64)> =
         result.signals.iter().zip(columns).map(|((_, unit, _), c)| (unit.as_str(), half_range(c))).collect();
     let largest = |of: &str| swings.iter().filter(|(unit, _)| *unit == of).map(|(_, swing)| *swing).fold(0.0, f64::max);
-    let one = |(unit, swing): &(&str, f64)| {
-        APART * options.errors().requested() * swing.max(SMALL * largest(unit)).max(least(unit))
-    };
+    let one =
+        |(unit, swing): &(&str, f64)| options.errors().after_contact(swing.max(SMALL * largest(unit)).max(least(unit)));
     swings.iter().map(one).collect()
 }
 

@@ -15,6 +15,7 @@ use super::transient::record::STABILITY_CHECKS;
 use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use crate::readout::signal::SignalView;
+use bimorph_base::ErrorBudget;
 use bimorph_domains::{Drive, Ramp};
 use bimorph_model::compile::CompiledModel;
 use bimorph_solve::baseline::SolverKind;
@@ -72,9 +73,9 @@ pub fn ends(
                     let (Some(setup), Some(watcher)) = (&set[number], slots[number].take()) else { continue };
                     let system = &variants[number].parts.system;
                     let motion = Motion::zeros(system.bodies());
-                    let (h, tol) = (first_step(system, options.stop), options.errors().step());
+                    let (h, errors) = (first_step(system, options.stop), ErrorBudget::of(options.errors().step()));
                     let ramp = setup.ramp(variants[number], options.stop);
-                    return Some((number, BatchRun { system, ramp, motion, h, tol, watcher }));
+                    return Some((number, BatchRun { system, ramp, motion, h, errors, watcher }));
                 }
             };
             let mut done = |number: usize, ended: Ended| match ended {

@@ -203,7 +203,7 @@ fn balance(
         // a correction that does not shrink any more is rounding
         if moved > 0.5 * before && (iteration > FEW || acting(frame, volts).next().is_none()) {
             // what is printed is within the tolerance beside it
-            if moved <= compiled.options.errors().requested() * all {
+            if moved <= compiled.options.errors().within(all) {
                 return Ok((q, iteration));
             }
             break;

@@ -88,7 +88,7 @@ pub fn joint_transient(
     let options = options.with_release(start.as_ref());
     let mut result = record(compiled, &options, &mut carrier, sample, watch)?;
     result.warnings.extend(rotary);
-    result.warnings.extend(open(carrier.report.largest_gap_m, options.errors().requested() * system.length_scale));
+    result.warnings.extend(open(carrier.report.largest_gap_m, options.errors().within(system.length_scale)));
     result.unknowns = carrier.linkage.coordinates.saturating_sub(carrier.linkage.constraints);
     Ok((result, carrier.report))
 }

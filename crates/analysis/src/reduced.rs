@@ -11,6 +11,7 @@ use super::transient::options::TransientOptions;
 use super::transient::record::{Propagator, record};
 use super::transient::result::TransientResult;
 use super::{AnalysisError, ProgressCallback};
+use bimorph_base::ErrorBudget;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_model::compile::{CompiledModel, Formulation};
 use bimorph_solve::baseline::SolverKind;
@@ -66,7 +67,7 @@ fn trained(cases: &[(&System, InputBox)], tol: f64, moments: usize) -> Result<Tr
     let joints = spanned(moving).map_err(reason)?;
     let cases: Vec<TrainingCase<'_>> =
         cases.iter().map(|(system, inputs)| TrainingCase { system, inputs: inputs.clone() }).collect();
-    train(&joints, &cases, TrainingOptions { tol, moments }).map_err(reason)
+    train(&joints, &cases, TrainingOptions { errors: ErrorBudget::of(tol), moments }).map_err(reason)
 }
 
 /// The warning of an analysis that takes the full model instead.

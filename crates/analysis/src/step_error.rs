@@ -33,8 +33,6 @@ pub use run::{beyond, unknown};
 use samples::{BufferedSamples, SelectedSamples, resolved};
 use std::cell::Cell;
 
-/// Fraction of the room that the next run aims at.
-const AIM: f64 = 0.7;
 /// The exponent with which an error is supposed to fall with the tolerance, and the range in which two runs teach another.
 const EXPONENT: f64 = 0.6;
 const EXPONENTS: (f64, f64) = (0.35, 1.0);
@@ -77,12 +75,12 @@ fn held<T>(
     let made = first(&estimated, model, run, sample, watch)?;
     let made = sharper(made, &estimated, model, run, watch)?;
     made.kept.send(sample);
-    let SampledRun { mut result, more, tol, .. } = made;
+    let SampledRun { mut result, more, steps, .. } = made;
     result.warnings.extend(match result.step_error {
         Some(error) => beyond(options, error, AT_THE_END),
         None => (!options.signals.is_empty()).then(|| unknown(options)),
     });
-    Ok((result, more, tol))
+    Ok((result, more, steps.requested()))
 }
 
 /// Whether a run of this model propagates its error.
@@ -102,7 +100,7 @@ struct SampledRun<T> {
     result: TransientResult,
     more: T,
     kept: BufferedSamples,
-    tol: f64,
+    steps: ErrorBudget,
     /// Its samples have been sent.
     long: bool,
 }
@@ -138,7 +136,7 @@ fn first<T>(
     };
     let (mut result, more) = run(options, &mut keep, &mut count)?;
     result.step_error = result.step_error.filter(|_| resolved(&picked, &result, options, model));
-    Ok(SampledRun { result, more, kept, tol: options.errors().requested(), long: long.get() })
+    Ok(SampledRun { result, more, kept, steps: options.errors(), long: long.get() })
 }
 
 /// Runs at sharper tolerances until one is within what its mesh leaves of the tolerance of `options`.
@@ -157,7 +155,7 @@ fn sharper<T>(
     let mut exponent = EXPONENT;
     for _ in 1..RUNS {
         let ratio = match made.result.step_error {
-            Some(error) if error > room && !made.long => (AIM * room / error).powf(1.0 / exponent),
+            Some(error) if error > room && !made.long => ErrorBudget::of(room).aim(error).powf(1.0 / exponent),
             _ => break,
         };
         let ratio = ratio.clamp(RATIOS.0, RATIOS.1);
@@ -165,7 +163,7 @@ fn sharper<T>(
         if made.result.counters.steps as f64 * ratio.powf(-0.25) * unknowns > MAX_AGAIN {
             break;
         }
-        let options = options.with_tolerance(ErrorBudget::of(made.tol).scaled(ratio).requested());
+        let options = options.with_tolerance(made.steps.within(ratio));
         let (mut kept, mut picked) = (BufferedSamples::default(), SelectedSamples::new(&options));
         let mut keep = |t: f64, values: &[f64]| {
             picked.add(values);
@@ -178,7 +176,7 @@ fn sharper<T>(
         };
         result.step_error = result.step_error.filter(|_| resolved(&picked, &result, &options, model));
         let errors = made.result.step_error.zip(result.step_error);
-        made = SampledRun { result, more, kept, tol: options.errors().requested(), long: false };
+        made = SampledRun { result, more, kept, steps: options.errors(), long: false };
         if let Some((before, after)) = errors {
             exponent = ((before / after).ln() / -ratio.ln()).clamp(EXPONENTS.0, EXPONENTS.1);
             if before.min(after) > HOPELESS {

@@ -12,7 +12,7 @@ pub struct ErrorBudget {
 impl ErrorBudget {
     /// Fraction of the tolerance for estimates of modes by the next term of the dynamic stiffness: they were found smaller than the error, by up to
     /// a factor of 2.9 where short wide beams matter.
-    pub const MODES: f64 = 0.36;
+    const MODES: f64 = 0.36;
     /// Fraction of the tolerance for estimates by comparison with twice the segments: they were found up to a quarter smaller than the error.
     const COMPARISON: f64 = 0.75;
     /// Fraction of a goal that predictions for meshes that were not run may use.
@@ -20,7 +20,7 @@ impl ErrorBudget {
     /// Fraction of the tolerance below which the error of a group of beams decides nothing.
     const MINOR: f64 = 0.1;
     /// Remaining error of the first order over the estimate of a comparison, which assumes the second order.
-    pub const FIRST_ORDER: f64 = 1.5;
+    const FIRST_ORDER: f64 = 1.5;
     /// Fraction of the tolerance for meshes that confirm a choice.
     const CONFIRMATION: f64 = 0.5;
     /// Fraction of the tolerance for permanent strains: the equilibrium after them uses the rest.
@@ -35,10 +35,30 @@ impl ErrorBudget {
     const COMPANION: f64 = 10.0;
     /// Loosest tolerance of a companion run, and of a run that chooses a mesh.
     const LOOSEST: [f64; 2] = [0.3, 0.1];
+    /// Least ratio of the tolerance of a companion run to that of the run: a nearer one takes much the same steps.
+    const LEAST_COMPANION: f64 = 2.0;
+    /// Reserve for the error of a run from its difference to a companion that is hardly looser: errors fall slower than tolerances.
+    const RESERVE: f64 = 1.2;
+    /// Fraction of what the mesh leaves that the next run aims at: the exponent of the error is an estimate.
+    const AIM: f64 = 0.7;
+    /// Tolerances between a run and its companion up to which single values hold: the companion has ten times the tolerance.
+    const AFTER_CONTACT: f64 = 10.0;
+    /// Smallest amplitude of a motion with an estimate, in floors of the error of a step: below it an error relative to the amplitude is noise.
+    const RESOLVED: f64 = 10.0;
     /// Ratio of the requested tolerance to the sharpest that the steps of a repeated run take.
     const MOST_SHARPER: f64 = 99.0;
     /// Fraction of the tolerance below which the amplitude of a mode is negligible.
     const NEGLIGIBLE_AMPLITUDE: f64 = 0.3;
+    /// Fraction of the error that no mesh mends (motion outside the modes, missing rotary inertia) that each mode may add: it stays the largest.
+    const UNRESOLVED: f64 = 0.3;
+    /// Range of errors that a frequency may have: the sharpest mesh that is sought, and where the phase of a mode is lost.
+    const FREQUENCY: [f64; 2] = [1e-8, 0.3];
+    /// Ratio of the tolerance of each mesh that is tried in a circuit to that of the one before, where that is too fine.
+    const RELAXATION: f64 = 10.0;
+    /// How often a tolerance is relaxed so.
+    const MAX_RELAXATIONS: i32 = 3;
+    /// Fractions of the tolerance for meshes that points of a sweep share, from coarse to fine: each leaves a margin for the other points.
+    const SHARED_MESHES: [f64; 3] = [0.6, 0.2, 0.06];
     /// Fraction of the tolerance for the equations of an implicit stage.
     const STAGE: f64 = 1e-2;
     /// Fraction of the tolerance for the statics of a reduced model.
@@ -46,6 +66,13 @@ impl ErrorBudget {
     /// Fraction of the tolerance below which singular values, relative to the largest, are left out of a reduced model: for statics, whose
     /// check adds what is lacking, and for motion, which passes through states that no equilibrium has.
     const SINGULAR_VALUES: [f64; 2] = [0.3, 0.02];
+    /// Fraction of the tolerance for the forces of a field at fewer points.
+    const REDUCED_FIELD: f64 = 0.1;
+    /// Root mean square of a strain of closures that a polynomial model leaves out, over the root of the tolerance (√E): energies go with its square.
+    const CLOSURES: f64 = 0.03;
+    /// Fraction of the tolerance below which approaches of electrodes, relative to the largest, are left out of a polynomial model: forces
+    /// grow steeply with them.
+    const APPROACHES: f64 = 3e-3;
     /// Multiple of the tolerance, of its range, by which a quantity of a circuit may depart from the line of its step. At the default it is
     /// 0.2 %, or 28 points for a cycle of full amplitude, which then stays within 0.5 %.
     const BEND: f64 = 2.0;
@@ -69,6 +96,28 @@ impl ErrorBudget {
     /// The tolerance as requested (1).
     pub fn requested(self) -> f64 {
         self.requested
+    }
+
+    /// The tolerance of a quantity of this size, in its unit.
+    #[inline]
+    pub fn within(self, size: f64) -> f64 {
+        self.requested * size
+    }
+
+    /// The part of the tolerance that an error of a quantity of this size uses (1); both in one unit.
+    #[inline]
+    pub fn used(self, error: f64, size: f64) -> f64 {
+        error / (self.requested * size)
+    }
+
+    /// The scale of a quantity with a tolerance of its own: an error is the same part of the scale and this tolerance as of the quantity and its own.
+    pub fn scale(self, quantity: f64, own: f64) -> f64 {
+        quantity * own / self.requested
+    }
+
+    /// The size of which an error, caused by rounding, is the tolerance.
+    pub fn size_of(self, error: f64) -> f64 {
+        error / self.requested
     }
 
     /// Whether an error is within the tolerance.
@@ -107,6 +156,41 @@ impl ErrorBudget {
         Self::MODES * self.requested
     }
 
+    /// Remaining error over such an estimate, for a mesh that was chosen for so many times the tolerance.
+    pub fn of_modes_estimate(times: f64) -> f64 {
+        times * Self::MODES
+    }
+
+    /// For the frequency of a mode that contributes to a result with this weight.
+    pub fn frequency(self, weight: f64) -> f64 {
+        (self.requested / weight.max(f64::MIN_POSITIVE)).clamp(Self::FREQUENCY[0], Self::FREQUENCY[1])
+    }
+
+    /// For the estimate of such a frequency, whose tolerance this is.
+    pub fn frequency_estimate(self) -> f64 {
+        self.modes().max(Self::FREQUENCY[0])
+    }
+
+    /// How many times the tolerance the modes may use beside an error that no mesh mends (1).
+    pub fn beside(self, error: f64) -> f64 {
+        (Self::UNRESOLVED * error / self.requested).max(1.0)
+    }
+
+    /// Tolerances for the mesh of a circuit, which takes the first that is not too fine.
+    pub fn relaxed(self) -> impl Iterator<Item = Self> {
+        (0..=Self::MAX_RELAXATIONS).map(move |k| self.scaled(Self::RELAXATION.powi(k)))
+    }
+
+    /// For the meshes that points of a sweep share, from coarse to fine.
+    pub fn shared_meshes(self) -> [f64; 3] {
+        Self::SHARED_MESHES.map(|fraction| fraction * self.requested)
+    }
+
+    /// Remaining error over the estimate of a comparison, for errors of the first order.
+    pub fn of_first_order_estimate() -> f64 {
+        Self::FIRST_ORDER
+    }
+
     /// For a comparison of errors of the first order.
     pub fn first_order(self) -> f64 {
         self.requested / Self::FIRST_ORDER
@@ -142,6 +226,36 @@ impl ErrorBudget {
         (Self::COMPANION * self.requested).min(Self::LOOSEST[0])
     }
 
+    /// Whether the steps of a companion run differ enough from those of the run.
+    pub fn has_companion(self) -> bool {
+        self.companion() >= Self::LEAST_COMPANION * self.requested
+    }
+
+    /// Part of the difference between a run and its companion that bounds the error of the run, if errors are in proportion to tolerances (1).
+    pub fn of_companion_difference(self) -> f64 {
+        Self::RESERVE / (self.companion() / self.requested - 1.0)
+    }
+
+    /// Ratio by which the error of the next run is to differ from this one, where this is the tolerance of the steps.
+    pub fn aim(self, error: f64) -> f64 {
+        Self::AIM * self.requested / error
+    }
+
+    /// For the difference between a run and its companion after a contact, in a signal of this size.
+    pub fn after_contact(self, size: f64) -> f64 {
+        Self::AFTER_CONTACT * self.requested * size
+    }
+
+    /// Smallest amplitude with an estimate, where a step counts the part `floor` of this size at least.
+    pub fn resolved(self, floor: f64, size: f64) -> f64 {
+        Self::RESOLVED * self.step() * floor * size
+    }
+
+    /// The error of a step in what is as small as the part `floor`, which it counts at least.
+    pub fn step_at_least(self, floor: f64) -> f64 {
+        self.step() * floor
+    }
+
     /// For a run that is repeated because its steps missed the tolerance.
     pub fn sharper_run(self) -> f64 {
         self.requested / Self::COMPANION
@@ -167,9 +281,24 @@ impl ErrorBudget {
         Self::REDUCED_STATICS * self.requested
     }
 
-    /// The singular value, relative to the largest, below which a reduced model leaves a direction out; `moves`: it is for motion too.
-    pub fn singular_values(self, moves: bool) -> f64 {
-        Self::SINGULAR_VALUES[usize::from(moves)] * self.requested
+    /// The singular value below which a reduced model leaves a direction out; `moves`: it is for motion too.
+    pub fn singular_value(self, moves: bool, largest: f64) -> f64 {
+        Self::SINGULAR_VALUES[usize::from(moves)] * self.requested * largest
+    }
+
+    /// For the forces of a field at fewer points.
+    pub fn reduced_field(self) -> f64 {
+        Self::REDUCED_FIELD * self.requested
+    }
+
+    /// Strains of closures that a polynomial model leaves out (√E).
+    pub fn closures(self) -> f64 {
+        Self::CLOSURES * self.requested.sqrt()
+    }
+
+    /// Approaches of electrodes that it leaves out, in the unit of the largest.
+    pub fn approaches(self, largest: f64) -> f64 {
+        Self::APPROACHES * self.requested * largest
     }
 
     /// For the departure of a quantity, over its range, from the line of a step of a circuit.
@@ -182,9 +311,10 @@ impl ErrorBudget {
         Self::BEND_OF_CHARGES * self.requested
     }
 
-    /// For a comparison whose scale is itself divided by the fraction of [`ErrorBudget::comparison`].
-    pub fn comparison_of_scales(self) -> f64 {
-        Self::COMPARISON * Self::COMPARISON * self.requested
+    /// The scale of a comparison that fails at this difference. A comparison divides by a part of the scale and allows a part of the tolerance,
+    /// both those of [`ErrorBudget::comparison`].
+    pub fn scale_of_comparison(self, difference: f64) -> f64 {
+        difference / (Self::COMPARISON * Self::COMPARISON * self.requested)
     }
 
     /// For the steps, beside a mesh with this error.

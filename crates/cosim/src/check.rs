@@ -39,13 +39,8 @@ pub fn check(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Co
         let kept = scratch.path().join(format!("{name}-kept.raw"));
         let raw = scratch.path().join(format!("{name}.raw"));
         let measuring = if options.raw.is_none() { measuring(text, &kept) } else { None };
-        let run_options = CosimOptions {
-            raw: measuring.is_none().then(|| raw.clone()),
-            text: Some(measuring.unwrap_or_else(|| keeping_plots(text, &kept))),
-            tolerance_share: Some(share),
-            capture: true,
-            ..options.clone()
-        };
+        let own = measuring.is_none().then(|| raw.clone());
+        let run_options = options.for_comparison(measuring.unwrap_or_else(|| keeping_plots(text, &kept)), own, share);
         let report = run_whatever(&run_options, keep_going)?;
         let mut plots = read(&kept)?;
         plots.extend(read(&raw)?);

@@ -40,6 +40,13 @@ pub struct CosimOptions {
     pub capture: bool,
 }
 
+impl CosimOptions {
+    /// For one of two runs that are compared: of this text, with this fraction of the tolerance of every model (1), and its output kept.
+    pub(crate) fn for_comparison(&self, text: String, raw: Option<PathBuf>, share: f64) -> Self {
+        Self { raw, text: Some(text), tolerance_share: Some(share), capture: true, ..self.clone() }
+    }
+}
+
 /// Result of a good run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CosimReport {

@@ -56,9 +56,7 @@ impl DeviceSession {
             };
             let step = state.next_step.min(state.shown.last_step());
             let split = Split { modes: &compiled.higher, rates: &rates, step, coupling: &coupling };
-            if let Some((text, n)) =
-                self.ringing.report(mode, compiled.options.errors().requested(), seen, &charges, &split)
-            {
+            if let Some((text, n)) = self.ringing.report(mode, compiled.options.errors(), seen, &charges, &split) {
                 let text = format!("{text} ({})", self.seen_name(n, compiled));
                 reported.push(Diagnostic::warning(WARNING, text, "give the model `segments` or a `band`"));
             }

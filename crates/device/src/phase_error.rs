@@ -11,6 +11,7 @@
 
 use super::half_cycles::{Phase, Waveform};
 use super::higher_modes::{HigherModes, OfMode, Split};
+use bimorph_base::ErrorBudget;
 use bimorph_model::compile::LowestMode;
 
 /// Fraction of half a cycle below which two points give no rate of a charge (1): at corners of a source they are
@@ -122,16 +123,16 @@ impl PhaseErrorMonitor {
     pub(super) fn report(
         &mut self,
         mode: &LowestMode,
-        tol: f64,
+        errors: ErrorBudget,
         at: AcceptedState<'_>,
         charges: &[bool],
         split: &Split<'_>,
     ) -> Option<(String, usize)> {
         let Worst { error, cycles, n, higher } = self.observe(mode, at, charges, Some(split));
-        if error <= tol * self.reported.max(1.0) {
+        if error <= errors.within(self.reported.max(1.0)) {
             return None;
         }
-        self.reported = GROWS * error / tol;
+        self.reported = errors.used(GROWS * error, 1.0);
         let frequency = match higher {
             None => format!(
                 "the mesh has an estimated error of {:.1e} in the lowest frequency, {:.4e} Hz,",
@@ -147,7 +148,8 @@ impl PhaseErrorMonitor {
         };
         let text = format!(
             "{frequency} which shifts the phase of a free oscillation: after {cycles:.1} \
-             cycles its estimated error is {error:.1e} of its range, more than the tolerance {tol:e}"
+             cycles its estimated error is {error:.1e} of its range, more than the tolerance {:e}",
+            errors.requested()
         );
         Some((text, n))
     }

@@ -175,7 +175,7 @@ impl DeviceSession {
             None => (StepHistory::start(seen), f64::INFINITY),
             Some(before) => {
                 let (errors, signals) = (compiled.options.errors(), self.signals.len());
-                let nothing = compiled.options.errors().step() * FLOOR;
+                let nothing = errors.step_at_least(FLOOR);
                 let charge = |capacitance: f64, volts: f64| {
                     capacitance.abs() * (SAME_VOLTAGE[0] + SAME_VOLTAGE[1] * volts.abs())
                 };

@@ -132,11 +132,7 @@ pub struct ParsedStructure {
 /// See [`CompileError`].
 pub fn draw(source: &dyn FrontEnd, options: &CompileOptions) -> Result<ParsedStructure, CompileError> {
     options.check()?;
-    let scheme = options.scheme.in_formulation(options.formulation);
-    let mut options = options.with_scheme(scheme);
-    if options.as_sugar {
-        (options.linear, options.junctions, options.anchors) = (true, Junctions::Centreline, Anchors::Rigid);
-    }
+    let options = options.in_effect();
     let loaded = source.load(&options.set).map_err(CompileError::Netlist)?;
     let mut structure = if options.without_circuit { loaded.structure.without_circuit() } else { loaded.structure };
     let mut warnings = loaded.warnings;

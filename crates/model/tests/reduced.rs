@@ -1,5 +1,6 @@
 //! Reduced models in joint coordinates against the full model: statics of a quarter stage, a bank and a switch.
 
+use bimorph_base::ErrorBudget;
 use bimorph_base::Setting;
 use bimorph_domains::Ramp;
 use bimorph_domains::{Drive, Input, System};
@@ -76,7 +77,7 @@ fn stage(newtons: f64) -> (CompiledModel, System, InputBox) {
 }
 
 fn trained(system: &System, inputs: &InputBox, tol: f64) -> Training {
-    trained_with(system, inputs, TrainingOptions { tol, moments: 0 })
+    trained_with(system, inputs, TrainingOptions { errors: ErrorBudget::of(tol), moments: 0 })
 }
 
 fn trained_with(system: &System, inputs: &InputBox, options: TrainingOptions) -> Training {
@@ -305,7 +306,7 @@ fn the_quarter_stage_in_time() {
     let (_, adaptive) = run(about, &ramp, Rodas4::new(&system, &[]), &begun, Control::Tolerance(1e-3));
     println!("quarter stage in time: bodies {adaptive} adaptive steps");
     let (tol, moments, most) = (1e-2, 2, 6e-3);
-    let trained = trained_with(&system, &inputs, TrainingOptions { tol, moments });
+    let trained = trained_with(&system, &inputs, TrainingOptions { errors: ErrorBudget::of(tol), moments });
     let space = Arc::new(trained.space);
     let method = || ReducedRodas4::new(Arc::clone(&space), 1e-9);
     // each model is released from its own equilibrium

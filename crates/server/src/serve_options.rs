@@ -41,6 +41,14 @@ pub struct ServeOptions {
     pub ready: Ready,
 }
 
+impl ServeOptions {
+    /// For a process that may end with its standard input (`while_stdin`) and reports its addresses.
+    #[must_use]
+    pub fn with_process(self, while_stdin: bool, ready: Ready) -> Self {
+        Self { while_stdin, ready, ..self }
+    }
+}
+
 /// Receives the bound addresses of a server.
 pub type Ready = Box<dyn FnOnce(&[Address]) + Send>;
 

@@ -40,13 +40,8 @@ use std::f64::consts::TAU;
 /// Modes computed first, and at most.
 const FIRST_MODES: usize = 6;
 const MAX_MODES: usize = 48;
-/// Fraction of the mesh-independent error that each mode may add: the residual outside the modes, and missing rotary
-/// inertia where that is large.
-const UNRESOLVED_SHARE: f64 = 0.3;
 /// Error assigned to a waveform unrelated to the reference.
 const UNRELATED_ERROR: f64 = 0.3;
-/// Smallest error that is asked of a frequency.
-const MIN_FREQUENCY_ERROR: f64 = 1e-8;
 
 /// A mode that a run excites.
 struct ExcitedMode {
@@ -102,13 +97,13 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
         let left = if left > errors.negligible_amplitude() { 2f64.sqrt() * left } else { 0.0 };
         // no mesh holds the tolerance where these do not
         let beside = left.max(turned(&modes, options.stop));
-        let looser = if given { 1.0 } else { (UNRESOLVED_SHARE * beside / errors.requested()).max(1.0) };
+        let looser = if given { 1.0 } else { errors.beside(beside) };
         let relaxed = errors.scaled(looser);
         let Some(highest) = modes.iter().rposition(|m| m.amplitude > relaxed.negligible_amplitude()) else {
             return Ok((still, left));
         };
         let of_modes = modes[..=highest].iter();
-        let tolerances: Vec<f64> = of_modes.map(|m| tolerance(m, options.stop, relaxed.requested())).collect();
+        let tolerances: Vec<f64> = of_modes.map(|m| relaxed.frequency(weight(m, options.stop))).collect();
         let mut analyse = |segments: &[usize]| frequencies(moving, voltages, segments, &tolerances);
         if given {
             let swings: Vec<f64> = modes[..=highest].iter().map(|m| 2f64.sqrt() * m.amplitude).collect();
@@ -117,10 +112,10 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
         }
         // measured frequency errors exceeded their estimates: the modes get a part of the tolerance, and the estimate
         // is reported
-        let sharper = tolerances.iter().map(|t| (ErrorBudget::of(*t).modes()).max(MIN_FREQUENCY_ERROR)).collect();
+        let sharper = tolerances.iter().map(|t| ErrorBudget::of(*t).frequency_estimate()).collect();
         let aim = MeshTarget { band: 1.01 * modes[highest].frequency, tolerances: sharper, rigid: false };
         let order = mesh_search::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
-        let order = order.with_estimate_times(looser * ErrorBudget::MODES);
+        let order = order.with_estimate_times(ErrorBudget::of_modes_estimate(looser));
         let mesh = merged(&still, &order);
         if order.estimated_error.is_some() {
             return Ok((mesh, left));
@@ -184,7 +179,7 @@ fn frequencies(
 ) -> Result<Vec<Output>, AnalysisError> {
     let model = meshed(moving, segments)?;
     let found = modes(&model, tolerances.len(), voltages)?.frequencies_hz;
-    let scale = |f: f64, tolerance: f64| (f * tolerance / moving.options.errors().requested()).max(f64::MIN_POSITIVE);
+    let scale = |f: f64, own: f64| moving.options.errors().scale(f, own).max(f64::MIN_POSITIVE);
     let mut outputs: Vec<Output> =
         found.iter().zip(tolerances).map(|(&f, &tolerance)| Output { value: f, scale: scale(f, tolerance) }).collect();
     outputs.resize(tolerances.len(), Output { value: f64::NAN, scale: 1.0 });
@@ -195,11 +190,10 @@ fn refused(error: DiscretizeError) -> AnalysisError {
     AnalysisError::NotConverged { detail: error.to_string() }
 }
 
-/// Error that the frequency of a mode may have.
-fn tolerance(mode: &ExcitedMode, stop: f64, tol: f64) -> f64 {
+/// Error of a run over that of the frequency of a mode, both relative.
+fn weight(mode: &ExcitedMode, stop: f64) -> f64 {
     let lasts = stop.min(2.0 / mode.decay.max(f64::MIN_POSITIVE));
-    let weight = mode.amplitude * (TAU * mode.frequency * lasts / 3f64.sqrt()).max(1.0);
-    (tol / weight.max(f64::MIN_POSITIVE)).clamp(MIN_FREQUENCY_ERROR, 0.3)
+    mode.amplitude * (TAU * mode.frequency * lasts / 3f64.sqrt()).max(1.0)
 }
 
 /// The finer of two meshes for every beam, and the larger of their errors.

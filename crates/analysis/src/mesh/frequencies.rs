@@ -156,13 +156,13 @@ impl ComparedMeshes<'_> {
         }
         let options = compiled.options.with_tolerance(compiled.options.errors().first_order());
         let order = doubling::fit(&compiled.structure, &options, segments, &mut analyse)?;
-        Ok(order.with_estimate_times(ErrorBudget::FIRST_ORDER))
+        Ok(order.with_estimate_times(ErrorBudget::of_first_order_estimate()))
     }
 
     /// The modes on the mesh that was chosen, each with the difference that twice its segments make.
     fn finish(&mut self, order: Mesh) -> Result<(Mesh, ModesWithShapes), AnalysisError> {
         let compiled = self.compiled;
-        let times = if is_fine(compiled) { ErrorBudget::FIRST_ORDER } else { 1.0 };
+        let times = if is_fine(compiled) { ErrorBudget::of_first_order_estimate() } else { 1.0 };
         let (mut result, curves) = self.shaped(&order.segments)?.clone();
         let twice = doubling::twice(&compiled.options, &order).map(|twice| twice.segments);
         // without an estimate there is no finer mesh with modes

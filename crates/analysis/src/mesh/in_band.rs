@@ -169,7 +169,7 @@ impl ComparisonGrid {
             self.groups.get_or_init(|| groups(inside, highest));
         }
         // rounding at the tolerance requires no mesh
-        let rounding = modal::UNSEEN.max(SHAPES / model.options.errors().requested());
+        let rounding = modal::UNSEEN.max(model.options.errors().size_of(SHAPES));
         if let Some(sum) = &sum {
             (0..exact.rows.len()).for_each(|row| outputs.extend(self.shares(sum, row, rounding)));
         }

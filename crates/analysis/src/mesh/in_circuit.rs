@@ -8,17 +8,14 @@ use super::frequencies::for_modes;
 use super::remeshed::{chosen, remeshed};
 use super::section_inertia::with_section_inertia;
 use super::warnings::{WARNING, beyond};
-use bimorph_base::Diagnostic;
 use bimorph_base::budget::bounded;
+use bimorph_base::{Diagnostic, ErrorBudget};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::mesh_search::Mesh;
 
 /// Unknowns of the finest mesh that is taken, and of the largest drawing for which one is sought: a circuit is not to wait for it. Meshes
 /// that it is compared with may have twice as many.
 const MAX_UNKNOWNS: usize = 3000;
-
-/// How much looser the tolerance becomes where its mesh would be finer than that (1), and how often.
-const TOLERANCE_RELAXATION: (f64, i32) = (10.0, 3);
 
 /// Modes whose errors are followed over a run.
 const FOLLOWED: usize = 12;
@@ -42,11 +39,8 @@ pub fn in_circuit(compiled: &CompiledModel) -> CompiledModel {
     if drawn > MAX_UNKNOWNS {
         return warned(compiled.clone(), "a drawing of so many unknowns", None);
     }
-    let finer = if given {
-        None
-    } else {
-        (0..=TOLERANCE_RELAXATION.1).find_map(|k| within_most(compiled, TOLERANCE_RELAXATION.0.powi(k)))
-    };
+    let finer =
+        if given { None } else { compiled.options.errors().relaxed().find_map(|errors| within_most(compiled, errors)) };
     let sought = finer.as_ref().and_then(|finer| finer.order.estimated_error);
     let mut fitted = finer.unwrap_or_else(|| compiled.clone());
     fitted.lowest =
@@ -87,13 +81,12 @@ pub fn twice(compiled: &CompiledModel, tol: f64) -> Result<CompiledModel, Analys
     Ok(finer.with_tolerance(tol))
 }
 
-/// The model on the mesh that holds `looser` times the tolerance, where that is not too fine.
-fn within_most(compiled: &CompiledModel, looser: f64) -> Option<CompiledModel> {
-    let errors = compiled.options.errors();
-    let asked = compiled.with_tolerance(errors.scaled(looser).requested());
+/// The model on the mesh that holds another tolerance, where that is not too fine.
+fn within_most(compiled: &CompiledModel, errors: ErrorBudget) -> Option<CompiledModel> {
+    let asked = compiled.with_tolerance(errors.requested());
     let found =
         bounded(2 * MAX_UNKNOWNS, || sought(&asked)).flatten().filter(|finer| finer.unknowns() <= MAX_UNKNOWNS)?;
-    Some(found.with_tolerance(errors.requested()))
+    Some(found.with_tolerance(compiled.options.errors().requested()))
 }
 
 /// The model on the mesh for both; none where there is no such equilibrium or mode.

@@ -16,7 +16,6 @@
 
 use super::super::AnalysisError;
 use super::super::chart::error::largest_error;
-use super::super::integrator::Integrator;
 use super::super::statics::{OperatingPoint, operating_point};
 use super::super::step_error;
 use super::super::transient::{TransientOptions, TransientResult, Until, transient};
@@ -177,13 +176,7 @@ fn bends(moving: &CompiledModel, options: &TransientOptions<'_>, order: &Mesh) -
 fn sample_run(moving: &CompiledModel, options: &TransientOptions<'_>, segments: &[usize]) -> Option<Vec<Vec<f64>>> {
     let model = meshed(moving, segments).ok()?;
     let start = options.release.map(|start| meshed(start, segments)).transpose().ok()?;
-    let loose = TransientOptions {
-        points: points(options),
-        release: start.as_deref(),
-        method: Integrator::default(),
-        step: None,
-        ..options.for_comparison(moving.options.errors().mesh_run())
-    };
+    let loose = options.for_mesh(moving.options.errors().mesh_run(), points(options), start.as_deref());
     let mut columns = vec![Vec::new(); options.signals.len()];
     let mut keep = |_: f64, values: &[f64]| {
         bimorph_base::budget::lay_out(size_of_val(values));

@@ -19,8 +19,7 @@ pub(super) fn with_section_inertia(compiled: &CompiledModel) -> Result<Cow<'_, C
     if options.rotary_inertia || options.as_sugar || !lacks || !system.can_touch() {
         return Ok(Cow::Borrowed(compiled));
     }
-    let mut model = compiled.clone();
-    model.options.rotary_inertia = true;
+    let model = CompiledModel { options: options.with_rotary_inertia(), ..compiled.clone() };
     let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
     let model = model.with_order(compiled.order.clone()).map_err(refused)?;
     Ok(Cow::Owned(CompiledModel { lowest: compiled.lowest, ..model }))

@@ -81,8 +81,7 @@ pub(super) fn agree(coarse: Option<f64>, fine: Option<f64>) -> bool {
 /// Scale for comparing the remaining stiffness, or the distance beyond a fold, at a tolerance: a larger difference
 /// means that two meshes disagree.
 pub(super) fn scale(left: f64, errors: ErrorBudget) -> f64 {
-    // a comparison divides by ¾ of the scale and allows ¾ of the tolerance
-    KNOWN * left.abs() / errors.comparison_of_scales()
+    errors.scale_of_comparison(KNOWN * left.abs())
 }
 
 /// The softest motion, for its masses.

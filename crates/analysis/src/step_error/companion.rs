@@ -27,8 +27,6 @@ use bimorph_model::compile::CompiledModel;
 const REPORTED_FRACTION: f64 = 0.5;
 /// The same for methods of second order, and explicit ones, whose error falls little with the tolerance.
 const SHARE_OF_SECOND: f64 = 1.0;
-/// Reserve where the companion is hardly looser (1).
-const RESERVE: f64 = 1.2;
 /// Times the steps of a run that one at a tenth of its tolerance takes, of the methods that are run again.
 const MORE: f64 = 2.0;
 /// Output times that a companion must reach, at least.
@@ -139,7 +137,7 @@ fn reported_fraction(options: &TransientOptions<'_>, method: Integrator) -> f64 
     let share = if is_high(method) { REPORTED_FRACTION } else { SHARE_OF_SECOND };
     match options.step {
         Some(_) => REPORTED_FRACTION,
-        None => share.max(RESERVE / (options.errors().companion() / options.errors().requested() - 1.0)),
+        None => share.max(options.errors().of_companion_difference()),
     }
 }
 
@@ -175,13 +173,11 @@ pub(super) fn companion<T>(
     run: RunFunction<'_, T>,
     watch: ProgressCallback<'_>,
 ) -> Result<(Option<TransientResult>, bool), AnalysisError> {
-    let tol = options.errors().companion();
-    let looser = options.step.is_some() || tol >= 2.0 * options.errors().requested();
+    let looser = options.step.is_some() || options.errors().has_companion();
     if options.signals.is_empty() || options.points < 2 || !looser {
         return Ok((None, false));
     }
-    let step = options.step.map(|step| 2.0 * step);
-    let looser = TransientOptions { step, ..options.for_comparison(tol) };
+    let looser = options.for_companion();
     let mut picked = SelectedSamples::new(options);
     let mut keep = |_: f64, values: &[f64]| picked.add(values);
     let (mut steps, mut stopped) = (0.0, false);

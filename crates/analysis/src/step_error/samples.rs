@@ -7,8 +7,6 @@ use bimorph_solve::equations::bodies::FLOOR;
 
 /// Output times that are compared, at most about twice as many: evenly spaced ones of a run that has more.
 const ENOUGH: usize = 1000;
-/// Smallest amplitude of a motion with an estimate, in floors of a step's error (1).
-const RESOLVED: f64 = 10.0;
 /// Fraction of the length scale below which an amplitude is rounding (1).
 const ROUNDING: f64 = 1e-12;
 
@@ -42,7 +40,7 @@ pub(super) fn resolved(
     let length = model.parts.system.length_scale;
     let lengths = result.signals.iter().zip(&picked.columns).filter(|((_, unit, _), _)| unit == "m");
     let most = lengths.map(|(_, column)| half_range(column)).fold(0.0, f64::max);
-    most < ROUNDING * length || most > RESOLVED * options.errors().step() * FLOOR * length
+    most < ROUNDING * length || most > options.errors().resolved(FLOOR, length)
 }
 
 /// One of so many output times is compared.

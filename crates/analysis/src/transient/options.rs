@@ -158,10 +158,39 @@ impl<'a> TransientOptions<'a> {
         TransientOptions { release, ..self.clone() }
     }
 
-    /// For a run that is compared with this one: at another tolerance (1), without events, and whose samples only the callback receives.
+    /// For the companion of this run, in looser steps: without events, and whose samples only the callback receives.
     #[must_use]
-    pub(crate) fn for_comparison(&self, tolerance: f64) -> Self {
-        Self { tol: tolerance, events: Vec::new(), keep: false, ..self.clone() }
+    pub(crate) fn for_companion(&self) -> Self {
+        let (tol, step) = (self.errors().companion(), self.step.map(|step| 2.0 * step));
+        Self { tol, step, events: Vec::new(), keep: false, ..self.clone() }
+    }
+
+    /// For a run that measures the error of a mesh, with this tolerance (1) and so many output times, from the equilibrium of `release`: by
+    /// the default integrator, without events, and whose samples only the callback receives.
+    #[must_use]
+    pub(crate) fn for_mesh<'b>(
+        &self,
+        tolerance: f64,
+        points: usize,
+        release: Option<&'b CompiledModel>,
+    ) -> TransientOptions<'b>
+    where
+        'a: 'b,
+    {
+        let (method, step, events) = (Integrator::default(), None, Vec::new());
+        TransientOptions { tol: tolerance, points, release, method, step, events, keep: false, ..self.clone() }
+    }
+
+    /// With other signals.
+    #[must_use]
+    pub fn with_signals(&self, signals: Vec<String>) -> Self {
+        Self { signals, ..self.clone() }
+    }
+
+    /// With another number of output times.
+    #[must_use]
+    pub fn with_points(&self, points: usize) -> Self {
+        Self { points, ..self.clone() }
     }
 }
 

@@ -14,6 +14,7 @@ use super::{ExportError, ExportRequest};
 use bimorph_analysis::readout::expression::Quantity;
 use bimorph_analysis::readout::ports::{OpenedPorts, PortResponse};
 use bimorph_analysis::readout::signal::{Signal, SignalView};
+use bimorph_base::ErrorBudget;
 use bimorph_device::PortKind;
 use bimorph_device::scale::PortScale;
 use bimorph_domains::thermal::HeatConductor;
@@ -276,7 +277,8 @@ fn trained(
     let refused = |error: ReductionError| ExportError::NotFlexible { why: reason(&error) };
     let joints = spanned(system).map_err(refused)?;
     let case = TrainingCase { system, inputs: inputs.clone() };
-    let training = train(&joints, &[case], TrainingOptions { tol: within, moments: MOMENTS }).map_err(refused)?;
+    let training = train(&joints, &[case], TrainingOptions { errors: ErrorBudget::of(within), moments: MOMENTS })
+        .map_err(refused)?;
     if training.space.size() == 0 {
         return Err(refused(ReductionError::NoInput));
     }

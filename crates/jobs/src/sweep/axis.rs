@@ -96,7 +96,7 @@ pub(super) fn chosen(options: &CompileOptions, settings: &[(String, Setting)]) -
             && let Some(option) = named(name)
         {
             // a value that is refused has been refused with its axis
-            let _ = options.choose(option, value_of(option, value));
+            options = options.with_choice(option, value_of(option, value)).unwrap_or(options);
         }
     }
     options

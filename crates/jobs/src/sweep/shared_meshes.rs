@@ -20,9 +20,6 @@ use bimorph_structure::Beam;
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-/// Fractions of the tolerance for which meshes are searched, from coarse to fine.
-const SHARES: [f64; 3] = [0.6, 0.2, 0.06];
-
 /// See the module.
 pub(super) struct SharedMeshes<'a> {
     spec: &'a SweepSpec,
@@ -31,7 +28,7 @@ pub(super) struct SharedMeshes<'a> {
     /// The analysis at the middle of the grid, for which meshes are searched.
     analysis: Cow<'a, SweepAnalysis>,
     first: OnceLock<Option<CompiledModel>>,
-    meshes: [OnceLock<Option<Vec<usize>>>; SHARES.len()],
+    meshes: [OnceLock<Option<Vec<usize>>>; 3],
 }
 
 impl<'a> SharedMeshes<'a> {
@@ -47,8 +44,8 @@ impl<'a> SharedMeshes<'a> {
         request: &MeshRequest<'_>,
     ) -> Result<Option<Assessment>, AnalysisError> {
         let Some(first) = self.like(drawn) else { return Ok(None) };
-        for (mesh, share) in self.meshes.iter().zip(SHARES) {
-            let Some(segments) = mesh.get_or_init(|| self.search(first, share)) else { continue };
+        for (mesh, tolerance) in self.meshes.iter().zip(first.options.errors().shared_meshes()) {
+            let Some(segments) = mesh.get_or_init(|| self.search(first, tolerance)) else { continue };
             let order = Mesh { segments: segments.clone(), estimated_error: None, modes_in_band: 0, passes: 0 };
             let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
             match assess(&drawn.clone().on(order).map_err(refused)?, request) {
@@ -64,7 +61,8 @@ impl<'a> SharedMeshes<'a> {
     /// The variant that meshes are searched for and the first of these meshes, where they fit this one.
     pub(super) fn first_mesh(&self, drawn: &ParsedStructure) -> Option<(&CompiledModel, &Vec<usize>)> {
         let first = self.like(drawn)?;
-        let segments = self.meshes[0].get_or_init(|| self.search(first, SHARES[0])).as_ref()?;
+        let segments =
+            self.meshes[0].get_or_init(|| self.search(first, first.options.errors().shared_meshes()[0])).as_ref()?;
         Some((first, segments))
     }
 
@@ -83,9 +81,9 @@ impl<'a> SharedMeshes<'a> {
         alike(&first.structure.beams, &drawn.structure.beams).then_some(first)
     }
 
-    /// The mesh that holds a fraction of the tolerance for one variant.
-    fn search(&self, first: &CompiledModel, share: f64) -> Option<Vec<usize>> {
-        let sharper = first.with_tolerance(first.options.errors().scaled(share).requested());
+    /// The mesh that holds this tolerance for one variant.
+    fn search(&self, first: &CompiledModel, tolerance: f64) -> Option<Vec<usize>> {
+        let sharper = first.with_tolerance(tolerance);
         let order = mesh::order(&sharper, &self.analysis.request()?).ok()?;
         order.estimated_error.is_some_and(|error| sharper.options.errors().holds(error)).then_some(order.segments)
     }

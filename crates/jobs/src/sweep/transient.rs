@@ -99,7 +99,7 @@ impl<'a> TransientSweep<'a> {
         // lanes have one voltage for all
         let same = self.spec.ports().next().is_none();
         let batch_results = same.then(|| {
-            let options = TransientOptions { tol, ..self.transient(&[]) };
+            let options = self.transient(&[]).with_tolerance(tol);
             means.guarded(|| {
                 batch_transient::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
             })
@@ -158,7 +158,7 @@ impl<'a> TransientSweep<'a> {
             None => {
                 let compiled = drawn.compile().map_err(|error| brief(&error))?;
                 let (compiled, _) = mesh::fitted_in_time(&compiled, &options).map_err(|error| error.to_string())?;
-                let steps = steps(&compiled, options.clone(), "by the end of the run", go_on);
+                let steps = steps(&compiled, &options, "by the end of the run", go_on);
                 Ok(prepared(compiled, &options, steps))
             }
         }
@@ -192,7 +192,7 @@ impl<'a> TransientSweep<'a> {
         let middle = drawn.filter(|drawn| alike(&shared.beams, &drawn.structure.beams));
         let middle = middle.and_then(|drawn| drawn.on(shared.order.clone()).ok());
         if let Some(compiled) = middle {
-            shared.steps = steps(&compiled, self.transient(&settings), IN_THE_MIDDLE, go_on);
+            shared.steps = steps(&compiled, &self.transient(&settings), IN_THE_MIDDLE, go_on);
         }
         Some(shared)
     }
@@ -228,8 +228,8 @@ fn prepared(compiled: CompiledModel, options: &TransientOptions<'_>, steps: Step
 }
 
 /// The steps of a run of this variant.
-fn steps(compiled: &CompiledModel, run: TransientOptions<'_>, place: &'static str, go_on: &dyn Fn() -> bool) -> Steps {
-    let options = TransientOptions { points: ERROR_SAMPLES, ..run };
+fn steps(compiled: &CompiledModel, run: &TransientOptions<'_>, place: &'static str, go_on: &dyn Fn() -> bool) -> Steps {
+    let options = run.with_points(ERROR_SAMPLES);
     let (error, tol) = step_error::step_error(&options, compiled, &mut |_| go_on());
     Steps { tol, error, place }
 }

@@ -11,6 +11,7 @@
 
 use super::error::{DiscretizeError, MAX_SEGMENTS};
 use crate::options::CompileOptions;
+use bimorph_base::ErrorBudget;
 use bimorph_structure::BeamRows;
 use bimorph_structure::{Beam, Structure};
 
@@ -82,6 +83,7 @@ pub fn segments(beam: &Beam, band: Option<f64>, tol: f64) -> usize {
     };
     let kl = waves(beam, band);
     // one beam beyond the limit of all is enough to be refused
-    let count = (kl / (1440.0 * tol).powf(0.25)).ceil().clamp(1.0, MAX_SEGMENTS as f64 + 1.0) as usize;
+    let count =
+        (kl / ErrorBudget::of(tol).within(1440.0).powf(0.25)).ceil().clamp(1.0, MAX_SEGMENTS as f64 + 1.0) as usize;
     if kl > 3.0 { count.max(2) } else { count }
 }

@@ -1,6 +1,6 @@
 //! Options of a model with one of them changed, and the division of their tolerance. No other place copies options to change one.
 
-use super::{CompileOptions, Formulation, Scheme};
+use super::{Anchors, CompileOptions, Formulation, Junctions, ModelOption, OptionError, OptionValue, Scheme};
 use bimorph_base::{ErrorBudget, Setting};
 
 impl CompileOptions {
@@ -33,6 +33,41 @@ impl CompileOptions {
         Self { formulation, ..self.clone() }
     }
 
+    /// With the inertia of sections that turn.
+    #[must_use]
+    pub fn with_rotary_inertia(&self) -> Self {
+        Self { rotary_inertia: true, ..self.clone() }
+    }
+
+    /// With so many segments of every beam, whatever the band.
+    #[must_use]
+    pub fn with_segments(&self, segments: usize) -> Self {
+        Self { segments: Some(segments), band: None, ..self.clone() }
+    }
+
+    /// With centrelines that meet in points and rigid anchors, as a frame has them.
+    #[must_use]
+    pub fn with_centrelines(&self) -> Self {
+        Self { junctions: Junctions::Centreline, anchors: Anchors::Rigid, ..self.clone() }
+    }
+
+    /// With all that the options say of each other: the scheme of the formulation, and what SUGAR had.
+    #[must_use]
+    pub fn in_effect(&self) -> Self {
+        let own = self.with_scheme(self.scheme.in_formulation(self.formulation));
+        if own.as_sugar { Self { linear: true, ..own.with_centrelines() } } else { own }
+    }
+
+    /// With an option of the table at another value.
+    ///
+    /// # Errors
+    /// A value that the option cannot have.
+    pub fn with_choice(&self, option: &ModelOption, value: OptionValue) -> Result<Self, OptionError> {
+        let mut changed = self.clone();
+        changed.choose(option, value)?;
+        Ok(changed)
+    }
+
     /// With these parameters of the netlist at these values, behind the others.
     #[must_use]
     pub fn with_settings(&self, settings: &[(String, Setting)]) -> Self {
@@ -46,6 +81,14 @@ impl CompileOptions {
     #[must_use]
     pub fn without_settings(&self) -> Self {
         Self { set: Vec::new(), ..self.clone() }
+    }
+
+    /// Without these parameters of the netlist.
+    #[must_use]
+    pub fn without(&self, names: &[String]) -> Self {
+        let mut changed = self.clone();
+        changed.set.retain(|(name, _)| !names.contains(name));
+        changed
     }
 
     /// With one parameter of the netlist at this number (SI).

@@ -46,7 +46,8 @@ pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> 
         };
         let tolerances = vec![options.errors().modes(); count];
         let aim = MeshTarget { band: frequency * (1.0 + ABOVE), tolerances, rigid: false };
-        let order = mesh_search::choose_for(structure, options, &aim)?.with_estimate_times(ErrorBudget::MODES);
+        let order =
+            mesh_search::choose_for(structure, options, &aim)?.with_estimate_times(ErrorBudget::of_modes_estimate(1.0));
         let done = order.estimated_error.is_none() || order.modes_in_band >= count;
         segments.clone_from(&order.segments);
         chosen = Some(order);

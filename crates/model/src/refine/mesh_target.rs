@@ -44,6 +44,6 @@ impl MeshTarget {
     /// Largest error over what is allowed for it, times the option `tol`.
     pub(super) fn worst(&self, options: &CompileOptions, relative: &[f64]) -> f64 {
         let over = |(m, e): (usize, &f64)| e.abs() / self.tolerance(options, m);
-        options.errors().requested() * relative.iter().enumerate().map(over).fold(0.0, f64::max)
+        options.errors().within(relative.iter().enumerate().map(over).fold(0.0, f64::max))
     }
 }

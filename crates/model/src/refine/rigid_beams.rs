@@ -71,7 +71,7 @@ pub(super) fn stiffen(
             && still
                 .iter()
                 .zip(&yields)
-                .all(|(rigid, elastic)| (rigid - elastic).abs() <= options.errors().requested() * elastic);
+                .all(|(rigid, elastic)| (rigid - elastic).abs() <= options.errors().within(*elastic));
         if firm {
             let now = solve_modes(bare, options, aim, &segments, Some(elastic))?;
             order.passes += 1;

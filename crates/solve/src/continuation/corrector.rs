@@ -6,6 +6,7 @@
 use super::family::LoadFamily;
 use super::options::ContinuationOptions;
 use crate::equilibrium::balanced;
+use bimorph_base::ErrorBudget;
 use bimorph_domains::System;
 use bimorph_multibody::BlockMatrix;
 use bimorph_multibody::factor::ZeroPivot;
@@ -108,7 +109,7 @@ impl Continuation {
             let stalled = small || (correction <= 1e-8 * reach && correction > 0.1 * last);
             let (fast, stands) = (correction <= 0.1 * last, correction > 0.9 * last);
             last = correction;
-            if correction <= self.options.tolerance * reach || stalled {
+            if correction <= ErrorBudget::of(self.options.tolerance).within(reach) || stalled {
                 // contact softens towards the touch, and Newton's method takes a quarter of the way each time there: a correction
                 // is small long before forces balance
                 let rounding = correction <= ROUNDING[0] * reach || (correction <= ROUNDING[1] * reach && stands);

@@ -9,6 +9,7 @@
 //! to where it ends.
 
 use super::{DegreeOfFreedom, Equations, Motion};
+use bimorph_base::ErrorBudget;
 use bimorph_domains::{Ramp, System};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyId, Model};
@@ -85,7 +86,7 @@ impl Equations for Bodies<'_> {
         let mass = mass + h * dragged.iter().map(|(_, _, c)| c).sum::<f64>();
         let reach = norm(&before.q).max(norm(&after.q)) + FLOOR * system.length_scale * mass.sqrt();
         let contact = contact_error(system, (before, after), error, tol);
-        relative_error([norm(&error.q), norm(&error.v)], h, tol * reach, contact)
+        relative_error([norm(&error.q), norm(&error.v)], h, ErrorBudget::of(tol).within(reach), contact)
     }
 
     fn worst(&self, error: &[Pose]) -> DegreeOfFreedom {
@@ -130,7 +131,8 @@ pub(crate) fn contact_error(system: &System, (before, after): (&Motion, &Motion)
     let kinetic = 0.5 * model.mass_product(&after.v, &after.v).max(model.mass_product(&before.v, &before.v));
     let work = system.contact_work(&after.q, &error.q);
     let weight = if system.loses() { OF_LOSS } else { 1.0 };
-    let energy = weight * (model.mass_product(&after.v, &error.v).abs() + work) / (tol * (kinetic + stored));
+    let lost = weight * (model.mass_product(&after.v, &error.v).abs() + work);
+    let energy = ErrorBudget::of(tol).used(lost, kinetic + stored);
     energy.hypot(system.contact_change([&before.q, &after.q], &error.q, PRESSED.1) / PRESSED.0)
 }
 

@@ -111,7 +111,7 @@ impl<'a, L: Loads> Constrained<'a, L> {
     pub fn first_step(&mut self, now: &Motion<f64>, tol: f64) -> Result<f64, StepFailure> {
         let mut a = self.zeros.clone();
         self.accelerations(0.0, &now.q, &now.v, &mut a)?;
-        let reach = tol * (self.norm(&now.q) + FLOOR);
+        let reach = ErrorBudget::of(tol).within(self.norm(&now.q) + FLOOR);
         let (a, v) = (self.norm(&a), self.norm(&now.v));
         let by_force = (2.0 * reach / a).sqrt();
         // rates are exact to first order: it is their change that counts, within ten times the error
@@ -181,7 +181,7 @@ impl<L: Loads> Equations for Constrained<'_, L> {
     fn share(&self, [before, after]: [&Motion<f64>; 2], error: &Motion<f64>, h: f64, tol: f64) -> f64 {
         let (eq, ev) = (self.norm(&error.q), self.norm(&error.v));
         let reach = self.norm(&before.q).max(self.norm(&after.q)) + FLOOR;
-        let share = eq.hypot(h * ev) / (tol * reach);
+        let share = ErrorBudget::of(tol).used(eq.hypot(h * ev), reach);
         if share.is_nan() { f64::INFINITY } else { share }
     }
 
@@ -189,7 +189,7 @@ impl<L: Loads> Equations for Constrained<'_, L> {
         self.at.q.copy_from_slice(&end.q);
         self.project(t, end);
         self.at.q.iter_mut().zip(&end.q).for_each(|(from, to)| *from -= to);
-        MOVED_SHARE * self.norm(&self.at.q) / (tol * (self.norm(before) + FLOOR))
+        ErrorBudget::of(tol).used(MOVED_SHARE * self.norm(&self.at.q), self.norm(before) + FLOOR)
     }
 
     /// The body whose joint has the largest of the coordinates against its size.
@@ -220,7 +220,7 @@ impl<L: Loads> Staged for Constrained<'_, L> {
 
     /// Until its coordinates are right to a fraction of what the step may be wrong.
     fn stage(&mut self, stage: &Stage<'_, f64>, a: &mut [f64], at: &mut Motion<f64>) -> Result<(), StepFailure> {
-        let tolerance = self.exact * (self.norm(stage.near) + FLOOR);
+        let tolerance = ErrorBudget::of(self.exact).within(self.norm(stage.near) + FLOOR);
         let (mut first, mut last) = (0.0, f64::INFINITY);
         self.anderson.restart();
         for iteration in 1..=MAX_ITERATIONS as i32 {

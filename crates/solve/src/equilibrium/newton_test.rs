@@ -1,5 +1,6 @@
 //! Tests of the corrections of Newton's method: divergence, convergence and change of branch, for one model or a lane of variants.
 
+use bimorph_base::ErrorBudget;
 use bimorph_domains::{Domain, System};
 use bimorph_multibody::planar::Pose;
 use std::ops::Deref;
@@ -38,7 +39,7 @@ impl Corrections {
         let reach = reach.max(1e-6 * self.scale);
         let stands = correction <= STALLED * reach && correction > 0.1 * self.last;
         self.last = correction;
-        correction <= tolerance * reach || (stands && is_rounding())
+        correction <= ErrorBudget::of(tolerance).within(reach) || (stands && is_rounding())
     }
 
     /// Whether an equilibrium at this distance from its prediction (m), which went so far (m), lies on the same branch.

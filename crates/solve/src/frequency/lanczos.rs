@@ -9,6 +9,7 @@
 //! Reference: B. N. Parlett, "The symmetric eigenvalue problem" (1998), chapter 13.
 
 use super::tridiagonal::{eigen, last_entries};
+use bimorph_base::ErrorBudget;
 use nalgebra::DMatrix;
 
 /// Ritz pairs, |θ| descending.
@@ -152,7 +153,8 @@ fn settled(diagonal: &[f64], beside: &[f64], wanted: usize, tolerance: f64) -> u
     let m = diagonal.len();
     let (values, last) = last_entries(diagonal, &beside[..m - 1]);
     let rest = |k: usize| (beside[m - 1] * last[k][0]).abs();
-    largest_of(&values, wanted).into_iter().take_while(|&k| rest(k) <= tolerance * values[k].abs()).count()
+    let settled = |k: usize| rest(k) <= ErrorBudget::of(tolerance).within(values[k].abs());
+    largest_of(&values, wanted).into_iter().take_while(|&k| settled(k)).count()
 }
 
 /// Largest eigenvalues of the tridiagonal matrix, and its vectors.

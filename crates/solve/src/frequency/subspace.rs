@@ -6,6 +6,7 @@
 //!
 //! Reference: K.-J. Bathe, "Finite Element Procedures" (2014), §11.6.
 
+use bimorph_base::ErrorBudget;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BlockMatrix, Model};
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
@@ -79,7 +80,7 @@ pub fn iterate(
         let (mu, v) = ritz(&(y.transpose() * z), &(y.transpose() * weigh(&y)))?;
         x = y * v;
         let settled = (mu.iter().zip(&lambda).take(wanted))
-            .all(|(mu, old)| (mu + shift - old).abs() <= tolerance * (mu.abs() + shift.abs()));
+            .all(|(mu, old)| (mu + shift - old).abs() <= ErrorBudget::of(tolerance).within(mu.abs() + shift.abs()));
         lambda = mu.iter().map(|mu| mu + shift).collect();
         if settled {
             let shapes = (x.column_iter())

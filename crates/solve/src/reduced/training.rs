@@ -42,8 +42,8 @@ const FEW: usize = 8;
 /// Requirements on a training.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrainingOptions {
-    /// Relative error of displacements (1).
-    pub tol: f64,
+    /// Relative error of displacements.
+    pub errors: ErrorBudget,
     /// Moments of each input; 0 for statics.
     pub moments: usize,
 }
@@ -156,7 +156,7 @@ impl Trainer<'_> {
             }
             sum
         };
-        let least = ErrorBudget::of(self.options.tol).singular_values(self.options.moments > 0) * most;
+        let least = self.options.errors.singular_value(self.options.moments > 0, most);
         let kept = order.into_iter().filter(|k| sigma[*k] > least && sigma[*k] > 0.0);
         let shapes: Vec<Vec<Pose>> = kept
             .map(|k| {
@@ -231,7 +231,7 @@ impl Trainer<'_> {
         }
         let largest = reach.iter().fold(0.0f64, |a, b| a.max(*b));
         // a moment that no equilibrium has moves as far as the smallest that counts
-        reach.iter_mut().for_each(|reach| *reach = reach.max(self.options.tol * largest));
+        reach.iter_mut().for_each(|reach| *reach = reach.max(self.options.errors.within(largest)));
         let directions = self.basis.iter().map(|b| b.x.clone()).collect();
         ReducedSpace::new(Arc::clone(self.joints), directions, reach, amplitude)
     }
@@ -256,7 +256,7 @@ impl Trainer<'_> {
     ) {
         let (system, inputs) = (case.system, &case.inputs);
         let mut full = FullCheck::new(system);
-        let share = ErrorBudget::of(self.options.tol).reduced_statics();
+        let share = self.options.errors.reduced_statics();
         for u in inputs.points(CHECKS, true) {
             let drive = inputs.drive(&u);
             if drive == inputs.none {

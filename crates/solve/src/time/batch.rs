@@ -10,6 +10,7 @@ use super::method::Motion;
 use super::pace::StepController;
 use super::rodas4::lanes::{Lane, LaneRodas4};
 use crate::equations::bodies::{self, FLOOR, contact_error, dragged};
+use bimorph_base::ErrorBudget;
 use bimorph_domains::{Ramp, System};
 use bimorph_multibody::batch::LANES;
 
@@ -26,8 +27,8 @@ pub struct BatchRun<'a> {
     pub motion: Motion,
     /// First step to try (s).
     pub h: f64,
-    /// Relative error that a step may make (1).
-    pub tol: f64,
+    /// Relative error that a step may make.
+    pub errors: ErrorBudget,
     /// Sees each accepted step.
     pub watcher: &'a mut dyn Watcher,
 }
@@ -54,7 +55,7 @@ pub enum Ended {
 /// A lane at work.
 struct RunningLane<'a> {
     number: usize,
-    tol: f64,
+    errors: ErrorBudget,
     watcher: &'a mut dyn Watcher,
     mass: f64,
     contacts: bool,
@@ -63,10 +64,15 @@ struct RunningLane<'a> {
 }
 
 impl<'a> RunningLane<'a> {
-    fn start(number: usize, system: &System, (pace, tol): (StepController, f64), watcher: &'a mut dyn Watcher) -> Self {
+    fn start(
+        number: usize,
+        system: &System,
+        (pace, errors): (StepController, ErrorBudget),
+        watcher: &'a mut dyn Watcher,
+    ) -> Self {
         Self {
             number,
-            tol,
+            errors,
             watcher,
             mass: system.model.bodies.iter().map(|b| b.mass).sum(),
             contacts: (0..system.members.len()).any(|g| system.touching(g).is_some()),
@@ -117,7 +123,7 @@ pub fn advance<'a>(
                 method.set_lane(k, variant.system, &variant.ramp, &variant.motion);
                 let pace = StepController::new((0.0, variant.ramp.dt), variant.h, ORDER);
                 lanes[k] = Some(Lane { system: variant.system, ramp: variant.ramp });
-                running[k] = Some(RunningLane::start(number, variant.system, (pace, variant.tol), variant.watcher));
+                running[k] = Some(RunningLane::start(number, variant.system, (pace, variant.errors), variant.watcher));
             }
         }
         if running.iter().all(Option::is_none) {
@@ -147,7 +153,7 @@ pub fn advance<'a>(
             } else {
                 let contact = if run.contacts {
                     method.error.take(k, &mut error_motion);
-                    contact_error(system, (&before, &after), &error_motion, run.tol)
+                    contact_error(system, (&before, &after), &error_motion, run.errors.requested())
                 } else {
                     0.0
                 };
@@ -186,5 +192,5 @@ fn relative_error(method: &LaneRodas4, k: usize, system: &System, run: &RunningL
     }
     let norms = &method.norms;
     let reach = norms.before[k].max(norms.after[k]) + FLOOR * system.length_scale * run.mass.sqrt();
-    bodies::relative_error([norms.error_q[k], norms.error_v[k]], h, run.tol * reach, contact)
+    bodies::relative_error([norms.error_q[k], norms.error_v[k]], h, run.errors.within(reach), contact)
 }

@@ -70,8 +70,8 @@ pub fn root(mut f: impl FnMut(f64) -> f64, a: (f64, f64), b: (f64, f64)) -> f64 
         }
         (x1, f1) = (x, fx);
         let best = if f2.abs() < f1.abs() { x2 } else { x1 };
-        let tolerance = 2.0 * f64::EPSILON * best.abs() + f64::MIN_POSITIVE;
-        let least = tolerance / (x2 - x1).abs();
+        let rounding = 2.0 * f64::EPSILON * best.abs() + f64::MIN_POSITIVE;
+        let least = rounding / (x2 - x1).abs();
         if least > 0.5 || f1 == 0.0 {
             return best;
         }

@@ -58,7 +58,7 @@ pub(crate) fn motion(
         let largest = corners.iter().map(|[_, v]| *v).max_by(|a, b| a.abs().total_cmp(&b.abs()));
         held.extend(largest.map(|volts| (port.clone(), volts)));
     }
-    let mut options = TransientOptions {
+    let options = TransientOptions {
         stop: asked.stop,
         signals: asked.signals.clone(),
         points: asked.points,
@@ -69,7 +69,7 @@ pub(crate) fn motion(
     let (fitted, _) = fitted_in_time(&drawn, &options)?;
     let chosen = if asked.signals.is_empty() { free_nodes(&fitted) } else { asked.signals.clone() };
     let picture = picture_signals(&fitted);
-    options.signals = chosen.iter().chain(&picture).cloned().collect();
+    let options = options.with_signals(chosen.iter().chain(&picture).cloned().collect());
     let samples = if asked.waves.is_empty() {
         let found = transient(&fitted, &options, &mut |_, _| (), &mut |fraction| progress(fraction))?;
         MotionSamples {

@@ -44,9 +44,8 @@ pub(crate) fn samples(
     };
     let limits = asked.limits.iter().map(|text| text.parse()).collect::<Result<Vec<YieldLimit>, SweepError>>();
     let limits = limits.map_err(Refusal::of)?;
-    let mut options = bench.compile_options(state);
     // a parameter that varies is set by its samples
-    options.set.retain(|(name, _)| !names.contains(name));
+    let options = bench.compile_options(state).without(&names);
     let bundle = bench.bundle(state)?;
     let watch = |done: sweep::SweepProgress| progress(done.done as f64 / done.points.max(1) as f64);
     let table = sweep::run(&spec, &bundle, &options, &watch).map_err(|error| match error {

@@ -11,6 +11,7 @@
 use super::Approaches;
 use super::monomials::Monomials;
 use super::shapes::MemberPoints;
+use bimorph_base::ErrorBudget;
 use bimorph_domains::capacitor::Capacitor;
 use bimorph_domains::{Law, PointLaw};
 use nalgebra::{DMatrix, DVector, SVD};
@@ -21,8 +22,6 @@ const FEW: usize = 12;
 const NEIGHBOURS: usize = 32;
 /// Most points of a field.
 const MOST: usize = 60;
-/// Error of the forces of a field, over the tolerance (1).
-const SHARE: f64 = 0.1;
 /// Weight that counts as 0 (1).
 const NONE: f64 = 1e-12;
 
@@ -78,7 +77,7 @@ pub(super) fn thinned(
     groups: &[Vec<usize>],
     states: &[Vec<f64>],
     monomials: &Monomials,
-    tol: f64,
+    errors: ErrorBudget,
 ) -> Approaches {
     let mut members = Vec::new();
     let mut rows: Vec<DVector<f64>> = Vec::new();
@@ -101,7 +100,7 @@ pub(super) fn thinned(
             kept.extend(match wanted {
                 PointKind::Field if chosen.len() > FEW => {
                     let of: Vec<&MixedPoint> = chosen.iter().map(|(_, point)| point).collect();
-                    weighted(&of, all, states, monomials, SHARE * tol)
+                    weighted(&of, all, states, monomials, errors.reduced_field())
                 }
                 PointKind::Contact | PointKind::Film if chosen.len() > NEIGHBOURS => joined(&chosen),
                 _ => chosen.into_iter().map(|(_, point)| point.clone()).collect(),

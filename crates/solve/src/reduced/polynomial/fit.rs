@@ -15,6 +15,7 @@ use super::monomials::{Monomials, Polynomials};
 use super::samples::FullEquilibrium;
 use super::shapes::{Probe, ShapeFunctions};
 use super::{Approaches, ClosureStrains, PolynomialModel};
+use bimorph_base::ErrorBudget;
 use bimorph_domains::System;
 use bimorph_multibody::forces::add_damping;
 use bimorph_multibody::joint_coordinates::sprung_loops::poses::TreeKinematics;
@@ -37,10 +38,6 @@ const STEP: f64 = 1e-4;
 const AT_REST: f64 = 0.1;
 /// Every so many points are kept apart.
 const APART: usize = 5;
-/// Root mean square of a strain of closures that is left out, over the root of the tolerance (√E).
-const CLOSURES: f64 = 0.03;
-/// The same of a shape of approaches, over the tolerance, relative to the largest (1).
-const SHAPES: f64 = 3e-3;
 
 /// Samples and matrices of a space, of which polynomials are made.
 pub(super) struct Fit<'a> {
@@ -156,9 +153,9 @@ impl<'a> Fit<'a> {
         }
         let all = Polynomials { monomials: Arc::clone(&monomials), coefficients: coefficients.transpose() };
         let [c, a, w, p] = counts;
-        let least = CLOSURES * tol.sqrt();
+        let (errors, least) = (ErrorBudget::of(tol), ErrorBudget::of(tol).closures());
         let closed = principal(&typical.columns(0, c).into_owned(), |_| least);
-        let near = principal(&typical.columns(c, a).into_owned(), |largest| SHAPES * tol * largest);
+        let near = principal(&typical.columns(c, a).into_owned(), |largest| errors.approaches(largest));
         let (thermal, built_in) = self.shapes.rests();
         let closures = ClosureStrains {
             strains: all.rows(0, c).mixed(&closed.transpose()),
@@ -174,7 +171,7 @@ impl<'a> Fit<'a> {
             .flat_map(|z| [0.6, 0.9, 1.0].map(|share| DVector::from_column_slice(z) * share))
             .map(|z| (self.rotation.tr_mul(&z) / scale).as_slice().to_vec())
             .collect();
-        let approaches = thinned(&approaches, groups, &of_gaps, &monomials, tol);
+        let approaches = thinned(&approaches, groups, &of_gaps, &monomials, errors);
         let (stiffness, thermal, built_in) = self.tree_forces(scale);
         PolynomialModel {
             scale,

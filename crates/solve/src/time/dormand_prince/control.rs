@@ -1,6 +1,7 @@
 //! From one time to another within tolerances: the PI rule for the step, the first step, and what may go wrong.
 
 use super::{DenseOutput, DormandPrince, PhasePoint, SecondOrder, continuous};
+use bimorph_base::ErrorBudget;
 use thiserror::Error;
 
 /// Bounds of an error: every component may be wrong by atol + rtol·|y| in a step, in the mean square over all.
@@ -23,7 +24,8 @@ impl Tolerances {
         let halves = [(&x.q, &a.q, &b.q, &self.atol_q), (&x.v, &a.v, &b.v, &self.atol_v)];
         for (half, (x, a, b, atol)) in halves.into_iter().enumerate() {
             for i in 0..n {
-                let share = x[i] / (atol[i] + self.rtol * a[i].abs().max(b[i].abs()));
+                let allowed = atol[i] + ErrorBudget::of(self.rtol).within(a[i].abs().max(b[i].abs()));
+                let share = x[i] / allowed;
                 let square = share * share;
                 sum += square;
                 if square > worst || square.is_nan() {
