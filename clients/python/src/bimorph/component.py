@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from .layout import Kind, Mechanism
+from .cells import Kind, Mechanism
 
 _POWERS = {"m": -6, "s": -6}
 """Powers of ten of the SI units in which settings are given: micrometres and microseconds."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from . import arguments
 from .errors import BimorphError, InvalidRequest, Unavailable
-from .server import program
+from .program import program
 
 
 @dataclass(frozen=True, eq=False)

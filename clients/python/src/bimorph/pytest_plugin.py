@@ -13,7 +13,8 @@ import pytest
 
 from . import ngspice as spice
 from .client import Client
-from .server import Server, program, serve
+from .program import program
+from .server import Server, serve
 
 
 @pytest.fixture(scope="session")

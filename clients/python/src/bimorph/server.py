@@ -8,7 +8,6 @@ import contextlib
 import os
 import shutil
 import subprocess
-import sysconfig
 import tempfile
 import threading
 from types import TracebackType
@@ -17,6 +16,7 @@ from typing import IO
 from . import arguments
 from .client import Client
 from .errors import BimorphError, Unavailable
+from .program import program
 
 _START_S = 30.0
 _STOP_S = 15.0
@@ -121,13 +121,6 @@ def serve(binary: str | os.PathLike[str] | None = None) -> Server:
     Raises :class:`Unavailable` if the program is not found or does not start.
     """
     return Server(binary).start()
-
-
-def program() -> str | None:
-    """Path of the ``bimorph`` program: from the environment variable ``BIMORPH_BIN``, else installed with this package, else from
-    ``PATH``."""
-    own = os.path.join(sysconfig.get_path("scripts"), "bimorph")
-    return os.environ.get("BIMORPH_BIN") or shutil.which(own) or shutil.which("bimorph")
 
 
 class _Running:

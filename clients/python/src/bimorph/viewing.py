@@ -23,6 +23,7 @@ from urllib.parse import urlsplit
 from .errors import BimorphError, Unavailable
 from .messages import setting_value
 from .options import WIRE
+from .program import program
 
 _REQUEST_S = 600.0
 _STOP_S = 10.0
@@ -44,8 +45,6 @@ class BenchProcess:
     """``bimorph view`` on the files of a netlist. It ends with this process, or with :meth:`close`."""
 
     def __init__(self, source: Any, voltages: dict[str, float]) -> None:
-        from .server import program  # it imports the models, which import this module
-
         binary = program()
         if binary is None:
             raise Unavailable("the program bimorph was not found; set BIMORPH_BIN to its path, or put it on PATH")
