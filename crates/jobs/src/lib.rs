@@ -4,4 +4,5 @@
 //! and the command run them.
 
 pub mod content;
+pub mod durable;
 pub mod sweep;

@@ -7,7 +7,6 @@
 
 mod axis;
 mod batched;
-pub mod checksummed_line;
 mod design;
 mod distribution;
 mod error;

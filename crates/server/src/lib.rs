@@ -11,7 +11,7 @@
 //! | `rpc`, `analyses`, `runs`, `stream`, `stream_request`, `chunks`, `pace` | handlers of the calls, streams, long replies |
 //! | `models`, `sessions`, `session`, `attached_session`, `usage` | compiled models, open sessions and their leases |
 //! | `session_states`, `small_signals`, `reply_size`, `snapshots` | states, spectra and snapshots of a session |
-//! | [`store`], `session_restore`, `disk` | sessions that outlive the server |
+//! | [`store`], `session_restore` | sessions that outlive the server |
 //! | `jobs` | analyses that outlive their connection |
 //! | `work`, `fair_semaphore` | computations off the event loop, scheduled fairly among clients |
 //! | `monitoring`, [`metrics`], [`log`], `status` | endpoints, counters, log lines, errors as gRPC statuses |
@@ -31,7 +31,6 @@ mod chunks;
 mod connection;
 mod default_quotas;
 pub mod descriptors;
-mod disk;
 mod fair_semaphore;
 mod framing;
 pub mod in_process;

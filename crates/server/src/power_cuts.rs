@@ -1,9 +1,9 @@
 //! A machine may lose its power at any moment: whatever of the files was not waited for may then be there, be gone, or be torn. In
 //! each such case a state whose keeping was answered is found again, with its model.
 
-use super::disk::DiskOperation;
 use super::store::SessionStore;
 use super::store::writer::SessionWriter;
+use bimorph_jobs::durable::disk::{Disk, DiskOperation};
 use bimorph_wire::proto;
 use std::collections::BTreeMap;
 use std::fs;
@@ -119,7 +119,7 @@ impl Machine {
 #[test]
 fn no_answered_state_is_lost_with_the_power() {
     let folder = tempfile::tempdir().expect("a folder");
-    let store = Arc::new(SessionStore::open(folder.path(), true, 1 << 20).expect("opens"));
+    let store = Arc::new(SessionStore::open_on(Disk::recording(), folder.path(), 1 << 20).expect("opens"));
     let source = proto::CompileRequest {
         bundle: Some(proto::Bundle {
             root: "a.net".into(),
@@ -128,7 +128,7 @@ fn no_answered_state_is_lost_with_the_power() {
         options: None,
     };
     let mut keeper = SessionWriter::new(&store, ID, MODEL, &source).expect("there is room");
-    let done = || store.disk().done.lock().expect("no panic").clone();
+    let done = || store.disk().operations();
     let mut answered = vec![(0, done().len())];
     for state in 1..=5_u64 {
         // longer and shorter ones in turn

@@ -3,7 +3,7 @@
 //! A name and a version of the envelope, a checksum, the version of the program (numbers may differ between versions, and a
 //! continuation promises the same bits), the id of the model, and the states.
 
-use bimorph_jobs::content::Fnv;
+use bimorph_jobs::durable::record::checksum;
 use tonic::Status;
 
 const NAME: &[u8; 16] = b"bimorph snapshot";
@@ -58,14 +58,6 @@ pub(super) fn open<'a>(model: &str, sealed: &'a [u8]) -> Result<&'a [u8], Status
 fn word(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (length, rest) = bytes.split_first()?;
     rest.split_at_checked(usize::from(*length))
-}
-
-/// FNV-1a, 128 bits (Fowler, Noll, Vo): against accidents, not against forgery, which harms only the forger's own
-/// session.
-pub(super) fn checksum(bytes: &[u8]) -> u128 {
-    let mut sum = Fnv::default();
-    sum.bytes(bytes);
-    sum.value()
 }
 
 #[cfg(test)]

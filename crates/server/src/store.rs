@@ -14,7 +14,7 @@ pub mod scan;
 pub(super) mod writer;
 
 use super::byte_quota::ByteQuota;
-use super::disk::{Disk, private};
+use bimorph_jobs::durable::disk::{Disk, private_file};
 use bimorph_wire::proto;
 use record::SessionRecord;
 use scan::{StoreError, StoreScan};
@@ -75,15 +75,19 @@ impl SessionStore {
     /// # Errors
     /// [`StoreError`].
     pub(super) fn open(folder: &Path, sync: bool, most: usize) -> Result<Self, StoreError> {
+        Self::open_on(Disk::new(sync), folder, most)
+    }
+
+    /// The same on this disk.
+    pub(super) fn open_on(disk: Disk, folder: &Path, most: usize) -> Result<Self, StoreError> {
         let wrong = |reason| StoreError::Folder { path: folder.to_owned(), reason };
         for path in [folder.to_owned(), folder.join("sessions"), folder.join("models"), folder.join("jobs")] {
             DirBuilder::new().recursive(true).mode(0o700).create(path).map_err(wrong)?;
         }
-        let disk = Disk::new(sync);
         // the names of new folders are kept by those that they are in
         let above = folder.parent().filter(|path| !path.as_os_str().is_empty()).unwrap_or(Path::new("."));
         [folder, above].iter().try_for_each(|folder| disk.keep_names(folder)).map_err(wrong)?;
-        let lock = private().open(folder.join("lock")).map_err(wrong)?;
+        let lock = private_file().open(folder.join("lock")).map_err(wrong)?;
         // one that is about to end, or a process that it was about to begin, may still hold it
         let patience = Instant::now() + PATIENCE;
         loop {
@@ -236,23 +240,14 @@ impl SessionStore {
     }
 
     fn keep_model(&self, id: &str, source: &proto::CompileRequest) -> io::Result<()> {
-        let models = self.folder.join("models");
-        let path = models.join(id);
+        let path = self.folder.join("models").join(id);
         let bytes = model_record::write(source);
         // one that the machine left half written when it lost its power is not what it should be
         if fs::read(&path).is_ok_and(|held| held == bytes) {
             return Ok(());
         }
         let unfinished = path.with_extension(format!("{}.new", std::process::id()));
-        let written = self.counted(&path, bytes.len(), || {
-            self.disk.write(&unfinished, &bytes)?;
-            self.disk.rename(&unfinished, &path)?;
-            self.disk.keep_names(&models)
-        });
-        if written.is_err() {
-            let _ = fs::remove_file(unfinished);
-        }
-        written
+        self.counted(&path, bytes.len(), || self.disk.replace(&path, &unfinished, &bytes))
     }
 
     /// The netlist and the options of a model.

@@ -2,17 +2,16 @@
 //! one line of JSON for each finished point. On resumption the points are read back bit by bit. A truncated last line
 //! counts as unfinished, and its point is computed again. Each line has a checksum, so that damaged lines are rejected.
 
-use super::checksummed_line::{opened, sealed};
 use super::spec::SweepSpec;
 use crate::content::Fnv;
+use crate::durable::line::{opened, sealed};
+use crate::durable::log::{AppendLog, LogRefusal};
 use bimorph_base::{Bundle, Setting};
 use bimorph_model::options::CompileOptions;
 use serde::{Deserialize, Serialize};
-use std::fs::{File, TryLockError};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use thiserror::Error;
 
 /// Longest time between two points and their way to the disk. A stop of the process loses nothing, a stop of the machine so much.
@@ -80,17 +79,8 @@ pub enum JournalError {
 /// The file, open for more points.
 #[derive(Debug)]
 pub struct Journal {
-    path: PathBuf,
-    file: Mutex<Open>,
+    log: AppendLog,
     damaged: usize,
-}
-
-#[derive(Debug)]
-struct Open {
-    file: File,
-    /// Bytes of whole lines.
-    good: u64,
-    synced: Instant,
 }
 
 /// The name of a sweep: the same for the same points and the same program.
@@ -123,24 +113,21 @@ impl Journal {
     /// # Errors
     /// [`JournalError`]: a file exists without `resume`, it is of another sweep, or the file system refuses.
     pub fn open(path: &Path, name: &str, resume: bool) -> Result<(Self, Vec<JournalRow>), JournalError> {
-        let failed = |source| JournalError::Io { path: path.to_owned(), source };
-        let mut file = File::options().read(true).append(true).create(true).open(path).map_err(failed)?;
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => return Err(JournalError::Busy { path: path.to_owned() }),
-            // a file system without locks: the documentation requires a separate file for each sweep
-            Err(TryLockError::Error(_)) | Ok(()) => {}
-        }
-        let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).map_err(failed)?;
-        if bytes.contains(&b'\n') && !resume {
-            return Err(JournalError::Exists { path: path.to_owned() });
-        }
-        let JournalContents { known, good, damaged } = read(path, name, &bytes)?;
-        file.set_len(good as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
-        let open = Open { file, good: good as u64, synced: Instant::now() };
-        let journal = Self { path: path.to_owned(), file: Mutex::new(open), damaged };
-        if good == 0 {
-            journal.write(&head(name).map_err(failed)?, |_| true)?;
+        let refused = |refusal| match refusal {
+            LogRefusal::Busy => JournalError::Busy { path: path.to_owned() },
+            LogRefusal::Io(source) => JournalError::Io { path: path.to_owned(), source },
+        };
+        let check = |bytes: &[u8]| {
+            if bytes.contains(&b'\n') && !resume {
+                return Err(JournalError::Exists { path: path.to_owned() });
+            }
+            let JournalContents { known, good, damaged } = read(path, name, bytes)?;
+            Ok(((known, damaged, good == 0), good as u64))
+        };
+        let (log, (known, damaged, is_new)) = AppendLog::open(path, refused, check)?;
+        let journal = Self { log, damaged };
+        if is_new {
+            head(name).and_then(|line| journal.log.append(&line, |_| true)).map_err(|error| journal.failed(error))?;
         }
         Ok((journal, known))
     }
@@ -159,16 +146,13 @@ impl Journal {
     /// # Errors
     /// [`JournalError::Io`].
     pub fn keep(&self, kept: &JournalRow) -> Result<(), JournalError> {
-        let line = lines(std::slice::from_ref(kept)).map_err(|error| self.failed(error))?;
-        self.write(&line, |open| open.synced.elapsed() >= SYNC)
+        let line = lines(std::slice::from_ref(kept));
+        line.and_then(|line| self.log.append(&line, |since| since >= SYNC)).map_err(|error| self.failed(error))
     }
 
-    /// Adds points, as text of [`lines`], and waits for the disk, where `sync` says so: all of them, or none.
-    ///
-    /// # Errors
-    /// [`JournalError::Io`].
-    pub fn keep_all(&self, lines: &[u8], sync: bool) -> Result<(), JournalError> {
-        self.write(lines, |_| sync)
+    /// Its file, to which text of [`lines`] can be added.
+    pub fn log(&self) -> &AppendLog {
+        &self.log
     }
 
     /// Lines that were damaged when it was opened: their points are to be computed again.
@@ -176,34 +160,8 @@ impl Journal {
         self.damaged
     }
 
-    /// Where it is.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Bytes of whole lines that it has.
-    pub fn bytes(&self) -> u64 {
-        self.file.lock().unwrap_or_else(PoisonError::into_inner).good
-    }
-
-    fn write(&self, lines: &[u8], sync: impl FnOnce(&Open) -> bool) -> Result<(), JournalError> {
-        let mut open = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        // one call: a line is there whole, or is the last
-        let mut written = open.file.write_all(lines);
-        if written.is_ok() && sync(&open) {
-            written = open.file.sync_data();
-            open.synced = Instant::now();
-        }
-        match written {
-            Ok(()) => open.good += lines.len() as u64,
-            // half a line would hide those after it
-            Err(_) => drop(open.file.set_len(open.good)),
-        }
-        written.map_err(|source| self.failed(source))
-    }
-
     fn failed(&self, source: io::Error) -> JournalError {
-        JournalError::Io { path: self.path.clone(), source }
+        JournalError::Io { path: self.log.path().to_owned(), source }
     }
 
     /// Removes the file: its table has been written.
@@ -211,7 +169,7 @@ impl Journal {
     /// # Errors
     /// [`JournalError::Io`].
     pub fn finish(self) -> Result<(), JournalError> {
-        std::fs::remove_file(&self.path).map_err(|source| JournalError::Io { path: self.path, source })
+        std::fs::remove_file(self.log.path()).map_err(|source| self.failed(source))
     }
 }
 

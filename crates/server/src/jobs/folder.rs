@@ -3,11 +3,11 @@
 //! in the journal, at any end of the server, and a job without its last file continues. All of it counts among the
 //! bytes of the folder of states.
 
-use super::super::snapshots::checksum;
 use super::super::store::SessionStore;
 use super::super::store::scan::is_id;
 use super::job_origin::JobOrigin;
-use bimorph_jobs::sweep::checksummed_line::{opened, sealed};
+use bimorph_jobs::durable::line;
+use bimorph_jobs::durable::record;
 use bimorph_jobs::sweep::journal::{self, Journal, JournalError, JournalRow};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -68,13 +68,7 @@ pub(super) fn begin(store: &Arc<SessionStore>, id: &str, asked: &JobOrigin, requ
     let file = JobFile::of(store, id, &asked.sweep);
     let head = head(asked, request)?;
     file.take(head.len())?;
-    let written = || {
-        let (path, unfinished) = (file.path("job"), file.path("new"));
-        store.disk().write(&unfinished, &head)?;
-        store.disk().rename(&unfinished, &path)?;
-        store.disk().keep_names(&folder(store))
-    };
-    match written() {
+    match store.disk().replace(&file.path("job"), &file.path("new"), &head) {
         Ok(()) => Ok(file),
         Err(error) => {
             file.remove();
@@ -119,24 +113,16 @@ fn folder(store: &SessionStore) -> PathBuf {
 
 fn head(asked: &JobOrigin, request: &[u8]) -> io::Result<Vec<u8>> {
     let asked = serde_json::to_vec(asked)?;
-    let mut out = Vec::with_capacity(48 + asked.len() + request.len());
-    out.extend(HEAD);
-    out.extend([0; 16]);
-    out.extend((asked.len() as u64).to_le_bytes());
-    out.extend(asked);
-    out.extend(request);
-    let sum = checksum(&out[32..]);
-    out[16..32].copy_from_slice(&sum.to_le_bytes());
-    Ok(out)
+    Ok(record::sealed(HEAD, 8 + asked.len() + request.len(), |out| {
+        out.extend((asked.len() as u64).to_le_bytes());
+        out.extend(&asked);
+        out.extend(request);
+    }))
 }
 
 /// None for a file that is not whole.
 fn read_head(bytes: &[u8]) -> Option<StoredRequest> {
-    let (head, rest) = bytes.split_at_checked(32)?;
-    if !head.starts_with(HEAD) || head[16..] != checksum(rest).to_le_bytes() {
-        return None;
-    }
-    let (length, rest) = rest.split_at_checked(8)?;
+    let (length, rest) = record::opened(HEAD, bytes)?.split_at_checked(8)?;
     let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
     let (asked, request) = rest.split_at_checked(length)?;
     Some((serde_json::from_slice(asked).ok()?, request.to_vec()))
@@ -168,7 +154,7 @@ impl JobFile {
         let head = read_head(&bytes).ok_or_else(strange)?;
         // a damaged one counts as missing: the job continues
         let end = there("end")?.and_then(|bytes| {
-            let end: Option<JobOutcome> = opened(&bytes).and_then(|object| serde_json::from_slice(&object).ok());
+            let end: Option<JobOutcome> = line::opened(&bytes).and_then(|object| serde_json::from_slice(&object).ok());
             if end.is_none() {
                 tracing::warn!(job = self.id, "its end is damaged, so it continues");
             }
@@ -201,7 +187,8 @@ impl JobFile {
     pub(super) fn open(&mut self) -> io::Result<Vec<JournalRow>> {
         let path = self.path("rows");
         let before = self.size("rows");
-        let (journal, rows) = self.store.disk().journal(&path, &self.sweep).map_err(io_error)?;
+        let open = || Journal::open(&path, &self.sweep, true).map_err(io_error);
+        let (journal, rows) = self.store.disk().open(&path, open)?;
         if journal.damaged() > 0 {
             tracing::warn!(
                 job = self.id,
@@ -209,7 +196,7 @@ impl JobFile {
                 "lines of its journal are damaged: their points are computed again"
             );
         }
-        let bytes = journal.bytes();
+        let bytes = journal.log().bytes();
         if bytes > before {
             self.take(usize::try_from(bytes - before).unwrap_or(usize::MAX))?;
             self.store.disk().keep_names(&folder(&self.store))?;
@@ -237,7 +224,7 @@ impl JobFile {
         let lines = journal::lines(rows)?;
         self.take(lines.len())?;
         let Some(journal) = &self.journal else { return Err(io::Error::other("its journal is closed")) };
-        self.store.disk().append(journal, &lines).map_err(io_error).inspect_err(|_| self.give_back(lines.len()))
+        self.store.disk().append(journal.log(), &lines).inspect_err(|_| self.give_back(lines.len()))
     }
 
     /// Keeps how it ended. When this returns it is on the disk. Its few bytes may exceed the limit, so that a job on a
@@ -246,23 +233,18 @@ impl JobFile {
     /// # Errors
     /// The system's error.
     pub(super) fn end(&self, end: &JobOutcome) -> io::Result<()> {
-        let end =
-            JobOutcome { bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), Journal::bytes), ..end.clone() };
-        let (bytes, path, unfinished) = (sealed(serde_json::to_vec(&end)?), self.path("end"), self.path("new"));
+        let end = JobOutcome {
+            bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), |rows| rows.log().bytes()),
+            ..end.clone()
+        };
+        let bytes = line::sealed(serde_json::to_vec(&end)?);
         let before = usize::try_from(self.size("end")).unwrap_or(usize::MAX);
         self.store.room().count(0, bytes.len());
         self.bytes.fetch_add(bytes.len(), Ordering::Relaxed);
-        let written = self.store.disk().write(&unfinished, &bytes);
-        let written = written.and_then(|()| self.store.disk().rename(&unfinished, &path));
-        match written.and_then(|()| self.store.disk().keep_names(&folder(&self.store))) {
-            Ok(()) => self.give_back(before),
-            Err(error) => {
-                let _ = fs::remove_file(unfinished);
-                self.give_back(bytes.len());
-                return Err(error);
-            }
-        }
-        Ok(())
+        let written = self.store.disk().replace(&self.path("end"), &self.path("new"), &bytes);
+        // what it had before, or what it did not get
+        self.give_back(if written.is_ok() { before } else { bytes.len() });
+        written
     }
 
     /// Closes its journal.

@@ -5,6 +5,7 @@ use super::super::power_cuts::{Machine, UnsyncedBytes};
 use super::super::store::SessionStore;
 use super::folder::{self, JobOutcome, StoredJob};
 use super::job_origin::JobOrigin;
+use bimorph_jobs::durable::disk::Disk;
 use bimorph_jobs::sweep::journal::JournalRow;
 use std::sync::Arc;
 
@@ -46,8 +47,8 @@ enum Answered {
 #[test]
 fn nothing_that_a_job_gave_out_is_lost_with_the_power() {
     let folder = tempfile::tempdir().expect("a folder");
-    let store = Arc::new(SessionStore::open(folder.path(), true, 1 << 20).expect("opens"));
-    let done = || store.disk().done.lock().expect("no panic").clone();
+    let store = Arc::new(SessionStore::open_on(Disk::recording(), folder.path(), 1 << 20).expect("opens"));
+    let done = || store.disk().operations();
     let mut answered = Vec::new();
     let mut file = folder::begin(&store, ID, &asked(), REQUEST).expect("there is room");
     assert!(file.open().expect("opens").is_empty());

@@ -1,30 +1,20 @@
 //! Stored netlist and options of a model, as bytes with a checksum.
 
-use crate::snapshots::checksum;
+use bimorph_jobs::durable::record::{opened, sealed};
 use bimorph_wire::proto;
 use prost::Message;
 
 /// Magic bytes of a file.
 const HEAD: &[u8; 16] = b"bimorph models 1";
-/// Head and checksum.
-const BEFORE: usize = 32;
 
 /// The bytes of a file.
 pub(super) fn write(source: &proto::CompileRequest) -> Vec<u8> {
-    let mut out = Vec::with_capacity(BEFORE + source.encoded_len());
-    out.extend(HEAD);
-    out.extend([0; 16]);
-    out.extend(source.encode_to_vec());
-    let sum = checksum(&out[BEFORE..]);
-    out[16..BEFORE].copy_from_slice(&sum.to_le_bytes());
-    out
+    sealed(HEAD, source.encoded_len(), |out| out.extend(source.encode_to_vec()))
 }
 
 /// None for a file that is damaged, or of another version.
 pub(super) fn read(bytes: &[u8]) -> Option<proto::CompileRequest> {
-    let (head, body) = bytes.split_at_checked(BEFORE)?;
-    let good = head.starts_with(HEAD) && head[16..] == checksum(body).to_le_bytes();
-    good.then(|| proto::CompileRequest::decode(body).ok()).flatten()
+    proto::CompileRequest::decode(opened(HEAD, bytes)?).ok()
 }
 
 #[cfg(test)]

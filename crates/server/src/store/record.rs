@@ -1,11 +1,11 @@
 //! Stored state of a session, as bytes with a checksum.
 
-use crate::snapshots::checksum;
+use bimorph_jobs::durable::record;
 
 /// Magic bytes of a file.
 pub(crate) const HEAD: &[u8; 16] = b"bimorph states 2";
-/// Head, checksum, sequence number, token, lease, length.
-const BEFORE: usize = 16 + 16 + 4 * 8;
+/// Sequence number, token, lease, length.
+const BEFORE: usize = 4 * 8;
 
 /// Stored state of a session.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,25 +21,20 @@ pub(crate) struct SessionRecord {
 
 impl SessionRecord {
     pub(crate) fn write(sequence: u64, accepted: u64, lease_ms: u64, sealed: &[u8]) -> Vec<u8> {
-        let mut out = Vec::with_capacity(BEFORE + sealed.len());
-        out.extend(HEAD);
-        out.extend([0; 16]);
-        for word in [sequence, accepted, lease_ms, sealed.len() as u64] {
-            out.extend(word.to_le_bytes());
-        }
-        out.extend(sealed);
-        let sum = checksum(&out[32..]);
-        out[16..32].copy_from_slice(&sum.to_le_bytes());
-        out
+        record::sealed(HEAD, BEFORE + sealed.len(), |out| {
+            for word in [sequence, accepted, lease_ms, sealed.len() as u64] {
+                out.extend(word.to_le_bytes());
+            }
+            out.extend(sealed);
+        })
     }
 
     /// None for a file that is not whole: the server ended while it was written.
     pub(crate) fn read(bytes: &[u8]) -> Option<Self> {
-        let (head, rest) = bytes.split_at_checked(32)?;
-        let word = |k: usize| rest.get(8 * k..8 * k + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
-        let [sequence, accepted, lease_ms, length] = [word(0)?, word(1)?, word(2)?, word(3)?];
-        let whole = rest.get(..usize::try_from(length).ok()?.checked_add(BEFORE - 32)?)?;
-        let good = head.starts_with(HEAD) && head[16..] == checksum(whole).to_le_bytes();
-        good.then(|| Self { sequence, accepted, lease_ms, sealed: whole[BEFORE - 32..].to_vec() })
+        let word = |body: &[u8], k: usize| Some(u64::from_le_bytes(body.get(8 * k..8 * k + 8)?.try_into().ok()?));
+        let length = |body: &[u8]| usize::try_from(word(body, 3)?).ok()?.checked_add(BEFORE);
+        let body = record::opened_first(HEAD, bytes, length)?;
+        let [sequence, accepted, lease_ms] = [word(body, 0)?, word(body, 1)?, word(body, 2)?];
+        Some(Self { sequence, accepted, lease_ms, sealed: body.get(BEFORE..)?.to_vec() })
     }
 }

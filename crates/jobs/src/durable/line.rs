@@ -1,6 +1,6 @@
 //! Lines of JSON with a checksum: a damaged line is rejected.
 
-use crate::content::Fnv;
+use super::record::checksum;
 
 /// The text before the checksum of a line, and its length including the text after it.
 const SUM: &[u8] = b",\"sum\":\"";
@@ -8,16 +8,10 @@ const SUMMED: usize = SUM.len() + 32 + 3;
 
 /// An object of JSON with the sum of its bytes, as a line.
 pub fn sealed(mut object: Vec<u8>) -> Vec<u8> {
-    let sum = sum(&object);
+    let sum = checksum(&object);
     object.pop();
     object.extend([SUM, format!("{sum:032x}\"}}\n").as_bytes()].concat());
     object
-}
-
-fn sum(object: &[u8]) -> u128 {
-    let mut sum = Fnv::default();
-    sum.bytes(object);
-    sum.value()
 }
 
 /// The object of such a line; none for one that is damaged.
@@ -25,7 +19,7 @@ pub fn opened(line: &[u8]) -> Option<Vec<u8>> {
     let (object, end) = line.split_at_checked(line.len().checked_sub(SUMMED)?)?;
     let written = std::str::from_utf8(end.strip_prefix(SUM)?.strip_suffix(b"\"}\n")?).ok()?;
     let object = [object, b"}"].concat();
-    (u128::from_str_radix(written, 16).ok()? == sum(&object)).then_some(object)
+    (u128::from_str_radix(written, 16).ok()? == checksum(&object)).then_some(object)
 }
 
 #[cfg(test)]
