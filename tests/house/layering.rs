@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// Crates from the bottom up, each with the crates that it may depend on.
-const CRATES: [(&str, &[&str]); 18] = [
+const CRATES: [(&str, &[&str]); 19] = [
     ("base", &[]),
     ("structure", &["base"]),
     ("document", &["base", "structure"]),
@@ -22,9 +22,10 @@ const CRATES: [(&str, &[&str]); 18] = [
     ("export", &["base", "multibody", "domains", "solve", "results", "model", "analysis", "device"]),
     ("jobs", &["base", "structure", "netlist", "model", "analysis"]),
     ("cosim", &["structure", "results"]),
-    ("view", &["base", "structure", "netlist", "layout", "results", "model", "analysis", "device", "jobs", "cosim"]),
+    ("http", &[]),
+    ("view", &["base", "structure", "netlist", "layout", "results", "model", "analysis", "device", "jobs", "cosim", "http"]),
     ("wire", &["base", "solve", "model", "analysis", "device", "export", "jobs"]),
-    ("server", &["base", "netlist", "layout", "model", "analysis", "device", "export", "jobs", "wire"]),
+    ("server", &["base", "netlist", "layout", "model", "analysis", "device", "export", "jobs", "http", "wire"]),
 ];
 
 /// Modules of one crate from the bottom up: a module names modules before it alone. `*` is all that is not listed.

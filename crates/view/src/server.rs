@@ -14,12 +14,11 @@ use crate::guard::{Origins, PageGuard};
 use crate::page;
 use crate::question::{Ask, Question};
 use crate::refusal::Refusal;
+use bimorph_http::HttpLimits;
 use http_body_util::{BodyExt, Limited};
 use hyper::body::{Body, Bytes, Frame, Incoming};
 use hyper::header::{HeaderMap, HeaderName, HeaderValue};
 use hyper::{Method, Request, Response, StatusCode};
-use hyper_util::rt::{TokioIo, TokioTimer};
-use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::fmt::{Debug, Formatter};
 use std::io;
@@ -31,12 +30,10 @@ use std::time::{Duration, Instant, SystemTime};
 use thiserror::Error;
 use tokio::net::TcpListener;
 use tokio::sync::{broadcast, mpsc};
-use tokio::task::{AbortHandle, JoinSet};
 
-/// Connections open at once; the oldest makes room for a new one.
-const MAX_CONNECTIONS: usize = 64;
-/// Longest time until the head of a request has come.
-const HEAD_PATIENCE: Duration = Duration::from_secs(10);
+/// Limits of connections. They stay open: a page sends many requests and reads events.
+const LIMITS: HttpLimits =
+    HttpLimits { connections: 64, head: Duration::from_secs(10), head_bytes: 64 * 1024, whole: None };
 /// Longest time until the body of a request has come.
 const BODY_PATIENCE: Duration = Duration::from_secs(20);
 /// Largest body of a request (bytes): the edited netlist, escaped, and the rest.
@@ -124,35 +121,9 @@ impl ViewServer {
     /// Serves until the process ends.
     pub fn run(self) {
         let Self { runtime, listener, service } = self;
-        runtime.block_on(accept(listener, service));
-    }
-}
-
-async fn accept(listener: TcpListener, service: Arc<Service>) {
-    let mut tasks = JoinSet::new();
-    let mut open: VecDeque<AbortHandle> = VecDeque::new();
-    loop {
-        let Ok((socket, _)) = listener.accept().await else {
-            tokio::time::sleep(Duration::from_millis(50)).await;
-            continue;
-        };
-        while tasks.try_join_next().is_some() {}
-        open.retain(|task| !task.is_finished());
-        if open.len() >= MAX_CONNECTIONS
-            && let Some(oldest) = open.pop_front()
-        {
-            oldest.abort();
-        }
-        let _ = socket.set_nodelay(true);
-        let service = Arc::clone(&service);
-        open.push_back(tasks.spawn(async move {
-            let each = hyper::service::service_fn(move |request| {
-                let service = Arc::clone(&service);
-                async move { Ok::<_, Infallible>(service.reply(request).await) }
-            });
-            let mut builder = hyper::server::conn::http1::Builder::new();
-            builder.timer(TokioTimer::new()).header_read_timeout(HEAD_PATIENCE).max_buf_size(64 * 1024);
-            let _ = builder.serve_connection(TokioIo::new(socket), each).await;
+        runtime.block_on(bimorph_http::serve(listener, LIMITS, move |request| {
+            let service = Arc::clone(&service);
+            async move { service.reply(request).await }
         }));
     }
 }

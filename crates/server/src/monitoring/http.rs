@@ -4,19 +4,16 @@
 
 use super::report::{MonitoringState, busy, text};
 use crate::server::ServeError;
+use bimorph_http::HttpLimits;
 use bimorph_wire::address::Address;
-use hyper_util::rt::{TokioIo, TokioTimer};
-use std::collections::VecDeque;
-use std::convert::Infallible;
 use std::time::Duration;
 use tokio::net::TcpListener;
-use tokio::task::{AbortHandle, JoinSet};
 use tonic::codegen::http::{Method, Request, Response, StatusCode};
 
-/// Connections open at once.
-const MAX_CONNECTIONS: usize = 16;
-/// Longest time for one.
+/// Longest time of a connection.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// Limits of connections. Each answers once.
+const LIMITS: HttpLimits = HttpLimits { connections: 16, head: PATIENCE, head_bytes: 8192, whole: Some(PATIENCE) };
 
 /// Opens the address.
 pub(crate) async fn bind(address: &Address) -> Result<(TcpListener, Address), ServeError> {
@@ -27,35 +24,13 @@ pub(crate) async fn bind(address: &Address) -> Result<(TcpListener, Address), Se
     Ok((listener, bound))
 }
 
-/// Answers until it is dropped. A request is answered as it comes, so those that are open have not asked, or do not read: where all
-/// places are taken, the oldest one makes room.
+/// Answers until it is dropped.
 pub(crate) async fn answer(listener: TcpListener, overseen: MonitoringState) {
-    // ends all that are open when this is dropped
-    let mut tasks = JoinSet::new();
-    let mut open: VecDeque<AbortHandle> = VecDeque::new();
-    loop {
-        let Ok((socket, _)) = listener.accept().await else {
-            tokio::time::sleep(Duration::from_millis(50)).await;
-            continue;
-        };
-        while tasks.try_join_next().is_some() {}
-        open.retain(|task| !task.is_finished());
-        if open.len() >= MAX_CONNECTIONS
-            && let Some(oldest) = open.pop_front()
-        {
-            oldest.abort();
-        }
-        let overseen = overseen.clone();
-        open.push_back(tasks.spawn(async move {
-            let service = hyper::service::service_fn(move |request| {
-                let reply = reply(&request, &overseen);
-                async { Ok::<_, Infallible>(reply) }
-            });
-            let mut builder = hyper::server::conn::http1::Builder::new();
-            builder.timer(TokioTimer::new()).header_read_timeout(PATIENCE).keep_alive(false).max_buf_size(8192);
-            let _ = tokio::time::timeout(PATIENCE, builder.serve_connection(TokioIo::new(socket), service)).await;
-        }));
-    }
+    let answer = move |request: Request<_>| {
+        let reply = reply(&request, &overseen);
+        async { reply }
+    };
+    bimorph_http::serve(listener, LIMITS, answer).await;
 }
 
 fn reply<B>(request: &Request<B>, overseen: &MonitoringState) -> Response<String> {
