@@ -57,13 +57,14 @@ async fn next<T>(
     }
 }
 
-/// One watcher less of a job: rows of one that has ended need not stay in memory.
-fn unwatched(job: &Arc<Job>, standing: watch::Receiver<JobState>) {
+/// One watcher less of a job: rows of one that has ended need not stay in memory. They have left it when this returns, and so when the
+/// client sees its stream end: what it requests next is read from the disk.
+async fn unwatched(job: &Arc<Job>, standing: watch::Receiver<JobState>) {
     drop(standing);
     if job.has_ended() {
         let job = Arc::clone(job);
         // it may block on a reader of the disk
-        tokio::task::spawn_blocking(move || job.unload());
+        let _ = tokio::task::spawn_blocking(move || job.unload()).await;
     }
 }
 
@@ -79,6 +80,7 @@ pub(super) fn watch<T: Send + 'static>(job: Arc<Job>, shutdown: &Shutdown, say: 
     let (sender, receiver) = mpsc::channel(1);
     let (mut standing, shutdown) = (job.watch(), shutdown.clone());
     tokio::spawn(async move {
+        // the sender is dropped with this block, after the rows
         loop {
             let now = standing.borrow_and_update().clone();
             let last = now.end.is_some() || now.gone;
@@ -93,7 +95,7 @@ pub(super) fn watch<T: Send + 'static>(job: Arc<Job>, shutdown: &Shutdown, say: 
             }
             tokio::time::sleep(WATCH_INTERVAL).await;
         }
-        unwatched(&job, standing);
+        unwatched(&job, standing).await;
     });
     Box::pin(ReceiverStream::new(receiver))
 }
@@ -111,7 +113,7 @@ pub(super) fn rows(
     tokio::spawn(async move {
         let _place = place;
         send_rows(&job, (first, only_finished), &mut standing, &sender, &shutdown).await;
-        unwatched(&job, standing);
+        unwatched(&job, standing).await;
     });
     Box::pin(ReceiverStream::new(receiver))
 }
