@@ -45,6 +45,29 @@ impl Bench {
         }
     }
 
+    /// Sends an interrupt to a run that would take long, once it listens: it ends with status 130 and without output, and leaves these
+    /// files alone.
+    #[cfg(unix)]
+    pub(crate) fn interrupt(&self, long: &str, files: &[&str]) {
+        use std::os::unix::process::ExitStatusExt;
+        // a process that is not listening yet dies of the signal itself: then it gets more time to start
+        for patience in [300, 1000, 3000, 9000] {
+            let mut command = self.command(long);
+            let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
+            std::thread::sleep(std::time::Duration::from_millis(patience));
+            let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+            assert!(sent.is_ok_and(|status| status.success()));
+            let output = child.wait_with_output().expect("it ends");
+            assert_eq!(self.files(), files);
+            if output.status.signal().is_none() {
+                assert_eq!(output.status.code(), Some(130), "{}", String::from_utf8_lossy(&output.stderr));
+                assert!(output.stdout.is_empty());
+                return;
+            }
+        }
+        panic!("it never listened");
+    }
+
     /// Runs the command, which must succeed, and reads its JSON.
     pub(crate) fn json(&self, words: &str) -> serde_json::Value {
         let ran = self.run(&format!("{words} --json"));

@@ -15,23 +15,25 @@ fn volts(volts: f64) -> Vec<(String, f64)> {
     vec![("drive".to_owned(), volts)]
 }
 
+/// A guided mass of 0.1 µg on 1 N/m with an anchored electrode, these parts, and a source `drive` at the node s.
+fn resonator(parts: &str) -> String {
+    format!(
+        "anchor * [f] []
+        mass2d * [m] [m=1e-10]
+        guide2d * [m] []
+        spring2d * [f m] [kx=1]
+        anchor * [e] []
+        {parts}
+        drive port * [s] []"
+    )
+}
+
 /// A guided mass of 0.1 µg on 1 N/m, a plate of 1000 µm² at 2 µm biased through a resistance: Q = ω·m/(η²·R)·(1 + (ωRC)²) with η = V·∂C/∂x at the equilibrium (H. A. C. Tilmans 1996,
 /// J. Micromech. Microeng. 6, 157, with a resistance as the electrical load), for ωRC of 0.004 to 4. Without a voltage or a resistance there is no loss.
 #[test]
 fn current_through_a_resistance() {
-    let text = |resistor: &str| {
-        format!(
-            "anchor * [f] []
-            mass2d * [m] [m=1e-10]
-            guide2d * [m] []
-            spring2d * [f m] [kx=1]
-            anchor * [e] []
-            plategap2d * [m e] [A=1e-9 gap=2u fringe=none permittivity=8.854e-12]
-            {resistor}
-            eground * [m] []
-            drive port * [s] []"
-        )
-    };
+    let plate = "plategap2d * [m e] [A=1e-9 gap=2u fringe=none permittivity=8.854e-12]";
+    let text = |resistor: &str| resonator(&format!("{plate}\n{resistor}\neground * [m] []"));
     let v = 10.0;
     let mut u = 0.0;
     for _ in 0..200 {
@@ -54,18 +56,12 @@ fn current_through_a_resistance() {
 #[test]
 fn currents_that_cancel() {
     let text = |wiring: &str| {
-        format!(
-            "anchor * [f] []
-            mass2d * [m] [m=1e-10]
-            guide2d * [m] []
-            spring2d * [f m] [kx=1]
-            anchor * [e] []
-            anchor * [g] []
+        resonator(&format!(
+            "anchor * [g] []
             plategap2d * [m e] [A=1e-9 gap=2u fringe=none]
             plategap2d * [m g] [A=1e-9 gap=2u fringe=none oz=pi]
-            {wiring}
-            drive port * [s] []"
-        )
+            {wiring}"
+        ))
     };
     let shared = loss(&text("wire * [e s] []\nwire * [g s] []\nR * [m z] [R=1e7]\neground * [z] []"), &volts(5.0));
     let own = loss(&text("R * [e s] [R=1e7]\nR * [g s] [R=1e7]\neground * [m] []"), &volts(5.0));
