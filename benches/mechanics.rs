@@ -7,7 +7,7 @@ use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::domains::Ramp;
 use bimorph::equations::Bodies;
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::{BlockMatrix, forces};
+use bimorph::multibody::{BodyMatrix, forces};
 use bimorph::netlist::read_bundle;
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
@@ -36,7 +36,7 @@ fn mechanics(c: &mut Criterion) {
         *q = Pose::new(1e-8 * (k % 3) as f64, 1e-7, 1e-4);
     }
     let drive = system.electrics.drive();
-    let mut tangent = BlockMatrix::new(pattern);
+    let mut tangent = BodyMatrix::new(pattern);
     let mut r = vec![Pose::zeros(); n];
     group.bench_function("residual", |b| b.iter(|| system.residual(black_box(&motion.q), &drive, &mut r)));
     group.bench_function("tangent and residual", |b| {

@@ -16,7 +16,7 @@ use bimorph::equations::constrained::Constrained;
 use bimorph::equations::{Bodies, Control, Equations, Stage, Staged};
 use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction};
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::{BlockMatrix, BodyId, Model, forces};
+use bimorph::multibody::{BodyId, BodyMatrix, Model, forces};
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
 use std::hint::black_box;
@@ -45,11 +45,11 @@ fn measure(name: &str, coordinates: usize) -> (usize, [f64; 8]) {
     let pattern = &model.pattern;
     let q = displaced(model);
     let drive = Drive { load: 1.0, ..Drive::default() };
-    let (mut a, mut r) = (BlockMatrix::new(pattern), vec![Pose::zeros(); n]);
+    let (mut a, mut r) = (BodyMatrix::new(pattern), vec![Pose::zeros(); n]);
     let residual = median(1, |_| system.residual(black_box(&q), &drive, &mut r));
     let tangent = median(1, |_| system.tangent(black_box(&q), &drive, &mut a, &mut r));
     // a step of 4e-8 s: inertia and stiffness weigh alike
-    let prepare = |a: &mut BlockMatrix<f64, 3>, r: &mut [Pose]| {
+    let prepare = |a: &mut BodyMatrix, r: &mut [Pose]| {
         system.tangent(black_box(&q), &drive, a, r);
         forces::add_inertia(model, 1e16, 1e8, a);
     };

@@ -18,7 +18,7 @@ use bimorph::multibody::joint_coordinates::sprung_loops::columns::Four;
 use bimorph::multibody::joint_coordinates::sprung_loops::dynamics::Stresses;
 use bimorph::multibody::joint_coordinates::sprung_loops::poses::{LaneJointStates, TreeKinematics};
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::{BlockMatrix, forces};
+use bimorph::multibody::{BodyMatrix, forces};
 use std::hint::black_box;
 use std::time::Instant;
 use topologies::Topology;
@@ -45,7 +45,7 @@ fn report(name: &str, count: usize, units: usize, topology: &Topology) {
     let (n, pattern) = (system.bodies(), &system.model.pattern);
     let q: Vec<Pose> = (0..n).map(|k| Pose::new(1e-8 * (k % 3) as f64, 1e-8, 1e-3 * (k % 5) as f64)).collect();
     let drive = Drive { load: 1.0, ..Drive::default() };
-    let (mut a, mut r) = (BlockMatrix::new(pattern), vec![Pose::zeros(); n]);
+    let (mut a, mut r) = (BodyMatrix::new(pattern), vec![Pose::zeros(); n]);
     let mut factor = |r: &mut [Pose]| {
         system.tangent(black_box(&q), &drive, &mut a, r);
         forces::add_inertia(&system.model, 1e16, 1e8, &mut a);

@@ -19,7 +19,7 @@ use bimorph::domains::{Drive, Ramp, System};
 use bimorph::equations::{Bodies, Joints};
 use bimorph::multibody::joint_coordinates::sprung_loops::Tree;
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::{BlockMatrix, BodyId};
+use bimorph::multibody::{BodyId, BodyMatrix};
 use bimorph::netlist::{Setting, read_bundle};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::frequency::eigen::lowest_modes;
@@ -167,7 +167,7 @@ fn energies(system: &System, states: &[&Vec<Pose>], ramp: &Ramp<'_>, stop: f64) 
     let model = &system.model;
     let (rest, mut hot) = (system.electrics.drive(), system.electrics.drive());
     ramp.at(stop, &mut hot);
-    let mut stiffness = BlockMatrix::new(&model.pattern);
+    let mut stiffness = BodyMatrix::new(&model.pattern);
     let still = vec![Pose::zeros(); system.bodies()];
     system.tangent(&still, &rest, &mut stiffness, &mut still.clone());
     let modes = lowest_modes(system, (&still, &rest), &stiffness, 6).unwrap().shapes;

@@ -6,7 +6,7 @@ mod topologies;
 use bimorph::domains::{Drive, Ramp, System};
 use bimorph::equations::Bodies;
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::{BlockMatrix, Model, forces};
+use bimorph::multibody::{BodyMatrix, Model, forces};
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
 use topologies::{NAMES, bodies_per_unit, named};
@@ -85,7 +85,7 @@ fn the_factor_solves_every_topology() {
         let system = system(topologies::sized(name, 10_000).model());
         let (n, pattern) = (system.bodies(), &system.model.pattern);
         let q: Vec<Pose> = (0..n).map(|k| Pose::new(1e-8 * (k % 3) as f64, 1e-8, 1e-3 * (k % 5) as f64)).collect();
-        let (mut a, mut r) = (BlockMatrix::new(pattern), vec![Pose::zeros(); n]);
+        let (mut a, mut r) = (BodyMatrix::new(pattern), vec![Pose::zeros(); n]);
         system.tangent(&q, &Drive { load: 1.0, ..Drive::default() }, &mut a, &mut r);
         forces::add_inertia(&system.model, 1e16, 1e8, &mut a);
         let mut factored = a.clone();

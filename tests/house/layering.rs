@@ -23,7 +23,10 @@ const CRATES: [(&str, &[&str]); 19] = [
     ("jobs", &["base", "structure", "netlist", "model", "analysis"]),
     ("cosim", &["structure", "results"]),
     ("http", &[]),
-    ("view", &["base", "structure", "netlist", "layout", "results", "model", "analysis", "device", "jobs", "cosim", "http"]),
+    (
+        "view",
+        &["base", "structure", "netlist", "layout", "results", "model", "analysis", "device", "jobs", "cosim", "http"],
+    ),
     ("wire", &["base", "solve", "model", "analysis", "device", "export", "jobs"]),
     ("server", &["base", "netlist", "layout", "model", "analysis", "device", "export", "jobs", "http", "wire"]),
 ];
@@ -80,6 +83,20 @@ fn no_module_names_a_module_above_it() {
         }
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Above the bodies a matrix over them is a `BodyMatrix`, whose blocks have the size of the plane: `planar::DOF` is that number, once.
+#[test]
+fn one_file_has_the_degrees_of_freedom_of_a_body() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
+    let mut matrices = 0;
+    for path in files(&root).iter().filter(|path| path.extension().is_some_and(|end| end == "rs")) {
+        let place = path.strip_prefix(&root).unwrap();
+        let text = fs::read_to_string(path).unwrap();
+        matrices += text.matches("BodyMatrix").count();
+        assert!(place.starts_with("multibody") || !text.contains("BlockMatrix"), "{}", place.display());
+    }
+    assert!(matrices > 200, "the scan finds the matrices: {matrices}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::CompileOptions;
 use bimorph::domains::{Configuration, Domain, MaterialPoint};
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::{BlockMatrix, BodyId};
+use bimorph::multibody::{BodyId, BodyMatrix};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
@@ -203,7 +203,7 @@ fn differences_of_a_nanometre() {
         }
         flat(&force)
     };
-    let dense = |matrix: &BlockMatrix<f64, 3>| {
+    let dense = |matrix: &BodyMatrix| {
         let columns: Vec<_> = (0..6)
             .map(|k| {
                 let mut out = vec![Pose::zeros(); 2];

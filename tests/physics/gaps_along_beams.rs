@@ -6,7 +6,7 @@ use bimorph::analysis::mesh::{pull_in_fitted, static_fitted};
 use bimorph::compile::{CompileOptions, CompiledModel, Junctions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
-use bimorph::multibody::BlockMatrix;
+use bimorph::multibody::BodyMatrix;
 use bimorph::multibody::planar::Pose;
 use bimorph::netlist::Bundle;
 use bimorph::refine::mesh_search::Mesh;
@@ -126,7 +126,7 @@ fn one_potential_on_unequal_segments() {
         close(slope, dot(&residual(0.0), &way), 1e-5);
         let (there, here) = (residual(step), residual(-step));
         let mut change: Vec<Pose> = there.iter().zip(&here).map(|(a, b)| (a - b) / (2.0 * step)).collect();
-        let mut tangent = BlockMatrix::new(&system.model.pattern);
+        let mut tangent = BodyMatrix::new(&system.model.pattern);
         system.tangent(&at(0.0), &drive, &mut tangent, &mut vec![Pose::zeros(); n]);
         tangent.factor(&system.model.pattern).unwrap();
         tangent.solve(&system.model.pattern, &mut change);

@@ -8,7 +8,7 @@ use bimorph::analysis::modes::{ModesResult, modes};
 use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::discretize::Scheme;
 use bimorph::discretize::frame::{ElementCount, FrameGaps, FrameOptions};
-use bimorph::multibody::BlockMatrix;
+use bimorph::multibody::BodyMatrix;
 use bimorph::multibody::planar::Pose;
 
 /// Frequencies of a beam of 200 × 2 µm in units of √(EI/ρA)/L²: ω = β².
@@ -239,7 +239,7 @@ fn coupled_joints() {
     let drive = system.electrics.drive();
     let q: Vec<Pose> = (0..n).map(|k| Pose::new(1e-9 * k as f64, 2e-8, 1e-3 * (k % 3) as f64)).collect();
     let direction: Vec<Pose> = (0..n).map(|k| Pose::new(0.0, 0.0, 1.0 + k as f64)).collect();
-    let (mut tangent, mut residual) = (BlockMatrix::new(&system.model.pattern), vec![Pose::zeros(); n]);
+    let (mut tangent, mut residual) = (BodyMatrix::new(&system.model.pattern), vec![Pose::zeros(); n]);
     system.tangent(&q, &drive, &mut tangent, &mut residual);
     let mut slope = vec![Pose::zeros(); n];
     tangent.multiply_add(&system.model.pattern, &direction, &mut slope);

@@ -3,7 +3,7 @@
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::equations::linear::LinearSolver;
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::{BlockMatrix, forces};
+use bimorph::multibody::{BodyMatrix, forces};
 use bimorph::netlist::read_bundle;
 use bimorph::solve::baseline::sparse::Sparse;
 use bimorph::solve::baseline::{Solver, SolverKind};
@@ -21,7 +21,7 @@ fn all_solvers_agree_on_step_matrices() {
     let zeros = vec![Pose::zeros(); n];
     let mut r = zeros.clone();
     for h in [1e-3, 1e-6, 1e-9] {
-        let mut a = BlockMatrix::new(pattern);
+        let mut a = BodyMatrix::new(pattern);
         system.tangent(&zeros, &system.electrics.drive(), &mut a, &mut r);
         forces::add_inertia(&system.model, 1.0 / (h * h), 1.0 / h, &mut a);
         system.model.project_matrix(&mut a);

@@ -224,7 +224,7 @@ fn derivatives() {
                 let numeric = differences(&|h| force(&q, &(v + unit * h)), 1e-3 * scale);
                 let largest = derivatives.damping().unwrap().diagonal[0].norm();
                 assert!((numeric - by_rate[0]).norm() <= 1e-7 * largest, "{i}: {numeric} {}", by_rate[0]);
-                let mut stiffness = bimorph::multibody::BlockMatrix::new(&model.pattern);
+                let mut stiffness = bimorph::multibody::BodyMatrix::new(&model.pattern);
                 derivatives.add_stiffness(1.0, &mut stiffness);
                 let own = stiffness.diagonal[0] * unit;
                 let numeric = differences(&|h| force(&(q + unit * h), &v), 4e-11 * scale.min(1e3));
@@ -334,7 +334,7 @@ fn derivatives_of_states() {
         };
         derivatives.at(system, &q, |k| v[k]);
         let pattern = &system.model.pattern;
-        let mut stiffness = bimorph::multibody::BlockMatrix::new(pattern);
+        let mut stiffness = bimorph::multibody::BodyMatrix::new(pattern);
         derivatives.add_stiffness(1.0, &mut stiffness);
         let mut by_place = vec![Pose::zeros(); count];
         stiffness.multiply_add_of(pattern, |k| unit[k], &mut by_place);

@@ -5,7 +5,7 @@ use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, CompiledModel};
 use bimorph::domains::{Configuration, Domain};
-use bimorph::multibody::BlockMatrix;
+use bimorph::multibody::BodyMatrix;
 use bimorph::multibody::planar::Pose;
 
 fn run(start: &CompiledModel, moving: &CompiledModel, stop: f64, signals: &[&str]) -> TransientResult {
@@ -146,7 +146,7 @@ fn energy_and_derivatives() {
         assert!((slope - work).abs() < 1e-7 * work.abs().max(scale), "{k}: {slope:e} {work:e}");
         pressed += usize::from(stop.bearing(Configuration { q: &q, linear: false }) > 0.0);
         drawn += usize::from(norm(&f) > 0.0);
-        let mut tangent = BlockMatrix::new(pattern);
+        let mut tangent = BodyMatrix::new(pattern);
         stop.add_tangent(Configuration { q: &q, linear: false }, 0.0, pattern, &mut tangent);
         let mut change = zeros.clone();
         tangent.multiply_add(pattern, &way, &mut change);
@@ -161,7 +161,7 @@ fn energy_and_derivatives() {
         // friction and loss resist, and their derivatives with rates are exact along the speed itself
         let power = dot(&lost(&q, &speed), &speed);
         assert!(power >= -1e-30, "{k}: {power}");
-        let (mut stiffness, mut damping) = (BlockMatrix::new(pattern), BlockMatrix::new(pattern));
+        let (mut stiffness, mut damping) = (BodyMatrix::new(pattern), BodyMatrix::new(pattern));
         if stop.add_loss_tangent(
             Configuration { q: &q, linear: false },
             &|k| speed[k],
@@ -187,7 +187,7 @@ fn energy_and_derivatives() {
             at: [&q, &middle, &end].map(|q| Configuration { q, linear: false }),
             h: 1e-9,
         };
-        let (mut r, mut unused) = (zeros.clone(), BlockMatrix::new(pattern));
+        let (mut r, mut unused) = (zeros.clone(), BodyMatrix::new(pattern));
         stop.add_quotient(&chord, 0.0, pattern, &mut r, &mut unused);
         let dissipated = dot(&r, &way) - (energy(&end) - energy(&q));
         assert!(dissipated >= -1e-10 * (energy(&q).abs() + energy(&end).abs()), "{k}: {dissipated:e}");

@@ -3,7 +3,7 @@
 use super::frame::cantilever;
 use bimorph::domains::System;
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::{BlockMatrix, BodyId};
+use bimorph::multibody::{BodyId, BodyMatrix};
 use bimorph::solve::continuation::{Branch, Continuation, ContinuationOptions};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::family::LoadFamily;
@@ -37,7 +37,7 @@ pub(crate) struct Found {
 pub(crate) fn newton(share: f64) -> Found {
     let (system, _) = column(share);
     let mut q = vec![Pose::zeros(); system.bodies()];
-    let (mut tangent, mut r) = (BlockMatrix::new(&system.model.pattern), q.clone());
+    let (mut tangent, mut r) = (BodyMatrix::new(&system.model.pattern), q.clone());
     let drive = system.electrics.drive();
     let mut negative = 0;
     for _ in 0..20 {

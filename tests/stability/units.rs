@@ -4,7 +4,7 @@
 use super::mechanism::Stream;
 use bimorph::multibody::joint_coordinates::constrained_loops::{Linkage, Reduction, ReductionTask};
 use bimorph::multibody::planar::{JointFrame, Pose};
-use bimorph::multibody::{BlockMatrix, Body, BodyId, Joint, Model, forces};
+use bimorph::multibody::{Body, BodyId, BodyMatrix, Joint, Model, forces};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector3};
 
 /// Metres, kilograms and seconds in the unit used: 1e6, 1e12 and 1e6 for µm, ng and µs.
@@ -113,7 +113,7 @@ pub(crate) fn by_factor(u: Units) -> Vec<[f64; 3]> {
     let n = model.bodies.len();
     let q = vec![Pose::zeros(); n];
     let rest = forces::RestStrain { expansion: &[], built_in: 1.0 };
-    let mut matrix = BlockMatrix::new(&model.pattern);
+    let mut matrix = BodyMatrix::new(&model.pattern);
     let mut unused = q.clone();
     forces::add_tangent(&model, &q, &rest, &mut matrix, &mut unused);
     forces::add_inertia(&model, 1.0 / (h * h), 0.0, &mut matrix);

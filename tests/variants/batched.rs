@@ -6,7 +6,7 @@ use bimorph::analysis::modes::modes;
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::domains::System;
 use bimorph::jobs::sweep::{Shard, SweepAnalysis};
-use bimorph::multibody::BlockMatrix;
+use bimorph::multibody::BodyMatrix;
 use bimorph::multibody::planar::Pose;
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::eigen::{Modes, lowest_modes};
@@ -96,7 +96,7 @@ fn equilibria_are_those_alone() {
 
 fn modes_alone(system: &System, count: usize) -> Modes {
     let (q, drive) = (vec![Pose::zeros(); system.bodies()], system.electrics.drive());
-    let mut tangent = BlockMatrix::new(&system.model.pattern);
+    let mut tangent = BodyMatrix::new(&system.model.pattern);
     system.tangent(&q, &drive, &mut tangent, &mut q.clone());
     lowest_modes(system, (&q, &drive), &tangent, count).expect("modes")
 }

@@ -4,7 +4,7 @@ use super::{AnalysisError, PortVoltages};
 use bimorph_domains::backbending::Strength;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::permanent_strain;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::forces::{RestStrain, add_offset_change, axial_change, axial_force};
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::SolveError;
@@ -138,7 +138,7 @@ fn pressures(
             arm.strength.excess(pressure, arm.strength.ambient + point.rise[arm.heater])
         })
         .collect();
-    let mut tangent = BlockMatrix::new(&model.pattern);
+    let mut tangent = BodyMatrix::new(&model.pattern);
     let mut moved = point.q.clone();
     system.tangent(&point.q, &drive, &mut tangent, &mut moved);
     model.project_matrix(&mut tangent);

@@ -7,7 +7,7 @@ use super::PortVoltages;
 use super::modes::{GUARDS, ModesResult, about_equilibrium, unloaded};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::batch_mode_errors::{BatchVariant, LaneReference};
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::batch::LANES;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::eigen::{Modes, RELIABLE, lowest_modes};
@@ -29,7 +29,7 @@ impl BatchModes {
         }
         let system = &first.parts.system;
         let (q, drive) = (vec![Pose::zeros(); system.bodies()], system.electrics.drive());
-        let mut tangent = BlockMatrix::new(&system.model.pattern);
+        let mut tangent = BodyMatrix::new(&system.model.pattern);
         system.tangent(&q, &drive, &mut tangent, &mut q.clone());
         let mut found: Modes = lowest_modes(system, (&q, &drive), &tangent, count + GUARDS).ok()?;
         let sound = found.lambda.len() == count + GUARDS && found.residuals.iter().all(|r| *r <= RELIABLE);

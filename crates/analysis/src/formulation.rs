@@ -18,6 +18,7 @@ use bimorph_domains::System;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::joint_coordinates::TreeParent;
 use bimorph_multibody::joint_coordinates::constrained_loops::Linkage;
+use bimorph_multibody::planar::DOF;
 use bimorph_multibody::{BodyId, Model};
 use bimorph_solve::baseline::SolverKind;
 use bimorph_solve::fastest::fastest;
@@ -177,7 +178,7 @@ pub fn linkage(formulation: Formulation, system: &System) -> Result<Linkage, Ana
 pub fn coordinate_scales(linkage: &Linkage, length: f64) -> Vec<f64> {
     let mut scale = vec![length; linkage.coordinates];
     for link in &linkage.links {
-        let moving = (0..3).filter(|&i| link.parent == TreeParent::Free || link.moving[i]);
+        let moving = (0..DOF).filter(|&i| link.parent == TreeParent::Free || link.moving[i]);
         for (next, i) in moving.enumerate() {
             if i == 2 {
                 scale[link.first + next] = length / link.lever;

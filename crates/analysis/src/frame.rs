@@ -12,7 +12,7 @@ use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use bimorph_domains::{Configuration, Domain, Drive, MaterialPoint, Member};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::frame::{ElementCount, FrameGaps, FrameOptions, LinearFrame, assemble};
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::SolveError;
@@ -232,7 +232,7 @@ fn drawn(q: &[Pose]) -> Configuration<'_> {
 }
 
 /// Adds what the field in the gaps does to the stiffness at `q`, contact with it.
-fn add_gap_stiffness(frame: &LinearFrame, q: &[Pose], volts: &[f64], stiffness: &mut BlockMatrix<f64, 3>) {
+fn add_gap_stiffness(frame: &LinearFrame, q: &[Pose], volts: &[f64], stiffness: &mut BodyMatrix) {
     for (gap, volts) in acting(frame, volts) {
         gap.add_tangent(drawn(q), volts, &frame.system.pattern, stiffness);
     }

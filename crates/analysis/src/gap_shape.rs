@@ -6,7 +6,7 @@
 
 use super::statics::OperatingPoint;
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 
 /// The gap with the largest part in that error of an equilibrium, and the error of the largest displacement of a node (1): infinite
@@ -27,7 +27,7 @@ pub(super) fn left_out(compiled: &CompiledModel, point: &OperatingPoint) -> Opti
         }
     }
     let name = compiled.parts.gap_names.get(largest.0)?.clone();
-    let (mut tangent, mut residual) = (BlockMatrix::new(pattern), q.clone());
+    let (mut tangent, mut residual) = (BodyMatrix::new(pattern), q.clone());
     system.tangent(q, &drive, &mut tangent, &mut residual);
     model.project_matrix(&mut tangent);
     model.project(&mut change);

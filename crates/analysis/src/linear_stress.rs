@@ -7,7 +7,7 @@
 
 use super::statics::OperatingPoint;
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 
 /// Error of the deflection `x` of a linear model without the stress stiffening at `point`, as a fraction of the largest
@@ -21,13 +21,13 @@ pub(super) fn left_out(compiled: &CompiledModel, point: &OperatingPoint, x: &[Po
     let mut drive = system.electrics.drive();
     system.electrics.apply(&point.sources, &point.rise, &mut drive);
     let zeros = vec![Pose::zeros(); x.len()];
-    let (mut stiffness, mut none, mut force) = (BlockMatrix::new(&model.pattern), zeros.clone(), zeros.clone());
+    let (mut stiffness, mut none, mut force) = (BodyMatrix::new(&model.pattern), zeros.clone(), zeros.clone());
     system.tangent(&zeros, &drive, &mut stiffness, &mut none);
     system.residual(x, &drive, &mut force);
     force.iter_mut().zip(&none).for_each(|(force, none)| *force -= none);
     let mut largest = 0.0;
     let mut apart = 0.0;
-    let solved = |matrix: &BlockMatrix<f64, 3>| {
+    let solved = |matrix: &BodyMatrix| {
         let mut factor = matrix.clone();
         model.project_matrix(&mut factor);
         let inertia = factor.factor(&model.pattern).ok()?;

@@ -6,8 +6,8 @@
 
 use bimorph_domains::{Drive, System};
 use bimorph_multibody::factor::ZeroPivot;
-use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, Model};
+use bimorph_multibody::planar::{DOF, Pose};
+use bimorph_multibody::{BodyMatrix, Model};
 use bimorph_solve::eigen::Modes;
 use nalgebra::Vector2;
 
@@ -33,7 +33,7 @@ pub(super) fn unbalanced(system: &System, q: &[Pose], drive: &Drive) -> Option<Z
             let scale = if direction == 2 { moment } else { force };
             left[body][direction].abs() > UNBALANCED * scale
         };
-        (0..3).find(|&direction| over(direction)).map(|direction| ZeroPivot { body, direction })
+        (0..DOF).find(|&direction| over(direction)).map(|direction| ZeroPivot { body, direction })
     })
 }
 
@@ -80,7 +80,7 @@ pub(super) fn free_motions(system: &System, held: &[ZeroPivot]) -> Vec<String> {
 }
 
 /// Sets λ of rigid-body modes to exactly zero; true for each mode that is one.
-pub(super) fn settle_rigid(system: &System, stiffness: &BlockMatrix<f64, 3>, found: &mut Modes) -> Vec<bool> {
+pub(super) fn settle_rigid(system: &System, stiffness: &BodyMatrix, found: &mut Modes) -> Vec<bool> {
     let model = &system.model;
     let highest = found.lambda.iter().fold(0.0, |m: f64, l| m.max(l.abs()));
     let mut of = vec![Pose::zeros(); system.bodies()];

@@ -12,9 +12,9 @@ use bimorph_model::compile::{CompiledModel, HigherMode, LowestMode};
 use bimorph_model::refine::axial::axial_forces;
 use bimorph_model::refine::doubling;
 use bimorph_model::refine::mode_errors::{own_stiffness, relative_of_loaded_modes};
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::forces::{add_damping, add_inertia};
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_solve::eigen::{Modes, RELIABLE, lowest_modes};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -169,14 +169,14 @@ pub(super) fn shapeless(
     } else {
         vec![Pose::zeros(); system.bodies()]
     };
-    let mut tangent = BlockMatrix::new(&system.model.pattern);
+    let mut tangent = BodyMatrix::new(&system.model.pattern);
     let mut residual = q.clone();
     system.tangent(&q, &drive, &mut tangent, &mut residual);
     if !as_sugar {
         // what stress and heat do to the stiffness belongs to the vibration, in a linear model too
         system.add_stress_stiffness(&q, &drive, &mut tangent);
     }
-    let rigid = 3 * system.model.loose().count();
+    let rigid = DOF * system.model.loose().count();
     let mut found = lowest_modes(system, (&q, &drive), &tangent, count + GUARDS + rigid)?;
     if found.lambda.is_empty() {
         let detail = match compiled.unknowns() {
@@ -262,12 +262,7 @@ fn sure((error, like): (f64, f64)) -> Option<f64> {
 }
 
 /// Estimated errors of modes about an equilibrium with this tangent, where the beams carry these axial forces.
-fn estimated(
-    compiled: &CompiledModel,
-    tangent: &BlockMatrix<f64, 3>,
-    forces: &[f64],
-    found: &Modes,
-) -> Vec<Option<f64>> {
+fn estimated(compiled: &CompiledModel, tangent: &BodyMatrix, forces: &[f64], found: &Modes) -> Vec<Option<f64>> {
     let options = &compiled.options;
     let model = &compiled.parts.system.model;
     let (lambda, none) = (&found.lambda, vec![None; found.lambda.len()]);

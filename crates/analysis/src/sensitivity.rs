@@ -9,7 +9,7 @@
 
 use bimorph_domains::Drive;
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 
 /// δ of the equilibrium: far above rounding, far below what a gap closes by.
@@ -50,7 +50,7 @@ impl LinearizationPoint<'_> {
     /// xᵀ·K·x of each shape at `q` under `drive`.
     fn quotients(&self, q: &[Pose], drive: &Drive) -> Vec<f64> {
         let system = &self.compiled.parts.system;
-        let mut tangent = BlockMatrix::new(&system.model.pattern);
+        let mut tangent = BodyMatrix::new(&system.model.pattern);
         let mut force = q.to_vec();
         system.tangent(q, drive, &mut tangent, &mut force);
         if self.stressed {

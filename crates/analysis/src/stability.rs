@@ -8,7 +8,7 @@
 use bimorph_domains::{Drive, System};
 use bimorph_multibody::forces::add_inertia;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, Model};
+use bimorph_multibody::{BodyMatrix, Model};
 
 /// Fraction of displacement or rate in an unstable direction from which the motion counts as unstable (1).
 const MOVING: f64 = 1e-2;
@@ -29,7 +29,7 @@ pub(crate) struct UnstableEquilibrium {
 /// Checks the stability of some states of a run.
 #[derive(Debug)]
 pub(crate) struct StabilityMonitor {
-    tangent: BlockMatrix<f64, 3>,
+    tangent: BodyMatrix,
     rest: Vec<Pose>,
     found: Option<UnstableEquilibrium>,
     /// Still so at the last look.
@@ -39,7 +39,7 @@ pub(crate) struct StabilityMonitor {
 impl StabilityMonitor {
     pub(crate) fn new(system: &System) -> Self {
         let rest = vec![Pose::zeros(); system.bodies()];
-        Self { tangent: BlockMatrix::new(&system.model.pattern), rest, found: None, lasts: false }
+        Self { tangent: BodyMatrix::new(&system.model.pattern), rest, found: None, lasts: false }
     }
 
     /// Checks a state at time `t` (s).
@@ -122,7 +122,7 @@ impl StabilityMonitor {
 }
 
 /// Smallest inverse diagonal entry times mass: no faster than the stiffest body alone (rad²/s²).
-fn fastest(model: &Model, factor: &BlockMatrix<f64, 3>) -> f64 {
+fn fastest(model: &Model, factor: &BodyMatrix) -> f64 {
     let rate = |j: usize| 1.0 / (factor.diagonal[j][(0, 0)].abs() * model.mass(j).x);
     (0..factor.diagonal.len()).map(rate).filter(|r| r.is_finite()).fold(1.0, f64::max)
 }

@@ -7,7 +7,7 @@
 use bimorph_base::sets::Sets;
 use bimorph_domains::System;
 use bimorph_multibody::planar::{Block, Pose};
-use bimorph_multibody::{BlockMatrix, BodyId};
+use bimorph_multibody::{BodyId, BodyMatrix};
 
 /// Bending stiffness of a joint, as a fraction of the largest, below which it holds nothing (1): rounding of the stiffness is 1e-16 of that, times
 /// what elimination loses.
@@ -51,7 +51,7 @@ pub(super) fn held(system: &System) -> Option<(System, Vec<usize>)> {
     if last.is_empty() {
         return None;
     }
-    let (zeros, mut tangent) = (vec![Pose::zeros(); ground], BlockMatrix::new(&model.pattern));
+    let (zeros, mut tangent) = (vec![Pose::zeros(); ground], BodyMatrix::new(&model.pattern));
     system.tangent(&zeros, &system.electrics.drive(), &mut tangent, &mut zeros.clone());
     let largest = |of: &dyn Fn(&Block) -> f64| HOLDS * tangent.diagonal.iter().map(of).fold(0.0, f64::max);
     // half of the trace does not depend on the directions of the axes

@@ -24,7 +24,7 @@ use bimorph_base::budget;
 use bimorph_domains::System;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::agitation::{BOLTZMANN, damped};
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_solve::frequency::gyroscopic;
 use bimorph_solve::harmonic::ComplexPose;
 use nalgebra::Complex;
@@ -108,7 +108,7 @@ impl DeviceSession {
         let mut unit = vec![Pose::zeros(); system.bodies()];
         let still = unit.clone();
         for k in 0..unit.len() {
-            for d in 0..3 {
+            for d in 0..DOF {
                 unit[k][d] = 1.0;
                 let place = SignalView { q: &unit, v: &still, rise: &cold, volts: &off };
                 let motion = SignalView { q: &still, v: &unit, rise: &cold, volts: &off };

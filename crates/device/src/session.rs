@@ -15,7 +15,7 @@ use bimorph_base::budget;
 use bimorph_domains::drive::Electrics;
 use bimorph_domains::{Drive, System};
 use bimorph_model::compile::{CompiledModel, Formulation};
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::equations::bodies::NormWeights;
 use bimorph_solve::equilibrium::{Equilibrium, EquilibriumOptions};
@@ -49,7 +49,7 @@ pub(super) struct DeviceSession {
     pub(super) drive: Drive,
     pub(super) change: Drive,
     pub(super) zeros: Vec<Pose>,
-    pub(super) linear: Option<(Token, BlockMatrix<f64, 3>)>,
+    pub(super) linear: Option<(Token, BodyMatrix)>,
     pub(super) harmonic: Harmonic,
     /// Gradient of each output over displacements, about the last state whose noise was requested.
     pub(super) seen: Option<(Token, Vec<OutputGradient>)>,

@@ -9,7 +9,7 @@ use bimorph_analysis::readout::ports::PortResponse;
 use bimorph_analysis::readout::small_signal::{ForcedMotion, PerturbedState};
 use bimorph_domains::System;
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_solve::frequency::gyroscopic;
 use nalgebra::Complex;
 
@@ -24,7 +24,7 @@ impl DeviceSession {
     ) -> Result<(), DeviceError> {
         system.electrics.apply(&state.sources, &state.rise, &mut self.drive);
         if self.linear.as_ref().is_none_or(|(t, _)| *t != token) {
-            let mut tangent = BlockMatrix::new(&system.model.pattern);
+            let mut tangent = BodyMatrix::new(&system.model.pattern);
             system.tangent(&state.q, &self.drive, &mut tangent, &mut self.motion.q);
             self.harmonic.about(system, &state.q);
             self.linear = Some((token, tangent));

@@ -6,7 +6,7 @@
 use super::contract::{Agitation, DeviceError, OpenRequest, Token, refused};
 use super::states::{Snapshot, States};
 use super::step_history::StepHistory;
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_solve::time::method::Motion;
 
 /// Magic bytes: a name and the version of this format.
@@ -179,7 +179,7 @@ impl SnapshotReader<'_> {
         let bytes = self.bytes(24 * count)?;
         let number = |k: usize, pose: &[[u8; 8]]| f64::from_le_bytes(pose[k]);
         Some(
-            (bytes.as_chunks::<8>().0.chunks_exact(3))
+            (bytes.as_chunks::<8>().0.chunks_exact(DOF))
                 .map(|pose| Pose::new(number(0, pose), number(1, pose), number(2, pose)))
                 .collect(),
         )

@@ -2,7 +2,7 @@
 
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::{self, Pose};
-use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Model, Pattern};
 use nalgebra::{Matrix6, Vector2, Vector6};
 
 /// A material point of a body.
@@ -132,7 +132,7 @@ impl Approach {
         rate: &impl Fn(usize) -> Pose,
         law: impl Fn((f64, f64)) -> (f64, f64, f64),
         pattern: &Pattern,
-        [stiffness, damping]: [&mut BlockMatrix<f64, 3>; 2],
+        [stiffness, damping]: [&mut BodyMatrix; 2],
     ) {
         let m = self.measure(q, linear);
         let (value, by_u, by_rate) = law((m.value, self.rate(&m, rate)));

@@ -17,7 +17,7 @@ use super::point_law::Law;
 use super::quotient::{SMALL, quotient};
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use bimorph_structure::{Comb, Fringe, GapVoltage};
 use nalgebra::Vector2;
 
@@ -125,14 +125,7 @@ impl CombDrive {
     }
 
     /// Adds the Hessian of a potential with these derivatives.
-    fn add_hessian(
-        &self,
-        seen: &Seen,
-        first: [f64; 2],
-        second: [f64; 3],
-        pattern: &Pattern,
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    fn add_hessian(&self, seen: &Seen, first: [f64; 2], second: [f64; 3], pattern: &Pattern, tangent: &mut BodyMatrix) {
         let mut h = seen.along.hessian(first[0], second[0]);
         if let Some(across) = &seen.across {
             h += across.hessian(first[1], second[2]);
@@ -187,7 +180,7 @@ impl Domain for CombDrive {
         self.add(&seen, seen.field.first.map(|x| factor * x), r);
     }
 
-    fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BodyMatrix) {
         let (seen, factor) = (self.seen(at), -0.5 * volts * volts);
         let Jet { first, second, .. } = seen.field * factor;
         self.add_hessian(&seen, first, second, pattern, tangent);
@@ -198,7 +191,7 @@ impl Domain for CombDrive {
         at: Configuration<'_>,
         volts: f64,
         pattern: &Pattern,
-        (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
+        (r, tangent): (&mut [Pose], &mut BodyMatrix),
     ) {
         let (seen, factor) = (self.seen(at), -0.5 * volts * volts);
         let Jet { first, second, .. } = seen.field * factor;
@@ -249,14 +242,7 @@ impl Domain for CombDrive {
     }
 
     /// Each displacement has the mean quotient of both orders in which the two can change.
-    fn add_quotient(
-        &self,
-        chord: &Chord<'_>,
-        volts: f64,
-        pattern: &Pattern,
-        r: &mut [Pose],
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    fn add_quotient(&self, chord: &Chord<'_>, volts: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {
         let [start, middle, end] = chord.at;
         let factor = -0.5 * volts * volts;
         let [u, y] = [&Some(self.approach), &self.sides.as_ref().map(|(across, ..)| *across)].map(|approach| {

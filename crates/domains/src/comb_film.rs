@@ -12,7 +12,7 @@ use super::domain::{Chord, Configuration, Domain};
 use super::from_structure::{FromStructure, StructureView};
 use super::quotient;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use bimorph_structure::GapVoltage;
 
 /// Gas between fingers.
@@ -89,21 +89,14 @@ impl Domain for CombFilm {
         at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
-        stiffness: &mut BlockMatrix<f64, 3>,
-        damping: &mut BlockMatrix<f64, 3>,
+        stiffness: &mut BodyMatrix,
+        damping: &mut BodyMatrix,
     ) -> bool {
         self.approach.add_rate_tangent((at.q, at.linear), rate, |now| self.drag(now), pattern, [stiffness, damping]);
         true
     }
 
-    fn add_quotient(
-        &self,
-        chord: &Chord<'_>,
-        _: f64,
-        pattern: &Pattern,
-        r: &mut [Pose],
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    fn add_quotient(&self, chord: &Chord<'_>, _: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {
         quotient::add_drag(&self.approach, chord, |now| self.drag(now), pattern, r, tangent);
     }
 }

@@ -13,7 +13,7 @@ use super::contact_loss::Loss;
 use super::domain::{Configuration, Domain};
 use super::system::System;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, forces};
+use bimorph_multibody::{BodyMatrix, forces};
 use std::collections::BTreeMap;
 
 /// Speed of reference where nothing elastic holds the part, or it has no mass (m/s).
@@ -76,7 +76,7 @@ fn groups(system: &System, asked: &[usize]) -> Vec<Vec<usize>> {
 /// Shapes that loads bend the drawn mechanism into.
 struct Bent {
     /// The factored stiffness as drawn; none where a part can move freely.
-    stiffness: Option<BlockMatrix<f64, 3>>,
+    stiffness: Option<BodyMatrix>,
     rest: Vec<Pose>,
     unused: Vec<Pose>,
     shapes: usize,
@@ -87,7 +87,7 @@ impl Bent {
         let model = &system.model;
         let rest = vec![Pose::zeros(); system.bodies()];
         let mut unused = rest.clone();
-        let mut stiffness = BlockMatrix::new(&model.pattern);
+        let mut stiffness = BodyMatrix::new(&model.pattern);
         forces::add_tangent(model, &rest, &system.electrics.drive().rest(), &mut stiffness, &mut unused);
         model.project_matrix(&mut stiffness);
         let stiffness = stiffness.factor(&model.pattern).is_ok().then_some(stiffness);

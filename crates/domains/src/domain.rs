@@ -18,7 +18,7 @@ use super::contact_loss::Loss;
 use super::point_law::{Law, PointLaw};
 use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use nalgebra::{Vector2, Vector6};
 
 /// Where the bodies are.
@@ -89,13 +89,7 @@ pub trait Domain {
     }
 
     /// `tangent += ∂²Π/∂q²`, on a pattern that couples its bodies.
-    fn add_tangent(
-        &self,
-        at: Configuration<'_>,
-        given: Self::Given,
-        pattern: &Pattern,
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    fn add_tangent(&self, at: Configuration<'_>, given: Self::Given, pattern: &Pattern, tangent: &mut BodyMatrix) {
         let _ = (at, given, pattern, tangent);
     }
 
@@ -105,7 +99,7 @@ pub trait Domain {
         at: Configuration<'_>,
         given: Self::Given,
         pattern: &Pattern,
-        (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
+        (r, tangent): (&mut [Pose], &mut BodyMatrix),
     ) {
         self.add_force(at, given, r);
         self.add_tangent(at, given, pattern, tangent);
@@ -292,8 +286,8 @@ pub trait Domain {
         at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
-        stiffness: &mut BlockMatrix<f64, 3>,
-        damping: &mut BlockMatrix<f64, 3>,
+        stiffness: &mut BodyMatrix,
+        damping: &mut BodyMatrix,
     ) -> bool {
         let _ = (at, rate, pattern, stiffness, damping);
         false
@@ -311,7 +305,7 @@ pub trait Domain {
         given: Self::Given,
         pattern: &Pattern,
         r: &mut [Pose],
-        tangent: &mut BlockMatrix<f64, 3>,
+        tangent: &mut BodyMatrix,
     ) {
         self.add_force(chord.at[1], given, r);
         self.add_tangent(chord.at[1], given, pattern, tangent);

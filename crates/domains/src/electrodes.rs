@@ -11,7 +11,7 @@ use super::point_law::Law;
 use super::quotient::{self, quotient};
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use bimorph_structure::GapVoltage;
 use nalgebra::Vector2;
 
@@ -95,7 +95,7 @@ impl Domain for Electrodes {
         self.approach.add_force(&m, -volts * change * self.capacitor.at(m.value).slope, r);
     }
 
-    fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BodyMatrix) {
         let m = self.approach.measure(at.q, at.linear);
         let Capacitance { slope, curvature, .. } = self.capacitor.at(m.value);
         let factor = -0.5 * volts * volts;
@@ -196,8 +196,8 @@ impl Domain for Electrodes {
         at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
-        stiffness: &mut BlockMatrix<f64, 3>,
-        damping: &mut BlockMatrix<f64, 3>,
+        stiffness: &mut BodyMatrix,
+        damping: &mut BodyMatrix,
     ) -> bool {
         if !self.loses(at) {
             return false;
@@ -206,14 +206,7 @@ impl Domain for Electrodes {
         true
     }
 
-    fn add_quotient(
-        &self,
-        chord: &Chord<'_>,
-        volts: f64,
-        pattern: &Pattern,
-        r: &mut [Pose],
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    fn add_quotient(&self, chord: &Chord<'_>, volts: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {
         let factor = -0.5 * volts * volts;
         let law = |u0: f64, u1: f64| {
             let field = |u: f64| {

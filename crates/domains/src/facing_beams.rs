@@ -17,7 +17,7 @@ use super::from_structure::{FromStructure, StructureView};
 use super::point_law::PointLaw;
 use bimorph_multibody::batch::everywhere;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Model, Pattern};
 use bimorph_structure::{BeamRows, GapVoltage};
 use nalgebra::{Vector2, Vector4};
 
@@ -115,7 +115,7 @@ impl Domain for FacingBeams {
         });
     }
 
-    fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BodyMatrix) {
         if !self.tiles.is_empty() {
             return everywhere(FieldForces { tangent: Some((pattern, tangent)), ..self.pull_at(at, volts) });
         }
@@ -131,7 +131,7 @@ impl Domain for FacingBeams {
         at: Configuration<'_>,
         volts: f64,
         pattern: &Pattern,
-        (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
+        (r, tangent): (&mut [Pose], &mut BodyMatrix),
     ) {
         if volts == 0.0 && self.surely_apart(at) {
             return;
@@ -295,20 +295,13 @@ impl Domain for FacingBeams {
         at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
-        stiffness: &mut BlockMatrix<f64, 3>,
-        damping: &mut BlockMatrix<f64, 3>,
+        stiffness: &mut BodyMatrix,
+        damping: &mut BodyMatrix,
     ) -> bool {
         facing_loss::add_tangent(self, at, rate, pattern, [stiffness, damping])
     }
 
-    fn add_quotient(
-        &self,
-        chord: &Chord<'_>,
-        volts: f64,
-        pattern: &Pattern,
-        r: &mut [Pose],
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    fn add_quotient(&self, chord: &Chord<'_>, volts: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {
         facing_loss::add_quotient(self, chord, volts, pattern, r, tangent);
     }
 

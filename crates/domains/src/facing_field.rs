@@ -10,7 +10,7 @@ use super::facing_side::{Opening, back, onto};
 use super::facing_tiles::{STATIONS, STRETCHES, SegmentPart, Tile, TileSide};
 use bimorph_multibody::batch::{Kernel, LANES, Lane8, SimdReal, load, store};
 use bimorph_multibody::planar::{HalfTurn, Pose};
-use bimorph_multibody::{BlockMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 use nalgebra::{Matrix3, Matrix4, Vector4};
 
 /// Places in a symmetric matrix of four, row by row from the diagonal.
@@ -27,7 +27,7 @@ pub(super) struct FieldForces<'a> {
     /// To which forces are added.
     pub(super) r: Option<&'a mut [Pose]>,
     /// To which their derivatives are added.
-    pub(super) tangent: Option<(&'a Pattern, &'a mut BlockMatrix<f64, 3>)>,
+    pub(super) tangent: Option<(&'a Pattern, &'a mut BodyMatrix)>,
 }
 
 /// Displacement along the axis (m), slope along the gap (1), ∂w/∂θ and ∂²w/∂θ² (m) of a station.
@@ -405,7 +405,7 @@ fn block(frame: &Opening, [a, b]: [f64; 2], [h, h_slope, slope_h, slopes]: [f64;
 
 /// Adds a block of two bodies (row, column) and its transpose, of which the matrix holds what lies on or below the diagonal.
 #[inline(always)]
-fn add_block([a, b]: [usize; 2], block: &Matrix3<f64>, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+fn add_block([a, b]: [usize; 2], block: &Matrix3<f64>, pattern: &Pattern, tangent: &mut BodyMatrix) {
     if a == b {
         tangent.diagonal[a] += block + block.transpose();
     } else if let Some(at) = pattern.block(a.max(b), a.min(b)) {
@@ -420,7 +420,7 @@ fn couple(
     [(upper, above), (lower, below)]: [(&TileSide, &SeenStations); 2],
     second: &Matrix4<f64>,
     pattern: &Pattern,
-    tangent: &mut BlockMatrix<f64, 3>,
+    tangent: &mut BodyMatrix,
 ) {
     let (mut h, mut from) = (-second, [lane; 2]);
     if let Some(cut) = &upper.cut {
@@ -535,7 +535,7 @@ mod tests {
                     let of = |beams: &FacingBeams| {
                         let mut r =
                             [vec![Pose::zeros(); count], vec![Pose::zeros(); count], vec![Pose::zeros(); count]];
-                        let mut tangents = [BlockMatrix::new(&pattern), BlockMatrix::new(&pattern)];
+                        let mut tangents = [BodyMatrix::new(&pattern), BodyMatrix::new(&pattern)];
                         beams.add_force(at, volts, &mut r[0]);
                         beams.add_force_change(at, volts, 0.3, &mut r[1]);
                         beams.add_tangent(at, volts, &pattern, &mut tangents[0]);

@@ -12,7 +12,7 @@ use super::from_structure::{FromStructure, StructureView};
 use super::point_law::PointLaw;
 use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Model, Pattern};
 use bimorph_structure::GapVoltage;
 use nalgebra::{Matrix4, Vector4};
 
@@ -116,8 +116,8 @@ impl Domain for FacingFilm {
         at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
-        stiffness: &mut BlockMatrix<f64, 3>,
-        damping: &mut BlockMatrix<f64, 3>,
+        stiffness: &mut BodyMatrix,
+        damping: &mut BodyMatrix,
     ) -> bool {
         self.beams.along(at, |local| {
             let (force, by_rate) = self.drag_at(local, rate);
@@ -147,14 +147,7 @@ impl Domain for FacingFilm {
     }
 
     /// Its work over a step is never negative: c at the middle of the step times the mean rate.
-    fn add_quotient(
-        &self,
-        chord: &Chord<'_>,
-        _: f64,
-        pattern: &Pattern,
-        r: &mut [Pose],
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    fn add_quotient(&self, chord: &Chord<'_>, _: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {
         let law = |facing: &FacingStretch, [z0, z1]: [&Vector4<f64>; 2]| {
             let ((first, by_z), by_rate) = self.drag(facing, &((z0 + z1) * 0.5), &((z1 - z0) / chord.h));
             (first, by_z * 0.5 + by_rate / chord.h)

@@ -7,7 +7,7 @@ use super::facing_side::{Deflection, Flank, Opening, Walk, back, onto, values};
 use super::facing_stretches::CubicStretch;
 use super::facing_tiles::Tile;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use nalgebra::{Matrix4, Vector4};
 
 /// Facing beams: the upper side runs from a to b, the lower one from c to d.
@@ -141,7 +141,7 @@ impl FacingBeams {
         local: &Local<'_>,
         (first, second): (Vector4<f64>, Matrix4<f64>),
         pattern: &Pattern,
-        tangent: &mut BlockMatrix<f64, 3>,
+        tangent: &mut BodyMatrix,
     ) {
         let weights = &local.stretch.weights;
         for (one, other) in [(0, 0), (0, 1), (1, 0), (1, 1)] {

@@ -9,7 +9,7 @@ use super::facing_local::{FacingBeams, Local};
 use super::facing_side::Deflection;
 use super::quotient::quotient;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use nalgebra::{Matrix4, Vector4};
 
 /// Forces of z and their derivatives.
@@ -117,7 +117,7 @@ pub(super) fn add_tangent(
     at: Configuration<'_>,
     rate: &impl Fn(usize) -> Pose,
     pattern: &Pattern,
-    [stiffness, damping]: [&mut BlockMatrix<f64, 3>; 2],
+    [stiffness, damping]: [&mut BodyMatrix; 2],
 ) -> bool {
     let mut acts = false;
     if beams.loss.is_dissipative() && !beams.surely_apart(at) {
@@ -139,7 +139,7 @@ pub(super) fn add_quotient(
     volts: f64,
     pattern: &Pattern,
     r: &mut [Pose],
-    tangent: &mut BlockMatrix<f64, 3>,
+    tangent: &mut BodyMatrix,
 ) {
     let law = |facing: &FacingStretch, z: [&Vector4<f64>; 2]| facing.discrete(z, (volts, chord.h), &beams.loss);
     along_chord(beams, chord, law, pattern, r, tangent);
@@ -153,7 +153,7 @@ pub(super) fn along_chord(
     law: impl Fn(&FacingStretch, [&Vector4<f64>; 2]) -> Derivatives,
     pattern: &Pattern,
     r: &mut [Pose],
-    tangent: &mut BlockMatrix<f64, 3>,
+    tangent: &mut BodyMatrix,
 ) {
     let mut walks = chord.at.map(|at| beams.walks(at));
     for stretch in &beams.stretches {

@@ -10,7 +10,7 @@ use super::domain::Chord;
 use super::quotient;
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use bimorph_structure::Friction;
 
 /// v/√(v² + v_s²) and its derivative with v (s/m).
@@ -39,7 +39,7 @@ pub(super) fn add_tangent(
     rate: &impl Fn(usize) -> Pose,
     normal: f64,
     pattern: &Pattern,
-    [stiffness, damping]: [&mut BlockMatrix<f64, 3>; 2],
+    [stiffness, damping]: [&mut BodyMatrix; 2],
 ) {
     let (share, slope) = slip(friction, along.rate(m, rate));
     let (force, by_rate) = (friction.coefficient * normal * share, friction.coefficient * normal * slope);
@@ -64,7 +64,7 @@ pub(super) fn add_quotient(
     chord: &Chord<'_>,
     normal: f64,
     pattern: &Pattern,
-    (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
+    (r, tangent): (&mut [Pose], &mut BodyMatrix),
 ) {
     let law = |from: f64, to: f64| {
         let (share, slope) = slip(friction, (to - from) / chord.h);

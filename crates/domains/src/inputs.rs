@@ -8,7 +8,7 @@ use super::load::DeadLoad;
 use super::moving_frame::FrameInertiaForces;
 pub use super::moving_frame::FrameMotion;
 use super::system::System;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use nalgebra::Vector2;
 
@@ -65,7 +65,7 @@ impl System {
     }
 
     /// `tangent +=` the share of inputs in ∂r/∂q but for the skew one of Euler's force.
-    pub(super) fn add_input_tangent(&self, at: Configuration<'_>, drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+    pub(super) fn add_input_tangent(&self, at: Configuration<'_>, drive: &Drive, tangent: &mut BodyMatrix) {
         for (load, size) in self.given_loads(&drive.inputs) {
             load.add_tangent(at, size, &self.model.pattern, tangent);
         }

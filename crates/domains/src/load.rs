@@ -3,7 +3,7 @@
 use super::approach::MaterialPoint;
 use super::domain::{Configuration, Domain};
 use bimorph_multibody::planar::{self, Pose};
-use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use nalgebra::Vector2;
 
 /// A dead load on a point. Its input is the fraction of it that acts (1); for a unit load, its size (N, N·m).
@@ -36,7 +36,7 @@ impl Domain for DeadLoad {
         self.add_force(at, change, r);
     }
 
-    fn add_tangent(&self, at: Configuration<'_>, share: f64, _: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, share: f64, _: &Pattern, tangent: &mut BodyMatrix) {
         if let BodyId::Free(k) = self.point.body {
             let (_, bend) = planar::point_turn(&at.q[k], self.point.arm, at.linear);
             tangent.diagonal[k][(2, 2)] += -share * bend.dot(&self.force);

@@ -3,14 +3,14 @@
 use super::domain::{Domain, SkewCoupling};
 use super::system::System;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId};
+use bimorph_multibody::{BodyId, BodyMatrix};
 use nalgebra::Matrix3;
 
 /// Derivatives with displacements and with rates.
 #[derive(Debug, Clone)]
 pub struct LossDerivatives {
-    stiffness: BlockMatrix<f64, 3>,
-    damping: BlockMatrix<f64, 3>,
+    stiffness: BodyMatrix,
+    damping: BodyMatrix,
     /// The skew part of the derivatives with displacements; `stiffness` is the symmetric one.
     skew: Vec<SkewCoupling>,
     /// Bodies that such forces act on, ascending, and of each the blocks below its diagonal with their rows: all other blocks are zero.
@@ -23,7 +23,7 @@ impl LossDerivatives {
     /// Storage, all zero.
     #[inline]
     pub fn new(system: &System) -> Self {
-        let zeros = BlockMatrix::new(&system.model.pattern);
+        let zeros = BodyMatrix::new(&system.model.pattern);
         Self { stiffness: zeros.clone(), damping: zeros, skew: Vec::new(), columns: columns(system), acts: false }
     }
 
@@ -57,7 +57,7 @@ impl LossDerivatives {
 
     /// Derivatives with rates.
     #[inline]
-    pub fn damping(&self) -> Option<&BlockMatrix<f64, 3>> {
+    pub fn damping(&self) -> Option<&BodyMatrix> {
         self.acts.then_some(&self.damping)
     }
 
@@ -69,18 +69,18 @@ impl LossDerivatives {
 
     /// `to +=` the derivatives with displacements times `beta` and those with rates times `gamma`, but for the skew part.
     #[inline]
-    pub fn add_to(&self, [beta, gamma]: [f64; 2], to: &mut BlockMatrix<f64, 3>) {
+    pub fn add_to(&self, [beta, gamma]: [f64; 2], to: &mut BodyMatrix) {
         self.add_stiffness(beta, to);
         self.add_blocks(&self.damping, gamma, to);
     }
 
     /// `to +=` the derivatives with displacements times `beta`, but for the skew part.
     #[inline]
-    pub fn add_stiffness(&self, beta: f64, to: &mut BlockMatrix<f64, 3>) {
+    pub fn add_stiffness(&self, beta: f64, to: &mut BodyMatrix) {
         self.add_blocks(&self.stiffness, beta, to);
     }
 
-    fn add_blocks(&self, from: &BlockMatrix<f64, 3>, factor: f64, to: &mut BlockMatrix<f64, 3>) {
+    fn add_blocks(&self, from: &BodyMatrix, factor: f64, to: &mut BodyMatrix) {
         if !self.acts {
             return;
         }
@@ -96,7 +96,7 @@ impl LossDerivatives {
         if !self.acts {
             return;
         }
-        let BlockMatrix { diagonal, below: blocks, .. } = &self.damping;
+        let BodyMatrix { diagonal, below: blocks, .. } = &self.damping;
         for (body, below) in &self.columns {
             let own = rate(*body);
             let mut sum = diagonal[*body] * own;

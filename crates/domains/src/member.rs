@@ -7,7 +7,7 @@ use super::from_structure::{FromStructure, PlacedMember, StructureView};
 use super::point_law::{Law, PointLaw};
 use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Damper, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Damper, Pattern};
 use nalgebra::Vector2;
 
 /// Makes [`Member`] of the types listed, in the order in which a drawing's members stand.
@@ -96,7 +96,7 @@ impl Domain for Member {
     }
 
     #[inline]
-    fn add_tangent(&self, at: Configuration<'_>, given: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, given: f64, pattern: &Pattern, tangent: &mut BodyMatrix) {
         each!(self, m => m.add_tangent(at, given, pattern, tangent));
     }
 
@@ -106,7 +106,7 @@ impl Domain for Member {
         at: Configuration<'_>,
         given: f64,
         pattern: &Pattern,
-        sums: (&mut [Pose], &mut BlockMatrix<f64, 3>),
+        sums: (&mut [Pose], &mut BodyMatrix),
     ) {
         each!(self, m => m.add_force_and_tangent(at, given, pattern, sums));
     }
@@ -240,8 +240,8 @@ impl Domain for Member {
         at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
-        stiffness: &mut BlockMatrix<f64, 3>,
-        damping: &mut BlockMatrix<f64, 3>,
+        stiffness: &mut BodyMatrix,
+        damping: &mut BodyMatrix,
     ) -> bool {
         each!(self, m => m.add_loss_tangent(at, rate, pattern, stiffness, damping))
     }
@@ -251,14 +251,7 @@ impl Domain for Member {
         each!(self, m => m.skew_couplings(at, rate, see));
     }
 
-    fn add_quotient(
-        &self,
-        chord: &Chord<'_>,
-        given: f64,
-        pattern: &Pattern,
-        r: &mut [Pose],
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    fn add_quotient(&self, chord: &Chord<'_>, given: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {
         each!(self, m => m.add_quotient(chord, given, pattern, r, tangent));
     }
 

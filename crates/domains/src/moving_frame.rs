@@ -10,7 +10,7 @@
 
 use super::domain::{Configuration, Domain};
 use bimorph_multibody::planar::{self, Pose};
-use bimorph_multibody::{BlockMatrix, Body, BodyId, Pattern};
+use bimorph_multibody::{Body, BodyId, BodyMatrix, Pattern};
 use nalgebra::Vector2;
 
 /// Motion of the frame, or a change of it.
@@ -65,7 +65,7 @@ impl Domain for FrameInertiaForces<'_> {
     }
 
     /// But for the skew share of Euler's force.
-    fn add_tangent(&self, _: Configuration<'_>, frame: FrameMotion, _: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, _: Configuration<'_>, frame: FrameMotion, _: &Pattern, tangent: &mut BodyMatrix) {
         if frame.rate == 0.0 {
             return;
         }

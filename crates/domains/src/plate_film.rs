@@ -13,7 +13,7 @@ use super::quotient;
 use super::squeeze_film::{SqueezeFilm, slip, tilt};
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use bimorph_structure::GapVoltage;
 use nalgebra::Matrix6;
 
@@ -77,7 +77,7 @@ impl PlateFilm {
     }
 
     /// Adds its derivative with the relative rotation.
-    fn add_moment_tangent(&self, slope: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_moment_tangent(&self, slope: f64, pattern: &Pattern, tangent: &mut BodyMatrix) {
         let mut h = Matrix6::zeros();
         (h[(2, 2)], h[(5, 5)]) = (slope, slope);
         (h[(2, 5)], h[(5, 2)]) = (-slope, -slope);
@@ -122,7 +122,7 @@ impl PlateFilm {
         (k, i): (usize, usize),
         along: f64,
         pattern: &Pattern,
-        tangent: &mut BlockMatrix<f64, 3>,
+        tangent: &mut BodyMatrix,
     ) {
         for (side, body) in self.approach.bodies().into_iter().enumerate() {
             if body == BodyId::Ground {
@@ -242,7 +242,7 @@ impl Domain for PlateFilm {
         self.approach.add_force(&m, first, r);
     }
 
-    fn add_tangent(&self, at: Configuration<'_>, _: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, _: f64, pattern: &Pattern, tangent: &mut BodyMatrix) {
         if self.states.is_empty() {
             return;
         }
@@ -281,8 +281,8 @@ impl Domain for PlateFilm {
         at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
-        stiffness: &mut BlockMatrix<f64, 3>,
-        damping: &mut BlockMatrix<f64, 3>,
+        stiffness: &mut BodyMatrix,
+        damping: &mut BodyMatrix,
     ) -> bool {
         let m = self.approach.measure(at.q, at.linear);
         self.add_moment_tangent(self.tilting(m.value), pattern, damping);
@@ -320,14 +320,7 @@ impl Domain for PlateFilm {
 
     /// Its work over a step is what it stores and what is never negative: discrete gradients of the stored energy, and the flow at the middle of
     /// the step.
-    fn add_quotient(
-        &self,
-        chord: &Chord<'_>,
-        _: f64,
-        pattern: &Pattern,
-        r: &mut [Pose],
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    fn add_quotient(&self, chord: &Chord<'_>, _: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {
         let [start, middle, end] = chord.at;
         let [u0, u1] = [start, end].map(|at| self.approach.value(at.q, at.linear));
         let per = self.tilting(0.5 * (u0 + u1)) / chord.h;

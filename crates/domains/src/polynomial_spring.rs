@@ -10,7 +10,7 @@ use super::from_structure::{FromStructure, StructureView};
 use super::point_law::Law;
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::{JointFrame, JointKinematics, Pose, Symmetric, Vec3};
-use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Model, Pattern};
 use bimorph_structure::GapVoltage;
 use nalgebra::Vector2;
 
@@ -98,7 +98,7 @@ impl Domain for PolynomialSpring {
 
     fn add_force_change(&self, _: Configuration<'_>, _: f64, _: f64, _: &mut [Pose]) {}
 
-    fn add_tangent(&self, at: Configuration<'_>, _: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, _: f64, pattern: &Pattern, tangent: &mut BodyMatrix) {
         let strained = self.strained(at);
         let stiffness = self.stiffness(&strained.strain);
         let h = match at.linear {
@@ -158,7 +158,7 @@ mod tests {
             let slope = (8.0 * (energy(h) - energy(-h)) - energy(2.0 * h) + energy(-2.0 * h)) / (12.0 * h);
             let work: f64 = force(&q).iter().zip(&way).map(|(f, w)| f.dot(w)).sum();
             assert!((slope - work).abs() < 1e-7 * (1.0 + work.abs()), "{k}: {slope} {work}");
-            let mut tangent = BlockMatrix::new(&pattern);
+            let mut tangent = BodyMatrix::new(&pattern);
             spring.add_tangent(Configuration { q: &q, linear }, 0.0, &pattern, &mut tangent);
             let mut change = vec![Pose::zeros(); 2];
             tangent.multiply_add(&pattern, &way, &mut change);

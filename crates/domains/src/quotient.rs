@@ -11,7 +11,7 @@ use super::approach::Approach;
 use super::domain::Chord;
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Model, Pattern};
 
 /// Change of a distance below which Simpson's rule stands for the quotient (m).
 pub(super) const SMALL: f64 = 1e-12;
@@ -50,7 +50,7 @@ pub(super) fn add(
     law: impl Fn(f64, f64) -> (f64, f64),
     pattern: &Pattern,
     r: &mut [Pose],
-    tangent: &mut BlockMatrix<f64, 3>,
+    tangent: &mut BodyMatrix,
 ) {
     let [start, middle, end] = chord.at;
     let (force, slope) = law(approach.value(start.q, start.linear), approach.value(end.q, end.linear));
@@ -73,7 +73,7 @@ pub(super) fn add_drag(
     drag: impl Fn((f64, f64)) -> (f64, f64, f64),
     pattern: &Pattern,
     r: &mut [Pose],
-    tangent: &mut BlockMatrix<f64, 3>,
+    tangent: &mut BodyMatrix,
 ) {
     let law = |u0: f64, u1: f64| {
         let (force, by_u, by_rate) = drag((0.5 * (u0 + u1), (u1 - u0) / chord.h));

@@ -13,7 +13,7 @@ use super::quotient::{self, quotient};
 use super::stop::{StopKind, lost, nearer};
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Pattern};
+use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use bimorph_structure::{Adhesion, Friction, GapVoltage};
 use nalgebra::Vector2;
 
@@ -112,7 +112,7 @@ impl Domain for StopPair {
 
     fn add_force_change(&self, _: Configuration<'_>, _: f64, _: f64, _: &mut [Pose]) {}
 
-    fn add_tangent(&self, at: Configuration<'_>, _: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+    fn add_tangent(&self, at: Configuration<'_>, _: f64, pattern: &Pattern, tangent: &mut BodyMatrix) {
         let m = self.approach.measure(at.q, at.linear);
         let (first, second) = self.resisting(m.value);
         if first != 0.0 || second != 0.0 {
@@ -212,8 +212,8 @@ impl Domain for StopPair {
         at: Configuration<'_>,
         rate: &impl Fn(usize) -> Pose,
         pattern: &Pattern,
-        stiffness: &mut BlockMatrix<f64, 3>,
-        damping: &mut BlockMatrix<f64, 3>,
+        stiffness: &mut BodyMatrix,
+        damping: &mut BodyMatrix,
     ) -> bool {
         if !self.damps() || self.distance(at) >= 0.0 {
             return false;
@@ -233,14 +233,7 @@ impl Domain for StopPair {
         true
     }
 
-    fn add_quotient(
-        &self,
-        chord: &Chord<'_>,
-        _: f64,
-        pattern: &Pattern,
-        r: &mut [Pose],
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    fn add_quotient(&self, chord: &Chord<'_>, _: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {
         let side = |way: Option<f64>, u0: f64, u1: f64| {
             let Some(way) = way.filter(|way| u0.max(u1) > *way) else { return (0.0, 0.0) };
             let pressed = |u: f64| {

@@ -9,7 +9,7 @@ use super::drive::{Drive, Electrics};
 use super::load::DeadLoad;
 use super::member::Member;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Model, forces};
+use bimorph_multibody::{BodyId, BodyMatrix, Model, forces};
 use nalgebra::Vector2;
 use std::sync::Arc;
 
@@ -92,7 +92,7 @@ impl System {
 
     /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
     #[inline]
-    pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+    pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BodyMatrix) {
         let (at, pattern) = (self.at(q), &self.model.pattern);
         for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
             gap.add_tangent(at, volts, pattern, tangent);
@@ -106,14 +106,14 @@ impl System {
     /// The tangent ∂r/∂q and the residual r. Held directions of the tangent are left to the caller, which may add
     /// inertia.
     #[inline]
-    pub fn tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
+    pub fn tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BodyMatrix, r: &mut [Pose]) {
         r.fill(Pose::zeros());
         self.add_tangent(q, drive, tangent, r);
     }
 
     /// [`System::tangent`] with the residual added to `r`, held directions removed from the sum.
     #[inline]
-    pub fn add_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
+    pub fn add_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BodyMatrix, r: &mut [Pose]) {
         self.add_tangent_and(q, drive, tangent, r, |_| ());
     }
 
@@ -122,7 +122,7 @@ impl System {
         &self,
         q: &[Pose],
         drive: &Drive,
-        tangent: &mut BlockMatrix<f64, 3>,
+        tangent: &mut BodyMatrix,
         r: &mut [Pose],
         more: impl FnOnce(&mut [Pose]),
     ) {
@@ -147,7 +147,7 @@ impl System {
         here: (&[Pose], &Drive),
         share: f64,
         there: (&[Pose], &Drive),
-        tangent: &mut BlockMatrix<f64, 3>,
+        tangent: &mut BodyMatrix,
         r: &mut [Pose],
     ) {
         tangent.clear();
@@ -197,14 +197,14 @@ impl System {
     /// the joints turn with them (K_σ of [`forces::add_stress_stiffness`]), and so do the points at which loads, voltage and contact act:
     /// [`System::add_levers`]. Left out, a beam of N segments under thrust is too stiff by a fraction that falls with 1/N only.
     #[inline]
-    pub fn add_stress_stiffness(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+    pub fn add_stress_stiffness(&self, q: &[Pose], drive: &Drive, tangent: &mut BodyMatrix) {
         forces::add_stress_stiffness(&self.model, q, &drive.rest(), tangent);
         self.add_levers(q, drive, tangent);
     }
 
     /// Its geometric part from the points of application of forces. A body that rotates by θ moves the point at its arm
     /// r. The force F keeps its direction and gets the lever −θ·r, a moment of −θ·(r·F).
-    pub fn add_levers(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+    pub fn add_levers(&self, q: &[Pose], drive: &Drive, tangent: &mut BodyMatrix) {
         if !self.model.linear {
             return;
         }
@@ -226,13 +226,7 @@ impl System {
     }
 
     /// [`System::tangent`] without what members add.
-    pub fn tangent_without_members(
-        &self,
-        q: &[Pose],
-        drive: &Drive,
-        tangent: &mut BlockMatrix<f64, 3>,
-        r: &mut [Pose],
-    ) {
+    pub fn tangent_without_members(&self, q: &[Pose], drive: &Drive, tangent: &mut BodyMatrix, r: &mut [Pose]) {
         tangent.clear();
         r.fill(Pose::zeros());
         forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
@@ -249,14 +243,7 @@ impl System {
     /// Adds the discrete forces of members over a step of length `h` (s) with the configurations `q` at its start, middle and end, and the
     /// symmetric part of their tangent with the end; held directions not removed.
     #[inline]
-    pub fn add_quotients(
-        &self,
-        q: [&[Pose]; 3],
-        h: f64,
-        drive: &Drive,
-        r: &mut [Pose],
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
+    pub fn add_quotients(&self, q: [&[Pose]; 3], h: f64, drive: &Drive, r: &mut [Pose], tangent: &mut BodyMatrix) {
         let chord = Chord { at: q.map(|q| self.at(q)), h };
         let acts = |(gap, volts): &(&Member, &f64)| gap.is_active(**volts) || gap.damps();
         for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(acts) {
@@ -289,8 +276,8 @@ impl System {
         &self,
         q: &[Pose],
         rate: impl Fn(usize) -> Pose,
-        stiffness: &mut BlockMatrix<f64, 3>,
-        damping: &mut BlockMatrix<f64, 3>,
+        stiffness: &mut BodyMatrix,
+        damping: &mut BodyMatrix,
     ) -> bool {
         let (at, pattern) = (self.at(q), &self.model.pattern);
         let add = |any, member: &Member| member.add_loss_tangent(at, &rate, pattern, stiffness, damping) | any;

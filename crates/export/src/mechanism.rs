@@ -11,7 +11,7 @@ use bimorph_device::PortKind;
 use bimorph_domains::thermal::HeatConductor;
 use bimorph_domains::{Drive, System};
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::SolveError;
 use bimorph_solve::frequency::refined::{ROUNDING, Refined};
@@ -44,8 +44,8 @@ pub struct LinearizedMechanism<'a> {
     pub(super) sources: Vec<f64>,
     pub(super) rise: Vec<f64>,
     pub(super) drive: Drive,
-    pub(super) tangent: BlockMatrix<f64, 3>,
-    pub(super) factor: BlockMatrix<f64, 3>,
+    pub(super) tangent: BodyMatrix,
+    pub(super) factor: BodyMatrix,
     pub(super) pushes: Vec<InputExcitation>,
 }
 
@@ -100,7 +100,7 @@ impl<'a> LinearizedMechanism<'a> {
         sources.resize(system.electrics.sources(), 0.0);
         let mut drive = system.electrics.drive();
         system.electrics.apply(&sources, &point.rise, &mut drive);
-        let mut tangent = BlockMatrix::new(&system.model.pattern);
+        let mut tangent = BodyMatrix::new(&system.model.pattern);
         let mut residual = point.q.clone();
         system.tangent(&point.q, &drive, &mut tangent, &mut residual);
         let mut factor = tangent.clone();

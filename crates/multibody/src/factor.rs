@@ -16,6 +16,7 @@
 mod block;
 
 use super::Pattern;
+use super::planar::DOF;
 use block::BlockFactor;
 pub(super) use block::LOST;
 pub use block::{PivotSigns, Scalar, ZeroPivot};
@@ -31,6 +32,9 @@ pub struct BlockMatrix<T: Scalar, const N: usize> {
     /// Diagonal entries before elimination: the scale against which a pivot has vanished.
     scale: Vec<SVector<f64, N>>,
 }
+
+/// Such a matrix over the degrees of freedom of bodies in the plane.
+pub type BodyMatrix<T = f64> = BlockMatrix<T, DOF>;
 
 /// Stiffness that holds a direction that has none, as a fraction of that of others (1): with a thousandth, a load that excites it moves it a thousand
 /// times as far as others in every iteration, and none settles.

@@ -6,7 +6,7 @@ use super::planar::factored::FactoredTangent;
 use super::planar::vector::dot3;
 use super::planar::{Block, HalfTurn, JointKinematics, PairTangent, Pose, Symmetric, Vec3};
 use super::section::{JointSection, NONE, PackedJoint, PairSlot};
-use super::{BlockMatrix, BodyId};
+use super::{BodyId, BodyMatrix};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// Half turns of the two bodies that were met last. Along a beam each body is met twice in a row, and a sine and cosine
@@ -194,7 +194,7 @@ fn turn_between(q: &[Pose], (a, b): (BodyId, BodyId)) -> f64 {
 }
 
 /// The constant tangent of coupled joints.
-pub(super) fn add_coupling_tangent(model: &Model, factor: f64, tangent: &mut BlockMatrix<f64, 3>) {
+pub(super) fn add_coupling_tangent(model: &Model, factor: f64, tangent: &mut BodyMatrix) {
     for Coupling { first, second, stiffness } in &model.couplings {
         let stiffness = factor * stiffness;
         for (i, row) in [(first.0, -stiffness), (first.1, stiffness)] {
@@ -211,13 +211,7 @@ pub(super) fn add_coupling_tangent(model: &Model, factor: f64, tangent: &mut Blo
 }
 
 /// `tangent += ∂²U/∂q²` and `r += ∂U/∂q`.
-pub fn add_tangent(
-    model: &Model,
-    q: &[Pose],
-    rest: &RestStrain<'_>,
-    tangent: &mut BlockMatrix<f64, 3>,
-    r: &mut [Pose],
-) {
+pub fn add_tangent(model: &Model, q: &[Pose], rest: &RestStrain<'_>, tangent: &mut BodyMatrix, r: &mut [Pose]) {
     let mut turns = HalfTurnCache::new();
     for joint in &model.joints {
         let section = model.section(joint);
@@ -238,7 +232,7 @@ pub fn add_tangent(
 /// `tangent +=` the stiffness that the stress of the joints brings to a linear model about the drawn geometry, as stress and
 /// heat do. Equilibria of a linear model do not have it; vibrations about them do.
 #[inline]
-pub fn add_stress_stiffness(model: &Model, q: &[Pose], rest: &RestStrain<'_>, tangent: &mut BlockMatrix<f64, 3>) {
+pub fn add_stress_stiffness(model: &Model, q: &[Pose], rest: &RestStrain<'_>, tangent: &mut BodyMatrix) {
     let mut turns = HalfTurnCache::new();
     for joint in model.joints.iter().filter(|_| model.linear) {
         let section = model.section(joint);
@@ -326,7 +320,7 @@ pub fn add_dampers(model: &Model, v: impl Fn(usize) -> Pose, r: &mut [Pose]) {
 }
 
 /// `matrix += m·M + c·C`: the inertia and damping share of an implicit step.
-pub fn add_inertia(model: &Model, m: f64, c: f64, matrix: &mut BlockMatrix<f64, 3>) {
+pub fn add_inertia(model: &Model, m: f64, c: f64, matrix: &mut BodyMatrix) {
     for (block, body) in matrix.diagonal.iter_mut().zip(&model.bodies) {
         let (drag, first) = (body.drag, body.drag.first * c);
         let translation = m * body.mass + c * drag.amount;
@@ -356,7 +350,7 @@ pub(super) fn scatter(place: PairSlot, (a, b): (Vec3<f64>, Vec3<f64>), r: &mut [
 impl PairSlot {
     /// Adds the tangent of a pair to `matrix`, in the parts that belong to free bodies.
     #[inline(always)]
-    pub(crate) fn add_pair(self, matrix: &mut BlockMatrix<f64, 3>, h: &PairTangent) {
+    pub(crate) fn add_pair(self, matrix: &mut BodyMatrix, h: &PairTangent) {
         if self.a != NONE {
             matrix.diagonal[self.a as usize] += Block::from(h.aa());
         }
@@ -371,7 +365,7 @@ impl PairSlot {
 
     /// Adds a 6×6 pair block (a then b) to `matrix`, in the parts that belong to free bodies.
     #[inline]
-    pub fn add(self, matrix: &mut BlockMatrix<f64, 3>, h: &Matrix6<f64>) {
+    pub fn add(self, matrix: &mut BodyMatrix, h: &Matrix6<f64>) {
         if self.a != NONE {
             matrix.diagonal[self.a as usize] += h.fixed_view::<3, 3>(0, 0);
         }

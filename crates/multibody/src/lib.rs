@@ -47,7 +47,7 @@ pub mod sine;
 pub mod unstressed;
 
 pub use body::{Body, BodyName, Drag};
-pub use factor::{BlockMatrix, Scalar};
+pub use factor::{BlockMatrix, BodyMatrix, Scalar};
 pub use joint::{BodyId, Coupling, Damper, Joint};
 pub use model::{Model, ModelOrder, State};
 pub use pattern::Pattern;

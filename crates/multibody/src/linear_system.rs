@@ -6,7 +6,7 @@
 use super::model::projected;
 use super::order::elimination_order;
 use super::planar::{Block, Pose};
-use super::{BlockMatrix, BodyId, Pattern};
+use super::{BodyId, BodyMatrix, Pattern};
 use nalgebra::Matrix6;
 
 /// Mass, damping and stiffness of bodies in elimination order.
@@ -17,11 +17,11 @@ pub struct LinearSystem {
     /// Pattern of all three matrices.
     pub pattern: Pattern,
     /// Stiffness (N/m, N, N·m).
-    pub stiffness: BlockMatrix<f64, 3>,
+    pub stiffness: BodyMatrix,
     /// Mass (kg, kg·m, kg·m²).
-    pub mass: BlockMatrix<f64, 3>,
+    pub mass: BodyMatrix,
     /// Damping (N·s/m, N·s, N·m·s).
-    pub damping: BlockMatrix<f64, 3>,
+    pub damping: BodyMatrix,
     /// Projector of each body onto the directions that supports leave free; none: all.
     pub free: Vec<Option<Block>>,
 }
@@ -46,7 +46,7 @@ impl LinearSystem {
         }
         let edges: Vec<(usize, usize)> = edges.iter().map(|&(a, b)| (place[a], place[b])).collect();
         let pattern = Pattern::new(bodies.len(), &edges);
-        let zero = BlockMatrix::new(&pattern);
+        let zero = BodyMatrix::new(&pattern);
         let (names, free) = order.iter().map(|&k| bodies[k].clone()).unzip();
         (Self { names, stiffness: zero.clone(), mass: zero.clone(), damping: zero, free, pattern }, place)
     }
@@ -64,8 +64,8 @@ impl LinearSystem {
     }
 
     /// `k·K + m·M + c·C`, held directions projected.
-    pub fn combine(&self, k: f64, m: f64, c: f64) -> BlockMatrix<f64, 3> {
-        let mut sum = BlockMatrix::new(&self.pattern);
+    pub fn combine(&self, k: f64, m: f64, c: f64) -> BodyMatrix {
+        let mut sum = BodyMatrix::new(&self.pattern);
         for (factor, part) in [(k, &self.stiffness), (m, &self.mass), (c, &self.damping)] {
             for (to, from) in sum.diagonal.iter_mut().zip(&part.diagonal) {
                 *to += from * factor;
@@ -102,7 +102,7 @@ impl LinearSystem {
 }
 
 /// Adds a pair block (a then b) to a symmetric matrix, in the parts that belong to free bodies.
-pub fn add_pair(matrix: &mut BlockMatrix<f64, 3>, pattern: &Pattern, a: BodyId, b: BodyId, pair: &Matrix6<f64>) {
+pub fn add_pair(matrix: &mut BodyMatrix, pattern: &Pattern, a: BodyId, b: BodyId, pair: &Matrix6<f64>) {
     for (id, at) in [(a, 0), (b, 3)] {
         if let BodyId::Free(k) = id {
             matrix.diagonal[k] += pair.fixed_view::<3, 3>(at, at);

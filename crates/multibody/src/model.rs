@@ -1,6 +1,6 @@
 //! The immutable model: bodies in elimination order, joints, dampers; and the state that a snapshot holds.
 
-use super::BlockMatrix;
+use super::BodyMatrix;
 use super::body::Body;
 use super::factor::{HELD, PivotSigns, ZeroPivot};
 use super::joint::{BodyId, Coupling, Damper, Joint};
@@ -204,13 +204,13 @@ impl Model {
         model
     }
 
-    /// [`BlockMatrix::factor_holding`] of a stiffness whose held directions are projected: the last body of each loose part is held, too.
+    /// [`BodyMatrix::factor_holding`] of a stiffness whose held directions are projected: the last body of each loose part is held, too.
     ///
     /// # Errors
     /// [`ZeroPivot`].
     pub fn factor_holding(
         &self,
-        stiffness: &mut BlockMatrix<f64, 3>,
+        stiffness: &mut BodyMatrix,
         held: &mut Vec<ZeroPivot>,
     ) -> Result<PivotSigns, ZeroPivot> {
         for body in self.loose() {
@@ -262,7 +262,7 @@ impl Model {
     }
 
     /// Removes the held directions from a matrix and gives them pivots, so that solutions have no part in them.
-    pub fn project_matrix<T: super::Scalar>(&self, matrix: &mut BlockMatrix<T, 3>) {
+    pub fn project_matrix<T: super::Scalar>(&self, matrix: &mut BodyMatrix<T>) {
         if self.held.is_empty() {
             return;
         }

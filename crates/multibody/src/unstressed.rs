@@ -4,7 +4,7 @@
 //! section forces and strains vanish while the frames of the joints keep their directions. A part that has only turned has
 //! the same stiffness as at rest.
 
-use super::BlockMatrix;
+use super::BodyMatrix;
 use super::forces::{HalfTurnCache, add_coupling_tangent, scatter};
 use super::model::Model;
 use super::planar::Pose;
@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 /// `tangent += factor·K₀`: the stiffness in the geometry `q` with all strains and section forces set to zero.
 #[inline]
-pub fn add_unstressed_tangent(model: &Model, q: &[Pose], factor: f64, tangent: &mut BlockMatrix<f64, 3>) {
+pub fn add_unstressed_tangent(model: &Model, q: &[Pose], factor: f64, tangent: &mut BodyMatrix) {
     let mut turns = HalfTurnCache::new();
     for joint in &model.joints {
         let section = model.section(joint);

@@ -20,7 +20,7 @@ pub mod sparse;
 use crate::equations::linear::{LinearSolver, Recursion};
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::{DOF, Pose};
-use bimorph_multibody::{BlockMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 use dense::DensePivoted;
 use dense_unpivoted::DenseUnpivoted;
 pub use kind::{SolverKind, TooLarge};
@@ -79,7 +79,7 @@ impl Solver {
 }
 
 impl LinearSolver for Solver {
-    fn factor(&mut self, pattern: &Pattern, matrix: &mut BlockMatrix<f64, 3>) -> Result<(), ZeroPivot> {
+    fn factor(&mut self, pattern: &Pattern, matrix: &mut BodyMatrix) -> Result<(), ZeroPivot> {
         match self {
             Self::Recursion(s) => s.factor(pattern, matrix),
             Self::DenseUnpivoted(s) => s.factor(pattern, matrix),
@@ -88,7 +88,7 @@ impl LinearSolver for Solver {
         }
     }
 
-    fn solve(&self, pattern: &Pattern, matrix: &BlockMatrix<f64, 3>, b: &mut [Pose]) {
+    fn solve(&self, pattern: &Pattern, matrix: &BodyMatrix, b: &mut [Pose]) {
         match self {
             Self::Recursion(s) => s.solve(pattern, matrix, b),
             Self::DenseUnpivoted(s) => s.solve(pattern, matrix, b),
@@ -107,7 +107,7 @@ mod tests {
     fn a_singular_matrix_is_refused() {
         let pattern = Pattern::new(2, &[(0, 1)]);
         for kind in SolverKind::ALL {
-            let mut a = BlockMatrix::<f64, 3>::new(&pattern);
+            let mut a = BodyMatrix::<f64>::new(&pattern);
             a.diagonal.fill(nalgebra::Matrix3::identity());
             a.below[0] = nalgebra::Matrix3::identity();
             let mut solver = Solver::new(kind, &pattern).unwrap();

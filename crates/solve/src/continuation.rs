@@ -29,7 +29,7 @@ use corrector::{CorrectorPlane, PathState};
 
 use super::SolveError;
 use bimorph_domains::System;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use family::LoadFamily;
 
@@ -42,7 +42,7 @@ impl Continuation {
         let zeros = vec![Pose::zeros(); system.bodies()];
         Self {
             options,
-            tangent: BlockMatrix::new(&system.model.pattern),
+            tangent: BodyMatrix::new(&system.model.pattern),
             residual: zeros.clone(),
             slope: zeros,
             iterations: 0,

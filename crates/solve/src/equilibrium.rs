@@ -23,7 +23,7 @@ pub use loss::{LossKind, StabilityLoss};
 
 use super::SolveError;
 use bimorph_domains::{Drive, System};
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::Pose;
 use newton_test::{Corrections, leaps};
@@ -89,7 +89,7 @@ pub struct Path {
 pub struct Equilibrium {
     /// Options.
     pub options: EquilibriumOptions,
-    tangent: BlockMatrix<f64, 3>,
+    tangent: BodyMatrix,
     residual: Vec<Pose>,
     step: Vec<Pose>,
     /// Where the tangent predicted the end of the step.
@@ -127,7 +127,7 @@ impl Equilibrium {
         let zeros = vec![Pose::zeros(); system.bodies()];
         Self {
             options,
-            tangent: BlockMatrix::new(&system.model.pattern),
+            tangent: BodyMatrix::new(&system.model.pattern),
             residual: zeros.clone(),
             step: zeros.clone(),
             prediction: zeros.clone(),
@@ -148,7 +148,7 @@ impl Equilibrium {
     }
 
     /// The factored tangent of the last equilibrium.
-    pub fn factor(&self) -> &BlockMatrix<f64, 3> {
+    pub fn factor(&self) -> &BodyMatrix {
         &self.tangent
     }
 

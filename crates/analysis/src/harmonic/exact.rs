@@ -9,7 +9,7 @@ use crate::readout::small_signal::{ForcedMotion, PerturbedState};
 use crate::statics::{OperatingPoint, operating_point};
 use bimorph_domains::{Drive, System};
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::frequency::refined::Refined;
 use bimorph_solve::harmonic::{ComplexPose, Harmonic};
@@ -23,7 +23,7 @@ pub(crate) struct ExactResponse<'a> {
     pub(super) point: OperatingPoint,
     still: Vec<Pose>,
     pub(super) drive: Drive,
-    pub(crate) tangent: BlockMatrix<f64, 3>,
+    pub(crate) tangent: BodyMatrix,
     pub(super) harmonic: Harmonic,
     /// The tangent unsummed; none for a linear model, whose tangent is another one.
     refined: Option<Refined<'a>>,
@@ -67,7 +67,7 @@ impl<'a> ExactResponse<'a> {
         point.sources.resize(system.electrics.sources(), 0.0);
         let mut drive = system.electrics.drive();
         system.electrics.apply(&point.sources, &point.rise, &mut drive);
-        let mut tangent = BlockMatrix::new(&system.model.pattern);
+        let mut tangent = BodyMatrix::new(&system.model.pattern);
         let mut residual = point.q.clone();
         system.tangent(&point.q, &drive, &mut tangent, &mut residual);
         let bodies = system.bodies();
@@ -130,7 +130,7 @@ impl<'a> ExactResponse<'a> {
     }
 
     /// Something that needs the storage for complex frequencies, too.
-    pub(super) fn with_system<T>(&mut self, f: impl FnOnce(&System, &BlockMatrix<f64, 3>, &mut Harmonic) -> T) -> T {
+    pub(super) fn with_system<T>(&mut self, f: impl FnOnce(&System, &BodyMatrix, &mut Harmonic) -> T) -> T {
         let own = self.ports.system.clone();
         f(own.as_deref().unwrap_or(&self.compiled.parts.system), &self.tangent, &mut self.harmonic)
     }

@@ -14,7 +14,7 @@ use crate::AnalysisError;
 use crate::readout::signal::Signal;
 use crate::readout::small_signal::{Constituent, ForcedMotion, FrequencyDependence};
 use bimorph_domains::{Drive, System};
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::forces::{add_damping, add_inertia};
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::eigen::{Modes, RELIABLE, lowest_modes};
@@ -39,7 +39,7 @@ const ASIDE: f64 = 0.03;
 pub fn lowest(
     system: &System,
     (q, drive): (&[Pose], &Drive),
-    tangent: &BlockMatrix<f64, 3>,
+    tangent: &BodyMatrix,
     count: usize,
 ) -> Result<Modes, AnalysisError> {
     if system.model.linear {
@@ -59,7 +59,7 @@ pub fn lowest(
 fn linear(
     system: &System,
     (q, drive): (&[Pose], &Drive),
-    tangent: &BlockMatrix<f64, 3>,
+    tangent: &BodyMatrix,
     count: usize,
 ) -> Result<Modes, AnalysisError> {
     let model = &system.model;

@@ -33,7 +33,7 @@ use bimorph_model::refine::lowest_modes;
 use bimorph_model::refine::mesh_search::{self, Mesh, MeshTarget};
 use bimorph_multibody::forces::add_damping;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, Model};
+use bimorph_multibody::{BodyMatrix, Model};
 use bimorph_solve::eigen::lowest_modes;
 use std::f64::consts::TAU;
 
@@ -227,7 +227,7 @@ fn excited(
     let to = operating_point(&model, &options.voltages).unwrap_or(rest);
     let mut drive = system.electrics.drive();
     system.electrics.apply(&to.sources, &to.rise, &mut drive);
-    let mut stiffness = BlockMatrix::new(&system.model.pattern);
+    let mut stiffness = BodyMatrix::new(&system.model.pattern);
     let mut residual = to.q.clone();
     system.tangent(&to.q, &drive, &mut stiffness, &mut residual);
     system.add_stress_stiffness(&to.q, &drive, &mut stiffness);
@@ -282,7 +282,7 @@ fn pushed(
     from: &OperatingPoint,
     shock: Option<&Shock>,
     drive: &Drive,
-    stiffness: &BlockMatrix<f64, 3>,
+    stiffness: &BodyMatrix,
 ) -> Option<Vec<Pose>> {
     let system = &model.parts.system;
     let mut x = vec![Pose::zeros(); system.bodies()];
@@ -312,7 +312,7 @@ pub(super) fn linear_way(model: &CompiledModel, from: &OperatingPoint, to: &Oper
     let system = &model.parts.system;
     let mut drive = system.electrics.drive();
     system.electrics.apply(&to.sources, &to.rise, &mut drive);
-    let mut stiffness = BlockMatrix::new(&system.model.pattern);
+    let mut stiffness = BodyMatrix::new(&system.model.pattern);
     let mut residual = to.q.clone();
     system.tangent(&to.q, &drive, &mut stiffness, &mut residual);
     pushed(model, from, None, &drive, &stiffness)

@@ -14,7 +14,7 @@ use super::super::statics::{OperatingPoint, operating_point_near};
 use super::doubled_mesh::{Finer, MAX_NEAR_LIMIT, finer};
 use bimorph_domains::BeamLine;
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::unstressed::add_unstressed_tangent;
 
@@ -71,7 +71,7 @@ pub(super) fn hidden(compiled: &CompiledModel, voltages: &PortVoltages, point: &
 /// True where μ < `fraction`: one factorization.
 fn is_softer(compiled: &CompiledModel, point: &OperatingPoint, fraction: f64) -> bool {
     let system = &compiled.parts.system;
-    let (mut tangent, mut force) = (BlockMatrix::new(&system.model.pattern), vec![Pose::zeros(); system.bodies()]);
+    let (mut tangent, mut force) = (BodyMatrix::new(&system.model.pattern), vec![Pose::zeros(); system.bodies()]);
     system.tangent(&point.q, &point.drive(compiled), &mut tangent, &mut force);
     add_unstressed_tangent(&system.model, &point.q, -fraction, &mut tangent);
     system.model.project_matrix(&mut tangent);
@@ -82,11 +82,11 @@ fn is_softer(compiled: &CompiledModel, point: &OperatingPoint, fraction: f64) ->
 fn softest(compiled: &CompiledModel, point: &OperatingPoint) -> Option<String> {
     let (system, model) = (&compiled.parts.system, &compiled.parts.system.model);
     let mut x = vec![Pose::zeros(); system.bodies()];
-    let mut loaded = BlockMatrix::new(&model.pattern);
+    let mut loaded = BodyMatrix::new(&model.pattern);
     system.tangent(&point.q, &point.drive(compiled), &mut loaded, &mut x);
     model.project_matrix(&mut loaded);
     loaded.factor(&model.pattern).ok()?;
-    let mut unloaded = BlockMatrix::new(&model.pattern);
+    let mut unloaded = BodyMatrix::new(&model.pattern);
     add_unstressed_tangent(model, &point.q, 1.0, &mut unloaded);
     model.project_matrix(&mut unloaded);
     system.excite(&point.q, system.length_scale, &mut x);

@@ -22,7 +22,7 @@ use super::super::statics::OperatingPoint;
 use bimorph_base::ErrorBudget;
 use bimorph_domains::Drive;
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 
 /// Fraction of the stiffness at rest below which it is compared from mesh to mesh (1). The coarsest mesh of a clamped
@@ -44,7 +44,7 @@ pub(super) fn left_of_soft(compiled: &CompiledModel, point: &OperatingPoint) -> 
     }
     let [here, rest, without] = drives(compiled, point);
     let still = vec![Pose::zeros(); system.bodies()];
-    let (mut force, mut tangent) = (still.clone(), BlockMatrix::new(pattern));
+    let (mut force, mut tangent) = (still.clone(), BodyMatrix::new(pattern));
     let pulled = here.volts.iter().any(|v| *v != 0.0);
     let references = [(&still, &rest), (&point.q, &without)];
     references.into_iter().take(1 + usize::from(pulled)).find_map(|(q, drive)| {
@@ -96,7 +96,7 @@ struct SoftestMotion {
 fn lowest(compiled: &CompiledModel, q: &[Pose], drive: &Drive) -> Option<SoftestMotion> {
     let (system, model) = (&compiled.parts.system, &compiled.parts.system.model);
     let mut x = vec![Pose::zeros(); q.len()];
-    let mut stiffness = BlockMatrix::new(&model.pattern);
+    let mut stiffness = BodyMatrix::new(&model.pattern);
     system.tangent(q, drive, &mut stiffness, &mut x);
     model.project_matrix(&mut stiffness);
     stiffness.factor(&model.pattern).ok().filter(|inertia| inertia.negative == 0)?;

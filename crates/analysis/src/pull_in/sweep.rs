@@ -4,7 +4,7 @@ use super::super::AnalysisError;
 use super::super::contact_range::{comb_aside, within_contact_range};
 use bimorph_domains::{Domain, System};
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::SolveError;
 use bimorph_solve::continuation::{Continuation, ContinuationOptions, PathEnd, TracedPath};
@@ -254,7 +254,7 @@ impl<'a> VoltageSweep<'a> {
     fn unit(&self, q: &[Pose], max: f64) -> Result<f64, AnalysisError> {
         let system = self.system;
         let electrics = &system.electrics;
-        let mut tangent = BlockMatrix::new(&system.model.pattern);
+        let mut tangent = BodyMatrix::new(&system.model.pattern);
         let mut rise = vec![0.0; electrics.heating.states()];
         let mut residual = [vec![Pose::zeros(); q.len()], vec![Pose::zeros(); q.len()]];
         let mut drive = electrics.drive();

@@ -6,7 +6,7 @@ use bimorph_base::suggest::nearest;
 use bimorph_domains::MaterialPoint;
 use bimorph_domains::contact_resistance::conductance;
 use bimorph_model::compile::CompiledModel;
-use bimorph_multibody::planar::{self, Pose};
+use bimorph_multibody::planar::{self, DOF, Pose};
 use bimorph_multibody::{BodyId, Model};
 use bimorph_structure::OhmicContact;
 
@@ -215,11 +215,11 @@ pub fn names(compiled: &CompiledModel) -> Vec<String> {
 }
 
 /// Components of the motion of a node: displacements, then rates.
-const DIRECTIONS: [&str; 6] = ["x", "y", "rz", "vx", "vy", "vrz"];
+const DIRECTIONS: [&str; 2 * DOF] = ["x", "y", "rz", "vx", "vy", "vrz"];
 
 /// Direction and kind (true: rate) of the motion that `x`, `y`, `rz`, `vx`, `vy` and `vrz` stand for.
 fn direction(quantity: &str) -> Option<(usize, bool)> {
-    DIRECTIONS.iter().position(|n| *n == quantity).map(|k| (k % 3, k >= 3))
+    DIRECTIONS.iter().position(|n| *n == quantity).map(|k| (k % DOF, k >= DOF))
 }
 
 /// Node, direction and kind (true: rate) of a signal of a node.

@@ -1,14 +1,14 @@
 //! How long the first step in time is.
 
 use bimorph_domains::System;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 
 /// A cautious first step: the error control corrects it within a few steps either way.
 pub fn first_step(system: &System, interval: f64) -> f64 {
     // a tenth of a radian of the fastest translation that a body and its own joints would make
     let model = &system.model;
-    let mut tangent = BlockMatrix::new(&model.pattern);
+    let mut tangent = BodyMatrix::new(&model.pattern);
     let zeros = vec![Pose::zeros(); system.bodies()];
     let mut r = zeros.clone();
     system.tangent(&zeros, &system.electrics.drive(), &mut tangent, &mut r);

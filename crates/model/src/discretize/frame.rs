@@ -19,7 +19,7 @@ use super::rigid::RigidGroups;
 use super::{DiscretizeError, cubic, lay_spring, order};
 use bimorph_domains::{Domain, MaterialPoint, Member};
 use bimorph_multibody::linear_system::{LinearSystem, add_pair};
-use bimorph_multibody::planar::{JointFrame, Pose};
+use bimorph_multibody::planar::{DOF, JointFrame, Pose};
 use bimorph_multibody::{BodyId, BodyName, Joint};
 use bimorph_structure::{Beam, Structure};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector2, Vector3, Vector6};
@@ -134,7 +134,7 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<LinearF
         let heater = heated.binary_search(&piece.index).ok();
         for (id, row) in ends {
             if let BodyId::Free(body) = id {
-                let force: Vector3<f64> = push.fixed_rows::<3>(row).into_owned();
+                let force: Vector3<f64> = push.fixed_rows::<DOF>(row).into_owned();
                 load[body] += force * strain;
                 if let Some(heater) = heater {
                     expansion[heater][body] += force;
@@ -149,7 +149,7 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<LinearF
             let push = rows(&joint.frame).transpose() * joint.stiffness * Vector3::new(joint.rest, 0.0, 0.0);
             for (id, row) in [(moved(joint.a), 0), (moved(joint.b), 3)] {
                 if let BodyId::Free(body) = id {
-                    load[body] += push.fixed_rows::<3>(row);
+                    load[body] += push.fixed_rows::<DOF>(row);
                 }
             }
         }
@@ -239,8 +239,8 @@ impl FrameElement<'_> {
         let (s, c) = self.beam.angle.sin_cos();
         let turn = Matrix3::new(c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0);
         let mut t = Matrix6::zeros();
-        t.fixed_view_mut::<3, 3>(0, 0).copy_from(&(turn * carry(self.from.arm)));
-        t.fixed_view_mut::<3, 3>(3, 3).copy_from(&(turn * carry(self.to.arm)));
+        t.fixed_view_mut::<DOF, DOF>(0, 0).copy_from(&(turn * carry(self.from.arm)));
+        t.fixed_view_mut::<DOF, DOF>(DOF, DOF).copy_from(&(turn * carry(self.to.arm)));
         let push = t.transpose() * Vector6::new(-a * h, 0.0, 0.0, a * h, 0.0, 0.0);
         (t.transpose() * k * t, t.transpose() * m * t, push)
     }

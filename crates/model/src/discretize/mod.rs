@@ -52,6 +52,7 @@ mod stations;
 pub mod stressed;
 
 pub use crate::options::{Anchors, Junctions, Scheme};
+use bimorph_multibody::planar::DOF;
 pub use error::{DiscretizeError, MAX_SEGMENTS};
 use free_rotation::BodyActions;
 
@@ -124,7 +125,7 @@ pub fn discretize_like(
         return Err(DiscretizeError::TooFine { segments: total });
     }
     // check the bodies inside beams, a lower bound, before any allocation
-    budget::unknowns(3 * segments.iter().map(|n| n.saturating_sub(1)).sum::<usize>());
+    budget::unknowns(DOF * segments.iter().map(|n| n.saturating_sub(1)).sum::<usize>());
     budget::lay_out(total * SEGMENT_BYTES);
     if structure.nodes.is_empty() {
         return Err(DiscretizeError::NothingDrawn);

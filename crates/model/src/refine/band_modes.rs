@@ -7,8 +7,8 @@ use super::mode_errors::{ModeErrors, of_modes};
 use super::transfer::carried;
 use crate::discretize::{Assembly, DiscretizeError, discretize_with};
 use crate::options::CompileOptions;
-use bimorph_multibody::BlockMatrix;
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::BodyMatrix;
+use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_solve::subspace;
 use bimorph_structure::Structure;
 
@@ -68,13 +68,13 @@ fn modes_in_band(
 ) -> Option<ModesInBand> {
     let (system, model) = (&parts.system, &parts.system.model);
     let n = system.bodies();
-    let mut k = BlockMatrix::new(&model.pattern);
+    let mut k = BodyMatrix::new(&model.pattern);
     let (rest, mut residual) = (vec![Pose::zeros(); n], vec![Pose::zeros(); n]);
     system.tangent(&rest, &system.electrics.drive(), &mut k, &mut residual);
     let shifted = |sigma: f64| {
         let mut a = k.clone();
         for (j, block) in a.diagonal.iter_mut().enumerate() {
-            for i in 0..3 {
+            for i in 0..DOF {
                 block[(i, i)] -= sigma * model.mass(j)[i];
             }
         }

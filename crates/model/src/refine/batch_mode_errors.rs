@@ -12,6 +12,7 @@ use crate::discretize::Assembly;
 use crate::options::CompileOptions;
 use bimorph_multibody::BodyId;
 use bimorph_multibody::batch::{Kernel, LANES, Lane8, LanePose, SimdReal, ZERO_POSE, across, forces, load, store};
+use bimorph_multibody::planar::DOF;
 use bimorph_multibody::scalar::StoredReal;
 use bimorph_solve::frequency::batch::{LaneModes, RitzMatrices, dot, weigh};
 use bimorph_solve::frequency::mac;
@@ -265,7 +266,7 @@ fn add_beams<W: SimdReal>(
     (local, force): (&mut [LanePose], &mut [LanePose]),
     out: &mut [LanePose],
 ) {
-    let none = [W::splat(simd, 0.0); 3];
+    let none = [W::splat(simd, 0.0); DOF];
     for span in spans {
         let [cos, sin] = load::<W, 2>(simd, &span.along);
         let mut matrix = load::<W, 20>(simd, &span.mass);
@@ -275,7 +276,8 @@ fn add_beams<W: SimdReal>(
         for ((point, local), force) in span.points.iter().zip(&mut *local).zip(&mut *force) {
             let mut moved = none;
             if let Some(body) = point.body {
-                let ([x, y, turn], [ax, ay]) = (load::<W, 3>(simd, &x[body as usize]), load::<W, 2>(simd, &point.arm));
+                let ([x, y, turn], [ax, ay]) =
+                    (load::<W, DOF>(simd, &x[body as usize]), load::<W, 2>(simd, &point.arm));
                 let (dx, dy) = (x - turn * ay, y + turn * ax);
                 moved = [dx * cos + dy * sin, dy * cos - dx * sin, turn];
             }
@@ -286,9 +288,9 @@ fn add_beams<W: SimdReal>(
             store(moved, local);
         }
         for k in 0..span.points.len() - 1 {
-            let (p, q) = (load::<W, 3>(simd, &local[k]), load::<W, 3>(simd, &local[k + 1]));
+            let (p, q) = (load::<W, DOF>(simd, &local[k]), load::<W, DOF>(simd, &local[k + 1]));
             let (long, bending) = ([p[0], q[0]], [p[1], p[2], q[1], q[2]]);
-            let (mut f, mut g) = (load::<W, 3>(simd, &force[k]), load::<W, 3>(simd, &force[k + 1]));
+            let (mut f, mut g) = (load::<W, DOF>(simd, &force[k]), load::<W, DOF>(simd, &force[k + 1]));
             for j in 0..2 {
                 f[0] += matrix[j] * long[j];
                 g[0] += matrix[2 + j] * long[j];
@@ -304,9 +306,9 @@ fn add_beams<W: SimdReal>(
         }
         for (point, force) in span.points.iter().zip(&*force) {
             let Some(body) = point.body else { continue };
-            let ([fu, fw, moment], [ax, ay]) = (load::<W, 3>(simd, force), load::<W, 2>(simd, &point.arm));
+            let ([fu, fw, moment], [ax, ay]) = (load::<W, DOF>(simd, force), load::<W, 2>(simd, &point.arm));
             let (fx, fy) = (fu * cos - fw * sin, fu * sin + fw * cos);
-            let mut sum = load::<W, 3>(simd, &out[body as usize]);
+            let mut sum = load::<W, DOF>(simd, &out[body as usize]);
             sum[0] += fx;
             sum[1] += fy;
             sum[2] += moment + ax * fy - ay * fx;

@@ -10,7 +10,7 @@
 use crate::discretize::Assembly;
 use bimorph_domains::{DeadLoad, MaterialPoint};
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId};
+use bimorph_multibody::{BodyId, BodyMatrix};
 use bimorph_solve::frequency::eigen::lowest_modes;
 use nalgebra::Vector2;
 
@@ -21,7 +21,7 @@ pub fn apply(parts: &mut Assembly, size: f64) {
     let zeros = vec![Pose::zeros(); system.bodies()];
     let mut drive = system.electrics.drive();
     drive.load = 0.0;
-    let mut tangent = BlockMatrix::new(&system.model.pattern);
+    let mut tangent = BodyMatrix::new(&system.model.pattern);
     let mut residual = zeros.clone();
     system.tangent(&zeros, &drive, &mut tangent, &mut residual);
     system.add_stress_stiffness(&zeros, &drive, &mut tangent);

@@ -11,7 +11,7 @@ use super::mesh_target::{Mesh, MeshTarget};
 use crate::discretize::{Assembly, DiscretizeError, discretize_with, order};
 use crate::options::CompileOptions;
 use bimorph_base::ErrorBudget;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::forces::add_inertia;
 use bimorph_multibody::planar::Pose;
 use bimorph_structure::Structure;
@@ -62,7 +62,7 @@ pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> 
 fn highest_of(parts: &Assembly, count: usize) -> Option<f64> {
     let (system, model) = (&parts.system, &parts.system.model);
     let rest = vec![Pose::zeros(); system.bodies()];
-    let mut stiffness = BlockMatrix::new(&model.pattern);
+    let mut stiffness = BodyMatrix::new(&model.pattern);
     let mut residual = rest.clone();
     system.tangent(&rest, &system.electrics.drive(), &mut stiffness, &mut residual);
     let mut shifted = stiffness.clone();

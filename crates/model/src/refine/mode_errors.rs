@@ -40,7 +40,7 @@ use crate::discretize::{Assembly, cubic, order};
 use crate::options::{CompileOptions, Scheme};
 use bimorph_multibody::linear_system::LinearSystem;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Model};
+use bimorph_multibody::{BodyId, BodyMatrix, Model};
 use bimorph_structure::Structure;
 use nalgebra::Vector3;
 
@@ -92,7 +92,7 @@ pub fn of_modes(
     structure: &Structure,
     options: &CompileOptions,
     parts: &Assembly,
-    factor: (&BlockMatrix<f64, 3>, f64),
+    factor: (&BodyMatrix, f64),
     lambda: &[f64],
     shapes: &[Vec<Pose>],
 ) -> Option<ModeErrors> {
@@ -104,7 +104,7 @@ pub fn of_loaded_modes(
     structure: &Structure,
     options: &CompileOptions,
     parts: &Assembly,
-    factor: (&BlockMatrix<f64, 3>, f64),
+    factor: (&BodyMatrix, f64),
     axial: &[f64],
     (lambda, shapes): (&[f64], &[Vec<Pose>]),
 ) -> Option<ModeErrors> {
@@ -132,7 +132,7 @@ pub fn relative_of_loaded_modes(
     structure: &Structure,
     options: &CompileOptions,
     parts: &Assembly,
-    factor: (&BlockMatrix<f64, 3>, f64),
+    factor: (&BodyMatrix, f64),
     axial: &[f64],
     (lambda, shapes): (&[f64], &[Vec<Pose>]),
 ) -> Option<Vec<(f64, f64)>> {
@@ -151,7 +151,7 @@ fn compared(
     structure: &Structure,
     options: &CompileOptions,
     parts: &Assembly,
-    (factor, shift): (&BlockMatrix<f64, 3>, f64),
+    (factor, shift): (&BodyMatrix, f64),
     axial: &[f64],
     (lambda, shapes): (&[f64], &[Vec<Pose>]),
 ) -> Option<(ReferenceModes, Vec<BeamSpan>)> {

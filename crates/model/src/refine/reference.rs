@@ -7,7 +7,7 @@
 
 use super::span::{BeamSpan, SpanScratch};
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 use bimorph_solve::frequency::mac;
 use bimorph_solve::subspace::{columns, ritz};
 use nalgebra::{DMatrix, Matrix6};
@@ -17,7 +17,7 @@ const NEAR: f64 = 1e-2;
 
 /// K − σM of a mesh, factored, and its mass matrix.
 pub(super) struct Pencil<'a> {
-    pub(super) factor: &'a BlockMatrix<f64, 3>,
+    pub(super) factor: &'a BodyMatrix,
     pub(super) pattern: &'a Pattern,
     pub(super) shift: f64,
     pub(super) mass: &'a dyn Fn(&[Pose]) -> Vec<Pose>,

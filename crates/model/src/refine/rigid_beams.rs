@@ -13,7 +13,7 @@ use crate::discretize::{Assembly, DiscretizeError, discretize_with};
 use crate::options::CompileOptions;
 use bimorph_domains::MaterialPoint;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId};
+use bimorph_multibody::{BodyId, BodyMatrix};
 use bimorph_structure::BeamRows;
 use bimorph_structure::{NodeId, Structure};
 
@@ -135,7 +135,7 @@ fn compliances(structure: &Structure, acted: &[NodeId], parts: &Assembly) -> Opt
     if forces.is_empty() {
         return Some(Vec::new());
     }
-    let mut k = BlockMatrix::new(&model.pattern);
+    let mut k = BodyMatrix::new(&model.pattern);
     let (rest, mut residual) = (vec![Pose::zeros(); n], vec![Pose::zeros(); n]);
     system.tangent(&rest, &system.electrics.drive(), &mut k, &mut residual);
     model.project_matrix(&mut k);

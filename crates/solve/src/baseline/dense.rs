@@ -12,7 +12,7 @@ use super::plain::{SolveScratch, flatten, spread, unflatten};
 use crate::linear::LinearSolver;
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::{DOF, Pose};
-use bimorph_multibody::{BlockMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::{factor, solve};
 use faer::perm::PermRef;
@@ -44,7 +44,7 @@ impl DensePivoted {
 }
 
 impl LinearSolver for DensePivoted {
-    fn factor(&mut self, pattern: &Pattern, matrix: &mut BlockMatrix<f64, 3>) -> Result<(), ZeroPivot> {
+    fn factor(&mut self, pattern: &Pattern, matrix: &mut BodyMatrix) -> Result<(), ZeroPivot> {
         self.lu.fill(0.0);
         spread(pattern, matrix, |i, j, value| {
             self.lu[(i, j)] = value;
@@ -61,7 +61,7 @@ impl LinearSolver for DensePivoted {
         }
     }
 
-    fn solve(&self, _: &Pattern, _: &BlockMatrix<f64, 3>, b: &mut [Pose]) {
+    fn solve(&self, _: &Pattern, _: &BodyMatrix, b: &mut [Pose]) {
         let SolveScratch { flat, memory } = &mut *self.scratch.borrow_mut();
         flatten(b, flat);
         let n = flat.len();

@@ -14,7 +14,7 @@ use super::plain::spread;
 use crate::linear::LinearSolver;
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::{DOF, Pose};
-use bimorph_multibody::{BlockMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 
 /// L and U of a dense matrix, row by row in one square.
 #[derive(Debug, Clone)]
@@ -32,7 +32,7 @@ impl DenseUnpivoted {
 }
 
 impl LinearSolver for DenseUnpivoted {
-    fn factor(&mut self, pattern: &Pattern, matrix: &mut BlockMatrix<f64, 3>) -> Result<(), ZeroPivot> {
+    fn factor(&mut self, pattern: &Pattern, matrix: &mut BodyMatrix) -> Result<(), ZeroPivot> {
         let n = self.n;
         self.rows.fill(0.0);
         spread(pattern, matrix, |i, j, value| {
@@ -57,7 +57,7 @@ impl LinearSolver for DenseUnpivoted {
         Ok(())
     }
 
-    fn solve(&self, _: &Pattern, _: &BlockMatrix<f64, 3>, b: &mut [Pose]) {
+    fn solve(&self, _: &Pattern, _: &BodyMatrix, b: &mut [Pose]) {
         let n = self.n;
         for i in 0..n {
             let row = &self.rows[i * n..(i + 1) * n];

@@ -8,7 +8,7 @@
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::linear_system::LinearSystem;
 use bimorph_multibody::planar::{DOF, Pose};
-use bimorph_multibody::{BlockMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, Par, Side};
 
@@ -68,7 +68,7 @@ pub fn lowest_consistent_modes(system: &LinearSystem, count: usize) -> Result<Co
     Ok(modes)
 }
 
-fn full(pattern: &Pattern, matrix: &BlockMatrix<f64, 3>) -> Mat<f64> {
+fn full(pattern: &Pattern, matrix: &BodyMatrix) -> Mat<f64> {
     let mut dense = Mat::zeros(DOF * pattern.bodies(), DOF * pattern.bodies());
     super::plain::spread(pattern, matrix, |i, j, value| {
         dense[(i, j)] = value;
@@ -78,7 +78,7 @@ fn full(pattern: &Pattern, matrix: &BlockMatrix<f64, 3>) -> Mat<f64> {
 }
 
 /// Smallest ratio of a translation's stiffness to its mass (rad²/s²).
-fn typical(stiffness: &BlockMatrix<f64, 3>, mass: &BlockMatrix<f64, 3>) -> f64 {
+fn typical(stiffness: &BodyMatrix, mass: &BodyMatrix) -> f64 {
     (stiffness.diagonal.iter().zip(&mass.diagonal))
         .map(|(k, m)| k[(0, 0)] / m[(0, 0)])
         .filter(|r| r.is_finite() && *r > 0.0)

@@ -10,7 +10,7 @@
 //! Reference: N. M. Newmark, "A method of computation for structural dynamics", J. Eng. Mech. Div. ASCE 85 (1959).
 
 use crate::linear::LinearSolver;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::linear_system::LinearSystem;
 use bimorph_multibody::planar::Pose;
@@ -19,7 +19,7 @@ use bimorph_multibody::planar::Pose;
 #[derive(Debug)]
 pub struct Newmark<S> {
     solver: S,
-    matrix: BlockMatrix<f64, 3>,
+    matrix: BodyMatrix,
     h: f64,
     force: Vec<Pose>,
     momentum: Vec<Pose>,

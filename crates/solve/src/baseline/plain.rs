@@ -1,11 +1,11 @@
 //! A matrix of blocks and its vectors as plain numbers, for solvers that know no blocks.
 
 use bimorph_multibody::planar::{DOF, Pose};
-use bimorph_multibody::{BlockMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 use faer::dyn_stack::MemBuffer;
 
 /// Visits every entry of the lower triangle that a matrix stores: row, column, value.
-pub(crate) fn spread(pattern: &Pattern, matrix: &BlockMatrix<f64, 3>, mut visit: impl FnMut(usize, usize, f64)) {
+pub(crate) fn spread(pattern: &Pattern, matrix: &BodyMatrix, mut visit: impl FnMut(usize, usize, f64)) {
     for j in 0..pattern.bodies() {
         for c in 0..DOF {
             for r in c..DOF {

@@ -15,7 +15,7 @@ use super::plain::{SolveScratch, flatten, unflatten};
 use crate::linear::LinearSolver;
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::{DOF, Pose};
-use bimorph_multibody::{BlockMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::cholesky::{
     LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
@@ -93,7 +93,7 @@ impl Sparse {
 }
 
 impl LinearSolver for Sparse {
-    fn factor(&mut self, pattern: &Pattern, matrix: &mut BlockMatrix<f64, 3>) -> Result<(), ZeroPivot> {
+    fn factor(&mut self, pattern: &Pattern, matrix: &mut BodyMatrix) -> Result<(), ZeroPivot> {
         let mut next = self.values.iter_mut();
         entries(pattern, |i, j, block| {
             if let Some(value) = next.next() {
@@ -118,7 +118,7 @@ impl LinearSolver for Sparse {
         })
     }
 
-    fn solve(&self, _: &Pattern, _: &BlockMatrix<f64, 3>, b: &mut [Pose]) {
+    fn solve(&self, _: &Pattern, _: &BodyMatrix, b: &mut [Pose]) {
         let SolveScratch { flat, memory } = &mut *self.scratch.borrow_mut();
         flatten(b, flat);
         let n = flat.len();

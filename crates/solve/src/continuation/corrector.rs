@@ -8,7 +8,7 @@ use super::options::ContinuationOptions;
 use crate::equilibrium::balanced;
 use bimorph_base::ErrorBudget;
 use bimorph_domains::System;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::Pose;
 
@@ -40,7 +40,7 @@ pub(super) struct CorrectorPlane<'a> {
 pub struct Continuation {
     /// Options.
     pub options: ContinuationOptions,
-    pub(super) tangent: BlockMatrix<f64, 3>,
+    pub(super) tangent: BodyMatrix,
     pub(super) residual: Vec<Pose>,
     pub(super) slope: Vec<Pose>,
     pub(super) iterations: usize,

@@ -5,7 +5,7 @@
 //! difference over any interval, exactly, and [`LoadFamily::slope`] is that, whatever a gap function's law in q.
 
 use bimorph_domains::{DeadLoad, Drive, System};
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use thiserror::Error;
 
@@ -131,7 +131,7 @@ impl LoadFamily {
     }
 
     /// Tangent (held directions projected) and residual at the present s.
-    pub fn tangent(&self, q: &[Pose], tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
+    pub fn tangent(&self, q: &[Pose], tangent: &mut BodyMatrix, r: &mut [Pose]) {
         self.system.tangent(q, &self.drive, tangent, r);
         self.system.model.project_matrix(tangent);
     }

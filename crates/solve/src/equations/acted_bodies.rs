@@ -3,9 +3,9 @@
 
 use bimorph_domains::System;
 use bimorph_multibody::batch::{LaneMatrix, LanePose};
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_multibody::scalar::StoredReal;
-use bimorph_multibody::{BlockMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 
 /// These bodies, with what acts on one lane of them.
 #[derive(Debug, Clone)]
@@ -19,7 +19,7 @@ pub(crate) struct ActedBodies {
     /// Forces on it.
     pub(crate) r: Vec<Pose>,
     /// Its tangent.
-    pub(crate) tangent: BlockMatrix<f64, 3>,
+    pub(crate) tangent: BodyMatrix,
 }
 
 fn block(pattern: &Pattern, row: usize, column: usize) -> Option<usize> {
@@ -41,7 +41,7 @@ impl ActedBodies {
             blocks: bodies.iter().flat_map(between).collect(),
             q: vec![Pose::zeros(); n],
             r: vec![Pose::zeros(); n],
-            tangent: BlockMatrix::new(pattern),
+            tangent: BodyMatrix::new(pattern),
             bodies,
         }
     }
@@ -61,7 +61,7 @@ impl ActedBodies {
     /// Puts the forces back.
     pub(crate) fn give(&self, lane: usize, forces: &mut [LanePose]) {
         for &b in &self.bodies {
-            (0..3).for_each(|i| forces[b][i].set_lane(lane, self.r[b][i]));
+            (0..DOF).for_each(|i| forces[b][i].set_lane(lane, self.r[b][i]));
         }
     }
 
@@ -72,7 +72,7 @@ impl ActedBodies {
             [(&from.diagonal, &mut tangent.diagonal, &*bodies), (&from.below, &mut tangent.below, &*blocks)]
         {
             for &b in which {
-                (0..9).for_each(|e| own[b][(e % 3, e / 3)] = from[b][e / 3][e % 3].lane(lane));
+                (0..DOF * DOF).for_each(|e| own[b][(e % DOF, e / DOF)] = from[b][e / DOF][e % DOF].lane(lane));
             }
         }
     }
@@ -83,7 +83,7 @@ impl ActedBodies {
         for (to, own, which) in [(&mut to.diagonal, &tangent.diagonal, bodies), (&mut to.below, &tangent.below, blocks)]
         {
             for &b in which {
-                (0..9).for_each(|e| to[b][e / 3][e % 3].set_lane(lane, own[b][(e % 3, e / 3)]));
+                (0..DOF * DOF).for_each(|e| to[b][e / DOF][e % DOF].set_lane(lane, own[b][(e % DOF, e / DOF)]));
             }
         }
     }

@@ -11,7 +11,7 @@
 use super::{DegreeOfFreedom, Equations, Motion};
 use bimorph_base::ErrorBudget;
 use bimorph_domains::{Ramp, System};
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_multibody::{BodyId, Model};
 use nalgebra::Matrix6;
 use std::borrow::Cow;
@@ -93,7 +93,7 @@ impl Equations for Bodies<'_> {
         let (mut place, mut worst) = ((0, 0), -1.0);
         for (j, e) in error.iter().enumerate() {
             let m = self.system.model.mass(j);
-            for i in 0..3 {
+            for i in 0..DOF {
                 let share = m[i] * e[i] * e[i];
                 if share > worst || share.is_nan() {
                     (place, worst) = ((j, i), share);
@@ -145,7 +145,7 @@ pub(crate) fn dragged(model: &Model) -> Vec<(usize, usize, f64)> {
     for (j, body) in model.bodies.iter().enumerate().filter(|(_, body)| body.mass == 0.0) {
         bimorph_base::budget::check();
         let own = body.drag.matrix();
-        for i in (0..3).filter(|i| *i < 2 || body.inertia == 0.0) {
+        for i in (0..DOF).filter(|i| *i < 2 || body.inertia == 0.0) {
             let at =
                 |id: BodyId, i: usize, matrix: &Matrix6<f64>| if id == BodyId::Free(j) { matrix[(i, i)] } else { 0.0 };
             let dampers = model.dampers.iter().zip(&model.damper_matrix);

@@ -18,7 +18,7 @@
 
 use super::anderson::Anderson;
 use super::loads::Loads;
-use super::{Control, DegreeOfFreedom, Equations, Motion, SolverCounters, Stage, Staged, StepFailure};
+use super::{Control, DegreeOfFreedom, Equations, Motion, SolverCounters, Stage, Staged, StepFailure, StepResult};
 use bimorph_base::ErrorBudget;
 use bimorph_multibody::joint_coordinates::constrained_loops::{
     AddedInertia, Linkage, Reduction, ReductionTask, Singularity,
@@ -145,7 +145,7 @@ impl<'a, L: Loads> Constrained<'a, L> {
         self.work.solves += 1;
     }
 
-    fn finite(&self, a: &[f64]) -> Result<(), StepFailure> {
+    fn finite(&self, a: &[f64]) -> StepResult {
         if a.iter().all(|x| x.is_finite()) {
             return Ok(());
         }
@@ -209,7 +209,7 @@ impl<L: Loads> Equations for Constrained<'_, L> {
 }
 
 impl<L: Loads> Staged for Constrained<'_, L> {
-    fn accelerations(&mut self, t: f64, q: &[f64], v: &[f64], a: &mut [f64]) -> Result<(), StepFailure> {
+    fn accelerations(&mut self, t: f64, q: &[f64], v: &[f64], a: &mut [f64]) -> StepResult {
         self.at.q.copy_from_slice(q);
         self.at.v.copy_from_slice(v);
         self.act(t);
@@ -219,7 +219,7 @@ impl<L: Loads> Staged for Constrained<'_, L> {
     }
 
     /// Until its coordinates are right to a fraction of what the step may be wrong.
-    fn stage(&mut self, stage: &Stage<'_, f64>, a: &mut [f64], at: &mut Motion<f64>) -> Result<(), StepFailure> {
+    fn stage(&mut self, stage: &Stage<'_, f64>, a: &mut [f64], at: &mut Motion<f64>) -> StepResult {
         let tolerance = ErrorBudget::of(self.exact).within(self.norm(stage.near) + FLOOR);
         let (mut first, mut last) = (0.0, f64::INFINITY);
         self.anderson.restart();
@@ -258,7 +258,7 @@ impl<L: Loads> Staged for Constrained<'_, L> {
         Ok(())
     }
 
-    fn smooth(&mut self, (_, gamma): (f64, f64), q: &[f64], error: &mut Motion<f64>) -> Result<(), StepFailure> {
+    fn smooth(&mut self, (_, gamma): (f64, f64), q: &[f64], error: &mut Motion<f64>) -> StepResult {
         // M + γC + β·K on the smoothed coordinates is M on γ·e_v + e_q; at rest nothing else acts
         let Motion { q: error_q, v: error_v } = error;
         for ((v, e), w) in self.at.v.iter_mut().zip(error_q.iter()).zip(error_v.iter()) {

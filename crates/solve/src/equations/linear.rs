@@ -4,7 +4,7 @@
 
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 
 /// A direct solver of A·x = b for a symmetric block matrix A.
 pub trait LinearSolver {
@@ -12,10 +12,10 @@ pub trait LinearSolver {
     ///
     /// # Errors
     /// [`ZeroPivot`] where A is singular.
-    fn factor(&mut self, pattern: &Pattern, matrix: &mut BlockMatrix<f64, 3>) -> Result<(), ZeroPivot>;
+    fn factor(&mut self, pattern: &Pattern, matrix: &mut BodyMatrix) -> Result<(), ZeroPivot>;
 
     /// `b` becomes A⁻¹·b, with `matrix` as [`LinearSolver::factor`] left it; one vector for each body, in elimination order.
-    fn solve(&self, pattern: &Pattern, matrix: &BlockMatrix<f64, 3>, b: &mut [Pose]);
+    fn solve(&self, pattern: &Pattern, matrix: &BodyMatrix, b: &mut [Pose]);
 }
 
 /// The block recursion of [`bimorph_multibody::factor`], which keeps its factors in the matrix: the default.
@@ -24,12 +24,12 @@ pub struct Recursion;
 
 impl LinearSolver for Recursion {
     #[inline]
-    fn factor(&mut self, pattern: &Pattern, matrix: &mut BlockMatrix<f64, 3>) -> Result<(), ZeroPivot> {
+    fn factor(&mut self, pattern: &Pattern, matrix: &mut BodyMatrix) -> Result<(), ZeroPivot> {
         matrix.factor(pattern).map(|_| ())
     }
 
     #[inline]
-    fn solve(&self, pattern: &Pattern, matrix: &BlockMatrix<f64, 3>, b: &mut [Pose]) {
+    fn solve(&self, pattern: &Pattern, matrix: &BodyMatrix, b: &mut [Pose]) {
         matrix.solve(pattern, b);
     }
 }

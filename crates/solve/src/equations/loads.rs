@@ -10,7 +10,7 @@ use bimorph_domains::loss_derivatives::LossDerivatives;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::forces;
 use bimorph_multibody::joint_coordinates::constrained_loops::{AddedInertia, Closure, Linkage, Reduction};
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 
 /// Loads on a mechanism in joint coordinates.
 pub trait Loads {
@@ -99,7 +99,7 @@ impl Loads for JointLoads<'_> {
             self.system.add_loss(&self.q, |k| self.v[k], &mut self.r);
         }
         for (force, r) in reduction.force.iter_mut().zip(&self.r) {
-            for i in 0..3 {
+            for i in 0..DOF {
                 force[i] -= r[i];
             }
         }

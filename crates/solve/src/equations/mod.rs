@@ -72,6 +72,9 @@ impl SolverCounters {
 /// A body, by its number in elimination order, and one of its directions.
 pub type DegreeOfFreedom = (usize, usize);
 
+/// Result of a step, or of a part of one.
+pub type StepResult = Result<(), StepFailure>;
+
 /// Why a step of this length could not be taken; a shorter one may.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepFailure {
@@ -185,7 +188,7 @@ pub trait Staged: Equations {
         q: &[Self::Unknown],
         v: &[Self::Unknown],
         a: &mut [Self::Unknown],
-    ) -> Result<(), StepFailure>;
+    ) -> StepResult;
 
     /// Solves a stage. `a` holds a guess and becomes its acceleration, `at` its displacements and rates.
     ///
@@ -196,19 +199,14 @@ pub trait Staged: Equations {
         stage: &Stage<'_, Self::Unknown>,
         a: &mut [Self::Unknown],
         at: &mut Motion<Self::Unknown>,
-    ) -> Result<(), StepFailure>;
+    ) -> StepResult;
 
     /// Takes an estimated error through (I − γ·J)⁻¹, with the J that the last stage left, which had this γ (s); the step ends at time
     /// `t` (s) and displacements `q`.
     ///
     /// # Errors
     /// [`StepFailure`].
-    fn smooth(
-        &mut self,
-        at: (f64, f64),
-        q: &[Self::Unknown],
-        error: &mut Motion<Self::Unknown>,
-    ) -> Result<(), StepFailure>;
+    fn smooth(&mut self, at: (f64, f64), q: &[Self::Unknown], error: &mut Motion<Self::Unknown>) -> StepResult;
 
     /// A rate without inertia is no state: after a step of length `h` (s) from displacements `before` it becomes the mean of the step, and
     /// its accelerations nothing. A rule that takes it from the last one would ring on.

@@ -10,11 +10,11 @@
 //! no further.
 
 use super::linear::LinearSolver;
-use super::{Bodies, DegreeOfFreedom, Equations, Motion, SolverCounters, Stage, Staged, StepFailure};
+use super::{Bodies, DegreeOfFreedom, Equations, Motion, SolverCounters, Stage, Staged, StepFailure, StepResult};
 use bimorph_domains::loss_derivatives::LossDerivatives;
 use bimorph_domains::{Drive, System};
-use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, forces};
+use bimorph_multibody::planar::{DOF, Pose};
+use bimorph_multibody::{BodyMatrix, forces};
 
 /// Next correction allowed, relative to the displacement.
 const TOLERANCE: f64 = 1e-12;
@@ -60,8 +60,8 @@ pub(crate) struct Equation<'a> {
 pub struct Newton<'a, S> {
     bodies: Bodies<'a>,
     solver: S,
-    matrix: Option<BlockMatrix<f64, 3>>,
-    part: Option<BlockMatrix<f64, 3>>,
+    matrix: Option<BodyMatrix>,
+    part: Option<BodyMatrix>,
     /// 1/M, or 0 without mass.
     inverse: Vec<Pose>,
     /// Derivatives of what contact loses with displacements and rates; none where it loses nothing.
@@ -104,12 +104,12 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
     }
 
     /// Newton from the guess in `x` to the root. The last iteration's factor stays for [`Staged::smooth`].
-    pub(crate) fn root(&mut self, equation: &Equation<'_>, x: &mut [Pose]) -> Result<(), StepFailure> {
+    pub(crate) fn root(&mut self, equation: &Equation<'_>, x: &mut [Pose]) -> StepResult {
         let system = self.bodies.system;
         let pattern = &system.model.pattern;
         let (mut first, mut last) = (0.0, f64::INFINITY);
         for iteration in 0..MAX_ITERATIONS {
-            let mut matrix = self.matrix.take().unwrap_or_else(|| BlockMatrix::new(pattern));
+            let mut matrix = self.matrix.take().unwrap_or_else(|| BodyMatrix::new(pattern));
             self.assemble(equation, x, &mut matrix);
             // a matrix that breaks down here means that the iteration has left the neighbourhood of the step
             let factored = self.solver.factor(pattern, &mut matrix).map_err(|p| match iteration {
@@ -146,7 +146,7 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
     }
 
     /// R(x) into `residual` and its tangent into `matrix`.
-    fn assemble(&mut self, equation: &Equation<'_>, x: &[Pose], matrix: &mut BlockMatrix<f64, 3>) {
+    fn assemble(&mut self, equation: &Equation<'_>, x: &[Pose], matrix: &mut BodyMatrix) {
         let system = self.bodies.system;
         let model = &system.model;
         for (k, (r, constant)) in self.residual.iter_mut().zip(equation.constant).enumerate() {
@@ -170,7 +170,7 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
                 matrix.diagonal.iter_mut().for_each(|b| *b *= scale);
                 matrix.below.iter_mut().for_each(|b| *b *= scale);
             } else {
-                let part = self.part.get_or_insert_with(|| BlockMatrix::new(&model.pattern));
+                let part = self.part.get_or_insert_with(|| BodyMatrix::new(&model.pattern));
                 tangent(system, &self.at, &self.drive, part, &mut self.force);
                 let sum = |a: &mut [_], b: &[_]| {
                     for (a, b) in a.iter_mut().zip(b) {
@@ -236,7 +236,7 @@ impl<S: LinearSolver> Equations for Newton<'_, S> {
 }
 
 impl<S: LinearSolver> Staged for Newton<'_, S> {
-    fn accelerations(&mut self, t: f64, q: &[Pose], v: &[Pose], a: &mut [Pose]) -> Result<(), StepFailure> {
+    fn accelerations(&mut self, t: f64, q: &[Pose], v: &[Pose], a: &mut [Pose]) -> StepResult {
         let system = self.bodies.system;
         let model = &system.model;
         self.bodies.ramp.at(t, &mut self.drive);
@@ -253,7 +253,7 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
         Ok(())
     }
 
-    fn stage(&mut self, stage: &Stage<'_, Pose>, a: &mut [Pose], at: &mut Motion) -> Result<(), StepFailure> {
+    fn stage(&mut self, stage: &Stage<'_, Pose>, a: &mut [Pose], at: &mut Motion) -> StepResult {
         let model = &self.bodies.system.model;
         let (mut x, mut constant) = (std::mem::take(&mut self.x), std::mem::take(&mut self.constant));
         constant.fill(Pose::zeros());
@@ -275,7 +275,7 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
         found
     }
 
-    fn smooth(&mut self, (_, gamma): (f64, f64), _: &[Pose], error: &mut Motion) -> Result<(), StepFailure> {
+    fn smooth(&mut self, (_, gamma): (f64, f64), _: &[Pose], error: &mut Motion) -> StepResult {
         // (M/γ² + C/γ + K)·e_q' = M·(e_q + γ·e_v)/γ² + C·e_q/γ
         let model = &self.bodies.system.model;
         let c = 1.0 / gamma;
@@ -306,7 +306,7 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
                 continue;
             }
             let mass = model.mass(k);
-            for i in (0..3).filter(|&i| mass[i] == 0.0) {
+            for i in (0..DOF).filter(|&i| mass[i] == 0.0) {
                 end.v[k][i] = (end.q[k][i] - before[k][i]) / h;
                 for a in accelerations.iter_mut() {
                     (a.q[k][i], a.v[k][i]) = (0.0, 0.0);
@@ -320,7 +320,7 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
 pub(crate) fn largest(system: &System, x: &[Pose]) -> (f64, DegreeOfFreedom) {
     let mut found = (0.0, (0, 0));
     for (j, p) in x.iter().enumerate() {
-        for i in 0..3 {
+        for i in 0..DOF {
             let size = if i == 2 { p[i].abs() * system.length_scale } else { p[i].abs() };
             if size.is_nan() {
                 return (f64::INFINITY, (j, i));

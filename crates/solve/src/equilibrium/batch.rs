@@ -15,7 +15,7 @@ use super::path::LoadPath;
 use crate::equations::acted_bodies::pose_in_lane;
 use bimorph_domains::{Drive, System};
 use bimorph_multibody::batch::{LANES, Lane8, LanePose, across};
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_multibody::scalar::StoredReal;
 use kernels::{EquilibriumKernel, EquilibriumPass};
 
@@ -57,7 +57,7 @@ impl LaneEquilibrium {
             let BatchPath { system, path, q } = way(lane);
             self.model.set_lane(lane, &system.model);
             for (to, q) in self.trial.iter_mut().zip(*q) {
-                (0..3).for_each(|i| to[i].set_lane(lane, q[i]));
+                (0..DOF).for_each(|i| to[i].set_lane(lane, q[i]));
             }
             path.at(0.0, &mut drives[lane]);
             path.slope(0.0, &mut slopes[lane]);

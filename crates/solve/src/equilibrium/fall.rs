@@ -12,7 +12,7 @@ use super::path::LoadPath;
 use super::{Equilibrium, Path};
 use crate::SolveError;
 use bimorph_domains::{BeamLine, Domain, System};
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::{Block, Pose};
 
 /// Weight of rotations in W; that of translations is 1.
@@ -81,7 +81,7 @@ impl Units {
     }
 
     /// The median of the translational stiffness of the bodies (J).
-    pub(super) fn median_stiffness(self, tangent: &BlockMatrix<f64, 3>) -> f64 {
+    pub(super) fn median_stiffness(self, tangent: &BodyMatrix) -> f64 {
         let one = |block: &Block| 0.5 * (block[(0, 0)] + block[(1, 1)]).abs() * self.length * self.length;
         let mut all: Vec<f64> = tangent.diagonal.iter().map(one).filter(|k| *k > 0.0).collect();
         all.sort_by(f64::total_cmp);
@@ -89,7 +89,7 @@ impl Units {
     }
 
     /// `tangent += shift·W`.
-    pub(super) fn add_shift(self, shift: f64, tangent: &mut BlockMatrix<f64, 3>) {
+    pub(super) fn add_shift(self, shift: f64, tangent: &mut BodyMatrix) {
         if shift > 0.0 {
             let translation = shift / (self.length * self.length);
             for block in &mut tangent.diagonal {

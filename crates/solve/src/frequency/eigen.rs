@@ -19,8 +19,8 @@ use super::refined::{ROUNDING, Refined};
 use super::subspace;
 use crate::SolveError;
 use bimorph_domains::{Drive, System};
-use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, Model};
+use bimorph_multibody::planar::{DOF, Pose};
+use bimorph_multibody::{BodyMatrix, Model};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Models of at most this many coordinates are solved densely.
@@ -52,7 +52,7 @@ pub struct Modes {
 /// M^½·(K − σM)⁻¹·M^½ over flat vectors.
 struct Operator<'a, 'b> {
     refined: &'a mut Refined<'b>,
-    factor: &'a BlockMatrix<f64, 3>,
+    factor: &'a BodyMatrix,
     shift: f64,
     model: &'a Model,
     root: &'a [Pose],
@@ -66,7 +66,7 @@ impl Operator<'_, '_> {
     /// (K − σM)⁻¹·M^½·y.
     fn displacement(&mut self, y: &[f64]) -> &[Pose] {
         bimorph_base::budget::check();
-        for ((x, r), y) in self.x.iter_mut().zip(self.root).zip(y.chunks_exact(3)) {
+        for ((x, r), y) in self.x.iter_mut().zip(self.root).zip(y.chunks_exact(DOF)) {
             *x = Pose::new(r.x * y[0], r.y * y[1], r.z * y[2]);
         }
         if self.corrected {
@@ -82,7 +82,7 @@ impl Operator<'_, '_> {
     /// Puts the image of `y` into `to`.
     fn apply(&mut self, y: &[f64], to: &mut [f64]) {
         let root = self.root;
-        for ((to, x), r) in to.chunks_exact_mut(3).zip(self.displacement(y)).zip(root) {
+        for ((to, x), r) in to.chunks_exact_mut(DOF).zip(self.displacement(y)).zip(root) {
             to.copy_from_slice(&[x.x * r.x, x.y * r.y, x.z * r.z]);
         }
     }
@@ -98,7 +98,7 @@ impl Operator<'_, '_> {
 pub fn lowest_modes(
     system: &System,
     (q, drive): (&[Pose], &Drive),
-    stiffness: &BlockMatrix<f64, 3>,
+    stiffness: &BodyMatrix,
     count: usize,
 ) -> Result<Modes, SolveError> {
     let model = &system.model;
@@ -123,7 +123,8 @@ pub fn lowest_modes(
     let mut operator =
         Operator { refined: &mut refined, factor: &factor, shift, model, root: &root, corrected: rounding > ROUGH, x };
     let wide = (count + GUARD_MODES).min(massive);
-    let pairs = if 3 * root.len() <= DENSE { dense(&mut operator, wide) } else { sparse(&mut operator, wide, massive) };
+    let pairs =
+        if DOF * root.len() <= DENSE { dense(&mut operator, wide) } else { sparse(&mut operator, wide, massive) };
     let few = if pairs.settled >= wide && rounding <= ROUGH { count } else { wide };
     let start: Vec<Vec<Pose>> = (0..few.min(pairs.theta.len()))
         .map(|i| operator.displacement(pairs.vectors.column(i).as_slice()).iter().map(|x| x / pairs.theta[i]).collect())
@@ -162,7 +163,7 @@ pub fn lowest_modes(
 }
 
 /// The factor of K − σM and σ: 0, or a little below where K itself is singular.
-fn factored(system: &System, stiffness: &BlockMatrix<f64, 3>) -> Result<(BlockMatrix<f64, 3>, f64), SolveError> {
+fn factored(system: &System, stiffness: &BodyMatrix) -> Result<(BodyMatrix, f64), SolveError> {
     let model = &system.model;
     let mut k = stiffness.clone();
     model.project_matrix(&mut k);
@@ -179,7 +180,7 @@ fn factored(system: &System, stiffness: &BlockMatrix<f64, 3>) -> Result<(BlockMa
 
 /// True when more modes lie below the highest one than were found there: of several with the highest frequency, some may be found while
 /// one below is not. The factor that counts has rounding errors itself.
-fn missed(model: &Model, stiffness: &BlockMatrix<f64, 3>, lambda: &[f64], rounding: f64) -> bool {
+fn missed(model: &Model, stiffness: &BodyMatrix, lambda: &[f64], rounding: f64) -> bool {
     let margin = 0.01 + 20.0 * rounding;
     let Some(&highest) = lambda.last() else { return true };
     if margin.is_nan() || margin > 0.5 || highest <= 0.0 {
@@ -205,7 +206,7 @@ fn massive_directions(model: &Model) -> usize {
 }
 
 /// Smallest ratio of a body's stiffness to its mass (rad²/s²).
-fn typical(model: &Model, k: &BlockMatrix<f64, 3>) -> f64 {
+fn typical(model: &Model, k: &BodyMatrix) -> f64 {
     (0..k.diagonal.len())
         .filter(|&j| model.mass(j).x > 0.0)
         .map(|j| k.diagonal[j][(0, 0)] / model.mass(j).x)
@@ -216,7 +217,7 @@ fn typical(model: &Model, k: &BlockMatrix<f64, 3>) -> f64 {
 
 /// The largest eigenvalues of an operator from all of its columns.
 fn dense(operator: &mut Operator<'_, '_>, wanted: usize) -> Pairs {
-    let n = 3 * operator.root.len();
+    let n = DOF * operator.root.len();
     let mut a = DMatrix::<f64>::zeros(n, n);
     let mut unit = vec![0.0; n];
     for c in 0..n {
@@ -237,7 +238,7 @@ fn dense(operator: &mut Operator<'_, '_>, wanted: usize) -> Pairs {
 
 /// The same by Lanczos, from fixed directions with components everywhere: the same bits on every run.
 fn sparse(operator: &mut Operator<'_, '_>, wanted: usize, rank: usize) -> Pairs {
-    let n = 3 * operator.root.len();
+    let n = DOF * operator.root.len();
     let direction = |k: usize| (0..n).map(|i| 1.0 + ((i * (7919 + 104 * k)) % 101) as f64 / 101.0).collect();
     let mut apply = |y: &[f64], to: &mut [f64]| operator.apply(y, to);
     lanczos::largest((n, rank), &mut apply, &direction, wanted, 1e-10, 3 * wanted + 100)

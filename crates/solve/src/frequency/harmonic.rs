@@ -7,8 +7,8 @@ use super::refined::Refined;
 use crate::SolveError;
 use bimorph_domains::System;
 use bimorph_domains::loss_derivatives::LossDerivatives;
-use bimorph_multibody::BlockMatrix;
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::BodyMatrix;
+use bimorph_multibody::planar::{DOF, Pose};
 use nalgebra::{Complex, Vector3};
 
 /// Corrections of a solution with K as it is.
@@ -20,9 +20,9 @@ pub type ComplexPose = Vector3<Complex<f64>>;
 /// Solver with its storage.
 #[derive(Debug, Clone)]
 pub struct Harmonic {
-    pub(super) matrix: BlockMatrix<Complex<f64>, 3>,
-    factor: BlockMatrix<Complex<f64>, 3>,
-    pub(super) damping: BlockMatrix<f64, 3>,
+    pub(super) matrix: BodyMatrix<Complex<f64>>,
+    factor: BodyMatrix<Complex<f64>>,
+    pub(super) damping: BodyMatrix,
     /// Linearized contact loss about the state at rest; `None` without loss.
     loss: Option<LossDerivatives>,
     rest: Vec<ComplexPose>,
@@ -32,9 +32,9 @@ impl Harmonic {
     /// Storage for a system.
     pub fn new(system: &System) -> Self {
         let pattern = &system.model.pattern;
-        let matrix = BlockMatrix::new(pattern);
+        let matrix = BodyMatrix::new(pattern);
         let factor = matrix.clone();
-        let mut damping = BlockMatrix::new(pattern);
+        let mut damping = BodyMatrix::new(pattern);
         bimorph_multibody::forces::add_inertia(&system.model, 0.0, 1.0, &mut damping);
         Self {
             matrix,
@@ -67,7 +67,7 @@ impl Harmonic {
     ///
     /// # Errors
     /// [`SolveError::Singular`] at an undamped resonance.
-    pub fn factor(&mut self, system: &System, stiffness: &BlockMatrix<f64, 3>, omega: f64) -> Result<(), SolveError> {
+    pub fn factor(&mut self, system: &System, stiffness: &BodyMatrix, omega: f64) -> Result<(), SolveError> {
         self.factor_at(system, stiffness, Complex::new(0.0, omega))
     }
 
@@ -75,12 +75,7 @@ impl Harmonic {
     ///
     /// # Errors
     /// [`SolveError::Singular`] at an eigenvalue.
-    pub fn factor_at(
-        &mut self,
-        system: &System,
-        stiffness: &BlockMatrix<f64, 3>,
-        s: Complex<f64>,
-    ) -> Result<(), SolveError> {
+    pub fn factor_at(&mut self, system: &System, stiffness: &BodyMatrix, s: Complex<f64>) -> Result<(), SolveError> {
         let model = &system.model;
         let blend = |k: &nalgebra::Matrix3<f64>, c: &nalgebra::Matrix3<f64>| {
             k.zip_map(c, |k, c| Complex::new(k + s.re * c, s.im * c))
@@ -95,7 +90,7 @@ impl Harmonic {
         }
         for (j, block) in self.matrix.diagonal.iter_mut().enumerate() {
             let m = model.mass(j);
-            for i in 0..3 {
+            for i in 0..DOF {
                 block[(i, i)] += square * m[i];
             }
         }
@@ -139,7 +134,7 @@ impl Harmonic {
             let square = s * s;
             for (j, rest) in self.rest.iter_mut().enumerate() {
                 let m = model.mass(j);
-                for i in 0..3 {
+                for i in 0..DOF {
                     let stiff = Complex::new(stiff_re[j][i], stiff_im[j][i]);
                     rest[i] = force[j][i] - stiff - s * dragged[j][i] - square * m[i] * x[j][i];
                 }

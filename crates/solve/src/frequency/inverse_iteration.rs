@@ -13,8 +13,8 @@
 use super::mass::shifted;
 use super::refined::Refined;
 use super::subspace::{columns, ritz};
-use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, Model};
+use bimorph_multibody::planar::{DOF, Pose};
+use bimorph_multibody::{BodyMatrix, Model};
 
 /// Rounds at most.
 const MAX_ROUNDS: usize = 30;
@@ -37,8 +37,8 @@ pub struct ModeBlock {
 pub fn settle(
     model: &Model,
     refined: &mut Refined<'_>,
-    (factor, shift): (&BlockMatrix<f64, 3>, f64),
-    stiffness: &BlockMatrix<f64, 3>,
+    (factor, shift): (&BodyMatrix, f64),
+    stiffness: &BodyMatrix,
     mut x: Vec<Vec<Pose>>,
     wanted: usize,
     goal: f64,
@@ -68,7 +68,7 @@ pub fn settle(
 fn improve(
     model: &Model,
     refined: &mut Refined<'_>,
-    (factor, shift): (&BlockMatrix<f64, 3>, f64),
+    (factor, shift): (&BodyMatrix, f64),
     x: &[Vec<Pose>],
     goal: f64,
 ) -> Option<(Vec<Vec<Pose>>, f64)> {
@@ -80,7 +80,7 @@ fn improve(
     let (flat, weighed) = (columns(&y), columns(&y.iter().map(weigh).collect::<Vec<_>>()));
     let (_, v) = ritz(&(flat.transpose() * columns(&forces)), &(flat.transpose() * weighed))?;
     let flat = flat * v;
-    let pose = |c: nalgebra::DVectorView<'_, f64>, k: usize| Pose::new(c[3 * k], c[3 * k + 1], c[3 * k + 2]);
+    let pose = |c: nalgebra::DVectorView<'_, f64>, k: usize| Pose::new(c[DOF * k], c[DOF * k + 1], c[DOF * k + 2]);
     let normal = |c: nalgebra::DVectorView<'_, f64>| {
         let x: Vec<Pose> = (0..model.bodies.len()).map(|k| pose(c, k)).collect();
         let length = model.mass_product(&x, &x).sqrt();
@@ -93,12 +93,12 @@ fn improve(
 fn measure(
     model: &Model,
     refined: &mut Refined<'_>,
-    stiffness: &BlockMatrix<f64, 3>,
+    stiffness: &BodyMatrix,
     least: f64,
     x: &[Vec<Pose>],
 ) -> (Vec<f64>, Vec<f64>) {
     let mut rest = vec![Pose::zeros(); model.bodies.len()];
-    let mut known: Option<(f64, BlockMatrix<f64, 3>)> = None;
+    let mut known: Option<(f64, BodyMatrix)> = None;
     // K + sM is positive for s beyond the most negative of them
     let lowest = x.iter().map(|x| refined.quotient(x, &mut rest)).fold(0.0, f64::min);
     let least = least.max(-2.0 * lowest);

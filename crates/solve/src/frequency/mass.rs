@@ -1,13 +1,14 @@
 //! The tangent shifted by the masses.
 
-use bimorph_multibody::{BlockMatrix, Model};
+use bimorph_multibody::planar::DOF;
+use bimorph_multibody::{BodyMatrix, Model};
 
 /// K − σM, held directions projected.
-pub(super) fn shifted(model: &Model, stiffness: &BlockMatrix<f64, 3>, sigma: f64) -> BlockMatrix<f64, 3> {
+pub(super) fn shifted(model: &Model, stiffness: &BodyMatrix, sigma: f64) -> BodyMatrix {
     let mut a = stiffness.clone();
     for (j, block) in a.diagonal.iter_mut().enumerate() {
         let m = model.mass(j);
-        for i in 0..3 {
+        for i in 0..DOF {
             block[(i, i)] -= sigma * m[i];
         }
     }

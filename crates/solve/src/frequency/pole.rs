@@ -9,7 +9,7 @@
 
 use super::harmonic::{ComplexPose, Harmonic};
 use bimorph_domains::System;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use nalgebra::Complex;
 
@@ -27,7 +27,7 @@ const NEAR: f64 = 0.2;
 pub fn pole(
     harmonic: &mut Harmonic,
     system: &System,
-    stiffness: &BlockMatrix<f64, 3>,
+    stiffness: &BodyMatrix,
     guess: Complex<f64>,
     push: &[Pose],
 ) -> Option<Complex<f64>> {

@@ -9,10 +9,10 @@
 //! extra-precise iterative refinement", ACM Trans. Math. Software 32 (2006).
 
 use bimorph_domains::{Drive, System};
-use bimorph_multibody::planar::{Block, Pose};
+use bimorph_multibody::planar::{Block, DOF, Pose};
 use bimorph_multibody::precise::PreciseTangent;
 use bimorph_multibody::scalar::{Double, DoublePose};
-use bimorph_multibody::{BlockMatrix, Model};
+use bimorph_multibody::{BodyMatrix, Model};
 
 /// Corrections of one solve at most.
 const MAX_CORRECTIONS: usize = 40;
@@ -46,7 +46,7 @@ impl<'a> Refined<'a> {
     /// K = ∂r/∂q at `q` under `drive`.
     pub fn new(system: &'a System, q: &[Pose], drive: &Drive) -> Self {
         let model = &system.model;
-        let mut added = BlockMatrix::<f64, 3>::new(&model.pattern);
+        let mut added = BodyMatrix::<f64>::new(&model.pattern);
         system.add_body_tangent(q, drive, &mut added);
         system.add_levers(q, drive, &mut added);
         let mut bodies = Vec::new();
@@ -55,7 +55,7 @@ impl<'a> Refined<'a> {
             bodies.extend(std::iter::once((j, j, added.diagonal[j])).chain(below));
         }
         bodies.retain(|(_, _, block)| block.iter().any(|x| *x != 0.0));
-        let zeros = vec![[Double::default(); 3]; model.bodies.len()];
+        let zeros = vec![[Double::default(); DOF]; model.bodies.len()];
         Self {
             model,
             joints: PreciseTangent::new(model, q, &drive.rest()),
@@ -69,11 +69,11 @@ impl<'a> Refined<'a> {
 
     /// `product` = K·x for the stored x.
     fn multiply(&mut self) {
-        self.product.fill([Double::default(); 3]);
+        self.product.fill([Double::default(); DOF]);
         self.joints.multiply_add(&self.x, &mut self.product);
         for &(row, column, block) in &self.bodies {
-            for i in 0..3 {
-                for c in 0..3 {
+            for i in 0..DOF {
+                for c in 0..DOF {
                     let term = self.x[column][c] * block[(i, c)];
                     self.product[row][i] += term;
                     if row != column {
@@ -102,14 +102,14 @@ impl<'a> Refined<'a> {
         self.multiply();
         let mut sum = Double::default();
         for (x, k) in x.iter().zip(&self.product) {
-            for i in 0..3 {
+            for i in 0..DOF {
                 sum += k[i] * x[i];
             }
         }
         let lambda = sum.high;
         for (j, (rest, x)) in rest.iter_mut().zip(x).enumerate() {
             let m = self.model.mass(j);
-            for i in 0..3 {
+            for i in 0..DOF {
                 rest[i] = (self.product[j][i] - Double::from(x[i]) * m[i] * lambda).high;
             }
         }
@@ -119,7 +119,7 @@ impl<'a> Refined<'a> {
 
     /// Solves (K − σM)·x = b in place to about the relative error `goal`, with the factor of about that matrix. Corrections are left
     /// out where the first solve of all has shown that rounding is less than that.
-    pub fn solve(&mut self, factor: &BlockMatrix<f64, 3>, shift: f64, b: &mut [Pose], goal: f64) -> SolveAccuracy {
+    pub fn solve(&mut self, factor: &BodyMatrix, shift: f64, b: &mut [Pose], goal: f64) -> SolveAccuracy {
         let (model, pattern) = (self.model, &self.model.pattern);
         if self.rounding <= goal {
             model.project(b);
@@ -142,7 +142,7 @@ impl<'a> Refined<'a> {
             self.multiply();
             for (j, (rest, b)) in self.correction.iter_mut().zip(&right).enumerate() {
                 let m = model.mass(j) * shift;
-                for i in 0..3 {
+                for i in 0..DOF {
                     rest[i] = (Double::from(b[i]) - self.product[j][i] + self.x[j][i] * m[i]).high;
                 }
             }
@@ -160,7 +160,7 @@ impl<'a> Refined<'a> {
             settled.left = now * now / last;
             last = now;
             for (x, c) in self.x.iter_mut().zip(&self.correction) {
-                for i in 0..3 {
+                for i in 0..DOF {
                     x[i] += c[i].into();
                 }
             }

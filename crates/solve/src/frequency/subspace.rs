@@ -7,8 +7,8 @@
 //! Reference: K.-J. Bathe, "Finite Element Procedures" (2014), §11.6.
 
 use bimorph_base::ErrorBudget;
-use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, Model};
+use bimorph_multibody::planar::{DOF, Pose};
+use bimorph_multibody::{BodyMatrix, Model};
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 /// Iterations at most.
@@ -39,7 +39,7 @@ pub fn start(bodies: usize, count: usize, length: f64) -> Vec<Vec<Pose>> {
 /// the vectors have become dependent, as they must when there are fewer modes, or do not settle.
 pub fn iterate(
     model: &Model,
-    (factor, shift): (&BlockMatrix<f64, 3>, f64),
+    (factor, shift): (&BodyMatrix, f64),
     start: Vec<Vec<Pose>>,
     wanted: usize,
     tolerance: f64,
@@ -53,8 +53,8 @@ pub fn iterate(
         let mut z = x.clone();
         for mut column in z.column_iter_mut() {
             for (k, m) in mass.iter().enumerate() {
-                for i in 0..3 {
-                    column[3 * k + i] *= m[i];
+                for i in 0..DOF {
+                    column[DOF * k + i] *= m[i];
                 }
             }
         }
@@ -66,14 +66,14 @@ pub fn iterate(
         for mut column in y.column_iter_mut() {
             bimorph_base::budget::check();
             for (k, pose) in scratch.iter_mut().enumerate() {
-                *pose = Pose::new(column[3 * k], column[3 * k + 1], column[3 * k + 2]);
+                *pose = Pose::new(column[DOF * k], column[DOF * k + 1], column[DOF * k + 2]);
             }
             model.project(&mut scratch);
             factor.solve(&model.pattern, &mut scratch);
             model.project(&mut scratch);
             for (k, pose) in scratch.iter().enumerate() {
-                for i in 0..3 {
-                    column[3 * k + i] = pose[i];
+                for i in 0..DOF {
+                    column[DOF * k + i] = pose[i];
                 }
             }
         }
@@ -84,7 +84,7 @@ pub fn iterate(
         lambda = mu.iter().map(|mu| mu + shift).collect();
         if settled {
             let shapes = (x.column_iter())
-                .map(|c| (0..n).map(|k| Pose::new(c[3 * k], c[3 * k + 1], c[3 * k + 2])).collect())
+                .map(|c| (0..n).map(|k| Pose::new(c[DOF * k], c[DOF * k + 1], c[DOF * k + 2])).collect())
                 .collect();
             return Some(SubspaceModes { lambda, shapes, iterations });
         }
@@ -94,10 +94,10 @@ pub fn iterate(
 
 /// Body vectors as the columns of a matrix.
 pub fn columns(vectors: &[Vec<Pose>]) -> DMatrix<f64> {
-    let rows = vectors.first().map_or(0, |v| 3 * v.len());
+    let rows = vectors.first().map_or(0, |v| DOF * v.len());
     let mut matrix = DMatrix::zeros(rows, vectors.len());
     for (mut column, vector) in matrix.column_iter_mut().zip(vectors) {
-        for (to, p) in column.as_mut_slice().chunks_exact_mut(3).zip(vector) {
+        for (to, p) in column.as_mut_slice().chunks_exact_mut(DOF).zip(vector) {
             to.copy_from_slice(p.as_slice());
         }
     }

@@ -5,7 +5,7 @@
 //! state is essential: one at rest is useless at large rotations. Negative pivots say that the full model is unstable there.
 
 use bimorph_domains::{Drive, System};
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 
 /// Newton iterations of [`FullCheck::corrected`], and the correction at which they end (1).
@@ -15,7 +15,7 @@ const CONVERGED: f64 = 1e-9;
 /// Storage.
 #[derive(Debug, Clone)]
 pub struct FullCheck {
-    tangent: BlockMatrix<f64, 3>,
+    tangent: BodyMatrix,
     /// r; then the step.
     step: Vec<Pose>,
     held: Vec<bimorph_multibody::factor::ZeroPivot>,
@@ -34,7 +34,7 @@ impl FullCheck {
     /// Storage for a system.
     pub fn new(system: &System) -> Self {
         Self {
-            tangent: BlockMatrix::new(&system.model.pattern),
+            tangent: BodyMatrix::new(&system.model.pattern),
             step: vec![Pose::zeros(); system.bodies()],
             held: Vec::new(),
         }

@@ -6,7 +6,7 @@
 use super::space::dot;
 use crate::equations::Joints;
 use bimorph_domains::Drive;
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::joint_coordinates::sprung_loops::poses::{LaneJointStates, TreeKinematics};
 use bimorph_multibody::planar::Pose;
 
@@ -15,7 +15,7 @@ use bimorph_multibody::planar::Pose;
 pub struct EnergyProduct<'a> {
     joints: &'a Joints,
     placed: TreeKinematics,
-    stiffness: BlockMatrix<f64, 3>,
+    stiffness: BodyMatrix,
 }
 
 /// A vector with what its product with others takes.
@@ -36,7 +36,7 @@ impl<'a> EnergyProduct<'a> {
         let zeros = vec![Pose::zeros(); joints.tree.links.len()];
         let mut placed = TreeKinematics::new(&joints.tree);
         placed.place(&joints.tree, &LaneJointStates::at_rest(&zeros));
-        let mut stiffness = BlockMatrix::new(&joints.tree.pattern);
+        let mut stiffness = BodyMatrix::new(&joints.tree.pattern);
         let mut room = zeros.clone();
         let drive = Drive { load: 0.0, ..closures.electrics.drive() };
         closures.tangent(&zeros, &drive, &mut stiffness, &mut room);

@@ -18,8 +18,8 @@ use bimorph_multibody::joint_coordinates::sprung_loops::dynamics::Stresses;
 use bimorph_multibody::joint_coordinates::sprung_loops::geometric::{self, Geometric};
 use bimorph_multibody::joint_coordinates::sprung_loops::poses::{LaneJointStates, TreeKinematics, place_of};
 use bimorph_multibody::joint_coordinates::sprung_loops::{Tree, UnsupportedModel};
-use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId};
+use bimorph_multibody::planar::{DOF, Pose};
+use bimorph_multibody::{BodyId, BodyMatrix};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -136,7 +136,7 @@ pub struct ReducedForces {
     stresses: Stresses,
     geometric: Vec<Geometric>,
     out: Vec<Four>,
-    stiffness: BlockMatrix<f64, 3>,
+    stiffness: BodyMatrix,
     /// Room for a form over the bodies times V.
     pub(crate) product: DirectionRows,
     of_geometry: DirectionRows,
@@ -157,7 +157,7 @@ impl ReducedForces {
             stresses: Stresses::new(tree),
             geometric: vec![Geometric::ZERO; count],
             out: vec![Four::ZERO; count],
-            stiffness: BlockMatrix::new(&tree.pattern),
+            stiffness: BodyMatrix::new(&tree.pattern),
             product: none.clone(),
             of_geometry: none,
         }
@@ -270,9 +270,9 @@ impl Kernel for PlaceReduced<'_> {
         let Self { tiles, motion: [z, v, w], given } = self;
         for (t, given) in given.iter_mut().enumerate() {
             for (values, to) in [(z, &mut given.q), (v, &mut given.v), (w, &mut given.z)] {
-                let mut sum = [W::splat(simd, 0.0); 3];
+                let mut sum = [W::splat(simd, 0.0); DOF];
                 for (direction, value) in tiles.iter().zip(values) {
-                    add_scaled(&mut sum, &load::<W, 3>(simd, &direction[t]), W::splat(simd, *value));
+                    add_scaled(&mut sum, &load::<W, DOF>(simd, &direction[t]), W::splat(simd, *value));
                 }
                 store(sum, to);
             }

@@ -19,7 +19,7 @@ use crate::equations::Joints;
 use crate::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph_base::ErrorBudget;
 use bimorph_domains::{Drive, System};
-use bimorph_multibody::BlockMatrix;
+use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -176,7 +176,7 @@ impl Trainer<'_> {
         let (system, inputs) = (case.system, &case.inputs);
         let model = &system.model;
         let rest = vec![Pose::zeros(); system.bodies()];
-        let (mut tangent, mut at_rest) = (BlockMatrix::new(&model.pattern), rest.clone());
+        let (mut tangent, mut at_rest) = (BodyMatrix::new(&model.pattern), rest.clone());
         system.tangent(&rest, &inputs.none, &mut tangent, &mut at_rest);
         model.project_matrix(&mut tangent);
         let mut held = Vec::new();

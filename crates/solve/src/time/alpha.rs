@@ -19,7 +19,7 @@
 //! Reference: J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371–375; M. Arnold, O. Brüls, Multibody System Dynamics 18 (2007)
 //! 185–202 (the form with two accelerations); N. M. Newmark, J. Eng. Mech. 85 (1959) 67–94.
 
-use super::method::{Method, Motion, StepFailure};
+use super::method::{Method, Motion, StepResult};
 use super::tableau::Alpha;
 use crate::equations::{Stage, Staged, Unknown};
 use bimorph_multibody::planar::Pose;
@@ -52,12 +52,7 @@ impl<X: Unknown> GeneralizedAlpha<X> {
     }
 
     /// The acceleration that a motion begins with, as its first step sees it.
-    fn begin<E: Staged<Unknown = X>>(
-        &mut self,
-        equations: &mut E,
-        h: f64,
-        motion: &Motion<X>,
-    ) -> Result<(), StepFailure> {
+    fn begin<E: Staged<Unknown = X>>(&mut self, equations: &mut E, h: f64, motion: &Motion<X>) -> StepResult {
         let [Motion { q: own, v: truly }] = &mut self.carried;
         truly.fill(X::ZERO);
         let (beta, gamma) = (self.alpha.beta * h * h, self.alpha.gamma * h);
@@ -82,7 +77,7 @@ impl<E: Staged> Method<E> for GeneralizedAlpha<E::Unknown> {
         h: f64,
         motion: &mut Motion<E::Unknown>,
         error: &mut Motion<E::Unknown>,
-    ) -> Result<(), StepFailure> {
+    ) -> StepResult {
         error.clear();
         if t == 0.0 {
             self.begin(equations, h, motion)?;

@@ -12,7 +12,7 @@
 //! Reference: G. R. W. Quispel, D. I. McLaren, "A new class of energy-preserving numerical integration methods", J. Phys. A
 //! 41 (2008) 045206, eq. 4; E. Hairer, "Energy-preserving variant of collocation methods", JNAIAM 5 (2010).
 
-use super::method::{Method, Motion, StepFailure};
+use super::method::{Method, Motion, StepResult};
 use crate::equations::linear::LinearSolver;
 use crate::equations::newton::{Equation, ForceEvaluation, Newton};
 use bimorph_multibody::planar::Pose;
@@ -51,7 +51,7 @@ impl<S: LinearSolver> Method<Newton<'_, S>> for AverageField {
         h: f64,
         motion: &mut Motion,
         error: &mut Motion,
-    ) -> Result<(), StepFailure> {
+    ) -> StepResult {
         error.clear();
         let model = &equations.system().model;
         for (k, v) in motion.v.iter().enumerate() {

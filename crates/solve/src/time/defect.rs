@@ -19,7 +19,7 @@
 
 use super::method::Method;
 use super::rodas4::tableau::GAMMA;
-use crate::equations::{Bodies, Motion, SolverCounters, StepFailure};
+use crate::equations::{Bodies, Motion, SolverCounters, StepResult};
 use bimorph_multibody::planar::Pose;
 use nalgebra::Complex;
 
@@ -156,18 +156,11 @@ impl<'s, M: Propagates<'s>> Method<Bodies<'s>> for Estimated<'_, M> {
         self.method.error_order()
     }
 
-    fn start(&mut self, bodies: &mut Bodies<'s>, motion: &Motion) -> Result<(), StepFailure> {
+    fn start(&mut self, bodies: &mut Bodies<'s>, motion: &Motion) -> StepResult {
         self.method.start(bodies, motion)
     }
 
-    fn step(
-        &mut self,
-        bodies: &mut Bodies<'s>,
-        t: f64,
-        h: f64,
-        motion: &mut Motion,
-        error: &mut Motion,
-    ) -> Result<(), StepFailure> {
+    fn step(&mut self, bodies: &mut Bodies<'s>, t: f64, h: f64, motion: &mut Motion, error: &mut Motion) -> StepResult {
         self.method.step(bodies, t, h, motion, error)
     }
 

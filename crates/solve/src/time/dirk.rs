@@ -12,7 +12,7 @@
 //! A direction without inertia has no acceleration: its k is what the differences of its rates are, and no equation has it, since its
 //! displacement follows from the springs and its rate from the displacements of the stages.
 
-use super::method::{Method, Motion, StepFailure};
+use super::method::{Method, Motion, StepResult};
 use super::tableau::Tableau;
 use crate::equations::{Stage, Staged, Unknown};
 use bimorph_multibody::planar::Pose;
@@ -62,7 +62,7 @@ impl<X: Unknown> Dirk<X> {
         equations: &mut E,
         (i, t, h): (usize, f64, f64),
         now: &Motion<X>,
-    ) -> Result<(), StepFailure> {
+    ) -> StepResult {
         let Tableau { a, c, .. } = self.tableau;
         let gamma = h * a[i][i];
         let (before, rest) = self.stages.split_at_mut(i);
@@ -114,7 +114,7 @@ impl<E: Staged> Method<E> for Dirk<E::Unknown> {
         h: f64,
         motion: &mut Motion<E::Unknown>,
         error: &mut Motion<E::Unknown>,
-    ) -> Result<(), StepFailure> {
+    ) -> StepResult {
         let Tableau { a, b, error: weights, .. } = self.tableau;
         for i in 0..a.len() {
             self.stage(equations, (i, t, h), motion)?;

@@ -5,7 +5,7 @@
 //!
 //! Reference: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I" (1993), §II.4, eq. 4.4.
 
-use super::method::{Method, Motion, SolverCounters, StepFailure};
+use super::method::{Method, Motion, SolverCounters, StepResult};
 use crate::equations::{Equations, Unknown};
 use bimorph_multibody::planar::Pose;
 
@@ -29,7 +29,7 @@ impl<E: Equations, M: Method<E>> Method<E> for Doubling<M, E::Unknown> {
         3.0
     }
 
-    fn start(&mut self, equations: &mut E, motion: &Motion<E::Unknown>) -> Result<(), StepFailure> {
+    fn start(&mut self, equations: &mut E, motion: &Motion<E::Unknown>) -> StepResult {
         self.carried = self.method.carried().to_vec();
         self.method.start(equations, motion)
     }
@@ -41,7 +41,7 @@ impl<E: Equations, M: Method<E>> Method<E> for Doubling<M, E::Unknown> {
         h: f64,
         motion: &mut Motion<E::Unknown>,
         error: &mut Motion<E::Unknown>,
-    ) -> Result<(), StepFailure> {
+    ) -> StepResult {
         self.start.copy(motion);
         for (keep, now) in self.carried.iter_mut().zip(self.method.carried().iter()) {
             keep.copy(now);

@@ -4,12 +4,12 @@
 //! needs inertia. See [`super::dormand_prince`] for the method.
 
 use super::dormand_prince::DormandPrince;
-use super::method::{Method, Motion, StepFailure};
+use super::method::{Method, Motion, StepResult};
 use crate::SolveError;
 use crate::equations::bodies::DIRECTIONS;
 use crate::equations::{Staged, Unknown};
 use bimorph_domains::System;
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 
 /// The method with its storage.
 #[derive(Debug, Clone)]
@@ -31,7 +31,7 @@ pub fn suits(system: &System) -> Result<(), SolveError> {
     for (j, body) in system.model.bodies.iter().enumerate() {
         let mass = system.model.mass(j);
         let moves = |i: usize| body.free.as_ref().is_none_or(|p| p[(i, i)] > 0.0);
-        if let Some(i) = (0..3).find(|&i| mass[i] <= 0.0 && moves(i)) {
+        if let Some(i) = (0..DOF).find(|&i| mass[i] <= 0.0 && moves(i)) {
             return Err(SolveError::Massless { body: body.name.to_string(), direction: DIRECTIONS[i] });
         }
     }
@@ -50,7 +50,7 @@ impl<E: Staged> Method<E> for Rk45<E::Unknown> {
         5.0
     }
 
-    fn start(&mut self, _: &mut E, _: &Motion<E::Unknown>) -> Result<(), StepFailure> {
+    fn start(&mut self, _: &mut E, _: &Motion<E::Unknown>) -> StepResult {
         self.begun = None;
         Ok(())
     }
@@ -62,7 +62,7 @@ impl<E: Staged> Method<E> for Rk45<E::Unknown> {
         h: f64,
         motion: &mut Motion<E::Unknown>,
         error: &mut Motion<E::Unknown>,
-    ) -> Result<(), StepFailure> {
+    ) -> StepResult {
         let mut accelerate =
             |t: f64, q: &[E::Unknown], v: &[E::Unknown], a: &mut [E::Unknown]| equations.accelerations(t, q, v, a);
         let begun = self.begun.take();

@@ -1,7 +1,7 @@
 //! Rodas4 in the formulation of a model: a circuit, a service or a sweep steps a mechanism without asking which it is.
 
 use super::joint_rodas4::JointRodas4;
-use super::method::{Method, Motion, SolverCounters, StepFailure};
+use super::method::{Method, Motion, SolverCounters, StepResult};
 use super::rodas4::Rodas4;
 use crate::equations::{Bodies, Joints};
 use bimorph_domains::System;
@@ -73,21 +73,14 @@ impl Method<Bodies<'_>> for Formulated {
         }
     }
 
-    fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> Result<(), StepFailure> {
+    fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> StepResult {
         match self {
             Self::Bodies(m) => m.start(bodies, motion),
             Self::Joints(m) => m.start(bodies, motion),
         }
     }
 
-    fn step(
-        &mut self,
-        bodies: &mut Bodies<'_>,
-        s: f64,
-        h: f64,
-        motion: &mut Motion,
-        error: &mut Motion,
-    ) -> Result<(), StepFailure> {
+    fn step(&mut self, bodies: &mut Bodies<'_>, s: f64, h: f64, motion: &mut Motion, error: &mut Motion) -> StepResult {
         match self {
             Self::Bodies(m) => m.step(bodies, s, h, motion, error),
             Self::Joints(m) => m.step(bodies, s, h, motion, error),

@@ -23,7 +23,7 @@ mod ports;
 mod stages;
 mod tableau;
 
-use super::method::{Method, Motion, SolverCounters, StepFailure};
+use super::method::{Method, Motion, SolverCounters, StepResult};
 use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I};
 use super::rosenbrock::{self, CONSISTENT, RosenbrockStep};
 use super::stage_loss::StageLoss;
@@ -172,7 +172,7 @@ impl JointRodas4 {
         self.work.forces += 1;
     }
 
-    fn factor(&mut self, gh: f64) -> Result<(), StepFailure> {
+    fn factor(&mut self, gh: f64) -> StepResult {
         let Self { joints, w, placed, geometric, stages, force, loss, .. } = self;
         forces::add_inertia(&joints.closures.model, 1.0 / (gh * gh), 1.0 / gh, &mut w.bodies);
         if let Some(loss) = loss {
@@ -237,7 +237,7 @@ struct JointStep<'a> {
 }
 
 impl RosenbrockStep for JointStep<'_> {
-    fn begin(&mut self) -> Result<(), StepFailure> {
+    fn begin(&mut self) -> StepResult {
         self.ramp.at_and_rate(self.s, &mut self.rodas.drive, &mut self.rodas.rate);
         self.rodas.drive.load = 1.0;
         Ok(())
@@ -257,7 +257,7 @@ impl RosenbrockStep for JointStep<'_> {
         self.rodas.residual(i == 0, self.stays);
     }
 
-    fn factor(&mut self) -> Result<(), StepFailure> {
+    fn factor(&mut self) -> StepResult {
         self.rodas.factor(GAMMA * self.h)?;
         let JointRodas4 { joints, w, placed, carried, stages, ports, forcing, drive, rate, .. } = &mut *self.rodas;
         stages.set_out(&joints.tree, w, &carried[0], &carried[1]);
@@ -296,7 +296,7 @@ impl Method<Bodies<'_>> for JointRodas4 {
         4.0
     }
 
-    fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> Result<(), StepFailure> {
+    fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> StepResult {
         if std::mem::take(&mut self.resumed) {
             return Ok(());
         }
@@ -319,14 +319,7 @@ impl Method<Bodies<'_>> for JointRodas4 {
         Ok(())
     }
 
-    fn step(
-        &mut self,
-        bodies: &mut Bodies<'_>,
-        s: f64,
-        h: f64,
-        motion: &mut Motion,
-        error: &mut Motion,
-    ) -> Result<(), StepFailure> {
+    fn step(&mut self, bodies: &mut Bodies<'_>, s: f64, h: f64, motion: &mut Motion, error: &mut Motion) -> StepResult {
         let step = &mut JointStep { rodas: self, ramp: bodies.ramp, s, h, motion, error, stays: false };
         rosenbrock::take(step)
     }

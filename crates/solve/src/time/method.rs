@@ -2,7 +2,7 @@
 //! them, chosen at compile time.
 
 use crate::equations::Equations;
-pub use crate::equations::{Motion, SolverCounters, StepFailure};
+pub use crate::equations::{Motion, SolverCounters, StepFailure, StepResult};
 
 /// A one-step method with its storage, for some equations or for all.
 pub trait Method<E: Equations> {
@@ -13,7 +13,7 @@ pub trait Method<E: Equations> {
     ///
     /// # Errors
     /// [`StepFailure`] where there is no beginning.
-    fn start(&mut self, equations: &mut E, motion: &Motion<E::Unknown>) -> Result<(), StepFailure> {
+    fn start(&mut self, equations: &mut E, motion: &Motion<E::Unknown>) -> StepResult {
         let _ = (equations, motion);
         Ok(())
     }
@@ -30,7 +30,7 @@ pub trait Method<E: Equations> {
         h: f64,
         motion: &mut Motion<E::Unknown>,
         error: &mut Motion<E::Unknown>,
-    ) -> Result<(), StepFailure>;
+    ) -> StepResult;
 
     /// A step of length `h` (s) from time `t` (s) between these ends is accepted; `carried` is what the method carried at its start.
     fn accepted(

@@ -10,13 +10,13 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.8; coefficients of its RADAU5.
 
-use super::method::{Method, Motion, SolverCounters, StepFailure};
+use super::method::{Method, Motion, SolverCounters, StepFailure, StepResult};
 use crate::equations::Bodies;
 use crate::equations::newton::largest;
 use bimorph_domains::loss_derivatives::LossDerivatives;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, forces};
+use bimorph_multibody::{BodyMatrix, forces};
 use nalgebra::{Complex, Matrix3, Vector3};
 
 /// Stage times: (4 ∓ √6)/10 and 1.
@@ -50,12 +50,12 @@ const MAX_ITERATIONS: usize = 15;
 /// The method with its storage.
 #[derive(Debug, Clone)]
 pub struct Radau5 {
-    tangent: BlockMatrix<f64, 3>,
-    damping: BlockMatrix<f64, 3>,
+    tangent: BodyMatrix,
+    damping: BodyMatrix,
     /// Derivatives of what contact loses with displacements and rates at the start of the step; none where it loses nothing.
     loss: Option<LossDerivatives>,
-    real: BlockMatrix<f64, 3>,
-    complex: BlockMatrix<Complex<f64>, 3>,
+    real: BodyMatrix,
+    complex: BodyMatrix<Complex<f64>>,
     /// Z and W.
     stages: [Motion; 3],
     transformed: [Motion; 3],
@@ -75,14 +75,14 @@ impl Radau5 {
         let n = system.bodies();
         let pattern = &system.model.pattern;
         let three = || std::array::from_fn(|_| Motion::zeros(n));
-        let mut damping = BlockMatrix::new(pattern);
+        let mut damping = BodyMatrix::new(pattern);
         forces::add_inertia(&system.model, 0.0, 1.0, &mut damping);
         Self {
-            tangent: BlockMatrix::new(pattern),
+            tangent: BodyMatrix::new(pattern),
             damping,
             loss: LossDerivatives::of(system),
-            real: BlockMatrix::new(pattern),
-            complex: BlockMatrix::new(pattern),
+            real: BodyMatrix::new(pattern),
+            complex: BodyMatrix::new(pattern),
             stages: three(),
             transformed: three(),
             slopes: three(),
@@ -96,7 +96,7 @@ impl Radau5 {
     }
 
     /// Factors λ²·M + λ·C + K and μ²·M + μ·C + K.
-    fn factor(&mut self, system: &System, h: f64) -> Result<(), StepFailure> {
+    fn factor(&mut self, system: &System, h: f64) -> StepResult {
         let model = &system.model;
         let lambda = LAMBDA / h;
         self.real.diagonal.copy_from_slice(&self.tangent.diagonal);
@@ -266,14 +266,7 @@ impl Method<Bodies<'_>> for Radau5 {
         4.0
     }
 
-    fn step(
-        &mut self,
-        bodies: &mut Bodies<'_>,
-        s: f64,
-        h: f64,
-        motion: &mut Motion,
-        error: &mut Motion,
-    ) -> Result<(), StepFailure> {
+    fn step(&mut self, bodies: &mut Bodies<'_>, s: f64, h: f64, motion: &mut Motion, error: &mut Motion) -> StepResult {
         let Bodies { system, ramp, .. } = *bodies;
         let model = &system.model;
         let n = motion.q.len();

@@ -15,7 +15,7 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 (RODAS).
 
-use super::method::{Method, Motion, SolverCounters, StepFailure};
+use super::method::{Method, Motion, SolverCounters, StepFailure, StepResult};
 use super::rodas4::tableau::{A, ALPHA, C, GAMMA, GAMMA_I};
 use super::rosenbrock::{self, CONSISTENT, RosenbrockStep};
 use super::stage_loss::StageLoss;
@@ -27,8 +27,8 @@ use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::joint_coordinates::sprung_loops::columns::Four;
 use bimorph_multibody::joint_coordinates::sprung_loops::directions::DirectionRows;
-use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, forces};
+use bimorph_multibody::planar::{DOF, Pose};
+use bimorph_multibody::{BodyMatrix, forces};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::sync::Arc;
 
@@ -92,7 +92,7 @@ pub struct ReducedRodas4 {
     factor: Option<Cholesky<f64, Dyn>>,
     /// Something drags on bodies, or contact loses.
     damped: bool,
-    drag: BlockMatrix<f64, 3>,
+    drag: BodyMatrix,
     loss: Option<Box<StageLoss>>,
     force: Vec<f64>,
     forcing: Vec<f64>,
@@ -130,7 +130,7 @@ impl ReducedRodas4 {
             stiffness: DMatrix::zeros(m, m),
             factor: None,
             damped: *drags || loss.is_some(),
-            drag: BlockMatrix::new(&space.joints.tree.pattern),
+            drag: BodyMatrix::new(&space.joints.tree.pattern),
             loss,
             force: vec![0.0; m],
             forcing: vec![0.0; m],
@@ -190,7 +190,7 @@ impl ReducedRodas4 {
     }
 
     /// M, C and W at the place of the first stage.
-    fn factor(&mut self, gh: f64) -> Result<(), StepFailure> {
+    fn factor(&mut self, gh: f64) -> StepResult {
         let Self { space, forces, loss, drag, .. } = self;
         let model = &space.joints.closures.model;
         forces.stiffness(space, &mut self.stiffness);
@@ -285,7 +285,7 @@ impl ReducedRodas4 {
         let Self { carried, now, .. } = self;
         let [position, push] = &mut carried[..] else { return };
         for (to, from) in [(&mut position.q, &now.z), (&mut position.v, &now.v), (&mut push.q, &now.w)] {
-            from.iter().enumerate().for_each(|(k, x)| to[k / 3][k % 3] = *x);
+            from.iter().enumerate().for_each(|(k, x)| to[k / DOF][k % DOF] = *x);
         }
     }
 
@@ -293,7 +293,7 @@ impl ReducedRodas4 {
         let Self { carried, now, .. } = self;
         let [position, push] = &carried[..] else { return };
         for (to, from) in now.all().into_iter().zip([&position.q, &position.v, &push.q]) {
-            to.iter_mut().enumerate().for_each(|(k, x)| *x = from[k / 3][k % 3]);
+            to.iter_mut().enumerate().for_each(|(k, x)| *x = from[k / DOF][k % DOF]);
         }
     }
 }
@@ -324,7 +324,7 @@ struct ReducedStep<'a> {
 }
 
 impl RosenbrockStep for ReducedStep<'_> {
-    fn begin(&mut self) -> Result<(), StepFailure> {
+    fn begin(&mut self) -> StepResult {
         self.ramp.at_and_rate(self.s, &mut self.rodas.drive, &mut self.rodas.rate);
         self.rodas.drive.load = 1.0;
         Ok(())
@@ -349,7 +349,7 @@ impl RosenbrockStep for ReducedStep<'_> {
         self.rodas.residual(i == 0);
     }
 
-    fn factor(&mut self) -> Result<(), StepFailure> {
+    fn factor(&mut self) -> StepResult {
         self.rodas.factor(GAMMA * self.h)?;
         self.rodas.fill_forcing();
         Ok(())
@@ -381,7 +381,7 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         4.0
     }
 
-    fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> Result<(), StepFailure> {
+    fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> StepResult {
         let [z, v] = projected(&self.space, motion);
         (self.now.z, self.now.v) = (z, v);
         self.now.w.fill(0.0);
@@ -401,14 +401,7 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         Ok(())
     }
 
-    fn step(
-        &mut self,
-        bodies: &mut Bodies<'_>,
-        s: f64,
-        h: f64,
-        motion: &mut Motion,
-        error: &mut Motion,
-    ) -> Result<(), StepFailure> {
+    fn step(&mut self, bodies: &mut Bodies<'_>, s: f64, h: f64, motion: &mut Motion, error: &mut Motion) -> StepResult {
         self.put_back();
         rosenbrock::take(&mut ReducedStep { rodas: self, ramp: bodies.ramp, s, h, motion, error })
     }

@@ -27,7 +27,7 @@ pub(crate) mod tableau;
 
 use super::defect::Propagates;
 pub use super::method::Motion;
-use super::method::{Method, SolverCounters, StepFailure};
+use super::method::{Method, SolverCounters, StepResult};
 use crate::equations::Bodies;
 use crate::equations::linear::{LinearSolver, Recursion};
 use crate::time::gyration::{Gyration, held_out, skew};
@@ -35,7 +35,7 @@ use crate::time::rosenbrock::{self, RosenbrockStep};
 use crate::time::stage_loss::{StageLoss, StepMatrix};
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, forces};
+use bimorph_multibody::{BodyMatrix, forces};
 use defect::DefectEstimate;
 use ports::{FrameRotation, PortSensitivities};
 use stages::Stages;
@@ -45,7 +45,7 @@ use tableau::{ALPHA, GAMMA};
 #[derive(Debug, Clone)]
 pub struct Rodas4<S = Recursion> {
     solver: S,
-    w: BlockMatrix<f64, 3>,
+    w: BodyMatrix,
     stages: Stages,
     drive: Drive,
     rate: Drive,
@@ -72,7 +72,7 @@ impl<S: LinearSolver> Rodas4<S> {
     pub fn with_solver(solver: S, system: &System, sources: &[usize]) -> Self {
         Self {
             solver,
-            w: BlockMatrix::new(&system.model.pattern),
+            w: BodyMatrix::new(&system.model.pattern),
             stages: Stages::new(&system.model),
             drive: system.electrics.drive(),
             rate: system.electrics.drive(),
@@ -101,7 +101,7 @@ struct BodyStep<'a, S> {
 }
 
 impl<S: LinearSolver> RosenbrockStep for BodyStep<'_, S> {
-    fn begin(&mut self) -> Result<(), StepFailure> {
+    fn begin(&mut self) -> StepResult {
         let Self { system, ramp, s, h, motion, .. } = self;
         let Rodas4 { stages, drive, rate, ports, sensitivity, .. } = &mut *self.rodas;
         ramp.at_and_rate(*s, drive, rate);
@@ -161,7 +161,7 @@ impl<S: LinearSolver> RosenbrockStep for BodyStep<'_, S> {
         }
     }
 
-    fn factor(&mut self) -> Result<(), StepFailure> {
+    fn factor(&mut self) -> StepResult {
         let (model, gh) = (&self.system.model, GAMMA * self.h);
         let Rodas4 { solver, w, loss, work, .. } = &mut *self.rodas;
         if let Some(loss) = loss {
@@ -207,14 +207,7 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
         4.0
     }
 
-    fn step(
-        &mut self,
-        bodies: &mut Bodies<'_>,
-        s: f64,
-        h: f64,
-        motion: &mut Motion,
-        error: &mut Motion,
-    ) -> Result<(), StepFailure> {
+    fn step(&mut self, bodies: &mut Bodies<'_>, s: f64, h: f64, motion: &mut Motion, error: &mut Motion) -> StepResult {
         let Bodies { system, ramp, .. } = *bodies;
         rosenbrock::take(&mut BodyStep { rodas: self, system, ramp, s, h, motion, error, turning: None })
     }

@@ -13,7 +13,7 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 (RODAS).
 
-use super::method::StepFailure;
+use super::method::StepResult;
 use super::rodas4::tableau::{ALPHA, moves_on};
 
 /// Fraction of the shortest time at which accelerations are made consistent: directions without inertia follow their springs,
@@ -26,7 +26,7 @@ pub(super) trait RosenbrockStep {
     ///
     /// # Errors
     /// [`StepFailure`] where the step is too long for them.
-    fn begin(&mut self) -> Result<(), StepFailure>;
+    fn begin(&mut self) -> StepResult;
 
     /// Sources after the fraction `alpha` of the step.
     fn drive_at(&mut self, alpha: f64);
@@ -41,7 +41,7 @@ pub(super) trait RosenbrockStep {
     ///
     /// # Errors
     /// [`StepFailure`] where it has no factor.
-    fn factor(&mut self) -> Result<(), StepFailure>;
+    fn factor(&mut self) -> StepResult;
 
     /// The increments of stage `i`.
     fn solve(&mut self, i: usize);
@@ -55,7 +55,7 @@ pub(super) trait RosenbrockStep {
 /// # Errors
 /// Those of its parts.
 #[inline]
-pub(super) fn take(step: &mut impl RosenbrockStep) -> Result<(), StepFailure> {
+pub(super) fn take(step: &mut impl RosenbrockStep) -> StepResult {
     step.begin()?;
     for (i, alpha) in ALPHA.into_iter().enumerate() {
         if moves_on(i) {

@@ -17,8 +17,8 @@ use bimorph_domains::System;
 use bimorph_domains::domain::SkewCoupling;
 use bimorph_domains::loss_derivatives::LossDerivatives;
 use bimorph_multibody::model::locate;
-use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, BodyId, Model, Pattern};
+use bimorph_multibody::planar::{DOF, Pose};
+use bimorph_multibody::{BodyId, BodyMatrix, Model, Pattern};
 use nalgebra::Vector6;
 
 /// Derivatives in a step.
@@ -44,7 +44,7 @@ struct Shear {
 pub(super) struct StepMatrix<'a, S> {
     pub(super) solver: &'a S,
     pub(super) pattern: &'a Pattern,
-    pub(super) w: &'a BlockMatrix<f64, 3>,
+    pub(super) w: &'a BodyMatrix,
     pub(super) loss: Option<&'a StageLoss>,
 }
 
@@ -55,7 +55,7 @@ impl<S: LinearSolver> StepMatrix<'_, S> {
         for Shear { state: (k, i), bodies, s } in shears {
             for (side, body) in bodies.iter().enumerate() {
                 if let BodyId::Free(b) = *body {
-                    let part = s.fixed_rows::<3>(3 * side) * x[*k][*i];
+                    let part = s.fixed_rows::<DOF>(DOF * side) * x[*k][*i];
                     x[b] += part;
                 }
             }
@@ -64,7 +64,7 @@ impl<S: LinearSolver> StepMatrix<'_, S> {
         for Shear { state: (k, i), bodies, s } in shears {
             for (side, body) in bodies.iter().enumerate() {
                 if let BodyId::Free(b) = *body {
-                    x[*k][*i] -= s.fixed_rows::<3>(3 * side).dot(&x[b]);
+                    x[*k][*i] -= s.fixed_rows::<DOF>(DOF * side).dot(&x[b]);
                 }
             }
         }
@@ -100,12 +100,12 @@ impl StageLoss {
     }
 
     /// Adds the symmetric part of the matrix of a step.
-    pub(super) fn add_matrix(&self, gh: f64, w: &mut BlockMatrix<f64, 3>) {
+    pub(super) fn add_matrix(&self, gh: f64, w: &mut BodyMatrix) {
         self.start.add_to([1.0, 1.0 / gh], w);
     }
 
     /// Shears the matrix of a step, which has all its parts and whose held directions have been removed.
-    pub(super) fn shear(&mut self, model: &Model, w: &mut BlockMatrix<f64, 3>) {
+    pub(super) fn shear(&mut self, model: &Model, w: &mut BodyMatrix) {
         self.shears.clear();
         for SkewCoupling { state: (k, i), bodies, half } in self.start.skew() {
             let d = w.diagonal[*k][(*i, *i)];
@@ -115,8 +115,8 @@ impl StageLoss {
             let mut s = half / d;
             for (side, body) in bodies.iter().enumerate() {
                 if let BodyId::Free(b) = *body {
-                    let free = held_out(&model.bodies[b], s.fixed_rows::<3>(3 * side).into());
-                    s.fixed_rows_mut::<3>(3 * side).copy_from(&free);
+                    let free = held_out(&model.bodies[b], s.fixed_rows::<DOF>(DOF * side).into());
+                    s.fixed_rows_mut::<DOF>(DOF * side).copy_from(&free);
                 }
             }
             let [a, b] = *bodies;
@@ -126,7 +126,7 @@ impl StageLoss {
     }
 
     /// Adds the derivatives with displacements in the stage at hand to its tangent.
-    pub(super) fn add_tangent(&self, tangent: &mut BlockMatrix<f64, 3>) {
+    pub(super) fn add_tangent(&self, tangent: &mut BodyMatrix) {
         if let Some(now) = &self.now {
             now.add_stiffness(1.0, tangent);
         }

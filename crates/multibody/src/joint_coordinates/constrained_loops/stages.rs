@@ -18,7 +18,7 @@ use super::reduction::Reduction;
 use super::schedule::Plan;
 use super::singular::Singularity;
 use super::tree::Linkage;
-use crate::BlockMatrix;
+use crate::BodyMatrix;
 use nalgebra::Matrix3;
 
 /// Contribution of an implicit step to the inertia: γ·C + β·K.
@@ -27,14 +27,14 @@ pub struct AddedInertia {
     /// Of each body's joint, over the coordinates that move: the lower triangle by rows.
     pub joints: Vec<[f64; 6]>,
     /// Of bodies and pairs of bodies.
-    pub bodies: BlockMatrix<f64, 3>,
+    pub bodies: BodyMatrix,
 }
 
 impl AddedInertia {
     /// Zero, for `linkage`.
     #[inline]
     pub fn new(linkage: &Linkage) -> Self {
-        Self { joints: vec![[0.0; 6]; linkage.links.len()], bodies: BlockMatrix::new(&linkage.pattern) }
+        Self { joints: vec![[0.0; 6]; linkage.links.len()], bodies: BodyMatrix::new(&linkage.pattern) }
     }
 
     /// Back to zero.

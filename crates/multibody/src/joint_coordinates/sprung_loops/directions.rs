@@ -14,7 +14,7 @@ use super::tree::Tree;
 use crate::batch::{Kernel, LANES, LanePose, SimdReal, ZERO_POSE, everywhere, load, store};
 use crate::joint_coordinates::TreeParent;
 use crate::planar::Pose;
-use crate::{BlockMatrix, Pattern};
+use crate::{BodyMatrix, Pattern};
 use nalgebra::DMatrix;
 
 /// Three numbers of each body for each direction.
@@ -64,7 +64,7 @@ impl DirectionRows {
     }
 
     /// Becomes A·x with an unfactored matrix over the bodies.
-    pub fn multiply(&mut self, pattern: &Pattern, matrix: &BlockMatrix<f64, 3>, x: &Self) {
+    pub fn multiply(&mut self, pattern: &Pattern, matrix: &BodyMatrix, x: &Self) {
         self.clear();
         everywhere(MultiplyAll { out: self, pattern, matrix, x });
     }
@@ -139,7 +139,7 @@ impl Kernel for SpreadAll<'_> {
 struct MultiplyAll<'a> {
     out: &'a mut DirectionRows,
     pattern: &'a Pattern,
-    matrix: &'a BlockMatrix<f64, 3>,
+    matrix: &'a BodyMatrix,
     x: &'a DirectionRows,
 }
 

@@ -25,7 +25,7 @@ use super::tree::{Tree, TreeJoint};
 use crate::factor::{PivotSigns, ZeroPivot};
 use crate::joint_coordinates::TreeParent;
 use crate::planar::Pose;
-use crate::{BlockMatrix, Pattern};
+use crate::{BodyMatrix, Pattern};
 use pulp::{Simd, WithSimd};
 
 /// A pivot smaller than this fraction of what it came from is taken for zero.
@@ -35,7 +35,7 @@ const LOST: f64 = 1e-13;
 #[derive(Debug, Clone)]
 pub struct JointMatrix {
     /// Blocks over the bodies' motions.
-    pub bodies: BlockMatrix<f64, 3>,
+    pub bodies: BodyMatrix,
     /// The same in the course of the elimination.
     diagonal: Vec<ColumnBlock>,
     below: Vec<ColumnBlock>,
@@ -59,7 +59,7 @@ impl JointMatrix {
         let pattern = &tree.pattern;
         let count = pattern.bodies();
         Self {
-            bodies: BlockMatrix::new(pattern),
+            bodies: BodyMatrix::new(pattern),
             diagonal: vec![ColumnBlock::ZERO; count],
             below: vec![ColumnBlock::ZERO; pattern.off_blocks()],
             factors: Factors::new(tree),

@@ -6,6 +6,7 @@
 use super::storage::LaneEquilibrium;
 use bimorph_multibody::batch::forces::{self, LaneRestStrain};
 use bimorph_multibody::batch::{Kernel, SimdReal, ZERO_POSE, add, load, store};
+use bimorph_multibody::planar::DOF;
 
 /// A part that goes over all lanes.
 #[derive(Debug, Clone, Copy)]
@@ -69,8 +70,8 @@ impl LaneEquilibrium {
         if predicts {
             forces::project::<W>(simd, model, force);
             for (force, residual) in force.iter_mut().zip(&*residual) {
-                let (mut step, rest) = (load::<W, 3>(simd, force), load::<W, 3>(simd, residual));
-                for i in 0..3 {
+                let (mut step, rest) = (load::<W, DOF>(simd, force), load::<W, DOF>(simd, residual));
+                for i in 0..DOF {
                     step[i] = step[i] * -1.0 - rest[i];
                 }
                 store(step, force);
@@ -79,8 +80,8 @@ impl LaneEquilibrium {
         tangent.solve::<W>(simd, &model.pattern, force);
         let (goes, none) = (W::load(simd, goes), W::splat(simd, 0.0));
         for (trial, step) in trial.iter_mut().zip(&*force) {
-            let mut step = load::<W, 3>(simd, step);
-            for i in 0..3 {
+            let mut step = load::<W, DOF>(simd, step);
+            for i in 0..DOF {
                 step[i] = goes.if_zero(none, if predicts { step[i] } else { -step[i] });
             }
             add(simd, trial, &step);

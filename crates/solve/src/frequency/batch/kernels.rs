@@ -7,6 +7,7 @@ use super::storage::{LaneModes, Which};
 use super::vectors::{dot, mass_product, scale, weigh};
 use bimorph_multibody::batch::forces::{self, LaneRestStrain};
 use bimorph_multibody::batch::{Kernel, SimdReal, load, store};
+use bimorph_multibody::planar::DOF;
 use bimorph_multibody::scalar::Double;
 
 /// A part that goes over all lanes.
@@ -111,8 +112,8 @@ impl LaneModes {
         precise.multiply_add::<W>(simd, &x[k], product);
         let (mut sum, mut size) = (Double::from(none), Double::from(none));
         for ((x, product), body) in x[k].iter().zip(&*product).zip(&model.bodies) {
-            let (x, m) = (load::<W, 3>(simd, x), load::<W, 3>(simd, &body.mass));
-            for i in 0..3 {
+            let (x, m) = (load::<W, DOF>(simd, x), load::<W, DOF>(simd, &body.mass));
+            for i in 0..DOF {
                 let [high, low] = load::<W, 2>(simd, &product[i]);
                 sum += Double { high, low } * x[i];
                 size += Double::from(x[i]) * x[i] * m[i];
@@ -121,9 +122,9 @@ impl LaneModes {
         let found = sum.high / size.high;
         found.store(&mut lambda[k]);
         for (((to, x), product), body) in force.iter_mut().zip(&x[k]).zip(&*product).zip(&model.bodies) {
-            let (x, m) = (load::<W, 3>(simd, x), load::<W, 3>(simd, &body.mass));
+            let (x, m) = (load::<W, DOF>(simd, x), load::<W, DOF>(simd, &body.mass));
             let mut rest = x;
-            for i in 0..3 {
+            for i in 0..DOF {
                 let [high, low] = load::<W, 2>(simd, &product[i]);
                 rest[i] = (Double { high, low } - Double::from(x[i]) * m[i] * found).high;
             }

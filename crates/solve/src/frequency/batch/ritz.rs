@@ -10,6 +10,7 @@
 
 use super::vectors::{mass_product, scale};
 use bimorph_multibody::batch::{LANES, Lane8, LaneModel, LanePose, SimdReal, load, store};
+use bimorph_multibody::planar::DOF;
 
 /// Rows at most.
 pub(super) const MAX_ROWS: usize = 10;
@@ -160,10 +161,10 @@ impl RitzMatrices {
         let one = W::splat(simd, 1.0);
         for j in 0..self.count {
             for body in 0..model.bodies.len() {
-                let mut sum = [W::splat(simd, 0.0); 3];
+                let mut sum = [W::splat(simd, 0.0); DOF];
                 for i in 0..self.count {
-                    let (share, x) = (W::load(simd, &self.v[i][j]), load::<W, 3>(simd, &x[i][body]));
-                    for d in 0..3 {
+                    let (share, x) = (W::load(simd, &self.v[i][j]), load::<W, DOF>(simd, &x[i][body]));
+                    for d in 0..DOF {
                         sum[d] += x[d] * share;
                     }
                 }

@@ -4,7 +4,7 @@ use super::ritz::{MAX_ROWS, RitzMatrices};
 use bimorph_domains::System;
 use bimorph_multibody::batch::joint::LanePlaced;
 use bimorph_multibody::batch::{LANES, Lane8, LaneMatrix, LaneModel, LanePose, LanePrecise, PrecisePose, ZERO_POSE};
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_multibody::scalar::has_lanes;
 
 /// Which factor.
@@ -63,7 +63,7 @@ impl LaneModes {
             x: block.clone(),
             given: block,
             force: vec![ZERO_POSE; n],
-            product: vec![[[Lane8::NONE; 2]; 3]; n],
+            product: vec![[[Lane8::NONE; 2]; DOF]; n],
             lambda: vec![Lane8::NONE; start.len()],
             residual: vec![Lane8::NONE; start.len()],
             shift: Lane8::NONE,

@@ -4,14 +4,15 @@
 #![allow(clippy::needless_range_loop)]
 
 use bimorph_multibody::batch::{LaneModel, LanePose, SimdReal, load, store};
+use bimorph_multibody::planar::DOF;
 
 /// xᵀy.
 #[inline(always)]
 pub fn dot<W: SimdReal>(simd: W::Simd, x: &[LanePose], y: &[LanePose]) -> W {
-    let mut sum = [W::splat(simd, 0.0); 3];
+    let mut sum = [W::splat(simd, 0.0); DOF];
     for (x, y) in x.iter().zip(y) {
-        let (x, y) = (load::<W, 3>(simd, x), load::<W, 3>(simd, y));
-        for i in 0..3 {
+        let (x, y) = (load::<W, DOF>(simd, x), load::<W, DOF>(simd, y));
+        for i in 0..DOF {
             sum[i] += x[i] * y[i];
         }
     }
@@ -21,10 +22,10 @@ pub fn dot<W: SimdReal>(simd: W::Simd, x: &[LanePose], y: &[LanePose]) -> W {
 /// xᵀMy.
 #[inline(always)]
 pub(crate) fn mass_product<W: SimdReal>(simd: W::Simd, model: &LaneModel, x: &[LanePose], y: &[LanePose]) -> W {
-    let mut sum = [W::splat(simd, 0.0); 3];
+    let mut sum = [W::splat(simd, 0.0); DOF];
     for ((x, y), body) in x.iter().zip(y).zip(&model.bodies) {
-        let (x, y, m) = (load::<W, 3>(simd, x), load::<W, 3>(simd, y), load::<W, 3>(simd, &body.mass));
-        for i in 0..3 {
+        let (x, y, m) = (load::<W, DOF>(simd, x), load::<W, DOF>(simd, y), load::<W, DOF>(simd, &body.mass));
+        for i in 0..DOF {
             sum[i] += x[i] * y[i] * m[i];
         }
     }
@@ -35,8 +36,8 @@ pub(crate) fn mass_product<W: SimdReal>(simd: W::Simd, model: &LaneModel, x: &[L
 #[inline(always)]
 pub(crate) fn scale<W: SimdReal>(simd: W::Simd, x: &mut [LanePose], s: W) {
     for x in x {
-        let mut scaled = load::<W, 3>(simd, x);
-        for i in 0..3 {
+        let mut scaled = load::<W, DOF>(simd, x);
+        for i in 0..DOF {
             scaled[i] = scaled[i] * s;
         }
         store(scaled, x);
@@ -47,8 +48,8 @@ pub(crate) fn scale<W: SimdReal>(simd: W::Simd, x: &mut [LanePose], s: W) {
 #[inline(always)]
 pub fn weigh<W: SimdReal>(simd: W::Simd, model: &LaneModel, x: &[LanePose], y: &mut [LanePose]) {
     for ((y, x), body) in y.iter_mut().zip(x).zip(&model.bodies) {
-        let (mut x, m) = (load::<W, 3>(simd, x), load::<W, 3>(simd, &body.mass));
-        for i in 0..3 {
+        let (mut x, m) = (load::<W, DOF>(simd, x), load::<W, DOF>(simd, &body.mass));
+        for i in 0..DOF {
             x[i] = x[i] * m[i];
         }
         store(x, y);

@@ -13,7 +13,7 @@ use bimorph_multibody::joint_coordinates::sprung_loops::derivatives::Changes;
 use bimorph_multibody::joint_coordinates::sprung_loops::poses::place_of;
 use bimorph_multibody::joint_coordinates::sprung_loops::{JointMatrix, Tree};
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, Pattern, forces};
+use bimorph_multibody::{BodyMatrix, Pattern, forces};
 
 /// Sources whose final voltages the motion is differentiated by.
 #[derive(Debug, Clone)]
@@ -21,7 +21,7 @@ pub(super) struct JointPortSensitivities {
     sources: Vec<usize>,
     stages: Vec<JointStages>,
     /// ∂r/∂q of closures and gaps in the stage at hand; without sources on an empty pattern.
-    pub(super) tangent: BlockMatrix<f64, 3>,
+    pub(super) tangent: BodyMatrix,
     /// Wrenches of the stage at hand, not summed.
     pub(super) force: Vec<Pose>,
     /// Change of ∂R/∂t with each voltage: bodies, then joints.
@@ -45,7 +45,7 @@ impl JointPortSensitivities {
         Self {
             sources: sources.to_vec(),
             stages: sources.iter().map(|_| JointStages::new(count)).collect(),
-            tangent: BlockMatrix::new(if sources.is_empty() { &nothing } else { pattern }),
+            tangent: BodyMatrix::new(if sources.is_empty() { &nothing } else { pattern }),
             force: zeros.clone(),
             forcing: sources.iter().map(|_| (zeros.clone(), zeros.clone())).collect(),
             changes: Changes::new(tree),

@@ -10,7 +10,7 @@ use bimorph_multibody::joint_coordinates::sprung_loops::columns::Four;
 use bimorph_multibody::joint_coordinates::sprung_loops::kinematics::JointState;
 use bimorph_multibody::joint_coordinates::sprung_loops::poses::{LaneJointStates, place_of, tiles};
 use bimorph_multibody::joint_coordinates::sprung_loops::{JointMatrix, Tree};
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 
 /// Increments of eight bodies in the stages.
 type Increments = [LanePose; 6];
@@ -110,7 +110,7 @@ impl JointStages {
         for (j, (solved, moved)) in solved.iter().zip(moved).enumerate() {
             let (tile, lane) = place_of(j);
             let (u, bodies) = (&mut self.increments[tile][i], &mut self.moved[tile][i]);
-            for k in 0..3 {
+            for k in 0..DOF {
                 (u[k].0[lane], bodies[k].0[lane]) = (solved.0[k], moved.0[k]);
             }
         }
@@ -148,7 +148,7 @@ fn get(from: &[LanePose], j: usize) -> Pose {
 #[inline(always)]
 fn set(to: &mut [LanePose], j: usize, pose: &Pose) {
     let (tile, lane) = place_of(j);
-    for i in 0..3 {
+    for i in 0..DOF {
         to[tile][i].0[lane] = pose[i];
     }
 }
@@ -221,7 +221,7 @@ impl JointStages {
             let JointState { q, v, z } = start.load::<W>(simd);
             let mut at = JointState { q, v: v.map(|v| v * p), z: both(simd, (&z, t), (&v, a)) };
             for k in 0..I {
-                let u = load::<W, 3>(simd, &u[k]);
+                let u = load::<W, DOF>(simd, &u[k]);
                 add_scaled(&mut at.q, &u, W::splat(simd, A[I][k]));
                 add_scaled(&mut at.v, &u, W::splat(simd, rate[k]));
                 add_scaled(&mut at.z, &u, W::splat(simd, acceleration[k]));
@@ -246,7 +246,7 @@ impl JointStages {
         let lag = TABLEAU.lag[i].map(|c| c / h);
         let p = TABLEAU.rate_start[i];
         for ((u, v), drift) in self.moved.iter().zip(&self.rate).zip(&mut self.drift) {
-            let v = load::<W, 3>(simd, v);
+            let v = load::<W, DOF>(simd, v);
             store(sum(simd, v.map(|v| v * p), &u[..i], &lag), drift);
         }
     }
@@ -261,8 +261,8 @@ impl JointStages {
             let JointState { v, z, .. } = start.load::<W>(simd);
             let rate = sum(simd, v.map(|v| v * p), &u[..LAST], &lag);
             let acceleration = sum(simd, both(simd, (&z, t), (&v, s)), &u[..LAST], &pushed);
-            let (mut end, u) = (argument.load::<W>(simd), load::<W, 3>(simd, &u[LAST]));
-            for i in 0..3 {
+            let (mut end, u) = (argument.load::<W>(simd), load::<W, DOF>(simd, &u[LAST]));
+            for i in 0..DOF {
                 end.q[i] += u[i];
                 end.v[i] += u[i] * (1.0 / gh) - rate[i];
                 end.z[i] += u[i] * (1.0 / (gh * gh)) - acceleration[i];

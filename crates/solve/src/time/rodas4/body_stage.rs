@@ -7,6 +7,7 @@
 
 use super::tableau::{A, C, GAMMA, GAMMA_I, IN_PLACE};
 use bimorph_multibody::batch::{LaneBlock, add_scaled, times};
+use bimorph_multibody::planar::DOF;
 use bimorph_multibody::planar::Vec3;
 use bimorph_multibody::scalar::Real;
 
@@ -75,12 +76,12 @@ pub(super) fn body_stage<T: Real, const I: usize>(
         add_scaled(&mut place.q, &u.q, a);
         add_scaled(&mut place.v, &u.v, a);
     }
-    let mut lag = [gh.splat_like(0.0); 3];
+    let mut lag = [gh.splat_like(0.0); DOF];
     for j in 0..I {
         add_scaled(&mut lag, &kept(j).q, c[j]);
     }
     let (mut r1, mut momentum) = (lag, lag);
-    for k in 0..3 {
+    for k in 0..DOF {
         r1[k] = place.v[k] + lag[k];
         momentum[k] = r1[k] / gh;
     }
@@ -91,7 +92,7 @@ pub(super) fn body_stage<T: Real, const I: usize>(
     let BodyTerms { mass, drag, forcing } = terms;
     let drag = drag(&lag);
     let mut force = momentum;
-    for k in 0..3 {
+    for k in 0..DOF {
         force[k] = forcing[k] * rate - drag[k] - mass[k] * momentum[k];
     }
     BodyStage { place, r1, force }
@@ -106,7 +107,7 @@ pub(super) fn increment<T: Real>(
     free: Option<impl FnOnce() -> LaneBlock<T>>,
 ) -> BodyState<T> {
     let (mut q, mut v) = (*solved, *r1);
-    for k in 0..3 {
+    for k in 0..DOF {
         q[k] = -solved[k];
         v[k] = q[k] / gh - r1[k];
     }

@@ -14,7 +14,7 @@ pub use storage::{Lane, LaneRodas4};
 
 use kernels::{StepKernel, StepPass};
 
-use crate::time::method::{Motion, StepFailure};
+use crate::time::method::{Motion, StepResult};
 use crate::time::rosenbrock::{self, RosenbrockStep};
 use bimorph_domains::{Ramp, System};
 use bimorph_multibody::batch::{LANES, across};
@@ -71,7 +71,7 @@ struct LaneStep<'a, 's> {
 }
 
 impl RosenbrockStep for LaneStep<'_, '_> {
-    fn begin(&mut self) -> Result<(), StepFailure> {
+    fn begin(&mut self) -> StepResult {
         self.rodas.h.0 = *self.h;
         self.rodas.heat.at(of_lanes(self.lanes, self.s));
         self.rodas.run(StepPass::Forcing);
@@ -97,7 +97,7 @@ impl RosenbrockStep for LaneStep<'_, '_> {
     }
 
     /// A lane without a factor is marked, and the others go on.
-    fn factor(&mut self) -> Result<(), StepFailure> {
+    fn factor(&mut self) -> StepResult {
         self.rodas.run(StepPass::Factor);
         Ok(())
     }

@@ -8,7 +8,7 @@ use crate::time::gyration::{Gyration, held_out, skew};
 use crate::time::stage_loss::StepMatrix;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BlockMatrix, Model, Pattern};
+use bimorph_multibody::{BodyMatrix, Model, Pattern};
 
 /// How the frame turns: at the start of a step, and in the stage at hand.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +25,7 @@ pub(super) struct PortSensitivities {
     sources: Vec<usize>,
     stages: Vec<Stages>,
     /// ∂r/∂q of the stage at hand; without sources on an empty pattern.
-    tangent: BlockMatrix<f64, 3>,
+    tangent: BodyMatrix,
     change: Drive,
     scratch: Vec<Pose>,
 }
@@ -42,19 +42,19 @@ impl PortSensitivities {
                     Stages::new(model)
                 })
                 .collect(),
-            tangent: BlockMatrix::new(if sources.is_empty() { &nothing } else { &model.pattern }),
+            tangent: BodyMatrix::new(if sources.is_empty() { &nothing } else { &model.pattern }),
             change: system.electrics.drive(),
             scratch: vec![Pose::zeros(); if sources.is_empty() { 0 } else { model.bodies.len() }],
         }
     }
 
     /// Where to put the tangent of the stage at hand; none where nothing needs it.
-    pub(super) fn tangent(&mut self) -> Option<&mut BlockMatrix<f64, 3>> {
+    pub(super) fn tangent(&mut self) -> Option<&mut BodyMatrix> {
         (!self.sources.is_empty()).then_some(&mut self.tangent)
     }
 
     /// Keeps the tangent of the first stage.
-    pub(super) fn keep_tangent(&mut self, tangent: &BlockMatrix<f64, 3>) {
+    pub(super) fn keep_tangent(&mut self, tangent: &BodyMatrix) {
         if let Some(own) = self.tangent() {
             own.diagonal.copy_from_slice(&tangent.diagonal);
             own.below.copy_from_slice(&tangent.below);

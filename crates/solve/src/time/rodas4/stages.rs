@@ -9,7 +9,7 @@ use super::tableau::{C, GAMMA, IN_PLACE};
 use crate::method::Motion;
 use crate::time::gyration::{Gyration, skew};
 use bimorph_multibody::batch::LaneBlock;
-use bimorph_multibody::planar::{Pose, Vec3};
+use bimorph_multibody::planar::{DOF, Pose, Vec3};
 use bimorph_multibody::{Body, Model, forces};
 
 /// Bodies of a tile.
@@ -38,7 +38,7 @@ impl Stages {
     pub(super) fn new(model: &Model) -> Self {
         let bodies = model.bodies.len();
         let zeros = vec![Pose::zeros(); bodies];
-        let none = BodyState { q: [0.0; 3], v: [0.0; 3] };
+        let none = BodyState { q: [0.0; DOF], v: [0.0; DOF] };
         Self {
             force: zeros.clone(),
             forcing: zeros.clone(),

@@ -9,6 +9,7 @@ use super::motion::{Norms, mass_norm};
 use super::storage::LaneRodas4;
 use bimorph_multibody::batch::forces::{self, LaneRestStrain};
 use bimorph_multibody::batch::{Kernel, LaneModel, LanePose, SimdReal, ZERO_POSE, add, load, load_block, store};
+use bimorph_multibody::planar::DOF;
 
 /// A part of a step that goes over all lanes.
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +52,7 @@ impl LaneRodas4 {
             }
             let start = BodyState { q: load(simd, &motion.q[k]), v: load(simd, &motion.v[k]) };
             let drag = |v: &LanePose<W>| body.drag_force(v);
-            let terms = BodyTerms { mass: body.mass, drag, forcing: load::<W, 3>(simd, &forcing[k]) };
+            let terms = BodyTerms { mass: body.mass, drag, forcing: load::<W, DOF>(simd, &forcing[k]) };
             let stage = body_stage::<W, I>(&scale, start, |j| kept[j].load::<W>(simd), terms);
             if I < IN_PLACE {
                 store(stage.place.q, &mut at[k]);
@@ -63,9 +64,9 @@ impl LaneRodas4 {
             store(stage.force, &mut force[k]);
         }
         for (k, lag) in lags.iter_mut().enumerate() {
-            let mut sum = [W::splat(simd, 0.0); 3];
+            let mut sum = [W::splat(simd, 0.0); DOF];
             for j in 0..I {
-                for i in 0..3 {
+                for i in 0..DOF {
                     sum[i] -= W::load(simd, &increments[k][j].q[i]) * scale.c[j];
                 }
             }

@@ -2,7 +2,7 @@
 
 use crate::time::method::Motion;
 use bimorph_multibody::batch::{LANES, Lane8, LaneModel, LanePose, SimdReal, ZERO_POSE, load};
-use bimorph_multibody::planar::Pose;
+use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_multibody::scalar::StoredReal;
 
 /// Displacements and rates in each variant.
@@ -23,7 +23,7 @@ impl LaneMotion {
     pub fn set_lane(&mut self, lane: usize, motion: &Motion) {
         for (to, from) in [(&mut self.q, &motion.q), (&mut self.v, &motion.v)] {
             for (to, from) in to.iter_mut().zip(from) {
-                for i in 0..3 {
+                for i in 0..DOF {
                     to[i].set_lane(lane, from[i]);
                 }
             }
@@ -42,7 +42,7 @@ impl LaneMotion {
     /// Copies one lane of another motion.
     pub fn copy_lane(&mut self, lane: usize, other: &Self) {
         for (to, from) in self.q.iter_mut().zip(&other.q).chain(self.v.iter_mut().zip(&other.v)) {
-            for i in 0..3 {
+            for i in 0..DOF {
                 to[i].set_lane(lane, from[i].lane(lane));
             }
         }
@@ -73,7 +73,7 @@ impl Default for Norms {
 pub(super) fn mass_norm<W: SimdReal>(simd: W::Simd, model: &LaneModel, x: &[LanePose]) -> [f64; LANES] {
     let mut sum = W::splat(simd, 0.0);
     for (x, body) in x.iter().zip(&model.bodies) {
-        let (x, mass) = (load::<W, 3>(simd, x), load::<W, 3>(simd, &body.mass));
+        let (x, mass) = (load::<W, DOF>(simd, x), load::<W, DOF>(simd, &body.mass));
         sum += x[0] * (mass[0] * x[0]) + x[1] * (mass[1] * x[1]) + x[2] * (mass[2] * x[2]);
     }
     let mut square = Lane8::NONE;
