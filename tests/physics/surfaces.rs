@@ -4,6 +4,7 @@ use crate::model;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, CompiledModel};
+use bimorph::domains::loss_tangent::LossTangent;
 use bimorph::domains::{Configuration, Domain};
 use bimorph::multibody::BodyMatrix;
 use bimorph::multibody::planar::Pose;
@@ -162,13 +163,8 @@ fn energy_and_derivatives() {
         let power = dot(&lost(&q, &speed), &speed);
         assert!(power >= -1e-30, "{k}: {power}");
         let (mut stiffness, mut damping) = (BodyMatrix::new(pattern), BodyMatrix::new(pattern));
-        if stop.add_loss_tangent(
-            Configuration { q: &q, linear: false },
-            &|k| speed[k],
-            pattern,
-            &mut stiffness,
-            &mut damping,
-        ) {
+        let mut to = LossTangent { pattern, stiffness: &mut stiffness, damping: &mut damping };
+        if stop.add_loss_tangent(Configuration { q: &q, linear: false }, &|k| speed[k], &mut to) {
             // friction at a fixed contact force: motions along the stop alone, without rotation
             let along: Vec<Pose> = vec![Pose::new(-sin, cos, 0.0), Pose::zeros()];
             let mut rated = zeros.clone();

@@ -1,8 +1,9 @@
 //! The scalar that a gap measures: how far a point of one body has come along a fixed direction towards another's.
 
+use super::loss_tangent::LossTangent;
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::{self, Pose};
-use bimorph_multibody::{BodyId, BodyMatrix, Model, Pattern};
+use bimorph_multibody::{BodyId, Model};
 use nalgebra::{Matrix6, Vector2, Vector6};
 
 /// A material point of a body.
@@ -131,11 +132,22 @@ impl Approach {
         (q, linear): (&[Pose], bool),
         rate: &impl Fn(usize) -> Pose,
         law: impl Fn((f64, f64)) -> (f64, f64, f64),
-        pattern: &Pattern,
-        [stiffness, damping]: [&mut BodyMatrix; 2],
+        to: &mut LossTangent<'_>,
     ) {
         let m = self.measure(q, linear);
-        let (value, by_u, by_rate) = law((m.value, self.rate(&m, rate)));
+        let found = law((m.value, self.rate(&m, rate)));
+        self.add_rates(&m, rate, found, to);
+    }
+
+    /// The same of a force with its derivatives with u and u̇.
+    #[inline]
+    pub(super) fn add_rates(
+        &self,
+        m: &ApproachDerivatives,
+        rate: &impl Fn(usize) -> Pose,
+        (value, by_u, by_rate): (f64, f64, f64),
+        to: &mut LossTangent<'_>,
+    ) {
         let turn = |id: BodyId| if let BodyId::Free(k) = id { rate(k).z } else { 0.0 };
         let mut k = m.hessian(value, by_u);
         // ∂u̇/∂q has the two rotations alone
@@ -146,9 +158,9 @@ impl Approach {
                 k[(i, j)] += half[j];
             }
         }
-        let place = locate(pattern, self.a.body, self.b.body);
-        place.add(stiffness, &k);
-        place.add(damping, &(m.gradient * m.gradient.transpose() * by_rate));
+        let place = locate(to.pattern, self.a.body, self.b.body);
+        place.add(to.stiffness, &k);
+        place.add(to.damping, &(m.gradient * m.gradient.transpose() * by_rate));
     }
 
     /// The forces of that potential on its points: −φ′·n on a, φ′·n on b.

@@ -10,6 +10,7 @@
 use super::approach::{Approach, MaterialPoint};
 use super::domain::{Chord, Configuration, Domain};
 use super::from_structure::{FromStructure, StructureView};
+use super::loss_tangent::LossTangent;
 use super::quotient;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
@@ -84,15 +85,8 @@ impl Domain for CombFilm {
         self.approach.add_force(&m, self.drag((m.value, self.approach.rate(&m, rate))).0, r);
     }
 
-    fn add_loss_tangent(
-        &self,
-        at: Configuration<'_>,
-        rate: &impl Fn(usize) -> Pose,
-        pattern: &Pattern,
-        stiffness: &mut BodyMatrix,
-        damping: &mut BodyMatrix,
-    ) -> bool {
-        self.approach.add_rate_tangent((at.q, at.linear), rate, |now| self.drag(now), pattern, [stiffness, damping]);
+    fn add_loss_tangent(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, to: &mut LossTangent<'_>) -> bool {
+        self.approach.add_rate_tangent((at.q, at.linear), rate, |now| self.drag(now), to);
         true
     }
 

@@ -15,6 +15,7 @@
 
 use super::approach::{Approach, MaterialPoint};
 use super::contact_loss::Loss;
+use super::loss_tangent::LossTangent;
 use super::point_law::{Law, PointLaw};
 use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
@@ -280,16 +281,9 @@ pub trait Domain {
         let _ = (at, rate, r);
     }
 
-    /// Adds the derivatives of that force with displacements to `stiffness` and with rates to `damping`. True where there are any.
-    fn add_loss_tangent(
-        &self,
-        at: Configuration<'_>,
-        rate: &impl Fn(usize) -> Pose,
-        pattern: &Pattern,
-        stiffness: &mut BodyMatrix,
-        damping: &mut BodyMatrix,
-    ) -> bool {
-        let _ = (at, rate, pattern, stiffness, damping);
+    /// Adds the derivatives of that force with displacements and with rates. True where there are any.
+    fn add_loss_tangent(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, to: &mut LossTangent<'_>) -> bool {
+        let _ = (at, rate, to);
         false
     }
 

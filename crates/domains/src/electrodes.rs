@@ -7,6 +7,7 @@ use super::contact_loss::{Loss, fall_at_pull_in};
 use super::domain::{Chord, Configuration, Domain};
 use super::edge_field::EdgeField;
 use super::from_structure::{FromStructure, StructureView};
+use super::loss_tangent::LossTangent;
 use super::point_law::Law;
 use super::quotient::{self, quotient};
 use bimorph_multibody::model::locate;
@@ -191,18 +192,11 @@ impl Domain for Electrodes {
         }
     }
 
-    fn add_loss_tangent(
-        &self,
-        at: Configuration<'_>,
-        rate: &impl Fn(usize) -> Pose,
-        pattern: &Pattern,
-        stiffness: &mut BodyMatrix,
-        damping: &mut BodyMatrix,
-    ) -> bool {
+    fn add_loss_tangent(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, to: &mut LossTangent<'_>) -> bool {
         if !self.loses(at) {
             return false;
         }
-        self.approach.add_rate_tangent((at.q, at.linear), rate, |now| self.lost(now), pattern, [stiffness, damping]);
+        self.approach.add_rate_tangent((at.q, at.linear), rate, |now| self.lost(now), to);
         true
     }
 

@@ -14,6 +14,7 @@ use super::facing_loss;
 use super::facing_side::{Opening, back};
 use super::facing_stretches::{CubicStretch, side, stretches};
 use super::from_structure::{FromStructure, StructureView};
+use super::loss_tangent::LossTangent;
 use super::point_law::PointLaw;
 use bimorph_multibody::batch::everywhere;
 use bimorph_multibody::planar::Pose;
@@ -290,15 +291,8 @@ impl Domain for FacingBeams {
         facing_loss::add(self, at, rate, r);
     }
 
-    fn add_loss_tangent(
-        &self,
-        at: Configuration<'_>,
-        rate: &impl Fn(usize) -> Pose,
-        pattern: &Pattern,
-        stiffness: &mut BodyMatrix,
-        damping: &mut BodyMatrix,
-    ) -> bool {
-        facing_loss::add_tangent(self, at, rate, pattern, [stiffness, damping])
+    fn add_loss_tangent(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, to: &mut LossTangent<'_>) -> bool {
+        facing_loss::add_tangent(self, at, rate, to)
     }
 
     fn add_quotient(&self, chord: &Chord<'_>, volts: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {

@@ -9,6 +9,7 @@ use super::facing::FacingStretch;
 use super::facing_local::{FacingBeams, Local};
 use super::facing_loss::{Derivatives, along_chord};
 use super::from_structure::{FromStructure, StructureView};
+use super::loss_tangent::LossTangent;
 use super::point_law::PointLaw;
 use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
@@ -111,18 +112,11 @@ impl Domain for FacingFilm {
     }
 
     /// That the rates of z change with rotations is left out, as in the loss of contact.
-    fn add_loss_tangent(
-        &self,
-        at: Configuration<'_>,
-        rate: &impl Fn(usize) -> Pose,
-        pattern: &Pattern,
-        stiffness: &mut BodyMatrix,
-        damping: &mut BodyMatrix,
-    ) -> bool {
+    fn add_loss_tangent(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, to: &mut LossTangent<'_>) -> bool {
         self.beams.along(at, |local| {
             let (force, by_rate) = self.drag_at(local, rate);
-            self.beams.add_stiffness(local, force, pattern, stiffness);
-            self.beams.add_stiffness(local, (Vector4::zeros(), by_rate), pattern, damping);
+            self.beams.add_stiffness(local, force, to.pattern, to.stiffness);
+            self.beams.add_stiffness(local, (Vector4::zeros(), by_rate), to.pattern, to.damping);
         });
         true
     }

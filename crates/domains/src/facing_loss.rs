@@ -7,6 +7,7 @@ use super::edge_field::EdgeField;
 use super::facing::FacingStretch;
 use super::facing_local::{FacingBeams, Local};
 use super::facing_side::Deflection;
+use super::loss_tangent::LossTangent;
 use super::quotient::quotient;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
@@ -116,15 +117,14 @@ pub(super) fn add_tangent(
     beams: &FacingBeams,
     at: Configuration<'_>,
     rate: &impl Fn(usize) -> Pose,
-    pattern: &Pattern,
-    [stiffness, damping]: [&mut BodyMatrix; 2],
+    to: &mut LossTangent<'_>,
 ) -> bool {
     let mut acts = false;
     if beams.loss.is_dissipative() && !beams.surely_apart(at) {
         beams.along(at, |local| {
             if let Some((force, by_rate)) = lost(beams, local, rate) {
-                beams.add_stiffness(local, force, pattern, stiffness);
-                beams.add_stiffness(local, (Vector4::zeros(), by_rate), pattern, damping);
+                beams.add_stiffness(local, force, to.pattern, to.stiffness);
+                beams.add_stiffness(local, (Vector4::zeros(), by_rate), to.pattern, to.damping);
                 acts = true;
             }
         });

@@ -7,10 +7,10 @@
 
 use super::approach::{Approach, ApproachDerivatives};
 use super::domain::Chord;
+use super::loss_tangent::LossTangent;
 use super::quotient;
-use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
+use bimorph_multibody::{BodyMatrix, Pattern};
 use bimorph_structure::Friction;
 
 /// v/√(v² + v_s²) and its derivative with v (s/m).
@@ -38,23 +38,11 @@ pub(super) fn add_tangent(
     (along, m): (&Approach, &ApproachDerivatives),
     rate: &impl Fn(usize) -> Pose,
     normal: f64,
-    pattern: &Pattern,
-    [stiffness, damping]: [&mut BodyMatrix; 2],
+    to: &mut LossTangent<'_>,
 ) {
     let (share, slope) = slip(friction, along.rate(m, rate));
     let (force, by_rate) = (friction.coefficient * normal * share, friction.coefficient * normal * slope);
-    let turn = |id: BodyId| if let BodyId::Free(k) = id { rate(k).z } else { 0.0 };
-    let mut k = m.hessian(force, 0.0);
-    for (i, turned) in [(2, m.bend[0] * turn(along.a.body)), (5, m.bend[1] * turn(along.b.body))] {
-        let half = m.gradient * (0.5 * by_rate * turned);
-        for j in 0..6 {
-            k[(j, i)] += half[j];
-            k[(i, j)] += half[j];
-        }
-    }
-    let place = locate(pattern, along.a.body, along.b.body);
-    place.add(stiffness, &k);
-    place.add(damping, &(m.gradient * m.gradient.transpose() * by_rate));
+    along.add_rates(m, rate, (force, 0.0, by_rate), to);
 }
 
 /// Adds the force at the mean speed of a step, under the contact force `normal` (N) at its middle: its work is negative, whatever the step.

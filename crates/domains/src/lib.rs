@@ -21,7 +21,7 @@
 //! | [`contact_loss`] | impact losses |
 //! | [`contact_speed`] | at which speed, from statics |
 //! | [`contact_ways`] | whether parts may touch within a step |
-//! | [`loss_derivatives`] | derivatives of the forces of that over the bodies |
+//! | [`loss_derivatives`], [`loss_tangent`] | derivatives of the forces of that over the bodies |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
 //! | [`dashpot`] | a damper to the ground |
 //! | [`from_structure`] | from a drawing to them |
@@ -97,6 +97,7 @@ pub mod lag;
 mod laplacian;
 pub mod load;
 pub mod loss_derivatives;
+pub mod loss_tangent;
 pub mod member;
 pub mod moving_frame;
 pub mod network;

@@ -4,6 +4,7 @@ use super::approach::{Approach, MaterialPoint};
 use super::contact_loss::Loss;
 use super::domain::{Chord, Configuration, Domain, SideRoom, SkewCoupling};
 use super::from_structure::{FromStructure, PlacedMember, StructureView};
+use super::loss_tangent::LossTangent;
 use super::point_law::{Law, PointLaw};
 use super::squeeze_film::SqueezeFilm;
 use bimorph_multibody::planar::Pose;
@@ -235,15 +236,8 @@ impl Domain for Member {
     }
 
     #[inline]
-    fn add_loss_tangent(
-        &self,
-        at: Configuration<'_>,
-        rate: &impl Fn(usize) -> Pose,
-        pattern: &Pattern,
-        stiffness: &mut BodyMatrix,
-        damping: &mut BodyMatrix,
-    ) -> bool {
-        each!(self, m => m.add_loss_tangent(at, rate, pattern, stiffness, damping))
+    fn add_loss_tangent(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, to: &mut LossTangent<'_>) -> bool {
+        each!(self, m => m.add_loss_tangent(at, rate, to))
     }
 
     #[inline]

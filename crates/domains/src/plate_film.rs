@@ -9,6 +9,7 @@ use super::approach::{Approach, MaterialPoint};
 use super::domain::{Chord, Configuration, Domain, SkewCoupling};
 use super::film_series::{FilmTerm, root, series};
 use super::from_structure::{FromStructure, StructureView};
+use super::loss_tangent::LossTangent;
 use super::quotient;
 use super::squeeze_film::{SqueezeFilm, slip, tilt};
 use bimorph_multibody::model::locate;
@@ -276,32 +277,19 @@ impl Domain for PlateFilm {
 
     /// The flow out of a state depends on the approach, and the force along the approach not on that flow: the matrix has the symmetric part of the
     /// derivative with displacements, and [`Domain::skew_couplings`] the rest. That of the moment of tilt with the approach is left out.
-    fn add_loss_tangent(
-        &self,
-        at: Configuration<'_>,
-        rate: &impl Fn(usize) -> Pose,
-        pattern: &Pattern,
-        stiffness: &mut BodyMatrix,
-        damping: &mut BodyMatrix,
-    ) -> bool {
+    fn add_loss_tangent(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, to: &mut LossTangent<'_>) -> bool {
         let m = self.approach.measure(at.q, at.linear);
-        self.add_moment_tangent(self.tilting(m.value), pattern, damping);
+        self.add_moment_tangent(self.tilting(m.value), to.pattern, to.damping);
         if self.states.is_empty() {
-            self.approach.add_rate_tangent(
-                (at.q, at.linear),
-                rate,
-                |now| self.drag(now),
-                pattern,
-                [stiffness, damping],
-            );
+            self.approach.add_rate_tangent((at.q, at.linear), rate, |now| self.drag(now), to);
             return true;
         }
         self.flows(at.q, m.value, |k, i, [c, by_zeta, by_u]| {
             let v = rate(k)[i];
-            damping.diagonal[k][(i, i)] += c;
-            stiffness.diagonal[k][(i, i)] += by_zeta * v;
+            to.damping.diagonal[k][(i, i)] += c;
+            to.stiffness.diagonal[k][(i, i)] += by_zeta * v;
             if v != 0.0 {
-                self.add_coupling(&m.gradient, (k, i), 0.5 * by_u * v, pattern, stiffness);
+                self.add_coupling(&m.gradient, (k, i), 0.5 * by_u * v, to.pattern, to.stiffness);
             }
         });
         true

@@ -8,6 +8,7 @@ use super::contact_loss::Loss;
 use super::domain::{Chord, Configuration, Domain};
 use super::friction;
 use super::from_structure::{FromStructure, StructureView};
+use super::loss_tangent::LossTangent;
 use super::point_law::Law;
 use super::quotient::{self, quotient};
 use super::stop::{StopKind, lost, nearer};
@@ -207,14 +208,7 @@ impl Domain for StopPair {
         }
     }
 
-    fn add_loss_tangent(
-        &self,
-        at: Configuration<'_>,
-        rate: &impl Fn(usize) -> Pose,
-        pattern: &Pattern,
-        stiffness: &mut BodyMatrix,
-        damping: &mut BodyMatrix,
-    ) -> bool {
+    fn add_loss_tangent(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, to: &mut LossTangent<'_>) -> bool {
         if !self.damps() || self.distance(at) >= 0.0 {
             return false;
         }
@@ -223,12 +217,11 @@ impl Domain for StopPair {
                 (at.q, at.linear),
                 rate,
                 |now| lost(&self.stop, &self.loss, &self.ways, now),
-                pattern,
-                [&mut *stiffness, &mut *damping],
+                to,
             );
         }
         if let Some((friction, along, m, normal)) = self.sliding(at, rate) {
-            friction::add_tangent(&friction, (&along, &m), rate, normal, pattern, [stiffness, damping]);
+            friction::add_tangent(&friction, (&along, &m), rate, normal, to);
         }
         true
     }

@@ -7,6 +7,7 @@ use super::beam_line::BeamLine;
 use super::domain::{Chord, Configuration, Domain, SkewCoupling};
 use super::drive::{Drive, Electrics};
 use super::load::DeadLoad;
+use super::loss_tangent::LossTangent;
 use super::member::Member;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyId, BodyMatrix, Model, forces};
@@ -279,8 +280,8 @@ impl System {
         stiffness: &mut BodyMatrix,
         damping: &mut BodyMatrix,
     ) -> bool {
-        let (at, pattern) = (self.at(q), &self.model.pattern);
-        let add = |any, member: &Member| member.add_loss_tangent(at, &rate, pattern, stiffness, damping) | any;
+        let (at, mut to) = (self.at(q), LossTangent { pattern: &self.model.pattern, stiffness, damping });
+        let add = |any, member: &Member| member.add_loss_tangent(at, &rate, &mut to) | any;
         self.members.iter().fold(false, add)
     }
 
