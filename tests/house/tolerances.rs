@@ -8,9 +8,6 @@ use std::path::Path;
 /// The file that divides tolerances.
 const BUDGET: &str = "crates/base/src/error_budget.rs";
 
-/// The number of segments of a beam goes with the fourth root of the tolerance.
-const ORDER: &str = "crates/model/src/discretize/order.rs";
-
 /// Files that read the field `tol` of options, of a run or of a point of a chart, with the reason.
 const READERS: &[(&str, &str)] = &[
     ("crates/analysis/src/transient/options.rs", "makes the budget of a run"),
@@ -131,8 +128,7 @@ fn file(place: &str) -> &str {
 fn one_file_divides_tolerances() {
     let own = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(BUDGET)).unwrap();
     assert!(own.matches("self.requested").count() > 30, "the budget is there");
-    let others: Vec<_> =
-        places(divides).into_iter().filter(|place| file(place) != BUDGET && file(place) != ORDER).collect();
+    let others: Vec<_> = places(divides).into_iter().filter(|place| file(place) != BUDGET).collect();
     assert!(others.is_empty(), "a part of a tolerance is a method of ErrorBudget, with its reason: {others:#?}");
 }
 

@@ -115,6 +115,11 @@ impl ErrorBudget {
         quantity * own / self.requested
     }
 
+    /// Parts of a whole whose relative error is the tolerance, where that of a part h is h⁴ over a coefficient.
+    pub fn parts(self, whole: f64, coefficient: f64) -> f64 {
+        whole / (coefficient * self.requested).powf(0.25)
+    }
+
     /// The size of which an error, caused by rounding, is the tolerance.
     pub fn size_of(self, error: f64) -> f64 {
         error / self.requested

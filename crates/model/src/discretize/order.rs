@@ -83,7 +83,6 @@ pub fn segments(beam: &Beam, band: Option<f64>, tol: f64) -> usize {
     };
     let kl = waves(beam, band);
     // one beam beyond the limit of all is enough to be refused
-    let count =
-        (kl / ErrorBudget::of(tol).within(1440.0).powf(0.25)).ceil().clamp(1.0, MAX_SEGMENTS as f64 + 1.0) as usize;
+    let count = ErrorBudget::of(tol).parts(kl, 1440.0).ceil().clamp(1.0, MAX_SEGMENTS as f64 + 1.0) as usize;
     if kl > 3.0 { count.max(2) } else { count }
 }
