@@ -15,7 +15,7 @@
 //!
 //! The trapezoidal rule keeps an error of a current with the other sign at each step, and a loop of the circuit may feed
 //! it back. Such an alternation has the same height at every step length, so shorter steps do not end it. A quantity
-//! that still alternates from point to point after [`MIN_ALTERNATIONS`] steps that became [`MAX_SHORTENING`] times
+//! that still alternates from point to point after `MIN_ALTERNATIONS` steps that became `MAX_SHORTENING` times
 //! shorter follows its mean: d is then that of the mean height of the last two points.
 
 use bimorph_base::ErrorBudget;

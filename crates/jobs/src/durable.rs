@@ -3,7 +3,7 @@
 //! | module | what it has | files |
 //! |---|---|---|
 //! | [`record`] | bytes with their kind and a checksum | sessions and models of a server, requests of jobs |
-//! | [`line`] | lines of JSON with a checksum | rows and ends of jobs, journals of sweeps |
+//! | [`mod@line`] | lines of JSON with a checksum | rows and ends of jobs, journals of sweeps |
 //! | [`log`] | a file that grows by whole lines | journals |
 //! | [`disk`] | writing, replacing and adding, in an order that a failure of power cannot undo | all files of a server |
 //!
