@@ -12,8 +12,8 @@ use bimorph_multibody::planar::Pose;
 /// The ways of the parts of a system until they touch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactWays {
-    /// Member, its way as drawn, and the bound at the end of the last step (m).
-    ways: Vec<(usize, f64, Option<f64>)>,
+    /// Member, its way as drawn (m), and the bounds of displacements (m) and rates (m/s) at the end of the last step.
+    ways: Vec<(usize, f64, Option<[f64; 2]>)>,
 }
 
 /// Displacements and rates at an end of a step.
@@ -29,12 +29,12 @@ impl ContactWays {
 
     /// Bound of the largest part of a way that parts come within a step of length `h` (s) (1), which begins where the last one ended. Below 1 none touches.
     pub fn used(&mut self, system: &System, [before, after]: [StepEnd<'_>; 2], h: f64) -> f64 {
-        let used = |(g, way, last): &mut (usize, f64, Option<f64>)| {
-            let bound = |q: &[Pose]| system.members[*g].closing_bound(q);
-            let (start, end) = (last.unwrap_or_else(|| bound(before.0)), bound(after.0));
-            *last = Some(end);
+        let used = |(g, way, last): &mut (usize, f64, Option<[f64; 2]>)| {
+            let bounds = |(q, v): StepEnd<'_>| [q, v].map(|of| system.members[*g].closing_bound(of));
+            let ([start, from], [end, to]) = (last.unwrap_or_else(|| bounds(before)), bounds(after));
+            *last = Some([end, to]);
             let most = 0.5 * (start + end) + 0.5 * (start - end).abs();
-            (most + h * (bound(before.1) + bound(after.1))) / way.max(0.0)
+            (most + h * (from + to)) / way.max(0.0)
         };
         // what is no number must not be lost
         self.ways.iter_mut().map(used).fold(0.0, |most, used| if used <= most { most } else { used })

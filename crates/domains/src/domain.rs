@@ -106,6 +106,24 @@ pub trait Domain {
         self.add_tangent(at, given, pattern, tangent);
     }
 
+    /// [`Domain::add_force`]. True where the evaluation shows that nothing touches; false: nothing is known.
+    fn add_force_finding_apart(&self, at: Configuration<'_>, given: Self::Given, r: &mut [Pose]) -> bool {
+        self.add_force(at, given, r);
+        false
+    }
+
+    /// [`Domain::add_force_and_tangent`] with the same result.
+    fn add_force_and_tangent_finding_apart(
+        &self,
+        at: Configuration<'_>,
+        given: Self::Given,
+        pattern: &Pattern,
+        sums: (&mut [Pose], &mut BodyMatrix),
+    ) -> bool {
+        self.add_force_and_tangent(at, given, pattern, sums);
+        false
+    }
+
     /// True where it has two sides with a distance between them, and is called a gap.
     fn is_gap(&self) -> bool {
         !self.is_gas()

@@ -11,7 +11,7 @@ use super::facing_field::FieldForces;
 pub use super::facing_local::FacingBeams;
 use super::facing_local::SIGNS;
 use super::facing_loss;
-use super::facing_side::{Opening, back};
+use super::facing_side::{Flank, Opening, back};
 use super::facing_stretches::{CubicStretch, side, stretches};
 use super::from_structure::{FromStructure, StructureView};
 use super::loss_tangent::LossTangent;
@@ -63,14 +63,23 @@ impl FromStructure for FacingBeams {
         for station in self.sides.iter_mut().flat_map(|side| &mut side.stations) {
             station.point = to(station.point);
         }
-        Self::new(self.frame, self.sides, self.stretches, self.loss)
+        let sides = self.sides.map(|side| Flank::new(side.stations, side.yields));
+        Self::new(self.frame, sides, self.stretches, self.loss)
     }
 }
 
 impl FacingBeams {
     /// Field at a voltage and contact, added to nothing.
     fn pull_at<'a>(&'a self, at: Configuration<'a>, volts: f64) -> FieldForces<'a> {
-        FieldForces { beams: self, at, factor: -0.5 * volts * volts, contact: true, r: None, tangent: None }
+        FieldForces {
+            beams: self,
+            at,
+            factor: -0.5 * volts * volts,
+            contact: true,
+            r: None,
+            tangent: None,
+            apart: None,
+        }
     }
 }
 
@@ -92,17 +101,26 @@ impl Domain for FacingBeams {
     }
 
     fn add_force(&self, at: Configuration<'_>, volts: f64, r: &mut [Pose]) {
+        self.add_force_finding_apart(at, volts, r);
+    }
+
+    fn add_force_finding_apart(&self, at: Configuration<'_>, volts: f64, r: &mut [Pose]) -> bool {
         if volts == 0.0 && self.surely_apart(at) {
-            return;
+            return true;
         }
+        let mut apart = true;
         if !self.tiles.is_empty() {
-            return everywhere(FieldForces { r: Some(r), ..self.pull_at(at, volts) });
+            everywhere(FieldForces { r: Some(r), apart: Some(&mut apart), ..self.pull_at(at, volts) });
+            return apart;
         }
         self.along(at, |local| {
-            if volts != 0.0 || !local.stretch.facing.apart(&local.z) {
+            let open = local.stretch.facing.apart(&local.z);
+            apart &= open;
+            if volts != 0.0 || !open {
                 self.add(local, local.stretch.facing.load(&local.z, volts), r);
             }
         });
+        apart
     }
 
     fn add_force_change(&self, at: Configuration<'_>, volts: f64, change: f64, r: &mut [Pose]) {
@@ -132,24 +150,39 @@ impl Domain for FacingBeams {
         at: Configuration<'_>,
         volts: f64,
         pattern: &Pattern,
-        (r, tangent): (&mut [Pose], &mut BodyMatrix),
+        sums: (&mut [Pose], &mut BodyMatrix),
     ) {
+        self.add_force_and_tangent_finding_apart(at, volts, pattern, sums);
+    }
+
+    fn add_force_and_tangent_finding_apart(
+        &self,
+        at: Configuration<'_>,
+        volts: f64,
+        pattern: &Pattern,
+        (r, tangent): (&mut [Pose], &mut BodyMatrix),
+    ) -> bool {
         if volts == 0.0 && self.surely_apart(at) {
-            return;
+            return true;
         }
+        let mut apart = true;
         if !self.tiles.is_empty() {
-            return everywhere(FieldForces {
+            everywhere(FieldForces {
                 r: Some(r),
                 tangent: Some((pattern, tangent)),
+                apart: Some(&mut apart),
                 ..self.pull_at(at, volts)
             });
+            return apart;
         }
         self.along(at, |local| {
+            apart &= local.stretch.facing.apart(&local.z);
             if let Some(both) = local.stretch.facing.load_and_stiffness(&local.z, volts) {
                 self.add(local, both.0, r);
                 self.add_stiffness(local, both, pattern, tangent);
             }
         });
+        apart
     }
 
     fn load_points(&self, at: Configuration<'_>, volts: f64, mut lever: impl FnMut(MaterialPoint, Vector2<f64>)) {

@@ -7,14 +7,12 @@ use super::domain::Configuration;
 use super::facing::FacingStretch;
 use super::facing_local::{FacingBeams, SIGNS};
 use super::facing_side::{Opening, back, onto};
-use super::facing_tiles::{STATIONS, STRETCHES, SegmentPart, Tile, TileSide};
+use super::facing_tangent::{self, PLACES, add_block, block, couple, matrix};
+use super::facing_tiles::{STATIONS, STRETCHES, SeenStations, SegmentPart, Tile, TileSide, following};
 use bimorph_multibody::batch::{Kernel, LANES, Lane8, SimdReal, load, store};
 use bimorph_multibody::planar::{HalfTurn, Pose};
 use bimorph_multibody::{BodyMatrix, Pattern};
-use nalgebra::{Matrix3, Matrix4, Vector4};
-
-/// Places in a symmetric matrix of four, row by row from the diagonal.
-const PLACES: [(usize, usize); 10] = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)];
+use nalgebra::Vector4;
 
 /// Forces to be added: those of the field with −½V² (or its change with V), and those of contact.
 pub(super) struct FieldForces<'a> {
@@ -28,37 +26,8 @@ pub(super) struct FieldForces<'a> {
     pub(super) r: Option<&'a mut [Pose]>,
     /// To which their derivatives are added.
     pub(super) tangent: Option<(&'a Pattern, &'a mut BodyMatrix)>,
-}
-
-/// Displacement along the axis (m), slope along the gap (1), ∂w/∂θ and ∂²w/∂θ² (m) of a station.
-const QUANTITIES: usize = 4;
-
-/// Stations of a side at a configuration.
-#[derive(Clone, Copy)]
-struct SeenStations {
-    /// The first.
-    first: [f64; QUANTITIES],
-    /// The others.
-    own: [Lane8; QUANTITIES],
-}
-
-impl SeenStations {
-    const NONE: Self = Self { first: [0.0; QUANTITIES], own: [Lane8::NONE; QUANTITIES] };
-
-    /// A quantity of station `k`.
-    #[inline(always)]
-    fn of(&self, quantity: usize, k: usize) -> f64 {
-        if k == 0 { self.first[quantity] } else { self.own[quantity].0[k - 1] }
-    }
-
-    /// A quantity of the stations where stretches begin.
-    #[inline(always)]
-    fn starts(&self, quantity: usize) -> Lane8 {
-        let mut starts = self.own[quantity];
-        starts.0.copy_within(..LANES - 1, 1);
-        starts.0[0] = self.first[quantity];
-        starts
-    }
+    /// Becomes false where a bound of the cubics does not leave both sides apart.
+    pub(super) apart: Option<&'a mut bool>,
 }
 
 /// First and second derivatives over the ends (w₁, φ₁, w₂, φ₂) of the stretches.
@@ -86,11 +55,14 @@ impl FieldForces<'_> {
     fn all<W: SimdReal, const CURVED: bool>(&mut self, simd: W::Simd) {
         let (beams, mut seen) = (self.beams, [SeenStations::NONE; 2]);
         for tile in &beams.tiles {
-            let z = self.ends::<W>(simd, tile, &mut seen);
+            let z = self.ends::<W, CURVED>(simd, tile, &mut seen);
             let facing = &beams.stretches[tile.stretches.start].facing;
             let length = W::load(simd, &tile.length);
             let scaled = [z[0], z[1] * length, z[2], z[3] * length];
             let open = !self.contact || apart(scaled, facing.gap - facing.touch);
+            if !open && let Some(apart) = &mut self.apart {
+                **apart = false;
+            }
             if open && self.factor == 0.0 {
                 continue;
             }
@@ -99,8 +71,11 @@ impl FieldForces<'_> {
             if self.factor != 0.0 {
                 field::<W, CURVED>(simd, facing, (scaled, length), self.factor, (&mut first, &mut second));
             }
-            if open && !CURVED && tile.sides.iter().flatten().all(|own| own.cut.is_none()) {
+            if open && tile.sides.iter().flatten().all(|own| own.cut.is_none()) {
                 self.add_forces(simd, tile, &seen, first);
+                if CURVED {
+                    self.add_tangents(simd, tile, &seen, (first, second));
+                }
                 continue;
             }
             let mut sums = StretchSums { first: [Lane8::NONE; 4], second: [Lane8::NONE; 10] };
@@ -119,12 +94,17 @@ impl FieldForces<'_> {
 
     /// The ends of the stretches; `seen` is that of the tile before, and becomes that of the tile.
     #[inline(always)]
-    fn ends<W: SimdReal>(&self, simd: W::Simd, tile: &Tile, seen: &mut [SeenStations; 2]) -> [W; 4] {
+    fn ends<W: SimdReal, const CURVED: bool>(
+        &self,
+        simd: W::Simd,
+        tile: &Tile,
+        seen: &mut [SeenStations; 2],
+    ) -> [W; 4] {
         let mut z = [W::splat(simd, 0.0); 4];
         for (side, own) in tile.sides.iter().enumerate() {
             let Some(own) = own else { continue };
             let seen = &mut seen[side];
-            stations::<W>(simd, &self.beams.frame, own, self.at, seen);
+            stations::<W, CURVED>(simd, &self.beams.frame, own, self.at, seen);
             let ends = match &own.cut {
                 None => [&seen.starts(0), &seen.starts(1), &seen.own[0], &seen.own[1]].map(|end| W::load(simd, end)),
                 Some(cut) => load(simd, &cut_ends(cut, seen)),
@@ -144,12 +124,7 @@ impl FieldForces<'_> {
         let mut over = [Lane8::NONE; 4];
         store(first, &mut over);
         let [starts, turned, ..] = over;
-        let following = [starts, turned].map(|of| {
-            let mut following = of;
-            following.0.copy_within(1.., 0);
-            following.0[LANES - 1] = 0.0;
-            following
-        });
+        let following = [&starts, &turned].map(following);
         for (side, own) in tile.sides.iter().enumerate() {
             let Some(own) = own else { continue };
             let (sign, seen) = (SIGNS[side], &seen[side]);
@@ -161,10 +136,32 @@ impl FieldForces<'_> {
                 let (force, moment) = (sign * starts.0[0], sign * turn * turned.0[0]);
                 r[body] += Pose::new(force * axis.x, force * axis.y, seen.first[2] * force + moment);
             }
-            for lane in 0..LANES {
-                if let Some(body) = own.body(lane + 1) {
-                    r[body] += Pose::new(pose[0].0[lane], pose[1].0[lane], pose[2].0[lane]);
-                }
+            own.add_poses(&pose, r);
+        }
+    }
+
+    /// Adds the derivatives of forces that are `first` and `second` over the ends of such stretches.
+    #[inline(always)]
+    fn add_tangents<W: SimdReal>(
+        &mut self,
+        simd: W::Simd,
+        tile: &Tile,
+        seen: &[SeenStations; 2],
+        (first, second): ([W; 4], [W; 10]),
+    ) {
+        let Some((pattern, tangent)) = &mut self.tangent else { return };
+        let (mut force, mut curved) = ([Lane8::NONE; 4], [Lane8::NONE; 10]);
+        store(first, &mut force);
+        store(second, &mut curved);
+        for (side, own) in tile.sides.iter().enumerate() {
+            let Some(own) = own else { continue };
+            let sums = (&force, &curved, SIGNS[side]);
+            facing_tangent::add_side::<W>(simd, &self.beams.frame, (own, &seen[side]), sums, pattern, tangent);
+        }
+        if let [Some(upper), Some(lower)] = &tile.sides {
+            for lane in 0..tile.stretches.len() {
+                let ends = [(upper, &seen[0]), (lower, &seen[1])];
+                couple(&self.beams.frame, lane, ends, &matrix(&curved, lane), pattern, tangent);
             }
         }
     }
@@ -181,7 +178,7 @@ impl FieldForces<'_> {
         if let ([Some(upper), Some(lower)], Some((pattern, tangent))) = (&tile.sides, &mut self.tangent) {
             for lane in 0..tile.stretches.len() {
                 let ends = [(upper, &seen[0]), (lower, &seen[1])];
-                couple(&self.beams.frame, lane, ends, &sums.matrix(lane), pattern, tangent);
+                couple(&self.beams.frame, lane, ends, &matrix(&sums.second, lane), pattern, tangent);
             }
         }
     }
@@ -217,7 +214,7 @@ impl FieldForces<'_> {
 
 /// Stations of a side at a configuration; `seen` is that of the tile before.
 #[inline(always)]
-fn stations<W: SimdReal>(
+fn stations<W: SimdReal, const CURVED: bool>(
     simd: W::Simd,
     frame: &Opening,
     own: &TileSide,
@@ -230,13 +227,7 @@ fn stations<W: SimdReal>(
         let first = frame.deflection(&own.first, at.q, at.linear);
         [first.w, first.slope, first.gradient.z, first.bend]
     };
-    let mut poses = [Lane8::NONE; 3];
-    for lane in 0..LANES {
-        if let Some(body) = own.body(lane + 1) {
-            let pose = &at.q[body];
-            (poses[0].0[lane], poses[1].0[lane], poses[2].0[lane]) = (pose.x, pose.y, pose.z);
-        }
-    }
+    let poses = own.poses(at.q);
     let [x, y, turn] = load::<W, 3>(simd, &poses);
     let arm = load::<W, 2>(simd, &own.arm);
     let (nx, ny) = (frame.axis.x, frame.axis.y);
@@ -247,9 +238,15 @@ fn stations<W: SimdReal>(
         let moved = HalfTurn::of([sin, cos]).rotation_minus_identity(arm);
         (moved, [arm[0] + moved[0], arm[1] + moved[1]])
     };
-    let bend = if at.linear { W::splat(simd, 0.0) } else { -(lies[0] * nx + lies[1] * ny) };
     let w = (x + moved[0]) * nx + (y + moved[1]) * ny;
-    store([w, turn * frame.side, lies[0] * ny - lies[1] * nx, bend], &mut seen.own);
+    let [deflection, slope, lever, bend] = &mut seen.own;
+    w.store(deflection);
+    (turn * frame.side).store(slope);
+    (lies[0] * ny - lies[1] * nx).store(lever);
+    if CURVED {
+        let bent = if at.linear { W::splat(simd, 0.0) } else { -(lies[0] * nx + lies[1] * ny) };
+        bent.store(bend);
+    }
 }
 
 /// Ends of stretches that are parts of segments.
@@ -334,17 +331,6 @@ impl StretchSums {
             sum.0[lane] += second[place];
         }
     }
-
-    /// Second derivatives of a stretch.
-    #[inline(always)]
-    fn matrix(&self, lane: usize) -> Matrix4<f64> {
-        let mut matrix = Matrix4::zeros();
-        for (sum, (i, j)) in self.second.iter().zip(PLACES) {
-            matrix[(i, j)] = sum.0[lane];
-            matrix[(j, i)] = sum.0[lane];
-        }
-        matrix
-    }
 }
 
 /// Sums over the stations of a side, from those over the stretches; second derivatives where it is `curved`.
@@ -377,7 +363,7 @@ fn over_stations(own: &TileSide, sums: &StretchSums, curved: bool) -> StationSum
             over.first[i][b] += first[2 + i];
         }
         if curved {
-            let mut h = sums.matrix(lane);
+            let mut h = matrix(&sums.second, lane);
             if let Some(weights) = &part.weights {
                 h = weights.tr_mul(&h) * **weights;
             }
@@ -393,53 +379,6 @@ fn over_stations(own: &TileSide, sums: &StretchSums, curved: bool) -> StationSum
     over
 }
 
-/// Over the poses of two bodies, what is `h` over the displacements and slopes of two stations with these levers.
-#[inline(always)]
-fn block(frame: &Opening, [a, b]: [f64; 2], [h, h_slope, slope_h, slopes]: [f64; 4]) -> Matrix3<f64> {
-    let Opening { axis: n, side } = *frame;
-    let (column, row) = (b * h + side * h_slope, a * h + side * slope_h);
-    let turned = a * column + side * (b * slope_h + side * slopes);
-    let mixed = n.x * n.y * h;
-    Matrix3::new(n.x * n.x * h, mixed, n.x * column, mixed, n.y * n.y * h, n.y * column, n.x * row, n.y * row, turned)
-}
-
-/// Adds a block of two bodies (row, column) and its transpose, of which the matrix holds what lies on or below the diagonal.
-#[inline(always)]
-fn add_block([a, b]: [usize; 2], block: &Matrix3<f64>, pattern: &Pattern, tangent: &mut BodyMatrix) {
-    if a == b {
-        tangent.diagonal[a] += block + block.transpose();
-    } else if let Some(at) = pattern.block(a.max(b), a.min(b)) {
-        tangent.below[at] += if a > b { *block } else { block.transpose() };
-    }
-}
-
-/// Adds the derivatives of a stretch that couple its two sides.
-fn couple(
-    frame: &Opening,
-    lane: usize,
-    [(upper, above), (lower, below)]: [(&TileSide, &SeenStations); 2],
-    second: &Matrix4<f64>,
-    pattern: &Pattern,
-    tangent: &mut BodyMatrix,
-) {
-    let (mut h, mut from) = (-second, [lane; 2]);
-    if let Some(cut) = &upper.cut {
-        from[0] = cut[lane].from;
-        h = cut[lane].weights.as_ref().map_or(h, |weights| weights.tr_mul(&h));
-    }
-    if let Some(cut) = &lower.cut {
-        from[1] = cut[lane].from;
-        h = cut[lane].weights.as_ref().map_or(h, |weights| h * **weights);
-    }
-    for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        let (one, other) = (from[0] + i, from[1] + j);
-        let (Some(a), Some(b)) = (upper.body(one), lower.body(other)) else { continue };
-        let part = [h[(2 * i, 2 * j)], h[(2 * i, 2 * j + 1)], h[(2 * i + 1, 2 * j)], h[(2 * i + 1, 2 * j + 1)]];
-        let block = block(frame, [above.of(2, one), below.of(2, other)], part);
-        add_block([a, b], &block, pattern, tangent);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::approach::MaterialPoint;
@@ -448,11 +387,11 @@ mod tests {
     use super::super::edge_field::EdgeField;
     use super::super::facing_side::Flank;
     use super::super::facing_stretches::{CubicStretch, stretches};
-    use super::super::from_structure::Station;
+    use super::super::from_structure::{FromStructure, Station};
     use super::*;
     use bimorph_multibody::BodyId;
     use bimorph_structure::{Impact, InsulatingLayer};
-    use nalgebra::Vector2;
+    use nalgebra::{Matrix3, Vector2};
 
     struct Random(u64);
 
@@ -463,12 +402,14 @@ mod tests {
         }
     }
 
-    /// A side of a gap of 200 µm whose stations lie at these fractions, on bodies in turn from `first` on; the first station is anchored without one.
-    fn side(at: &[f64], first: Option<usize>, random: &mut Random) -> Flank {
+    /// A side of a gap of 200 µm whose stations lie at these fractions, on bodies in turn from `first` on, every `step`-th of them; the first station is anchored without one.
+    fn side(at: &[f64], first: Option<usize>, step: isize, random: &mut Random) -> Flank {
+        let count = at.len();
         let station = |(k, at): (usize, &f64)| {
             let body = match (first, k) {
                 (None, _) | (Some(0), 0) => BodyId::Ground,
-                (Some(first), k) => BodyId::Free(first + 2 * k),
+                (Some(_), k) if step < 0 => BodyId::Free(count - k),
+                (Some(first), k) => BodyId::Free(first + step as usize * k),
             };
             let arm = Vector2::new(random.of(4e-6), random.of(2e-6));
             Station { at: at * 200e-6, point: MaterialPoint { body, arm } }
@@ -478,7 +419,9 @@ mod tests {
 
     /// Beams whose sides have these stations.
     fn beams(cuts: [&[f64]; 2], lower: Option<usize>, edges: EdgeField, random: &mut Random) -> FacingBeams {
-        let sides = [side(cuts[0], Some(0), random), side(cuts[1], lower, random)];
+        // bodies of a side that moves alone are neighbours, up or down
+        let step = if lower.is_some() { 2 } else { [1, -1][usize::from(random.of(1.0) > 0.0)] };
+        let sides = [side(cuts[0], Some(0), step, random), side(cuts[1], lower, step, random)];
         let angle = random.of(3.0);
         let frame = Opening { axis: Vector2::new(angle.cos(), angle.sin()), side: random.of(1.0).signum() };
         let facing = FacingStretch {
@@ -557,5 +500,29 @@ mod tests {
             }
         }
         assert!(touched > 10, "{touched}");
+    }
+
+    /// Members whose bodies get other numbers have the force and the bound of displacements of those bodies, to the bit.
+    #[test]
+    fn members_follow_their_bodies() {
+        let mut random = Random(3);
+        let even: Vec<f64> = (0..=9).map(|k| f64::from(k) / 9.0).collect();
+        let own = beams([&even, &even], None, EdgeField::None, &mut random);
+        let count = 12;
+        let other = |body: BodyId| match body {
+            BodyId::Free(k) => BodyId::Free(count - 1 - k),
+            BodyId::Ground => BodyId::Ground,
+        };
+        let moved = own.clone().moved(&|point| MaterialPoint { body: other(point.body), ..point });
+        let q: Vec<Pose> = (0..count).map(|k| Pose::new(1e-8 * k as f64, 2e-8 * k as f64, 1e-5 * k as f64)).collect();
+        let turned: Vec<Pose> = q.iter().rev().copied().collect();
+        assert_eq!(own.closing_bound(&q).to_bits(), moved.closing_bound(&turned).to_bits());
+        let force = |beams: &FacingBeams, q: &[Pose]| {
+            let mut r = vec![Pose::zeros(); count];
+            beams.add_force(Configuration { q, linear: false }, 10.0, &mut r);
+            r
+        };
+        let (one, two) = (force(&own, &q), force(&moved, &turned));
+        assert!(one.iter().zip(two.iter().rev()).all(|(a, b)| a == b) && one[5].norm() > 0.0);
     }
 }

@@ -31,14 +31,11 @@ impl Opening {
     /// A bound of the displacement along the axis of all points between stations (m). A body that rotates by θ moves a point at the arm r by at most |θ|·|r|.
     pub(super) fn bound(&self, side: &Flank, q: &[Pose]) -> f64 {
         let (mut most, mut sum) = (0.0, 0.0);
-        for station in &side.stations {
-            if let BodyId::Free(k) = station.point.body {
-                let (pose, arm) = (&q[k], station.point.arm);
-                let turned = (arm.x.abs() + arm.y.abs() + side.third) * pose.z.abs();
-                let moved = (pose.x * self.axis.x + pose.y * self.axis.y).abs() + turned;
-                most = if moved > most { moved } else { most };
-                sum += moved;
-            }
+        for &(body, reach) in &side.reach {
+            let pose = &q[body];
+            let moved = (pose.x * self.axis.x + pose.y * self.axis.y).abs() + reach * pose.z.abs();
+            most = if moved > most { moved } else { most };
+            sum += moved;
         }
         // a comparison with NaN must not hide it
         if sum < f64::INFINITY { most } else { sum }
@@ -95,8 +92,8 @@ pub struct Flank {
     pub fixed: bool,
     /// h⁴/24EI of each segment between two stations (m²/N); empty where nothing bends.
     pub yields: Vec<f64>,
-    /// A third of the longest segment (m).
-    third: f64,
+    /// Body of each station that moves, and how far the points around it may move where it rotates by 1 rad: its arm, and a third of the longest segment (m).
+    reach: Vec<(usize, f64)>,
 }
 
 impl Flank {
@@ -104,7 +101,11 @@ impl Flank {
     pub(super) fn new(stations: Vec<Station>, yields: Vec<f64>) -> Self {
         let third = stations.windows(2).map(|ends| ends[1].at - ends[0].at).fold(0.0, f64::max) / 3.0;
         let fixed = stations.iter().all(|station| station.point.body == BodyId::Ground);
-        Self { stations, fixed, yields, third }
+        let reach = stations.iter().filter_map(|station| match station.point.body {
+            BodyId::Free(body) => Some((body, station.point.arm.x.abs() + station.point.arm.y.abs() + third)),
+            BodyId::Ground => None,
+        });
+        Self { reach: reach.collect(), stations, fixed, yields }
     }
 
     /// Deflection of a segment beyond its cubic, towards the other side, at distance `at` from the start of the gap

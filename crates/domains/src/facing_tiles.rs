@@ -7,6 +7,7 @@ use super::facing_side::{EndWeights, Flank};
 use super::facing_stretches::CubicStretch;
 use bimorph_multibody::BodyId;
 use bimorph_multibody::batch::{LANES, Lane8};
+use bimorph_multibody::planar::Pose;
 
 /// Stretches of a tile.
 pub(super) const STRETCHES: usize = LANES;
@@ -39,6 +40,8 @@ pub(super) struct TileSide {
     pub(super) follows: bool,
     /// Where the stretches are not the segments between the stations: how they follow.
     pub(super) cut: Option<Box<[SegmentPart; STRETCHES]>>,
+    /// The bodies in the lanes, where they are neighbours.
+    run: Option<BodyRun>,
 }
 
 /// A stretch as a part of a segment.
@@ -48,6 +51,91 @@ pub(super) struct SegmentPart {
     pub(super) from: usize,
     /// From the ends of the segment to those of the stretch.
     pub(super) weights: EndWeights,
+}
+
+/// Displacement along the axis (m), slope along the gap (1), ∂w/∂θ and ∂²w/∂θ² (m) of a station.
+pub(super) const QUANTITIES: usize = 4;
+
+/// Stations of a side at a configuration.
+#[derive(Clone, Copy)]
+pub(super) struct SeenStations {
+    /// The first.
+    pub(super) first: [f64; QUANTITIES],
+    /// The others.
+    pub(super) own: [Lane8; QUANTITIES],
+}
+
+impl SeenStations {
+    pub(super) const NONE: Self = Self { first: [0.0; QUANTITIES], own: [Lane8::NONE; QUANTITIES] };
+
+    /// A quantity of station `k`.
+    #[inline(always)]
+    pub(super) fn of(&self, quantity: usize, k: usize) -> f64 {
+        if k == 0 { self.first[quantity] } else { self.own[quantity].0[k - 1] }
+    }
+
+    /// A quantity of the stations where stretches begin.
+    #[inline(always)]
+    pub(super) fn starts(&self, quantity: usize) -> Lane8 {
+        let mut starts = self.own[quantity];
+        starts.0.copy_within(..LANES - 1, 1);
+        starts.0[0] = self.first[quantity];
+        starts
+    }
+}
+
+/// A number of each stretch in the lane before it; 0 in the last.
+#[inline(always)]
+pub(super) fn following(of: &Lane8) -> Lane8 {
+    let mut following = *of;
+    following.0.copy_within(1.., 0);
+    following.0[LANES - 1] = 0.0;
+    following
+}
+
+/// Bodies of the stations but the first, where each lane has one and they are neighbours in the order of elimination.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct BodyRun {
+    /// The lowest.
+    from: usize,
+    /// They descend from lane to lane.
+    down: bool,
+}
+
+impl BodyRun {
+    fn of(bodies: &[u32; STATIONS]) -> Option<Self> {
+        let own = &bodies[1..];
+        if own.contains(&NONE) {
+            return None;
+        }
+        let run = |down: bool| Self { from: own[if down { LANES - 1 } else { 0 }] as usize, down };
+        let steps = |step: i64| own.windows(2).all(|pair| i64::from(pair[1]) - i64::from(pair[0]) == step);
+        if steps(1) {
+            Some(run(false))
+        } else if steps(-1) {
+            Some(run(true))
+        } else {
+            None
+        }
+    }
+}
+
+/// Poses in lanes, lane by lane or against them.
+#[inline(always)]
+fn spread<const DOWN: bool>(from: &[Pose; LANES], to: &mut [Lane8; 3]) {
+    for lane in 0..LANES {
+        let pose = &from[if DOWN { LANES - 1 - lane } else { lane }];
+        (to[0].0[lane], to[1].0[lane], to[2].0[lane]) = (pose.x, pose.y, pose.z);
+    }
+}
+
+/// Adds poses in lanes, lane by lane or against them.
+#[inline(always)]
+fn add_spread<const DOWN: bool>(from: &[Lane8; 3], to: &mut [Pose; LANES]) {
+    for lane in 0..LANES {
+        let pose = &mut to[if DOWN { LANES - 1 - lane } else { lane }];
+        *pose += Pose::new(from[0].0[lane], from[1].0[lane], from[2].0[lane]);
+    }
 }
 
 impl Tile {
@@ -102,12 +190,51 @@ impl TileSide {
         let whole = |lane| part(lane).is_none_or(|part| part.from == lane && part.weights.is_none());
         let cut =
             (!(0..STRETCHES).all(whole)).then(|| Box::new(std::array::from_fn(|lane| part(lane).unwrap_or_default())));
-        Self { bodies, first: flank.stations[first].point, arm, follows: before == Some(first), cut }
+        let run = BodyRun::of(&bodies);
+        Self { bodies, first: flank.stations[first].point, arm, follows: before == Some(first), cut, run }
     }
 
     /// The body of a station; none: ground, or no station.
     #[inline(always)]
     pub(super) fn body(&self, k: usize) -> Option<usize> {
         (self.bodies[k] != NONE).then_some(self.bodies[k] as usize)
+    }
+
+    /// Of displacements `q` of all bodies those in the lanes.
+    #[inline(always)]
+    pub(super) fn poses(&self, q: &[Pose]) -> [Lane8; 3] {
+        let mut poses = [Lane8::NONE; 3];
+        if let Some(run) = &self.run
+            && let Some(of) = q[run.from..].first_chunk::<LANES>()
+        {
+            if run.down {
+                spread::<true>(of, &mut poses)
+            } else {
+                spread::<false>(of, &mut poses)
+            }
+            return poses;
+        }
+        for lane in 0..LANES {
+            if let Some(body) = self.body(lane + 1) {
+                let pose = &q[body];
+                (poses[0].0[lane], poses[1].0[lane], poses[2].0[lane]) = (pose.x, pose.y, pose.z);
+            }
+        }
+        poses
+    }
+
+    /// Adds forces in lanes to those of all bodies.
+    #[inline(always)]
+    pub(super) fn add_poses(&self, poses: &[Lane8; 3], r: &mut [Pose]) {
+        if let Some(run) = &self.run
+            && let Some(to) = r[run.from..].first_chunk_mut::<LANES>()
+        {
+            return if run.down { add_spread::<true>(poses, to) } else { add_spread::<false>(poses, to) };
+        }
+        for lane in 0..LANES {
+            if let Some(body) = self.body(lane + 1) {
+                r[body] += Pose::new(poses[0].0[lane], poses[1].0[lane], poses[2].0[lane]);
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Derivatives of the forces that depend on rates (of contact that loses energy, [`super::contact_loss`], and of gas) over the bodies of a system.
 
 use super::domain::{Domain, SkewCoupling};
-use super::system::System;
+use super::system::{ApartMembers, System};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyId, BodyMatrix};
 use nalgebra::Matrix3;
@@ -36,6 +36,12 @@ impl LossDerivatives {
     /// Takes them at displacements `q` and the rate of each body.
     #[inline]
     pub fn at(&mut self, system: &System, q: &[Pose], rate: impl Fn(usize) -> Pose) {
+        self.near(system, (q, ApartMembers::default()), rate);
+    }
+
+    /// The same without members that are known to be `apart` at `q`.
+    #[inline]
+    pub fn near(&mut self, system: &System, (q, apart): (&[Pose], ApartMembers), rate: impl Fn(usize) -> Pose) {
         if self.acts {
             for matrix in [&mut self.stiffness, &mut self.damping] {
                 for (body, below) in &self.columns {
@@ -44,7 +50,7 @@ impl LossDerivatives {
                 }
             }
         }
-        self.acts = system.add_loss_tangent(q, &rate, &mut self.stiffness, &mut self.damping);
+        self.acts = system.add_loss_tangent((q, apart), &rate, &mut self.stiffness, &mut self.damping);
         self.skew.clear();
         system.skew_couplings(q, &rate, |coupling| self.skew.push(coupling));
     }

@@ -113,6 +113,22 @@ impl Domain for Member {
     }
 
     #[inline]
+    fn add_force_finding_apart(&self, at: Configuration<'_>, given: f64, r: &mut [Pose]) -> bool {
+        each!(self, m => m.add_force_finding_apart(at, given, r))
+    }
+
+    #[inline]
+    fn add_force_and_tangent_finding_apart(
+        &self,
+        at: Configuration<'_>,
+        given: f64,
+        pattern: &Pattern,
+        sums: (&mut [Pose], &mut BodyMatrix),
+    ) -> bool {
+        each!(self, m => m.add_force_and_tangent_finding_apart(at, given, pattern, sums))
+    }
+
+    #[inline]
     fn is_active(&self, given: f64) -> bool {
         each!(self, m => m.is_active(given))
     }

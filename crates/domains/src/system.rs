@@ -14,6 +14,22 @@ use bimorph_multibody::{BodyId, BodyMatrix, Model, forces};
 use nalgebra::Vector2;
 use std::sync::Arc;
 
+/// The first 64 members, where the evaluation of their forces showed that nothing touches: contact loses nothing there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ApartMembers(u64);
+
+impl ApartMembers {
+    fn put(&mut self, member: usize, apart: bool) {
+        if apart && member < 64 {
+            self.0 |= 1 << member;
+        }
+    }
+
+    fn has(self, member: usize) -> bool {
+        member < 64 && self.0 >> member & 1 == 1
+    }
+}
+
 /// The mechanical system that `solve` works on. Immutable; shared by sessions.
 #[derive(Debug, Clone)]
 pub struct System {
@@ -58,30 +74,44 @@ impl System {
     /// over the bodies from the first to the last it finds in the caches what the one before left there.
     #[inline]
     pub fn add_residual(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
-        self.add_residual_and(q, drive, r, |_| ());
+        self.add_residual_and(q, drive, r, |_, _| ());
     }
 
     /// The same with what `more` adds before held directions are removed.
     #[inline]
-    pub fn add_residual_and(&self, q: &[Pose], drive: &Drive, r: &mut [Pose], more: impl FnOnce(&mut [Pose])) {
+    pub fn add_residual_and(
+        &self,
+        q: &[Pose],
+        drive: &Drive,
+        r: &mut [Pose],
+        more: impl FnOnce(&mut [Pose], ApartMembers),
+    ) {
         forces::add_elastic_backwards(&self.model, q, &drive.rest(), r);
-        self.add_body_forces(q, drive, r);
-        more(r);
+        let apart = self.add_body_forces(q, drive, r);
+        more(r, apart);
         self.model.project(r);
     }
 
     /// `r +=` the share of gaps, contacts and dead loads in the residual: minus the wrench on each body. A formulation that
-    /// has its own way with joints needs only this of a system.
+    /// has its own way with joints needs only this of a system. Returns members that it finds apart.
     #[inline]
-    pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
-        let at = self.at(q);
-        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
-            gap.add_force(at, volts, r);
+    pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) -> ApartMembers {
+        let (at, mut apart) = (self.at(q), ApartMembers::default());
+        for (g, gap, volts) in self.active(drive) {
+            apart.put(g, gap.add_force_finding_apart(at, volts, r));
         }
         for load in &self.loads {
             load.add_force(at, drive.load, r);
         }
         self.add_input_forces(at, drive, r);
+        apart
+    }
+
+    /// Members with a force of a potential, and their voltages (V).
+    #[inline]
+    fn active<'a>(&'a self, drive: &'a Drive) -> impl Iterator<Item = (usize, &'a Member, f64)> {
+        let all = self.members.iter().zip(&drive.volts).enumerate().map(|(g, (gap, volts))| (g, gap, *volts));
+        all.filter(|(_, gap, volts)| gap.is_active(*volts))
     }
 
     /// True where [`System::add_body_forces`] adds anything.
@@ -115,7 +145,7 @@ impl System {
     /// [`System::tangent`] with the residual added to `r`, held directions removed from the sum.
     #[inline]
     pub fn add_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BodyMatrix, r: &mut [Pose]) {
-        self.add_tangent_and(q, drive, tangent, r, |_| ());
+        self.add_tangent_and(q, drive, tangent, r, |_, _| ());
     }
 
     /// The same with what `more` adds to `r` before held directions are removed.
@@ -125,20 +155,20 @@ impl System {
         drive: &Drive,
         tangent: &mut BodyMatrix,
         r: &mut [Pose],
-        more: impl FnOnce(&mut [Pose]),
+        more: impl FnOnce(&mut [Pose], ApartMembers),
     ) {
         tangent.clear();
         forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
-        let (at, pattern) = (self.at(q), &self.model.pattern);
-        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
-            gap.add_force_and_tangent(at, volts, pattern, (r, tangent));
+        let (at, pattern, mut apart) = (self.at(q), &self.model.pattern, ApartMembers::default());
+        for (g, gap, volts) in self.active(drive) {
+            apart.put(g, gap.add_force_and_tangent_finding_apart(at, volts, pattern, (r, tangent)));
         }
         for load in &self.loads {
             load.add_force_and_tangent(at, drive.load, pattern, (r, tangent));
         }
         self.add_input_forces(at, drive, r);
         self.add_input_tangent(at, drive, tangent);
-        more(r);
+        more(r, apart);
         self.model.project(r);
     }
 
@@ -267,22 +297,32 @@ impl System {
     /// `r +=` the forces that rates add to those of members, `rate` the rate of each body; held directions not removed.
     #[inline]
     pub fn add_loss(&self, q: &[Pose], rate: impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        self.add_loss_near((q, ApartMembers::default()), rate, r);
+    }
+
+    /// The same without members that are known to be `apart` at `q`.
+    #[inline]
+    pub fn add_loss_near(&self, (q, apart): (&[Pose], ApartMembers), rate: impl Fn(usize) -> Pose, r: &mut [Pose]) {
         let at = self.at(q);
-        self.members.iter().for_each(|member| member.add_loss(at, &rate, r));
+        self.near(apart).for_each(|member| member.add_loss(at, &rate, r));
+    }
+
+    fn near(&self, apart: ApartMembers) -> impl Iterator<Item = &Member> {
+        self.members.iter().enumerate().filter(move |(g, _)| !apart.has(*g)).map(|(_, member)| member)
     }
 
     /// Adds the derivatives of those forces with displacements to `stiffness` and with rates to `damping`. True where there are any.
     #[inline]
     pub fn add_loss_tangent(
         &self,
-        q: &[Pose],
+        (q, apart): (&[Pose], ApartMembers),
         rate: impl Fn(usize) -> Pose,
         stiffness: &mut BodyMatrix,
         damping: &mut BodyMatrix,
     ) -> bool {
         let (at, mut to) = (self.at(q), LossTangent { pattern: &self.model.pattern, stiffness, damping });
         let add = |any, member: &Member| member.add_loss_tangent(at, &rate, &mut to) | any;
-        self.members.iter().fold(false, add)
+        self.near(apart).fold(false, add)
     }
 
     /// Calls `see` with the skew part of the derivatives of those forces with displacements.

@@ -157,7 +157,12 @@ impl Pattern {
     pub fn block(&self, row: usize, column: usize) -> Option<usize> {
         let range = self.column(column);
         let row = u32::try_from(row).ok()?;
-        self.row[range.clone()].binary_search(&row).ok().map(|k| range.start + k)
+        let rows = &self.row[range.clone()];
+        // neighbours along a beam
+        if rows.first() == Some(&row) {
+            return Some(range.start);
+        }
+        rows.binary_search(&row).ok().map(|k| range.start + k)
     }
 
     /// Block multiplications of one factorization: the operation count that must grow linearly with n + m.

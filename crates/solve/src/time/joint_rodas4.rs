@@ -28,6 +28,7 @@ use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I};
 use super::rosenbrock::{self, CONSISTENT, RosenbrockStep};
 use super::stage_loss::StageLoss;
 use crate::equations::{Bodies, Joints};
+use bimorph_domains::system::ApartMembers;
 use bimorph_domains::{Drive, Ramp};
 use bimorph_multibody::forces;
 use bimorph_multibody::joint_coordinates::sprung_loops::JointMatrix;
@@ -145,7 +146,7 @@ impl JointRodas4 {
         }
         let poses = placed.at.as_slice();
         if let Some(loss) = loss {
-            loss.add_forces(closures, first, poses, |k| placed.rate[k], force);
+            loss.add_forces(closures, first, (poses, ApartMembers::default()), |k| placed.rate[k], force);
         }
         if first {
             closures.add_tangent(poses, drive, &mut w.bodies, force);

@@ -23,6 +23,7 @@ use crate::equations::{Bodies, Joints};
 use crate::reduced::check::FullCheck;
 use crate::reduced::energy::{EnergyProduct, EnergyVector};
 use crate::reduced::{ReducedForces, ReducedSpace};
+use bimorph_domains::system::ApartMembers;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::joint_coordinates::sprung_loops::columns::Four;
@@ -178,7 +179,8 @@ impl ReducedRodas4 {
         forces.set_motion_forces(space);
         if let Some(loss) = loss {
             let (placed, wrench) = forces.placed_and_wrench();
-            loss.add_forces(&space.joints.closures, first, &placed.at, |k| placed.rate[k], wrench);
+            let at = (&placed.at[..], ApartMembers::default());
+            loss.add_forces(&space.joints.closures, first, at, |k| placed.rate[k], wrench);
         }
         if first {
             forces.add_forces_and_tangent(space, drive);

@@ -33,6 +33,7 @@ use crate::equations::linear::{LinearSolver, Recursion};
 use crate::time::gyration::{Gyration, held_out, skew};
 use crate::time::rosenbrock::{self, RosenbrockStep};
 use crate::time::stage_loss::{StageLoss, StepMatrix};
+use bimorph_domains::system::ApartMembers;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyMatrix, forces};
@@ -138,9 +139,9 @@ impl<S: LinearSolver> RosenbrockStep for BodyStep<'_, S> {
         let Rodas4 { stages, drive, loss, ports, defect, w, .. } = &mut *self.rodas;
         // what contact loses needs the stages beside their force
         let mut force = std::mem::take(&mut stages.force);
-        let lose = |force: &mut [Pose]| {
+        let lose = |force: &mut [Pose], apart: ApartMembers| {
             if let Some(loss) = loss {
-                loss.add_forces(system, i == 0, stages.at(i, from), |k| stages.speed(i, h, k), force);
+                loss.add_forces(system, i == 0, (stages.at(i, from), apart), |k| stages.speed(i, h, k), force);
                 loss.start.add_damping(|k| -stages.r1()[k], force);
             }
         };

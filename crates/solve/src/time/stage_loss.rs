@@ -16,6 +16,7 @@ use crate::equations::linear::LinearSolver;
 use bimorph_domains::System;
 use bimorph_domains::domain::SkewCoupling;
 use bimorph_domains::loss_derivatives::LossDerivatives;
+use bimorph_domains::system::ApartMembers;
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_multibody::{BodyId, BodyMatrix, Model, Pattern};
@@ -78,25 +79,25 @@ impl StageLoss {
         Some(Self { now: sensitivities.then(|| start.clone()), start, shears: Vec::new() })
     }
 
-    /// Adds the forces of a stage at displacements `q` and the rate of each body; the first stage is the start of the step.
+    /// Adds the forces of a stage at displacements, with members known to be apart there, and the rate of each body; the first stage is the start of the step.
     pub(super) fn add_forces(
         &mut self,
         system: &System,
         first: bool,
-        q: &[Pose],
+        at: (&[Pose], ApartMembers),
         rate: impl Fn(usize) -> Pose,
         force: &mut [Pose],
     ) {
         if first {
-            self.start.at(system, q, &rate);
+            self.start.near(system, at, &rate);
         }
         match &mut self.now {
-            Some(now) => now.at(system, q, &rate),
+            Some(now) => now.near(system, at, &rate),
             // without derivatives there is no force
             None if first && !self.start.is_nonzero() => return,
             None => {}
         }
-        system.add_loss(q, rate, force);
+        system.add_loss_near(at, rate, force);
     }
 
     /// Adds the symmetric part of the matrix of a step.

@@ -23,7 +23,7 @@ impl LaneRodas4 {
             }
             acted.take(k, from, force);
             let ActedBodies { bodies, q, r, .. } = &mut *acted;
-            lane.system.add_body_forces(q, drive, r);
+            let apart = lane.system.add_body_forces(q, drive, r);
             let loses = !losses.is_empty() && lane.system.loses();
             if loses {
                 for &b in bodies.iter() {
@@ -32,9 +32,9 @@ impl LaneRodas4 {
                         .fold(r1_of[b], |rate, j| rate - pose_in_lane(&increments[b][j].q, k) * (C[i][j] / h.0[k]));
                 }
                 if i == 0 {
-                    losses[k].at(lane.system, q, |b| rate_of[b]);
+                    losses[k].near(lane.system, (q, apart), |b| rate_of[b]);
                 }
-                lane.system.add_loss(q, |b| rate_of[b], r);
+                lane.system.add_loss_near((q, apart), |b| rate_of[b], r);
                 losses[k].add_damping(|b| -r1_of[b], r);
             }
             acted.give(k, force);
