@@ -151,3 +151,20 @@ fn facing_beams_with_film_and_contact() {
         drive port * [c a] []";
     balances("facing beams", text, &[(60.0, 30e-6), (0.0, 30e-6)], true);
 }
+
+/// A plate on a spring that stiffens is pulled against a stop that holds it by adhesion, and slides along it with friction under a dead load.
+#[test]
+fn a_stop_with_adhesion_and_friction() {
+    let text = "
+        anchor * [f] []
+        mass2d * [m] [m=1e-10 J=1e-20]
+        spring2d * [f m] [kx=1 ky=0.5 krz=1e-7 kx3=1e11 ky2=1e4]
+        dashpot2d * [m] [bx=1e-6 by=1e-6 brz=1e-16]
+        f2d * [m] [F=0.2u oz=pi/2]
+        anchor * [e] []
+        plategap2d * [m e] [A=1e-8 l=100u w=100u gap=2u fringe=none]
+        stop2d * [m] [gap=0.8u restitution=0.4 adhesion=0.3u adhesionrange=50n friction=0.3 slipspeed=20m]
+        eground * [e] []
+        drive port * [m e] []";
+    balances("adhesion and friction", text, &[(7.0, 200e-6), (0.0, 200e-6)], true);
+}

@@ -11,6 +11,7 @@ mod contact_signals;
 mod contact_speed;
 mod contact_steps;
 mod dashpot;
+mod domain_derivatives;
 mod drawing_semantics;
 mod duffing;
 mod eigenvalues;

@@ -3,6 +3,7 @@
 
 mod frame;
 mod meaning;
+mod sliding;
 
 use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Junctions, compile};
 use bimorph::device::local::LocalDevice;

@@ -31,7 +31,8 @@ struct BatchEquilibrium {
 impl BatchStatics {
     /// For variants like `first`; none where it has no lanes.
     pub fn new(first: &CompiledModel) -> Option<Self> {
-        LaneEquilibrium::new(&first.parts.system).map(Self)
+        let system = &first.parts.system;
+        if system.sticks() { None } else { LaneEquilibrium::new(system).map(Self) }
     }
 
     /// The equilibrium of each variant, from rest or, for all of them, next to where they begin. None for one whose equilibrium has to be
@@ -40,7 +41,7 @@ impl BatchStatics {
         let mut points: Vec<Option<OperatingPoint>> = vec![None; variants.len()];
         let lay = |(number, (compiled, start)): (usize, &BatchStart<'_>)| {
             let system = &compiled.parts.system;
-            let sources = source_vector(compiled, voltages).ok().filter(|_| self.0.fits(system))?;
+            let sources = source_vector(compiled, voltages).ok().filter(|_| self.0.fits(system) && !system.sticks())?;
             let rest = vec![0.0; sources.len()];
             let from = if start.is_some() { sources.clone() } else { rest };
             let q = start.clone().unwrap_or_else(|| vec![Pose::zeros(); system.bodies()]);

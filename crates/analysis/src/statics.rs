@@ -252,6 +252,10 @@ pub(crate) fn operating_point_near(
     voltages: &PortVoltages,
     q: Vec<Pose>,
 ) -> Result<(OperatingPoint, bool), AnalysisError> {
+    // where friction holds parts at rest, an equilibrium depends on the way to it
+    if compiled.parts.system.sticks() {
+        return Ok((operating_point(compiled, voltages)?, true));
+    }
     let sources = source_vector(compiled, voltages)?;
     // another branch than that of `q` is of no use
     let options = EquilibriumOptions { stop_at_fold: true, ..Default::default() };

@@ -44,6 +44,7 @@ impl DeviceSession {
             v: self.motion.v.clone(),
             rise: self.rise.clone(),
             sources: self.sources.clone(),
+            anchors: if from.is_some() { Vec::new() } else { self.equilibrium.sticking.anchors().to_vec() },
             next_step,
             elapsed: from.map_or(0.0, |(_, before)| before.elapsed + request.dt),
             carried: if from.is_some() { self.stepper.method.state().to_vec() } else { Vec::new() },

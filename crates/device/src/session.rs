@@ -166,6 +166,7 @@ impl DeviceSession {
             && poses(&state.v)
             && numbers(&state.rise, self.rise.len())
             && numbers(&state.sources, self.sources.len())
+            && (state.anchors.is_empty() || numbers(&state.anchors, self.equilibrium.sticking.anchors().len()))
             && state.next_step > 0.0
             && (0.0..f64::INFINITY).contains(&state.elapsed)
             && state.shown.numbers().into_iter().flatten().all(|x| x.is_finite())

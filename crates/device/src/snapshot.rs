@@ -11,7 +11,7 @@ use bimorph_solve::time::method::Motion;
 
 /// Magic bytes: a name and the version of this format.
 const HEAD: [u8; 8] = *b"bimorph\x03";
-/// Those of format 2, whose histories of steps count no alternations.
+/// Those of format 2, whose histories of steps count no alternations and whose states have no anchors.
 const HEAD_2: [u8; 8] = *b"bimorph\x02";
 
 /// Writes what is open and its states.
@@ -19,7 +19,7 @@ pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
     write_format(HEAD, StepHistory::PARTS, opened, states)
 }
 
-/// The same with `head`, and the first `parts` of each history.
+/// The same with `head`, and the first `parts` of each history; anchors with all of them.
 fn write_format(head: [u8; 8], parts: usize, opened: &OpenRequest, states: &States) -> Vec<u8> {
     let mut out = SnapshotWriter(head.to_vec());
     for names in [&opened.ports, &opened.signals] {
@@ -42,6 +42,9 @@ fn write_format(head: [u8; 8], parts: usize, opened: &OpenRequest, states: &Stat
         out.poses(&state.v);
         out.numbers(&state.rise);
         out.numbers(&state.sources);
+        if parts == StepHistory::PARTS {
+            out.numbers(&state.anchors);
+        }
         out.word(state.next_step.to_bits());
         out.word(state.elapsed.to_bits());
         for numbers in &state.shown.numbers()[..parts] {
@@ -110,6 +113,7 @@ impl SnapshotReader<'_> {
                 v: self.poses()?,
                 rise: self.numbers()?,
                 sources: self.numbers()?,
+                anchors: if parts == StepHistory::PARTS { self.numbers()? } else { Vec::new() },
                 next_step: f64::from_bits(self.word()?),
                 elapsed: f64::from_bits(self.word()?),
                 shown: {
@@ -209,6 +213,7 @@ mod tests {
                 v: pose(0.1),
                 rise: vec![300.0; k as usize],
                 sources: vec![1.0, -2.0],
+                anchors: vec![3e-9; k as usize],
                 elapsed: 3e-6,
                 next_step: f64::INFINITY,
                 shown: StepHistory::start(vec![1.0, 2.0])

@@ -26,6 +26,8 @@ pub struct Snapshot {
     pub rise: Vec<f64>,
     /// Source voltages (V).
     pub sources: Vec<f64>,
+    /// Where parts that friction holds at rest stick along their stops (m); none after a motion.
+    pub anchors: Vec<f64>,
     /// First internal step of what follows (s).
     pub next_step: f64,
     /// Time since the equilibrium that the motion began from (s).
@@ -141,7 +143,7 @@ impl States {
 fn size(s: &Snapshot) -> usize {
     (s.q.len() + s.v.len()) * size_of::<Pose>()
         + s.carried.iter().map(|m| m.q.len() + m.v.len()).sum::<usize>() * size_of::<Pose>()
-        + (s.rise.len() + s.sources.len() + s.shown.doubles()) * 8
+        + (s.rise.len() + s.sources.len() + s.anchors.len() + s.shown.doubles()) * 8
         + size_of::<Snapshot>()
 }
 

@@ -47,6 +47,8 @@ impl DeviceSession {
         let (from, load) = parent.map_or((rest.as_slice(), 0.0), |p| (p.sources.as_slice(), 1.0));
         self.motion.q.copy_from_slice(parent.map_or(&self.zeros, |p| &p.q));
         self.motion.v.fill(Pose::zeros());
+        let drawn = vec![0.0; self.equilibrium.sticking.anchors().len()];
+        self.equilibrium.sticking.set_anchors(system, &self.motion.q, parent.map_or(&drawn, |p| &p.anchors));
         let path = SourcePath::new(electrics, from, &self.sources, [load, 1.0]);
         let sources = &self.sources;
         let energised = |gap: usize| electrics.is_energised(gap, sources);
@@ -79,7 +81,7 @@ impl DeviceSession {
             for x in &mut s.q {
                 *x = -*x;
             }
-            self.equilibrium.factor().solve(&system.model.pattern, &mut s.q);
+            self.equilibrium.solve(system, &mut s.q);
             s.v.fill(Pose::zeros());
         }
         self.answer(compiled, request, None, self.first_step, reply);

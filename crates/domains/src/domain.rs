@@ -18,6 +18,7 @@ use super::contact_loss::Loss;
 use super::loss_tangent::LossTangent;
 use super::point_law::{Law, PointLaw};
 use super::squeeze_film::SqueezeFilm;
+use super::stick_point::StickPoint;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyId, BodyMatrix, Pattern};
 use nalgebra::{Vector2, Vector6};
@@ -265,6 +266,17 @@ pub trait Domain {
     /// True where forces that depend on rates take energy out of a motion: loss of contact, gas.
     fn damps(&self) -> bool {
         self.is_gas() || self.loss().is_some_and(|loss| loss.is_dissipative())
+    }
+
+    /// True where friction holds it at rest, too.
+    fn sticks(&self) -> bool {
+        false
+    }
+
+    /// The part that friction holds at rest.
+    fn stick_point(&self, at: Configuration<'_>) -> Option<StickPoint> {
+        let _ = at;
+        None
     }
 
     /// True where friction acts across its approach.

@@ -68,7 +68,7 @@ mod tests {
     /// Half of Coulomb's force at v_s/√3, all but 5e-9 of it at 10⁴·v_s; the derivative is that of differences.
     #[test]
     fn slips() {
-        let friction = Friction { coefficient: 0.3, slip_speed: 1e-5 };
+        let friction = Friction { coefficient: 0.3, slip_speed: 1e-5, stick_stiffness: None };
         assert!((slip(&friction, 1e-5 / 3f64.sqrt()).0 - 0.5).abs() < 1e-12);
         assert!((slip(&friction, 0.1).0 - 1.0).abs() < 6e-9);
         for v in [-3e-5, 0.0, 1e-6, 2e-5, 1e-3] {

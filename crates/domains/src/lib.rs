@@ -47,6 +47,7 @@
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
 //! | `side` | the side to which a part buckles |
 //! | [`stop`] | how a stop bears |
+//! | [`sticking`], `stick_point` | friction of parts at rest, and its history |
 //! | [`quotient`] | discrete gradients of members over a step |
 //! | `reading` | quantities of gaps: capacitance, distance, pull, contact |
 //! | [`system`] | a multibody model with its gaps, loads and network: the input of `solve` |
@@ -111,6 +112,8 @@ pub mod quotient;
 mod reading;
 mod side;
 pub mod squeeze_film;
+mod stick_point;
+pub mod sticking;
 pub mod stop;
 pub mod stop_pair;
 pub mod system;

@@ -7,6 +7,7 @@ use super::from_structure::{FromStructure, PlacedMember, StructureView};
 use super::loss_tangent::LossTangent;
 use super::point_law::{Law, PointLaw};
 use super::squeeze_film::SqueezeFilm;
+use super::stick_point::StickPoint;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyId, BodyMatrix, Damper, Pattern};
 use nalgebra::Vector2;
@@ -215,6 +216,14 @@ impl Domain for Member {
 
     fn slides(&self) -> bool {
         each!(self, m => m.slides())
+    }
+
+    fn sticks(&self) -> bool {
+        each!(self, m => m.sticks())
+    }
+
+    fn stick_point(&self, at: Configuration<'_>) -> Option<StickPoint> {
+        each!(self, m => m.stick_point(at))
     }
 
     fn is_gas(&self) -> bool {

@@ -2,6 +2,7 @@
 
 use super::domain::Domain;
 use super::member::Member;
+use super::stick_point::StickPoint;
 use super::system::System;
 use bimorph_multibody::planar::Pose;
 
@@ -117,6 +118,18 @@ impl System {
             let left = self.distance(g, q);
             (left < least).then_some((g, left))
         })
+    }
+
+    /// The part of a member that friction holds at rest.
+    #[inline]
+    pub(super) fn stick_point(&self, member: usize, q: &[Pose]) -> Option<StickPoint> {
+        self.members[member].stick_point(self.at(q))
+    }
+
+    /// True where friction holds parts at rest: equilibria have a history.
+    #[inline]
+    pub fn sticks(&self) -> bool {
+        self.members.iter().any(Domain::sticks)
     }
 
     /// Energy stored where parts touch (J).

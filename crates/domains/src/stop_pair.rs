@@ -11,6 +11,7 @@ use super::from_structure::{FromStructure, StructureView};
 use super::loss_tangent::LossTangent;
 use super::point_law::Law;
 use super::quotient::{self, quotient};
+use super::stick_point::StickPoint;
 use super::stop::{StopKind, lost, nearer};
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
@@ -181,6 +182,25 @@ impl Domain for StopPair {
 
     fn slides(&self) -> bool {
         self.friction.is_some()
+    }
+
+    fn sticks(&self) -> bool {
+        self.friction.is_some_and(|friction| friction.stick_stiffness.is_some())
+    }
+
+    fn stick_point(&self, at: Configuration<'_>) -> Option<StickPoint> {
+        let friction = self.friction?;
+        let toward = self.approach.measure(at.q, at.linear);
+        let (force, slope) = self.stop.bearing(&self.ways, toward.value);
+        let along = self.along();
+        Some(StickPoint {
+            approach: self.approach,
+            toward,
+            along,
+            slide: along.measure(at.q, at.linear),
+            limit: (friction.coefficient * force.abs(), friction.coefficient * slope * force.signum()),
+            stiffness: friction.stick_stiffness?,
+        })
     }
 
     fn damps(&self) -> bool {

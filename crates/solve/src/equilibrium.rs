@@ -22,6 +22,7 @@ mod refusal;
 pub use loss::{LossKind, StabilityLoss};
 
 use super::SolveError;
+use bimorph_domains::sticking::Sticking;
 use bimorph_domains::{Drive, System};
 use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::factor::ZeroPivot;
@@ -32,6 +33,9 @@ use path::LoadPath;
 /// Largest residual force in such a place, as a fraction of the largest contact force, where parts touch. Contact softens towards
 /// the touch, and Newton's method then takes a quarter of the way each time: that is no rounding.
 const UNBALANCED: f64 = 1e-6;
+
+/// Largest load step where friction holds parts at rest, and the largest one in which such parts come to bear: they meet no friction in it (fractions of the path).
+const STICKING_STEPS: [f64; 2] = [1.0 / 32.0, 1e-3];
 
 /// Smallest load step where the present load is next to nothing, as a fraction of the path.
 const MIN_STEP: f64 = 1e-10;
@@ -89,6 +93,8 @@ pub struct Path {
 pub struct Equilibrium {
     /// Options.
     pub options: EquilibriumOptions,
+    /// Friction of parts at rest: the history of the equilibrium.
+    pub sticking: Sticking,
     tangent: BodyMatrix,
     residual: Vec<Pose>,
     step: Vec<Pose>,
@@ -127,6 +133,7 @@ impl Equilibrium {
         let zeros = vec![Pose::zeros(); system.bodies()];
         Self {
             options,
+            sticking: Sticking::new(system),
             tangent: BodyMatrix::new(&system.model.pattern),
             residual: zeros.clone(),
             step: zeros.clone(),
@@ -147,9 +154,10 @@ impl Equilibrium {
         &self.held
     }
 
-    /// The factored tangent of the last equilibrium.
-    pub fn factor(&self) -> &BodyMatrix {
-        &self.tangent
+    /// `f` becomes the change of the last equilibrium with a force −`f` (r = −f).
+    pub fn solve(&self, system: &System, f: &mut [Pose]) {
+        self.tangent.solve(&system.model.pattern, f);
+        self.sticking.correct(&system.model, &self.tangent, f);
     }
 
     /// Follows the path from the equilibrium `q` at s = 0 (or near it) to s = 1; `q` becomes the equilibrium there.
@@ -159,14 +167,19 @@ impl Equilibrium {
     pub fn follow(&mut self, system: &System, path: &dyn LoadPath, q: &mut [Pose]) -> Result<Path, SolveError> {
         let mut done = Path::default();
         let mut s = 0.0;
-        let mut ds = 1.0;
+        let longest = if self.sticking.is_empty() { 1.0 } else { STICKING_STEPS[0] };
+        let mut ds = longest;
         let mut free_at_first = None;
         self.free_from_start = false;
         while s < 1.0 {
             let station = path.station(s);
             let step = f64::min(ds, station - s);
             let to = if station - s - step < 1e-12 { station } else { s + step };
+            self.sticking.begin(system, q);
             self.predict(system, path, s, to - s, q)?;
+            while !self.sticking.is_empty() && self.sticking.turns_back(system, q, &self.step) {
+                self.predict(system, path, s, to - s, q)?;
+            }
             // held where the step begins; what a wild trial holds says nothing
             let free = self.held.first().copied();
             let from_the_first = *free_at_first.get_or_insert(free.is_some());
@@ -176,10 +189,14 @@ impl Equilibrium {
                 false => (self.options.smallest_step * to).max(MIN_STEP),
             };
             match self.correct(system, path, to, q, &mut done) {
+                Corrected::Stable if step > STICKING_STEPS[1] && self.sticking.closes(system, &self.trial) => {
+                    ds = 0.5 * step;
+                }
                 Corrected::Stable => {
                     q.copy_from_slice(&self.trial);
+                    self.sticking.accept(system, q);
                     s = to;
-                    ds = 2.0 * step;
+                    ds = longest.min(2.0 * step);
                 }
                 Corrected::Leaps if step > smallest => ds = 0.5 * step,
                 Corrected::No if free.is_some() && !from_the_first => {
@@ -197,6 +214,8 @@ impl Equilibrium {
                         return Ok(done);
                     }
                     (s, ds) = self.pass(system, path, (s, to), q, &mut done)?;
+                    ds = ds.min(longest);
+                    self.sticking.release(system, q);
                 }
             }
         }
@@ -210,6 +229,9 @@ impl Equilibrium {
         path.at(s, &mut self.drive);
         path.slope(s, &mut self.slope);
         system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
+        if !self.sticking.is_empty() {
+            self.sticking.add(system, q, true, &mut self.tangent, &mut self.residual);
+        }
         system.model.project_matrix(&mut self.tangent);
         (system.model.factor_holding(&mut self.tangent, &mut self.held))
             .map_err(|p| SolveError::singular(system, p))?;
@@ -218,6 +240,7 @@ impl Equilibrium {
             *step = *step * -ds - r;
         }
         self.tangent.solve(&system.model.pattern, &mut self.step);
+        self.sticking.correct(&system.model, &self.tangent, &mut self.step);
         for ((trial, q), step) in self.trial.iter_mut().zip(q).zip(&self.step) {
             *trial = q + step;
         }
@@ -234,6 +257,9 @@ impl Equilibrium {
             bimorph_base::budget::check();
             done.iterations += 1;
             system.tangent(&self.trial, &self.drive, &mut self.tangent, &mut self.residual);
+            if !self.sticking.is_empty() {
+                self.sticking.add(system, &self.trial, false, &mut self.tangent, &mut self.residual);
+            }
             system.model.project_matrix(&mut self.tangent);
             let Ok(inertia) = system.model.factor_holding(&mut self.tangent, &mut self.held) else {
                 return Corrected::No;
@@ -241,6 +267,7 @@ impl Equilibrium {
             let unbalanced = self.residual.iter().map(|r| r.xy().norm_squared()).fold(0.0, f64::max).sqrt();
             std::mem::swap(&mut self.step, &mut self.residual);
             self.tangent.solve(&system.model.pattern, &mut self.step);
+            self.sticking.correct(&system.model, &self.tangent, &mut self.step);
             let correction = size(system, &self.step);
             if corrections.diverge(correction) {
                 return Corrected::No;

@@ -404,4 +404,7 @@ pub struct Friction {
     pub coefficient: f64,
     /// Speed below which surfaces stick (m/s).
     pub slip_speed: f64,
+    /// Stiffness along the surface while they stick, which gives friction to parts at rest (N/m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stick_stiffness: Option<f64>,
 }

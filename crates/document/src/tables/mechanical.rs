@@ -203,6 +203,7 @@ record! {
     Friction: "Coulomb's friction, regularised." {
         coefficient: "1", Positive, "Coefficient of friction";
         slip_speed: "m/s", Positive, "Speed below which surfaces stick";
+        stick_stiffness: "N/m", Positive, "Stiffness along the surface while they stick, which gives friction to parts at rest; left out: those have none";
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "m" => "mass [kg]",
         "Ip" => "polar second moment of area [m⁴]",
         "J" => "moment of inertia [kg·m²]",
-        "k" | "kx" | "ky" => "stiffness [N/m]",
+        "k" | "kx" | "ky" | "stickstiffness" => "stiffness [N/m]",
         "kx2" | "ky2" => "quadratic stiffness [N/m²]",
         "kx3" | "ky3" => "cubic stiffness [N/m³]",
         "krz2" | "krz3" => "quadratic or cubic rotational stiffness [N·m/rad², N·m/rad³]",

@@ -27,7 +27,12 @@ pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let range = site.positive_if_any("adhesionrange")?.unwrap_or(ADHESION_RANGE);
     let adhesion = site.positive_if_any("adhesion")?.map(|force| Adhesion { force, range });
     let slip_speed = site.positive_if_any("slipspeed")?.unwrap_or(SLIP_SPEED);
-    let friction = site.positive_if_any("friction")?.map(|coefficient| Friction { coefficient, slip_speed });
+    let stick_stiffness = site.positive_if_any("stickstiffness")?;
+    let coefficient = site.positive_if_any("friction")?;
+    if coefficient.is_none() && stick_stiffness.is_some() {
+        return Err(site.missing("friction"));
+    }
+    let friction = coefficient.map(|coefficient| Friction { coefficient, slip_speed, stick_stiffness });
     if let Some(way) = ways.into_iter().flatten().find(|way| *way <= range && adhesion.is_some()) {
         return Err(site.out_of_range("adhesionrange", range, &format!("below the travel of {way:e} m")));
     }

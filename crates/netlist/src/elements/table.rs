@@ -193,6 +193,7 @@ const STOP: &[&str] = &[
     "adhesionrange",
     "friction",
     "slipspeed",
+    "stickstiffness",
 ];
 const LOAD: &[&str] = &["F", "M"];
 

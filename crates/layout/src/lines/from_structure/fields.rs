@@ -145,6 +145,8 @@ impl OfStructure<'_> {
             let adhesion = stop.adhesion.map(|a| [("adhesion", a.force), ("adhesionrange", a.range)]);
             let friction = stop.friction.map(|f| [("friction", f.coefficient), ("slipspeed", f.slip_speed)]);
             parameters.extend([adhesion, friction].into_iter().flatten().flatten());
+            let sticks = stop.friction.and_then(|f| f.stick_stiffness);
+            parameters.extend(sticks.map(|k| ("stickstiffness", k)));
             let nodes: Vec<NodeId> = [Some(stop.a), stop.b].into_iter().flatten().collect();
             self.push(&stop.name, "stop2d", "*", &nodes, &parameters);
         }
