@@ -18,6 +18,7 @@ use bimorph_solve::baseline::SolverKind;
 use bimorph_solve::equations::Bodies;
 use bimorph_solve::path::{LoadPath, SourcePath};
 use bimorph_solve::reduced::check::FullCheck;
+use bimorph_solve::reduced::polynomial::moving::{FittedMotion, of_motion};
 use bimorph_solve::reduced::space::spanned;
 use bimorph_solve::reduced::statics::ReducedStatics;
 use bimorph_solve::reduced::taylor::DriveRay;
@@ -144,18 +145,25 @@ pub fn reduced_transient(
     } else if options.shock.is_some() {
         Err("a shock is none of the inputs that it is trained for".to_owned())
     } else {
-        trained(&cases(compiled, options)?, tol, MOMENTS)
+        let cases = cases(compiled, options)?;
+        let largest = cases.first().map(|(_, inputs)| inputs.drive(&vec![1.0; inputs.inputs.len()]));
+        trained(&cases, tol, MOMENTS).map(|training| (training, largest))
     };
-    let training = match found {
-        Ok(training) => training,
+    let (training, largest) = match found {
+        Ok(found) => found,
         Err(why) => {
             let mut result = full(sample, watch)?;
             result.warnings.push(coded(taken(&why)));
             return Ok(result);
         }
     };
-    let space = Arc::new(training.space.of_system(&compiled.parts.system));
-    let mut carrier = ReducedPropagator { compiled, options, space: &space, error: None, excess: 0.0 };
+    let system = &compiled.parts.system;
+    let fitted = largest.and_then(|drive| of_motion(&training, system, &drive, tol));
+    let space = Arc::new(match &fitted {
+        Some(fitted) => fitted.space.clone(),
+        None => training.space.of_system(system),
+    });
+    let mut carrier = ReducedPropagator { compiled, options, space: &space, fitted, error: None, excess: 0.0 };
     let mut result = record(compiled, options, &mut carrier, sample, watch)?;
     let ReducedPropagator { error, excess, .. } = carrier;
     result.unknowns = space.size();
@@ -219,6 +227,8 @@ struct ReducedPropagator<'a> {
     compiled: &'a CompiledModel,
     options: &'a TransientOptions<'a>,
     space: &'a Arc<ReducedSpace>,
+    /// Forces as polynomials, where these are within their part of the tolerance.
+    fitted: Option<FittedMotion>,
     /// Estimated error by the reduction (1).
     error: Option<f64>,
     excess: f64,
@@ -249,7 +259,11 @@ impl Propagator for ReducedPropagator<'_> {
         let system = &self.compiled.parts.system;
         let h = first_step(system, self.options.stop);
         let run = IntegrationRun { motion, h, control: self.options.control(), observe };
-        let method = ReducedRodas4::new(Arc::clone(self.space), h).with_estimate(system);
+        let mut method = ReducedRodas4::new(Arc::clone(self.space), h).with_estimate(system);
+        if let Some(fitted) = self.fitted.take() {
+            let share = self.compiled.options.errors().reduced_statics();
+            method = method.with_polynomials(fitted.polynomials, share, fitted.largest);
+        }
         let (end, stepper) = run.stepped(&mut Bodies::new(system, ramp), method);
         (self.error, self.excess) = (stepper.method.error(), stepper.method.excess);
         Ok((end?, stepper.work()))

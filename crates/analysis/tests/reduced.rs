@@ -4,9 +4,17 @@ use bimorph_analysis::mesh::{modes_fitted, static_fitted};
 use bimorph_analysis::statics::{NodeMotion, StaticResult};
 use bimorph_analysis::step_error::with_step_error;
 use bimorph_analysis::transient::{TransientOptions, TransientResult, transient};
-use bimorph_base::Setting;
+use bimorph_base::{ErrorBudget, Setting};
+use bimorph_domains::Drive;
 use bimorph_model::compile::{CompileOptions, CompiledModel, Formulation, Junctions, draw};
 use bimorph_netlist::{NetlistSource, read_bundle};
+use bimorph_solve::reduced::polynomial::motion::PolynomialForces;
+use bimorph_solve::reduced::polynomial::moving::of_motion;
+use bimorph_solve::reduced::space::spanned;
+use bimorph_solve::reduced::statics::ReducedStatics;
+use bimorph_solve::reduced::taylor::DriveRay;
+use bimorph_solve::reduced::{InputBox, TrainingCase, TrainingOptions, train};
+use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 
 /// A model of the examples on a given mesh, beams that meet in points.
@@ -136,6 +144,93 @@ fn motion_is_that_of_the_full_model() {
         assert_eq!(reduced.warnings, full.warnings, "{name}");
         assert!(error <= tol, "{name}: {error:e}");
         assert!(5 * reduced.unknowns <= full.unknowns);
+    }
+}
+
+/// Stages of polynomials of the quarter stage, the heated bank and the switch have the tangent, the damping and the mass of their forces, by central
+/// differences to 1e-5 of the largest entry. The forces follow a change of the drive to 1e-5. At an equilibrium of the reduced model they
+/// move it by less than the tolerance.
+#[test]
+fn polynomials_have_the_tangent_of_their_forces() {
+    type Case<'a> = (&'a str, &'a [(&'a str, f64)], f64);
+    let cases: [Case<'_>; 3] = [
+        ("quarter_stage/quarter_stage.net", &[("F", 20e-6), ("angle", 0.9)], 0.0),
+        ("bank/bank.net", &[], 1.5),
+        ("switch/switch.net", &[], 12.0),
+    ];
+    for (name, set, volts) in cases {
+        let compiled = example(name, set, Formulation::Reduced, 1e-2);
+        let system = &compiled.parts.system;
+        let electrics = &system.electrics;
+        let mut sources = vec![0.0; electrics.sources()];
+        sources.iter_mut().take(1).for_each(|source| *source = volts);
+        let mut drive = electrics.drive();
+        electrics.steady(&sources, &mut vec![0.0; electrics.heating.states()], &mut drive);
+        let inputs = InputBox::around(system, std::slice::from_ref(&drive), [-1.0, 1.0]);
+        let joints = spanned(system).unwrap();
+        let training = train(
+            &joints,
+            &[TrainingCase { system, inputs }],
+            TrainingOptions { errors: ErrorBudget::of(1e-2), moments: 2 },
+        )
+        .unwrap();
+        let fitted = of_motion(&training, system, &drive, 1e-2).unwrap();
+        let (of, space) = (&fitted.polynomials, &fitted.space);
+        let m = space.size();
+        let mut forces = PolynomialForces::new(of);
+        let mut statics = ReducedStatics::new(space);
+        let mut z = vec![0.0; m];
+        let none = Drive { load: 0.0, ..electrics.drive() };
+        assert!(statics.follow(space, &DriveRay { none: &none, to: &drive }, &mut z).reached == 1.0);
+        let zero = vec![0.0; m];
+        let mut at = |z: &[f64], v: &[f64], w: &[f64], drive: &Drive| {
+            let mut force = vec![0.0; m];
+            forces.residual(of, [z, v, w], drive, &mut force);
+            DVector::from_vec(force)
+        };
+        let size = z.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let mut found = [0, 1, 2].map(|_| DMatrix::zeros(m, m));
+        for k in 0..m {
+            let moved = |h: f64| {
+                let mut x = zero.clone();
+                x[k] = h;
+                x
+            };
+            let about = |h: f64| z.iter().zip(moved(h)).map(|(z, x)| z + x).collect::<Vec<f64>>();
+            let (h, rate, push) = (1e-5 * size, 1e4 * size, 1e10 * size);
+            let with_z = (at(&about(h), &zero, &zero, &drive) - at(&about(-h), &zero, &zero, &drive)) / (2.0 * h);
+            let with_v = (at(&z, &moved(rate), &zero, &drive) - at(&z, &moved(-rate), &zero, &drive)) / (2.0 * rate);
+            let with_w = (at(&z, &zero, &moved(push), &drive) - at(&z, &zero, &moved(-push), &drive)) / (2.0 * push);
+            found.iter_mut().zip([with_w, with_v, with_z]).for_each(|(to, column)| to.set_column(k, &column));
+        }
+        // a thousandth of all that drives it
+        let mut faster = drive.clone();
+        faster.volts.iter_mut().for_each(|v| *v *= 1e-3);
+        faster.expansion.iter_mut().for_each(|x| *x *= 1e-3);
+        faster.inputs.iter_mut().for_each(|x| *x *= 1e-3);
+        faster.load = 0.0;
+        let changed = |sign: f64| {
+            let mut to = drive.clone();
+            to.volts.iter_mut().zip(&faster.volts).for_each(|(v, rate)| *v += sign * rate);
+            to.expansion.iter_mut().zip(&faster.expansion).for_each(|(x, rate)| *x += sign * rate);
+            to.inputs.iter_mut().zip(&faster.inputs).for_each(|(x, rate)| *x += sign * rate);
+            to
+        };
+        let change = (at(&z, &zero, &zero, &changed(1.0)) - at(&z, &zero, &zero, &changed(-1.0))) / 2.0;
+        let force = at(&z, &zero, &zero, &drive);
+        let mut known = [0, 1, 2].map(|_| DMatrix::zeros(m, m));
+        let [mass, damping, stiffness] = &mut known;
+        forces.matrices(of, mass, damping, stiffness);
+        let mut forcing = vec![0.0; m];
+        forces.forcing(of, &drive, &faster, &mut forcing);
+        for (found, known) in found.iter().zip(&known) {
+            let off = (found - known).amax() / known.amax().max(f64::MIN_POSITIVE);
+            assert!(off < 1e-5 || known.amax() == 0.0, "{name}: {off:e}");
+        }
+        let off = (DVector::from_vec(forcing) - &change).amax();
+        assert!(off <= 1e-5 * change.amax(), "{name}: {off:e} of {:e}", change.amax());
+        let moved = known[2].clone().lu().solve(&force).unwrap();
+        assert!(moved.norm() <= 1e-2 * DVector::from_vec(z).norm(), "{name}");
     }
 }
 

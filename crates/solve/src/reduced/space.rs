@@ -89,6 +89,20 @@ impl ReducedSpace {
         Self { joints: Arc::new(Joints::new(system, self.joints.tree.clone())), ..self.clone() }
     }
 
+    /// The same space with directions turned: z = R·z′ with R orthogonal.
+    #[must_use]
+    pub fn turned(&self, rotation: &DMatrix<f64>) -> Self {
+        let m = self.size();
+        let sum = |k: usize| {
+            let mut x = vec![Pose::zeros(); self.joints.tree.links.len()];
+            self.strains(rotation.column(k).as_slice(), &mut x);
+            x
+        };
+        let reach = |k: usize| (0..m).map(|i| rotation[(i, k)].abs() * self.reach[i]).sum();
+        let (directions, reach) = ((0..m).map(sum).collect(), (0..m).map(reach).collect());
+        Self::new(Arc::clone(&self.joints), directions, reach, self.amplitude)
+    }
+
     /// Number of directions m.
     pub fn size(&self) -> usize {
         self.directions.len()

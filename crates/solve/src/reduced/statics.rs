@@ -128,7 +128,7 @@ fn norm(z: &[f64]) -> f64 {
 }
 
 /// A⁻¹·b of a symmetric matrix by its L·D·Lᵀ, and the number of negative pivots; none at a vanished pivot.
-pub(super) fn solve(a: &DMatrix<f64>, b: &DVector<f64>) -> Option<(DVector<f64>, usize)> {
+pub(crate) fn solve(a: &DMatrix<f64>, b: &DVector<f64>) -> Option<(DVector<f64>, usize)> {
     let m = b.len();
     let (mut l, mut d, mut negative) = (DMatrix::<f64>::identity(m, m), vec![0.0; m], 0);
     for j in 0..m {

@@ -68,6 +68,8 @@ pub struct Training {
     pub added: usize,
     /// Independent inputs.
     pub inputs: usize,
+    /// z of stable equilibria in the box, by the last check.
+    pub equilibria: Vec<Vec<f64>>,
 }
 
 /// The directions of a mechanism on its tree for the boxes of its cases.
@@ -107,7 +109,8 @@ pub fn train(
         let more = trainer.basis.len() - before;
         space = trainer.space(&samples, &states);
         if more == 0 {
-            return Ok(Training { space, error, added, inputs: count });
+            let equilibria = states.iter().map(|s| trainer.coordinates(s)).collect();
+            return Ok(Training { space, error, added, inputs: count, equilibria });
         }
         (added, rounds) = (added + more, rounds + 1);
         trainer.affordable()?;
@@ -220,20 +223,21 @@ impl Trainer<'_> {
     fn space(&self, samples: &[Vec<Pose>], states: &[Vec<Pose>]) -> ReducedSpace {
         let (mut reach, mut amplitude) = (vec![0.0f64; self.basis.len()], 0.0f64);
         for s in samples.iter().chain(states) {
-            let s = self.product.of(s.clone());
-            let mut squares = 0.0;
-            for (reach, b) in reach.iter_mut().zip(&self.basis) {
-                let z = self.product.product(b, &s);
-                *reach = reach.max(z.abs());
-                squares += z * z;
-            }
-            amplitude = amplitude.max(squares.sqrt());
+            let z = self.coordinates(s);
+            reach.iter_mut().zip(&z).for_each(|(reach, z)| *reach = reach.max(z.abs()));
+            amplitude = amplitude.max(z.iter().map(|z| z * z).sum::<f64>().sqrt());
         }
         let largest = reach.iter().fold(0.0f64, |a, b| a.max(*b));
         // a moment that no equilibrium has moves as far as the smallest that counts
         reach.iter_mut().for_each(|reach| *reach = reach.max(self.options.errors.within(largest)));
         let directions = self.basis.iter().map(|b| b.x.clone()).collect();
         ReducedSpace::new(Arc::clone(self.joints), directions, reach, amplitude)
+    }
+
+    /// z of a state over the coordinates of the tree.
+    fn coordinates(&self, s: &[Pose]) -> Vec<f64> {
+        let s = self.product.of(s.to_vec());
+        self.basis.iter().map(|b| self.product.product(b, &s)).collect()
     }
 
     /// Step 4: the largest error in the boxes, the equilibria that are lacking at the worst point, and all reduced states.

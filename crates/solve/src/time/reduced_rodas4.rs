@@ -22,6 +22,8 @@ use super::stage_loss::StageLoss;
 use crate::equations::{Bodies, Joints};
 use crate::reduced::check::FullCheck;
 use crate::reduced::energy::{EnergyProduct, EnergyVector};
+use crate::reduced::polynomial::motion::{PolynomialForces, PolynomialMotion};
+use crate::reduced::statics::solve;
 use crate::reduced::{ReducedForces, ReducedSpace};
 use bimorph_domains::system::ApartMembers;
 use bimorph_domains::{Drive, Ramp, System};
@@ -49,7 +51,19 @@ struct ReductionEstimate {
     squares: f64,
     count: u64,
     largest: f64,
-    steps: u64,
+}
+
+/// The forces as polynomials, which replace the exact kinematics of stages while their error is within a part of the tolerance.
+#[derive(Debug, Clone)]
+struct PolynomialStages {
+    of: PolynomialMotion,
+    forces: PolynomialForces,
+    /// Motion of the bodies per unit of each direction at rest: near enough for the size of an error.
+    moved: Vec<Vec<Pose>>,
+    /// Largest error of z over the largest z, both in the mass norm (1).
+    share: f64,
+    /// The largest z in that norm, of equilibria of the training or so far.
+    largest: f64,
 }
 
 /// Coordinates, rates and accelerations.
@@ -81,6 +95,7 @@ impl ReducedMotion {
 pub struct ReducedRodas4 {
     space: Arc<ReducedSpace>,
     forces: ReducedForces,
+    polynomials: Option<Box<PolynomialStages>>,
     now: ReducedMotion,
     at: ReducedMotion,
     /// Increments of z, v and w in each stage.
@@ -107,6 +122,8 @@ pub struct ReducedRodas4 {
     drive: Drive,
     rate: Drive,
     shortest: f64,
+    /// Accepted steps.
+    taken: u64,
     estimate: Option<Box<ReductionEstimate>>,
     /// Largest excess over the trained states so far, see [`ReducedSpace::excess`].
     pub excess: f64,
@@ -122,6 +139,8 @@ impl ReducedRodas4 {
         let packed = m.div_ceil(3);
         Self {
             forces: ReducedForces::new(&space),
+            polynomials: None,
+            taken: 0,
             now: ReducedMotion::zeros(m),
             at: ReducedMotion::zeros(m),
             increments: vec![ReducedMotion::zeros(m); ALPHA.len()],
@@ -155,9 +174,31 @@ impl ReducedRodas4 {
     #[must_use]
     pub fn with_estimate(mut self, system: &System) -> Self {
         let (check, taken) = (FullCheck::new(system), vec![Pose::zeros(); system.bodies()]);
-        let estimate = ReductionEstimate { check, taken, squares: 0.0, count: 0, largest: 0.0, steps: 0 };
+        let estimate = ReductionEstimate { check, taken, squares: 0.0, count: 0, largest: 0.0 };
         self.estimate = Some(Box::new(estimate));
         self
+    }
+
+    /// The same with stages of polynomials whose directions are those of the space. Every some steps they are compared with the exact kinematics, which
+    /// take over where the error of the coordinates exceeds `share` of the largest, in the mass norm; that begins with `largest` (√(N·m)·s).
+    #[must_use]
+    pub fn with_polynomials(mut self, of: PolynomialMotion, share: f64, largest: f64) -> Self {
+        let Self { space, forces, .. } = &mut self;
+        forces.place_at_rest(space, &vec![0.0; space.size()]);
+        let moved = |x: &Vec<Pose>| {
+            let mut to = vec![Pose::zeros(); x.len()];
+            forces.placed.spread(&space.joints.tree, x, &mut to);
+            to
+        };
+        let moved = space.directions.iter().map(moved).collect();
+        let forces = PolynomialForces::new(&of);
+        self.polynomials = Some(Box::new(PolynomialStages { of, forces, moved, share, largest }));
+        self
+    }
+
+    /// Whether stages are those of polynomials.
+    pub fn has_polynomials(&self) -> bool {
+        self.polynomials.is_some()
     }
 
     /// Estimated root mean square error of the motion by the reduction in the mass norm, of its largest displacement (1); none without an
@@ -174,6 +215,16 @@ impl ReducedRodas4 {
 
     /// Forces R at `at`; the first stage also begins K.
     fn residual(&mut self, first: bool) {
+        let Self { polynomials, at, force, drive, .. } = self;
+        match polynomials {
+            Some(stages) => stages.forces.residual(&stages.of, [&at.z, &at.v, &at.w], drive, force),
+            None => self.exact_residual(first),
+        }
+        self.work.forces += 1;
+    }
+
+    /// The same by exact kinematics.
+    fn exact_residual(&mut self, first: bool) {
         let Self { space, forces, at, loss, force, drive, .. } = self;
         forces.place(space, [&at.z, &at.v, &at.w]);
         forces.set_motion_forces(space);
@@ -188,11 +239,10 @@ impl ReducedRodas4 {
             forces.add_forces(space, drive);
         }
         forces.gather(space, drive, force);
-        self.work.forces += 1;
     }
 
-    /// M, C and W at the place of the first stage.
-    fn factor(&mut self, gh: f64) -> StepResult {
+    /// M, C and K at the place of the first stage, by exact kinematics.
+    fn exact_matrices(&mut self) {
         let Self { space, forces, loss, drag, .. } = self;
         let model = &space.joints.closures.model;
         forces.stiffness(space, &mut self.stiffness);
@@ -216,6 +266,15 @@ impl ReducedRodas4 {
                 add(&|product, moved| product.multiply(&model.pattern, drag, moved), &mut self.stiffness);
             }
         }
+    }
+
+    /// M, C and W at the place of the first stage.
+    fn factor(&mut self, gh: f64) -> StepResult {
+        let Self { polynomials, mass, damping, stiffness, .. } = self;
+        match polynomials {
+            Some(stages) => stages.forces.matrices(&stages.of, mass, damping, stiffness),
+            None => self.exact_matrices(),
+        }
         let m = self.mass.nrows();
         let mut w = self.factor.take().map_or_else(|| DMatrix::zeros(m, m), Cholesky::unpack_dirty);
         w.copy_from(&self.mass);
@@ -234,6 +293,9 @@ impl ReducedRodas4 {
 
     /// ∂R/∂t over z, after [`ReducedRodas4::factor`].
     fn fill_forcing(&mut self) {
+        if let Some(stages) = &mut self.polynomials {
+            return stages.forces.forcing(&stages.of, &self.drive, &self.rate, &mut self.forcing);
+        }
         let Self { space, forces, forcing, drive, rate, room, gathered, .. } = self;
         let Joints { closures, tree, .. } = &*space.joints;
         closures.drive_force(&forces.placed.at, drive, rate, room);
@@ -263,16 +325,16 @@ impl ReducedRodas4 {
             }
         }
         product.iter_mut().zip(r1.iter()).zip(r2.iter()).for_each(|((x, r1), r2)| *x = r1 / gh + r2);
-        right.gemv(1.0, &*mass, &*product, 0.0);
+        right.fill(0.0);
+        add_product(mass, product.as_slice(), right.as_mut_slice());
         if self.damped {
-            product.gemv(1.0, &*damping, &*r1, 0.0);
-            *right += &*product;
+            add_product(damping, r1.as_slice(), right.as_mut_slice());
         }
         for (right, (force, forcing)) in right.iter_mut().zip(force.iter().zip(&*forcing)) {
             *right -= force + shift * forcing;
         }
         if let Some(factor) = &self.factor {
-            factor.solve_mut(right);
+            solve_factored(factor.l_dirty(), right.as_mut_slice());
         }
         self.work.solves += 1;
         let u = &mut after[0];
@@ -281,6 +343,45 @@ impl ReducedRodas4 {
             u.v[k] = u.z[k] / gh - r1;
             u.w[k] = u.v[k] / gh - r2;
         }
+    }
+
+    /// Accelerations that the forces at z and its rate bring.
+    fn make_consistent(&mut self) -> StepResult {
+        self.now.w.fill(0.0);
+        self.at.copy(&self.now);
+        self.residual(true);
+        let gh = CONSISTENT * self.shortest;
+        self.factor(gh)?;
+        self.right.iter_mut().zip(&self.force).for_each(|(right, force)| *right = -force);
+        if let Some(factor) = &self.factor {
+            factor.solve_mut(&mut self.right);
+        }
+        self.now.w.iter_mut().zip(self.right.iter()).for_each(|(w, x)| *w = x / (gh * gh));
+        self.work.solves += 1;
+        self.keep();
+        Ok(())
+    }
+
+    /// Compares the polynomials with the exact kinematics at the motion now, and leaves them where their error is too large.
+    fn check_polynomials(&mut self) {
+        let Some(mut stages) = self.polynomials.take() else { return };
+        self.at.copy(&self.now);
+        self.exact_residual(false);
+        let Self { now, drive, force, forcing, right, mass, stiffness, .. } = self;
+        stages.forces.residual(&stages.of, [&now.z, &now.v, &now.w], drive, forcing);
+        right.iter_mut().zip(force.iter().zip(&*forcing)).for_each(|(r, (exact, found))| *r = exact - found);
+        let norm = |x: &DVector<f64>| x.dot(&(&*mass * x)).max(0.0).sqrt();
+        stages.largest = stages.largest.max(norm(&DVector::from_column_slice(&now.z)));
+        let error = solve(stiffness, right).map_or(f64::INFINITY, |(off, _)| norm(&off));
+        if error <= stages.share * stages.largest {
+            self.polynomials = Some(stages);
+            return;
+        }
+        if self.make_consistent().is_err() {
+            self.put_back(); // the next step fails, and says why
+        }
+        let Self { space, forces, now, .. } = self;
+        forces.place(space, [&now.z, &now.v, &now.w]);
     }
 
     fn keep(&mut self) {
@@ -297,6 +398,30 @@ impl ReducedRodas4 {
         for (to, from) in now.all().into_iter().zip([&position.q, &position.v, &push.q]) {
             to.iter_mut().enumerate().for_each(|(k, x)| *x = from[k / DOF][k % DOF]);
         }
+    }
+}
+
+/// `to += a·x`.
+#[inline]
+fn add_product(a: &DMatrix<f64>, x: &[f64], to: &mut [f64]) {
+    for (column, x) in a.as_slice().chunks_exact(to.len()).zip(x) {
+        to.iter_mut().zip(column).for_each(|(to, a)| *to += a * x);
+    }
+}
+
+/// `x` becomes (L·Lᵀ)⁻¹·x, with what is above the diagonal not read.
+#[inline]
+fn solve_factored(l: &DMatrix<f64>, x: &mut [f64]) {
+    let m = x.len();
+    let columns = || l.as_slice().chunks_exact(m).enumerate();
+    for (j, column) in columns() {
+        x[j] /= column[j];
+        let (done, rest) = x.split_at_mut(j + 1);
+        rest.iter_mut().zip(&column[j + 1..]).for_each(|(x, l)| *x -= l * done[j]);
+    }
+    for (j, column) in columns().rev() {
+        let known: f64 = x[j + 1..].iter().zip(&column[j + 1..]).map(|(x, l)| l * x).sum();
+        x[j] = (x[j] - known) / column[j];
     }
 }
 
@@ -362,7 +487,7 @@ impl RosenbrockStep for ReducedStep<'_> {
     }
 
     fn finish(&mut self) {
-        let ReducedRodas4 { space, forces, now, at, increments, room, .. } = &mut *self.rodas;
+        let ReducedRodas4 { space, forces, now, at, increments, room, polynomials, .. } = &mut *self.rodas;
         let last = &increments[ALPHA.len() - 1];
         for ((now, at), u) in now.all().into_iter().zip(at.all()).zip([&last.z, &last.v, &last.w]) {
             now.iter_mut().zip(at.iter()).zip(u).for_each(|((now, at), u)| *now = at + u);
@@ -371,8 +496,15 @@ impl RosenbrockStep for ReducedStep<'_> {
         self.motion.q.copy_from_slice(&forces.placed.at);
         self.motion.v.copy_from_slice(&forces.placed.rate);
         for (u, to) in [(&last.z, &mut self.error.q), (&last.v, &mut self.error.v)] {
-            space.strains(u, room);
-            forces.placed.spread(&space.joints.tree, room, to);
+            if let Some(stages) = polynomials {
+                to.fill(Pose::zeros());
+                for (moved, u) in stages.moved.iter().zip(u) {
+                    to.iter_mut().zip(moved).for_each(|(to, moved)| *to += moved * *u);
+                }
+            } else {
+                space.strains(u, room);
+                forces.placed.spread(&space.joints.tree, room, to);
+            }
         }
         self.rodas.keep();
     }
@@ -386,21 +518,9 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
     fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> StepResult {
         let [z, v] = projected(&self.space, motion);
         (self.now.z, self.now.v) = (z, v);
-        self.now.w.fill(0.0);
         bodies.ramp.at(0.0, &mut self.drive);
         self.drive.load = 1.0;
-        self.at.copy(&self.now);
-        self.residual(true);
-        let gh = CONSISTENT * self.shortest;
-        self.factor(gh)?;
-        self.right.iter_mut().zip(&self.force).for_each(|(right, force)| *right = -force);
-        if let Some(factor) = &self.factor {
-            factor.solve_mut(&mut self.right);
-        }
-        self.now.w.iter_mut().zip(self.right.iter()).for_each(|(w, x)| *w = x / (gh * gh));
-        self.work.solves += 1;
-        self.keep();
-        Ok(())
+        self.make_consistent()
     }
 
     fn step(&mut self, bodies: &mut Bodies<'_>, s: f64, h: f64, motion: &mut Motion, error: &mut Motion) -> StepResult {
@@ -410,12 +530,17 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
 
     fn accepted(&mut self, bodies: &mut Bodies<'_>, (t, h): (f64, f64), ends: [&Motion; 2], _: &[Motion]) {
         self.excess = self.excess.max(self.space.excess(&self.now.z));
+        self.taken += 1;
+        let (system, end, looks) = (bodies.system, ends[1], self.taken % EVERY == 1);
+        if looks {
+            bodies.ramp.at(t + h, &mut self.drive);
+            self.drive.load = 1.0;
+            self.check_polynomials();
+        }
         let Some(estimate) = &mut self.estimate else { return };
-        let (system, end) = (bodies.system, ends[1]);
         let norm = |x: &[Pose]| system.model.mass_product(x, x).sqrt();
         estimate.largest = estimate.largest.max(norm(&end.q));
-        estimate.steps += 1;
-        if estimate.steps % EVERY != 1 {
+        if !looks {
             return;
         }
         let ReductionEstimate { check, taken, .. } = &mut **estimate;
@@ -424,8 +549,6 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         }
         forces::add_damping(&system.model, &end.v, taken);
         system.add_loss(&end.q, |k| end.v[k], taken);
-        bodies.ramp.at(t + h, &mut self.drive);
-        self.drive.load = 1.0;
         check.of(system, &end.q, &self.drive, Some(taken));
         let error = norm(check.step());
         if error.is_finite() {

@@ -12,7 +12,6 @@ use super::super::inputs::low_discrepancy;
 use super::super::space::{ReducedForces, ReducedSpace, dot};
 use super::cubature::thinned;
 use super::monomials::{Monomials, Polynomials};
-use super::samples::FullEquilibrium;
 use super::shapes::{Probe, ShapeFunctions};
 use super::{Approaches, ClosureStrains, PolynomialModel};
 use bimorph_base::ErrorBudget;
@@ -57,15 +56,14 @@ pub(super) struct Fit<'a> {
 }
 
 impl<'a> Fit<'a> {
-    /// Of a space of this system and what is read.
+    /// Of a space of this system with equilibria, and what is read; where it `moves`, with its inertia.
     pub(super) fn new(
         space: &'a ReducedSpace,
         system: &'a System,
-        sampled: &[FullEquilibrium],
+        equilibria: Vec<Vec<f64>>,
         probes: &'a [&'a Probe<'a>],
+        moves: bool,
     ) -> Self {
-        let made = sampled.iter().filter(|equilibrium| equilibrium.makes);
-        let equilibria: Vec<Vec<f64>> = made.map(|equilibrium| equilibrium.z.clone()).collect();
         let m = space.size();
         let rest = matrices(space, &vec![0.0; m]);
         let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(rest.0.clone());
@@ -93,7 +91,7 @@ impl<'a> Fit<'a> {
         Self {
             space,
             system,
-            shapes: ShapeFunctions::new(&space.joints, system, probes),
+            shapes: ShapeFunctions::new(&space.joints, system, probes, moves),
             equilibria,
             damping: rotation.tr_mul(&(&rest.1 * &rotation)),
             mass: order.iter().map(|k| eigenvalues[*k].max(least)).collect(),
@@ -124,8 +122,10 @@ impl<'a> Fit<'a> {
             forces.place_at_rest(self.space, z.as_slice());
             values.row_mut(k).copy_from_slice(&self.shapes.values(&forces.placed.at));
         }
-        // closures in units of the energy
-        values.columns_mut(0, counts[0]).scale_mut(1.0 / scale);
+        // closures and inertia in units of the energy
+        for (first, count) in in_energy(counts) {
+            values.columns_mut(first, count).scale_mut(1.0 / scale);
+        }
         let of_monomials = |apart: bool| {
             let chosen: Vec<usize> = (0..states.len()).filter(|k| (k % APART == APART - 1) == apart).collect();
             let table = DMatrix::from_fn(chosen.len(), monomials.count(), |k, c| {
@@ -147,12 +147,16 @@ impl<'a> Fit<'a> {
         let fit_error = largest_error(&(&kept * &coefficients), &wanted);
         let root = (table.nrows() as f64).sqrt();
         let typical = table * &coefficients / root;
+        let apart = ErrorBudget::of(tol).reduced_statics(); // of displacements, whose squares have masses
+        let inertia = independent(&coefficients.columns(in_energy(counts)[1].0, counts[4]).into_owned(), apart * apart);
+        let mut inertia = Polynomials { monomials: Arc::clone(&monomials), coefficients: inertia };
         for (c, factors) in monomials.factors.iter().enumerate() {
             let size: f64 = factors.iter().map(|i| reach[*i]).product();
             coefficients.row_mut(c).scale_mut(1.0 / size);
+            inertia.coefficients.column_mut(c).scale_mut(1.0 / size);
         }
         let all = Polynomials { monomials: Arc::clone(&monomials), coefficients: coefficients.transpose() };
-        let [c, a, w, p] = counts;
+        let [c, a, w, p, _] = counts;
         let (errors, least) = (ErrorBudget::of(tol), ErrorBudget::of(tol).closures());
         let closed = principal(&typical.columns(0, c).into_owned(), |_| least);
         let near = principal(&typical.columns(c, a).into_owned(), |largest| errors.approaches(largest));
@@ -184,6 +188,7 @@ impl<'a> Fit<'a> {
             approaches,
             work: all.rows(c + a, w),
             probes: all.rows(c + a + w, p),
+            inertia,
             mass: self.mass.clone(),
             damping: self.damping.clone(),
             mass_change: self.mass_change,
@@ -193,7 +198,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Derivatives of all functions with x at rest, coordinates × functions: central differences of exact kinematics.
-    fn slopes(&self, scale: f64, counts: [usize; 4]) -> DMatrix<f64> {
+    fn slopes(&self, scale: f64, counts: [usize; 5]) -> DMatrix<f64> {
         let mut forces = ReducedForces::new(self.space);
         let mut at = |k: usize, step: f64| {
             let z = self.rotation.column(k) * (scale * step);
@@ -206,7 +211,9 @@ impl<'a> Fit<'a> {
             let change = (at(k, STEP) - at(k, -STEP)) / (2.0 * STEP);
             slopes.row_mut(k).copy_from(&change.transpose());
         }
-        slopes.columns_mut(0, counts[0]).scale_mut(1.0 / scale);
+        for (first, count) in in_energy(counts) {
+            slopes.columns_mut(first, count).scale_mut(1.0 / scale);
+        }
         slopes
     }
 
@@ -247,6 +254,30 @@ impl<'a> Fit<'a> {
         let stiffness = turn(&(self.space.tree_energy() * &self.rotation));
         (stiffness, turn(&thermal) / scale, self.rotation.tr_mul(&built_in) / scale)
     }
+}
+
+/// First row and number of the rows of closures and of inertia.
+fn in_energy(counts: [usize; 5]) -> [(usize, usize); 2] {
+    [(0, counts[0]), (counts[..4].iter().sum(), counts[4])]
+}
+
+/// Few rows with the products RᵀR of all rows, given as columns, but for `least` of their trace: a Cholesky factorization with diagonal pivots.
+fn independent(columns: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
+    let n = columns.nrows();
+    let mut left = columns * columns.transpose();
+    let bound = least * left.trace();
+    let mut rows: Vec<DVector<f64>> = Vec::new();
+    while rows.len() < n && left.diagonal().sum() > bound {
+        let pivot = left.diagonal().imax();
+        if left[(pivot, pivot)] <= 0.0 {
+            break;
+        }
+        let row = left.column(pivot) / left[(pivot, pivot)].sqrt();
+        left -= &row * row.transpose();
+        rows.push(row);
+    }
+    let rows: Vec<_> = rows.iter().map(DVector::transpose).collect();
+    if rows.is_empty() { DMatrix::zeros(0, n) } else { DMatrix::from_rows(&rows) }
 }
 
 /// Masses and damping over z at a state (s², s).

@@ -10,16 +10,24 @@
 //!
 //! | file | what it holds |
 //! |---|---|
+//! | `chain` | values and derivatives of monomials, one factor at a time |
 //! | `cubature` | fewer points of gaps |
 //! | [`monomials`] | monomials and sums of them |
+//! | [`motion`] | the polynomials in the stages of an integrator |
+//! | `moving` | the polynomials for a motion, with their error against exact kinematics |
+//! | `rows` | many polynomials of common monomials in vector instructions |
 //! | `samples` | equilibria of the full model |
 //! | [`shapes`] | the functions of a configuration that become polynomials |
 //! | [`fit`] | least squares at states that the space was trained for, and compression |
 //! | [`statics`] | equilibria, and their error against the full model |
 
+mod chain;
 mod cubature;
 pub mod fit;
 pub mod monomials;
+pub mod motion;
+pub mod moving;
+mod rows;
 mod samples;
 pub mod shapes;
 pub mod statics;
@@ -77,6 +85,9 @@ pub struct PolynomialModel {
     pub work: Polynomials,
     /// Readings.
     pub probes: Polynomials,
+    /// Displacements times the roots of masses, in which twice the kinetic energy is the sum of the squares of their rates (√E·s); none where only
+    /// equilibria are wanted.
+    pub inertia: Polynomials,
     /// Diagonal of the mass matrix (s²).
     pub mass: Vec<f64>,
     /// Damping matrix of dampers and drag (s).

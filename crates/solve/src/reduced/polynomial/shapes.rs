@@ -35,7 +35,7 @@ struct ClosureRows<'a> {
     of_stress: Vec<Vector3<f64>>,
 }
 
-/// The functions of a system, in four blocks of rows.
+/// The functions of a system, in five blocks of rows.
 pub(super) struct ShapeFunctions<'a> {
     joints: &'a Joints,
     system: &'a System,
@@ -43,10 +43,13 @@ pub(super) struct ShapeFunctions<'a> {
     /// Members with points.
     pub(super) members: Vec<MemberPoints>,
     probes: &'a [&'a Probe<'a>],
+    /// Whether displacements of the bodies are among them.
+    moves: bool,
 }
 
 impl<'a> ShapeFunctions<'a> {
-    pub(super) fn new(joints: &'a Joints, system: &'a System, probes: &'a [&'a Probe<'a>]) -> Self {
+    /// Of a system and what is read; where it `moves`, with the displacements of its bodies.
+    pub(super) fn new(joints: &'a Joints, system: &'a System, probes: &'a [&'a Probe<'a>], moves: bool) -> Self {
         let model = &joints.closures.model;
         let rows = |joint: &'a PackedJoint| {
             let columns = [0, 1, 2].map(|i| model.section(joint).stiffness.column(i));
@@ -62,16 +65,17 @@ impl<'a> ShapeFunctions<'a> {
                 first += count;
             }
         }
-        Self { joints, system, closures: joints.tree.closures.iter().map(rows).collect(), members, probes }
+        Self { joints, system, closures: joints.tree.closures.iter().map(rows).collect(), members, probes, moves }
     }
 
-    /// Rows of the blocks: closures, approaches, works, probes.
-    pub(super) fn counts(&self) -> [usize; 4] {
+    /// Rows of the blocks: closures, approaches, works, probes, and displacements times the roots of masses.
+    pub(super) fn counts(&self) -> [usize; 5] {
         [
             self.closures.iter().map(|rows| rows.of_stress.len()).sum(),
             self.members.iter().map(|points| points.laws.len()).sum(),
             1 + self.system.electrics.inputs.len(),
             self.probes.len(),
+            if self.moves { 3 * self.system.bodies() } else { 0 },
         ]
     }
 
@@ -96,6 +100,11 @@ impl<'a> ShapeFunctions<'a> {
             });
         }
         out.extend(self.probes.iter().map(|probe| probe(q)));
+        if self.moves {
+            for (j, q) in q.iter().enumerate() {
+                out.extend(model.mass(j).iter().zip(q).map(|(mass, q)| mass.sqrt() * q));
+            }
+        }
         out
     }
 

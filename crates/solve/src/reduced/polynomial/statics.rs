@@ -60,7 +60,8 @@ pub fn fitted(
     let groups = groups(system, apart);
     let space = space.of_system(system);
     let sampled = equilibria(&space, system, inputs);
-    let fit = Fit::new(&space, system, &sampled, probes);
+    let made = sampled.iter().filter(|equilibrium| equilibrium.makes);
+    let fit = Fit::new(&space, system, made.map(|equilibrium| equilibrium.z.clone()).collect(), probes, false);
     let references: Vec<Reference<'_>> = (sampled.iter().filter(|equilibrium| equilibrium.tests))
         .map(|at| Reference {
             at,
@@ -89,7 +90,7 @@ pub fn fitted(
 }
 
 /// Members by their voltage, but for those that stay apart.
-fn groups(system: &System, apart: &[usize]) -> Vec<Vec<usize>> {
+pub(super) fn groups(system: &System, apart: &[usize]) -> Vec<Vec<usize>> {
     let rows = &system.electrics.gap_rows;
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for g in 0..system.members.len() {

@@ -1,0 +1,345 @@
+//! Polynomials in the stages of an integrator: forces over z with inertia, their tangent, mass and damping.
+//!
+//! With the monomials m_k of z, every function of a configuration is a row C·m. Strains of closures bring the stress e, approaches of gaps the
+//! forces of their laws, and mass-weighted displacements p of bodies the push p̈, so that
+//! ```text
+//! R = K_T·z + C_d·ż − t·T − t₀ + (∂m/∂z)ᵀ·b          b = C_eᵀ·(e − ρ·T − ρ₀) + C_pᵀ·p̈ + C_uᵀ·φ′(u) − C_Wᵀ·F
+//! ```
+//! The mass matrix is (∂p/∂z)ᵀ·(∂p/∂z) at each state, and forces quadratic in rates are in p̈. No body is placed.
+
+use super::chain::{MonomialChain, MonomialValues};
+use super::rows::{LaneColumns, PolynomialRows, add_gram};
+use super::shapes::MemberPoints;
+use super::{PolynomialModel, monomials::Polynomials};
+use bimorph_domains::capacitor::Capacitor;
+use bimorph_domains::{Domain, Drive, Law, PointLaw, System};
+use bimorph_multibody::batch::{LANES, Lane8};
+use nalgebra::DMatrix;
+
+/// A point of a gap that has its share in shapes.
+#[derive(Debug, Clone, Copy, Default)]
+struct PointState {
+    approach: f64,
+    /// Force of its law, its gas and its loss, and their derivatives with the approach and with its rate.
+    force: f64,
+    stiffness: f64,
+    damping: f64,
+}
+
+/// The polynomials of a space whose directions are turned as theirs are: z = A·x.
+#[derive(Debug, Clone)]
+pub struct PolynomialMotion {
+    chain: MonomialChain,
+    /// Φᵀ·K_T·Φ (1).
+    stiffness: DMatrix<f64>,
+    damping: DMatrix<f64>,
+    /// [K_T, C_d, −t, −t₀]: the linear forces of coordinates, rates, free strains and built-in strains.
+    linear: LaneColumns,
+    strains: PolynomialRows,
+    /// [−ρ, −ρ₀]: stresses of free strains and built-in strains.
+    rests: LaneColumns,
+    inertia: PolynomialRows,
+    shapes: PolynomialRows,
+    members: Vec<MemberPoints>,
+    /// Shapes × points.
+    mix: DMatrix<f64>,
+    /// Whether laws of points resist rates.
+    resists: bool,
+    works: PolynomialRows,
+    /// Whether there are loads.
+    loaded: bool,
+}
+
+/// Storage of an evaluation. Nothing is allocated after [`PolynomialForces::new`].
+#[derive(Debug, Clone)]
+pub struct PolynomialForces {
+    at: MonomialValues,
+    /// Coordinates, rates, free strains and the factor of built-in strains.
+    given: Vec<f64>,
+    force: Vec<f64>,
+    /// b, and the same with its gradient taken.
+    combined: Vec<f64>,
+    reversed: Vec<f64>,
+    stress: Vec<f64>,
+    push: Vec<f64>,
+    shape: Vec<f64>,
+    shape_rate: Vec<f64>,
+    work: Vec<f64>,
+    points: Vec<PointState>,
+    strain_slopes: Vec<Lane8>,
+    inertia_slopes: Vec<Lane8>,
+    shape_slopes: Vec<Lane8>,
+    /// Shapes × shapes: stiffness and damping of the points.
+    of_shapes: [DMatrix<f64>; 2],
+}
+
+/// Whether all that acts on a system has a law of points; of those that lose energy, contacts between plates alone.
+pub fn has_polynomials(system: &System) -> bool {
+    let between_plates = |law: &PointLaw| matches!(law.law, Some(Law::Field(Capacitor::Plates { .. }, Some(_))));
+    system.members.iter().all(|member| {
+        let laws = member.point_laws();
+        let acts = member.is_gas() || member.is_active(1.0);
+        !member.slides() && !(laws.is_empty() && acts) && laws.iter().all(|law| law.loss == 0.0 || between_plates(law))
+    })
+}
+
+impl PolynomialMotion {
+    /// Of a model with rows of inertia.
+    pub(super) fn new(model: &PolynomialModel) -> Self {
+        let a = model.scale;
+        let chain = MonomialChain::new(&model.monomials);
+        // coefficients over z: a monomial of x of the degree d is one of z over A^d
+        let rows = |of: &Polynomials, unit: f64| {
+            let mut c = of.coefficients.clone();
+            for (k, factors) in model.monomials.factors.iter().enumerate() {
+                let degree = i32::try_from(factors.len()).unwrap_or(i32::MAX);
+                c.column_mut(k).scale_mut(unit * a.powi(-degree));
+            }
+            PolynomialRows::new(&c, &chain)
+        };
+        let closures = &model.closures;
+        let laws = || model.approaches.members.iter().flat_map(|points| &points.laws);
+        let m = model.size();
+        let beside = |parts: &[DMatrix<f64>]| {
+            let columns: Vec<_> = parts.iter().flat_map(|part| part.column_iter().map(|c| c.into_owned())).collect();
+            DMatrix::from_columns(&columns)
+        };
+        let rest = |by_heat: &DMatrix<f64>, built_in: &nalgebra::DVector<f64>| {
+            [by_heat * -a, DMatrix::from_columns(&[built_in * -a])]
+        };
+        let [by_heat, built_in] = rest(&model.thermal, &model.built_in);
+        let strains = rows(&closures.strains, a);
+        Self {
+            linear: LaneColumns::new(
+                &beside(&[model.stiffness.clone(), model.damping.clone(), by_heat, built_in]),
+                m.div_ceil(LANES),
+            ),
+            stiffness: model.stiffness.clone(),
+            damping: model.damping.clone(),
+            rests: LaneColumns::new(&beside(&rest(&closures.thermal, &closures.built_in)), strains.groups()),
+            strains,
+            inertia: rows(&model.inertia, a),
+            shapes: rows(&model.approaches.shapes, 1.0),
+            members: model.approaches.members.clone(),
+            mix: model.approaches.mix.transpose(),
+            resists: laws().any(|law| law.film.is_some() || law.loss > 0.0),
+            works: rows(&model.work, 1.0),
+            loaded: model.work.coefficients.amax() > 0.0,
+            chain,
+        }
+    }
+}
+
+impl PolynomialForces {
+    /// Storage.
+    pub fn new(of: &PolynomialMotion) -> Self {
+        let heaters = of.rests.columns() - 1;
+        let (m, shapes) = (of.stiffness.nrows(), of.shapes.count);
+        let at = of.chain.storage();
+        let combined = vec![0.0; at.values.len()];
+        Self {
+            given: vec![0.0; 2 * m + heaters + 1],
+            force: vec![0.0; m.div_ceil(LANES) * LANES],
+            reversed: combined.clone(),
+            combined,
+            stress: of.strains.storage(),
+            push: of.inertia.storage(),
+            shape: of.shapes.storage(),
+            shape_rate: of.shapes.storage(),
+            work: of.works.storage(),
+            points: vec![PointState::default(); of.mix.ncols()],
+            strain_slopes: of.strains.slope_storage(m),
+            inertia_slopes: of.inertia.slope_storage(m),
+            shape_slopes: of.shapes.slope_storage(m),
+            of_shapes: [DMatrix::zeros(shapes, shapes), DMatrix::zeros(shapes, shapes)],
+            at,
+        }
+    }
+
+    /// The force R at coordinates, rates and accelerations.
+    pub fn residual(&mut self, of: &PolynomialMotion, motion: [&[f64]; 3], drive: &Drive, force: &mut [f64]) {
+        let m = force.len();
+        let [z, v, _] = motion;
+        self.given[..m].copy_from_slice(z);
+        self.given[m..2 * m].copy_from_slice(v);
+        self.give(m, drive);
+        of.chain.place(motion, &mut self.at);
+        of.strains.values(&self.at.values, &mut self.stress);
+        of.rests.add_product(&self.given[2 * m..], &mut self.stress);
+        of.inertia.values(&self.at.pushes, &mut self.push);
+        self.combined.fill(0.0);
+        of.strains.add_combined(&self.stress, &mut self.combined);
+        of.inertia.add_combined(&self.push, &mut self.combined);
+        if !self.points.is_empty() {
+            self.press(of, drive);
+        }
+        if of.loaded {
+            self.load(drive);
+            of.works.add_combined(&self.work, &mut self.combined);
+        }
+        self.force.fill(0.0);
+        of.linear.add_product(&self.given, &mut self.force);
+        self.reversed.copy_from_slice(&self.combined);
+        of.chain.add_gradient(z, &self.at, &mut self.reversed, &mut self.force);
+        force.copy_from_slice(&self.force[..m]);
+    }
+
+    /// Free strains and the factor of built-in strains of a drive, or their rates.
+    fn give(&mut self, m: usize, drive: &Drive) {
+        let (strains, built_in) = self.given[2 * m..].split_at_mut(drive.expansion.len());
+        strains.copy_from_slice(&drive.expansion);
+        built_in[0] = drive.load;
+    }
+
+    /// Loads of a drive, or their rates.
+    fn load(&mut self, drive: &Drive) {
+        self.work[0] = -drive.load;
+        self.work[1..].iter_mut().zip(&drive.inputs).for_each(|(work, size)| *work = -size);
+    }
+
+    /// The laws of all points, and what they bring to the monomials.
+    fn press(&mut self, of: &PolynomialMotion, drive: &Drive) {
+        of.shapes.values(&self.at.values, &mut self.shape);
+        if of.resists {
+            of.shapes.values(&self.at.rates, &mut self.shape_rate);
+        }
+        let sum = |point: usize, of_shapes: &[f64]| -> f64 {
+            of.mix.column(point).iter().zip(of_shapes).map(|(share, y)| share * y).sum()
+        };
+        for points in &of.members {
+            let volts = drive.volts[points.member];
+            for (k, law) in points.laws.iter().enumerate() {
+                let point = points.first + k;
+                let approach = sum(point, &self.shape);
+                let pressed = law.at(approach, volts);
+                let state = &mut self.points[point];
+                *state = PointState { approach, force: pressed.force, stiffness: pressed.stiffness, damping: 0.0 };
+                if law.loss > 0.0 {
+                    let bears = law.at(approach, 0.0);
+                    let added = law.loss * sum(point, &self.shape_rate);
+                    let (share, by_rate) = if added > -1.0 { (added, law.loss) } else { (-1.0, 0.0) };
+                    state.force += bears.force * share;
+                    state.stiffness += bears.stiffness * share;
+                    state.damping += bears.force * by_rate;
+                }
+                if let Some((drawn, film)) = law.film {
+                    let rate = sum(point, &self.shape_rate);
+                    let (damping, by_distance) = film.damping(drawn - approach);
+                    state.force += damping * rate;
+                    state.stiffness -= by_distance * rate;
+                    state.damping += damping;
+                }
+            }
+        }
+        // the values of shapes are not needed any more: what acts on shapes stands in their place
+        self.shape.fill(0.0);
+        for (point, state) in self.points.iter().enumerate() {
+            self.shape.iter_mut().zip(of.mix.column(point).iter()).for_each(|(to, share)| *to += share * state.force);
+        }
+        of.shapes.add_combined(&self.shape, &mut self.combined);
+    }
+
+    /// Mass, damping and stiffness where the residual was taken last.
+    pub fn matrices(
+        &mut self,
+        of: &PolynomialMotion,
+        mass: &mut DMatrix<f64>,
+        damping: &mut DMatrix<f64>,
+        stiffness: &mut DMatrix<f64>,
+    ) {
+        let m = mass.nrows();
+        of.chain.differentiate(&self.given[..m], &mut self.at);
+        stiffness.copy_from(&of.stiffness);
+        of.strains.slopes(&of.chain, &self.at, m, &mut self.strain_slopes);
+        add_gram(&self.strain_slopes, stiffness);
+        of.inertia.slopes(&of.chain, &self.at, m, &mut self.inertia_slopes);
+        mass.fill(0.0);
+        add_gram(&self.inertia_slopes, mass);
+        damping.copy_from(&of.damping);
+        if !self.points.is_empty() {
+            self.add_point_matrices(of, damping, stiffness);
+        }
+        of.chain.add_curvature(&self.at, &self.combined, stiffness);
+    }
+
+    fn add_point_matrices(&mut self, of: &PolynomialMotion, damping: &mut DMatrix<f64>, stiffness: &mut DMatrix<f64>) {
+        let (m, shapes) = (stiffness.nrows(), of.shapes.count);
+        of.shapes.slopes(&of.chain, &self.at, m, &mut self.shape_slopes);
+        let [by_approach, by_rate] = &mut self.of_shapes;
+        by_approach.fill(0.0);
+        by_rate.fill(0.0);
+        for (point, state) in self.points.iter().enumerate() {
+            let shares = of.mix.column(point);
+            for (a, first) in shares.iter().enumerate() {
+                for (b, second) in shares.iter().enumerate().take(a + 1) {
+                    by_approach[(a, b)] += state.stiffness * first * second;
+                    by_rate[(a, b)] += state.damping * first * second;
+                }
+            }
+        }
+        let slopes = &self.shape_slopes;
+        let slope = |shape: usize, i: usize| slopes[shape / LANES * m + i].0[shape % LANES];
+        let add = |of_shapes: &DMatrix<f64>, to: &mut DMatrix<f64>| {
+            for a in 0..shapes {
+                for b in 0..=a {
+                    let both = of_shapes[(a, b)];
+                    for i in 0..m {
+                        for j in 0..m {
+                            let one = slope(a, i) * slope(b, j);
+                            let two = if a == b { 0.0 } else { slope(b, i) * slope(a, j) };
+                            to[(i, j)] += both * (one + two);
+                        }
+                    }
+                }
+            }
+        };
+        add(by_approach, stiffness);
+        if of.resists {
+            add(by_rate, damping);
+        }
+    }
+
+    /// ∂R/∂t where the residual and the matrices were taken last, as the drive changes at this rate.
+    pub fn forcing(&mut self, of: &PolynomialMotion, drive: &Drive, rate: &Drive, out: &mut [f64]) {
+        let m = out.len();
+        self.reversed.fill(0.0);
+        self.force.fill(0.0);
+        let warms = rate.expansion.iter().any(|x| *x != 0.0) || rate.load != 0.0;
+        let charges = rate.volts.iter().any(|v| *v != 0.0);
+        let loads = of.loaded && (rate.load != 0.0 || rate.inputs.iter().any(|x| *x != 0.0));
+        if warms {
+            self.give(m, rate);
+            self.stress.fill(0.0);
+            of.rests.add_product(&self.given[2 * m..], &mut self.stress);
+            of.strains.add_combined(&self.stress, &mut self.reversed);
+        }
+        if charges {
+            self.shape.fill(0.0);
+            for points in &of.members {
+                let both = drive.volts[points.member] * rate.volts[points.member];
+                for (k, law) in points.laws.iter().enumerate() {
+                    let point = points.first + k;
+                    if let Some(Law::Field(capacitor, _)) = &law.law {
+                        let force = -both * capacitor.at(self.points[point].approach).slope;
+                        let shares = of.mix.column(point);
+                        self.shape.iter_mut().zip(shares.iter()).for_each(|(to, share)| *to += share * force);
+                    }
+                }
+            }
+            of.shapes.add_combined(&self.shape, &mut self.reversed);
+        }
+        if loads {
+            self.load(rate);
+            of.works.add_combined(&self.work, &mut self.reversed);
+        }
+        if warms || charges || loads {
+            of.chain.add_gradient(&self.given[..m], &self.at, &mut self.reversed, &mut self.force);
+        }
+        if warms {
+            // coordinates and rates have their shares in the tangent
+            self.given[..2 * m].fill(0.0);
+            of.linear.add_product(&self.given, &mut self.force);
+        }
+        out.copy_from_slice(&self.force[..m]);
+    }
+}

@@ -1,0 +1,202 @@
+//! Rows of polynomials over common monomials, eight of them or eight monomials to a vector instruction.
+
+// sums of a fixed number are indexed as they are written
+#![allow(clippy::needless_range_loop)]
+
+use super::chain::{MonomialChain, MonomialValues};
+use bimorph_multibody::batch::{Kernel, LANES, Lane8, SimdReal, everywhere};
+use nalgebra::DMatrix;
+
+/// Groups of lanes that are summed at once: their additions do not wait for each other.
+const TOGETHER: usize = 4;
+
+/// A matrix by groups of eight rows, the last one filled with zeros, a column after the other.
+#[derive(Debug, Clone)]
+pub(super) struct LaneColumns {
+    columns: usize,
+    lanes: Vec<Lane8>,
+}
+
+impl LaneColumns {
+    /// Of a matrix, with zeros behind it to so many groups of rows.
+    pub(super) fn new(matrix: &DMatrix<f64>, groups: usize) -> Self {
+        let at = |row: usize, k: usize| if row < matrix.nrows() { matrix[(row, k)] } else { 0.0 };
+        let mut lanes = Vec::with_capacity(groups * matrix.ncols());
+        for g in 0..groups {
+            for k in 0..matrix.ncols() {
+                let mut column = Lane8::NONE;
+                (0..LANES).for_each(|lane| column.0[lane] = at(g * LANES + lane, k));
+                lanes.push(column);
+            }
+        }
+        Self { columns: matrix.ncols(), lanes }
+    }
+
+    /// Number of columns.
+    pub(super) fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// `to +=` the product with the first numbers of `x`; `to` has all groups.
+    #[inline]
+    pub(super) fn add_product(&self, x: &[f64], to: &mut [f64]) {
+        everywhere(WeightedSums { columns: &self.lanes, weights: &x[..self.columns], to });
+    }
+}
+
+/// Coefficients of some rows, twice: by groups of rows, and by groups of monomials. Values of rows have zeros behind them to a multiple of the
+/// lanes.
+#[derive(Debug, Clone)]
+pub(super) struct PolynomialRows {
+    /// Number of rows.
+    pub(super) count: usize,
+    of_rows: LaneColumns,
+    of_monomials: LaneColumns,
+}
+
+impl PolynomialRows {
+    /// Of coefficients, rows × monomials.
+    pub(super) fn new(coefficients: &DMatrix<f64>, chain: &MonomialChain) -> Self {
+        let count = coefficients.nrows();
+        Self {
+            count,
+            of_rows: LaneColumns::new(coefficients, count.div_ceil(LANES)),
+            of_monomials: LaneColumns::new(&coefficients.transpose(), chain.groups()),
+        }
+    }
+
+    /// Groups of lanes that the rows take.
+    pub(super) fn groups(&self) -> usize {
+        self.count.div_ceil(LANES)
+    }
+
+    /// Storage for a value of each row.
+    pub(super) fn storage(&self) -> Vec<f64> {
+        vec![0.0; self.groups() * LANES]
+    }
+
+    /// Storage for derivatives with coordinates.
+    pub(super) fn slope_storage(&self, size: usize) -> Vec<Lane8> {
+        vec![Lane8::NONE; self.groups() * size]
+    }
+
+    /// Values where the monomials have these.
+    #[inline]
+    pub(super) fn values(&self, monomials: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        self.of_rows.add_product(monomials, out);
+    }
+
+    /// `to +=` the coefficients of each monomial in the sum of the rows with these weights.
+    #[inline]
+    pub(super) fn add_combined(&self, weights: &[f64], to: &mut [f64]) {
+        self.of_monomials.add_product(weights, to);
+    }
+
+    /// Derivatives with `size` coordinates at a state: those of a group of rows together, a coordinate after the other.
+    #[inline]
+    pub(super) fn slopes(&self, chain: &MonomialChain, at: &MonomialValues, size: usize, out: &mut [Lane8]) {
+        everywhere(RowSlopes { columns: &self.of_rows, chain, at, size, out });
+    }
+}
+
+/// `to +=` sums of columns, each a group of lanes for each weight.
+struct WeightedSums<'a> {
+    columns: &'a [Lane8],
+    weights: &'a [f64],
+    to: &'a mut [f64],
+}
+
+impl Kernel for WeightedSums<'_> {
+    #[inline(always)]
+    fn run<W: SimdReal>(self, simd: W::Simd) {
+        let Self { columns, weights, to } = self;
+        let n = weights.len();
+        let groups = if n == 0 { 0 } else { to.len() / LANES };
+        let mut g = 0;
+        while g + TOGETHER <= groups {
+            add_sums::<W, TOGETHER>(simd, &columns[g * n..], weights, &mut to[g * LANES..]);
+            g += TOGETHER;
+        }
+        while g < groups {
+            add_sums::<W, 1>(simd, &columns[g * n..], weights, &mut to[g * LANES..]);
+            g += 1;
+        }
+    }
+}
+
+/// `to +=` those of `K` groups.
+#[inline(always)]
+fn add_sums<W: SimdReal, const K: usize>(simd: W::Simd, columns: &[Lane8], weights: &[f64], to: &mut [f64]) {
+    let n = weights.len();
+    let mut sums = [W::splat(simd, 0.0); K];
+    for k in 0..n {
+        let weight = W::splat(simd, weights[k]);
+        for i in 0..K {
+            sums[i] += W::load(simd, &columns[i * n + k]) * weight;
+        }
+    }
+    for i in 0..K {
+        let mut found = Lane8::NONE;
+        sums[i].store(&mut found);
+        for lane in 0..LANES {
+            to[i * LANES + lane] += found.0[lane];
+        }
+    }
+}
+
+struct RowSlopes<'a> {
+    columns: &'a LaneColumns,
+    chain: &'a MonomialChain,
+    at: &'a MonomialValues,
+    size: usize,
+    out: &'a mut [Lane8],
+}
+
+impl Kernel for RowSlopes<'_> {
+    #[inline(always)]
+    fn run<W: SimdReal>(self, simd: W::Simd) {
+        let Self { columns, chain, at, size, out } = self;
+        out.fill(Lane8::NONE);
+        for (columns, out) in columns.lanes.chunks_exact(columns.columns).zip(out.chunks_exact_mut(size)) {
+            chain.each_slope(at, |k, i, slope| {
+                let sum = W::load(simd, &out[i]) + W::load(simd, &columns[k]) * W::splat(simd, slope);
+                sum.store(&mut out[i]);
+            });
+        }
+    }
+}
+
+/// `to +=` the products Jᵀ·J of derivatives, groups of rows × coordinates.
+pub(super) fn add_gram(slopes: &[Lane8], to: &mut DMatrix<f64>) {
+    everywhere(Gram { slopes, to });
+}
+
+struct Gram<'a> {
+    slopes: &'a [Lane8],
+    to: &'a mut DMatrix<f64>,
+}
+
+impl Kernel for Gram<'_> {
+    #[inline(always)]
+    fn run<W: SimdReal>(self, simd: W::Simd) {
+        let Self { slopes, to } = self;
+        let m = to.nrows();
+        for i in 0..m {
+            for j in 0..=i {
+                let mut sum = W::splat(simd, 0.0);
+                for of in slopes.chunks_exact(m) {
+                    sum += W::load(simd, &of[i]) * W::load(simd, &of[j]);
+                }
+                let mut lanes = Lane8::NONE;
+                sum.store(&mut lanes);
+                let [a, b, c, d, e, f, g, h] = lanes.0;
+                let sum = ((a + b) + (c + d)) + ((e + f) + (g + h));
+                to[(i, j)] += sum;
+                if i != j {
+                    to[(j, i)] += sum;
+                }
+            }
+        }
+    }
+}
