@@ -78,8 +78,8 @@ pub fn has_polynomials(system: &System) -> bool {
     let between_plates = |law: &PointLaw| matches!(law.law, Some(Law::Field(Capacitor::Plates { .. }, Some(_))));
     system.members.iter().all(|member| {
         let laws = member.point_laws();
-        let acts = member.is_gas() || member.is_active(1.0);
-        !member.slides() && !(laws.is_empty() && acts) && laws.iter().all(|law| law.loss == 0.0 || between_plates(law))
+        let has_none = laws.is_empty() && (member.is_gas() || member.is_active(1.0));
+        !(member.slides() || has_none) && laws.iter().all(|law| law.loss == 0.0 || between_plates(law))
     })
 }
 
