@@ -147,6 +147,30 @@ def interrupts() -> Iterator[None]:
     signal.signal(signal.SIGINT, before)
 
 
+@contextlib.contextmanager
+def pressing_ctrl_c(*delays: float) -> Iterator[None]:
+    """SIGINT after each of the delays (s), and then every second until the block is left: Python drops what is raised while it calls a finalizer."""
+    left = threading.Event()
+
+    def press() -> None:
+        start = time.monotonic()
+        for delay in delays:
+            time.sleep(max(start + delay - time.monotonic(), 0.0))
+            signal.raise_signal(signal.SIGINT)
+        while not left.wait(1.0):
+            signal.raise_signal(signal.SIGINT)
+
+    thread = threading.Thread(target=press)
+    thread.start()
+    try:
+        yield
+    finally:
+        while thread.is_alive():
+            with contextlib.suppress(KeyboardInterrupt):
+                left.set()
+                thread.join()
+
+
 @pytest.mark.usefixtures("interrupts")
 def test_ctrl_c_ends_a_run_and_leaves_the_session(model: bimorph.Model) -> None:
     """A run of minutes is over soon after Ctrl-C; the session stands where it stood, and has the bits of a quiet one."""
@@ -155,11 +179,8 @@ def test_ctrl_c_ends_a_run_and_leaves_the_session(model: bimorph.Model) -> None:
     with model.session(["m.x"]) as session:
         session.operating_point({"drive": 1.0})
         long = 1e-7 * np.arange(1, 1_000_001)
-        timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
-        timer.start()
-        with pytest.raises(KeyboardInterrupt):
-            for _ in range(100):
-                session.run(long, {"drive": 1.5})
+        with pytest.raises(KeyboardInterrupt), pressing_ctrl_c(0.3):
+            session.run(long, {"drive": 1.5})
         left = time.monotonic()
         assert session.t == 0.0
         assert session.run(times, {"drive": volts}).signals["m.x"].tolist() == expected
@@ -173,8 +194,7 @@ def test_interrupts_leave_the_connection_as_it_was(plate: bimorph.Model) -> None
     for k in range(10):
         with plate.session(["m.x"], timeout=10.0) as session:
             session.operating_point({"drive": 1.0})
-            threading.Timer(0.1 + 0.03 * k, signal.raise_signal, [signal.SIGINT]).start()
-            with pytest.raises(KeyboardInterrupt):
+            with pytest.raises(KeyboardInterrupt), pressing_ctrl_c(0.1 + 0.03 * k):
                 for _ in range(100):
                     session.run(session.t + long, {"drive": 1.5})
     assert threading.active_count() < 40
@@ -301,14 +321,9 @@ def test_an_interrupted_batch_keeps_every_state(model: bimorph.Model, monkeypatc
         batch.operating_point({"drive": 1.0})
         before = states(batch)
         long = 1e-7 * np.arange(1, 300_001)
-        for delays in ([0.05], [0.3], [0.5, 0.5001]):
-            for delay in delays:
-                threading.Timer(delay, signal.raise_signal, [signal.SIGINT]).start()
-            with pytest.raises(KeyboardInterrupt):
-                for _ in range(100):
-                    batch.run(long, {"drive": 1.5})
-            with contextlib.suppress(KeyboardInterrupt):
-                time.sleep(0.05 * len(delays))
+        for delays in ((0.05,), (0.3,), (0.5, 0.5001)):
+            with pytest.raises(KeyboardInterrupt), pressing_ctrl_c(*delays):
+                batch.run(long, {"drive": 1.5})
             assert states(batch) == before
         assert batch.run(times, {"drive": volts}).signals["m.x"].tolist() == expected
 

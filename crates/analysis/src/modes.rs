@@ -306,7 +306,7 @@ fn notes(compiled: &CompiledModel, count: usize, q: &[Pose], (lambda, rounding):
     }
     let size = compiled.structure.extent();
     let moved = deflection(compiled, q);
-    if moved > FAR * size {
+    if size > 0.0 && moved > FAR * size {
         let share = 100.0 * moved / size;
         let moved = 1e6 * moved;
         warnings.push(format!(
