@@ -5,6 +5,7 @@ use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::Formulation;
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, Token};
+use bimorph::netlist::{Bundle, load};
 
 /// A block on a spring of 1 N/m along a floor, on which 1 µN presses it: friction of at most 0.9 µN, and 9 N/m while it sticks.
 const BLOCK: &str = "
@@ -105,4 +106,34 @@ fn a_wedge_slips_under_its_own_contact_force() {
         let exact = 3e-6 * t[0] + coefficient * normal;
         assert!(normal > 1e-6 && (way(t) - exact).abs() < 1e-6 * exact.abs(), "{stick}: {:e} {exact:e}", way(t));
     }
+}
+
+/// A block that meets its stop under a load beside it sticks to where it touched: at x₀ = F·gap/N while the spring alone holds it, and x = (F + k_t·x₀)/(k + k_t) then. That
+/// holds to 2e-5 in every direction of the drawing, since the contact closes in a millionth of the load.
+#[test]
+fn a_block_sticks_where_it_touches() {
+    let (k, kt, force, normal, gap) = (1.0, 9.0, 0.95e-6, 1e-6, 1e-9);
+    let exact = (force + kt * force * gap / normal) / (k + kt);
+    for angle in [0.0, 0.3, std::f64::consts::FRAC_PI_2, 2.0, 4.5f64] {
+        let text = format!(
+            "anchor * [f] []
+            spring2d * [f m] [kx={k} ky={k} krz=1e-6 oz={angle}]
+            mass2d * [m] [m=1e-9 J=1e-18]
+            f2d * [m] [F={normal} oz={angle}-pi/2]
+            f2d * [m] [F={force} oz={angle}]
+            floor stop2d * [m] [gap={gap} oz={angle}-pi/2 k=1e4 friction=0.9 stickstiffness={kt}]"
+        );
+        let found = static_equilibrium(&compiled(&text, Formulation::Compliant), &Vec::new()).unwrap();
+        let m = found.nodes.iter().find(|(name, _)| name == "m").unwrap().1;
+        let along = m.x * angle.cos() + m.y * angle.sin();
+        assert!((along - exact).abs() < 2e-5 * exact, "{angle}: {along:e} {exact:e}");
+    }
+}
+
+/// A stiffness along a stop beyond 1e9 N/m, where rounding of displacements would decide on the force, is refused by name.
+#[test]
+fn stiffness_beyond_that_of_contacts_is_refused() {
+    let text = BLOCK.replace("stickstiffness=9", "stickstiffness=1e300");
+    let refused = load(&Bundle::from_text("block.net", &text), &[]).unwrap_err().to_string();
+    assert!(refused.contains("`stickstiffness` (stiffness [N/m]) must be at most 1e9, this is 1e300"), "{refused}");
 }

@@ -157,7 +157,9 @@ def pressing_ctrl_c(*delays: float) -> Iterator[None]:
         for delay in delays:
             time.sleep(max(start + delay - time.monotonic(), 0.0))
             signal.raise_signal(signal.SIGINT)
-        while not left.wait(1.0):
+        for _ in range(10):
+            if left.wait(1.0):
+                break
             signal.raise_signal(signal.SIGINT)
 
     thread = threading.Thread(target=press)

@@ -110,7 +110,7 @@ impl ErrorBudget {
         error / (self.requested * size)
     }
 
-    /// The scale of a quantity with a tolerance of its own: an error is the same part of the scale and this tolerance as of the quantity and its own.
+    /// The scale of a quantity that has a tolerance `own`. An error over the scale and the tolerance is the error over the quantity and `own`.
     pub fn scale(self, quantity: f64, own: f64) -> f64 {
         quantity * own / self.requested
     }

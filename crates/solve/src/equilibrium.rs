@@ -34,8 +34,9 @@ use path::LoadPath;
 /// the touch, and Newton's method then takes a quarter of the way each time: that is no rounding.
 const UNBALANCED: f64 = 1e-6;
 
-/// Largest load step where friction holds parts at rest, and the largest one in which such parts come to bear: they meet no friction in it (fractions of the path).
-const STICKING_STEPS: [f64; 2] = [1.0 / 32.0, 1e-3];
+/// Largest load step where friction holds parts at rest, and the largest one in which such parts come to bear (fractions of the path). They meet no friction in it,
+/// so that anchors are off by this part of the motion at most.
+const STICKING_STEPS: [f64; 2] = [1.0 / 32.0, 1e-6];
 
 /// Smallest load step where the present load is next to nothing, as a fraction of the path.
 const MIN_STEP: f64 = 1e-10;

@@ -11,6 +11,8 @@ const AREA: f64 = 1e-10;
 const ADHESION_RANGE: f64 = 10e-9;
 /// Speed below which parts stick unless it is given (m/s).
 const SLIP_SPEED: f64 = 1e-5;
+/// Largest stiffness along a stop (N/m): a thousand times that of the stiffest contacts. Rounding of displacements would decide on forces of stiffer ones.
+const MAX_STICK_STIFFNESS: f64 = 1e9;
 
 /// stop2d: a may move by `gap` along local x, and by `back` against it, relative to b or to where it was drawn.
 pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
@@ -28,6 +30,9 @@ pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let adhesion = site.positive_if_any("adhesion")?.map(|force| Adhesion { force, range });
     let slip_speed = site.positive_if_any("slipspeed")?.unwrap_or(SLIP_SPEED);
     let stick_stiffness = site.positive_if_any("stickstiffness")?;
+    if let Some(k) = stick_stiffness.filter(|k| *k > MAX_STICK_STIFFNESS) {
+        return Err(site.out_of_range("stickstiffness", k, &format!("at most {MAX_STICK_STIFFNESS:e}")));
+    }
     let coefficient = site.positive_if_any("friction")?;
     if coefficient.is_none() && stick_stiffness.is_some() {
         return Err(site.missing("friction"));

@@ -367,12 +367,16 @@ impl ReducedRodas4 {
         let Some(mut stages) = self.polynomials.take() else { return };
         self.at.copy(&self.now);
         self.exact_residual(false);
-        let Self { now, drive, force, forcing, right, mass, stiffness, .. } = self;
+        let Self { now, drive, force, forcing, right, product, mass, stiffness, .. } = self;
         stages.forces.residual(&stages.of, [&now.z, &now.v, &now.w], drive, forcing);
         right.iter_mut().zip(force.iter().zip(&*forcing)).for_each(|(r, (exact, found))| *r = exact - found);
-        let norm = |x: &DVector<f64>| x.dot(&(&*mass * x)).max(0.0).sqrt();
-        stages.largest = stages.largest.max(norm(&DVector::from_column_slice(&now.z)));
-        let error = solve(stiffness, right).map_or(f64::INFINITY, |(off, _)| norm(&off));
+        let mut norm = |x: &[f64]| {
+            product.fill(0.0);
+            add_product(mass, x, product.as_mut_slice());
+            x.iter().zip(product.iter()).map(|(x, p)| x * p).sum::<f64>().max(0.0).sqrt()
+        };
+        stages.largest = stages.largest.max(norm(&now.z));
+        let error = solve(stiffness, right).map_or(f64::INFINITY, |(off, _)| norm(off.as_slice()));
         if error <= stages.share * stages.largest {
             self.polynomials = Some(stages);
             return;
