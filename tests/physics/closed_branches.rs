@@ -35,9 +35,9 @@ impl Plate {
         model(&text, &CompileOptions::default())
     }
 
-    /// Force of contact at a distance (N): p = 1 TPa·(2(t − d)/t)⁴.
+    /// Force of contact at a distance (N): p = 0.2 TPa·(2(t − d)/t)³.
     fn contact(&self, d: f64) -> f64 {
-        self.area * 1e12 * (2.0 * (self.touch - d).max(0.0) / self.touch).powi(4)
+        self.area * 2e11 * (2.0 * (self.touch - d).max(0.0) / self.touch).powi(3)
     }
 
     /// V² of the equilibrium at a distance (V²): ½εAV²/d² = k·(g − d) + F.

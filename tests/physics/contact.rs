@@ -244,7 +244,7 @@ fn stops_hold() {
         let x = at(force, "").abs();
         let share = 2.0 * (x - way) / TOUCH;
         assert!((0.0..5e-9).contains(&(x - way)), "{x:e}");
-        close(1e-10 * 1e12 * share.powi(4), 10e-6 - x, 1e-6);
+        close(1e-10 * 2e11 * share.powi(3), 10e-6 - x, 1e-6);
         let pressed = at(force, "k=50").abs() - way;
         close(50.0 * pressed * pressed / (pressed + 1e-9), 10e-6 - way - pressed, 1e-6);
     }

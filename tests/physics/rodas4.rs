@@ -80,8 +80,8 @@ fn within_contact(steps: usize, dt: f64, end: f64) -> (f64, f64) {
 /// derivative of a step is that of central differences of 0.1 V (1e-5). The force has a time constant of 0.03 ns there.
 #[test]
 fn contact_with_loss() {
-    let fine = within_contact(1600, 0.1e-9, 4.0).0;
-    let errors: Vec<f64> = [16, 32, 64].map(|n| (within_contact(n, 0.1e-9, 4.0).0 - fine).abs()).to_vec();
+    let fine = within_contact(1600, 0.4e-9, 4.0).0;
+    let errors: Vec<f64> = [16, 32, 64].map(|n| (within_contact(n, 0.4e-9, 4.0).0 - fine).abs()).to_vec();
     for pair in errors.windows(2) {
         let order = (pair[0] / pair[1]).log2();
         assert!((3.5..5.0).contains(&order), "{order} of {errors:?}");

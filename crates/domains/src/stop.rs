@@ -99,12 +99,12 @@ pub(super) fn nearer(ways: &[Option<f64>; 2], u: f64) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    /// An elastic stop gives k·(p − w) far beyond w, a rigid one p = 1 TPa·s⁴ with s = p/50 nm; nothing before.
+    /// An elastic stop gives k·(p − w) far beyond w, a rigid one 0.2 TPa·s³ with s = p/50 nm; nothing before.
     #[test]
     fn follows_its_law() {
         let (f, slope) = StopKind::Elastic(1e3).force(-1e-6);
         assert!((f / (1e3 * (1e-6 - 1e-9)) - 1.0).abs() < 2e-6 && (slope / -1e3 - 1.0).abs() < 2e-6);
-        assert!((StopKind::Rigid(1e-10).force(-5e-9).0 / (1e-10 * 1e12 * 1e-4) - 1.0).abs() < 1e-9);
+        assert!((StopKind::Rigid(1e-10).force(-5e-9).0 / (1e-10 * 2e11 * 1e-3) - 1.0).abs() < 1e-9);
         assert_eq!(StopKind::Elastic(1e3).force(0.0), (0.0, 0.0));
         assert!((StopKind::Rigid(1e-10).least() + 25e-9).abs() < 1e-15);
     }

@@ -216,7 +216,7 @@ fn attracted(adhesion: &Adhesion, d: &str) -> String {
 fn pressed(contact: &Contact, d: &str) -> String {
     let s = format!("max({:e} * ({:e} - {d}), 0)", 2.0 / contact.touch, contact.touch);
     let within = format!("min({s}, {DEEPEST:e})");
-    format!("({:e} * {within} * {within} * {within} * (4 * {s} - 3 * {within}))", contact.area * PRESSURE)
+    format!("({:e} * {within} * {within} * (3 * {s} - 2 * {within}))", contact.area * PRESSURE)
 }
 
 #[cfg(test)]

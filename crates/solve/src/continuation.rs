@@ -44,6 +44,7 @@ impl Continuation {
             options,
             tangent: BodyMatrix::new(&system.model.pattern),
             residual: zeros.clone(),
+            before: zeros.clone(),
             slope: zeros,
             iterations: 0,
         }

@@ -43,6 +43,8 @@ pub struct Continuation {
     pub(super) tangent: BodyMatrix,
     pub(super) residual: Vec<Pose>,
     pub(super) slope: Vec<Pose>,
+    /// Positions before the last correction.
+    pub(super) before: Vec<Pose>,
     pub(super) iterations: usize,
 }
 
@@ -94,6 +96,7 @@ impl Continuation {
             let lean = plane.ds - inner(system, plane.dq, &self.slope);
             let ds = (inner(system, plane.dq, &self.residual) - off) / lean;
             let mut correction = ds.abs() * system.length_scale;
+            self.before.copy_from_slice(&at.q);
             for (q, (a, b)) in at.q.iter_mut().zip(self.residual.iter().zip(&self.slope)) {
                 let dq = -a - b * ds;
                 *q += dq;
@@ -113,13 +116,20 @@ impl Continuation {
                 // contact softens towards the touch, and Newton's method takes a quarter of the way each time there: a correction
                 // is small long before forces balance
                 let rounding = correction <= ROUNDING[0] * reach || (correction <= ROUNDING[1] * reach && stands);
-                if fast || rounding || balanced(family.contact_scale(&at.q), unbalanced) {
+                let settled = fast || rounding || balanced(family.contact_scale(&at.q), unbalanced);
+                if settled && !self.crosses_touch(family.system(), &at.q) {
                     return Ok((at, count));
                 }
                 most = IN_CONTACT * self.options.iterations;
             }
         }
         Err(None)
+    }
+
+    /// True where the last correction, which led to `q`, closed or opened a contact: what bore is gone behind the touch, and a small
+    /// correction is none there.
+    fn crosses_touch(&self, system: &System, q: &[Pose]) -> bool {
+        (0..system.members.len()).any(|g| system.touches(g, &self.before) != system.touches(g, q))
     }
 
     /// Factors the tangent at a place, with residual and slope; counts negative pivots.
