@@ -84,7 +84,7 @@ fn fields() -> String {
             Range::Flag => "bool",
             Range::Count(..) => "optional uint32",
             Range::Above(..) | Range::Within(..) => "optional double",
-            Range::Names(_) => "string",
+            Range::Names(_) | Range::Ranges => "string",
         };
         text += &wrapped(&sentences(about), "  // ", 120);
         text += &format!("  {kind} {} = {number};\n", about.wire);
@@ -107,6 +107,7 @@ fn python() -> String {
                 let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
                 format!("Literal[{}]", names.join(", "))
             }
+            Range::Ranges => "str".to_owned(),
         };
         text += &format!("\n    {}: {kind} | None\n", about.name);
         let quoted = wrapped(&sentences(about), "    ", 112);
@@ -170,6 +171,7 @@ fn inside_and_beyond(about: &OptionDescription) -> (OptionValue, Option<OptionVa
         }
         Range::Within(low, high) => (OptionValue::Number(low), Some(OptionValue::Number(2.0 * high))),
         Range::Names(names) => (OptionValue::Name(names[0].to_owned()), Some(OptionValue::Name("nosuch".to_owned()))),
+        Range::Ranges => (OptionValue::Name("a:0:1".to_owned()), Some(OptionValue::Name("a:1:0".to_owned()))),
     }
 }
 

@@ -79,6 +79,7 @@ fn arg(about: &OptionDescription, flag: &'static str) -> Arg {
             arg.value_parser(value::number).allow_negative_numbers(true)
         }
         Range::Names(_) => arg.value_name("NAME"),
+        Range::Ranges => arg.value_name("NAME:LOW:HIGH,…"),
     }
 }
 
@@ -87,7 +88,7 @@ fn found(matches: &ArgMatches, about: &OptionDescription) -> Option<OptionValue>
         Range::Flag => matches.get_flag(about.name).then_some(OptionValue::Flag(true)),
         Range::Count(..) => matches.get_one(about.name).copied().map(OptionValue::Count),
         Range::Above(..) | Range::Within(..) => matches.get_one(about.name).copied().map(OptionValue::Number),
-        Range::Names(_) => matches.get_one(about.name).cloned().map(OptionValue::Name),
+        Range::Names(_) | Range::Ranges => matches.get_one(about.name).cloned().map(OptionValue::Name),
     }
 }
 

@@ -29,7 +29,7 @@ fn option_value(range: &Range, text: &str) -> Option<OptionValue> {
             _ => None,
         },
         Range::Count(..) => text.parse().ok().map(OptionValue::Count),
-        Range::Names(_) => Some(OptionValue::Name(text.to_owned())),
+        Range::Names(_) | Range::Ranges => Some(OptionValue::Name(text.to_owned())),
         _ => match parse_setting(text) {
             Ok(Setting::Number(x)) => Some(OptionValue::Number(x)),
             _ => None,

@@ -34,7 +34,7 @@ pub fn declared() -> Vec<Declared> {
         Declared {
             name: about.name,
             default: match (&about.default, about.range) {
-                (OptionValue::Unset, Range::Names(_)) => DeckValue::Text(String::new()),
+                (OptionValue::Unset, Range::Names(_) | Range::Ranges) => DeckValue::Text(String::new()),
                 (default, _) => written(default),
             },
             text: format!("{}{unit}{zero}", about.about()),
@@ -67,6 +67,7 @@ pub fn choose(options: &mut CompileOptions, option: &ModelOption, written: &Deck
         (DeckValue::Number(x), Range::Count(..)) if *x >= 0.0 && x.fract() == 0.0 => OptionValue::Count(*x as usize),
         (DeckValue::Number(x), _) => OptionValue::Number(*x),
         (DeckValue::Flag(flag), _) => OptionValue::Flag(*flag),
+        (DeckValue::Text(text), Range::Ranges) => OptionValue::Name(text.clone()),
         // ngspice 39 turns the line to lower case, and no name has another
         (DeckValue::Text(text), _) => OptionValue::Name(text.to_ascii_lowercase()),
     };

@@ -4,6 +4,8 @@
 //! beyond where motion overshoots. Where it would not pay (a tolerance of 1e-4 or below, more directions than a fifth of the
 //! strains) or cannot be trained, the full model is taken, and a warning says why.
 
+pub mod circuit;
+
 use super::integrator::{IntegrationRun, Integrator};
 use super::statics::{OperatingPoint, operating_point, source_vector};
 use super::transient::first_step;
@@ -42,7 +44,7 @@ const MOMENTS: usize = 2;
 /// Smallest tolerance of a motion (1): with more moments and Taylor terms errors of 3e-3 remain on a stage of beams.
 const FULL_IN_TIME: f64 = 5e-3;
 /// Excess over the trained states up to which a motion counts as trained (1).
-const TRAINED: f64 = 1.1;
+pub const TRAINED: f64 = 1.1;
 
 /// Rejects a reduced model in an analysis that has none.
 ///
@@ -52,7 +54,9 @@ pub fn not_reduced(compiled: &CompiledModel, analysis: &str) -> Result<(), Analy
     match compiled.options.formulation {
         Formulation::Reduced => Err(AnalysisError::BadRequest {
             what: "formulation reduced".into(),
-            detail: format!("{analysis} has no reduced model; static and tran have, others take formulation compliant"),
+            detail: format!(
+                "{analysis} has no reduced model; static, tran and circuits have, others take formulation compliant"
+            ),
         }),
         _ => Ok(()),
     }
@@ -72,7 +76,7 @@ fn trained(cases: &[(&System, InputBox)], tol: f64, moments: usize) -> Result<Tr
 }
 
 /// The warning of an analysis that takes the full model instead.
-pub(crate) fn taken(why: &str) -> String {
+pub fn taken(why: &str) -> String {
     format!("formulation reduced took the full model: {why}")
 }
 
@@ -190,7 +194,7 @@ pub(crate) fn beyond(error: f64, tol: f64) -> Option<String> {
 }
 
 /// Warning about a motion beyond what the model was trained for.
-fn left(excess: f64) -> Option<String> {
+pub fn left(excess: f64) -> Option<String> {
     (excess > TRAINED).then(|| {
         format!(
             "the motion left the range of the reduced model: {excess:.2} times the largest trained amplitude; take --formulation compliant"

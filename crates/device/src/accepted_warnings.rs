@@ -40,6 +40,9 @@ impl DeviceSession {
         };
         let mut reported: Vec<Diagnostic> =
             found.into_iter().filter_map(|(warning, size)| self.grown(warning, size)).collect();
+        if let Some(warning) = self.reduction_warning(compiled, state) {
+            reported.extend(self.grown(warning, 1.0));
+        }
         if let Some(mode) = &compiled.lowest {
             let (charges, seen) = (self.charges(), AcceptedState { t: state.elapsed, values: state.shown.values() });
             let model = &compiled.parts.system.model;
@@ -83,14 +86,10 @@ impl DeviceSession {
     /// Name of a value, or of the current of a charge after all values.
     fn seen_name(&self, n: usize, compiled: &CompiledModel) -> String {
         let (signals, ports) = (self.signals.len(), self.ports.len());
-        let port = |n: usize| match self.opened.ports.get(n) {
-            Some(name) => name.clone(),
-            None => compiled.parts.system.electrics.names[self.ports.sources[n]].clone(),
-        };
         match n {
             n if n < signals => format!("signal `{}`", self.opened.signals[n]),
-            n if n < signals + ports => format!("port `{}`", port(n - signals)),
-            n => format!("the current of port `{}`", port(n - 2 * signals - ports)),
+            n if n < signals + ports => format!("port `{}`", self.port_name(n - signals, compiled)),
+            n => format!("the current of port `{}`", self.port_name(n - 2 * signals - ports, compiled)),
         }
     }
 

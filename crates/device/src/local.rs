@@ -39,7 +39,7 @@ impl LocalDevice {
 
 impl Device for LocalDevice {
     fn open(&mut self, request: &OpenRequest) -> Result<Description, DeviceError> {
-        let (session, description) = DeviceSession::open(&self.compiled, request)?;
+        let (session, description) = DeviceSession::open(&self.compiled, request, None)?;
         self.session = Some(session);
         Ok(description)
     }
@@ -101,9 +101,9 @@ impl Device for LocalDevice {
         match only {
             Some(tokens) => {
                 let alone = session.states.only(tokens).map_err(DeviceError::UnknownToken)?;
-                Ok(snapshot::write(&session.opened, &alone))
+                Ok(snapshot::write(&session.opened, &alone, session.tag()))
             }
-            None => Ok(snapshot::write(&session.opened, &session.states)),
+            None => Ok(snapshot::write(&session.opened, &session.states, session.tag())),
         }
     }
 
@@ -112,8 +112,13 @@ impl Device for LocalDevice {
     }
 
     fn load(&mut self, bytes: &[u8]) -> Result<Description, DeviceError> {
-        let (opened, states) = snapshot::read(bytes)?;
-        let (mut session, description) = DeviceSession::open(&self.compiled, &opened)?;
+        let (opened, states, tag) = snapshot::read(bytes)?;
+        let known = self.session.as_ref().filter(|session| session.opened.ports == opened.ports);
+        let known = known.and_then(DeviceSession::reduced_model).cloned();
+        let (mut session, description) = DeviceSession::open(&self.compiled, &opened, known.as_ref())?;
+        if session.tag() != tag {
+            return Err(refused("states of this formulation", "states of another one, or of another reduced model"));
+        }
         if !states.in_order().all(|(_, _, state)| session.fits(state)) {
             return Err(refused("states of this model", "states of another one"));
         }
@@ -125,7 +130,8 @@ impl Device for LocalDevice {
     fn recover(&mut self) {
         // a state is stored whole or not at all; all else is storage that every trial fills again
         let Some(mut session) = self.session.take() else { return };
-        self.session = DeviceSession::open(&self.compiled, &session.opened)
+        let known = session.reduced_model().cloned();
+        self.session = DeviceSession::open(&self.compiled, &session.opened, known.as_ref())
             .ok()
             .map(|(fresh, _)| DeviceSession { states: std::mem::take(&mut session.states), ..fresh });
     }

@@ -38,6 +38,7 @@ impl DeviceSession {
         self.partials(compiled, system, from.map(|(from, before)| ((from, before.rise.as_slice()), request.dt)), reply);
         let (shown, bound) = self.seen(compiled, system, request, from.map(|(_, before)| before), reply);
         reply.dt_next = bound;
+        let carried = self.carried(from.is_some());
         let snapshot = Snapshot {
             shown,
             q: self.motion.q.clone(),
@@ -47,7 +48,7 @@ impl DeviceSession {
             anchors: if from.is_some() { Vec::new() } else { self.equilibrium.sticking.anchors().to_vec() },
             next_step,
             elapsed: from.map_or(0.0, |(_, before)| before.elapsed + request.dt),
-            carried: if from.is_some() { self.stepper.method.state().to_vec() } else { Vec::new() },
+            carried,
         };
         reply.token = Some(self.states.insert(request, snapshot));
     }

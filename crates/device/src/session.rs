@@ -1,5 +1,7 @@
 //! Session of a device: its ports, its signals, its states, and the storage that every trial reuses.
 
+pub(crate) mod reduction;
+
 use super::agitation::ThermalForce;
 use super::contact_steps::ContactSteps;
 use super::growth::{Difference, Growth};
@@ -8,13 +10,14 @@ use super::phase_error::PhaseErrorMonitor;
 use super::states::{Snapshot, States};
 use super::{Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, Token, Trial};
 use bimorph_analysis::readout::expression::Expression;
-use bimorph_analysis::readout::ports::OpenedPorts;
+use bimorph_analysis::readout::ports::{OpenedPorts, PortResponse};
 use bimorph_analysis::readout::signal::Signal;
+use bimorph_analysis::reduced::circuit::CircuitReduction;
 use bimorph_analysis::transient::first_step;
 use bimorph_base::budget;
 use bimorph_domains::drive::Electrics;
 use bimorph_domains::{Drive, System};
-use bimorph_model::compile::{CompiledModel, Formulation};
+use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::equations::bodies::NormWeights;
@@ -23,6 +26,7 @@ use bimorph_solve::harmonic::{ComplexPose, Harmonic};
 use bimorph_solve::time::adaptive::Adaptive;
 use bimorph_solve::time::formulated::Formulated;
 use bimorph_solve::time::method::Motion;
+use reduction::SessionReduction;
 use std::sync::Arc;
 
 /// An open session: the choice of ports and signals, the states, and the storage that every trial reuses.
@@ -37,6 +41,14 @@ pub(super) struct DeviceSession {
     pub(super) equilibrium: Equilibrium,
     /// Thermal agitation, if requested.
     pub(super) shaken: Option<ThermalForce>,
+    /// The reduced model, if trials have one.
+    pub(super) reduction: Option<SessionReduction>,
+    /// Why trials have the full model, though a reduced one was requested.
+    pub(super) full_because: Option<String>,
+    /// Whether a signal or port shows a rate.
+    pub(super) sees_rates: bool,
+    /// The trial at hand is taken again in the full model.
+    pub(super) takes_bodies: bool,
     /// Carries ∂motion/∂(final voltage), one for each opened port.
     pub(super) stepper: Adaptive<Formulated>,
     /// Weights of its step errors.
@@ -69,14 +81,12 @@ pub(super) struct DeviceSession {
 const DOUBLES: usize = 64;
 
 impl DeviceSession {
-    pub(super) fn open(compiled: &CompiledModel, request: &OpenRequest) -> Result<(Self, Description), DeviceError> {
-        if compiled.options.formulation == Formulation::Reduced {
-            return Err(DeviceError::BadRequest {
-                what: "formulation",
-                expected: "compliant, rcr or rcr-elastic in a circuit; static and tran have reduced models".into(),
-                got: Formulation::Reduced.name().to_owned(),
-            });
-        }
+    /// `known` is a reduced model of the same ports, if one was trained before.
+    pub(super) fn open(
+        compiled: &CompiledModel,
+        request: &OpenRequest,
+        known: Option<&Arc<CircuitReduction>>,
+    ) -> Result<(Self, Description), DeviceError> {
         let ports = OpenedPorts::find(compiled, &request.ports)?;
         let own = ports.system.clone();
         let system = own.as_deref().unwrap_or(&compiled.parts.system);
@@ -87,19 +97,7 @@ impl DeviceSession {
                 Expression::of_state(compiled, name)
             })
             .collect::<Result<_, _>>()?;
-        let description = Description {
-            ports: if request.ports.is_empty() {
-                let name = |&source: &usize| electrics.names[source].clone();
-                ports.sources.iter().map(|p| PortInfo { name: name(p), kind: PortKind::Electrical }).collect()
-            } else {
-                let kinds = request.ports.iter().zip(&ports.kinds);
-                kinds.map(|(name, &kind)| PortInfo { name: name.clone(), kind }).collect()
-            },
-            signals: (request.signals.iter().zip(&signals))
-                .map(|(name, s)| SignalInfo { name: name.clone(), unit: s.unit().into() })
-                .collect(),
-            unknowns: compiled.unknowns(),
-        };
+        let mut description = describe(compiled, request, (&ports, &signals), electrics);
         let n = system.bodies();
         // each port has its sensitivity in every stage of a step, and matrices of ports and signals go with every reply
         budget::lay_out_matrix(ports.len(), DOUBLES * n + 4 * ports.len() + 2 * signals.len());
@@ -120,10 +118,24 @@ impl DeviceSession {
             Some(noise) => Some(ThermalForce::new(noise, compiled, surroundings(compiled))?),
             None => None,
         };
+        let names: Vec<String> = description.ports.iter().map(|port| port.name.clone()).collect();
+        let asked = (shaken.is_some(), first_step);
+        let found = (&names[..], &ports.sources[..], &ports.kinds[..]);
+        let reduction = SessionReduction::requested(compiled, system, found, asked, known);
+        let (reduction, full_because) = reduction.map_or_else(|why| (None, Some(why)), |found| (found, None));
+        let method = match &reduction {
+            Some(found) => Formulated::reduced(found.model.method(), system, &ports.sources),
+            None => Formulated::new(system, joints.as_ref(), first_step, &ports.sources),
+        };
+        description.unknowns = reduction.as_ref().map_or(description.unknowns, |found| found.model.space.size());
         let session = Self {
             opened: request.clone(),
             shaken,
-            stepper: Adaptive::new(n, Formulated::new(system, joints.as_ref(), first_step, &ports.sources)),
+            stepper: Adaptive::new(n, method),
+            reduction,
+            sees_rates: sees_rates(&signals, &ports),
+            full_because,
+            takes_bodies: false,
             weights: NormWeights::new(&system.model),
             ports,
             signals,
@@ -156,7 +168,7 @@ impl DeviceSession {
         let n = self.zeros.len();
         let poses = |poses: &[Pose]| poses.len() == n && poses.iter().all(|p| p.iter().all(|x| x.is_finite()));
         let numbers = |numbers: &[f64], count: usize| numbers.len() == count && numbers.iter().all(|x| x.is_finite());
-        let carried = self.stepper.method.state();
+        let carried = self.stepper.method.layout();
         let finite = |poses: &[Pose]| poses.iter().all(|p| p.iter().all(|x| x.is_finite()));
         let alike = |(a, b): (&Motion, &Motion)| {
             a.q.len() == b.q.len() && a.v.len() == b.v.len() && finite(&a.q) && finite(&a.v)
@@ -225,4 +237,36 @@ impl DeviceSession {
             self.sources[port] = value;
         }
     }
+}
+
+/// Description of what a request opens.
+fn describe(
+    compiled: &CompiledModel,
+    request: &OpenRequest,
+    (ports, signals): (&OpenedPorts, &[Expression<Signal>]),
+    electrics: &Electrics,
+) -> Description {
+    Description {
+        ports: if request.ports.is_empty() {
+            let name = |&source: &usize| electrics.names[source].clone();
+            ports.sources.iter().map(|p| PortInfo { name: name(p), kind: PortKind::Electrical }).collect()
+        } else {
+            let kinds = request.ports.iter().zip(&ports.kinds);
+            kinds.map(|(name, &kind)| PortInfo { name: name.clone(), kind }).collect()
+        },
+        signals: (request.signals.iter().zip(signals))
+            .map(|(name, s)| SignalInfo { name: name.clone(), unit: s.unit().into() })
+            .collect(),
+        unknowns: compiled.unknowns(),
+    }
+}
+
+/// Whether a signal or port shows a rate.
+fn sees_rates(signals: &[Expression<Signal>], ports: &OpenedPorts) -> bool {
+    let of_ports = ports.answers.iter().filter_map(|answer| match answer {
+        PortResponse::Motion(signal) => Some(signal),
+        _ => None,
+    });
+    let is_rate = |signal: &Signal| matches!(signal, Signal::Rate(..));
+    signals.iter().flat_map(Expression::quantities).chain(of_ports).any(is_rate)
 }

@@ -11,16 +11,24 @@ use bimorph_solve::time::method::Motion;
 
 /// Magic bytes: a name and the version of this format.
 const HEAD: [u8; 8] = *b"bimorph\x03";
+/// Those of states of a reduced model: format 3 behind the name of its coordinates.
+const HEAD_REDUCED: [u8; 8] = *b"bimorph\x04";
 /// Those of format 2, whose histories of steps count no alternations and whose states have no anchors.
 const HEAD_2: [u8; 8] = *b"bimorph\x02";
 
-/// Writes what is open and its states.
-pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
-    write_format(HEAD, StepHistory::PARTS, opened, states)
+/// Writes what is open and its states; `tag` names the coordinates of a reduced model.
+pub(super) fn write(opened: &OpenRequest, states: &States, tag: Option<u64>) -> Vec<u8> {
+    match tag {
+        None => write_format(&HEAD, StepHistory::PARTS, opened, states),
+        Some(tag) => {
+            let head = [HEAD_REDUCED, tag.to_le_bytes()].concat();
+            write_format(&head, StepHistory::PARTS, opened, states)
+        }
+    }
 }
 
 /// The same with `head`, and the first `parts` of each history; anchors with all of them.
-fn write_format(head: [u8; 8], parts: usize, opened: &OpenRequest, states: &States) -> Vec<u8> {
+fn write_format(head: &[u8], parts: usize, opened: &OpenRequest, states: &States) -> Vec<u8> {
     let mut out = SnapshotWriter(head.to_vec());
     for names in [&opened.ports, &opened.signals] {
         out.count(names.len());
@@ -63,7 +71,7 @@ fn write_format(head: [u8; 8], parts: usize, opened: &OpenRequest, states: &Stat
 ///
 /// # Errors
 /// [`DeviceError::BadRequest`] for bytes that [`write`] has not made.
-pub(super) fn read(bytes: &[u8]) -> Result<(OpenRequest, States), DeviceError> {
+pub(super) fn read(bytes: &[u8]) -> Result<(OpenRequest, States, Option<u64>), DeviceError> {
     let mut from = SnapshotReader(bytes);
     let read = from.all();
     match read {
@@ -98,12 +106,15 @@ impl SnapshotWriter {
 struct SnapshotReader<'a>(&'a [u8]);
 
 impl SnapshotReader<'_> {
-    fn all(&mut self) -> Option<(OpenRequest, States)> {
-        let (parts, rest) = match (self.0.strip_prefix(&HEAD), self.0.strip_prefix(&HEAD_2)) {
-            (Some(rest), _) => (StepHistory::PARTS, rest),
-            (None, rest) => (StepHistory::PARTS_OF_FORMAT_2, rest?),
-        };
+    fn all(&mut self) -> Option<(OpenRequest, States, Option<u64>)> {
+        let (head, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
+        let (parts, tag) = match *head {
+            HEAD => (StepHistory::PARTS, None),
+            HEAD_REDUCED => (StepHistory::PARTS, Some(self.word()?)),
+            HEAD_2 => (StepHistory::PARTS_OF_FORMAT_2, None),
+            _ => return None,
+        };
         let opened = OpenRequest { ports: self.names()?, signals: self.names()?, noise: self.noise()? };
         let mut states = States::default();
         for _ in 0..self.count(8)? {
@@ -133,7 +144,7 @@ impl SnapshotReader<'_> {
             };
             states.put(token, (parent != 0).then_some(Token(parent)), state);
         }
-        Some((opened, states))
+        Some((opened, states, tag))
     }
 
     fn bytes(&mut self, count: usize) -> Option<&[u8]> {
@@ -238,26 +249,28 @@ mod tests {
     #[test]
     fn states_come_back() {
         let (opened, states) = some();
-        let bytes = write(&opened, &states);
-        let (read_opened, read_states) = read(&bytes).expect("its own bytes");
-        assert_eq!(read_opened, opened);
-        assert_eq!(write(&read_opened, &read_states), bytes, "with the same bits, in the same order");
+        for tag in [None, Some(7)] {
+            let bytes = write(&opened, &states, tag);
+            let (read_opened, read_states, read_tag) = read(&bytes).expect("its own bytes");
+            assert_eq!((&read_opened, read_tag), (&opened, tag));
+            assert_eq!(write(&read_opened, &read_states, tag), bytes, "with the same bits, in the same order");
+        }
     }
 
     /// Snapshots of format 2 come back with histories that have counted no alternations.
     #[test]
     fn states_of_format_2_come_back() {
         let (opened, states) = some();
-        let bytes = write_format(HEAD_2, StepHistory::PARTS_OF_FORMAT_2, &opened, &states);
-        let (read_opened, read_states) = read(&bytes).expect("bytes of format 2");
+        let bytes = write_format(&HEAD_2, StepHistory::PARTS_OF_FORMAT_2, &opened, &states);
+        let (read_opened, read_states, _) = read(&bytes).expect("bytes of format 2");
         assert_eq!(read_opened, opened);
-        assert_eq!(write_format(HEAD_2, StepHistory::PARTS_OF_FORMAT_2, &read_opened, &read_states), bytes);
+        assert_eq!(write_format(&HEAD_2, StepHistory::PARTS_OF_FORMAT_2, &read_opened, &read_states), bytes);
     }
 
     #[test]
     fn other_bytes_are_refused() {
         let (opened, states) = some();
-        let bytes = write(&opened, &states);
+        let bytes = write(&opened, &states, None);
         for length in 0..bytes.len() {
             assert!(read(&bytes[..length]).is_err(), "{length}");
         }

@@ -1,6 +1,8 @@
 //! How a trial is made: a static one by following the parent's equilibrium, a transient one by integrating from the parent's
 //! state.
 
+mod reduced;
+
 use super::agitation::ThermalForce;
 use super::contact_steps::{ContactSteps, MAX_ERROR, near};
 use super::growth::{Bound, rate_along};
@@ -49,11 +51,17 @@ impl DeviceSession {
         self.motion.v.fill(Pose::zeros());
         let drawn = vec![0.0; self.equilibrium.sticking.anchors().len()];
         self.equilibrium.sticking.set_anchors(system, &self.motion.q, parent.map_or(&drawn, |p| &p.anchors));
-        let path = SourcePath::new(electrics, from, &self.sources, [load, 1.0]);
-        let sources = &self.sources;
-        let energised = |gap: usize| electrics.is_energised(gap, sources);
-        match self.equilibrium.follow(system, &path, &mut self.motion.q) {
-            Ok(found) => reply.jumped = !found.passed.is_empty(),
+        let sources = self.sources.clone();
+        let path = SourcePath::new(electrics, from, &sources, [load, 1.0]);
+        let energised = |gap: usize| electrics.is_energised(gap, &sources);
+        let reduced = self.balance_reduced(compiled, system, parent, &path);
+        if !reduced {
+            self.stepper.method.take_bodies();
+        }
+        let followed = (!reduced).then(|| self.equilibrium.follow(system, &path, &mut self.motion.q));
+        match followed.transpose() {
+            Ok(None) => {}
+            Ok(Some(found)) => reply.jumped = !found.passed.is_empty(),
             Err(error) => {
                 // a gap pressed beyond its law is the reason where there is one
                 let error =
@@ -69,6 +77,11 @@ impl DeviceSession {
         electrics.steady(&self.sources, &mut self.rise, &mut self.drive);
         if let Some(runaway) = thermal_runaway(compiled, &self.sources, &self.rise) {
             reply.status = Status::Fail(runaway);
+            return;
+        }
+        if reduced {
+            self.balance_reduced_ports(system);
+            self.answer(compiled, request, None, self.first_step, reply);
             return;
         }
         // ∂q/∂V = −K⁻¹·∂r/∂V with the factor that the last Newton iteration left
@@ -87,7 +100,7 @@ impl DeviceSession {
         self.answer(compiled, request, None, self.first_step, reply);
     }
 
-    /// A transient trial: the motion over dt, sensitivities along.
+    /// A transient trial: the motion over dt, sensitivities along. It is taken again in the full model where the reduced one has none.
     pub(super) fn advance(
         &mut self,
         compiled: &CompiledModel,
@@ -95,6 +108,21 @@ impl DeviceSession {
         parent: Option<&Snapshot>,
         reply: &mut TrialReply,
     ) {
+        self.takes_bodies = false;
+        if !self.try_advance(compiled, request, parent, reply) {
+            self.takes_bodies = true;
+            self.try_advance(compiled, request, parent, reply);
+        }
+    }
+
+    /// The same, once. False where the reduced model has no answer.
+    fn try_advance(
+        &mut self,
+        compiled: &CompiledModel,
+        request: &Trial<'_>,
+        parent: Option<&Snapshot>,
+        reply: &mut TrialReply,
+    ) -> bool {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
         self.fill_sources(&system.electrics, request.voltages);
@@ -104,23 +132,24 @@ impl DeviceSession {
             let start = parent.map_or(0.0, |p| p.elapsed);
             if let Err(longest) = shaken.over(compiled, start, request.dt) {
                 reply.status = Status::NeedDt(longest);
-                return;
+                return true;
             }
         }
         let tol = compiled.options.errors().step();
         let kept = parent.is_some_and(|parent| self.keep_steps(system, (request, parent), &from, tol));
-        self.begin(parent);
+        let beyond = self.is_beyond(&self.sources);
+        self.begin(parent, beyond);
         let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
         let mut ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
         if let Err(error) = check_course(compiled, &ramp) {
             reply.status = Status::Fail(error.to_string());
-            return;
+            return true;
         }
         let mut h = self.contact_steps.next;
         let ends = &self.contact_steps.ends;
         let bodies = &mut Bodies::weighed(system, &ramp, &self.weights);
         if !(kept && self.stepper.along(bodies, &mut self.motion, ends, (tol, MAX_ERROR))) {
-            self.begin(parent);
+            self.begin(parent, beyond);
             h = parent.map_or(self.first_step, |p| p.next_step);
             let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
             ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
@@ -137,25 +166,29 @@ impl DeviceSession {
                 Ok(Advance::Done | Advance::Stopped) => {}
                 Ok(Advance::OutOfSteps(reached)) => {
                     reply.status = Status::NeedDt(f64::max(0.5 * reached, 1e-3 * request.dt));
-                    return;
+                    return true;
                 }
                 Err(error) => {
                     reply.status = Status::Fail(error.begun_at(request.t - request.dt).to_string());
-                    return;
+                    return !self.went_far(true);
                 }
             }
         }
+        if self.went_far(false) {
+            return false;
+        }
+        self.stepper.method.place_sensitivities(self.sees_rates);
         let energised = |gap: usize| electrics.is_energised(gap, &self.sources);
         if let Err(error) = within_contact_range(compiled, &self.motion.q, energised) {
             reply.status = Status::Fail(error.to_string());
-            return;
+            return true;
         }
         ramp.end_rises(&mut self.rise_slope);
         ramp.at(request.dt, &mut self.drive);
         self.rise.copy_from_slice(&self.rise_slope);
         if let Some(runaway) = thermal_runaway(compiled, &self.sources, &self.rise) {
             reply.status = Status::Fail(runaway);
-            return;
+            return true;
         }
         let rest = Snapshot::default();
         self.answer(compiled, request, Some((&from, parent.unwrap_or(&rest))), h, reply);
@@ -166,10 +199,11 @@ impl DeviceSession {
             Bound::Next(longest) => reply.dt_next = reply.dt_next.min(longest),
             Bound::This(longest) => (reply.status, reply.token) = (Status::NeedDt(longest), None),
         }
+        true
     }
 
     /// The state that a trial starts from.
-    fn begin(&mut self, parent: Option<&Snapshot>) {
+    fn begin(&mut self, parent: Option<&Snapshot>, beyond: bool) {
         match parent {
             Some(p) => {
                 self.motion.q.copy_from_slice(&p.q);
@@ -182,7 +216,10 @@ impl DeviceSession {
                 self.rise.fill(0.0);
             }
         }
-        self.stepper.method.begin(parent.map_or(&[], |p| &p.carried));
+        self.stepper.method.begin(parent.map(|p| &p.carried[..]));
+        if beyond || self.takes_bodies {
+            self.stepper.method.take_bodies();
+        }
     }
 
     /// The steps that all trials of a point take, see [`super::contact_steps`]. False where each takes its own.
@@ -199,7 +236,7 @@ impl DeviceSession {
         if self.contact_steps.is_of(state, request.dt) {
             return !self.contact_steps.ends.is_empty();
         }
-        self.begin(Some(parent));
+        self.begin(Some(parent), self.is_beyond(from));
         let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
         let ramp = Ramp::new(&system.electrics, from, from, &self.rise, request.dt).pushed(push);
         let (mut h, mut touches) = (parent.next_step, system.contact_energy(&parent.q) > 0.0);

@@ -19,6 +19,7 @@ mod models;
 mod noise;
 mod ports;
 mod queries;
+mod reduced;
 #[cfg(feature = "remote")]
 mod remote;
 mod steps;

@@ -68,10 +68,15 @@ class Options(TypedDict, total=False):
     nodes are ports by their names, for a deck that has the circuit."""
 
     formulation: Literal["auto", "compliant", "rcr", "rcr-elastic", "reduced"] | None
-    """How bodies become equations. compliant: every body's own coordinates; rcr: joint coordinates on a tree,
-    loops closed inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method;
-    reduced: few joint coordinates (static, tran); auto: what suits. One of auto, compliant, rcr, rcr-elastic,
-    reduced; default: compliant."""
+    """How bodies become equations. compliant: each body's own coordinates; rcr: joint coordinates on a tree, loops
+    closed inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method;
+    reduced: few coordinates (static, tran, circuits); auto: what suits. One of auto, compliant, rcr,
+    rcr-elastic, reduced; default: compliant."""
+
+    ranges: str | None
+    """Ranges of what a circuit gives to ports (V, N, W), for which a reduced model is trained
+    (docs/explanation/reduction.md). Without them circuits have the full model. Range: NAME:LOW:HIGH with LOW
+    below HIGH, several separated by commas (in decks by bars); default: none."""
 
 
 WIRE = {
@@ -91,5 +96,6 @@ WIRE = {
     "as_sugar": "as_sugar",
     "without_circuit": "without_circuit",
     "formulation": "formulation",
+    "ranges": "ranges",
 }
 """Field on the wire of each option."""

@@ -6,6 +6,7 @@
 //! from it.
 
 use super::choices::{Anchors, Formulation, FringeFields, Junctions, Scheme};
+use super::port_ranges::PortRanges;
 use super::table::{Field, OptionDescription, OptionError, OptionValue, Range};
 use bimorph_base::Setting;
 use std::sync::LazyLock;
@@ -117,10 +118,14 @@ options! {
     /// their names, for a deck that has the circuit.
     without_circuit: bool = false, "without_circuit" = 14, [""], Range::Flag, "";
 
-    /// How bodies become equations. compliant: every body's own coordinates; rcr: joint coordinates on a tree, loops closed
-    /// inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method; reduced: few joint coordinates
-    /// (static, tran); auto: what suits.
+    /// How bodies become equations. compliant: each body's own coordinates; rcr: joint coordinates on a tree, loops closed
+    /// inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method; reduced: few coordinates
+    /// (static, tran, circuits); auto: what suits.
     formulation: Formulation = Formulation::Compliant, "formulation" = 11, [""], Range::Names(&Formulation::NAMES), "";
+
+    /// Ranges of what a circuit gives to ports (V, N, W), for which a reduced model is trained
+    /// (docs/explanation/reduction.md). Without them circuits have the full model.
+    ranges: Option<PortRanges> = None, "ranges" = 18, [""], Range::Ranges, "none";
 }
 
 impl CompileOptions {
@@ -198,6 +203,7 @@ mod tests {
                 Range::Above(low, high) => (OptionValue::Number(0.5 * high), OptionValue::Number(low)),
                 Range::Within(low, high) => (OptionValue::Number(high), OptionValue::Number(low - high)),
                 Range::Names(names) => (OptionValue::Name(names[0].to_owned()), OptionValue::Name("nosuch".to_owned())),
+                Range::Ranges => (OptionValue::Name("a:0:1".to_owned()), OptionValue::Name("a:1:0".to_owned())),
             };
             let mut options = CompileOptions::default();
             let refused = options.choose(option, bad).expect_err(option.about.name);

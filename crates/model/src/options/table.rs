@@ -4,6 +4,7 @@
 //! and tables come from here.
 
 use super::choices::{Anchors, Formulation, FringeFields, Junctions, Scheme};
+use super::port_ranges::PortRanges;
 use std::fmt;
 use thiserror::Error;
 
@@ -18,7 +19,7 @@ pub enum OptionValue {
     Count(usize),
     /// A number in the option's unit.
     Number(f64),
-    /// One of a few names.
+    /// One of a few names, or a text.
     Name(String),
 }
 
@@ -48,6 +49,8 @@ pub enum Range {
     Within(f64, f64),
     /// One of these names.
     Names(&'static [&'static str]),
+    /// Ranges by name.
+    Ranges,
 }
 
 impl fmt::Display for Range {
@@ -61,6 +64,9 @@ impl fmt::Display for Range {
             Self::Within(low, high) => write!(f, "{} to {}", number(low), number(high)),
             Self::Names([first, second, third]) => write!(f, "{first}, {second} or {third}"),
             Self::Names(names) => f.write_str(&names.join(", ")),
+            Self::Ranges => {
+                f.write_str("NAME:LOW:HIGH with LOW below HIGH, several separated by commas (in decks by bars)")
+            }
         }
     }
 }
@@ -119,7 +125,7 @@ impl OptionDescription {
     /// The range in words, with its unit.
     pub fn expected(&self) -> String {
         let kind = match self.range {
-            Range::Flag | Range::Names(_) => "",
+            Range::Flag | Range::Names(_) | Range::Ranges => "",
             Range::Count(..) => "a whole number from ",
             Range::Above(..) => "a number ",
             Range::Within(..) => "a number from ",
@@ -141,6 +147,7 @@ impl OptionDescription {
             (Range::Above(low, high), OptionValue::Number(x)) => x > low && (x < high || *x == *high && *high != 1.0),
             (Range::Within(low, high), OptionValue::Number(x)) => (low..=high).contains(&x),
             (Range::Names(names), OptionValue::Name(name)) => names.contains(&name.as_str()),
+            (Range::Ranges, OptionValue::Name(text)) => PortRanges::parse(text).is_some(),
             _ => false,
         };
         if fits {
@@ -195,6 +202,16 @@ impl<T: Field> Field for Option<T> {
 
     fn from_value(value: OptionValue) -> Option<Self> {
         if value == OptionValue::Unset { Some(None) } else { T::from_value(value).map(Some) }
+    }
+}
+
+impl Field for PortRanges {
+    fn value(&self) -> OptionValue {
+        OptionValue::Name(self.text().to_owned())
+    }
+
+    fn from_value(value: OptionValue) -> Option<Self> {
+        if let OptionValue::Name(text) = value { Self::parse(&text) } else { None }
     }
 }
 

@@ -124,6 +124,12 @@ impl ReducedSpace {
         }
     }
 
+    /// Strains, their rates and accelerations of a motion of z, by tiles of bodies.
+    #[inline]
+    pub(crate) fn place_strains(&self, motion: [&[f64]; 3], given: &mut [LaneJointStates]) {
+        everywhere(PlaceReduced { tiles: &self.tiles, motion, given });
+    }
+
     /// How far a state is beyond the trained ones: |z| over the largest in training (1).
     pub fn excess(&self, z: &[f64]) -> f64 {
         z.iter().map(|z| z * z).sum::<f64>().sqrt() / self.amplitude.max(f64::MIN_POSITIVE)
@@ -180,7 +186,7 @@ impl ReducedForces {
     /// Places the bodies at z, its rate and its acceleration.
     #[inline]
     pub fn place(&mut self, space: &ReducedSpace, motion: [&[f64]; 3]) {
-        everywhere(PlaceReduced { tiles: &space.tiles, motion, given: &mut self.given });
+        space.place_strains(motion, &mut self.given);
         self.placed.place(&space.joints.tree, &self.given);
     }
 

@@ -84,9 +84,7 @@ impl<M, X: Unknown> Adaptive<M, X> {
     where
         M: Method<E>,
     {
-        if self.carried_before.is_empty() {
-            self.carried_before = self.method.carried().to_vec();
-        }
+        self.prepare::<E>();
         equations.begin(control);
         let begun = self.method.start(equations, motion).map_err(|e| failed(equations, 0.0, *h, e));
         let end = begun.and_then(|()| match control {
@@ -110,9 +108,7 @@ impl<M, X: Unknown> Adaptive<M, X> {
     where
         M: Method<E>,
     {
-        if self.carried_before.is_empty() {
-            self.carried_before = self.method.carried().to_vec();
-        }
+        self.prepare::<E>();
         equations.begin(Control::Tolerance(tol));
         let mut holds = self.method.start(equations, motion).is_ok();
         let mut t = 0.0;
@@ -138,6 +134,18 @@ impl<M, X: Unknown> Adaptive<M, X> {
         self.spent = self.spent.and(equations.work());
         self.done = self.method.work();
         holds
+    }
+
+    /// Makes room for what the method carries: it may be another one than before.
+    fn prepare<E: Equations<Unknown = X>>(&mut self)
+    where
+        M: Method<E>,
+    {
+        let carried = self.method.carried();
+        let alike = |(a, b): (&Motion<X>, &Motion<X>)| a.q.len() == b.q.len();
+        if self.carried_before.len() != carried.len() || !self.carried_before.iter().zip(&*carried).all(alike) {
+            self.carried_before = carried.to_vec();
+        }
     }
 
     fn controlled<E: Equations<Unknown = X>>(

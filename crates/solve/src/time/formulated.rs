@@ -2,6 +2,7 @@
 
 use super::joint_rodas4::JointRodas4;
 use super::method::{Method, Motion, SolverCounters, StepResult};
+use super::reduced_rodas4::ReducedRodas4;
 use super::rodas4::Rodas4;
 use crate::equations::{Bodies, Joints};
 use bimorph_domains::System;
@@ -14,6 +15,18 @@ pub enum Formulated {
     Bodies(Box<Rodas4>),
     /// Relative joint coordinates.
     Joints(Box<JointRodas4>),
+    /// A reduced model, or every body's own coordinates where a motion has left what that was trained for.
+    Reduced(Box<ReducedOrBodies>),
+}
+
+/// A reduced model with the full one, which takes over where it has to.
+#[derive(Debug, Clone)]
+pub struct ReducedOrBodies {
+    /// The reduced model.
+    pub reduced: ReducedRodas4,
+    bodies: Rodas4,
+    /// Whether the reduced model steps.
+    pub is_reduced: bool,
 }
 
 impl Formulated {
@@ -26,11 +39,43 @@ impl Formulated {
         }
     }
 
+    /// With a reduced model that has its sensitivities, and the full one beside it.
+    pub fn reduced(reduced: ReducedRodas4, system: &System, sources: &[usize]) -> Self {
+        let bodies = Rodas4::new(system, sources);
+        Self::Reduced(Box::new(ReducedOrBodies { reduced, bodies, is_reduced: true }))
+    }
+
+    /// The reduced model, where it steps.
+    pub fn reduced_now(&mut self) -> Option<&mut ReducedRodas4> {
+        match self {
+            Self::Reduced(m) if m.is_reduced => Some(&mut m.reduced),
+            _ => None,
+        }
+    }
+
+    /// The same, to be read.
+    pub fn reduced_state(&self) -> Option<&ReducedRodas4> {
+        match self {
+            Self::Reduced(m) if m.is_reduced => Some(&m.reduced),
+            _ => None,
+        }
+    }
+
+    /// The full model steps from here on; the motion begins anew.
+    pub fn take_bodies(&mut self) {
+        if let Self::Reduced(m) = self {
+            m.is_reduced = false;
+        }
+        self.begin(Some(&[]));
+    }
+
     /// ∂(bodies' motion)/∂(final voltage), one for each source.
     pub fn sensitivity(&self) -> &[Motion] {
         match self {
             Self::Bodies(m) => &m.sensitivity,
             Self::Joints(m) => &m.sensitivity,
+            Self::Reduced(m) if m.is_reduced => m.reduced.sensitivity(),
+            Self::Reduced(m) => &m.bodies.sensitivity,
         }
     }
 
@@ -39,28 +84,55 @@ impl Formulated {
         match self {
             Self::Bodies(m) => &mut m.sensitivity,
             Self::Joints(m) => &mut m.sensitivity,
+            Self::Reduced(m) => match m.is_reduced {
+                true => m.reduced.sensitivity_mut(),
+                false => &mut m.bodies.sensitivity,
+            },
         }
     }
 
-    /// A motion begins that depends on no voltage yet. `state` is the result of [`Formulated::state`] at its beginning;
-    /// empty where only the bodies' motion is known.
-    pub fn begin(&mut self, state: &[Motion]) {
+    /// A motion begins that depends on no voltage yet. `state` is the result of [`Formulated::state`] at its beginning: empty where only the bodies'
+    /// motion is known, none where it begins at rest as drawn.
+    pub fn begin(&mut self, state: Option<&[Motion]>) {
         match self {
             Self::Bodies(m) => m.sensitivity.iter_mut().for_each(Motion::clear),
             Self::Joints(m) => {
                 m.forget_sensitivities();
-                if !state.is_empty() {
+                if let Some(state @ [_, ..]) = state {
                     m.resume(state);
                 }
             }
+            Self::Reduced(m) => {
+                m.is_reduced = state.is_none_or(|state| !state.is_empty());
+                match m.is_reduced {
+                    true => m.reduced.resume(state),
+                    false => m.bodies.sensitivity.iter_mut().for_each(Motion::clear),
+                }
+            }
+        }
+    }
+
+    /// Makes the sensitivities those of the bodies at the end of the steps taken; those of rates may be left out unless `rates`.
+    pub fn place_sensitivities(&mut self, rates: bool) {
+        if let Some(reduced) = self.reduced_now() {
+            reduced.place_sensitivities(rates);
         }
     }
 
     /// State for the next step beside the bodies' motion.
     pub fn state(&self) -> &[Motion] {
         match self {
+            Self::Reduced(m) if !m.is_reduced => &[],
+            _ => self.layout(),
+        }
+    }
+
+    /// A state of the sizes that one has; of a reduced model it may also be empty.
+    pub fn layout(&self) -> &[Motion] {
+        match self {
             Self::Bodies(_) => &[],
             Self::Joints(m) => m.state(),
+            Self::Reduced(m) => m.reduced.state(),
         }
     }
 }
@@ -70,6 +142,7 @@ impl Method<Bodies<'_>> for Formulated {
         match self {
             Self::Bodies(m) => Method::<Bodies<'_>>::error_order(&**m),
             Self::Joints(m) => Method::<Bodies<'_>>::error_order(&**m),
+            Self::Reduced(m) => Method::<Bodies<'_>>::error_order(&m.reduced),
         }
     }
 
@@ -77,6 +150,8 @@ impl Method<Bodies<'_>> for Formulated {
         match self {
             Self::Bodies(m) => m.start(bodies, motion),
             Self::Joints(m) => m.start(bodies, motion),
+            Self::Reduced(m) if m.is_reduced => m.reduced.start(bodies, motion),
+            Self::Reduced(m) => m.bodies.start(bodies, motion),
         }
     }
 
@@ -84,6 +159,14 @@ impl Method<Bodies<'_>> for Formulated {
         match self {
             Self::Bodies(m) => m.step(bodies, s, h, motion, error),
             Self::Joints(m) => m.step(bodies, s, h, motion, error),
+            Self::Reduced(m) if m.is_reduced => m.reduced.step(bodies, s, h, motion, error),
+            Self::Reduced(m) => m.bodies.step(bodies, s, h, motion, error),
+        }
+    }
+
+    fn accepted(&mut self, bodies: &mut Bodies<'_>, step: (f64, f64), ends: [&Motion; 2], carried: &[Motion]) {
+        if let Some(reduced) = self.reduced_now() {
+            reduced.accepted(bodies, step, ends, carried);
         }
     }
 
@@ -91,6 +174,10 @@ impl Method<Bodies<'_>> for Formulated {
         match self {
             Self::Bodies(m) => m.carried(),
             Self::Joints(m) => m.carried(),
+            Self::Reduced(m) => match m.is_reduced {
+                true => m.reduced.carried(),
+                false => m.bodies.carried(),
+            },
         }
     }
 
@@ -98,6 +185,8 @@ impl Method<Bodies<'_>> for Formulated {
         match self {
             Self::Bodies(m) => m.work(),
             Self::Joints(m) => m.work(),
+            Self::Reduced(m) if m.is_reduced => m.reduced.work(),
+            Self::Reduced(m) => m.bodies.work(),
         }
     }
 }

@@ -15,8 +15,12 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 (RODAS).
 
+mod circuit;
+mod coordinates;
+mod ports;
+
 use super::method::{Method, Motion, SolverCounters, StepFailure, StepResult};
-use super::rodas4::tableau::{A, ALPHA, C, GAMMA, GAMMA_I};
+use super::rodas4::tableau::{A, ALPHA, GAMMA, GAMMA_I};
 use super::rosenbrock::{self, CONSISTENT, RosenbrockStep};
 use super::stage_loss::StageLoss;
 use crate::equations::{Bodies, Joints};
@@ -30,9 +34,11 @@ use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::factor::ZeroPivot;
 use bimorph_multibody::joint_coordinates::sprung_loops::columns::Four;
 use bimorph_multibody::joint_coordinates::sprung_loops::directions::DirectionRows;
-use bimorph_multibody::planar::{DOF, Pose};
+use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyMatrix, forces};
+use coordinates::{ReducedMotion, add_product, put_increments, solve_factored};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use ports::ReducedPortSensitivities;
 use std::sync::Arc;
 
 /// Accepted steps between two estimates of the error by the reduction.
@@ -64,30 +70,6 @@ struct PolynomialStages {
     share: f64,
     /// The largest z in that norm, of equilibria of the training or so far.
     largest: f64,
-}
-
-/// Coordinates, rates and accelerations.
-#[derive(Debug, Clone)]
-struct ReducedMotion {
-    z: Vec<f64>,
-    v: Vec<f64>,
-    w: Vec<f64>,
-}
-
-impl ReducedMotion {
-    fn zeros(m: usize) -> Self {
-        Self { z: vec![0.0; m], v: vec![0.0; m], w: vec![0.0; m] }
-    }
-
-    fn copy(&mut self, from: &Self) {
-        for (to, from) in self.all().into_iter().zip([&from.z, &from.v, &from.w]) {
-            to.copy_from_slice(from);
-        }
-    }
-
-    fn all(&mut self) -> [&mut Vec<f64>; 3] {
-        [&mut self.z, &mut self.v, &mut self.w]
-    }
 }
 
 /// The method with its storage.
@@ -125,6 +107,10 @@ pub struct ReducedRodas4 {
     /// Accepted steps.
     taken: u64,
     estimate: Option<Box<ReductionEstimate>>,
+    /// Sensitivities, in a circuit. Its stages are those of polynomials throughout.
+    ports: Option<Box<ReducedPortSensitivities>>,
+    /// The accelerations are those of the motion to come.
+    resumed: bool,
     /// Largest excess over the trained states so far, see [`ReducedSpace::excess`].
     pub excess: f64,
     work: SolverCounters,
@@ -164,6 +150,8 @@ impl ReducedRodas4 {
             rate: closures.electrics.drive(),
             shortest,
             estimate: None,
+            ports: None,
+            resumed: false,
             excess: 0.0,
             work: SolverCounters::default(),
             space,
@@ -314,35 +302,31 @@ impl ReducedRodas4 {
     }
 
     fn solve_stage(&mut self, i: usize, h: f64) {
-        let (gh, shift) = (GAMMA * h, GAMMA_I[i] * h);
-        let Self { increments, at, mass, damping, force, forcing, right, r1, r2, product, .. } = self;
-        let (before, after) = increments.split_at_mut(i);
-        r1.as_mut_slice().copy_from_slice(&at.v);
-        r2.as_mut_slice().copy_from_slice(&at.w);
-        for (c, u) in C[i].iter().zip(&*before) {
-            for (r, u) in [(&mut *r1, &u.z), (&mut *r2, &u.v)] {
-                r.iter_mut().zip(u).for_each(|(r, u)| *r += c / h * u);
-            }
-        }
+        let Self { increments, at, r1, r2, .. } = self;
+        at.combined(i, h, &increments[..i], r1.as_mut_slice(), r2.as_mut_slice());
+        let (force, forcing) = (std::mem::take(&mut self.force), std::mem::take(&mut self.forcing));
+        self.solve_right(h, (&force, &forcing, GAMMA_I[i] * h));
+        (self.force, self.forcing) = (force, forcing);
+        put_increments(GAMMA * h, (&self.right, &self.r1, &self.r2), &mut self.increments[i]);
+    }
+
+    /// Uz = W⁻¹·(M·(r₁/(γh) + r₂) + C·r₁ − force − shift·forcing).
+    fn solve_right(&mut self, h: f64, (force, forcing, shift): (&[f64], &[f64], f64)) {
+        let gh = GAMMA * h;
+        let Self { mass, damping, right, r1, r2, product, .. } = self;
         product.iter_mut().zip(r1.iter()).zip(r2.iter()).for_each(|((x, r1), r2)| *x = r1 / gh + r2);
         right.fill(0.0);
         add_product(mass, product.as_slice(), right.as_mut_slice());
         if self.damped {
             add_product(damping, r1.as_slice(), right.as_mut_slice());
         }
-        for (right, (force, forcing)) in right.iter_mut().zip(force.iter().zip(&*forcing)) {
+        for (right, (force, forcing)) in right.iter_mut().zip(force.iter().zip(forcing)) {
             *right -= force + shift * forcing;
         }
         if let Some(factor) = &self.factor {
             solve_factored(factor.l_dirty(), right.as_mut_slice());
         }
         self.work.solves += 1;
-        let u = &mut after[0];
-        for (k, (z, (r1, r2))) in right.iter().zip(r1.iter().zip(r2.iter())).enumerate() {
-            u.z[k] = *z;
-            u.v[k] = u.z[k] / gh - r1;
-            u.w[k] = u.v[k] / gh - r2;
-        }
     }
 
     /// Accelerations that the forces at z and its rate bring.
@@ -365,18 +349,8 @@ impl ReducedRodas4 {
     /// Compares the polynomials with the exact kinematics at the motion now, and leaves them where their error is too large.
     fn check_polynomials(&mut self) {
         let Some(mut stages) = self.polynomials.take() else { return };
-        self.at.copy(&self.now);
-        self.exact_residual(false);
-        let Self { now, drive, force, forcing, right, product, mass, stiffness, .. } = self;
-        stages.forces.residual(&stages.of, [&now.z, &now.v, &now.w], drive, forcing);
-        right.iter_mut().zip(force.iter().zip(&*forcing)).for_each(|(r, (exact, found))| *r = exact - found);
-        let mut norm = |x: &[f64]| {
-            product.fill(0.0);
-            add_product(mass, x, product.as_mut_slice());
-            x.iter().zip(product.iter()).map(|(x, p)| x * p).sum::<f64>().max(0.0).sqrt()
-        };
-        stages.largest = stages.largest.max(norm(&now.z));
-        let error = solve(stiffness, right).map_or(f64::INFINITY, |(off, _)| norm(off.as_slice()));
+        let [error, size] = self.compared(&mut stages);
+        stages.largest = stages.largest.max(size);
         if error <= stages.share * stages.largest {
             self.polynomials = Some(stages);
             return;
@@ -388,44 +362,28 @@ impl ReducedRodas4 {
         forces.place(space, [&now.z, &now.v, &now.w]);
     }
 
+    /// The error of z by the polynomials at the motion now, and z, both in the mass norm (√(N·m)·s).
+    fn compared(&mut self, stages: &mut PolynomialStages) -> [f64; 2] {
+        self.at.copy(&self.now);
+        self.exact_residual(false);
+        let Self { now, drive, force, forcing, right, product, mass, stiffness, .. } = self;
+        stages.forces.residual(&stages.of, now.parts(), drive, forcing);
+        right.iter_mut().zip(force.iter().zip(&*forcing)).for_each(|(r, (exact, found))| *r = exact - found);
+        let mut norm = |x: &[f64]| {
+            product.fill(0.0);
+            add_product(mass, x, product.as_mut_slice());
+            x.iter().zip(product.iter()).map(|(x, p)| x * p).sum::<f64>().max(0.0).sqrt()
+        };
+        let error = solve(stiffness, right).map_or(f64::INFINITY, |(off, _)| norm(off.as_slice()));
+        [error, norm(&now.z)]
+    }
+
     fn keep(&mut self) {
-        let Self { carried, now, .. } = self;
-        let [position, push] = &mut carried[..] else { return };
-        for (to, from) in [(&mut position.q, &now.z), (&mut position.v, &now.v), (&mut push.q, &now.w)] {
-            from.iter().enumerate().for_each(|(k, x)| to[k / DOF][k % DOF] = *x);
-        }
+        self.now.pack(&mut self.carried[..2]);
     }
 
     fn put_back(&mut self) {
-        let Self { carried, now, .. } = self;
-        let [position, push] = &carried[..] else { return };
-        for (to, from) in now.all().into_iter().zip([&position.q, &position.v, &push.q]) {
-            to.iter_mut().enumerate().for_each(|(k, x)| *x = from[k / DOF][k % DOF]);
-        }
-    }
-}
-
-/// `to += a·x`.
-#[inline]
-fn add_product(a: &DMatrix<f64>, x: &[f64], to: &mut [f64]) {
-    for (column, x) in a.as_slice().chunks_exact(to.len()).zip(x) {
-        to.iter_mut().zip(column).for_each(|(to, a)| *to += a * x);
-    }
-}
-
-/// `x` becomes (L·Lᵀ)⁻¹·x, with what is above the diagonal not read.
-#[inline]
-fn solve_factored(l: &DMatrix<f64>, x: &mut [f64]) {
-    let m = x.len();
-    let columns = || l.as_slice().chunks_exact(m).enumerate();
-    for (j, column) in columns() {
-        x[j] /= column[j];
-        let (done, rest) = x.split_at_mut(j + 1);
-        rest.iter_mut().zip(&column[j + 1..]).for_each(|(x, l)| *x -= l * done[j]);
-    }
-    for (j, column) in columns().rev() {
-        let known: f64 = x[j + 1..].iter().zip(&column[j + 1..]).map(|(x, l)| l * x).sum();
-        x[j] = (x[j] - known) / column[j];
+        self.now.unpack(&self.carried[..2]);
     }
 }
 
@@ -470,9 +428,7 @@ impl RosenbrockStep for ReducedStep<'_> {
         let ReducedRodas4 { now, at, increments, .. } = &mut *self.rodas;
         at.copy(now);
         for (j, u) in increments[..i].iter().enumerate() {
-            for (to, u) in at.all().into_iter().zip([&u.z, &u.v, &u.w]) {
-                to.iter_mut().zip(u).for_each(|(to, u)| *to += A[i][j] * u);
-            }
+            at.add(A[i][j], u);
         }
     }
 
@@ -483,11 +439,16 @@ impl RosenbrockStep for ReducedStep<'_> {
     fn factor(&mut self) -> StepResult {
         self.rodas.factor(GAMMA * self.h)?;
         self.rodas.fill_forcing();
+        let ReducedRodas4 { ports, polynomials, drive, rate, .. } = &mut *self.rodas;
+        if let (Some(ports), Some(stages)) = (ports, polynomials) {
+            ports.begin((&stages.of, &mut stages.forces), self.ramp, self.s, [drive, rate]);
+        }
         Ok(())
     }
 
     fn solve(&mut self, i: usize) {
         self.rodas.solve_stage(i, self.h);
+        self.rodas.solve_ports(self.ramp, (i, self.s + ALPHA[i] * self.h, self.h));
     }
 
     fn finish(&mut self) {
@@ -511,6 +472,11 @@ impl RosenbrockStep for ReducedStep<'_> {
             }
         }
         self.rodas.keep();
+        let ReducedRodas4 { ports, carried, .. } = &mut *self.rodas;
+        if let Some(ports) = ports {
+            ports.finish();
+            ports.keep(&mut carried[2..]);
+        }
     }
 }
 
@@ -520,6 +486,9 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
     }
 
     fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> StepResult {
+        if std::mem::take(&mut self.resumed) {
+            return Ok(());
+        }
         let [z, v] = projected(&self.space, motion);
         (self.now.z, self.now.v) = (z, v);
         bodies.ramp.at(0.0, &mut self.drive);
@@ -529,11 +498,17 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
 
     fn step(&mut self, bodies: &mut Bodies<'_>, s: f64, h: f64, motion: &mut Motion, error: &mut Motion) -> StepResult {
         self.put_back();
+        if let Some(ports) = &mut self.ports {
+            ports.take(&self.carried[2..]);
+        }
         rosenbrock::take(&mut ReducedStep { rodas: self, ramp: bodies.ramp, s, h, motion, error })
     }
 
     fn accepted(&mut self, bodies: &mut Bodies<'_>, (t, h): (f64, f64), ends: [&Motion; 2], _: &[Motion]) {
         self.excess = self.excess.max(self.space.excess(&self.now.z));
+        if self.ports.is_some() {
+            return; // a trial depends on its request alone
+        }
         self.taken += 1;
         let (system, end, looks) = (bodies.system, ends[1], self.taken % EVERY == 1);
         if looks {

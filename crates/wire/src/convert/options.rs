@@ -153,6 +153,7 @@ mod tests {
                 Range::Count(low, _) => OptionValue::Count(low + 1),
                 Range::Above(low, high) | Range::Within(low, high) => OptionValue::Number(low + 0.25 * (high - low)),
                 Range::Names(names) => OptionValue::Name(names[0].to_owned()),
+                Range::Ranges => OptionValue::Name("a:0:1".to_owned()),
             };
             let mut options = CompileOptions::default();
             options.choose(option, value).unwrap_or_else(|e| panic!("{e}"));

@@ -94,6 +94,42 @@ impl MonomialChain {
         }
     }
 
+    /// Changes of the values and their derivatives in time at the placed state, where coordinates, rates and accelerations change.
+    #[inline]
+    pub(super) fn place_change(
+        &self,
+        [x, v, w]: [&[f64]; 3],
+        [dx, dv, dw]: [&[f64]; 3],
+        at: &MonomialValues,
+        change: &mut MonomialValues,
+    ) {
+        change.values[self.count()] = 0.0;
+        for (k, &[of, i]) in self.links.iter().enumerate() {
+            let (a, b, c) = (at.values[of], at.rates[of], at.pushes[of]);
+            let (da, db, dc) = (change.values[of], change.rates[of], change.pushes[of]);
+            change.values[k] = da * x[i] + a * dx[i];
+            change.rates[k] = db * x[i] + b * dx[i] + da * v[i] + a * dv[i];
+            change.pushes[k] = dc * x[i] + c * dx[i] + 2.0 * (db * v[i] + b * dv[i]) + da * w[i] + a * dw[i];
+        }
+    }
+
+    /// `to +=` the change of the gradient of a sum, where coordinates change by `dx` and values as placed; `coefficients` and their changes are used up.
+    #[inline]
+    pub(super) fn add_gradient_change(
+        &self,
+        [x, dx]: [&[f64]; 2],
+        [at, change]: [&MonomialValues; 2],
+        [coefficients, changes]: [&mut [f64]; 2],
+        to: &mut [f64],
+    ) {
+        for (k, &[of, i]) in self.links.iter().enumerate().rev() {
+            let (c, dc) = (coefficients[k], changes[k]);
+            to[i] += dc * at.values[of] + c * change.values[of];
+            coefficients[of] += c * x[i];
+            changes[of] += dc * x[i] + c * dx[i];
+        }
+    }
+
     /// Derivatives with the coordinates at the placed state.
     #[inline]
     pub(super) fn differentiate(&self, x: &[f64], at: &mut MonomialValues) {

@@ -71,6 +71,11 @@ pub struct PolynomialForces {
     shape_slopes: Vec<Lane8>,
     /// Shapes × shapes: stiffness and damping of the points.
     of_shapes: [DMatrix<f64>; 2],
+    /// Changes of the values, of what is given and of b.
+    change: MonomialValues,
+    point_change: Vec<f64>,
+    given_change: Vec<f64>,
+    combined_change: Vec<f64>,
 }
 
 /// Whether all that acts on a system has a law of points; of those that lose energy, contacts between plates alone.
@@ -138,6 +143,10 @@ impl PolynomialForces {
         let at = of.chain.storage();
         let combined = vec![0.0; at.values.len()];
         Self {
+            change: at.clone(),
+            point_change: vec![0.0; of.mix.ncols()],
+            given_change: vec![0.0; 2 * m + heaters + 1],
+            combined_change: combined.clone(),
             given: vec![0.0; 2 * m + heaters + 1],
             force: vec![0.0; m.div_ceil(LANES) * LANES],
             reversed: combined.clone(),
@@ -162,7 +171,7 @@ impl PolynomialForces {
         let [z, v, _] = motion;
         self.given[..m].copy_from_slice(z);
         self.given[m..2 * m].copy_from_slice(v);
-        self.give(m, drive);
+        give(m, drive, &mut self.given);
         of.chain.place(motion, &mut self.at);
         of.strains.values(&self.at.values, &mut self.stress);
         of.rests.add_product(&self.given[2 * m..], &mut self.stress);
@@ -182,13 +191,6 @@ impl PolynomialForces {
         self.reversed.copy_from_slice(&self.combined);
         of.chain.add_gradient(z, &self.at, &mut self.reversed, &mut self.force);
         force.copy_from_slice(&self.force[..m]);
-    }
-
-    /// Free strains and the factor of built-in strains of a drive, or their rates.
-    fn give(&mut self, m: usize, drive: &Drive) {
-        let (strains, built_in) = self.given[2 * m..].split_at_mut(drive.expansion.len());
-        strains.copy_from_slice(&drive.expansion);
-        built_in[0] = drive.load;
     }
 
     /// Loads of a drive, or their rates.
@@ -308,24 +310,15 @@ impl PolynomialForces {
         let charges = rate.volts.iter().any(|v| *v != 0.0);
         let loads = of.loaded && (rate.load != 0.0 || rate.inputs.iter().any(|x| *x != 0.0));
         if warms {
-            self.give(m, rate);
+            self.given_change[..2 * m].fill(0.0);
+            give(m, rate, &mut self.given_change);
             self.stress.fill(0.0);
-            of.rests.add_product(&self.given[2 * m..], &mut self.stress);
+            of.rests.add_product(&self.given_change[2 * m..], &mut self.stress);
             of.strains.add_combined(&self.stress, &mut self.reversed);
         }
         if charges {
             self.shape.fill(0.0);
-            for points in &of.members {
-                let both = drive.volts[points.member] * rate.volts[points.member];
-                for (k, law) in points.laws.iter().enumerate() {
-                    let point = points.first + k;
-                    if let Some(Law::Field(capacitor, _)) = &law.law {
-                        let force = -both * capacitor.at(self.points[point].approach).slope;
-                        let shares = of.mix.column(point);
-                        self.shape.iter_mut().zip(shares.iter()).for_each(|(to, share)| *to += share * force);
-                    }
-                }
-            }
+            self.charge(of, drive, rate);
             of.shapes.add_combined(&self.shape, &mut self.reversed);
         }
         if loads {
@@ -337,9 +330,90 @@ impl PolynomialForces {
         }
         if warms {
             // coordinates and rates have their shares in the tangent
-            self.given[..2 * m].fill(0.0);
-            of.linear.add_product(&self.given, &mut self.force);
+            of.linear.add_product(&self.given_change, &mut self.force);
         }
         out.copy_from_slice(&self.force[..m]);
     }
+
+    /// `shape +=` the change of the forces of fields, as voltages change.
+    fn charge(&mut self, of: &PolynomialMotion, drive: &Drive, change: &Drive) {
+        for points in &of.members {
+            let both = drive.volts[points.member] * change.volts[points.member];
+            for (k, law) in points.laws.iter().enumerate().filter(|_| both != 0.0) {
+                let point = points.first + k;
+                if let Some(Law::Field(capacitor, _)) = &law.law {
+                    let force = -both * capacitor.at(self.points[point].approach).slope;
+                    let shares = of.mix.column(point);
+                    self.shape.iter_mut().zip(shares.iter()).for_each(|(to, share)| *to += share * force);
+                }
+            }
+        }
+    }
+
+    /// The exact change of the force R where the residual was taken last, at `motion`, as that and the drive change.
+    pub fn change(
+        &mut self,
+        of: &PolynomialMotion,
+        (motion, moved): ([&[f64]; 3], [&[f64]; 3]),
+        (drive, change): (&Drive, &Drive),
+        out: &mut [f64],
+    ) {
+        let m = out.len();
+        self.given_change[..m].copy_from_slice(moved[0]);
+        self.given_change[m..2 * m].copy_from_slice(moved[1]);
+        give(m, change, &mut self.given_change);
+        of.chain.place_change(motion, moved, &self.at, &mut self.change);
+        of.strains.values(&self.change.values, &mut self.stress);
+        of.rests.add_product(&self.given_change[2 * m..], &mut self.stress);
+        of.inertia.values(&self.change.pushes, &mut self.push);
+        self.combined_change.fill(0.0);
+        of.strains.add_combined(&self.stress, &mut self.combined_change);
+        of.inertia.add_combined(&self.push, &mut self.combined_change);
+        if !self.points.is_empty() {
+            self.press_change(of, drive, change);
+        }
+        if of.loaded {
+            self.load(change);
+            of.works.add_combined(&self.work, &mut self.combined_change);
+        }
+        self.force.fill(0.0);
+        of.linear.add_product(&self.given_change, &mut self.force);
+        self.reversed.copy_from_slice(&self.combined);
+        let coefficients = [&mut self.reversed[..], &mut self.combined_change[..]];
+        of.chain.add_gradient_change([motion[0], moved[0]], [&self.at, &self.change], coefficients, &mut self.force);
+        out.copy_from_slice(&self.force[..m]);
+    }
+
+    /// Changes of the forces of all points, over the monomials.
+    fn press_change(&mut self, of: &PolynomialMotion, drive: &Drive, change: &Drive) {
+        // changes of the shapes and of their rates, point by point; then what acts on the shapes
+        of.shapes.values(&self.change.values, &mut self.shape_rate);
+        let mut force = std::mem::take(&mut self.point_change);
+        let sum = |point: usize, of_shapes: &[f64]| -> f64 {
+            of.mix.column(point).iter().zip(of_shapes).map(|(share, y)| share * y).sum()
+        };
+        for (point, state) in self.points.iter().enumerate() {
+            force[point] = state.stiffness * sum(point, &self.shape_rate);
+        }
+        if of.resists {
+            of.shapes.values(&self.change.rates, &mut self.shape_rate);
+            for (point, state) in self.points.iter().enumerate() {
+                force[point] += state.damping * sum(point, &self.shape_rate);
+            }
+        }
+        self.shape.fill(0.0);
+        for (point, force) in force.iter().enumerate() {
+            self.shape.iter_mut().zip(of.mix.column(point).iter()).for_each(|(to, share)| *to += share * force);
+        }
+        self.point_change = force;
+        self.charge(of, drive, change);
+        of.shapes.add_combined(&self.shape, &mut self.combined_change);
+    }
+}
+
+/// Puts the free strains and the factor of built-in strains of a drive, or their rates, behind coordinates and rates.
+fn give(m: usize, drive: &Drive, given: &mut [f64]) {
+    let (strains, built_in) = given[2 * m..].split_at_mut(drive.expansion.len());
+    strains.copy_from_slice(&drive.expansion);
+    built_in[0] = drive.load;
 }

@@ -1,0 +1,132 @@
+//! Reduced models in circuits: trained once for the ranges of the ports, with polynomial forces throughout.
+
+use super::{FULL_IN_TIME, MOMENTS, trained};
+use bimorph_domains::{Drive, System};
+use bimorph_model::compile::CompiledModel;
+use bimorph_solve::reduced::polynomial::moving::of_motion;
+use bimorph_solve::reduced::{InputBox, ReducedSpace};
+use bimorph_solve::time::reduced_rodas4::ReducedRodas4;
+use std::sync::Arc;
+
+/// How far motion exceeds the statics of what is applied at once, and how far it swings back through rest (1).
+const OVERSHOOT: [f64; 2] = [-0.5, 2.0];
+/// Ports of which all corners of the ranges are drives of the training.
+const CORNERS: usize = 6;
+/// Part of a range that an input may lie beyond it (1).
+const BEYOND: f64 = 0.1;
+
+/// The box of inputs for ranges of sources, in the unit of each; the others are at rest.
+pub fn range_inputs(system: &System, sources: &[usize], ranges: &[[f64; 2]]) -> InputBox {
+    let electrics = &system.electrics;
+    let p = ranges.len();
+    let corners = if p <= CORNERS { 1usize << p } else { 2 * p + 1 };
+    let end = |corner: usize, q: usize| match p <= CORNERS {
+        true => (corner >> q) & 1,
+        false => usize::from(corner == 2 * p || corner == 2 * q),
+    };
+    let drives: Vec<Drive> = (0..corners)
+        .map(|corner| {
+            let mut u = vec![0.0; electrics.sources()];
+            electrics.fill_sources(&vec![0.0; electrics.ports], &mut u);
+            for (q, range) in ranges.iter().enumerate() {
+                u[sources[q]] = range[end(corner, q)];
+            }
+            let mut drive = electrics.drive();
+            electrics.steady(&u, &mut vec![0.0; electrics.heating.states()], &mut drive);
+            drive
+        })
+        .collect();
+    let mut inputs = InputBox::around(system, &drives, OVERSHOOT);
+    // forces of both signs go as far back as ahead
+    let lowest = |k: usize| drives.iter().map(|drive| drive.inputs[k]).fold(0.0, f64::min);
+    let highest = |k: usize| drives.iter().map(|drive| drive.inputs[k]).fold(0.0, f64::max);
+    for input in &mut inputs.inputs {
+        let of = (0..input.unit.inputs.len()).find(|k| input.unit.inputs[*k] != 0.0);
+        if of.is_some_and(|k| lowest(k) < 0.0 && highest(k) > 0.0) {
+            input.range[0] = -OVERSHOOT[1];
+        }
+    }
+    inputs
+}
+
+/// A reduced model of a circuit. Immutable; shared by sessions.
+#[derive(Debug)]
+pub struct CircuitReduction {
+    /// The method at rest, whose copies step.
+    method: ReducedRodas4,
+    /// The space.
+    pub space: Arc<ReducedSpace>,
+    /// Sources of the opened ports with the ranges of the training.
+    ranges: Vec<(usize, [f64; 2])>,
+    /// Names the coordinates: states of another training mean something else.
+    pub tag: u64,
+}
+
+impl CircuitReduction {
+    /// Trains a model for its option `ranges`, with ports `names` that are `sources`; `shortest` is about the shortest time in which something moves (s).
+    ///
+    /// # Errors
+    /// Why the full model is taken.
+    pub fn train(
+        compiled: &CompiledModel,
+        system: &System,
+        (names, sources): (&[String], &[usize]),
+        shortest: f64,
+    ) -> Result<Self, String> {
+        let tol = compiled.options.errors().requested();
+        if tol < FULL_IN_TIME {
+            return Err(format!(
+                "at a tolerance of {tol:e} its error in time may be larger; a tol of {FULL_IN_TIME:e} or more takes it"
+            ));
+        }
+        let Some(given) = &compiled.options.ranges else {
+            return Err(
+                "no range of a port is given; give ranges=\"NAME:LOW:HIGH\" for those that a source drives".into()
+            );
+        };
+        if let Some((name, _)) =
+            given.all().iter().find(|(name, _)| !names.iter().any(|n| n.eq_ignore_ascii_case(name)))
+        {
+            return Err(format!("ranges names \"{name}\", and the ports are {}", names.join(", ")));
+        }
+        let ranges: Vec<[f64; 2]> = names.iter().map(|name| given.of(name).unwrap_or([0.0; 2])).collect();
+        let inputs = range_inputs(system, sources, &ranges);
+        let largest = inputs.drive(&vec![1.0; inputs.inputs.len()]);
+        let training = trained(&[(system, inputs)], tol, MOMENTS)?;
+        let fitted = of_motion(&training, system, &largest, tol).ok_or_else(|| {
+            "its forces are no polynomials within 0.3 of the tolerance (or friction or gas acts that has none); narrower ranges or a larger tol may have them"
+                .to_owned()
+        })?;
+        let space = Arc::new(fitted.space);
+        let share = compiled.options.errors().reduced_statics();
+        let method = ReducedRodas4::new(Arc::clone(&space), shortest)
+            .with_polynomials(fitted.polynomials, share, fitted.largest)
+            .with_ports(sources);
+        let tag = tag(&space);
+        Ok(Self { method, space, ranges: sources.iter().copied().zip(ranges).collect(), tag })
+    }
+
+    /// A copy that steps.
+    pub fn method(&self) -> ReducedRodas4 {
+        self.method.clone()
+    }
+
+    /// The first port that is given more than its range and a tenth of it, with what it is given and the range.
+    pub fn beyond(&self, given: &[f64]) -> Option<(usize, f64, [f64; 2])> {
+        self.ranges.iter().enumerate().find_map(|(port, (source, range))| {
+            let (x, more) = (given[*source], BEYOND * (range[1] - range[0]));
+            (x < range[0].min(0.0) - more || x > range[1].max(0.0) + more).then_some((port, x, *range))
+        })
+    }
+}
+
+/// FNV-1a over the directions; the polynomials follow from them.
+fn tag(space: &ReducedSpace) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for x in space.directions.iter().flatten().flat_map(|pose| pose.iter()) {
+        for byte in x.to_bits().to_le_bytes() {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+    hash
+}

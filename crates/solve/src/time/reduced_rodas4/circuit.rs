@@ -1,0 +1,160 @@
+//! The method in a circuit: trials from given states with their sensitivities, and equilibria of the same polynomials.
+
+use super::ReducedRodas4;
+use super::coordinates::put_increments;
+use super::ports::ReducedPortSensitivities;
+use crate::equations::Motion;
+use crate::reduced::ReducedSpace;
+use crate::reduced::statics::solve;
+use crate::time::rodas4::tableau::{GAMMA, GAMMA_I};
+use bimorph_domains::{Drive, Ramp};
+use bimorph_multibody::planar::Pose;
+
+/// Iterations of Newton's method for an equilibrium.
+const ITERATIONS: usize = 12;
+/// Newton ends at corrections below this fraction of the trained amplitude (1).
+const TOLERANCE: f64 = 1e-13;
+/// Corrections below this fraction that no longer shrink are rounding.
+const STALLED: f64 = 1e-9;
+
+impl ReducedRodas4 {
+    /// The same with sensitivities to the final voltages of `sources`. Its stages are polynomials ([`ReducedRodas4::with_polynomials`]) throughout; the
+    /// caller decides by [`ReducedRodas4::holds`] where the full model takes over.
+    #[must_use]
+    pub fn with_ports(mut self, sources: &[usize]) -> Self {
+        let packed = self.carried[0].clone();
+        self.carried.resize(2 + 2 * sources.len(), packed);
+        self.ports = Some(Box::new(ReducedPortSensitivities::new(&self.space, sources)));
+        self
+    }
+
+    /// Coordinates, rates and accelerations, for [`ReducedRodas4::resume`].
+    pub fn state(&self) -> &[Motion] {
+        &self.carried[..2]
+    }
+
+    /// Continues from a state, which no voltage has changed yet: the next start takes it as it is. None: from the bodies' motion.
+    pub fn resume(&mut self, state: Option<&[Motion]>) {
+        self.carried.iter_mut().for_each(Motion::clear);
+        self.carried.iter_mut().zip(state.unwrap_or_default()).for_each(|(to, from)| to.copy(from));
+        self.resumed = state.is_some();
+        self.put_back();
+    }
+
+    /// The space.
+    pub fn space(&self) -> &ReducedSpace {
+        &self.space
+    }
+
+    /// ∂(bodies' motion)/∂(final voltage), one for each source.
+    pub fn sensitivity(&self) -> &[Motion] {
+        self.ports.as_ref().map_or(&[], |ports| &ports.bodies)
+    }
+
+    /// The same, to be filled from outside.
+    pub fn sensitivity_mut(&mut self) -> &mut [Motion] {
+        self.ports.as_mut().map_or(&mut [], |ports| &mut ports.bodies)
+    }
+
+    /// Makes the sensitivities of the bodies those of the motion now: of displacements, and of rates where `rates`.
+    pub fn place_sensitivities(&mut self, rates: bool) {
+        if let Some(ports) = &mut self.ports {
+            ports.take(&self.carried[2..]);
+            ports.place_bodies(&self.space, &self.forces, rates);
+        }
+    }
+
+    /// The bodies where the last step or equilibrium placed them.
+    pub fn bodies(&self) -> &[Pose] {
+        &self.forces.placed.at
+    }
+
+    /// The largest coordinates in the mass norm, of equilibria of the training (√(N·m)·s).
+    pub fn largest(&self) -> f64 {
+        self.polynomials.as_ref().map_or(0.0, |stages| stages.largest)
+    }
+
+    /// How far the state is beyond the trained ones (1), see [`ReducedSpace::excess`].
+    pub fn excess_now(&self) -> f64 {
+        self.space.excess(&self.now.z)
+    }
+
+    /// Whether the polynomials are within their part of the tolerance at the end of the last step, where the drive is `drive`.
+    pub fn holds(&mut self, drive: &Drive) -> bool {
+        let Some(mut stages) = self.polynomials.take() else { return false };
+        self.drive.clone_from(drive);
+        let [error, size] = self.compared(&mut stages);
+        let holds = error <= stages.share * stages.largest.max(size);
+        self.polynomials = Some(stages);
+        holds
+    }
+
+    /// The equilibrium of the polynomials at a drive next to `z`, where the bodies are placed at rest. Returns how far it is from `z`, of the trained
+    /// amplitude; none where there is none, or it is unstable.
+    pub fn balance(&mut self, z: &[f64], drive: &Drive) -> Option<f64> {
+        self.carried.iter_mut().for_each(Motion::clear);
+        self.now.clear();
+        self.now.z.copy_from_slice(z);
+        let (mut last, mut done) = (f64::INFINITY, false);
+        for _ in 0..ITERATIONS {
+            let negative = self.tangent(drive)?;
+            let size = self.right.norm() / self.space.amplitude;
+            self.now.z.iter_mut().zip(self.right.iter()).for_each(|(z, dz)| *z -= dz);
+            done = size <= TOLERANCE || size <= STALLED && size > 0.1 * last;
+            last = size;
+            if !size.is_finite() || negative > 0 {
+                return None;
+            }
+            if done {
+                break;
+            }
+        }
+        if !done {
+            return None;
+        }
+        // the tangent of the sensitivities is that of the state
+        self.tangent(drive)?;
+        self.keep();
+        self.forces.place_at_rest(&self.space, &self.now.z);
+        let off = self.now.z.iter().zip(z).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
+        Some(off / self.space.amplitude)
+    }
+
+    /// Residual and tangent at rest at the motion now; K⁻¹·r is left on the right side. Returns the number of negative pivots.
+    fn tangent(&mut self, drive: &Drive) -> Option<usize> {
+        let Self { polynomials, now, mass, damping, stiffness, force, right, .. } = self;
+        let stages = polynomials.as_mut()?;
+        stages.forces.residual(&stages.of, now.parts(), drive, force);
+        stages.forces.matrices(&stages.of, mass, damping, stiffness);
+        right.as_mut_slice().copy_from_slice(force);
+        let (change, negative) = solve(stiffness, right)?;
+        right.copy_from(&change);
+        Some(negative)
+    }
+
+    /// The sensitivity of the equilibrium at `drive` to source `p`, with which the drive changes by `change`; after [`ReducedRodas4::balance`].
+    pub fn balance_port(&mut self, p: usize, drive: &Drive, change: &Drive) {
+        let Self { polynomials, now, at, stiffness, force, right, carried, .. } = self;
+        let Some(stages) = polynomials else { return };
+        at.clear();
+        stages.forces.change(&stages.of, (now.parts(), at.parts()), (drive, change), force);
+        right.as_mut_slice().copy_from_slice(force);
+        if let Some((moved, _)) = solve(stiffness, right) {
+            at.z.iter_mut().zip(moved.iter()).for_each(|(to, x)| *to = -x);
+        }
+        at.pack(&mut carried[2 + 2 * p..4 + 2 * p]);
+    }
+
+    /// The increments of stage `i` of the sensitivities, at time `s` (s) of the ramp.
+    pub(super) fn solve_ports(&mut self, ramp: &Ramp<'_>, (i, s, h): (usize, f64, f64)) {
+        let Some(mut ports) = self.ports.take() else { return };
+        for p in 0..ports.len() {
+            let Self { polynomials: Some(stages), at, drive, .. } = self else { break };
+            ports.stage((&stages.of, &mut stages.forces), ramp, (p, i, s), (at, drive));
+            ports.at.combined(i, h, &ports.increments[p][..i], self.r1.as_mut_slice(), self.r2.as_mut_slice());
+            self.solve_right(h, (&ports.force, &ports.forcing[p], GAMMA_I[i] * h));
+            put_increments(GAMMA * h, (&self.right, &self.r1, &self.r2), &mut ports.increments[p][i]);
+        }
+        self.ports = Some(ports);
+    }
+}

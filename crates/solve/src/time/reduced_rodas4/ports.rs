@@ -1,0 +1,151 @@
+//! Sensitivities with respect to final source voltages: the same stages with the exact change of each stage's forces.
+//!
+//! The forces are those of polynomials, whose change along a motion costs about as much as the forces. Bodies follow by the exact kinematics of the
+//! tree over values with their derivatives, once at the end of a trial.
+
+use super::coordinates::ReducedMotion;
+use crate::equations::Motion;
+use crate::reduced::ReducedSpace;
+use crate::reduced::polynomial::motion::{PolynomialForces, PolynomialMotion};
+use crate::reduced::space::ReducedForces;
+use crate::time::rodas4::tableau::{A, ALPHA};
+use bimorph_domains::{Drive, Ramp};
+use bimorph_multibody::joint_coordinates::sprung_loops::derivatives::Changes;
+use bimorph_multibody::joint_coordinates::sprung_loops::poses::LaneJointStates;
+use bimorph_multibody::planar::Pose;
+
+/// Sources whose final voltages the motion is differentiated by.
+#[derive(Debug, Clone)]
+pub(super) struct ReducedPortSensitivities {
+    sources: Vec<usize>,
+    /// Change of coordinates, rates and accelerations at the start of the step, where the stage at hand evaluates, and increments of each stage.
+    now: Vec<ReducedMotion>,
+    pub(super) at: ReducedMotion,
+    pub(super) increments: Vec<Vec<ReducedMotion>>,
+    /// Change of ∂R/∂t with each voltage.
+    pub(super) forcing: Vec<Vec<f64>>,
+    pub(super) force: Vec<f64>,
+    /// Room for a part of a forcing.
+    part: Vec<f64>,
+    change: Drive,
+    changes: Changes,
+    given: Vec<LaneJointStates>,
+    room: Vec<Pose>,
+    /// ∂(bodies' motion)/∂(final voltage of a source).
+    pub(super) bodies: Vec<Motion>,
+}
+
+impl ReducedPortSensitivities {
+    pub(super) fn new(space: &ReducedSpace, sources: &[usize]) -> Self {
+        let (m, tree) = (space.size(), &space.joints.tree);
+        let count = tree.links.len();
+        Self {
+            sources: sources.to_vec(),
+            now: vec![ReducedMotion::zeros(m); sources.len()],
+            at: ReducedMotion::zeros(m),
+            increments: vec![vec![ReducedMotion::zeros(m); ALPHA.len()]; sources.len()],
+            forcing: vec![vec![0.0; m]; sources.len()],
+            force: vec![0.0; m],
+            part: vec![0.0; m],
+            change: space.joints.closures.electrics.drive(),
+            changes: Changes::new(tree),
+            given: LaneJointStates::at_rest(&vec![Pose::zeros(); count]),
+            room: vec![Pose::zeros(); count],
+            bodies: vec![Motion::zeros(count); sources.len()],
+        }
+    }
+
+    /// Number of sources.
+    pub(super) fn len(&self) -> usize {
+        self.sources.len()
+    }
+
+    /// Takes what is carried between steps, two motions for each source.
+    pub(super) fn take(&mut self, carried: &[Motion]) {
+        for (now, carried) in self.now.iter_mut().zip(carried.chunks_exact(2)) {
+            now.unpack(carried);
+        }
+    }
+
+    /// Gives it back.
+    pub(super) fn keep(&self, carried: &mut [Motion]) {
+        for (now, carried) in self.now.iter().zip(carried.chunks_exact_mut(2)) {
+            now.pack(carried);
+        }
+    }
+
+    /// ∂(∂R/∂t)/∂(final voltage) of each source at time `s` (s) of the ramp, where a step begins.
+    pub(super) fn begin(
+        &mut self,
+        (of, forces): (&PolynomialMotion, &mut PolynomialForces),
+        ramp: &Ramp<'_>,
+        s: f64,
+        [drive, rate]: [&Drive; 2],
+    ) {
+        let Self { sources, forcing, part, change, .. } = self;
+        for (forcing, &source) in forcing.iter_mut().zip(&*sources) {
+            ramp.rate_sensitivity(s, source, change);
+            forces.forcing(of, drive, change, forcing);
+            // forces are quadratic in gap voltages: the voltage that rate acts on changes too
+            ramp.sensitivity(s, source, change);
+            change.keep_quadratic(ramp.electrics);
+            forces.forcing(of, rate, change, part);
+            forcing.iter_mut().zip(&*part).for_each(|(to, part)| *to += part);
+        }
+    }
+
+    /// The argument of stage `i` of source `p`, and ∂R/∂(final voltage) there in `force`, at time `s` (s) of the ramp.
+    pub(super) fn stage(
+        &mut self,
+        (of, forces): (&PolynomialMotion, &mut PolynomialForces),
+        ramp: &Ramp<'_>,
+        (p, i, s): (usize, usize, f64),
+        (motion, drive): (&ReducedMotion, &Drive),
+    ) {
+        let Self { sources, now, at, increments, force, change, .. } = self;
+        at.copy(&now[p]);
+        for (j, u) in increments[p][..i].iter().enumerate() {
+            at.add(A[i][j], u);
+        }
+        ramp.sensitivity(s, sources[p], change);
+        let parts = [&change.volts, &change.expansion, &change.inputs];
+        if parts.iter().all(|x| x.iter().all(|x| *x == 0.0)) && at.is_zero() {
+            // the start of a trial depends on no voltage yet
+            return force.fill(0.0);
+        }
+        forces.change(of, (motion.parts(), at.parts()), (drive, change), force);
+    }
+
+    /// After the last stage of a step.
+    pub(super) fn finish(&mut self) {
+        let Self { now, at, increments, .. } = self;
+        let last = ALPHA.len() - 1;
+        for (now, increments) in now.iter_mut().zip(&*increments) {
+            at.copy(now);
+            for (j, u) in increments[..last].iter().enumerate() {
+                at.add(A[last][j], u);
+            }
+            now.copy(at);
+            now.add(1.0, &increments[last]);
+        }
+    }
+
+    /// The change of the bodies' motion, where these are placed by `forces`; of rates where `rates`, else they stay 0.
+    pub(super) fn place_bodies(&mut self, space: &ReducedSpace, forces: &ReducedForces, rates: bool) {
+        let Self { now, changes, given, room, bodies, .. } = self;
+        let tree = &space.joints.tree;
+        for (now, bodies) in now.iter().zip(bodies) {
+            if !rates {
+                space.strains(&now.z, room);
+                forces.placed.spread(tree, room, &mut bodies.q);
+                bodies.v.fill(Pose::zeros());
+                continue;
+            }
+            space.place_strains([&now.z, &now.v, &[]], given);
+            changes.place(tree, &forces.given, given);
+            for (j, (q, v)) in bodies.q.iter_mut().zip(&mut bodies.v).enumerate() {
+                [*q, *v, _] = changes.of(j);
+            }
+        }
+    }
+}
