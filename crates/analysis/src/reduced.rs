@@ -184,7 +184,7 @@ fn coded(message: String) -> String {
 }
 
 /// Warning about an error by the reduction above the tolerance.
-pub(crate) fn beyond(error: f64, tol: f64) -> Option<String> {
+pub fn beyond(error: f64, tol: f64) -> Option<String> {
     (error > tol).then(|| {
         format!(
             "estimated error of the reduced model {error:.1e}, more than the tolerance {tol:e}; take --formulation compliant, or a smaller --tol, \

@@ -40,8 +40,8 @@ impl DeviceSession {
         };
         let mut reported: Vec<Diagnostic> =
             found.into_iter().filter_map(|(warning, size)| self.grown(warning, size)).collect();
-        if let Some(warning) = self.reduction_warning(compiled, state) {
-            reported.extend(self.grown(warning, 1.0));
+        for (warning, size) in self.reduction_warnings(compiled, system, state) {
+            reported.extend(self.grown(warning, size));
         }
         if let Some(mode) = &compiled.lowest {
             let (charges, seen) = (self.charges(), AcceptedState { t: state.elapsed, values: state.shown.values() });

@@ -2,10 +2,14 @@
 
 use bimorph_analysis::readout::PortKind;
 use bimorph_analysis::reduced::circuit::CircuitReduction;
-use bimorph_domains::System;
+use bimorph_domains::{Drive, System};
 use bimorph_model::compile::{CompiledModel, Formulation};
+use bimorph_multibody::forces;
+use bimorph_multibody::planar::Pose;
 use bimorph_solve::reduced::check::FullCheck;
 use bimorph_solve::reduced::statics::ReducedStatics;
+use bimorph_solve::time::method::Motion;
+use bimorph_solve::time::reduced_rodas4::ReducedRodas4;
 use std::sync::Arc;
 
 /// The reduced model of a session with the storage of its equilibria.
@@ -14,6 +18,54 @@ pub(crate) struct SessionReduction {
     pub(crate) model: Arc<CircuitReduction>,
     pub(crate) statics: ReducedStatics,
     pub(crate) check: FullCheck,
+    pub(crate) error: ReductionErrorSum,
+}
+
+/// The error by the reduction of a motion, from the residual of the full model at some accepted states.
+#[derive(Debug, Default)]
+pub(crate) struct ReductionErrorSum {
+    /// Sum of the squares of the errors in the mass norm (kg·m²), their number, and the largest displacement in that norm (√kg·m).
+    squares: f64,
+    count: f64,
+    largest: f64,
+    /// Accepted states.
+    accepted: u64,
+}
+
+/// Accepted states from one residual to the next.
+const EVERY: u64 = 20;
+
+impl SessionReduction {
+    /// The root mean square error by the reduction of the motion so far, of its or the training's largest displacement; with an accepted state `q`, `v` that carries
+    /// `carried` under `drive`, the first of a motion where `begins`.
+    pub(crate) fn seen(
+        &mut self,
+        system: &System,
+        method: &mut ReducedRodas4,
+        (q, v, carried): (&[Pose], &[Pose], &[Motion]),
+        (drive, begins): (&Drive, bool),
+    ) -> f64 {
+        if begins {
+            self.error = ReductionErrorSum::default();
+        }
+        let error = &mut self.error;
+        error.accepted += 1;
+        if error.accepted % EVERY == 1 && !carried.is_empty() {
+            let push = method.accelerations(carried);
+            let mut taken: Vec<Pose> =
+                push.iter().enumerate().map(|(j, push)| system.model.mass(j).component_mul(push)).collect();
+            forces::add_damping(&system.model, v, &mut taken);
+            system.add_loss(q, |k| v[k], &mut taken);
+            self.check.of(system, q, drive, Some(&taken));
+            let squares = system.model.mass_product(self.check.step(), self.check.step());
+            if squares.is_finite() {
+                error.squares += squares;
+                error.count += 1.0;
+            }
+            error.largest = error.largest.max(system.model.mass_product(q, q).sqrt());
+        }
+        (error.squares / error.count.max(1.0)).sqrt() / error.largest.max(method.largest())
+    }
 }
 
 /// Ports of a session: names, sources and kinds.
@@ -45,6 +97,7 @@ impl SessionReduction {
             Some(known) => Arc::clone(known),
             None => Arc::new(CircuitReduction::train(compiled, system, (names, sources), shortest)?),
         };
-        Ok(Some(Self { statics: ReducedStatics::new(&model.space), check: FullCheck::new(system), model }))
+        let (statics, check) = (ReducedStatics::new(&model.space), FullCheck::new(system));
+        Ok(Some(Self { statics, check, error: ReductionErrorSum::default(), model }))
     }
 }

@@ -13,7 +13,7 @@ use crate::session::DeviceSession;
 use crate::session::reduction::SessionReduction;
 use crate::states::Snapshot;
 use bimorph_analysis::reduced::circuit::CircuitReduction;
-use bimorph_analysis::reduced::{TRAINED, taken};
+use bimorph_analysis::reduced::{TRAINED, beyond, taken};
 use bimorph_base::Diagnostic;
 use bimorph_domains::System;
 use bimorph_model::compile::CompiledModel;
@@ -25,6 +25,8 @@ use std::sync::Arc;
 const EVERY: f64 = 20.0;
 /// Excess over the trained states (1) from which on a step is taken again in the full model.
 const FAR: f64 = 1.5;
+/// Size of the warning that the full model has taken over: more than that of any error, in units of the tolerance (1).
+const LEFT: f64 = 1e6;
 /// Code of the warnings.
 const WARNING: &str = "W053";
 
@@ -58,7 +60,7 @@ impl DeviceSession {
         self.stepper.method.begin(parent.map(|p| &p.carried[..]));
         let Some(reduction) = &mut self.reduction else { return false };
         let Some(method) = self.stepper.method.reduced_now() else { return false };
-        let SessionReduction { model, statics, check } = reduction;
+        let SessionReduction { model, statics, check, .. } = reduction;
         let mut z = vec![0.0; model.space.size()];
         if parent.is_some() {
             z.copy_from_slice(method.coordinates());
@@ -117,8 +119,32 @@ impl DeviceSession {
         carried
     }
 
-    /// Warnings about the reduced model in an accepted state.
-    pub(crate) fn reduction_warning(&self, compiled: &CompiledModel, state: &Snapshot) -> Option<Diagnostic> {
+    /// Warnings about the reduced model in an accepted state, with their sizes.
+    pub(crate) fn reduction_warnings(
+        &mut self,
+        compiled: &CompiledModel,
+        system: &System,
+        state: &Snapshot,
+    ) -> Vec<(Diagnostic, f64)> {
+        // reported after a warning about an error, too
+        let mut found: Vec<_> = self.left_warning(compiled, state).into_iter().map(|warning| (warning, LEFT)).collect();
+        let mut drive = system.electrics.drive();
+        system.electrics.apply(&state.sources, &state.rise, &mut drive);
+        self.stepper.method.begin(Some(&state.carried));
+        if let (Some(reduction), Some(method)) = (&mut self.reduction, self.stepper.method.reduced_now()) {
+            let about = (&state.q[..], &state.v[..], &state.carried[..]);
+            let error = reduction.seen(system, method, about, (&drive, state.elapsed == 0.0));
+            let tol = compiled.options.errors().requested();
+            if let Some(text) = beyond(error, tol) {
+                let help = "take narrower `ranges`, a smaller `tol`, which adds directions, or `formulation=compliant`";
+                found.push((Diagnostic::warning(WARNING, text, help), compiled.options.errors().used(error, 1.0)));
+            }
+        }
+        found
+    }
+
+    /// The warning that the full model has taken over.
+    fn left_warning(&self, compiled: &CompiledModel, state: &Snapshot) -> Option<Diagnostic> {
         let help = "give `ranges` that hold what the ports are given, or take `formulation=compliant`";
         if let Some(why) = &self.full_because {
             return Some(Diagnostic::warning(WARNING, taken(why), help));

@@ -303,11 +303,22 @@ impl PolynomialForces {
 
     /// ∂R/∂t where the residual and the matrices were taken last, as the drive changes at this rate.
     pub fn forcing(&mut self, of: &PolynomialMotion, drive: &Drive, rate: &Drive, out: &mut [f64]) {
+        self.forcing_beside(of, [drive, rate], None, out);
+    }
+
+    /// The same where forces are those of the products of voltages of `beside`, too.
+    pub fn forcing_beside(
+        &mut self,
+        of: &PolynomialMotion,
+        [drive, rate]: [&Drive; 2],
+        beside: Option<[&Drive; 2]>,
+        out: &mut [f64],
+    ) {
         let m = out.len();
         self.reversed.fill(0.0);
         self.force.fill(0.0);
         let warms = rate.expansion.iter().any(|x| *x != 0.0) || rate.load != 0.0;
-        let charges = rate.volts.iter().any(|v| *v != 0.0);
+        let charges = rate.volts.iter().any(|v| *v != 0.0) || beside.is_some();
         let loads = of.loaded && (rate.load != 0.0 || rate.inputs.iter().any(|x| *x != 0.0));
         if warms {
             self.given_change[..2 * m].fill(0.0);
@@ -319,6 +330,9 @@ impl PolynomialForces {
         if charges {
             self.shape.fill(0.0);
             self.charge(of, drive, rate);
+            if let Some([drive, rate]) = beside {
+                self.charge(of, drive, rate);
+            }
             of.shapes.add_combined(&self.shape, &mut self.reversed);
         }
         if loads {

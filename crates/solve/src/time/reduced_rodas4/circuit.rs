@@ -74,6 +74,13 @@ impl ReducedRodas4 {
         self.polynomials.as_ref().map_or(0.0, |stages| stages.largest)
     }
 
+    /// Accelerations of the bodies in a state.
+    pub fn accelerations(&mut self, state: &[Motion]) -> &[Pose] {
+        self.resume(Some(state));
+        self.forces.place(&self.space, self.now.parts());
+        &self.forces.placed.acceleration
+    }
+
     /// How far the state is beyond the trained ones (1), see [`ReducedSpace::excess`].
     pub fn excess_now(&self) -> f64 {
         self.space.excess(&self.now.z)

@@ -25,9 +25,8 @@ pub(super) struct ReducedPortSensitivities {
     /// Change of ∂R/∂t with each voltage.
     pub(super) forcing: Vec<Vec<f64>>,
     pub(super) force: Vec<f64>,
-    /// Room for a part of a forcing.
-    part: Vec<f64>,
     change: Drive,
+    also: Drive,
     changes: Changes,
     given: Vec<LaneJointStates>,
     room: Vec<Pose>,
@@ -46,8 +45,8 @@ impl ReducedPortSensitivities {
             increments: vec![vec![ReducedMotion::zeros(m); ALPHA.len()]; sources.len()],
             forcing: vec![vec![0.0; m]; sources.len()],
             force: vec![0.0; m],
-            part: vec![0.0; m],
             change: space.joints.closures.electrics.drive(),
+            also: space.joints.closures.electrics.drive(),
             changes: Changes::new(tree),
             given: LaneJointStates::at_rest(&vec![Pose::zeros(); count]),
             room: vec![Pose::zeros(); count],
@@ -82,15 +81,13 @@ impl ReducedPortSensitivities {
         s: f64,
         [drive, rate]: [&Drive; 2],
     ) {
-        let Self { sources, forcing, part, change, .. } = self;
+        let Self { sources, forcing, also, change, .. } = self;
         for (forcing, &source) in forcing.iter_mut().zip(&*sources) {
             ramp.rate_sensitivity(s, source, change);
-            forces.forcing(of, drive, change, forcing);
             // forces are quadratic in gap voltages: the voltage that rate acts on changes too
-            ramp.sensitivity(s, source, change);
-            change.keep_quadratic(ramp.electrics);
-            forces.forcing(of, rate, change, part);
-            forcing.iter_mut().zip(&*part).for_each(|(to, part)| *to += part);
+            ramp.sensitivity(s, source, also);
+            let beside = also.volts.iter().any(|v| *v != 0.0).then_some([rate, &*also]);
+            forces.forcing_beside(of, [drive, change], beside, forcing);
         }
     }
 
