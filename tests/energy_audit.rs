@@ -137,6 +137,20 @@ fn combs_in_gas() {
     balances("comb", text, &[(20.0, 300e-6), (0.0, 300e-6)], false);
 }
 
+/// Misaligned fingers of a comb snap to the side, bounce on each other with loss, and are released.
+#[test]
+fn a_comb_at_its_sides() {
+    let text = "
+        anchor * [f] []
+        mass2d * [m] [m=1e-10 J=1e-19]
+        spring2d * [f m] [kx=5 ky=20 krz=1e-6]
+        anchor * [e] []
+        comb2de * [m e] [N=40 gap=2u h=20u l=10u L=30u w=2u misalign=0.1u restitution=0.4]
+        eground * [e] []
+        drive port * [m e] []";
+    balances("sides", text, &[(60.0, 100e-6), (0.0, 100e-6)], true);
+}
+
 /// A cantilever that faces an electrode in gas closes on its contact, zips along it, and opens.
 #[test]
 fn facing_beams_with_film_and_contact() {

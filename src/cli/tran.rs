@@ -30,7 +30,7 @@ use std::path::PathBuf;
 /// ones, where that takes some seconds at most.
 ///
 /// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], BEAM.stress [Pa], GAP.q [C], GAP.gap
-/// [m], GAP.C [F], GAP.F, GAP.N [N], STOP.G [S], PORT.q [C], PORT.i [A]. JSON: "t": times [s]. "signals" and
+/// [m], GAP.C [F], GAP.F, GAP.N [N], COMB.side [m], STOP.G [S], PORT.q [C], PORT.i [A]. JSON: "t": times [s]. "signals" and
 /// "units" by name. "events": crossings of --event. "step_error": estimated error of the steps. "reliable_until" and "after_contact": time [s] up to
 /// which single values hold --tol where parts bounce, and mean values after it.
 /// "largest_stress": of the run, where a layer has a `strength` or a --shock acts.

@@ -7,7 +7,7 @@ use bimorph::multibody::BodyMatrix;
 use bimorph::multibody::planar::Pose;
 
 /// Members, each with the voltage (V) across it, and the sizes of random displacements (m) and rotations (rad).
-const CASES: [(&str, f64, [f64; 2], &str); 7] = [
+const CASES: [(&str, f64, [f64; 2], &str); 8] = [
     (
         "comb",
         30.0,
@@ -17,6 +17,18 @@ const CASES: [(&str, f64, [f64; 2], &str); 7] = [
         spring2d * [f m] [kx=1 ky=1 krz=1e-9]
         anchor p [f] [l=1u w=1u]
         c comb2de p [m e] [N=40 gap=2u l=10u L=30u w=2u fringe=exact]
+        mass2d * [e] [m=1e-10 J=1e-20]
+        spring2d * [f e] [kx=1 ky=1 krz=1e-9]",
+    ),
+    (
+        "comb pressed",
+        30.0,
+        [10e-9, 2e-4],
+        "process p = [ density=2300 h=20u ]
+        mass2d * [m] [m=1e-10 J=1e-20]
+        spring2d * [f m] [kx=1 ky=1 krz=1e-9]
+        anchor p [f] [l=1u w=1u]
+        c comb2de p [m e] [N=40 gap=2u l=10u L=30u w=2u fringe=exact misalign=1.699u touch=0.3u oz=0.4]
         mass2d * [e] [m=1e-10 J=1e-20]
         spring2d * [f e] [kx=1 ky=1 krz=1e-9]",
     ),

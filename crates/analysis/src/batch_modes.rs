@@ -70,6 +70,6 @@ fn at_rest(compiled: &CompiledModel, voltages: &PortVoltages) -> bool {
     let system = &compiled.parts.system;
     !about_equilibrium(compiled, voltages)
         && system.model.loose().next().is_none()
-        && !system.is_acted_on(&system.electrics.drive())
+        && !system.is_acted_on_as_drawn(&system.electrics.drive())
         && system.electrics.inputs.is_empty()
 }

@@ -157,7 +157,7 @@ impl<'a> RunFinisher<'a> {
             setup,
             ramp,
             stop: options.stop,
-            contacts: (0..system.members.len()).any(|g| system.touching(g).is_some()),
+            contacts: system.has_contacts(),
             looks: 0,
             stability: StabilityMonitor::new(system),
             drive,

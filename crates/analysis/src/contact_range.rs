@@ -1,5 +1,5 @@
 //! No result from beyond the law of contact: a part pressed further into another than the law knows is refused by name.
-//! Combs have no contact at the ends of their fingers: fingers beyond them cause a warning.
+//! Combs have no contact at the ends of their fingers: fingers beyond them cause a warning. Neither have fingers that do not overlap.
 
 use super::AnalysisError;
 use bimorph_domains::Domain;
@@ -7,8 +7,8 @@ use bimorph_domains::domain::SideRoom;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 
-/// Refuses a configuration in which a gap is closed beyond the range of its law, see [`bimorph_domains::contact`], or fingers of a comb touch at their sides
-/// under a voltage. `energised` says which gaps have one. Without it fingers that touch cause a warning, as those beyond the other side do.
+/// Refuses a configuration in which a gap is closed beyond the range of its law, see [`bimorph_domains::contact`], or fingers of a comb lie aside of their gaps under a
+/// voltage, where they do not overlap. `energised` says which gaps have one. Without it such fingers cause a warning, as those beyond the other side do.
 ///
 /// # Errors
 /// [`AnalysisError::ContactRange`] with the gap, [`AnalysisError::SidePullIn`] with the comb.
@@ -23,15 +23,13 @@ pub fn within_contact_range(
             None => Ok(()),
             Some((comb, [aside, room])) => Err(AnalysisError::SidePullIn { comb: comb.to_owned(), aside, room }),
         },
-        Some((gap, left)) => Err(AnalysisError::ContactRange {
-            gap: compiled.parts.gap_names[gap].clone(),
-            left,
-            least: system.touching(gap).map_or(0.0, |[_, least]| least),
-        }),
+        Some((gap, [left, least])) => {
+            Err(AnalysisError::ContactRange { gap: compiled.parts.gap_names[gap].clone(), left, least })
+        }
     }
 }
 
-/// Of the combs among these gaps the one whose fingers touch at their sides at `q`: its name, how far they lie aside and how far they can (m).
+/// Of the combs among these gaps the one whose fingers lie beyond their gaps at `q` and do not overlap: its name, how far they lie aside and how far they can (m).
 pub(crate) fn comb_aside<'a>(
     compiled: &'a CompiledModel,
     q: &[Pose],
@@ -39,12 +37,12 @@ pub(crate) fn comb_aside<'a>(
 ) -> Option<(&'a str, [f64; 2])> {
     let system = &compiled.parts.system;
     let gaps = system.members.iter().zip(&compiled.parts.gap_names).enumerate().filter(|(g, _)| among(*g));
-    let touching = gaps.filter_map(|(_, (member, name))| {
+    let beyond = gaps.filter_map(|(gap, (member, name))| {
         let (across, SideRoom { drawn, room }) = member.side_room()?;
         let aside = (drawn + across.value(q, system.model.linear)).abs();
-        (aside > room).then_some((name.as_str(), [aside, room]))
+        (aside > room && system.side_contact(gap, q).is_none()).then_some((name.as_str(), [aside, room]))
     });
-    touching.max_by(|a, b| (a.1[0] - a.1[1]).total_cmp(&(b.1[0] - b.1[1])))
+    beyond.max_by(|a, b| (a.1[0] - a.1[1]).total_cmp(&(b.1[0] - b.1[1])))
 }
 
 /// Warning about that comb.
@@ -58,7 +56,7 @@ pub(crate) fn comb_beyond_reported(compiled: &CompiledModel, q: &[Pose]) -> Opti
     }
     let (name, [aside, room]) = comb_aside(compiled, q, |_| true)?;
     Some(format!(
-        "the fingers of the comb `{name}` lie {:.3} µm aside of the middle of their gaps, and touch at {:.3} µm: nothing stops them there",
+        "the fingers of the comb `{name}` lie {:.3} µm aside of the middle of gaps that leave {:.3} µm, and do not overlap: nothing stops them there",
         1e6 * aside,
         1e6 * room
     ))

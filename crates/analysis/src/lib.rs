@@ -96,9 +96,9 @@ pub enum AnalysisError {
         /// Least distance within the range (m).
         least: f64,
     },
-    /// The fingers of a comb touch at their sides under a voltage.
+    /// The fingers of a comb lie aside of their gaps under a voltage, where they do not overlap.
     #[error(
-        "the fingers of the comb \"{comb}\" lie {aside:.3e} m aside of the middle of their gaps under a voltage, and touch at {room:.3e} m. Lower \
+        "the fingers of the comb \"{comb}\" do not overlap, and lie {aside:.3e} m aside of the middle of their gaps under a voltage, which leave {room:.3e} m. Lower \
          the voltage or what moves the part across its fingers, make it stiffer across them, or draw wider gaps or a `stop2d` across"
     )]
     SidePullIn {

@@ -42,9 +42,8 @@ impl ContactSteps {
 /// True where parts touch at displacements `q`, or may within `dt` (s) at rates `v`.
 pub(super) fn near(system: &System, q: &[Pose], v: &[Pose], dt: f64) -> bool {
     (0..system.members.len()).any(|g| {
-        system.touching(g).is_some_and(|[touch, _]| {
-            let left = system.distance(g, q) - touch;
-            left < 0.0 || left < NEAR * dt * -system.distance_slope(g, q, v)
-        })
+        let soon = |left: f64, rate: f64| left < 0.0 || left < NEAR * dt * -rate;
+        system.touching(g).is_some_and(|[touch, _]| soon(system.distance(g, q) - touch, system.distance_slope(g, q, v)))
+            || system.side_contact(g, q).is_some_and(|side| soon(side.left - side.touch, system.side_slope(g, q, v)))
     })
 }

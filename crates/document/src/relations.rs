@@ -191,6 +191,8 @@ impl Relations<'_> {
             )?;
             let known = width > 0.0 || comb.law != Some(Fringe::Exact);
             self.require(known, ("combs", k, "law"), "the exact field needs the width of the fingers")?;
+            let closer = comb.touch.is_none_or(|touch| touch < comb.gap);
+            self.require(closer, ("combs", k, "touch"), "expected less than the gap")?;
         }
         for (k, gap) in s.plate_gaps.iter().enumerate() {
             self.axis("plate_gaps", k, gap.axis)?;

@@ -1,7 +1,8 @@
 //! A comb drive: the field of its fingers over their overlap and over how far they lie aside of the middle of their gaps ([`super::comb_sides`]).
 //!
 //! Both displacements are those of the bodies, along fixed directions: the overlap at the nodes, the distance aside in the middle of the overlap as drawn. A rotation
-//! therefore moves the fingers aside, and they stay parallel. Where the field pulls fingers to the side faster than springs hold them, the comb loses its stability.
+//! therefore moves the fingers aside, and they stay parallel. Where the field pulls fingers to the side faster than springs hold them, the comb loses its stability, and the
+//! fingers come to rest on each other's sides. Contact loses energy as [`super::contact_loss`] has it, in its force across.
 //!
 //! Reference: R. Legtenberg, A. W. Groeneveld, M. Elwenspoek, "Comb-drive actuators for large displacements", J. Micromech. Microeng. 6 (1996) 320–329.
 
@@ -9,11 +10,13 @@ use super::approach::{Approach, ApproachDerivatives, MaterialPoint};
 use super::capacitor::Capacitor;
 use super::comb_field::{CombField, above_and_below};
 use super::comb_sides::{CombSides, substrate_share};
-use super::contact::touching_distance;
-use super::domain::{Chord, Configuration, Domain, SideRoom};
+use super::contact::{Contact, touching_distance};
+use super::contact_loss::{Loss, snap_aside};
+use super::domain::{Chord, Configuration, Domain, SideContact, SideRoom};
 use super::from_structure::{FromStructure, StructureView};
 use super::jet::Jet;
-use super::point_law::Law;
+use super::loss_tangent::LossTangent;
+use super::point_law::{Law, PointLaw};
 use super::quotient::{SMALL, quotient};
 use bimorph_multibody::model::locate;
 use bimorph_multibody::planar::Pose;
@@ -33,6 +36,8 @@ pub struct CombDrive {
     pub capacitor: Capacitor,
     /// The motion across the fingers, and the field with it; none: SUGAR's comb, which has no side force.
     pub sides: Option<(Approach, CombSides, SideRoom)>,
+    /// Impact losses of the sides.
+    pub loss: Loss,
 }
 
 /// Displacements along and across the fingers at a configuration.
@@ -41,6 +46,16 @@ struct Seen {
     across: Option<ApproachDerivatives>,
     /// C over both.
     field: Jet,
+    /// Energy of the contact at the sides, where they touch.
+    pressed: Option<Jet>,
+}
+
+impl Seen {
+    /// The potential at a voltage.
+    fn potential(&self, volts: f64) -> Jet {
+        let field = self.field * (-0.5 * volts * volts);
+        self.pressed.map_or(field, |pressed| field + pressed)
+    }
 }
 
 impl CombDrive {
@@ -63,7 +78,7 @@ impl CombDrive {
             parasitic: comb.parasitic,
             fingers: fingers.map(|(_, field)| field),
         };
-        let closest = touching_distance(comb.gap);
+        let touch = comb.touch.unwrap_or(touching_distance(comb.gap));
         let sides = (comb.finite && !sugar).then(|| {
             // the middle of the overlap as drawn
             let middle = approach.axis * (length - 0.5 * comb.overlap).max(0.0);
@@ -75,12 +90,12 @@ impl CombDrive {
                 gap: comb.gap,
                 fingers,
                 substrate,
-                closest,
+                contact: Contact { touch, area: 0.5 * comb.gaps * comb.height },
                 parasitic: comb.parasitic,
             };
-            (across, field, SideRoom { drawn: comb.misalignment, room: comb.gap - closest })
+            (across, field, SideRoom { drawn: comb.misalignment, room: comb.gap - touch })
         });
-        Self { approach, capacitor, sides }
+        Self { approach, capacitor, sides, loss: Loss::new(&comb.impact) }
     }
 
     fn overlap(&self) -> f64 {
@@ -107,11 +122,62 @@ impl CombDrive {
         }
     }
 
+    /// Energy of the contact at the sides over the same (J), where they touch.
+    fn pressed(&self, u: f64, y: f64) -> Option<Jet> {
+        let (_, field, side) = self.sides.as_ref()?;
+        field.pressed(self.overlap() + u, side.drawn + y)
+    }
+
+    /// That energy at a configuration.
+    fn pressed_at(&self, at: Configuration<'_>) -> Option<Jet> {
+        let (across, ..) = self.sides.as_ref()?;
+        self.pressed(self.approach.value(at.q, at.linear), across.value(at.q, at.linear))
+    }
+
     fn seen(&self, at: Configuration<'_>) -> Seen {
         let along = self.approach.measure(at.q, at.linear);
         let across = self.sides.as_ref().map(|(across, ..)| across.measure(at.q, at.linear));
-        let field = self.field(along.value, across.map_or(0.0, |m| m.value));
-        Seen { along, across, field }
+        let y = across.map_or(0.0, |m| m.value);
+        Seen { along, across, field: self.field(along.value, y), pressed: self.pressed(along.value, y) }
+    }
+
+    /// The same where there is a force.
+    fn acting(&self, at: Configuration<'_>, volts: f64) -> Option<Seen> {
+        (volts != 0.0 || self.pressed_at(at).is_some()).then(|| self.seen(at))
+    }
+
+    /// Rate-dependent part of the contact force across at the rate of y (m/s), and its derivatives with u, y and this rate.
+    fn lost(&self, pressed: &Jet, rate: f64) -> (f64, [f64; 2], f64) {
+        let force = pressed.first[1];
+        let side = force.signum();
+        let (added, by_rate) = self.loss.fraction(side * rate);
+        (force * added, [pressed.second[1] * added, pressed.second[2] * added], force * by_rate * side)
+    }
+
+    /// Rate-dependent part of the mean contact force across over a step of length `h` (s) between two overlaps and distances aside, and its derivative with
+    /// the last distance.
+    fn quotient_lost(&self, u: [f64; 2], y: [f64; 2], h: f64) -> (f64, f64) {
+        let over = |u: f64| {
+            let energy = |y: f64| (y, self.pressed(u, y).map_or(0.0, |pressed| pressed.value));
+            let law = |y: f64| self.pressed(u, y).map_or((0.0, 0.0), |at| (at.first[1], at.second[2]));
+            quotient(energy(y[0]), energy(y[1]), law)
+        };
+        let (a, b) = (over(u[0]), over(u[1]));
+        let (mean, by_end) = (0.5 * (a.0 + b.0), 0.5 * (a.1 + b.1));
+        let side = mean.signum();
+        let (added, by_rate) = self.loss.fraction(side * (y[1] - y[0]) / h);
+        (mean * added, by_end * added + mean * by_rate * side / h)
+    }
+
+    /// The contact of the sides where it loses energy, with what is measured there.
+    fn losing(&self, at: Configuration<'_>) -> Option<(&Approach, Seen, Jet, ApproachDerivatives)> {
+        if !self.loss.is_dissipative() {
+            return None;
+        }
+        self.pressed_at(at)?;
+        let seen = self.seen(at);
+        let ((across, ..), pressed, m) = (self.sides.as_ref()?, seen.pressed?, seen.across?);
+        Some((across, seen, pressed, m))
     }
 
     /// `r +=` the forces of a potential with these derivatives along and across.
@@ -167,12 +233,21 @@ impl Domain for CombDrive {
     }
 
     fn is_active(&self, volts: f64) -> bool {
+        volts != 0.0 || self.sides.is_some()
+    }
+
+    fn is_active_as_drawn(&self, volts: f64) -> bool {
         volts != 0.0
     }
 
     fn add_force(&self, at: Configuration<'_>, volts: f64, r: &mut [Pose]) {
-        let (seen, factor) = (self.seen(at), -0.5 * volts * volts);
-        self.add(&seen, seen.field.first.map(|x| factor * x), r);
+        self.add_force_finding_apart(at, volts, r);
+    }
+
+    fn add_force_finding_apart(&self, at: Configuration<'_>, volts: f64, r: &mut [Pose]) -> bool {
+        let Some(seen) = self.acting(at, volts) else { return true };
+        self.add(&seen, seen.potential(volts).first, r);
+        seen.pressed.is_none()
     }
 
     fn add_force_change(&self, at: Configuration<'_>, volts: f64, change: f64, r: &mut [Pose]) {
@@ -181,8 +256,8 @@ impl Domain for CombDrive {
     }
 
     fn add_tangent(&self, at: Configuration<'_>, volts: f64, pattern: &Pattern, tangent: &mut BodyMatrix) {
-        let (seen, factor) = (self.seen(at), -0.5 * volts * volts);
-        let Jet { first, second, .. } = seen.field * factor;
+        let Some(seen) = self.acting(at, volts) else { return };
+        let Jet { first, second, .. } = seen.potential(volts);
         self.add_hessian(&seen, first, second, pattern, tangent);
     }
 
@@ -191,20 +266,32 @@ impl Domain for CombDrive {
         at: Configuration<'_>,
         volts: f64,
         pattern: &Pattern,
-        (r, tangent): (&mut [Pose], &mut BodyMatrix),
+        sums: (&mut [Pose], &mut BodyMatrix),
     ) {
-        let (seen, factor) = (self.seen(at), -0.5 * volts * volts);
-        let Jet { first, second, .. } = seen.field * factor;
+        self.add_force_and_tangent_finding_apart(at, volts, pattern, sums);
+    }
+
+    fn add_force_and_tangent_finding_apart(
+        &self,
+        at: Configuration<'_>,
+        volts: f64,
+        pattern: &Pattern,
+        (r, tangent): (&mut [Pose], &mut BodyMatrix),
+    ) -> bool {
+        let Some(seen) = self.acting(at, volts) else { return true };
+        let Jet { first, second, .. } = seen.potential(volts);
         self.add(&seen, first, r);
         self.add_hessian(&seen, first, second, pattern, tangent);
+        seen.pressed.is_none()
     }
 
     fn load_points(&self, at: Configuration<'_>, volts: f64, mut lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
         let at = Configuration { linear: true, ..at };
-        let (seen, factor) = (self.seen(at), -0.5 * volts * volts);
-        self.approach.load_points(factor * seen.field.first[0], &mut lever);
+        let Some(seen) = self.acting(at, volts) else { return };
+        let first = seen.potential(volts).first;
+        self.approach.load_points(first[0], &mut lever);
         if let Some((across, ..)) = &self.sides {
-            across.load_points(factor * seen.field.first[1], lever);
+            across.load_points(first[1], lever);
         }
     }
 
@@ -241,6 +328,73 @@ impl Domain for CombDrive {
         self.sides.as_ref().map(|(across, _, side)| (across, *side))
     }
 
+    fn side_contact(&self, at: Configuration<'_>) -> Option<SideContact> {
+        let (across, field, side) = self.sides.as_ref()?;
+        let left = field.gap - (side.drawn + across.value(at.q, at.linear)).abs();
+        let faces = field.faces(self.overlap() + self.approach.value(at.q, at.linear));
+        faces.then_some(SideContact { left, touch: field.contact.touch, least: field.contact.least() })
+    }
+
+    fn side_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let Some((across, _, side)) = &self.sides else { return 0.0 };
+        let m = across.measure(at.q, at.linear);
+        -(side.drawn + m.value).signum() * across.change(&m, dq)
+    }
+
+    /// Of the way across the fingers.
+    fn closing_bound(&self, q: &[Pose]) -> f64 {
+        self.sides.as_ref().map_or(f64::INFINITY, |(across, ..)| across.bound(q))
+    }
+
+    fn bearing(&self, at: Configuration<'_>) -> f64 {
+        self.pressed_at(at).map_or(0.0, |pressed| pressed.first[1].abs())
+    }
+
+    fn bearing_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let Some(pressed) = self.pressed_at(at) else { return 0.0 };
+        let [u, y] = self.changes(&self.seen(at), dq);
+        pressed.first[1].signum() * (pressed.second[1] * u + pressed.second[2] * y)
+    }
+
+    fn contact_energy(&self, at: Configuration<'_>) -> f64 {
+        self.pressed_at(at).map_or(0.0, |pressed| pressed.value)
+    }
+
+    fn contact_work(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let Some(pressed) = self.pressed_at(at) else { return 0.0 };
+        let [u, y] = self.changes(&self.seen(at), dq);
+        -(pressed.first[0] * u + pressed.first[1] * y)
+    }
+
+    fn loss(&self) -> Option<Loss> {
+        self.sides.as_ref().map(|_| self.loss)
+    }
+
+    fn set_loss(&mut self, loss: Loss) {
+        self.loss = loss;
+    }
+
+    fn add_closing(&self, at: Configuration<'_>, r: &mut [Pose]) -> f64 {
+        let Some((across, field, side)) = &self.sides else { return 0.0 };
+        across.add_force(&across.measure(at.q, at.linear), 1.0, r);
+        snap_aside(field.gap, side.room)
+    }
+
+    fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        if let Some((across, _, pressed, m)) = self.losing(at) {
+            across.add_force(&m, self.lost(&pressed, across.rate(&m, rate)).0, r);
+        }
+    }
+
+    fn add_loss_tangent(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, to: &mut LossTangent<'_>) -> bool {
+        let Some((across, seen, pressed, m)) = self.losing(at) else { return false };
+        let (force, [by_u, by_y], by_rate) = self.lost(&pressed, across.rate(&m, rate));
+        across.add_rates(&m, rate, (force, by_y, by_rate), to);
+        let mixed = seen.along.gradient * m.gradient.transpose() * (0.5 * by_u);
+        locate(to.pattern, across.a.body, across.b.body).add(to.stiffness, &(mixed + mixed.transpose()));
+        true
+    }
+
     /// Each displacement has the mean quotient of both orders in which the two can change.
     fn add_quotient(&self, chord: &Chord<'_>, volts: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {
         let [start, middle, end] = chord.at;
@@ -248,26 +402,38 @@ impl Domain for CombDrive {
         let [u, y] = [&Some(self.approach), &self.sides.as_ref().map(|(across, ..)| *across)].map(|approach| {
             [start, end].map(|at| approach.as_ref().map_or(0.0, |approach| approach.value(at.q, at.linear)))
         });
+        let touched = y.iter().any(|y| u.iter().any(|u| self.pressed(*u, *y).is_some()));
+        if volts == 0.0 && !touched {
+            return;
+        }
+        let potential = |u: f64, y: f64| {
+            let field = self.field(u, y) * factor;
+            self.pressed(u, y).map_or(field, |pressed| field + pressed)
+        };
         // over (u, y) at both ends of either
-        let at = |i: usize, k: usize| self.field(u[i], y[k]) * factor;
+        let at = |i: usize, k: usize| potential(u[i], y[k]);
         let [[f00, f01], [f10, f11]] = [[at(0, 0), at(0, 1)], [at(1, 0), at(1, 1)]];
         let along = |k: usize, (a, b): (Jet, Jet)| {
             let law = |u: f64| {
-                let field = self.field(u, y[k]) * factor;
-                (field.first[0], field.second[0])
+                let at = potential(u, y[k]);
+                (at.first[0], at.second[0])
             };
             quotient((u[0], a.value), (u[1], b.value), law)
         };
         let across = |i: usize, (a, b): (Jet, Jet)| {
             let law = |y: f64| {
-                let field = self.field(u[i], y) * factor;
-                (field.first[1], field.second[2])
+                let at = potential(u[i], y);
+                (at.first[1], at.second[2])
             };
             quotient((y[0], a.value), (y[1], b.value), law)
         };
         let mean = |a: (f64, f64), b: (f64, f64)| (0.5 * (a.0 + b.0), 0.5 * (a.1 + b.1));
         let (force, slope) = mean(along(0, (f00, f10)), along(1, (f01, f11)));
-        let (aside, bend) = mean(across(0, (f00, f01)), across(1, (f10, f11)));
+        let (mut aside, mut bend) = mean(across(0, (f00, f01)), across(1, (f10, f11)));
+        if touched && self.loss.is_dissipative() {
+            let (lost, by_end) = self.quotient_lost(u, y, chord.h);
+            (aside, bend) = (aside + lost, bend + by_end);
+        }
         let mixed = |by: f64, a: f64, b: f64| if by.abs() < SMALL { 0.5 * f11.second[1] } else { 0.5 * (b - a) / by };
         let mixed =
             0.5 * (mixed(u[1] - u[0], f01.first[1], f11.first[1]) + mixed(y[1] - y[0], f10.first[0], f11.first[0]));
@@ -279,9 +445,14 @@ impl Domain for CombDrive {
             m
         };
         let across = self.sides.as_ref().map(|(across, ..)| own(across));
-        let seen = Seen { along: own(&self.approach), across, field: Jet::default() };
+        let seen = Seen { along: own(&self.approach), across, field: Jet::default(), pressed: None };
         self.add(&seen, [force, aside], r);
         self.add_hessian(&seen, [force, aside], [slope, mixed, bend], pattern, tangent);
+    }
+
+    /// That of fingers in the middle of their gaps, which do not touch.
+    fn point_laws(&self) -> Vec<PointLaw> {
+        vec![PointLaw::of(Law::Field(self.capacitor, None))]
     }
 
     /// That of fingers in the middle of their gaps.

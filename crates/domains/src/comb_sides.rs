@@ -14,9 +14,13 @@
 //! ```
 //! is within 1.3 % of finite elements of tall fingers (h = 4g, bilinear, 10⁴ nodes), for ρ of 0.25 to 5 and δ of 0.25 to 8.
 //!
-//! Below the touching distance gaps are replaced by γ = t²/(2t − g), by which 1/g continues along its tangent.
+//! Below the least distance t that the law of contact knows, gaps are replaced by γ = t²/(2t − g), by which 1/g continues along its tangent.
+//!
+//! Sides touch at the touching distance of [`super::contact`]. Half of the gaps close, so that the area ½·N·h·o bears, with the overlap as at the field's end. The energy of contact
+//! is that area times the law's per area: the contact force acts across, and its small change with the overlap along the fingers.
 
 use super::comb_field::{CombField, above_and_below};
+use super::contact::Contact;
 use super::jet::Jet;
 use std::f64::consts::PI;
 
@@ -39,8 +43,8 @@ pub struct CombSides {
     pub fingers: Option<(f64, CombField)>,
     /// S (1).
     pub substrate: f64,
-    /// Distance of the sides below which the field continues along its tangent (m).
-    pub closest: f64,
+    /// How the sides touch, with the area per overlap ½·N·h (m).
+    pub contact: Contact,
     /// Constant part C_p (F).
     pub parasitic: f64,
 }
@@ -68,6 +72,23 @@ impl CombSides {
         sum
     }
 
+    /// Energy of the contact at the sides (J) over the overlap and the distance aside (m); none where they do not touch.
+    pub fn pressed(&self, overlap: f64, aside: f64) -> Option<Jet> {
+        let left = self.gap - aside.abs();
+        if left >= self.contact.touch || !self.faces(overlap) {
+            return None;
+        }
+        let (force, slope) = self.contact.force(left);
+        let value = self.contact.energy(left);
+        let per_overlap = Jet { value, first: [0.0, aside.signum() * force], second: [0.0, 0.0, -slope] };
+        Some(Jet::variable(overlap, 0).map(self.facing(overlap)) * per_overlap)
+    }
+
+    /// True where fingers face each other with their sides.
+    pub fn faces(&self, overlap: f64) -> bool {
+        overlap > -self.gap
+    }
+
     /// Overlap, which ends over a gap on both sides of 0, and its derivatives.
     fn facing(&self, o: f64) -> [f64; 3] {
         let blend = self.gap;
@@ -83,7 +104,7 @@ impl CombSides {
 
     /// C/(N·ε) of gaps that are narrower by `sign`·y, without tips.
     fn side(&self, o: Jet, facing: Jet, aside: f64, sign: f64) -> Jet {
-        let (g, t) = (self.gap - sign * aside, self.closest);
+        let (g, t) = (self.gap - sign * aside, self.contact.least());
         // 1/γ over y
         let inverse = if g >= t { 1.0 / g } else { (2.0 * t - g) / (t * t) };
         let slope = sign * if g >= t { inverse * inverse } else { 1.0 / (t * t) };
@@ -124,7 +145,7 @@ mod tests {
             gap: g,
             fingers: Some((rho * g, CombField::new(strength * h * g, [g, rho * g, 40e-6]))),
             substrate: if delta > 0.0 { substrate_share(rho, delta) } else { 0.0 },
-            closest: 0.1e-6,
+            contact: Contact { touch: 0.1e-6, area: 10.0 * h * g },
             parasitic: 1e-15,
         }
     }
@@ -156,6 +177,37 @@ mod tests {
                     ];
                     assert!(left < 0.2e-6 || off.iter().all(|x| x.abs() < 2.0 * right), "{o} {y}: {off:?} {at:?}");
                 }
+            }
+        }
+    }
+
+    /// Contact begins at the touching distance on either side. At 5 nm of penetration it bears with 100 MPa on half of the gaps, and derivatives are those of its energy by central
+    /// differences to 1e-6, engaged and at the end of the overlap. Fingers that have left each other do not touch.
+    #[test]
+    fn sides_bear() {
+        let comb = comb(1.0, 2.0, 0.0);
+        assert_eq!((comb.pressed(12e-6, 1.899e-6), comb.pressed(12e-6, -1.899e-6)), (None, None));
+        assert_eq!(comb.pressed(-2e-6, 1.95e-6), None);
+        let force = comb.pressed(12e-6, 1.905e-6).unwrap().first[1];
+        assert!(
+            (force / (10.0 * 4e-6 * 12e-6 * comb.contact.force(0.095e-6).0 / comb.contact.area) - 1.0).abs() < 1e-12
+        );
+        for o in [12e-6, 0.7e-6] {
+            for y in [1.91e-6, -1.93e-6] {
+                let (at, e) = (comb.pressed(o, y).unwrap(), 1e-12);
+                let slope = |of: &dyn Fn(f64) -> f64| (of(e) - of(-e)) / (2.0 * e);
+                let along = |k: usize| slope(&|d| comb.pressed(o + d, y).unwrap().first[k]);
+                let across = |k: usize| slope(&|d| comb.pressed(o, y + d).unwrap().first[k]);
+                for (found, wanted) in [
+                    (slope(&|d| comb.pressed(o + d, y).unwrap().value), at.first[0]),
+                    (slope(&|d| comb.pressed(o, y + d).unwrap().value), at.first[1]),
+                    (along(1), at.second[1]),
+                    (across(0), at.second[1]),
+                    (across(1), at.second[2]),
+                ] {
+                    assert!((found / wanted - 1.0).abs() < 1e-6, "{o} {y}: {found} {wanted}");
+                }
+                assert!(at.first[1] * y > 0.0 && at.second[2] > 0.0);
             }
         }
     }

@@ -70,6 +70,13 @@ pub(super) fn fall_at_pull_in(g: f64, t: f64) -> f64 {
     g * (8.0 / 27.0 * (g / t - 1.0) - (1.0 - t / g) * (1.0 - t / g)).max(0.0).sqrt()
 }
 
+/// The same of fingers that snap to the side in gaps of the width `g` (m), from their middle over the distance `room` (m).
+///
+/// At pull-in the stiffness across is that of the field at rest, k = N·ε·h·o·V²/g³. The field gives ½k·y²·g²/(g² − y²), the springs take ½k·y².
+pub(super) fn snap_aside(g: f64, room: f64) -> f64 {
+    room * room / (g * g - room * room).sqrt()
+}
+
 /// α of a restitution above 0 and at most 1.
 pub fn alpha(restitution: f64) -> f64 {
     let e = restitution;

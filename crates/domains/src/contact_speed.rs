@@ -4,9 +4,10 @@
 //! ```text
 //! v = ω₀·g·√((8/27)·(g/t − 1) − (1 − t/g)²)
 //! ```
-//! and a part released at the distance w of a stop passes its rest position at the speed ω₀·w. ω₀ is Rayleigh's
+//! Fingers that lie in the middle of their gaps snap to the side at their pull-in voltage over the distance r to where they touch, and arrive with
+//! v = ω₀·r²/√(g² − r²). A part released at the distance w of a stop passes its rest position at the speed ω₀·w. ω₀ is Rayleigh's
 //! quotient of the shape that the load bends the drawn mechanism into: the field of the gaps at one voltage, or a force
-//! along a stop. Gaps at the same voltage fall together. Neither stress nor voltage enters, so that the speed is a
+//! along a stop or across fingers. Gaps at the same voltage fall together, combs alone. Neither stress nor voltage enters, so that the speed is a
 //! constant of the element.
 
 use super::contact_loss::Loss;
@@ -27,7 +28,10 @@ impl System {
     /// Finds the reference speeds that the netlist does not give.
     pub fn settle_impacts(&mut self) {
         let open = |loss: Loss| loss.speed.is_none() && loss.restitution < 1.0;
-        let asked: Vec<usize> = (0..self.members.len()).filter(|&g| self.members[g].loss().is_some_and(open)).collect();
+        let mut asked: Vec<usize> =
+            (0..self.members.len()).filter(|&g| self.members[g].loss().is_some_and(open)).collect();
+        // combs last: shapes of their own are fewer than members
+        asked.sort_by_key(|&g| self.members[g].side_room().is_some());
         if asked.is_empty() {
             return;
         }
@@ -61,7 +65,8 @@ fn groups(system: &System, asked: &[usize]) -> Vec<Vec<usize>> {
     for &g in asked {
         let row: Vec<u64> =
             if g < rows.nrows() { rows.row(g).iter().map(|x| x.to_bits()).collect() } else { Vec::new() };
-        let driven = g < rows.nrows() && rows.row(g).iter().any(|x| *x != 0.0);
+        let fingers = system.members[g].side_room().is_some();
+        let driven = !fingers && g < rows.nrows() && rows.row(g).iter().any(|x| *x != 0.0);
         match of_voltage.get(&row).filter(|_| driven) {
             Some(&group) => groups[group].push(g),
             None => {

@@ -23,7 +23,11 @@ impl ContactWays {
     /// Of a system.
     pub fn new(system: &System) -> Self {
         let rest = vec![Pose::zeros(); system.bodies()];
-        let way = |g| system.touching(g).map(|[touch, _]| (g, system.distance(g, &rest) - touch, None));
+        let way = |g| {
+            let own = system.touching(g).map(|[touch, _]| system.distance(g, &rest) - touch);
+            let sides = || system.members[g].side_room().map(|(_, side)| side.room - side.drawn.abs());
+            Some((g, own.or_else(sides)?, None))
+        };
         Self { ways: (0..system.members.len()).filter_map(way).collect() }
     }
 

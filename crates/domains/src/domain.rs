@@ -62,6 +62,17 @@ pub struct SideRoom {
     pub room: f64,
 }
 
+/// Sides of fingers that face each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SideContact {
+    /// Distance left (m).
+    pub left: f64,
+    /// Distance at which they touch (m).
+    pub touch: f64,
+    /// Least distance that the law of contact knows (m).
+    pub least: f64,
+}
+
 /// One thing that acts on bodies. Forces are those of the residual: minus the wrench on each body.
 pub trait Domain {
     /// Its input: the voltage across a gap (V), the fraction of the dead loads that acts (1), a force (N), the motion
@@ -134,6 +145,11 @@ pub trait Domain {
     fn is_active(&self, given: Self::Given) -> bool {
         let _ = given;
         !self.is_gas()
+    }
+
+    /// False where it adds no force of a potential to the bodies as drawn.
+    fn is_active_as_drawn(&self, given: Self::Given) -> bool {
+        self.is_active(given)
     }
 
     /// Calls `lever` for each point with a force of fixed direction, and the force (N): terms that the tangent of a
@@ -221,6 +237,18 @@ pub trait Domain {
     /// The motion of fingers across their gaps, where they have a side force.
     fn side_room(&self) -> Option<(&Approach, SideRoom)> {
         None
+    }
+
+    /// The sides of fingers that overlap; none: no finger faces another with its side.
+    fn side_contact(&self, at: Configuration<'_>) -> Option<SideContact> {
+        let _ = at;
+        None
+    }
+
+    /// Change of the distance left between those sides with a change `dq` of the configuration (m).
+    fn side_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        let _ = (at, dq);
+        0.0
     }
 
     /// Force with which its sides bear on each other (N).

@@ -2,7 +2,7 @@
 
 use super::approach::{Approach, MaterialPoint};
 use super::contact_loss::Loss;
-use super::domain::{Chord, Configuration, Domain, SideRoom, SkewCoupling};
+use super::domain::{Chord, Configuration, Domain, SideContact, SideRoom, SkewCoupling};
 use super::from_structure::{FromStructure, PlacedMember, StructureView};
 use super::loss_tangent::LossTangent;
 use super::point_law::{Law, PointLaw};
@@ -134,6 +134,10 @@ impl Domain for Member {
         each!(self, m => m.is_active(given))
     }
 
+    fn is_active_as_drawn(&self, given: f64) -> bool {
+        each!(self, m => m.is_active_as_drawn(given))
+    }
+
     fn load_points(&self, at: Configuration<'_>, given: f64, lever: impl FnMut(MaterialPoint, Vector2<f64>)) {
         each!(self, m => m.load_points(at, given, lever));
     }
@@ -192,6 +196,14 @@ impl Domain for Member {
 
     fn side_room(&self) -> Option<(&Approach, SideRoom)> {
         each!(self, m => m.side_room())
+    }
+
+    fn side_contact(&self, at: Configuration<'_>) -> Option<SideContact> {
+        each!(self, m => m.side_contact(at))
+    }
+
+    fn side_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
+        each!(self, m => m.side_change(at, dq))
     }
 
     fn bearing(&self, at: Configuration<'_>) -> f64 {

@@ -1,6 +1,6 @@
 //! Quantities of a system's gaps, by number.
 
-use super::domain::Domain;
+use super::domain::{Domain, SideContact};
 use super::member::Member;
 use super::stick_point::StickPoint;
 use super::system::System;
@@ -92,6 +92,37 @@ impl System {
     #[inline]
     pub fn touches(&self, gap: usize, q: &[Pose]) -> bool {
         self.touching(gap).is_some_and(|[touch, _]| self.distance(gap, q) < touch)
+            || self.side_contact(gap, q).is_some_and(|side| side.left < side.touch)
+    }
+
+    /// The sides of a comb's fingers; none of other gaps, and where no finger faces another.
+    #[inline]
+    pub fn side_contact(&self, gap: usize, q: &[Pose]) -> Option<SideContact> {
+        self.members[gap].side_contact(self.at(q))
+    }
+
+    /// Way left until the sides of a comb's fingers touch (m), whether they overlap or not; infinite of other gaps.
+    #[inline]
+    pub fn side_way(&self, gap: usize, q: &[Pose]) -> f64 {
+        self.members[gap]
+            .side_room()
+            .map_or(f64::INFINITY, |(across, side)| side.room - (side.drawn + across.value(q, self.model.linear)).abs())
+    }
+
+    /// Change of the distance left between those sides with a change `dq` of the configuration (m).
+    #[inline]
+    pub fn side_slope(&self, gap: usize, q: &[Pose], dq: &[Pose]) -> f64 {
+        self.members[gap].side_change(self.at(q), dq)
+    }
+
+    /// True where the way between two configurations leads through the contact of fingers at their sides, which changes the distance left by more than
+    /// `part` of what `of` makes of both.
+    #[inline]
+    pub fn sides_leap(&self, [from, to]: [&[Pose]; 2], part: f64, of: impl Fn(f64, f64) -> f64) -> bool {
+        (0..self.members.len()).any(|gap| {
+            let (Some(a), Some(b)) = (self.side_contact(gap, from), self.side_contact(gap, to)) else { return false };
+            a.left.min(b.left) < a.touch && (a.left - b.left).abs() > part * of(a.left, b.left)
+        })
     }
 
     /// Scale of the force balance where parts touch (N): the largest contact force. At a contact with almost no load, and up to a thousandth of
@@ -102,21 +133,25 @@ impl System {
             let bearing = gap.bearing(self.at(q));
             // contact begins so softly that Newton's method may come to a stand on its open side
             let near = || gap.touching().is_some_and(|[touch, _]| gap.distance(self.at(q)) < (1.0 + 1e-3) * touch);
-            if bearing > 0.0 || near() { bearing.max(1e-3 * self.pull(g, q, *volts).abs()) } else { 0.0 }
+            let sides = || gap.side_contact(self.at(q)).is_some_and(|side| side.left < (1.0 + 1e-3) * side.touch);
+            if bearing > 0.0 || near() || sides() { bearing.max(1e-3 * self.pull(g, q, *volts).abs()) } else { 0.0 }
         };
         self.members.iter().zip(volts).enumerate().map(of).fold(0.0, f64::max)
     }
 
-    /// The first gap that is closed beyond the range of its law of contact, with the distance that is left (m).
+    /// The first gap that is closed beyond the range of its law of contact, with the distance that is left and the least one of that law (m).
     #[inline]
-    pub fn overrun(&self, q: &[Pose]) -> Option<(usize, f64)> {
+    pub fn overrun(&self, q: &[Pose]) -> Option<(usize, [f64; 2])> {
         (0..self.members.len()).find_map(|g| {
+            if let Some(side) = self.side_contact(g, q) {
+                return (side.left < side.least).then_some((g, [side.left, side.least]));
+            }
             let [_, least] = self.touching(g)?;
             if self.members[g].surely_apart(self.at(q)) {
                 return None;
             }
             let left = self.distance(g, q);
-            (left < least).then_some((g, left))
+            (left < least).then_some((g, [left, least]))
         })
     }
 
@@ -150,13 +185,20 @@ impl System {
     #[inline]
     pub fn contact_change(&self, [before, q]: [&[Pose]; 2], dq: &[Pose], least: f64) -> f64 {
         let change = |gap: &Member| {
-            let [touch, allowed] = gap.touching()?;
-            let pressed = touch - gap.distance(self.at(q));
-            let most = touch - allowed;
-            if pressed > most && touch - gap.distance(self.at(before)) < PRESSED_BEFORE * most {
+            let (at, sides) = (self.at(q), |q| gap.side_contact(self.at(q)));
+            let ([touch, allowed], after, start) = match (gap.touching(), sides(q)) {
+                (Some(law), _) => (law, gap.distance(at), gap.distance(self.at(before))),
+                (None, Some(side)) => {
+                    ([side.touch, side.least], side.left, sides(before).map_or(f64::INFINITY, |side| side.left))
+                }
+                (None, None) => return None,
+            };
+            let (pressed, most) = (touch - after, touch - allowed);
+            if pressed > most && touch - start < PRESSED_BEFORE * most {
                 return Some(f64::INFINITY);
             }
-            (pressed > 0.0).then(|| gap.distance_change(self.at(q), dq).abs() / pressed.max(least))
+            let slope = || if gap.touching().is_some() { gap.distance_change(at, dq) } else { gap.side_change(at, dq) };
+            (pressed > 0.0).then(|| slope().abs() / pressed.max(least))
         };
         // a sum that includes NaN is NaN
         self.members.iter().filter_map(change).fold(0.0, |most, one| if one <= most { most } else { one })

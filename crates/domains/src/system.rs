@@ -121,6 +121,13 @@ impl System {
             || self.members.iter().zip(&drive.volts).any(|(gap, volts)| gap.is_active(*volts))
     }
 
+    /// True where [`System::add_body_forces`] adds anything to bodies as drawn.
+    #[inline]
+    pub fn is_acted_on_as_drawn(&self, drive: &Drive) -> bool {
+        !(self.loads.is_empty() && drive.inputs.is_empty() && drive.push.is_empty())
+            || self.members.iter().zip(&drive.volts).any(|(gap, volts)| gap.is_active_as_drawn(*volts))
+    }
+
     /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
     #[inline]
     pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BodyMatrix) {
@@ -282,10 +289,25 @@ impl System {
         }
     }
 
-    /// True where parts can touch.
+    /// True where parts are drawn to touch: all contacts but those of fingers at their sides.
     #[inline]
     pub fn can_touch(&self) -> bool {
         self.members.iter().any(|member| member.touching().is_some())
+    }
+
+    /// True where there is any contact, that of fingers at their sides included.
+    #[inline]
+    pub fn has_contacts(&self) -> bool {
+        self.members.iter().any(|member| member.touching().is_some() || member.side_room().is_some())
+    }
+
+    /// True where the sides of fingers touch at `q`, or may within `h` (s) at the rates `v`, by a bound.
+    #[inline]
+    pub fn sides_near(&self, q: &[Pose], v: &[Pose], h: f64) -> bool {
+        let at = self.at(q);
+        self.members.iter().any(|member| {
+            member.side_contact(at).is_some_and(|side| side.left - h * member.closing_bound(v) < side.touch)
+        })
     }
 
     /// True where forces of a member that depend on rates take energy out of a motion.

@@ -142,6 +142,12 @@ pub struct Comb {
     /// Drag of the gas that slides between the fingers, per rate and overlap (Pa·s); 0: it does not drag.
     #[serde(default)]
     pub sliding: f64,
+    /// Distance at which the sides of the fingers touch (m); none: that of nearly closed gaps of their size.
+    #[serde(default)]
+    pub touch: Option<f64>,
+    /// Impact losses of the sides.
+    #[serde(default)]
+    pub impact: Impact,
     /// False for SUGAR's `comb2d`, whose force is constant whatever the overlap.
     pub finite: bool,
     /// Voltage that trapped charge adds to that of its nodes, from the second side to the first (V).

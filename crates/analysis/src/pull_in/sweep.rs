@@ -125,8 +125,8 @@ impl<'a> VoltageSweep<'a> {
             let fallen = self.fall(&mut q, beyond);
             if let Some((comb, _)) = comb_aside(self.compiled, &q, |gap| self.drives(gap)) {
                 self.of_closed.push(format!(
-                    "the fingers of the comb `{comb}` are drawn to the side there until they touch, and nothing stops them: a stiffer suspension across \
-                     the fingers or wider gaps raise this voltage"
+                    "the fingers of the comb `{comb}` are drawn aside of their gaps there, where they do not overlap and nothing stops them: a stiffer \
+                     suspension across the fingers or wider gaps raise this voltage"
                 ));
                 return Ok(PostPullIn::Falls { volts: fold });
             }

@@ -6,6 +6,7 @@
 use super::ReadoutError;
 use super::expression::{Expression, Quantity};
 use super::signal::{Signal, SignalView};
+use bimorph_domains::Domain;
 use bimorph_model::compile::CompiledModel;
 use std::sync::Arc;
 
@@ -14,6 +15,8 @@ use std::sync::Arc;
 pub enum RunSignal {
     /// A quantity of a state.
     State(Signal),
+    /// Way left until the fingers of a comb, by its gap, touch at their sides (m).
+    SideWay(usize),
     /// Charge on a port (C).
     PortCharge(usize),
     /// Current into a port (A), of which `conduction` is that through resistances.
@@ -33,7 +36,7 @@ pub enum RunSignal {
 }
 
 impl RunSignal {
-    /// Finds a quantity by name: a signal, see [`Signal::find`], or `PORT.q` or `PORT.i` with these voltages of the sources (V).
+    /// Finds a quantity by name: a signal, see [`Signal::find`], `COMB.side`, or `PORT.q` or `PORT.i` with these voltages of the sources (V).
     ///
     /// # Errors
     /// [`ReadoutError::UnknownSignal`] with what would be understood.
@@ -43,6 +46,9 @@ impl RunSignal {
         match Signal::find(compiled, name) {
             Ok(signal) => Ok(Self::State(signal)),
             Err(unknown) => {
+                if let Some(comb) = name.strip_suffix(".side").and_then(|comb| fingers(compiled, comb)) {
+                    return Ok(Self::SideWay(comb));
+                }
                 if let Some(port) = port(".q") {
                     return Ok(Self::PortCharge(port));
                 }
@@ -73,6 +79,7 @@ impl RunSignal {
         let system = &compiled.parts.system;
         match self {
             Self::State(signal) => signal.value(compiled, state),
+            Self::SideWay(comb) => system.side_way(*comb, state.q),
             Self::PortCharge(port) => of_gaps(compiled, *port, |g| system.capacitance(g, state.q) * state.volts[g]),
             Self::PortCurrent { port, conduction } => {
                 conduction
@@ -90,6 +97,7 @@ impl RunSignal {
         let system = &compiled.parts.system;
         match self {
             Self::State(signal) => signal.slope(compiled, state, change),
+            Self::SideWay(comb) => system.side_slope(*comb, state.q, change.q),
             Self::PortCharge(port) => of_gaps(compiled, *port, |g| {
                 system.capacitance(g, state.q) * change.volts[g]
                     + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
@@ -106,10 +114,17 @@ impl RunSignal {
     }
 }
 
+/// The gap of a comb whose fingers can touch at their sides.
+fn fingers(compiled: &CompiledModel, name: &str) -> Option<usize> {
+    let gap = compiled.parts.gap_names.iter().position(|gap| gap == name)?;
+    compiled.parts.system.members[gap].side_room().map(|_| gap)
+}
+
 impl Quantity for RunSignal {
     fn unit(&self) -> &'static str {
         match self {
             Self::State(signal) => signal.unit(),
+            Self::SideWay(_) => "m",
             Self::PortCharge(_) => "C",
             Self::PortCurrent { .. } | Self::HotCurrent { .. } => "A",
         }

@@ -3,6 +3,7 @@
 use super::expression::{Expression, Quantity};
 use super::{ReadoutError, stress};
 use bimorph_base::suggest::nearest;
+use bimorph_domains::Domain;
 use bimorph_domains::MaterialPoint;
 use bimorph_domains::contact_resistance::conductance;
 use bimorph_model::compile::CompiledModel;
@@ -53,7 +54,7 @@ pub struct SignalView<'a> {
 impl Signal {
     /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, the same of `BEAM[k]`, the k-th point along a beam from 0, `BEAM.T`, `BEAM.stress`,
     /// `GAP.q`, `GAP.gap`, `GAP.C`, `GAP.F`, `GAP.N`,
-    /// `GAP.G`.
+    /// `STOP.G`.
     ///
     /// # Errors
     /// [`ReadoutError::UnknownSignal`] with what would be understood.
@@ -206,10 +207,13 @@ pub fn names(compiled: &CompiledModel) -> Vec<String> {
     });
     let gaps = compiled.parts.gap_names.iter();
     let of_gaps = gaps.enumerate().flat_map(|(g, gap)| {
-        let bears = compiled.parts.system.touching(g).is_some();
+        let system = &compiled.parts.system;
+        let fingers = system.members[g].side_room().is_some();
+        let bears = fingers || system.touching(g).is_some();
         let conducts = compiled.structure.stops.iter().any(|stop| stop.name == *gap && stop.ohmic.is_some());
-        let quantities = [Some("gap"), Some("q"), Some("C"), Some("F"), bears.then_some("N"), conducts.then_some("G")];
-        quantities.into_iter().flatten().map(|quantity| format!("{gap}.{quantity}")).collect::<Vec<_>>()
+        let own = [bears.then_some("N"), conducts.then_some("G")];
+        let quantities = ["gap", "q", "C", "F"].map(Some).into_iter().chain(own);
+        quantities.flatten().map(|quantity| format!("{gap}.{quantity}")).collect::<Vec<_>>()
     });
     motions.chain(of_beams).chain(of_gaps).collect()
 }

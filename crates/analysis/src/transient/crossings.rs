@@ -7,8 +7,8 @@ use crate::readout::ReadoutError;
 use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use crate::readout::signal::{Signal, SignalView};
-use bimorph_domains::Ramp;
 use bimorph_domains::contact_ways::ContactWays;
+use bimorph_domains::{Domain, Ramp};
 use bimorph_model::compile::CompiledModel;
 use bimorph_solve::dense::interpolate;
 use bimorph_solve::time::event::{Detector, Direction};
@@ -51,7 +51,11 @@ fn watched(
             let name = format!("{}.gap", compiled.parts.gap_names[g]);
             Ok(watch(name, RunSignal::State(Signal::Distance(g)).into(), touch, true))
         });
-    Ok(asked.chain(ending).chain(touching).collect::<Result<_, ReadoutError>>()?)
+    let sides = (0..system.members.len()).filter(|&g| system.members[g].side_room().is_some()).map(|g| {
+        let name = format!("{}.side", compiled.parts.gap_names[g]);
+        Ok(watch(name, RunSignal::SideWay(g).into(), 0.0, true))
+    });
+    Ok(asked.chain(ending).chain(touching).chain(sides).collect::<Result<_, ReadoutError>>()?)
 }
 
 /// True for the event that ends a run.

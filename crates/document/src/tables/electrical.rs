@@ -71,6 +71,8 @@ record! {
         misalignment = 0.0: "m", Any, "Distance of the fingers of a from the middle of their gaps, to the left of the axis; left out: 0";
         substrate = 0.0: "m", NonNegative, "Distance of a conducting substrate at the potential of one side; left out: none";
         sliding = 0.0: "Pa·s", NonNegative, "Drag of the gas between the fingers, per rate and overlap; left out: 0";
+        touch: "m", Positive, "Distance at which the sides of the fingers touch; left out: that of nearly closed gaps";
+        impact: "", Any, "Impact losses of the sides";
         finite: "", Any, "False: the force is constant whatever the overlap";
         offset = 0.0: "V", Any, "Voltage that trapped charge adds in series; left out: 0";
         voltage: "V", Any, "A fixed voltage, or the nodes between which it lies";

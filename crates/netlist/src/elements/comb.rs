@@ -2,7 +2,7 @@
 
 use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
-use bimorph_structure::{Comb, Fringe, GapVoltage, touching_distance};
+use bimorph_structure::{Comb, Fringe, GapVoltage, Impact, touching_distance};
 
 impl ElementSite<'_, '_> {
     /// Viscosity of the gas that slides in gaps of a width (m): 0 without a `pressure`.
@@ -14,10 +14,10 @@ impl ElementSite<'_, '_> {
         Ok(self.sliding(viscosity, gap)?.unwrap_or(0.0))
     }
 
-    /// Misalignment of the fingers in gaps of a width, and distance of the substrate (m), 0 without one.
-    fn place_of_fingers(&mut self, gap: f64, width: f64) -> Result<(f64, f64), Reported> {
+    /// Misalignment of the fingers in gaps of a width that touch at a distance, and distance of the substrate (m), 0 without one.
+    fn place_of_fingers(&mut self, gap: f64, touch: Option<f64>, width: f64) -> Result<(f64, f64), Reported> {
         let misalignment = self.number_or("misalign", 0.0)?;
-        if misalignment.abs() > gap - touching_distance(gap) {
+        if misalignment.abs() > gap - touch.unwrap_or(touching_distance(gap)) {
             return Err(self.out_of_range(
                 "misalign",
                 misalignment,
@@ -48,7 +48,8 @@ impl ElementSite<'_, '_> {
             return Err(self.missing("w"));
         }
         let offset = self.offset()?;
-        let (misalignment, substrate) = if finite { self.place_of_fingers(gap, width)? } else { (0.0, 0.0) };
+        let (touch, impact) = if finite { (self.touch(gap)?, self.impact()?) } else { (None, Impact::default()) };
+        let (misalignment, substrate) = if finite { self.place_of_fingers(gap, touch, width)? } else { (0.0, 0.0) };
         let sliding = self.between_fingers(gap)? * gaps * height / gap;
         let axis = [angle.cos(), angle.sin()];
         let (a, b) = (self.node(0), self.node(1));
@@ -72,6 +73,8 @@ impl ElementSite<'_, '_> {
             misalignment,
             substrate,
             sliding,
+            touch,
+            impact,
             finite,
             offset,
             voltage,

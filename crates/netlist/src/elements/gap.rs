@@ -30,7 +30,7 @@ impl ElementSite<'_, '_> {
     }
 
     /// Distance at which electrodes drawn `gap` apart touch (m), if it is given.
-    fn touch(&mut self, gap: f64) -> Result<Option<f64>, Reported> {
+    pub(super) fn touch(&mut self, gap: f64) -> Result<Option<f64>, Reported> {
         let touch = self.positive_if_any("touch")?;
         if let Some(touch) = touch
             && touch >= gap

@@ -44,10 +44,13 @@ impl Continuation {
 
     /// True where a gap changes more from one place to the other than it may in a step.
     fn leaps(&self, system: &System, here: &PathState, next: &PathState) -> bool {
-        (0..system.members.len()).filter(|&g| system.touching(g).is_some()).any(|g| {
-            let (a, b) = (system.clearance(g, &here.q), system.clearance(g, &next.q));
-            (a - b).abs() > self.options.closing * a.min(b)
-        })
+        let closing = self.options.closing;
+        let sides = system.sides_leap([&here.q, &next.q], closing, f64::min);
+        sides
+            || (0..system.members.len()).filter(|&g| system.touching(g).is_some()).any(|g| {
+                let (a, b) = (system.clearance(g, &here.q), system.clearance(g, &next.q));
+                (a - b).abs() > closing * a.min(b)
+            })
     }
 
     /// True when a `place` lies on the branch through the two `ends` of a step, between which it was expected at `guess`.

@@ -274,6 +274,8 @@ impl Equilibrium {
             let member = &system.members[*gap];
             member.touching().is_some() || (member.is_electrostatic() && self.drive.volts[*gap] != 0.0)
         };
-        (0..system.members.len()).filter(acts).any(far)
+        // from one side of a finger's gap to the other, too
+        system.sides_leap([from, &self.trial], CLOSING, |a, b| a.abs().max(b.abs()))
+            || (0..system.members.len()).filter(acts).any(far)
     }
 }

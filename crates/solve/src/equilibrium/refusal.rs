@@ -79,14 +79,15 @@ impl Equilibrium {
             BodyId::Free(k) => system.model.bodies[k].name.to_string(),
             BodyId::Ground => String::new(),
         };
-        system.members.iter().find_map(|member| {
+        system.members.iter().enumerate().find_map(|(gap, member)| {
             let (across, SideRoom { drawn, room }) = member.side_room()?;
             let aside = (drawn + across.value(q, system.model.linear)).abs();
-            (aside > room).then(|| {
+            // sides that face each other bear
+            (aside > room && system.side_contact(gap, q).is_none()).then(|| {
                 let part = [across.a.body, across.b.body].map(name).concat();
                 format!(
-                    "the fingers of the comb at \"{part}\" are drawn to the side until they touch: the side force exceeds what holds them (a stiffer part \
-                     across the fingers, wider gaps, or a `stop2d`)"
+                    "the fingers of the comb at \"{part}\" are drawn aside of their gaps where they do not overlap: the side force exceeds what holds them (a \
+                     stiffer part across the fingers, wider gaps, or a `stop2d`)"
                 )
             })
         })

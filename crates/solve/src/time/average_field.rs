@@ -61,7 +61,8 @@ impl<S: LinearSolver> Method<Newton<'_, S>> for AverageField {
         let samples = POINTS.map(|share| ForceEvaluation { weight: 0.5, share, time: t + share * h });
         let (base, constant) = (&motion.q, &self.constant);
         let (m, c, rates) = (2.0 / (h * h), 1.0 / h, &self.still);
-        let quotient = equations.system().can_touch().then_some(h);
+        let system = equations.system();
+        let quotient = (system.can_touch() || system.sides_near(&motion.q, &motion.v, h)).then_some(h);
         let equation = Equation { m, c, rates, base, constant, samples: &samples, quotient };
         equations.root(&equation, &mut self.x)?;
         for (k, x) in self.x.iter().enumerate() {

@@ -75,7 +75,7 @@ impl<'a> RunningLane<'a> {
             errors,
             watcher,
             mass: system.model.bodies.iter().map(|b| b.mass).sum(),
-            contacts: (0..system.members.len()).any(|g| system.touching(g).is_some()),
+            contacts: system.has_contacts(),
             pace,
             steps: 0,
         }

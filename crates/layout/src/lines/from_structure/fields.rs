@@ -91,6 +91,7 @@ impl OfStructure<'_> {
                     let optional =
                         [("Cp", comb.parasitic), ("misalign", comb.misalignment), ("substrate", comb.substrate)];
                     parameters.extend(optional.into_iter().filter(|(_, value)| *value != 0.0));
+                    parameters.extend(comb.touch.map(|t| ("touch", t)).into_iter().chain(impact(&comb.impact)));
                     "comb2de"
                 }
             };

@@ -100,7 +100,7 @@ impl LaneRodas4 {
             h: Lane8::of(1.0),
             acted: ActedBodies::new(system),
             drives: vec![system.electrics.drive(); LANES],
-            losses: vec![LossDerivatives::new(system); if system.can_touch() { LANES } else { 0 }],
+            losses: vec![LossDerivatives::new(system); if system.has_contacts() { LANES } else { 0 }],
             rates: [(); 2].map(|()| vec![Pose::zeros(); n]),
             model,
         })
