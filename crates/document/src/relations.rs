@@ -120,7 +120,8 @@ impl Relations<'_> {
         }
         for (k, beam) in s.beams.iter().enumerate() {
             let heater = beam.heater.iter();
-            let of_heater = heater.flat_map(|h| [&h.resistance_curve, &h.conductance_curve, &h.capacity_curve]);
+            let of_heater =
+                heater.flat_map(|h| [&h.resistance_curve, &h.conductance_curve, &h.capacity_curve, &h.gas_curve]);
             for curve in of_heater.chain([&beam.material.expansion_curve]).flatten() {
                 if let Some(fault) = curve.fault() {
                     self.require(false, ("beams", k, ""), &format!("a curve over temperature: {fault}"))?;

@@ -20,6 +20,18 @@ impl RelativeCurve {
     fn at(&self, rise: f64) -> [f64; 2] {
         self.curve.at(self.ambient + rise)
     }
+
+    /// Integral of the value between two rises (K), and the value at the second one (1).
+    pub(super) fn between(&self, from: f64, to: f64) -> [f64; 2] {
+        [self.curve.integral(self.ambient + from, self.ambient + to), self.at(to)[0]]
+    }
+
+    /// The largest value of a table; of a polynomial, that at ambient temperature or at a rise (K).
+    fn largest(&self, rise: f64) -> f64 {
+        let points = self.curve.table.iter().map(|point| point[1]);
+        let ends = [0.0, rise].map(|rise| self.at(rise)[0]);
+        points.chain(ends).fold(0.0, f64::max)
+    }
 }
 
 /// Curves of a heated beam.
@@ -31,6 +43,8 @@ pub struct HeatCurves {
     pub conductance: Option<RelativeCurve>,
     /// Of its heat capacity; none: linear.
     pub capacity: Option<RelativeCurve>,
+    /// Of the thermal conductivity of the gas; none: constant.
+    pub gas: Option<RelativeCurve>,
     /// Of its thermal expansion, with the ambient temperature (1/K, K); none: constant.
     pub expansion: Option<(PropertyCurve, f64)>,
 }
@@ -52,6 +66,11 @@ impl HeatCurves {
         *self == Self::default()
     }
 
+    /// Largest conductivity of the gas of a table, and of a polynomial up to a rise (K), over that at ambient temperature (1).
+    pub(super) fn largest_gas(&self, rise: f64) -> f64 {
+        self.gas.as_ref().map_or(1.0, |curve| curve.largest(rise))
+    }
+
     /// The first table that does not cover one of these rises, and otherwise none. `near` widens the test: a fraction of the range (1).
     pub(super) fn end_of_table(&self, rises: [f64; 2], near: f64) -> Option<TableEnd> {
         let relative = |curve: &Option<RelativeCurve>| curve.as_ref().map(|c| (c.curve.range(), c.ambient));
@@ -60,6 +79,7 @@ impl HeatCurves {
             ("resistivity", relative(&self.resistance)),
             ("thermcond", relative(&self.conductance)),
             ("specificheat", relative(&self.capacity)),
+            ("gasconductivity", relative(&self.gas)),
             ("thermalexpansion", expansion),
         ];
         all.into_iter().find_map(|(property, found)| {

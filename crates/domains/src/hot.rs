@@ -165,7 +165,8 @@ impl HotNetwork {
         }
         let mut states = nodes;
         let bar = |h: &HeatConductor| {
-            let sides = h.gas + 4.0 * h.radiation * (h.ambient + GLOWING).powi(3);
+            let gas = h.gas * h.curves.as_ref().map_or(1.0, |curves| curves.largest_gas(GLOWING));
+            let sides = gas + 4.0 * h.radiation * (h.ambient + GLOWING).powi(3);
             let fine = (PER_DECAY * (sides / h.conductance).sqrt()).ceil() as usize;
             let bar = HotBeam {
                 conductance: h.conductance,
@@ -543,11 +544,11 @@ impl HotNetwork {
         })
     }
 
-    /// A beam whose resistivity, thermal conductivity or heat capacity is not positive somewhere, with the rise there (K).
+    /// A beam whose resistivity, thermal conductivity, heat capacity or gas has no positive law somewhere, with the rise there (K).
     fn without_resistance(&self, state: &[f64]) -> Option<(usize, f64)> {
         self.bars.iter().enumerate().find_map(|(k, bar)| {
             let extremes = bar.extremes(self.ends_of(k, state), self.inner_of(k, state));
-            let laws = |t: f64| [bar.resistivity(t)[0], bar.conductivity(t)[0], bar.capacity_law(t)[0]];
+            let laws = |t: f64| [bar.resistivity(t)[0], bar.conductivity(t)[0], bar.capacity_law(t)[0], bar.gas_law(t)];
             let positive = |t: f64| laws(t).iter().all(|law| *law > 0.0 && law.is_finite());
             let lost = |t: &f64| !positive(*t);
             let found = extremes.into_iter().find(lost)?;

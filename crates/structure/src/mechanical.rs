@@ -117,6 +117,9 @@ pub struct Heater {
     /// See `resistance_curve`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub capacity_curve: Option<PropertyCurve>,
+    /// Curve in whose proportion the conductivity of the gas changes with temperature; none: constant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gas_curve: Option<PropertyCurve>,
     /// Emissivity of its surface (1).
     #[serde(default)]
     pub emissivity: f64,

@@ -73,6 +73,7 @@ record! {
         resistance_curve: "", Any, "Curve in whose proportion the resistance changes with temperature; left out: by the coefficient";
         conductance_curve: "", Any, "The same of the thermal conductance";
         capacity_curve: "", Any, "The same of the heat capacity";
+        gas_curve: "", Any, "Curve in whose proportion the conductivity of the gas changes with temperature; left out: constant";
         emissivity = 0.0: "1", NonNegative, "Emissivity of the surface; left out: 0";
         substrate: "K", NonNegative, "Temperature of the substrate; left out: ambient";
     }

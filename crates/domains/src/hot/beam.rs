@@ -3,15 +3,16 @@
 //! Let s go from 0 to 1 along the beam. K is its conductance from end to end, G that to the surroundings, R₀ its resistance and C its
 //! heat capacity. B·T⁴ is the power that it radiates at the absolute temperature T, T₀ that of the surroundings, and T_s the rise of the substrate. The rise T(s) and the current I satisfy
 //! ```text
-//! C·c(T)·∂T/∂t = K·∂(κ(T)·∂T/∂s)/∂s − G·(T − T_s) − B·((T₀ + T)⁴ − T₀⁴) + I²·R₀·r(T),      V = I·R₀·∫r(T)ds
-//! r(T) = 1 + TCR·T,      κ(T) = 1/(1 + TCK·T),      c(T) = 1 + TCC·T
+//! C·c(T)·∂T/∂t = K·∂(κ(T)·∂T/∂s)/∂s − G·∫γ(θ)dθ − B·((T₀ + T)⁴ − T₀⁴) + I²·R₀·r(T),      V = I·R₀·∫r(T)ds
+//! r(T) = 1 + TCR·T,      κ(T) = 1/(1 + TCK·T),      c(T) = 1 + TCC·T,      γ = 1
 //! ```
-//! in weak form on elements with a node in their middle, integrated by three Gauss points. Where a property has a curve, that stands for r, κ or c, and
+//! with the integral from T_s to T: Kirchhoff's transformation of the gas between two faces at these temperatures, whatever its shape,
+//! in weak form on elements with a node in their middle, integrated by three Gauss points. Where a property has a curve, that stands for r, κ, c or γ, and
 //! the mean strain ∫∫α(T)dT ds and the mean of r are integrated by the same points. Newton's matrix of the inner nodes has two
 //! bands on either side. Its solution for the rises of the ends, the current and the residual leaves three equations: the heat that the
 //! ends receive, and the voltage.
 
-use super::super::heat_curves::{HeatCurves, linear_or, reciprocal_or};
+use super::super::heat_curves::{HeatCurves, RelativeCurve, linear_or, reciprocal_or};
 use super::element::{DERIVATIVES, POINTS, SHAPES};
 use nalgebra::ComplexField;
 use std::sync::Arc;
@@ -116,6 +117,15 @@ impl HotBeam {
         linear_or(self.capacity_coefficient, self.curves.as_ref().and_then(|c| c.capacity.as_ref()), t)
     }
 
+    /// Conductivity of the gas over that at ambient temperature (1).
+    pub(super) fn gas_law(&self, t: f64) -> f64 {
+        self.gas_curve().map_or(1.0, |curve| curve.between(t, t)[1])
+    }
+
+    fn gas_curve(&self) -> Option<&RelativeCurve> {
+        self.curves.as_ref().and_then(|c| c.gas.as_ref())
+    }
+
     /// Whether its heat capacity depends on temperature.
     fn capacity_changes(&self) -> bool {
         self.capacity_coefficient != 0.0 || self.curves.as_ref().is_some_and(|c| c.capacity.is_some())
@@ -175,14 +185,17 @@ impl HotBeam {
 
     /// Power that leaves to the surroundings at a rise, as if all of the beam had it, and its slope (W, W/K).
     fn aside(&self, t: f64) -> [f64; 2] {
-        let conducted = self.gas * (t - self.substrate);
+        let [conducted, slope] = match self.gas_curve() {
+            Some(curve) => curve.between(self.substrate, t).map(|x| self.gas * x),
+            None => [self.gas * (t - self.substrate), self.gas],
+        };
         if self.radiation == 0.0 {
-            return [conducted, self.gas];
+            return [conducted, slope];
         }
         let there = self.ambient + t;
         // (T₀ + t)⁴ − T₀⁴ without cancellation
         let power = t * (there + self.ambient) * (there * there + self.ambient * self.ambient);
-        [conducted + self.radiation * power, self.gas + 4.0 * self.radiation * there.powi(3)]
+        [conducted + self.radiation * power, slope + 4.0 * self.radiation * there.powi(3)]
     }
 
     /// Number of inner nodes.

@@ -1,10 +1,13 @@
 //! A bar of 200 × 2 × 2 µm between ends at ambient, against closed forms: rise = (cos(λ(x − L/2))/cos(λL/2) − 1)/ξ with λ² = J²·ρ₀·ξ/k,
 //! and its counterpart with a loss through gas, computed independently.
 
+use super::super::heat_curves::{HeatCurves, RelativeCurve};
 use super::super::network::ElectricalNetwork;
 use super::super::thermal::{HeatConductor, Heating};
 use super::element::POINTS;
+use bimorph_structure::PropertyCurve;
 use nalgebra::Complex;
+use std::sync::Arc;
 
 /// ρ 2e-5 Ω·m, k 32 W/(m·K), ρ·c 2330·700 J/(m³·K), a TCR of 1.25e-3/K; `gas` of all of its length (W/K), in equal pieces, fed through a
 /// resistor (Ω).
@@ -105,6 +108,45 @@ fn conductivity_falls_with_temperature() {
     heating.slopes(&[1.0], &rise, &[1.0], &mut slopes);
     let difference = (8.0 * (mean(1.001) - mean(0.999)) - (mean(1.002) - mean(0.998))) / 12e-3;
     assert!((slopes[0] / difference - 1.0).abs() < 1e-7, "{} {difference}", slopes[0]);
+}
+
+/// A bar and a gas whose conductivities follow one curve f over temperature, over a substrate at a rise of 30 K: Θ = ∫f is that of a fin with constant properties (Kirchhoff), for a
+/// polynomial and a table. The highest Θ at 1 V and constant resistance is Θ_s + P/G·(…) of the closed form, to 1e-5, and slopes agree with differences to 1e-7.
+#[test]
+fn gas_follows_its_curve() {
+    let curves = [
+        PropertyCurve { polynomial: vec![0.01, 6e-5, 2e-8], ..PropertyCurve::default() },
+        PropertyCurve { table: vec![[250.0, 0.02], [400.0, 0.034], [700.0, 0.05]], ..PropertyCurve::default() },
+    ];
+    for curve in curves {
+        let (ambient, gas, substrate) = (300.0, 2.08e-5, 30.0);
+        let mut heaters = bar(1, 0.0, 0.0).heaters;
+        let law = || Some(RelativeCurve::new(&curve, ambient));
+        let both = HeatCurves { conductance: law(), gas: law(), ..HeatCurves::default() };
+        let h = &mut heaters[0];
+        (h.coefficient, h.gas, h.substrate, h.ambient, h.curves) = (0.0, gas, substrate, ambient, Some(Arc::new(both)));
+        let (k, watts) = (h.conductance, 1.0 / h.resistance);
+        let circuit = ElectricalNetwork {
+            nodes: 2,
+            resistors: vec![(0, 1, h.resistance)],
+            sources: vec![(1, None)],
+            grounds: vec![0],
+        };
+        let heating =
+            Heating::new(heaters, &circuit.solve().unwrap(), 1, &[true, true]).unwrap().with_hot(&circuit, &[]);
+        let [_, peak, _] = at(&heating, 1.0);
+        let theta = |rise: f64| law().unwrap().between(0.0, rise)[0];
+        let half = 0.5 * f64::sqrt(gas / k);
+        let wanted = (theta(substrate) + watts / gas) * (1.0 - half.cosh().recip());
+        assert!((theta(peak) / wanted - 1.0).abs() < 1e-5, "{peak}: {} {wanted}", theta(peak));
+        let mut rise = vec![0.0; heating.states()];
+        heating.rises(&[1.0], &mut rise);
+        let mut slopes = vec![0.0; 1];
+        heating.slopes(&[1.0], &rise, &[1.0], &mut slopes);
+        let mean = |volts: f64| at(&heating, volts)[0];
+        let difference = (8.0 * (mean(1.001) - mean(0.999)) - (mean(1.002) - mean(0.998))) / 12e-3;
+        assert!((slopes[0] / difference - 1.0).abs() < 1e-7, "{} {difference}", slopes[0]);
+    }
 }
 
 /// A negative TCR of ξ = −2e-3/K at a held voltage has no temperature above 2·√(ρ₀·k/|ξ|) = 1.13137 V, where the rise of 500 K takes the

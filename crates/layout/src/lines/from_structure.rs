@@ -83,6 +83,7 @@ fn curves(beam: &Beam, line: &mut ElementLine) {
         put("resistivity", &heater.resistance_curve);
         put("thermcond", &heater.conductance_curve);
         put("specificheat", &heater.capacity_curve);
+        put("gasconductivity", &heater.gas_curve);
     }
     if beam.heater.is_some() || beam.temperature.is_some() {
         put("thermalexpansion", &beam.material.expansion_curve);

@@ -121,6 +121,7 @@ fn heat_curves(beam: &Beam, heater: &Heater) -> Option<Arc<HeatCurves>> {
         resistance: relative(&heater.resistance_curve),
         conductance: relative(&heater.conductance_curve),
         capacity: relative(&heater.capacity_curve),
+        gas: relative(&heater.gas_curve),
         expansion: beam.material.expansion_curve.clone().map(|curve| (curve, ambient)),
     };
     (!curves.is_empty()).then(|| Arc::new(curves))

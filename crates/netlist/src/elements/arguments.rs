@@ -13,8 +13,17 @@ use std::sync::Arc;
 pub(crate) const LONGEST: f64 = 0.1;
 
 /// Parameters that can depend on temperature.
-pub(crate) const CURVES: [&str; 5] =
-    ["resistivity", "sheetresistance", "specificheat", "thermalexpansion", "thermcond"];
+pub(crate) const CURVES: [&str; 9] = [
+    "C11",
+    "C12",
+    "C44",
+    "gasconductivity",
+    "resistivity",
+    "sheetresistance",
+    "specificheat",
+    "thermalexpansion",
+    "thermcond",
+];
 
 /// One parameter as given.
 #[derive(Debug, Clone)]

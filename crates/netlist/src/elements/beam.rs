@@ -205,6 +205,12 @@ pub(super) fn beam2det(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let resistance_curve = site.resistance_curve()?;
     let conductance_curve = site.changing("thermcond", "TCK")?;
     let capacity_curve = site.changing("specificheat", "TCC")?;
+    let substrate = site.absolute("substratetemperature")?;
+    let gas_curve = if gas.is_some() { site.curve("gasconductivity")? } else { None };
+    if let Some((curve, substrate)) = gas_curve.as_ref().zip(substrate) {
+        let span = site.span_of("gasconductivity");
+        site.covered("gasconductivity", curve, substrate, "temperature of the substrate", span)?;
+    }
     beam.heater = Some(Heater {
         resistance,
         conductance,
@@ -217,8 +223,9 @@ pub(super) fn beam2det(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
         resistance_curve,
         conductance_curve,
         capacity_curve,
+        gas_curve,
         emissivity: site.emissivity(ambient)?,
-        substrate: site.absolute("substratetemperature")?,
+        substrate,
     });
     site.drawing.electrical(&[a, b]);
     if let (Some(stress), Some(softening)) = (site.positive_if_any("yieldstress")?, site.positive_if_any("softening")?)

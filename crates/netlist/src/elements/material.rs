@@ -23,7 +23,7 @@ const STRONGEST: f64 = 0.1;
 pub(super) const VACUUM: f64 = 8.854e-12;
 
 /// Parameters of a material.
-const READ: [&str; 18] = [
+const READ: [&str; 21] = [
     "strength",
     "anchorquality",
     "Youngsmodulus",
@@ -31,6 +31,9 @@ const READ: [&str; 18] = [
     "shearmodulus",
     "crystal",
     "crystalangle",
+    "C11",
+    "C12",
+    "C44",
     "density",
     "viscosity",
     "fluid",

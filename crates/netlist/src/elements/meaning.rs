@@ -46,6 +46,7 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "Poisson" => "Poisson's ratio [1]",
         "shearmodulus" => "shear modulus in the plane [Pa]",
         "crystal" => "plane of a silicon wafer, 100 or 111 [1]",
+        "C11" | "C12" | "C44" => "elastic constant of the crystal [Pa]",
         "crystalangle" => "angle from x to the flat of the wafer [rad]",
         "strength" => "stress that the material bears [Pa]",
         "hardness" => "hardness of the softer metal [Pa]",

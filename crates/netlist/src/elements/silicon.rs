@@ -9,7 +9,8 @@
 //! Beams that lie along no symmetry axis also shear when they are stretched, which is left out.
 //!
 //! Source: M. A. Hopcroft, W. D. Nix, T. W. Kenny, "What is the Young's modulus of silicon?", J. MEMS 19 (2010) 229–238:
-//! C₁₁ = 165.7 GPa, C₁₂ = 63.9 GPa, C₄₄ = 79.6 GPa, lightly doped, at room temperature.
+//! C₁₁ = 165.7 GPa, C₁₂ = 63.9 GPa, C₄₄ = 79.6 GPa, lightly doped, at room temperature. A layer may give others, as curves over temperature too: those of another doping, or of
+//! another cubic crystal. They are taken at its ambient temperature.
 
 use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
@@ -18,6 +19,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Elastic constants C₁₁, C₁₂, C₄₄ (Pa).
 const STIFFNESS: [f64; 3] = [165.7e9, 63.9e9, 79.6e9];
+/// Their names in layers.
+const CONSTANTS: [&str; 3] = ["C11", "C12", "C44"];
 
 /// A direction in crystal axes, of length 1.
 type CrystalDirection = [f64; 3];
@@ -29,6 +32,8 @@ pub(super) struct Wafer {
     axes: [CrystalDirection; 3],
     /// Angle from x of the drawing to the flat (rad).
     angle: f64,
+    /// C₁₁, C₁₂, C₄₄ (Pa).
+    stiffness: [f64; 3],
 }
 
 /// Elastic constants of a beam.
@@ -55,12 +60,12 @@ impl Wafer {
         } else {
             return None;
         };
-        Some(Self { axes: [flat, across, normal], angle })
+        Some(Self { axes: [flat, across, normal], angle, stiffness: STIFFNESS })
     }
 
     /// The constants of a beam in the direction `angle` of the drawing (rad).
     pub(super) fn along(&self, angle: f64) -> ElasticConstants {
-        let [c11, c12, c44] = STIFFNESS;
+        let [c11, c12, c44] = self.stiffness;
         let split = (c11 - c12) * (c11 + 2.0 * c12);
         let (s11, s12, s44) = ((c11 + c12) / split, -c12 / split, 1.0 / c44);
         let anisotropy = s11 - s12 - 0.5 * s44;
@@ -89,9 +94,16 @@ impl Wafer {
 impl ElementSite<'_, '_> {
     /// The wafer that the layer is cut from, where it says so.
     pub(super) fn wafer(&mut self) -> Result<Option<Wafer>, Reported> {
-        let Some(plane) = self.number("crystal")? else { return Ok(None) };
+        let Some(plane) = self.number("crystal")? else {
+            for name in CONSTANTS {
+                if self.number(name)?.is_some() {
+                    return Err(self.missing("crystal"));
+                }
+            }
+            return Ok(None);
+        };
         let angle = self.number_or("crystalangle", 0.0)?;
-        let Some(wafer) = Wafer::new(plane, angle) else {
+        let Some(mut wafer) = Wafer::new(plane, angle) else {
             return Err(self.out_of_range("crystal", plane, "100 or 111, the plane of a silicon wafer"));
         };
         for constant in ["Youngsmodulus", "shearmodulus", "Poisson"] {
@@ -100,6 +112,15 @@ impl ElementSite<'_, '_> {
                 let help = format!("`crystal` gives `{constant}` by the direction of each beam: leave one of them out");
                 return Err(self.sink.error("E060", self.span_of(constant), message, help));
             }
+        }
+        for (constant, name) in wafer.stiffness.iter_mut().zip(CONSTANTS) {
+            // of a curve, positive everywhere
+            self.curve(name)?;
+            *constant = self.positive_if_any(name)?.unwrap_or(*constant);
+        }
+        let [c11, c12, _] = wafer.stiffness;
+        if c12 >= c11 {
+            return Err(self.out_of_range("C12", c12, "below `C11`: no crystal that is stable has more"));
         }
         Ok(Some(wafer))
     }

@@ -49,6 +49,39 @@ fn beam2d() {
     same2(at(&s, "b"), [0.0, 100e-6]);
 }
 
+/// Elastic constants of a crystal as numbers, and as curves at the ambient temperature: E is (C11 − C12)·(C11 + 2·C12)/(C11 + C12) along ⟨100⟩ and
+/// 4/(2/(C11 + C12 − 2·C12²/C11) + 1/C44) along ⟨110⟩, by hand. Constants of no crystal, and constants without a crystal, are refused.
+#[test]
+fn crystals_have_constants_over_temperature() {
+    let text = |layer: &str, oz: f64| {
+        let layer = format!("process s = [{layer} density=2330 h=20u]");
+        format!("{layer}\nanchor s [a] []\nbeam2d s [a b] [l=100u w=3u oz={oz}]")
+    };
+    let modulus =
+        |layer: &str, degrees: f64| drawn(&text(layer, degrees.to_radians())).beams[0].material.youngs_modulus;
+    let close = |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 1e-9, "{found:e} {wanted:e}");
+    let both = |layer: &str, [c11, c12, c44]: [f64; 3]| {
+        close(modulus(layer, 45.0), (c11 - c12) * (c11 + 2.0 * c12) / (c11 + c12));
+        close(modulus(layer, 0.0), 4.0 / (2.0 / (c11 + c12 - 2.0 * c12 * c12 / c11) + 1.0 / c44));
+    };
+    both("crystal=100 C11=128.5e9 C12=48.3e9 C44=66.8e9", [128.5e9, 48.3e9, 66.8e9]);
+    both("crystal=100 C12=64.5e9", [165.7e9, 64.5e9, 79.6e9]);
+    let curves = "C11=polynomial(170e9, -12e6, -8e3) C12=polynomial(66e9, -6e6) C44=table(250, 80e9, 350, 79e9)";
+    for (t, c44) in [(260.0, 79.9e9), (330.0, 79.2e9)] {
+        let layer = format!("crystal=100 ambienttemperature={t} {curves}");
+        both(&layer, [170e9 - 12e6 * t - 8e3 * t * t, 66e9 - 6e6 * t, c44]);
+    }
+    for (layer, code) in [
+        ("crystal=100 C11=60e9", "below `C11`"),
+        ("crystal=100 C44=-1e9", "`C44` (elastic constant of the crystal [Pa])"),
+        ("crystal=100 ambienttemperature=500 C44=table(250, 80e9, 350, 79e9)", "does not cover"),
+        ("Youngsmodulus=160e9 C44=79e9", "`crystal`"),
+    ] {
+        let refused = load(&Bundle::from_text("t.net", &text(layer, 0.0)), &[]).unwrap_err().to_string();
+        assert!(refused.contains("E0") && refused.contains(code), "{layer}: {refused}");
+    }
+}
+
 /// Without viscosity or film there is no damping.
 #[test]
 fn damping_needs_viscosity_and_film() {
@@ -415,6 +448,29 @@ fn gas_around_a_heated_beam() {
     same(usual.shape, 2.5);
     same(usual.conductance(4e-6, 100e-6), 2.5 * 0.026 * 4e-6 / 2e-6 * 100e-6);
     same(one("gasconductivity=0.026 fluid=2u shapefactor=4").expect("gas").shape, 4.0);
+}
+
+/// The conductivity of the gas as a curve over temperature: its value at ambient temperature counts, and the curve stays. A table that does not cover the substrate is refused.
+#[test]
+fn gas_conducts_by_a_curve() {
+    let one = |extra: &str| {
+        let text = format!(
+            "anchor p1 [a] []\neground * [a] []\nhot beam2det p1 [a b] [l=100u w=4u fluid=2u {extra}]\nanchor p1 [b] []\nheat port * [b a] []"
+        );
+        load(&Bundle::from_text("t.net", &format!("{P1}{text}")), &[])
+    };
+    let air = "gasconductivity=table(300, 0.0263, 400, 0.0338, 600, 0.0469)";
+    let heater = one(air).expect("a model").structure.beams[0].heater.clone().expect("heater");
+    same(heater.gas.expect("gas").conductivity, 0.0263);
+    same(heater.gas_curve.expect("a curve").at(600.0)[0], 0.0469);
+    assert_eq!(
+        one("gasconductivity=0.026").expect("a model").structure.beams[0].heater.as_ref().unwrap().gas_curve,
+        None
+    );
+    let refused = one(&format!("{air} substratetemperature=280")).unwrap_err().to_string();
+    assert!(refused.contains("does not cover the temperature of the substrate"), "{refused}");
+    let refused = one("gasconductivity=table(300, 0.0263, 400, -1)").unwrap_err().to_string();
+    assert!(refused.contains("must be positive"), "{refused}");
 }
 
 /// comb2d: constant force, b at 2L − l; comb2de: finite overlap between electrical nodes.
