@@ -55,7 +55,7 @@ pub(crate) struct ExportCommand {
     nonlinear: bool,
 
     /// Range of what is given to a port, for which a reduced nonlinear model is made [V, N, W, …]; others are at 0. Repeatable
-    #[arg(long = "range", value_name = "NAME=LOW:HIGH", requires = "nonlinear", value_parser = value::range)]
+    #[arg(id = "export_range", long = "range", value_name = "NAME=LOW:HIGH", requires = "nonlinear", value_parser = value::range)]
     ranges: Vec<(String, [f64; 2])>,
 
     /// Operating point: hold a port at a voltage [V]; others are at 0 V. Repeatable

@@ -44,3 +44,4 @@ pub use contract::{
     Agitation, Description, Device, DeviceError, Mode, OpenRequest, PortInfo, SignalInfo, SmallSignal, Status, Token,
     Trial, TrialReply,
 };
+pub use output_gradient::surroundings;

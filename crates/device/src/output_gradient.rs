@@ -9,7 +9,7 @@ use nalgebra::Complex;
 const ROOM: f64 = 300.15;
 
 /// Temperature of what surrounds the mechanism (K).
-pub(super) fn surroundings(compiled: &CompiledModel) -> f64 {
+pub fn surroundings(compiled: &CompiledModel) -> f64 {
     let ambient = compiled.structure.beams.iter().map(|beam| beam.material.ambient_temperature);
     ambient.into_iter().find(|t| *t > 0.0).unwrap_or(ROOM)
 }

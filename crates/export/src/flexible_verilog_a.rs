@@ -19,10 +19,12 @@ use super::flexible::text::PolynomialText;
 use super::flexible::{FlexibleModel, FlexibleOutput};
 use super::laws::{bearing, capacitance, drag, slope};
 use super::names::Pins;
+use super::noise_sources::{NoiseText, warm};
 use super::verilog_a::{ContributionSum, head};
 use bimorph_domains::{Law, PointLaw};
 use bimorph_solve::reduced::polynomial::PolynomialModel;
 use bimorph_solve::reduced::polynomial::monomials::Polynomials;
+use nalgebra::DMatrix;
 use std::fmt::Write;
 
 /// Part of the largest share below which a shape has none in a point (1).
@@ -40,7 +42,9 @@ pub(super) fn follows_at_once(of: &PolynomialModel, j: usize) -> bool {
 
 /// The file: a descriptive header, and the module `name`.
 pub fn write(model: &FlexibleModel, pins: &Pins, name: &str, about: &[String]) -> String {
-    let mut module = FlexibleModule { model, of: &model.fitted.model, body: String::new(), reals: Vec::new() };
+    let of = &model.fitted.model;
+    let noise = NoiseText::default();
+    let mut module = FlexibleModule { model, of, body: String::new(), reals: Vec::new(), noise };
     module.coordinates();
     module.heat();
     module.closures();
@@ -51,12 +55,15 @@ pub fn write(model: &FlexibleModel, pins: &Pins, name: &str, about: &[String]) -
     for row in 0..model.rows.len() {
         module.row(row, pins);
     }
+    module.drag_noise();
+    module.conducted_noise();
     let coordinates = (1..=module.of.size()).flat_map(|j| [format!("x{j}"), format!("v{j}")]);
     let lags = (0..model.heat.lags.len()).filter(|l| module.lags(*l)).map(|l| format!("h{}", l + 1));
-    let inner: Vec<String> = coordinates.chain(lags).collect();
-    let FlexibleModule { body, reals, .. } = module;
-    let mut text = head(name, pins, &inner, &reals, &model.ports, about);
-    text.push_str(&body);
+    let FlexibleModule { body, reals, noise, .. } = &module;
+    let inner: Vec<String> = coordinates.chain(lags).chain(noise.nodes.iter().cloned()).collect();
+    let mut text = head(name, pins, &inner, reals, &model.ports, about);
+    text.push_str(body);
+    text.push_str(&noise.text);
     text.push_str("  end\nendmodule\n");
     text
 }
@@ -66,6 +73,7 @@ struct FlexibleModule<'a> {
     of: &'a PolynomialModel,
     body: String,
     reals: Vec<String>,
+    noise: NoiseText,
 }
 
 impl FlexibleModule<'_> {
@@ -232,6 +240,9 @@ impl FlexibleModule<'_> {
                 law.law.iter().filter_map(|of| bearing(of, law.loss, "u", "s")).map(|text| format!("+ {text}")),
             );
             force.extend(drag(law.film, "u", "s").map(|text| format!("+ {text}")));
+            if let Some(drag) = drag(law.film, "u", "1") {
+                self.gas_noise(&shares, &drag);
+            }
             if !force.is_empty() {
                 self.set("f", &force.join(" "));
                 for (l, share) in &shares {
@@ -239,6 +250,21 @@ impl FlexibleModule<'_> {
                 }
             }
         }
+    }
+
+    /// Noise of the gas at a point with these shares, whose damping is the expression `drag` (N·s/m), while the variable `u` is that of the point.
+    fn gas_noise(&mut self, shares: &[(usize, f64)], drag: &str) {
+        let unit = 1e-6 / self.of.energy_unit();
+        let gain = |j: usize| -> String {
+            let terms: Vec<String> = shares.iter().map(|(l, share)| format!("{share:e} * y{}_{j}", l + 1)).collect();
+            format!("({unit:e} * ({}))", terms.join(" + "))
+        };
+        let targets: Vec<_> = (1..=self.of.size()).map(|j| (format!("I(v{j})"), gain(j))).collect();
+        let power = format!("{:e} * {drag}", warm(self.model.johnson.temperature));
+        self.noise.source(&targets, &power, "gas");
+        // while `u` is that of the point
+        let written = std::mem::take(&mut self.noise.text);
+        self.body.push_str(&written);
     }
 
     /// Shapes with their share in the approach of a point.
@@ -304,6 +330,30 @@ impl FlexibleModule<'_> {
                 sum.term(&format!("-{unit:e} * {size} * w{}_{n}", k + 1));
             }
             sum.end(&mut self.body);
+        }
+    }
+
+    /// Noise of the damping, on coordinates that have inertia.
+    fn drag_noise(&mut self) {
+        let of = self.of;
+        let moving: Vec<usize> = (0..of.size()).filter(|&j| !follows_at_once(of, j)).collect();
+        let largest = of.damping.amax();
+        let entry = |i: usize, k: usize| significant(of.damping[(moving[i], moving[k])], largest);
+        let damping = DMatrix::from_fn(moving.len(), moving.len(), entry);
+        let targets: Vec<_> = moving.iter().map(|j| (format!("I(v{})", j + 1), 1.0)).collect();
+        let power = format!("{:e}", warm(self.model.johnson.temperature) / of.energy_unit());
+        self.noise.matrix(&damping, &targets, &power, "dampers");
+    }
+
+    /// Noise of resistances between ports at their own temperatures.
+    fn conducted_noise(&mut self) {
+        let johnson = &self.model.johnson;
+        let targets: Vec<_> = johnson.ports.iter().map(|k| (format!("I(b{})", k + 1), 1.0)).collect();
+        let power = format!("{:e}", warm(johnson.temperature));
+        self.noise.matrix(&johnson.conductance, &targets, &power, "resistors");
+        for (l, heated) in johnson.heated.iter().enumerate() {
+            let power = format!("{:e} * max({}, 0)", warm(1.0), self.lag(l));
+            self.noise.matrix(heated, &targets, &power, "heat");
         }
     }
 

@@ -3,14 +3,17 @@
 //! They are those of [`bimorph_domains::capacitor`], [`bimorph_domains::contact`] and [`bimorph_domains::stop`], with `min` and `max` in the place of
 //! cases, so that no branch divides by what another one keeps away from 0.
 
-use super::lumped::{Law, LumpedGap};
+use super::lumped::{Law, LumpedGap, LumpedOutput};
 use bimorph_domains::attraction::Adhesion;
 use bimorph_domains::capacitor::Capacitor;
 use bimorph_domains::comb_field::CombField;
 use bimorph_domains::contact::{Contact, DEEPEST, PRESSURE, TOUCH};
+use bimorph_domains::contact_resistance;
 use bimorph_domains::edge_field::EdgeField;
 use bimorph_domains::squeeze_film::SqueezeFilm;
 use bimorph_domains::stop::{SOFT, StopKind};
+use bimorph_structure::OhmicContact;
+use std::f64::consts::PI;
 
 /// C(u) (F).
 pub(super) fn capacitance(capacitor: &Capacitor, u: &str) -> String {
@@ -159,17 +162,8 @@ pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<Strin
         }
         Law::Stop(ways, stop, adhesion) => {
             let side = |way: Option<f64>, [sign, closing]: [&str; 2]| {
-                let left = format!("({:e} {sign} 1e-6 * {u})", way?);
-                let elastic = match stop {
-                    StopKind::Rigid(area) => {
-                        pressed(&Contact { touch: TOUCH, area: *area }, &format!("({TOUCH:e} + {left})"))
-                    }
-                    StopKind::Elastic(k) => {
-                        let p = format!("max(-{left}, 0)");
-                        format!("({k:e} * {p} * {p} / ({p} + {SOFT:e}))")
-                    }
-                };
-                let pressing = lossy(elastic, loss, closing, rate);
+                let left = left(way?, sign, u);
+                let pressing = lossy(stopped(stop, &left), loss, closing, rate);
                 Some(match adhesion {
                     Some(adhesion) => format!("({pressing} - {})", attracted(adhesion, &left)),
                     None => pressing,
@@ -181,6 +175,67 @@ pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<Strin
                 (None, Some(back)) => Some(format!("(-{back})")),
                 (None, None) => None,
             }
+        }
+    }
+}
+
+/// What is read of a contact with a `law` at the approach `u`: the way that is left, its force or its conductance; other readings are 0.
+pub(super) fn contact_reading(reading: &LumpedOutput, law: &Law, u: &str) -> String {
+    match (reading, law) {
+        (LumpedOutput::Way(_), Law::Stop(ways, ..)) => nearer_way(ways, u),
+        (LumpedOutput::Bearing(_), _) => pressing(law, u),
+        (LumpedOutput::Conductance(_, metals), _) => conductance(metals, &pressing(law, u)),
+        _ => "0".to_owned(),
+    }
+}
+
+/// Size of the elastic contact force at the approach `u` (N), as `GAP.N` shows it; 0 where parts never touch.
+pub(super) fn pressing(law: &Law, u: &str) -> String {
+    match law {
+        Law::Field(_, None) | Law::Spring(_) => "0".to_owned(),
+        Law::Field(capacitor, Some(contact)) => {
+            let sign = if matches!(capacitor, Capacitor::Comb { .. }) { "+" } else { "-" };
+            pressed(contact, &format!("({:e} {sign} 1e-6 * {u})", capacitor.distance(0.0)))
+        }
+        Law::Stop(ways, stop, _) => {
+            let sides = ways.iter().zip(["-", "+"]);
+            let forces: Vec<_> = sides.filter_map(|(way, sign)| Some(stopped(stop, &left((*way)?, sign, u)))).collect();
+            format!("({})", forces.join(" + "))
+        }
+    }
+}
+
+/// Way that is left before the nearer side of a stop at the approach `u` (m), as `STOP.gap` shows it.
+fn nearer_way(ways: &[Option<f64>; 2], u: &str) -> String {
+    match [ways[0].map(|way| left(way, "-", u)), ways[1].map(|way| left(way, "+", u))] {
+        [Some(ahead), Some(back)] => format!("min({ahead}, {back})"),
+        [way, other] => way.or(other).unwrap_or_else(|| "0".to_owned()),
+    }
+}
+
+/// Conductance of two metals under the force `pressing`, a text in newtons (S), as [`bimorph_domains::contact_resistance`]. The root of the radius begins at a
+/// force that conducts next to nothing, from where its slope is finite.
+fn conductance(contact: &OhmicContact, pressing: &str) -> String {
+    const LEAST: f64 = 1e-18;
+    let OhmicContact { hardness, resistivity, electron_path: path } = *contact;
+    let a = format!("sqrt(max({pressing}, {LEAST:e}) / {:e})", PI * hardness);
+    let constriction = format!("0.5 * {a} * ({a} + {:e}) / ({a} + {:e})", 0.83 * path, 1.33 * path);
+    let (crossing, start) = (4.0 * path / (3.0 * PI), contact_resistance::conductance(contact, LEAST).0);
+    format!("({a} * {a} / ({resistivity:e} * ({constriction} + {crossing:e})) - {start:e})")
+}
+
+/// Way that is left of `way` (m) at the approach `u`, which it falls with at the `sign` "-".
+fn left(way: f64, sign: &str, u: &str) -> String {
+    format!("({way:e} {sign} 1e-6 * {u})")
+}
+
+/// Elastic force of a stop with the way `left`, a text in metres.
+fn stopped(stop: &StopKind, left: &str) -> String {
+    match stop {
+        StopKind::Rigid(area) => pressed(&Contact { touch: TOUCH, area: *area }, &format!("({TOUCH:e} + {left})")),
+        StopKind::Elastic(k) => {
+            let p = format!("max(-{left}, 0)");
+            format!("({k:e} * {p} * {p} / ({p} + {SOFT:e}))")
         }
     }
 }
@@ -317,6 +372,45 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Way, contact force and conductance that are read have the values of the stop and of the contact of metals, open and closed on both sides; those of plates that
+    /// touch the force of the contact alone.
+    #[test]
+    fn contacts_are_read() {
+        let (ways, stop) = ([Some(0.5e-6), Some(0.3e-6)], StopKind::Rigid(1e-12));
+        let metals = OhmicContact { hardness: 2e9, resistivity: 2.2e-8, electron_path: 38e-9 };
+        let law = Law::Stop(ways, stop, Some(Adhesion { force: 2e-6, range: 20e-9 }));
+        let read = |reading: &LumpedOutput, law: &Law, u: f64| {
+            let text = contact_reading(reading, law, &format!("({u:e})"));
+            let mut left = text.as_str();
+            let found = sum(&mut left);
+            assert_eq!(left, "", "{text}");
+            found
+        };
+        for u in [-0.303_f64, -0.29, 0.0, 0.2, 0.4999, 0.504] {
+            let (ahead, back) = (0.5e-6 - 1e-6 * u, 0.3e-6 + 1e-6 * u);
+            let force = stop.force(ahead).0 + stop.force(back).0;
+            let conductance = contact_resistance::conductance(&metals, force).0;
+            for (reading, value) in [
+                (LumpedOutput::Way(0), ahead.min(back)),
+                (LumpedOutput::Bearing(0), force),
+                (LumpedOutput::Conductance(0, metals), conductance),
+            ] {
+                let found = read(&reading, &law, u);
+                assert!((found - value).abs() < 1e-9 * value.abs() + 1e-12, "{reading:?} {u}: {found} {value}");
+            }
+        }
+        let plates = Capacitor::Plates {
+            strength: 1e-19,
+            edges: [EdgeField::None; 2],
+            gap: 2e-6,
+            shortening: 0.0,
+            closest: 0.07e-6,
+        };
+        let contact = Contact { touch: 0.1e-6, area: 1e-9 };
+        let force = read(&LumpedOutput::Bearing(0), &Law::Field(plates, Some(contact)), 1.902);
+        assert!((force / contact.force(0.098e-6).0 - 1.0).abs() < 1e-9, "{force}");
     }
 
     /// A nonlinear spring, and a stop with adhesion on both sides, have the force against the approach of their domains.

@@ -35,6 +35,7 @@ pub mod lumped_verilog_a;
 mod mechanism;
 pub mod model_options;
 pub mod names;
+mod noise_sources;
 pub mod osdi_deck;
 mod parts;
 pub mod reduce;

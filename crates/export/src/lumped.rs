@@ -21,6 +21,7 @@ use bimorph_analysis::readout::ports::{OpenedPorts, PortResponse};
 use bimorph_analysis::readout::signal::Signal;
 use bimorph_device::PortKind;
 use bimorph_device::scale::PortScale;
+use bimorph_device::surroundings;
 use bimorph_domains::capacitor::Capacitor;
 use bimorph_domains::drive::Electrics;
 use bimorph_domains::{Domain, Input, Member, PointLaw, System};
@@ -89,6 +90,7 @@ pub fn lump(compiled: &CompiledModel, request: &ExportRequest) -> Result<LumpedM
         scales: scaled.iter().map(|s| s.answered).chain(signals.iter().map(|s| s.scale)).collect(),
         given: scaled.iter().map(|s| s.given).collect(),
         signals,
+        temperature: surroundings(compiled),
         coordinates,
         damping,
         stiffness,
@@ -192,13 +194,11 @@ fn reading(signal: &Signal, coordinates: &[Coordinate], gaps: &[LumpedGap]) -> R
                 Ok(LumpedOutput::Distance(g, capacitor.distance(0.0), 1.0))
             }
             Law::Field(capacitor, _) => Ok(LumpedOutput::Distance(g, capacitor.distance(0.0), -1.0)),
-            Law::Stop(..) | Law::Spring(_) => Err(ExportError::NotLumped {
-                why: format!("\"{}\" is a stop, whose distance has a corner", gaps[g].name),
-            }),
+            Law::Stop(..) => Ok(LumpedOutput::Way(g)),
+            Law::Spring(_) => Ok(LumpedOutput::Nothing),
         },
-        Signal::Bearing(g) | Signal::Conductance(g, _) => {
-            Err(ExportError::NotLumped { why: format!("the contact force of \"{}\" has a corner", gaps[g].name) })
-        }
+        Signal::Bearing(g) => Ok(LumpedOutput::Bearing(g)),
+        Signal::Conductance(g, metals) => Ok(LumpedOutput::Conductance(g, metals)),
         Signal::Stress(_) => Err(ExportError::NotLumped { why: "the stress of a beam has a corner".to_owned() }),
         // of beams that heat, which have been refused
         Signal::Temperature(_) => Ok(LumpedOutput::Nothing),

@@ -10,7 +10,7 @@
 //! | `f1` … | its force in micronewtons |
 //! | `q1` … | its charge in femtocoulombs, through a capacitor of a femtofarad: that current is dQ/dt |
 
-use super::laws::{bearing, capacitance, drag, loses, slope};
+use super::laws::{bearing, capacitance, contact_reading, drag, loses, slope};
 use super::lumped::{Law, LumpedModel, LumpedOutput};
 use super::names::Pins;
 use super::parts::SubcircuitText;
@@ -185,6 +185,10 @@ impl LumpedSubcircuit<'_> {
             LumpedOutput::Distance(g, rest, sign) => {
                 self.parts.by_voltage(places, &format!("g{}", g + 1), 1e-6 * sign * scale);
                 self.parts.constant(places, rest * scale);
+            }
+            reading @ (LumpedOutput::Way(g) | LumpedOutput::Bearing(g) | LumpedOutput::Conductance(g, _)) => {
+                let value = contact_reading(reading, &model.gaps[*g].law, &format!("V(g{})", g + 1));
+                self.parts.line(&format!("By{n} 0 {sum} I={scale:e} * {value}"));
             }
             LumpedOutput::Constant(value) => self.parts.constant(places, value * scale),
         }

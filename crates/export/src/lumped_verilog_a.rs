@@ -1,11 +1,12 @@
 //! The nonlinear lumped model as a Verilog-A module, by the rules of [`super::verilog_a`]: every state is a node, and nothing but
 //! `ddt` acts in time.
 
-use super::laws::{bearing, capacitance, drag, loses, slope};
-use super::lumped::{Law, LumpedModel, LumpedOutput};
+use super::laws::{bearing, capacitance, contact_reading, drag, loses, pressing, slope};
+use super::lumped::{Coordinate, Law, LumpedModel, LumpedOutput};
 use super::names::Pins;
+use super::noise_sources::{NoiseText, warm};
 use super::verilog_a::{ContributionSum, head};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// The file: a descriptive header, and the module `name`.
 pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> String {
@@ -15,7 +16,8 @@ pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> 
         let voltage = matches!(gap.law, Law::Field(..)).then(|| of("e"));
         [Some(of("g")), voltage, loses(gap).then(|| of("s"))].into_iter().flatten()
     });
-    let inner: Vec<String> = coordinates.chain(gaps).collect();
+    let noise = noise(model);
+    let inner: Vec<String> = coordinates.chain(gaps).chain(noise.nodes).collect();
     let mut text = head(name, pins, &inner, &[], &model.ports, about);
     for (g, gap) in model.gaps.iter().enumerate() {
         let mut sum = ContributionSum::begin(&format!("I(g{0}) <+ V(g{0})", g + 1));
@@ -100,12 +102,42 @@ pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> 
                 sum.add(1e-6 * sign * scale, &format!("V(g{})", g + 1));
                 sum.add(rest * scale, "1");
             }
+            LumpedOutput::Way(g) | LumpedOutput::Bearing(g) | LumpedOutput::Conductance(g, _) => {
+                sum.add(scale, &contact_reading(reading, &model.gaps[*g].law, &format!("V(g{})", g + 1)));
+            }
             LumpedOutput::Constant(value) => sum.add(value * scale, "1"),
         }
         sum.end(&mut text);
     }
+    text.push_str(&noise.text);
     text.push_str("  end\nendmodule\n");
     text
+}
+
+/// Noise of dampers, of the gas and the losses of contacts in each gap, and of resistors between ports.
+fn noise(model: &LumpedModel) -> NoiseText {
+    let (mut noise, warm) = (NoiseText::default(), warm(model.temperature));
+    let target = |(j, c): (usize, &Coordinate)| (format!("I(v{})", j + 1), c.mass * c.omega * c.omega * 1e-6);
+    let parts: Vec<_> = model.coordinates.iter().enumerate().map(target).collect();
+    noise.matrix(&model.damping, &parts, &format!("{warm:e}"), "dampers");
+    for (g, gap) in model.gaps.iter().enumerate().filter(|(_, gap)| loses(gap)) {
+        let u = format!("V(g{})", g + 1);
+        let lost = (gap.loss > 0.0).then(|| format!("{:e} * {}", gap.loss, pressing(&gap.law, &u)));
+        let drag: Vec<String> = drag(gap.film, &u, "1").into_iter().chain(lost).collect();
+        let shares = gap.along.iter().zip(&parts).filter(|(share, _)| **share != 0.0);
+        let shares: Vec<_> =
+            shares.map(|(share, (target, unit))| (target.clone(), format!("({:e})", share / unit))).collect();
+        noise.source(&shares, &format!("{warm:e} * ({})", drag.join(" + ")), "gas");
+    }
+    let conducts = |row: &LumpedOutput| matches!(row, LumpedOutput::Current(..));
+    let electrical: Vec<usize> = (0..model.ports.len()).filter(|&k| conducts(&model.rows[k])).collect();
+    let conductance = DMatrix::from_fn(electrical.len(), electrical.len(), |i, k| match &model.rows[electrical[i]] {
+        LumpedOutput::Current(row, _) => row[electrical[k]],
+        _ => 0.0,
+    });
+    let branches: Vec<_> = electrical.iter().map(|k| (format!("I(b{})", k + 1), 1.0)).collect();
+    noise.matrix(&conductance, &branches, &format!("{warm:e}"), "resistors");
+    noise
 }
 
 /// Adds `scale` times the shares of nodes or branches `name1` ….

@@ -5,6 +5,7 @@
 //! one lag for each time constant. Charge and force come from one energy.
 
 pub mod heat;
+pub mod johnson;
 pub mod ports;
 pub mod text;
 
@@ -17,6 +18,7 @@ use bimorph_analysis::readout::signal::{Signal, SignalView};
 use bimorph_base::ErrorBudget;
 use bimorph_device::PortKind;
 use bimorph_device::scale::PortScale;
+use bimorph_device::surroundings;
 use bimorph_domains::thermal::HeatConductor;
 use bimorph_domains::{Domain, Drive, Law, PointLaw, System};
 use bimorph_model::compile::CompiledModel;
@@ -26,6 +28,7 @@ use bimorph_solve::reduced::polynomial::statics::{FittedPolynomials, fitted};
 use bimorph_solve::reduced::space::spanned;
 use bimorph_solve::reduced::{InputBox, ReductionError, TrainingCase, TrainingOptions, train};
 use heat::HeatCourses;
+use johnson::ConductedNoise;
 use ports::{SourceText, sum_of};
 
 /// How far motion exceeds the statics of what is applied at once, and how far it swings back through rest (1).
@@ -85,6 +88,8 @@ pub struct FlexibleModel {
     pub rows: Vec<FlexibleOutput>,
     /// Range of each port.
     pub ranges: Vec<[f64; 2]>,
+    /// Noise of what conducts.
+    pub johnson: ConductedNoise,
     /// Strains of the full model.
     pub strains: usize,
 }
@@ -138,7 +143,9 @@ pub fn flexible(compiled: &CompiledModel, request: &ExportRequest) -> Result<Fle
     let gap_name = |g: usize| compiled.parts.gap_names.get(g).cloned().unwrap_or_else(|| "a film or spring".to_owned());
     let volts = points.iter().map(|points| sum_of(&sources, |s| electrics.gap_rows[(points.member, s)]));
     let heaters = &electrics.heating.heaters;
+    let heat = HeatCourses::new(electrics, &sources);
     Ok(FlexibleModel {
+        johnson: ConductedNoise::new(electrics, &opened, &heat, surroundings(compiled)),
         scales: scaled.iter().map(|s| s.answered).chain(signals.iter().map(|s| s.scale)).collect(),
         volts: volts.collect(),
         inputs: (0..electrics.inputs.len()).map(|k| sources[electrics.voltages() + k].text()).collect(),
@@ -149,7 +156,7 @@ pub fn flexible(compiled: &CompiledModel, request: &ExportRequest) -> Result<Fle
                 count => format!("{count} gaps and films, of which the first is {}", gap_name(points.member)),
             })
             .collect(),
-        heat: HeatCourses::new(electrics, &sources),
+        heat,
         expansion: heaters.iter().map(|heater| heater.expansion).collect(),
         rows: rows.into_iter().map(|row| by_points(row, &fitted)).collect(),
         ports,

@@ -3,6 +3,7 @@
 use super::super::linear::{ReducedPort, SignalShown};
 pub use bimorph_domains::Law;
 use bimorph_domains::squeeze_film::SqueezeFilm;
+use bimorph_structure::OhmicContact;
 use nalgebra::{DMatrix, DVector, Vector2};
 
 /// Way of one part along one direction.
@@ -56,6 +57,12 @@ pub enum LumpedOutput {
     Pull(usize),
     /// Distance left in a gap: at rest (m), and its sign with the approach.
     Distance(usize, f64, f64),
+    /// Way that is left before a stop.
+    Way(usize),
+    /// Contact force of a gap or stop.
+    Bearing(usize),
+    /// Conductance of a contact of these metals.
+    Conductance(usize, OhmicContact),
     /// A constant.
     Constant(f64),
     /// Nothing.
@@ -85,6 +92,8 @@ pub struct LumpedModel {
     pub rows: Vec<LumpedOutput>,
     /// Volts or amperes of the circuit per unit of each row.
     pub scales: Vec<f64>,
+    /// Temperature of what surrounds it (K).
+    pub temperature: f64,
     /// Unit of what is given per volt or ampere of the circuit, of each port.
     pub given: Vec<f64>,
 }
