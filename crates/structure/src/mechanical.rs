@@ -32,6 +32,9 @@ pub struct Material {
     /// Stress that the material bears (Pa), where it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strength: Option<f64>,
+    /// Radius of the fillets at the ends of beams (m); none: the stress has no concentration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fillet: Option<f64>,
     /// Q that the anchors leave a mode whose energy is in beams of this layer (1), where it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub anchor_quality: Option<f64>,

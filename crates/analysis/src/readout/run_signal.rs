@@ -6,6 +6,7 @@
 use super::ReadoutError;
 use super::expression::{Expression, Quantity};
 use super::signal::{Signal, SignalView};
+use super::stress;
 use bimorph_domains::Domain;
 use bimorph_model::compile::CompiledModel;
 use std::sync::Arc;
@@ -17,6 +18,8 @@ pub enum RunSignal {
     State(Signal),
     /// Way left until the fingers of a comb, by its gap, touch at their sides (m).
     SideWay(usize),
+    /// Largest stress on the faces of a beam without the concentration at its fillets (Pa).
+    NominalStress(usize),
     /// Charge on a port (C).
     PortCharge(usize),
     /// Current into a port (A), of which `conduction` is that through resistances.
@@ -36,7 +39,7 @@ pub enum RunSignal {
 }
 
 impl RunSignal {
-    /// Finds a quantity by name: a signal, see [`Signal::find`], `COMB.side`, or `PORT.q` or `PORT.i` with these voltages of the sources (V).
+    /// Finds a quantity by name: a signal, see [`Signal::find`], `BEAM.nominal`, `COMB.side`, or `PORT.q` or `PORT.i` with these voltages of the sources (V).
     ///
     /// # Errors
     /// [`ReadoutError::UnknownSignal`] with what would be understood.
@@ -48,6 +51,9 @@ impl RunSignal {
             Err(unknown) => {
                 if let Some(comb) = name.strip_suffix(".side").and_then(|comb| fingers(compiled, comb)) {
                     return Ok(Self::SideWay(comb));
+                }
+                if let Some(beam) = name.strip_suffix(".nominal").and_then(|beam| filleted(compiled, beam)) {
+                    return Ok(Self::NominalStress(beam));
                 }
                 if let Some(port) = port(".q") {
                     return Ok(Self::PortCharge(port));
@@ -80,6 +86,9 @@ impl RunSignal {
         match self {
             Self::State(signal) => signal.value(compiled, state),
             Self::SideWay(comb) => system.side_way(*comb, state.q),
+            Self::NominalStress(beam) => {
+                stress::nominal(compiled, *beam, state.q, state.rise).map_or(0.0, |found| found.value())
+            }
             Self::PortCharge(port) => of_gaps(compiled, *port, |g| system.capacitance(g, state.q) * state.volts[g]),
             Self::PortCurrent { port, conduction } => {
                 conduction
@@ -98,6 +107,8 @@ impl RunSignal {
         match self {
             Self::State(signal) => signal.slope(compiled, state, change),
             Self::SideWay(comb) => system.side_slope(*comb, state.q, change.q),
+            Self::NominalStress(beam) => stress::nominal(compiled, *beam, state.q, state.rise)
+                .map_or(0.0, |found| found.slope(compiled, state.q, change.q, change.rise)),
             Self::PortCharge(port) => of_gaps(compiled, *port, |g| {
                 system.capacitance(g, state.q) * change.volts[g]
                     + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
@@ -120,11 +131,19 @@ fn fingers(compiled: &CompiledModel, name: &str) -> Option<usize> {
     compiled.parts.system.members[gap].side_room().map(|_| gap)
 }
 
+/// A beam whose layer has a fillet and whose stress is known.
+fn filleted(compiled: &CompiledModel, name: &str) -> Option<usize> {
+    let beam = compiled.structure.beams.iter().position(|beam| beam.name == name)?;
+    let known = compiled.structure.beams[beam].material.fillet.is_some() && !compiled.parts.stressed[beam].rigid;
+    known.then_some(beam)
+}
+
 impl Quantity for RunSignal {
     fn unit(&self) -> &'static str {
         match self {
             Self::State(signal) => signal.unit(),
             Self::SideWay(_) => "m",
+            Self::NominalStress(_) => "Pa",
             Self::PortCharge(_) => "C",
             Self::PortCurrent { .. } | Self::HotCurrent { .. } => "A",
         }

@@ -22,7 +22,7 @@ pub enum Signal {
     Temperature(usize),
     /// A temperature that the netlist prescribes (K).
     Prescribed(f64),
-    /// Largest stress on the faces of a beam, along all of it (Pa).
+    /// Largest stress on the faces of a beam, along all of it, with the concentration at its fillets (Pa).
     Stress(usize),
     /// Force with which the sides of gap g bear on each other (N).
     Bearing(usize),

@@ -12,8 +12,20 @@ pub(crate) struct LargestStress<'a> {
     beam: &'a StressedBeam,
     /// Joint of the model, and half the length of its segment (m).
     joint: (u32, f64),
+    /// Factors on the stress of tension and of bending there (1).
+    factors: [f64; 2],
     /// Normal force, shear force and moment there (N, N, N·m).
     resultants: Vector3<f64>,
+}
+
+/// Where the nominal stress of a beam is largest, without the concentration at fillets; see [`largest`].
+pub(crate) fn nominal<'a>(
+    compiled: &'a CompiledModel,
+    beam: usize,
+    q: &[Pose],
+    rise: &[f64],
+) -> Option<LargestStress<'a>> {
+    largest_with(compiled, beam, q, rise, false)
 }
 
 /// Where the stress of a beam is largest at displacements `q` and temperature rises `rise` (K); none of a beam without segments.
@@ -23,14 +35,31 @@ pub(crate) fn largest<'a>(
     q: &[Pose],
     rise: &[f64],
 ) -> Option<LargestStress<'a>> {
+    largest_with(compiled, beam, q, rise, true)
+}
+
+fn largest_with<'a>(
+    compiled: &'a CompiledModel,
+    beam: usize,
+    q: &[Pose],
+    rise: &[f64],
+    concentrated: bool,
+) -> Option<LargestStress<'a>> {
     let system = &compiled.parts.system;
     let beam = &compiled.parts.stressed[beam];
-    let at = |&(k, length): &(u32, f64)| {
+    let last = beam.joints.len().saturating_sub(1);
+    let factors = |k: usize| {
+        let ends =
+            [(0, beam.fillets[0]), (last, beam.fillets[1])].into_iter().filter(|(at, _)| concentrated && *at == k);
+        ends.filter_map(|(_, factors)| factors).fold([1.0; 2], |[a, b], [c, d]| [f64::max(a, c), f64::max(b, d)])
+    };
+    let at = |(place, &(k, length)): (usize, &(u32, f64))| {
         let resultants =
             forces::resultants(&system.model, &system.model.joints[k as usize], q, 1.0, expansion(compiled, rise));
-        LargestStress { beam, joint: (k, 0.5 * length), resultants }
+        LargestStress { beam, joint: (k, 0.5 * length), factors: factors(place), resultants }
     };
-    beam.joints.iter().map(at).reduce(|most, next| if next.value() > most.value() { next } else { most })
+    let all = beam.joints.iter().enumerate().map(at);
+    all.reduce(|most, next| if next.value() > most.value() { next } else { most })
 }
 
 /// Free strain of each heater at its rise (1).
@@ -51,7 +80,8 @@ impl LargestStress<'_> {
     }
 
     fn weighed(&self, sizes: &Vector3<f64>) -> f64 {
-        sizes.x / self.beam.area + (sizes.z + sizes.y * self.joint.1) / self.beam.modulus
+        let [tension, bending] = self.factors;
+        tension * (sizes.x / self.beam.area) + bending * ((sizes.z + sizes.y * self.joint.1) / self.beam.modulus)
     }
 
     /// Its change with a change of displacements and rises.

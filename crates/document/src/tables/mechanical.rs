@@ -33,6 +33,7 @@ record! {
         ambient_temperature: "K", NonNegative, "Temperature at which the drawn length is free of stress";
         stress: "Pa", Any, "Residual stress, tensile positive";
         strength: "Pa", Positive, "Stress that the material bears, where it is known";
+        fillet: "m", Positive, "Radius of the fillets at the ends of beams; left out: the stress has no concentration";
         anchor_quality: "1", Positive, "Q that the anchors leave a mode whose energy is in beams of this layer, where it is known";
         heat: "", Any, "Thermal constants; left out: unknown";
     }

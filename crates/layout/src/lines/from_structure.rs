@@ -153,6 +153,7 @@ impl<'a> OfStructure<'a> {
             ("ambienttemperature", m.ambient_temperature),
             ("stress", m.stress),
             ("strength", m.strength.unwrap_or(0.0)),
+            ("fillet", m.fillet.unwrap_or(0.0)),
             ("anchorquality", m.anchor_quality.unwrap_or(0.0)),
             ("shearmodulus", m.shear_modulus.unwrap_or(0.0)),
         ];

@@ -24,6 +24,7 @@
 //! | [`beam`] | a cut beam in the drawing: bodies, masses, joints, points |
 //! | [`cubic`] | the cubic beam element, and the next term of its dynamic stiffness |
 //! | [`frame`] | the same drawing as a linear frame of cubic beam elements: a baseline |
+//! | [`fillet`] | stress concentration at the ends of beams |
 //! | [`stressed`] | where the stress along each beam is measured |
 //! | `stations` | where along each beam the bodies of its segments measure |
 //! | [`ports`] | resistors, heaters, sources and ports → network and quadratic forms of temperature |
@@ -34,6 +35,7 @@ pub mod beam;
 mod contact_mass;
 pub mod cubic;
 mod error;
+pub mod fillet;
 pub mod frame;
 mod free_rotation;
 pub mod junction;
@@ -190,7 +192,7 @@ pub fn discretize_like(
     }
     couplings.extend(coupled.iter().flat_map(Coupling::pairs));
     let (model, order) = Model::ordered(bodies, joints, dampers, &couplings, options.linear);
-    let (place, stressed) = (order.bodies, stressed::beams(&structure.beams, &of_beams, &order.joints));
+    let (place, stressed) = (order.bodies, stressed::beams(structure, &of_beams, &order.joints));
     for Coupling { first, second, .. } in &mut coupled {
         let placed = |id: BodyId| if let BodyId::Free(k) = id { BodyId::Free(place[k]) } else { id };
         (*first, *second) = ((placed(first.0), placed(first.1)), (placed(second.0), placed(second.1)));

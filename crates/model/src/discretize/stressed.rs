@@ -5,9 +5,11 @@
 //! ```text
 //! σ = |N|/(w·t) + 6·(|M| + |V|·h/2)/(t·w²)
 //! ```
-//! This is exact for beams without loads between their ends. Where beams meet, the stress at a re-entrant corner is higher.
+//! This is exact for beams without loads between their ends. Where beams meet, the stress at a re-entrant corner is higher: with the radius of the fillets, both terms have factors
+//! in the segments at the ends ([`super::fillet`]).
 
-use bimorph_structure::Beam;
+use super::fillet;
+use bimorph_structure::{Beam, Structure};
 
 /// The joints of a beam.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +20,8 @@ pub struct StressedBeam {
     pub area: f64,
     /// Section modulus (m³).
     pub modulus: f64,
+    /// Factors on the stress of tension and of bending at the first and the last joint, where a fillet is there (1).
+    pub fillets: [Option<[f64; 2]>; 2],
     /// True where a joint has rigid directions, whose forces do not follow from strains.
     pub rigid: bool,
 }
@@ -34,12 +38,14 @@ pub struct SegmentSpan {
 }
 
 /// Those of all beams, `order` the place of each joint among those of the model.
-pub(super) fn beams(drawn: &[Beam], segments: &[Vec<SegmentSpan>], order: &[u32]) -> Vec<StressedBeam> {
-    let one = |(beam, segments): (&Beam, &Vec<SegmentSpan>)| StressedBeam {
+pub(super) fn beams(structure: &Structure, segments: &[Vec<SegmentSpan>], order: &[u32]) -> Vec<StressedBeam> {
+    let one = |beam: &Beam, fillets: [Option<[f64; 2]>; 2], segments: &Vec<SegmentSpan>| StressedBeam {
         joints: segments.iter().map(|segment| (order[segment.joint], segment.length)).collect(),
         area: beam.width * beam.thickness,
         modulus: beam.thickness * beam.width * beam.width / 6.0,
+        fillets,
         rigid: segments.iter().any(|segment| segment.rigid),
     };
-    drawn.iter().zip(segments).map(one).collect()
+    let all = structure.beams.iter().zip(fillet::of_beams(structure)).zip(segments);
+    all.map(|((beam, fillets), segments)| one(beam, fillets, segments)).collect()
 }

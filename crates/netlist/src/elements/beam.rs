@@ -2,6 +2,7 @@
 
 use super::super::diagnostic_sink::Reported;
 use super::super::drawing::Fact;
+use super::super::value::short;
 use super::arguments::ElementSite;
 use super::etched::EquivalentRectangle;
 use bimorph_structure::{Beam, Heater, Load, NodeId, PropertyCurve, Resistor, Yield};
@@ -9,6 +10,8 @@ use bimorph_structure::{Beam, Heater, Load, NodeId, PropertyCurve, Resistor, Yie
 /// A layer's `thermcond` below this is no conductivity of a solid structural material (W/(m·K)). The MUMPs process
 /// file of SUGAR has 2.33, which is the digits of silicon's expansion coefficient.
 const SMALL_CONDUCTIVITY: f64 = 5.0;
+/// Least radius of a fillet, of the width of the beam (1): the end of the chart of stress concentration.
+const SHARPEST: f64 = 0.05;
 
 /// In-plane width, thickness and direction of a rectangular section.
 struct RectangularSection {
@@ -41,6 +44,10 @@ impl ElementSite<'_, '_> {
         let section = self.section(width)?;
         let material = self.material()?;
         let temperature = self.temperature(&material)?;
+        if let Some(radius) = material.fillet.filter(|radius| *radius < SHARPEST * section.width * (1.0 - 1e-9)) {
+            let wanted = format!("{} m or more, a twentieth of the width", short(SHARPEST * section.width));
+            return Err(self.out_of_range("fillet", radius, &wanted));
+        }
         Ok(Beam {
             name,
             a: ends[0],

@@ -23,8 +23,9 @@ const STRONGEST: f64 = 0.1;
 pub(super) const VACUUM: f64 = 8.854e-12;
 
 /// Parameters of a material.
-const READ: [&str; 21] = [
+const READ: [&str; 22] = [
     "strength",
+    "fillet",
     "anchorquality",
     "Youngsmodulus",
     "Poisson",
@@ -130,6 +131,7 @@ impl ElementSite<'_, '_> {
             ambient_temperature: self.ambient()?,
             stress,
             strength: self.positive_if_any("strength")?,
+            fillet: self.positive_if_any("fillet")?,
             anchor_quality: self.positive_if_any("anchorquality")?,
             heat: self.solid_heat()?,
         };

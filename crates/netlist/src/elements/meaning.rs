@@ -54,7 +54,6 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "electronpath" => "mean free path of the electrons [m]",
         "undercut" => "distance by which a pad is etched free at its edge [m]",
         "packagestrain" | "packagestrainx" | "packagestrainy" => "strain of the substrate [1]",
-        "anchorx" | "anchory" => "displacement of the anchor [m]",
         "overetch" => "distance by which every edge recedes [m]",
         "sidewall" => "angle of the side walls [rad]",
         "stressgradient" => "change of the stress across the width [Pa/m]",
@@ -67,7 +66,7 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "filmgap" => "thickness of the gas film at contact [m]",
         "slit" => "height of the slit under the film [m]",
         "filmstates" => "states of gas that compresses [1]",
-        "hole" => "radius of a hole [m]",
+        "hole" | "fillet" => "radius of a hole or of a fillet [m]",
         "pitch" => "distance of holes [m]",
         "permittivity" => "permittivity [F/m]",
         "resistivity" => "resistivity [Ω·m]",
@@ -107,6 +106,7 @@ fn of_combs_and_anchors(name: &str) -> &'static str {
     match name {
         "misalign" => "distance of the fingers from the middle of their gaps [m]",
         "substrate" => "distance of the substrate [m]",
+        "anchorx" | "anchory" => "displacement of the anchor [m]",
         "anchorquality" => "Q that the anchors leave a mode [1]",
         _ => "angle [rad]",
     }

@@ -77,6 +77,7 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
     "yieldstress",
     "softening",
     "strength",
+    "fillet",
     "anchorquality",
     "undercut",
     "packagestrain",

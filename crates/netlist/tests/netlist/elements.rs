@@ -82,6 +82,20 @@ fn crystals_have_constants_over_temperature() {
     }
 }
 
+/// Fillets are radii of at least a twentieth of the width, and belong to the layer.
+#[test]
+fn fillets() {
+    let with = |fillet: &str| {
+        let text = format!(
+            "process q = [Youngsmodulus=1e9 density=1 h=1u fillet={fillet}]\nanchor q [a] []\nbeam2d q [a b] [l=10u w=2u]"
+        );
+        load(&Bundle::from_text("t.net", &text), &[])
+    };
+    assert_eq!(with("0.1u").expect("a model").structure.beams[0].material.fillet, Some(0.1e-6));
+    let refused = with("0.09u").unwrap_err().to_string();
+    assert!(refused.contains("`fillet`") && refused.contains("a twentieth of the width"), "{refused}");
+}
+
 /// Without viscosity or film there is no damping.
 #[test]
 fn damping_needs_viscosity_and_film() {

@@ -159,6 +159,7 @@ mod tests {
             ambient_temperature: 0.0,
             stress: 0.0,
             strength: None,
+            fillet: None,
             anchor_quality: None,
             heat: None,
         };
