@@ -161,7 +161,8 @@ fn gaps(
             let (by_port, constant) = by_port(electrics, ports, &|s| electrics.gap_rows[(g, s)]);
             let name = compiled.parts.gap_names.get(g).map_or("of a nonlinear spring", String::as_str).to_owned();
             let along = along(coordinates, &approach.a, approach.axis) - along(coordinates, &approach.b, approach.axis);
-            let loss = gap.loss().map_or(0.0, |loss| loss.coefficient());
+            // fingers that cannot move aside do not touch
+            let loss = gap.loss().filter(|_| gap.side_room().is_none()).map_or(0.0, |loss| loss.coefficient());
             let own = films.iter().position(|(of, ..)| **of == approach);
             let film = own.map(|k| films.remove(k)).map(|(_, drawn, film)| (drawn, film));
             found.push(LumpedGap { name, along, law, loss, film, by_port, constant });
