@@ -19,7 +19,7 @@ const CRATES: [(&str, &[&str]); 19] = [
     ("model", &["base", "structure", "multibody", "domains", "solve"]),
     ("analysis", &["base", "structure", "multibody", "domains", "solve", "model"]),
     ("device", &["base", "multibody", "domains", "solve", "model", "analysis"]),
-    ("export", &["base", "multibody", "domains", "solve", "results", "model", "analysis", "device"]),
+    ("export", &["base", "structure", "multibody", "domains", "solve", "results", "model", "analysis", "device"]),
     ("jobs", &["base", "structure", "netlist", "model", "analysis"]),
     ("cosim", &["structure", "results"]),
     ("http", &[]),

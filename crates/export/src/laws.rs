@@ -179,7 +179,7 @@ pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<Strin
     }
 }
 
-/// What is read of a contact with a `law` at the approach `u`: the way that is left, its force or its conductance; other readings are 0.
+/// A reading of a contact with a `law` at the approach `u`: the way that is left, its force or its conductance; other readings are 0.
 pub(super) fn contact_reading(reading: &LumpedOutput, law: &Law, u: &str) -> String {
     match (reading, law) {
         (LumpedOutput::Way(_), Law::Stop(ways, ..)) => nearer_way(ways, u),

@@ -61,57 +61,62 @@ pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> 
         }
         sum.end(&mut text);
     }
-    for (row, reading) in model.rows.iter().enumerate() {
-        let scale = model.scales[row];
-        let left = match row.checked_sub(model.ports.len()) {
-            Some(k) => format!("V({})", pins.signals[k]),
-            None if matches!(reading, LumpedOutput::Current(..)) => format!("I(b{})", row + 1),
-            None => format!("V(b{})", row + 1),
-        };
-        let mut sum = ContributionSum::begin(&format!("{left} <+ 0"));
-        match reading {
-            LumpedOutput::Nothing => continue,
-            LumpedOutput::Current(conductance, constant) => {
-                add(&mut sum, "b", conductance, 1.0);
-                sum.add(*constant, "1");
-                for (g, gap) in model.gaps.iter().enumerate() {
-                    if let (Law::Field(capacitor, _), true) = (&gap.law, gap.by_port[row] != 0.0) {
-                        let c = capacitance(capacitor, &format!("V(g{})", g + 1));
-                        sum.term(&format!("ddt({:e} * {c} * V(e{}))", gap.by_port[row], g + 1));
-                    }
-                }
-            }
-            LumpedOutput::Place(shares) => add(&mut sum, "x", shares, 1e-6 * scale),
-            LumpedOutput::Rate(shares) => {
-                for (j, (share, c)) in shares.iter().zip(&model.coordinates).enumerate() {
-                    sum.add(1e-6 * scale * share * c.omega, &format!("V(v{})", j + 1));
-                }
-            }
-            LumpedOutput::Charge(g) | LumpedOutput::Capacitance(g) | LumpedOutput::Pull(g) => {
-                if let Law::Field(capacitor, _) = &model.gaps[*g].law {
-                    let (u, e) = (format!("V(g{})", g + 1), format!("V(e{})", g + 1));
-                    let value = match reading {
-                        LumpedOutput::Pull(_) => format!("0.5 * {e} * {e} * {}", slope(capacitor, &u)),
-                        LumpedOutput::Charge(_) => format!("{} * {e}", capacitance(capacitor, &u)),
-                        _ => capacitance(capacitor, &u),
-                    };
-                    sum.add(scale, &value);
-                }
-            }
-            LumpedOutput::Distance(g, rest, sign) => {
-                sum.add(1e-6 * sign * scale, &format!("V(g{})", g + 1));
-                sum.add(rest * scale, "1");
-            }
-            LumpedOutput::Way(g) | LumpedOutput::Bearing(g) | LumpedOutput::Conductance(g, _) => {
-                sum.add(scale, &contact_reading(reading, &model.gaps[*g].law, &format!("V(g{})", g + 1)));
-            }
-            LumpedOutput::Constant(value) => sum.add(value * scale, "1"),
-        }
-        sum.end(&mut text);
+    for row in 0..model.rows.len() {
+        add_row(model, row, pins, &mut text);
     }
     text.push_str(&noise.text);
     text.push_str("  end\nendmodule\n");
     text
+}
+
+/// Output of a port or signal.
+fn add_row(model: &LumpedModel, row: usize, pins: &Pins, text: &mut String) {
+    let (reading, scale) = (&model.rows[row], model.scales[row]);
+    let left = match row.checked_sub(model.ports.len()) {
+        Some(k) => format!("V({})", pins.signals[k]),
+        None if matches!(reading, LumpedOutput::Current(..)) => format!("I(b{})", row + 1),
+        None => format!("V(b{})", row + 1),
+    };
+    let mut sum = ContributionSum::begin(&format!("{left} <+ 0"));
+    match reading {
+        LumpedOutput::Nothing => return,
+        LumpedOutput::Current(conductance, constant) => {
+            add(&mut sum, "b", conductance, 1.0);
+            sum.add(*constant, "1");
+            for (g, gap) in model.gaps.iter().enumerate() {
+                if let (Law::Field(capacitor, _), true) = (&gap.law, gap.by_port[row] != 0.0) {
+                    let c = capacitance(capacitor, &format!("V(g{})", g + 1));
+                    sum.term(&format!("ddt({:e} * {c} * V(e{}))", gap.by_port[row], g + 1));
+                }
+            }
+        }
+        LumpedOutput::Place(shares) => add(&mut sum, "x", shares, 1e-6 * scale),
+        LumpedOutput::Rate(shares) => {
+            for (j, (share, c)) in shares.iter().zip(&model.coordinates).enumerate() {
+                sum.add(1e-6 * scale * share * c.omega, &format!("V(v{})", j + 1));
+            }
+        }
+        LumpedOutput::Charge(g) | LumpedOutput::Capacitance(g) | LumpedOutput::Pull(g) => {
+            if let Law::Field(capacitor, _) = &model.gaps[*g].law {
+                let (u, e) = (format!("V(g{})", g + 1), format!("V(e{})", g + 1));
+                let value = match reading {
+                    LumpedOutput::Pull(_) => format!("0.5 * {e} * {e} * {}", slope(capacitor, &u)),
+                    LumpedOutput::Charge(_) => format!("{} * {e}", capacitance(capacitor, &u)),
+                    _ => capacitance(capacitor, &u),
+                };
+                sum.add(scale, &value);
+            }
+        }
+        LumpedOutput::Distance(g, rest, sign) => {
+            sum.add(1e-6 * sign * scale, &format!("V(g{})", g + 1));
+            sum.add(rest * scale, "1");
+        }
+        LumpedOutput::Way(g) | LumpedOutput::Bearing(g) | LumpedOutput::Conductance(g, _) => {
+            sum.add(scale, &contact_reading(reading, &model.gaps[*g].law, &format!("V(g{})", g + 1)));
+        }
+        LumpedOutput::Constant(value) => sum.add(value * scale, "1"),
+    }
+    sum.end(text);
 }
 
 /// Noise of dampers, of the gas and the losses of contacts in each gap, and of resistors between ports.

@@ -15,12 +15,13 @@ use super::{ExportError, ExportRequest};
 use bimorph_analysis::readout::expression::Quantity;
 use bimorph_analysis::readout::ports::{OpenedPorts, PortResponse};
 use bimorph_analysis::readout::signal::{Signal, SignalView};
+use bimorph_analysis::reduced::circuit::range_inputs;
 use bimorph_base::ErrorBudget;
 use bimorph_device::PortKind;
 use bimorph_device::scale::PortScale;
 use bimorph_device::surroundings;
 use bimorph_domains::thermal::HeatConductor;
-use bimorph_domains::{Domain, Drive, Law, PointLaw, System};
+use bimorph_domains::{Domain, Law, PointLaw, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::reduced::polynomial::shapes::Probe;
@@ -31,12 +32,8 @@ use heat::HeatCourses;
 use johnson::ConductedNoise;
 use ports::{SourceText, sum_of};
 
-/// How far motion exceeds the statics of what is applied at once, and how far it swings back through rest (1).
-const OVERSHOOT: [f64; 2] = [-0.5, 2.0];
 /// Moments of each input for motion.
 const MOMENTS: usize = 2;
-/// Ports of which all corners of the ranges are drives of the training.
-const CORNERS: usize = 6;
 
 /// Output of a port or signal.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,7 +134,8 @@ pub fn flexible(compiled: &CompiledModel, request: &ExportRequest) -> Result<Fle
     let probes: Vec<Box<Probe<'_>>> = read.iter().map(probe).collect();
     let probes: Vec<&Probe<'_>> = probes.iter().map(|probe| &**probe).collect();
     let apart: Vec<usize> = rows.iter().filter_map(read_gap).collect();
-    let (fitted, strains) = trained(system, &inputs(system, &opened, &ranges), &probes, (request.within, &apart))?;
+    let (fitted, strains) =
+        trained(system, &range_inputs(system, &opened.sources, &ranges), &probes, (request.within, &apart))?;
     let points = &fitted.model.approaches.members;
     let electrics = &system.electrics;
     let gap_name = |g: usize| compiled.parts.gap_names.get(g).cloned().unwrap_or_else(|| "a film or spring".to_owned());
@@ -238,40 +236,6 @@ fn ranges(request: &ExportRequest, names: &[String]) -> Result<Vec<[f64; 2]>, Ex
     }
     let of = |name: &String| request.ranges.iter().find(|(n, _)| n == name).map_or([0.0; 2], |(_, range)| *range);
     Ok(names.iter().map(of).collect())
-}
-
-/// The box of inputs of the ranges.
-fn inputs(system: &System, opened: &OpenedPorts, ranges: &[[f64; 2]]) -> InputBox {
-    let electrics = &system.electrics;
-    let p = ranges.len();
-    let corners = if p <= CORNERS { 1usize << p } else { 2 * p + 1 };
-    let end = |corner: usize, q: usize| match p <= CORNERS {
-        true => (corner >> q) & 1,
-        false => usize::from(corner == 2 * p || corner == 2 * q),
-    };
-    let drives: Vec<Drive> = (0..corners)
-        .map(|corner| {
-            let mut u = vec![0.0; electrics.sources()];
-            electrics.fill_sources(&vec![0.0; electrics.ports], &mut u);
-            for (q, range) in ranges.iter().enumerate() {
-                u[opened.sources[q]] = range[end(corner, q)];
-            }
-            let mut drive = electrics.drive();
-            electrics.steady(&u, &mut vec![0.0; electrics.heating.states()], &mut drive);
-            drive
-        })
-        .collect();
-    let mut inputs = InputBox::around(system, &drives, OVERSHOOT);
-    // forces of both signs go as far back as ahead
-    let lowest = |k: usize| drives.iter().map(|drive| drive.inputs[k]).fold(0.0, f64::min);
-    let highest = |k: usize| drives.iter().map(|drive| drive.inputs[k]).fold(0.0, f64::max);
-    for input in &mut inputs.inputs {
-        let of = (0..input.unit.inputs.len()).find(|k| input.unit.inputs[*k] != 0.0);
-        if of.is_some_and(|k| lowest(k) < 0.0 && highest(k) > 0.0) {
-            input.range[0] = -OVERSHOOT[1];
-        }
-    }
-    inputs
 }
 
 /// The polynomials of the space for a box, and the strains of the full model.
