@@ -100,6 +100,7 @@ OPTIONS: dict[str, Accepts] = {
     "as_sugar": either(nothing, flag),
     "without_circuit": either(nothing, flag),
     "formulation": nothing,
+    "ranges": nothing,
 }
 
 

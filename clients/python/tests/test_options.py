@@ -33,6 +33,7 @@ def test_every_option_reaches_the_server(client: bimorph.Client) -> None:
         {"as_sugar": True},
         {"other_branch": True},
         {"without_circuit": True},
+        {"ranges": "drive:0:1"},
     ]
     assert {name for other in others for name in other} == set(bimorph.Options.__annotations__)
     ids = {client.compile(NETLIST, **other).id for other in others}
@@ -48,6 +49,7 @@ def test_every_option_reaches_the_server(client: bimorph.Client) -> None:
         ("segments", 100_001, "from 1 to 100000"),
         ("junctions", "welded", '"centreline", "offset" or "calibrated"'),
         ("anchors", "glued", '"auto", "rigid" or "elastic"'),
+        ("ranges", "drive:1:0", "LOW below HIGH"),
         ("fringe", "palmer", '"auto", "none", "parallel", "exact" or "sugar"'),
     ],
 )
