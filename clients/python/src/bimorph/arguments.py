@@ -267,7 +267,7 @@ def instance(name: str, value: Any, kind: type[T] | tuple[type[Any], ...], what:
 
 
 def of_annotation(name: str, value: Any, annotation: Any) -> Any:
-    """A value of a simple annotation: ``float``, ``int``, ``bool``, ``Literal[…]``, or one of these or None."""
+    """A value of a simple annotation: ``float``, ``int``, ``bool``, ``str``, ``Literal[…]``, or one of these or None."""
     kinds = [kind for kind in get_args(annotation) if kind is not type(None)] if type(None) in get_args(annotation) else [annotation]
     if value is None and len(kinds) != 1 or value is None and type(None) in get_args(annotation):
         return None
@@ -278,4 +278,6 @@ def of_annotation(name: str, value: Any, annotation: Any) -> Any:
         return flag(name, value)
     if kind is int:
         return integer(name, value)
+    if kind is str:
+        return text(name, value)
     return number(name, value)
