@@ -46,6 +46,7 @@ mod tran;
 mod tran_report;
 mod value;
 mod view;
+mod waveform;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

@@ -44,7 +44,7 @@ pub(crate) struct ModesCommand {
     #[arg(long, short = 'n', default_value_t = MODES_COUNT.count())]
     count: usize,
 
-    /// Hold a port at a voltage [V]; others are at 0 V. Repeatable
+    /// Hold a port at a voltage [V], or a driven anchor at NODE.ux, .uy [m] or .urz [rad]; others are at 0. Repeatable
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 

@@ -11,7 +11,7 @@ use bimorph::analysis::mesh::static_fitted;
 use bimorph::analysis::readout::ReadoutError;
 use bimorph::analysis::readout::expression::Expression;
 use bimorph::analysis::static_outputs::StaticOutput;
-use bimorph::analysis::statics::{NodeMotion, StaticResult};
+use bimorph::analysis::statics::{AnchorForce, NodeMotion, StaticResult};
 use bimorph::analysis::{AnalysisError, BeamMotions};
 use bimorph::compile::CompiledModel;
 use bimorph::results::plot::axis::quantity;
@@ -28,7 +28,8 @@ use std::fmt::Write;
 ///
 /// The equilibrium is the one reached from rest by raising all loads and voltages together. JSON: "nodes" holds x [m],
 /// y [m] and rz [rad] from the drawn place; "temperatures_k" (means), "peak_temperatures_k" (highest along each heated beam),
-/// "currents_a", "charges_c" and "permanent_strains" by name. "stresses_pa": largest stress in each beam whose layer has a strength.
+/// "currents_a", "charges_c" and "permanent_strains" by name. "stresses_pa": largest stress in each beam whose layer has a strength,
+/// "nominal_stresses_pa": the same without the concentration at fillets. "anchor_forces": "fx", "fy" [N] and "m" [N·m] of driven anchors.
 ///
 /// The estimated error is of the displacement of each node as a vector, of a thirtieth of the largest where a node
 /// moves less. The relative error of a small component, or of a small rotation beside large displacements, may be
@@ -43,11 +44,11 @@ pub(crate) struct StaticCommand {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// Hold a port at a voltage [V]; others are at 0 V. Repeatable
+    /// Hold a port at a voltage [V], or a driven anchor at NODE.ux, .uy [m] or .urz [rad]; others are at 0. Repeatable
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// Show these only, in the text and in CSV and raw files (JSON documents are whole): NODE.x, NODE.y, NODE.rz, BEAM.T, BEAM.Tmax, BEAM.stress, PORT.i, PORT.q, or sums such as a.x-0.5*b.x; a,b or repeated
+    /// Show these only, in the text and in CSV and raw files (JSON documents are whole): NODE.x, NODE.y, NODE.rz, BEAM.T, BEAM.Tmax, BEAM.stress, BEAM.nominal, ANCHOR.fx|fy|m, PORT.i, PORT.q, or sums such as a.x-0.5*b.x; a,b or repeated
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 
@@ -69,6 +70,10 @@ struct StaticDocument<'a> {
     temperatures_k: JsonMap<'a, f64>,
     #[serde(skip_serializing_if = "JsonMap::is_empty")]
     stresses_pa: JsonMap<'a, f64>,
+    #[serde(skip_serializing_if = "JsonMap::is_empty")]
+    nominal_stresses_pa: JsonMap<'a, f64>,
+    #[serde(skip_serializing_if = "JsonMap::is_empty")]
+    anchor_forces: JsonMap<'a, AnchorForce>,
     #[serde(skip_serializing_if = "JsonMap::is_empty")]
     peak_temperatures_k: JsonMap<'a, f64>,
     currents_a: JsonMap<'a, f64>,
@@ -112,6 +117,8 @@ impl StaticCommand {
             nodes: JsonMap(&result.nodes),
             temperatures_k: JsonMap(&result.temperatures_k),
             stresses_pa: JsonMap(&result.stresses_pa),
+            nominal_stresses_pa: JsonMap(&result.nominal_stresses_pa),
+            anchor_forces: JsonMap(&result.anchor_forces),
             peak_temperatures_k: JsonMap(&result.peak_temperatures_k),
             currents_a: JsonMap(&result.currents_a),
             charges_c: JsonMap(&result.charges_c),
@@ -164,12 +171,18 @@ fn table(title: &str, result: &StaticResult, names: &[String]) -> Result<Table, 
         (&result.temperatures_k, "T", "K"),
         (&result.peak_temperatures_k, "Tmax", "K"),
         (&result.stresses_pa, "stress", "Pa"),
+        (&result.nominal_stresses_pa, "nominal", "Pa"),
         (&result.currents_a, "i", "A"),
         (&result.charges_c, "q", "C"),
     ];
     for (list, suffix, unit) in lists {
         for (name, value) in list {
             table.push_real(&format!("{name}.{suffix}"), unit, vec![*value])?;
+        }
+    }
+    for (name, force) in &result.anchor_forces {
+        for (suffix, unit, value) in [("fx", "N", force.fx), ("fy", "N", force.fy), ("m", "N·m", force.m)] {
+            table.push_real(&format!("{name}.{suffix}"), unit, vec![value])?;
         }
     }
     Ok(table)
@@ -252,6 +265,7 @@ fn text(compiled: &CompiledModel, result: &StaticResult, strains: &[(String, f64
     }
     for (list, unit, head) in [
         (&result.stresses_pa, "Pa", ["beam", "stress"]),
+        (&result.nominal_stresses_pa, "Pa", ["beam", "nominal stress"]),
         (&result.currents_a, "A", ["port", "current"]),
         (&result.charges_c, "C", ["port", "charge"]),
     ] {
@@ -259,6 +273,13 @@ fn text(compiled: &CompiledModel, result: &StaticResult, strains: &[(String, f64
             let rows: Vec<Vec<String>> = list.iter().map(|(n, v)| vec![n.clone(), quantity(*v, unit)]).collect();
             let _ = write!(text, "\n{}", report::columns(&head, &rows));
         }
+    }
+    if !result.anchor_forces.is_empty() {
+        let row = |(node, force): &(String, AnchorForce)| {
+            vec![node.clone(), quantity(force.fx, "N"), quantity(force.fy, "N"), quantity(force.m, "N·m")]
+        };
+        let rows: Vec<Vec<String>> = result.anchor_forces.iter().map(row).collect();
+        let _ = write!(text, "\n{}", report::columns(&["anchor", "fx", "fy", "m"], &rows));
     }
     if !strains.is_empty() {
         let rows: Vec<Vec<String>> = strains.iter().map(|(n, e)| vec![n.clone(), format!("{e:.3e}")]).collect();

@@ -195,7 +195,8 @@ fn curves(title: &str, table: &SweepTable, result: usize, over: usize) -> PlaneC
         dashed: Vec::new(),
     };
     let (parameter, name) = (&table.parameters[over], &table.results[result]);
-    let unit = if parameter.ends_with(".v") { "V" } else { "" };
+    let units = [(".v", "V"), (".ux", "m"), (".uy", "m"), (".urz", "rad")];
+    let unit = units.iter().find(|(end, _)| parameter.ends_with(end)).map_or("", |(_, unit)| unit);
     PlaneChart {
         title: format!("{title}: {name}"),
         x: [parameter.clone(), unit.to_owned()],

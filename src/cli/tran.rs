@@ -5,7 +5,7 @@ use super::model::{JsonMap, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::SolverChoice;
 use super::tran_report::{ShockDocument, TransientDocument, picture, table, text};
-use super::{draw_motion, progress, value};
+use super::{draw_motion, progress, value, waveform};
 use bimorph::analysis::ProgressCallback;
 use bimorph::analysis::chart::released;
 use bimorph::analysis::formulation::{self, ChosenFormulation};
@@ -16,7 +16,7 @@ use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
 use bimorph::compile::{CompiledModel, Formulation, Scheme};
-use bimorph::domains::Shock;
+use bimorph::domains::{InputWaveform, Shock};
 use bimorph::multibody::joint_coordinates::sprung_loops::UnsupportedModel;
 use bimorph::netlist::NetlistSource;
 use bimorph::options::OptionValue;
@@ -77,13 +77,17 @@ pub(crate) struct TransientCommand {
     #[arg(long, value_name = "NAME")]
     release: Option<String>,
 
-    /// Hold a port at a voltage [V] from t = 0; others are at 0 V. Repeatable
+    /// Hold a port at a voltage [V], or a driven anchor at NODE.ux, .uy [m] or .urz [rad], from t = 0; others are at 0. Repeatable
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
     /// Half-sine acceleration of the frame from t = 0: its peak [m/s², or 500g], its duration [s] and its direction [degrees from x, default: 0]
     #[arg(long, value_name = "PEAK,SECONDS[,DEGREES]", value_parser = value::shock, allow_negative_numbers = true)]
     shock: Option<Shock>,
+
+    /// Move a driven anchor: NODE.ux, .uy [m] or .urz [rad] as 'sin(OFFSET AMPLITUDE HZ [DELAY])', 'pulse(FROM TO DELAY RISE FALL LENGTH [PERIOD])' or 'pwl(SECONDS VALUE …)'. Repeatable
+    #[arg(long = "motion", value_name = "NAME=WAVEFORM", value_parser = waveform::motion)]
+    motions: Vec<(String, InputWaveform)>,
 
     /// Integration method [default: rodas4; in joint coordinates whose loops do not close by springs rk45]
     #[arg(long, value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(Integrator::NAMES))]
@@ -152,6 +156,7 @@ impl TransientCommand {
             voltages: self.ports.clone(),
             release: start,
             shock: self.shock,
+            motions: self.motions.clone(),
             method,
             step: self.step,
             events: self.events.clone(),
@@ -216,6 +221,7 @@ impl TransientCommand {
         let plain = self.method.is_none()
             && self.step.is_none()
             && self.shock.is_none()
+            && self.motions.is_empty()
             && matches!(self.solver, SolverChoice::Recursion)
             && options.scheme == Scheme::Auto;
         if options.formulation != Formulation::Auto || !plain {
@@ -239,6 +245,7 @@ impl TransientCommand {
         if self.solver == SolverChoice::Frame {
             let given = [
                 ("--shock", self.shock.is_some()),
+                ("--motion", !self.motions.is_empty()),
                 ("--method", self.method.is_some()),
                 ("--step", self.step.is_some()),
                 ("--rho", self.rho.is_some()),
@@ -272,6 +279,7 @@ impl TransientCommand {
             voltages: self.ports.clone(),
             release,
             shock: self.shock,
+            motions: self.motions.clone(),
             method,
             step: self.step,
             until: self.until.clone(),

@@ -66,7 +66,9 @@ fn struck(compiled: &CompiledModel, method: Integrator, stop: f64, h: f64) -> (V
     let mut now = Motion::zeros(n);
     now.v.iter_mut().zip(&scale).for_each(|(v, s)| *v = 2e6 * s);
     equations.project(0.0, &mut now);
-    let run = IntegrationRun { motion: &mut now, h, control: Control::Fixed(h), observe: &mut |_, _, _, _| true };
+    let corners = Vec::new();
+    let run =
+        IntegrationRun { motion: &mut now, h, control: Control::Fixed(h), observe: &mut |_, _, _, _| true, corners };
     let (end, work) = method.rule().unwrap().advance(&mut equations, run);
     end.unwrap();
     (now.q, work.iterations)

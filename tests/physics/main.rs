@@ -13,6 +13,7 @@ mod contact_steps;
 mod dashpot;
 mod domain_derivatives;
 mod drawing_semantics;
+mod driven_anchors;
 mod duffing;
 mod eigenvalues;
 mod electrothermal;

@@ -526,7 +526,7 @@ def test_bad_arguments_are_rejected_by_name(cases: dict[str, Case]) -> None:
 
 
 MADE_BY_CALLS = {
-    *("Conversion", "Diagnostic", "FrequencyResponse", "ModeLoss", "Model", "ModesResult", "NodeMotion", "Options", "Piece", "PullInResult", "Root"),
+    *("AnchorForce", "Conversion", "Diagnostic", "FrequencyResponse", "ModeLoss", "Model", "ModesResult", "NodeMotion", "Options", "Piece", "PullInResult", "Root"),
     *("Row", "Session", "Snapshot", "StaticResult", "Statistics", "Sweep", "SweepStatus", "Table", "Ticket", "TransientResult", "TrialReply"),
     *("BatchRun", "ColumnStatistics", "CriticalPoint", "Crossing", "ExportResult", "PathResult", "StabilityLoss", "Failure", "Fraction", "Histogram", "Run", "SweepStatistics"),
     *("Violation", "aio", "local"),

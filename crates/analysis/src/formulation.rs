@@ -18,6 +18,7 @@ use bimorph_domains::System;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::joint_coordinates::TreeParent;
 use bimorph_multibody::joint_coordinates::constrained_loops::Linkage;
+use bimorph_multibody::joint_coordinates::sprung_loops::UnsupportedModel;
 use bimorph_multibody::planar::DOF;
 use bimorph_multibody::{BodyId, Model};
 use bimorph_solve::baseline::SolverKind;
@@ -42,7 +43,7 @@ pub struct ChosenFormulation {
 /// Why a run in joint coordinates takes fewer steps than one of the bodies, in words: rigid parts outweigh the flexures of an open tree.
 pub fn outweighed_tree(compiled: &CompiledModel) -> Option<String> {
     let model = &compiled.parts.system.model;
-    if model.linear {
+    if model.linear || !compiled.parts.system.anchors.is_empty() {
         return None;
     }
     let beams = compiled.structure.beams.iter().zip(&compiled.order.segments).filter(|(_, segments)| **segments > 0);
@@ -121,7 +122,8 @@ pub fn of_run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> (Chos
         && options.step.is_none()
         && options.solver == SolverKind::Recursion
         && options.release.is_none()
-        && options.shock.is_none();
+        && options.shock.is_none()
+        && options.motions.is_empty();
     if !plain {
         let why = "a release, a shock, a method, equal steps or a solver was given".into();
         return (ChosenFormulation { formulation: Formulation::Compliant, why }, method);
@@ -151,6 +153,9 @@ pub fn linkage(formulation: Formulation, system: &System) -> Result<Linkage, Ana
     let model = locked_model(formulation, &system.model);
     if model.linear {
         return refuse("joint coordinates are not small displacements; leave out --linear or take compliant".into());
+    }
+    if !system.anchors.is_empty() {
+        return refuse(UnsupportedModel::DrivenAnchor.to_string());
     }
     if !model.couplings.is_empty() {
         return refuse(

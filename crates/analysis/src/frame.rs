@@ -73,6 +73,8 @@ pub fn frame_statics(
         nodes,
         temperatures_k: electrical.temperatures_k,
         stresses_pa: Vec::new(),
+        nominal_stresses_pa: Vec::new(),
+        anchor_forces: Vec::new(),
         peak_temperatures_k: electrical.peak_temperatures_k,
         currents_a: electrical.currents_a,
         charges_c: (0..electrics.ports).map(|p| (electrics.names[p].clone(), charge(p))).collect(),
@@ -125,6 +127,12 @@ pub fn frame_modes(
 fn sources(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec<f64>, Drive), AnalysisError> {
     let electrics = &compiled.parts.system.electrics;
     let sources = source_vector(compiled, voltages)?;
+    if let Some(k) = (electrics.voltages()..sources.len()).find(|k| sources[*k] != 0.0) {
+        return Err(AnalysisError::BadRequest {
+            what: format!("port \"{}\"", electrics.names[k]),
+            detail: "the linear frame moves its anchors as drawn alone; give the displacement as anchorx, anchory or anchorrz".into(),
+        });
+    }
     let mut rise = vec![0.0; electrics.heating.states()];
     let mut drive = electrics.drive();
     electrics.steady(&sources, &mut rise, &mut drive);

@@ -120,7 +120,7 @@ impl Integrator {
         observe: Observer<'_>,
     ) -> (Result<Advance, SolveError>, SolverCounters) {
         let mut bodies = Bodies::new(system, ramp);
-        let run = IntegrationRun { motion, h, control, observe };
+        let run = IntegrationRun { motion, h, control, observe, corners: ramp.corners() };
         match self.rule() {
             Some(rule) => match explicit::suits(system).err().filter(|_| rule == IntegrationRule::Rk45) {
                 Some(error) => (Err(error), SolverCounters::default()),
@@ -213,6 +213,8 @@ pub struct IntegrationRun<'a, 'b, X> {
     pub control: Control,
     /// Sees each accepted step.
     pub observe: Observer<'b, X>,
+    /// Times at which steps end (s).
+    pub corners: Vec<f64>,
 }
 
 impl<X: Unknown> IntegrationRun<'_, '_, X> {
@@ -223,6 +225,7 @@ impl<X: Unknown> IntegrationRun<'_, '_, X> {
         method: M,
     ) -> (Result<Advance, SolveError>, Adaptive<M, X>) {
         let mut stepper = Adaptive::new(equations.unknowns(), method);
+        stepper.corners = self.corners;
         let end = stepper.advance(equations, self.motion, &mut self.h, self.control, usize::MAX, self.observe);
         (end, stepper)
     }

@@ -5,7 +5,7 @@ use bimorph_base::Setting;
 use bimorph_model::compile::{CompileError, CompiledModel, draw};
 use bimorph_model::options::analysis::PATH_POINTS;
 use bimorph_solve::continuation::Branch;
-use bimorph_structure::FrontEnd;
+use bimorph_structure::{FrontEnd, is_anchor_motion};
 use thiserror::Error;
 
 /// Name of the factor on all dead loads.
@@ -97,7 +97,7 @@ impl PathParameter {
     /// # Errors
     /// [`UnknownPathParameter`].
     pub fn find(compiled: &CompiledModel, name: &str) -> Result<Self, UnknownPathParameter> {
-        if compiled.structure.port(name).is_some() {
+        if compiled.structure.port(name).is_some() || compiled.parts.system.anchor_source(name).is_some() {
             return Ok(Self::Port);
         }
         if compiled.parameters.iter().any(|(p, v)| p == name && matches!(v, Setting::Number(_))) {
@@ -107,6 +107,8 @@ impl PathParameter {
             return Ok(Self::Loads);
         }
         let ports = compiled.structure.ports.iter().map(|p| p.name.clone());
+        let electrics = &compiled.parts.system.electrics;
+        let ports = ports.chain(electrics.names.iter().skip(electrics.voltages()).cloned());
         let known = ports.chain(compiled.parameters.iter().map(|(p, _)| p.clone())).chain([LOADS.to_owned()]);
         Err(UnknownPathParameter { name: name.to_owned(), known: known.collect() })
     }
@@ -115,8 +117,8 @@ impl PathParameter {
 /// Models of a path.
 #[derive(Debug, Clone)]
 pub enum PathModels {
-    /// The voltage of a port varies.
-    Port,
+    /// The voltage of a port or the motion of an anchor varies, with this unit.
+    Port(&'static str),
     /// The factor on all dead loads varies.
     Loads,
     /// The netlist with the first and with the last value of one of its parameters.
@@ -135,7 +137,13 @@ impl PathModels {
         source: impl FnOnce() -> Result<S, E>,
     ) -> Result<Self, E> {
         match parameter {
-            PathParameter::Port => return Ok(Self::Port),
+            PathParameter::Port => {
+                return Ok(Self::Port(match options.along.rsplit_once('.') {
+                    Some((_, "urz")) => "rad",
+                    Some(_) if is_anchor_motion(&options.along) => "m",
+                    _ => "V",
+                }));
+            }
             PathParameter::Loads => return Ok(Self::Loads),
             PathParameter::Netlist => {}
         }
@@ -147,7 +155,7 @@ impl PathModels {
     /// The model at the start of the path, and the input along it.
     pub fn input<'a>(&'a self, compiled: &'a CompiledModel, along: &'a str) -> (&'a CompiledModel, PathInput<'a>) {
         match self {
-            Self::Port => (compiled, PathInput::Port(along)),
+            Self::Port(_) => (compiled, PathInput::Port(along)),
             Self::Loads => (compiled, PathInput::Loads),
             Self::Netlist(ends) => (&ends[0], PathInput::Parameter(&ends[1])),
         }
@@ -156,7 +164,7 @@ impl PathModels {
     /// Unit of the parameter, where its effects determine it; otherwise empty.
     pub fn unit(&self) -> &'static str {
         let [first, last] = match self {
-            Self::Port => return "V",
+            Self::Port(unit) => return unit,
             Self::Loads => return "",
             Self::Netlist(ends) => &**ends,
         };

@@ -262,7 +262,7 @@ impl Propagator for ReducedPropagator<'_> {
     ) -> Result<(Advance, SolverCounters), AnalysisError> {
         let system = &self.compiled.parts.system;
         let h = first_step(system, self.options.stop);
-        let run = IntegrationRun { motion, h, control: self.options.control(), observe };
+        let run = IntegrationRun { motion, h, control: self.options.control(), observe, corners: Vec::new() };
         let mut method = ReducedRodas4::new(Arc::clone(self.space), h).with_estimate(system);
         if let Some(fitted) = self.fitted.take() {
             let share = self.compiled.options.errors().reduced_statics();

@@ -8,7 +8,7 @@ use bimorph_structure::Structure;
 use std::collections::HashSet;
 
 /// Names of the numbers of a static result.
-pub const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, BEAM.Tmax, BEAM.stress, PORT.i or PORT.q";
+pub const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, BEAM.Tmax, BEAM.stress, BEAM.nominal, ANCHOR.fx, ANCHOR.fy, ANCHOR.m, PORT.i or PORT.q";
 
 /// A number of a static result.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +30,10 @@ enum StaticPart {
     Beam,
     /// A beam whose strength is known.
     StressedBeam,
+    /// The same with a fillet.
+    FilletedBeam,
+    /// A driven anchor, by its node.
+    Anchor,
     Port,
 }
 
@@ -40,6 +44,9 @@ fn split(name: &str) -> Option<(&str, &str, StaticPart, &'static str)> {
         "x" | "y" => (StaticPart::Node, "m"),
         "rz" => (StaticPart::Node, "rad"),
         "stress" => (StaticPart::StressedBeam, "Pa"),
+        "nominal" => (StaticPart::FilletedBeam, "Pa"),
+        "fx" | "fy" => (StaticPart::Anchor, "N"),
+        "m" => (StaticPart::Anchor, "N·m"),
         "T" | "Tmax" => (StaticPart::Beam, "K"),
         "i" => (StaticPart::Port, "A"),
         "q" => (StaticPart::Port, "C"),
@@ -62,15 +69,19 @@ fn parts(result: &StaticResult) -> impl Iterator<Item = (&str, StaticPart)> {
     let nodes = result.nodes.iter().map(|(name, _)| (name.as_str(), StaticPart::Node));
     let beams = result.temperatures_k.iter().map(|(name, _)| (name.as_str(), StaticPart::Beam));
     let stressed = result.stresses_pa.iter().map(|(name, _)| (name.as_str(), StaticPart::StressedBeam));
+    let filleted = result.nominal_stresses_pa.iter().map(|(name, _)| (name.as_str(), StaticPart::FilletedBeam));
     nodes
         .chain(beams)
         .chain(stressed)
+        .chain(filleted)
+        .chain(result.anchor_forces.iter().map(|(name, _)| (name.as_str(), StaticPart::Anchor)))
         .chain(result.currents_a.iter().map(|(name, _)| (name.as_str(), StaticPart::Port)))
 }
 
 fn output(result: &StaticResult, name: &str) -> Option<StaticOutput> {
     let (part, quantity, _, unit) = split(name)?;
     let node = || result.nodes.iter().find(|(node, _)| node == part).map(|(_, motion)| motion);
+    let anchor = || result.anchor_forces.iter().find(|(node, _)| node == part).map(|(_, force)| force);
     let listed = |list: &[(String, f64)]| list.iter().find(|(name, _)| name == part).map(|(_, x)| *x);
     let value = match quantity {
         "x" => node()?.x,
@@ -78,6 +89,10 @@ fn output(result: &StaticResult, name: &str) -> Option<StaticOutput> {
         "rz" => node()?.rz,
         "T" => listed(&result.temperatures_k)?,
         "stress" => listed(&result.stresses_pa)?,
+        "nominal" => listed(&result.nominal_stresses_pa)?,
+        "fx" => anchor()?.fx,
+        "fy" => anchor()?.fy,
+        "m" => anchor()?.m,
         // a prescribed temperature is that of all of a beam
         "Tmax" => listed(&result.peak_temperatures_k).or_else(|| listed(&result.temperatures_k))?,
         "i" => listed(&result.currents_a)?,
@@ -111,8 +126,13 @@ pub fn check(structure: &Structure, texts: &[String]) -> Result<(), ReadoutError
     let beams = structure.beams.iter().map(|beam| (beam.name.as_str(), StaticPart::Beam));
     let strong = structure.beams.iter().filter(|beam| beam.material.strength.is_some());
     let stressed = strong.map(|beam| (beam.name.as_str(), StaticPart::StressedBeam));
+    let filleted =
+        structure.beams.iter().filter(|beam| beam.material.strength.is_some() && beam.material.fillet.is_some());
+    let filleted = filleted.map(|beam| (beam.name.as_str(), StaticPart::FilletedBeam));
+    let driven = structure.driven_anchors().map(|node| (node, StaticPart::Anchor));
     let ports = structure.ports.iter().map(|port| (port.name.as_str(), StaticPart::Port));
-    let known: HashSet<(&str, StaticPart)> = nodes.chain(beams).chain(stressed).chain(ports).collect();
+    let known: HashSet<(&str, StaticPart)> =
+        nodes.chain(beams).chain(stressed).chain(filleted).chain(driven).chain(ports).collect();
     let find = |name: &str| match split(name) {
         Some((part, _, kind, unit)) if known.contains(&(part, kind)) => Ok(StaticOutput { unit, value: 0.0 }),
         _ => Err(unknown(name, known.iter().copied())),

@@ -8,13 +8,26 @@ use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::readout::signal::{Signal, SignalView};
 use crate::readout::stress;
 use bimorph_domains::Drive;
+use bimorph_domains::anchor_force::AnchorView;
+use bimorph_domains::driven_anchor::DrivenAnchor;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::SolveError;
 use bimorph_solve::equilibrium::{Equilibrium, EquilibriumOptions, LossKind, Path, StabilityLoss};
 use bimorph_solve::path::{LoadPath, SourcePath};
-use bimorph_structure::{Beam, MOLTEN};
+use bimorph_structure::{Beam, MOLTEN, is_anchor_motion};
 use serde::Serialize;
+
+/// Force of a driven anchor on the mechanism.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct AnchorForce {
+    /// Along x (N).
+    pub fx: f64,
+    /// Along y (N).
+    pub fy: f64,
+    /// Moment about its node (N·m).
+    pub m: f64,
+}
 
 /// A static equilibrium.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,6 +39,12 @@ pub struct StaticResult {
     /// Largest stress on the faces of every beam whose strength is known (Pa), by name.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stresses_pa: Vec<(String, f64)>,
+    /// The same without the concentration at fillets, of layers with a fillet (Pa).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub nominal_stresses_pa: Vec<(String, f64)>,
+    /// Force and moment with which each driven anchor moves the mechanism, by the name of its node.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub anchor_forces: Vec<(String, AnchorForce)>,
     /// Highest temperature along every heated beam (K), by name.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub peak_temperatures_k: Vec<(String, f64)>,
@@ -136,6 +155,8 @@ pub(crate) fn result_at(compiled: &CompiledModel, point: &OperatingPoint) -> Sta
         nodes: node_motions(compiled, &point.q),
         temperatures_k: electrical.temperatures_k,
         stresses_pa: stresses(compiled, point).map(|(beam, stress)| (beam.name.clone(), stress)).collect(),
+        nominal_stresses_pa: nominal_stresses(compiled, point),
+        anchor_forces: anchor_forces(compiled, point),
         peak_temperatures_k: electrical.peak_temperatures_k,
         currents_a: electrical.currents_a,
         charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
@@ -155,6 +176,32 @@ fn stresses<'a>(compiled: &'a CompiledModel, point: &'a OperatingPoint) -> impl 
     let known = compiled.structure.beams.iter().enumerate();
     let known = known.filter(|(k, beam)| beam.material.strength.is_some() && !compiled.parts.stressed[*k].rigid);
     known.filter_map(|(k, beam)| Some((beam, stress::largest(compiled, k, &point.q, &point.rise)?.value())))
+}
+
+/// The same without the concentration at fillets, of beams that have some.
+fn nominal_stresses(compiled: &CompiledModel, point: &OperatingPoint) -> Vec<(String, f64)> {
+    let beams = compiled.structure.beams.iter().zip(&compiled.parts.stressed).enumerate();
+    let known = beams.filter(|(_, (beam, stressed))| beam.material.strength.is_some() && !stressed.rigid);
+    let filleted = known.filter(|(_, (_, stressed))| stressed.fillets.iter().any(Option::is_some));
+    let found = filleted.filter_map(|(k, (beam, _))| {
+        Some((beam.name.clone(), stress::nominal(compiled, k, &point.q, &point.rise)?.value()))
+    });
+    found.collect()
+}
+
+/// Forces of driven anchors.
+fn anchor_forces(compiled: &CompiledModel, point: &OperatingPoint) -> Vec<(String, AnchorForce)> {
+    let system = &compiled.parts.system;
+    if system.anchors.is_empty() {
+        return Vec::new();
+    }
+    let (drive, still) = (point.drive(compiled), vec![Pose::zeros(); point.q.len()]);
+    let state = AnchorView { q: &point.q, v: &still, drive: &drive };
+    let force = |(k, anchor): (usize, &DrivenAnchor)| {
+        let found = system.anchor_force(k, &state);
+        Some((anchor.node.clone()?, AnchorForce { fx: found.x, fy: found.y, m: found.z }))
+    };
+    system.anchors.iter().enumerate().filter_map(force).collect()
 }
 
 /// The beam whose stress exceeds its strength by the largest factor, as a sentence.
@@ -319,6 +366,10 @@ pub(super) fn settled(
 
 /// Largest voltage of a port (V), as of those that are searched.
 const MAX_VOLTS: f64 = 1e9;
+/// Largest displacement of an anchor (m): beyond any structure.
+const MAX_DISPLACEMENT: f64 = 1.0;
+/// Largest rotation of an anchor (rad): a hundred turns and more.
+const MAX_ROTATION: f64 = 1e3;
 
 /// Warning about beams that the current heats beyond the strength of any solid.
 pub(crate) fn too_hot(compiled: &CompiledModel, point: &OperatingPoint) -> Option<String> {
@@ -336,10 +387,24 @@ pub(crate) fn too_hot(compiled: &CompiledModel, point: &OperatingPoint) -> Optio
 pub(crate) fn source_vector(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<Vec<f64>, AnalysisError> {
     let electrics = &compiled.parts.system.electrics;
     let mut ports = vec![None; electrics.ports];
+    let mut anchors: Vec<(usize, f64)> = Vec::new();
     for (name, volts) in voltages {
+        if let Some(source) = compiled.parts.system.anchor_source(name) {
+            check_motion(compiled, (name, source), *volts)?;
+            if let Some((_, before)) = anchors.iter().find(|(known, _)| *known == source) {
+                let detail = format!("given twice, {before} and {volts}");
+                return Err(AnalysisError::BadRequest { what: format!("motion \"{name}\""), detail });
+            }
+            anchors.push((source, *volts));
+            continue;
+        }
         let port = compiled.structure.port(name).ok_or_else(|| AnalysisError::BadRequest {
             what: format!("port \"{name}\""),
             detail: match electrics.ports {
+                _ if is_anchor_motion(name) => format!(
+                    "no driven anchor has that input; give the anchor `moves=1`{}",
+                    driven(compiled).map(|known| format!("; there are {known}")).unwrap_or_default()
+                ),
                 0 => "the netlist has no ports; add one with `NAME port * [node] []`".into(),
                 n => format!("the netlist's ports are {}", electrics.names[..n].join(", ")),
             },
@@ -359,8 +424,34 @@ pub(crate) fn source_vector(compiled: &CompiledModel, voltages: &PortVoltages) -
     let ports: Vec<f64> = ports.into_iter().map(Option::unwrap_or_default).collect();
     let mut sources = vec![0.0; electrics.sources()];
     electrics.fill_sources(&ports, &mut sources);
+    anchors.into_iter().for_each(|(source, value)| sources[source] = value);
     check_heat(compiled, electrics, &sources)?;
     Ok(sources)
+}
+
+/// The motions of driven anchors by name; none without such an anchor.
+pub(crate) fn driven(compiled: &CompiledModel) -> Option<String> {
+    let electrics = &compiled.parts.system.electrics;
+    let names = electrics.names.get(electrics.voltages()..).filter(|names| !names.is_empty())?;
+    Some(names.join(", "))
+}
+
+/// Checks a displacement (m) or a rotation (rad) of an anchor.
+///
+/// # Errors
+/// [`AnalysisError::BadRequest`].
+pub(crate) fn check_motion(
+    compiled: &CompiledModel,
+    (name, source): (&str, usize),
+    value: f64,
+) -> Result<(), AnalysisError> {
+    let turns = compiled.parts.system.anchor_input(source).is_some_and(|(_, direction)| direction == 2);
+    let (most, unit) = if turns { (MAX_ROTATION, "rad") } else { (MAX_DISPLACEMENT, "m") };
+    if value.abs() <= most {
+        return Ok(());
+    }
+    let detail = format!("expected at most {most:e} {unit}, got {value:e}");
+    Err(AnalysisError::BadRequest { what: format!("motion \"{name}\""), detail })
 }
 
 /// Checks port voltages: each is that of a port, given once, finite and within the range.

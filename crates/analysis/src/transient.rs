@@ -59,7 +59,7 @@ impl Propagator for Compliant<'_> {
         let solver = Solver::new(options.solver, &self.system.model.pattern)?;
         let h = first_step(self.system, options.stop);
         if let Some(see) = errors.filter(|_| options.method == Integrator::Rodas4 && !self.system.turns()) {
-            let run = IntegrationRun { motion, h, control: options.control(), observe };
+            let run = IntegrationRun { motion, h, control: options.control(), observe, corners: ramp.corners() };
             let method = Rodas4::with_solver(solver, self.system, &[]);
             let (end, work) = run.with_errors(&mut Bodies::new(self.system, ramp), method, Some(see));
             return Ok((end?, work));

@@ -187,7 +187,7 @@ impl DeviceSession {
                     Signal::Rate(_, 2) => nothing / self.first_step,
                     Signal::Rate(..) => nothing * system.length_scale / self.first_step,
                     Signal::Temperature(_) | Signal::Prescribed(_) => SAME_TEMPERATURE,
-                    Signal::Stress(_) | Signal::Bearing(_) | Signal::Conductance(..) => {
+                    Signal::Stress(_) | Signal::Bearing(_) | Signal::Conductance(..) | Signal::AnchorForce(..) => {
                         nothing * signal.value(compiled, &view)
                     }
                     Signal::Capacitance(g) => nothing * system.capacitance(*g, view.q).abs(),

@@ -26,6 +26,9 @@ impl PortScale {
             PortKind::Acceleration | PortKind::Rate => {
                 return Self { given: 1.0 / across.unwrap_or(1.0), answered: 0.0 };
             }
+            // displacements and forces as at a port of the other kind
+            PortKind::Displacement => return Self { given: 1.0 / across.unwrap_or(1e6), answered: 1.0 },
+            PortKind::Rotation => return Self { given: 1.0 / across.unwrap_or(1e3), answered: 1e3 },
             PortKind::Force => (1.0, 1e6),
             PortKind::Moment => (1e-3, 1e3),
             PortKind::ForceRate => (1.0, 1.0),

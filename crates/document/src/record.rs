@@ -94,9 +94,9 @@ impl DocumentWriter<'_> {
 }
 
 /// An object with its fields, in the order in which they are written: `name: "unit", range, "what it is";`, or `name = default: …` for a number that is left out
-/// where it has this value. An object whose fields can all be left out can be left out itself.
+/// where it has this value, or `name = false: …`. An object whose fields can all be left out can be left out itself.
 macro_rules! record {
-    ($type:ident: $about:literal { $($name:ident $(= $default:literal)?: $unit:literal, $range:expr, $what:literal;)+ }) => {
+    ($type:ident: $about:literal { $($name:ident $(= $default:tt)?: $unit:literal, $range:expr, $what:literal;)+ }) => {
         impl DocumentValue for $type {
             fn write(&self, to: &mut DocumentWriter<'_>, _: &DocumentField) -> Result<(), UnwritableStructure> {
                 let Self { $($name),+ } = self;
@@ -149,9 +149,10 @@ macro_rules! record {
         }
     };
     (@left_out) => { DocumentValue::left_out() };
-    (@left_out $default:literal) => { Some($default) };
+    (@left_out $default:tt) => { Some($default) };
     (@is_left_out $name:ident) => { $name.is_left_out() };
-    (@is_left_out $name:ident, $default:literal) => { $name.to_bits() == f64::to_bits($default) };
+    (@is_left_out $name:ident, false) => { !*$name };
+    (@is_left_out $name:ident, $default:tt) => { $name.to_bits() == f64::to_bits($default) };
 }
 
 pub(crate) use record;

@@ -4,7 +4,9 @@
 mod electrics;
 mod ramp;
 mod shock;
+mod waveform;
 
 pub use electrics::{Drive, Electrics};
 pub use ramp::Ramp;
 pub use shock::Shock;
+pub use waveform::InputWaveform;

@@ -1,4 +1,4 @@
-//! Inputs other than voltages: forces at points, heat into beams, the motion of the frame.
+//! Inputs other than voltages: forces at points, motion of anchors, heat into beams, the motion of the frame.
 
 use super::approach::MaterialPoint;
 
@@ -9,6 +9,13 @@ pub enum Input {
     Force {
         /// Where it acts.
         point: MaterialPoint,
+        /// Which it is.
+        direction: usize,
+    },
+    /// Displacement of an anchor along global x (0) or y (1) (m), or its rotation about z (2) (rad).
+    Motion {
+        /// Number of the anchor in [`System::anchors`](super::system::System::anchors).
+        anchor: usize,
         /// Which it is.
         direction: usize,
     },

@@ -42,6 +42,7 @@
 //! | [`hot`] | beams whose resistance depends on their temperature |
 //! | [`lag`] | how a rise lags behind its steady value |
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
+//! | [`driven_anchor`], [`anchor_force`] | anchors whose displacement and rotation are inputs; their force |
 //! | [`inputs`] | effects of forces at points, heat into beams and frame motion; `input`: their kinds |
 //! | [`edge_field`] | laws of the fringe field beside a gap |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
@@ -55,6 +56,7 @@
 //! **Architecture invariant.** Below are [`bimorph_multibody`] and [`bimorph_structure`]. A domain never solves: it gives
 //! forces, tangents, charges and energies at a state.
 
+pub mod anchor_force;
 pub mod approach;
 pub mod attraction;
 pub mod backbending;
@@ -73,6 +75,7 @@ pub mod contact_ways;
 pub mod dashpot;
 pub mod domain;
 pub mod drive;
+pub mod driven_anchor;
 pub mod edge_field;
 pub mod electrodes;
 pub mod energy;
@@ -122,7 +125,7 @@ pub mod thermal;
 pub use approach::MaterialPoint;
 pub use beam_line::BeamLine;
 pub use domain::{Configuration, Domain};
-pub use drive::{Drive, Ramp, Shock};
+pub use drive::{Drive, InputWaveform, Ramp, Shock};
 pub use from_structure::{PlacedMember, Station, StructureView};
 pub use input::Input;
 pub use lag::Lags;

@@ -6,6 +6,7 @@ use super::approach::MaterialPoint;
 use super::beam_line::BeamLine;
 use super::domain::{Chord, Configuration, Domain, SkewCoupling};
 use super::drive::{Drive, Electrics};
+use super::driven_anchor::DrivenAnchor;
 use super::load::DeadLoad;
 use super::loss_tangent::LossTangent;
 use super::member::Member;
@@ -39,6 +40,8 @@ pub struct System {
     pub members: Vec<Member>,
     /// Dead loads.
     pub loads: Vec<DeadLoad>,
+    /// Anchors whose displacement and rotation are inputs, or turned in the drawing.
+    pub anchors: Vec<DrivenAnchor>,
     /// Ports, sources, heaters.
     pub electrics: Arc<Electrics>,
     /// Scale of displacements (m): the narrowest beam or the smallest gap, whichever is smaller; 1 µm without either.
@@ -51,8 +54,8 @@ impl System {
     /// A mechanism on which nothing acts but its joints, with a length scale (m).
     #[inline]
     pub fn of_model(model: Model, length_scale: f64) -> Self {
-        let (members, loads) = (Vec::new(), Vec::new());
-        Self { model, members, loads, electrics: Arc::default(), length_scale, beams: Arc::default() }
+        let (members, loads, anchors) = (Vec::new(), Vec::new(), Vec::new());
+        Self { model, members, loads, anchors, electrics: Arc::default(), length_scale, beams: Arc::default() }
     }
 
     /// Bodies that move.
@@ -117,14 +120,14 @@ impl System {
     /// True where [`System::add_body_forces`] adds anything.
     #[inline]
     pub fn is_acted_on(&self, drive: &Drive) -> bool {
-        !(self.loads.is_empty() && drive.inputs.is_empty() && drive.push.is_empty())
+        !(self.loads.is_empty() && self.anchors.is_empty() && drive.inputs.is_empty() && drive.push.is_empty())
             || self.members.iter().zip(&drive.volts).any(|(gap, volts)| gap.is_active(*volts))
     }
 
     /// True where [`System::add_body_forces`] adds anything to bodies as drawn.
     #[inline]
     pub fn is_acted_on_as_drawn(&self, drive: &Drive) -> bool {
-        !(self.loads.is_empty() && drive.inputs.is_empty() && drive.push.is_empty())
+        !(self.loads.is_empty() && self.anchors.is_empty() && drive.inputs.is_empty() && drive.push.is_empty())
             || self.members.iter().zip(&drive.volts).any(|(gap, volts)| gap.is_active_as_drawn(*volts))
     }
 
@@ -255,7 +258,7 @@ impl System {
         for load in &self.loads {
             load.load_points(at, drive.load, &mut lever);
         }
-        for (load, size) in self.given_loads(&drive.inputs) {
+        for (load, size) in self.given_loads(drive) {
             load.load_points(at, size, &mut lever);
         }
         for (gap, &volts) in self.members.iter().zip(&drive.volts) {
@@ -390,6 +393,7 @@ impl System {
         };
         self.members.iter().for_each(|gap| gap.bodies(&mut see));
         self.loads.iter().for_each(|load| load.bodies(&mut see));
+        self.anchors.iter().for_each(|anchor| see(anchor.point.body));
         bodies.sort_unstable();
         bodies.dedup();
         bodies

@@ -121,6 +121,14 @@ pub enum ExportError {
         /// Its name.
         port: String,
     },
+    /// A port that moves an anchor, or an anchor that turns.
+    #[error(
+        "the anchor at \"{node}\" is driven or turned (moves, anchorrz), which the written model does not have; leave it out, or use the plug-in"
+    )]
+    DrivenAnchor {
+        /// Its node.
+        node: String,
+    },
     /// A resistance that the written models do not have.
     #[error(
         "beam \"{beam}\" has properties that depend on temperature (curves, TCR, TCK, TCC, emissivity) or a substrate or anchors at another one than ambient, which the written models do not have; leave them out, or use the plug-in"

@@ -15,7 +15,7 @@ mod sliding;
 use super::ExportError;
 use super::ExportRequest;
 use super::linear::{ReducedPort, SignalShown};
-use super::mechanism::port_names;
+use super::mechanism::{port_names, refuse_driven};
 use bimorph_analysis::readout::expression::Quantity;
 use bimorph_analysis::readout::ports::{OpenedPorts, PortResponse};
 use bimorph_analysis::readout::signal::Signal;
@@ -45,6 +45,7 @@ pub fn lump(compiled: &CompiledModel, request: &ExportRequest) -> Result<LumpedM
     if let Some(k) = ports.kinds.iter().position(|kind| *kind == PortKind::Rate) {
         return Err(ExportError::Turning { port: names[k].clone() });
     }
+    refuse_driven(compiled)?;
     if !electrics.heating.heaters.is_empty() {
         let beam = &compiled.structure.beams[compiled.parts.heaters[0]].name;
         return Err(ExportError::NotLumped { why: format!("beam \"{beam}\" heats") });
@@ -201,7 +202,7 @@ fn reading(signal: &Signal, coordinates: &[Coordinate], gaps: &[LumpedGap]) -> R
         Signal::Bearing(g) => Ok(LumpedOutput::Bearing(g)),
         Signal::Conductance(g, metals) => Ok(LumpedOutput::Conductance(g, metals)),
         Signal::Stress(_) => Err(ExportError::NotLumped { why: "the stress of a beam has a corner".to_owned() }),
-        // of beams that heat, which have been refused
-        Signal::Temperature(_) => Ok(LumpedOutput::Nothing),
+        // of beams that heat and of driven anchors, which have been refused
+        Signal::AnchorForce(..) | Signal::Temperature(_) => Ok(LumpedOutput::Nothing),
     }
 }

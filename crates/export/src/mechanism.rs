@@ -65,6 +65,18 @@ pub fn port_names(
     if names.is_empty() { Err(ExportError::NoPorts) } else { Ok(names) }
 }
 
+/// Refuses models with driven anchors.
+///
+/// # Errors
+/// [`ExportError::DrivenAnchor`].
+pub(super) fn refuse_driven(compiled: &CompiledModel) -> Result<(), ExportError> {
+    let driven = compiled.structure.supports.iter().find(|s| s.motion.is_some_and(|m| m.driven || m.rotation != 0.0));
+    match driven {
+        Some(support) => Err(ExportError::DrivenAnchor { node: compiled.structure.nodes[support.node.0].name.clone() }),
+        None => Ok(()),
+    }
+}
+
 pub(super) fn dot(a: &[Pose], b: &[Pose]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
@@ -80,6 +92,7 @@ impl<'a> LinearizedMechanism<'a> {
         if let Some(k) = ports.kinds.iter().position(|kind| *kind == PortKind::Rate) {
             return Err(ExportError::Turning { port: names[k].clone() });
         }
+        refuse_driven(compiled)?;
         let heating = &compiled.parts.system.electrics.heating;
         let dependent = heating.heaters.iter().position(HeatConductor::depends_on_temperature);
         // anchors alone may have temperatures of their own

@@ -157,6 +157,17 @@ pub fn add_elastic_backwards(model: &Model, q: &[Pose], rest: &RestStrain<'_>, r
     add_joints(model, model.joints.iter().rev(), q, rest, r);
 }
 
+/// [`add_elastic`] of some of the joints, with all couplings.
+pub fn add_elastic_of<'a>(
+    model: &Model,
+    joints: impl Iterator<Item = &'a PackedJoint>,
+    q: &[Pose],
+    rest: &RestStrain<'_>,
+    r: &mut [Pose],
+) {
+    add_joints(model, joints, q, rest, r);
+}
+
 #[inline(always)]
 fn add_joints<'a>(
     model: &Model,
@@ -212,8 +223,21 @@ pub(super) fn add_coupling_tangent(model: &Model, factor: f64, tangent: &mut Bod
 
 /// `tangent += ∂²U/∂q²` and `r += ∂U/∂q`.
 pub fn add_tangent(model: &Model, q: &[Pose], rest: &RestStrain<'_>, tangent: &mut BodyMatrix, r: &mut [Pose]) {
+    add_tangent_of(model, model.joints.iter(), q, rest, tangent, r);
+}
+
+/// [`add_tangent`] of some of the joints, with all couplings.
+#[inline(always)]
+pub fn add_tangent_of<'a>(
+    model: &Model,
+    joints: impl Iterator<Item = &'a PackedJoint>,
+    q: &[Pose],
+    rest: &RestStrain<'_>,
+    tangent: &mut BodyMatrix,
+    r: &mut [Pose],
+) {
     let mut turns = HalfTurnCache::new();
-    for joint in &model.joints {
+    for joint in joints {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q);
         let stress = joint.stress(section, &k, rest);

@@ -403,6 +403,10 @@ pub struct Adhesion {
     pub range: f64,
 }
 
+/// Largest stiffness along a surface to which a part sticks (N/m): a thousand times that of the stiffest contacts. Rounding of displacements would decide on
+/// forces of stiffer ones.
+pub const MAX_STICK_STIFFNESS: f64 = 1e9;
+
 /// Coulomb's friction, regularised.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Friction {

@@ -31,13 +31,13 @@ pub use domain_element::DomainElement;
 pub use front_end::{FrontEnd, LoadedNetlist, ReadFunction};
 pub use gap::{
     Adhesion, BeamGap, Comb, ElectrodeShape, FacingGas, FilmSlit, Friction, Fringe, GapVoltage, IMPACT_SPEEDS, Impact,
-    InsulatingLayer, MAX_FILM_STATES, MIN_RESTITUTION, OhmicContact, Perforation, PlateGap, Stop, TOUCH,
-    touching_distance,
+    InsulatingLayer, MAX_FILM_STATES, MAX_STICK_STIFFNESS, MIN_RESTITUTION, OhmicContact, Perforation, PlateGap, Stop,
+    TOUCH, touching_distance,
 };
 pub use index::NodeIndex;
 pub use mechanical::{
-    AnchorMotion, Beam, GasLoss, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SolidHeat, SpringDamper, Support,
-    Yield,
+    ANCHOR_MOTIONS, AnchorMotion, Beam, GasLoss, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SolidHeat,
+    SpringDamper, Support, Yield, is_anchor_motion,
 };
 pub use network::{Port, Resistor, VoltageSource, Wire};
 pub use node::{Node, NodeId};
@@ -103,8 +103,20 @@ pub struct Structure {
 impl Structure {
     /// Whether any anchor is displaced.
     pub fn moves_anchors(&self) -> bool {
-        let displaced = |s: &Support| s.motion.is_some_and(|m| m.at(self.nodes[s.node.0].position) != [0.0; 2]);
+        let moves = |m: &AnchorMotion, place| m.at(place) != [0.0; 2] || m.rotation != 0.0;
+        let displaced = |s: &Support| s.motion.is_some_and(|m| moves(&m, self.nodes[s.node.0].position));
         self.supports.iter().any(displaced)
+    }
+
+    /// Nodes of anchors whose displacement and rotation are inputs.
+    pub fn driven_anchors(&self) -> impl Iterator<Item = &str> {
+        let driven = self.supports.iter().filter(|support| support.motion.is_some_and(|motion| motion.driven));
+        driven.map(|support| self.nodes[support.node.0].name.as_str())
+    }
+
+    /// Names of those inputs.
+    pub fn driven_inputs(&self) -> impl Iterator<Item = String> {
+        self.driven_anchors().flat_map(|node| ANCHOR_MOTIONS.map(|quantity| format!("{node}.{quantity}")))
     }
 
     /// The node of that full name. Cost: constant, after the first call.

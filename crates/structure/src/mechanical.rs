@@ -218,13 +218,32 @@ pub struct Support {
     pub motion: Option<AnchorMotion>,
 }
 
-/// Motion of an anchor: with a substrate that is strained about the origin of the drawing, and by a given displacement.
+/// Motion of an anchor: with a substrate that is strained about the origin of the drawing, and by a given displacement and rotation.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct AnchorMotion {
     /// Strain of the substrate along x and y (1).
     pub strain: [f64; 2],
     /// Displacement along x and y (m).
     pub displacement: [f64; 2],
+    /// Rotation about z (rad).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub rotation: f64,
+    /// Whether analyses give it a displacement and a rotation beside these: its inputs.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub driven: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes references
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
+/// Names of the inputs of a driven anchor behind that of its node: displacements along x and y (m), rotation (rad).
+pub const ANCHOR_MOTIONS: [&str; 3] = ["ux", "uy", "urz"];
+
+/// Whether a name is that of the motion of an anchor.
+pub fn is_anchor_motion(name: &str) -> bool {
+    name.rsplit_once('.').is_some_and(|(_, quantity)| ANCHOR_MOTIONS.contains(&quantity))
 }
 
 impl AnchorMotion {

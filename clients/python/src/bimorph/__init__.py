@@ -34,6 +34,7 @@ from .netlist import Netlist
 from .options import Options
 from .paths import CriticalPoint, PathResult
 from .results import (
+    AnchorForce,
     Crossing,
     FrequencyResponse,
     ModeLoss,
@@ -58,6 +59,7 @@ from .trial_reply import TrialReply
 
 __all__ = [
     "AccuracyWarning",
+    "AnchorForce",
     "Batch",
     "BatchRun",
     "BimorphError",

@@ -19,7 +19,7 @@ from .messages import Voltages, by_name, diagnostic, estimate_of, named, setting
 from .naming import by_argument, each
 from .paths import Branch, PathResult
 from .response import SPACINGS, response_of
-from .results import FrequencyResponse, ModeLoss, ModesResult, NodeMotion, PullInResult, StabilityLoss, StaticResult, TransientResult
+from .results import AnchorForce, FrequencyResponse, ModeLoss, ModesResult, NodeMotion, PullInResult, StabilityLoss, StaticResult, TransientResult
 from .session import Session, opened_just_now
 from .stopping import apart
 from .ticket import Snapshot
@@ -108,7 +108,7 @@ class Model:
         return view_of(self._source, arguments.volts("voltages", voltages), arguments.integer("height", height, 200, 4000))
 
     def static(self, voltages: Voltages | None = None, *, backbend: Voltages | None = None) -> StaticResult:
-        """Static equilibrium at these port voltages [V], followed from rest.
+        """Static equilibrium at these port voltages [V], followed from rest. ``NODE.ux``, ``.uy`` [m] and ``.urz`` [rad] in place of a port move a driven anchor.
 
         ``backbend`` are voltages [V] to which ports are raised once before, so that hot arms with a ``yieldstress`` yield and stay shorter; the
         ``permanent_strains`` of the result are those of the arms.
@@ -132,6 +132,8 @@ class Model:
             passed=tuple(_loss(one) for one in answer.passed),
             permanent_strains=by_name(answer.permanent_strains),
             stresses_pa=by_name(answer.stresses_pa),
+            nominal_stresses_pa=by_name(answer.nominal_stresses_pa),
+            anchor_forces={one.name: AnchorForce(one.fx, one.fy, one.m) for one in answer.anchor_forces},
         )
 
     def modes(self, count: int = 6, voltages: Voltages | None = None, quality: bool = False) -> ModesResult:
@@ -176,7 +178,7 @@ class Model:
     ) -> FrequencyResponse:
         """Small-signal frequency response from ``start`` to ``stop`` [Hz], about the equilibrium at these port voltages [V].
 
-        ``drive`` is ``NODE.fx``, ``NODE.fy`` [N], ``NODE.m`` [N·m], a port [V], ``BEAM.T`` (heat) [W], ``frame.ax``, ``frame.ay`` [m/s²]
+        ``drive`` is ``NODE.fx``, ``NODE.fy`` [N], ``NODE.m`` [N·m], ``NODE.ux``, ``.uy`` [m] or ``.urz`` [rad] of a driven anchor, a port [V], ``BEAM.T`` (heat) [W], ``frame.ax``, ``frame.ay`` [m/s²]
         or ``frame.wz`` [rad/s]. ``signals`` are those of nodes, beams and gaps, and ``PORT.i``, the current into a port [A]; the default
         is the driving-point response. ``points`` is the number of frequencies with equal quotients (``"log"``) or equal differences (``"linear"``),
         or their number in each ``"decade"``. Points are added near resonances and zeros unless ``even``. ``by_modes`` selects modal superposition
@@ -308,8 +310,8 @@ class Model:
         ``method`` is the integrator, by default ``"rodas4"``, and ``rho`` the spectral radius of ``"generalized-alpha"`` at infinite frequency.
         With ``step`` [s] all steps have this length and do not follow ``tol``.
 
-        ``inputs`` are piecewise linear waveforms of ports, ``{"heat": (times, volts)}``, constant before and after. The run then begins in the static
-        equilibrium at time 0, and steps end at every corner. The error estimate comes from a second run on a finer mesh with a tenth of the
+        ``inputs`` are piecewise linear waveforms of ports, ``{"heat": (times, volts)}`` or ``{"b.uy": (times, metres)}`` of a driven anchor, constant before
+        and after. The run then begins in the static equilibrium at time 0, and steps end at every corner. The error estimate comes from a second run on a finer mesh with a tenth of the
         tolerance, which runs at the same time and takes several times as long. ``estimate=False`` omits it.
         """
         stop = arguments.number("stop", stop, "a time in seconds", above=0.0)
@@ -337,9 +339,11 @@ class Model:
                     why = "a run along inputs lasts to stop, and begins in the equilibrium of its inputs, with the tolerance of the model"
                     raise InvalidRequest(f"{name}: expected none together with inputs, got {arguments.shown(given)}; {why}")
             waves: dict[str, Waveform] = {**{port: ([0.0], [volts]) for port, volts in held.items()}, **checked(inputs)}
+            # ports of nodes, beams, anchors and the frame exist where a session names them
+            ports = tuple(waves) if any("." in port for port in waves) else ()
 
             def driven(model: Model, progress: Callable[[float], object] | None = None) -> TransientResult:
-                with model._session(signals) as session:
+                with model._session(signals, ports) as session:
                     return drive(session, waves, stop, points, progress)
 
             if estimate:
@@ -414,7 +418,8 @@ class Model:
 
         Every reply has the values of ``signals``. ``ports`` selects ports and their order. They are ports of the netlist; ``NODE.x``, ``.y`` and ``.rz``
         (input force or moment, response displacement); ``NODE.vx``, ``.vy`` and ``.vrz`` (response velocity); ``BEAM.T`` (input heat, response
-        temperature rise); ``frame.ax``, ``.ay`` and ``.wz`` (acceleration and angular rate of the frame). Omitted electrical ports are at 0 V, other
+        temperature rise); ``NODE.ux``, ``.uy`` and ``.urz`` of a driven anchor (input displacement or rotation, response force or moment);
+        ``frame.ax``, ``.ay`` and ``.wz`` (acceleration and angular rate of the frame). Omitted electrical ports are at 0 V, other
         ones are free. ``timeout`` [s] bounds each call.
 
         With a ``seed``, the thermal noise of gas and dampers acts as a random force in every step; equal seeds give equal forces. ``noise_band`` [Hz] is

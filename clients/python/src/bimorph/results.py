@@ -36,6 +36,18 @@ class NodeMotion:
 
 
 @dataclass(frozen=True)
+class AnchorForce:
+    """Force of a driven anchor on the mechanism."""
+
+    fx: float
+    """Along x [N]."""
+    fy: float
+    """Along y [N]."""
+    m: float
+    """Moment about its node [N·m]."""
+
+
+@dataclass(frozen=True)
 class StabilityLoss:
     """Point of the loading path from rest at which the equilibrium loses its stability."""
 
@@ -81,6 +93,10 @@ class StaticResult:
     """Largest stress on the faces of each beam whose layer has a ``strength`` [Pa]."""
     peak_temperatures_k: dict[str, float] = field(default_factory=dict)
     """Highest temperature along every heated beam [K]."""
+    nominal_stresses_pa: dict[str, float] = field(default_factory=dict)
+    """The stresses without the concentration at fillets [Pa], of beams whose layer has a ``strength`` and a ``fillet``."""
+    anchor_forces: dict[str, AnchorForce] = field(default_factory=dict)
+    """Force of each driven anchor on the mechanism, by its node."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """Displacement [m] and rotation [rad] of every node; ``attrs["units"]`` has the units."""

@@ -88,7 +88,8 @@ class Session(Runs):
         kinds = [_kind(k) for k in opened.device.port_kinds] or ["electrical"] * len(self.ports)
         self.port_kinds: dict[str, str] = dict(zip(self.ports, kinds))
         """Kind of each port with the units of input and response: "electrical" (V; A), "force" (N; m), "moment" (N·m; rad), "force_rate"
-        (N; m/s), "moment_rate" (N·m; rad/s), "thermal" (W; K above ambient), "acceleration" (m/s²; 0), "rate" (rad/s; 0)."""
+        (N; m/s), "moment_rate" (N·m; rad/s), "thermal" (W; K above ambient), "acceleration" (m/s²; 0), "rate" (rad/s; 0),
+        "displacement" (m; N), "rotation" (rad; N·m)."""
         self.signals: dict[str, str] = {s.name: s.unit for s in opened.device.signals}
         """Opened signals and their units."""
         self.kept: bool = opened.kept

@@ -103,6 +103,7 @@ class Checked:
         for what, values in (
             ("temperatures_k", answer.temperatures_k),
             ("stresses_pa", answer.stresses_pa),
+            ("nominal_stresses_pa", answer.nominal_stresses_pa),
             ("peak_temperatures_k", answer.peak_temperatures_k),
             ("currents_a", answer.currents_a),
             ("charges_c", answer.charges_c),
@@ -110,6 +111,9 @@ class Checked:
         ):
             self.names(what, (named.name for named in values))
             self.numbers(what, [named.value for named in values], len(values))
+        self.names("anchor_forces", (force.name for force in answer.anchor_forces))
+        for force in answer.anchor_forces:
+            self.numbers(f"anchor_forces {force.name}", (force.fx, force.fy, force.m), 3)
         self.numbers("passed", [loss.share for loss in answer.passed], len(answer.passed))
 
     def modes(self, answer: Any) -> None:

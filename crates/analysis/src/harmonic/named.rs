@@ -4,7 +4,7 @@ use crate::AnalysisError;
 use crate::readout::ReadoutError;
 use crate::readout::expression::{Expression, Quantity};
 use crate::readout::ports::{OpenedPorts, PortResponse};
-use crate::readout::signal::Signal;
+use crate::readout::signal::{ANCHOR_FORCES, Signal};
 use bimorph_model::compile::CompiledModel;
 
 /// Output of a response.
@@ -48,7 +48,7 @@ pub(crate) fn drive_port(compiled: &CompiledModel, drive: &str) -> Result<Opened
                 _ => String::new(),
             };
             refused(format!(
-                "expected NODE.fx, NODE.fy or NODE.m (a force or moment), a port, BEAM.T (heat) or frame.ax|ay|wz; {ports}; \
+                "expected NODE.fx, NODE.fy or NODE.m (a force or moment), NODE.ux, .uy or .urz (a driven anchor), a port, BEAM.T (heat) or frame.ax|ay|wz; {ports}; \
                  {detail}"
             ))
         }
@@ -61,6 +61,10 @@ pub(crate) fn drive_port(compiled: &CompiledModel, drive: &str) -> Result<Opened
 pub(super) fn own_answer(compiled: &CompiledModel, drive: &str, ports: &OpenedPorts) -> Result<String, AnalysisError> {
     match ports.answers[0] {
         PortResponse::Current => Ok(format!("{drive}.i")),
+        PortResponse::Motion(Signal::AnchorForce(_, direction)) => {
+            let node = drive.rsplit_once('.').map_or(drive, |(node, _)| node);
+            Ok(format!("{node}.{}", ANCHOR_FORCES[direction]))
+        }
         PortResponse::Motion(_) | PortResponse::Rise(_) => Ok(port_name(compiled, drive)),
         PortResponse::Nothing => Err(AnalysisError::BadRequest {
             what: "signals".into(),

@@ -67,7 +67,8 @@ impl Propagator for JointPropagator<'_> {
             Control::Fixed(step) => Ok(step),
         };
         let h = h.map_err(|error| failure(self.formulation, self.rule, error))?;
-        let run = IntegrationRun { motion: &mut self.now, h, control: self.control, observe: &mut see };
+        let run =
+            IntegrationRun { motion: &mut self.now, h, control: self.control, observe: &mut see, corners: Vec::new() };
         let (end, work) = self.rule.advance(&mut equations, run);
         self.report.accelerations = work.forces;
         self.report.singular_evaluations = equations.singular;

@@ -79,7 +79,7 @@ impl Propagator for TreePropagator<'_> {
             });
         }
         let h = first_step(self.system, options.stop);
-        let run = IntegrationRun { motion, h, control: options.control(), observe };
+        let run = IntegrationRun { motion, h, control: options.control(), observe, corners: Vec::new() };
         let method = JointRodas4::new(Arc::clone(self.joints), h, &[]);
         let (end, work) = run.with_errors(&mut Bodies::new(self.system, ramp), method, errors);
         Ok((end?, work))

@@ -17,6 +17,7 @@ use super::super::modes::modes;
 use super::super::rotary_inertia_error;
 use super::super::statics::{OperatingPoint, operating_point};
 use super::super::transient::TransientOptions;
+use super::super::transient::record::at_anchors;
 use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium;
 use super::remeshed::{chosen, meshed};
@@ -33,7 +34,7 @@ use bimorph_model::refine::lowest_modes;
 use bimorph_model::refine::mesh_search::{self, Mesh, MeshTarget};
 use bimorph_multibody::forces::add_damping;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BodyMatrix, Model};
+use bimorph_multibody::{BodyId, BodyMatrix, Model};
 use bimorph_solve::eigen::lowest_modes;
 use std::f64::consts::TAU;
 
@@ -221,7 +222,10 @@ fn excited(
             let held = meshed(start, segments)?;
             operating_point(&held, &options.voltages)?
         }
-        None => rest.clone(),
+        None => match at_anchors(&model, options)? {
+            Some(q) if !system.anchors.is_empty() => OperatingPoint { q, ..rest.clone() },
+            _ => rest.clone(),
+        },
     };
     // without an equilibrium to go to the way is that from rest
     let to = operating_point(&model, &options.voltages).unwrap_or(rest);
@@ -235,6 +239,7 @@ fn excited(
 
     let mut way = pushed(&model, &from, options.shock.as_ref(), &drive, &stiffness)
         .unwrap_or_else(|| from.q.iter().zip(&to.q).map(|(a, b)| a - b).collect());
+    add_driven(&model, options, &stiffness, &mut way);
     let size = reach(&model, &way);
     if size == 0.0 {
         return Ok((Vec::new(), 0.0));
@@ -305,6 +310,42 @@ fn pushed(
     factor.solve(&system.model.pattern, &mut x);
     system.model.project(&mut x);
     x.iter().all(|x| x.iter().all(|v| v.is_finite())).then_some(x)
+}
+
+/// `way +=` the shapes that moving anchors excite: those of the inertia forces of the whole mechanism moving with them, as large as the motion of
+/// each anchor.
+fn add_driven(model: &CompiledModel, options: &TransientOptions<'_>, stiffness: &BodyMatrix, way: &mut [Pose]) {
+    let system = &model.parts.system;
+    for (name, wave) in &options.motions {
+        let Some((anchor, direction)) = system.anchor_source(name).and_then(|source| system.anchor_input(source))
+        else {
+            continue;
+        };
+        let BodyId::Free(held) = system.anchors[anchor].point.body else { continue };
+        let mut amplitude = (wave.farthest() - wave.at(0.0)[0]).abs();
+        let mut x = vec![Pose::zeros(); system.bodies()];
+        let about = system.model.bodies[held].center + system.anchors[anchor].point.arm;
+        for (k, (x, body)) in x.iter_mut().zip(&system.model.bodies).enumerate() {
+            let arm = body.center - about;
+            let moved = [Pose::x(), Pose::y(), Pose::new(-arm.y, arm.x, 1.0)][direction];
+            *x = system.model.mass(k).component_mul(&moved);
+        }
+        if direction == 2 {
+            amplitude *= model.structure.extent();
+        }
+        let mut factor = stiffness.clone();
+        system.model.project_matrix(&mut factor);
+        system.model.project(&mut x);
+        if factor.factor(&system.model.pattern).is_err() {
+            continue;
+        }
+        factor.solve(&system.model.pattern, &mut x);
+        system.model.project(&mut x);
+        let size = reach(model, &x);
+        if size > 0.0 && size.is_finite() {
+            way.iter_mut().zip(&x).for_each(|(way, x)| *way += x * (amplitude / size));
+        }
+    }
 }
 
 /// The way from one state to another, if the stiffness all along were that at its end; none for a part that floats.

@@ -22,11 +22,15 @@ pub enum PortKind {
     Acceleration,
     /// Rate of the frame; nothing.
     Rate,
+    /// Displacement of an anchor; its force.
+    Displacement,
+    /// Rotation of an anchor; its moment.
+    Rotation,
 }
 
 impl PortKind {
     /// Every kind, in the order of its number on the wire.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Electrical,
         Self::Force,
         Self::Moment,
@@ -35,6 +39,8 @@ impl PortKind {
         Self::Thermal,
         Self::Acceleration,
         Self::Rate,
+        Self::Displacement,
+        Self::Rotation,
     ];
 
     /// The input and its unit.
@@ -46,6 +52,8 @@ impl PortKind {
             Self::Thermal => ("heat", "W"),
             Self::Acceleration => ("acceleration", "m/s²"),
             Self::Rate => ("rate", "rad/s"),
+            Self::Displacement => ("displacement", "m"),
+            Self::Rotation => ("rotation", "rad"),
         }
     }
 
@@ -59,11 +67,16 @@ impl PortKind {
             Self::MomentRate => ("rate of rotation", "rad/s"),
             Self::Thermal => ("rise", "K"),
             Self::Acceleration | Self::Rate => ("nothing", ""),
+            Self::Displacement => ("force", "N"),
+            Self::Rotation => ("moment", "N·m"),
         }
     }
 
     /// Whether the flow is given and the answer is what lies across the port: mechanical and thermal ports.
     pub fn given_flow(self) -> bool {
-        !matches!(self, Self::Electrical | Self::Acceleration | Self::Rate)
+        match self {
+            Self::Electrical | Self::Acceleration | Self::Rate | Self::Displacement | Self::Rotation => false,
+            Self::Force | Self::Moment | Self::ForceRate | Self::MomentRate | Self::Thermal => true,
+        }
     }
 }

@@ -6,6 +6,7 @@
 //! | `NODE.x`, `.y`, `.rz` | mechanical | force (N), moment (N·m) | displacement (m, rad) |
 //! | `NODE.vx`, `.vy`, `.vrz` | mechanical | force (N), moment (N·m) | velocity (m/s, rad/s) |
 //! | `BEAM.T` | thermal | heat into the beam (W) | its mean rise above ambient (K) |
+//! | `NODE.ux`, `.uy`, `.urz` of a driven anchor | mechanical | displacement (m), rotation (rad) | force (N), moment (N·m) |
 //! | `frame.ax`, `.ay`, `.wz` | inertial | acceleration (m/s²), rate (rad/s) of the frame | nothing |
 //!
 //! The frame's rate needs the compliant formulation.
@@ -21,6 +22,7 @@ use bimorph_domains::{MaterialPoint, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::BodyId;
 use bimorph_solve::equations::Joints;
+use bimorph_structure::is_anchor_motion;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -67,7 +69,8 @@ impl OpenedPorts {
             found.answers = vec![PortResponse::Current; electrics.ports];
             return Ok(found);
         }
-        let (mut inputs, mut given) = (Vec::new(), HashSet::new());
+        let own = electrics.inputs.len();
+        let (mut inputs, mut given) = (electrics.inputs.clone(), HashSet::new());
         for name in names {
             bimorph_base::budget::check();
             if !given.insert(name.as_str()) {
@@ -78,6 +81,7 @@ impl OpenedPorts {
             }
             let (source, kind, answer) = match known.get(name.as_str()) {
                 Some(&source) => (source, PortKind::Electrical, PortResponse::Current),
+                None if let Some(source) = system.anchor_source(name) => of_anchor(system, source),
                 None => {
                     let (input, kind, answer) = offered(compiled, name)?;
                     inputs.push(input);
@@ -88,7 +92,7 @@ impl OpenedPorts {
             found.kinds.push(kind);
             found.answers.push(answer);
         }
-        if !inputs.is_empty() {
+        if inputs.len() > own {
             found.system =
                 Some(Arc::new(System { electrics: Arc::new(electrics.with_inputs(inputs)), ..system.clone() }));
         }
@@ -115,6 +119,13 @@ impl OpenedPorts {
             }
         }
     }
+}
+
+/// The port of the motion of an anchor.
+fn of_anchor(system: &System, source: usize) -> (usize, PortKind, PortResponse) {
+    let (anchor, direction) = system.anchor_input(source).unwrap_or_default();
+    let kind = if direction == 2 { PortKind::Rotation } else { PortKind::Displacement };
+    (source, kind, PortResponse::Motion(Signal::AnchorForce(anchor, direction)))
 }
 
 /// The port that a node, a beam or the frame offers under this name.
@@ -160,8 +171,12 @@ fn offered(compiled: &CompiledModel, name: &str) -> Result<(Input, PortKind, Por
             | Signal::Charge(_)
             | Signal::Distance(_)
             | Signal::Capacitance(_)
-            | Signal::Pull(_),
+            | Signal::Pull(_)
+            | Signal::AnchorForce(..),
         ) => refused("NODE.x|y|rz|vx|vy|vrz, BEAM.T or frame.ax|ay|wz", "which can be monitored but not driven"),
+        Err(_) if is_anchor_motion(name) => {
+            refused("the motion of an anchor with `moves=1`", "of which there is none at that node")
+        }
         Err(_) => {
             let electrics = &compiled.parts.system.electrics;
             let available = electrics.names[..electrics.ports].to_vec();

@@ -4,8 +4,9 @@ use super::expression::{Expression, Quantity};
 use super::{ReadoutError, stress};
 use bimorph_base::suggest::nearest;
 use bimorph_domains::Domain;
-use bimorph_domains::MaterialPoint;
+use bimorph_domains::anchor_force::AnchorView;
 use bimorph_domains::contact_resistance::conductance;
+use bimorph_domains::{Drive, MaterialPoint};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::{self, DOF, Pose};
 use bimorph_multibody::{BodyId, Model};
@@ -36,6 +37,8 @@ pub enum Signal {
     Capacitance(usize),
     /// Force with which the voltage closes gap g (N).
     Pull(usize),
+    /// Force with which a driven anchor moves the mechanism along x (0) or y (1) (N), or its moment (2) (N·m).
+    AnchorForce(usize, usize),
 }
 
 /// State, or change of a state, that signals are read from.
@@ -53,8 +56,7 @@ pub struct SignalView<'a> {
 
 impl Signal {
     /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, the same of `BEAM[k]`, the k-th point along a beam from 0, `BEAM.T`, `BEAM.stress`,
-    /// `GAP.q`, `GAP.gap`, `GAP.C`, `GAP.F`, `GAP.N`,
-    /// `STOP.G`.
+    /// `GAP.q`, `GAP.gap`, `GAP.C`, `GAP.F`, `GAP.N`, `STOP.G`, and `NODE.fx|fy|m` of a driven anchor.
     ///
     /// # Errors
     /// [`ReadoutError::UnknownSignal`] with what would be understood.
@@ -71,6 +73,9 @@ impl Signal {
                 None => along_beam(compiled, part)?,
             };
             return Some(if rate { Self::Rate(point, direction) } else { Self::Displacement(point, direction) });
+        }
+        if let Some(direction) = ANCHOR_FORCES.iter().position(|force| *force == quantity) {
+            return Some(Self::AnchorForce(compiled.parts.system.anchor_at(part)?, direction));
         }
         let gap = || compiled.parts.gap_names.iter().position(|n| n == part);
         match quantity {
@@ -122,6 +127,10 @@ impl Signal {
             Self::Distance(g) => system.distance(g, state.q),
             Self::Capacitance(g) => system.capacitance(g, state.q),
             Self::Pull(g) => system.pull(g, state.q, state.volts[g]),
+            Self::AnchorForce(anchor, direction) => {
+                let drive = drive_of(compiled, state, 1.0);
+                system.anchor_force(anchor, &AnchorView { q: state.q, v: state.v, drive: &drive })[direction]
+            }
         }
     }
 
@@ -154,6 +163,12 @@ impl Signal {
             Self::Distance(g) => system.distance_slope(g, state.q, change.q),
             Self::Capacitance(g) => system.capacitance_slope(g, state.q, change.q),
             Self::Pull(g) => system.pull_slope(g, state.q, state.volts[g], change.q, change.volts[g]),
+            Self::AnchorForce(anchor, direction) => {
+                let (drive, moved) = (drive_of(compiled, state, 1.0), drive_of(compiled, change, 0.0));
+                let at = AnchorView { q: state.q, v: state.v, drive: &drive };
+                let by = AnchorView { q: change.q, v: change.v, drive: &moved };
+                system.anchor_force_change(anchor, &at, &by)[direction]
+            }
         }
     }
 }
@@ -168,7 +183,8 @@ impl Quantity for Signal {
             Self::Temperature(_) | Self::Prescribed(_) => "K",
             Self::Charge(_) => "C",
             Self::Capacitance(_) => "F",
-            Self::Pull(_) | Self::Bearing(_) => "N",
+            Self::AnchorForce(_, 2) => "N·m",
+            Self::Pull(_) | Self::Bearing(_) | Self::AnchorForce(..) => "N",
             Self::Conductance(..) => "S",
             Self::Stress(_) => "Pa",
         }
@@ -215,7 +231,22 @@ pub fn names(compiled: &CompiledModel) -> Vec<String> {
         let quantities = ["gap", "q", "C", "F"].map(Some).into_iter().chain(own);
         quantities.flatten().map(|quantity| format!("{gap}.{quantity}")).collect::<Vec<_>>()
     });
-    motions.chain(of_beams).chain(of_gaps).collect()
+    let driven = compiled.structure.driven_anchors().filter(|node| compiled.parts.system.anchor_at(node).is_some());
+    let of_anchors = driven.flat_map(|node| ANCHOR_FORCES.map(|force| format!("{node}.{force}")));
+    motions.chain(of_beams).chain(of_gaps).chain(of_anchors).collect()
+}
+
+/// Components of the force of a driven anchor.
+pub(crate) const ANCHOR_FORCES: [&str; DOF] = ["fx", "fy", "m"];
+
+/// Voltages of gaps and free strains of a state, with a fraction of built-in strains (1), or their change.
+fn drive_of(compiled: &CompiledModel, state: &SignalView<'_>, load: f64) -> Drive {
+    let electrics = &compiled.parts.system.electrics;
+    let mut drive = electrics.drive();
+    drive.volts.copy_from_slice(state.volts);
+    electrics.expand(state.rise, &mut drive.expansion);
+    drive.load = load;
+    drive
 }
 
 /// Components of the motion of a node: displacements, then rates.
@@ -252,7 +283,8 @@ fn hint(compiled: &CompiledModel, name: &str) -> String {
     let part = name.rsplit_once('.').map_or(name, |(part, _)| part);
     let nodes: Vec<&str> = compiled.structure.nodes.iter().filter(|n| n.mechanical).map(|n| n.name.as_str()).collect();
     if nodes.contains(&part) {
-        return format!("\"{part}\" is a node: use {part}.x, .y, .rz, .vx, .vy or .vrz");
+        let forces = if compiled.parts.system.anchor_at(part).is_some() { ", .fx, .fy, .m" } else { "" };
+        return format!("\"{part}\" is a node: use {part}.x, .y, .rz{forces}, .vx, .vy or .vrz");
     }
     let beams = compiled.structure.beams.iter().map(|b| b.name.as_str());
     let known: Vec<&str> =

@@ -36,6 +36,7 @@ impl<'a> ContactEnergy<'a> {
         let system = &compiled.parts.system;
         let conserved = compiled.parts.heaters.is_empty()
             && options.shock.is_none()
+            && options.motions.is_empty()
             && !compiled.options.as_sugar
             && !system.turns();
         (conserved && system.can_touch()).then(|| Self {

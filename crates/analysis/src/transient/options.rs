@@ -3,7 +3,7 @@
 use super::super::AnalysisError;
 use super::super::integrator::Integrator;
 use bimorph_base::ErrorBudget;
-use bimorph_domains::Shock;
+use bimorph_domains::{InputWaveform, Shock};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::analysis::TRAN_POINTS;
 use bimorph_solve::baseline::SolverKind;
@@ -47,6 +47,8 @@ pub struct TransientOptions<'a> {
     pub release: Option<&'a CompiledModel>,
     /// Acceleration of the frame from the start on; in the bodies' own coordinates.
     pub shock: Option<Shock>,
+    /// Displacements (m) and rotations (rad) of driven anchors over time, by the names of their inputs.
+    pub motions: Vec<(String, InputWaveform)>,
     /// Integrator.
     pub method: Integrator,
     /// Length of equal steps (s); none: steps follow `tol`.
@@ -77,6 +79,7 @@ impl Default for TransientOptions<'_> {
             voltages: Vec::new(),
             release: None,
             shock: None,
+            motions: Vec::new(),
             method: Integrator::default(),
             step: None,
             events: Vec::new(),
@@ -116,6 +119,17 @@ pub(crate) fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError>
         && !(duration.is_finite() && duration > 0.0 && peak.iter().all(|peak| peak.is_finite()))
     {
         return bad("shock", format!("{peak:?} m/s² during {duration} s is no acceleration over a positive time"));
+    }
+    for (name, wave) in &options.motions {
+        if let Err(expected) = wave.check() {
+            return bad("motion", format!("\"{name}\": expected {expected}"));
+        }
+        if options.voltages.iter().any(|(held, _)| held == name) {
+            return bad(
+                "motion",
+                format!("\"{name}\" is held at a value and follows a waveform; expected one of them"),
+            );
+        }
     }
     if let Some((name, level)) = options.events.iter().find(|(_, level)| !level.is_finite()) {
         return bad("event", format!("{name}={level}: the level is not finite"));
@@ -195,6 +209,12 @@ impl<'a> TransientOptions<'a> {
 }
 
 impl TransientOptions<'_> {
+    /// Values of ports and anchors at the start of the run.
+    pub(crate) fn at_start(&self) -> Vec<(String, f64)> {
+        let motions = self.motions.iter().map(|(name, wave)| (name.clone(), wave.at(0.0)[0]));
+        self.voltages.iter().cloned().chain(motions).collect()
+    }
+
     /// The division of the tolerance.
     pub fn errors(&self) -> ErrorBudget {
         ErrorBudget::of(self.tol)

@@ -2,7 +2,7 @@
 
 use super::super::contact_range::within_contact_range;
 use super::super::stability::StabilityMonitor;
-use super::super::statics::{notes_at, operating_point, source_vector};
+use super::super::statics::{check_motion, notes_at, operating_point, source_vector};
 use super::super::{AnalysisError, ProgressCallback};
 use super::contact_energy::ContactEnergy;
 use super::crossings::Crossings;
@@ -16,7 +16,7 @@ use super::samples::SampleRecorder;
 use crate::overheating::check_course;
 use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
-use bimorph_domains::{Ramp, System};
+use bimorph_domains::{InputWaveform, Ramp, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::Body;
 use bimorph_multibody::planar::Pose;
@@ -70,7 +70,9 @@ pub(crate) fn record(
     let signals: Vec<Expression<RunSignal>> =
         options.signals.iter().map(|name| Expression::of_run(compiled, name, &sources)).collect::<Result<_, _>>()?;
     let (mut motion, rise, begun) = start(compiled, options)?;
-    let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop).shocked(options.shock);
+    let motions = motions(compiled, options)?;
+    let ramp =
+        Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop).shocked(options.shock).moved(&motions);
     check_course(compiled, &ramp)?;
     let mut drive = system.electrics.drive();
     ramp.at(0.0, &mut drive);
@@ -187,14 +189,43 @@ fn lost(SignalLoss { signal, t, chaotic }: SignalLoss) -> String {
     }
 }
 
-/// Takes a system to the equilibrium of its built-in strains and moved anchors, without dead loads and voltages: anchors that jumped would send waves along
-/// the beams.
-fn built_in(system: &System, q: &mut [Pose]) -> Result<(), AnalysisError> {
-    let unloaded = System { loads: Vec::new(), ..system.clone() };
+/// Waveforms of driven anchors by their places among the inputs.
+fn motions(
+    compiled: &CompiledModel,
+    options: &TransientOptions<'_>,
+) -> Result<Vec<(usize, InputWaveform)>, AnalysisError> {
+    // names, and values at the start
+    source_vector(compiled, &options.at_start())?;
+    let system = &compiled.parts.system;
+    let place = |(name, wave): &(String, InputWaveform)| {
+        let source = system.anchor_source(name).ok_or_else(|| AnalysisError::BadRequest {
+            what: format!("motion \"{name}\""),
+            detail: format!("expected NODE.ux, .uy or .urz of an anchor with `moves=1`, got \"{name}\""),
+        })?;
+        check_motion(compiled, (name, source), wave.farthest())?;
+        Ok((source - system.electrics.voltages(), wave.clone()))
+    };
+    options.motions.iter().map(place).collect()
+}
+
+/// The equilibrium of built-in strains and moved anchors at the start of a run, without dead loads and voltages: anchors that jumped would send waves along
+/// the beams. None where no anchor moves.
+pub(crate) fn at_anchors(
+    compiled: &CompiledModel,
+    options: &TransientOptions<'_>,
+) -> Result<Option<Vec<Pose>>, AnalysisError> {
+    let system = &compiled.parts.system;
     let off = vec![0.0; system.electrics.sources()];
-    let path = SourcePath::new(&unloaded.electrics, &off, &off, [0.0, 1.0]);
-    Equilibrium::new(&unloaded, EquilibriumOptions::default()).follow(&unloaded, &path, q)?;
-    Ok(())
+    let mut placed = source_vector(compiled, &options.at_start())?;
+    placed[..system.electrics.voltages()].fill(0.0);
+    if !compiled.structure.moves_anchors() && placed == off {
+        return Ok(None);
+    }
+    let unloaded = System { loads: Vec::new(), ..system.clone() };
+    let mut q = vec![Pose::zeros(); system.bodies()];
+    let path = SourcePath::new(&unloaded.electrics, &off, &placed, [0.0, 1.0]);
+    Equilibrium::new(&unloaded, EquilibriumOptions::default()).follow(&unloaded, &path, &mut q)?;
+    Ok(Some(q))
 }
 
 /// Initial state of a run, temperature rises of its heaters (K), and warnings: at rest as drawn, in the equilibrium of moved anchors, or in that
@@ -215,7 +246,7 @@ fn start(
     let mut rise = system.electrics.heating.rest();
     let mut reported = Vec::new();
     if let Some(start) = options.release {
-        let point = operating_point(start, &options.voltages)?;
+        let point = operating_point(start, &options.at_start())?;
         let places = |model: &CompiledModel| model.structure.nodes.iter().map(|node| node.position).collect::<Vec<_>>();
         if point.q.len() != motion.q.len() || places(start) != places(compiled) {
             return Err(AnalysisError::BadRequest {
@@ -226,8 +257,8 @@ fn start(
         motion.q.copy_from_slice(&point.q);
         rise.copy_from_slice(&point.rise);
         reported = notes_at(start, &point);
-    } else if compiled.structure.moves_anchors() {
-        built_in(system, &mut motion.q)?;
+    } else if let Some(q) = at_anchors(compiled, options)? {
+        motion.q = q;
     }
     Ok((
         motion,

@@ -7,8 +7,8 @@ use crate::record::{DocumentRecord, ObjectReader, ObjectSchema, field_schema, re
 use crate::value::NumberRange::{Any, NonNegative, Positive, Within};
 use crate::value::{DocumentField, DocumentValue, DocumentWriter, NodeNames};
 use bimorph_structure::{
-    Adhesion, AnchorMotion, Beam, Friction, GasLoss, Heater, Link, Load, Mass, Material, Node, OhmicContact, Pad,
-    PlacedElement, PropertyCurve, SolidHeat, SpringDamper, Stop, Support, Yield,
+    Adhesion, AnchorMotion, Beam, Friction, GasLoss, Heater, Link, Load, MAX_STICK_STIFFNESS, Mass, Material, Node,
+    OhmicContact, Pad, PlacedElement, PropertyCurve, SolidHeat, SpringDamper, Stop, Support, Yield,
 };
 
 record! {
@@ -127,9 +127,11 @@ record! {
 }
 
 record! {
-    AnchorMotion: "Motion of an anchor with a strained substrate, and by a given displacement." {
+    AnchorMotion: "Motion of an anchor with a strained substrate, and by a given displacement and rotation." {
         strain: "1", Any, "Strain of the substrate along x and y, about the origin";
         displacement: "m", Any, "Displacement along x and y";
+        rotation = 0.0: "rad", Any, "Rotation about z";
+        driven = false: "", Any, "Whether analyses give it a displacement and a rotation beside these";
     }
 }
 
@@ -205,7 +207,7 @@ record! {
     Friction: "Coulomb's friction, regularised." {
         coefficient: "1", Positive, "Coefficient of friction";
         slip_speed: "m/s", Positive, "Speed below which surfaces stick";
-        stick_stiffness: "N/m", Positive, "Stiffness along the surface while they stick, which gives friction to parts at rest; left out: those have none";
+        stick_stiffness: "N/m", Within(0.0, MAX_STICK_STIFFNESS), "Stiffness along the surface while they stick, which gives friction to parts at rest; left out: those have none";
     }
 }
 

@@ -6,8 +6,12 @@ use super::super::input::Input;
 use super::super::lag::Lags;
 use super::electrics::{Drive, Electrics};
 use super::shock::Shock;
+use super::waveform::InputWaveform;
 use bimorph_multibody::planar::Pose;
 use std::sync::OnceLock;
+
+/// Corners of waveforms that steps end at.
+const MAX_CORNERS: usize = 1_000_000;
 
 /// Source voltages that go linearly from one value to another during a step, with the rises that follow them.
 /// Time-independent quantities are computed once.
@@ -27,6 +31,8 @@ pub struct Ramp<'a> {
     pub push: &'a [Pose],
     /// Acceleration of the frame beside that of the sources; its inputs must be among those of the electrical side.
     pub shock: Option<Shock>,
+    /// Inputs of the electrical side that follow waveforms beside their sources.
+    pub motions: &'a [(usize, InputWaveform)],
     /// Of each heater the coefficients of its steady rise in the time since the start: [`Electrics::heat_course`].
     heat: Vec<[f64; 3]>,
     /// The course of the rises where resistances depend on temperature.
@@ -44,7 +50,7 @@ impl<'a> Ramp<'a> {
         let course = heating.hot().map(|hot| hot.course(line, &rise[heating.means()..]));
         let changes = if course.is_some() { vec![OnceLock::new(); from.len()] } else { Vec::new() };
         let heat = electrics.heat_course((from, to), dt);
-        Self { electrics, from, to, rise, dt, push: &[], shock: None, heat, course, changes }
+        Self { electrics, from, to, rise, dt, push: &[], shock: None, motions: &[], heat, course, changes }
     }
 
     /// The time at which rises leave all bounds (s), with the heater and the table that ends there, if it is one; none: they do not.
@@ -99,10 +105,27 @@ impl<'a> Ramp<'a> {
         Self { shock, ..self }
     }
 
-    /// Acceleration and its rate that a shock adds to input `k` at time `s` (m/s², m/s³).
-    fn shock_at(&self, k: usize, s: f64) -> [f64; 2] {
+    /// The same with waveforms of inputs, by their places among those of the electrical side.
+    #[inline]
+    pub fn moved(self, motions: &'a [(usize, InputWaveform)]) -> Self {
+        Self { motions, ..self }
+    }
+
+    /// Times before the end at which the rate of an input jumps (s), ascending, the first million of them.
+    pub fn corners(&self) -> Vec<f64> {
+        let after = |t: f64| self.motions.iter().map(|(_, wave)| wave.corner_after(t)).fold(f64::INFINITY, f64::min);
+        let inside = |t: f64| Some(after(t)).filter(|corner| *corner < self.dt);
+        std::iter::successors(inside(0.0), |t| inside(*t)).take(MAX_CORNERS).collect()
+    }
+
+    /// Sum of the shock and the waveforms of input `k` at time `s`, and its rate.
+    fn course_at(&self, k: usize, s: f64) -> [f64; 2] {
         match (&self.shock, self.electrics.inputs[k]) {
             (Some(shock), Input::Acceleration { axis }) => shock.at(axis, s),
+            (_, Input::Motion { .. }) => {
+                let own = self.motions.iter().filter(|(input, _)| *input == k).map(|(_, wave)| wave.at(s));
+                own.fold([0.0; 2], |[x, v], [a, b]| [x + a, v + b])
+            }
             _ => [0.0; 2],
         }
     }
@@ -193,7 +216,7 @@ impl<'a> Ramp<'a> {
         drive.turning = 0.0;
         for (k, value) in drive.inputs.iter_mut().enumerate() {
             let change = self.to[first + k] - self.from[first + k];
-            *value = self.from[first + k] + x * change + self.shock_at(k, s)[0];
+            *value = self.from[first + k] + x * change + self.course_at(k, s)[0];
             if self.electrics.inputs[k] == Input::Rate {
                 drive.turning += change / self.dt;
             }
@@ -207,7 +230,7 @@ impl<'a> Ramp<'a> {
         self.expansion_rates(lags, |k, strain| rate.expansion[k] = strain);
         let first = self.electrics.voltages();
         for (k, value) in rate.inputs.iter_mut().enumerate() {
-            *value = (self.to[first + k] - self.from[first + k]) / self.dt + self.shock_at(k, lags.t)[1];
+            *value = (self.to[first + k] - self.from[first + k]) / self.dt + self.course_at(k, lags.t)[1];
         }
         (rate.load, rate.turning) = (0.0, 0.0);
         rate.push.clear();

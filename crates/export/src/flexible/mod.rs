@@ -10,7 +10,7 @@ pub mod ports;
 pub mod text;
 
 use super::linear::{ReducedPort, SignalShown};
-use super::mechanism::port_names;
+use super::mechanism::{port_names, refuse_driven};
 use super::{ExportError, ExportRequest};
 use bimorph_analysis::readout::expression::Quantity;
 use bimorph_analysis::readout::ports::{OpenedPorts, PortResponse};
@@ -103,6 +103,7 @@ pub fn flexible(compiled: &CompiledModel, request: &ExportRequest) -> Result<Fle
     if let Some(k) = opened.kinds.iter().position(|kind| *kind == PortKind::Rate) {
         return Err(ExportError::Turning { port: names[k].clone() });
     }
+    refuse_driven(compiled)?;
     writable(compiled, system)?;
     let ranges = ranges(request, &names)?;
     let scaled: Vec<PortScale> =
@@ -337,6 +338,10 @@ impl RowReader<'_> {
                         "the way and the force of a contact are not written, which a signal of \"{name}\" shows; leave it out"
                     ),
                 });
+            }
+            Signal::AnchorForce(..) => {
+                let why = "the force of an anchor is not written; leave its signal out".to_owned();
+                return Err(ExportError::NotFlexible { why });
             }
             Signal::Stress(_) => {
                 let why = "the stress of a beam is not written; leave its signal out".to_owned();

@@ -4,6 +4,7 @@ use super::error::{SweepError, bad};
 use super::values::Values;
 use bimorph_base::Setting;
 use bimorph_model::options::{CompileOptions, MODEL, ModelOption, OptionValue, Range};
+use bimorph_structure::is_anchor_motion;
 
 /// Suffix of a port's name that makes the name of an axis of its voltages: `heat.v`. No netlist parameter has a point
 /// in its name.
@@ -14,7 +15,7 @@ const OPTION: &str = "option.";
 /// One axis of the grid, or of several that go together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepParameter {
-    /// A netlist parameter; a port with `.v` behind it: its voltage (V); an option of the model with `option.` before it.
+    /// A netlist parameter; a port with `.v` behind it: its voltage (V); the motion `NODE.ux`, `.uy` or `.urz` of a driven anchor (m, rad); an option of the model with `option.` before it.
     pub name: String,
     /// The values it takes, in order. SI.
     pub values: Values,
@@ -26,7 +27,7 @@ pub struct SweepParameter {
 #[derive(Clone, Copy)]
 pub(super) enum Varied<'a> {
     Parameter,
-    /// A port.
+    /// A port, or the motion of an anchor.
     Voltage(&'a str),
     /// An option, by its name.
     Option(&'a str),
@@ -36,6 +37,7 @@ pub(super) enum Varied<'a> {
 pub(super) fn varied(name: &str) -> Varied<'_> {
     match (name.strip_suffix(VOLTS), name.strip_prefix(OPTION)) {
         (Some(port), _) => Varied::Voltage(port),
+        (None, None) if is_anchor_motion(name) => Varied::Voltage(name),
         (None, Some(option)) => Varied::Option(option),
         (None, None) => Varied::Parameter,
     }

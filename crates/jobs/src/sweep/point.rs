@@ -17,6 +17,7 @@ use bimorph_base::budget;
 use bimorph_base::{Setting, Severity};
 use bimorph_model::compile::{CompileError, CompileOptions, Formulation, draw};
 use bimorph_netlist::NetlistSource;
+use bimorph_structure::is_anchor_motion;
 use std::borrow::Cow;
 use std::collections::HashSet;
 
@@ -137,10 +138,14 @@ pub(super) fn check_names(
         Err(_) => return Ok(()),
     };
     let ports = || drawn.structure.ports.iter().map(|port| port.name.as_str());
-    let names: HashSet<&str> = ports().collect();
+    let driven: Vec<String> = drawn.structure.driven_inputs().collect();
+    let names: HashSet<&str> = ports().chain(driven.iter().map(String::as_str)).collect();
     if let Some(none) = spec.ports().find(|name| !names.contains(name)) {
-        let known = ports().take(MAX_LISTED_PORTS).map(|port| format!("{port}{VOLTS}")).collect::<Vec<_>>().join(", ");
-        return refused("parameters", format!("voltages of ports ({known})"), format!("\"{none}{VOLTS}\""));
+        let known = ports().map(|port| format!("{port}{VOLTS}")).chain(driven.iter().cloned());
+        let known = known.take(MAX_LISTED_PORTS).collect::<Vec<_>>().join(", ");
+        let suffix = if is_anchor_motion(none) { "" } else { VOLTS };
+        let expected = format!("voltages of ports and motions of driven anchors ({known})");
+        return refused("parameters", expected, format!("\"{none}{suffix}\""));
     }
     let outputs = match &spec.analysis {
         SweepAnalysis::Static { outputs, .. } => outputs,

@@ -343,8 +343,12 @@ impl<'a> OfStructure<'a> {
             let warm = support.temperature.map(|temperature| ("anchortemperature", temperature));
             let names = ["packagestrainx", "packagestrainy", "anchorx", "anchory"];
             let motion = support.motion.map(|m| names.into_iter().zip(m.strain.into_iter().chain(m.displacement)));
+            let turned = support.motion.map(|m| m.rotation).filter(|rotation| *rotation != 0.0);
+            let driven = support.motion.filter(|m| m.driven).map(|_| ("moves", 1.0));
             let parameters: Vec<_> = (size.into_iter().flatten().chain(undercut).chain(warm))
                 .chain(motion.into_iter().flatten())
+                .chain(turned.map(|rotation| ("anchorrz", rotation)))
+                .chain(driven)
                 .chain([("oz", support.angle)])
                 .collect();
             self.push(&support.name, model, "*", &[support.node], &parameters);

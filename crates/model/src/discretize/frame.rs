@@ -15,6 +15,7 @@
 
 use super::bar::bar;
 use super::free_rotation::{self, BodyActions};
+use super::rigid::PlacedAnchor;
 use super::rigid::RigidGroups;
 use super::{DiscretizeError, cubic, lay_spring, order};
 use bimorph_domains::{Domain, MaterialPoint, Member};
@@ -102,7 +103,7 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<LinearF
     let ends: Vec<BodyId> = pieces.iter().flat_map(|piece| [piece.from.body, piece.to.body]).collect();
     let acting = BodyActions { structure, joints: &joints, dampers: &dampers, members: &gaps, elements: &ends };
     free_rotation::hold(&acting, &mut rigid);
-    rigid.hold_hinges(structure, &mut joints);
+    let driven = rigid.hold_hinges(structure, &mut joints);
     let couplings: Vec<(BodyId, BodyId)> = (pieces.iter().map(|p| (p.from.body, p.to.body)))
         .chain(joints.iter().map(|j: &Joint| (j.a, j.b)))
         .chain(dampers.iter().map(|d| (d.a, d.b)))
@@ -175,12 +176,23 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<LinearF
             load[k] += carry(point.arm).transpose() * Vector3::new(force.force[0], force.force[1], force.moment);
         }
     }
+    add_anchors(&driven, moved, &mut load);
     let placed = |point: MaterialPoint| MaterialPoint { body: moved(point.body), ..point };
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| placed(rigid.point(n)))).collect();
     let beams = beams.into_iter().map(|points| points.into_iter().map(placed).collect()).collect();
     let gaps = gaps.into_iter().map(|laid| laid.member.moved(&placed)).collect();
     Ok(LinearFrame { system, load, expansion, nodes, beams, gaps })
+}
+
+/// The loads that hold anchors at the places of the drawing.
+fn add_anchors(driven: &[PlacedAnchor], moved: impl Fn(BodyId) -> BodyId, load: &mut [Pose]) {
+    for PlacedAnchor { anchor, .. } in driven {
+        if let BodyId::Free(k) = moved(anchor.point.body) {
+            let pull = Vector3::from(anchor.stiffness).component_mul(&Vector3::from(anchor.drawn));
+            load[k] += carry(anchor.point.arm).transpose() * pull;
+        }
+    }
 }
 
 /// The elements of every beam, and the points between them along its centreline, ends included.

@@ -12,6 +12,7 @@
 //! | [`order`] | model order: how many segments a beam gets |
 //! | [`rigid`] | nodes → rigid groups, supports → ground and held directions |
 //! | `free_rotation` | rotations that nothing uses, which are held |
+//! | `driven_anchors` | anchors whose displacement is an input |
 //! | [`anchor_root`] | the compliance of a beam's root at an elastic anchor |
 //! | [`junction`] | which beams meet where, and what that does to their ends |
 //! | [`junction_limits`] | where a drawing goes beyond the table of junctions |
@@ -34,6 +35,7 @@ pub(crate) mod bar;
 pub mod beam;
 mod contact_mass;
 pub mod cubic;
+mod driven_anchors;
 mod error;
 pub mod fillet;
 pub mod frame;
@@ -168,7 +170,7 @@ pub fn discretize_like(
     lay_dampers(&gaps, options.undamped, &mut dampers);
     let acting = BodyActions { structure, joints: &joints, dampers: &dampers, members: &gaps, elements: &[] };
     free_rotation::hold(&acting, &mut rigid);
-    rigid.hold_hinges(structure, &mut joints);
+    let driven = rigid.hold_hinges(structure, &mut joints);
     let mut couplings = couplings(&gaps);
     let load = |l: &bimorph_structure::Load| {
         let force = Vector2::new(l.force[0], l.force[1]);
@@ -177,19 +179,16 @@ pub fn discretize_like(
     let loads: Vec<DeadLoad> = structure.loads.iter().map(load).collect();
     let electrics = match other {
         Some(other) => Arc::clone(&other.system.electrics),
-        None => Arc::new(ports::lay(structure, &heaters, &gaps, &rigid)?),
+        None => Arc::new(driven_anchors::give_inputs(ports::lay(structure, &heaters, &gaps, &rigid)?, &driven)),
     };
     if rigid.bodies.is_empty() {
         return Err(DiscretizeError::NothingMoves);
     }
     budget::lay_out(rigid.bodies.len() * BODY_BYTES);
     let bodies = contact_mass::weighed(rigid.finish_bodies(), &gaps, options);
-    for joint in &mut joints {
-        rigid.center(joint.a, joint.b, &mut joint.frame);
-    }
-    for damper in &mut dampers {
-        rigid.center(damper.a, damper.b, &mut damper.frame);
-    }
+    let of_joints = joints.iter_mut().map(|joint| (joint.a, joint.b, &mut joint.frame));
+    let of_dampers = dampers.iter_mut().map(|damper| (damper.a, damper.b, &mut damper.frame));
+    of_joints.chain(of_dampers).for_each(|(a, b, frame)| rigid.center(a, b, frame));
     couplings.extend(coupled.iter().flat_map(Coupling::pairs));
     let (model, order) = Model::ordered(bodies, joints, dampers, &couplings, options.linear);
     let (place, stressed) = (order.bodies, stressed::beams(structure, &of_beams, &order.joints));
@@ -207,6 +206,7 @@ pub fn discretize_like(
         model,
         members: gaps.into_iter().map(|laid| laid.member.moved(&moved)).collect(),
         loads: loads.into_iter().map(|l| DeadLoad { point: moved(l.point), ..l }).collect(),
+        anchors: driven_anchors::placed(driven, &order.joints, &moved),
         electrics,
         length_scale: length_scale(structure),
     };

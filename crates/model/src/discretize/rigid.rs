@@ -5,11 +5,12 @@
 //! first node); after it, from the centre of mass, in which the mass matrix is diagonal and constant.
 
 use bimorph_base::sets::Sets;
+use bimorph_domains::driven_anchor::DrivenAnchor;
 use bimorph_domains::plate_film::STATES_OF_BODY;
 use bimorph_domains::{MaterialPoint, Member, PlacedMember, Station, StructureView};
 use bimorph_multibody::planar::JointFrame;
 use bimorph_multibody::{Body, BodyId, BodyName, Drag, Joint};
-use bimorph_structure::{Beam, Mass, NodeId, Structure, Support};
+use bimorph_structure::{AnchorMotion, Beam, Mass, NodeId, Structure, Support};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -52,6 +53,15 @@ pub struct UnfinishedBody {
     fixed_angle: bool,
     /// An anchor that moves: without inertia and drag.
     anchored: bool,
+}
+
+/// A driven anchor, with the place of its joint among those of a model under construction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacedAnchor {
+    /// The anchor; its own `joint` is not yet known.
+    pub anchor: DrivenAnchor,
+    /// Place of its joint to ground.
+    pub joint: usize,
 }
 
 /// Groups of nodes and the bodies they become.
@@ -101,7 +111,7 @@ impl RigidGroups {
         for support in &structure.supports {
             if let BodyId::Free(k) = assembly.group[support.node.0] {
                 match support.motion {
-                    Some(_) => assembly.bodies[k].anchor(),
+                    Some(motion) => assembly.bodies[k].anchor(may_turn(&motion)),
                     None => assembly.bodies[k].hold(support.held, support.angle),
                 }
             }
@@ -232,7 +242,8 @@ impl RigidGroups {
     /// Supports that hold a translation but let the body turn: a joint to ground a million times stiffer than the stiffest beam
     /// or spring as drawn, whatever the mesh. (Held directions of the centre of mass would be wrong: the node moves when the
     /// body turns.) Anchors that move have such joints, too.
-    pub fn hold_hinges(&self, structure: &Structure, joints: &mut Vec<Joint>) {
+    /// Returns the anchors that are driven.
+    pub fn hold_hinges(&self, structure: &Structure, joints: &mut Vec<Joint>) -> Vec<PlacedAnchor> {
         let along = |beam: &Beam| beam.material.youngs_modulus * beam.width * beam.thickness / beam.length;
         let springs = structure.springs.iter().flat_map(|s| [s.stiffness[0].abs(), s.stiffness[1].abs()]);
         let stiffest = structure.beams.iter().map(along).chain(springs).fold(0.0, f64::max);
@@ -241,7 +252,7 @@ impl RigidGroups {
         for support in &structure.supports {
             let point = self.point(support.node.0);
             let BodyId::Free(k) = point.body else { continue };
-            if self.bodies[k].fixed_angle || !(support.held[0] || support.held[1]) {
+            if self.bodies[k].fixed_angle || support.motion.is_some() || !(support.held[0] || support.held[1]) {
                 continue;
             }
             // a second joint that holds the same would close a loop of rigid joints
@@ -267,17 +278,45 @@ impl RigidGroups {
                 locked: [support.held[0], support.held[1], false],
             });
         }
-        self.move_anchors(structure, stiffness, joints);
+        self.move_anchors(structure, stiffness, joints)
     }
 
     /// Anchors that move: joints to ground as stiff as hinges, with the displacement as their rest offset, so that it acts as built-in strain does.
-    /// Those of one rigid part share its mean displacement.
-    fn move_anchors(&self, structure: &Structure, stiffness: f64, joints: &mut Vec<Joint>) {
+    /// Those of one rigid part share its mean displacement. Driven ones have no offset in their joint, and turn ([`bimorph_domains::driven_anchor`]).
+    fn move_anchors(&self, structure: &Structure, stiffness: f64, joints: &mut Vec<Joint>) -> Vec<PlacedAnchor> {
         let ground = MaterialPoint { body: BodyId::Ground, arm: Vector2::zeros() };
+        let longest = structure.beams.iter().map(|beam| beam.length).fold(0.0, f64::max);
+        let lever = if longest > 0.0 { longest } else { structure.extent() };
+        let turning = if lever > 0.0 { stiffness * lever * lever } else { stiffness };
+        let mut driven = Vec::new();
         for support in &structure.supports {
             let point = self.point(support.node.0);
             let (Some(motion), BodyId::Free(_)) = (support.motion, point.body) else { continue };
-            let displacement = Vector2::from(motion.at(structure.nodes[support.node.0].position));
+            let node = &structure.nodes[support.node.0];
+            let displacement = Vector2::from(motion.at(node.position));
+            if may_turn(&motion) {
+                driven.push(PlacedAnchor {
+                    joint: joints.len(),
+                    anchor: DrivenAnchor {
+                        node: motion.driven.then(|| node.name.clone()),
+                        point,
+                        joint: 0,
+                        stiffness: [stiffness, stiffness, turning],
+                        drawn: [displacement.x, displacement.y, motion.rotation],
+                    },
+                });
+                joints.push(Joint {
+                    a: BodyId::Ground,
+                    b: point.body,
+                    frame: self.frame_at(ground, point, self.position[support.node.0], Vector2::x()),
+                    stiffness: Matrix3::from_diagonal(&[stiffness, stiffness, turning].into()),
+                    second: Matrix2::zeros(),
+                    expansion: None,
+                    rest: 0.0,
+                    locked: [false; 3],
+                });
+                continue;
+            }
             let axis = displacement.try_normalize(0.0).unwrap_or(Vector2::x());
             joints.push(Joint {
                 a: BodyId::Ground,
@@ -290,6 +329,7 @@ impl RigidGroups {
                 locked: [false; 3],
             });
         }
+        driven
     }
 
     /// The finished bodies, about their centres of mass.
@@ -317,6 +357,11 @@ impl RigidGroups {
     }
 }
 
+/// Whether an anchor that moves turns, or may.
+fn may_turn(motion: &AnchorMotion) -> bool {
+    motion.driven || motion.rotation != 0.0
+}
+
 /// Whether one support holds every translation that another one holds.
 fn holds_all_of(one: &Support, other: &Support) -> bool {
     let translations = |support: &Support| [support.held[0], support.held[1]];
@@ -340,9 +385,10 @@ impl UnfinishedBody {
         self.fixed_angle |= held[2];
     }
 
-    /// Makes it an anchor that moves.
-    fn anchor(&mut self) {
-        (self.anchored, self.fixed_angle) = (true, true);
+    /// Makes it an anchor that moves, and may turn.
+    fn anchor(&mut self, turns: bool) {
+        self.anchored = true;
+        self.fixed_angle |= !turns;
     }
 
     /// Calls `see` with the point that a mass or a drag acts on, from the reference point (m); `None` where it resists

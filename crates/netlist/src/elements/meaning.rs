@@ -107,6 +107,8 @@ fn of_combs_and_anchors(name: &str) -> &'static str {
         "misalign" => "distance of the fingers from the middle of their gaps [m]",
         "substrate" => "distance of the substrate [m]",
         "anchorx" | "anchory" => "displacement of the anchor [m]",
+        "anchorrz" => "rotation of the anchor [rad]",
+        "moves" => "1: displacement and rotation of the anchor are inputs [1]",
         "anchorquality" => "Q that the anchors leave a mode [1]",
         _ => "angle [rad]",
     }

@@ -2,7 +2,7 @@
 
 use super::super::diagnostic_sink::Reported;
 use super::arguments::ElementSite;
-use bimorph_structure::{Adhesion, Friction, OhmicContact, Stop};
+use bimorph_structure::{Adhesion, Friction, MAX_STICK_STIFFNESS, OhmicContact, Stop};
 
 /// Area on which a rigid stop bears unless it is given (m²): 10 µm by 10 µm.
 const AREA: f64 = 1e-10;
@@ -11,8 +11,6 @@ const AREA: f64 = 1e-10;
 const ADHESION_RANGE: f64 = 10e-9;
 /// Speed below which parts stick unless it is given (m/s).
 const SLIP_SPEED: f64 = 1e-5;
-/// Largest stiffness along a stop (N/m): a thousand times that of the stiffest contacts. Rounding of displacements would decide on forces of stiffer ones.
-const MAX_STICK_STIFFNESS: f64 = 1e9;
 
 /// stop2d: a may move by `gap` along local x, and by `back` against it, relative to b or to where it was drawn.
 pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {

@@ -42,9 +42,19 @@ impl ElementSite<'_, '_> {
                 return Err(self.out_of_range(given, strain, "at most 0.1"));
             }
         }
-        let moves = strain.iter().chain(&displacement).any(Option::is_some);
+        let rotation = self.number("anchorrz")?;
+        let driven = match self.number("moves")? {
+            Some(moves) if moves != 0.0 && moves != 1.0 => return Err(self.out_of_range("moves", moves, "0 or 1")),
+            given => given == Some(1.0),
+        };
+        let moves = driven || strain.iter().chain(&displacement).chain([&rotation]).any(Option::is_some);
         let or_none = |of: [Option<f64>; 2]| of.map(|x| x.unwrap_or(0.0));
-        Ok(moves.then(|| AnchorMotion { strain: or_none(strain), displacement: or_none(displacement) }))
+        Ok(moves.then(|| AnchorMotion {
+            strain: or_none(strain),
+            displacement: or_none(displacement),
+            rotation: rotation.unwrap_or(0.0),
+            driven,
+        }))
     }
 
     fn hold(&mut self, node: NodeId, held: [bool; 3], angle: f64, undercut: Option<f64>) {

@@ -95,7 +95,7 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
 /// Parameters that are angles (rad), besides ox, oy, oz. (`qoz` of a prestressedbeam is in degrees everywhere.)
 pub(super) const ANGLES: &[&str] = &[
     "alpha", "ox1", "oy1", "oz1", "ox2", "oy2", "oz2", "qox1", "qoy1", "qoz1", "qox2", "qoy2", "qoz2", "sliderox",
-    "slideroy", "slideroz",
+    "slideroy", "slideroz", "anchorrz",
 ];
 
 /// Parameters whose values are words, which need no quotes where no variable has their name.
@@ -174,6 +174,7 @@ const WIRED: &[usize] = &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 /// Nodes that one anchor may hold.
 const PADS: &[usize] = &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 const SIZE: &[&str] = &["l", "w", "h"];
+const ANCHOR: &[&str] = joined!(SIZE, &["anchorrz", "moves"]);
 /// The gas, the field and the contact of a clearance between two faces.
 const CLEARANCE: &[&str] =
     &["permittivity", "fringe", "electrode", "td", "er", "voffset", "touch", "restitution", "speed", "filmgap"];
@@ -223,9 +224,9 @@ const fn own(
 
 /// Every element of the language.
 const MODELS: &[ElementModel] = &[
-    sugar("anchor", PADS, "[a …]", SIZE, support::anchor),
-    sugar("bondingpad", PADS, "[a …]", SIZE, support::anchor),
-    sugar("commonground", PADS, "[a …]", SIZE, support::anchor),
+    sugar("anchor", PADS, "[a …]", ANCHOR, support::anchor),
+    sugar("bondingpad", PADS, "[a …]", ANCHOR, support::anchor),
+    sugar("commonground", PADS, "[a …]", ANCHOR, support::anchor),
     sugar("hinge", &[1], "[a]", SIZE, support::hinge),
     sugar("slider", &[1], "[a]", SIZE, support::slider),
     sugar("pinjoint", &[1], "[a]", SIZE, support::pinjoint),

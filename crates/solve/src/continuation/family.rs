@@ -4,6 +4,7 @@
 //! the pull of gaps and the heat of resistors with the square of voltages. Its derivative is therefore the central
 //! difference over any interval, exactly, and [`LoadFamily::slope`] is that, whatever a gap function's law in q.
 
+use bimorph_domains::driven_anchor::DrivenAnchor;
 use bimorph_domains::{DeadLoad, Drive, System};
 use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
@@ -29,6 +30,7 @@ pub enum NotAFamily {
 struct FamilyEnd {
     loads: Vec<DeadLoad>,
     rest: Vec<f64>,
+    anchors: Vec<[f64; 3]>,
     sources: Vec<f64>,
 }
 
@@ -60,8 +62,14 @@ impl LoadFamily {
             });
         let same_points =
             from.loads.len() == to.loads.len() && from.loads.iter().zip(&to.loads).all(|(x, y)| x.point == y.point);
-        let same =
-            same_joints && same_points && a.bodies == b.bodies && a.dampers == b.dampers && from.members == to.members;
+        let same_anchors = from.anchors.len() == to.anchors.len()
+            && from.anchors.iter().zip(&to.anchors).all(|(x, y)| DrivenAnchor { drawn: x.drawn, ..y.clone() } == *x);
+        let same = same_anchors
+            && same_joints
+            && same_points
+            && a.bodies == b.bodies
+            && a.dampers == b.dampers
+            && from.members == to.members;
         if !same {
             return Err(NotAFamily::Mechanism);
         }
@@ -72,6 +80,7 @@ impl LoadFamily {
         let end = |system: &System, sources: &[f64]| FamilyEnd {
             loads: system.loads.clone(),
             rest: system.model.joints.iter().map(|j| j.rest).collect(),
+            anchors: system.anchors.iter().map(|anchor| anchor.drawn).collect(),
             sources: sources.to_vec(),
         };
         let mut blend = Self {
@@ -108,6 +117,9 @@ impl LoadFamily {
         }
         for (joint, (a, b)) in self.system.model.joints.iter_mut().zip(a.rest.iter().zip(&b.rest)) {
             joint.rest = at(*a, *b);
+        }
+        for (anchor, (a, b)) in self.system.anchors.iter_mut().zip(a.anchors.iter().zip(&b.anchors)) {
+            anchor.drawn = [0, 1, 2].map(|k| at(a[k], b[k]));
         }
         for (source, (a, b)) in self.sources.iter_mut().zip(a.sources.iter().zip(&b.sources)) {
             *source = at(*a, *b);

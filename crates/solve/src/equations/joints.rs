@@ -44,6 +44,9 @@ impl Joints {
     /// # Errors
     /// [`UnsupportedModel`].
     pub fn elastic(system: &System) -> Result<Self, UnsupportedModel> {
+        if !system.anchors.is_empty() {
+            return Err(UnsupportedModel::DrivenAnchor);
+        }
         Tree::elastic(&system.model).map(|tree| Self::new(system, tree))
     }
 

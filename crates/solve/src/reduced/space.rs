@@ -50,6 +50,9 @@ pub fn spanned(system: &System) -> Result<Arc<Joints>, ReductionError> {
     if model.linear {
         return Err(UnsupportedModel::Linear.into());
     }
+    if !system.anchors.is_empty() {
+        return Err(UnsupportedModel::DrivenAnchor.into());
+    }
     if !model.couplings.is_empty() {
         return Err(ReductionError::Coupled);
     }

@@ -13,6 +13,9 @@ use crate::equations::{DegreeOfFreedom, Equations, Unknown};
 use crate::{SolveError, WhyFailed};
 use bimorph_multibody::planar::Pose;
 
+/// Times nearer than this part of themselves are one (1).
+const SAME_TIME: f64 = 1e-12;
+
 /// How an advance ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Advance {
@@ -32,6 +35,8 @@ pub type Observer<'a, X = Pose> = &'a mut dyn FnMut(f64, f64, &Motion<X>, &Motio
 pub struct Adaptive<M = Rodas4, X = Pose> {
     /// The method.
     pub method: M,
+    /// Times at which steps of a tolerance end, ascending (s): forces have no smooth course through them.
+    pub corners: Vec<f64>,
     steps: u64,
     rejected: u64,
     /// Counters of the equations.
@@ -48,6 +53,7 @@ impl<M, X: Unknown> Adaptive<M, X> {
     pub fn new(unknowns: usize, method: M) -> Self {
         Self {
             method,
+            corners: Vec::new(),
             steps: 0,
             rejected: 0,
             spent: SolverCounters::default(),
@@ -161,13 +167,17 @@ impl<M, X: Unknown> Adaptive<M, X> {
         M: Method<E>,
     {
         let mut pace = StepController::new((0.0, equations.end()), *h, self.method.error_order());
-        let mut steps = 0;
+        let (mut steps, mut corner) = (0, 0);
         while !pace.is_over() {
             if steps == max_steps {
                 return Ok(Advance::OutOfSteps(pace.t));
             }
             bimorph_base::budget::check();
-            let (t, step) = (pace.t, pace.step());
+            let t = pace.t;
+            while self.corners.get(corner).is_some_and(|at| *at <= t * (1.0 + SAME_TIME)) {
+                corner += 1;
+            }
+            let step = self.corners.get(corner).map_or(pace.step(), |at| pace.step().min(at - t));
             self.keep(motion);
             let stepped = self.method.step(equations, t, step, motion, &mut self.error);
             let mut error = match &stepped {

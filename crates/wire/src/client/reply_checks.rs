@@ -179,6 +179,11 @@ pub(super) fn statics(reply: &proto::StaticResponse) -> Result<(), String> {
     nodes(&reply.nodes)?;
     named("temperatures_k", &reply.temperatures_k)?;
     named("stresses_pa", &reply.stresses_pa)?;
+    named("nominal_stresses_pa", &reply.nominal_stresses_pa)?;
+    reply.anchor_forces.iter().try_for_each(|force| {
+        name("anchor_forces", &force.name)?;
+        finite(&format!("anchor_forces {}", force.name), &[force.fx, force.fy, force.m])
+    })?;
     named("peak_temperatures_k", &reply.peak_temperatures_k)?;
     named("currents_a", &reply.currents_a)?;
     named("charges_c", &reply.charges_c)?;

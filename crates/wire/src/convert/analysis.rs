@@ -5,7 +5,7 @@ use crate::proto;
 use bimorph_analysis::mode_quality::ModeLoss;
 use bimorph_analysis::modes::ModesResult;
 use bimorph_analysis::pull_in::PullInResult;
-use bimorph_analysis::statics::{NodeMotion, StaticResult};
+use bimorph_analysis::statics::{AnchorForce, NodeMotion, StaticResult};
 use bimorph_analysis::transient::{CrossingEvent, Statistics, TransientResult, Until};
 use bimorph_solve::equilibrium::{LossKind, StabilityLoss};
 use bimorph_solve::event::Direction;
@@ -44,7 +44,17 @@ pub fn static_to_wire(result: &StaticResult, strains: &[(String, f64)]) -> proto
         warnings: result.warnings.clone(),
         permanent_strains: named(strains),
         peak_temperatures_k: named(&result.peak_temperatures_k),
+        nominal_stresses_pa: named(&result.nominal_stresses_pa),
+        anchor_forces: result.anchor_forces.iter().map(anchor_force_to_wire).collect(),
     }
+}
+
+fn anchor_force_to_wire((name, force): &(String, AnchorForce)) -> proto::AnchorForce {
+    proto::AnchorForce { name: name.clone(), fx: force.fx, fy: force.fy, m: force.m }
+}
+
+fn anchor_force_from_wire(wire: proto::AnchorForce) -> (String, AnchorForce) {
+    (wire.name, AnchorForce { fx: wire.fx, fy: wire.fy, m: wire.m })
 }
 
 fn passed_to_wire(passed: &StabilityLoss) -> proto::PassedLoss {
@@ -69,6 +79,8 @@ pub fn static_from_wire(wire: proto::StaticResponse) -> StaticResult {
         nodes: nodes_from_wire(wire.nodes),
         temperatures_k: pairs(wire.temperatures_k),
         stresses_pa: pairs(wire.stresses_pa),
+        nominal_stresses_pa: pairs(wire.nominal_stresses_pa),
+        anchor_forces: wire.anchor_forces.into_iter().map(anchor_force_from_wire).collect(),
         peak_temperatures_k: pairs(wire.peak_temperatures_k),
         currents_a: pairs(wire.currents_a),
         charges_c: pairs(wire.charges_c),

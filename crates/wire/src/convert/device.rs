@@ -43,6 +43,8 @@ fn kind_to_wire(kind: PortKind) -> proto::PortKind {
         PortKind::Thermal => proto::PortKind::Thermal,
         PortKind::Acceleration => proto::PortKind::Acceleration,
         PortKind::Rate => proto::PortKind::Rate,
+        PortKind::Displacement => proto::PortKind::Displacement,
+        PortKind::Rotation => proto::PortKind::Rotation,
     }
 }
 

@@ -83,6 +83,9 @@ pub enum UnsupportedModel {
     /// Small displacements about the drawn geometry were requested.
     #[error("joint coordinates are not small displacements; leave out --linear or take compliant")]
     Linear,
+    /// The displacement or rotation of an anchor is given.
+    #[error("an anchor is driven or turned (moves, anchorrz), which joint coordinates do not have; take compliant")]
+    DrivenAnchor,
     /// A body rotates without inertia: the residual rotation of a step would leak, with the rotating axes, into
     /// directions with inertia.
     #[error("body \"{body}\" turns without inertia; give it some (J of a lumped mass, --scheme es), or take compliant")]

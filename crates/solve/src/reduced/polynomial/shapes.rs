@@ -96,7 +96,7 @@ impl<'a> ShapeFunctions<'a> {
                 Input::Force { point, direction: 2 } => point.rotation(q),
                 Input::Force { point, direction } => point.displacement(q, false)[direction],
                 Input::Acceleration { axis } => -(0..q.len()).map(|j| model.mass(j)[axis] * q[j][axis]).sum::<f64>(),
-                Input::Heat { .. } | Input::Rate => 0.0,
+                Input::Motion { .. } | Input::Heat { .. } | Input::Rate => 0.0,
             });
         }
         out.extend(self.probes.iter().map(|probe| probe(q)));
