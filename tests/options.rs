@@ -171,7 +171,7 @@ fn inside_and_beyond(about: &OptionDescription) -> (OptionValue, Option<OptionVa
         }
         Range::Within(low, high) => (OptionValue::Number(low), Some(OptionValue::Number(2.0 * high))),
         Range::Names(names) => (OptionValue::Name(names[0].to_owned()), Some(OptionValue::Name("nosuch".to_owned()))),
-        Range::Ranges => (OptionValue::Name("a:0:1".to_owned()), Some(OptionValue::Name("a:1:0".to_owned()))),
+        Range::Ranges => (OptionValue::Name("b.x:0:1".to_owned()), Some(OptionValue::Name("b.x:1:0".to_owned()))),
     }
 }
 
@@ -302,4 +302,34 @@ fn analyses_take_the_same_options() {
     assert!(client.contains(&format!("points: int = {},", TRAN_POINTS.count())));
     assert!(client.contains(&format!("count: int = {},", MODES_COUNT.count())));
     assert_eq!((TransientOptions::default().points, Integrator::RHO), (TRAN_POINTS.count(), TRAN_RHO.number()));
+}
+
+/// Ranges of ports are for circuits: analyses refuse them, `check` compares their names with the ports, and each error has the range.
+#[test]
+fn analyses_refuse_ranges_of_ports() {
+    let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
+    for command in [
+        &["static", "c.net"][..],
+        &["tran", "c.net", "--stop", "1u"],
+        &["modes", "c.net"],
+        &["ac", "c.net", "--drive", "b.fy", "--by-modes", "--from", "1", "--to", "2"],
+        &["sweep", "c.net", "--analysis", "static", "--param", "w=1,2"],
+        &["export", "c.net", "--spice", "--ports", "b.x"],
+    ] {
+        let (status, _, err) = bimorph(&[words(command), words(&["--ranges", "b.x:0:1"])].concat());
+        assert_eq!(status, Some(1), "{command:?}: {err}");
+        assert!(err.contains("--ranges: expected none in this command"), "{command:?}: {err}");
+        assert!(err.contains("got \"b.x:0:1\""), "{command:?}: {err}");
+    }
+    for (ranges, expected) in [
+        ("gate:0:1", "--ranges: expected the name of a port of this model (it has no electrical one; NODE.x|y|rz"),
+        ("b.x:0:1,gate:0:1", "got \"gate:0e0:1e0\""),
+        ("b.x:0:1,b.y:2:1", "got \"b.y:2:1\""),
+        ("b.x:0:1,b.x:0:2", "got \"b.x\" twice"),
+        ("b.x:nan:1", "got \"b.x:nan:1\""),
+    ] {
+        let (status, _, err) = bimorph(&words(&["check", "c.net", "--ranges", ranges]));
+        assert_eq!(status, Some(1), "{ranges}: {err}");
+        assert!(err.contains(expected), "{ranges}: {err}");
+    }
 }

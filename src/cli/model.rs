@@ -3,6 +3,8 @@
 use super::failure::Failure;
 use super::options::Chosen;
 use super::{interrupt, progress, value};
+use bimorph::analysis::readout::ReadoutError;
+use bimorph::analysis::readout::ports::check_ranges;
 use bimorph::compile::{
     Anchors, CompileOptions, CompiledModel, Formulation, Junctions, ParsedStructure, compile, draw,
 };
@@ -117,14 +119,37 @@ impl ModelArgs {
         Ok(drawn)
     }
 
-    /// The options of the compilation, checked.
+    /// The options of the compilation, checked. Ranges of ports are refused: an analysis is trained for what acts in it.
     pub(crate) fn options(&self) -> Result<CompileOptions, Failure> {
+        let options = self.options_of_circuits()?;
+        match &options.ranges {
+            Some(ranges) => Err(Failure::bad(
+                "--ranges",
+                "none in this command, which no circuit drives (they are for decks, cosim, view, sessions of the service, Python and C; \
+                 export has --range)",
+                format!("\"{}\"", ranges.text()),
+            )),
+            None => Ok(options),
+        }
+    }
+
+    /// The options of the compilation of a model that a circuit drives, checked.
+    pub(crate) fn options_of_circuits(&self) -> Result<CompileOptions, Failure> {
         Ok(self.chosen.options()?.with_settings(&self.set))
     }
 
     /// Compiles the netlist and shows its warnings on standard error.
     pub(crate) fn compile(&self) -> Result<CompiledModel, Failure> {
         self.compiled(&self.options()?)
+    }
+
+    /// The same for circuits: ranges are those of ports.
+    pub(crate) fn compile_for_circuits(&self) -> Result<CompiledModel, Failure> {
+        let compiled = self.compiled(&self.options_of_circuits()?)?;
+        match check_ranges(&compiled, &[]) {
+            Err(ReadoutError::BadRange { expected, got }) => Err(Failure::bad("--ranges", expected, got)),
+            _ => Ok(compiled),
+        }
     }
 
     /// The same model in another formulation. Its warnings have been shown.

@@ -178,6 +178,7 @@ impl From<ReadoutError> for DeviceError {
             }
             ReadoutError::UnknownPort { name, available } => Self::UnknownPort { name, available },
             ReadoutError::BadPort { expected, got } => Self::BadRequest { what: "ports", expected, got },
+            ReadoutError::BadRange { expected, got } => Self::BadRequest { what: "ranges", expected, got },
         }
     }
 }

@@ -9,6 +9,7 @@ use super::quantities;
 use super::session::DeviceSession;
 use super::snapshot;
 use super::{Description, Device, DeviceError, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
+use bimorph_analysis::readout::ports::check_ranges;
 use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
 use std::sync::Arc;
@@ -39,6 +40,8 @@ impl LocalDevice {
 
 impl Device for LocalDevice {
     fn open(&mut self, request: &OpenRequest) -> Result<Description, DeviceError> {
+        // before a reduced model is trained
+        check_ranges(&self.compiled, &request.ports)?;
         let (session, description) = DeviceSession::open(&self.compiled, request, None)?;
         self.session = Some(session);
         Ok(description)

@@ -92,7 +92,9 @@ impl From<ReadoutError> for ExportError {
     fn from(error: ReadoutError) -> Self {
         match error {
             ReadoutError::UnknownSignal { .. } | ReadoutError::BadExpression { .. } => Self::Analysis(error.into()),
-            ReadoutError::UnknownPort { .. } | ReadoutError::BadPort { .. } => Self::Device(error.into()),
+            ReadoutError::UnknownPort { .. } | ReadoutError::BadPort { .. } | ReadoutError::BadRange { .. } => {
+                Self::Device(error.into())
+            }
         }
     }
 }

@@ -102,7 +102,9 @@ pub(super) fn device(error: &DeviceError) -> Status {
     match error {
         DeviceError::UnknownPort { .. } => violation(Violation::new("ports", message)),
         DeviceError::UnknownSignal { .. } => violation(Violation::new("signals", message)),
-        DeviceError::BadRequest { what, .. } => violation(Violation::new(*what, message)),
+        DeviceError::BadRequest { what, expected, got } => {
+            violation(Violation::new(*what, format!("expected {expected}, got {got}")))
+        }
         DeviceError::UnknownToken(_) => Status::not_found(message),
         DeviceError::NotOpen => Status::failed_precondition(message),
         DeviceError::Remote { .. } => Status::unavailable(cut(message, MESSAGE_BYTES)),

@@ -76,7 +76,7 @@ class Options(TypedDict, total=False):
     ranges: str | None
     """Ranges of what a circuit gives to ports (V, N, W), for which a reduced model is trained
     (docs/explanation/reduction.md). Without them circuits have the full model. Range: NAME:LOW:HIGH with LOW
-    below HIGH, several separated by commas (in decks by bars); default: none."""
+    below HIGH, finite and once for each port, separated by commas (in decks by bars); default: none."""
 
 
 WIRE = {

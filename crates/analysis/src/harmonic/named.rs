@@ -53,7 +53,9 @@ pub(crate) fn drive_port(compiled: &CompiledModel, drive: &str) -> Result<Opened
             ))
         }
         ReadoutError::BadPort { expected, got } => refused(format!("expected {expected}, got {got}")),
-        other @ (ReadoutError::UnknownSignal { .. } | ReadoutError::BadExpression { .. }) => refused(other.to_string()),
+        other @ (ReadoutError::UnknownSignal { .. }
+        | ReadoutError::BadExpression { .. }
+        | ReadoutError::BadRange { .. }) => refused(other.to_string()),
     })
 }
 

@@ -29,6 +29,14 @@ pub enum ReadoutError {
         /// The names there are.
         available: Vec<String>,
     },
+    /// A range of an unknown port, or two of one.
+    #[error("ranges: expected {expected}, got {got}")]
+    BadRange {
+        /// The ports there are.
+        expected: String,
+        /// The given range.
+        got: String,
+    },
     /// A port that cannot be.
     #[error("ports: expected {expected}, got {got}")]
     BadPort {

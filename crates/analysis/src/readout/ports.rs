@@ -128,6 +128,43 @@ fn of_anchor(system: &System, source: usize) -> (usize, PortKind, PortResponse) 
     (source, kind, PortResponse::Motion(Signal::AnchorForce(anchor, direction)))
 }
 
+/// Checks that each range of the options is that of a port: of one of `opened`, or of another one of the model, which a session holds at 0.
+/// Case counts where two ports differ by it alone.
+///
+/// # Errors
+/// [`ReadoutError::BadRange`]: a range of no port, or two of one port.
+pub fn check_ranges(compiled: &CompiledModel, opened: &[String]) -> Result<(), ReadoutError> {
+    let Some(ranges) = &compiled.options.ranges else { return Ok(()) };
+    let electrics = &compiled.parts.system.electrics;
+    let own = &electrics.names[..electrics.ports];
+    let mut found: Vec<&str> = Vec::new();
+    for (name, [low, high]) in ranges.all() {
+        let known = || opened.iter().chain(own).map(String::as_str);
+        let listed = known().find(|port| port == name).or_else(|| known().find(|port| port.eq_ignore_ascii_case(name)));
+        let port = match listed {
+            Some(port) => port,
+            None if OpenedPorts::find(compiled, std::slice::from_ref(name)).is_ok() => name,
+            None => {
+                let mut names: Vec<&str> = known().collect();
+                names.dedup();
+                let names = if names.is_empty() { "it has no electrical one".to_owned() } else { names.join(", ") };
+                return Err(ReadoutError::BadRange {
+                    expected: format!(
+                        "the name of a port of this model ({names}; NODE.x|y|rz, NODE.vx|vy|vrz, BEAM.T, frame.ax|ay)"
+                    ),
+                    got: format!("\"{name}:{low:e}:{high:e}\""),
+                });
+            }
+        };
+        if found.contains(&port) {
+            let (expected, got) = ("one range for each port".into(), format!("two of \"{port}\""));
+            return Err(ReadoutError::BadRange { expected, got });
+        }
+        found.push(port);
+    }
+    Ok(())
+}
+
 /// The port that a node, a beam or the frame offers under this name.
 fn offered(compiled: &CompiledModel, name: &str) -> Result<(Input, PortKind, PortResponse), ReadoutError> {
     let inertial = |input, kind| Ok((input, kind, PortResponse::Nothing));

@@ -65,7 +65,9 @@ impl fmt::Display for Range {
             Self::Names([first, second, third]) => write!(f, "{first}, {second} or {third}"),
             Self::Names(names) => f.write_str(&names.join(", ")),
             Self::Ranges => {
-                f.write_str("NAME:LOW:HIGH with LOW below HIGH, several separated by commas (in decks by bars)")
+                f.write_str(
+                    "NAME:LOW:HIGH with LOW below HIGH, finite and once for each port, separated by commas (in decks by bars)",
+                )
             }
         }
     }
@@ -147,7 +149,10 @@ impl OptionDescription {
             (Range::Above(low, high), OptionValue::Number(x)) => x > low && (x < high || *x == *high && *high != 1.0),
             (Range::Within(low, high), OptionValue::Number(x)) => (low..=high).contains(&x),
             (Range::Names(names), OptionValue::Name(name)) => names.contains(&name.as_str()),
-            (Range::Ranges, OptionValue::Name(text)) => PortRanges::parse(text).is_some(),
+            (Range::Ranges, OptionValue::Name(text)) => match PortRanges::parse(text) {
+                Ok(_) => true,
+                Err(got) => return Err(OptionError { option: self.name, expected: self.expected(), got }),
+            },
             _ => false,
         };
         if fits {
@@ -211,7 +216,7 @@ impl Field for PortRanges {
     }
 
     fn from_value(value: OptionValue) -> Option<Self> {
-        if let OptionValue::Name(text) = value { Self::parse(&text) } else { None }
+        if let OptionValue::Name(text) = value { Self::parse(&text).ok() } else { None }
     }
 }
 
