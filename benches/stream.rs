@@ -118,7 +118,7 @@ fn lines(criterion: &mut Criterion, name: &str, address: &Address) {
         let trial = proto::TrialRequest { mode: mode.into(), parent, t, dt, voltages };
         let Some(device_reply::Kind::Trial(reply)) = ask(device_request::Kind::Trial(trial)) else { panic!("a trial") };
         parent = reply.token;
-        ask(device_request::Kind::Accept(proto::Accept { token: reply.token, answer: false }));
+        ask(device_request::Kind::Accept(proto::Accept { token: reply.token, answer: false, warn: false }));
     };
     let mut k = 0;
     criterion.bench_function(name, |b| {

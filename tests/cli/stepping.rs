@@ -58,7 +58,7 @@ impl Stream {
         let trial = proto::TrialRequest { mode, parent, t: 0.0, dt: DT, voltages: voltages(step) };
         let Reply::Trial(reply) = self.ask(Ask::Trial(trial)).await? else { panic!("a trial has a reply") };
         assert_eq!(reply.status(), proto::trial_reply::Status::Ok, "the plate takes such steps");
-        let accept = proto::Accept { token: reply.token, answer: true };
+        let accept = proto::Accept { token: reply.token, answer: true, warn: false };
         match self.ask(Ask::Accept(accept)).await? {
             Reply::Accepted(accepted) => Ok((reply, accepted.kept)),
             Reply::Fault(fault) => Err(Status::data_loss(fault.message)),

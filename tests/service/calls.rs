@@ -78,7 +78,7 @@ fn a_stream_answers_in_order() {
             ask(Ask::Open(open.clone())),
             ask(trial(0, 0.0, &[1.0, 2.0])),
             ask(trial(0, 0.25, &[3.0, 4.0])),
-            ask(Ask::Accept(proto::Accept { token: 12345, answer: false })),
+            ask(Ask::Accept(proto::Accept { token: 12345, answer: false, warn: false })),
             ask(trial(0, 0.5, &[1.0])),
             ask(Ask::Open(open)),
             ask(trial(0, 0.75, &[5.0, 6.0])),

@@ -71,7 +71,7 @@ fn each_question_has_its_own_reply() {
         };
         // the echo: i = v · 1 mS
         assert_eq!(reply.currents, [volts * 1e-3]);
-        let accept = proto::Accept { token: reply.token, answer: false };
+        let accept = proto::Accept { token: reply.token, answer: false, warn: false };
         assert_eq!(ask(&mut line, Ask::Accept(accept), DEADLINE).expect("is sent"), None);
     }
 }

@@ -53,7 +53,7 @@ fn it_says_what_a_server_says() {
             let reply = stream.trial(parent, dt(step), f64::from(step)).await;
             parent = reply.token;
             replies.push(reply);
-            stream.say(Ask::Accept(proto::Accept { token: parent, answer: false })).await;
+            stream.say(Ask::Accept(proto::Accept { token: parent, answer: false, warn: false })).await;
         }
         // a thread that may not block receives an error
         let waits = inside.call("Static", &statics.encode_to_vec(), &|| true).expect_err("asynchronous code");
@@ -72,7 +72,7 @@ fn it_says_what_a_server_says() {
         let token = expected.token;
         let reply = ask(&mut questions, trial(parent, dt(step), f64::from(step)));
         assert_eq!(reply, Some(ReplyKind::Trial(expected)));
-        assert_eq!(ask(&mut questions, Ask::Accept(proto::Accept { token, answer: false })), None);
+        assert_eq!(ask(&mut questions, Ask::Accept(proto::Accept { token, answer: false, warn: false })), None);
         parent = token;
     }
 }

@@ -32,6 +32,7 @@ mod shutdown;
 mod slow_readers;
 mod snapshots;
 mod soak;
+mod state_warnings;
 mod stored_jobs;
 mod stored_sessions;
 mod sweep_faults;

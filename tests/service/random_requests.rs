@@ -32,7 +32,8 @@ fn request() -> impl Strategy<Value = Option<Ask>> {
             let (mode, parent) = if plain { (1, 0) } else { (mode, parent) };
             Ask::Trial(proto::TrialRequest { mode, parent, t, dt, voltages })
         });
-    let accept = any::<u64>().prop_map(|token| Ask::Accept(proto::Accept { token, answer: token % 2 == 0 }));
+    let accept =
+        any::<u64>().prop_map(|token| Ask::Accept(proto::Accept { token, answer: token % 2 == 0, warn: false }));
     let linearize = (any::<u64>(), number())
         .prop_map(|(token, omega)| Ask::Linearize(proto::SmallSignalRequest { token, omega, noise: token % 2 == 0 }));
     let attach = ".{0,12}".prop_map(|session| Ask::Attach(proto::Attach { session }));

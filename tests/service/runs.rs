@@ -182,6 +182,7 @@ fn a_step_without_an_answer_ends_a_run() {
             values: pack(&[0.0, 4.0, 6.0, 1.0]),
             signals: vec!["x".into()],
             ports: false,
+            warn: false,
         };
         let mut stream = client.run(request).await.expect("runs").into_inner();
         let (mut rows, mut ends) = (vec![Vec::new(); 2], Vec::new());
@@ -214,6 +215,7 @@ fn no_message_follows_the_end_of_a_run() {
             values: pack(&[1.0]),
             signals: vec!["x".into()],
             ports: false,
+            warn: false,
         };
         let mut stream = client.run(request).await.expect("runs").into_inner();
         let mut ends = 0;
@@ -238,6 +240,7 @@ fn what_does_not_fit_is_refused() {
             values: pack(&[0.0]),
             signals: vec!["x".into()],
             ports: true,
+            warn: false,
         };
         type Change<'a> = &'a dyn Fn(&mut proto::RunRequest);
         let refused: [(Code, &str, Change<'_>); 11] = [
@@ -278,6 +281,7 @@ fn a_run_is_in_no_way_and_ends_with_its_client() {
             values: pack(&[1.0]),
             signals: vec!["x".into()],
             ports: false,
+            warn: false,
         };
         let mut run = client.run(request).await.expect("runs").into_inner();
         run.message().await.expect("goes on").expect("rows");
@@ -317,6 +321,7 @@ fn the_next_question_to_a_session_ends_its_run() {
             values: pack(&[1.0]),
             signals: vec!["x".into()],
             ports: false,
+            warn: false,
         };
         let ended = async |mut stream: tonic::Streaming<proto::RunEvent>| loop {
             match stream.message().await {

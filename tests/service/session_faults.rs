@@ -85,7 +85,7 @@ impl Line {
             ReplyKind::Trial(reply) => reply,
             other => panic!("the state is there: {other:?}"),
         };
-        match self.ask(Ask::Accept(proto::Accept { token: reply.token, answer: true })).await? {
+        match self.ask(Ask::Accept(proto::Accept { token: reply.token, answer: true, warn: false })).await? {
             ReplyKind::Accepted(accepted) => assert_eq!((accepted.token, accepted.kept), (reply.token, true)),
             // a stream that the network held back has joined meanwhile
             other => {
@@ -267,7 +267,7 @@ fn what_was_held_back_undoes_nothing() {
         let second = new.step(1, first).await.expect("steps").token;
         let last = new.step(2, second).await.expect("steps").token;
         for (token, answer) in [(held_back.token, false), (held_back.token, true), (first, true)] {
-            let accept = Ask::Accept(proto::Accept { token, answer });
+            let accept = Ask::Accept(proto::Accept { token, answer, warn: false });
             if answer {
                 assert_eq!(refusal(&old.ask(accept).await.expect("an answer")), Code::Aborted);
             } else {

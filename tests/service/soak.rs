@@ -45,7 +45,7 @@ async fn co_simulate(mut wire: Wire, model: String, end: Instant) -> Vec<Duratio
             proto::trial_reply::Status::Ok => {
                 steps.push(asked.elapsed());
                 (parent, dt) = (reply.token, STEP);
-                let accept = Ask::Accept(proto::Accept { token: parent, answer: false });
+                let accept = Ask::Accept(proto::Accept { token: parent, answer: false, warn: false });
                 requests.send(proto::DeviceRequest { kind: Some(accept) }).await.expect("sent");
             }
             proto::trial_reply::Status::NeedDt => dt = 0.5 * reply.need_dt,

@@ -269,7 +269,7 @@ fn two_who_wake_one_session() {
         let [first, second] = &mut both;
         let next = first.trial(asleep.token, DT, 2.0).await;
         assert_eq!(second.trial(asleep.token, DT, 2.0).await, next);
-        let accept = || Ask::Accept(proto::Accept { token: next.token, answer: true });
+        let accept = || Ask::Accept(proto::Accept { token: next.token, answer: true, warn: false });
         let answers = [first.ask(accept()).await, second.ask(accept()).await];
         let accepted = answers.iter().filter(|answer| matches!(answer, ReplyKind::Accepted(_))).count();
         let refused = answers.iter().filter(|answer| matches!(answer, ReplyKind::Fault(_))).map(refusal);
@@ -324,7 +324,7 @@ fn an_accept_that_is_not_kept_is_reported() {
         let session = open(&mut client).await.session;
         let mut stream = Attached::to(&mut client, &session).await;
         let token = stream.trial(0, 0.0, 1.0).await.token;
-        stream.say(Ask::Accept(proto::Accept { token, answer: false })).await;
+        stream.say(Ask::Accept(proto::Accept { token, answer: false, warn: false })).await;
         assert_eq!(refusal(&stream.ask(trial(token, DT, 2.0)).await), Code::ResourceExhausted);
     });
 }

@@ -127,6 +127,7 @@ fn of_sessions(model: &dyn Fn() -> String, session: &str, snapshot: &[u8]) -> Ve
                 values: pack(&[1.0]),
                 signals: vec!["m.x".into()],
                 ports: true,
+                warn: false,
             }
             .encode_to_vec(),
         ),

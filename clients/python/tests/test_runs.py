@@ -389,7 +389,7 @@ def test_a_batch_of_kept_sessions_is_accepted_as_a_whole(client: bimorph.Client,
         for session in sessions:
             session.kept = True
 
-        def report(self: bimorph.Session, reply: bimorph.TrialReply) -> None:
+        def report(self: bimorph.Session, reply: bimorph.TrialReply, *, warn: bool) -> None:
             asked.append((sessions.index(self), reply.token))
             if len(asked) == 3:
                 raise bimorph.Unavailable("the third")

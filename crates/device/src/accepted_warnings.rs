@@ -77,6 +77,15 @@ impl DeviceSession {
         reported
     }
 
+    /// Takes the monitors of accepted states and the codes of warnings of an earlier session of the same states.
+    pub(super) fn continues(&mut self, earlier: &mut Self) {
+        self.warned = std::mem::take(&mut earlier.warned);
+        self.ringing = std::mem::take(&mut earlier.ringing);
+        if let (Some(own), Some(earlier)) = (&mut self.reduction, &mut earlier.reduction) {
+            own.error = std::mem::take(&mut earlier.error);
+        }
+    }
+
     /// Which of the values that the circuit sees are charges: their change is a current.
     fn charges(&self) -> Vec<bool> {
         let signals = self.signals.iter().map(|_| false);

@@ -134,8 +134,10 @@ impl Device for LocalDevice {
         // a state is stored whole or not at all; all else is storage that every trial fills again
         let Some(mut session) = self.session.take() else { return };
         let known = session.reduced_model().cloned();
-        self.session = DeviceSession::open(&self.compiled, &session.opened, known.as_ref())
-            .ok()
-            .map(|(fresh, _)| DeviceSession { states: std::mem::take(&mut session.states), ..fresh });
+        self.session =
+            DeviceSession::open(&self.compiled, &session.opened, known.as_ref()).ok().map(|(mut fresh, _)| {
+                fresh.continues(&mut session);
+                DeviceSession { states: std::mem::take(&mut session.states), ..fresh }
+            });
     }
 }

@@ -82,6 +82,11 @@ impl AttachedSession {
         Ok(())
     }
 
+    /// New warnings of the session's accepted states.
+    pub(super) fn warnings(&self) -> Vec<proto::Diagnostic> {
+        self.session.as_ref().map_or_else(Vec::new, |session| session.take_warnings())
+    }
+
     /// Continues with a session, in the place of the one before.
     pub(super) fn join(&mut self, session: Result<Arc<Session>, Status>) -> ReplyKind {
         match session {

@@ -201,7 +201,8 @@ impl DeviceChannel {
     pub fn ask(&mut self, request: &[u8]) -> Result<Option<Vec<u8>>, Status> {
         let request = decoded::<proto::DeviceRequest>(request)?.into_inner();
         let kind = self.reply(request);
-        Ok(kind.map(|kind| proto::DeviceReply { kind: Some(kind) }.encode_to_vec()))
+        let reply = |kind| proto::DeviceReply { kind: Some(kind), warnings: self.joined.warnings() };
+        Ok(kind.map(|kind| reply(kind).encode_to_vec()))
     }
 
     fn reply(&mut self, request: proto::DeviceRequest) -> Option<ReplyKind> {

@@ -9,6 +9,7 @@ use super::work::{CancellingStream, caught};
 use bimorph_base::budget::Budget;
 use bimorph_device::run::{Run, Stepped};
 use bimorph_device::{Device, DeviceError, Token, TrialReply};
+use bimorph_wire::convert::model::diagnostic_to_wire;
 use bimorph_wire::convert::run::{self, Rows};
 use bimorph_wire::convert::{Violation, device as wire, number};
 use bimorph_wire::proto;
@@ -36,6 +37,8 @@ struct RunContext {
     values: Option<Rows>,
     /// Whether currents and charges are wanted.
     ports: bool,
+    /// Whether warnings of the states are wanted.
+    warn: bool,
 }
 
 /// A session of a run.
@@ -49,6 +52,8 @@ struct RunLane {
     /// Steps taken.
     done: usize,
     given: Vec<f64>,
+    /// Warnings of its states.
+    warnings: Vec<proto::Diagnostic>,
 }
 
 impl BimorphService {
@@ -56,7 +61,7 @@ impl BimorphService {
     pub(super) async fn ran(&self, request: proto::RunRequest) -> Reply<RunStream> {
         let limits = &self.0.limits;
         let times = run::times(&request.times).map_err(status::violation)?;
-        let mut course = RunContext { times, values: None, ports: request.ports };
+        let mut course = RunContext { times, values: None, ports: request.ports, warn: request.warn };
         for (what, most, got) in
             [("sessions", limits.sessions, request.lanes.len()), ("signals", limits.signals, request.signals.len())]
         {
@@ -151,6 +156,7 @@ impl RunLane {
             signals,
             done: 0,
             given,
+            warnings: Vec::new(),
         })
     }
 
@@ -201,6 +207,9 @@ impl RunLane {
                 Stepped::Taken => {
                     sender.push(self.run.last(), &self.signals, course.ports);
                     self.done += 1;
+                    if let Some(token) = self.run.last().token.filter(|_| course.warn) {
+                        self.warnings.extend(device.warns(token).iter().map(diagnostic_to_wire));
+                    }
                 }
             }
             if sender.is_full() || self.done.is_multiple_of(UNWATCHED) && began.elapsed() >= BURST {
@@ -210,13 +219,14 @@ impl RunLane {
         Ok(None)
     }
 
-    fn ended(&self, error: String) -> proto::RunEnd {
+    fn ended(&mut self, error: String) -> proto::RunEnd {
         proto::RunEnd {
             lane: self.number,
             steps: self.done as u64,
             trials: self.run.trials() as u64,
             last: (self.done > 0).then(|| wire::reply_to_wire(&mut self.run.last().clone())),
             error,
+            warnings: std::mem::take(&mut self.warnings),
         }
     }
 }

@@ -15,6 +15,7 @@ use super::work::caught;
 use bimorph_base::budget::{Allowance, Budget, OwnerQuota, Stopped};
 use bimorph_device::{Device, Token, TrialReply};
 use bimorph_wire::convert::device as wire;
+use bimorph_wire::convert::model::diagnostic_to_wire;
 use bimorph_wire::proto;
 use proto::device_reply::Kind as ReplyKind;
 use std::panic::catch_unwind;
@@ -51,6 +52,8 @@ pub(super) struct Session {
     accepted: AtomicU64,
     /// An accepted state that could not be stored, and was not reported yet; 0: none.
     due: AtomicU64,
+    /// Warnings of accepted states for the next reply, and the state that was evaluated last (0: none).
+    warnings: Mutex<(Vec<proto::Diagnostic>, u64)>,
 }
 
 /// A request that needs a thread.
@@ -58,6 +61,8 @@ pub(super) struct NeedsThread;
 
 /// Longest computation where requests arrive.
 const SLICE: Duration = Duration::from_millis(5);
+/// Most warnings that wait for a reply.
+const MAX_WARNINGS: usize = 64;
 /// After a long one, so many requests go to a thread at once.
 const AFTER_SLOW: u32 = 64;
 
@@ -89,6 +94,7 @@ impl Session {
             run: Mutex::default(),
             closed: AtomicBool::new(false),
             due: AtomicU64::new(0),
+            warnings: Mutex::default(),
         }))
     }
 
@@ -233,7 +239,7 @@ impl Session {
     /// Accepts a state and keeps it. Only the last attached stream may accept: delayed messages of an earlier one must
     /// not undo later accepts.
     fn accept(&self, device: &mut dyn Device, accept: &proto::Accept, stream: u64) -> Option<ReplyKind> {
-        let proto::Accept { token, answer } = *accept;
+        let proto::Accept { token, answer, warn } = *accept;
         if !self.usage.is_last(stream) {
             return answer.then(|| refused(&status::overtaken(&self.id)));
         }
@@ -243,8 +249,27 @@ impl Session {
             tracing::warn!(session = self.id, reason = status.message(), "an accepted state is not kept");
         }
         self.due.store(if kept.is_err() && !answer { token } else { 0 }, Ordering::Relaxed);
+        if warn {
+            self.evaluate_warnings(device, token);
+        }
         let accepted = |kept| ReplyKind::Accepted(proto::Accepted { token, kept });
         answer.then(|| kept.map_or_else(|status| refused(&status), accepted))
+    }
+
+    /// Evaluates the warnings of an accepted state, once where it is accepted again.
+    fn evaluate_warnings(&self, device: &mut dyn Device, token: u64) {
+        let mut pending = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        if pending.1 != token {
+            let left = MAX_WARNINGS.saturating_sub(pending.0.len());
+            let found = device.warns(Token(token));
+            pending.0.extend(found.iter().take(left).map(diagnostic_to_wire));
+            pending.1 = token;
+        }
+    }
+
+    /// Warnings of accepted states since the last call.
+    pub(super) fn take_warnings(&self) -> Vec<proto::Diagnostic> {
+        std::mem::take(&mut self.warnings.lock().unwrap_or_else(PoisonError::into_inner).0)
     }
 
     /// Keeps now what an accept without an answer could not: until that is done its stream has no later reply but the refusal.

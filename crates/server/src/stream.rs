@@ -139,7 +139,8 @@ impl Stream for TrialStream {
                 }
             };
             if reply.is_some() {
-                return Poll::Ready(Some(Ok(proto::DeviceReply { kind: reply })));
+                let warnings = this.joined.warnings();
+                return Poll::Ready(Some(Ok(proto::DeviceReply { kind: reply, warnings })));
             }
         }
         cx.waker().wake_by_ref();

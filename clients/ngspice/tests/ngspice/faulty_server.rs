@@ -137,7 +137,7 @@ impl Liar {
                     _ => continue,
                 };
                 for kind in said {
-                    if sender.send(Ok(proto::DeviceReply { kind })).await.is_err() {
+                    if sender.send(Ok(proto::DeviceReply { kind, ..Default::default() })).await.is_err() {
                         return;
                     }
                 }

@@ -17,8 +17,8 @@ State = tuple["Session", "TrialReply", dict[str, float]]
 """A session, the reply whose state it accepts, and the values of its ports there."""
 
 
-def accept_together(states: Sequence[State]) -> None:
-    """Accepts a state of each session: of all of them or, where this raises, of none.
+def accept_together(states: Sequence[State], *, warn: bool = True) -> None:
+    """Accepts a state of each session: of all of them or, where this raises, of none. ``warn``: their warnings come with the next replies.
 
     A kept session is accepted on its server first. If one of several cannot be, the states before are accepted again there.
     """
@@ -27,14 +27,14 @@ def accept_together(states: Sequence[State]) -> None:
         for session, reply, _ in states:
             if session.kept:
                 asked.append(session)
-                session._report_accepted(reply)
+                session._report_accepted(reply, warn=warn)
             else:
                 session._usable()
     except BaseException:
         for session in asked:
             if session.accepted is not None:
                 with contextlib.suppress(BimorphError):
-                    session._report_accepted(session.accepted)
+                    session._report_accepted(session.accepted, warn=False)
         raise
     changes = [change for session, reply, voltages in states for change in _changes(session, reply, voltages)]
     # In C throughout: no interrupt of the main thread comes between two of the assignments.
@@ -43,7 +43,7 @@ def accept_together(states: Sequence[State]) -> None:
         if not session.kept:
             # It only frees memory on the server. A stream that has ended is reported by the next call.
             with contextlib.suppress(BimorphError):
-                session._report_accepted(reply)
+                session._report_accepted(reply, warn=warn)
 
 
 def _changes(session: Session, reply: TrialReply, voltages: dict[str, float]) -> list[tuple[Session, str, object]]:

@@ -28,6 +28,7 @@ from . import client as _client
 from . import model as _model
 from . import session as _session
 from . import sweep_handle as _sweep_handle
+from .errors import Diagnostic
 from .local import ADDRESS
 from .trial_reply import TrialReply
 from .stopping import Stopping, current
@@ -199,6 +200,10 @@ class Session(_Block[_session.Session]):
     def accepted(self) -> TrialReply | None:
         """The accepted state; None: the model at rest as drawn."""
         return self.sync.accepted
+
+    async def warnings(self) -> tuple[Diagnostic, ...]:
+        """:attr:`bimorph.Session.warnings`."""
+        return await _call(lambda: self.sync.warnings)
 
     async def fork(self) -> Session:
         """Opens another session with the same states; close it as well."""

@@ -39,3 +39,14 @@ def of_mesh(diagnostics: Iterable[Diagnostic], level: int = 3) -> None:
     for one in diagnostics:
         if one.code == MESH:
             warnings.warn(f"{one.message} ({one.help})", AccuracyWarning, stacklevel=level)
+
+
+def of_states(diagnostics: Iterable[Diagnostic], level: int = 3, about: str = "") -> None:
+    """Issues the warnings of accepted states, each text after ``about``."""
+    for one in diagnostics:
+        warnings.warn(f"{about}{text_of(one)}", AccuracyWarning, stacklevel=level)
+
+
+def text_of(one: Diagnostic) -> str:
+    """A warning as one line: code, message and remedy."""
+    return f"{one.code}: {one.message}" + (f" ({one.help})" if one.help else "")

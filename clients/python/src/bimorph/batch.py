@@ -200,6 +200,8 @@ class Batch:
                 for k, session in enumerate(self.sessions)
             ]
             advance(lanes, t, wanted, True, divide=self._divide)
+            for k, session in enumerate(self.sessions):
+                session._issue(about=f"sessions[{k}]: ")
         return _gathered(lanes, t, wanted)
 
     def step(self, voltages: Given, dt: float) -> BatchRun:

@@ -20,6 +20,7 @@ from .arguments import mapping, names, one_of, text, unmasked, wrong_type
 from .channel import Channel
 from .errors import InvalidRequest, StepFailed, Unavailable, shown
 from .local import ADDRESS
+from .messages import diagnostic
 from .stopping import Stopping, check, current
 from .v1 import device_pb2, run_pb2
 
@@ -149,6 +150,7 @@ class Runs:
             wanted = checked_signals(signals, self.signals)
             lane = Lane.of(self, port_values(self, voltages, len(t)), len(t), len(wanted), True)
             advance([lane], t, wanted, True)
+            self._issue()
             return finished(lane, t, wanted)
 
 
@@ -206,7 +208,7 @@ def advance(
             request(here)
         else:
             divide(here, request)
-        accept_together([state for lane in here if (state := lane.state(times)) is not None])
+        accept_together([state for lane in here if (state := lane.state(times)) is not None], warn=False)
 
 
 def _advance(
@@ -219,7 +221,7 @@ def _advance(
 ) -> None:
     channel: Channel = lanes[0].session._channel
     here = times[part]
-    request = run_pb2.RunRequest(times=_packed(here), signals=signals, ports=ports)
+    request = run_pb2.RunRequest(times=_packed(here), signals=signals, ports=ports, warn=True)
     shared = lanes[0].values if all(lane.values is lanes[0].values for lane in lanes) else None
     if shared is not None:
         request.values = _packed(shared if len(shared) == 1 else shared[part])
@@ -285,6 +287,7 @@ def _end(lane: Lane, end: Any, here: Array, start: int) -> None:
         checked.require(end.last.status == device_pb2.TrialReply.STATUS_OK, "end: expected a step that was taken")
         checked.trial(end.last, len(session.ports), len(session.signals), None)
         lane.last = end.last
+    session._warnings.extend(map(diagnostic, end.warnings))
     lane.trials += end.trials
     lane.error = shown(end.error)
 

@@ -11,10 +11,12 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
+from .aloud import of_states
 from .arguments import MAX_STEP, given_to, instance, number, one_of, text
 from .channel import Channel
-from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, from_fault, shown
+from .errors import BimorphError, Diagnostic, InvalidRequest, NotFound, StepFailed, from_fault, shown
 from .local import ADDRESS
+from .messages import diagnostic
 from .naming import by_argument
 from .results import NodeMotion
 from .runs import Runs
@@ -68,6 +70,10 @@ class Session(Runs):
         self._voltages: dict[str, float] = {}
         self._checked = Checked(channel.address, f"session of model {model[:8]}")
         self._last: tuple[int, object] | None = None
+        self._warnings: list[Diagnostic] = []
+        self._issued = 0
+        # Token of an accepted state whose warnings come with the next reply.
+        self._due = 0
         if session:
             first = device_pb2.DeviceRequest(attach=device_pb2.Attach(session=session))
         else:
@@ -145,6 +151,7 @@ class Session(Runs):
         with self._lock:
             held = {**reply.voltages, **({} if voltages is None else given_to(self._voltages, voltages))}
             self._accept(reply, dict(zip(self.ports, self._vector(held))))
+            self._issue()
 
     def _accept(self, reply: TrialReply, voltages: dict[str, float]) -> None:
         if self.kept:
@@ -156,14 +163,40 @@ class Session(Runs):
         self.accepted, self.t, self._voltages = reply, reply.t, voltages
         self._report_accepted(reply)
 
-    def _report_accepted(self, reply: TrialReply) -> None:
+    def _report_accepted(self, reply: TrialReply, *, warn: bool = True) -> None:
+        """``warn``: the warnings of the state come with the next reply."""
         if self.kept:
-            accept = device_pb2.Accept(token=reply.token, answer=True)
-            accepted = self._checked.kind(self._ask(device_pb2.DeviceRequest(accept=accept)), "accepted")
-            self._checked.require(accepted.token == reply.token, "it accepts another state than that of the request")
+            self._ask_to_accept(reply.token, warn=warn)
             return
         self._own()
-        self._line.send(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)))
+        self._line.send(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token, warn=warn)))
+        self._due = reply.token if warn else self._due
+
+    def _ask_to_accept(self, token: int, *, warn: bool) -> None:
+        """Accepts a state and waits until the server has."""
+        accept = device_pb2.Accept(token=token, answer=True, warn=warn)
+        accepted = self._checked.kind(self._ask(device_pb2.DeviceRequest(accept=accept)), "accepted")
+        self._checked.require(accepted.token == token, "it accepts another state than that of the request")
+
+    @property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """Warnings of the accepted states since this object was opened, with code, message and remedy: an error of the mesh above the tolerance
+        (W040), a reduced model with an error above it or one that the full model has replaced (W053), and others. Each kind is there once, and again
+        where it is ten times larger.
+
+        Those of a state come with the reply to the next call, or when this is read. Calls that accept a state issue them as
+        :class:`AccuracyWarning`.
+        """
+        with self._lock:
+            if self._due and not self._closed and self._line.over is None:
+                with contextlib.suppress(BimorphError):
+                    self._ask_to_accept(self._due, warn=False)
+            return tuple(self._warnings)
+
+    def _issue(self, level: int = 4, about: str = "") -> None:
+        """Issues the warnings received since the last call, located ``level`` calls above."""
+        new, self._issued = self._warnings[self._issued :], len(self._warnings)
+        of_states(new, level, about)
 
     def operating_point(self, voltages: Mapping[str, float]) -> TrialReply:
         """Accepts the static equilibrium at these port voltages [V] and sets the time to 0 s.
@@ -174,15 +207,22 @@ class Session(Runs):
         Raises :class:`StepFailed` where none is found; the session keeps its state.
         """
         with self._lock:
-            reply = replace(self.trial(voltages), t=0.0)
-            self.accept(reply)
+            reply = self._operating_point(voltages)
+            self._issue()
             return reply
+
+    def _operating_point(self, voltages: Mapping[str, float]) -> TrialReply:
+        reply = replace(self.trial(voltages), t=0.0)
+        self._accept(reply, dict(reply.voltages))
+        return reply
 
     def step(self, voltages: Mapping[str, float], dt: float) -> TrialReply:
         """Takes a step of ``dt`` [s], along which the voltages [V] change linearly to these, in as many pieces as the device requires. If this
         raises, the accepted state is unchanged."""
         with self._lock:
-            return self._step(voltages, number("dt", dt, "a time in seconds", above=0.0, most=MAX_STEP))
+            reply = self._step(voltages, number("dt", dt, "a time in seconds", above=0.0, most=MAX_STEP))
+            self._issue()
+            return reply
 
     def _step(self, voltages: Mapping[str, float], dt: float) -> TrialReply:
         start, end = [self._voltages[port] for port in self.ports], self._vector(voltages)
@@ -199,7 +239,7 @@ class Session(Runs):
                     return reply
                 parent, done, taken = reply, done + h, taken + 1
                 if taken % _PIECES == 0 and self.accepted is not None:
-                    self._report_accepted(self.accepted)
+                    self._report_accepted(self.accepted, warn=False)
                 continue
             h = min(reply.need_dt / dt, h / 2)
             if h < _SHORTEST:
@@ -356,6 +396,8 @@ class Session(Runs):
         with self._lock:
             self._own()
             reply = self._line.ask(request)
+            self._due = 0
+            self._warnings.extend(map(diagnostic, reply.warnings))
         if reply.WhichOneof("kind") == "fault":
             fault = reply.fault
             kind = fault.WhichOneof("kind")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .aloud import MESH, text_of
 from .arguments import integer, mapping, number, text, unmasked, wrong_type
 from .errors import InvalidRequest, StepFailed
 from .results import TransientResult
@@ -84,7 +85,7 @@ def drive(
     times = _apart(np.concatenate([output, *corners]), stop)
 
     start = {port: float(np.interp(times[0], *wave)) for port, wave in waves.items()}
-    opening = session.operating_point(start)
+    opening = session._operating_point(start)
     later = times[1:]
     values = port_values(session, {port: np.interp(later, *wave) for port, wave in waves.items()}, len(later))
     names = list(session.signals)
@@ -98,7 +99,9 @@ def drive(
     signals = {
         name: np.concatenate([[opening.outputs[name]], lane.outputs[wanted, k]]) for k, name in enumerate(names)
     }
-    return TransientResult(output, signals, dict(session.signals), len(times) - 1, 0, session.unknowns)
+    # the error of mesh and steps is estimated by a finer run
+    warnings = tuple(text_of(one) for one in session.warnings if one.code != MESH)
+    return TransientResult(output, signals, dict(session.signals), len(times) - 1, 0, session.unknowns, warnings=warnings)
 
 
 def with_error_estimate(found: TransientResult, finer: TransientResult | None, tol: float) -> TransientResult:

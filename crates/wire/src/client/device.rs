@@ -48,6 +48,8 @@ pub struct RemoteDevice {
     replay: Option<Replay>,
     /// When the call at hand must have ended.
     until: Instant,
+    /// The state whose warnings were requested; it is evaluated where it is accepted.
+    watched: Option<Token>,
 }
 
 impl RemoteDevice {
@@ -90,6 +92,7 @@ impl RemoteDevice {
             asked: OpenRequest::default(),
             replay: None,
             until: Instant::now() + deadline,
+            watched: None,
         };
         device.reach().map_err(|status| device.lose(&status))?;
         Ok(device)
@@ -323,10 +326,19 @@ impl Device for RemoteDevice {
             replay.accept(token.0);
         }
         if let Some(stream) = &self.stream {
-            let accept = proto::Accept { token: token.0, answer: false };
+            let warn = self.watched == Some(token);
+            let accept = proto::Accept { token: token.0, answer: false, warn };
             // Advisory: when the queue is full, the next one says as much.
             stream.report(RequestKind::Accept(accept));
         }
+    }
+
+    /// Warnings of accepted states before this one, which have come with replies: no request waits for them. Those of this state come with
+    /// the reply after its accept.
+    fn warns(&mut self, token: Token) -> Vec<Diagnostic> {
+        self.watched = Some(token);
+        let reported = self.stream.as_mut().map(|stream| std::mem::take(&mut stream.warnings));
+        reply_checks::warnings(&reported.unwrap_or_default())
     }
 
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError> {

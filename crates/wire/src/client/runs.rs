@@ -30,6 +30,7 @@ impl RemoteDevice {
             values: pack(course.values),
             signals: course.signals.to_vec(),
             ports: course.ports,
+            warn: false,
         };
         self.begin();
         let shape = self.shape();

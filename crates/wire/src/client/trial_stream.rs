@@ -12,6 +12,9 @@ use std::task::Poll;
 use tokio::sync::mpsc;
 use tonic::{Status, Streaming};
 
+/// Most warnings of states that wait to be read.
+const MAX_WARNINGS: usize = 64;
+
 /// A stream and what is open on it.
 #[derive(Debug)]
 pub(super) struct OpenTrialStream {
@@ -22,12 +25,15 @@ pub(super) struct OpenTrialStream {
     pub(super) order: TrialOrder,
     /// Id of the session that is open; empty: none.
     pub(super) session: String,
+    /// Warnings of accepted states that came with replies.
+    pub(super) warnings: Vec<proto::Diagnostic>,
 }
 
 impl OpenTrialStream {
     /// One on which nothing is open yet.
     pub(super) fn new(requests: mpsc::Sender<proto::DeviceRequest>, replies: Streaming<proto::DeviceReply>) -> Self {
-        Self { requests, replies, shape: None, order: TrialOrder::default(), session: String::new() }
+        let (order, session, warnings) = (TrialOrder::default(), String::new(), Vec::new());
+        Self { requests, replies, shape: None, order, session, warnings }
     }
 
     /// A device was opened on it.
@@ -63,6 +69,8 @@ impl OpenTrialStream {
             return Err(replies.message().await.err().unwrap_or_else(ended));
         }
         let reply = replies.message().await?.ok_or_else(ended)?;
+        let left = MAX_WARNINGS.saturating_sub(self.warnings.len());
+        self.warnings.extend(reply.warnings.into_iter().take(left));
         reply.kind.ok_or_else(|| unexpected("one of a kind that is not known, or of none"))
     }
 

@@ -210,7 +210,7 @@ pub fn fault_from_wire(fault: proto::Fault, address: &str) -> DeviceError {
 
 /// The error's field names are static in process; those known are restored, others keep their place in the text.
 fn field_name(what: &str) -> &'static str {
-    ["voltages", "dt", "t", "mode", "omega", "ports", "signals", "parent"]
+    ["voltages", "dt", "t", "mode", "omega", "ports", "signals", "ranges", "parent"]
         .into_iter()
         .find(|name| *name == what)
         .unwrap_or("request")
