@@ -11,6 +11,7 @@
 
 use super::basis::Basis;
 use super::linear::ReducedModel;
+use super::linear_noise::LinearNoise;
 use super::mechanism::{LinearizedMechanism, port_names};
 use super::{ExportError, ExportRequest};
 use bimorph_device::local::LocalDevice;
@@ -62,6 +63,10 @@ struct ExactDevice {
 pub struct ModelFit {
     /// The model.
     pub model: ReducedModel,
+    /// Its thermal noise.
+    pub noise: LinearNoise,
+    /// Largest relative deviation of the spectral density of a port or signal from that of the full model (1).
+    pub noise_error: f64,
     /// Largest relative deviation from the exact small-signal answer (1).
     pub error: f64,
     /// Where: row, port and frequency (Hz).
@@ -105,19 +110,28 @@ pub fn fit(compiled: &Arc<CompiledModel>, request: &ExportRequest) -> Result<Mod
         };
         let grid = grid(&all, to);
         let answers = grid.iter().map(|omega| exact.response(*omega)).collect::<Result<Vec<_>, _>>()?;
+        let jumped = exact.jumped;
         let assessed = |basis: &Basis| {
             let mut model = mechanism.reduced(basis);
             model.at_rest.copy_from(&at_rest);
             let (error, worst) = deviation(&model, &all, &grid, &answers);
             let band = [grid[0] / TAU, to];
             let unknowns = compiled.parts.system.model.unknowns();
-            ModelFit { model, error, worst, band, compared: grid.len(), unknowns, jumped: exact.jumped }
+            let (noise, noise_error, compared) = (LinearNoise::default(), 0.0, grid.len());
+            ModelFit { model, noise, noise_error, error, worst, band, compared, unknowns, jumped }
         };
+
         let choices = match request.count {
             Some(_) => vec![every.clone()],
             None => choices(&every, &showing, |j| hertz(j) <= 1.01 * to),
         };
-        let mut best: Option<ModelFit> = None;
+        let mut noisy = |(fitted, basis): (ModelFit, Basis)| -> Result<ModelFit, ExportError> {
+            let noise = mechanism.noise(&basis);
+            let exact = grid.iter().map(|omega| exact.noise(*omega)).collect::<Result<Vec<_>, _>>()?;
+            let noise_error = noise_deviation(&fitted.model, &noise, &grid, &exact);
+            Ok(ModelFit { noise, noise_error, ..fitted })
+        };
+        let mut best: Option<(ModelFit, Basis)> = None;
         for kept in &choices {
             let basis = Basis::of(&found, kept);
             for depth in 1..=DEEPEST {
@@ -126,20 +140,21 @@ pub fn fit(compiled: &Arc<CompiledModel>, request: &ExportRequest) -> Result<Mod
                 // one after the other, or all at once where there are many
                 let swinging = if most <= MANY { (0..=most).collect() } else { vec![0, most] };
                 for more in swinging.into_iter().filter(|more| depth == 1 || *more > 0) {
-                    let fitted = assessed(&corrected.first(kept.len() + more));
+                    let basis = corrected.first(kept.len() + more);
+                    let fitted = assessed(&basis);
                     if fitted.error <= request.within {
-                        return Ok(fitted);
+                        return noisy((fitted, basis));
                     }
-                    if best.as_ref().is_none_or(|best| fitted.error < best.error) {
-                        best = Some(fitted);
+                    if best.as_ref().is_none_or(|(best, _)| fitted.error < best.error) {
+                        best = Some((fitted, basis));
                     }
                 }
             }
         }
         match best {
-            Some(best) if request.count.is_some() => return Ok(best),
+            Some(best) if request.count.is_some() => return noisy(best),
             best if exhausted => {
-                let (error, modes) = best.map_or((f64::INFINITY, 0), |b| (b.error, b.model.modes.len()));
+                let (error, modes) = best.map_or((f64::INFINITY, 0), |(b, _)| (b.error, b.model.modes.len()));
                 return Err(ExportError::NotReached { modes, error, to, within: request.within });
             }
             _ => count *= 2,
@@ -216,6 +231,18 @@ fn deviation(
     worst
 }
 
+/// Largest relative deviation of spectral densities.
+fn noise_deviation(model: &ReducedModel, noise: &LinearNoise, grid: &[f64], exact: &[Vec<f64>]) -> f64 {
+    let mut worst = 0.0f64;
+    for (omega, exact) in grid.iter().zip(exact) {
+        bimorph_base::budget::check();
+        let Some(found) = noise.densities(model, *omega) else { return f64::INFINITY };
+        let off = found.iter().zip(exact).filter(|(_, exact)| **exact > 0.0);
+        worst = off.map(|(found, exact)| (found / exact - 1.0).abs()).fold(worst, f64::max);
+    }
+    worst
+}
+
 impl ExactDevice {
     fn new(compiled: &Arc<CompiledModel>, request: &ExportRequest) -> Result<(Self, DVector<f64>), ExportError> {
         let mut device = LocalDevice::new(Arc::clone(compiled));
@@ -264,6 +291,17 @@ impl ExactDevice {
             };
             Complex::new(re, im) * (scale * self.scales[q].given)
         }))
+    }
+
+    /// The exact spectral density of each row in the scales of the circuit.
+    fn noise(&mut self, omega: f64) -> Result<Vec<f64>, ExportError> {
+        bimorph_base::budget::check();
+        let mut found = Vec::new();
+        self.device.noise(self.token, omega, &mut found)?;
+        let (p, answers) = (self.scales.len(), self.opened + self.signals.len());
+        let of_port = (0..p).map(|k| (k, self.scales[k].answered));
+        let of_signal = self.signals.iter().enumerate().map(|(k, scale)| (self.opened + k, *scale));
+        Ok(of_port.chain(of_signal).map(|(k, scale)| found[k * answers + k][0] * scale * scale).collect())
     }
 
     /// How much of what is there at its resonance each mode is, at the port or signal that sees it best (1).

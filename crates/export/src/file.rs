@@ -145,7 +145,7 @@ impl FileRequest {
         let warnings = self.warnings(compiled, &fitted);
         let about = self.about(compiled, &fitted, source, &warnings);
         let (rows, ports, modes, lags) = (model.rows(), model.ports.len(), model.modes.len(), model.lags.len());
-        let couplings = rows * (2 * ports + 2 * modes + lags) + modes * (modes + ports + lags);
+        let couplings = rows * (2 * ports + 2 * modes + lags) + modes * (modes + ports + lags) + (modes + rows).pow(2);
         bimorph_base::budget::lay_out(LINE.saturating_mul(couplings));
         let text = match self.language {
             FileLanguage::Spice => spice::write(&fitted, &pins, &name, &about),
@@ -284,6 +284,15 @@ impl FileRequest {
         if fitted.error > 0.0 {
             about.push(format!("  found at {hertz:.4e} Hz from port {port} to {row}"));
         }
+        about.push(match self.language {
+            FileLanguage::Spice => {
+                "noise: that of resistors at the temperature of the simulator alone, without that of drag".to_owned()
+            }
+            FileLanguage::VerilogA => format!(
+                "noise: of drag at {:e} K and of resistances as warm as at the operating point; spectral densities deviate by {:.1e} at these frequencies",
+                fitted.noise.temperature, fitted.noise_error
+            ),
+        });
         about.extend(warnings.iter().map(|warning| format!("warning: {warning}")));
         about.extend(model.signals.iter().map(meaning));
         about

@@ -13,11 +13,12 @@
 //! | `p1` … | displacements that are read |
 //! | `u`, `s`, `f` | approach (µm), rate (m/s) and force (N) of one point of a gap |
 //! | `f1` … | forces over the shapes (N) |
+//! | `m1`, `a1` | force of a contact that is shown (N), and its radius (µm) |
 //! | `g1`, `c1`, `k1`, `d1` | voltage, capacitance, its slope and smallest distance of a gap |
 
 use super::flexible::text::PolynomialText;
 use super::flexible::{FlexibleModel, FlexibleOutput};
-use super::laws::{bearing, capacitance, drag, slope};
+use super::laws::{bearing, capacitance, conductance, drag, nearer_way, pressing, radius, slope};
 use super::names::Pins;
 use super::noise_sources::{NoiseText, warm};
 use super::verilog_a::{ContributionSum, head};
@@ -206,6 +207,11 @@ impl FlexibleModule<'_> {
             self.set(&format!("k{n}"), "0");
         }
         let shows = self.model.rows.contains(&FlexibleOutput::Distance(m));
+        let bearing_shown = |row: &FlexibleOutput| matches!(row, FlexibleOutput::Bearing(of) | FlexibleOutput::Conductance(of, _) if *of == m);
+        let weighs = self.model.rows.iter().any(bearing_shown);
+        if weighs {
+            self.set(&format!("m{n}"), "0");
+        }
         let touching = |law: &PointLaw| matches!(law.law, Some(Law::Field(_, Some(_))));
         let bears = points.laws.iter().any(touching);
         let mut first = true;
@@ -221,27 +227,37 @@ impl FlexibleModule<'_> {
                 self.set("s", &format!("1e-6 * ({})", sum("z")));
             }
             let mut force: Vec<String> = Vec::new();
-            if let Some(Law::Field(capacitor, _)) = &law.law {
-                if capacitor.acts() {
-                    self.set(&format!("c{n}"), &format!("c{n} + {}", capacitance(capacitor, "u")));
-                    self.set("s0", &slope(capacitor, "u"));
-                    self.set(&format!("k{n}"), &format!("k{n} + s0"));
-                    force.push(format!("- 0.5 * g{n} * g{n} * s0"));
-                }
-                if shows && (!bears || touching(law)) {
+            if let Some(Law::Field(capacitor, _)) = &law.law
+                && capacitor.acts()
+            {
+                self.set(&format!("c{n}"), &format!("c{n} + {}", capacitance(capacitor, "u")));
+                self.set("s0", &slope(capacitor, "u"));
+                self.set(&format!("k{n}"), &format!("k{n} + s0"));
+                force.push(format!("- 0.5 * g{n} * g{n} * s0"));
+            }
+            let way = match &law.law {
+                Some(Law::Field(capacitor, _)) if !bears || touching(law) => {
                     let (sign, drawn) = capacitor.way();
-                    let way = format!("{drawn:e} {sign} 1e-6 * u");
-                    let least = if first { way } else { format!("min(d{n}, {way})") };
-                    self.set(&format!("d{n}"), &least);
-                    first = false;
+                    Some(format!("{drawn:e} {sign} 1e-6 * u"))
                 }
+                Some(Law::Stop(ways, ..)) => Some(nearer_way(ways, "u")),
+                _ => None,
+            };
+            if let Some(way) = way.filter(|_| shows) {
+                self.set(&format!("d{n}"), &if first { way } else { format!("min(d{n}, {way})") });
+                first = false;
+            }
+            if let Some(law) = law.law.as_ref().filter(|_| weighs) {
+                self.set(&format!("m{n}"), &format!("m{n} + {}", pressing(law, "u")));
             }
             force.extend(
                 law.law.iter().filter_map(|of| bearing(of, law.loss, "u", "s")).map(|text| format!("+ {text}")),
             );
             force.extend(drag(law.film, "u", "s").map(|text| format!("+ {text}")));
-            if let Some(drag) = drag(law.film, "u", "1") {
-                self.gas_noise(&shares, &drag);
+            let lost = law.law.as_ref().filter(|_| law.loss > 0.0);
+            let lost = lost.map(|of| format!("{:e} * {}", law.loss, pressing(of, "u")));
+            for (drag, name) in [(drag(law.film, "u", "1"), "gas"), (lost, "contact")] {
+                drag.into_iter().for_each(|drag| self.point_noise(&shares, &drag, name));
             }
             if !force.is_empty() {
                 self.set("f", &force.join(" "));
@@ -252,8 +268,8 @@ impl FlexibleModule<'_> {
         }
     }
 
-    /// Noise of the gas at a point with these shares, whose damping is the expression `drag` (N·s/m), while the variable `u` is that of the point.
-    fn gas_noise(&mut self, shares: &[(usize, f64)], drag: &str) {
+    /// Noise of a damping at a point with these shares, the expression `drag` (N·s/m), while the variable `u` is that of the point.
+    fn point_noise(&mut self, shares: &[(usize, f64)], drag: &str, name: &str) {
         let unit = 1e-6 / self.of.energy_unit();
         let gain = |j: usize| -> String {
             let terms: Vec<String> = shares.iter().map(|(l, share)| format!("{share:e} * y{}_{j}", l + 1)).collect();
@@ -261,7 +277,7 @@ impl FlexibleModule<'_> {
         };
         let targets: Vec<_> = (1..=self.of.size()).map(|j| (format!("I(v{j})"), gain(j))).collect();
         let power = format!("{:e} * {drag}", warm(self.model.johnson.temperature));
-        self.noise.source(&targets, &power, "gas");
+        self.noise.source(&targets, &power, name);
         // while `u` is that of the point
         let written = std::mem::take(&mut self.noise.text);
         self.body.push_str(&written);
@@ -392,6 +408,12 @@ impl FlexibleModule<'_> {
             }
             FlexibleOutput::Charge(_) | FlexibleOutput::Capacitance(_) | FlexibleOutput::Pull(_) => {}
             FlexibleOutput::Distance(m) => sum.add(scale, &format!("d{}", m + 1)),
+            FlexibleOutput::Bearing(m) => sum.add(scale, &format!("m{}", m + 1)),
+            FlexibleOutput::Conductance(m, metals) => {
+                let a = format!("a{}", m + 1);
+                self.set(&a, &radius(metals, &format!("m{}", m + 1)));
+                sum.add(scale, &conductance(metals, &a));
+            }
             FlexibleOutput::Constant(value) => sum.add(scale * value, "1"),
         }
         sum.end(&mut self.body);

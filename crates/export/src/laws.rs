@@ -179,12 +179,18 @@ pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<Strin
     }
 }
 
-/// A reading of a contact with a `law` at the approach `u`: the way that is left, its force or its conductance; other readings are 0.
-pub(super) fn contact_reading(reading: &LumpedOutput, law: &Law, u: &str) -> String {
+/// A reading of a contact with a `law` at the approach `u`: the way that is left, its force or its conductance; other readings are 0. `named` takes the expression of
+/// the radius of a contact that conducts (µm), and gives it a name.
+pub(super) fn contact_reading(
+    reading: &LumpedOutput,
+    law: &Law,
+    u: &str,
+    named: impl FnOnce(String) -> String,
+) -> String {
     match (reading, law) {
         (LumpedOutput::Way(_), Law::Stop(ways, ..)) => nearer_way(ways, u),
         (LumpedOutput::Bearing(_), _) => pressing(law, u),
-        (LumpedOutput::Conductance(_, metals), _) => conductance(metals, &pressing(law, u)),
+        (LumpedOutput::Conductance(_, metals), _) => conductance(metals, &named(radius(metals, &pressing(law, u)))),
         _ => "0".to_owned(),
     }
 }
@@ -206,22 +212,28 @@ pub(super) fn pressing(law: &Law, u: &str) -> String {
 }
 
 /// Way that is left before the nearer side of a stop at the approach `u` (m), as `STOP.gap` shows it.
-fn nearer_way(ways: &[Option<f64>; 2], u: &str) -> String {
+pub(super) fn nearer_way(ways: &[Option<f64>; 2], u: &str) -> String {
     match [ways[0].map(|way| left(way, "-", u)), ways[1].map(|way| left(way, "+", u))] {
         [Some(ahead), Some(back)] => format!("min({ahead}, {back})"),
         [way, other] => way.or(other).unwrap_or_else(|| "0".to_owned()),
     }
 }
 
-/// Conductance of two metals under the force `pressing`, a text in newtons (S), as [`bimorph_domains::contact_resistance`]. The root of the radius begins at a
-/// force that conducts next to nothing, from where its slope is finite.
-fn conductance(contact: &OhmicContact, pressing: &str) -> String {
-    const LEAST: f64 = 1e-18;
-    let OhmicContact { hardness, resistivity, electron_path: path } = *contact;
-    let a = format!("sqrt(max({pressing}, {LEAST:e}) / {:e})", PI * hardness);
+/// Force that conducts next to nothing (N): from there on the root of the radius has a finite slope.
+const LEAST: f64 = 1e-18;
+
+/// Radius of the contact of two metals under the force `pressing`, a text in newtons (µm).
+pub(super) fn radius(contact: &OhmicContact, pressing: &str) -> String {
+    format!("sqrt(max({pressing}, {LEAST:e}) / {:e})", 1e-12 * PI * contact.hardness)
+}
+
+/// Conductance of two metals at the radius `a`, a text in micrometres (S), as [`bimorph_domains::contact_resistance`].
+pub(super) fn conductance(contact: &OhmicContact, a: &str) -> String {
+    let OhmicContact { resistivity, electron_path, .. } = *contact;
+    let path = 1e6 * electron_path;
     let constriction = format!("0.5 * {a} * ({a} + {:e}) / ({a} + {:e})", 0.83 * path, 1.33 * path);
     let (crossing, start) = (4.0 * path / (3.0 * PI), contact_resistance::conductance(contact, LEAST).0);
-    format!("({a} * {a} / ({resistivity:e} * ({constriction} + {crossing:e})) - {start:e})")
+    format!("({a} * {a} / ({:e} * ({constriction} + {crossing:e})) - {start:e})", 1e6 * resistivity)
 }
 
 /// Way that is left of `way` (m) at the approach `u`, which it falls with at the `sign` "-".
@@ -382,7 +394,7 @@ mod tests {
         let metals = OhmicContact { hardness: 2e9, resistivity: 2.2e-8, electron_path: 38e-9 };
         let law = Law::Stop(ways, stop, Some(Adhesion { force: 2e-6, range: 20e-9 }));
         let read = |reading: &LumpedOutput, law: &Law, u: f64| {
-            let text = contact_reading(reading, law, &format!("({u:e})"));
+            let text = contact_reading(reading, law, &format!("({u:e})"), |radius| format!("({radius})"));
             let mut left = text.as_str();
             let found = sum(&mut left);
             assert_eq!(left, "", "{text}");

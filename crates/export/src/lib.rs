@@ -3,6 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`linear`] | the reduced linear model: modes, static correction, lags of heaters, ports; its response |
+//! | [`linear_noise`] | its thermal noise |
 //! | [`reduce`], [`basis`] | how it is made of a mechanism at an operating point, and in which directions it moves |
 //! | `mechanism` | that mechanism, and what its inputs do there |
 //! | [`compare`] | how far it is from the exact small-signal answer, and how many modes that takes |
@@ -29,6 +30,7 @@ pub mod flexible;
 pub mod flexible_verilog_a;
 mod laws;
 pub mod linear;
+pub mod linear_noise;
 pub mod lumped;
 pub mod lumped_spice;
 pub mod lumped_verilog_a;

@@ -122,17 +122,35 @@ impl ReducedModel {
         }
     }
 
+    /// Matrix of the shares x of the modes at angular frequency `omega` (rad/s), n × n.
+    fn matrix(&self, omega: f64) -> DMatrix<Complex<f64>> {
+        let n = self.modes.len();
+        DMatrix::from_fn(n, n, |j, k| {
+            let own = self.modes[j].omega;
+            let stiff = if j == k { own - omega * omega / own } else { 0.0 };
+            Complex::new(stiff, omega * self.damping[(j, k)] / self.modes[k].omega)
+        })
+    }
+
+    /// Change of y with a current out of the node of each mode's rate at angular frequency `omega` (rad/s), r × n; none at an undamped
+    /// resonance.
+    pub(super) fn response_to_modes(&self, omega: f64) -> Option<DMatrix<Complex<f64>>> {
+        let n = self.modes.len();
+        if n == 0 {
+            return Some(DMatrix::zeros(self.rows(), 0));
+        }
+        let pushed = DMatrix::from_fn(n, n, |j, k| Complex::from(if j == k { -self.modes[j].omega } else { 0.0 }));
+        let x = self.matrix(omega).lu().solve(&pushed)?;
+        Some(DMatrix::from_fn(self.rows(), n, |r, j| self.by_mode(omega, r, j)) * x)
+    }
+
     /// Shares x of the modes per unit of each input at angular frequency `omega` (rad/s), n × p; none at an undamped resonance.
     fn shares(&self, omega: f64) -> Option<DMatrix<Complex<f64>>> {
         let n = self.modes.len();
         if n == 0 {
             return Some(DMatrix::zeros(0, self.ports.len()));
         }
-        let matrix = DMatrix::from_fn(n, n, |j, k| {
-            let own = self.modes[j].omega;
-            let stiff = if j == k { own - omega * omega / own } else { 0.0 };
-            Complex::new(stiff, omega * self.damping[(j, k)] / self.modes[k].omega)
-        });
+        let matrix = self.matrix(omega);
         let mut force =
             DMatrix::from_fn(n, self.ports.len(), |j, q| Complex::from(self.modes[j].omega * self.push[(j, q)]));
         for (l, lag) in self.lags.iter().enumerate() {

@@ -8,6 +8,7 @@
 //! | `e1` … | voltage of a gap |
 //! | `s1` … | rate of a gap in metres per second, where its contact loses energy |
 //! | `f1` … | its force in micronewtons |
+//! | `a1` … | radius of a contact whose conductance is shown, in micrometres |
 //! | `q1` … | its charge in femtocoulombs, through a capacitor of a femtofarad: that current is dQ/dt |
 
 use super::laws::{bearing, capacitance, contact_reading, drag, loses, slope};
@@ -187,7 +188,10 @@ impl LumpedSubcircuit<'_> {
                 self.parts.constant(places, rest * scale);
             }
             reading @ (LumpedOutput::Way(g) | LumpedOutput::Bearing(g) | LumpedOutput::Conductance(g, _)) => {
-                let value = contact_reading(reading, &model.gaps[*g].law, &format!("V(g{})", g + 1));
+                let value = contact_reading(reading, &model.gaps[*g].law, &format!("V(g{})", g + 1), |radius| {
+                    self.parts.line(&format!("Ba{n} a{n} 0 V={radius}"));
+                    format!("V(a{n})")
+                });
                 self.parts.line(&format!("By{n} 0 {sum} I={scale:e} * {value}"));
             }
             LumpedOutput::Constant(value) => self.parts.constant(places, value * scale),

@@ -7,6 +7,7 @@ use super::names::Pins;
 use super::noise_sources::{NoiseText, warm};
 use super::verilog_a::{ContributionSum, head};
 use nalgebra::{DMatrix, DVector};
+use std::fmt::Write;
 
 /// The file: a descriptive header, and the module `name`.
 pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> String {
@@ -18,7 +19,8 @@ pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> 
     });
     let noise = noise(model);
     let inner: Vec<String> = coordinates.chain(gaps).chain(noise.nodes).collect();
-    let mut text = head(name, pins, &inner, &[], &model.ports, about);
+    let radii: Vec<String> = (0..model.rows.len()).filter(|row| conducts(model, *row)).map(radius_name).collect();
+    let mut text = head(name, pins, &inner, &radii, &model.ports, about);
     for (g, gap) in model.gaps.iter().enumerate() {
         let mut sum = ContributionSum::begin(&format!("I(g{0}) <+ V(g{0})", g + 1));
         add(&mut sum, "x", &gap.along, -1.0);
@@ -69,6 +71,16 @@ pub fn write(model: &LumpedModel, pins: &Pins, name: &str, about: &[String]) -> 
     text
 }
 
+/// Whether a row shows the conductance of a contact, whose radius is a variable.
+fn conducts(model: &LumpedModel, row: usize) -> bool {
+    matches!(model.rows[row], LumpedOutput::Conductance(..))
+}
+
+/// Variable of the radius of a contact that a row shows (µm).
+fn radius_name(row: usize) -> String {
+    format!("a{}", row + 1)
+}
+
 /// Output of a port or signal.
 fn add_row(model: &LumpedModel, row: usize, pins: &Pins, text: &mut String) {
     let (reading, scale) = (&model.rows[row], model.scales[row]);
@@ -112,7 +124,12 @@ fn add_row(model: &LumpedModel, row: usize, pins: &Pins, text: &mut String) {
             sum.add(rest * scale, "1");
         }
         LumpedOutput::Way(g) | LumpedOutput::Bearing(g) | LumpedOutput::Conductance(g, _) => {
-            sum.add(scale, &contact_reading(reading, &model.gaps[*g].law, &format!("V(g{})", g + 1)));
+            let u = format!("V(g{})", g + 1);
+            let value = contact_reading(reading, &model.gaps[*g].law, &u, |radius| {
+                let _ = writeln!(text, "    {} = {radius};", radius_name(row));
+                radius_name(row)
+            });
+            sum.add(scale, &value);
         }
         LumpedOutput::Constant(value) => sum.add(value * scale, "1"),
     }
@@ -128,11 +145,12 @@ fn noise(model: &LumpedModel) -> NoiseText {
     for (g, gap) in model.gaps.iter().enumerate().filter(|(_, gap)| loses(gap)) {
         let u = format!("V(g{})", g + 1);
         let lost = (gap.loss > 0.0).then(|| format!("{:e} * {}", gap.loss, pressing(&gap.law, &u)));
-        let drag: Vec<String> = drag(gap.film, &u, "1").into_iter().chain(lost).collect();
         let shares = gap.along.iter().zip(&parts).filter(|(share, _)| **share != 0.0);
         let shares: Vec<_> =
             shares.map(|(share, (target, unit))| (target.clone(), format!("({:e})", share / unit))).collect();
-        noise.source(&shares, &format!("{warm:e} * ({})", drag.join(" + ")), "gas");
+        for (drag, name) in [(drag(gap.film, &u, "1"), "gas"), (lost, "contact")] {
+            drag.into_iter().for_each(|drag| noise.source(&shares, &format!("{warm:e} * {drag}"), name));
+        }
     }
     let conducts = |row: &LumpedOutput| matches!(row, LumpedOutput::Current(..));
     let electrical: Vec<usize> = (0..model.ports.len()).filter(|&k| conducts(&model.rows[k])).collect();

@@ -1,4 +1,4 @@
-//! Thermal noise of a nonlinear module: white sources of dampers, gas and resistors.
+//! Thermal noise of a module: white sources of dampers, gas and resistors.
 //!
 //! Forces of drag C have the spectral density 4·k·T·C, and currents of conductance G have 4·k·T·G ([`bimorph_device`] computes the same). A symmetric matrix is a sum of
 //! columns a·aᵀ, each of which is one source that acts on several equations with the gains a. Where it acts on one alone it is written there; otherwise it is the voltage of
@@ -48,12 +48,49 @@ impl NoiseText {
                 let _ = writeln!(self.text, "    {target} <+ white_noise({gain} * {gain} * ({power}), \"{name}\");");
             }
             _ => {
-                let node = format!("n{}", self.nodes.len() + 1);
-                let _ = writeln!(self.text, "    I({node}) <+ V({node}) + white_noise({power}, \"{name}\");");
+                let node = self.node(power, name);
                 for (target, gain) in shares {
                     let _ = writeln!(self.text, "    {target} <+ {gain} * V({node});");
                 }
-                self.nodes.push(node);
+            }
+        }
+    }
+
+    /// A node of its own whose voltage is a source of a spectral density `power`.
+    fn node(&mut self, power: &str, name: &str) -> String {
+        let node = format!("n{}", self.nodes.len() + 1);
+        let _ = writeln!(self.text, "    I({node}) <+ V({node}) + white_noise({power}, \"{name}\");");
+        self.nodes.push(node.clone());
+        node
+    }
+
+    /// Sources of the spectral densities `sizes`² with a correlation. Each acts on its target; where its entry of `rates` is true by its rate of change.
+    pub(super) fn correlated(
+        &mut self,
+        (sizes, correlation): (&DVector<f64>, &DMatrix<f64>),
+        targets: &[(String, bool)],
+        name: &str,
+    ) {
+        for column in columns(correlation) {
+            let shares: Vec<(usize, f64)> = column
+                .iter()
+                .zip(sizes)
+                .map(|(share, size)| share * size)
+                .enumerate()
+                .filter(|(_, x)| *x != 0.0)
+                .collect();
+            if let [(k, share)] = shares[..]
+                && !targets[k].1
+            {
+                let _ = writeln!(self.text, "    {} <+ white_noise({:e}, \"{name}\");", targets[k].0, share * share);
+                continue;
+            }
+            let node = self.node("1", name);
+            for (k, share) in shares {
+                let (target, rate) = &targets[k];
+                let text = format!("{share:e} * V({node})");
+                let text = if *rate { format!("ddt({text})") } else { text };
+                let _ = writeln!(self.text, "    {target} <+ {text};");
             }
         }
     }

@@ -23,13 +23,13 @@ use bimorph_multibody::planar::Pose;
 use nalgebra::{DMatrix, DVector};
 
 /// Displacement that a volt of a mode's share stands for where the mode moves most (m).
-const MICROMETRE: f64 = 1e-6;
+pub(super) const MICROMETRE: f64 = 1e-6;
 /// A coupling below this fraction of the largest of its kind is rounding.
 const NONE: f64 = 1e-10;
 
 /// Kind of a row of y.
 #[derive(Debug, Clone, Copy)]
-enum OutputRow {
+pub(super) enum OutputRow {
     /// A quantity of the state.
     Level(Signal),
     /// Its rate of change.
@@ -148,7 +148,7 @@ impl LinearizedMechanism<'_> {
     }
 
     /// The rows of y: ports, then signals.
-    fn rows(&self) -> Vec<OutputRow> {
+    pub(super) fn rows(&self) -> Vec<OutputRow> {
         let of_signal = |signal: Signal| match signal {
             Signal::Rate(point, direction) => OutputRow::Change(Signal::Displacement(point, direction)),
             level => OutputRow::Level(level),
@@ -164,7 +164,7 @@ impl LinearizedMechanism<'_> {
     }
 
     /// Change of a row's quantity (of its charge, of what it is the rate of) with a change of state.
-    fn read(&self, row: OutputRow, q: &[Pose], volts: &[f64], rise: &[f64]) -> f64 {
+    pub(super) fn read(&self, row: OutputRow, q: &[Pose], volts: &[f64], rise: &[f64]) -> f64 {
         let system = self.system();
         let still = vec![Pose::zeros(); self.q.len()];
         match row {
@@ -185,7 +185,7 @@ impl LinearizedMechanism<'_> {
     }
 
     /// Largest displacement in a shape (m); where nothing but rotation is, that of a lever of a millimetre.
-    fn largest(&self, shape: &[Pose]) -> f64 {
+    pub(super) fn largest(&self, shape: &[Pose]) -> f64 {
         let nodes = self.compiled.parts.nodes.iter().flatten().map(|p| p.displacement(shape, true).norm());
         let moved = nodes.chain(shape.iter().map(|x| x.xy().norm())).fold(0.0, f64::max);
         let turned = shape.iter().map(|x| 1e-3 * x.z.abs()).fold(0.0, f64::max);

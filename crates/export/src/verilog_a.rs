@@ -7,15 +7,18 @@
 use super::compare::ModelFit;
 use super::linear::{ReducedModel, ReducedPort};
 use super::names::Pins;
+use super::noise_sources::NoiseText;
 use bimorph_device::PortKind;
 use std::fmt::Write;
 
 /// The file: a descriptive header, and the module `name`.
 pub fn write(fitted: &ModelFit, pins: &Pins, name: &str, about: &[String]) -> String {
     let model = &fitted.model;
+    let noise = noise(fitted, pins);
     let inner: Vec<String> = (1..=model.modes.len())
         .flat_map(|k| [format!("x{k}"), format!("w{k}")])
         .chain((1..=model.lags.len()).map(|l| format!("h{l}")))
+        .chain(noise.nodes)
         .collect();
     let mut text = head(name, pins, &inner, &[], &model.ports, about);
     for (l, lag) in model.lags.iter().enumerate() {
@@ -39,12 +42,7 @@ pub fn write(fitted: &ModelFit, pins: &Pins, name: &str, about: &[String]) -> St
         sum.end(&mut text);
     }
     for row in 0..model.rows() {
-        let left = match (model.ports.get(row), row.checked_sub(model.ports.len())) {
-            (Some(port), _) if port.kind.answered().1.is_empty() => continue,
-            (Some(port), _) if port.kind == PortKind::Electrical => format!("I(b{})", row + 1),
-            (_, Some(k)) => format!("V({})", pins.signals[k]),
-            _ => format!("V(b{})", row + 1),
-        };
+        let Some(left) = output(model, row, pins) else { continue };
         let mut sum = ContributionSum::begin(&format!("{left} <+ {:e}", model.at_rest[row]));
         for j in 0..model.modes.len() {
             sum.add(model.place[(row, j)], &format!("V(x{})", j + 1));
@@ -62,7 +60,30 @@ pub fn write(fitted: &ModelFit, pins: &Pins, name: &str, about: &[String]) -> St
         }
         sum.end(&mut text);
     }
+    text.push_str(&noise.text);
     text.push_str("  end\nendmodule\n");
+    text
+}
+
+/// Branch or node of a row; none where the port answers nothing.
+fn output(model: &ReducedModel, row: usize, pins: &Pins) -> Option<String> {
+    match (model.ports.get(row), row.checked_sub(model.ports.len())) {
+        (Some(port), _) if port.kind.answered().1.is_empty() => None,
+        (Some(port), _) if port.kind == PortKind::Electrical => Some(format!("I(b{})", row + 1)),
+        (_, Some(k)) => Some(format!("V({})", pins.signals[k])),
+        _ => Some(format!("V(b{})", row + 1)),
+    }
+}
+
+/// Noise of drag on the directions, and of what all others yield to it in each row; and of resistances between ports.
+fn noise(fitted: &ModelFit, pins: &Pins) -> NoiseText {
+    let (model, noise, mut text) = (&fitted.model, &fitted.noise, NoiseText::default());
+    let directions = (1..=model.modes.len()).map(|k| (format!("I(w{k})"), false));
+    let rows = (0..model.rows()).map(|row| (output(model, row, pins).unwrap_or_default(), noise.rates[row]));
+    let targets: Vec<(String, bool)> = directions.chain(rows).collect();
+    text.correlated((&noise.sizes, &noise.correlation), &targets, "dampers");
+    let branches: Vec<(String, f64)> = (1..=model.ports.len()).map(|k| (format!("I(b{k})"), 1.0)).collect();
+    text.matrix(&noise.currents, &branches, "1", "resistors");
     text
 }
 

@@ -28,6 +28,7 @@ use bimorph_solve::reduced::polynomial::shapes::Probe;
 use bimorph_solve::reduced::polynomial::statics::{FittedPolynomials, fitted};
 use bimorph_solve::reduced::space::spanned;
 use bimorph_solve::reduced::{InputBox, ReductionError, TrainingCase, TrainingOptions, train};
+use bimorph_structure::OhmicContact;
 use heat::HeatCourses;
 use johnson::ConductedNoise;
 use ports::{SourceText, sum_of};
@@ -54,6 +55,10 @@ pub enum FlexibleOutput {
     Pull(usize),
     /// Smallest distance among its points.
     Distance(usize),
+    /// Force of its contact.
+    Bearing(usize),
+    /// Conductance of its contact of these metals.
+    Conductance(usize, OhmicContact),
     /// A constant.
     Constant(f64),
     /// Nothing.
@@ -172,7 +177,9 @@ fn read_gap(row: &FlexibleOutput) -> Option<usize> {
         FlexibleOutput::Charge(g)
         | FlexibleOutput::Capacitance(g)
         | FlexibleOutput::Pull(g)
-        | FlexibleOutput::Distance(g) => Some(*g),
+        | FlexibleOutput::Distance(g)
+        | FlexibleOutput::Bearing(g)
+        | FlexibleOutput::Conductance(g, _) => Some(*g),
         _ => None,
     }
 }
@@ -187,6 +194,10 @@ fn by_points(row: FlexibleOutput, fitted: &FittedPolynomials) -> FlexibleOutput 
         FlexibleOutput::Capacitance(g) => of(g, FlexibleOutput::Capacitance),
         FlexibleOutput::Pull(g) => of(g, FlexibleOutput::Pull),
         FlexibleOutput::Distance(g) => of(g, FlexibleOutput::Distance),
+        FlexibleOutput::Bearing(g) => of(g, FlexibleOutput::Bearing),
+        FlexibleOutput::Conductance(g, metals) => {
+            place(g).map_or(FlexibleOutput::Nothing, |m| FlexibleOutput::Conductance(m, metals))
+        }
         FlexibleOutput::Current(text, shares) => {
             FlexibleOutput::Current(text, members.iter().map(|points| shares[points.member]).collect())
         }
@@ -328,14 +339,14 @@ impl RowReader<'_> {
             Signal::Charge(g) => FlexibleOutput::Charge(g),
             Signal::Capacitance(g) => FlexibleOutput::Capacitance(g),
             Signal::Pull(g) => FlexibleOutput::Pull(g),
-            Signal::Distance(g) if self.system.members[g].point_laws().iter().any(has_distance) => {
-                FlexibleOutput::Distance(g)
-            }
+            Signal::Distance(g) if self.has_sides(g) => FlexibleOutput::Distance(g),
+            Signal::Bearing(g) if self.has_sides(g) => FlexibleOutput::Bearing(g),
+            Signal::Conductance(g, metals) if self.has_sides(g) => FlexibleOutput::Conductance(g, metals),
             Signal::Distance(g) | Signal::Bearing(g) | Signal::Conductance(g, _) => {
                 let name = self.compiled.parts.gap_names[g].clone();
                 return Err(ExportError::NotFlexible {
                     why: format!(
-                        "the way and the force of a contact are not written, which a signal of \"{name}\" shows; leave it out"
+                        "the sides of \"{name}\" have no points whose distance and force a signal could show; leave it out"
                     ),
                 });
             }
@@ -349,9 +360,10 @@ impl RowReader<'_> {
             }
         })
     }
-}
 
-/// Whether a point has the distance of two conductors.
-fn has_distance(law: &PointLaw) -> bool {
-    matches!(law.law, Some(Law::Field(..)))
+    /// Whether a member has points with two conductors, or with a stop.
+    fn has_sides(&self, g: usize) -> bool {
+        let sides = |law: &PointLaw| matches!(law.law, Some(Law::Field(..) | Law::Stop(..)));
+        self.system.members[g].point_laws().iter().any(sides)
+    }
 }
