@@ -15,7 +15,7 @@ use serde::Serialize;
 
 /// Frequency response about the operating point: magnitude and phase of what a small sinusoid at one place does.
 ///
-/// Drive: NODE.fx, NODE.fy [N], NODE.m [N·m], a port of the netlist [V], BEAM.T (heat) [W], frame.ax, frame.ay [m/s²],
+/// Drive: NODE.fx, NODE.fy [N], NODE.m [N·m], NODE.ux, .uy [m] or .urz [rad] of a driven anchor, a port of the netlist [V], BEAM.T (heat) [W], frame.ax, frame.ay [m/s²],
 /// frame.wz [rad/s]. Signals: those of `tran` over the unit of the drive, and PORT.i [A], the current into a port. Rows
 /// keep their own scale, which makes elimination with rows of very different weight stable. See A. J. Cox, N. J.
 /// Higham, "Stability of Householder QR factorization for weighted least squares problems", 1998. See also C. C. Paige,
@@ -31,7 +31,7 @@ pub(crate) struct AcCommand {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// Input: NODE.fx, NODE.fy, NODE.m, a port, BEAM.T, frame.ax, frame.ay or frame.wz
+    /// Input: NODE.fx, NODE.fy, NODE.m, NODE.ux, .uy or .urz of a driven anchor, a port, BEAM.T, frame.ax, frame.ay or frame.wz
     #[arg(long, short = 'd', value_name = "NAME")]
     drive: String,
 

@@ -39,7 +39,7 @@ pub(crate) struct PathCommand {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// Path parameter: a port [V], a netlist parameter that sets loads, temperatures or stresses, or `loads`, a factor
+    /// Path parameter: a port [V], NODE.ux, .uy [m] or .urz [rad] of a driven anchor, a netlist parameter that sets loads, temperatures or stresses, or `loads`, a factor
     /// on all
     #[arg(long, value_name = "NAME=FROM:TO", value_parser = way)]
     along: PathRange,
