@@ -50,8 +50,8 @@ pub(crate) struct SweepCommand {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// An axis of the grid: LOW:HIGH:COUNT, ends included, or a list A,B,C, of a netlist parameter, of the voltage of a port (PORT.v), of
-    /// the motion of a driven anchor (NODE.ux, .uy, .urz), or of an option of the model (option.tol). Repeatable; the last varies fastest
+    /// An axis of the grid, LOW:HIGH:COUNT or a list A,B,C: a netlist parameter, the voltage of a port (PORT.v), the motion of a driven anchor
+    /// (NODE.ux, .uy, .urz), or an option of the model (option.tol). Repeatable; the last varies fastest
     #[arg(long = "param", value_name = "NAME=LOW:HIGH:COUNT", required_unless_present_any = ["vary", "points"])]
     parameters: Vec<String>,
 
