@@ -143,7 +143,8 @@ fn every_signal() {
     }
     // stops and combs are gaps too, driven anchors are nodes, and this is what they have beside one; runs alone have COMB.side and BEAM.nominal
     let shared = |name: &String| ["STOP.", "COMB.", "ANCHOR."].iter().any(|of| name.starts_with(of));
-    let own = |name: &String| !shared(name) || ["STOP.G", "ANCHOR.fx", "ANCHOR.fy", "ANCHOR.m"].contains(&name.as_str());
+    let own =
+        |name: &String| !shared(name) || ["STOP.G", "ANCHOR.fx", "ANCHOR.fy", "ANCHOR.m"].contains(&name.as_str());
     let names = signal::names(&compiled).into_iter().filter(own);
     assert_eq!(listed, names.collect());
 }

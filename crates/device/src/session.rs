@@ -3,11 +3,11 @@
 pub(crate) mod reduction;
 
 use super::agitation::ThermalForce;
-use super::contact_steps::ContactSteps;
 use super::growth::{Difference, Growth};
 use super::output_gradient::{OutputGradient, surroundings};
 use super::phase_error::PhaseErrorMonitor;
 use super::states::{Snapshot, States};
+use super::trial::held::HeldMotion;
 use super::{Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, Token, Trial};
 use bimorph_analysis::readout::expression::Expression;
 use bimorph_analysis::readout::ports::{OpenedPorts, PortResponse};
@@ -60,7 +60,6 @@ pub(super) struct DeviceSession {
     pub(super) unit: Vec<f64>,
     pub(super) drive: Drive,
     pub(super) change: Drive,
-    pub(super) zeros: Vec<Pose>,
     pub(super) linear: Option<(Token, BodyMatrix)>,
     pub(super) harmonic: Harmonic,
     /// Gradient of each output over displacements, about the last state whose noise was requested.
@@ -73,8 +72,8 @@ pub(super) struct DeviceSession {
     /// How fast the last trial's motion grows at fixed voltages.
     pub(super) growth: Growth,
     pub(super) difference: Difference,
-    /// Steps of the point at hand where parts touch.
-    pub(super) contact_steps: ContactSteps,
+    /// The motion that all trials of the point at hand lie about.
+    pub(super) held: HeldMotion,
 }
 
 /// Doubles for each port and body: stages, displacements, velocities, and those of states that are kept.
@@ -128,7 +127,9 @@ impl DeviceSession {
             None => Formulated::new(system, joints.as_ref(), first_step, &ports.sources),
         };
         description.unknowns = reduction.as_ref().map_or(description.unknowns, |found| found.model.space.size());
+        let held = HeldMotion::new(n, ports.len(), (heaters, electrics.heating.means()));
         let session = Self {
+            held,
             opened: request.clone(),
             shaken,
             stepper: Adaptive::new(n, method),
@@ -149,7 +150,6 @@ impl DeviceSession {
             unit: vec![0.0; electrics.sources()],
             drive: electrics.drive(),
             change: electrics.drive(),
-            zeros: vec![Pose::zeros(); n],
             linear: None,
             harmonic: Harmonic::new(system),
             seen: None,
@@ -158,14 +158,13 @@ impl DeviceSession {
             ringing: PhaseErrorMonitor::default(),
             growth: Growth::default(),
             difference: Difference::new(n),
-            contact_steps: ContactSteps::default(),
         };
         Ok((session, description))
     }
 
     /// Whether a state has the sizes and the sense that one of this session has.
     pub(super) fn fits(&self, state: &Snapshot) -> bool {
-        let n = self.zeros.len();
+        let n = self.motion.q.len();
         let poses = |poses: &[Pose]| poses.len() == n && poses.iter().all(|p| p.iter().all(|x| x.is_finite()));
         let numbers = |numbers: &[f64], count: usize| numbers.len() == count && numbers.iter().all(|x| x.is_finite());
         let carried = self.stepper.method.layout();

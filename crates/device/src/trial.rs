@@ -1,10 +1,11 @@
 //! How a trial is made: a static one by following the parent's equilibrium, a transient one by integrating from the parent's
 //! state.
 
+pub(crate) mod held;
 mod reduced;
 
 use super::agitation::ThermalForce;
-use super::contact_steps::{ContactSteps, MAX_ERROR, near};
+use super::contact_steps::MAX_ERROR;
 use super::growth::{Bound, rate_along};
 use super::session::DeviceSession;
 use super::states::Snapshot;
@@ -47,7 +48,10 @@ impl DeviceSession {
         }
         let rest = vec![0.0; self.sources.len()];
         let (from, load) = parent.map_or((rest.as_slice(), 0.0), |p| (p.sources.as_slice(), 1.0));
-        self.motion.q.copy_from_slice(parent.map_or(&self.zeros, |p| &p.q));
+        match parent {
+            Some(parent) => self.motion.q.copy_from_slice(&parent.q),
+            None => self.motion.q.fill(Pose::zeros()),
+        }
         self.motion.v.fill(Pose::zeros());
         let drawn = vec![0.0; self.equilibrium.sticking.anchors().len()];
         self.equilibrium.sticking.set_anchors(system, &self.motion.q, parent.map_or(&drawn, |p| &p.anchors));
@@ -136,19 +140,21 @@ impl DeviceSession {
             }
         }
         let tol = compiled.options.errors().step();
-        let kept = parent.is_some_and(|parent| self.keep_steps(system, (request, parent), &from, tol));
         let beyond = self.is_beyond(&self.sources);
-        self.begin(parent, beyond);
+        let held = self.about_held(system, (request, parent), tol, beyond);
+        if held.is_none() {
+            self.begin(parent, beyond);
+        }
         let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
         let mut ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
         if let Err(error) = check_course(compiled, &ramp) {
             reply.status = Status::Fail(error.to_string());
             return true;
         }
-        let mut h = self.contact_steps.next;
-        let ends = &self.contact_steps.ends;
+        let (mut h, ends) = (self.held.next, &self.held.ends);
         let bodies = &mut Bodies::weighed(system, &ramp, &self.weights);
-        if !(kept && self.stepper.along(bodies, &mut self.motion, ends, (tol, MAX_ERROR))) {
+        let kept = !ends.is_empty();
+        if held.is_none() && !(kept && self.stepper.along(bodies, &mut self.motion, ends, (tol, MAX_ERROR))) {
             self.begin(parent, beyond);
             h = parent.map_or(self.first_step, |p| p.next_step);
             let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
@@ -220,45 +226,6 @@ impl DeviceSession {
         if beyond || self.takes_bodies {
             self.stepper.method.take_bodies();
         }
-    }
-
-    /// The steps that all trials of a point take, see [`super::contact_steps`]. False where each takes its own.
-    fn keep_steps(
-        &mut self,
-        system: &System,
-        (request, parent): (&Trial<'_>, &Snapshot),
-        from: &[f64],
-        tol: f64,
-    ) -> bool {
-        let Some(state) = request.parent.filter(|_| near(system, &parent.q, &parent.v, request.dt)) else {
-            return false;
-        };
-        if self.contact_steps.is_of(state, request.dt) {
-            return !self.contact_steps.ends.is_empty();
-        }
-        self.begin(Some(parent), self.is_beyond(from));
-        let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
-        let ramp = Ramp::new(&system.electrics, from, from, &self.rise, request.dt).pushed(push);
-        let (mut h, mut touches) = (parent.next_step, system.contact_energy(&parent.q) > 0.0);
-        let ContactSteps { ends, next, .. } = &mut self.contact_steps;
-        let advanced = self.stepper.advance(
-            &mut Bodies::weighed(system, &ramp, &self.weights),
-            &mut self.motion,
-            &mut h,
-            Control::Tolerance(tol),
-            MAX_INTERNAL_STEPS,
-            &mut |t, step, _, after| {
-                ends.push(t + step);
-                touches |= system.contact_energy(&after.q) > 0.0;
-                true
-            },
-        );
-        if !touches || !matches!(advanced, Ok(Advance::Done)) {
-            ends.clear();
-        } else if let Some(last) = ends.last_mut() {
-            (*last, *next) = (request.dt, h);
-        }
-        !ends.is_empty()
     }
 
     /// Rate at which the motion at the end of a trial grows at fixed voltages (1/s); 0 where nothing shows that it does.

@@ -115,7 +115,7 @@ fn partials_match_finite_differences() {
         let moving = ask(&mut device, Mode::Transient, rest.token, example.steps[1], example.moved);
         let cases = [
             (Mode::Static, rest.token, 0.0, 1e-3, 1e-6),
-            (Mode::Transient, moving.token, example.steps[0], 1e-2, 1e-6),
+            (Mode::Transient, moving.token, example.steps[0], 1e-3, 1e-6),
             (Mode::Transient, moving.token, example.steps[1], 1e-2, 1e-3),
         ];
         for (mode, parent, dt, step, tolerance) in cases {

@@ -32,6 +32,17 @@ impl Drive {
         RestStrain { expansion: &self.expansion, built_in: self.load }
     }
 
+    /// Becomes the change from itself to another drive under the same dead loads.
+    pub fn change_to(&mut self, to: &Self) {
+        let parts =
+            [(&mut self.volts, &to.volts), (&mut self.expansion, &to.expansion), (&mut self.inputs, &to.inputs)];
+        for (from, to) in parts {
+            from.iter_mut().zip(to).for_each(|(from, to)| *from = to - *from);
+        }
+        (self.load, self.turning) = (0.0, to.turning - self.turning);
+        self.push.clear();
+    }
+
     /// Leaves of a change what acts in proportion to the drive that it changes: voltages, and the rate of the frame.
     #[inline]
     pub fn keep_quadratic(&mut self, electrics: &Electrics) {

@@ -54,6 +54,55 @@ impl<'a> Bodies<'a> {
         Self { system, ramp, weights: Cow::Owned(NormWeights::new(&system.model)) }
     }
 
+    /// What a motion between two ends leaves out in which a change of the sources is linear, over the error that a step of length `h` (s) may have. Of the
+    /// motion it is half of the change, as forces are quadratic in the sources; of contact the change times that of the penetration, as forces go with the
+    /// third power.
+    /// Bodies without mass follow at once and weigh as much as the mean of the others. Infinite where nothing has mass.
+    pub fn left_out(&self, ends: [&Motion; 2], change: &Motion, h: f64, tol: f64) -> f64 {
+        let (bodies, mass) = (&self.system.model.bodies, self.weights.mass);
+        let Some(([q, v], may)) = self.of_masses(ends, change, h, tol).filter(|_| mass > 0.0) else {
+            return f64::INFINITY;
+        };
+        let massless = bodies.iter().zip(&change.q).filter(|(body, _)| body.mass == 0.0);
+        let follows: f64 = massless.map(|(_, q)| q.x * q.x + q.y * q.y).sum();
+        let q = q.hypot((follows * mass / bodies.len() as f64).sqrt());
+        let moved = relative_error([q, v], h, may, 0.0);
+        let contact = contact_error(self.system, ends.into(), change, tol);
+        if contact == 0.0 {
+            return 0.5 * moved;
+        }
+        let pressed = self.system.contact_change(ends.map(|end| &end.q[..]), &change.q, PRESSED.1);
+        (0.5 * moved).hypot(1.5 * pressed * contact)
+    }
+
+    /// By how much forces that grow from zero over a step of length `h` (s) move the masses where nothing holds these, over the error that the step may have.
+    pub fn would_move(&self, motion: &Motion, force: &[Pose], h: f64, tol: f64) -> f64 {
+        let Some((_, may)) = self.of_masses([motion, motion], motion, h, tol) else { return f64::INFINITY };
+        let push = |(j, force): (usize, &Pose)| -> f64 {
+            let mass = self.system.model.mass(j);
+            force.iter().zip(mass.iter()).filter(|(_, m)| **m > 0.0).map(|(f, m)| f * f / m).sum()
+        };
+        force.iter().enumerate().map(push).sum::<f64>().sqrt() * h * h / (6.0 * may)
+    }
+
+    /// Norms of an error of displacements and of rates, and what they may be; none where nothing moves in time, with neither mass nor drag.
+    fn of_masses(&self, [before, after]: [&Motion; 2], error: &Motion, h: f64, tol: f64) -> Option<([f64; 2], f64)> {
+        let (system, NormWeights { mass, dragged }) = (self.system, &*self.weights);
+        if *mass == 0.0 && dragged.is_empty() {
+            return None;
+        }
+        // what drag holds back and no mass weighs as much as a mass that it would stop in this step
+        let drag = |x: &[Pose]| h * dragged.iter().map(|(j, i, c)| c * x[*j][*i] * x[*j][*i]).sum::<f64>();
+        let own = |x: &[Pose]| system.model.mass_product(x, x).sqrt();
+        let norm = |x: &[Pose]| match dragged.is_empty() {
+            true => own(x),
+            false => own(x).hypot(drag(x).sqrt()),
+        };
+        let mass = mass + h * dragged.iter().map(|(_, _, c)| c).sum::<f64>();
+        let reach = norm(&before.q).max(norm(&after.q)) + FLOOR * system.length_scale * mass.sqrt();
+        Some(([norm(&error.q), norm(&error.v)], ErrorBudget::of(tol).within(reach)))
+    }
+
     /// The same with weights that have been found before.
     pub fn weighed(system: &'a System, ramp: &'a Ramp<'a>, weights: &'a NormWeights) -> Self {
         Self { system, ramp, weights: Cow::Borrowed(weights) }
@@ -71,22 +120,9 @@ impl Equations for Bodies<'_> {
         self.ramp.dt
     }
 
-    fn share(&self, [before, after]: [&Motion; 2], error: &Motion, h: f64, tol: f64) -> f64 {
-        let (system, NormWeights { mass, dragged }) = (self.system, &*self.weights);
-        if *mass == 0.0 && dragged.is_empty() {
-            return 0.0; // nothing moves in time with neither mass nor drag
-        }
-        // what drag holds back and no mass weighs as much as a mass that it would stop in this step
-        let drag = |x: &[Pose]| h * dragged.iter().map(|(j, i, c)| c * x[*j][*i] * x[*j][*i]).sum::<f64>();
-        let own = |x: &[Pose]| system.model.mass_product(x, x).sqrt();
-        let norm = |x: &[Pose]| match dragged.is_empty() {
-            true => own(x),
-            false => own(x).hypot(drag(x).sqrt()),
-        };
-        let mass = mass + h * dragged.iter().map(|(_, _, c)| c).sum::<f64>();
-        let reach = norm(&before.q).max(norm(&after.q)) + FLOOR * system.length_scale * mass.sqrt();
-        let contact = contact_error(system, (before, after), error, tol);
-        relative_error([norm(&error.q), norm(&error.v)], h, ErrorBudget::of(tol).within(reach), contact)
+    fn share(&self, ends: [&Motion; 2], error: &Motion, h: f64, tol: f64) -> f64 {
+        let Some((norms, may)) = self.of_masses(ends, error, h, tol) else { return 0.0 };
+        relative_error(norms, h, may, contact_error(self.system, ends.into(), error, tol))
     }
 
     fn worst(&self, error: &[Pose]) -> DegreeOfFreedom {

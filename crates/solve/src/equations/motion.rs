@@ -55,12 +55,14 @@ impl<X: Unknown> Motion<X> {
         Self { q: vec![X::ZERO; unknowns], v: vec![X::ZERO; unknowns] }
     }
 
-    pub(crate) fn copy(&mut self, from: &Self) {
+    /// Takes the values of another one.
+    pub fn copy(&mut self, from: &Self) {
         self.q.copy_from_slice(&from.q);
         self.v.copy_from_slice(&from.v);
     }
 
-    pub(crate) fn clear(&mut self) {
+    /// Makes all zero.
+    pub fn clear(&mut self) {
         self.q.fill(X::ZERO);
         self.v.fill(X::ZERO);
     }
@@ -69,7 +71,8 @@ impl<X: Unknown> Motion<X> {
         self.q.iter_mut().chain(&mut self.v).for_each(|x| *x *= factor);
     }
 
-    pub(crate) fn add(&mut self, factor: f64, other: &Self) {
+    /// Adds a multiple of another one.
+    pub fn add(&mut self, factor: f64, other: &Self) {
         if factor != 0.0 {
             for (a, b) in self.q.iter_mut().zip(&other.q) {
                 *a += *b * factor;

@@ -119,6 +119,44 @@ impl Formulated {
         }
     }
 
+    /// Whether a motion from a state can be moved along its sensitivities ([`Formulated::move_by`]).
+    pub fn has_linear_trials(&self, state: &[Motion]) -> bool {
+        match self {
+            Self::Bodies(_) => true,
+            Self::Joints(_) => false,
+            Self::Reduced(m) => state.is_empty() || state.len() == m.reduced.state().len(),
+        }
+    }
+
+    /// Whether sensitivities take the tangent at the start of a step for all its stages ([`Rodas4::first_tangent`]).
+    pub fn keep_first_tangent(&mut self, keep: bool) {
+        match self {
+            Self::Bodies(m) => m.first_tangent = keep,
+            Self::Joints(_) => {}
+            Self::Reduced(m) => {
+                m.bodies.first_tangent = keep;
+                m.reduced.keep_first_tangent(keep);
+            }
+        }
+    }
+
+    /// What is carried from step to step, with the sensitivities.
+    pub fn all_carried(&mut self) -> &[Motion] {
+        Method::<Bodies<'_>>::carried(self)
+    }
+
+    /// Takes the motion to the end `from` of a step, after which `carried` was carried, moved by its sensitivities times changes of the sources.
+    pub fn move_by(&mut self, carried: &[Motion], from: &Motion, changes: &[f64], motion: &mut Motion) {
+        if let Some(reduced) = self.reduced_now() {
+            return reduced.move_by(carried, changes, motion);
+        }
+        motion.copy(from);
+        for (s, change) in carried.iter().zip(changes) {
+            motion.add(*change, s);
+        }
+        self.sensitivity_mut().iter_mut().zip(carried).for_each(|(to, s)| to.copy(s));
+    }
+
     /// State for the next step beside the bodies' motion.
     pub fn state(&self) -> &[Motion] {
         match self {

@@ -56,6 +56,8 @@ pub struct Rodas4<S = Recursion> {
     scratch: Vec<Pose>,
     /// ∂motion/∂(final voltage of a source), one for each source given to [`Rodas4::new`]; advanced with the motion.
     pub sensitivity: Vec<Motion>,
+    /// Sensitivities take the tangent at the start of a step for all its stages, which is a third of their work.
+    pub first_tangent: bool,
     /// The error of the motion, where it is wanted.
     defect: Option<Box<DefectEstimate>>,
     work: SolverCounters,
@@ -81,6 +83,7 @@ impl<S: LinearSolver> Rodas4<S> {
             loss: StageLoss::new(system, !sources.is_empty()).map(Box::new),
             scratch: vec![Pose::zeros(); if system.turns() { system.bodies() } else { 0 }],
             sensitivity: vec![Motion::zeros(system.bodies()); sources.len()],
+            first_tangent: false,
             defect: None,
             work: SolverCounters::default(),
         }
@@ -136,7 +139,8 @@ impl<S: LinearSolver> RosenbrockStep for BodyStep<'_, S> {
 
     fn residual(&mut self, i: usize) {
         let (system, h, from) = (self.system, self.h, &*self.motion);
-        let Rodas4 { stages, drive, loss, ports, defect, w, .. } = &mut *self.rodas;
+        let Rodas4 { stages, drive, loss, ports, defect, w, first_tangent, .. } = &mut *self.rodas;
+        let keeps = i > 0 && *first_tangent;
         // what contact loses needs the stages beside their force
         let mut force = std::mem::take(&mut stages.force);
         let lose = |force: &mut [Pose], apart: ApartMembers| {
@@ -151,13 +155,13 @@ impl<S: LinearSolver> RosenbrockStep for BodyStep<'_, S> {
             system.add_tangent_and(q, drive, w, &mut force, lose);
             defect.iter_mut().for_each(|defect| defect.after_forces(&force));
             ports.keep_tangent(w);
-        } else if let Some(tangent) = ports.tangent() {
+        } else if let Some(tangent) = ports.tangent().filter(|_| !keeps) {
             system.add_tangent_and(q, drive, tangent, &mut force, lose);
         } else {
             system.add_residual_and(q, drive, &mut force, lose);
         }
         stages.force = force;
-        if let (Some(loss), Some(tangent)) = (&*loss, ports.tangent()) {
+        if let (Some(loss), Some(tangent)) = (&*loss, ports.tangent().filter(|_| !keeps)) {
             loss.add_tangent(tangent);
         }
     }

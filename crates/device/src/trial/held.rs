@@ -1,0 +1,218 @@
+//! One motion for all trials of a point: that from the parent's state with the sources held at the parent's values, and its change with each source.
+//!
+//! A circuit asks for several trials of a point, and its steps are often far shorter than those of the motion. What the sources change within such a
+//! step is small beside the tolerance. The motion at other values is then the held one plus its sensitivities times the changes, and its partials
+//! are these sensitivities. Currents, charges and signals are exact functions of that motion. It is used where
+//!
+//! * the step is one that the motion can take at once, or parts touch in it;
+//! * no voltage across a gap, and no rise of a heater, changes by more than what is linear in the changes and as much again;
+//! * what is left out is at most [`SMALL`] of the error that a step may have, by an estimate.
+//!
+//! Sensitivities may therefore be approximate: where nothing touches they take the tangent at the start of a step for all its stages.
+//!
+//! Where parts touch, a trial that is not such a one takes the internal steps of the held motion, see [`crate::contact_steps`].
+//!
+//! All of this follows from the parent, the length and the values given, so that trials stay pure.
+
+use crate::agitation::ThermalForce;
+use crate::contact_steps::near;
+use crate::session::DeviceSession;
+use crate::states::Snapshot;
+use crate::{Token, Trial};
+use bimorph_domains::{Input, Ramp, System};
+use bimorph_solve::equations::Bodies;
+use bimorph_solve::time::adaptive::{Advance, Control};
+use bimorph_solve::time::method::Motion;
+
+/// What may be left out, relative to the error that a step may have (1).
+const SMALL: f64 = 1e-4;
+/// The same where parts touch. Bounces multiply errors, and their steps are chosen by those of contact.
+const SMALL_TOUCHING: f64 = 0.025;
+/// How far the motion of free masses may be beyond [`SMALL`] for a held motion to be worth its making (1).
+const IN_VAIN: f64 = 30.0;
+/// Voltage that moves nothing (V).
+const NO_VOLTAGE: f64 = 1e-6;
+/// Rise that moves nothing (K).
+const NO_RISE: f64 = 1e-6;
+
+/// The motion of one point.
+#[derive(Debug, Clone)]
+pub(crate) struct HeldMotion {
+    /// The parent and the length (s) that it is of.
+    of: Option<(Token, u64)>,
+    /// It reached the end.
+    found: bool,
+    /// The internal step that would come next (s).
+    pub(super) next: f64,
+    /// Where its internal steps end (s), if parts touch in it.
+    pub(super) ends: Vec<f64>,
+    motion: Motion,
+    /// What the method carries at the end, with the sensitivities.
+    carried: Vec<Motion>,
+    /// Rises at the end (K), and their change with the source of each port.
+    rise: Vec<f64>,
+    rise_slope: Vec<Vec<f64>>,
+    /// Changes of the sources, port by port, and what they make.
+    changes: Vec<f64>,
+    change: Motion,
+}
+
+impl HeldMotion {
+    /// Storage for some bodies, ports, and states of heat with their means.
+    pub(crate) fn new(bodies: usize, ports: usize, (rises, means): (usize, usize)) -> Self {
+        let zeros = || Motion::zeros(bodies);
+        Self {
+            of: None,
+            found: false,
+            next: 0.0,
+            ends: Vec::new(),
+            motion: zeros(),
+            carried: Vec::new(),
+            rise: vec![0.0; rises],
+            rise_slope: vec![vec![0.0; means]; ports],
+            changes: vec![0.0; ports],
+            change: zeros(),
+        }
+    }
+}
+
+impl DeviceSession {
+    /// Makes the motion and its sensitivities those about the held motion of the point, and returns the internal step that would come next (s).
+    /// None where the trial needs a motion of its own.
+    pub(super) fn about_held(
+        &mut self,
+        system: &System,
+        (request, parent): (&Trial<'_>, Option<&Snapshot>),
+        tol: f64,
+        beyond: bool,
+    ) -> Option<f64> {
+        let touching = parent.is_some_and(|p| near(system, &p.q, &p.v, request.dt));
+        let at_once = |p: &&Snapshot| touching || request.dt <= p.next_step;
+        let (Some(parent), Some(token)) = (parent.filter(at_once), request.parent) else {
+            (self.held.of, self.held.found) = (None, false);
+            self.held.ends.clear();
+            return None;
+        };
+        let linear = self.shaken.is_none()
+            && !self.takes_bodies
+            && self.stepper.method.has_linear_trials(&parent.carried)
+            && (parent.carried.is_empty() || !beyond)
+            && self.changes_little(system, &parent.sources)
+            && (touching || self.pushes_little(system, (request, parent), tol));
+        if !(linear || touching) {
+            return None;
+        }
+        let of = Some((token, request.dt.to_bits()));
+        if self.held.of != of {
+            self.held.of = of;
+            self.held.ends.clear();
+            self.hold(system, (request, parent), tol, touching);
+        }
+        if !(linear && self.held.found) {
+            return None;
+        }
+        self.begin(Some(parent), false);
+        let held = &mut self.held;
+        for (change, &source) in held.changes.iter_mut().zip(&self.ports.sources) {
+            *change = self.sources[source] - parent.sources[source];
+        }
+        let ramp = Ramp::new(&system.electrics, &parent.sources, &self.sources, &self.rise, request.dt);
+        if !warms_little(&ramp, held, &mut self.rise_slope) {
+            return None;
+        }
+        self.stepper.method.move_by(&held.carried, &held.motion, &held.changes, &mut self.motion);
+        held.change.copy(&self.motion);
+        held.change.add(-1.0, &held.motion);
+        let bodies = Bodies::weighed(system, &ramp, &self.weights);
+        let left_out = bodies.left_out([&held.motion, &self.motion], &held.change, request.dt, tol);
+        let most = if touching { SMALL_TOUCHING } else { SMALL };
+        (left_out <= most).then_some(held.next)
+    }
+
+    /// Whether no voltage across a gap, and no rate of a turning frame, differs from the held one by more than that: forces are quadratic in both.
+    fn changes_little(&self, system: &System, held: &[f64]) -> bool {
+        let electrics = &system.electrics;
+        let (rows, first) = (&electrics.gap_rows, electrics.voltages());
+        let turns = electrics.inputs.iter().enumerate().filter(|(_, input)| **input == Input::Rate);
+        let mut turns = turns.map(|(k, _)| (self.sources[first + k] - held[first + k], held[first + k]));
+        let mut gaps = (0..rows.nrows()).map(|gap| {
+            let sum = |of: &dyn Fn(usize) -> f64| -> f64 { (0..held.len()).map(|s| rows[(gap, s)] * of(s)).sum() };
+            (sum(&|s| self.sources[s] - held[s]), sum(&|s| held[s]).abs().max(NO_VOLTAGE))
+        });
+        turns.all(|(change, held)| change.abs() <= held.abs()) && gaps.all(|(change, held)| change.abs() <= held)
+    }
+
+    /// Whether the forces that the sources change move free masses by little more than what a trial about the held motion may leave out: no held motion
+    /// is made in vain.
+    fn pushes_little(&mut self, system: &System, (request, parent): (&Trial<'_>, &Snapshot), tol: f64) -> bool {
+        if self.sources == parent.sources {
+            return true;
+        }
+        self.begin(Some(parent), false);
+        let [held, ramp] = [&parent.sources, &self.sources]
+            .map(|to| Ramp::new(&system.electrics, &parent.sources, to, &self.rise, request.dt));
+        held.at(request.dt, &mut self.change);
+        ramp.at(request.dt, &mut self.drive);
+        self.change.change_to(&self.drive);
+        let force = &mut self.held.change.q;
+        system.drive_force(&self.motion.q, &self.drive, &self.change, force);
+        let bodies = Bodies::weighed(system, &ramp, &self.weights);
+        bodies.would_move(&self.motion, force, request.dt, tol) <= IN_VAIN * SMALL
+    }
+
+    /// Steps from the parent at its sources.
+    fn hold(&mut self, system: &System, (request, parent): (&Trial<'_>, &Snapshot), tol: f64, touching: bool) {
+        self.begin(Some(parent), false);
+        let held = &mut self.held;
+        let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
+        let ramp = Ramp::new(&system.electrics, &parent.sources, &parent.sources, &self.rise, request.dt).pushed(push);
+        let (mut h, mut touches) = (parent.next_step, system.contact_energy(&parent.q) > 0.0);
+        self.stepper.method.keep_first_tangent(!touching);
+        let advanced = self.stepper.advance(
+            &mut Bodies::weighed(system, &ramp, &self.weights),
+            &mut self.motion,
+            &mut h,
+            Control::Tolerance(tol),
+            super::MAX_INTERNAL_STEPS,
+            &mut |t, step, _, after| {
+                held.ends.push(t + step);
+                touches |= system.contact_energy(&after.q) > 0.0;
+                true
+            },
+        );
+        self.stepper.method.keep_first_tangent(false);
+        held.found = matches!(advanced, Ok(Advance::Done));
+        held.next = h;
+        if !(touches && held.found) {
+            held.ends.clear();
+        } else if let Some(last) = held.ends.last_mut() {
+            *last = request.dt;
+        }
+        if !held.found {
+            return;
+        }
+        held.motion.copy(&self.motion);
+        let carried = self.stepper.method.all_carried();
+        held.carried.resize_with(carried.len(), || Motion { q: Vec::new(), v: Vec::new() });
+        held.carried.iter_mut().zip(carried).for_each(|(held, carried)| held.clone_from(carried));
+        ramp.end_rises(&mut held.rise);
+        let way = ((&parent.sources[..], &parent.sources[..]), &parent.rise[..]);
+        for (slopes, &source) in held.rise_slope.iter_mut().zip(&self.ports.sources) {
+            system.electrics.rise_sensitivities(way, request.dt, request.dt, source, |k, slope| slopes[k] = slope);
+        }
+    }
+}
+
+/// Whether no mean rise at the end of a ramp differs from what is linear in the changes by more than that, or by what moves nothing.
+fn warms_little(ramp: &Ramp<'_>, held: &HeldMotion, rise: &mut [f64]) -> bool {
+    let means = ramp.electrics.heating.means();
+    if means == 0 {
+        return true;
+    }
+    ramp.end_rises(rise);
+    (0..means).all(|k| {
+        let change = |(slopes, change): (&Vec<f64>, &f64)| slopes[k] * change;
+        let linear: f64 = held.rise_slope.iter().zip(&held.changes).map(change).sum();
+        (rise[k] - held.rise[k] - linear).abs() <= linear.abs().max(NO_RISE)
+    })
+}
