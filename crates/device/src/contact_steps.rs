@@ -2,7 +2,7 @@
 //!
 //! With error control of each trial the charge at the end is a staircase of the voltage: steps move with the impact, and bounces multiply what
 //! that changes. Newton's method of the circuit finds no solution on a staircase. So all trials of a point take the steps of one motion: the
-//! held motion of the point ([`crate::trial::held`]). A trial for which one of these steps errs by more
+//! held motion of the point ([`crate::held_motion`]). A trial for which one of these steps errs by more
 //! than [`MAX_ERROR`] times what is allowed takes its own. The list is a function of the accepted state and the length, so that trials
 //! stay pure.
 

@@ -23,6 +23,7 @@ mod contact_steps;
 mod contract;
 mod growth;
 mod half_cycles;
+mod held_motion;
 mod higher_modes;
 pub mod local;
 mod noise;

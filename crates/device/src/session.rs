@@ -4,10 +4,10 @@ pub(crate) mod reduction;
 
 use super::agitation::ThermalForce;
 use super::growth::{Difference, Growth};
+use super::held_motion::HeldMotion;
 use super::output_gradient::{OutputGradient, surroundings};
 use super::phase_error::PhaseErrorMonitor;
 use super::states::{Snapshot, States};
-use super::trial::held::HeldMotion;
 use super::{Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, Token, Trial};
 use bimorph_analysis::readout::expression::Expression;
 use bimorph_analysis::readout::ports::{OpenedPorts, PortResponse};

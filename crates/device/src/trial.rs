@@ -1,7 +1,7 @@
 //! How a trial is made: a static one by following the parent's equilibrium, a transient one by integrating from the parent's
 //! state.
 
-pub(crate) mod held;
+mod held;
 mod reduced;
 
 use super::agitation::ThermalForce;

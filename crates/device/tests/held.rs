@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// A model, its signals, port voltages of an equilibrium and of a motion from there, and a short point (s).
-struct Example {
+struct ShortPoint {
     name: &'static str,
     signals: &'static [&'static str],
     rest: &'static [f64],
@@ -16,19 +16,19 @@ struct Example {
     short: f64,
 }
 
-const EXAMPLES: [Example; 3] = [
-    Example {
+const POINTS: [ShortPoint; 3] = [
+    ShortPoint {
         name: "bank",
         signals: &["yoke.y", "yoke.vy", "b1.hot.T"],
         rest: &[1.0, 10.0],
         moved: &[1.2, 11.0],
         short: 1e-8,
     },
-    Example { name: "switch", signals: &["a(8).y", "a(8).vy"], rest: &[8.0], moved: &[9.0], short: 1e-9 },
-    Example { name: "switch", signals: &["a(8).y", "a(8).vy"], rest: &[25.0], moved: &[24.0], short: 2e-10 },
+    ShortPoint { name: "switch", signals: &["a(8).y", "a(8).vy"], rest: &[8.0], moved: &[9.0], short: 1e-9 },
+    ShortPoint { name: "switch", signals: &["a(8).y", "a(8).vy"], rest: &[25.0], moved: &[24.0], short: 2e-10 },
 ];
 
-impl Example {
+impl ShortPoint {
     fn open(&self) -> LocalDevice {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../examples/{0}/{0}.net", self.name));
         let bundle = read_bundle(&path, &[]).unwrap();
@@ -66,7 +66,7 @@ fn ask(device: &mut LocalDevice, mode: Mode, parent: Option<Token>, dt: f64, vol
 /// points of other lengths.
 #[test]
 fn trials_do_not_depend_on_those_before() {
-    for example in &EXAMPLES {
+    for example in &POINTS {
         let parts = [0.0, 1e-6, 1e-3, 0.7, -0.2];
         let mut alone = Vec::new();
         for part in parts {
@@ -89,7 +89,7 @@ fn trials_do_not_depend_on_those_before() {
 /// Partials are those of fourth-order differences, to 1e-6 of the largest entry of each row: the held motion is linear in the voltages.
 #[test]
 fn partials_match_finite_differences() {
-    for example in &EXAMPLES {
+    for example in &POINTS {
         let mut device = example.open();
         let parent = example.moving(&mut device);
         let about = ask(&mut device, Mode::Transient, parent, example.short, example.moved);
@@ -123,7 +123,7 @@ fn partials_match_finite_differences() {
 /// A ramp in 400 short points comes to where it comes in 10 long ones, within the tolerance of 1e-3.
 #[test]
 fn short_points_come_to_where_long_ones_do() {
-    for example in &EXAMPLES {
+    for example in &POINTS {
         let ends = [(400, 1.0), (10, 40.0)].map(|(count, times)| {
             let mut device = example.open();
             let mut state = ask(&mut device, Mode::Static, None, 0.0, example.rest);

@@ -1,7 +1,7 @@
 //! One motion for all trials of a point: that from the parent's state with the sources held at the parent's values, and its change with each source.
 //!
-//! A circuit asks for several trials of a point, and its steps are often far shorter than those of the motion. What the sources change within such a
-//! step is small beside the tolerance. The motion at other values is then the held one plus its sensitivities times the changes, and its partials
+//! A circuit requests several trials of a point, and its steps are often far shorter than those of the motion. Changes of the sources within such a
+//! step make little beside the tolerance. The motion at other values is then the held one plus its sensitivities times the changes, and its partials
 //! are these sensitivities. Currents, charges and signals are exact functions of that motion. It is used where
 //!
 //! * the step is one that the motion can take at once, or parts touch in it;
@@ -14,17 +14,18 @@
 //!
 //! All of this follows from the parent, the length and the values given, so that trials stay pure.
 
+use crate::Trial;
 use crate::agitation::ThermalForce;
 use crate::contact_steps::near;
+use crate::held_motion::HeldMotion;
 use crate::session::DeviceSession;
 use crate::states::Snapshot;
-use crate::{Token, Trial};
 use bimorph_domains::{Input, Ramp, System};
 use bimorph_solve::equations::Bodies;
 use bimorph_solve::time::adaptive::{Advance, Control};
 use bimorph_solve::time::method::Motion;
 
-/// What may be left out, relative to the error that a step may have (1).
+/// Part of the motion that may be left out, relative to the error that a step may have (1).
 const SMALL: f64 = 1e-4;
 /// The same where parts touch. Bounces multiply errors, and their steps are chosen by those of contact.
 const SMALL_TOUCHING: f64 = 0.025;
@@ -34,47 +35,6 @@ const IN_VAIN: f64 = 30.0;
 const NO_VOLTAGE: f64 = 1e-6;
 /// Rise that moves nothing (K).
 const NO_RISE: f64 = 1e-6;
-
-/// The motion of one point.
-#[derive(Debug, Clone)]
-pub(crate) struct HeldMotion {
-    /// The parent and the length (s) that it is of.
-    of: Option<(Token, u64)>,
-    /// It reached the end.
-    found: bool,
-    /// The internal step that would come next (s).
-    pub(super) next: f64,
-    /// Where its internal steps end (s), if parts touch in it.
-    pub(super) ends: Vec<f64>,
-    motion: Motion,
-    /// What the method carries at the end, with the sensitivities.
-    carried: Vec<Motion>,
-    /// Rises at the end (K), and their change with the source of each port.
-    rise: Vec<f64>,
-    rise_slope: Vec<Vec<f64>>,
-    /// Changes of the sources, port by port, and what they make.
-    changes: Vec<f64>,
-    change: Motion,
-}
-
-impl HeldMotion {
-    /// Storage for some bodies, ports, and states of heat with their means.
-    pub(crate) fn new(bodies: usize, ports: usize, (rises, means): (usize, usize)) -> Self {
-        let zeros = || Motion::zeros(bodies);
-        Self {
-            of: None,
-            found: false,
-            next: 0.0,
-            ends: Vec::new(),
-            motion: zeros(),
-            carried: Vec::new(),
-            rise: vec![0.0; rises],
-            rise_slope: vec![vec![0.0; means]; ports],
-            changes: vec![0.0; ports],
-            change: zeros(),
-        }
-    }
-}
 
 impl DeviceSession {
     /// Makes the motion and its sensitivities those about the held motion of the point, and returns the internal step that would come next (s).

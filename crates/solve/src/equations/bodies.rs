@@ -54,8 +54,8 @@ impl<'a> Bodies<'a> {
         Self { system, ramp, weights: Cow::Owned(NormWeights::new(&system.model)) }
     }
 
-    /// What a motion between two ends leaves out in which a change of the sources is linear, over the error that a step of length `h` (s) may have. Of the
-    /// motion it is half of the change, as forces are quadratic in the sources; of contact the change times that of the penetration, as forces go with the
+    /// Part that a motion between two ends leaves out where a change of the sources is linear in it, over the error that a step of length `h` (s) may have.
+    /// Of the motion it is half of the change, as forces are quadratic in the sources; of contact the change times that of the penetration, as forces go with the
     /// third power.
     /// Bodies without mass follow at once and weigh as much as the mean of the others. Infinite where nothing has mass.
     pub fn left_out(&self, ends: [&Motion; 2], change: &Motion, h: f64, tol: f64) -> f64 {

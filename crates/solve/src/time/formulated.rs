@@ -140,7 +140,7 @@ impl Formulated {
         }
     }
 
-    /// What is carried from step to step, with the sensitivities.
+    /// State that the method carries from step to step, with the sensitivities.
     pub fn all_carried(&mut self) -> &[Motion] {
         Method::<Bodies<'_>>::carried(self)
     }
