@@ -141,7 +141,7 @@ impl DeviceSession {
         }
         let tol = compiled.options.errors().step();
         let beyond = self.is_beyond(&self.sources);
-        let held = self.about_held(system, (request, parent), tol, beyond);
+        let held = self.about_held(system, (request, parent), tol);
         if held.is_none() {
             self.begin(parent, beyond);
         }

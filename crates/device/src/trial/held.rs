@@ -8,6 +8,8 @@
 //! * no voltage across a gap, and no rise of a heater, changes by more than what is linear in the changes and as much again;
 //! * what is left out is at most [`SMALL`] of the error that a step may have, by an estimate.
 //!
+//! It is that of the bodies: a reduced model places them for each trial, which costs as much as a step of its own.
+//!
 //! Sensitivities may therefore be approximate: where nothing touches they take the tangent at the start of a step for all its stages.
 //!
 //! Where parts touch, a trial that is not such a one takes the internal steps of the held motion, see [`crate::contact_steps`].
@@ -44,7 +46,6 @@ impl DeviceSession {
         system: &System,
         (request, parent): (&Trial<'_>, Option<&Snapshot>),
         tol: f64,
-        beyond: bool,
     ) -> Option<f64> {
         let touching = parent.is_some_and(|p| near(system, &p.q, &p.v, request.dt));
         let at_once = |p: &&Snapshot| touching || request.dt <= p.next_step;
@@ -56,7 +57,6 @@ impl DeviceSession {
         let linear = self.shaken.is_none()
             && !self.takes_bodies
             && self.stepper.method.has_linear_trials(&parent.carried)
-            && (parent.carried.is_empty() || !beyond)
             && self.changes_little(system, &parent.sources)
             && (touching || self.pushes_little(system, (request, parent), tol));
         if !(linear || touching) {

@@ -119,12 +119,12 @@ impl Formulated {
         }
     }
 
-    /// Whether a motion from a state can be moved along its sensitivities ([`Formulated::move_by`]).
+    /// Whether a motion from a state can be moved along its sensitivities ([`Formulated::move_by`]): that of every body's own coordinates.
     pub fn has_linear_trials(&self, state: &[Motion]) -> bool {
         match self {
             Self::Bodies(_) => true,
             Self::Joints(_) => false,
-            Self::Reduced(m) => state.is_empty() || state.len() == m.reduced.state().len(),
+            Self::Reduced(_) => state.is_empty(),
         }
     }
 
@@ -133,10 +133,7 @@ impl Formulated {
         match self {
             Self::Bodies(m) => m.first_tangent = keep,
             Self::Joints(_) => {}
-            Self::Reduced(m) => {
-                m.bodies.first_tangent = keep;
-                m.reduced.keep_first_tangent(keep);
-            }
+            Self::Reduced(m) => m.bodies.first_tangent = keep,
         }
     }
 
@@ -145,11 +142,8 @@ impl Formulated {
         Method::<Bodies<'_>>::carried(self)
     }
 
-    /// Takes the motion to the end `from` of a step, after which `carried` was carried, moved by its sensitivities times changes of the sources.
+    /// Takes the motion of the bodies to the end `from` of a step, after which `carried` was carried, moved by its sensitivities times changes of the sources.
     pub fn move_by(&mut self, carried: &[Motion], from: &Motion, changes: &[f64], motion: &mut Motion) {
-        if let Some(reduced) = self.reduced_now() {
-            return reduced.move_by(carried, changes, motion);
-        }
         motion.copy(from);
         for (s, change) in carried.iter().zip(changes) {
             motion.add(*change, s);

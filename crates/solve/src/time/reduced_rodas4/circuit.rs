@@ -41,24 +41,6 @@ impl ReducedRodas4 {
         self.put_back();
     }
 
-    /// Whether sensitivities take mass, damping and tangent at the start of a step for all its stages, which is a part of their work.
-    pub fn keep_first_tangent(&mut self, keep: bool) {
-        self.ports.iter_mut().for_each(|ports| ports.first_tangent = keep);
-    }
-
-    /// Takes what was carried after a step, moved by its sensitivities times changes of the sources, and places the bodies there.
-    pub fn move_by(&mut self, carried: &[Motion], changes: &[f64], motion: &mut Motion) {
-        self.carried.iter_mut().zip(carried).for_each(|(to, from)| to.copy(from));
-        let (state, sensitivities) = self.carried.split_at_mut(2);
-        for (s, change) in sensitivities.chunks_exact(2).zip(changes) {
-            state.iter_mut().zip(s).for_each(|(to, s)| to.add(*change, s));
-        }
-        self.put_back();
-        self.forces.place(&self.space, self.now.parts());
-        motion.q.copy_from_slice(&self.forces.placed.at);
-        motion.v.copy_from_slice(&self.forces.placed.rate);
-    }
-
     /// The space.
     pub fn space(&self) -> &ReducedSpace {
         &self.space
@@ -108,9 +90,6 @@ impl ReducedRodas4 {
     pub fn holds(&mut self, drive: &Drive) -> bool {
         let Some(mut stages) = self.polynomials.take() else { return false };
         self.drive.clone_from(drive);
-        // the matrices at hand may be those of another trial
-        stages.forces.residual(&stages.of, self.now.parts(), drive, &mut self.forcing);
-        stages.forces.matrices(&stages.of, &mut self.mass, &mut self.damping, &mut self.stiffness);
         let [error, size] = self.compared(&mut stages);
         let holds = error <= stages.share * stages.largest.max(size);
         self.polynomials = Some(stages);
@@ -177,16 +156,8 @@ impl ReducedRodas4 {
     pub(super) fn solve_ports(&mut self, ramp: &Ramp<'_>, (i, s, h): (usize, f64, f64)) {
         let Some(mut ports) = self.ports.take() else { return };
         for p in 0..ports.len() {
-            let Self { polynomials: Some(stages), at, drive, mass, damping, stiffness, damped, .. } = self else {
-                break;
-            };
-            let forces = (&stages.of, &mut stages.forces);
-            if ports.first_tangent {
-                let damping = damped.then_some(&*damping);
-                ports.stage_at_start(forces, ramp, (p, i, s), drive, (mass, damping, stiffness));
-            } else {
-                ports.stage(forces, ramp, (p, i, s), (at, drive));
-            }
+            let Self { polynomials: Some(stages), at, drive, .. } = self else { break };
+            ports.stage((&stages.of, &mut stages.forces), ramp, (p, i, s), (at, drive));
             ports.at.combined(i, h, &ports.increments[p][..i], self.r1.as_mut_slice(), self.r2.as_mut_slice());
             self.solve_right(h, (&ports.force, &ports.forcing[p], GAMMA_I[i] * h));
             put_increments(GAMMA * h, (&self.right, &self.r1, &self.r2), &mut ports.increments[p][i]);

@@ -3,7 +3,7 @@
 //! The forces are those of polynomials, whose change along a motion costs about as much as the forces. Bodies follow by the exact kinematics of the
 //! tree over values with their derivatives, once at the end of a trial.
 
-use super::coordinates::{ReducedMotion, add_product};
+use super::coordinates::ReducedMotion;
 use crate::equations::Motion;
 use crate::reduced::ReducedSpace;
 use crate::reduced::polynomial::motion::{PolynomialForces, PolynomialMotion};
@@ -13,18 +13,11 @@ use bimorph_domains::{Drive, Ramp};
 use bimorph_multibody::joint_coordinates::sprung_loops::derivatives::Changes;
 use bimorph_multibody::joint_coordinates::sprung_loops::poses::LaneJointStates;
 use bimorph_multibody::planar::Pose;
-use nalgebra::DMatrix;
 
 /// Sources whose final voltages the motion is differentiated by.
 #[derive(Debug, Clone)]
 pub(super) struct ReducedPortSensitivities {
     sources: Vec<usize>,
-    /// Mass, damping and tangent at the start of a step stand for those of all its stages.
-    pub(super) first_tangent: bool,
-    /// ∂R/∂(final voltage) at the start of a step as at its end; of sources that heat nothing.
-    unit: Vec<Vec<f64>>,
-    /// Whether a source heats nothing, so that this holds.
-    unheated: Vec<bool>,
     /// Change of coordinates, rates and accelerations at the start of the step, where the stage at hand evaluates, and increments of each stage.
     now: Vec<ReducedMotion>,
     pub(super) at: ReducedMotion,
@@ -47,9 +40,6 @@ impl ReducedPortSensitivities {
         let count = tree.links.len();
         Self {
             sources: sources.to_vec(),
-            first_tangent: false,
-            unit: vec![vec![0.0; m]; sources.len()],
-            unheated: vec![false; sources.len()],
             now: vec![ReducedMotion::zeros(m); sources.len()],
             at: ReducedMotion::zeros(m),
             increments: vec![vec![ReducedMotion::zeros(m); ALPHA.len()]; sources.len()],
@@ -91,18 +81,8 @@ impl ReducedPortSensitivities {
         s: f64,
         [drive, rate]: [&Drive; 2],
     ) {
-        let Self { sources, forcing, also, change, first_tangent, unit, unheated, .. } = self;
-        for (p, (forcing, &source)) in forcing.iter_mut().zip(&*sources).enumerate() {
-            unheated[p] = false;
-            if *first_tangent {
-                ramp.sensitivity(ramp.dt, source, change);
-                unheated[p] = change.expansion.iter().all(|x| *x == 0.0);
-                if unheated[p] {
-                    forces.forcing(of, drive, change, &mut unit[p]);
-                    forcing.iter_mut().zip(&unit[p]).for_each(|(rate, unit)| *rate = unit / ramp.dt);
-                    continue;
-                }
-            }
+        let Self { sources, forcing, also, change, .. } = self;
+        for (forcing, &source) in forcing.iter_mut().zip(&*sources) {
             ramp.rate_sensitivity(s, source, change);
             // forces are quadratic in gap voltages: the voltage that rate acts on changes too
             ramp.sensitivity(s, source, also);
@@ -131,33 +111,6 @@ impl ReducedPortSensitivities {
             return force.fill(0.0);
         }
         forces.change(of, (motion.parts(), at.parts()), (drive, change), force);
-    }
-
-    /// The same with mass, damping and tangent at the start of the step, where the drive is `drive`.
-    pub(super) fn stage_at_start(
-        &mut self,
-        (of, forces): (&PolynomialMotion, &mut PolynomialForces),
-        ramp: &Ramp<'_>,
-        (p, i, s): (usize, usize, f64),
-        drive: &Drive,
-        (mass, damping, stiffness): (&DMatrix<f64>, Option<&DMatrix<f64>>, &DMatrix<f64>),
-    ) {
-        let Self { sources, now, at, increments, force, change, unit, unheated, .. } = self;
-        at.copy(&now[p]);
-        for (j, u) in increments[p][..i].iter().enumerate() {
-            at.add(A[i][j], u);
-        }
-        if unheated[p] {
-            force.iter_mut().zip(&unit[p]).for_each(|(force, unit)| *force = unit * (s / ramp.dt));
-        } else {
-            ramp.sensitivity(s, sources[p], change);
-            forces.forcing(of, drive, change, force);
-        }
-        add_product(stiffness, &at.z, force);
-        add_product(mass, &at.w, force);
-        if let Some(damping) = damping {
-            add_product(damping, &at.v, force);
-        }
     }
 
     /// After the last stage of a step.
