@@ -42,4 +42,10 @@ impl HeldMotion {
             change: zeros(),
         }
     }
+
+    /// Another point begins.
+    pub(crate) fn forget(&mut self) {
+        (self.of, self.found) = (None, false);
+        self.ends.clear();
+    }
 }

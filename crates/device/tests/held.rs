@@ -144,3 +144,19 @@ fn short_points_come_to_where_long_ones_do() {
         }
     }
 }
+
+/// A point in which nothing touches does not take the internal steps of a point before in which parts touch: its trials have the bits of a device that
+/// never touched, with a change of voltage that no held motion covers, and with one that it does.
+#[test]
+fn a_point_is_free_of_the_contact_before() {
+    let [_, open, closed] = &POINTS;
+    for part in [1.5, 0.5, 1e-3, 0.0] {
+        let mut fresh = open.open();
+        let parent = open.moving(&mut fresh);
+        let expected = ask(&mut fresh, Mode::Transient, parent, open.short, &open.near(part));
+        let mut device = open.open();
+        let [touching, parent] = [closed, open].map(|point| point.moving(&mut device));
+        ask(&mut device, Mode::Transient, touching, 40.0 * closed.short, &closed.near(0.01));
+        assert_eq!(ask(&mut device, Mode::Transient, parent, open.short, &open.near(part)), expected, "{part}");
+    }
+}

@@ -22,7 +22,7 @@ use crate::contact_steps::near;
 use crate::held_motion::HeldMotion;
 use crate::session::DeviceSession;
 use crate::states::Snapshot;
-use bimorph_domains::{Input, Ramp, System};
+use bimorph_domains::{Domain, Input, Ramp, System};
 use bimorph_solve::equations::Bodies;
 use bimorph_solve::time::adaptive::{Advance, Control};
 use bimorph_solve::time::method::Motion;
@@ -47,25 +47,26 @@ impl DeviceSession {
         (request, parent): (&Trial<'_>, Option<&Snapshot>),
         tol: f64,
     ) -> Option<f64> {
-        let touching = parent.is_some_and(|p| near(system, &p.q, &p.v, request.dt));
-        let at_once = |p: &&Snapshot| touching || request.dt <= p.next_step;
-        let (Some(parent), Some(token)) = (parent.filter(at_once), request.parent) else {
-            (self.held.of, self.held.found) = (None, false);
-            self.held.ends.clear();
+        let of = request.parent.map(|token| (token, request.dt.to_bits()));
+        if self.held.of != of {
+            self.held.forget();
+        }
+        let (parent, of) = (parent?, of?);
+        let touching = near(system, &parent.q, &parent.v, request.dt);
+        if !touching && request.dt > parent.next_step {
             return None;
-        };
+        }
+        let most = if touching { SMALL_TOUCHING } else { SMALL };
         let linear = self.shaken.is_none()
             && !self.takes_bodies
             && self.stepper.method.has_linear_trials(&parent.carried)
             && self.changes_little(system, &parent.sources)
-            && (touching || self.pushes_little(system, (request, parent), tol));
+            && self.pushes_little(system, (request, parent), tol, touching);
         if !(linear || touching) {
             return None;
         }
-        let of = Some((token, request.dt.to_bits()));
-        if self.held.of != of {
-            self.held.of = of;
-            self.held.ends.clear();
+        if self.held.of.is_none() {
+            self.held.of = Some(of);
             self.hold(system, (request, parent), tol, touching);
         }
         if !(linear && self.held.found) {
@@ -85,7 +86,6 @@ impl DeviceSession {
         held.change.add(-1.0, &held.motion);
         let bodies = Bodies::weighed(system, &ramp, &self.weights);
         let left_out = bodies.left_out([&held.motion, &self.motion], &held.change, request.dt, tol);
-        let most = if touching { SMALL_TOUCHING } else { SMALL };
         (left_out <= most).then_some(held.next)
     }
 
@@ -102,9 +102,21 @@ impl DeviceSession {
         turns.all(|(change, held)| change.abs() <= held.abs()) && gaps.all(|(change, held)| change.abs() <= held)
     }
 
-    /// Whether the forces that the sources change move free masses by little more than what a trial about the held motion may leave out: no held motion
-    /// is made in vain.
-    fn pushes_little(&mut self, system: &System, (request, parent): (&Trial<'_>, &Snapshot), tol: f64) -> bool {
+    /// Whether the forces that the sources change move free masses by little: no held motion is made in vain, and no part that friction holds in it would
+    /// slide by more than may be left out. Where parts touch, the motion is made for its steps anyway.
+    fn pushes_little(
+        &mut self,
+        system: &System,
+        (request, parent): (&Trial<'_>, &Snapshot),
+        tol: f64,
+        touching: bool,
+    ) -> bool {
+        let slides = || system.members.iter().any(|member| member.slides());
+        let most = match touching {
+            false => IN_VAIN * SMALL,
+            true if slides() => SMALL_TOUCHING,
+            true => return true,
+        };
         if self.sources == parent.sources {
             return true;
         }
@@ -117,7 +129,7 @@ impl DeviceSession {
         let force = &mut self.held.change.q;
         system.drive_force(&self.motion.q, &self.drive, &self.change, force);
         let bodies = Bodies::weighed(system, &ramp, &self.weights);
-        bodies.would_move(&self.motion, force, request.dt, tol) <= IN_VAIN * SMALL
+        bodies.would_move(&self.motion, force, request.dt, tol) <= most
     }
 
     /// Steps from the parent at its sources.
@@ -143,7 +155,7 @@ impl DeviceSession {
         self.stepper.method.keep_first_tangent(false);
         held.found = matches!(advanced, Ok(Advance::Done));
         held.next = h;
-        if !(touches && held.found) {
+        if !(touching && touches && held.found) {
             held.ends.clear();
         } else if let Some(last) = held.ends.last_mut() {
             *last = request.dt;
