@@ -5,6 +5,7 @@
 
 use super::domain::Configuration;
 use super::facing::FacingStretch;
+use super::facing_lanes::derivatives;
 use super::facing_local::{FacingBeams, SIGNS};
 use super::facing_side::{Opening, back, onto};
 use super::facing_tangent::{self, PLACES, add_block, block, couple, matrix};
@@ -66,10 +67,9 @@ impl FieldForces<'_> {
             if open && self.factor == 0.0 {
                 continue;
             }
-            let mut first = [W::splat(simd, 0.0); 4];
-            let mut second = [W::splat(simd, 0.0); 10];
+            let (mut first, mut second) = ([W::splat(simd, 0.0); 4], [W::splat(simd, 0.0); 10]);
             if self.factor != 0.0 {
-                field::<W, CURVED>(simd, facing, (scaled, length), self.factor, (&mut first, &mut second));
+                derivatives::<W, CURVED>(simd, facing, (scaled, length), self.factor, (&mut first, &mut second));
             }
             if open && tile.sides.iter().flatten().all(|own| own.cut.is_none()) {
                 self.add_forces(simd, tile, &seen, first);
@@ -275,49 +275,6 @@ fn apart<W: SimdReal>([w, slope, w_end, slope_end]: [W; 4], room: f64) -> bool {
     open
 }
 
-/// Adds the derivatives of the capacitances of a tile times a factor, second ones where it is `CURVED`; slopes times length.
-#[inline(always)]
-fn field<W: SimdReal, const CURVED: bool>(
-    simd: W::Simd,
-    facing: &FacingStretch,
-    (z, length): ([W; 4], W),
-    factor: f64,
-    (first, second): (&mut [W; 4], &mut [W; 10]),
-) {
-    let (gap, closest) = facing.open();
-    let (one, bound) = (W::splat(simd, 1.0), W::splat(simd, closest));
-    let along = length * (factor * facing.strength);
-    for node in facing.gauss() {
-        let n = &node.shape;
-        let g = (z[0] * n[0] + z[1] * n[1]) + (z[2] * n[2] + z[3] * n[3]) + gap;
-        let (inverse, weight) = (one / g.max(bound), along * node.weight);
-        let slope = if CURVED {
-            let [slope, curvature] = facing.edges.derivatives(inverse);
-            let curvature = g.above(bound, curvature * weight);
-            let rows = [curvature * n[0], curvature * n[1], curvature * n[2], curvature * n[3]];
-            for (sum, (i, j)) in second.iter_mut().zip(PLACES) {
-                *sum += rows[i] * n[j];
-            }
-            slope * weight
-        } else {
-            facing.edges.slope(inverse) * weight
-        };
-        for i in 0..4 {
-            first[i] += slope * n[i];
-        }
-    }
-    (first[1], first[3]) = (first[1] * length, first[3] * length);
-    if CURVED {
-        for (sum, (i, j)) in second.iter_mut().zip(PLACES) {
-            for place in [i, j] {
-                if place % 2 == 1 {
-                    *sum = *sum * length;
-                }
-            }
-        }
-    }
-}
-
 impl StretchSums {
     /// Adds the contact of a stretch whose ends lie at `z`.
     #[cold]
@@ -500,6 +457,32 @@ mod tests {
             }
         }
         assert!(touched > 10, "{touched}");
+    }
+
+    /// Of ten stretches whose first and last two stations are anchored, eight move and fill one tile. Its force is that stretch by stretch, to rounding, also with a stretch between
+    /// anchored stations among the eight.
+    #[test]
+    fn anchored_stretches_have_no_lanes() {
+        let mut random = Random(11);
+        let even: Vec<f64> = (0..=10).map(|k| f64::from(k) / 10.0).collect();
+        for anchored in [&[0, 1, 9, 10][..], &[0, 1, 5, 6, 9, 10]] {
+            let drawn = beams([&even, &[0.0, 1.0]], None, EdgeField::between_bars(2e-6, 1e-6, 2e-6), &mut random);
+            let [mut upper, lower] = drawn.sides;
+            anchored.iter().for_each(|&k| upper.stations[k].point.body = BodyId::Ground);
+            let sides = [Flank::new(upper.stations, Vec::new()), lower];
+            let tiled = FacingBeams::new(drawn.frame, sides, drawn.stretches, drawn.loss);
+            assert!(matches!(tiled.tiles.as_slice(), [tile] if tile.stretches == (1..9)));
+            let plain = FacingBeams { tiles: Vec::new(), ..tiled.clone() };
+            let q: Vec<Pose> = (0..12).map(|_| Pose::new(random.of(1e-6), random.of(1e-6), random.of(1e-2))).collect();
+            let force = |beams: &FacingBeams| {
+                let mut r = vec![Pose::zeros(); 12];
+                beams.add_force(Configuration { q: &q, linear: false }, 10.0, &mut r);
+                r
+            };
+            let (r, plain) = (force(&tiled), force(&plain));
+            let most = plain.iter().map(Pose::norm).fold(0.0, f64::max);
+            assert!(most > 0.0 && r.iter().zip(&plain).all(|(a, b)| (a - b).norm() <= 1e-12 * most));
+        }
     }
 
     /// Members whose bodies get other numbers have the force and the bound of displacements of those bodies, to the bit.

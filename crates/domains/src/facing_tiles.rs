@@ -139,11 +139,17 @@ fn add_spread<const DOWN: bool>(from: &[Lane8; 3], to: &mut [Pose; LANES]) {
 }
 
 impl Tile {
-    /// The tiles of all stretches between two sides.
+    /// The tiles of all stretches between two sides, but those between anchored stations: nothing there moves.
     pub(super) fn all(sides: &[Flank; 2], stretches: &[CubicStretch]) -> Vec<Self> {
         let mut tiles = Vec::with_capacity(stretches.len().div_ceil(STRETCHES));
+        let moves = |stretch: &CubicStretch| {
+            sides.iter().zip(stretch.segments).any(|(side, from)| {
+                side.stations[from..from + 2].iter().any(|station| station.point.body != BodyId::Ground)
+            })
+        };
         let (mut begin, mut before) = (0, [None; 2]);
-        while begin < stretches.len() {
+        while let Some(skipped) = stretches[begin..].iter().position(moves) {
+            begin += skipped;
             // segments so short that a cut stands for both their ends are skipped by stretches
             let fits = |end: &usize| {
                 let spans = |side: usize| stretches[end - 1].segments[side] - stretches[begin].segments[side];

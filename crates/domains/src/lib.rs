@@ -33,7 +33,7 @@
 //! | [`squeeze_film`] | damping of gas that flows out of a gap; [`perforation`]: holes; [`film_series`]: states of one that compresses; [`plate_film`], [`facing_film`]: between plates, between beams |
 //! | [`facing`] | a stretch of two facing beams: pressure along a gap that varies over their length |
 //! | `facing_side`, `facing_stretches`, `facing_tiles` | where facing beams measure; how the segments of both sides cut a gap; stretches in lanes |
-//! | `facing_field`, `facing_tangent` | forces and tangent along facing beams, a stretch in each lane |
+//! | `facing_field`, `facing_lanes`, `facing_tangent` | forces and tangent along facing beams, a stretch in each lane |
 //! | [`quadrature`] | rules of integration along it |
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
 //! | `laplacian` | potentials in a network of conductors |
@@ -83,6 +83,7 @@ pub mod facing;
 pub mod facing_beams;
 mod facing_field;
 pub mod facing_film;
+mod facing_lanes;
 pub mod facing_local;
 mod facing_loss;
 mod facing_side;
