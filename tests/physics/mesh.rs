@@ -227,3 +227,25 @@ fn circuits_know_the_error_of_their_lowest_mode() {
         );
     }
 }
+
+/// Beams five times as long as wide between two anchors move, by every request. The first frequency is (βl)² = 22.3733 (Blevins 1979, table 8-1)
+/// within the tolerance. The mean rise at 1 V, of 12.5 mW in 80 Ω, is P·l/(12·k·w·h).
+#[test]
+fn stubby_beams_between_anchors_move() {
+    let text = "x beam2d p [a b] [l=50u w=10u]\nanchor p [b] []";
+    let model =
+        fitted(&drawn(text, CompileOptions::default()), &MeshRequest::Modes { count: 1, voltages: &[] }).unwrap();
+    let exact = 22.3733 * (165e9 * 100e-12 / 12.0 / 2300.0_f64).sqrt() / (std::f64::consts::TAU * 2.5e-9);
+    let error = modes(&model, 1, &[]).unwrap().frequencies_hz[0] / exact - 1.0;
+    assert!(error.abs() < 1e-3, "{error:e}");
+
+    let heated = text
+        .replace("beam2d", "beam2det")
+        .replace("w=10u", "w=12.5u sheetresistance=20 thermcond=32 thermalexpansion=0 ambienttemperature=300");
+    let heated = drawn(&format!("{heated}\neground * [a] []\nfeed port * [b] []"), CompileOptions::default());
+    let volts = [("feed".to_owned(), 1.0)];
+    let model = fitted(&heated, &MeshRequest::Static { voltages: &volts }).unwrap();
+    let found = static_equilibrium(&model, &volts).unwrap();
+    let rise = 12.5e-3 * 50e-6 / (12.0 * 32.0 * 12.5e-6 * 2e-6);
+    assert!(((found.temperatures_k[0].1 - 300.0) / rise - 1.0).abs() < 1e-9, "{:?}", found.temperatures_k);
+}

@@ -12,8 +12,8 @@
 use super::error::{DiscretizeError, MAX_SEGMENTS};
 use crate::options::CompileOptions;
 use bimorph_base::ErrorBudget;
-use bimorph_structure::BeamRows;
 use bimorph_structure::{Beam, Structure};
+use std::collections::HashSet;
 
 /// Length over width above which a beam counts as slender.
 const SLENDER: f64 = 8.0;
@@ -43,7 +43,7 @@ pub fn check(beam: &Beam) -> Result<(), DiscretizeError> {
 /// # Errors
 /// See [`check`].
 pub fn a_priori(structure: &Structure, options: &CompileOptions) -> Result<Vec<usize>, DiscretizeError> {
-    let held = held_under_gaps(structure);
+    let held = held_at_both_ends(structure);
     let count = |(index, beam): (usize, &Beam)| {
         check(beam)?;
         let least = if held.contains(&index) { 2 } else { 1 };
@@ -54,18 +54,14 @@ pub fn a_priori(structure: &Structure, options: &CompileOptions) -> Result<Vec<u
     structure.beams.iter().enumerate().map(count).collect()
 }
 
-/// The beams along gaps with both ends anchored: nothing of a single segment moves there.
-fn held_under_gaps(structure: &Structure) -> Vec<usize> {
-    if structure.beam_gaps.is_empty() {
-        return Vec::new();
-    }
+/// The beams with both ends anchored: nothing of a single segment moves there.
+fn held_at_both_ends(structure: &Structure) -> HashSet<usize> {
     let mut anchored = vec![false; structure.nodes.len()];
     for support in structure.supports.iter().filter(|support| support.held == [true; 3]) {
         anchored[support.node.0] = true;
     }
-    let beams = BeamRows::new(structure);
-    let held = |&index: &usize| [structure.beams[index].a, structure.beams[index].b].iter().all(|n| anchored[n.0]);
-    structure.beam_gaps.iter().flat_map(|gap| beams.along(gap)).filter(held).collect()
+    let held = |(_, beam): &(usize, &Beam)| [beam.a, beam.b].iter().all(|n| anchored[n.0]);
+    structure.beams.iter().enumerate().filter(held).map(|(index, _)| index).collect()
 }
 
 /// kL at the edge of a band (Hz).
