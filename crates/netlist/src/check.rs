@@ -394,7 +394,9 @@ fn floating_potentials(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
         } else {
             String::new()
         };
-        let message = format!("the potential of node `{name}` floats: no port, source or ground fixes it{more}");
+        let message = format!(
+            "the potential of node `{name}` floats: no port, source or ground fixes it, and it stays at 0 V{more}"
+        );
         let help = "connect it with `R`, or add `eground * [node] []`";
         sink.warning("W013", drawing.first_named[index], message, help);
     }

@@ -96,7 +96,10 @@ pub(super) fn of_rotary(compiled: &CompiledModel, error: f64) -> Option<Diagnost
 /// Where an equilibrium is so close to buckling that its load decides on less than the accuracy of dimensions.
 pub(super) fn near_buckling(point: &OperatingPoint) -> Option<Diagnostic> {
     let beam = point.near_buckling.as_ref()?;
-    let message = format!("the load is within 1 % of buckling; softest motion: beam {beam}");
+    let message = match beam.as_str() {
+        "" => "the load is within 1 % of a loss of stability (pull-in or buckling)".to_owned(),
+        beam => format!("the load is within 1 % of buckling; softest motion: beam {beam}"),
+    };
     Some(Diagnostic::warning(
         BUCKLING,
         message,

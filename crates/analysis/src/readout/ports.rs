@@ -145,8 +145,8 @@ pub fn check_ranges(compiled: &CompiledModel, opened: &[String]) -> Result<(), R
             Some(port) => port,
             None if OpenedPorts::find(compiled, std::slice::from_ref(name)).is_ok() => name,
             None => {
-                let mut names: Vec<&str> = known().collect();
-                names.dedup();
+                let mut seen = HashSet::new();
+                let names: Vec<&str> = known().filter(|name| seen.insert(*name)).collect();
                 let names = if names.is_empty() { "it has no electrical one".to_owned() } else { names.join(", ") };
                 return Err(ReadoutError::BadRange {
                     expected: format!(

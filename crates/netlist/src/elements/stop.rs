@@ -25,14 +25,14 @@ pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
     let impact = site.impact()?;
     let ohmic = ohmic(site)?;
     let range = site.positive_if_any("adhesionrange")?.unwrap_or(ADHESION_RANGE);
-    let adhesion = site.positive_if_any("adhesion")?.map(|force| Adhesion { force, range });
+    let adhesion = above_zero(site, "adhesion")?.map(|force| Adhesion { force, range });
     let slip_speed = site.positive_if_any("slipspeed")?.unwrap_or(SLIP_SPEED);
-    let stick_stiffness = site.positive_if_any("stickstiffness")?;
+    let stick_stiffness = above_zero(site, "stickstiffness")?;
     if let Some(k) = stick_stiffness.filter(|k| *k > MAX_STICK_STIFFNESS) {
         return Err(site.out_of_range("stickstiffness", k, &format!("at most {MAX_STICK_STIFFNESS:e}")));
     }
-    let coefficient = site.positive_if_any("friction")?;
-    if coefficient.is_none() && stick_stiffness.is_some() {
+    let coefficient = above_zero(site, "friction")?;
+    if stick_stiffness.is_some() && site.number("friction")?.is_none() {
         return Err(site.missing("friction"));
     }
     let friction = coefficient.map(|coefficient| Friction { coefficient, slip_speed, stick_stiffness });
@@ -57,6 +57,11 @@ pub(super) fn stop2d(site: &mut ElementSite<'_, '_>) -> Result<(), Reported> {
         friction,
     });
     Ok(())
+}
+
+/// A parameter that is zero, which is none, or positive.
+fn above_zero(site: &mut ElementSite<'_, '_>, name: &str) -> Result<Option<f64>, Reported> {
+    Ok(Some(site.non_negative_or(name, 0.0)?).filter(|x| *x > 0.0))
 }
 
 /// The metals of an ohmic contact, where `hardness` and `contactresistivity` are given.

@@ -264,6 +264,23 @@ fn stops() {
     assert!(none.err().is_some_and(|d| d.to_string().contains("`gap` or `back`")));
 }
 
+/// A stop whose adhesion, friction and stick stiffness are zero has none of them; negative ones are refused.
+#[test]
+fn zeros_of_stops_are_none() {
+    let text = |values: &str| {
+        format!("anchor * [e] []\nmass2d * [m] [m=1e-10]\nspring2d * [e m] [kx=1]\nstop2d * [m e] [gap=1u {values}]")
+    };
+    let s = drawn(&text("adhesion=0 friction=0 stickstiffness=0"));
+    assert!(s.stops[0].adhesion.is_none() && s.stops[0].friction.is_none());
+    let stuck = drawn(&text("friction=0.3 stickstiffness=0")).stops[0].friction.expect("friction");
+    assert_eq!((stuck.coefficient, stuck.stick_stiffness), (0.3, None));
+    assert!(drawn(&text("friction=0 stickstiffness=1e3")).stops[0].friction.is_none());
+    for name in ["adhesion", "friction", "stickstiffness"] {
+        let none = load(&Bundle::from_text("t.net", &text(&format!("{name}=-1"))), &[]);
+        assert!(none.err().is_some_and(|d| d.to_string().contains("zero or positive")), "{name}");
+    }
+}
+
 /// damper2d, and a spring turned by oz.
 #[test]
 fn springs_and_dampers() {
