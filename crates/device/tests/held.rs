@@ -145,8 +145,8 @@ fn short_points_come_to_where_long_ones_do() {
     }
 }
 
-/// A point in which nothing touches does not take the internal steps of a point before in which parts touch: its trials have the bits of a device that
-/// never touched, with a change of voltage that no held motion covers, and with one that it does.
+/// A point in which nothing touches does not take the internal steps of a point before in which parts touch. Its trials have the bits of a device that
+/// never touched, with and without a held motion that covers the change of voltage.
 #[test]
 fn a_point_is_free_of_the_contact_before() {
     let [_, open, closed] = &POINTS;
