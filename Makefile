@@ -35,6 +35,7 @@ notebooks:
 
 soak:
 	@scripts/setup build
+	cargo test --release --no-default-features --test device_contract
 	cargo test --release --test service -- --ignored --nocapture --test-threads=1 soak:: session_faults::soak sweep_faults::soak
 	cargo test --release --test cli -- --ignored --nocapture --test-threads=1 damage::soak stored_sessions::soak killed_clients::soak killed_jobs::soak
 
