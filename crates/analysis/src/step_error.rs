@@ -10,6 +10,9 @@
 //! than in proportion to the tolerance. There are five runs at most, none of which takes more than some seconds; the samples of a run that
 //! does are sent as they come, and it is not made again.
 //!
+//! A propagated error may grow where that of the motion does not: the Jacobian of a step is that at its start. Where it says that nothing is predictable,
+//! the run is compared as those without it, and is predictable if the comparison says so.
+//!
 //! Runs without such an estimate are compared with a companion run (`companion.rs`). These are other methods, equal
 //! steps, rotating frames, and models whose parts may touch, where the error is propagated up to the first contact
 //! only.
@@ -40,7 +43,7 @@ const EXPONENTS: (f64, f64) = (0.35, 1.0);
 const RATIOS: (f64, f64) = (0.01, 0.7);
 /// Runs at most.
 const RUNS: usize = 5;
-/// Error of two runs from which on a third is not made: nothing is predictable.
+/// Error of two runs from which on a third is not made (1): nothing seems predictable.
 const HOPELESS: f64 = 0.3;
 
 /// Makes the run that `options` specify, with [`TransientResult::step_error`], and a warning where that is beyond the
@@ -74,6 +77,15 @@ fn held<T>(
     let estimated = options.with_estimate();
     let made = first(&estimated, model, run, sample, watch)?;
     let made = sharper(made, &estimated, model, run, watch)?;
+    if made.result.step_error.is_some_and(|error| error > HOPELESS) && !made.long {
+        let mut kept = BufferedSamples::default();
+        let companion = companion(options, model.unknowns(), run, watch)?;
+        let again = compared(options, model, companion, run, &mut |t, values| kept.keep(t, values), watch)?;
+        if again.0.step_error.is_some_and(|error| error <= HOPELESS) {
+            kept.send(sample);
+            return Ok(again);
+        }
+    }
     made.kept.send(sample);
     let SampledRun { mut result, more, steps, .. } = made;
     result.warnings.extend(match result.step_error {
