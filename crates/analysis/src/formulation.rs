@@ -9,7 +9,7 @@
 //!
 //! Rigid parts on flexures are the other case. Where they outweigh the flexures and close no loop, large rotations are linear in the
 //! joint coordinates and curved in those of the bodies. Steps in joint coordinates are as long as those of small rotations then:
-//! rcr with the method of the bodies ([`outweighed_tree`]). Loops cancel the advantage.
+//! rcr with the method of the bodies ([`outweighed_tree`]), unless parts may touch. Loops cancel the advantage.
 
 use super::AnalysisError;
 use super::integrator::Integrator;
@@ -43,7 +43,8 @@ pub struct ChosenFormulation {
 /// Why a run in joint coordinates takes fewer steps than one of the bodies, in words: rigid parts outweigh the flexures of an open tree.
 pub fn outweighed_tree(compiled: &CompiledModel) -> Option<String> {
     let model = &compiled.parts.system.model;
-    if model.linear || !compiled.parts.system.anchors.is_empty() {
+    // steps in joint coordinates collapse where parts touch
+    if model.linear || !compiled.parts.system.anchors.is_empty() || compiled.parts.system.can_touch() {
         return None;
     }
     let beams = compiled.structure.beams.iter().zip(&compiled.order.segments).filter(|(_, segments)| **segments > 0);
