@@ -20,12 +20,14 @@ const FORMULATIONS: [(&str, Formulation); 3] =
     [("bodies", Formulation::Compliant), ("joints", Formulation::Rcr), ("reduced", Formulation::Reduced)];
 
 fn main() {
-    let examples: [Example<'_>; 5] = [
+    let examples: [Example<'_>; 7] = [
         ("bank", &[], &[], &[("heat", 1.5)], "yoke.y", 300e-6),
         ("comb_resonator", &[], &[], &[("drive", 20.0)], "shuttle.x", 300e-6),
         ("quarter_stage", &[], &[("F", 20e-6), ("angle", 0.9)], &[], "c.x", 30e-6),
         ("quarter_stage", &[], &[("F", 100e-6), ("angle", 0.9)], &[], "c.x", 30e-6),
+        ("rotary_stage", &[], &[], &[("counter", 2.0)], "rotor.rz", 30e-6),
         ("switch", &[], &[], &[("drive", 12.0)], "a(8).y", 3e-6),
+        ("chevron", &[], &[], &[("heat", 3.0)], "apex.y", 300e-6),
     ];
     println!("model,formulation,tol,unknowns,steps,rejected,us a step,error,warnings");
     let wanted: Vec<String> = std::env::args().skip(1).collect();

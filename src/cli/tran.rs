@@ -164,6 +164,7 @@ impl TransientCommand {
             solver: self.solver.linear(),
             estimate: false,
             keep: true,
+            directions: None,
         };
         let decides = formulation == Formulation::Auto && self.method.is_none() && self.solver != SolverChoice::Frame;
         let suited = decides.then(|| formulation::of_run(compiled, &options));

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// Steps in which the voltages are raised, since plastic strain depends on the path.
 const STEPS: usize = 8;
-/// Corrections of the plastic strains in one step.
+/// MotionCorrections of the plastic strains in one step.
 const CORRECTIONS: usize = 60;
 /// Tolerance of the stress, relative to the cold strength: far below the error of any mesh.
 const TOLERANCE: f64 = 1e-9;

@@ -5,6 +5,7 @@
 //! strains) or cannot be trained, the full model is taken, and a warning says why.
 
 pub mod circuit;
+mod directions;
 
 use super::integrator::{IntegrationRun, Integrator};
 use super::statics::{OperatingPoint, operating_point, source_vector};
@@ -20,6 +21,7 @@ use bimorph_solve::baseline::SolverKind;
 use bimorph_solve::equations::Bodies;
 use bimorph_solve::path::{LoadPath, SourcePath};
 use bimorph_solve::reduced::check::FullCheck;
+use bimorph_solve::reduced::enrichment::MotionCorrections;
 use bimorph_solve::reduced::polynomial::moving::{FittedMotion, of_motion};
 use bimorph_solve::reduced::space::spanned;
 use bimorph_solve::reduced::statics::ReducedStatics;
@@ -29,6 +31,7 @@ use bimorph_solve::time::adaptive::{Advance, Observer};
 use bimorph_solve::time::defect::SeeError;
 use bimorph_solve::time::method::{Motion, SolverCounters};
 use bimorph_solve::time::reduced_rodas4::ReducedRodas4;
+pub use directions::Directions;
 use std::sync::Arc;
 
 /// Code of the warnings about a reduced model.
@@ -151,9 +154,14 @@ pub fn reduced_transient(
     } else {
         let cases = cases(compiled, options)?;
         let largest = cases.first().map(|(_, inputs)| inputs.drive(&vec![1.0; inputs.inputs.len()]));
-        trained(&cases, tol, MOMENTS).map(|training| (training, largest))
+        let found = match &options.directions {
+            Some(Directions::Trained { training, polynomials }) => Ok((Arc::clone(training), *polynomials)),
+            Some(Directions::Full(why)) => Err(why.clone()),
+            None => trained(&cases, tol, MOMENTS).map(|training| (Arc::new(training), compiled.options.errors())),
+        };
+        found.map(|found| (found, largest))
     };
-    let (training, largest) = match found {
+    let ((training, polynomials), largest) = match found {
         Ok(found) => found,
         Err(why) => {
             let mut result = full(sample, watch)?;
@@ -162,15 +170,26 @@ pub fn reduced_transient(
         }
     };
     let system = &compiled.parts.system;
-    let fitted = largest.and_then(|drive| of_motion(&training, system, &drive, tol));
+    let fitted = largest.and_then(|drive| of_motion(&training, system, &drive, polynomials));
     let space = Arc::new(match &fitted {
         Some(fitted) => fitted.space.clone(),
         None => training.space.of_system(system),
     });
-    let mut carrier = ReducedPropagator { compiled, options, space: &space, fitted, error: None, excess: 0.0 };
+    let mut carrier = ReducedPropagator {
+        compiled,
+        options,
+        space: &space,
+        fitted,
+        polynomials,
+        corrections: None,
+        error: None,
+        excess: 0.0,
+    };
     let mut result = record(compiled, options, &mut carrier, sample, watch)?;
-    let ReducedPropagator { error, excess, .. } = carrier;
+    let ReducedPropagator { corrections, error, excess, .. } = carrier;
     result.unknowns = space.size();
+    let directions = Directions::Trained { training, polynomials };
+    result.directions = corrections.map(|corrections| directions.after(system, &corrections));
     if let Some(error) = error {
         result.estimated_error = result.estimated_error.map(|mesh| mesh + error);
         result.warnings.extend(beyond(error, tol).map(coded));
@@ -233,6 +252,10 @@ struct ReducedPropagator<'a> {
     space: &'a Arc<ReducedSpace>,
     /// Forces as polynomials, where these are within their part of the tolerance.
     fitted: Option<FittedMotion>,
+    /// The division of the tolerance for them.
+    polynomials: ErrorBudget,
+    /// Corrections of the full model along the motion.
+    corrections: Option<MotionCorrections>,
     /// Estimated error by the reduction (1).
     error: Option<f64>,
     excess: f64,
@@ -265,11 +288,12 @@ impl Propagator for ReducedPropagator<'_> {
         let run = IntegrationRun { motion, h, control: self.options.control(), observe, corners: Vec::new() };
         let mut method = ReducedRodas4::new(Arc::clone(self.space), h).with_estimate(system);
         if let Some(fitted) = self.fitted.take() {
-            let share = self.compiled.options.errors().reduced_statics();
+            let share = self.polynomials.reduced_statics();
             method = method.with_polynomials(fitted.polynomials, share, fitted.largest);
         }
         let (end, stepper) = run.stepped(&mut Bodies::new(system, ramp), method);
         (self.error, self.excess) = (stepper.method.error(), stepper.method.excess);
+        self.corrections = stepper.method.corrections().cloned();
         Ok((end?, stepper.work()))
     }
 }

@@ -15,7 +15,7 @@
 //!
 //! Runs without such an estimate are compared with a companion run (`companion.rs`). These are other methods, equal
 //! steps, rotating frames, and models whose parts may touch, where the error is propagated up to the first contact
-//! only.
+//! only. The companion of a run in a reduced model also lacks directions that the run has (`reduced::directions`).
 
 mod companion;
 mod run;
@@ -26,10 +26,11 @@ pub(super) use super::transient::error_log::least;
 use super::transient::{TransientOptions, TransientResult, transient};
 use super::{AnalysisError, ProgressCallback};
 use crate::formulation;
+use crate::reduced::Directions;
 use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::Formulation;
-use companion::{companion, compared};
+use companion::{companion, compared, is_made_again};
 pub use run::RunFunction;
 use run::{AT_THE_END, MAX_AGAIN, MAX_STORED_SAMPLES};
 pub use run::{beyond, unknown};
@@ -72,6 +73,9 @@ fn held<T>(
 ) -> Result<(TransientResult, T, f64), AnalysisError> {
     if !propagates(options, model) {
         let first = companion(options, model.unknowns(), run, watch)?;
+        if model.options.formulation == Formulation::Reduced && !options.takes_full_model() {
+            return reduced(options, model, first, run, sample, watch);
+        }
         return compared(options, model, first, run, sample, watch);
     }
     let estimated = options.with_estimate();
@@ -95,11 +99,49 @@ fn held<T>(
     Ok((result, more, steps.requested()))
 }
 
+/// A run in a reduced model, compared as others; one of the full model where further directions leave an error beyond the tolerance.
+fn reduced<T>(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    first: (Option<TransientResult>, bool),
+    run: RunFunction<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<(TransientResult, T, f64), AnalysisError> {
+    let full = |why: String| options.with_directions(Some(Directions::Full(why)));
+    if first.0.is_none() && !options.signals.is_empty() && options.errors().has_companion() {
+        return held(&full("it fails at a looser tolerance".to_owned()), model, run, sample, watch);
+    }
+    if !is_made_again(options, model, &first) {
+        return compared(options, model, first, run, sample, watch);
+    }
+    let mut kept = BufferedSamples::default();
+    let made = compared(options, model, first, run, &mut |t, values| kept.keep(t, values), watch);
+    let why = match &made {
+        Err(error) if !matches!(error, AnalysisError::Cancelled | AnalysisError::BadRequest { .. }) => {
+            error.to_string()
+        }
+        Ok((result, ..))
+            if result.directions.is_some() && !result.step_error.is_some_and(|e| options.errors().holds(e)) =>
+        {
+            match &result.directions {
+                Some(Directions::Full(why)) => why.clone(),
+                _ => "its error stays beyond the tolerance with more directions".to_owned(),
+            }
+        }
+        _ => {
+            kept.send(sample);
+            return made;
+        }
+    };
+    held(&full(why), model, run, sample, watch)
+}
+
 /// Whether a run of this model propagates its error.
 fn propagates(options: &TransientOptions<'_>, model: &CompiledModel) -> bool {
     let system = &model.parts.system;
     formulation::of_run(model, options).1 == Integrator::Rodas4
-        && model.options.formulation != Formulation::Reduced
+        && (model.options.formulation != Formulation::Reduced || options.takes_full_model())
         && options.step.is_none()
         && options.points >= 2
         && !options.signals.is_empty()

@@ -63,6 +63,8 @@ impl ErrorBudget {
     const STAGE: f64 = 1e-2;
     /// Fraction of the tolerance for the statics of a reduced model.
     const REDUCED_STATICS: f64 = 0.3;
+    /// Ratio of the error of the polynomials of a reduced run to that of the run before, with which it is compared.
+    const NEXT_POLYNOMIALS: f64 = 0.3;
     /// Fraction of the tolerance below which singular values, relative to the largest, are left out of a reduced model: for statics, whose
     /// check adds what is lacking, and for motion, which passes through states that no equilibrium has.
     const SINGULAR_VALUES: [f64; 2] = [0.3, 0.02];
@@ -284,6 +286,12 @@ impl ErrorBudget {
     /// For the statics of a reduced model.
     pub fn reduced_statics(self) -> f64 {
         Self::REDUCED_STATICS * self.requested
+    }
+
+    /// For the polynomials of a reduced run after one with this division.
+    #[must_use]
+    pub fn next_polynomials(self) -> Self {
+        self.scaled(Self::NEXT_POLYNOMIALS)
     }
 
     /// The singular value below which a reduced model leaves a direction out; `moves`: it is for motion too.

@@ -1,6 +1,7 @@
 //! Reduced models in circuits: trained once for the ranges of the ports, with polynomial forces throughout.
 
 use super::{FULL_IN_TIME, MOMENTS, trained};
+use bimorph_base::ErrorBudget;
 use bimorph_domains::{Drive, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_solve::reduced::polynomial::moving::of_motion;
@@ -88,7 +89,7 @@ impl CircuitReduction {
         let inputs = range_inputs(system, sources, &ranges);
         let largest = inputs.drive(&vec![1.0; inputs.inputs.len()]);
         let training = trained(&[(system, inputs)], tol, MOMENTS)?;
-        let fitted = of_motion(&training, system, &largest, tol).ok_or_else(|| {
+        let fitted = of_motion(&training, system, &largest, ErrorBudget::of(tol)).ok_or_else(|| {
             "its forces are no polynomials within 0.3 of the tolerance (or friction or gas acts that has none); narrower ranges or a larger tol may have them"
                 .to_owned()
         })?;

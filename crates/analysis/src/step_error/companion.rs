@@ -21,12 +21,15 @@ use super::super::{AnalysisError, ProgressCallback};
 use super::run::{AT_THE_END, MAX_AGAIN, MAX_STORED_SAMPLES, MAX_WORK, RunFunction, beyond, unknown};
 use super::samples::{BufferedSamples, SelectedSamples, resolved, stride};
 use crate::formulation;
+use crate::reduced::Directions;
 use bimorph_model::compile::CompiledModel;
 
 /// Fraction of the difference that is reported.
 const REPORTED_FRACTION: f64 = 0.5;
 /// The same for methods of second order, and explicit ones, whose error falls little with the tolerance.
 const SHARE_OF_SECOND: f64 = 1.0;
+/// The same of a run in a reduced model, which has more directions than its companion: the next ones may matter as much.
+const SHARE_OF_REDUCED: f64 = 1.0;
 /// Times the steps of a run that one at a tenth of its tolerance takes, of the methods that are run again.
 const MORE: f64 = 2.0;
 /// Output times that a companion must reach, at least.
@@ -42,25 +45,20 @@ pub(super) fn compared<T>(
     watch: ProgressCallback<'_>,
 ) -> Result<(TransientResult, T, f64), AnalysisError> {
     let unknowns = model.unknowns() as f64;
-    let steps = companion.as_ref().map_or(0, |c| c.counters.steps) as f64;
-    // the samples of a long run are sent as they come
-    let again = whole
-        && options.step.is_none()
-        && is_high(formulation::of_run(model, options).1)
-        && MORE * MORE * steps * unknowns <= MAX_AGAIN
-        && options.points * options.signals.len() <= MAX_STORED_SAMPLES;
-    if !again {
-        let mut made = once(options, model, (companion, whole), run, sample, watch)?;
+    let first = (companion, whole);
+    if !is_made_again(options, model, &first) {
+        let mut made = once(options, model, first, run, sample, watch)?;
         made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
         return Ok((made.result, made.more, options.errors().requested()));
     }
     let mut now = options.clone();
     let mut kept = BufferedSamples::default();
-    let mut made = once(&now, model, (companion, whole), run, &mut |t, values| kept.keep(t, values), watch)?;
+    let mut made = once(&now, model, first, run, &mut |t, values| kept.keep(t, values), watch)?;
     let room = options.errors().left_for_steps(made.result.estimated_error);
     while made.result.step_error.is_some_and(|error| error > room)
         && MORE * made.result.counters.steps as f64 * unknowns <= MAX_AGAIN
         && now.errors().requested() > options.errors().sharpest_run()
+        && !made.result.directions.as_ref().is_some_and(Directions::are_all)
     {
         let sharper = options.with_tolerance(now.errors().sharper_run());
         let mut others = BufferedSamples::default();
@@ -74,6 +72,20 @@ pub(super) fn compared<T>(
     kept.send(sample);
     made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
     Ok((made.result, made.more, now.errors().requested()))
+}
+
+/// Whether a run with this companion is made again where its error is too large: the samples of a long run are sent as they come.
+pub(super) fn is_made_again(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    (companion, whole): &(Option<TransientResult>, bool),
+) -> bool {
+    let steps = companion.as_ref().map_or(0, |c| c.counters.steps) as f64;
+    *whole
+        && options.step.is_none()
+        && is_high(formulation::of_run(model, options).1)
+        && MORE * MORE * steps * model.unknowns() as f64 <= MAX_AGAIN
+        && options.points * options.signals.len() <= MAX_STORED_SAMPLES
 }
 
 /// A run with its estimate, and what a sharper one is compared with.
@@ -94,6 +106,8 @@ fn once<T>(
 ) -> Result<EstimatedRun<T>, AnalysisError> {
     let reached = companion.as_ref().map_or(0, sampled);
     let mut picked = SelectedSamples::new(options);
+    let directions = companion.as_ref().and_then(|c| c.directions.clone());
+    let options = &options.with_directions(directions.or(options.directions.clone()));
     let mut both = |t: f64, values: &[f64]| {
         picked.add(values);
         sample(t, values);
@@ -102,7 +116,12 @@ fn once<T>(
     // what both do not resolve they have in common
     let resolved = options.step.is_some() || resolved(&picked, &result, options, model);
     let signals = picked.signals(&result.signals);
-    let picked = TransientResult { signals, counters: result.counters, ..TransientResult::default() };
+    let picked = TransientResult {
+        signals,
+        counters: result.counters,
+        directions: result.directions.clone(),
+        ..TransientResult::default()
+    };
     // one that took the same steps proves nothing
     let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
     let least = |unit: &str| least(unit, options, model);
@@ -118,7 +137,11 @@ fn once<T>(
                 false => ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64,
             };
             let (_, method) = formulation::of_run(model, options);
-            result.step_error = Some(reported_fraction(options, method) * apart / share.min(1.0));
+            let reported = match &result.directions {
+                Some(_) => SHARE_OF_REDUCED,
+                None => reported_fraction(options, method),
+            };
+            result.step_error = Some(reported * apart / share.min(1.0));
         }
         None => result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options))),
     }
@@ -188,6 +211,7 @@ pub(super) fn companion<T>(
     };
     let ended = run(&looser, &mut keep, &mut few);
     let counters = ended.as_ref().map_or_else(|_| Default::default(), |(result, _)| result.counters);
+    let directions = ended.as_ref().ok().and_then(|(result, _)| result.directions.clone());
     if stopped {
         return Err(AnalysisError::Cancelled);
     }
@@ -196,7 +220,12 @@ pub(super) fn companion<T>(
         Ok(_) | Err(AnalysisError::Cancelled) => {
             let names: Vec<_> = options.signals.iter().map(|name| (name.clone(), String::new(), Vec::new())).collect();
             Ok((
-                Some(TransientResult { signals: picked.signals(&names), counters, ..TransientResult::default() }),
+                Some(TransientResult {
+                    signals: picked.signals(&names),
+                    counters,
+                    directions,
+                    ..TransientResult::default()
+                }),
                 whole,
             ))
         }

@@ -2,6 +2,7 @@
 
 use super::super::AnalysisError;
 use super::super::integrator::Integrator;
+use super::super::reduced::Directions;
 use bimorph_base::ErrorBudget;
 use bimorph_domains::{InputWaveform, Shock};
 use bimorph_model::compile::CompiledModel;
@@ -66,6 +67,8 @@ pub struct TransientOptions<'a> {
     pub estimate: bool,
     /// Whether the result stores the samples, default true; otherwise only the callback receives them.
     pub keep: bool,
+    /// Directions of a reduced model, from a run before; none: those of a training.
+    pub directions: Option<Directions>,
 }
 
 impl Default for TransientOptions<'_> {
@@ -87,6 +90,7 @@ impl Default for TransientOptions<'_> {
             solver: SolverKind::default(),
             estimate: false,
             keep: true,
+            directions: None,
         }
     }
 }
@@ -145,6 +149,12 @@ impl<'a> TransientOptions<'a> {
         Self { tol: tolerance, ..self.clone() }
     }
 
+    /// With the directions of a reduced model, from a run before.
+    #[must_use]
+    pub fn with_directions(&self, directions: Option<Directions>) -> Self {
+        Self { directions, ..self.clone() }
+    }
+
     /// With another integrator.
     #[must_use]
     pub fn with_method(&self, method: Integrator) -> Self {
@@ -192,7 +202,19 @@ impl<'a> TransientOptions<'a> {
         'a: 'b,
     {
         let (method, step, events) = (Integrator::default(), None, Vec::new());
-        TransientOptions { tol: tolerance, points, release, method, step, events, keep: false, ..self.clone() }
+        // directions that lack something may lack it on one mesh and not on another
+        let directions = Some(Directions::Full("the error of a mesh is that of the full model".to_owned()));
+        TransientOptions {
+            tol: tolerance,
+            points,
+            release,
+            method,
+            step,
+            events,
+            directions,
+            keep: false,
+            ..self.clone()
+        }
     }
 
     /// With other signals.
@@ -209,6 +231,11 @@ impl<'a> TransientOptions<'a> {
 }
 
 impl TransientOptions<'_> {
+    /// Whether a run in a reduced model takes the full one.
+    pub(crate) fn takes_full_model(&self) -> bool {
+        self.directions.as_ref().is_some_and(Directions::are_all)
+    }
+
     /// Values of ports and anchors at the start of the run.
     pub(crate) fn at_start(&self) -> Vec<(String, f64)> {
         let motions = self.motions.iter().map(|(name, wave)| (name.clone(), wave.at(0.0)[0]));

@@ -143,6 +143,7 @@ pub(crate) fn record(
         after_contact: Vec::new(),
         events: crossings.events,
         largest_stress: stress.largest(),
+        directions: None,
         warnings: begun
             .into_iter()
             .chain(stability.warning())

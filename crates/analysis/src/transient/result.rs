@@ -1,5 +1,6 @@
 //! Result of a transient: sampled signals, crossings of levels, and the work.
 
+use crate::reduced::Directions;
 use bimorph_solve::time::event::Direction;
 use bimorph_solve::time::method::SolverCounters;
 use serde::Serialize;
@@ -83,4 +84,7 @@ pub struct TransientResult {
     pub largest_stress: Option<StressMaximum>,
     /// Warnings about the result.
     pub warnings: Vec<String>,
+    /// Directions for the next run in a reduced model.
+    #[serde(skip)]
+    pub directions: Option<Directions>,
 }

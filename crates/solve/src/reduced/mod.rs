@@ -12,6 +12,7 @@
 //! | [`taylor`] | Taylor terms of the statics at rest over the inputs |
 //! | [`training`] | the directions of a mechanism for a box of inputs and a tolerance |
 //! | [`statics`] | static equilibrium over z |
+//! | [`enrichment`] | directions that a motion lacks, from the full model's corrections along it |
 //! | [`check`] | the error of a reduced state, by the residual of the full model |
 //! | [`polynomial`] | the model as polynomials of z, for export |
 //!
@@ -21,6 +22,7 @@
 
 pub mod check;
 pub mod energy;
+pub mod enrichment;
 pub mod inputs;
 pub mod polynomial;
 pub mod space;

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Newton ends at corrections below this fraction of |z| (1).
 const TOLERANCE: f64 = 1e-11;
-/// Corrections below this fraction that no longer shrink are rounding.
+/// MotionCorrections below this fraction that no longer shrink are rounding.
 const STALLED: f64 = 1e-6;
 /// Most iterations of a step.
 const ITERATIONS: usize = 14;

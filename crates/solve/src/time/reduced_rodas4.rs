@@ -26,6 +26,7 @@ use super::stage_loss::StageLoss;
 use crate::equations::{Bodies, Joints};
 use crate::reduced::check::FullCheck;
 use crate::reduced::energy::{EnergyProduct, EnergyVector};
+use crate::reduced::enrichment::MotionCorrections;
 use crate::reduced::polynomial::motion::{PolynomialForces, PolynomialMotion};
 use crate::reduced::statics::solve;
 use crate::reduced::{ReducedForces, ReducedSpace};
@@ -43,6 +44,8 @@ use std::sync::Arc;
 
 /// Accepted steps between two estimates of the error by the reduction.
 const EVERY: u64 = 20;
+/// Accepted steps between two corrections of the first hundred steps: short runs have some, too.
+const EVERY_OF_FIRST: u64 = 5;
 
 /// The error by the reduction, from the residual of the full model at states of the motion.
 ///
@@ -57,6 +60,8 @@ struct ReductionEstimate {
     squares: f64,
     count: u64,
     largest: f64,
+    /// The corrections of the displacements at these states.
+    corrections: MotionCorrections,
 }
 
 /// The forces as polynomials, which replace the exact kinematics of stages while their error is within a part of the tolerance.
@@ -162,7 +167,8 @@ impl ReducedRodas4 {
     #[must_use]
     pub fn with_estimate(mut self, system: &System) -> Self {
         let (check, taken) = (FullCheck::new(system), vec![Pose::zeros(); system.bodies()]);
-        let estimate = ReductionEstimate { check, taken, squares: 0.0, count: 0, largest: 0.0 };
+        let corrections = MotionCorrections::default();
+        let estimate = ReductionEstimate { check, taken, squares: 0.0, count: 0, largest: 0.0, corrections };
         self.estimate = Some(Box::new(estimate));
         self
     }
@@ -194,6 +200,11 @@ impl ReducedRodas4 {
     pub fn error(&self) -> Option<f64> {
         let estimate = self.estimate.as_ref().filter(|estimate| estimate.count > 0 && estimate.largest > 0.0)?;
         Some((estimate.squares / estimate.count as f64).sqrt() / estimate.largest)
+    }
+
+    /// The corrections of the full model along the motion; none without an estimate.
+    pub fn corrections(&self) -> Option<&MotionCorrections> {
+        self.estimate.as_ref().map(|estimate| &estimate.corrections)
     }
 
     /// Coordinates z.
@@ -519,10 +530,14 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         let Some(estimate) = &mut self.estimate else { return };
         let norm = |x: &[Pose]| system.model.mass_product(x, x).sqrt();
         estimate.largest = estimate.largest.max(norm(&end.q));
-        if !looks {
+        if !looks && !(self.taken < 5 * EVERY && self.taken % EVERY_OF_FIRST == 1) {
             return;
         }
-        let ReductionEstimate { check, taken, .. } = &mut **estimate;
+        if !looks {
+            bodies.ramp.at(t + h, &mut self.drive);
+            self.drive.load = 1.0;
+        }
+        let ReductionEstimate { check, taken, corrections, largest, .. } = &mut **estimate;
         for (j, (taken, push)) in taken.iter_mut().zip(&self.forces.placed.acceleration).enumerate() {
             *taken = system.model.mass(j).component_mul(push);
         }
@@ -531,8 +546,14 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         check.of(system, &end.q, &self.drive, Some(taken));
         let error = norm(check.step());
         if error.is_finite() {
-            estimate.squares += error * error;
-            estimate.count += 1;
+            // a correction beyond the motion is none
+            if error < *largest {
+                corrections.add(&self.space.joints.tree, &end.q, check.step());
+            }
+            if looks {
+                estimate.squares += error * error;
+                estimate.count += 1;
+            }
         }
     }
 

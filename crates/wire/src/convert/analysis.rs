@@ -299,5 +299,6 @@ pub fn transient_from_wire(
         events: events.into_iter().map(event).collect(),
         largest_stress: None,
         warnings,
+        directions: None,
     }
 }

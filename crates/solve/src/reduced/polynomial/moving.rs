@@ -29,14 +29,14 @@ pub struct FittedMotion {
 
 /// The turned space of a training and its polynomials for the motion of a system under a drive: of the lowest degree whose error at the equilibria
 /// is within its part of the tolerance. None where there is no such degree, or a law of a member is none of single points.
-pub fn of_motion(training: &Training, system: &System, drive: &Drive, tol: f64) -> Option<FittedMotion> {
+pub fn of_motion(training: &Training, system: &System, drive: &Drive, errors: ErrorBudget) -> Option<FittedMotion> {
     if training.equilibria.is_empty() || !has_polynomials(system) {
         return None;
     }
     let space = training.space.of_system(system);
     let fit = Fit::new(&space, system, training.equilibria.clone(), &[], true);
     let groups = groups(system, &[]);
-    let share = ErrorBudget::of(tol).reduced_statics();
+    let share = errors.reduced_statics();
     for (degree, most) in DEGREES {
         if space.size() > most {
             break;

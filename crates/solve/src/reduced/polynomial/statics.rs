@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector};
 /// Newton iterations, and the correction at which they end (1).
 const ITERATIONS: usize = 60;
 const CONVERGED: f64 = 1e-11;
-/// Corrections below this fraction that no longer shrink are rounding (1).
+/// MotionCorrections below this fraction that no longer shrink are rounding (1).
 const STALLED: f64 = 1e-8;
 /// Part of the largest displacement or reading that others count at least as (1): an error where one passes through 0 is one of that.
 const SMALL: f64 = 0.1;
