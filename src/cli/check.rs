@@ -4,6 +4,7 @@ use super::failure::Failure;
 use super::model::{Context, JsonMap, ModelArgs};
 use super::output;
 use bimorph::analysis::formulation;
+use bimorph::analysis::transient::TransientOptions;
 use bimorph::compile::{CompiledModel, Formulation};
 use bimorph::discretize::anchor_root;
 use bimorph::netlist::Setting;
@@ -126,7 +127,7 @@ impl CheckCommand {
             let _ =
                 writeln!(text, "anchors: rigid, which stiffens `{beam}` by about {percent:.1} % (--anchors elastic)");
         }
-        text.push_str(&formulation(&compiled));
+        text.push_str(&formulation(&compiled, self.model.gives("formulation")));
         let warnings = compiled.warnings.items.len();
         let _ = writeln!(text, "no errors, {warnings} warning{}", if warnings == 1 { "" } else { "s" });
         output::print(&text)
@@ -143,8 +144,8 @@ fn rigid_anchors(compiled: &CompiledModel) -> Option<RigidAnchors<'_>> {
     Some(RigidAnchors { beam: &s.beams[beam].name, stiffening })
 }
 
-/// Effect of the formulation on the model, in a line; empty for the bodies' own coordinates.
-fn formulation(compiled: &CompiledModel) -> String {
+/// Effect of the formulation on the model, in a line; empty for the bodies' own coordinates, and where `auto` takes them and was not given by its name.
+fn formulation(compiled: &CompiledModel, given: bool) -> String {
     let name = compiled.options.formulation.name();
     match &compiled.joints {
         Some(Ok(joints)) => format!(
@@ -155,10 +156,13 @@ fn formulation(compiled: &CompiledModel) -> String {
         ),
         Some(Err(unfit)) => format!("formulation {name}: not by springs: {unfit}\n"),
         None if compiled.options.formulation == Formulation::Auto => {
-            let suited = formulation::suited(compiled, None);
-            let moving = formulation::outweighed_tree(compiled)
-                .map_or_else(String::new, |why| format!("; tran takes rcr: {why}"));
-            format!("formulation auto takes {}: {}{moving}\n", suited.formulation.name(), suited.why)
+            let joints = formulation::in_joints(compiled, &TransientOptions::default());
+            if joints.is_none() && !given {
+                return String::new();
+            }
+            let why = joints.and_then(|_| formulation::outweighed_tree(compiled));
+            let moving = why.map_or_else(String::new, |why| format!("; tran takes rcr: {why}"));
+            format!("formulation auto takes {}{moving}\n", formulation::suited(compiled, None))
         }
         None => String::new(),
     }

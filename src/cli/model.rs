@@ -5,9 +5,7 @@ use super::options::Chosen;
 use super::{interrupt, progress, value};
 use bimorph::analysis::readout::ReadoutError;
 use bimorph::analysis::readout::ports::check_ranges;
-use bimorph::compile::{
-    Anchors, CompileOptions, CompiledModel, Formulation, Junctions, ParsedStructure, compile, draw,
-};
+use bimorph::compile::{Anchors, CompileOptions, CompiledModel, Junctions, ParsedStructure, compile, draw};
 use bimorph::input::{self, InputBundle, LayoutChoice};
 use bimorph::layout::LayoutFormat;
 use bimorph::layout::drawing::FlatLayout;
@@ -152,9 +150,9 @@ impl ModelArgs {
         }
     }
 
-    /// The same model in another formulation. Its warnings have been shown.
-    pub(crate) fn compile_again_in(&self, formulation: Formulation) -> Result<CompiledModel, Failure> {
-        Ok(compile(&self.bundle()?, &self.options()?.with_formulation(formulation))?)
+    /// Whether an option of the model was given by its name, not left out.
+    pub(crate) fn gives(&self, option: &str) -> bool {
+        self.chosen.given(option)
     }
 
     /// The same for a frame of cubic beams, whose centrelines meet in points.
@@ -171,7 +169,7 @@ impl ModelArgs {
                 "\"elastic\" with --solver frame, whose anchors are rigid".to_owned(),
             ));
         }
-        let mut compiled = compile(&self.bundle()?, &options.with_centrelines())?;
+        let mut compiled = compile(&self.bundle()?, &options.with_centrelines())?.for_given_steps();
         // that of the recursion's mesh is no frame's
         compiled.order.estimated_error = None;
         compiled.warnings.items.push(baseline());

@@ -6,16 +6,16 @@ use super::output::OutputArgs;
 use super::solver::SolverChoice;
 use super::tran_report::{ShockDocument, TransientDocument, picture, table, text};
 use super::{draw_motion, progress, value, waveform};
-use bimorph::analysis::ProgressCallback;
 use bimorph::analysis::chart::released;
-use bimorph::analysis::formulation::{self, ChosenFormulation};
+use bimorph::analysis::chosen_run::{FittedRun, run_as_chosen};
+use bimorph::analysis::formulation;
 use bimorph::analysis::frame::{frame, frame_transient};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
-use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
-use bimorph::compile::{CompiledModel, Formulation, Scheme};
+use bimorph::analysis::{AnalysisError, ProgressCallback};
+use bimorph::compile::{CompiledModel, Formulation};
 use bimorph::domains::{InputWaveform, Shock};
 use bimorph::multibody::joint_coordinates::sprung_loops::UnsupportedModel;
 use bimorph::netlist::NetlistSource;
@@ -121,40 +121,36 @@ pub(crate) struct TransientCommand {
     output: OutputArgs,
 }
 
+/// The models of a finished run, and its method.
+struct FinishedRun {
+    fitted: CompiledModel,
+    start: Option<CompiledModel>,
+    joints: Option<JointReport>,
+    method: Integrator,
+}
+
 impl TransientCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.check()?;
-        let mut formulation = self.model.options()?.formulation;
-        let mut initial = match self.solver {
+        let initial = match self.solver {
             SolverChoice::Frame => self.model.compile_frame()?,
             _ => self.model.compile()?,
         };
-        let in_joints = self.in_joints(&initial)?;
-        let in_joints = in_joints.map(|(compiled, chosen)| {
-            (formulation, initial) = (chosen.formulation, compiled);
-            chosen
-        });
         let released = match &self.release {
             Some(name) => Some(released(&NetlistSource::new(&self.model.bundle()?), &initial, name)?),
             None => None,
         };
         let drawn = released.as_ref().unwrap_or(&initial);
         let method = self.integrator(drawn)?;
-        let mut signals = if self.signals.is_empty() { free_nodes(drawn) } else { value::names(&self.signals) };
-        let (fitted, start) = self.fitted(drawn, released.as_ref().map(|_| &initial), method, &signals)?;
-        warn_of_mesh(drawn, &fitted);
-        let (compiled, start) = (&fitted, start.as_ref());
+        let signals = if self.signals.is_empty() { free_nodes(drawn) } else { value::names(&self.signals) };
         let wanted = signals.len();
-        if self.draw.is_some() {
-            signals.extend(draw_motion::signals(compiled));
-        }
         let options = TransientOptions {
             stop: self.stop,
             signals,
             points: self.points,
-            tol: compiled.options.errors().requested(),
+            tol: drawn.options.errors().requested(),
             voltages: self.ports.clone(),
-            release: start,
+            release: released.as_ref().map(|_| &initial),
             shock: self.shock,
             motions: self.motions.clone(),
             method,
@@ -166,17 +162,12 @@ impl TransientCommand {
             keep: true,
             directions: None,
         };
-        let decides = formulation == Formulation::Auto && self.method.is_none() && self.solver != SolverChoice::Frame;
-        let suited = decides.then(|| formulation::of_run(compiled, &options));
-        let (formulation, method) = match &suited {
-            Some((suited, method)) => (suited.formulation, *method),
-            None => (formulation, method),
-        };
-        let (mut result, joints) = self.run_motion(compiled, formulation, &options.with_method(method))?;
+        let (mut result, FinishedRun { fitted, start, joints, method }) = self.run_motion(drawn, &options)?;
+        let (compiled, start) = (&fitted, start.as_ref());
         warn_of(&result.warnings);
-        let drawn = result.signals.split_off(wanted);
+        let pictured = result.signals.split_off(wanted);
         if let Some(path) = &self.draw {
-            draw_motion::write(path, compiled, &self.model.title(), &result.t, &drawn)?;
+            draw_motion::write(path, compiled, &self.model.title(), &result.t, &pictured)?;
         }
 
         let (mut signals, mut units) = (Vec::new(), Vec::new());
@@ -184,8 +175,6 @@ impl TransientCommand {
             signals.push((name.clone(), values.clone()));
             units.push((name.clone(), unit.clone()));
         }
-        let taken = suited.map(|(suited, _)| suited).or(in_joints);
-        let taken = taken.map(|suited| format!("{}: {}", suited.formulation.name(), suited.why));
         let document = TransientDocument {
             t: &result.t,
             signals: JsonMap(&signals),
@@ -194,7 +183,7 @@ impl TransientCommand {
             counters: result.counters,
             events: &result.events,
             joint_coordinates: joints.clone(),
-            formulation_taken: taken.clone(),
+            formulation_taken: result.formulation_taken.as_deref(),
             unknowns: result.unknowns,
             step_error: result.step_error,
             stopped_at: result.stopped_at,
@@ -209,29 +198,11 @@ impl TransientCommand {
         };
         let title = self.model.title();
         let mut text = text(compiled, &result, joints.as_ref(), &self.events);
-        if let Some(taken) = &taken {
+        let told = joints.is_some() || self.model.gives("formulation");
+        if let Some(taken) = result.formulation_taken.as_ref().filter(|_| told) {
             text += &format!("formulation auto took {taken}\n");
         }
         self.output.finish(|| table(&title, &result), || Ok(picture(&title, &result)), &document, &text)
-    }
-
-    /// The model in joint coordinates where `auto` takes them, since runs take fewer steps there. A method, a scheme, equal steps, a baseline's solver and
-    /// a shock are those of the bodies.
-    fn in_joints(&self, drawn: &CompiledModel) -> Result<Option<(CompiledModel, ChosenFormulation)>, Failure> {
-        let options = self.model.options()?;
-        let plain = self.method.is_none()
-            && self.step.is_none()
-            && self.shock.is_none()
-            && self.motions.is_empty()
-            && matches!(self.solver, SolverChoice::Recursion)
-            && options.scheme == Scheme::Auto;
-        if options.formulation != Formulation::Auto || !plain {
-            return Ok(None);
-        }
-        let Some(why) = formulation::outweighed_tree(drawn) else { return Ok(None) };
-        let compiled = self.model.compile_again_in(Formulation::Rcr)?;
-        let suits = matches!(compiled.joints, Some(Ok(_)));
-        Ok(suits.then_some((compiled, ChosenFormulation { formulation: Formulation::Rcr, why })))
     }
 
     /// Each option within its range, before anything is compiled.
@@ -265,64 +236,69 @@ impl TransientCommand {
         Ok(())
     }
 
-    /// The moving model and the model that it is released from, on the mesh for the run.
-    fn fitted(
-        &self,
-        drawn: &CompiledModel,
-        release: Option<&CompiledModel>,
-        method: Integrator,
-        signals: &[String],
-    ) -> Result<(CompiledModel, Option<CompiledModel>), Failure> {
-        let run = TransientOptions {
-            stop: self.stop,
-            signals: signals.to_vec(),
-            points: self.points,
-            voltages: self.ports.clone(),
-            release,
-            shock: self.shock,
-            motions: self.motions.clone(),
-            method,
-            step: self.step,
-            until: self.until.clone(),
-            ..TransientOptions::default()
-        };
-        let busy = progress::spinner("mesh");
-        let fitted = match self.solver {
-            SolverChoice::Frame => Ok((drawn.clone(), release.cloned())),
-            _ => fitted_in_time(drawn, &run),
-        };
-        busy.finish_and_clear();
-        Ok(fitted?)
-    }
-
-    /// The motion, by the equations that were chosen.
+    /// The motion on its mesh, by the equations that were chosen.
     fn run_motion(
         &self,
-        compiled: &CompiledModel,
-        formulation: Formulation,
+        drawn: &CompiledModel,
         options: &TransientOptions<'_>,
-    ) -> Result<(TransientResult, Option<JointReport>), Failure> {
-        let bar = progress::bar("transient");
-        let watch = &mut progress::watch(&bar, self.cheaper(options.method));
-        let result = match self.solver {
-            SolverChoice::Frame => {
-                frame(compiled).and_then(|frame| frame_transient(compiled, &frame, options, watch)).map(|r| (r, None))
-            }
-            _ => {
-                let mut run = |options: &TransientOptions<'_>,
-                               sample: &mut dyn FnMut(f64, &[f64]),
-                               watch: ProgressCallback<'_>| {
-                    if matches!(formulation, Formulation::Rcr | Formulation::RcrElastic) {
-                        joint_transient(compiled, formulation, options, sample, watch).map(|(r, j)| (r, Some(j)))
-                    } else {
-                        transient(compiled, options, sample, watch).map(|r| (r, None))
-                    }
-                };
-                with_step_error(options, compiled, &mut run, &mut |_, _| (), watch)
-            }
+    ) -> Result<(TransientResult, FinishedRun), Failure> {
+        if self.solver == SolverChoice::Frame {
+            let bar = progress::bar("transient");
+            let watch = &mut progress::watch(&bar, self.cheaper(options.method));
+            let result = frame(drawn).and_then(|frame| frame_transient(drawn, &frame, options, watch));
+            bar.finish_and_clear();
+            let start = options.release.cloned();
+            return Ok((result?, FinishedRun { fitted: drawn.clone(), start, joints: None, method: options.method }));
+        }
+        let busy = progress::spinner("mesh");
+        let mut attempt = |fitted: FittedRun, sample: &mut dyn FnMut(f64, &[f64]), watch: ProgressCallback<'_>| {
+            busy.finish_and_clear();
+            self.attempt(drawn, fitted, options, sample, watch)
         };
+        let done = run_as_chosen(drawn, options, &mut attempt, &mut |_, _| (), &mut |_| true);
+        busy.finish_and_clear();
+        Ok(done?)
+    }
+
+    /// One run on its mesh.
+    fn attempt(
+        &self,
+        drawn: &CompiledModel,
+        FittedRun { moving, start, is_tentative }: FittedRun,
+        options: &TransientOptions<'_>,
+        sample: &mut dyn FnMut(f64, &[f64]),
+        goes_on: ProgressCallback<'_>,
+    ) -> Result<(TransientResult, FinishedRun), AnalysisError> {
+        if !is_tentative {
+            warn_of_mesh(drawn, &moving);
+        }
+        let mut signals = options.signals.clone();
+        if self.draw.is_some() {
+            signals.extend(draw_motion::signals(&moving));
+        }
+        let options = options.with_signals(signals);
+        let options = options.with_release(start.as_ref());
+        let (_, method) = formulation::of_run(&moving, &options);
+        let bar = progress::bar("transient");
+        let shown = &mut progress::watch(&bar, self.cheaper(method));
+        let mut run =
+            |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: ProgressCallback<'_>| {
+                let (chosen, method) = formulation::of_run(&moving, options);
+                match chosen.formulation {
+                    formulation @ (Formulation::Rcr | Formulation::RcrElastic) => {
+                        let options = options.with_method(method);
+                        joint_transient(&moving, formulation, &options, sample, watch).map(|(r, j)| (r, Some(j)))
+                    }
+                    _ => transient(&moving, options, sample, watch).map(|r| (r, None)),
+                }
+            };
+        let done = with_step_error(&options, &moving, &mut run, sample, &mut |f| goes_on(f) && shown(f));
         bar.finish_and_clear();
-        Ok(result?)
+        let (result, joints) = done?;
+        if is_tentative {
+            warn_of_mesh(drawn, &moving);
+        }
+        Ok((result, FinishedRun { fitted: moving, start, joints, method }))
     }
 
     /// Options that make the run cheaper.

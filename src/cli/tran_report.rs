@@ -32,7 +32,7 @@ pub(super) struct TransientDocument<'a> {
     pub(super) events: &'a [CrossingEvent],
     pub(super) joint_coordinates: Option<JointReport>,
     /// The formulation that auto chose, and the reason.
-    pub(super) formulation_taken: Option<String>,
+    pub(super) formulation_taken: Option<&'a str>,
     pub(super) unknowns: usize,
     pub(super) step_error: Option<f64>,
     pub(super) stopped_at: Option<f64>,

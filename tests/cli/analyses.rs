@@ -14,7 +14,7 @@ fn check() {
     assert!(bench.run("check p.net").stdout.contains("no errors, 0 warnings"));
 }
 
-/// `--formulation auto` says what it takes and why: joint coordinates with explicit steps for plates on pivots that only turn, with the default method
+/// `auto`, the default, says what it takes and why: joint coordinates with explicit steps for plates on pivots that only turn, with the default method
 /// where plates outweigh elastic flexures, and the bodies' own otherwise. `check` says it without a run.
 #[test]
 fn auto_says_what_it_takes() {
@@ -66,10 +66,44 @@ fn auto_takes_joint_coordinates_of_heavy_chains() {
     let steps = |found: &serde_json::Value| number(&found["counters"]["steps"]);
     let end = |found: &serde_json::Value| number(&found["signals"]["c(6).y"][2]);
     let [bodies, chosen] = ["compliant", "auto"].map(|f| run("open.net", f));
+    let default = bench.json("tran open.net --release F --undamped --stop 100u --points 3 --signals c(6).y");
+    assert_eq!(default, chosen);
+    // what is of the bodies is not refused
+    for other in ["--shock 10,1u", "--solver dense", "--step 0.1u --method tr-bdf2", "--scheme e4"] {
+        let found = bench.json(&format!("tran open.net --undamped --stop 5u --points 3 --signals c(6).y {other}"));
+        assert!(found["formulation_taken"].as_str().unwrap_or_default().starts_with("compliant"), "{other}");
+    }
     assert!(chosen["formulation_taken"].as_str().unwrap_or_default().starts_with("rcr: rigid parts of"));
     assert!(5.0 * steps(&chosen) < steps(&bodies), "{} and {} steps", steps(&chosen), steps(&bodies));
     assert_relative_eq!(end(&chosen), end(&bodies), epsilon = 2e-3 * 62e-6);
     assert!(run("held.net", "auto")["formulation_taken"].as_str().unwrap_or_default().starts_with("compliant"));
+}
+
+/// Default runs take the bodies, to the same bits as `compliant` and without an error, where a plate on a cantilever closes its gap under 12 V, and where
+/// flexures fold under 500 µN. From there on there is no step in joint coordinates.
+#[test]
+fn auto_gives_way_to_bodies() {
+    let plate = "process s=[Youngsmodulus=165e9 density=2330 h=20u viscosity=1.83e-5 pressure=101325]\nanchor s [a] [oz=pi]\narm beam2d s [a b] [l=200u \
+                 w=2u]\nm mass2d * [b] [m=5e-9 J=1e-18]\ng plategap2d s [b c] [l=100u w=100u gap=3u oz=-pi/2]\nanchor s [c] []\neground * [c] []\ndrive port * [b c] []\n";
+    let chain = "process p1 = [ Youngsmodulus=165e9 density=2300 h=2u ]\nanchor p1 [q(0)] []\nfor i=1:3 [\n beam2d p1 [q(i-1) r(i)] [l=10u w=1u]\n link2d * \
+                 [r(i) c(i)] [l=20u]\n plate2d p1 [c(i)] [l=40u w=30u]\n link2d * [c(i) q(i)] [l=20u]\n]\nf2d * [c(3)] [F=500u oz=pi/2]\n";
+    let bench = Bench::new(&[("plate.net", plate), ("chain.net", chain)]);
+    let contact = "tran plate.net --stop 400u --points 3 --port drive=12 --signals b.y,g.gap --tol 1e-2";
+    let folded = "tran chain.net --undamped --segments 2 --stop 20u --points 3 --signals c(3).y";
+    for (words, why) in [
+        (contact, "compliant: joints are elastic in every direction"),
+        (folded, "compliant: a run in joint coordinates was given up (transient stopped at t = 1.3"),
+    ] {
+        let mut chosen = bench.json(words);
+        let mut bodies = bench.json(&format!("{words} --formulation compliant"));
+        let taken = chosen["formulation_taken"].take();
+        assert!(taken.as_str().unwrap_or_default().starts_with(why), "{taken}");
+        (chosen["formulation"], bodies["formulation"]) = Default::default();
+        assert_eq!(chosen, bodies);
+    }
+    assert!(bench.run(folded).stderr.lines().all(|line| !line.starts_with("error")));
+    let refused = bench.run(&format!("{folded} --formulation rcr"));
+    assert!(refused.status == 1 && refused.stderr.contains("step size fell to"), "{}", refused.stderr);
 }
 
 /// The tip of a cantilever moves by F·l³/(3·E·I) and turns by F·l²/(2·E·I); every option is in the document.

@@ -1,19 +1,20 @@
 //! A model on a server and the same model in process give the same bits: trials, small signals, analyses and sweeps.
 
 use super::test_server::{DEADLINE, PLATE, Running, bundle, start_with};
+use bimorph::analysis::chosen_run::{FittedRun, run_as_chosen};
 use bimorph::analysis::harmonic::HarmonicOptions;
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::mesh::harmonic_fitted;
 use bimorph::analysis::mesh::in_circuit;
-use bimorph::analysis::mesh::{modes_fitted, pull_in_fitted, static_fitted};
+use bimorph::analysis::mesh::{modes_fitted, pull_in_fitted, static_fitted, warnings};
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, Until, transient};
 use bimorph::compile::{CompileOptions, CompiledModel, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
-use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepSpec};
-use bimorph::netlist::Bundle;
+use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepRow, SweepSpec};
+use bimorph::netlist::{Bundle, Setting};
 use bimorph::service::client::{Client, RemoteDevice, RemoteTransient};
 use bimorph::service::limits::Limits;
 use std::sync::Arc;
@@ -199,6 +200,68 @@ fn analyses_have_the_same_bits() {
         true
     });
     assert_eq!(there.expect("runs"), local);
+}
+
+/// Where `auto` takes joint coordinates, and where a run there fails, a transient over the wire, one in process and a sweep of one point are one run,
+/// which reports the formulation. Under 500 µN the flexures fold, and joint coordinates have no step from there on. So does a point of a grid.
+#[test]
+fn choices_of_auto_have_the_same_bits() {
+    let chain = "process p1 = [ Youngsmodulus=165e9 density=2300 h=2u ]\nparam F=0.1u\nanchor p1 [q(0)] []\nfor i=1:3 [\n beam2d p1 [q(i-1) r(i)] \
+                 [l=10u w=1u]\n link2d * [r(i) c(i)] [l=20u]\n plate2d p1 [c(i)] [l=40u w=30u]\n link2d * [c(i) q(i)] [l=20u]\n]\n\
+                 f2d * [c(3)] [F=F oz=pi/2]\n";
+    let netlist = Bundle::from_text("chain.net", chain);
+    let server = local_server(Limits::default());
+    let mut client = Client::connect(&server.address.uri(), DEADLINE).expect("connects");
+    for (force, segments, taken) in
+        [(1e-7, None, "rcr: rigid parts of"), (5e-4, Some(2), "compliant: a run in joint coordinates was given up (")]
+    {
+        let set = vec![("F".to_owned(), Setting::Number(force))];
+        let options = CompileOptions { segments, set, undamped: segments.is_some(), ..CompileOptions::default() };
+        let drawn = compile(&netlist, &options).unwrap_or_else(|error| panic!("{error}"));
+        let asked = TransientOptions {
+            stop: 2e-5,
+            signals: vec!["c(3).y".into()],
+            points: 201,
+            tol: options.tol,
+            ..TransientOptions::default()
+        };
+        let mut attempt = |on: FittedRun, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
+            let mut run = |options: &TransientOptions<'_>,
+                           sample: &mut dyn FnMut(f64, &[f64]),
+                           watch: &mut dyn FnMut(f64) -> bool| {
+                transient(&on.moving, options, sample, watch).map(|r| (r, ()))
+            };
+            let (mut found, ()) = with_step_error(&asked, &on.moving, &mut run, sample, watch)?;
+            found.warnings.extend(warnings(&on.moving));
+            Ok((found, ()))
+        };
+        let (local, ()) = run_as_chosen(&drawn, &asked, &mut attempt, &mut |_, _| {}, &mut |_| true).expect("runs");
+        let told = local.formulation_taken.clone().unwrap_or_default();
+        assert!(told.starts_with(taken), "{told}");
+
+        let model = client.compile(&netlist, &options).expect("compiles");
+        let remote = RemoteTransient {
+            stop: asked.stop,
+            signals: asked.signals.clone(),
+            points: asked.points,
+            tol: asked.tol,
+            ..RemoteTransient::default()
+        };
+        assert_eq!(client.transient(&model, &remote, &mut |_| true).expect("runs"), local);
+
+        let sweep_of = |axis: String| {
+            let outputs = asked.signals.clone();
+            let analysis = SweepAnalysis::Transient { stop: asked.stop, outputs, voltages: Vec::new() };
+            let parameters = vec![axis.parse().expect("an axis")];
+            let spec = SweepSpec { samples: None, parameters, analysis, shard: Shard::default(), threads: Some(1) };
+            sweep::run(&spec, &netlist, &options, &|_| true).expect("a table")
+        };
+        let end = local.signals[0].2.last().copied();
+        let values = |row: &SweepRow| row.values.as_ref().map(|values| values[0]).ok();
+        assert_eq!(values(&sweep_of(format!("F={force}")).rows[0]), Some(end));
+        let grid = sweep_of(format!("F=1e-7:{force}:3"));
+        assert!(grid.rows.iter().all(|row| values(row).is_some()), "{:?}", grid.rows);
+    }
 }
 
 /// A sweep over the wire, on one thread and on several, whole and in shards, is one table.

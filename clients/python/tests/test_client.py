@@ -85,7 +85,7 @@ def test_losses_of_modes(client: bimorph.Client) -> None:
 
 
 def test_transient_streams_its_samples(plate: bimorph.Model) -> None:
-    """Held at 1 V from rest, the plate swings about its equilibrium; progress never goes back."""
+    """Held at 1 V from rest, the plate swings about its equilibrium; progress never goes back, and the result has the choice of a formulation."""
     seen: list[float] = []
     result = plate.transient(5e-5, ["m.x"], points=51, voltages={"drive": 1.0}, progress=seen.append)
     assert len(result.t) == len(result.signals["m.x"]) == 51
@@ -94,6 +94,7 @@ def test_transient_streams_its_samples(plate: bimorph.Model) -> None:
     assert max(result.signals["m.x"]) > closed_form(1.0)
     assert seen == sorted(seen) and seen[-1] == 1.0
     assert result.step_error is not None and 0 < result.step_error < 1e-3
+    assert result.formulation_taken is not None and result.formulation_taken.startswith("compliant: ")
     assert result.warnings == ()
 
 

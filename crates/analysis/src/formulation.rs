@@ -5,17 +5,21 @@
 //! joints that only rotate and close no loops, as rigid plates on flexure pivots under a scheme of the paper. The
 //! bodies' own coordinates then need stiff springs in the rigid directions, and short steps. The recursion needs
 //! neither, and its explicit steps cost a few evaluations without any factorization: rcr with rk45, as long as the
-//! steps are few. In circuits and services, whose steps the caller sets, compliant.
+//! steps are few. In circuits and sessions, whose steps the caller sets, compliant.
 //!
 //! Rigid parts on flexures are the other case. Where they outweigh the flexures and close no loop, large rotations are linear in the
 //! joint coordinates and curved in those of the bodies. Steps in joint coordinates are as long as those of small rotations then:
-//! rcr with the method of the bodies ([`outweighed_tree`]), unless parts may touch. Loops cancel the advantage.
+//! rcr with the method of the bodies ([`outweighed_tree`]), unless parts may touch. Loops cancel the advantage, and so do flexures of many
+//! segments. Beams are cut otherwise in joint coordinates, so that this choice comes before the mesh ([`in_joints`]), and the other after it
+//! ([`of_run`]).
+//!
+//! Every front end has both by the search for the mesh and by the run. [`taken`] reports the choice.
 
 use super::AnalysisError;
 use super::integrator::Integrator;
 use super::transient::options::TransientOptions;
 use bimorph_domains::System;
-use bimorph_model::compile::CompiledModel;
+use bimorph_model::compile::{CompiledModel, Scheme};
 use bimorph_multibody::joint_coordinates::TreeParent;
 use bimorph_multibody::joint_coordinates::constrained_loops::Linkage;
 use bimorph_multibody::joint_coordinates::sprung_loops::UnsupportedModel;
@@ -31,6 +35,13 @@ pub use bimorph_model::options::Formulation;
 /// that this means a thousand steps, as many as the bodies' coordinates take for such a motion at a tolerance of 1e-3.
 const FEW: f64 = 3e3;
 
+/// Least mass of rigid parts, of that of the flexures, for which joint coordinates are taken (1). Of 60 random trees those below took 1.0 to 1.9 times the time
+/// of bodies, and up to 34 times where flexures were soft; those above took 0.005 to 1.5 times.
+const OUTWEIGHING: f64 = 30.0;
+
+/// Segments of a flexure at most: short ones that move fast shorten the steps in joint coordinates, whose matrix omits their rates.
+const MOST_SEGMENTS: usize = 8;
+
 /// Choice of `auto`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChosenFormulation {
@@ -40,18 +51,75 @@ pub struct ChosenFormulation {
     pub why: String,
 }
 
+impl std::fmt::Display for ChosenFormulation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.formulation.name(), self.why)
+    }
+}
+
+/// The choice that `auto` made for a run of a model on its mesh; none where another formulation was requested.
+pub fn taken(moving: &CompiledModel, options: &TransientOptions<'_>) -> Option<ChosenFormulation> {
+    match (moving.requested.formulation, moving.options.formulation) {
+        (Formulation::Auto, Formulation::Auto) => Some(of_run(moving, options).0),
+        (Formulation::Auto, formulation @ Formulation::Rcr) => {
+            let why = outweighed_tree(moving).unwrap_or_else(|| "rigid parts outweigh the flexures".to_owned());
+            Some(ChosenFormulation { formulation, why })
+        }
+        _ => None,
+    }
+}
+
+/// Whether a run is that of default steps: a method, equal steps, a baseline's solver, a shock and moving anchors are those of the bodies.
+fn has_default_steps(options: &TransientOptions<'_>) -> bool {
+    options.method == Integrator::Rodas4
+        && options.step.is_none()
+        && options.solver == SolverKind::Recursion
+        && options.shock.is_none()
+        && options.motions.is_empty()
+}
+
+/// Whether `auto` takes joint coordinates for a run of this model before there is a mesh. A given scheme is that of the bodies.
+pub fn takes_joints(drawn: &CompiledModel, options: &TransientOptions<'_>) -> bool {
+    drawn.options.formulation == Formulation::Auto
+        && drawn.requested.scheme == Scheme::Auto
+        && has_default_steps(options)
+        && outweighed_tree(drawn).is_some()
+}
+
+/// Whether joint coordinates suit a mesh with these numbers of segments.
+pub fn suits_joints(segments: &[usize]) -> bool {
+    segments.iter().all(|&n| n <= MOST_SEGMENTS)
+}
+
+/// The model in joint coordinates and what it is released from, where `auto` takes them and they can describe both.
+pub fn in_joints(
+    drawn: &CompiledModel,
+    options: &TransientOptions<'_>,
+) -> Option<(CompiledModel, Option<CompiledModel>)> {
+    if !takes_joints(drawn, options) {
+        return None;
+    }
+    let compiled = |model: &CompiledModel| {
+        let compiled = model.parsed().in_formulation(Formulation::Rcr).compile().ok()?;
+        matches!(compiled.joints, Some(Ok(_))).then_some(compiled)
+    };
+    let start = options.release.map(|start| compiled(start).ok_or(())).transpose().ok()?;
+    Some((compiled(drawn)?, start))
+}
+
 /// Why a run in joint coordinates takes fewer steps than one of the bodies, in words: rigid parts outweigh the flexures of an open tree.
 pub fn outweighed_tree(compiled: &CompiledModel) -> Option<String> {
-    let model = &compiled.parts.system.model;
+    let system = &compiled.parts.system;
+    let model = &system.model;
     // steps in joint coordinates collapse where parts touch
-    if model.linear || !compiled.parts.system.anchors.is_empty() || compiled.parts.system.can_touch() {
+    if model.linear || !system.anchors.is_empty() || system.turns() || system.can_touch() {
         return None;
     }
     let beams = compiled.structure.beams.iter().zip(&compiled.order.segments).filter(|(_, segments)| **segments > 0);
     let flexures: f64 = beams.map(|(b, _)| b.material.density * b.length * b.width * b.thickness).sum();
     let moving: f64 = model.bodies.iter().map(|body| body.mass).sum();
     let rigid = moving - flexures;
-    if flexures == 0.0 || rigid < flexures {
+    if flexures == 0.0 || rigid < OUTWEIGHING * flexures {
         return None;
     }
     is_forest(model).then(|| {
@@ -88,6 +156,9 @@ pub fn suited(compiled: &CompiledModel, stop: Option<f64>) -> ChosenFormulation 
     if beams.clone().next().is_none() || beams.any(|s| !s.only_turns()) {
         return compliant("joints are elastic in every direction, where a step in joint coordinates costs more");
     }
+    if system.can_touch() {
+        return compliant("joints only turn, but parts may touch, whose forces are too stiff for explicit steps");
+    }
     let Ok(linkage) = linkage(Formulation::Rcr, system) else { return compliant("joint coordinates do not suit it") };
     if linkage.constraints > 0 {
         return compliant("joints that only turn close loops, which may be singular as drawn");
@@ -110,7 +181,7 @@ pub fn suited(compiled: &CompiledModel, stop: Option<f64>) -> ChosenFormulation 
     }
 }
 
-/// The formulation and the method of a run: `auto` resolved, with the reason, everything else as requested. A
+/// The formulation and the method of a run on its mesh: `auto` resolved, with the reason, everything else as requested. A
 /// method other than the default, equal steps and a baseline's solver are those of the bodies; so is the
 /// equilibrium that a release starts from.
 pub fn of_run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> (ChosenFormulation, Integrator) {
@@ -119,13 +190,7 @@ pub fn of_run(compiled: &CompiledModel, options: &TransientOptions<'_>) -> (Chos
     if asked != Formulation::Auto {
         return (ChosenFormulation { formulation: asked, why: "as asked".into() }, method);
     }
-    let plain = method == Integrator::Rodas4
-        && options.step.is_none()
-        && options.solver == SolverKind::Recursion
-        && options.release.is_none()
-        && options.shock.is_none()
-        && options.motions.is_empty();
-    if !plain {
+    if !has_default_steps(options) || options.release.is_some() {
         let why = "a release, a shock, a method, equal steps or a solver was given".into();
         return (ChosenFormulation { formulation: Formulation::Compliant, why }, method);
     }

@@ -10,6 +10,7 @@ pub mod batch_statics;
 pub mod batch_transient;
 pub mod beam_states;
 pub mod chart;
+pub mod chosen_run;
 pub mod contact_range;
 pub mod continuation;
 pub mod critical_names;

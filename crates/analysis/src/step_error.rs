@@ -32,9 +32,10 @@ use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::Formulation;
 use companion::{companion, compared, is_made_again};
 pub use run::RunFunction;
-use run::{AT_THE_END, MAX_AGAIN, MAX_STORED_SAMPLES};
+use run::{AT_THE_END, MAX_AGAIN};
 pub use run::{beyond, unknown};
-use samples::{BufferedSamples, SelectedSamples, resolved};
+pub(crate) use samples::BufferedSamples;
+use samples::{SelectedSamples, resolved};
 use std::cell::Cell;
 
 /// The exponent with which an error is supposed to fall with the tolerance, and the range in which two runs teach another.
@@ -47,8 +48,8 @@ const RUNS: usize = 5;
 /// Error of two runs from which on a third is not made (1): nothing seems predictable.
 const HOPELESS: f64 = 0.3;
 
-/// Makes the run that `options` specify, with [`TransientResult::step_error`], and a warning where that is beyond the
-/// tolerance. `model` is what moves; `sample` receives the samples of the run that is reported, and `watch` the
+/// Makes the run that `options` specify, with [`TransientResult::step_error`], a warning where that is beyond the
+/// tolerance, and [`TransientResult::formulation_taken`]. `model` is what moves; `sample` receives the samples of the run that is reported, and `watch` the
 /// progress of each run in turn.
 ///
 /// # Errors
@@ -60,7 +61,9 @@ pub fn with_step_error<T>(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: ProgressCallback<'_>,
 ) -> Result<(TransientResult, T), AnalysisError> {
-    held(options, model, run, sample, watch).map(|(result, more, _)| (result, more))
+    let (mut result, more, _) = held(options, model, run, sample, watch)?;
+    result.formulation_taken = formulation::taken(model, options).map(|taken| taken.to_string());
+    Ok((result, more))
 }
 
 /// As above, with the tolerance that the steps of the run followed.
@@ -171,7 +174,7 @@ fn first<T>(
     watch: ProgressCallback<'_>,
 ) -> Result<SampledRun<T>, AnalysisError> {
     let unknowns = model.unknowns() as f64;
-    let long = Cell::new(options.points * options.signals.len() > MAX_STORED_SAMPLES);
+    let long = Cell::new(!options.samples_are_kept());
     let (mut kept, mut picked) = (BufferedSamples::default(), SelectedSamples::new(options));
     let mut keep = |t: f64, values: &[f64]| {
         picked.add(values);

@@ -25,6 +25,8 @@ pub struct CompiledModel {
     pub warnings: Diagnostics,
     /// The options it was compiled with.
     pub options: CompileOptions,
+    /// Requested values of options that were chosen.
+    pub requested: RequestedChoices,
     /// Bodies, joints, gaps and electrics, and where the drawing's parts went.
     pub parts: Assembly,
     /// Segments of each beam, and the error estimated for them where a band was given or an analysis chose them.
@@ -35,6 +37,15 @@ pub struct CompiledModel {
     pub lowest: Option<LowestMode>,
     /// Modes above that whose errors are known, where they were looked for: in a circuit.
     pub higher: Arc<[HigherMode]>,
+}
+
+/// Choices that were left to the model: the options have what was chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RequestedChoices {
+    /// The scheme; auto: that of the formulation.
+    pub scheme: Scheme,
+    /// The formulation; auto: that of the run.
+    pub formulation: Formulation,
 }
 
 /// A mode above the lowest about the equilibrium without voltages.
@@ -89,6 +100,7 @@ impl CompiledModel {
             parameters: self.parameters.clone(),
             warnings: self.warnings.clone(),
             options: self.options.clone(),
+            requested: self.requested,
             joints: in_joints_of(&parts, &self.options),
             parts,
             order,
@@ -96,7 +108,37 @@ impl CompiledModel {
             higher: Arc::default(),
         })
     }
+
+    /// The options that were requested, for a variant of the same drawing.
+    pub fn requested_options(&self) -> CompileOptions {
+        self.options.with_formulation(self.requested.formulation).with_scheme(self.requested.scheme)
+    }
+
+    /// The drawing that it was compiled from.
+    pub fn parsed(&self) -> ParsedStructure {
+        let mut warnings = self.warnings.clone();
+        warnings.items.retain(|warning| warning.code != BEYOND_TABLE);
+        ParsedStructure {
+            structure: Arc::clone(&self.structure),
+            parameters: self.parameters.clone(),
+            warnings,
+            options: self.options.clone(),
+            requested: self.requested,
+        }
+    }
+
+    /// The same model for steps whose times a caller sets, where `auto` is compliant.
+    #[must_use]
+    pub fn for_given_steps(self) -> Self {
+        match self.options.formulation {
+            Formulation::Auto => Self { options: self.options.with_formulation(Formulation::Compliant), ..self },
+            _ => self,
+        }
+    }
 }
+
+/// The code of the warning about junctions outside the calibrated range.
+const BEYOND_TABLE: &str = "W017";
 
 /// Errors of a compilation.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -124,6 +166,8 @@ pub struct ParsedStructure {
     pub warnings: Diagnostics,
     /// The options, with what one of them says of another.
     pub options: CompileOptions,
+    /// Requested values of options that were chosen.
+    pub requested: RequestedChoices,
 }
 
 /// Draws a netlist that has been read: the part of a compilation that depends on the values of parameters alone.
@@ -132,6 +176,7 @@ pub struct ParsedStructure {
 /// See [`CompileError`].
 pub fn draw(source: &dyn FrontEnd, options: &CompileOptions) -> Result<ParsedStructure, CompileError> {
     options.check()?;
+    let requested = RequestedChoices { scheme: options.scheme, formulation: options.formulation };
     let options = options.in_effect();
     let loaded = source.load(&options.set).map_err(CompileError::Netlist)?;
     let mut structure = if options.without_circuit { loaded.structure.without_circuit() } else { loaded.structure };
@@ -141,10 +186,18 @@ pub fn draw(source: &dyn FrontEnd, options: &CompileOptions) -> Result<ParsedStr
         // of the range of the law that is replaced, and of the factor that it cancels
         warnings.items.retain(|d| !(d.code == "W025" || d.code == "W026" && law != Fringe::Exact));
     }
-    Ok(ParsedStructure { structure: Arc::new(structure), parameters: loaded.parameters, warnings, options })
+    let structure = Arc::new(structure);
+    Ok(ParsedStructure { structure, parameters: loaded.parameters, warnings, options, requested })
 }
 
 impl ParsedStructure {
+    /// The same in another formulation, cut by its scheme where none was requested.
+    #[must_use]
+    pub fn in_formulation(self, formulation: Formulation) -> Self {
+        let requested = self.options.with_scheme(self.requested.scheme);
+        Self { options: requested.with_formulation(formulation).in_effect(), ..self }
+    }
+
     /// The model on the mesh that the options specify.
     ///
     /// # Errors
@@ -173,6 +226,7 @@ impl ParsedStructure {
             parameters: self.parameters,
             warnings: self.warnings,
             options: self.options,
+            requested: self.requested,
             parts,
             order,
             lowest: None,
@@ -192,7 +246,7 @@ fn beyond_table(structure: &Structure, options: &CompileOptions, parts: &Assembl
     let message = format!("the junctions of `{name}` are beyond what they were calibrated for: {}{more}", found.why);
     let help =
         "the accuracy given in docs/explanation/junctions.md does not hold there; compare with `--junctions offset`";
-    Some(Diagnostic::warning("W017", message, help))
+    Some(Diagnostic::warning(BEYOND_TABLE, message, help))
 }
 
 /// Bodies and joints, with the requested imperfection.

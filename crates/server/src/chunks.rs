@@ -4,10 +4,11 @@ use super::fair_semaphore::{Permit, Waiter};
 use super::pace::{CHUNK_BYTES, HEARTBEAT};
 use super::shared::ServerState;
 use super::status;
-use bimorph_analysis::AnalysisError;
-use bimorph_analysis::mesh::{self, fitted_in_time};
+use bimorph_analysis::chosen_run::{FittedRun, run_as_chosen};
+use bimorph_analysis::mesh;
 use bimorph_analysis::step_error::{self, with_step_error};
 use bimorph_analysis::transient::{TransientOptions, TransientResult, transient};
+use bimorph_analysis::{AnalysisError, ProgressCallback};
 use bimorph_model::compile::CompiledModel;
 use bimorph_wire::convert::analysis::summary_to_wire;
 use bimorph_wire::proto;
@@ -136,14 +137,17 @@ pub(super) fn send_transient(
         }
         outlet.borrow().wanted()
     };
-    let result = fitted_in_time(compiled, options).and_then(|(moving, start)| {
+    let mut attempt = |FittedRun { moving, start, .. }: FittedRun,
+                       sample: &mut dyn FnMut(f64, &[f64]),
+                       watch: ProgressCallback<'_>| {
         let options = options.with_release(start.as_ref());
         let run: step_error::RunFunction<'_, ()> =
             &mut |options, sample, watch| transient(&moving, options, sample, watch).map(|r| (r, ()));
-        let (mut result, ()) = with_step_error(&options, &moving, run, &mut sample, &mut watch)?;
+        let (mut result, ()) = with_step_error(&options, &moving, run, sample, watch)?;
         result.warnings.extend(mesh::warnings(&moving));
-        Ok(result)
-    });
+        Ok((result, ()))
+    };
+    let result = run_as_chosen(compiled, options, &mut attempt, &mut sample, &mut watch).map(|(result, ())| result);
     let mut outlet = outlet.into_inner();
     if !pending.t.is_empty() {
         outlet.send(Ok(pending.take(progress.get())));

@@ -401,6 +401,7 @@ class Model:
                     reliable_until=end.reliable_until if end.HasField("reliable_until") else None,
                     after_contact=tuple(statistics(one) for one in end.after_contact),
                     events=tuple(crossing(one) for one in end.events),
+                    formulation_taken=end.formulation_taken if end.HasField("formulation_taken") else None,
                 )
         raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
 

@@ -71,7 +71,7 @@ class Options(TypedDict, total=False):
     """How bodies become equations. compliant: each body's own coordinates; rcr: joint coordinates on a tree, loops
     closed inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method;
     reduced: few coordinates (static, tran, circuits); auto: what suits. One of auto, compliant, rcr,
-    rcr-elastic, reduced; default: compliant."""
+    rcr-elastic, reduced; default: auto."""
 
     ranges: str | None
     """Ranges of what a circuit gives to ports (V, N, W), for which a reduced model is trained

@@ -400,6 +400,8 @@ class TransientResult:
     """Statistics of each signal after ``reliable_until``."""
     events: tuple[Crossing, ...] = ()
     """Crossings of ``events``, and contacts of gaps that begin and end, in order of time."""
+    formulation_taken: str | None = None
+    """Formulation that ``auto`` took, with the reason; None where another was requested."""
 
     def __repr__(self) -> str:
         names = ", ".join(f"{name} [{unit}]" for name, unit in self.units.items())

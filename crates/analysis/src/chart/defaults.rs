@@ -12,8 +12,8 @@ use super::runs::ChartProgress;
 use super::spec::{Chart, ChartError, ChartPart, ChartPoint, ChartSpec, Formulation, RunMeasurement};
 use super::variant::ChartVariant;
 use crate::NodeMotion;
+use crate::chosen_run::{FittedRun, run_as_chosen};
 use crate::integrator::Integrator;
-use crate::mesh::fitted_in_time;
 use crate::mesh::{modes_fitted, static_fitted};
 use crate::step_error::with_step_error;
 use crate::transient::{TransientOptions, TransientResult, transient};
@@ -138,13 +138,18 @@ fn analyse(
                 method: Integrator::default(),
                 ..TransientOptions::default()
             };
-            let (moving, start) = fitted_in_time(drawn.moving(), &asked)?;
-            let asked = TransientOptions { release: start.as_ref(), ..asked };
-            let mut run =
-                |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: ProgressCallback<'_>| {
+            let mut attempt = |FittedRun { moving, start, .. }: FittedRun,
+                               sample: &mut dyn FnMut(f64, &[f64]),
+                               watch: ProgressCallback<'_>| {
+                let asked = asked.with_release(start.as_ref());
+                let mut run = |options: &TransientOptions<'_>,
+                               sample: &mut dyn FnMut(f64, &[f64]),
+                               watch: ProgressCallback<'_>| {
                     transient(&moving, options, sample, watch).map(|r| (r, ()))
                 };
-            let (result, ()) = with_step_error(&asked, &moving, &mut run, &mut |_, _| (), watch)?;
+                with_step_error(&asked, &moving, &mut run, sample, watch)
+            };
+            let (result, ()) = run_as_chosen(drawn.moving(), &asked, &mut attempt, &mut |_, _| (), watch)?;
             let c = result.counters;
             measured = RunMeasurement {
                 steps: c.steps,

@@ -3,7 +3,7 @@
 use super::spec::{ChartError, Formulation};
 use crate::AnalysisError;
 use bimorph_base::Setting;
-use bimorph_model::compile::{CompileOptions, CompiledModel, draw};
+use bimorph_model::compile::{CompileOptions, CompiledModel, Formulation as Bodies, draw};
 use bimorph_structure::FrontEnd;
 
 /// The compiled mechanism, with what a release needs.
@@ -54,7 +54,7 @@ impl FormulationModels {
         release: Option<&str>,
         formulations: &[Formulation],
     ) -> Result<Self, ChartError> {
-        let bodies = ChartVariant::new(source, options, band, release)?;
+        let bodies = ChartVariant::new(source, &options.with_formulation(Bodies::Compliant), band, release)?;
         let compiled = |&one: &Formulation| {
             let options = options.with_formulation(one.compiled_as()?);
             // what bodies can be made of may not suit joints: points that say so
@@ -82,5 +82,5 @@ pub fn released(source: &dyn FrontEnd, initial: &CompiledModel, name: &str) -> R
         let detail = format!("no numeric parameter of that name; the netlist has {}", known.join(", "));
         return Err(AnalysisError::BadRequest { what: format!("release \"{name}\""), detail }.into());
     }
-    Ok(draw(source, &initial.options.with_parameter(name, 0.0))?.compile()?)
+    Ok(draw(source, &initial.requested_options().with_parameter(name, 0.0))?.compile()?)
 }

@@ -40,7 +40,7 @@ mod warnings;
 use super::linear_stress::left_out;
 use super::statics::{OperatingPoint, operating_point};
 use super::transient::TransientOptions;
-use super::{AnalysisError, PortVoltages};
+use super::{AnalysisError, PortVoltages, formulation};
 use crate::readout::expression::Expression;
 use bimorph_base::Diagnostic;
 use bimorph_model::compile::CompiledModel;
@@ -108,11 +108,27 @@ pub fn order(compiled: &CompiledModel, request: &MeshRequest<'_>) -> Result<Mesh
     })
 }
 
-/// A released mechanism and what it was released from, on the mesh for a transient.
+/// A released mechanism and what it was released from, on the mesh for a transient, in the formulation that `auto` takes.
 ///
 /// # Errors
 /// See [`fitted`].
 pub fn fitted_in_time(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+) -> Result<(CompiledModel, Option<CompiledModel>), AnalysisError> {
+    let Some((joints, start)) = formulation::in_joints(moving, options) else {
+        return fitted_as_compiled(moving, options);
+    };
+    match fitted_as_compiled(&joints, &options.with_release(start.as_ref())) {
+        Ok(fitted) if formulation::suits_joints(&fitted.0.order.segments) => Ok(fitted),
+        Err(AnalysisError::Cancelled) => Err(AnalysisError::Cancelled),
+        // joint coordinates were not requested, and refuse nothing
+        _ => fitted_as_compiled(moving, options),
+    }
+}
+
+/// The same in the formulation that the model was compiled for.
+fn fitted_as_compiled(
     moving: &CompiledModel,
     options: &TransientOptions<'_>,
 ) -> Result<(CompiledModel, Option<CompiledModel>), AnalysisError> {

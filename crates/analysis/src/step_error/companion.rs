@@ -18,7 +18,7 @@ use super::super::integrator::Integrator;
 use super::super::transient::error_log::least;
 use super::super::transient::{TransientOptions, TransientResult};
 use super::super::{AnalysisError, ProgressCallback};
-use super::run::{AT_THE_END, MAX_AGAIN, MAX_STORED_SAMPLES, MAX_WORK, RunFunction, beyond, unknown};
+use super::run::{AT_THE_END, MAX_AGAIN, MAX_WORK, RunFunction, beyond, unknown};
 use super::samples::{BufferedSamples, SelectedSamples, resolved, stride};
 use crate::formulation;
 use crate::reduced::Directions;
@@ -85,7 +85,7 @@ pub(super) fn is_made_again(
         && options.step.is_none()
         && is_high(formulation::of_run(model, options).1)
         && MORE * MORE * steps * model.unknowns() as f64 <= MAX_AGAIN
-        && options.points * options.signals.len() <= MAX_STORED_SAMPLES
+        && options.samples_are_kept()
 }
 
 /// A run with its estimate, and what a sharper one is compared with.

@@ -7,8 +7,6 @@ use super::super::{AnalysisError, ProgressCallback};
 pub(super) const MAX_WORK: f64 = 3e6;
 /// Unknowns times steps of a run that is repeated, at most: some seconds.
 pub(super) const MAX_AGAIN: f64 = 1e7;
-/// Samples of a run that is run again, at most.
-pub(super) const MAX_STORED_SAMPLES: usize = 1 << 20;
 /// Where the estimate of a single run is made.
 pub(super) const AT_THE_END: &str = "over the run";
 

@@ -12,19 +12,19 @@ const ROUNDING: f64 = 1e-12;
 
 /// Samples that are not sent yet.
 #[derive(Default)]
-pub(super) struct BufferedSamples {
+pub(crate) struct BufferedSamples {
     t: Vec<f64>,
     values: Vec<f64>,
 }
 
 impl BufferedSamples {
-    pub(super) fn keep(&mut self, t: f64, values: &[f64]) {
+    pub(crate) fn keep(&mut self, t: f64, values: &[f64]) {
         bimorph_base::budget::lay_out(size_of_val(values) + size_of::<f64>());
         self.t.push(t);
         self.values.extend(values);
     }
 
-    pub(super) fn send(&self, sample: &mut dyn FnMut(f64, &[f64])) {
+    pub(crate) fn send(&self, sample: &mut dyn FnMut(f64, &[f64])) {
         let width = (self.values.len() / self.t.len().max(1)).max(1);
         self.t.iter().zip(self.values.chunks(width)).for_each(|(t, values)| sample(*t, values));
     }

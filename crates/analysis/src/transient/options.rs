@@ -10,6 +10,9 @@ use bimorph_model::options::analysis::TRAN_POINTS;
 use bimorph_solve::baseline::SolverKind;
 use bimorph_solve::time::adaptive::Control;
 
+/// Samples of a run that may be made again, at most (1): eight megabytes.
+const MAX_STORED_SAMPLES: usize = 1 << 20;
+
 /// Condition that ends a run early.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Until {
@@ -189,8 +192,13 @@ impl<'a> TransientOptions<'a> {
         Self { tol, step, events: Vec::new(), keep: false, ..self.clone() }
     }
 
+    /// Whether the samples are few enough to be kept until the run has ended, which may be made again.
+    pub(crate) fn samples_are_kept(&self) -> bool {
+        self.points * self.signals.len() <= MAX_STORED_SAMPLES
+    }
+
     /// For a run that measures the error of a mesh, with this tolerance (1) and so many output times, from the equilibrium of `release`: by
-    /// the default integrator, without events, and whose samples only the callback receives.
+    /// the default integrator and solver, without events, and whose samples only the callback receives.
     #[must_use]
     pub(crate) fn for_mesh<'b>(
         &self,
@@ -201,7 +209,8 @@ impl<'a> TransientOptions<'a> {
     where
         'a: 'b,
     {
-        let (method, step, events) = (Integrator::default(), None, Vec::new());
+        let (method, solver) = (Integrator::default(), SolverKind::default());
+        let (step, events) = (None, Vec::new());
         // directions that lack something may lack it on one mesh and not on another
         let directions = Some(Directions::Full("the error of a mesh is that of the full model".to_owned()));
         TransientOptions {
@@ -209,6 +218,7 @@ impl<'a> TransientOptions<'a> {
             points,
             release,
             method,
+            solver,
             step,
             events,
             directions,

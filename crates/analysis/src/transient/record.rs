@@ -144,6 +144,7 @@ pub(crate) fn record(
         events: crossings.events,
         largest_stress: stress.largest(),
         directions: None,
+        formulation_taken: None,
         warnings: begun
             .into_iter()
             .chain(stability.warning())

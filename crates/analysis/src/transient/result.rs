@@ -82,6 +82,10 @@ pub struct TransientResult {
     /// The largest stress of the run, where a layer has a strength or a shock acts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_stress: Option<StressMaximum>,
+    /// The formulation that `auto` took, with the reason; none where another was requested, see
+    /// [`with_step_error`](crate::step_error::with_step_error).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub formulation_taken: Option<String>,
     /// Warnings about the result.
     pub warnings: Vec<String>,
     /// Directions for the next run in a reduced model.

@@ -14,14 +14,17 @@ use super::point_error::Failed;
 use super::samples::SampleGenerator;
 use super::shared_meshes::{alike, middle};
 use super::spec::{SweepAnalysis, SweepSpec};
-use bimorph_analysis::AnalysisError;
 use bimorph_analysis::batch_transient::{self, RunEnd};
+use bimorph_analysis::chosen_run::tentative;
+use bimorph_analysis::formulation;
 use bimorph_analysis::mesh;
 use bimorph_analysis::readout::expression::Expression;
 use bimorph_analysis::step_error;
 use bimorph_analysis::transient::{TransientOptions, transient};
+use bimorph_analysis::{AnalysisError, ProgressCallback};
 use bimorph_base::Setting;
-use bimorph_model::compile::{CompileOptions, CompiledModel, draw};
+use bimorph_model::compile::{CompileOptions, CompiledModel, Formulation, ParsedStructure, draw};
+use bimorph_model::discretize::DiscretizeError;
 use bimorph_model::refine::mesh_search::Mesh;
 use bimorph_netlist::NetlistSource;
 use bimorph_structure::Beam;
@@ -42,6 +45,8 @@ const ERROR_SAMPLES: usize = 201;
 struct SweepMesh {
     beams: Vec<Beam>,
     order: Mesh,
+    /// Whether `auto` took joint coordinates for it, which cut beams otherwise: for the first probe, and then for every point on this mesh.
+    in_joints: bool,
     /// The steps in the middle of the grid.
     steps: Steps,
 }
@@ -55,6 +60,31 @@ struct Steps {
     error: Option<f64>,
     /// Where that was found.
     place: &'static str,
+}
+
+impl SweepMesh {
+    /// A point on this mesh, in the formulation that it is for; none where the point has other beams, or joint coordinates do not suit it.
+    ///
+    /// # Errors
+    /// See [`DiscretizeError`].
+    fn model(
+        &self,
+        drawn: &ParsedStructure,
+        options: &TransientOptions<'_>,
+    ) -> Result<Option<CompiledModel>, DiscretizeError> {
+        if !alike(&self.beams, &drawn.structure.beams) {
+            return Ok(None);
+        }
+        let compiled = drawn.clone().on(self.order.clone())?;
+        if !self.in_joints {
+            return Ok(Some(compiled));
+        }
+        if !formulation::takes_joints(&compiled, options) {
+            return Ok(None);
+        }
+        let joints = drawn.clone().in_formulation(Formulation::Rcr).on(self.order.clone())?;
+        Ok(matches!(joints.joints, Some(Ok(_))).then_some(joints))
+    }
 }
 
 /// A point on its mesh.
@@ -117,7 +147,7 @@ impl<'a> TransientSweep<'a> {
             let values = match (prepared, end) {
                 (Err(error), _) => Err(error.clone()),
                 (Ok(point), Some(end)) => self.found(point, &options, end).map_err(Failed::from),
-                (Ok(point), None) => means.guarded(|| self.found(point, &options, alone(point, &options)?)),
+                (Ok(point), None) => means.guarded(|| self.alone(point, &settings, &go_on)),
             };
             let parameters = settings.into_iter().map(|(_, value)| value).collect();
             let outcome = PointOutcome { number, parameters, values };
@@ -150,33 +180,63 @@ impl<'a> TransientSweep<'a> {
         let options = self.transient(settings);
         let shared =
             if self.spec.has_variants() { self.mesh.get_or_init(|| self.search(go_on)).as_ref() } else { None };
-        match shared.filter(|shared| alike(&shared.beams, &drawn.structure.beams)) {
-            Some(shared) => {
-                let compiled = drawn.on(shared.order.clone()).map_err(|error| error.to_string())?;
-                Ok(prepared(compiled, &options, shared.steps))
-            }
-            None => {
-                let compiled = drawn.compile().map_err(|error| brief(&error))?;
-                let (compiled, _) = mesh::fitted_in_time(&compiled, &options).map_err(|error| error.to_string())?;
-                let steps = steps(&compiled, &options, "by the end of the run", go_on);
-                Ok(prepared(compiled, &options, steps))
-            }
+        let on_shared = shared.map(|shared| Ok::<_, DiscretizeError>((shared.model(&drawn, &options)?, shared.steps)));
+        match on_shared.transpose().map_err(|error| error.to_string())? {
+            Some((Some(compiled), steps)) => Ok(prepared(compiled, &options, steps)),
+            _ => on_own_mesh(&drawn.compile().map_err(|error| brief(&error))?, &options, go_on),
         }
     }
 
-    /// The mesh that is fine enough at every probe.
+    /// A run of its own: of the bodies where one in joint coordinates fails that `auto` took.
+    fn alone(
+        &self,
+        point: &MeshedPoint,
+        settings: &[(String, Setting)],
+        go_on: &dyn Fn() -> bool,
+    ) -> Result<PointResults, String> {
+        let options = self.transient(settings);
+        let mut run = |watch: ProgressCallback<'_>| end(point, &options, watch);
+        let done = tentative(&point.compiled, &options, &mut |_| true, &mut run).map_err(|error| error.to_string())?;
+        if let Some(end) = done {
+            return self.found(point, &options, end);
+        }
+        let drawn = draw(self.source, &at(&self.options, settings)).map_err(|error| brief(&error))?;
+        let drawn = drawn.compile().map_err(|error| brief(&error))?.for_given_steps();
+        let point = on_own_mesh(&drawn, &options, go_on)?;
+        let end = end(&point, &options, &mut |_| true).map_err(|error| error.to_string())?;
+        self.found(&point, &options, end)
+    }
+
+    /// The mesh that is fine enough at every probe: that of the bodies where the run in the middle fails in joint coordinates.
     fn search(&self, go_on: &dyn Fn() -> bool) -> Option<SweepMesh> {
+        let chosen = self.search_in(true, go_on)?;
+        if chosen.in_joints && chosen.steps.error.is_none() { self.search_in(false, go_on) } else { Some(chosen) }
+    }
+
+    /// As above, in joint coordinates where they are allowed and `auto` takes them.
+    fn search_in(&self, joints: bool, go_on: &dyn Fn() -> bool) -> Option<SweepMesh> {
         let mut shared: Option<SweepMesh> = None;
         for settings in probes(self.spec) {
             let drawn = draw(self.source, &at(&self.options, &settings));
             let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
-            let Ok(order) = mesh::order_in_time(&compiled, &self.transient(&settings)) else { continue };
+            let options = self.transient(&settings);
+            let in_joints = if joints { formulation::in_joints(&compiled, &options) } else { None };
+            let in_joints = in_joints.and_then(|(moving, _)| {
+                let order = mesh::order_in_time(&moving, &options).ok()?;
+                formulation::suits_joints(&order.segments).then_some(order)
+            });
+            let (order, in_joints) = match in_joints {
+                Some(order) => (Ok(order), true),
+                None => (mesh::order_in_time(&compiled, &options), false),
+            };
+            let Ok(order) = order else { continue };
             match &mut shared {
                 None => {
                     let steps = Steps { tol: self.options.errors().requested(), error: None, place: IN_THE_MIDDLE };
-                    shared = Some(SweepMesh { beams: compiled.structure.beams.clone(), order, steps });
+                    let beams = compiled.structure.beams.clone();
+                    shared = Some(SweepMesh { beams, order, in_joints, steps });
                 }
-                Some(shared) if alike(&shared.beams, &compiled.structure.beams) => {
+                Some(shared) if shared.in_joints == in_joints && alike(&shared.beams, &compiled.structure.beams) => {
                     for (most, n) in shared.order.segments.iter_mut().zip(order.segments) {
                         *most = (*most).max(n);
                     }
@@ -189,10 +249,10 @@ impl<'a> TransientSweep<'a> {
         let mut shared = shared?;
         let settings = middle(self.spec);
         let drawn = draw(self.source, &at(&self.options, &settings)).ok();
-        let middle = drawn.filter(|drawn| alike(&shared.beams, &drawn.structure.beams));
-        let middle = middle.and_then(|drawn| drawn.on(shared.order.clone()).ok());
+        let options = self.transient(&settings);
+        let middle = drawn.and_then(|drawn| shared.model(&drawn, &options).ok().flatten());
         if let Some(compiled) = middle {
-            shared.steps = steps(&compiled, &self.transient(&settings), IN_THE_MIDDLE, go_on);
+            shared.steps = steps(&compiled, &options, IN_THE_MIDDLE, go_on);
         }
         Some(shared)
     }
@@ -230,15 +290,31 @@ fn prepared(compiled: CompiledModel, options: &TransientOptions<'_>, steps: Step
 /// The steps of a run of this variant.
 fn steps(compiled: &CompiledModel, run: &TransientOptions<'_>, place: &'static str, go_on: &dyn Fn() -> bool) -> Steps {
     let options = run.with_points(ERROR_SAMPLES);
-    let (error, tol) = step_error::step_error(&options, compiled, &mut |_| go_on());
+    let mut estimate = |watch: ProgressCallback<'_>| Ok(step_error::step_error(&options, compiled, watch));
+    let found = tentative(compiled, run, &mut |_| go_on(), &mut estimate).ok().flatten();
+    let (error, tol) = found.unwrap_or((None, run.errors().requested()));
     Steps { tol, error, place }
 }
 
-/// A run of its own.
-fn alone(point: &MeshedPoint, options: &TransientOptions<'_>) -> Result<RunEnd, String> {
+/// A point on the mesh of its own run.
+fn on_own_mesh(
+    drawn: &CompiledModel,
+    options: &TransientOptions<'_>,
+    go_on: &dyn Fn() -> bool,
+) -> Result<MeshedPoint, String> {
+    let (compiled, _) = mesh::fitted_in_time(drawn, options).map_err(|error| error.to_string())?;
+    let steps = steps(&compiled, options, "by the end of the run", go_on);
+    Ok(prepared(compiled, options, steps))
+}
+
+/// The end of a run of its own.
+fn end(
+    point: &MeshedPoint,
+    options: &TransientOptions<'_>,
+    watch: ProgressCallback<'_>,
+) -> Result<RunEnd, AnalysisError> {
     let options = options.with_tolerance(point.steps.tol);
-    let result = transient(&point.compiled, &options, &mut |_, _| (), &mut |_| true);
-    let result = result.map_err(|error: AnalysisError| error.to_string())?;
+    let result = transient(&point.compiled, &options, &mut |_, _| (), watch)?;
     let last = |(_, _, values): &(String, String, Vec<f64>)| values.last().copied().unwrap_or(f64::NAN);
     let values = result.signals.iter().map(last).collect();
     Ok(RunEnd { values, steps: result.counters.steps, warnings: result.warnings })

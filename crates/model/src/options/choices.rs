@@ -129,9 +129,9 @@ choice! {
     /// How bodies and joints become equations of motion.
     Formulation {
         /// The one that suits the model and the analysis.
+        #[default]
         Auto = "auto",
         /// Every body has its own coordinates, joints are springs in all directions; implicit steps.
-        #[default]
         Compliant = "compliant",
         /// Relative joint coordinates, loops closed inside the recursion: by springs, or with the methods that reduce
         /// constraints as in the paper, where joints of beams only turn.

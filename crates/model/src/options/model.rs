@@ -121,7 +121,7 @@ options! {
     /// How bodies become equations. compliant: each body's own coordinates; rcr: joint coordinates on a tree, loops closed
     /// inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method; reduced: few coordinates
     /// (static, tran, circuits); auto: what suits.
-    formulation: Formulation = Formulation::Compliant, "formulation" = 11, [""], Range::Names(&Formulation::NAMES), "";
+    formulation: Formulation = Formulation::Auto, "formulation" = 11, [""], Range::Names(&Formulation::NAMES), "";
 
     /// Ranges of what a circuit gives to ports (V, N, W), for which a reduced model is trained
     /// (docs/explanation/reduction.md). Without them circuits have the full model.

@@ -9,6 +9,7 @@ use crate::bench::Bench;
 use crate::figure;
 use crate::question::{BenchState, MotionQuestion};
 use crate::refusal::Refusal;
+use bimorph_analysis::chosen_run::{FittedRun, run_as_chosen};
 use bimorph_analysis::mesh::fitted_in_time;
 use bimorph_analysis::transient::{TransientOptions, transient};
 use bimorph_base::budget;
@@ -51,6 +52,7 @@ pub(crate) fn motion(
     }
     check_waves(asked)?;
     let drawn = bench.compiled(state)?;
+    let drawn = if asked.waves.is_empty() { drawn } else { drawn.for_given_steps() };
     let mut held = state.voltages();
     // the mesh is that of the largest voltages
     for (port, corners) in &asked.waves {
@@ -66,20 +68,31 @@ pub(crate) fn motion(
         voltages: held,
         ..TransientOptions::default()
     };
-    let (fitted, _) = fitted_in_time(&drawn, &options)?;
-    let chosen = if asked.signals.is_empty() { free_nodes(&fitted) } else { asked.signals.clone() };
-    let picture = picture_signals(&fitted);
-    let options = options.with_signals(chosen.iter().chain(&picture).cloned().collect());
-    let samples = if asked.waves.is_empty() {
-        let found = transient(&fitted, &options, &mut |_, _| (), &mut |fraction| progress(fraction))?;
-        MotionSamples {
+    let signals_on = |fitted: &CompiledModel| {
+        let chosen = if asked.signals.is_empty() { free_nodes(fitted) } else { asked.signals.clone() };
+        let all: Vec<String> = chosen.iter().cloned().chain(picture_signals(fitted)).collect();
+        (chosen, all)
+    };
+    let (fitted, chosen, samples) = if asked.waves.is_empty() {
+        let mut attempt = |run: FittedRun, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
+            let (chosen, all) = signals_on(&run.moving);
+            let found = transient(&run.moving, &options.with_signals(all), sample, watch)?;
+            Ok((found, (run.moving, chosen)))
+        };
+        let watch = &mut |fraction| progress(fraction);
+        let (found, (fitted, chosen)) = run_as_chosen(&drawn, &options, &mut attempt, &mut |_, _| (), watch)?;
+        let samples = MotionSamples {
             t: found.t,
             units: found.signals.iter().map(|s| s.1.clone()).collect(),
             columns: found.signals.into_iter().map(|s| s.2).collect(),
             warnings: found.warnings,
-        }
+        };
+        (fitted, chosen, samples)
     } else {
-        stepped(&fitted, state, asked, &options.signals, progress)?
+        let (fitted, _) = fitted_in_time(&drawn, &options)?;
+        let (chosen, all) = signals_on(&fitted);
+        let samples = stepped(&fitted, state, asked, &all, progress)?;
+        (fitted, chosen, samples)
     };
     let mut answer = Answer::default();
     put_signals(&mut answer, &chosen, &samples, asked.signals.is_empty());

@@ -214,6 +214,7 @@ pub fn summary_to_wire(result: &TransientResult) -> proto::TransientSummary {
         stopped_at: result.stopped_at,
         reliable_until: result.reliable_until,
         after_contact: result.after_contact.iter().map(statistics_to_wire).collect(),
+        formulation_taken: result.formulation_taken.clone(),
     }
 }
 
@@ -277,6 +278,7 @@ pub fn transient_from_wire(
         stopped_at,
         reliable_until,
         after_contact,
+        formulation_taken,
     } = summary;
     let event = |e: proto::Crossing| CrossingEvent {
         signal: e.signal,
@@ -298,6 +300,7 @@ pub fn transient_from_wire(
         after_contact: after_contact.into_iter().map(statistics_from_wire).collect(),
         events: events.into_iter().map(event).collect(),
         largest_stress: None,
+        formulation_taken,
         warnings,
         directions: None,
     }

@@ -1,0 +1,116 @@
+//! Runs in joint coordinates that `auto` takes give way to those of the bodies.
+
+use bimorph_analysis::AnalysisError;
+use bimorph_analysis::chosen_run::{FittedRun, run_as_chosen};
+use bimorph_analysis::step_error::with_step_error;
+use bimorph_analysis::transient::{TransientOptions, TransientResult, transient};
+use bimorph_base::Bundle;
+use bimorph_model::compile::{CompileOptions, CompiledModel, Formulation, draw};
+use bimorph_netlist::NetlistSource;
+
+/// Two plates of about 120 times the mass of their flexures.
+const CHAIN: &str = "
+process p1 = [Youngsmodulus=165e9 density=2300 h=2u]
+anchor p1 [q(0)] []
+for i=1:2 [
+  beam2d p1 [q(i-1) r(i)] [l=10u w=1u]
+  link2d * [r(i) c(i)] [l=20u]
+  plate2d p1 [c(i)] [l=40u w=30u]
+  link2d * [c(i) q(i)] [l=20u]
+]
+f2d * [c(2)] [F=0.1u oz=pi/2]
+";
+
+type Samples = Vec<(f64, Vec<f64>)>;
+type Interference<'a> = &'a dyn Fn(&mut dyn FnMut(f64) -> bool) -> Result<(), AnalysisError>;
+
+fn drawn(formulation: Formulation) -> CompiledModel {
+    let options = CompileOptions { formulation, undamped: true, ..CompileOptions::default() };
+    let bundle = Bundle::from_text("chain.net", CHAIN);
+    draw(&NetlistSource::new(&bundle), &options).and_then(|drawn| drawn.compile()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn asked(points: usize) -> TransientOptions<'static> {
+    TransientOptions { stop: 2e-5, signals: vec!["c(2).y".into()], points, ..TransientOptions::default() }
+}
+
+/// The run of `auto` or of bodies, its samples, and how many runs there were; `interfere` acts on a tentative one after it has been made.
+fn run(
+    formulation: Formulation,
+    points: usize,
+    interfere: Interference<'_>,
+) -> (Result<TransientResult, AnalysisError>, Samples, usize) {
+    let (mut samples, mut runs) = (Samples::new(), 0);
+    let options = asked(points);
+    let mut attempt = |run: FittedRun, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
+        runs += 1;
+        let mut go = |options: &TransientOptions<'_>,
+                      sample: &mut dyn FnMut(f64, &[f64]),
+                      watch: &mut dyn FnMut(f64) -> bool| {
+            transient(&run.moving, options, sample, watch).map(|r| (r, ()))
+        };
+        let done = with_step_error(&options, &run.moving, &mut go, sample, watch)?;
+        if run.is_tentative {
+            interfere(watch)?;
+        }
+        Ok(done)
+    };
+    let keep = &mut |t: f64, values: &[f64]| samples.push((t, values.to_vec()));
+    let done = run_as_chosen(&drawn(formulation), &options, &mut attempt, keep, &mut |_| true);
+    (done.map(|(result, ())| result), samples, runs)
+}
+
+fn failure() -> AnalysisError {
+    AnalysisError::StepFailed { t: 1e-5, dt: 1e-22, detail: "a fault".into() }
+}
+
+/// Where a run in joint coordinates fails or its steps collapse, result and samples are those of the bodies to the last bit, each sample comes once, and
+/// the result has the reason. One that succeeds is the only one.
+#[test]
+fn failed_runs_in_joints_give_way_to_bodies() {
+    let (bodies, samples, runs) = run(Formulation::Compliant, 101, &|_| Ok(()));
+    let bodies = bodies.unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((bodies.formulation_taken.as_deref(), samples.len(), runs), (None, 101, 1));
+
+    let (chosen, others, runs) = run(Formulation::Auto, 101, &|_| Ok(()));
+    let taken = chosen.unwrap_or_else(|e| panic!("{e}")).formulation_taken.unwrap_or_default();
+    assert!(taken.starts_with("rcr: rigid parts of"), "{taken}");
+    assert_eq!((others.len(), runs), (101, 1));
+    assert_ne!(others, samples);
+
+    let collapse = |watch: &mut dyn FnMut(f64) -> bool| {
+        assert!((0..1000).any(|k| !watch(1e-8 * f64::from(k))), "the run is given up");
+        Err(AnalysisError::Cancelled)
+    };
+    let stalled = "(its steps fell below 5e-8 of the run)";
+    let failed = "(transient stopped at t = 1e-5 s (dt = 1e-22 s): a fault)";
+    let cases: [(Interference<'_>, &str); 2] = [(&collapse, stalled), (&|_| Err(failure()), failed)];
+    for (interfere, why) in cases {
+        let (found, others, runs) = run(Formulation::Auto, 101, interfere);
+        let mut found = found.unwrap_or_else(|e| panic!("{e}"));
+        let taken = found.formulation_taken.take().unwrap_or_default();
+        let told =
+            format!("compliant: a run in joint coordinates was given up {why}, which were taken as rigid parts of");
+        assert!(taken.starts_with(&told), "{taken}");
+        assert_eq!((found, others, runs), (bodies.clone(), samples.clone(), 2));
+    }
+}
+
+/// A caller that cancels a run in joint coordinates gets no other one.
+#[test]
+fn cancelled_runs_do_not_give_way() {
+    let (found, samples, runs) = run(Formulation::Auto, 101, &|_| Err(AnalysisError::Cancelled));
+    assert_eq!((found, samples.len(), runs), (Err(AnalysisError::Cancelled), 0, 1));
+}
+
+/// Runs with more samples than are kept (2²⁰) are those of the bodies at once.
+#[test]
+fn runs_with_many_samples_are_those_of_bodies() {
+    let (found, samples, runs) = run(Formulation::Auto, (1 << 20) + 1, &|_| Ok(()));
+    let taken = found.unwrap_or_else(|e| panic!("{e}")).formulation_taken.unwrap_or_default();
+    assert!(
+        taken.starts_with("compliant: a run in joint coordinates was given up (more samples than are kept"),
+        "{taken}"
+    );
+    assert_eq!((samples.len(), runs), ((1 << 20) + 1, 1));
+}
