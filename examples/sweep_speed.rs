@@ -1,18 +1,19 @@
 //! Points per second of processor time in sweeps of the bank, one line each, in one run on one thread:
 //! `analysis,points,way,points_per_s,over_alone`.
 //!
-//!     taskset -c 0 cargo run --release --no-default-features --example sweep_speed [POINTS] [transient|static|modes|parts]
+//!     taskset -c 0 cargo run --release --no-default-features --example sweep_speed [POINTS] [transient|reduced|static|modes|parts]
 //!
 //! *alone*: every point as a call of its own, read, searched a mesh for and analysed. *given mesh*: the same on the a
 //! priori mesh, without any estimate. *sweep*: `jobs::sweep`, with the estimate of every point. Transients are on two
 //! segments a beam in all ways; *lanes* is the integration alone, *sweep* has the reading and the estimate too. Their
-//! ends are compared bit by bit. *parts*, on its own: the parts of a point's cost, `part,us`.
+//! ends are compared bit by bit. *reduced*: transients over the voltage of the heaters at a tolerance of 1e-2, of the full model (*bodies*) and in
+//! a reduced model, whose *sweep* has one training for all. *parts*, on its own: the parts of a point's cost, `part,us`.
 
 use bimorph::analysis::batch_transient;
 use bimorph::analysis::mesh::{MeshRequest, fitted};
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::analysis::{modes::modes, statics::static_equilibrium};
-use bimorph::compile::{CompileOptions, CompiledModel, compile, draw};
+use bimorph::compile::{CompileOptions, CompiledModel, Formulation, compile, draw};
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepSpec};
 use bimorph::netlist::{Bundle, NetlistSource, read_bundle};
 use bimorph::refine::mesh_search::Mesh;
@@ -29,6 +30,9 @@ fn main() {
     }
     if wanted("transient") {
         transients(points / 8);
+    }
+    if wanted("reduced") {
+        reduced(points / 8);
     }
     if wanted("static") {
         let voltages = vec![("heat".to_owned(), 2.2)];
@@ -101,6 +105,42 @@ fn transients(points: usize) {
         }
     });
     println!("transient,{},sweep,{whole:.0},{:.2}", variants.len(), whole / alone);
+}
+
+/// Runs of the bank over the voltage of its heaters: of the full model and of a reduced one, with a training each and in a sweep.
+fn reduced(points: usize) {
+    let analysis = SweepAnalysis::Transient { stop: 20e-6, outputs: vec!["yoke.y".into()], voltages: Vec::new() };
+    let heat: SweepParameter = format!("heat.v=0.5:2.2:{points}").parse().expect("an axis");
+    let spec = SweepSpec { parameters: vec![heat], samples: None, analysis, shard: Shard::default(), threads: Some(1) };
+    let bundle = read_bundle(Path::new("examples/bank/bank.net"), &[]).expect("the bank");
+    let options =
+        |formulation| CompileOptions { tol: 1e-2, segments: Some(2), formulation, ..CompileOptions::default() };
+    let swept = |formulation| {
+        rate(points, || {
+            let table = sweep::run(&spec, &bundle, &options(formulation), &|_| true).expect("a table");
+            assert_eq!(table.failed(), 0);
+        })
+    };
+    let bodies = swept(Formulation::Compliant);
+    println!("reduced,{points},bodies,{bodies:.0},1.00");
+    let compiled = compile(&bundle, &options(Formulation::Reduced)).expect("the bank");
+    let alone = rate(points, || {
+        for k in 0..points {
+            let heat = 0.5 + 1.7 * k as f64 / (points - 1) as f64;
+            let run = TransientOptions {
+                stop: 20e-6,
+                signals: vec!["yoke.y".into()],
+                points: 2,
+                tol: 1e-2,
+                voltages: vec![("heat".to_owned(), heat)],
+                ..TransientOptions::default()
+            };
+            black_box(transient(&compiled, &run, &mut |_, _| (), &mut |_| true).expect("a run"));
+        }
+    });
+    println!("reduced,{points},alone,{alone:.0},{:.2}", alone / bodies);
+    let sweep = swept(Formulation::Reduced);
+    println!("reduced,{points},sweep,{sweep:.0},{:.2}", sweep / bodies);
 }
 
 /// The grid of two parameters with about `points` points, and the bank that has them.

@@ -304,13 +304,12 @@ fn analyses_take_the_same_options() {
     assert_eq!((TransientOptions::default().points, Integrator::RHO), (TRAN_POINTS.count(), TRAN_RHO.number()));
 }
 
-/// Ranges of ports are for circuits: analyses refuse them, `check` compares their names with the ports, and each error has the range.
+/// Ranges of ports are for circuits and reduced motions: analyses refuse them, `check` compares their names with the ports, and each error has the range.
 #[test]
 fn analyses_refuse_ranges_of_ports() {
     let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
     for command in [
         &["static", "c.net"][..],
-        &["tran", "c.net", "--stop", "1u"],
         &["modes", "c.net"],
         &["ac", "c.net", "--drive", "b.fy", "--by-modes", "--from", "1", "--to", "2"],
         &["sweep", "c.net", "--analysis", "static", "--param", "w=1,2"],
@@ -319,6 +318,17 @@ fn analyses_refuse_ranges_of_ports() {
         let (status, _, err) = bimorph(&[words(command), words(&["--ranges", "b.x:0:1"])].concat());
         assert_eq!(status, Some(1), "{command:?}: {err}");
         assert!(err.contains("--ranges: expected none in this command"), "{command:?}: {err}");
+        assert!(err.contains("got \"b.x:0:1\""), "{command:?}: {err}");
+    }
+    let reduced = &["tran", "c.net", "--stop", "1u", "--formulation", "reduced"][..];
+    for (command, expected) in [
+        (&reduced[..4], "--formulation reduced beside it"),
+        (reduced, "electrical ports of the model"),
+        (&[reduced, &["--release", "w"]].concat(), "none with --release"),
+    ] {
+        let (status, _, err) = bimorph(&[words(command), words(&["--ranges", "b.x:0:1"])].concat());
+        assert_eq!(status, Some(1), "{command:?}: {err}");
+        assert!(err.contains(&format!("--ranges: expected {expected}")), "{command:?}: {err}");
         assert!(err.contains("got \"b.x:0:1\""), "{command:?}: {err}");
     }
     for (ranges, expected) in [

@@ -71,7 +71,7 @@ impl CheckCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         let format = self.out.as_deref().map(ResultFormat::from_path).transpose()?;
         self.out.as_deref().map(output::check_folder).transpose()?;
-        let compiled = self.model.compile_for_circuits()?;
+        let compiled = self.model.compile_with_ranges()?;
         let s = &compiled.structure;
         if let (Some(out), Some(format)) = (&self.out, format) {
             let no_table =

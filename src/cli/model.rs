@@ -119,20 +119,20 @@ impl ModelArgs {
 
     /// The options of the compilation, checked. Ranges of ports are refused: an analysis is trained for what acts in it.
     pub(crate) fn options(&self) -> Result<CompileOptions, Failure> {
-        let options = self.options_of_circuits()?;
+        let options = self.options_with_ranges()?;
         match &options.ranges {
             Some(ranges) => Err(Failure::bad(
                 "--ranges",
-                "none in this command, which no circuit drives (they are for decks, cosim, view, sessions of the service, Python and C; \
-                 export has --range)",
+                "none in this command, which has no motion and which no circuit drives (they are for tran, decks, cosim, view, sessions of the service, \
+                 Python and C; sweep has those of its points, export has --range)",
                 format!("\"{}\"", ranges.text()),
             )),
             None => Ok(options),
         }
     }
 
-    /// The options of the compilation of a model that a circuit drives, checked.
-    pub(crate) fn options_of_circuits(&self) -> Result<CompileOptions, Failure> {
+    /// The options of the compilation of a model that a circuit drives or that is trained for a motion, checked.
+    pub(crate) fn options_with_ranges(&self) -> Result<CompileOptions, Failure> {
         Ok(self.chosen.options()?.with_settings(&self.set))
     }
 
@@ -141,9 +141,9 @@ impl ModelArgs {
         self.compiled(&self.options()?)
     }
 
-    /// The same for circuits: ranges are those of ports.
-    pub(crate) fn compile_for_circuits(&self) -> Result<CompiledModel, Failure> {
-        let compiled = self.compiled(&self.options_of_circuits()?)?;
+    /// The same for circuits and motions: ranges are those of ports.
+    pub(crate) fn compile_with_ranges(&self) -> Result<CompiledModel, Failure> {
+        let compiled = self.compiled(&self.options_with_ranges()?)?;
         match check_ranges(&compiled, &[]) {
             Err(ReadoutError::BadRange { expected, got }) => Err(Failure::bad("--ranges", expected, got)),
             _ => Ok(compiled),

@@ -134,8 +134,9 @@ impl TransientCommand {
         self.check()?;
         let initial = match self.solver {
             SolverChoice::Frame => self.model.compile_frame()?,
-            _ => self.model.compile()?,
+            _ => self.model.compile_with_ranges()?,
         };
+        self.check_ranges(&initial)?;
         let released = match &self.release {
             Some(name) => Some(released(&NetlistSource::new(&self.model.bundle()?), &initial, name)?),
             None => None,
@@ -161,6 +162,7 @@ impl TransientCommand {
             estimate: false,
             keep: true,
             directions: None,
+            reduction: None,
         };
         let (mut result, FinishedRun { fitted, start, joints, method }) = self.run_motion(drawn, &options)?;
         let (compiled, start) = (&fitted, start.as_ref());
@@ -203,6 +205,22 @@ impl TransientCommand {
             text += &format!("formulation auto took {taken}\n");
         }
         self.output.finish(|| table(&title, &result), || Ok(picture(&title, &result)), &document, &text)
+    }
+
+    /// Ranges of ports are those of a reduced model from rest.
+    fn check_ranges(&self, compiled: &CompiledModel) -> Result<(), Failure> {
+        let Some(ranges) = &compiled.options.ranges else { return Ok(()) };
+        let refused = |expected: &str| Err(Failure::bad("--ranges", expected, format!("\"{}\"", ranges.text())));
+        if compiled.options.formulation != Formulation::Reduced {
+            return refused("--formulation reduced beside it");
+        }
+        if self.release.is_some() {
+            return refused("none with --release, which is trained for what it is released from");
+        }
+        match ranges.all().iter().all(|(name, _)| compiled.structure.port(name).is_some()) {
+            true => Ok(()),
+            false => refused("electrical ports of the model, whose voltages a run holds"),
+        }
     }
 
     /// Each option within its range, before anything is compiled.

@@ -57,7 +57,7 @@ impl ViewCommand {
             check_folder(path)?;
         }
         if let Some(path) = &self.export {
-            let compiled = self.model.compile_for_circuits()?;
+            let compiled = self.model.compile_with_ranges()?;
             return write_page(path, &Bench::new(self.bench()?).export(&compiled));
         }
         let bench = Bench::new(self.bench()?);
@@ -77,7 +77,7 @@ impl ViewCommand {
 
     fn bench(&self) -> Result<BenchOptions, Failure> {
         let file = self.model.file().to_owned();
-        let options = self.model.options_of_circuits()?;
+        let options = self.model.options_with_ranges()?;
         let voltages = self.ports.clone();
         if LayoutFormat::of(&file.display().to_string()).is_none() {
             let bundle = self.model.bundle()?;

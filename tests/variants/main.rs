@@ -5,6 +5,7 @@ mod batch_transients;
 mod batched;
 mod point_lists;
 mod ports;
+mod reduced;
 
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, compile};

@@ -4,8 +4,11 @@
 //! beyond where motion overshoots. Where it would not pay (a tolerance of 1e-4 or below, more directions than a fifth of the
 //! strains) or cannot be trained, the full model is taken, and a warning says why.
 
+pub mod batch;
 pub mod circuit;
 mod directions;
+pub mod ranges;
+pub mod shared;
 
 use super::integrator::{IntegrationRun, Integrator};
 use super::statics::{OperatingPoint, operating_point, source_vector};
@@ -22,25 +25,24 @@ use bimorph_solve::equations::Bodies;
 use bimorph_solve::path::{LoadPath, SourcePath};
 use bimorph_solve::reduced::check::FullCheck;
 use bimorph_solve::reduced::enrichment::MotionCorrections;
-use bimorph_solve::reduced::polynomial::moving::{FittedMotion, of_motion};
+use bimorph_solve::reduced::polynomial::moving::of_motion;
 use bimorph_solve::reduced::space::spanned;
 use bimorph_solve::reduced::statics::ReducedStatics;
 use bimorph_solve::reduced::taylor::DriveRay;
-use bimorph_solve::reduced::{InputBox, ReducedSpace, ReductionError, Training, TrainingCase, TrainingOptions, train};
+use bimorph_solve::reduced::{InputBox, ReductionError, Training, TrainingCase, TrainingOptions, train};
 use bimorph_solve::time::adaptive::{Advance, Observer};
 use bimorph_solve::time::defect::SeeError;
 use bimorph_solve::time::method::{Motion, SolverCounters};
-use bimorph_solve::time::reduced_rodas4::ReducedRodas4;
 pub use directions::Directions;
+use ranges::inputs_beside;
+use shared::{MotionReduction, TrainedMotion};
 use std::sync::Arc;
 
 /// Code of the warnings about a reduced model.
 pub const WARNING: &str = "W053";
 /// Tolerance from which on a reduced model does not pay (1).
 const FULL: f64 = 1e-4;
-/// How far motion exceeds the statics of what is applied at once, and how far it swings back through rest (1).
-const FROM_REST: [f64; 2] = [-0.5, 2.0];
-/// The same of a mechanism that is released.
+/// How far the motion of a mechanism that is released exceeds the statics of what it is released from, and how far it swings back (1).
 const RELEASED: [f64; 2] = [-1.0, 1.0];
 /// Moments of each input for motion.
 const MOMENTS: usize = 2;
@@ -119,6 +121,77 @@ pub(crate) fn equilibrium(compiled: &CompiledModel, point: &OperatingPoint) -> R
     Ok(ReducedEquilibrium { point, directions: space.size(), error })
 }
 
+/// Trains for what acts in a run, unless that has directions from a run before. With the option `ranges` that is all within the ranges of ports; ports without a range keep what the run
+/// gives them, and a value beyond its range widens this. Runs with the same ranges have the same coordinates.
+///
+/// # Errors
+/// [`AnalysisError::BadRequest`] for ports that the model does not have, and those of the equilibrium that a run is released from.
+pub fn train_motion(compiled: &CompiledModel, options: &TransientOptions<'_>) -> Result<TrainedMotion, AnalysisError> {
+    // the tolerance of the model: runs that are compared with each other for their steps have one space
+    let errors = compiled.options.errors();
+    let tol = errors.requested();
+    if tol < FULL_IN_TIME {
+        return Ok(Err(format!(
+            "at a tolerance of {tol:e} its error in time may be larger; --tol {FULL_IN_TIME:e} or more takes it"
+        )));
+    }
+    if options.shock.is_some() {
+        return Ok(Err("a shock is none of the inputs that it is trained for".to_owned()));
+    }
+    let cases = cases(compiled, options)?;
+    let largest = cases.first().map(|(_, inputs)| inputs.drive(&vec![1.0; inputs.inputs.len()]));
+    let found = match &options.directions {
+        Some(Directions::Trained { training, polynomials }) => Ok((Arc::clone(training), *polynomials)),
+        Some(Directions::Full(why)) => Err(why.clone()),
+        None => trained(&cases, tol, MOMENTS).map(|training| (Arc::new(training), errors)),
+    };
+    let (training, polynomials) = match found {
+        Ok(found) => found,
+        Err(why) => return Ok(Err(why)),
+    };
+    let system = &compiled.parts.system;
+    let fitted = largest.and_then(|drive| of_motion(&training, system, &drive, polynomials));
+    let space = Arc::new(match &fitted {
+        Some(fitted) => fitted.space.clone(),
+        None => training.space.of_system(system),
+    });
+    Ok(Ok(MotionReduction { space, training, fitted, polynomials }))
+}
+
+/// The systems of a run with what acts on them: what moves first, then what it is released from.
+fn cases<'a>(
+    compiled: &'a CompiledModel,
+    options: &TransientOptions<'a>,
+) -> Result<Vec<(&'a System, InputBox)>, AnalysisError> {
+    let system = &compiled.parts.system;
+    let electrics = &system.electrics;
+    let sources = source_vector(compiled, &options.voltages)?;
+    let Some(start) = options.release else {
+        return Ok(vec![(system, in_ranges(compiled, &sources))]);
+    };
+    let mut steady = electrics.drive();
+    electrics.steady(&sources, &mut vec![0.0; electrics.heating.states()], &mut steady);
+    let point = operating_point(start, &options.voltages)?;
+    let begun = point.drive(start);
+    let own = &start.parts.system;
+    Ok(vec![(system, InputBox::around(system, &[steady], RELEASED)), (own, InputBox::around(own, &[begun], RELEASED))])
+}
+
+/// The box of a run from rest with these sources, whose ports may have ranges.
+fn in_ranges(compiled: &CompiledModel, sources: &[f64]) -> InputBox {
+    let system = &compiled.parts.system;
+    let ports = &system.electrics.names[..system.electrics.ports];
+    let given = compiled.options.ranges.as_ref();
+    let mut ranged: Vec<(usize, [f64; 2])> = Vec::new();
+    for (port, name) in ports.iter().enumerate() {
+        if let Some([low, high]) = given.and_then(|ranges| ranges.of(name)) {
+            ranged.push((port, [low.min(sources[port]), high.max(sources[port])]));
+        }
+    }
+    let (ports, ranges): (Vec<usize>, Vec<[f64; 2]>) = ranged.into_iter().unzip();
+    inputs_beside(system, sources, (&ports, &ranges))
+}
+
 /// A run of the full model, for given samples and progress.
 pub type FullRun<'a> =
     dyn FnMut(&mut dyn FnMut(f64, &[f64]), ProgressCallback<'_>) -> Result<TransientResult, AnalysisError> + 'a;
@@ -143,59 +216,46 @@ pub fn reduced_transient(
                     .into(),
         });
     }
-    // the tolerance of the model: runs that are compared with each other for their steps have one space
-    let tol = compiled.options.errors().requested();
-    let found = if tol < FULL_IN_TIME {
-        Err(format!(
-            "at a tolerance of {tol:e} its error in time may be larger; --tol {FULL_IN_TIME:e} or more takes it"
-        ))
-    } else if options.shock.is_some() {
-        Err("a shock is none of the inputs that it is trained for".to_owned())
-    } else {
-        let cases = cases(compiled, options)?;
-        let largest = cases.first().map(|(_, inputs)| inputs.drive(&vec![1.0; inputs.inputs.len()]));
-        let found = match &options.directions {
-            Some(Directions::Trained { training, polynomials }) => Ok((Arc::clone(training), *polynomials)),
-            Some(Directions::Full(why)) => Err(why.clone()),
-            None => trained(&cases, tol, MOMENTS).map(|training| (Arc::new(training), compiled.options.errors())),
-        };
-        found.map(|found| (found, largest))
+    let shared = options.reduction.as_ref().filter(|_| options.directions.is_none());
+    let trained = match shared {
+        Some(trained) => Arc::clone(trained),
+        None => Arc::new(train_motion(compiled, options)?),
     };
-    let ((training, polynomials), largest) = match found {
-        Ok(found) => found,
+    let reduction = match &*trained {
+        Ok(reduction) => reduction,
         Err(why) => {
             let mut result = full(sample, watch)?;
-            result.warnings.push(coded(taken(&why)));
+            result.warnings.push(coded(taken(why)));
             return Ok(result);
         }
     };
-    let system = &compiled.parts.system;
-    let fitted = largest.and_then(|drive| of_motion(&training, system, &drive, polynomials));
-    let space = Arc::new(match &fitted {
-        Some(fitted) => fitted.space.clone(),
-        None => training.space.of_system(system),
-    });
-    let mut carrier = ReducedPropagator {
-        compiled,
-        options,
-        space: &space,
-        fitted,
-        polynomials,
-        corrections: None,
-        error: None,
-        excess: 0.0,
-    };
-    let mut result = record(compiled, options, &mut carrier, sample, watch)?;
+    let mut carrier = ReducedPropagator { compiled, options, reduction, corrections: None, error: None, excess: 0.0 };
+    let result = record(compiled, options, &mut carrier, sample, watch)?;
     let ReducedPropagator { corrections, error, excess, .. } = carrier;
-    result.unknowns = space.size();
-    let directions = Directions::Trained { training, polynomials };
-    result.directions = corrections.map(|corrections| directions.after(system, &corrections));
+    let mut result = concluded(result, compiled, reduction, (error, excess));
+    // a run that shares its training leaves it as it is
+    if let (Some(corrections), None) = (corrections, shared) {
+        let MotionReduction { training, polynomials, .. } = reduction;
+        let directions = Directions::Trained { training: Arc::clone(training), polynomials: *polynomials };
+        result.directions = Some(directions.after(&compiled.parts.system, &corrections));
+    }
+    Ok(result)
+}
+
+/// The result of a reduced run with its estimated error by the reduction (1) and its excess over the trained states (1).
+fn concluded(
+    mut result: TransientResult,
+    compiled: &CompiledModel,
+    reduction: &MotionReduction,
+    (error, excess): (Option<f64>, f64),
+) -> TransientResult {
+    result.unknowns = reduction.space.size();
     if let Some(error) = error {
         result.estimated_error = result.estimated_error.map(|mesh| mesh + error);
-        result.warnings.extend(beyond(error, tol).map(coded));
+        result.warnings.extend(beyond(error, compiled.options.errors().requested()).map(coded));
     }
     result.warnings.extend(left(excess).map(coded));
-    Ok(result)
+    result
 }
 
 fn coded(message: String) -> String {
@@ -226,34 +286,11 @@ fn rest(system: &System) -> Drive {
     Drive { load: 0.0, ..system.electrics.drive() }
 }
 
-/// The systems of a run with what acts on them: what moves first, then what it is released from.
-fn cases<'a>(
-    compiled: &'a CompiledModel,
-    options: &TransientOptions<'a>,
-) -> Result<Vec<(&'a System, InputBox)>, AnalysisError> {
-    let system = &compiled.parts.system;
-    let electrics = &system.electrics;
-    let sources = source_vector(compiled, &options.voltages)?;
-    let mut steady = electrics.drive();
-    electrics.steady(&sources, &mut vec![0.0; electrics.heating.states()], &mut steady);
-    let Some(start) = options.release else {
-        return Ok(vec![(system, InputBox::around(system, &[steady], FROM_REST))]);
-    };
-    let point = operating_point(start, &options.voltages)?;
-    let begun = point.drive(start);
-    let own = &start.parts.system;
-    Ok(vec![(system, InputBox::around(system, &[steady], RELEASED)), (own, InputBox::around(own, &[begun], RELEASED))])
-}
-
 /// The reduced coordinates during a motion.
 struct ReducedPropagator<'a> {
     compiled: &'a CompiledModel,
     options: &'a TransientOptions<'a>,
-    space: &'a Arc<ReducedSpace>,
-    /// Forces as polynomials, where these are within their part of the tolerance.
-    fitted: Option<FittedMotion>,
-    /// The division of the tolerance for them.
-    polynomials: ErrorBudget,
+    reduction: &'a MotionReduction,
     /// Corrections of the full model along the motion.
     corrections: Option<MotionCorrections>,
     /// Estimated error by the reduction (1).
@@ -266,7 +303,7 @@ impl Propagator for ReducedPropagator<'_> {
     fn begin(&mut self, _: &Ramp<'_>, motion: &mut Motion) -> Result<(), AnalysisError> {
         let Some(start) = self.options.release else { return Ok(()) };
         let point = operating_point(start, &self.options.voltages)?;
-        let own = self.space.of_system(&start.parts.system);
+        let own = self.reduction.space.of_system(&start.parts.system);
         let (none, to) = (rest(&start.parts.system), point.drive(start));
         let mut statics = ReducedStatics::new(&own);
         let found = statics.follow(&own, &DriveRay { none: &none, to: &to }, &mut vec![0.0; own.size()]);
@@ -286,11 +323,7 @@ impl Propagator for ReducedPropagator<'_> {
         let system = &self.compiled.parts.system;
         let h = first_step(system, self.options.stop);
         let run = IntegrationRun { motion, h, control: self.options.control(), observe, corners: Vec::new() };
-        let mut method = ReducedRodas4::new(Arc::clone(self.space), h).with_estimate(system);
-        if let Some(fitted) = self.fitted.take() {
-            let share = self.polynomials.reduced_statics();
-            method = method.with_polynomials(fitted.polynomials, share, fitted.largest);
-        }
+        let method = self.reduction.method(system, h);
         let (end, stepper) = run.stepped(&mut Bodies::new(system, ramp), method);
         (self.error, self.excess) = (stepper.method.error(), stepper.method.excess);
         self.corrections = stepper.method.corrections().cloned();

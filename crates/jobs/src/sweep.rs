@@ -18,6 +18,7 @@ mod point_budget;
 mod point_error;
 #[cfg(feature = "server")]
 mod points;
+mod reductions;
 mod samples;
 mod scheduling;
 pub mod shard;

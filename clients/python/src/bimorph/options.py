@@ -74,9 +74,10 @@ class Options(TypedDict, total=False):
     rcr-elastic, reduced; default: auto."""
 
     ranges: str | None
-    """Ranges of what a circuit gives to ports (V, N, W), for which a reduced model is trained
-    (docs/explanation/reduction.md). Without them circuits have the full model. Range: NAME:LOW:HIGH with LOW
-    below HIGH, finite and once for each port, separated by commas (in decks by bars); default: none."""
+    """Ranges of what is given to ports (V, N, W), for which a reduced model is trained
+    (docs/explanation/reduction.md). Without them tran trains for its own values, and circuits have the full
+    model. Range: NAME:LOW:HIGH with LOW below HIGH, finite and once for each port, separated by commas (in
+    decks by bars); default: none."""
 
 
 WIRE = {

@@ -1,54 +1,17 @@
 //! Reduced models in circuits: trained once for the ranges of the ports, with polynomial forces throughout.
 
+use super::ranges::range_inputs;
 use super::{FULL_IN_TIME, MOMENTS, trained};
 use bimorph_base::ErrorBudget;
-use bimorph_domains::{Drive, System};
+use bimorph_domains::System;
 use bimorph_model::compile::CompiledModel;
+use bimorph_solve::reduced::ReducedSpace;
 use bimorph_solve::reduced::polynomial::moving::of_motion;
-use bimorph_solve::reduced::{InputBox, ReducedSpace};
 use bimorph_solve::time::reduced_rodas4::ReducedRodas4;
 use std::sync::Arc;
 
-/// How far motion exceeds the statics of what is applied at once, and how far it swings back through rest (1).
-const OVERSHOOT: [f64; 2] = [-0.5, 2.0];
-/// Ports of which all corners of the ranges are drives of the training.
-const CORNERS: usize = 6;
 /// Part of a range that an input may lie beyond it (1).
 const BEYOND: f64 = 0.1;
-
-/// The box of inputs for ranges of sources, in the unit of each; the others are at rest.
-pub fn range_inputs(system: &System, sources: &[usize], ranges: &[[f64; 2]]) -> InputBox {
-    let electrics = &system.electrics;
-    let p = ranges.len();
-    let corners = if p <= CORNERS { 1usize << p } else { 2 * p + 1 };
-    let end = |corner: usize, q: usize| match p <= CORNERS {
-        true => (corner >> q) & 1,
-        false => usize::from(corner == 2 * p || corner == 2 * q),
-    };
-    let drives: Vec<Drive> = (0..corners)
-        .map(|corner| {
-            let mut u = vec![0.0; electrics.sources()];
-            electrics.fill_sources(&vec![0.0; electrics.ports], &mut u);
-            for (q, range) in ranges.iter().enumerate() {
-                u[sources[q]] = range[end(corner, q)];
-            }
-            let mut drive = electrics.drive();
-            electrics.steady(&u, &mut vec![0.0; electrics.heating.states()], &mut drive);
-            drive
-        })
-        .collect();
-    let mut inputs = InputBox::around(system, &drives, OVERSHOOT);
-    // forces of both signs go as far back as ahead
-    let lowest = |k: usize| drives.iter().map(|drive| drive.inputs[k]).fold(0.0, f64::min);
-    let highest = |k: usize| drives.iter().map(|drive| drive.inputs[k]).fold(0.0, f64::max);
-    for input in &mut inputs.inputs {
-        let of = (0..input.unit.inputs.len()).find(|k| input.unit.inputs[*k] != 0.0);
-        if of.is_some_and(|k| lowest(k) < 0.0 && highest(k) > 0.0) {
-            input.range[0] = -OVERSHOOT[1];
-        }
-    }
-    inputs
-}
 
 /// A reduced model of a circuit. Immutable; shared by sessions.
 #[derive(Debug)]

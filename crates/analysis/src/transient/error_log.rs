@@ -41,7 +41,7 @@ pub(crate) struct StepErrorEstimate {
 }
 
 /// Signals and their errors at some ends of steps.
-pub(super) struct ErrorLog<'a> {
+pub(crate) struct ErrorLog<'a> {
     compiled: &'a CompiledModel,
     ramp: &'a Ramp<'a>,
     volts: &'a [f64],

@@ -3,12 +3,14 @@
 use super::super::AnalysisError;
 use super::super::integrator::Integrator;
 use super::super::reduced::Directions;
+use super::super::reduced::shared::TrainedMotion;
 use bimorph_base::ErrorBudget;
 use bimorph_domains::{InputWaveform, Shock};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::analysis::TRAN_POINTS;
 use bimorph_solve::baseline::SolverKind;
 use bimorph_solve::time::adaptive::Control;
+use std::sync::Arc;
 
 /// Samples of a run that may be made again, at most (1): eight megabytes.
 const MAX_STORED_SAMPLES: usize = 1 << 20;
@@ -72,6 +74,8 @@ pub struct TransientOptions<'a> {
     pub keep: bool,
     /// Directions of a reduced model, from a run before; none: those of a training.
     pub directions: Option<Directions>,
+    /// A training that several runs share, where no directions are given; none: a run with a reduced model is trained for what acts in it.
+    pub reduction: Option<Arc<TrainedMotion>>,
 }
 
 impl Default for TransientOptions<'_> {
@@ -94,6 +98,7 @@ impl Default for TransientOptions<'_> {
             estimate: false,
             keep: true,
             directions: None,
+            reduction: None,
         }
     }
 }
@@ -156,6 +161,12 @@ impl<'a> TransientOptions<'a> {
     #[must_use]
     pub fn with_directions(&self, directions: Option<Directions>) -> Self {
         Self { directions, ..self.clone() }
+    }
+
+    /// With a training that this run shares with others.
+    #[must_use]
+    pub fn with_reduction(&self, reduction: Arc<TrainedMotion>) -> Self {
+        Self { reduction: Some(reduction), ..self.clone() }
     }
 
     /// With another integrator.

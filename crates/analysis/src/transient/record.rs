@@ -16,7 +16,7 @@ use super::samples::SampleRecorder;
 use crate::overheating::check_course;
 use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
-use bimorph_domains::{InputWaveform, Ramp, System};
+use bimorph_domains::{Drive, InputWaveform, Ramp, System};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::Body;
 use bimorph_multibody::planar::Pose;
@@ -56,6 +56,185 @@ pub(crate) trait Propagator {
     ) -> Result<(Advance, SolverCounters), AnalysisError>;
 }
 
+/// The start of a run: its motion, sources and signals.
+pub(crate) struct RunStart {
+    sources: Vec<f64>,
+    signals: Vec<Expression<RunSignal>>,
+    motions: Vec<(usize, InputWaveform)>,
+    /// The motion.
+    pub(crate) motion: Motion,
+    /// Temperature rises of the heaters (K).
+    rise: Vec<f64>,
+    /// Warnings about the equilibrium that it is released from.
+    begun: Vec<String>,
+}
+
+impl RunStart {
+    /// # Errors
+    /// [`AnalysisError::BadRequest`] for options that mean nothing, and those of the equilibrium that the run is released from.
+    pub(crate) fn of(compiled: &CompiledModel, options: &TransientOptions<'_>) -> Result<Self, AnalysisError> {
+        check(options)?;
+        let sources = source_vector(compiled, &options.voltages)?;
+        let signals = options
+            .signals
+            .iter()
+            .map(|name| Expression::of_run(compiled, name, &sources))
+            .collect::<Result<_, _>>()?;
+        let (motion, rise, begun) = start(compiled, options)?;
+        Ok(Self { sources, signals, motions: motions(compiled, options)?, motion, rise, begun })
+    }
+
+    /// Sources and heat over the run.
+    ///
+    /// # Errors
+    /// [`AnalysisError`] where heaters leave all bounds.
+    pub(crate) fn ramp<'a>(
+        &'a self,
+        compiled: &'a CompiledModel,
+        options: &TransientOptions<'_>,
+    ) -> Result<Ramp<'a>, AnalysisError> {
+        let (sources, stop) = (&self.sources, options.stop);
+        let ramp = Ramp::new(&compiled.parts.system.electrics, sources, sources, &self.rise, stop);
+        let ramp = ramp.shocked(options.shock).moved(&self.motions);
+        check_course(compiled, &ramp)?;
+        Ok(ramp)
+    }
+}
+
+/// Takes samples and events of a run, and checks its stability and its range, step by step.
+pub(crate) struct Recording<'a> {
+    compiled: &'a CompiledModel,
+    options: &'a TransientOptions<'a>,
+    start: &'a RunStart,
+    ramp: &'a Ramp<'a>,
+    volts: &'a [f64],
+    drive: Drive,
+    crossings: Crossings<'a>,
+    samples: SampleRecorder<'a>,
+    stability: StabilityMonitor,
+    energy: Option<ContactEnergy<'a>>,
+    stress: PeakStress<'a>,
+    gas: FilmPressure<'a>,
+    /// Checks of stability so far.
+    looks: usize,
+    /// Why the run ended before its end.
+    beyond: Option<AnalysisError>,
+    stopped_at: Option<f64>,
+}
+
+impl<'a> Recording<'a> {
+    /// Of a run from `motion`, under voltages that hold.
+    ///
+    /// # Errors
+    /// [`AnalysisError::BadRequest`] for signals of events that do not exist, and for a start in contact with a method that gains energy there.
+    pub(crate) fn start(
+        (compiled, options): (&'a CompiledModel, &'a TransientOptions<'a>),
+        start: &'a RunStart,
+        (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
+        sample: &'a mut dyn FnMut(f64, &[f64]),
+        motion: &Motion,
+    ) -> Result<Self, AnalysisError> {
+        let system = &compiled.parts.system;
+        let (asked, held) = ((compiled, options), (ramp, volts));
+        let crossings = Crossings::start(asked, (&start.sources, held), (motion, &start.rise))?;
+        let mut drive = system.electrics.drive();
+        ramp.at(0.0, &mut drive);
+        let samples = SampleRecorder::start(asked, held, &start.signals, sample, motion);
+        let energy = ContactEnergy::start(compiled, options, motion, &drive);
+        refuse_in_contact(compiled, options, 0.0, motion)?;
+        Ok(Self {
+            compiled,
+            options,
+            start,
+            ramp,
+            volts,
+            drive,
+            crossings,
+            samples,
+            stability: StabilityMonitor::new(system),
+            energy,
+            stress: PeakStress::new(compiled, held, options.shock.is_some()),
+            gas: FilmPressure::new(system),
+            looks: 0,
+            beyond: None,
+            stopped_at: None,
+        })
+    }
+
+    /// Takes a step of length `h` (s) from time `s`; false: the run ends there.
+    pub(crate) fn step(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> bool {
+        let Self { compiled, options, ramp, volts, .. } = *self;
+        let system = &compiled.parts.system;
+        self.stopped_at = self.crossings.step(s, h, before, after);
+        self.gas.step(s + h, after);
+        self.stress.step(s + h, after);
+        let suits = refuse_in_contact(compiled, options, s + h, after);
+        let within = |()| within_contact_range(compiled, &after.q, |gap| volts[gap] != 0.0);
+        let done = ((s + h) / options.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize;
+        let look = done > self.looks || options.step.is_some() && !self.crossings.stays_within(NEAR);
+        let kept = |()| self.energy.as_mut().map_or(Ok(()), |energy| energy.step(options, s + h, after, look));
+        // energy first: steps that are too long throw parts through each other
+        let ended = suits.and_then(kept).and_then(within);
+        if let Err(error) = ended.or_else(|error| self.stopped_at.map(|_| ()).ok_or(error)) {
+            self.beyond = Some(error);
+            return false;
+        }
+        self.samples.step(s, h, before, after, self.stopped_at.unwrap_or(f64::INFINITY));
+        if self.stopped_at.is_some() {
+            return false;
+        }
+        if done > self.looks {
+            self.looks = done;
+            ramp.at(s + h, &mut self.drive);
+            self.stability.check(system, &self.drive, s + h, (&after.q, &after.v));
+        }
+        true
+    }
+
+    /// The result of a run that ended so with this work; `log` has its errors, where it propagates them.
+    ///
+    /// # Errors
+    /// Why it ended before its end.
+    pub(crate) fn finish(
+        self,
+        end: Advance,
+        work: SolverCounters,
+        log: Option<ErrorLog<'_>>,
+    ) -> Result<TransientResult, AnalysisError> {
+        let Self { compiled, options, start, stopped_at, stability, stress, gas, samples, .. } = self;
+        if end == Advance::Stopped && stopped_at.is_none() {
+            return Err(self.beyond.unwrap_or(AnalysisError::Cancelled));
+        }
+        let estimate = log.and_then(|log| log.estimate(options));
+        let unreached = options.until.as_ref().filter(|_| stopped_at.is_none()).map(|until| {
+            format!("the run does not reach its end condition ({until}) by {:e} s; take a longer --stop", options.stop)
+        });
+        let named = options.signals.iter().zip(&start.signals).zip(samples.columns);
+        Ok(TransientResult {
+            t: samples.t,
+            signals: named.map(|((name, s), values)| (name.clone(), s.unit().to_owned(), values)).collect(),
+            counters: work,
+            unknowns: compiled.unknowns(),
+            estimated_error: compiled.order.estimated_error,
+            step_error: estimate.as_ref().map(|estimate| estimate.error),
+            stopped_at,
+            reliable_until: None,
+            after_contact: Vec::new(),
+            events: self.crossings.events,
+            largest_stress: stress.largest(),
+            directions: None,
+            formulation_taken: None,
+            warnings: (start.begun.iter().cloned())
+                .chain(stability.warning())
+                .chain(gas.warning())
+                .chain(stress.warning())
+                .chain(estimate.and_then(|e| e.lost).map(lost))
+                .chain(unreached)
+                .collect(),
+        })
+    }
+}
+
 /// Advances `carrier` from the start to the end of a run, and takes samples and events.
 pub(crate) fn record(
     compiled: &CompiledModel,
@@ -64,56 +243,17 @@ pub(crate) fn record(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: ProgressCallback<'_>,
 ) -> Result<TransientResult, AnalysisError> {
-    check(options)?;
-    let system = &compiled.parts.system;
-    let sources = source_vector(compiled, &options.voltages)?;
-    let signals: Vec<Expression<RunSignal>> =
-        options.signals.iter().map(|name| Expression::of_run(compiled, name, &sources)).collect::<Result<_, _>>()?;
-    let (mut motion, rise, begun) = start(compiled, options)?;
-    let motions = motions(compiled, options)?;
-    let ramp =
-        Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop).shocked(options.shock).moved(&motions);
-    check_course(compiled, &ramp)?;
-    let mut drive = system.electrics.drive();
+    let start = RunStart::of(compiled, options)?;
+    let ramp = start.ramp(compiled, options)?;
+    let mut drive = compiled.parts.system.electrics.drive();
     ramp.at(0.0, &mut drive);
-    let volts = drive.volts.clone();
+    let mut motion = start.motion.clone();
     carrier.begin(&ramp, &mut motion)?;
-
-    let (asked, held) = ((compiled, options), (&ramp, &volts[..]));
-    let mut crossings = Crossings::start(asked, (&sources, held), (&motion, &rise))?;
-    let mut samples = SampleRecorder::start(asked, held, &signals, sample, &motion);
-    let mut log = options.estimate.then(|| ErrorLog::start((compiled, options.stop), held, &signals, &motion));
-    let mut stability = StabilityMonitor::new(system);
-    let mut energy = ContactEnergy::start(compiled, options, &motion, &drive);
-    let mut stress = PeakStress::new(compiled, held, options.shock.is_some());
-    let mut gas = FilmPressure::new(system);
-    let mut looks = 0;
-    let (mut beyond, mut stopped_at) = (None, None);
-    refuse_in_contact(compiled, options, 0.0, &motion)?;
+    let held = (&ramp, &drive.volts[..]);
+    let mut log = options.estimate.then(|| ErrorLog::start((compiled, options.stop), held, &start.signals, &motion));
+    let mut recording = Recording::start((compiled, options), &start, held, sample, &motion)?;
     let mut observe = |s: f64, h: f64, before: &Motion, after: &Motion| {
-        stopped_at = crossings.step(s, h, before, after);
-        gas.step(s + h, after);
-        stress.step(s + h, after);
-        let suits = refuse_in_contact(compiled, options, s + h, after);
-        let within = |()| within_contact_range(compiled, &after.q, |gap| volts[gap] != 0.0);
-        let done = ((s + h) / options.stop * STABILITY_CHECKS as f64 * (1.0 + 1e-12)) as usize;
-        let look = done > looks || options.step.is_some() && !crossings.stays_within(NEAR);
-        let kept = |()| energy.as_mut().map_or(Ok(()), |energy| energy.step(options, s + h, after, look));
-        // energy first: steps that are too long throw parts through each other
-        if let Err(error) = suits.and_then(kept).and_then(within).or_else(|error| stopped_at.map(|_| ()).ok_or(error)) {
-            beyond = Some(error);
-            return false;
-        }
-        samples.step(s, h, before, after, stopped_at.unwrap_or(f64::INFINITY));
-        if stopped_at.is_some() {
-            return false;
-        }
-        if done > looks {
-            looks = done;
-            ramp.at(s + h, &mut drive);
-            stability.check(system, &drive, s + h, (&after.q, &after.v));
-        }
-        watch(((s + h) / options.stop).min(1.0))
+        recording.step(s, h, before, after) && watch(((s + h) / options.stop).min(1.0))
     };
     let mut errors = log.as_mut().map(|log| |t: f64, motion: &Motion, error: &Motion| log.observe(t, motion, error));
     let see = errors.as_mut().map(|see| see as SeeError<'_>);
@@ -123,37 +263,7 @@ pub(crate) fn record(
         }
         other => other,
     })?;
-    if end == Advance::Stopped && stopped_at.is_none() {
-        return Err(beyond.unwrap_or(AnalysisError::Cancelled));
-    }
-    let estimate = log.and_then(|log| log.estimate(options));
-    let unreached = options.until.as_ref().filter(|_| stopped_at.is_none()).map(|until| {
-        format!("the run does not reach its end condition ({until}) by {:e} s; take a longer --stop", options.stop)
-    });
-    let named = options.signals.iter().zip(&signals).zip(samples.columns);
-    Ok(TransientResult {
-        t: samples.t,
-        signals: named.map(|((name, s), values)| (name.clone(), s.unit().to_owned(), values)).collect(),
-        counters: work,
-        unknowns: compiled.unknowns(),
-        estimated_error: compiled.order.estimated_error,
-        step_error: estimate.as_ref().map(|estimate| estimate.error),
-        stopped_at,
-        reliable_until: None,
-        after_contact: Vec::new(),
-        events: crossings.events,
-        largest_stress: stress.largest(),
-        directions: None,
-        formulation_taken: None,
-        warnings: begun
-            .into_iter()
-            .chain(stability.warning())
-            .chain(gas.warning())
-            .chain(stress.warning())
-            .chain(estimate.and_then(|e| e.lost).map(lost))
-            .chain(unreached)
-            .collect(),
-    })
+    recording.finish(end, work, log)
 }
 
 /// Refuses the motion at time `t` (s) where parts touch and the method gains energy in contact.

@@ -15,7 +15,7 @@ use super::{ExportError, ExportRequest};
 use bimorph_analysis::readout::expression::Quantity;
 use bimorph_analysis::readout::ports::{OpenedPorts, PortResponse};
 use bimorph_analysis::readout::signal::{Signal, SignalView};
-use bimorph_analysis::reduced::circuit::range_inputs;
+use bimorph_analysis::reduced::ranges::range_inputs;
 use bimorph_base::ErrorBudget;
 use bimorph_device::PortKind;
 use bimorph_device::scale::PortScale;

@@ -203,6 +203,30 @@ impl SweepSpec {
         self.names().filter_map(|name| if let Varied::Voltage(port) = varied(name) { Some(port) } else { None })
     }
 
+    /// Ports whose voltages vary, each with its least and largest value in the whole grid, samples included (V).
+    pub(super) fn port_ranges(&self) -> Vec<(&str, [f64; 2])> {
+        let mut ranges: Vec<(&str, [f64; 2])> =
+            self.ports().map(|port| (port, [f64::INFINITY, -f64::INFINITY])).collect();
+        let mut widen = |name: &str, value: Setting| {
+            if let (Varied::Voltage(port), Setting::Number(volts)) = (varied(name), value)
+                && let Some((_, range)) = ranges.iter_mut().find(|(known, _)| *known == port)
+            {
+                *range = [range[0].min(volts), range[1].max(volts)];
+            }
+        };
+        for axis in &self.parameters {
+            let ends = axis.values.ends().into_iter().flat_map(|(least, largest)| [least, largest]);
+            ends.filter_map(|place| axis.values.get(place)).for_each(|value| widen(&axis.name, value));
+        }
+        let ports_vary = |samples: &&SampleGenerator| {
+            samples.asked.vary.iter().any(|vary| matches!(varied(&vary.name), Varied::Voltage(_)))
+        };
+        for samples in self.samples.iter().filter(ports_vary) {
+            (0..samples.asked.count).flat_map(|k| samples.values(k)).for_each(|(name, value)| widen(&name, value));
+        }
+        ranges
+    }
+
     /// Rejects invalid or repeated voltages.
     fn check_ports(&self) -> Result<(), SweepError> {
         let held = self.analysis.voltages();

@@ -11,6 +11,7 @@ use super::axis::{SweepParameter, at};
 use super::point::{PointOutcome, PointResults, PointValue, brief};
 use super::point_budget::PointBudget;
 use super::point_error::Failed;
+use super::reductions::{self, ReducedVariant, ReducedVariants};
 use super::samples::SampleGenerator;
 use super::shared_meshes::{alike, middle};
 use super::spec::{SweepAnalysis, SweepSpec};
@@ -19,8 +20,11 @@ use bimorph_analysis::chosen_run::tentative;
 use bimorph_analysis::formulation;
 use bimorph_analysis::mesh;
 use bimorph_analysis::readout::expression::Expression;
+use bimorph_analysis::reduced::batch::SharedRun;
+use bimorph_analysis::reduced::shared::TrainedMotion;
+use bimorph_analysis::reduced::{self, train_motion};
 use bimorph_analysis::step_error;
-use bimorph_analysis::transient::{TransientOptions, transient};
+use bimorph_analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph_analysis::{AnalysisError, ProgressCallback};
 use bimorph_base::Setting;
 use bimorph_model::compile::{CompileOptions, CompiledModel, Formulation, ParsedStructure, draw};
@@ -89,7 +93,9 @@ impl SweepMesh {
 
 /// A point on its mesh.
 struct MeshedPoint {
-    compiled: CompiledModel,
+    compiled: Arc<CompiledModel>,
+    /// The training that it shares with other points.
+    trained: Option<Arc<TrainedMotion>>,
     steps: Steps,
     /// Warnings about effects that its run omits.
     reported: Vec<String>,
@@ -101,11 +107,13 @@ pub(super) struct TransientSweep<'a> {
     source: &'a NetlistSource,
     options: Arc<CompileOptions>,
     mesh: OnceLock<Option<SweepMesh>>,
+    variants: ReducedVariants,
 }
 
 impl<'a> TransientSweep<'a> {
     pub(super) fn new(spec: &'a SweepSpec, source: &'a NetlistSource, options: Arc<CompileOptions>) -> Self {
-        Self { spec, source, options, mesh: OnceLock::new() }
+        let options = reductions::with_ranges(spec, options);
+        Self { spec, source, options, mesh: OnceLock::new(), variants: ReducedVariants::default() }
     }
 
     /// Runs some points. `finished` is called for each with whether it has a result, and returns whether to continue.
@@ -123,7 +131,7 @@ impl<'a> TransientSweep<'a> {
         let tol = prepared.iter().flatten().next().map_or(self.options.errors().requested(), |point| point.steps.tol);
         let like = |p: &'_ Result<MeshedPoint, Failed>| p.as_ref().is_ok_and(|point| point.steps.tol == tol);
         let variants: Vec<(usize, &CompiledModel)> = (prepared.iter().enumerate().filter(|(_, p)| like(p)))
-            .filter_map(|(k, p)| Some((k, &p.as_ref().ok()?.compiled)))
+            .filter_map(|(k, p)| Some((k, &*p.as_ref().ok()?.compiled)))
             .collect();
         let compiled: Vec<&CompiledModel> = variants.iter().map(|(_, compiled)| *compiled).collect();
         // lanes have one voltage for all
@@ -140,6 +148,7 @@ impl<'a> TransientSweep<'a> {
                 ends[*k] = end;
             }
         }
+        self.run_reduced(numbers, &prepared, means, &mut ends, &go_on);
         let mut outcomes = Vec::with_capacity(numbers.len());
         for ((&number, prepared), end) in numbers.iter().zip(&prepared).zip(ends) {
             let settings = self.spec.settings(number);
@@ -159,6 +168,29 @@ impl<'a> TransientSweep<'a> {
         Some(outcomes)
     }
 
+    /// Runs of points that share trainings, in lanes where these can have them.
+    fn run_reduced(
+        &self,
+        numbers: &[usize],
+        prepared: &[Result<MeshedPoint, Failed>],
+        means: &PointBudget,
+        ends: &mut [Option<RunEnd>],
+        go_on: &dyn Fn() -> bool,
+    ) {
+        let shared: Vec<(usize, SharedRun<'_>)> = (numbers.iter().zip(prepared).enumerate())
+            .filter_map(|(k, (&number, point))| {
+                let point = point.as_ref().ok().filter(|point| point.trained.is_some())?;
+                let options = own_options(point, &self.transient(&self.spec.settings(number)));
+                Some((k, (&*point.compiled, options)))
+            })
+            .collect();
+        let (places, runs): (Vec<usize>, Vec<SharedRun<'_>>) = shared.into_iter().unzip();
+        let Ok((results, _)) = means.guarded(|| Ok(reduced::batch::transients(&runs, &mut || go_on()))) else { return };
+        for (place, result) in places.into_iter().zip(results) {
+            ends[place] = result.map(ended);
+        }
+    }
+
     /// The run of a point.
     fn transient(&self, settings: &[(String, Setting)]) -> TransientOptions<'static> {
         let SweepAnalysis::Transient { stop, outputs, voltages } = &*self.spec.analysis_at(settings) else {
@@ -176,15 +208,38 @@ impl<'a> TransientSweep<'a> {
 
     /// A point on its mesh.
     fn prepare(&self, settings: &[(String, Setting)], go_on: &dyn Fn() -> bool) -> Result<MeshedPoint, String> {
-        let drawn = draw(self.source, &at(&self.options, settings)).map_err(|error| brief(&error))?;
         let options = self.transient(settings);
         let shared =
             if self.spec.has_variants() { self.mesh.get_or_init(|| self.search(go_on)).as_ref() } else { None };
+        if let Some(shared) = shared.filter(|_| reductions::shares(self.spec, &self.options)) {
+            let slot = self.variants.slot(settings);
+            let variant = slot.get_or_init(|| self.reduced_variant(settings, shared)).as_ref();
+            if let Some(ReducedVariant { compiled, trained }) = variant.map_err(Clone::clone)? {
+                let trained = Some(Arc::clone(trained));
+                return Ok(MeshedPoint { trained, ..prepared(Arc::clone(compiled), &options, shared.steps) });
+            }
+        }
+        let drawn = draw(self.source, &at(&self.options, settings)).map_err(|error| brief(&error))?;
         let on_shared = shared.map(|shared| Ok::<_, DiscretizeError>((shared.model(&drawn, &options)?, shared.steps)));
         match on_shared.transpose().map_err(|error| error.to_string())? {
-            Some((Some(compiled), steps)) => Ok(prepared(compiled, &options, steps)),
+            Some((Some(compiled), steps)) => Ok(prepared(Arc::new(compiled), &options, steps)),
             _ => on_own_mesh(&drawn.compile().map_err(|error| brief(&error))?, &options, go_on),
         }
+    }
+
+    /// The system of a point on the mesh that points share, trained for all voltages of its ports; none where its drawing has other beams.
+    fn reduced_variant(
+        &self,
+        settings: &[(String, Setting)],
+        shared: &SweepMesh,
+    ) -> Result<Option<ReducedVariant>, String> {
+        let drawn = draw(self.source, &at(&self.options, settings)).map_err(|error| brief(&error))?;
+        let options = self.transient(settings);
+        let Some(compiled) = shared.model(&drawn, &options).map_err(|error| error.to_string())? else {
+            return Ok(None);
+        };
+        let trained = train_motion(&compiled, &options).map_err(|error| error.to_string())?;
+        Ok(Some(ReducedVariant { compiled: Arc::new(compiled), trained: Arc::new(trained) }))
     }
 
     /// A run of its own: of the bodies where one in joint coordinates fails that `auto` took.
@@ -258,7 +313,7 @@ impl<'a> TransientSweep<'a> {
     }
 
     fn found(&self, point: &MeshedPoint, options: &TransientOptions<'_>, end: RunEnd) -> Result<PointResults, String> {
-        let MeshedPoint { compiled, steps: Steps { error, place, .. }, reported } = point;
+        let MeshedPoint { compiled, steps: Steps { error, place, .. }, reported, .. } = point;
         let mut values = Vec::with_capacity(end.values.len());
         for (name, value) in options.signals.iter().zip(end.values) {
             if !value.is_finite() {
@@ -282,9 +337,10 @@ impl<'a> TransientSweep<'a> {
 }
 
 /// A point on its mesh, with what its run leaves out.
-fn prepared(compiled: CompiledModel, options: &TransientOptions<'_>, steps: Steps) -> MeshedPoint {
+fn prepared(compiled: Arc<CompiledModel>, options: &TransientOptions<'_>, steps: Steps) -> MeshedPoint {
     let reported = mesh::run_warnings(&compiled, None, &options.voltages);
-    MeshedPoint { steps, reported: reported.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
+    let reported = reported.iter().map(|d| format!("{}: {}", d.code, d.message)).collect();
+    MeshedPoint { steps, reported, compiled, trained: None }
 }
 
 /// The steps of a run of this variant.
@@ -304,7 +360,7 @@ fn on_own_mesh(
 ) -> Result<MeshedPoint, String> {
     let (compiled, _) = mesh::fitted_in_time(drawn, options).map_err(|error| error.to_string())?;
     let steps = steps(&compiled, options, "by the end of the run", go_on);
-    Ok(prepared(compiled, options, steps))
+    Ok(prepared(Arc::new(compiled), options, steps))
 }
 
 /// The end of a run of its own.
@@ -313,11 +369,24 @@ fn end(
     options: &TransientOptions<'_>,
     watch: ProgressCallback<'_>,
 ) -> Result<RunEnd, AnalysisError> {
+    let result = transient(&point.compiled, &own_options(point, options), &mut |_, _| (), watch)?;
+    Ok(ended(result))
+}
+
+/// The options of a point with the tolerance of its steps and its training.
+fn own_options<'a>(point: &MeshedPoint, options: &TransientOptions<'a>) -> TransientOptions<'a> {
     let options = options.with_tolerance(point.steps.tol);
-    let result = transient(&point.compiled, &options, &mut |_, _| (), watch)?;
+    match &point.trained {
+        Some(trained) => options.with_reduction(Arc::clone(trained)),
+        None => options,
+    }
+}
+
+/// The end of a run.
+fn ended(result: TransientResult) -> RunEnd {
     let last = |(_, _, values): &(String, String, Vec<f64>)| values.last().copied().unwrap_or(f64::NAN);
     let values = result.signals.iter().map(last).collect();
-    Ok(RunEnd { values, steps: result.counters.steps, warnings: result.warnings })
+    RunEnd { values, steps: result.counters.steps, warnings: result.warnings }
 }
 
 /// Fraction of the samples beyond a probe on either side.

@@ -1,6 +1,8 @@
 //! Options of a model with one of them changed, and the division of their tolerance. No other place copies options to change one.
 
-use super::{Anchors, CompileOptions, Formulation, Junctions, ModelOption, OptionError, OptionValue, Scheme};
+use super::{
+    Anchors, CompileOptions, Formulation, Junctions, ModelOption, OptionError, OptionValue, PortRanges, Scheme,
+};
 use bimorph_base::{ErrorBudget, Setting};
 
 impl CompileOptions {
@@ -31,6 +33,12 @@ impl CompileOptions {
     #[must_use]
     pub fn with_formulation(&self, formulation: Formulation) -> Self {
         Self { formulation, ..self.clone() }
+    }
+
+    /// With other ranges of ports.
+    #[must_use]
+    pub fn with_ranges(&self, ranges: PortRanges) -> Self {
+        Self { ranges: Some(ranges), ..self.clone() }
     }
 
     /// With the inertia of sections that turn.

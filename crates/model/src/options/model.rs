@@ -123,8 +123,8 @@ options! {
     /// (static, tran, circuits); auto: what suits.
     formulation: Formulation = Formulation::Auto, "formulation" = 11, [""], Range::Names(&Formulation::NAMES), "";
 
-    /// Ranges of what a circuit gives to ports (V, N, W), for which a reduced model is trained
-    /// (docs/explanation/reduction.md). Without them circuits have the full model.
+    /// Ranges of what is given to ports (V, N, W), for which a reduced model is trained
+    /// (docs/explanation/reduction.md). Without them tran trains for its own values, and circuits have the full model.
     ranges: Option<PortRanges> = None, "ranges" = 18, [""], Range::Ranges, "none";
 }
 

@@ -108,6 +108,18 @@ impl<'a> Bodies<'a> {
         Some(([norm(&error.q), norm(&error.v)], ErrorBudget::of(tol).within(reach)))
     }
 
+    /// The norm of displacements by which errors are measured, where it is that of masses alone.
+    pub(crate) fn reach(&self, q: &[Pose]) -> Option<f64> {
+        let NormWeights { mass, dragged } = &*self.weights;
+        (*mass > 0.0 && dragged.is_empty()).then(|| self.system.model.mass_product(q, q).sqrt())
+    }
+
+    /// The error of a step of length `h` (s) over what it may be, between displacements of these norms and with an error of these; parts do not touch.
+    pub(crate) fn share_of_norms(&self, [before, after]: [f64; 2], error: [f64; 2], h: f64, tol: f64) -> f64 {
+        let floor = FLOOR * self.system.length_scale * self.weights.mass.sqrt();
+        relative_error(error, h, ErrorBudget::of(tol).within(before.max(after) + floor), 0.0)
+    }
+
     /// The same with weights that have been found before.
     pub fn weighed(system: &'a System, ramp: &'a Ramp<'a>, weights: &'a NormWeights) -> Self {
         Self { system, ramp, weights: Cow::Borrowed(weights) }

@@ -35,6 +35,7 @@
 //! | `stage_loss` | forces of contact that loses energy in the stages of both |
 //! | [`gyration`] | Coriolis' force in a frame that turns |
 //! | [`batch`] | runs of many variants in lanes |
+//! | [`reduced_batch`] | runs of one reduced model in lanes |
 
 pub mod adaptive;
 pub mod alpha;
@@ -54,6 +55,7 @@ pub mod joint_rodas4;
 pub mod method;
 mod pace;
 pub mod radau5;
+pub mod reduced_batch;
 pub mod reduced_rodas4;
 pub mod rodas4;
 mod rosenbrock;

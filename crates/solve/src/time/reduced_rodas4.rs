@@ -17,6 +17,7 @@
 
 mod circuit;
 mod coordinates;
+pub mod lanes;
 mod ports;
 
 use super::method::{Method, Motion, SolverCounters, StepFailure, StepResult};
@@ -67,7 +68,7 @@ struct ReductionEstimate {
 /// The forces as polynomials, which replace the exact kinematics of stages while their error is within a part of the tolerance.
 #[derive(Debug, Clone)]
 struct PolynomialStages {
-    of: PolynomialMotion,
+    of: Arc<PolynomialMotion>,
     forces: PolynomialForces,
     /// Motion of the bodies per unit of each direction at rest: near enough for the size of an error.
     moved: Vec<Vec<Pose>>,
@@ -116,6 +117,8 @@ pub struct ReducedRodas4 {
     ports: Option<Box<ReducedPortSensitivities>>,
     /// The accelerations are those of the motion to come.
     resumed: bool,
+    /// The coordinates and their rates are those of the motion to come.
+    projected: bool,
     /// Largest excess over the trained states so far, see [`ReducedSpace::excess`].
     pub excess: f64,
     work: SolverCounters,
@@ -157,6 +160,7 @@ impl ReducedRodas4 {
             estimate: None,
             ports: None,
             resumed: false,
+            projected: false,
             excess: 0.0,
             work: SolverCounters::default(),
             space,
@@ -186,7 +190,7 @@ impl ReducedRodas4 {
         };
         let moved = space.directions.iter().map(moved).collect();
         let forces = PolynomialForces::new(&of);
-        self.polynomials = Some(Box::new(PolynomialStages { of, forces, moved, share, largest }));
+        self.polynomials = Some(Box::new(PolynomialStages { of: Arc::new(of), forces, moved, share, largest }));
         self
     }
 
@@ -389,6 +393,37 @@ impl ReducedRodas4 {
         [error, norm(&now.z)]
     }
 
+    /// Coordinates and rates become those of a motion of the bodies.
+    fn project(&mut self, motion: &Motion) {
+        [self.now.z, self.now.v] = projected(&self.space, motion);
+    }
+
+    /// Places the bodies at the end of a step.
+    fn place_end(&mut self, motion: &mut Motion) {
+        let Self { space, forces, now, .. } = self;
+        forces.place(space, [&now.z, &now.v, &now.w]);
+        motion.q.copy_from_slice(&forces.placed.at);
+        motion.v.copy_from_slice(&forces.placed.rate);
+        self.keep();
+    }
+
+    /// The error of a step, its last increment, over the bodies where they are placed.
+    pub(super) fn fill_error(&mut self, error: &mut Motion) {
+        let Self { space, forces, increments, room, polynomials, .. } = self;
+        let last = &increments[ALPHA.len() - 1];
+        for (u, to) in [(&last.z, &mut error.q), (&last.v, &mut error.v)] {
+            if let Some(stages) = polynomials {
+                to.fill(Pose::zeros());
+                for (moved, u) in stages.moved.iter().zip(u) {
+                    to.iter_mut().zip(moved).for_each(|(to, moved)| *to += moved * *u);
+                }
+            } else {
+                space.strains(u, room);
+                forces.placed.spread(&space.joints.tree, room, to);
+            }
+        }
+    }
+
     fn keep(&mut self) {
         self.now.pack(&mut self.carried[..2]);
     }
@@ -463,26 +498,13 @@ impl RosenbrockStep for ReducedStep<'_> {
     }
 
     fn finish(&mut self) {
-        let ReducedRodas4 { space, forces, now, at, increments, room, polynomials, .. } = &mut *self.rodas;
+        let ReducedRodas4 { now, at, increments, .. } = &mut *self.rodas;
         let last = &increments[ALPHA.len() - 1];
         for ((now, at), u) in now.all().into_iter().zip(at.all()).zip([&last.z, &last.v, &last.w]) {
             now.iter_mut().zip(at.iter()).zip(u).for_each(|((now, at), u)| *now = at + u);
         }
-        forces.place(space, [&now.z, &now.v, &now.w]);
-        self.motion.q.copy_from_slice(&forces.placed.at);
-        self.motion.v.copy_from_slice(&forces.placed.rate);
-        for (u, to) in [(&last.z, &mut self.error.q), (&last.v, &mut self.error.v)] {
-            if let Some(stages) = polynomials {
-                to.fill(Pose::zeros());
-                for (moved, u) in stages.moved.iter().zip(u) {
-                    to.iter_mut().zip(moved).for_each(|(to, moved)| *to += moved * *u);
-                }
-            } else {
-                space.strains(u, room);
-                forces.placed.spread(&space.joints.tree, room, to);
-            }
-        }
-        self.rodas.keep();
+        self.rodas.place_end(self.motion);
+        self.rodas.fill_error(self.error);
         let ReducedRodas4 { ports, carried, .. } = &mut *self.rodas;
         if let Some(ports) = ports {
             ports.finish();
@@ -500,8 +522,9 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         if std::mem::take(&mut self.resumed) {
             return Ok(());
         }
-        let [z, v] = projected(&self.space, motion);
-        (self.now.z, self.now.v) = (z, v);
+        if !std::mem::take(&mut self.projected) {
+            self.project(motion);
+        }
         bodies.ramp.at(0.0, &mut self.drive);
         self.drive.load = 1.0;
         self.make_consistent()

@@ -12,11 +12,11 @@ use nalgebra::DMatrix;
 pub(super) struct MonomialChain {
     size: usize,
     /// The monomial and the coordinate whose product each is; the constant 1 has the place behind the last.
-    links: Vec<[usize; 2]>,
+    pub(super) links: Vec<[usize; 2]>,
     /// Monomials with the coordinates that they have.
-    touched: Vec<[usize; 2]>,
+    pub(super) touched: Vec<[usize; 2]>,
     /// Monomials with two of their factors, and the place of the product of the others.
-    pairs: Vec<[usize; 4]>,
+    pub(super) pairs: Vec<[usize; 4]>,
 }
 
 /// Values at a state.

@@ -7,6 +7,8 @@
 //! ```
 //! The mass matrix is (∂p/∂z)ᵀ·(∂p/∂z) at each state, and forces quadratic in rates are in p̈. No body is placed.
 
+pub mod lanes;
+
 use super::chain::{MonomialChain, MonomialValues};
 use super::rows::{LaneColumns, PolynomialRows, add_gram};
 use super::shapes::MemberPoints;
@@ -24,6 +26,30 @@ struct PointState {
     force: f64,
     stiffness: f64,
     damping: f64,
+}
+
+impl PointState {
+    /// Of a law at an approach (m) with its rate (m/s), under a voltage (V).
+    #[inline]
+    fn of(law: &PointLaw, (approach, rate): (f64, f64), volts: f64) -> Self {
+        let pressed = law.at(approach, volts);
+        let mut state = Self { approach, force: pressed.force, stiffness: pressed.stiffness, damping: 0.0 };
+        if law.loss > 0.0 {
+            let bears = law.at(approach, 0.0);
+            let added = law.loss * rate;
+            let (share, by_rate) = if added > -1.0 { (added, law.loss) } else { (-1.0, 0.0) };
+            state.force += bears.force * share;
+            state.stiffness += bears.stiffness * share;
+            state.damping += bears.force * by_rate;
+        }
+        if let Some((drawn, film)) = law.film {
+            let (damping, by_distance) = film.damping(drawn - approach);
+            state.force += damping * rate;
+            state.stiffness -= by_distance * rate;
+            state.damping += damping;
+        }
+        state
+    }
 }
 
 /// The polynomials of a space whose directions are turned as theirs are: z = A·x.
@@ -212,25 +238,8 @@ impl PolynomialForces {
             let volts = drive.volts[points.member];
             for (k, law) in points.laws.iter().enumerate() {
                 let point = points.first + k;
-                let approach = sum(point, &self.shape);
-                let pressed = law.at(approach, volts);
-                let state = &mut self.points[point];
-                *state = PointState { approach, force: pressed.force, stiffness: pressed.stiffness, damping: 0.0 };
-                if law.loss > 0.0 {
-                    let bears = law.at(approach, 0.0);
-                    let added = law.loss * sum(point, &self.shape_rate);
-                    let (share, by_rate) = if added > -1.0 { (added, law.loss) } else { (-1.0, 0.0) };
-                    state.force += bears.force * share;
-                    state.stiffness += bears.stiffness * share;
-                    state.damping += bears.force * by_rate;
-                }
-                if let Some((drawn, film)) = law.film {
-                    let rate = sum(point, &self.shape_rate);
-                    let (damping, by_distance) = film.damping(drawn - approach);
-                    state.force += damping * rate;
-                    state.stiffness -= by_distance * rate;
-                    state.damping += damping;
-                }
+                let rate = if of.resists { sum(point, &self.shape_rate) } else { 0.0 };
+                self.points[point] = PointState::of(law, (sum(point, &self.shape), rate), volts);
             }
         }
         // the values of shapes are not needed any more: what acts on shapes stands in their place

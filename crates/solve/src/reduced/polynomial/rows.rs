@@ -37,6 +37,18 @@ impl LaneColumns {
         self.columns
     }
 
+    /// The columns of a group of rows.
+    #[inline(always)]
+    pub(super) fn group(&self, group: usize) -> &[Lane8] {
+        &self.lanes[group * self.columns..(group + 1) * self.columns]
+    }
+
+    /// An element.
+    #[inline(always)]
+    pub(super) fn at(&self, row: usize, column: usize) -> f64 {
+        self.group(row / LANES)[column].0[row % LANES]
+    }
+
     /// `to +=` the product with the first numbers of `x`; `to` has all groups.
     #[inline]
     pub(super) fn add_product(&self, x: &[f64], to: &mut [f64]) {
@@ -63,6 +75,16 @@ impl PolynomialRows {
             of_rows: LaneColumns::new(coefficients, count.div_ceil(LANES)),
             of_monomials: LaneColumns::new(&coefficients.transpose(), chain.groups()),
         }
+    }
+
+    /// Coefficients by groups of rows.
+    pub(super) fn of_rows(&self) -> &LaneColumns {
+        &self.of_rows
+    }
+
+    /// Coefficients by groups of monomials.
+    pub(super) fn of_monomials(&self) -> &LaneColumns {
+        &self.of_monomials
     }
 
     /// Groups of lanes that the rows take.

@@ -4,7 +4,7 @@
 //! dead loads act on few bodies and have branches of their own, and run variant by variant.
 
 mod acted;
-mod heat;
+pub(in crate::time) mod heat;
 mod kernels;
 mod motion;
 mod storage;

@@ -37,7 +37,7 @@ struct LaneLag {
 
 /// The heaters of a mechanism.
 #[derive(Debug, Clone)]
-pub(super) struct LaneHeat {
+pub(in crate::time) struct LaneHeat {
     heaters: Vec<LaneHeater>,
     lags: Vec<LaneLag>,
     /// Time constants as they are, heater by heater (s).
@@ -46,7 +46,7 @@ pub(super) struct LaneHeat {
 
 impl LaneHeat {
     /// For so many heaters as these.
-    pub(super) fn new(heaters: &[HeatConductor]) -> Self {
+    pub(in crate::time) fn new(heaters: &[HeatConductor]) -> Self {
         let none = Lane8::NONE;
         let heater = |_: &HeatConductor| LaneHeater {
             lag: 0,
@@ -61,12 +61,12 @@ impl LaneHeat {
         new
     }
 
-    pub(super) fn count(&self) -> usize {
+    pub(in crate::time) fn count(&self) -> usize {
         self.heaters.len()
     }
 
     /// Puts the heaters of a variant into one lane.
-    pub(super) fn set_lane(&mut self, lane: usize, ramp: &Ramp<'_>) {
+    pub(in crate::time) fn set_lane(&mut self, lane: usize, ramp: &Ramp<'_>) {
         let all = ramp.electrics.heating.heaters.iter().enumerate();
         for ((to, tau), (k, heater)) in self.heaters.iter_mut().zip(&mut self.time_constants).zip(all) {
             let lags = heater.time_constant > 0.0;
@@ -97,7 +97,7 @@ impl LaneHeat {
     }
 
     /// Goes to the time of each lane (s), where it is one.
-    pub(super) fn at(&mut self, s: [Option<f64>; LANES]) {
+    pub(in crate::time) fn at(&mut self, s: [Option<f64>; LANES]) {
         for lag in &mut self.lags {
             for (k, s) in s.iter().enumerate() {
                 let Some(s) = *s else { continue };
@@ -113,7 +113,7 @@ impl LaneHeat {
 
     /// The free strain of each heater at that time.
     #[inline(always)]
-    pub(super) fn expansions<W: SimdReal>(&self, simd: W::Simd, to: &mut [Lane8]) {
+    pub(in crate::time) fn expansions<W: SimdReal>(&self, simd: W::Simd, to: &mut [Lane8]) {
         for (heater, to) in self.heaters.iter().zip(to) {
             (W::load(simd, &heater.expansion) * self.rise::<W>(simd, heater)).store(to);
         }
@@ -121,7 +121,7 @@ impl LaneHeat {
 
     /// Its rate of change (1/s).
     #[inline(always)]
-    pub(super) fn rates<W: SimdReal>(&self, simd: W::Simd, to: &mut [Lane8]) {
+    pub(in crate::time) fn rates<W: SimdReal>(&self, simd: W::Simd, to: &mut [Lane8]) {
         for (heater, to) in self.heaters.iter().zip(to) {
             let of = |x: &Lane8| W::load(simd, x);
             let slope = (of(&heater.steady) - self.rise::<W>(simd, heater)) / of(&heater.time_constant);

@@ -1,0 +1,155 @@
+//! Sweeps of motions in a reduced model over the voltages of ports.
+
+use bimorph::analysis::reduced::batch::{SharedRun, transients};
+use bimorph::analysis::reduced::train_motion;
+use bimorph::analysis::step_error::step_error;
+use bimorph::analysis::transient::{TransientOptions, transient};
+use bimorph::compile::{CompileOptions, Formulation, compile};
+use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepSpec};
+use bimorph::netlist::{Bundle, Setting, read_bundle};
+use bimorph::options::PortRanges;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A row: its value, and its warnings.
+type Row = (u64, String);
+
+/// The rows of a sweep of transients over these axes.
+fn swept(
+    bundle: &Bundle,
+    options: &CompileOptions,
+    run: &TransientOptions<'_>,
+    axes: &[&str],
+    threads: usize,
+) -> Vec<Row> {
+    let (stop, outputs, voltages) = (run.stop, run.signals.clone(), run.voltages.clone());
+    let spec = SweepSpec {
+        parameters: axes.iter().map(|text| text.parse::<SweepParameter>().expect("an axis")).collect(),
+        samples: None,
+        analysis: SweepAnalysis::Transient { stop, outputs, voltages },
+        shard: Shard::default(),
+        threads: Some(threads),
+    };
+    let table = sweep::run(&spec, bundle, options, &|_| true).expect("a table");
+    let row = |row: &sweep::SweepRow| {
+        let values = row.values.as_ref().expect("a run");
+        (values[0].expect("a number").to_bits(), row.warning.clone())
+    };
+    table.rows.iter().map(row).collect()
+}
+
+/// Rows of a sweep over a voltage, at two widths of the arms, have the bits of runs alone with the ranges of the sweep, on one thread and on two.
+/// A run with ranges has other bits than one that is trained for its own voltage.
+#[test]
+fn rows_over_voltages_are_runs_alone_with_their_ranges() {
+    let bundle = read_bundle(Path::new("examples/bank/bank.net"), &[]).expect("the bank");
+    let tol = 1e-2;
+    let options =
+        CompileOptions { tol, formulation: Formulation::Reduced, segments: Some(2), ..CompileOptions::default() };
+    let volts = |k: usize| 0.6 + 0.4 * k as f64;
+    let run = |heat: f64| TransientOptions {
+        stop: 4e-6,
+        signals: vec!["yoke.y".into()],
+        points: 2,
+        tol,
+        voltages: vec![("sense".to_owned(), 5.0), ("heat".to_owned(), heat)],
+        ..TransientOptions::default()
+    };
+    let held = TransientOptions { voltages: vec![("sense".to_owned(), 5.0)], ..run(0.0) };
+    let list = (0..5).map(|k| volts(k).to_string()).collect::<Vec<_>>().join(",");
+    let axes = ["wh=1.9u:2.1u:2", &format!("heat.v={list}")];
+    let rows = swept(&bundle, &options, &held, &axes, 1);
+    assert_eq!(rows, swept(&bundle, &options, &held, &axes, 2));
+    let ranges = PortRanges::parse(&format!("heat:{:e}:{:e}", volts(0), volts(4))).expect("ranges");
+    let at = |wh: f64, ranges: Option<&PortRanges>| {
+        let mut options = CompileOptions { set: vec![("wh".into(), Setting::Number(wh))], ..options.clone() };
+        options.ranges = ranges.cloned();
+        compile(&bundle, &options).expect("the bank")
+    };
+    // the steps are judged in the middle of the grid
+    let (_, steps) = step_error(&run(volts(2)).with_points(201), &at(2.1e-6, Some(&ranges)), &mut |_| true);
+    let mut own = 0;
+    for (place, wh) in [1.9e-6, 2.1e-6].into_iter().enumerate() {
+        let (shared, alone) = (at(wh, Some(&ranges)), at(wh, None));
+        for k in 0..5 {
+            let run = run(volts(k)).with_tolerance(steps);
+            let end = |compiled| {
+                let result = transient(compiled, &run, &mut |_, _| (), &mut |_| true).expect("a run");
+                assert!(result.unknowns < 10, "not a reduced model");
+                result
+            };
+            let (found, row) = (end(&shared), &rows[5 * place + k]);
+            assert_eq!(found.signals[0].2[1].to_bits(), row.0, "{wh} {}", volts(k));
+            assert!(found.warnings.iter().all(|warning| row.1.contains(warning)), "{:?} {}", found.warnings, row.1);
+            own += u32::from(end(&alone).signals[0].2[1].to_bits() == row.0);
+        }
+    }
+    assert!(own < 10, "ranges change nothing");
+}
+
+/// A mass between stops at the end of an arm, which a plate pulls.
+const STOPPED: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]
+anchor p [a] []
+arm beam2d p [a m] [l=100u w=2u]
+mass2d * [m] [m=1e-12]
+stop2d * [m] [gap=180n back=180n A=1e-12 restitution=1 oz=deg(90)]
+anchor * [e] [l=1u w=1u h=1u]
+gap plategap2d * [m e] [A=1e-9 gap=2u oz=deg(90)]
+eground * [m] []
+drive port * [e] []
+";
+
+/// Runs in lanes have the samples, warnings and counters of runs alone, to the bit, with any neighbours: a bank with a comb, a beam over an electrode
+/// with contact, and a mass between stops. Eleven and more voltages in eight lanes. Runs that leave the polynomials, by pull-in or at the stops, have no
+/// lane.
+#[test]
+fn lanes_are_runs_alone() {
+    let volts = |low: f64, high: f64| (0..11).map(|k| low + (high - low) * f64::from(k) / 10.0).collect::<Vec<_>>();
+    for (file, port, signal, volts, stop, most, leave) in [
+        ("bank/bank.net", "heat", "yoke.y", volts(0.0, 2.2), 8e-6, 2.2, vec![]),
+        ("switch/switch.net", "drive", "a(8).y", [volts(4.0, 14.0), vec![30.0]].concat(), 2e-6, 14.0, vec![30.0]),
+        ("stopped.net", "drive", "m.y", volts(4.0, 8.0), 1e-5, 8.0, vec![7.2, 7.6, 8.0]),
+    ] {
+        let bundle = match file {
+            "stopped.net" => Bundle::from_text(file, STOPPED),
+            _ => read_bundle(&Path::new("examples").join(file), &[]).expect("a netlist"),
+        };
+        let tol = 1e-2;
+        let ranges = PortRanges::parse(&format!("{port}:0:{most}")).expect("ranges");
+        let formulation = Formulation::Reduced;
+        let options = CompileOptions { tol, formulation, segments: Some(2), ..CompileOptions::default() };
+        let compiled = compile(&bundle, &options.with_ranges(ranges)).expect("a model");
+        let run = |volts: f64| TransientOptions {
+            stop,
+            signals: vec![signal.into()],
+            points: 21,
+            tol,
+            voltages: vec![(port.to_owned(), volts)],
+            ..TransientOptions::default()
+        };
+        let trained = Arc::new(train_motion(&compiled, &run(0.0)).expect("ports"));
+        let runs: Vec<SharedRun<'_>> =
+            volts.iter().map(|volts| (&compiled, run(*volts).with_reduction(Arc::clone(&trained)))).collect();
+        let (results, work) = transients(&runs, &mut || true);
+        assert!(work.together < work.accepted + work.rejected, "{file}: nothing was side by side: {work:?}");
+        let mut without = Vec::new();
+        for ((compiled, options), (result, volts)) in runs.iter().zip(results.iter().zip(&volts)) {
+            let alone = transient(compiled, options, &mut |_, _| (), &mut |_| true);
+            match result {
+                Some(result) => {
+                    assert_eq!(format!("{result:?}"), format!("{:?}", alone.expect("a run")), "{file} {volts}")
+                }
+                None => without.push(*volts),
+            }
+        }
+        assert_eq!(without, leave, "{file}");
+        // no run begins after the caller has stopped
+        let (mut left, mut counted) = (3, 0);
+        let (some, _) = transients(&runs, &mut || {
+            left -= 1;
+            left > 0
+        });
+        some.iter().for_each(|result| counted += u32::from(result.is_some()));
+        assert!((3..=10).contains(&counted), "{file}: {counted}");
+    }
+}
