@@ -553,7 +553,7 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         let Some(estimate) = &mut self.estimate else { return };
         let norm = |x: &[Pose]| system.model.mass_product(x, x).sqrt();
         estimate.largest = estimate.largest.max(norm(&end.q));
-        if !looks && !(self.taken < 5 * EVERY && self.taken % EVERY_OF_FIRST == 1) {
+        if !(looks || self.taken < 5 * EVERY && self.taken % EVERY_OF_FIRST == 1) {
             return;
         }
         if !looks {
