@@ -6,6 +6,7 @@
 
 pub mod batch;
 pub mod circuit;
+pub mod confirmed;
 mod directions;
 pub mod ranges;
 pub mod shared;
@@ -229,12 +230,13 @@ pub fn reduced_transient(
             return Ok(result);
         }
     };
-    let mut carrier = ReducedPropagator { compiled, options, reduction, corrections: None, error: None, excess: 0.0 };
+    let corrects = shared.is_none();
+    let mut carrier =
+        ReducedPropagator { compiled, options, reduction, corrects, corrections: None, error: None, excess: 0.0 };
     let result = record(compiled, options, &mut carrier, sample, watch)?;
     let ReducedPropagator { corrections, error, excess, .. } = carrier;
     let mut result = concluded(result, compiled, reduction, (error, excess));
-    // a run that shares its training leaves it as it is
-    if let (Some(corrections), None) = (corrections, shared) {
+    if let Some(corrections) = corrections {
         let MotionReduction { training, polynomials, .. } = reduction;
         let directions = Directions::Trained { training: Arc::clone(training), polynomials: *polynomials };
         result.directions = Some(directions.after(&compiled.parts.system, &corrections));
@@ -291,6 +293,8 @@ struct ReducedPropagator<'a> {
     compiled: &'a CompiledModel,
     options: &'a TransientOptions<'a>,
     reduction: &'a MotionReduction,
+    /// Whether the directions that the motion lacks are wanted: not where it shares its training.
+    corrects: bool,
     /// Corrections of the full model along the motion.
     corrections: Option<MotionCorrections>,
     /// Estimated error by the reduction (1).
@@ -323,7 +327,10 @@ impl Propagator for ReducedPropagator<'_> {
         let system = &self.compiled.parts.system;
         let h = first_step(system, self.options.stop);
         let run = IntegrationRun { motion, h, control: self.options.control(), observe, corners: Vec::new() };
-        let method = self.reduction.method(system, h);
+        let mut method = self.reduction.method(system, h);
+        if self.corrects {
+            method = method.with_corrections();
+        }
         let (end, stepper) = run.stepped(&mut Bodies::new(system, ramp), method);
         (self.error, self.excess) = (stepper.method.error(), stepper.method.excess);
         self.corrections = stepper.method.corrections().cloned();

@@ -57,6 +57,17 @@ pub(super) fn shares(spec: &SweepSpec, options: &CompileOptions) -> bool {
     options.formulation == Formulation::Reduced && spec.ports().next().is_some()
 }
 
+/// The voltages of a point with the largest of those that a sweep varies.
+pub(super) fn largest(spec: &SweepSpec, voltages: &[(String, f64)]) -> Vec<(String, f64)> {
+    let ranges = spec.port_ranges();
+    let of = |(name, volts): &(String, f64)| {
+        let range = ranges.iter().find(|(port, [low, high])| port == name && low <= high);
+        let volts = range.map_or(*volts, |(_, [low, high])| if low.abs() > high.abs() { *low } else { *high });
+        (name.clone(), volts)
+    };
+    voltages.iter().map(of).collect()
+}
+
 /// The options with the ranges of the ports in a sweep, where points share trainings and none are given.
 pub(super) fn with_ranges(spec: &SweepSpec, options: Arc<CompileOptions>) -> Arc<CompileOptions> {
     if !shares(spec, &options) || options.ranges.is_some() {

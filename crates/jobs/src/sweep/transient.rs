@@ -20,9 +20,10 @@ use bimorph_analysis::chosen_run::tentative;
 use bimorph_analysis::formulation;
 use bimorph_analysis::mesh;
 use bimorph_analysis::readout::expression::Expression;
+use bimorph_analysis::reduced;
 use bimorph_analysis::reduced::batch::SharedRun;
+use bimorph_analysis::reduced::confirmed::train_confirmed;
 use bimorph_analysis::reduced::shared::TrainedMotion;
-use bimorph_analysis::reduced::{self, train_motion};
 use bimorph_analysis::step_error;
 use bimorph_analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph_analysis::{AnalysisError, ProgressCallback};
@@ -213,7 +214,7 @@ impl<'a> TransientSweep<'a> {
             if self.spec.has_variants() { self.mesh.get_or_init(|| self.search(go_on)).as_ref() } else { None };
         if let Some(shared) = shared.filter(|_| reductions::shares(self.spec, &self.options)) {
             let slot = self.variants.slot(settings);
-            let variant = slot.get_or_init(|| self.reduced_variant(settings, shared)).as_ref();
+            let variant = slot.get_or_init(|| self.reduced_variant(settings, shared, go_on)).as_ref();
             if let Some(ReducedVariant { compiled, trained }) = variant.map_err(Clone::clone)? {
                 let trained = Some(Arc::clone(trained));
                 return Ok(MeshedPoint { trained, ..prepared(Arc::clone(compiled), &options, shared.steps) });
@@ -232,14 +233,16 @@ impl<'a> TransientSweep<'a> {
         &self,
         settings: &[(String, Setting)],
         shared: &SweepMesh,
+        go_on: &dyn Fn() -> bool,
     ) -> Result<Option<ReducedVariant>, String> {
         let drawn = draw(self.source, &at(&self.options, settings)).map_err(|error| brief(&error))?;
         let options = self.transient(settings);
         let Some(compiled) = shared.model(&drawn, &options).map_err(|error| error.to_string())? else {
             return Ok(None);
         };
-        let trained = train_motion(&compiled, &options).map_err(|error| error.to_string())?;
-        Ok(Some(ReducedVariant { compiled: Arc::new(compiled), trained: Arc::new(trained) }))
+        let largest = TransientOptions { voltages: reductions::largest(self.spec, &options.voltages), ..options };
+        let trained = train_confirmed(&compiled, &largest, &mut |_| go_on()).map_err(|error| error.to_string())?;
+        Ok(Some(ReducedVariant { compiled: Arc::new(compiled), trained }))
     }
 
     /// A run of its own: of the bodies where one in joint coordinates fails that `auto` took.

@@ -61,8 +61,8 @@ struct ReductionEstimate {
     squares: f64,
     count: u64,
     largest: f64,
-    /// The corrections of the displacements at these states.
-    corrections: MotionCorrections,
+    /// The corrections of the displacements at these states, where they are asked for.
+    corrections: Option<MotionCorrections>,
 }
 
 /// The forces as polynomials, which replace the exact kinematics of stages while their error is within a part of the tolerance.
@@ -171,9 +171,17 @@ impl ReducedRodas4 {
     #[must_use]
     pub fn with_estimate(mut self, system: &System) -> Self {
         let (check, taken) = (FullCheck::new(system), vec![Pose::zeros(); system.bodies()]);
-        let corrections = MotionCorrections::default();
-        let estimate = ReductionEstimate { check, taken, squares: 0.0, count: 0, largest: 0.0, corrections };
+        let estimate = ReductionEstimate { check, taken, squares: 0.0, count: 0, largest: 0.0, corrections: None };
         self.estimate = Some(Box::new(estimate));
+        self
+    }
+
+    /// The same with the corrections of the full model along the motion, beside its estimate.
+    #[must_use]
+    pub fn with_corrections(mut self) -> Self {
+        if let Some(estimate) = &mut self.estimate {
+            estimate.corrections = Some(MotionCorrections::default());
+        }
         self
     }
 
@@ -206,9 +214,9 @@ impl ReducedRodas4 {
         Some((estimate.squares / estimate.count as f64).sqrt() / estimate.largest)
     }
 
-    /// The corrections of the full model along the motion; none without an estimate.
+    /// The corrections of the full model along the motion; none without [`ReducedRodas4::with_corrections`].
     pub fn corrections(&self) -> Option<&MotionCorrections> {
-        self.estimate.as_ref().map(|estimate| &estimate.corrections)
+        self.estimate.as_ref()?.corrections.as_ref()
     }
 
     /// Coordinates z.
@@ -553,7 +561,8 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         let Some(estimate) = &mut self.estimate else { return };
         let norm = |x: &[Pose]| system.model.mass_product(x, x).sqrt();
         estimate.largest = estimate.largest.max(norm(&end.q));
-        if !(looks || self.taken < 5 * EVERY && self.taken % EVERY_OF_FIRST == 1) {
+        let is_early = self.taken < 5 * EVERY && self.taken % EVERY_OF_FIRST == 1;
+        if !(looks || is_early && estimate.corrections.is_some()) {
             return;
         }
         if !looks {
@@ -570,7 +579,7 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         let error = norm(check.step());
         if error.is_finite() {
             // a correction beyond the motion is none
-            if error < *largest {
+            if let Some(corrections) = corrections.as_mut().filter(|_| error < *largest) {
                 corrections.add(&self.space.joints.tree, &end.q, check.step());
             }
             if looks {
