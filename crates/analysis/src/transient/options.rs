@@ -244,6 +244,12 @@ impl<'a> TransientOptions<'a> {
         Self { signals, ..self.clone() }
     }
 
+    /// With other voltages held during the run, by port name (V).
+    #[must_use]
+    pub fn with_voltages(&self, voltages: Vec<(String, f64)>) -> Self {
+        Self { voltages, ..self.clone() }
+    }
+
     /// With another number of output times.
     #[must_use]
     pub fn with_points(&self, points: usize) -> Self {

@@ -240,7 +240,7 @@ impl<'a> TransientSweep<'a> {
         let Some(compiled) = shared.model(&drawn, &options).map_err(|error| error.to_string())? else {
             return Ok(None);
         };
-        let largest = TransientOptions { voltages: reductions::largest(self.spec, &options.voltages), ..options };
+        let largest = options.with_voltages(reductions::largest(self.spec, &options.voltages));
         let trained = train_confirmed(&compiled, &largest, &mut |_| go_on()).map_err(|error| error.to_string())?;
         Ok(Some(ReducedVariant { compiled: Arc::new(compiled), trained }))
     }

@@ -61,7 +61,7 @@ struct ReductionEstimate {
     squares: f64,
     count: u64,
     largest: f64,
-    /// The corrections of the displacements at these states, where they are asked for.
+    /// The corrections of the displacements at these states, where they are requested.
     corrections: Option<MotionCorrections>,
 }
 
