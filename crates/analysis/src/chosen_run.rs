@@ -4,7 +4,7 @@
 //! fails or whose steps collapse. Samples are kept until a run in joint coordinates has ended, so that each is
 //! sent once. A run with more samples than are kept is that of the bodies from the start.
 //!
-//! Steps have collapsed where [`SLOW`] of them in a row cover so little that the whole run would take more than [`MAX_STEPS`] at that pace,
+//! Steps have collapsed where `SLOW` of them in a row cover so little that the whole run would take more than [`MAX_STEPS`] at that pace,
 //! beyond which explicit steps are refused, too. The growth from a short first step is faster: five times a step.
 
 use super::formulation::{self, ChosenFormulation, Formulation};
