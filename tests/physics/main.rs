@@ -20,6 +20,7 @@ mod electrothermal;
 mod examples;
 mod excited_modes;
 mod expressions;
+mod floating;
 mod formulations;
 mod free_coordinates;
 mod fringe;

@@ -181,7 +181,8 @@ impl Watcher for RunFinisher<'_> {
     }
 
     fn observe(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> bool {
-        if self.contacts && within_contact_range(self.compiled, &after.q, |gap| self.drive.volts[gap] != 0.0).is_err() {
+        let charged = |gap| self.compiled.parts.system.electrics.is_charged(gap, &self.drive.volts);
+        if self.contacts && within_contact_range(self.compiled, &after.q, charged).is_err() {
             return false;
         }
         if self.ends(s, h) && self.values.is_empty() {

@@ -136,6 +136,14 @@ fn sources(compiled: &CompiledModel, voltages: &PortVoltages) -> Result<(Vec<f64
     let mut rise = vec![0.0; electrics.heating.states()];
     let mut drive = electrics.drive();
     electrics.steady(&sources, &mut rise, &mut drive);
+    if !electrics.floating.is_empty() && drive.volts.iter().any(|volts| *volts != 0.0) {
+        return Err(AnalysisError::BadRequest {
+            what: "frame".into(),
+            detail: "a conductor between gaps floats, which the linear frame has not; connect it with `R` or `eground`, or leave out \
+                     the voltage"
+                .into(),
+        });
+    }
     Ok((sources, rise, drive))
 }
 

@@ -20,7 +20,7 @@ pub(super) fn left_out(compiled: &CompiledModel, point: &OperatingPoint) -> Opti
     let drive = point.drive(compiled);
     let mut change = vec![Pose::zeros(); system.bodies()];
     let mut largest = (0, 0.0);
-    for (gap, &volts) in drive.volts.iter().enumerate() {
+    for (gap, &volts) in system.gap_voltages(q, &drive.volts).iter().enumerate() {
         let force = system.add_shape_force(gap, q, volts, &mut change);
         if force > largest.1 {
             largest = (gap, force);

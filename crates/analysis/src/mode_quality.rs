@@ -130,15 +130,19 @@ fn dissipated(
         return 0.0;
     }
     let jw = Complex::new(0.0, omega);
-    let moved = |g: &usize| jw * (drive.volts[*g] * system.capacitance_slope(*g, q, shape));
+    let moved = |g: &usize| jw * system.charge_slope(*g, (q, &drive.volts), (shape, None));
     let motional = DVector::from_iterator(gaps.len(), gaps.iter().map(moved));
-    let capacitance: Vec<f64> = gaps.iter().map(|g| system.capacitance(*g, q)).collect();
-    // i = motional + jω·C·v with v = −R·i
+    // i = motional + jω·C·v with v = −R·i; floating conductors share v among their gaps
     let n = gaps.len();
     bimorph_base::budget::lay_out_matrix(2 * n, n);
-    let matrix = DMatrix::from_fn(n, n, |i, k| {
-        Complex::from(if i == k { 1.0 } else { 0.0 }) + jw * (capacitance[i] * between[(i, k)])
-    });
+    let mut charges = DMatrix::zeros(n, n);
+    let mut drops = vec![0.0; drive.volts.len()];
+    for k in 0..n {
+        drops.fill(0.0);
+        gaps.iter().enumerate().for_each(|(i, gap)| drops[*gap] = between[(i, k)]);
+        gaps.iter().enumerate().for_each(|(i, gap)| charges[(i, k)] = system.charge(*gap, q, &drops));
+    }
+    let matrix = DMatrix::from_fn(n, n, |i, k| Complex::from(if i == k { 1.0 } else { 0.0 }) + jw * charges[(i, k)]);
     let Some(current) = matrix.lu().solve(&motional) else { return 0.0 };
     let drop = between.map(Complex::from) * &current;
     let power: f64 = current.iter().zip(drop.iter()).map(|(i, v)| (i.conj() * v).re).sum();

@@ -146,7 +146,7 @@ pub(crate) fn result_at(compiled: &CompiledModel, point: &OperatingPoint) -> Sta
     let port = |p: usize| electrics.names[p].clone();
     let charge = |p: usize| {
         (0..point.volts.len())
-            .map(|g| electrics.gap_rows[(g, p)] * system.capacitance(g, &point.q) * point.volts[g])
+            .map(|g| electrics.gap_rows[(g, p)] * system.charge(g, &point.q, &point.volts))
             .sum::<f64>()
     };
     let (pulled_in, jumped) = jump(compiled, point);
@@ -326,7 +326,7 @@ fn settle(
     let path = SourcePath::new(electrics, from, &sources, loads);
     let mut end = electrics.drive();
     path.at(1.0, &mut end);
-    let energised = |gap: usize| end.volts[gap] != 0.0;
+    let energised = |gap: usize| electrics.is_charged(gap, &end.volts);
     let (path, held_weakly) = match weak_parts::held(system) {
         Some((held, parts)) => {
             let found = solver.follow(&held, &path, &mut q)?;

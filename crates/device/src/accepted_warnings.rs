@@ -49,13 +49,14 @@ impl DeviceSession {
             let rates: Vec<f64> =
                 compiled.higher.iter().map(|mode| model.mass_product(&mode.shape, &state.v)).collect();
             let (sources, signals) = (&self.ports.sources, self.signals.len());
+            let volts = system.gap_voltages(&state.q, &point.volts);
             let coupling = |mode: usize, n: usize| -> f64 {
                 let port = sources[n - signals];
                 let of = |(g, volts): (usize, &f64)| match electrics.gap_rows[(g, port)] * volts {
                     0.0 => 0.0,
                     volts => volts * system.capacitance_slope(g, &state.q, &compiled.higher[mode].shape),
                 };
-                point.volts.iter().enumerate().map(of).sum()
+                volts.iter().enumerate().map(of).sum()
             };
             let step = state.next_step.min(state.shown.last_step());
             let split = Split { modes: &compiled.higher, rates: &rates, step, coupling: &coupling };

@@ -77,7 +77,7 @@ impl DeviceSession {
                         None => row.iter().zip(&self.sources).map(|(g, u)| g * u).sum(),
                     };
                     reply.di_dv.extend(self.ports.sources.iter().map(|&other| row[other]));
-                    let of = |g: usize| electrics.gap_rows[(g, port)] * system.capacitance(g, view.q) * view.volts[g];
+                    let of = |g: usize| electrics.gap_rows[(g, port)] * system.charge(g, view.q, view.volts);
                     charge = (0..gaps).map(of).sum();
                 }
                 PortResponse::Motion(signal) => current = signal.value(compiled, &view),
@@ -135,9 +135,8 @@ impl DeviceSession {
                     }
                 }
             }
-            for (g, volts) in gap_row.iter().enumerate() {
-                let dq =
-                    system.capacitance(g, view.q) * volts + system.capacitance_slope(g, view.q, &s.q) * view.volts[g];
+            for g in 0..gaps {
+                let dq = system.charge_slope(g, (view.q, view.volts), (&s.q, Some(&gap_row)));
                 for (row, &other) in self.ports.sources.iter().enumerate() {
                     if self.ports.answers[row] == PortResponse::Current {
                         reply.dq_dv[row * ports + p] += electrics.gap_rows[(g, other)] * dq;
@@ -191,7 +190,7 @@ impl DeviceSession {
                         nothing * signal.value(compiled, &view)
                     }
                     Signal::Capacitance(g) => nothing * system.capacitance(*g, view.q).abs(),
-                    Signal::Pull(g) => nothing * system.pull(*g, view.q, view.volts[*g]).abs(),
+                    Signal::Pull(_) => nothing * signal.value(compiled, &view).abs(),
                     Signal::Charge(g) => charge(system.capacitance(*g, view.q), view.volts[*g]),
                 };
                 let follow = |n: usize| match n.checked_sub(signals).map(|port| &self.ports.answers[port]) {

@@ -233,9 +233,9 @@ impl DeviceSession {
         let (electrics, ports) = (&system.electrics, self.ports.len());
         let mut fastest = 0.0f64;
         for (p, &source) in self.ports.sources.iter().enumerate() {
-            let fixed: f64 = (0..self.drive.volts.len())
-                .map(|g| electrics.gap_rows[(g, source)].powi(2) * system.capacitance(g, &self.motion.q))
-                .sum();
+            let row: Vec<f64> = (0..self.drive.volts.len()).map(|g| electrics.gap_rows[(g, source)]).collect();
+            let unit = system.gap_voltages(&self.motion.q, &row);
+            let fixed: f64 = (0..row.len()).map(|g| row[g] * unit[g] * system.capacitance(g, &self.motion.q)).sum();
             let moving = reply.dq_dv[p * (ports + 1)] - fixed;
             if moving.abs() > RESPONDS * fixed.abs() {
                 let response = &self.stepper.method.sensitivity()[p].q;

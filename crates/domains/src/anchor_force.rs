@@ -68,7 +68,8 @@ impl System {
             &mut stiffness,
             &mut force,
         );
-        for (member, volts) in self.members.iter().zip(&state.drive.volts).filter(|(m, volts)| m.is_active(**volts)) {
+        let volts = self.gap_voltages(state.q, &state.drive.volts);
+        for (member, volts) in self.members.iter().zip(&*volts).filter(|(m, volts)| m.is_active(**volts)) {
             member.add_force_and_tangent(at, *volts, &model.pattern, (&mut force, &mut stiffness));
         }
         for load in &self.loads {
@@ -84,7 +85,8 @@ impl System {
         damping.multiply_add(&model.pattern, change.v, &mut r);
         forces::add_damping(model, change.v, &mut r);
         forces::add_rest_change(model, state.q, &change.drive.rest(), &mut r);
-        for ((member, volts), dv) in self.members.iter().zip(&state.drive.volts).zip(&change.drive.volts) {
+        let changes = self.gap_voltage_slopes((state.q, &state.drive.volts), (change.q, &change.drive.volts));
+        for ((member, volts), dv) in self.members.iter().zip(&*volts).zip(&*changes) {
             if *dv != 0.0 {
                 member.add_force_change(at, *volts, *dv, &mut r);
             }
@@ -101,7 +103,8 @@ impl System {
         let (model, at) = (&self.model, self.at(q));
         let mut r = vec![Pose::zeros(); q.len()];
         forces::add_elastic_of(model, joints_of(model, body, but), q, &drive.rest(), &mut r);
-        for (member, volts) in self.members.iter().zip(&drive.volts).filter(|(m, volts)| m.is_active(**volts)) {
+        let volts = self.gap_voltages(q, &drive.volts);
+        for (member, volts) in self.members.iter().zip(&*volts).filter(|(m, volts)| m.is_active(**volts)) {
             member.add_force(at, *volts, &mut r);
         }
         for load in &self.loads {

@@ -1,6 +1,7 @@
 //! The potential whose gradient the residual is, and with it the energy that an undamped motion keeps.
 //!
 //! At constant voltages and temperatures, the potential is Π = U(q) − Σ ½·C(q)·V² + contact − load · displacement.
+//! V has the potentials of floating conductors, which make Π stationary.
 //! Forces and frame motion from sources count among the loads. Kinetic energy plus Π is constant; the energy delivered
 //! by the sources is part of −½·C·V².
 
@@ -14,14 +15,15 @@ impl System {
     /// Potential Π(q) at a drive (J); see [`crate::energy`].
     pub fn potential(&self, q: &[Pose], drive: &Drive) -> f64 {
         let mut sum = forces::strain_energy(&self.model, q, &drive.rest());
+        let volts = self.gap_voltages(q, &drive.volts);
         for g in 0..self.members.len() {
-            if drive.volts[g] != 0.0 {
-                sum -= 0.5 * self.capacitance(g, q) * drive.volts[g] * drive.volts[g];
+            if volts[g] != 0.0 {
+                sum -= 0.5 * self.capacitance(g, q) * volts[g] * volts[g];
             }
         }
         sum += self.contact_energy(q);
         let at = self.at(q);
-        for (gap, &volts) in self.members.iter().zip(&drive.volts) {
+        for (gap, &volts) in self.members.iter().zip(&*volts) {
             sum += gap.energy(at, volts);
         }
         for load in &self.loads {

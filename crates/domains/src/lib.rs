@@ -45,6 +45,7 @@
 //! | [`driven_anchor`], [`anchor_force`] | anchors whose displacement and rotation are inputs; their force |
 //! | [`inputs`] | effects of forces at points, heat into beams and frame motion; `input`: their kinds |
 //! | [`edge_field`] | laws of the fringe field beside a gap |
+//! | [`floating`], `gap_voltage` | conductors that keep their charge; voltages and charges of gaps with them |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
 //! | `side` | the side to which a part buckles |
 //! | [`stop`] | how a stop bears |
@@ -92,8 +93,10 @@ mod facing_tangent;
 mod facing_tiles;
 pub mod film_series;
 mod fin;
+pub mod floating;
 pub mod friction;
 pub mod from_structure;
+mod gap_voltage;
 mod heat_curves;
 pub mod hot;
 mod input;

@@ -139,6 +139,37 @@ impl ElectricalNetwork {
         Ok(DMatrix::from_fn(pairs.len(), pairs.len(), |i, k| potential(pairs[i][0], k) - potential(pairs[i][1], k)))
     }
 
+    /// Part of each node that no ground and none of the first `ports` sources fixes, and the number of these parts. The nodes of `held` count as
+    /// ground.
+    pub fn floating_parts(&self, ports: usize, held: impl Iterator<Item = usize>) -> (Vec<Option<usize>>, usize) {
+        let ground = self.nodes;
+        let mut part = Sets::new(self.nodes + 1);
+        for node in self.grounds.iter().copied().chain(held) {
+            part.join(node, ground);
+        }
+        for (k, &(plus, minus)) in self.sources.iter().enumerate() {
+            part.join(plus, minus.unwrap_or(ground));
+            if k < ports {
+                part.join(plus, ground);
+            }
+        }
+        for &(a, b, _) in &self.resistors {
+            bimorph_base::budget::check();
+            part.join(a, b);
+        }
+        let (mut number, mut count) = (vec![None; self.nodes + 1], 0);
+        let of = (0..self.nodes).map(|node| {
+            let root = part.first(node);
+            (root != part.first(ground)).then(|| {
+                *number[root].get_or_insert_with(|| {
+                    count += 1;
+                    count - 1
+                })
+            })
+        });
+        (of.collect(), count)
+    }
+
     fn out_of_range(&self) -> CircuitError {
         let resistance = |k: &usize| self.resistors[*k].2;
         let smallest = (0..self.resistors.len()).min_by(|a, b| resistance(a).total_cmp(&resistance(b)));
@@ -311,6 +342,20 @@ mod tests {
         assert!((found.conductance[(0, 0)] / out - 1.0).abs() < 1e-12);
         let into = 2.0 * found.potential[(at(side - 2, side - 1), 0)];
         assert!((out / into - 1.0).abs() < 1e-9);
+    }
+
+    /// Parts that float: resistors and sources join nodes, and grounds, ports and held nodes tie them.
+    #[test]
+    fn parts_that_float() {
+        let circuit = ElectricalNetwork {
+            nodes: 9,
+            resistors: vec![(0, 1, 1e3), (3, 4, 1e3), (5, 6, 1.0)],
+            sources: vec![(1, Some(2)), (4, Some(7))],
+            grounds: vec![5],
+        };
+        let (parts, count) = circuit.floating_parts(1, std::iter::once(8));
+        assert_eq!(count, 1);
+        assert_eq!(parts, [None, None, None, Some(0), Some(0), None, None, Some(0), None]);
     }
 
     /// Two ideal sources in parallel contradict each other and are refused by index.

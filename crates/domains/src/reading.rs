@@ -136,7 +136,7 @@ impl System {
             let sides = || gap.side_contact(self.at(q)).is_some_and(|side| side.left < (1.0 + 1e-3) * side.touch);
             if bearing > 0.0 || near() || sides() { bearing.max(1e-3 * self.pull(g, q, *volts).abs()) } else { 0.0 }
         };
-        self.members.iter().zip(volts).enumerate().map(of).fold(0.0, f64::max)
+        self.members.iter().zip(&*self.gap_voltages(q, volts)).enumerate().map(of).fold(0.0, f64::max)
     }
 
     /// The first gap that is closed beyond the range of its law of contact, with the distance that is left and the least one of that law (m).

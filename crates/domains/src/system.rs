@@ -100,7 +100,7 @@ impl System {
     #[inline]
     pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) -> ApartMembers {
         let (at, mut apart) = (self.at(q), ApartMembers::default());
-        for (g, gap, volts) in self.active(drive) {
+        for (g, gap, volts) in self.active(&self.gap_voltages(q, &drive.volts)) {
             apart.put(g, gap.add_force_finding_apart(at, volts, r));
         }
         for load in &self.loads {
@@ -112,8 +112,8 @@ impl System {
 
     /// Members with a force of a potential, and their voltages (V).
     #[inline]
-    fn active<'a>(&'a self, drive: &'a Drive) -> impl Iterator<Item = (usize, &'a Member, f64)> {
-        let all = self.members.iter().zip(&drive.volts).enumerate().map(|(g, (gap, volts))| (g, gap, *volts));
+    fn active<'a>(&'a self, volts: &'a [f64]) -> impl Iterator<Item = (usize, &'a Member, f64)> {
+        let all = self.members.iter().zip(volts).enumerate().map(|(g, (gap, volts))| (g, gap, *volts));
         all.filter(|(_, gap, volts)| gap.is_active(*volts))
     }
 
@@ -134,10 +134,11 @@ impl System {
     /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
     #[inline]
     pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BodyMatrix) {
-        let (at, pattern) = (self.at(q), &self.model.pattern);
-        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.is_active(**volts)) {
+        let (at, pattern, volts) = (self.at(q), &self.model.pattern, self.gap_voltages(q, &drive.volts));
+        for (_, gap, volts) in self.active(&volts) {
             gap.add_tangent(at, volts, pattern, tangent);
         }
+        self.add_floating_tangent(q, &volts, 1.0, tangent);
         for load in &self.loads {
             load.add_tangent(at, drive.load, pattern, tangent);
         }
@@ -170,9 +171,11 @@ impl System {
         tangent.clear();
         forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
         let (at, pattern, mut apart) = (self.at(q), &self.model.pattern, ApartMembers::default());
-        for (g, gap, volts) in self.active(drive) {
+        let volts = self.gap_voltages(q, &drive.volts);
+        for (g, gap, volts) in self.active(&volts) {
             apart.put(g, gap.add_force_and_tangent_finding_apart(at, volts, pattern, (r, tangent)));
         }
+        self.add_floating_tangent(q, &volts, 1.0, tangent);
         for load in &self.loads {
             load.add_force_and_tangent(at, drive.load, pattern, (r, tangent));
         }
@@ -218,8 +221,10 @@ impl System {
 
     /// The share of gaps, loads and inputs in that, held directions not removed.
     pub fn add_body_drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
-        let at = self.at(q);
-        for ((gap, &volts), &dv) in self.members.iter().zip(&drive.volts).zip(&change.volts) {
+        let (at, volts) = (self.at(q), self.gap_voltages(q, &drive.volts));
+        // linear in the voltages where the configuration is held
+        let changes = self.gap_voltages(q, &change.volts);
+        for ((gap, &volts), &dv) in self.members.iter().zip(&*volts).zip(&*changes) {
             if dv != 0.0 {
                 gap.add_force_change(at, volts, dv, out);
             }
@@ -261,7 +266,7 @@ impl System {
         for (load, size) in self.given_loads(drive) {
             load.load_points(at, size, &mut lever);
         }
-        for (gap, &volts) in self.members.iter().zip(&drive.volts) {
+        for (gap, &volts) in self.members.iter().zip(&*self.gap_voltages(q, &drive.volts)) {
             gap.load_points(at, volts, &mut lever);
         }
     }
@@ -286,10 +291,12 @@ impl System {
     #[inline]
     pub fn add_quotients(&self, q: [&[Pose]; 3], h: f64, drive: &Drive, r: &mut [Pose], tangent: &mut BodyMatrix) {
         let chord = Chord { at: q.map(|q| self.at(q)), h };
+        let volts = self.quotient_voltages(q, &drive.volts);
         let acts = |(gap, volts): &(&Member, &f64)| gap.is_active(**volts) || gap.damps();
-        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(acts) {
+        for (gap, &volts) in self.members.iter().zip(&*volts).filter(acts) {
             gap.add_quotient(&chord, volts, &self.model.pattern, r, tangent);
         }
+        self.add_floating_tangent(q[1], &volts, 0.5, tangent);
     }
 
     /// True where parts are drawn to touch: all contacts but those of fingers at their sides.

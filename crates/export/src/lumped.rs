@@ -125,6 +125,12 @@ fn by_port(electrics: &Electrics, ports: &OpenedPorts, row: &dyn Fn(usize) -> f6
     (DVector::from_iterator(ports.sources.len(), ports.sources.iter().map(|&s| row(s))), fixed)
 }
 
+/// The first gap with an electrode that floats.
+pub(super) fn floating_gap<'a>(compiled: &'a CompiledModel, system: &System) -> Option<&'a str> {
+    let group = system.electrics.floating.groups().first()?;
+    compiled.parts.gap_names.get(group.gaps.first()?.gap).map(String::as_str)
+}
+
 /// Every gap of the mechanism.
 fn gaps(
     compiled: &CompiledModel,
@@ -133,6 +139,10 @@ fn gaps(
     coordinates: &[Coordinate],
 ) -> Result<Vec<LumpedGap>, ExportError> {
     let electrics = &system.electrics;
+    if let Some(gap) = floating_gap(compiled, system) {
+        let why = format!("an electrode of \"{gap}\" floats, which joins gaps (tie it to a port, a source or ground)");
+        return Err(ExportError::NotLumped { why });
+    }
     // what acts without sides comes after all gaps; where it adds no force, its damping is among that of the parts
     let acts = |(_, gap): &(usize, &Member)| gap.is_gap() || gap.is_active(1.0) && !gap.is_gas();
     let mut films: Vec<_> = system.members.iter().filter_map(Domain::film).collect();

@@ -174,8 +174,7 @@ impl LinearizedMechanism<'_> {
             }
             OutputRow::Current(source) => (0..volts.len())
                 .map(|g| {
-                    let charge = system.capacitance(g, &self.q) * volts[g]
-                        + system.capacitance_slope(g, &self.q, q) * self.drive.volts[g];
+                    let charge = system.charge_slope(g, (&self.q, &self.drive.volts), (q, Some(volts)));
                     system.electrics.gap_rows[(g, source)] * charge
                 })
                 .sum(),

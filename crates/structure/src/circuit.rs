@@ -22,6 +22,13 @@ pub enum CircuitKind {
     Amplifier,
 }
 
+impl CircuitKind {
+    /// True for elements that act in a circuit simulator alone: the model leaves them out.
+    pub fn is_left_out(self) -> bool {
+        matches!(self, Self::Capacitor | Self::CurrentSource | Self::OpAmp | Self::Amplifier)
+    }
+}
+
 /// A circuit element as drawn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CircuitElement {

@@ -302,7 +302,7 @@ fn outputs(model: &CompiledModel, point: &OperatingPoint) -> Vec<Output> {
     }
     let electrics = &system.electrics;
     let charge = |p: usize| -> f64 {
-        let of = |g: usize| electrics.gap_rows[(g, p)] * system.capacitance(g, q) * point.volts[g];
+        let of = |g: usize| electrics.gap_rows[(g, p)] * system.charge(g, q, &point.volts);
         (0..point.volts.len()).map(of).sum()
     };
     let charges: Vec<f64> = (0..electrics.ports).map(charge).collect();

@@ -87,7 +87,7 @@ impl<'a> VoltageSweep<'a> {
 
     /// Whether the source is across a gap.
     pub(super) fn drives(&self, gap: usize) -> bool {
-        self.system.electrics.gap_rows[(gap, self.source)] != 0.0
+        self.system.electrics.drives(self.source, gap)
     }
 
     pub(super) fn touching(&self, q: &[Pose]) -> Vec<bool> {

@@ -89,14 +89,14 @@ impl RunSignal {
             Self::NominalStress(beam) => {
                 stress::nominal(compiled, *beam, state.q, state.rise).map_or(0.0, |found| found.value())
             }
-            Self::PortCharge(port) => of_gaps(compiled, *port, |g| system.capacitance(g, state.q) * state.volts[g]),
+            Self::PortCharge(port) => of_gaps(compiled, *port, |g| system.charge(g, state.q, state.volts)),
             Self::PortCurrent { port, conduction } => {
                 conduction
-                    + of_gaps(compiled, *port, |g| system.capacitance_slope(g, state.q, state.v) * state.volts[g])
+                    + of_gaps(compiled, *port, |g| system.charge_slope(g, (state.q, state.volts), (state.v, None)))
             }
             Self::HotCurrent { port, sources } => {
                 system.electrics.port_currents(sources, state.rise)[*port]
-                    + of_gaps(compiled, *port, |g| system.capacitance_slope(g, state.q, state.v) * state.volts[g])
+                    + of_gaps(compiled, *port, |g| system.charge_slope(g, (state.q, state.volts), (state.v, None)))
             }
         }
     }
@@ -110,16 +110,15 @@ impl RunSignal {
             Self::NominalStress(beam) => stress::nominal(compiled, *beam, state.q, state.rise)
                 .map_or(0.0, |found| found.slope(compiled, state.q, change.q, change.rise)),
             Self::PortCharge(port) => of_gaps(compiled, *port, |g| {
-                system.capacitance(g, state.q) * change.volts[g]
-                    + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
+                system.charge_slope(g, (state.q, state.volts), (change.q, Some(change.volts)))
             }),
             Self::HotCurrent { port, sources } => {
                 let unit = vec![0.0; sources.len()];
                 system.electrics.port_current_slopes((sources, state.rise), &unit, change.rise)[*port]
-                    + of_gaps(compiled, *port, |g| system.capacitance_slope(g, state.q, change.v) * state.volts[g])
+                    + of_gaps(compiled, *port, |g| system.charge_slope(g, (state.q, state.volts), (change.v, None)))
             }
             Self::PortCurrent { port, .. } => {
-                of_gaps(compiled, *port, |g| system.capacitance_slope(g, state.q, change.v) * state.volts[g])
+                of_gaps(compiled, *port, |g| system.charge_slope(g, (state.q, state.volts), (change.v, None)))
             }
         }
     }

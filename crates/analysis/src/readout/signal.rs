@@ -123,10 +123,10 @@ impl Signal {
             }
             Self::Bearing(g) => system.bearing(g, state.q),
             Self::Conductance(g, metals) => conductance(&metals, system.bearing(g, state.q)).0,
-            Self::Charge(g) => system.capacitance(g, state.q) * state.volts[g],
+            Self::Charge(g) => system.charge(g, state.q, state.volts),
             Self::Distance(g) => system.distance(g, state.q),
             Self::Capacitance(g) => system.capacitance(g, state.q),
-            Self::Pull(g) => system.pull(g, state.q, state.volts[g]),
+            Self::Pull(g) => system.pull(g, state.q, system.gap_voltages(state.q, state.volts)[g]),
             Self::AnchorForce(anchor, direction) => {
                 let drive = drive_of(compiled, state, 1.0);
                 system.anchor_force(anchor, &AnchorView { q: state.q, v: state.v, drive: &drive })[direction]
@@ -156,13 +156,14 @@ impl Signal {
             Self::Conductance(g, metals) => {
                 conductance(&metals, system.bearing(g, state.q)).1 * system.bearing_slope(g, state.q, change.q)
             }
-            Self::Charge(g) => {
-                system.capacitance(g, state.q) * change.volts[g]
-                    + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
-            }
+            Self::Charge(g) => system.charge_slope(g, (state.q, state.volts), (change.q, Some(change.volts))),
             Self::Distance(g) => system.distance_slope(g, state.q, change.q),
             Self::Capacitance(g) => system.capacitance_slope(g, state.q, change.q),
-            Self::Pull(g) => system.pull_slope(g, state.q, state.volts[g], change.q, change.volts[g]),
+            Self::Pull(g) => {
+                let volts = system.gap_voltages(state.q, state.volts);
+                let moved = system.gap_voltage_slopes((state.q, state.volts), (change.q, change.volts));
+                system.pull_slope(g, state.q, volts[g], change.q, moved[g])
+            }
             Self::AnchorForce(anchor, direction) => {
                 let (drive, moved) = (drive_of(compiled, state, 1.0), drive_of(compiled, change, 0.0));
                 let at = AnchorView { q: state.q, v: state.v, drive: &drive };

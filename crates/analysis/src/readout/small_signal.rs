@@ -253,10 +253,10 @@ impl PerturbedState<'_> {
     pub fn charges(&self, sources: &[usize], moved: &ForcedMotion) -> Vec<Complex<f64>> {
         let mut charges = vec![Complex::from(0.0); sources.len()];
         for g in 0..self.drive.volts.len() {
-            let [re, im] = moved.parts.each_ref().map(|part| {
-                self.system.capacitance(g, self.q) * part.volts[g]
-                    + self.system.capacitance_slope(g, self.q, &part.q) * self.drive.volts[g]
-            });
+            let [re, im] = moved
+                .parts
+                .each_ref()
+                .map(|part| self.system.charge_slope(g, (self.q, &self.drive.volts), (&part.q, Some(&part.volts))));
             for (charge, &source) in charges.iter_mut().zip(sources) {
                 let row = self.system.electrics.gap_rows[(g, source)];
                 *charge += Complex::new(row * re, row * im);

@@ -1,5 +1,6 @@
 //! The electrical side of a mechanism, and what it makes of source voltages at one time.
 
+use super::super::floating::FloatingConductors;
 use super::super::hot::SourceLine;
 use super::super::input::Input;
 use super::super::lag::Lags;
@@ -11,7 +12,7 @@ use nalgebra::DMatrix;
 /// Electrical and thermal state that acts on a mechanism at one instant, or its change.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Drive {
-    /// Voltage of each gap (V).
+    /// Voltage of each gap with floating conductors at 0 V (V); [`super::super::system::System::gap_voltages`] has them with these.
     pub volts: Vec<f64>,
     /// Free strain α·T̄ of each heated beam (1).
     pub expansion: Vec<f64>,
@@ -67,8 +68,10 @@ pub struct Electrics {
     pub fixed: Vec<f64>,
     /// Names of all sources, ports first.
     pub names: Vec<String>,
-    /// ∂gap voltage/∂u, gaps × sources.
+    /// ∂gap voltage/∂u, gaps × sources, with floating conductors at 0 V.
     pub gap_rows: DMatrix<f64>,
+    /// Conductors of gaps that keep their charge.
+    pub floating: FloatingConductors,
     /// ∂port current/∂u, ports × sources (S).
     pub conductance: DMatrix<f64>,
     /// Heated beams.
@@ -268,6 +271,23 @@ impl Electrics {
 
     /// Whether there is a voltage across a gap at source voltages `u`.
     pub fn is_energised(&self, gap: usize, u: &[f64]) -> bool {
-        self.volts_across(gap, u) != 0.0
+        self.among(gap, |g| self.volts_across(g, u) != 0.0)
+    }
+
+    /// Whether a gap has a field at the voltages of a [`Drive`].
+    #[inline]
+    pub fn is_charged(&self, gap: usize, volts: &[f64]) -> bool {
+        self.among(gap, |g| volts[g] != 0.0)
+    }
+
+    /// Whether a source is across a gap, or drives it through conductors that float.
+    pub fn drives(&self, source: usize, gap: usize) -> bool {
+        self.among(gap, |g| self.gap_rows[(g, source)] != 0.0)
+    }
+
+    /// Whether it holds of a gap, or of one that shares floating conductors with it.
+    #[inline]
+    fn among(&self, gap: usize, holds: impl Fn(usize) -> bool) -> bool {
+        holds(gap) || self.floating.of_gap(gap).is_some_and(|group| group.gaps.iter().any(|of| holds(of.gap)))
     }
 }

@@ -10,6 +10,7 @@ pub mod ports;
 pub mod text;
 
 use super::linear::{ReducedPort, SignalShown};
+use super::lumped::floating_gap;
 use super::mechanism::{port_names, refuse_driven};
 use super::{ExportError, ExportRequest};
 use bimorph_analysis::readout::expression::Quantity;
@@ -214,6 +215,11 @@ fn writable(compiled: &CompiledModel, system: &System) -> Result<(), ExportError
         return Err(ExportError::HotResistance { beam });
     }
     let refused = |why: String| Err(ExportError::NotFlexible { why });
+    if let Some(gap) = floating_gap(compiled, system) {
+        return refused(format!(
+            "an electrode of \"{gap}\" floats, which joins gaps; tie it to a port, a source or ground"
+        ));
+    }
     for (g, member) in system.members.iter().enumerate() {
         let name = || compiled.parts.gap_names.get(g).map_or("a member", String::as_str).to_owned();
         if member.slides() {

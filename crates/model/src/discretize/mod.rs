@@ -181,6 +181,7 @@ pub fn discretize_like(
         Some(other) => Arc::clone(&other.system.electrics),
         None => Arc::new(driven_anchors::give_inputs(ports::lay(structure, &heaters, &gaps, &rigid)?, &driven)),
     };
+    couplings.extend(ports::floating_pairs(&electrics, &gaps));
     if rigid.bodies.is_empty() {
         return Err(DiscretizeError::NothingMoves);
     }

@@ -6,9 +6,11 @@
 use super::error::DiscretizeError;
 use super::rigid::RigidGroups;
 use bimorph_domains::drive::Electrics;
+use bimorph_domains::floating::FloatingConductors;
 use bimorph_domains::network::{CircuitError, ElectricalNetwork, Potentials};
 use bimorph_domains::thermal::{HeatConductor, HeatCurves, Heating, RelativeCurve};
-use bimorph_domains::{Member, PlacedMember};
+use bimorph_domains::{Domain, Member, PlacedMember};
+use bimorph_multibody::BodyId;
 use bimorph_structure::{Beam, GapVoltage, Heater, PropertyCurve, Structure};
 use nalgebra::{DMatrix, RowDVector};
 use std::collections::HashMap;
@@ -87,7 +89,45 @@ pub fn lay(
     }
     let mut conductance = DMatrix::zeros(ports, sources);
     conductance.view_mut((0, 0), (ports, driven)).copy_from(&potentials.conductance.rows(0, ports));
-    Ok(Electrics { ports, fixed, names, gap_rows, conductance, heating, inputs: Vec::new() })
+    let floating = floating(structure, &circuit, &net, gaps);
+    Ok(Electrics { ports, fixed, names, gap_rows, floating, conductance, heating, inputs: Vec::new() })
+}
+
+/// Electrodes that no port, source or ground fixes. Nodes of elements that the model leaves out stay at 0 V.
+fn floating(
+    structure: &Structure,
+    circuit: &ElectricalNetwork,
+    net: &[usize],
+    gaps: &[PlacedMember<'_, Member>],
+) -> FloatingConductors {
+    let outside = structure.circuit.iter().filter(|element| element.kind.is_left_out());
+    let outside = outside.flat_map(|element| element.nodes.iter().map(|node| net[node.0]));
+    let (parts, count) = circuit.floating_parts(structure.ports.len(), outside);
+    let sides = gaps.iter().enumerate().filter_map(|(g, gap)| match gap.voltage {
+        Some(GapVoltage::Nodes(a, b)) => Some((g, [*a, *b].map(|node| parts[net[node.0]]))),
+        _ => None,
+    });
+    FloatingConductors::new((gaps.len(), count), &sides.collect::<Vec<_>>())
+}
+
+/// The pairs of bodies that floating conductors couple.
+pub fn floating_pairs(electrics: &Electrics, gaps: &[PlacedMember<'_, Member>]) -> Vec<(BodyId, BodyId)> {
+    let mut pairs = Vec::new();
+    for group in electrics.floating.groups() {
+        let mut bodies = Vec::new();
+        for of in &group.gaps {
+            gaps[of.gap].member.bodies(|body| {
+                if !bodies.contains(&body) {
+                    bodies.push(body);
+                }
+            });
+        }
+        for (i, a) in bodies.iter().enumerate() {
+            bimorph_base::budget::check();
+            pairs.extend(bodies[..i].iter().map(|b| (*a, *b)));
+        }
+    }
+    pairs
 }
 
 /// A heated beam as a conductor of heat and current.

@@ -74,7 +74,7 @@ impl LoadFamily {
             return Err(NotAFamily::Mechanism);
         }
         let (e, f) = (&from.electrics, &to.electrics);
-        if e.gap_rows != f.gap_rows || e.heating != f.heating || e.ports != f.ports {
+        if e.gap_rows != f.gap_rows || e.floating != f.floating || e.heating != f.heating || e.ports != f.ports {
             return Err(NotAFamily::Network);
         }
         let end = |system: &System, sources: &[f64]| FamilyEnd {

@@ -272,7 +272,8 @@ impl Equilibrium {
         };
         let acts = |gap: &usize| {
             let member = &system.members[*gap];
-            member.touching().is_some() || (member.is_electrostatic() && self.drive.volts[*gap] != 0.0)
+            member.touching().is_some()
+                || (member.is_electrostatic() && system.electrics.is_charged(*gap, &self.drive.volts))
         };
         // from one side of a finger's gap to the other, too
         system.sides_leap([from, &self.trial], CLOSING, |a, b| a.abs().max(b.abs()))

@@ -56,13 +56,13 @@ pub(super) fn leaps<Q: Deref<Target = [Pose]>>(
     before: &[Pose],
     after: impl FnOnce() -> Q,
 ) -> bool {
-    let closes = |(gap, volts): &(usize, &f64)| **volts != 0.0 && system.members[*gap].is_electrostatic();
-    let mut closing = volts.iter().enumerate().filter(closes).peekable();
+    let closes = |gap: &usize| system.electrics.is_charged(*gap, volts) && system.members[*gap].is_electrostatic();
+    let mut closing = (0..volts.len()).filter(closes).peekable();
     if closing.peek().is_none() {
         return false;
     }
     let end = after();
-    closing.any(|(gap, _)| {
+    closing.any(|gap| {
         let (before, after) = (system.distance(gap, before), system.distance(gap, &end));
         (after - before).abs() > LEAP * before.max(after)
     })

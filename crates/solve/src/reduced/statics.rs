@@ -116,10 +116,11 @@ impl ReducedStatics {
     }
 
     fn leaps(&self, space: &ReducedSpace, before: &[f64]) -> bool {
-        let far = |((before, after), volts): ((&f64, f64), &f64)| {
-            *volts != 0.0 && (after - before).abs() > LEAP * before.max(after)
+        let electrics = &space.joints.closures.electrics;
+        let far = |(gap, (before, after)): (usize, (&f64, f64))| {
+            electrics.is_charged(gap, &self.drive.volts) && (after - before).abs() > LEAP * before.max(after)
         };
-        before.iter().zip(self.distances(space)).zip(&self.drive.volts).any(far)
+        before.iter().zip(self.distances(space)).enumerate().any(far)
     }
 }
 

@@ -104,14 +104,17 @@ pub struct PolynomialForces {
     combined_change: Vec<f64>,
 }
 
-/// Whether all that acts on a system has a law of points; of those that lose energy, contacts between plates alone.
+/// Whether all that acts on a system has a law of points; of those that lose energy, contacts between plates alone. Floating conductors join the laws of
+/// several gaps.
 pub fn has_polynomials(system: &System) -> bool {
     let between_plates = |law: &PointLaw| matches!(law.law, Some(Law::Field(Capacitor::Plates { .. }, Some(_))));
-    system.members.iter().all(|member| {
-        let laws = member.point_laws();
-        let has_none = laws.is_empty() && (member.is_gas() || member.is_active(1.0));
-        !(member.slides() || has_none) && laws.iter().all(|law| law.loss == 0.0 || between_plates(law))
-    })
+    let joined = !system.electrics.floating.is_empty();
+    !joined
+        && system.members.iter().all(|member| {
+            let laws = member.point_laws();
+            let has_none = laws.is_empty() && (member.is_gas() || member.is_active(1.0));
+            !(member.slides() || has_none) && laws.iter().all(|law| law.loss == 0.0 || between_plates(law))
+        })
 }
 
 impl PolynomialMotion {
