@@ -11,7 +11,7 @@
 //! square of the worst signal, of its amplitude, from `auto` at a hundredth of the tolerance. A refusal stands in place of the numbers. The summary goes to
 //! standard error.
 
-use bimorph::analysis::mesh::fitted_in_time;
+use bimorph::analysis::chosen_run::{FittedRun, run_as_chosen};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::step_error::with_step_error;
@@ -237,33 +237,31 @@ fn once(scene: &Scene, formulation: Formulation, tol: f64) -> Result<Done, Strin
         release: held.as_ref(),
         ..TransientOptions::default()
     };
-    let (moving, start) = fitted_in_time(&moving, &options).map_err(|e| e.to_string())?;
-    let options = options.with_release(start.as_ref());
-    let meshed = Instant::now();
-    let (mut shortest, mut steps) = (f64::INFINITY, 0);
-    let mut go =
-        |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
+    let (mut shortest, mut steps, mut segments, mut runs) = (f64::INFINITY, 0, 0, 0.0);
+    let mut attempt = |fitted: FittedRun, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
+        let meshed = Instant::now();
+        segments = fitted.moving.order.segments.iter().copied().max().unwrap_or(0);
+        let options = options.with_release(fitted.start.as_ref());
+        let mut go = |options: &TransientOptions<'_>,
+                      sample: &mut dyn FnMut(f64, &[f64]),
+                      watch: &mut dyn FnMut(f64) -> bool| {
             let mut before = 0.0;
             let mut see = |fraction: f64| {
                 shortest = f64::min(shortest, (fraction - before) * options.stop);
                 before = fraction;
                 watch(fraction) && begin.elapsed().as_secs_f64() < PATIENCE
             };
-            let result = transient(&moving, options, sample, &mut see)?;
+            let result = transient(&fitted.moving, options, sample, &mut see)?;
             steps += result.counters.steps + result.counters.rejected;
             Ok((result, ()))
         };
-    let found = with_step_error(&options, &moving, &mut go, &mut |_, _| (), &mut |_| true);
+        let done = with_step_error(&options, &fitted.moving, &mut go, sample, watch);
+        runs += ms(meshed, Instant::now());
+        done
+    };
+    let found = run_as_chosen(&moving, &options, &mut attempt, &mut |_, _| (), &mut |_| true);
     let (result, ()) = found.map_err(|e| e.to_string())?;
-    let end = Instant::now();
-    Ok(Done {
-        result,
-        whole: ms(begin, end),
-        runs: ms(meshed, end),
-        steps,
-        shortest,
-        segments: moving.order.segments.iter().copied().max().unwrap_or(0),
-    })
+    Ok(Done { result, whole: ms(begin, Instant::now()), runs, steps, shortest, segments })
 }
 
 impl Scene {

@@ -1,15 +1,18 @@
-//! Runs in time in the formulation that `auto` takes, and of the bodies where one in joint coordinates fails.
+//! Runs in time in the formulation that `auto` takes, and in the other one where this fails.
 //!
 //! Joint coordinates were not requested where `auto` takes them. So a run of the bodies, on their own mesh, replaces one there that
 //! fails or whose steps collapse. Samples are kept until a run in joint coordinates has ended, so that each is
 //! sent once. A run with more samples than are kept is that of the bodies from the start.
+//!
+//! Where `auto` takes the bodies and their steps or their mesh fail ([`gives_way`]), a run in joint coordinates replaces theirs, under the same conditions.
+//! Samples of the bodies are sent as they come. So a run that has sent some is not replaced: it has taken more than some seconds.
 //!
 //! Steps have collapsed where `SLOW` of them in a row cover so little that the whole run would take more than [`MAX_STEPS`] at that pace,
 //! beyond which explicit steps are refused, too. The growth from a short first step is faster: five times a step.
 
 use super::formulation::{self, ChosenFormulation, Formulation};
 use super::joint_transient::MAX_STEPS;
-use super::mesh::fitted_in_time;
+use super::mesh::{fitted_in_joints, fitted_in_time};
 use super::step_error::BufferedSamples;
 use super::transient::{TransientOptions, TransientResult};
 use super::{AnalysisError, ProgressCallback};
@@ -26,7 +29,7 @@ pub struct FittedRun {
     pub moving: CompiledModel,
     /// The model that it is released from; none: it starts at rest as drawn.
     pub start: Option<CompiledModel>,
-    /// Whether a failure is followed by the run of the bodies.
+    /// Whether a failure may be followed by a run in the other formulation.
     pub is_tentative: bool,
 }
 
@@ -38,7 +41,7 @@ pub type Attempt<'r, T> = &'r mut dyn FnMut(
 ) -> Result<(TransientResult, T), AnalysisError>;
 
 /// Fits `drawn` to the run that `options` specify, and makes it by `attempt` in the formulation that `auto` takes: at most twice, and the
-/// second time of the bodies. `sample` receives the samples of the run whose result is returned.
+/// second time in the other one. `sample` receives the samples of the run whose result is returned.
 ///
 /// # Errors
 /// Those of the mesh and of the run; where both runs fail, those of the bodies.
@@ -53,22 +56,18 @@ pub fn run_as_chosen<T>(
         let (moving, start) = fitted_in_time(drawn, options)?;
         Ok::<_, AnalysisError>(FittedRun { moving, start, is_tentative })
     };
-    let run = fit(drawn, false)?;
+    let run = match fit(drawn, false) {
+        Ok(run) => run,
+        Err(error) => return instead_of_bodies(drawn, options, error, attempt, sample, watch),
+    };
     let taken = formulation::taken(&run.moving, options);
     let Some(taken) = taken.filter(|taken| taken.formulation != Formulation::Compliant) else {
-        return attempt(run, sample, watch);
+        return of_bodies(drawn, options, run, attempt, sample, watch);
     };
     let why = if options.samples_are_kept() {
-        let mut kept = BufferedSamples::default();
-        let mut pace = Pace::default();
-        let mut watched = |fraction: f64| pace.goes_on(fraction) && watch(fraction);
-        let run = FittedRun { is_tentative: true, ..run };
-        match attempt(run, &mut |t, values| kept.keep(t, values), &mut watched) {
-            Ok(done) => {
-                kept.send(sample);
-                return Ok(done);
-            }
-            Err(error) => pace.why(error)?,
+        match in_joints(run, attempt, sample, watch)? {
+            Ok(done) => return Ok(done),
+            Err(why) => why,
         }
     } else {
         "more samples than are kept until its end".to_owned()
@@ -77,6 +76,91 @@ pub fn run_as_chosen<T>(
     let (mut result, more) = attempt(run, sample, watch)?;
     result.formulation_taken = Some(instead_of(&taken, &why).to_string());
     Ok((result, more))
+}
+
+/// A run in joint coordinates that `auto` took, which sends its samples at its end; the reason where it was given up.
+///
+/// # Errors
+/// [`AnalysisError::Cancelled`].
+fn in_joints<T>(
+    run: FittedRun,
+    attempt: Attempt<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<Result<(TransientResult, T), String>, AnalysisError> {
+    let mut kept = BufferedSamples::default();
+    let mut pace = Pace::default();
+    let mut watched = |fraction: f64| pace.goes_on(fraction) && watch(fraction);
+    let run = FittedRun { is_tentative: true, ..run };
+    match attempt(run, &mut |t, values| kept.keep(t, values), &mut watched) {
+        Ok(done) => {
+            kept.send(sample);
+            Ok(Ok(done))
+        }
+        Err(error) => pace.why(error).map(Err),
+    }
+}
+
+/// A run of the bodies, or one in joint coordinates where `auto` may take them and the steps of the bodies fail before they have sent a sample.
+///
+/// # Errors
+/// Those of the bodies.
+fn of_bodies<T>(
+    drawn: &CompiledModel,
+    options: &TransientOptions<'_>,
+    run: FittedRun,
+    attempt: Attempt<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<(TransientResult, T), AnalysisError> {
+    if !(formulation::may_take_joints(drawn, options) && options.samples_are_kept()) {
+        return attempt(run, sample, watch);
+    }
+    let mut sent = false;
+    let mut send = |t: f64, values: &[f64]| {
+        sent = true;
+        sample(t, values);
+    };
+    match attempt(FittedRun { is_tentative: true, ..run }, &mut send, watch) {
+        Err(error) if !sent => instead_of_bodies(drawn, options, error, attempt, sample, watch),
+        ended => ended,
+    }
+}
+
+/// The run in joint coordinates after one of the bodies that ended with `error`, where that may be an error of the bodies alone.
+///
+/// # Errors
+/// `error` where the run fails, too, and [`AnalysisError::Cancelled`].
+fn instead_of_bodies<T>(
+    drawn: &CompiledModel,
+    options: &TransientOptions<'_>,
+    error: AnalysisError,
+    attempt: Attempt<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<(TransientResult, T), AnalysisError> {
+    if !gives_way(&error) || !options.samples_are_kept() {
+        return Err(error);
+    }
+    let Ok(Some((moving, start))) = fitted_in_joints(drawn, options) else { return Err(error) };
+    match in_joints(FittedRun { moving, start, is_tentative: true }, attempt, sample, watch)? {
+        Ok((mut result, more)) => {
+            let why = format!("a run of the bodies was given up ({error})");
+            let taken = ChosenFormulation { formulation: Formulation::Rcr, why };
+            result.formulation_taken = Some(taken.to_string());
+            Ok((result, more))
+        }
+        Err(_) => Err(error),
+    }
+}
+
+/// Whether a failure of a run of the bodies may be one of their coordinates or of their mesh, which joint coordinates cut otherwise. Input and the ranges of
+/// laws are the same in every formulation.
+pub fn gives_way(error: &AnalysisError) -> bool {
+    matches!(
+        error,
+        AnalysisError::StepFailed { .. } | AnalysisError::NoEquilibrium { .. } | AnalysisError::NotConverged { .. }
+    )
 }
 
 /// Makes a run of a model on its mesh alone, without samples, and gives up where steps collapse in joint coordinates that `auto` took.

@@ -13,7 +13,11 @@
 //! segments. Beams are cut otherwise in joint coordinates, so that this choice comes before the mesh ([`in_joints`]), and the other after it
 //! ([`of_run`]).
 //!
-//! Every front end has both by the search for the mesh and by the run. [`taken`] reports the choice.
+//! Other mechanisms have bodies first. The first coarse run of the search for their mesh propagates the error of its steps. Where this is of the size of the
+//! motion, the way is curved in the coordinates of the bodies, and their steps would become several times as many. Joint coordinates are then
+//! taken if their own coarse run has a smaller error and a mesh of their own holds the tolerance ([`may_take_joints`], `mesh::fitted_in_time`).
+//!
+//! Every front end has all of them by the search for the mesh and by the run. [`taken`] reports the choice.
 
 use super::AnalysisError;
 use super::integrator::Integrator;
@@ -62,7 +66,9 @@ pub fn taken(moving: &CompiledModel, options: &TransientOptions<'_>) -> Option<C
     match (moving.requested.formulation, moving.options.formulation) {
         (Formulation::Auto, Formulation::Auto) => Some(of_run(moving, options).0),
         (Formulation::Auto, formulation @ Formulation::Rcr) => {
-            let why = outweighed_tree(moving).unwrap_or_else(|| "rigid parts outweigh the flexures".to_owned());
+            let why = outweighed_tree(moving).unwrap_or_else(|| {
+                "in a coarse run of the bodies the error of the steps is of the size of the motion".to_owned()
+            });
             Some(ChosenFormulation { formulation, why })
         }
         _ => None,
@@ -78,12 +84,20 @@ fn has_default_steps(options: &TransientOptions<'_>) -> bool {
         && options.motions.is_empty()
 }
 
-/// Whether `auto` takes joint coordinates for a run of this model before there is a mesh. A given scheme is that of the bodies.
-pub fn takes_joints(drawn: &CompiledModel, options: &TransientOptions<'_>) -> bool {
+/// Whether `auto` may take joint coordinates for a run of this model. A given scheme is that of the bodies.
+pub fn may_take_joints(drawn: &CompiledModel, options: &TransientOptions<'_>) -> bool {
+    let system = &drawn.parts.system;
     drawn.options.formulation == Formulation::Auto
         && drawn.requested.scheme == Scheme::Auto
         && has_default_steps(options)
-        && outweighed_tree(drawn).is_some()
+        && !system.model.linear
+        && system.anchors.is_empty()
+        && !system.turns()
+}
+
+/// Whether `auto` takes joint coordinates for a run of this model before there is a mesh.
+pub fn takes_joints(drawn: &CompiledModel, options: &TransientOptions<'_>) -> bool {
+    may_take_joints(drawn, options) && outweighed_tree(drawn).is_some()
 }
 
 /// Whether joint coordinates suit a mesh with these numbers of segments.
@@ -91,12 +105,20 @@ pub fn suits_joints(segments: &[usize]) -> bool {
     segments.iter().all(|&n| n <= MOST_SEGMENTS)
 }
 
-/// The model in joint coordinates and what it is released from, where `auto` takes them and they can describe both.
+/// The model in joint coordinates and what it is released from, where `auto` takes them before there is a mesh and they can describe both.
 pub fn in_joints(
     drawn: &CompiledModel,
     options: &TransientOptions<'_>,
 ) -> Option<(CompiledModel, Option<CompiledModel>)> {
-    if !takes_joints(drawn, options) {
+    if takes_joints(drawn, options) { in_possible_joints(drawn, options) } else { None }
+}
+
+/// The same where `auto` may take joint coordinates.
+pub fn in_possible_joints(
+    drawn: &CompiledModel,
+    options: &TransientOptions<'_>,
+) -> Option<(CompiledModel, Option<CompiledModel>)> {
+    if !may_take_joints(drawn, options) {
         return None;
     }
     let compiled = |model: &CompiledModel| {

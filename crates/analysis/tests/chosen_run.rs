@@ -1,4 +1,4 @@
-//! Runs in joint coordinates that `auto` takes give way to those of the bodies.
+//! Runs in the formulation that `auto` takes give way to those in the other one.
 
 use bimorph_analysis::AnalysisError;
 use bimorph_analysis::chosen_run::{FittedRun, run_as_chosen};
@@ -19,6 +19,18 @@ for i=1:2 [
   link2d * [c(i) q(i)] [l=20u]
 ]
 f2d * [c(2)] [F=0.1u oz=pi/2]
+";
+
+/// A plate on two beams, one of them of two pieces, under a force that folds segments: with two segments a beam no step of the bodies passes
+/// 1.2e-7 s.
+const FRAME: &str = "
+process p1 = [Youngsmodulus=165e9 density=2300 h=5u]
+anchor p1 [a] []
+beam2d p1 [a b] [l=80u w=0.5u]
+beam2d p1 [a c] [l=80u w=1.5u oz=1]
+beam2d p1 [c b] [l=76.7u w=1.5u oz=-1.0708]
+plate2d p1 [b] [l=18u w=18u]
+f2d * [b] [F=120u oz=2.7]
 ";
 
 type Samples = Vec<(f64, Vec<f64>)>;
@@ -57,6 +69,35 @@ fn run(
     };
     let keep = &mut |t: f64, values: &[f64]| samples.push((t, values.to_vec()));
     let done = run_as_chosen(&drawn(formulation), &options, &mut attempt, keep, &mut |_| true);
+    (done.map(|(result, ())| result), samples, runs)
+}
+
+/// The run of the frame, its samples, and the formulations of all runs; `interfere` acts on one in joint coordinates after it has been made.
+fn run_frame(
+    formulation: Formulation,
+    interfere: Interference<'_>,
+) -> (Result<TransientResult, AnalysisError>, Samples, Vec<Formulation>) {
+    let (mut samples, mut runs) = (Samples::new(), Vec::new());
+    let model =
+        CompileOptions { formulation, undamped: true, segments: Some(2), tol: 1e-2, ..CompileOptions::default() };
+    let bundle = Bundle::from_text("frame.net", FRAME);
+    let drawn = draw(&NetlistSource::new(&bundle), &model).and_then(|drawn| drawn.compile());
+    let drawn = drawn.unwrap_or_else(|e| panic!("{e}"));
+    let signals = vec!["b.x".into(), "b.y".into()];
+    let options = TransientOptions { stop: 4e-7, signals, points: 101, tol: 1e-2, ..TransientOptions::default() };
+    let mut attempt = |run: FittedRun, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
+        runs.push(run.moving.options.formulation);
+        let mut go = |options: &TransientOptions<'_>,
+                      sample: &mut dyn FnMut(f64, &[f64]),
+                      watch: &mut dyn FnMut(f64) -> bool| {
+            transient(&run.moving, options, sample, watch).map(|r| (r, ()))
+        };
+        let done = with_step_error(&options, &run.moving, &mut go, sample, watch)?;
+        interfere(watch)?;
+        Ok(done)
+    };
+    let keep = &mut |t: f64, values: &[f64]| samples.push((t, values.to_vec()));
+    let done = run_as_chosen(&drawn, &options, &mut attempt, keep, &mut |_| true);
     (done.map(|(result, ())| result), samples, runs)
 }
 
@@ -113,4 +154,29 @@ fn runs_with_many_samples_are_those_of_bodies() {
         "{taken}"
     );
     assert_eq!((samples.len(), runs), ((1 << 20) + 1, 1));
+}
+
+/// Where a step of the bodies fails, result and samples are those of joint coordinates to the last bit, each sample comes once, and the result has the
+/// reason. Where these fail, too, the error is that of the bodies, and where the caller cancels them they are cancelled.
+#[test]
+fn failed_steps_of_bodies_give_way_to_joints() {
+    let (joints, samples, runs) = run_frame(Formulation::Rcr, &|_| Ok(()));
+    let joints = joints.unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((samples.len(), runs), (101, vec![Formulation::Rcr]));
+    let (refused, none, _) = run_frame(Formulation::Compliant, &|_| Ok(()));
+    let refused = refused.map(|_| ()).expect_err("segments fold");
+    assert!(matches!(&refused, AnalysisError::StepFailed { t, .. } if *t < 1.2e-7), "{refused}");
+    assert!(none.is_empty());
+
+    let both = vec![Formulation::Auto, Formulation::Rcr];
+    let (found, others, runs) = run_frame(Formulation::Auto, &|_| Ok(()));
+    let mut found = found.unwrap_or_else(|e| panic!("{e}"));
+    let taken = found.formulation_taken.take().unwrap_or_default();
+    assert_eq!(taken, format!("rcr: a run of the bodies was given up ({refused})"));
+    assert_eq!((found, others, &runs), (joints, samples, &both));
+
+    for (interfere, told) in [(failure(), refused), (AnalysisError::Cancelled, AnalysisError::Cancelled)] {
+        let (found, others, runs) = run_frame(Formulation::Auto, &|_| Err(interfere.clone()));
+        assert_eq!((found, others.len(), &runs), (Err(told), 0, &both));
+    }
 }

@@ -11,6 +11,9 @@
 //!
 //! A run to a state in which parts touch is compared up to its first contact: impacts on two meshes have nothing else in common than their means.
 //!
+//! Where another formulation may be taken, the first coarse run propagates the error of its steps, by which a judge ends the search
+//! ([`SearchLimits`]).
+//!
 //! If stiffness stays constant, but the motion outside the modes of the mesh exceeds the tolerance, only a bound could
 //! be reported. Such a run is made twice, too, and the difference of the two is reported instead.
 
@@ -47,20 +50,36 @@ const AIM: f64 = 0.7;
 /// and near buckling the measured order is lower, or seems higher.
 const ORDERS: (f64, f64) = (1.0, 2.0);
 
+/// Limits of a search.
+pub(super) struct SearchLimits<'j> {
+    /// Meshes that are tried, at most.
+    pub(super) passes: usize,
+    /// Whether to go on after the first coarse run, whose steps have this error of the amplitude; none: it is not estimated.
+    pub(super) judge: Option<&'j mut dyn FnMut(f64) -> bool>,
+}
+
+impl SearchLimits<'_> {
+    /// Of the only search.
+    pub(super) fn none() -> Self {
+        Self { passes: MAX_PASSES, judge: None }
+    }
+}
+
 /// The mesh for a run, from that for its initial and final states and modes; the error of the motion outside the modes
-/// is at most `left` of the amplitude.
+/// is at most `left` of the amplitude. None where the judge of the first coarse run ends the search.
 pub(super) fn order(
     moving: &CompiledModel,
     options: &TransientOptions<'_>,
     order: Mesh,
     left: f64,
-) -> Result<Mesh, AnalysisError> {
+    limits: SearchLimits<'_>,
+) -> Result<Option<Mesh>, AnalysisError> {
     let at_least =
         |error: f64| Mesh { estimated_error: order.estimated_error.map(|own| own.max(error)), ..order.clone() };
     let beams = !moving.structure.beams.is_empty() && order.segments.len() == moving.order.segments.len();
     let same = options.release.is_none_or(|start| start.order.segments.len() == order.segments.len());
     if !beams || !same || options.signals.is_empty() {
-        return Ok(at_least(left));
+        return Ok(Some(at_least(left)));
     }
     let goal = moving.options.errors().large_motion();
     let closes = ends_in_contact(moving, options);
@@ -69,24 +88,30 @@ pub(super) fn order(
     if !closes && !bends(moving, options, &order)? {
         let found =
             (left > moving.options.errors().requested()).then(|| compared(moving, options, &order.segments)).flatten();
-        return Ok(match found {
+        return Ok(Some(match found {
             // both runs include the error of the modes, too
             Some(error) if error <= goal => Mesh { estimated_error: Some(error), ..order },
             error => at_least(error.map_or(left, |error| error.min(left))),
-        });
+        }));
     }
     let given = chosen(moving) || moving.options.band.is_some();
     let on = |segments: &[usize], error: Option<f64>| {
         let estimated_error = order.estimated_error.zip(error).map(|(own, error)| own.max(error));
-        Mesh { segments: segments.to_vec(), estimated_error, ..order.clone() }
+        Some(Mesh { segments: segments.to_vec(), estimated_error, ..order.clone() })
     };
-    let first =
-        pair(moving, &order.segments).and_then(|(from, to)| Some((sample_run(moving, options, &from)?, from, to)));
+    let SearchLimits { passes, judge } = limits;
+    let first = pair(moving, &order.segments)
+        .and_then(|(from, to)| Some((run_on(moving, options, &from, judge.is_some())?, from, to)));
     // a failure is reported when the run is made; a result without a comparison has no estimate
-    let Some((mut coarse, mut from, mut segments)) = first else { return Ok(on(&order.segments, None)) };
+    let Some(((mut coarse, steps), mut from, mut segments)) = first else { return Ok(on(&order.segments, None)) };
+    if let Some((error, goes_on)) = steps.zip(judge)
+        && !goes_on(error)
+    {
+        return Ok(None);
+    }
     let (mut before, mut convergence) = (None, ORDERS.0);
     let mut last = on(&order.segments, None);
-    for _ in 0..MAX_PASSES {
+    for _ in 0..passes {
         let both = sample_run(moving, options, &segments)
             .and_then(|fine| Some((apart(moving, options, &coarse, &fine)?, fine)));
         let Some((difference, fine)) = both else { return Ok(last) };
@@ -174,6 +199,16 @@ fn bends(moving: &CompiledModel, options: &TransientOptions<'_>, order: &Mesh) -
 
 /// The samples of a run on a mesh, as far as it came; none where it failed.
 fn sample_run(moving: &CompiledModel, options: &TransientOptions<'_>, segments: &[usize]) -> Option<Vec<Vec<f64>>> {
+    run_on(moving, options, segments, false).map(|(samples, _)| samples)
+}
+
+/// The same, with the error of its steps of the amplitude where `judged`.
+fn run_on(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+    segments: &[usize],
+    judged: bool,
+) -> Option<(Vec<Vec<f64>>, Option<f64>)> {
     let model = meshed(moving, segments).ok()?;
     let start = options.release.map(|start| meshed(start, segments)).transpose().ok()?;
     let loose = options.for_mesh(moving.options.errors().mesh_run(), points(options), start.as_deref());
@@ -187,11 +222,13 @@ fn sample_run(moving: &CompiledModel, options: &TransientOptions<'_>, segments: 
         steps += 1.0;
         steps * unknowns <= MAX_WORK
     };
-    match transient(&model, &loose, &mut keep, &mut few) {
-        Ok(_) | Err(AnalysisError::Cancelled) => {}
+    let loose = if judged { loose.with_estimate() } else { loose };
+    let error = match transient(&model, &loose, &mut keep, &mut few) {
+        Ok(run) => run.step_error,
+        Err(AnalysisError::Cancelled) => None,
         Err(_) => return None,
-    }
-    columns.first().is_some_and(|column| column.len() >= MIN_SAMPLES).then_some(columns)
+    };
+    columns.first().is_some_and(|column| column.len() >= MIN_SAMPLES).then_some((columns, error))
 }
 
 fn points(options: &TransientOptions<'_>) -> usize {

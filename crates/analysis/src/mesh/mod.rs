@@ -60,9 +60,18 @@ use warnings::{of_fingers, of_heat, of_strength, of_stress};
 
 pub use equilibrium::{operating_point_warnings, transient_warnings};
 pub use in_circuit::{in_circuit, twice};
+use large_motion::SearchLimits;
 pub use permanent_strain::static_backbent;
 pub use warnings::WARNING;
 pub use warnings::{beyond, warnings};
+
+/// Error of the steps of a coarse run of the bodies from which on joint coordinates are tried (1), at ten times the tolerance of the steps. Of 55 runs
+/// of random mechanisms those above took 0.06 to 17 times the time of joint coordinates, and those below 0.01 to 3 times.
+const UNPREDICTABLE: f64 = 0.4;
+/// Ratio of the error in joint coordinates to that of the bodies, at most, for which they are taken (1).
+const LESS: f64 = 0.1;
+/// Meshes that are tried in joint coordinates then: a mesh of more than twice their first segments would cost more than the steps of the bodies.
+const FEW_PASSES: usize = 2;
 
 /// Request for a mesh.
 #[derive(Debug, Clone, Copy)]
@@ -108,43 +117,119 @@ pub fn order(compiled: &CompiledModel, request: &MeshRequest<'_>) -> Result<Mesh
     })
 }
 
+/// A model that moves and what it is released from, on the mesh for a run.
+type FittedModels = (CompiledModel, Option<CompiledModel>);
+
 /// A released mechanism and what it was released from, on the mesh for a transient, in the formulation that `auto` takes.
 ///
 /// # Errors
 /// See [`fitted`].
-pub fn fitted_in_time(
-    moving: &CompiledModel,
-    options: &TransientOptions<'_>,
-) -> Result<(CompiledModel, Option<CompiledModel>), AnalysisError> {
-    let Some((joints, start)) = formulation::in_joints(moving, options) else {
-        return fitted_as_compiled(moving, options);
-    };
-    match fitted_as_compiled(&joints, &options.with_release(start.as_ref())) {
-        Ok(fitted) if formulation::suits_joints(&fitted.0.order.segments) => Ok(fitted),
-        Err(AnalysisError::Cancelled) => Err(AnalysisError::Cancelled),
-        // joint coordinates were not requested, and refuse nothing
-        _ => fitted_as_compiled(moving, options),
-    }
+pub fn fitted_in_time(moving: &CompiledModel, options: &TransientOptions<'_>) -> Result<FittedModels, AnalysisError> {
+    in_suited_formulation(moving, options, &fitted_as_compiled, &|fitted| &fitted.0.order)
 }
 
-/// The same in the formulation that the model was compiled for.
+/// The same in joint coordinates, whatever suits; none where they cannot describe it, or `auto` was not requested.
+///
+/// # Errors
+/// See [`fitted`].
+pub fn fitted_in_joints(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+) -> Result<Option<FittedModels>, AnalysisError> {
+    let Some((joints, start)) = formulation::in_possible_joints(moving, options) else { return Ok(None) };
+    fitted_as_compiled(&joints, &options.with_release(start.as_ref()), SearchLimits::none())
+}
+
+/// The mesh for a transient in the formulation that `auto` takes, and whether this is joint coordinates.
+///
+/// # Errors
+/// See [`fitted`].
+pub fn suited_order_in_time(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+) -> Result<(Mesh, bool), AnalysisError> {
+    let order = |model: &CompiledModel, options: &TransientOptions<'_>, limits: SearchLimits<'_>| {
+        let found = limited_order_in_time(model, options, limits)?;
+        Ok(found.map(|order| (order, model.joints.is_some())))
+    };
+    in_suited_formulation(moving, options, &order, &|found| &found.0)
+}
+
+/// Searches a mesh for a model; none where the limits of the search end it.
+type LimitedSearch<'s, T> =
+    &'s dyn Fn(&CompiledModel, &TransientOptions<'_>, SearchLimits<'_>) -> Result<Option<T>, AnalysisError>;
+
+/// The mesh that `search` finds in the formulation that `auto` takes: joint coordinates where they suit before there is a mesh, or where the
+/// steps of the bodies are unpredictable in the first coarse run.
+fn in_suited_formulation<T>(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+    search: LimitedSearch<'_, T>,
+    order: &dyn Fn(&T) -> &Mesh,
+) -> Result<T, AnalysisError> {
+    let of_bodies = |limits: SearchLimits<'_>| {
+        search(moving, options, limits)?.ok_or_else(|| AnalysisError::NotConverged {
+            detail: "the search for the mesh of a run ended without a mesh".into(),
+        })
+    };
+    if let Some((joints, start)) = formulation::in_joints(moving, options) {
+        return match search(&joints, &options.with_release(start.as_ref()), SearchLimits::none()) {
+            Ok(Some(found)) if formulation::suits_joints(&order(&found).segments) => Ok(found),
+            Err(AnalysisError::Cancelled) => Err(AnalysisError::Cancelled),
+            // joint coordinates were not requested, and refuse nothing
+            _ => of_bodies(SearchLimits::none()),
+        };
+    }
+    let early = formulation::takes_joints(moving, options);
+    if early || !formulation::may_take_joints(moving, options) || moving.parts.system.can_touch() {
+        return of_bodies(SearchLimits::none());
+    }
+    let mut in_joints = None;
+    let mut judge = |error: f64| {
+        if error > UNPREDICTABLE {
+            in_joints = predictable_in_joints(moving, options, error, search, order);
+        }
+        in_joints.is_none()
+    };
+    let found = of_bodies(SearchLimits { judge: Some(&mut judge), ..SearchLimits::none() });
+    in_joints.map_or(found, Ok)
+}
+
+/// The mesh in joint coordinates, where that is little finer than their first one and the steps have a far smaller error in a coarse run than `error`,
+/// that of the bodies.
+fn predictable_in_joints<T>(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+    error: f64,
+    search: LimitedSearch<'_, T>,
+    order: &dyn Fn(&T) -> &Mesh,
+) -> Option<T> {
+    let (joints, start) = formulation::in_possible_joints(moving, options)?;
+    let mut judge = |own: f64| own < LESS * error;
+    let limits = SearchLimits { passes: FEW_PASSES, judge: Some(&mut judge) };
+    let found = search(&joints, &options.with_release(start.as_ref()), limits).ok()??;
+    order(&found).estimated_error.is_some_and(|error| moving.options.errors().holds(error)).then_some(found)
+}
+
+/// The same in the formulation that the model was compiled for; none where the limits of the search end it.
 fn fitted_as_compiled(
     moving: &CompiledModel,
     options: &TransientOptions<'_>,
-) -> Result<(CompiledModel, Option<CompiledModel>), AnalysisError> {
+    limits: SearchLimits<'_>,
+) -> Result<Option<FittedModels>, AnalysisError> {
     // reject unknown signal names before the mesh search; points along beams depend on the mesh
     for name in options.signals.iter().filter(|name| !name.contains('[')) {
         Expression::of_run(moving, name, &[])?;
     }
     let moving = &*with_section_inertia(moving)?;
-    let order = order_in_time(moving, options)?;
+    let Some(order) = limited_order_in_time(moving, options, limits)? else { return Ok(None) };
     let start = options.release.map(|start| on(&*with_section_inertia(start)?, order.clone())).transpose()?;
     let mut moving = on(moving, order)?;
     let reported = run_warnings(&moving, start.as_ref(), &options.voltages);
     moving.warnings.items.extend(reported);
     let reported = motion_warnings(&moving, options);
     moving.warnings.items.extend(reported);
-    Ok((moving, start))
+    Ok(Some((moving, start)))
 }
 
 /// Warnings about a run: stress stiffening omitted by a linear model, and combs and temperatures beyond their range,
@@ -173,15 +258,24 @@ fn left_out_in_time(moving: &CompiledModel, start: Option<&CompiledModel>, volta
     stressed.into_iter().reduce(f64::max)
 }
 
-/// The mesh for a transient, with the estimate of its error.
+/// The mesh for a transient in the formulation of the model, with the estimate of its error.
 ///
 /// # Errors
 /// See [`fitted`].
 pub fn order_in_time(moving: &CompiledModel, options: &TransientOptions<'_>) -> Result<Mesh, AnalysisError> {
+    Ok(limited_order_in_time(moving, options, SearchLimits::none())?.unwrap_or_else(|| moving.order.clone()))
+}
+
+/// As above; none where the limits of the search end it.
+fn limited_order_in_time(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+    limits: SearchLimits<'_>,
+) -> Result<Option<Mesh>, AnalysisError> {
     // the modes about a closed gap are those of parts that are pressed together, and say nothing of the way there
     let (order, left) = match large_motion::ends_in_contact(moving, options) {
         true => (Mesh { estimated_error: Some(0.0), ..moving.order.clone() }, 0.0),
         false => excited_modes::order(moving, options)?,
     };
-    large_motion::order(moving, options, order, left)
+    large_motion::order(moving, options, order, left, limits)
 }

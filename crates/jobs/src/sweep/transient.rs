@@ -16,7 +16,7 @@ use super::samples::SampleGenerator;
 use super::shared_meshes::{alike, middle};
 use super::spec::{SweepAnalysis, SweepSpec};
 use bimorph_analysis::batch_transient::{self, RunEnd};
-use bimorph_analysis::chosen_run::tentative;
+use bimorph_analysis::chosen_run::{gives_way, tentative};
 use bimorph_analysis::formulation;
 use bimorph_analysis::mesh;
 use bimorph_analysis::readout::expression::Expression;
@@ -84,7 +84,7 @@ impl SweepMesh {
         if !self.in_joints {
             return Ok(Some(compiled));
         }
-        if !formulation::takes_joints(&compiled, options) {
+        if !formulation::may_take_joints(&compiled, options) {
             return Ok(None);
         }
         let joints = drawn.clone().in_formulation(Formulation::Rcr).on(self.order.clone())?;
@@ -245,7 +245,8 @@ impl<'a> TransientSweep<'a> {
         Ok(Some(ReducedVariant { compiled: Arc::new(compiled), trained }))
     }
 
-    /// A run of its own: of the bodies where one in joint coordinates fails that `auto` took.
+    /// A run of its own: of the bodies where one in joint coordinates fails that `auto` took, and in joint coordinates where steps of the bodies
+    /// fail.
     fn alone(
         &self,
         point: &MeshedPoint,
@@ -254,13 +255,18 @@ impl<'a> TransientSweep<'a> {
     ) -> Result<PointResults, String> {
         let options = self.transient(settings);
         let mut run = |watch: ProgressCallback<'_>| end(point, &options, watch);
-        let done = tentative(&point.compiled, &options, &mut |_| true, &mut run).map_err(|error| error.to_string())?;
-        if let Some(end) = done {
+        let done = tentative(&point.compiled, &options, &mut |_| true, &mut run);
+        if let Ok(Some(end)) = done {
             return self.found(point, &options, end);
         }
         let drawn = draw(self.source, &at(&self.options, settings)).map_err(|error| brief(&error))?;
-        let drawn = drawn.compile().map_err(|error| brief(&error))?.for_given_steps();
-        let point = on_own_mesh(&drawn, &options, go_on)?;
+        let drawn = drawn.compile().map_err(|error| brief(&error))?;
+        if let Err(error) = done {
+            let in_joints = if gives_way(&error) { in_joints(&drawn, &options, go_on) } else { None };
+            let (point, end) = in_joints.ok_or_else(|| error.to_string())?;
+            return self.found(&point, &options, end);
+        }
+        let point = on_own_mesh(&drawn.for_given_steps(), &options, go_on)?;
         let end = end(&point, &options, &mut |_| true).map_err(|error| error.to_string())?;
         self.found(&point, &options, end)
     }
@@ -278,16 +284,11 @@ impl<'a> TransientSweep<'a> {
             let drawn = draw(self.source, &at(&self.options, &settings));
             let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
             let options = self.transient(&settings);
-            let in_joints = if joints { formulation::in_joints(&compiled, &options) } else { None };
-            let in_joints = in_joints.and_then(|(moving, _)| {
-                let order = mesh::order_in_time(&moving, &options).ok()?;
-                formulation::suits_joints(&order.segments).then_some(order)
-            });
-            let (order, in_joints) = match in_joints {
-                Some(order) => (Ok(order), true),
-                None => (mesh::order_in_time(&compiled, &options), false),
+            let order = match joints {
+                true => mesh::suited_order_in_time(&compiled, &options),
+                false => mesh::order_in_time(&compiled, &options).map(|order| (order, false)),
             };
-            let Ok(order) = order else { continue };
+            let Ok((order, in_joints)) = order else { continue };
             match &mut shared {
                 None => {
                     let steps = Steps { tol: self.options.errors().requested(), error: None, place: IN_THE_MIDDLE };
@@ -355,15 +356,33 @@ fn steps(compiled: &CompiledModel, run: &TransientOptions<'_>, place: &'static s
     Steps { tol, error, place }
 }
 
-/// A point on the mesh of its own run.
+/// A point on the mesh of its own run; in joint coordinates where `auto` may take them and the bodies have no mesh.
 fn on_own_mesh(
     drawn: &CompiledModel,
     options: &TransientOptions<'_>,
     go_on: &dyn Fn() -> bool,
 ) -> Result<MeshedPoint, String> {
-    let (compiled, _) = mesh::fitted_in_time(drawn, options).map_err(|error| error.to_string())?;
+    let fitted = mesh::fitted_in_time(drawn, options).or_else(|error| {
+        let in_joints = if gives_way(&error) { mesh::fitted_in_joints(drawn, options).ok().flatten() } else { None };
+        in_joints.ok_or(error)
+    });
+    let (compiled, _) = fitted.map_err(|error| error.to_string())?;
     let steps = steps(&compiled, options, "by the end of the run", go_on);
     Ok(prepared(Arc::new(compiled), options, steps))
+}
+
+/// A point in joint coordinates and the end of its run; none where it fails there, too, or `auto` was not requested.
+fn in_joints(
+    drawn: &CompiledModel,
+    options: &TransientOptions<'_>,
+    go_on: &dyn Fn() -> bool,
+) -> Option<(MeshedPoint, RunEnd)> {
+    let (compiled, _) = mesh::fitted_in_joints(drawn, options).ok().flatten()?;
+    let steps = steps(&compiled, options, "by the end of the run", go_on);
+    let point = prepared(Arc::new(compiled), options, steps);
+    let mut run = |watch: ProgressCallback<'_>| end(&point, options, watch);
+    let end = tentative(&point.compiled, options, &mut |_| go_on(), &mut run).ok().flatten()?;
+    Some((point, end))
 }
 
 /// The end of a run of its own.

@@ -74,9 +74,9 @@ pub(crate) fn motion(
         (chosen, all)
     };
     let (fitted, chosen, samples) = if asked.waves.is_empty() {
-        let mut attempt = |run: FittedRun, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
+        let mut attempt = |run: FittedRun, _: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
             let (chosen, all) = signals_on(&run.moving);
-            let found = transient(&run.moving, &options.with_signals(all), sample, watch)?;
+            let found = transient(&run.moving, &options.with_signals(all), &mut |_, _| (), watch)?;
             Ok((found, (run.moving, chosen)))
         };
         let watch = &mut |fraction| progress(fraction);
