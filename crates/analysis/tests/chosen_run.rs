@@ -4,7 +4,7 @@ use bimorph_analysis::AnalysisError;
 use bimorph_analysis::chosen_run::{FittedRun, run_as_chosen};
 use bimorph_analysis::step_error::with_step_error;
 use bimorph_analysis::transient::{TransientOptions, TransientResult, transient};
-use bimorph_base::Bundle;
+use bimorph_base::{Bundle, Setting};
 use bimorph_model::compile::{CompileOptions, CompiledModel, Formulation, draw};
 use bimorph_netlist::NetlistSource;
 
@@ -31,6 +31,17 @@ beam2d p1 [a c] [l=80u w=1.5u oz=1]
 beam2d p1 [c b] [l=76.7u w=1.5u oz=-1.0708]
 plate2d p1 [b] [l=18u w=18u]
 f2d * [b] [F=120u oz=2.7]
+";
+
+/// An arm of two beams with a plate, which a force turns by a radian.
+const ARM: &str = "
+process p1 = [Youngsmodulus=165e9 density=2300 h=3.1u]
+param F=0.74u
+anchor p1 [a] []
+beam2d p1 [a c] [l=57u w=0.55u oz=1.49]
+beam2d p1 [c b] [l=78u w=1.8u oz=2.144]
+plate2d p1 [b] [l=14u w=14u]
+f2d * [b] [F=F oz=4.07]
 ";
 
 type Samples = Vec<(f64, Vec<f64>)>;
@@ -77,14 +88,24 @@ fn run_frame(
     formulation: Formulation,
     interfere: Interference<'_>,
 ) -> (Result<TransientResult, AnalysisError>, Samples, Vec<Formulation>) {
+    let model = CompileOptions { formulation, segments: Some(2), ..CompileOptions::default() };
+    run_at_one_percent(FRAME, &model, 4e-7, interfere)
+}
+
+/// The same of a netlist with a node b, undamped, at a tolerance of 1e-2.
+fn run_at_one_percent(
+    netlist: &str,
+    model: &CompileOptions,
+    stop: f64,
+    interfere: Interference<'_>,
+) -> (Result<TransientResult, AnalysisError>, Samples, Vec<Formulation>) {
     let (mut samples, mut runs) = (Samples::new(), Vec::new());
-    let model =
-        CompileOptions { formulation, undamped: true, segments: Some(2), tol: 1e-2, ..CompileOptions::default() };
-    let bundle = Bundle::from_text("frame.net", FRAME);
+    let model = CompileOptions { undamped: true, tol: 1e-2, ..model.clone() };
+    let bundle = Bundle::from_text("frame.net", netlist);
     let drawn = draw(&NetlistSource::new(&bundle), &model).and_then(|drawn| drawn.compile());
     let drawn = drawn.unwrap_or_else(|e| panic!("{e}"));
     let signals = vec!["b.x".into(), "b.y".into()];
-    let options = TransientOptions { stop: 4e-7, signals, points: 101, tol: 1e-2, ..TransientOptions::default() };
+    let options = TransientOptions { stop, signals, points: 101, tol: 1e-2, ..TransientOptions::default() };
     let mut attempt = |run: FittedRun, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
         runs.push(run.moving.options.formulation);
         let mut go = |options: &TransientOptions<'_>,
@@ -178,5 +199,30 @@ fn failed_steps_of_bodies_give_way_to_joints() {
     for (interfere, told) in [(failure(), refused), (AnalysisError::Cancelled, AnalysisError::Cancelled)] {
         let (found, others, runs) = run_frame(Formulation::Auto, &|_| Err(interfere.clone()));
         assert_eq!((found, others.len(), &runs), (Err(told), 0, &both));
+    }
+}
+
+/// Where the steps of a coarse run of the bodies have an error of the size of the motion, `auto` makes one run in joint coordinates, to the last bit that
+/// of `rcr`, in less than a third of the steps of the bodies. Under a small force it is that of the bodies.
+#[test]
+fn unpredictable_steps_of_bodies_give_way_to_joints() {
+    let run = |formulation, force: f64| {
+        let set = vec![("F".to_owned(), Setting::Number(force))];
+        let model = CompileOptions { formulation, set, ..CompileOptions::default() };
+        let (found, samples, runs) = run_at_one_percent(ARM, &model, 2.4e-4, &|_| Ok(()));
+        (found.unwrap_or_else(|e| panic!("{e}")), samples, runs)
+    };
+    for (force, other, taken) in [
+        (7.4e-7, Formulation::Rcr, "rcr: in a coarse run of the bodies the error of the steps"),
+        (1e-8, Formulation::Compliant, "compliant: joints are elastic in every direction"),
+    ] {
+        let (mut chosen, samples, runs) = run(Formulation::Auto, force);
+        let why = chosen.formulation_taken.take().unwrap_or_default();
+        assert!(why.starts_with(taken) && runs.len() == 1, "{why}, {runs:?}");
+        let (same, others, _) = run(other, force);
+        assert_eq!((&chosen, samples), (&same, others));
+        let (bodies, ..) = run(Formulation::Compliant, force);
+        let fewer = 3 * chosen.counters.steps < bodies.counters.steps;
+        assert_eq!(fewer, other == Formulation::Rcr, "{} of {} steps", chosen.counters.steps, bodies.counters.steps);
     }
 }
