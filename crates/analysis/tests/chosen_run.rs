@@ -202,8 +202,8 @@ fn failed_steps_of_bodies_give_way_to_joints() {
     }
 }
 
-/// Where the steps of a coarse run of the bodies have an error of the size of the motion, `auto` makes one run in joint coordinates, to the last bit that
-/// of `rcr`, in less than a third of the steps of the bodies. Under a small force it is that of the bodies.
+/// Where the steps of a coarse run of the bodies have an error of the size of the motion, `auto` makes one run, in joint coordinates. It has the bits of
+/// `rcr`, and less than a third of the steps of the bodies. Under a small force the run is that of the bodies.
 #[test]
 fn unpredictable_steps_of_bodies_give_way_to_joints() {
     let run = |formulation, force: f64| {
