@@ -132,6 +132,21 @@ fn too_large_a_load_is_no_loose_part() {
     assert!(error.to_string().contains("the load is"), "{error}");
 }
 
+/// A moment that winds a cantilever to a radius M/EI below half its width is refused on the first meshes: the curvature there is that of the moment on any
+/// mesh. The search went on to 1,024 segments, for minutes.
+#[test]
+fn a_moment_beyond_beams_ends_the_search() {
+    for moment in [1e-5, 1e-3] {
+        let text = format!("x beam2d p [a b] [l=100u w=2u]\nf2d * [b] [M={moment}]");
+        let error = static_fitted(&drawn(&text, &CompileOptions::default()), &[]).unwrap_err();
+        assert!(matches!(error, AnalysisError::NoEquilibrium { overbent: true, .. }), "{error}");
+        let text = error.to_string();
+        assert!(text.contains("beam x is bent to a radius") && text.contains("beyond beams"), "{text}");
+        let segment = text.split("segment ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+        assert!(segment.parse::<usize>().unwrap() <= 32, "{text}");
+    }
+}
+
 /// One segment has two modes; a request for three gets two, with an estimate and a warning.
 #[test]
 fn fewer_modes_than_asked_for_are_reported() {

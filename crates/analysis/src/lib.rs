@@ -67,6 +67,8 @@ pub enum AnalysisError {
         detail: String,
         /// Beams whose segments bent so far there that shorter ones are needed, by index; empty where that is not the reason.
         coarse: Vec<usize>,
+        /// True where a beam bends to a radius below half its width, which shorter segments do not change.
+        overbent: bool,
     },
     /// The structure can move without any stiffness against it.
     #[error("singular structure: {detail}")]
@@ -160,8 +162,8 @@ impl From<bimorph_solve::SolveError> for AnalysisError {
         use bimorph_solve::SolveError;
         match error {
             SolveError::Singular { .. } => Self::Singular { detail: error.to_string() },
-            SolveError::Lost { ref coarse, .. } => {
-                Self::NoEquilibrium { detail: error.to_string(), coarse: coarse.clone() }
+            SolveError::Lost { ref coarse, overbent, .. } => {
+                Self::NoEquilibrium { detail: error.to_string(), coarse: coarse.clone(), overbent }
             }
             SolveError::StepTooSmall { t, dt, .. } | SolveError::StepFailed { t, dt, .. } => {
                 Self::StepFailed { t, dt, detail: error.to_string() }

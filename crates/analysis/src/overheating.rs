@@ -23,7 +23,7 @@ pub fn check_heat(compiled: &CompiledModel, electrics: &Electrics, sources: &[f6
                 error.rise
             ),
         };
-        AnalysisError::NoEquilibrium { detail, coarse: Vec::new() }
+        AnalysisError::NoEquilibrium { detail, coarse: Vec::new(), overbent: false }
     })
 }
 

@@ -266,7 +266,12 @@ impl ExactDevice {
             (Some(token), Status::Ok) => token,
             (_, status) => {
                 let detail = if let Status::Fail(text) = status { text } else { "no answer".into() };
-                return Err(bimorph_analysis::AnalysisError::NoEquilibrium { detail, coarse: Vec::new() }.into());
+                return Err(bimorph_analysis::AnalysisError::NoEquilibrium {
+                    detail,
+                    coarse: Vec::new(),
+                    overbent: false,
+                }
+                .into());
             }
         };
         let signals: Vec<f64> = request.signals.iter().map(|(_, scale)| *scale).collect();

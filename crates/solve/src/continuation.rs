@@ -138,7 +138,7 @@ impl Continuation {
             Err(Some(pivot)) => Err(SolveError::singular(family.system(), pivot)),
             Err(None) => {
                 let reason = "Newton's iteration does not settle on an equilibrium where the path begins".into();
-                Err(SolveError::Lost { share: 0.0, passed: String::new(), reason, coarse: Vec::new() })
+                Err(SolveError::Lost { share: 0.0, passed: String::new(), reason, coarse: Vec::new(), overbent: false })
             }
         }
     }

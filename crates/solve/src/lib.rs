@@ -58,6 +58,8 @@ pub enum SolveError {
         reason: String,
         /// Beams whose segments bent so far there that shorter ones are needed, by index.
         coarse: Vec<usize>,
+        /// True where a beam bends to a radius below half its width, which shorter segments do not change.
+        overbent: bool,
     },
     /// The integrator's steps became too small.
     #[error(

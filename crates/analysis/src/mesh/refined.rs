@@ -2,7 +2,7 @@
 //!
 //! A leg in one segment may bear nothing that one in two does. A beam that tension T bends at its end does so within √(EI/T), and one far longer
 //! segment turns over there and stretches as no beam does. First all segments are doubled; then those beams alone are divided further whose segments
-//! bend too far where the search ended.
+//! bend too far where the search ended. A load that bends beams to less than their own width on several meshes is beyond all of them.
 
 use super::super::AnalysisError;
 use super::doubled_mesh::MAX_NEAR_LIMIT;
@@ -16,10 +16,15 @@ const DOUBLINGS: usize = 5;
 /// How often the segments of single beams are divided into four after that.
 const QUARTERINGS: usize = 3;
 
+/// Meshes on which a beam may be bent to a radius below half its width before the load counts as beyond beams. The curvature there is that of the moment,
+/// whatever the mesh; a single long segment may turn over.
+const MAX_OVERBENT: usize = 3;
+
 /// Meshes that were tried for an equilibrium.
 #[derive(Debug, Default)]
 pub(super) struct Refinement {
     tried: usize,
+    overbent: usize,
 }
 
 impl Refinement {
@@ -30,7 +35,11 @@ impl Refinement {
         segments: &[usize],
         error: &AnalysisError,
     ) -> Option<Vec<usize>> {
-        let AnalysisError::NoEquilibrium { coarse, .. } = error else { return None };
+        let AnalysisError::NoEquilibrium { coarse, overbent, .. } = error else { return None };
+        self.overbent += usize::from(*overbent);
+        if self.overbent >= MAX_OVERBENT {
+            return None;
+        }
         let options = &compiled.options;
         let next = if self.tried < DOUBLINGS {
             doubled(options, segments, |_| true)

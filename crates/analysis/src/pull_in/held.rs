@@ -134,6 +134,7 @@ impl VoltageSweep<'_> {
         Err(AnalysisError::NoEquilibrium {
             detail: format!("no release found after {MAX_LIMIT_POINTS} folds of the closed branch"),
             coarse: Vec::new(),
+            overbent: false,
         })
     }
 

@@ -154,7 +154,7 @@ impl<'a> VoltageSweep<'a> {
         let port = &self.system.electrics.names[self.source];
         let detail =
             format!("no pull-in found after {MAX_LIMIT_POINTS} folds of the open branch, at {port} = {from:.6} V");
-        Err(AnalysisError::NoEquilibrium { detail, coarse: Vec::new() })
+        Err(AnalysisError::NoEquilibrium { detail, coarse: Vec::new(), overbent: false })
     }
 
     /// Why there is no pull-in up to `max`, for a part that is at `q` before the last piece of its way.
@@ -172,7 +172,7 @@ impl<'a> VoltageSweep<'a> {
             None => "raise the largest voltage".into(),
         };
         let detail = format!("{name} pulls nothing in up to {max} V; {way_out}");
-        AnalysisError::NoEquilibrium { detail, coarse: Vec::new() }
+        AnalysisError::NoEquilibrium { detail, coarse: Vec::new(), overbent: false }
     }
 
     /// True where the source drives the fields of combs alone.

@@ -38,15 +38,19 @@ impl Equilibrium {
         q: &[Pose],
     ) -> SolveError {
         let coarse = Self::coarse_beams(system, q);
-        let reason = (Self::fingers_aside(system, q))
-            .or_else(|| self.touching_without_contact(system, q))
-            .or_else(|| Self::overbent(system, q))
+        let first = Self::fingers_aside(system, q).or_else(|| self.touching_without_contact(system, q));
+        if first.is_none()
+            && let Some(reason) = Self::overbent(system, q)
+        {
+            return Self::refused(share, done, (reason, true), coarse);
+        }
+        let reason = first
             .or_else(|| Self::beyond_beams(system, q))
             .or_else(|| self.unheld(system, q))
             .or_else(|| self.gone(system, q))
             .or_else(|| Self::folded(system, &coarse))
             .unwrap_or_else(|| self.unsettled(system, why, q));
-        Self::refused(share, done, reason, coarse)
+        Self::refused(share, done, (reason, false), coarse)
     }
 
     /// A load that is far more than the part bears.
@@ -55,7 +59,7 @@ impl Equilibrium {
         let reason = format!(
             "\"{body}\" is deformed so far there that rounding hides what resists it: the load is too large for this part"
         );
-        Self::refused(share, done, reason, Vec::new())
+        Self::refused(share, done, (reason, false), Vec::new())
     }
 
     /// A path that loses stability again and again.
@@ -63,15 +67,16 @@ impl Equilibrium {
         let reason = format!(
             "{MAX_LOSSES} stability losses lie below that load, as where a part is crumpled: the load is far beyond what the part bears"
         );
-        Self::refused(share, done, reason, Vec::new())
+        Self::refused(share, done, (reason, false), Vec::new())
     }
 
-    fn refused(share: f64, done: &Path, reason: String, coarse: Vec<usize>) -> SolveError {
+    /// The error, with the reason and whether that is a beam bent to a radius below half its width.
+    fn refused(share: f64, done: &Path, (reason, overbent): (String, bool), coarse: Vec<usize>) -> SolveError {
         let first = done.passed.first().map(|passed| passed.share);
         let passed = first.map_or(String::new(), |first| {
             format!(" (the part as drawn loses its stability at {first:.4} of the load)")
         });
-        SolveError::Lost { share, passed, reason, coarse }
+        SolveError::Lost { share, passed, reason, coarse, overbent }
     }
 
     fn fingers_aside(system: &System, q: &[Pose]) -> Option<String> {
