@@ -12,6 +12,8 @@ use bimorph_structure::{
 
 /// States of gas that compresses, unless a netlist says otherwise: |Z| of a square within 0.4 % to ten times its first corner, of a rectangle of 1:2 to three times.
 const FILM_STATES: f64 = 4.0;
+/// Mean free path over the gap to which the effective viscosity is known to 5 % (Veijola and others 1995) (1).
+const MAX_FREE_PATHS: f64 = 880.0;
 /// Permittivity over that of vacuum below which a netlist cancels SUGAR's factor on the fringe field by hand (1).
 const REDUCED: f64 = 1.0 - 1e-3;
 
@@ -101,6 +103,15 @@ impl ElementSite<'_, '_> {
             return Err(self.missing("viscosity"));
         }
         let viscosity = self.non_negative_or("viscosity", 0.0)?;
+        if viscosity > 0.0 && free_path > MAX_FREE_PATHS * gap {
+            let message = format!(
+                "the mean free path of the gas in `{}` is {:.0} gaps; the law of the film holds for less than {MAX_FREE_PATHS}",
+                self.instance.name,
+                free_path / gap
+            );
+            let help = "`pressure=0` leaves the film out; a `dashpot2d` has a measured damping";
+            self.sink.warning("W027", self.instance.span, message, help);
+        }
         let Some(sides) = sides else {
             let message = format!("no gas damps `{}`: the sides of its plates are unknown", self.instance.name);
             let help = "give `l` and `w` of the plates [m], or `pressure=0`";

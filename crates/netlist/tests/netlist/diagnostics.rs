@@ -39,6 +39,23 @@ fn warning(text: &str, code: &str, message: &str) {
     assert!(item.message.contains(message), "{item:?}");
 }
 
+/// Gas whose mean free path exceeds 880 gaps is beyond Veijola's law (Sens. Actuators A 48, 1995): 68 nm at 101 325 Pa are 880 gaps of 2 µm at 3.915 Pa. Vacuum and a
+/// gap without viscosity have no film.
+#[test]
+fn rarefied_films_are_reported() {
+    let film = |pressure: f64, viscosity: f64| {
+        format!(
+            "anchor * [f] []\nspring2d * [f a] [kx=1]\nmass2d * [a] [m=1e-10]\nguide2d * [a] []\nanchor * [b] []\n\
+             g plategap2d * [a b] [l=100u w=100u gap=2u fringe=none pressure={pressure} viscosity={viscosity}]\n\
+             eground * [b] []\ndrive port * [a b] []"
+        )
+    };
+    warning(&film(3.8, 1.83e-5), "W027", "the mean free path of the gas in `g` is 907 gaps");
+    for quiet in [film(4.0, 1.83e-5), film(3.8, 0.0), film(0.0, 1.83e-5)] {
+        assert!(all(&quiet).items.is_empty(), "{}", all(&quiet));
+    }
+}
+
 /// A rendered message shows the line, a caret under the word, and the way out.
 #[test]
 fn rendered() {
