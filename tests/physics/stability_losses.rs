@@ -2,7 +2,7 @@
 //! beam beside a column does not hide.
 
 use super::{balance, close, model, node};
-use bimorph::analysis::mesh::static_fitted;
+use bimorph::analysis::mesh::{pull_in_fitted, static_fitted};
 use bimorph::analysis::statics::StaticResult;
 use bimorph::compile::CompileOptions;
 use bimorph::solve::equilibrium::LossKind;
@@ -143,6 +143,37 @@ fn states_do_not_depend_on_the_direction_of_the_drawing() {
             assert_eq!(directions(&its), directions(&passed), "{name} at {} °", 15 * k);
         }
     }
+}
+
+/// W046 names pull-in where voltages soften a part and buckling where a thrust does. Voltages 1e-5 below pull-in of plates on a spring and on a cantilever; a
+/// column 0.4 % below Euler's load.
+#[test]
+fn warnings_name_pull_in_and_buckling() {
+    let warned = |text: &str, options: &CompileOptions, voltages: &[(String, f64)]| {
+        let (fitted, ..) = static_fitted(&model(text, options), voltages).unwrap();
+        let near = fitted.warnings.items.into_iter().find(|warning| warning.code == "W046");
+        near.map(|warning| warning.message).unwrap_or_default()
+    };
+    let spring = "anchor * [f] []\nspring2d * [f a] [kx=1]\nmass2d * [a] [m=1e-10]\nguide2d * [a] []\n\
+        plategap2d * [a b] [A=1e-8 gap=4u]\nanchor * [b] []\neground * [b] []\ndrive port * [a b] []";
+    let plates = "anchor p1 [f] []\narm beam2d p1 [f a] [l=100u w=2u]\n\
+        plategap2d p1 [a b] [A=1e-8 gap=2u oz=pi/2]\nanchor p1 [b] []\neground * [b] []\ndrive port * [a b] []";
+    for (text, softest) in [(spring, ""), (plates, "; softest motion: beam arm")] {
+        let found = pull_in_fitted(&model(text, &segments(8)), None, 100.0).unwrap().1;
+        let below = [("drive".to_owned(), found.pull_in_v * (1.0 - 1e-5))];
+        let message = warned(text, &segments(8), &below);
+        assert_eq!(message, format!("the voltages are within 1 % of pull-in{softest}"));
+        assert_eq!(warned(text, &segments(8), &[("drive".to_owned(), found.pull_in_v * 0.95)]), "");
+    }
+    let euler = 4.0 * PI.powi(2) * rigidity(2.2e-6) / (120e-6 * 120e-6);
+    let column = format!(
+        "anchor p1 [a] []\ncolumn beam2d p1 [a tip] [l=120u w=2.2u oz=pi/2]\nguide2d * [tip] [oz=pi/2]\nf2d * [tip] [F={:e} oz=-pi/2]",
+        0.996 * euler
+    );
+    assert_eq!(
+        warned(&column, &CompileOptions::default(), &[]),
+        "the load is within 1 % of buckling; softest motion: beam column"
+    );
 }
 
 /// A column with a guided end 0.4 % above Euler's load 4π²EI/L² has buckled, and a slender beam attached at its foot or

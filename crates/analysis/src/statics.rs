@@ -243,6 +243,17 @@ pub(crate) fn electrical(compiled: &CompiledModel, sources: &[f64], rise: &[f64]
     ElectricalSolution { temperatures_k, peak_temperatures_k: peak_temperatures_k.collect(), currents_a }
 }
 
+/// Cause of the softening of an equilibrium.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SofteningCause {
+    /// Forces in the part: it buckles.
+    Stress,
+    /// Voltages: without them it has most of its stiffness.
+    Voltage,
+    /// Both.
+    Both,
+}
+
 /// An equilibrium with what it was found at.
 #[derive(Debug, Clone, Default)]
 pub struct OperatingPoint {
@@ -258,8 +269,8 @@ pub struct OperatingPoint {
     pub path: Path,
     /// Motions that nothing holds.
     pub free_motions: Vec<String>,
-    /// The beam that bends most in the softest motion, where the load is within 1 % of buckling.
-    pub near_buckling: Option<String>,
+    /// The beam that bends most in the softest motion, and the cause, where the load is within 1 % of buckling or pull-in.
+    pub near_buckling: Option<(String, SofteningCause)>,
 }
 
 impl OperatingPoint {

@@ -267,8 +267,8 @@ impl<'a> EquilibriumSearch<'a> {
         let mut point = point.ok_or_else(no_mesh)?;
         let buckled = match hidden(&*meshed(self.compiled, &order.segments)?, self.voltages, &point) {
             Hidden::Nothing => None,
-            Hidden::Near(beam) => {
-                point.near_buckling = Some(beam);
+            Hidden::Near(beam, softening) => {
+                point.near_buckling = Some((beam, softening));
                 None
             }
             Hidden::Buckled(segments) => {

@@ -10,9 +10,9 @@
 //! be, has its own μ near 1. Where μ is small the pivots are counted on twice and four times the segments, which leaves a window of 5e-4 of the load.
 
 use super::super::PortVoltages;
-use super::super::statics::{OperatingPoint, operating_point_near};
+use super::super::statics::{OperatingPoint, SofteningCause, operating_point_near};
 use super::doubled_mesh::{Finer, MAX_NEAR_LIMIT, finer};
-use bimorph_domains::BeamLine;
+use bimorph_domains::{BeamLine, Drive};
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
@@ -22,6 +22,8 @@ use bimorph_multibody::unstressed::add_unstressed_tangent;
 const SUSPECT: [f64; 2] = [0.35, 0.1];
 /// μ of twice the segments below which four times are asked, and the load is within about 1 % of buckling (1).
 const NEAR: f64 = 0.02;
+/// μ without voltages above which these alone make a part soft (1).
+const MOST: f64 = 0.5;
 /// Iterations for the softest motion, whose μ is at least 15 times below that of others where needed.
 const ROUNDS: usize = 6;
 
@@ -30,8 +32,8 @@ const ROUNDS: usize = 6;
 pub(super) enum Hidden {
     /// It is stable there, too.
     Nothing,
-    /// It is stable there, too, within about 1 % of where it buckles; the beam that bends most in the softest motion.
-    Near(String),
+    /// It is stable there, too, with less than [`NEAR`] of its stiffness; the beam that bends most in the softest motion, and what softens it.
+    Near(String, SofteningCause),
     /// It is unstable on a mesh with so many segments.
     Buckled(Vec<usize>),
 }
@@ -63,16 +65,36 @@ pub(super) fn hidden(compiled: &CompiledModel, voltages: &PortVoltages, point: &
         (here, there) = (Some(model), next);
     }
     if is_softer(here.as_ref().unwrap_or(compiled), &there, NEAR) {
-        return Hidden::Near(softest(compiled, point).unwrap_or_default());
+        let softening = softening(here.as_ref().unwrap_or(compiled), &there);
+        return Hidden::Near(softest(compiled, point).unwrap_or_default(), softening);
     }
     Hidden::Nothing
 }
 
-/// True where μ < `fraction`: one factorization.
+/// True where μ < `fraction`.
 fn is_softer(compiled: &CompiledModel, point: &OperatingPoint, fraction: f64) -> bool {
+    is_softer_under(compiled, point, &point.drive(compiled), fraction)
+}
+
+/// Cause of a small μ, by μ at the same place without voltages.
+fn softening(compiled: &CompiledModel, point: &OperatingPoint) -> SofteningCause {
+    let drive = point.drive(compiled);
+    if drive.volts.iter().all(|volts| *volts == 0.0) {
+        return SofteningCause::Stress;
+    }
+    let without = Drive { volts: vec![0.0; drive.volts.len()], ..drive };
+    match (is_softer_under(compiled, point, &without, MOST), is_softer_under(compiled, point, &without, NEAR)) {
+        (false, _) => SofteningCause::Voltage,
+        (true, false) => SofteningCause::Both,
+        (true, true) => SofteningCause::Stress,
+    }
+}
+
+/// True where μ < `fraction` under a drive: one factorization.
+fn is_softer_under(compiled: &CompiledModel, point: &OperatingPoint, drive: &Drive, fraction: f64) -> bool {
     let system = &compiled.parts.system;
     let (mut tangent, mut force) = (BodyMatrix::new(&system.model.pattern), vec![Pose::zeros(); system.bodies()]);
-    system.tangent(&point.q, &point.drive(compiled), &mut tangent, &mut force);
+    system.tangent(&point.q, drive, &mut tangent, &mut force);
     add_unstressed_tangent(&system.model, &point.q, -fraction, &mut tangent);
     system.model.project_matrix(&mut tangent);
     tangent.factor(&system.model.pattern).is_ok_and(|inertia| inertia.negative > 0)

@@ -3,7 +3,7 @@
 use super::super::contact_range::comb_beyond_reported;
 use super::super::reduced::WARNING as REDUCED;
 use super::super::rotary_inertia_error;
-use super::super::statics::{OperatingPoint, too_hot, too_stressed};
+use super::super::statics::{OperatingPoint, SofteningCause, too_hot, too_stressed};
 use bimorph_base::Diagnostic;
 use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
@@ -22,7 +22,7 @@ const STRENGTH: &str = "W051";
 const HEAT: &str = "W037";
 /// Code of the warning that the steps of a run are longer than what it begins with.
 const STEPS: &str = "W044";
-/// Code of the warning that an equilibrium is close to buckling.
+/// Code of the warning that an equilibrium is close to buckling or pull-in.
 const BUCKLING: &str = "W046";
 /// Code of the warning that rotary inertia is left out.
 const ROTARY: &str = "W045";
@@ -93,18 +93,25 @@ pub(super) fn of_rotary(compiled: &CompiledModel, error: f64) -> Option<Diagnost
     Some(Diagnostic::warning(ROTARY, message, "take --rotary-inertia"))
 }
 
-/// Where an equilibrium is so close to buckling that its load decides on less than the accuracy of dimensions.
+/// Where an equilibrium is so close to buckling or pull-in that its load decides on less than the accuracy of dimensions.
 pub(super) fn near_buckling(point: &OperatingPoint) -> Option<Diagnostic> {
-    let beam = point.near_buckling.as_ref()?;
-    let message = match beam.as_str() {
-        "" => "the load is within 1 % of a loss of stability (pull-in or buckling)".to_owned(),
-        beam => format!("the load is within 1 % of buckling; softest motion: beam {beam}"),
+    let (beam, cause) = point.near_buckling.as_ref()?;
+    let (limit, help) = match cause {
+        SofteningCause::Voltage => (
+            "the voltages are within 1 % of pull-in",
+            "`bimorph pullin` finds that voltage; `bimorph path` shows the branches",
+        ),
+        SofteningCause::Stress => (
+            "the load is within 1 % of buckling",
+            "`bimorph path` shows the branches; --imperfection gives the part a shape that is not ideal",
+        ),
+        SofteningCause::Both => (
+            "load and voltages together are within 1 % of a loss of stability",
+            "`bimorph path` shows the branches; --imperfection gives the part a shape that is not ideal",
+        ),
     };
-    Some(Diagnostic::warning(
-        BUCKLING,
-        message,
-        "`bimorph path` shows the branches; --imperfection gives the part a shape that is not ideal",
-    ))
+    let softest = if beam.is_empty() { String::new() } else { format!("; softest motion: beam {beam}") };
+    Some(Diagnostic::warning(BUCKLING, format!("{limit}{softest}"), help))
 }
 
 /// Where current makes a beam hotter than any solid bears.
