@@ -2,7 +2,8 @@
 
 use crate::{close, model};
 use bimorph::analysis::mode_quality::{ModeLoss, mode_losses};
-use bimorph::compile::CompileOptions;
+use bimorph::compile::{CompileOptions, Junctions, compile};
+use bimorph::netlist::Bundle;
 use std::f64::consts::TAU;
 
 const EPS: f64 = 8.854e-12;
@@ -68,6 +69,35 @@ fn currents_that_cancel() {
     let one = loss(&text("R * [e s] [R=1e7]\nwire * [g s] []\neground * [m] []"), &volts(5.0));
     assert!(shared.electrical.abs() < 1e-9 * own.electrical, "{} {}", shared.electrical, own.electrical);
     close(own.electrical, 2.0 * one.electrical, 1e-5);
+}
+
+/// Thermoelastic loss of a clamped beam whose heat flows across its width: exactly Δ·f(ξ) of Lifshitz and Roukes (2000) with beams that meet in points. Calibrated
+/// junctions hold part of the bending energy, and the rest does not depend on the mesh.
+#[test]
+fn thermoelastic_loss_has_no_mesh() {
+    let text = "process s = [ Youngsmodulus=165e9 density=2330 h=20u thermalexpansion=2.6e-6 thermcond=90 specificheat=700 ambienttemperature=300 ]
+        anchor s [a] [oz=pi]
+        beam2d s [a b] [l=200u w=8u]";
+    let capacity = 2330.0 * 700.0;
+    let exact = |found: &ModeLoss| {
+        let xi = 8e-6 * (TAU * found.frequency_hz * capacity / 180.0f64).sqrt();
+        let law = 6.0 / xi.powi(2) - 6.0 / xi.powi(3) * (xi.sinh() + xi.sin()) / (xi.cosh() + xi.cos());
+        165e9 * 2.6e-6f64.powi(2) * 300.0 / capacity * law
+    };
+    let of = |segments: usize, junctions: Junctions| {
+        let options = CompileOptions { segments: Some(segments), junctions, ..CompileOptions::default() };
+        mode_losses(&compile(&Bundle::from_text("ted.net", text), &options).unwrap(), 3, &[]).unwrap()
+    };
+    for found in of(16, Junctions::Centreline) {
+        close(found.thermoelastic, exact(&found), 1e-9);
+    }
+    let (coarse, fine) = (of(16, Junctions::Calibrated), of(64, Junctions::Calibrated));
+    for (mode, (coarse, fine)) in coarse.iter().zip(&fine).enumerate() {
+        let fraction = [coarse, fine].map(|found| found.thermoelastic / exact(found));
+        println!("mode {mode}: {fraction:?}");
+        assert!((0.9..1.0).contains(&fraction[1]), "{fraction:?}");
+        close(fraction[0], fraction[1], 1e-3);
+    }
 }
 
 /// A layer with `anchorquality` gives its modes that Q where beams hold all energy, within the error of the mesh. The loss is half where two equal springs, a beam of that

@@ -8,7 +8,7 @@
 //! electrical: Re iᴴRi/(ω³·m),      i = iω·(V∘∂C·φ + C∘v),      v = −R·i
 //! anchors: Σ_beams 2U/(ω²·m)/Q_a
 //! ```
-//! C is the drag and the dampers, Z the impedance of the gas at the frequency of the mode, and U the energy that the mode bends a beam with. The heat of a bent
+//! C is the drag and the dampers, Z the impedance of the gas at the frequency of the mode, and U the energy that the mode bends a beam with, without junctions. The heat of a bent
 //! beam flows across its width w. The shape is that without damping: the sum is right to the order of 1/Q².
 //!
 //! i is the current through each gap under its voltage V at the operating point, and R the resistances of the netlist between electrodes, with all sources held. Of one gap
@@ -24,7 +24,7 @@ use super::{AnalysisError, PortVoltages};
 use bimorph_domains::Drive;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::discretize::ports::{ElectrodeResistances, electrode_resistances};
-use bimorph_multibody::forces::add_damping;
+use bimorph_multibody::forces::{add_damping, resultants_change};
 use bimorph_multibody::planar::Pose;
 use bimorph_structure::{Beam, SolidHeat};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -78,8 +78,8 @@ pub fn mode_losses(
         add_damping(model, shape, &mut force);
         let drag: f64 = force.iter().zip(shape).map(|(force, rate)| force.dot(rate)).sum();
         let (mut bent, mut anchors) = (0.0, 0.0);
-        for (line, beam) in system.beams.iter().zip(&compiled.structure.beams) {
-            let part = 2.0 * line.bending(&q, shape, model.linear).0 / (omega * omega * mass);
+        for (index, beam) in compiled.structure.beams.iter().enumerate() {
+            let part = 2.0 * bending_energy(compiled, index, (&q, shape)) / (omega * omega * mass);
             bent += part * thermoelastic(beam, omega);
             anchors += part / beam.material.anchor_quality.unwrap_or(f64::INFINITY);
         }
@@ -98,6 +98,22 @@ pub fn mode_losses(
         }
     };
     Ok(found.frequencies_hz.iter().copied().zip(&shapes).map(of).collect())
+}
+
+/// Energy with which a motion `shape` about `q` bends a beam (J). Its moment is linear within a segment, so that the springs of calibrated junctions, in series
+/// with the first and the last joint, have no part in it. Of joints with rigid directions it is that of the cubics between their ends.
+fn bending_energy(compiled: &CompiledModel, beam: usize, (q, shape): (&[Pose], &[Pose])) -> f64 {
+    let system = &compiled.parts.system;
+    let (line, stressed) = (&system.beams[beam], &compiled.parts.stressed[beam]);
+    if stressed.rigid || stressed.joints.is_empty() {
+        return line.bending(q, shape, system.model.linear).0;
+    }
+    let of = |&(joint, length): &(u32, f64)| {
+        let joint = &system.model.joints[joint as usize];
+        let [_, shear, moment]: [f64; 3] = resultants_change(&system.model, joint, q, shape, |_| 0.0).into();
+        0.5 * length / line.rigidity * (moment * moment + (shear * length).powi(2) / 12.0)
+    };
+    stressed.joints.iter().map(of).sum()
 }
 
 /// Resistances between electrodes at the operating point, and the voltages there.
