@@ -4,6 +4,7 @@
 use bimorph::compile::{CompileOptions, CompiledModel, Formulation, Junctions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Agitation, Device, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial, TrialReply};
+use bimorph::document::StructureDocument;
 use bimorph::multibody::agitation::BOLTZMANN;
 use bimorph::netlist::Bundle;
 use nalgebra::Complex;
@@ -134,6 +135,37 @@ fn a_damped_mass_has_the_closed_form() {
             let error = (of(row, column) - factor * want).norm();
             assert!(error <= 1e-9 * want * factor.norm().max(f64::MIN_POSITIVE), "{omega:e} {row} {column}: {error:e}");
         }
+    }
+}
+
+/// Lumped parts have the ambient temperature of their layer: 4·k_B·T·c/k² at low frequency (Callen and Welton 1951), whichever element of the layer comes
+/// first. The temperature of a beam counts where there is one, and 27 °C where no layer gives any. Documents keep it.
+#[test]
+fn lumped_parts_are_at_the_temperature_of_their_layer() {
+    let layer = "process cold = [ density=2300 h=2u ambienttemperature=77 ]\nprocess q = [ Youngsmodulus=160e9 density=2300 h=2u AMBIENT ]\n";
+    let parts = "anchor * [g] []\nmass2d LAYER [m] [m=1e-10 J=1e-20]\nspring2d * [g m] [kx=4 ky=1e3 krz=1]\ndamper2d LAYER [g m] [bx=5e-7]\n";
+    let beam = "beam2d q [m t] [l=10u w=4u]\n";
+    for (text, temperature) in [
+        (parts.replace("LAYER", "cold"), 77.0),
+        (parts.replacen("LAYER", "*", 1).replace("LAYER", "cold"), 77.0),
+        (parts.replace("LAYER", "*"), 300.15),
+        (parts.replace("LAYER", "q"), 300.15),
+        (format!("{}{beam}", parts.replace("LAYER", "cold")), 77.0),
+        (format!("{}{}", parts.replace("LAYER", "cold"), beam).replace("beam2d q", "beam2d q2"), 350.0),
+    ] {
+        let warm = "process q2 = [ Youngsmodulus=160e9 density=2300 h=2u ambienttemperature=350 ]\n";
+        let text = format!("{}{warm}{text}", layer.replace("AMBIENT", ""));
+        let model = compiled(&text);
+        let drawn =
+            StructureDocument { source: String::new(), parameters: Vec::new(), structure: (*model.structure).clone() };
+        let read = StructureDocument::read(&drawn.write().unwrap()).unwrap();
+        assert_eq!(read.structure.ambient_temperature, model.structure.ambient_temperature);
+        let mut device = opened(&model, &["m.x"], &[]);
+        let (token, _) = balanced(&mut device, &[0.0]);
+        let mut noise = Vec::new();
+        device.noise(token, 1.0, &mut noise).unwrap();
+        let want = 4.0 * BOLTZMANN * temperature * 5e-7 / 16.0;
+        assert!((noise[0][0] / want - 1.0).abs() < 1e-6, "{temperature}: {:e} {want:e}", noise[0][0]);
     }
 }
 

@@ -8,10 +8,10 @@ use nalgebra::Complex;
 /// Temperature of a mechanism whose netlist names none: 27 °C, as circuits have it (K).
 const ROOM: f64 = 300.15;
 
-/// Temperature of what surrounds the mechanism (K).
+/// Temperature of what surrounds the mechanism (K): the ambient temperature of its first beam that has one, else of the layer of a lumped part.
 pub fn surroundings(compiled: &CompiledModel) -> f64 {
     let ambient = compiled.structure.beams.iter().map(|beam| beam.material.ambient_temperature);
-    ambient.into_iter().find(|t| *t > 0.0).unwrap_or(ROOM)
+    ambient.into_iter().find(|t| *t > 0.0).or(compiled.structure.ambient_temperature).unwrap_or(ROOM)
 }
 
 /// Gradient of an output over the displacement of each body, and over its rate: the same at every frequency.

@@ -19,6 +19,9 @@ pub fn schema() -> String {
         "    \"source\": {\"type\": \"string\", \"description\": \"File that the document was converted from.\"},\n";
     text += "    \"parameters\": {\"type\": \"object\", \"description\": \"Parameters of that file with the values they took (SI).\", \
              \"additionalProperties\": {\"type\": [\"number\", \"string\"]}}";
+    let (name, about, value) = tables::ambient_schema();
+    let value = value.strip_prefix('{').unwrap_or(&value);
+    let _ = write!(text, ",\n    \"{name}\": {{\"description\": \"{about}.\", {value}");
     for (name, about, items) in tables::section_schemas() {
         let _ = write!(
             text,

@@ -23,7 +23,15 @@ use std::collections::HashMap;
 type Origin = (String, Vec<(String, Setting)>, Structure);
 
 /// Fields of the head.
-const HEAD: [&str; 5] = ["format", "version", "units", "source", "parameters"];
+const HEAD: [&str; 6] = ["format", "version", "units", "source", "parameters", AMBIENT.name];
+
+/// Temperature of the surroundings.
+const AMBIENT: DocumentField = DocumentField {
+    name: "ambient_temperature",
+    unit: "K",
+    range: NumberRange::Positive,
+    about: "Temperature of the surroundings of lumped parts; left out: that of beams, or 300.15",
+};
 
 /// A list itself has no unit; its items have their own.
 const LIST: DocumentField = DocumentField { name: "", unit: "", range: NumberRange::Any, about: "" };
@@ -56,7 +64,7 @@ macro_rules! sections {
         const SECTIONS: &[&str] = &["nodes", $(stringify!($name)),+];
 
         fn write_sections(structure: &Structure, to: &mut DocumentWriter<'_>) -> Result<(), UnwritableStructure> {
-            let Structure { nodes, $($name,)+ index: _ } = structure;
+            let Structure { nodes, $($name,)+ ambient_temperature: _, index: _ } = structure;
             section("nodes", nodes, to)?;
             $(section(stringify!($name), $name, to)?;)+
             Ok(())
@@ -78,7 +86,8 @@ macro_rules! sections {
             }
             $(let $name: Vec<$type> = read_section(root, stringify!($name), &names)?;)+
             drop(names);
-            Ok(Structure { nodes, $($name,)+ index: NodeIndex::default() })
+            let ambient_temperature = read_ambient(root)?;
+            Ok(Structure { nodes, $($name,)+ ambient_temperature, index: NodeIndex::default() })
         }
 
         /// Each list with its description and the schema of its items.
@@ -185,6 +194,11 @@ pub(crate) fn write(
         }
         to.text.push('}');
     }
+    if let Some(temperature) = structure.ambient_temperature {
+        to.text += &format!(",\n  \"{}\": ", AMBIENT.name);
+        to.element.clear();
+        temperature.write(&mut to, &AMBIENT)?;
+    }
     write_sections(structure, &mut to)?;
     to.text.push_str("\n}\n");
     Ok(to.text)
@@ -235,6 +249,16 @@ fn check_head(root: &JsonNode<'_>) -> Result<(), DocumentError> {
     head("version", &readable, &format!("a version from 1 to {VERSION}"), newer)?;
     let metres = "numbers are in m, kg, s, A, K and units derived from them; convert them first";
     head("units", &|kind| is_text(kind, UNITS), &format!("\"{UNITS}\""), metres)
+}
+
+fn read_ambient(root: &JsonNode<'_>) -> Result<Option<f64>, DocumentError> {
+    let at = ValuePath::Field(&ValuePath::Root, AMBIENT.name);
+    root.get(AMBIENT.name).map(|node| f64::read(node, &at, &AMBIENT, &HashMap::new())).transpose()
+}
+
+/// The schema of the temperature of the surroundings, with its name and description.
+pub(crate) fn ambient_schema() -> (&'static str, String, String) {
+    (AMBIENT.name, format!("{} ({})", AMBIENT.about, AMBIENT.unit), f64::schema(&AMBIENT))
 }
 
 fn read_parameters(root: &JsonNode<'_>) -> Result<Vec<(String, Setting)>, DocumentError> {

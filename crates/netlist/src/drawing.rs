@@ -126,6 +126,8 @@ pub(crate) struct StructureBuilder {
     pub(crate) first_named: Vec<TextSpan>,
     /// Where each beam was drawn.
     pub(crate) beam_spans: Vec<TextSpan>,
+    /// Whether the layer of a beam has an ambient temperature.
+    pub(crate) warm_beams: bool,
 }
 
 impl StructureBuilder {

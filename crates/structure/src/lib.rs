@@ -95,6 +95,9 @@ pub struct Structure {
     pub yields: Vec<Yield>,
     /// Ports, in netlist order.
     pub ports: Vec<Port>,
+    /// Temperature of the surroundings of lumped parts (K): of the first layer that gives one, where no beam has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ambient_temperature: Option<f64>,
     /// Finds nodes by name; fills itself. Takes no part in comparisons.
     #[serde(skip)]
     pub index: NodeIndex,

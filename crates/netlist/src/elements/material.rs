@@ -148,6 +148,19 @@ impl ElementSite<'_, '_> {
         Ok(both.map(|(conductivity, specific_heat)| SolidHeat { conductivity, specific_heat }))
     }
 
+    /// Keeps the ambient temperature of the first layer that has one, unless a beam has one.
+    pub(super) fn note_surroundings(&mut self) -> Result<(), Reported> {
+        let last = self.drawing.structure.beams.last();
+        self.drawing.warm_beams |= last.is_some_and(|beam| beam.material.ambient_temperature > 0.0);
+        if self.drawing.warm_beams {
+            self.drawing.structure.ambient_temperature = None;
+        } else if self.drawing.structure.ambient_temperature.is_none() {
+            let own = self.number_or("ambienttemperature", 0.0)?;
+            self.drawing.structure.ambient_temperature = (own > 0.0).then_some(own);
+        }
+        Ok(())
+    }
+
     /// Ambient temperature (K); 0 by default, so that temperatures are rises.
     fn ambient(&mut self) -> Result<f64, Reported> {
         let ambient = self.number_or("ambienttemperature", 0.0)?;

@@ -93,7 +93,9 @@ pub(crate) fn build_as(
     if !sound {
         stray_parameters(model, instance, sink);
     }
-    (model.build)(&mut ElementSite { instance, drawing, sink, read })
+    let mut site = ElementSite { instance, drawing, sink, read };
+    (model.build)(&mut site)?;
+    site.note_surroundings()
 }
 
 /// Reports an unknown element, with the nearest known one or the reason why it is left out.
