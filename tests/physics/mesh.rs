@@ -2,7 +2,7 @@
 //! options.
 
 use super::{close, node};
-use bimorph::analysis::mesh::{MeshRequest, fitted, fitted_in_time, in_circuit};
+use bimorph::analysis::mesh::{MeshRequest, fitted, fitted_in_time, in_circuit, modes_fitted};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
@@ -16,6 +16,21 @@ const SILICON: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\npara
 fn drawn(text: &str, options: CompileOptions) -> CompiledModel {
     let options = CompileOptions { junctions: Junctions::Centreline, ..options };
     compile(&Bundle::from_text("mesh.net", &format!("{SILICON}{text}")), &options).unwrap()
+}
+
+/// Modes of a clamped beam with a slenderness of 10⁸, 4.730041²·√(E/12ρ)·w/(2π·l²) and the second with 7.853205, take as few segments as those of any beam. The axial
+/// motions of the first mesh need 10,000 segments, whose stiffness is rounding.
+#[test]
+fn modes_of_the_thinnest_beam_take_few_segments() {
+    for moves in ["", "moves=1"] {
+        let text = format!("x beam2d p [a b] [l=200u w=2p]\nanchor p [b] [{moves}]");
+        let (fitted, found, _) = modes_fitted(&drawn(&text, CompileOptions::default()), 2, &[]).unwrap();
+        assert!(fitted.unknowns() < 200, "{}", fitted.unknowns());
+        for (found, root) in found.frequencies_hz.iter().zip([4.730_041f64, 7.853_205]) {
+            let exact = root.powi(2) * (165e9f64 / (12.0 * 2300.0)).sqrt() * 2e-12 / (std::f64::consts::TAU * 4e-8);
+            close(*found, exact, 1e-3);
+        }
+    }
 }
 
 /// Elastica, a clamped beam under a dead load at its tip, F·l²/EI = 1, 2, 4, 8: deflection and approach of the tip within the tolerance

@@ -4,6 +4,9 @@
 //! of negative pivots of K − ω²M (Sylvester), reaches the requested number. It is found by bisection on a first mesh.
 //! Then [`mesh_search`] chooses the mesh for that band, and the band is determined again on it
 //! until the requested modes lie within.
+//!
+//! On a mesh of few segments the axial motions of slender beams are among the lowest. Where the band would have many bending waves on a beam, the frequency is
+//! determined on twice the segments first: a band of axial motions takes thousands of segments of a beam with a slenderness of 10⁸.
 
 use super::band_modes::mechanics;
 use super::mesh_search;
@@ -21,6 +24,10 @@ use std::f64::consts::TAU;
 const MAX_PASSES: usize = 12;
 /// Fraction by which the band lies above the highest requested mode.
 const ABOVE: f64 = 0.01;
+/// Phase of bending waves along a beam above which a frequency is compared with that on twice the segments (rad).
+const MANY_WAVES: f64 = 256.0;
+/// Fraction of the frequency of a mesh below which that of twice the segments replaces it (1).
+const FAR_BELOW: f64 = 0.1;
 /// Frequencies within which modes are looked for (Hz).
 const LOWEST: f64 = 1e-6;
 const HIGHEST: f64 = 1e13;
@@ -44,6 +51,10 @@ pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> 
             segments = finer;
             continue;
         };
+        if let Some(finer) = far_below((&bare, options), &segments, frequency, count)? {
+            segments = finer;
+            continue;
+        }
         let tolerances = vec![options.errors().modes(); count];
         let aim = MeshTarget { band: frequency * (1.0 + ABOVE), tolerances, rigid: false };
         let order =
@@ -56,6 +67,24 @@ pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> 
         }
     }
     Ok(chosen.unwrap_or(Mesh { segments, estimated_error: None, modes_in_band: 0, passes: 0 }))
+}
+
+/// Twice the segments, where the `count`-th mode is at a fraction of its `frequency` (Hz) there.
+fn far_below(
+    (bare, options): (&Structure, &CompileOptions),
+    segments: &[usize],
+    frequency: f64,
+    count: usize,
+) -> Result<Option<Vec<usize>>, DiscretizeError> {
+    if bare.beams.iter().all(|beam| order::waves(beam, frequency) <= MANY_WAVES) {
+        return Ok(None);
+    }
+    let finer: Vec<usize> = segments.iter().map(|&n| options.scheme.segments(2 * n)).collect();
+    if finer == segments || finer.iter().sum::<usize>() > mesh_search::MAX_SEGMENTS {
+        return Ok(None);
+    }
+    let parts = discretize_with(bare, options, &finer)?;
+    Ok(highest_of(&parts, count).filter(|of_finer| *of_finer < FAR_BELOW * frequency).map(|_| finer))
 }
 
 /// Frequency of the `count`-th mode as drawn (Hz), to half of [`ABOVE`]; none where the mesh has no such mode.
