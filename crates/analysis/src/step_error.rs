@@ -13,6 +13,9 @@
 //! A propagated error may grow where that of the motion does not: the Jacobian of a step is that at its start. Where it says that nothing is predictable,
 //! the run is compared as those without it, and is predictable if the comparison says so.
 //!
+//! Nor does a propagated error see what steps take from a motion that turns fast ones with it. Where half of the energy that they took, of what
+//! moves, is beyond what the mesh leaves of the tolerance, the run is compared as well, and the larger of both errors is its error.
+//!
 //! Runs without such an estimate are compared with a companion run (`companion.rs`). These are other methods, equal
 //! steps, rotating frames, and models whose parts may touch, where the error is propagated up to the first contact
 //! only. The companion of a run in a reduced model also lacks directions that the run has (`reduced::directions`).
@@ -30,7 +33,7 @@ use crate::reduced::Directions;
 use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::Formulation;
-use companion::{companion, compared, is_made_again};
+use companion::{companion, compared, from_companion, is_made_again};
 pub use run::RunFunction;
 use run::{AT_THE_END, MAX_AGAIN};
 pub use run::{beyond, unknown};
@@ -83,16 +86,26 @@ fn held<T>(
     }
     let estimated = options.with_estimate();
     let made = first(&estimated, model, run, sample, watch)?;
-    let made = sharper(made, &estimated, model, run, watch)?;
-    if made.result.step_error.is_some_and(|error| error > HOPELESS) && !made.long {
+    let mut made = sharper(made, &estimated, model, run, watch)?;
+    let found = made.result.step_error.unwrap_or(0.0);
+    let room = options.errors().left_for_steps(made.result.estimated_error);
+    let (hopeless, damped) = (found > HOPELESS, made.result.damped.filter(|damped| *damped > room.max(found)));
+    let apart = match damped {
+        // samples that have been sent cannot be compared
+        Some(damped) if made.long => Some(damped),
+        Some(_) => from_companion(&options.with_tolerance(made.steps.requested()), model, run, watch)?,
+        None => None,
+    };
+    if (hopeless || apart.is_some_and(|apart| apart > room)) && !made.long {
         let mut kept = BufferedSamples::default();
         let companion = companion(options, model.unknowns(), run, watch)?;
         let again = compared(options, model, companion, run, &mut |t, values| kept.keep(t, values), watch)?;
-        if again.0.step_error.is_some_and(|error| error <= HOPELESS) {
+        if again.0.step_error.is_some_and(|error| !hopeless || error <= HOPELESS) {
             kept.send(sample);
             return Ok(again);
         }
     }
+    made.result.step_error = made.result.step_error.map(|error| error.max(apart.unwrap_or(0.0)));
     made.kept.send(sample);
     let SampledRun { mut result, more, steps, .. } = made;
     result.warnings.extend(match result.step_error {

@@ -59,6 +59,8 @@ impl ErrorBudget {
     const MAX_RELAXATIONS: i32 = 3;
     /// Fractions of the tolerance for meshes that points of a sweep share, from coarse to fine: each leaves a margin for the other points.
     const SHARED_MESHES: [f64; 3] = [0.6, 0.2, 0.06];
+    /// Rotation of a body within a step over the root of the tolerance (rad/√1), from which on a step in joint coordinates solves twice.
+    const TURN: f64 = 0.03;
     /// Fraction of the tolerance for the equations of an implicit stage.
     const STAGE: f64 = 1e-2;
     /// Fraction of the tolerance for the statics of a reduced model.
@@ -115,6 +117,11 @@ impl ErrorBudget {
     /// The scale of a quantity that has a tolerance `own`. An error over the scale and the tolerance is the error over the quantity and `own`.
     pub fn scale(self, quantity: f64, own: f64) -> f64 {
         quantity * own / self.requested
+    }
+
+    /// The rotation of a body within a step that counts (rad): an error goes with its square.
+    pub fn turn(self) -> f64 {
+        Self::TURN * self.requested.sqrt()
     }
 
     /// Parts of a whole whose relative error is the tolerance, where that of a part h is h⁴ over a coefficient.

@@ -74,6 +74,20 @@ pub(super) fn compared<T>(
     Ok((made.result, made.more, now.errors().requested()))
 }
 
+/// The error of a run by its companion (1); none where they cannot be compared.
+///
+/// # Errors
+/// Those of the run, and [`AnalysisError::Cancelled`].
+pub(super) fn from_companion<T>(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    run: RunFunction<'_, T>,
+    watch: ProgressCallback<'_>,
+) -> Result<Option<f64>, AnalysisError> {
+    let companion = companion(options, model.unknowns(), run, watch)?;
+    Ok(once(options, model, companion, run, &mut |_, _| (), watch)?.result.step_error)
+}
+
 /// Whether a run with this companion is made again where its error is too large: the samples of a long run are sent as they come.
 pub(super) fn is_made_again(
     options: &TransientOptions<'_>,

@@ -6,9 +6,11 @@ use super::options::TransientOptions;
 use crate::readout::expression::Expression;
 use crate::readout::run_signal::RunSignal;
 use crate::readout::signal::SignalView;
-use bimorph_domains::Ramp;
+use bimorph_domains::{Drive, Ramp};
 use bimorph_model::compile::CompiledModel;
+use bimorph_multibody::forces::kinetic_energy;
 use bimorph_multibody::planar::Pose;
+use bimorph_solve::time::defect::MotionError;
 use bimorph_solve::time::method::Motion;
 
 /// Ends of steps at which signals are compared, at most.
@@ -38,6 +40,8 @@ pub(crate) struct StepErrorEstimate {
     pub(crate) error: f64,
     /// The first signal that is lost, if any is.
     pub(crate) lost: Option<SignalLoss>,
+    /// Largest change of the amplitude by the energy that the steps took (1).
+    pub(crate) damped: f64,
 }
 
 /// Signals and their errors at some ends of steps.
@@ -55,6 +59,38 @@ pub(crate) struct ErrorLog<'a> {
     errors: Vec<Vec<f64>>,
     /// Parts touch: the error after that is not estimated.
     touched: bool,
+    energy: MotionEnergy,
+}
+
+/// Energies over a run (J).
+struct MotionEnergy {
+    drive: Drive,
+    rest: Vec<Pose>,
+    /// Largest kinetic energy.
+    kinetic: f64,
+    /// Least and largest potential, from that of the drawing under the same sources.
+    potential: [f64; 2],
+    /// Most that the steps took.
+    taken: f64,
+}
+
+impl MotionEnergy {
+    fn observe(&mut self, model: &CompiledModel, ramp: &Ramp<'_>, t: f64, (motion, taken): (&Motion, f64)) {
+        let Self { drive, rest, kinetic, potential: [low, high], .. } = self;
+        let system = &model.parts.system;
+        ramp.at(t, drive);
+        let moving = kinetic_energy(&system.model, &motion.v);
+        let potential = system.energy(&motion.q, &motion.v, drive) - moving - system.energy(rest, rest, drive);
+        (*kinetic, *low, *high) = (kinetic.max(moving), low.min(potential), high.max(potential));
+        self.taken = self.taken.max(taken.abs());
+    }
+
+    /// Half of what the steps took, of what the run moved: an energy goes with the square of its amplitude.
+    fn damped(&self) -> f64 {
+        let [low, high] = self.potential;
+        let moved = self.kinetic.max(high - low);
+        if self.taken > 0.0 && moved > 0.0 { 0.5 * self.taken / moved } else { 0.0 }
+    }
 }
 
 impl<'a> ErrorLog<'a> {
@@ -79,13 +115,25 @@ impl<'a> ErrorLog<'a> {
             values: vec![Vec::new(); signals.len()],
             errors: vec![Vec::new(); signals.len()],
             touched: false,
+            energy: MotionEnergy {
+                drive: system.electrics.drive(),
+                rest: vec![Pose::zeros(); system.bodies()],
+                kinetic: 0.0,
+                potential: [f64::INFINITY, f64::NEG_INFINITY],
+                taken: 0.0,
+            },
         };
-        log.observe(0.0, motion, &Motion::zeros(system.bodies()));
+        log.observe(0.0, motion, MotionError { motion: &Motion::zeros(system.bodies()), taken: 0.0 });
         log
     }
 
     /// The end of a step at time `t` (s), the motion there and its error; returns whether the next one is of use.
-    pub(super) fn observe(&mut self, t: f64, motion: &Motion, error: &Motion) -> bool {
+    pub(super) fn observe(
+        &mut self,
+        t: f64,
+        motion: &Motion,
+        MotionError { motion: error, taken }: MotionError<'_>,
+    ) -> bool {
         self.touched = self.touched || self.compiled.parts.system.contact_energy(&motion.q) > 0.0;
         if self.touched {
             return false;
@@ -112,6 +160,7 @@ impl<'a> ErrorLog<'a> {
             errors.push((value - of(&self.exact)).abs());
         }
         self.t.push(t);
+        self.energy.observe(self.compiled, self.ramp, t, (motion, taken));
         true
     }
 
@@ -125,7 +174,7 @@ impl<'a> ErrorLog<'a> {
             let own = self.signals.iter().zip(&swings).filter(|(s, _)| s.unit() == unit);
             own.map(|(_, swing)| *swing).fold(0.0, f64::max)
         };
-        let mut found = StepErrorEstimate { error: 0.0, lost: None };
+        let mut found = StepErrorEstimate { error: 0.0, lost: None, damped: self.energy.damped() };
         for (k, signal) in self.signals.iter().enumerate() {
             let amplitude =
                 swings[k].max(SMALL * largest(signal.unit())).max(least(signal.unit(), options, self.compiled));

@@ -23,7 +23,7 @@ use bimorph_multibody::planar::Pose;
 use bimorph_solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph_solve::path::SourcePath;
 use bimorph_solve::time::adaptive::{Advance, Observer};
-use bimorph_solve::time::defect::SeeError;
+use bimorph_solve::time::defect::{MotionError, SeeError};
 use bimorph_solve::time::method::{Motion, SolverCounters};
 
 /// Times of a run at which its stability is checked, the end included.
@@ -217,6 +217,7 @@ impl<'a> Recording<'a> {
             unknowns: compiled.unknowns(),
             estimated_error: compiled.order.estimated_error,
             step_error: estimate.as_ref().map(|estimate| estimate.error),
+            damped: estimate.as_ref().map(|estimate| estimate.damped),
             stopped_at,
             reliable_until: None,
             after_contact: Vec::new(),
@@ -255,7 +256,8 @@ pub(crate) fn record(
     let mut observe = |s: f64, h: f64, before: &Motion, after: &Motion| {
         recording.step(s, h, before, after) && watch(((s + h) / options.stop).min(1.0))
     };
-    let mut errors = log.as_mut().map(|log| |t: f64, motion: &Motion, error: &Motion| log.observe(t, motion, error));
+    let mut errors =
+        log.as_mut().map(|log| |t: f64, motion: &Motion, error: MotionError<'_>| log.observe(t, motion, error));
     let see = errors.as_mut().map(|see| see as SeeError<'_>);
     let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe, see).map_err(|error| match error {
         AnalysisError::StepFailed { t, dt, detail } => {

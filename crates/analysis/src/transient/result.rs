@@ -71,6 +71,9 @@ pub struct TransientResult {
     /// Estimated root mean square error of the worst signal by the steps in time, of its amplitude (1); none without an estimate, see
     /// [`step_error`](crate::step_error).
     pub step_error: Option<f64>,
+    /// Change of the amplitude by the energy that the steps took from the motion (1); none without an estimate.
+    #[serde(skip)]
+    pub damped: Option<f64>,
     /// When [`super::TransientOptions::until`] ended the run (s).
     pub stopped_at: Option<f64>,
     /// Time up to which the tolerance holds (s); none: to the end. See [`super::super::after_contact`].

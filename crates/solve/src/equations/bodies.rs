@@ -8,7 +8,7 @@
 //! energy, and the error of a penetration below a tenth of it. A step that leaps beyond the law of contact is rejected, whatever its error is relative
 //! to where it ends.
 
-use super::{DegreeOfFreedom, Equations, Motion};
+use super::{Control, DegreeOfFreedom, Equations, Motion};
 use bimorph_base::ErrorBudget;
 use bimorph_domains::{Ramp, System};
 use bimorph_multibody::planar::{DOF, Pose};
@@ -18,6 +18,9 @@ use std::borrow::Cow;
 
 /// Fraction of the length scale below which a displacement's relative error does not count.
 pub const FLOOR: f64 = 1e-4;
+
+/// Tolerance that equal steps are taken to have (1).
+const EQUAL: f64 = 1e-6;
 
 /// Names of a planar body's directions, for messages.
 pub const DIRECTIONS: [&str; 3] = ["along x", "along y", "about z"];
@@ -46,12 +49,14 @@ pub struct Bodies<'a> {
     /// Its sources, inputs and heat over time.
     pub ramp: &'a Ramp<'a>,
     weights: Cow<'a, NormWeights>,
+    /// Division of the tolerance of the steps; of equal steps [`EQUAL`].
+    pub(crate) errors: ErrorBudget,
 }
 
 impl<'a> Bodies<'a> {
     /// A system under a ramp.
     pub fn new(system: &'a System, ramp: &'a Ramp<'a>) -> Self {
-        Self { system, ramp, weights: Cow::Owned(NormWeights::new(&system.model)) }
+        Self { system, ramp, weights: Cow::Owned(NormWeights::new(&system.model)), errors: ErrorBudget::of(EQUAL) }
     }
 
     /// Part that a motion between two ends leaves out where a change of the sources is linear in it, over the error that a step of length `h` (s) may have.
@@ -122,7 +127,7 @@ impl<'a> Bodies<'a> {
 
     /// The same with weights that have been found before.
     pub fn weighed(system: &'a System, ramp: &'a Ramp<'a>, weights: &'a NormWeights) -> Self {
-        Self { system, ramp, weights: Cow::Borrowed(weights) }
+        Self { system, ramp, weights: Cow::Borrowed(weights), errors: ErrorBudget::of(EQUAL) }
     }
 }
 
@@ -135,6 +140,13 @@ impl Equations for Bodies<'_> {
 
     fn end(&self) -> f64 {
         self.ramp.dt
+    }
+
+    fn begin(&mut self, control: Control) {
+        self.errors = ErrorBudget::of(match control {
+            Control::Tolerance(tol) => tol,
+            Control::Fixed(_) => EQUAL,
+        });
     }
 
     fn share(&self, ends: [&Motion; 2], error: &Motion, h: f64, tol: f64) -> f64 {

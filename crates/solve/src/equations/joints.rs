@@ -31,6 +31,12 @@ pub struct BodyInertia {
 }
 
 impl BodyInertia {
+    /// The force of an acceleration.
+    #[inline(always)]
+    pub(crate) fn of(&self, acceleration: &Pose) -> Pose {
+        self.mass.component_mul(acceleration)
+    }
+
     /// The force of an acceleration and a rate.
     #[inline(always)]
     pub(crate) fn force(&self, acceleration: &Pose, rate: &Pose) -> Pose {

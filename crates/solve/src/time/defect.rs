@@ -15,6 +15,9 @@
 //!
 //! P is any function with the right ends: an acceleration that is inexact changes ρ, and not its two moments.
 //!
+//! The residual takes the energy −h∫Ṗ·ρ dx from the motion. Where motions faster than the step turn with slow ones, a step damps them, and its
+//! linear error does not see what that takes from the slow ones. The energy shows it.
+//!
 //! Reference for estimates by the defect: W. H. Enright, "Continuous numerical methods for ODEs with defect control" (2000).
 
 use super::method::Method;
@@ -127,11 +130,26 @@ pub trait Propagates<'s>: Method<Bodies<'s>> {
 
     /// After an accepted step of length `h` (s) from time `s` (s): the error of the bodies' motion at its end. `carried` is what the
     /// method carried at its start.
-    fn error(&mut self, bodies: &mut Bodies<'s>, step: (f64, f64), ends: [&Motion; 2], carried: &[Motion]) -> &Motion;
+    fn error(
+        &mut self,
+        bodies: &mut Bodies<'s>,
+        step: (f64, f64),
+        ends: [&Motion; 2],
+        carried: &[Motion],
+    ) -> MotionError<'_>;
+}
+
+/// The error of a motion at the end of a step.
+#[derive(Debug, Clone, Copy)]
+pub struct MotionError<'a> {
+    /// Error of the bodies' motion.
+    pub motion: &'a Motion,
+    /// Energy that the residuals have taken from the motion so far (J).
+    pub taken: f64,
 }
 
 /// Receives each accepted step: its end (s), the motion there and the error of that; returns whether the error is still of use.
-pub type SeeError<'a> = &'a mut dyn FnMut(f64, &Motion, &Motion) -> bool;
+pub type SeeError<'a> = &'a mut dyn FnMut(f64, &Motion, MotionError<'_>) -> bool;
 
 /// A method whose error is reported after each accepted step. The motion is bit-identical to that of the method alone.
 pub struct Estimated<'a, M> {

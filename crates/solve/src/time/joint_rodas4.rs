@@ -9,8 +9,8 @@
 //! Uv = Uq/(γh) − r₁                 Uz = Uv/(γh) − r₂
 //! ```
 //! with M, C and K at the start of the step. K holds the springs of the tree's joints, the stiffness that forces and
-//! inertia bring to them ([`geometric`]), and the exact tangent of closures and gaps. The contribution of rates is
-//! omitted: it is small where joints rotate little in a step.
+//! inertia bring to them ([`geometric`]), and the exact tangent of closures and gaps. The change of accelerations with
+//! coordinates and rates is unsymmetric. Where bodies turn far in a step it is taken to first order ([`turning_inertia`]).
 //!
 //! To its caller the motion is that of the bodies, as with every other method; coordinates are internal.
 //!
@@ -22,12 +22,14 @@ mod error;
 mod ports;
 mod stages;
 mod tableau;
+mod turning_inertia;
 
 use super::method::{Method, Motion, SolverCounters, StepResult};
 use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I};
 use super::rosenbrock::{self, CONSISTENT, RosenbrockStep};
 use super::stage_loss::StageLoss;
 use crate::equations::{Bodies, Joints};
+use bimorph_base::ErrorBudget;
 use bimorph_domains::system::ApartMembers;
 use bimorph_domains::{Drive, Ramp};
 use bimorph_multibody::forces;
@@ -41,6 +43,7 @@ use error::JointDefectEstimate;
 use ports::JointPortSensitivities;
 use stages::JointStages;
 use std::sync::Arc;
+use turning_inertia::TurningInertia;
 
 /// The method with its storage.
 #[derive(Debug, Clone)]
@@ -53,6 +56,7 @@ pub struct JointRodas4 {
     /// Coordinates and rates, and accelerations (with nothing beside them); then the same of each sensitivity.
     carried: Vec<Motion>,
     stages: JointStages,
+    turning: TurningInertia,
     ports: JointPortSensitivities,
     /// ∂(bodies' motion)/∂(final voltage of a source), one for each source given to [`JointRodas4::new`].
     pub sensitivity: Vec<Motion>,
@@ -91,6 +95,7 @@ impl JointRodas4 {
             geometric: vec![Geometric::ZERO; count],
             carried: vec![Motion::zeros(count); 2 + 2 * sources.len()],
             stages: JointStages::new(count),
+            turning: TurningInertia::new(tree),
             ports: JointPortSensitivities::new(&joints, sources),
             sensitivity: vec![Motion::zeros(count); sources.len()],
             force: zeros.clone(),
@@ -189,13 +194,22 @@ impl JointRodas4 {
         Ok(())
     }
 
+    /// Begins what bodies that turn add to a step, where they have been placed at its start. Partials would need its derivative: steps with
+    /// sensitivities go without.
+    fn turn(&mut self, gh: f64, errors: ErrorBudget) {
+        let Self { joints, placed, stages, turning, ports, .. } = self;
+        if ports.is_empty() {
+            turning.begin(&joints.tree, placed, &stages.argument, gh, errors);
+        }
+    }
+
     /// Completes the right side of stage `i` of a step of length `h` (s): `right` holds −R.
     fn inertia(&mut self, i: usize, h: f64) {
         let rate = GAMMA_I[i] * h;
-        let Self { joints, stages, right, wrench, forcing, force, loss, .. } = self;
+        let Self { joints, stages, turning, right, wrench, forcing, force, loss, .. } = self;
         let Joints { tree, closures, inertias, drags, .. } = &**joints;
         let loses = loss.as_ref().is_some_and(|loss| loss.start.is_nonzero());
-        stages.move_bodies(i, h, *drags || loses);
+        stages.move_bodies(i, h, *drags || loses || turning.counts());
         for ((j, inertia), (wrench, forcing)) in inertias.iter().enumerate().zip(wrench.iter_mut().zip(forcing)) {
             *wrench = Four::from(inertia.force(&stages.push(j), &stages.drift(j)) - *forcing * rate);
         }
@@ -231,6 +245,7 @@ struct JointStep<'a> {
     /// Its start and length (s).
     s: f64,
     h: f64,
+    errors: ErrorBudget,
     motion: &'a mut Motion,
     error: &'a mut Motion,
     /// The stage at hand begins where the step before ended.
@@ -260,6 +275,7 @@ impl RosenbrockStep for JointStep<'_> {
 
     fn factor(&mut self) -> StepResult {
         self.rodas.factor(GAMMA * self.h)?;
+        self.rodas.turn(GAMMA * self.h, self.errors);
         let JointRodas4 { joints, w, placed, carried, stages, ports, forcing, drive, rate, .. } = &mut *self.rodas;
         stages.set_out(&joints.tree, w, &carried[0], &carried[1]);
         joints.closures.drive_force(&placed.at, drive, rate, forcing);
@@ -270,9 +286,15 @@ impl RosenbrockStep for JointStep<'_> {
     fn solve(&mut self, i: usize) {
         let (at, h, rate) = (self.s + ALPHA[i] * self.h, self.h, GAMMA_I[i] * self.h);
         self.rodas.inertia(i, h);
-        let JointRodas4 { joints, w, placed, carried, stages, ports, right, wrench, drive, loss, work, .. } =
-            &mut *self.rodas;
+        let JointRodas4 {
+            joints, w, placed, carried, stages, turning, ports, right, wrench, drive, loss, work, ..
+        } = &mut *self.rodas;
         w.solve(wrench, right);
+        if turning.counts() {
+            stages.fall_behind(i, h);
+            let lags = (|j| stages.lag(j), |j| stages.drift(j).z);
+            work.solves += turning.complete(joints, w, GAMMA * h, lags, (right, wrench));
+        }
         let stage = (&*stages, placed.at.as_slice(), &*drive);
         work.solves += 1 + ports.stage(joints, self.ramp, (i, at, h, rate), stage, (w, loss.as_deref()), &carried[2..]);
         stages.keep(i, right, wrench);
@@ -321,7 +343,8 @@ impl Method<Bodies<'_>> for JointRodas4 {
     }
 
     fn step(&mut self, bodies: &mut Bodies<'_>, s: f64, h: f64, motion: &mut Motion, error: &mut Motion) -> StepResult {
-        let step = &mut JointStep { rodas: self, ramp: bodies.ramp, s, h, motion, error, stays: false };
+        let errors = bodies.errors;
+        let step = &mut JointStep { rodas: self, ramp: bodies.ramp, s, h, errors, motion, error, stays: false };
         rosenbrock::take(step)
     }
 

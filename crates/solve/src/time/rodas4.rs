@@ -25,7 +25,7 @@ mod ports;
 mod stages;
 pub(crate) mod tableau;
 
-use super::defect::Propagates;
+use super::defect::{MotionError, Propagates};
 pub use super::method::Motion;
 use super::method::{Method, SolverCounters, StepResult};
 use crate::equations::Bodies;
@@ -231,7 +231,13 @@ impl<'s, S: LinearSolver> Propagates<'s> for Rodas4<S> {
         self.defect = Some(Box::new(DefectEstimate::zeros(self.stages.forcing.len())));
     }
 
-    fn error(&mut self, bodies: &mut Bodies<'s>, (s, h): (f64, f64), ends: [&Motion; 2], _: &[Motion]) -> &Motion {
+    fn error(
+        &mut self,
+        bodies: &mut Bodies<'s>,
+        (s, h): (f64, f64),
+        ends: [&Motion; 2],
+        _: &[Motion],
+    ) -> MotionError<'_> {
         let Self { solver, w, drive, defect, loss, .. } = self;
         let Bodies { system, ramp, .. } = *bodies;
         let defect = defect.get_or_insert_with(|| Box::new(DefectEstimate::zeros(system.bodies())));

@@ -295,6 +295,7 @@ pub fn transient_from_wire(
         unknowns: size(unknowns),
         estimated_error,
         step_error,
+        damped: None,
         stopped_at,
         reliable_until,
         after_contact: after_contact.into_iter().map(statistics_from_wire).collect(),

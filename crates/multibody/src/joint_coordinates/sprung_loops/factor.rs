@@ -297,7 +297,7 @@ fn inverse(a: &ColumnBlock, inertia: &mut PivotSigns, body: usize) -> Result<Col
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::batch::one_by_one;
     use crate::joint_coordinates::sprung_loops::poses::{LaneJointStates, PlaceTree};
@@ -308,7 +308,7 @@ mod tests {
     use pulp::Scalar;
 
     /// A frame of eleven bodies, a whole tile and a part of one: two chains from the ground that meet in a loop, and a tail.
-    fn frame() -> Model {
+    pub(in super::super) fn frame() -> Model {
         let turns = [0.3, 0.3, 0.3, -0.2, -0.2, 2.1, 2.1, 2.1, 1.2, 1.2, 0.4f64];
         let befores = [None, Some(0), Some(1), Some(2), Some(3), None, Some(5), Some(6), Some(4), Some(8), Some(9)];
         let mut centers: Vec<Vector2<f64>> = Vec::new();

@@ -47,7 +47,7 @@ impl<T: Real> MotionMap<T> {
 
     /// Displacement beyond the parent's with the parent's rotation and the coordinates' motion `s`.
     #[inline(always)]
-    fn along(&self, turn: T, s: &Vec3<T>) -> Vec2<T> {
+    pub(super) fn along(&self, turn: T, s: &Vec3<T>) -> Vec2<T> {
         let [u, g, p] = &self.columns;
         let mut out = self.lever;
         for i in 0..2 {
@@ -159,4 +159,70 @@ pub(super) fn offset_from_parent<T: Real>(
         acceleration[i] += squared * r[i] - squared_parent * r_parent[i] + joint;
     }
     RelativeOffset { map, beyond: [displaced, rate, acceleration] }
+}
+
+/// How a body's acceleration less its parent's changes with the parent's rotation and the coordinates, and with their rates.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AccelerationMaps<T> {
+    pub(super) displacement: MotionMap<T>,
+    pub(super) rate: MotionMap<T>,
+}
+
+/// The derivatives of the acceleration in [`offset_from_parent`], at held accelerations of the coordinates and of the parent's rotation.
+#[inline(always)]
+pub(super) fn acceleration_maps<T: Real>(
+    shape: &JointGeometry<T>,
+    parent: &RotationState<T>,
+    own: &RotationState<T>,
+    at: &JointState<T>,
+) -> AccelerationMaps<T> {
+    let s = shape.sign;
+    let ([stretch, g, p], v, z, [arm_parent, arm]) = (at.q, at.v, at.z, shape.arms);
+    let (swing_parent, swing) =
+        (parent.turn.rotation_minus_identity(arm_parent), own.turn.rotation_minus_identity(arm));
+    let e1 = own.turn.mean(&parent.turn, shape.axis);
+    let e2 = right_angle(e1);
+    let [gg, gp, pp] = shape.second;
+    let bent = [g * gg + p * gp, g * gp + p * pp];
+    let u = stretch - (bent[0] * g + bent[1] * p);
+    let frame = (parent.spin + own.spin) * 0.5;
+    let rate_u = v[0] - (bent[0] * v[1] + bent[1] * v[2]) * 2.0;
+    let curls = [(v[1] * gg + v[2] * gp) * 4.0, (v[1] * gp + v[2] * pp) * 4.0];
+    let mixed_2 = frame * rate_u * 2.0;
+    let mixed_1 = frame * v[1] * 2.0 + (v[1] * curls[0] + v[2] * curls[1]) * 0.5;
+    let (squared_parent, squared, squared_frame) = (parent.spin * parent.spin, own.spin * own.spin, frame * frame);
+    let push = parent.spin_rate;
+    let (none, along) = (s * 0.0, [s * push + z[2] * 0.5, s]);
+    let mut maps = [MotionMap { lever: [none; 2], columns: [[none; 2]; 3] }; 2];
+    for i in 0..2 {
+        // components of arms and of what they become by a right angle's turn
+        let turned = |x: Vec2<T>| if i == 0 { -x[1] } else { x[0] };
+        let r_parent = [swing_parent[0] + arm_parent[0], swing_parent[1] + arm_parent[1]];
+        let r = [swing[0] + arm[0], swing[1] + arm[1]];
+        let d = [e1[0] * u + e2[0] * g, e1[1] * u + e2[1] * g];
+        let (x, y) = (e1[i], e2[i]);
+        // with the rotations of the joint's frame, of the body and of the parent
+        let with_frame =
+            (z[0] * y - z[1] * (x + bent[0] * y * 2.0) - mixed_2 * x - mixed_1 * y - squared_frame * turned(d)) * s
+                - d[i] * along[0]
+                - z[2] * bent[1] * y * s * 2.0;
+        let with_own = r[i] * (push + z[2] * s) + squared * turned(r);
+        let with_parent = -(r_parent[i] * push + squared_parent * turned(r_parent));
+        // with the opening along and across, and with the bending's shares of it
+        let with_u = y * along[0] - squared_frame * x * along[1];
+        let with_g = -(x * along[0] + squared_frame * y * along[1]);
+        let shares = [1, 2].map(|k| -(x * z[k] * 2.0 + frame * v[k] * y * 4.0) * s);
+        maps[0].lever[i] = with_parent + with_own + with_frame;
+        maps[0].columns[0][i] = with_u;
+        maps[0].columns[1][i] = with_g - bent[0] * with_u * 2.0 + gg * shares[0] + gp * shares[1];
+        maps[0].columns[2][i] =
+            (with_own + with_frame * 0.5) * s - bent[1] * with_u * 2.0 + gp * shares[0] + pp * shares[1];
+        let (rate_frame, rate_own) = ((rate_u * y - v[1] * x - frame * d[i]) * s * 2.0, own.spin * r[i] * 2.0);
+        maps[1].lever[i] = rate_frame + rate_own - parent.spin * r_parent[i] * 2.0;
+        maps[1].columns[0][i] = frame * y * s * 2.0;
+        maps[1].columns[1][i] = -(frame * (x + bent[0] * y * 2.0) * 2.0 + curls[0] * x) * s;
+        maps[1].columns[2][i] = (rate_own + rate_frame * 0.5) * s - (frame * bent[1] * y * 4.0 + curls[1] * x) * s;
+    }
+    let [displacement, rate] = maps;
+    AccelerationMaps { displacement, rate }
 }

@@ -11,6 +11,7 @@
 //! | [`tree`] | parents of bodies, moving directions; closures |
 //! | [`kinematics`] | kinematics of a body relative to its parent, and the maps of motion |
 //! | [`poses`] | poses, rates and accelerations, root → leaf, eight bodies per vector |
+//! | [`acceleration_change`] | the change of accelerations with coordinates and rates |
 //! | [`derivatives`] | the change of where bodies are, over values with their derivatives |
 //! | [`columns`] | blocks and vectors in registers |
 //! | [`dynamics`] | forces over the coordinates, leaf → root; coordinates of a pose |
@@ -20,6 +21,7 @@
 //! | [`solve`] | solves with its factors |
 //! | [`directions`] | many motions of the coordinates at once |
 
+pub mod acceleration_change;
 pub mod columns;
 pub mod derivatives;
 pub mod directions;

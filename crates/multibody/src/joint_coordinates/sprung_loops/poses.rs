@@ -188,9 +188,14 @@ impl TreeKinematics {
         }
     }
 
-    /// Offset of each body of a tile from its parent.
+    /// Rotations of the parents of a tile's bodies, and of these.
     #[inline(always)]
-    fn attach_to_parents<W: SimdReal>(&mut self, simd: W::Simd, tree: &Tree, t: usize, given: &LaneJointStates) {
+    pub(super) fn rotations<W: SimdReal>(
+        &self,
+        simd: W::Simd,
+        tree: &Tree,
+        t: usize,
+    ) -> (RotationState<W>, RotationState<W>) {
         let (mut half, mut spin) = (REST.half, REST.spin);
         for (k, up) in tree.upward[t * LANES..].iter().take(LANES).enumerate() {
             let [sin, cos, rate, push] = match up.parent {
@@ -203,9 +208,16 @@ impl TreeKinematics {
             };
             (half[0].0[k], half[1].0[k], spin[0].0[k], spin[1].0[k]) = (sin, cos, rate, push);
         }
+        let tile = &self.tiles[t];
+        (turned::<W>(simd, &half, &spin), turned::<W>(simd, &tile.half, &tile.spin))
+    }
+
+    /// Offset of each body of a tile from its parent.
+    #[inline(always)]
+    fn attach_to_parents<W: SimdReal>(&mut self, simd: W::Simd, tree: &Tree, t: usize, given: &LaneJointStates) {
+        let (parent, own) = self.rotations::<W>(simd, tree, t);
         let tile = &mut self.tiles[t];
         let (shape, given) = (tree.shapes[t].load::<W>(simd), given.load::<W>(simd));
-        let (parent, own) = (turned::<W>(simd, &half, &spin), turned::<W>(simd, &tile.half, &tile.spin));
         let RelativeOffset { map, beyond } = offset_from_parent(&shape, &parent, &own, &given);
         let [u, g, p] = map.columns;
         store([map.lever[0], map.lever[1], u[0], u[1], g[0], g[1], p[0], p[1]], &mut tile.map);
@@ -256,7 +268,7 @@ fn turned<W: SimdReal>(simd: W::Simd, half: &[Lane8; 2], spin: &[Lane8; 2]) -> R
 
 impl JointGeometry<Lane8> {
     #[inline(always)]
-    fn load<W: SimdReal>(&self, simd: W::Simd) -> JointGeometry<W> {
+    pub(super) fn load<W: SimdReal>(&self, simd: W::Simd) -> JointGeometry<W> {
         JointGeometry {
             sign: W::load(simd, &self.sign),
             arms: [load(simd, &self.arms[0]), load(simd, &self.arms[1])],

@@ -3,7 +3,7 @@
 use super::JointRodas4;
 use super::error::JointDefectEstimate;
 use crate::equations::{Bodies, Joints};
-use crate::time::defect::{Impulses, NODES, Propagates, propagate, quartic};
+use crate::time::defect::{Impulses, MotionError, NODES, Propagates, propagate, quartic};
 use crate::time::method::Motion;
 use crate::time::rodas4::tableau::GAMMA;
 use bimorph_multibody::forces;
@@ -12,9 +12,9 @@ use bimorph_multibody::joint_coordinates::sprung_loops::poses::place_of;
 use bimorph_multibody::planar::Pose;
 
 impl JointRodas4 {
-    /// Moments of the residual over a step from the coordinates, rates and accelerations in `start`.
-    fn residuals(&mut self, bodies: &Bodies<'_>, (s, h): (f64, f64), start: &[Motion], impulses: &mut Impulses) {
-        let work = self.work;
+    /// Moments of the residual over a step from the coordinates, rates and accelerations in `start`; returns the energy that it takes (J).
+    fn residuals(&mut self, bodies: &Bodies<'_>, (s, h): (f64, f64), start: &[Motion], impulses: &mut Impulses) -> f64 {
+        let (work, mut taken) = (self.work, 0.0);
         impulses.clear();
         for node in NODES {
             bodies.ramp.at(s + node.0 * h, &mut self.drive);
@@ -26,10 +26,16 @@ impl JointRodas4 {
             }
             self.is_placed = false;
             self.residual(false, false);
-            self.right.iter().enumerate().for_each(|(j, right)| impulses.add(j, node, h, -right.pose()));
+            for (j, right) in self.right.iter().enumerate() {
+                let (tile, lane) = place_of(j);
+                let [_, rate, _] = self.stages.argument[tile].of(lane);
+                taken += node.1 * h * rate.dot(&right.pose());
+                impulses.add(j, node, h, -right.pose());
+            }
         }
         self.is_placed = false;
         self.work = work;
+        taken
     }
 }
 
@@ -38,11 +44,17 @@ impl<'s> Propagates<'s> for JointRodas4 {
         self.defect = Some(Box::new(JointDefectEstimate::zeros(self.joints.tree.links.len())));
     }
 
-    fn error(&mut self, bodies: &mut Bodies<'s>, (s, h): (f64, f64), _: [&Motion; 2], start: &[Motion]) -> &Motion {
+    fn error(
+        &mut self,
+        bodies: &mut Bodies<'s>,
+        (s, h): (f64, f64),
+        _: [&Motion; 2],
+        start: &[Motion],
+    ) -> MotionError<'_> {
         let count = self.joints.tree.links.len();
         let mut defect = self.defect.take().unwrap_or_else(|| Box::new(JointDefectEstimate::zeros(count)));
-        let JointDefectEstimate { error, room, impulses, right, wrench, force } = &mut *defect;
-        self.residuals(bodies, (s, h), start, impulses);
+        let JointDefectEstimate { error, taken, room, impulses, right, wrench, force } = &mut *defect;
+        *taken += self.residuals(bodies, (s, h), start, impulses);
         let gh = GAMMA * h;
         let Joints { tree, closures, inertias, .. } = &*self.joints;
         let [coordinates, moved] = &mut *error;
@@ -62,12 +74,15 @@ impl<'s> Propagates<'s> for JointRodas4 {
             }
             wrench[count] = Four::ZERO;
             self.w.solve(wrench, right);
+            let lags = (|j: usize| x.q[j] / gh, |j: usize| bodies.q[j].z / gh);
+            self.turning.complete(&self.joints, &self.w, gh, lags, (right, wrench));
             for (j, (right, wrench)) in right.iter().zip(&*wrench).enumerate() {
                 (x.q[j], x.v[j]) = advanced(right.pose(), &x.q[j], gh);
                 (bodies.q[j], bodies.v[j]) = advanced(wrench.pose(), &bodies.q[j], gh);
             }
         });
-        &self.defect.insert(defect).error[1]
+        let JointDefectEstimate { error: [_, motion], taken, .. } = &**self.defect.insert(defect);
+        MotionError { motion, taken: *taken }
     }
 }
 

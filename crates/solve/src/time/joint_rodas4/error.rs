@@ -9,6 +9,8 @@ use bimorph_multibody::planar::Pose;
 #[derive(Debug, Clone)]
 pub(super) struct JointDefectEstimate {
     pub(super) error: [Motion; 2],
+    /// Energy that the residuals have taken (J).
+    pub(super) taken: f64,
     pub(super) room: [Motion; 2],
     pub(super) impulses: Impulses,
     /// Right side over the coordinates, and over the bodies' motions; then what the solve has found.
@@ -23,6 +25,7 @@ impl JointDefectEstimate {
     pub(super) fn zeros(count: usize) -> Self {
         Self {
             error: [Motion::zeros(count), Motion::zeros(count)],
+            taken: 0.0,
             room: [Motion::zeros(count), Motion::zeros(count)],
             impulses: Impulses::zeros(count),
             right: vec![Four::ZERO; count],

@@ -33,6 +33,8 @@ pub(super) struct JointStages {
     push: Vec<LanePose>,
     /// Motion of the bodies with r₁: the argument of damping, where needed.
     drift: Vec<LanePose>,
+    /// r₁ itself, where needed.
+    lag: Vec<LanePose>,
     /// Room for motions of the bodies.
     room: [Vec<Pose>; 2],
 }
@@ -51,7 +53,8 @@ impl JointStages {
             acceleration: zeros.clone(),
             argument: vec![LaneJointStates::REST; tiles],
             push: zeros.clone(),
-            drift: zeros,
+            drift: zeros.clone(),
+            lag: zeros,
             room: [room.clone(), room],
         }
     }
@@ -86,6 +89,17 @@ impl JointStages {
         }
         everywhere(Sums { stages: self, task: StageSum::Begin(i), h });
         false
+    }
+
+    /// r₁ over the coordinates in stage `i`.
+    pub(super) fn fall_behind(&mut self, i: usize, h: f64) {
+        everywhere(Sums { stages: self, task: StageSum::Lag(i), h });
+    }
+
+    /// r₁ of the coordinates of body `j`.
+    #[inline(always)]
+    pub(super) fn lag(&self, j: usize) -> Pose {
+        get(&self.lag, j)
     }
 
     /// Arguments of inertia in stage `i`, and of damping where something `drags`.
@@ -162,6 +176,8 @@ enum StageSum {
     Move(usize, bool),
     /// Argument of damping.
     Drift(usize),
+    /// r₁ over the coordinates.
+    Lag(usize),
     /// The end of the step.
     Finish,
 }
@@ -189,6 +205,7 @@ impl Kernel for Sums<'_> {
                 }
             }
             StageSum::Drift(i) => stages.drift_stage::<W>(simd, i, h),
+            StageSum::Lag(i) => stages.lag_stage::<W>(simd, i, h),
             StageSum::Finish => stages.finish_step::<W>(simd, h),
         }
     }
@@ -248,6 +265,16 @@ impl JointStages {
         for ((u, v), drift) in self.moved.iter().zip(&self.rate).zip(&mut self.drift) {
             let v = load::<W, DOF>(simd, v);
             store(sum(simd, v.map(|v| v * p), &u[..i], &lag), drift);
+        }
+    }
+
+    #[inline(always)]
+    fn lag_stage<W: SimdReal>(&mut self, simd: W::Simd, i: usize, h: f64) {
+        let lag = TABLEAU.lag[i].map(|c| c / h);
+        let p = TABLEAU.rate_start[i];
+        for ((u, start), out) in self.increments.iter().zip(&self.start).zip(&mut self.lag) {
+            let JointState { v, .. } = start.load::<W>(simd);
+            store(sum(simd, v.map(|v| v * p), &u[..i], &lag), out);
         }
     }
 

@@ -3,7 +3,7 @@
 use super::tableau::GAMMA;
 use crate::equations::linear::LinearSolver;
 use crate::method::Motion;
-use crate::time::defect::{Impulses, NODES, POWERS, cubic_start, quartic};
+use crate::time::defect::{Impulses, MotionError, NODES, POWERS, cubic_start, quartic};
 use crate::time::stage_loss::StepMatrix;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::forces;
@@ -17,6 +17,8 @@ const RESOLVED: f64 = 10.0;
 #[derive(Debug, Clone)]
 pub(super) struct DefectEstimate {
     error: Motion,
+    /// Energy that the residuals have taken (J).
+    taken: f64,
     impulses: Impulses,
     /// r at the start of the step; then the acceleration there.
     start: Vec<Pose>,
@@ -31,6 +33,7 @@ impl DefectEstimate {
         let zeros = vec![Pose::zeros(); count];
         Self {
             error: Motion::zeros(count),
+            taken: 0.0,
             impulses: Impulses::zeros(count),
             start: zeros.clone(),
             at: Motion::zeros(count),
@@ -55,11 +58,11 @@ impl DefectEstimate {
         matrix: &StepMatrix<'_, S>,
         (s, h): (f64, f64),
         [before, after]: [&Motion; 2],
-    ) -> &Motion {
+    ) -> MotionError<'_> {
         let model = &system.model;
         let gh = GAMMA * h;
         self.accelerate(system, h, before, after);
-        let Self { impulses, start, at, rho, .. } = self;
+        let Self { taken, impulses, start, at, rho, .. } = self;
         impulses.clear();
         for node in NODES {
             ramp.at(s + node.0 * h, drive);
@@ -72,10 +75,11 @@ impl DefectEstimate {
             }
             forces::add_dampers(model, |k| at.v[k], rho);
             system.add_residual(&at.q, drive, rho);
+            *taken -= node.1 * h * at.v.iter().zip(&*rho).map(|(v, rho)| v.dot(rho)).sum::<f64>();
             rho.iter().enumerate().for_each(|(k, rho)| impulses.add(k, node, h, *rho));
         }
         self.propagate(system, matrix, gh);
-        &self.error
+        MotionError { motion: &self.error, taken: self.taken }
     }
 
     /// [`crate::time::defect::propagate`] in one sweep over the bodies between two solves.
