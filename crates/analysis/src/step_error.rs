@@ -65,6 +65,7 @@ pub fn with_step_error<T>(
     watch: ProgressCallback<'_>,
 ) -> Result<(TransientResult, T), AnalysisError> {
     let (mut result, more, _) = held(options, model, run, sample, watch)?;
+    result.damped = None;
     result.formulation_taken = formulation::taken(model, options).map(|taken| taken.to_string());
     Ok((result, more))
 }

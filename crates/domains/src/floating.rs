@@ -30,6 +30,9 @@ pub struct FloatingGroup {
     pub conductors: usize,
 }
 
+/// The number of a gap, and at either side its node, with the conductor of that where it floats.
+pub type GapNodes = (usize, [(usize, Option<usize>); 2]);
+
 /// All conductors that float.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FloatingConductors {
@@ -39,31 +42,41 @@ pub struct FloatingConductors {
 }
 
 impl FloatingConductors {
-    /// Of `gaps` gaps; `drawn` lists their numbers with the floating conductor at either side, of `count` in all.
+    /// Of `gaps` gaps; `drawn` lists their numbers with the nodes at either side and the floating conductors of these, of `count` in all.
     ///
-    /// A group without a gap to another potential has its first conductor at 0 V.
-    pub fn new((gaps, count): (usize, usize), drawn: &[(usize, [Option<usize>; 2])]) -> Self {
+    /// A group whose gaps lead to one other potential alone would be at that, without a field: it stays at 0 V. A group without another potential
+    /// has its first conductor at 0 V.
+    pub fn new((gaps, count): (usize, usize), drawn: &[GapNodes]) -> Self {
         let mut sets = Sets::new(count);
-        for (_, [a, b]) in drawn {
-            if let (Some(a), Some(b)) = (*a, *b) {
+        for (_, sides) in drawn {
+            if let [(_, Some(a)), (_, Some(b))] = *sides {
                 sets.join(a, b);
             }
         }
-        let mut tied = vec![false; count];
-        for side in drawn.iter().filter_map(|(_, [a, b])| if a.is_some() == b.is_some() { None } else { a.or(*b) }) {
-            tied[sets.first(side)] = true;
+        // other potentials that each group is at: one, or several
+        let mut tied: Vec<Option<(usize, bool)>> = vec![None; count];
+        for (_, sides) in drawn {
+            let (side, node) = match *sides {
+                [(node, None), (_, Some(side))] | [(_, Some(side)), (node, None)] => (side, node),
+                _ => continue,
+            };
+            let tie = &mut tied[sets.first(side)];
+            *tie = Some(tie.map_or((node, false), |(first, several)| (first, several || first != node)));
         }
         let mut all = Self { groups: Vec::new(), of_gaps: vec![None; gaps] };
         let (mut group_of, mut place) = (vec![None; count], vec![None; count]);
-        for &(gap, sides) in drawn.iter().filter(|(_, [a, b])| a != b) {
+        for (gap, sides) in drawn.iter().map(|(gap, [(_, a), (_, b)])| (*gap, [*a, *b])).filter(|(_, [a, b])| a != b) {
             let Some(root) = sides[0].or(sides[1]).map(|side| sets.first(side)) else { continue };
+            if tied[root].is_some_and(|(_, several)| !several) {
+                continue;
+            }
             let group = *group_of[root].get_or_insert_with(|| {
                 all.groups.push(FloatingGroup::default());
                 all.groups.len() - 1
             });
             let conductors = &mut all.groups[group].conductors;
             let sides = sides.map(|side| {
-                let side = side.filter(|side| tied[root] || *side != root)?;
+                let side = side.filter(|side| tied[root].is_some() || *side != root)?;
                 Some(*place[side].get_or_insert_with(|| {
                     *conductors += 1;
                     *conductors - 1
@@ -197,7 +210,14 @@ mod tests {
     /// else joins stays at 0 V.
     #[test]
     fn capacitors_in_series() {
-        let drawn = [(0, [None, Some(0)]), (1, [Some(0), Some(1)]), (2, [Some(1), None]), (3, [Some(2), Some(3)])];
+        let at = |node: usize| (node, None);
+        let floats = |conductor: usize| (conductor, Some(conductor));
+        let drawn = [
+            (0, [at(8), floats(0)]),
+            (1, [floats(0), floats(1)]),
+            (2, [floats(1), at(9)]),
+            (3, [floats(2), floats(3)]),
+        ];
         let floating = FloatingConductors::new((4, 4), &drawn);
         assert_eq!(floating.groups().len(), 2);
         let (c, mut volts) = ([1.0, 2.0, 4.0, 8.0], [7.0, 0.0, 0.0, 0.0]);
@@ -214,13 +234,17 @@ mod tests {
     /// A conductor without capacitance has no potential of its own, whatever the others have.
     #[test]
     fn a_conductor_without_capacitance_stays_at_zero() {
-        let floating = FloatingConductors::new((2, 2), &[(0, [None, Some(0)]), (1, [Some(0), Some(1)])]);
-        let (c, mut volts) = ([2.0, 0.0], [3.0, 0.0]);
+        let (one, other, middle) = ((8, None), (9, None), (0, Some(0)));
+        let drawn = [(0, [one, middle]), (1, [middle, (1, Some(1))]), (2, [middle, other])];
+        let floating = FloatingConductors::new((3, 2), &drawn);
+        let (c, mut volts) = ([2.0, 0.0, 2.0], [3.0, 0.0, 0.0]);
         let group = &floating.groups()[0];
         let mut phi = group.gathered(|gap| -c[gap] * volts[gap]);
         group.factor(|gap| c[gap]).solve(&mut phi);
         group.spread(&phi, &mut volts);
-        assert_eq!(volts[0], 0.0);
+        assert_eq!((volts[0], volts[2]), (1.5, 1.5));
         assert_eq!(phi[1], 0.0);
+        // with one other potential there is no field
+        assert!(FloatingConductors::new((3, 2), &drawn[..2]).is_empty());
     }
 }

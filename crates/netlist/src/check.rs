@@ -397,7 +397,11 @@ fn floating_potentials(drawing: &StructureBuilder, sink: &mut DiagnosticSink) {
         // its potential is that of a circuit which the model leaves out
         let outside = structure.circuit.iter().filter(|element| element.kind.is_left_out());
         let held = outside.flat_map(|element| &element.nodes).any(|node| nets.together(node.0, index));
-        let kept = if held { "it stays at 0 V" } else { "it keeps its charge, which is 0" };
+        let kept = if held {
+            "it stays at 0 V"
+        } else {
+            "it keeps its charge of 0 between two other potentials, and else stays at 0 V"
+        };
         let message =
             format!("the potential of node `{name}` floats: no port, source or ground fixes it, and {kept}{more}");
         let help = "connect it with `R`, or add `eground * [node] []`";

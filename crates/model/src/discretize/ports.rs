@@ -104,7 +104,7 @@ fn floating(
     let outside = outside.flat_map(|element| element.nodes.iter().map(|node| net[node.0]));
     let (parts, count) = circuit.floating_parts(structure.ports.len(), outside);
     let sides = gaps.iter().enumerate().filter_map(|(g, gap)| match gap.voltage {
-        Some(GapVoltage::Nodes(a, b)) => Some((g, [*a, *b].map(|node| parts[net[node.0]]))),
+        Some(GapVoltage::Nodes(a, b)) => Some((g, [*a, *b].map(|node| (net[node.0], parts[net[node.0]])))),
         _ => None,
     });
     FloatingConductors::new((gaps.len(), count), &sides.collect::<Vec<_>>())

@@ -10,7 +10,7 @@
 //! ```
 //! with M, C and K at the start of the step. K holds the springs of the tree's joints, the stiffness that forces and
 //! inertia bring to them ([`geometric`]), and the exact tangent of closures and gaps. The change of accelerations with
-//! coordinates and rates is unsymmetric. Where bodies turn far in a step it is taken to first order ([`turning_inertia`]).
+//! coordinates and rates is unsymmetric. Where bodies turn far in a step it is taken to first order (`turning_inertia`).
 //!
 //! To its caller the motion is that of the bodies, as with every other method; coordinates are internal.
 //!

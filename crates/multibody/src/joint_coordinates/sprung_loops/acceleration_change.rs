@@ -101,9 +101,7 @@ mod tests {
     /// The change is that of the kinematics over values with their derivatives (1e-12), for any motion of a frame with a loop.
     #[test]
     fn the_change_is_the_derivative() {
-        let mut model = frame();
-        model.joints.iter_mut().for_each(|joint| joint.second = Matrix2::new(1e4, 0.1, 0.1, 1e-6));
-        let tree = Tree::elastic(&model).unwrap();
+        let tree = Tree::elastic(&frame(Matrix2::new(1e4, 0.1, 0.1, 1e-6))).unwrap();
         let mut angles = (0..).map(|k| (0.7 * f64::from(k)).sin());
         let mut noise = || angles.next().unwrap_or_default();
         let mut poses = |size: f64| -> Vec<Pose> {
