@@ -2,7 +2,7 @@
 //!
 //! With a = J·z + J̇·v this is (∂a/∂q)·δq + 2·J̇·δv: relative accelerations turn with the parent, and Coriolis and centrifugal terms change.
 //! Beyond its parent's, a body's change is linear in the parent's rotation and its rate, and in the joint's
-//! coordinates and their rates ([`AccelerationMaps`]). The maps are computed for eight bodies per vector; sums go root → leaf.
+//! coordinates and their rates (`AccelerationMaps`). The maps are computed for eight bodies per vector; sums go root → leaf.
 
 use super::kinematics::{AccelerationMaps, MotionMap, acceleration_maps, triple};
 use super::poses::{LaneJointStates, TreeKinematics, place_of, tiles};
