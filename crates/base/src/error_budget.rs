@@ -29,6 +29,12 @@ impl ErrorBudget {
     const LARGE_MOTION: f64 = 0.6;
     /// Fraction of the tolerance that one step may use: errors of many steps add up.
     const STEP: f64 = 1e-2;
+    /// The same for a step that many points share: points with steps of their own would be far nearer.
+    const SHARED_STEP: f64 = 1e-3;
+    /// Fraction of the tolerance by which points within a step may be off its motion: this does not add up.
+    const WITHIN_STEP: f64 = 3e-2;
+    /// The same of rates.
+    const RATES_WITHIN_STEP: f64 = 0.3;
     /// Least fraction of the tolerance that is left to the steps beside the mesh.
     const LEAST_FOR_STEPS: f64 = 0.3;
     /// Ratio of the tolerance of a companion run to that of the run.
@@ -233,6 +239,26 @@ impl ErrorBudget {
     /// For one step of an integrator.
     pub fn step(self) -> f64 {
         Self::STEP * self.requested
+    }
+
+    /// For one step that many points share.
+    pub fn shared_step(self) -> f64 {
+        Self::SHARED_STEP * self.requested
+    }
+
+    /// For a quantity that is a `part` of a whole, relative to the `whole`; both in one unit.
+    pub fn of_part(self, part: f64, whole: f64) -> Self {
+        Self { requested: self.requested * part / whole }
+    }
+
+    /// For what points within a step leave out.
+    pub fn within_step(self) -> f64 {
+        Self::WITHIN_STEP * self.requested
+    }
+
+    /// The same for rates.
+    pub fn rates_within_step(self) -> f64 {
+        Self::RATES_WITHIN_STEP * self.requested
     }
 
     /// For the steps of a companion run.

@@ -26,6 +26,8 @@ mod half_cycles;
 mod held_motion;
 mod higher_modes;
 pub mod local;
+pub mod macro_step;
+mod multirate;
 mod noise;
 mod output_gradient;
 mod phase_error;

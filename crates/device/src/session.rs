@@ -5,6 +5,8 @@ pub(crate) mod reduction;
 use super::agitation::ThermalForce;
 use super::growth::{Difference, Growth};
 use super::held_motion::HeldMotion;
+use super::macro_step::InMacroStep;
+use super::multirate::Multirate;
 use super::output_gradient::{OutputGradient, surroundings};
 use super::phase_error::PhaseErrorMonitor;
 use super::states::{Snapshot, States};
@@ -74,6 +76,12 @@ pub(super) struct DeviceSession {
     pub(super) difference: Difference,
     /// The motion that all trials of the point at hand lie about.
     pub(super) held: HeldMotion,
+    /// Storage for trials of macro steps; none where there are none.
+    pub(super) multirate: Option<Box<Multirate>>,
+    /// Where the trial at hand lies in one.
+    pub(super) place: Option<Box<InMacroStep>>,
+    /// It would leave too much out of one.
+    pub(super) leaves_out_much: bool,
 }
 
 /// Doubles for each port and body: stages, displacements, velocities, and those of states that are kept.
@@ -128,8 +136,16 @@ impl DeviceSession {
         };
         description.unknowns = reduction.as_ref().map_or(description.unknowns, |found| found.model.space.size());
         let held = HeldMotion::new(n, ports.len(), (heaters, electrics.heating.means()));
+        let steps_bodies = matches!(method, Formulated::Bodies(_));
         let session = Self {
             held,
+            multirate: if steps_bodies {
+                Multirate::new(system, sees_rates(&signals, &ports)).map(Box::new)
+            } else {
+                None
+            },
+            place: None,
+            leaves_out_much: false,
             opened: request.clone(),
             shaken,
             stepper: Adaptive::new(n, method),
@@ -179,11 +195,36 @@ impl DeviceSession {
             && numbers(&state.sources, self.sources.len())
             && (state.anchors.is_empty() || numbers(&state.anchors, self.equilibrium.sticking.anchors().len()))
             && state.next_step > 0.0
+            && state.fastest >= 0.0
+            && state.reach >= 0.0
+            && (state.origin.is_empty() || poses(&state.origin))
             && (0.0..f64::INFINITY).contains(&state.elapsed)
             && state.shown.numbers().into_iter().flatten().all(|x| x.is_finite())
             && (followed == 0 || followed == self.signals.len() + self.ports.len())
+            && state.macro_step.as_ref().is_none_or(|place| self.fits_in(place))
             && (state.carried.is_empty()
                 || state.carried.len() == carried.len() && state.carried.iter().zip(carried).all(alike))
+    }
+
+    /// Whether a place in a macro step has the sizes and the sense that one of this session has.
+    fn fits_in(&self, place: &InMacroStep) -> bool {
+        let Some(multirate) = &self.multirate else { return false };
+        let (step, n) = (&place.step, self.motion.q.len());
+        let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
+        let motion = |motion: &Motion| {
+            [&motion.q, &motion.v].iter().all(|p| p.len() == n && p.iter().all(|p| finite(p.as_slice())))
+        };
+        motion(&step.motion)
+            && motion(&step.offset)
+            && (step.sources.len(), step.expected.len()) == (self.sources.len(), multirate.pairs())
+            && place.moments.len() == multirate.pairs()
+            && [&step.sources[..], &[step.first, step.fastest, step.reach, place.since]]
+                .iter()
+                .all(|numbers| finite(numbers))
+            && step.expected.iter().all(|e| finite(&[e.mean, e.value, e.slope]))
+            && finite(place.moments.as_flattened())
+            && step.first > 0.0
+            && place.since > 0.0
     }
 
     /// The state that a small signal is about.

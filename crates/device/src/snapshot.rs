@@ -4,15 +4,19 @@
 //! original. Reading trusts nothing: lengths are bounded by the bytes that are there, and sizes by the model's.
 
 use super::contract::{Agitation, DeviceError, OpenRequest, Token, refused};
+use super::macro_step::{Expected, InMacroStep, MacroStep};
 use super::states::{Snapshot, States};
 use super::step_history::StepHistory;
 use bimorph_multibody::planar::{DOF, Pose};
 use bimorph_solve::time::method::Motion;
+use std::sync::Arc;
 
 /// Magic bytes: a name and the version of this format.
-const HEAD: [u8; 8] = *b"bimorph\x03";
-/// Those of states of a reduced model: format 3 behind the name of its coordinates.
+const HEAD: [u8; 8] = *b"bimorph\x05";
+/// Those of states of a reduced model: format 3 behind the name of its coordinates. They lie in no macro steps.
 const HEAD_REDUCED: [u8; 8] = *b"bimorph\x04";
+/// Those of format 3, whose states lie in no macro steps.
+const HEAD_3: [u8; 8] = *b"bimorph\x03";
 /// Those of format 2, whose histories of steps count no alternations and whose states have no anchors.
 const HEAD_2: [u8; 8] = *b"bimorph\x02";
 
@@ -63,6 +67,9 @@ fn write_format(head: &[u8], parts: usize, opened: &OpenRequest, states: &States
             out.poses(&motion.q);
             out.poses(&motion.v);
         }
+        if head == HEAD {
+            out.macro_step(state);
+        }
     }
     out.0
 }
@@ -96,6 +103,28 @@ impl SnapshotWriter {
         numbers.iter().for_each(|x| self.word(x.to_bits()));
     }
 
+    /// Where a state lies in a macro step.
+    fn macro_step(&mut self, state: &Snapshot) {
+        self.word(state.pause.into());
+        self.word(state.fastest.to_bits());
+        self.word(state.reach.to_bits());
+        self.poses(&state.origin);
+        self.word(state.macro_step.is_some().into());
+        let Some(InMacroStep { step, since, points, moments }) = state.macro_step.as_deref() else { return };
+        self.word(since.to_bits());
+        self.word((*points).into());
+        self.numbers(moments.as_flattened());
+        self.word(step.start.0);
+        [&step.motion, &step.offset].iter().flat_map(|m| [&m.q, &m.v]).for_each(|poses| self.poses(poses));
+        self.numbers(&step.sources);
+        let expected = step.expected.iter().map(|e| [e.mean, e.value, e.slope, e.goes_on.into()]);
+        self.numbers(expected.collect::<Vec<_>>().as_flattened());
+        self.word(step.fastest.to_bits());
+        self.word(step.reach.to_bits());
+        self.word(step.informed.into());
+        self.word(step.first.to_bits());
+    }
+
     fn poses(&mut self, poses: &[Pose]) {
         self.count(poses.len());
         poses.iter().flat_map(|pose| pose.iter()).for_each(|x| self.word(x.to_bits()));
@@ -109,8 +138,9 @@ impl SnapshotReader<'_> {
     fn all(&mut self) -> Option<(OpenRequest, States, Option<u64>)> {
         let (head, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
+        let has_macro_steps = *head == HEAD;
         let (parts, tag) = match *head {
-            HEAD => (StepHistory::PARTS, None),
+            HEAD | HEAD_3 => (StepHistory::PARTS, None),
             HEAD_REDUCED => (StepHistory::PARTS, Some(self.word()?)),
             HEAD_2 => (StepHistory::PARTS_OF_FORMAT_2, None),
             _ => return None,
@@ -119,7 +149,7 @@ impl SnapshotReader<'_> {
         let mut states = States::default();
         for _ in 0..self.count(8)? {
             let (token, parent) = (Token(self.word()?), self.word()?);
-            let state = Snapshot {
+            let mut state = Snapshot {
                 q: self.poses()?,
                 v: self.poses()?,
                 rise: self.numbers()?,
@@ -137,11 +167,20 @@ impl SnapshotReader<'_> {
                 carried: {
                     let mut carried = Vec::new();
                     for _ in 0..self.count(16)? {
-                        carried.push(Motion { q: self.poses()?, v: self.poses()? });
+                        carried.push(self.motion()?);
                     }
                     carried
                 },
+                macro_step: None,
+                pause: 0,
+                fastest: 0.0,
+                reach: 0.0,
+                origin: Arc::default(),
             };
+            if has_macro_steps {
+                (state.pause, state.fastest, state.reach) = (self.small()?, self.number()?, self.number()?);
+                (state.origin, state.macro_step) = (self.poses()?.into(), self.macro_step()?.map(Box::new));
+            }
             states.put(token, (parent != 0).then_some(Token(parent)), state);
         }
         Some((opened, states, tag))
@@ -161,6 +200,52 @@ impl SnapshotReader<'_> {
     fn count(&mut self, each: usize) -> Option<usize> {
         let count = usize::try_from(self.word()?).ok()?;
         (count <= self.0.len() / each).then_some(count)
+    }
+
+    /// A number below 2³².
+    fn small(&mut self) -> Option<u32> {
+        self.word()?.try_into().ok()
+    }
+
+    fn number(&mut self) -> Option<f64> {
+        self.word().map(f64::from_bits)
+    }
+
+    fn motion(&mut self) -> Option<Motion> {
+        Some(Motion { q: self.poses()?, v: self.poses()? })
+    }
+
+    /// Where a state lies in a macro step.
+    fn macro_step(&mut self) -> Option<Option<InMacroStep>> {
+        match self.word()? {
+            0 => return Some(None),
+            1 => {}
+            _ => return None,
+        }
+        let (since, points, moments) = (self.number()?, self.small()?, self.numbers()?);
+        let (moments, rest) = moments.as_chunks::<2>();
+        let step = MacroStep {
+            start: Token(self.word()?),
+            motion: self.motion()?,
+            offset: self.motion()?,
+            sources: self.numbers()?,
+            expected: {
+                let numbers = self.numbers()?;
+                let (each, rest) = numbers.as_chunks::<4>();
+                let read = |&[mean, value, slope, goes_on]: &[f64; 4]| Expected {
+                    mean,
+                    value,
+                    slope,
+                    goes_on: goes_on != 0.0,
+                };
+                rest.is_empty().then(|| each.iter().map(read).collect())?
+            },
+            fastest: self.number()?,
+            reach: self.number()?,
+            informed: self.small()?,
+            first: self.number()?,
+        };
+        rest.is_empty().then(|| Some(InMacroStep { step: Arc::new(step), since, points, moments: moments.to_vec() }))
     }
 
     fn noise(&mut self) -> Option<Option<Agitation>> {
@@ -208,7 +293,7 @@ mod tests {
     use crate::{Mode, Trial};
     use bimorph_base::ErrorBudget;
 
-    fn some() -> (OpenRequest, States) {
+    fn some(of_macro_steps: bool) -> (OpenRequest, States) {
         let opened = OpenRequest {
             ports: vec!["drive".into()],
             signals: vec!["µ.x".into(), String::new()],
@@ -237,6 +322,28 @@ mod tests {
                     )
                     .0,
                 carried,
+                macro_step: (of_macro_steps && k > 0).then(|| {
+                    Box::new(InMacroStep {
+                        step: Arc::new(MacroStep {
+                            start: Token(5),
+                            motion: Motion { q: pose(1.0), v: pose(2.0) },
+                            offset: Motion { q: pose(3.0), v: pose(4.0) },
+                            sources: vec![1.0, 2.0],
+                            expected: vec![Expected { mean: 0.5, value: 0.6, slope: 0.7, goes_on: true }],
+                            fastest: 1e-9,
+                            reach: 3e-9,
+                            informed: 2,
+                            first: 1e-7,
+                        }),
+                        since: 1e-8,
+                        points: 3,
+                        moments: vec![[1e-9, 2e-18]],
+                    })
+                }),
+                pause: u32::from(of_macro_steps),
+                fastest: if of_macro_steps { 2e-9 } else { 0.0 },
+                reach: if of_macro_steps { 4e-9 } else { 0.0 },
+                origin: if of_macro_steps { pose(5.0).into() } else { Arc::default() },
             };
             let voltages = [f64::from(k)];
             parent = Some(
@@ -248,8 +355,8 @@ mod tests {
 
     #[test]
     fn states_come_back() {
-        let (opened, states) = some();
-        for tag in [None, Some(7)] {
+        for (tag, of_macro_steps) in [(None, false), (Some(7), false), (None, true)] {
+            let (opened, states) = some(of_macro_steps);
             let bytes = write(&opened, &states, tag);
             let (read_opened, read_states, read_tag) = read(&bytes).expect("its own bytes");
             assert_eq!((&read_opened, read_tag), (&opened, tag));
@@ -257,19 +364,21 @@ mod tests {
         }
     }
 
-    /// Snapshots of format 2 come back with histories that have counted no alternations.
+    /// Snapshots of formats 2 and 3 come back: with histories that have counted no alternations, and with states in no macro steps.
     #[test]
-    fn states_of_format_2_come_back() {
-        let (opened, states) = some();
-        let bytes = write_format(&HEAD_2, StepHistory::PARTS_OF_FORMAT_2, &opened, &states);
-        let (read_opened, read_states, _) = read(&bytes).expect("bytes of format 2");
-        assert_eq!(read_opened, opened);
-        assert_eq!(write_format(&HEAD_2, StepHistory::PARTS_OF_FORMAT_2, &read_opened, &read_states), bytes);
+    fn states_of_earlier_formats_come_back() {
+        for (head, parts) in [(HEAD_2, StepHistory::PARTS_OF_FORMAT_2), (HEAD_3, StepHistory::PARTS)] {
+            let (opened, states) = some(false);
+            let bytes = write_format(&head, parts, &opened, &states);
+            let (read_opened, read_states, _) = read(&bytes).expect("bytes of an earlier format");
+            assert_eq!(read_opened, opened);
+            assert_eq!(write_format(&head, parts, &read_opened, &read_states), bytes);
+        }
     }
 
     #[test]
     fn other_bytes_are_refused() {
-        let (opened, states) = some();
+        let (opened, states) = some(true);
         let bytes = write(&opened, &states, None);
         for length in 0..bytes.len() {
             assert!(read(&bytes[..length]).is_err(), "{length}");

@@ -1,10 +1,10 @@
 //! The states behind tokens: immutable, few, found by a hash of the request that made them.
 
+use super::macro_step::InMacroStep;
 use super::step_history::StepHistory;
 use super::{Mode, Token, Trial};
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::time::method::Motion;
-use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ const MAX_BYTES: usize = 32 << 20;
 const KEPT: usize = 8;
 
 /// Everything the next step depends on.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Snapshot {
     /// Displacements.
     pub q: Vec<Pose>,
@@ -36,6 +36,16 @@ pub struct Snapshot {
     pub shown: StepHistory,
     /// State of a formulation between steps, beside the bodies' motion.
     pub carried: Vec<Motion>,
+    /// The macro step that it lies in, of many points.
+    pub macro_step: Option<Box<InMacroStep>>,
+    /// Points before another one is made.
+    pub pause: u32,
+    /// Largest rates since the equilibrium, in the norm of masses.
+    pub fastest: f64,
+    /// The same of displacements from it.
+    pub reach: f64,
+    /// Displacements of that equilibrium; empty: none as drawn.
+    pub origin: Arc<[Pose]>,
 }
 
 /// Held states, in order of last use.
@@ -143,6 +153,7 @@ impl States {
 fn size(s: &Snapshot) -> usize {
     (s.q.len() + s.v.len()) * size_of::<Pose>()
         + s.carried.iter().map(|m| m.q.len() + m.v.len()).sum::<usize>() * size_of::<Pose>()
+        + s.macro_step.as_ref().map_or(0, |place| 8 * place.doubles())
         + (s.rise.len() + s.sources.len() + s.anchors.len() + s.shown.doubles()) * 8
         + size_of::<Snapshot>()
 }

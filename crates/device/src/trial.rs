@@ -2,6 +2,7 @@
 //! state.
 
 mod held;
+mod macro_steps;
 mod reduced;
 
 use super::agitation::ThermalForce;
@@ -41,6 +42,7 @@ impl DeviceSession {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
         let electrics = &system.electrics;
+        self.place = None;
         self.fill_sources(electrics, request.voltages);
         if let Err(error) = check_heat(compiled, electrics, &self.sources) {
             reply.status = Status::Fail(error.to_string());
@@ -139,9 +141,16 @@ impl DeviceSession {
                 return true;
             }
         }
-        let tol = compiled.options.errors().step();
+        let errors = compiled.options.errors();
+        let tol = errors.step();
         let beyond = self.is_beyond(&self.sources);
-        let held = self.about_held(system, (request, parent), tol);
+        let slow = self.of_macro_step(system, (request, parent), errors);
+        let slow_next = slow.as_ref().map(|found| found.next);
+        self.place = slow.map(|found| Box::new(found.place));
+        let left =
+            parent.filter(|_| self.place.is_none()).and_then(|p| self.leave_macro_step(system, (request, p), errors));
+        let parent = left.as_deref().or(parent);
+        let held = slow_next.or_else(|| self.about_held(system, (request, parent), tol));
         if held.is_none() {
             self.begin(parent, beyond);
         }
@@ -151,7 +160,7 @@ impl DeviceSession {
             reply.status = Status::Fail(error.to_string());
             return true;
         }
-        let (mut h, ends) = (self.held.next, &self.held.ends);
+        let (mut h, ends) = (held.unwrap_or(self.held.next), &self.held.ends);
         let bodies = &mut Bodies::weighed(system, &ramp, &self.weights);
         let kept = !ends.is_empty();
         if held.is_none() && !(kept && self.stepper.along(bodies, &mut self.motion, ends, (tol, MAX_ERROR))) {

@@ -69,6 +69,7 @@ impl System {
         for ((load, change), (_, size)) in self.given_loads(change).zip(self.given_loads(drive)) {
             load.add_force_change(at, size, change, r);
         }
+        r.iter_mut().zip(&change.push).for_each(|(r, push)| *r -= push);
         if let (Some(frame), Some(change)) = (self.frame(drive), self.frame(change)) {
             self.in_frame().add_force_change(at, frame, change, r);
         }

@@ -29,6 +29,8 @@ pub struct Ramp<'a> {
     pub dt: f64,
     /// Force and moment on each body throughout the step; empty: none.
     pub push: &'a [Pose],
+    /// By how much these grow in a second; empty: they stay.
+    pub push_rate: &'a [Pose],
     /// Acceleration of the frame beside that of the sources; its inputs must be among those of the electrical side.
     pub shock: Option<Shock>,
     /// Inputs of the electrical side that follow waveforms beside their sources.
@@ -50,7 +52,20 @@ impl<'a> Ramp<'a> {
         let course = heating.hot().map(|hot| hot.course(line, &rise[heating.means()..]));
         let changes = if course.is_some() { vec![OnceLock::new(); from.len()] } else { Vec::new() };
         let heat = electrics.heat_course((from, to), dt);
-        Self { electrics, from, to, rise, dt, push: &[], shock: None, motions: &[], heat, course, changes }
+        Self {
+            electrics,
+            from,
+            to,
+            rise,
+            dt,
+            push: &[],
+            push_rate: &[],
+            shock: None,
+            motions: &[],
+            heat,
+            course,
+            changes,
+        }
     }
 
     /// The time at which rises leave all bounds (s), with the heater and the table that ends there, if it is one; none: they do not.
@@ -97,6 +112,12 @@ impl<'a> Ramp<'a> {
     #[inline]
     pub fn pushed(self, push: &'a [Pose]) -> Self {
         Self { push, ..self }
+    }
+
+    /// The same with a force and a moment on each body at the start, and by how much these grow in a second.
+    #[inline]
+    pub fn pushed_along(self, push: &'a [Pose], push_rate: &'a [Pose]) -> Self {
+        Self { push, push_rate, ..self }
     }
 
     /// The same with a shock.
@@ -212,6 +233,7 @@ impl<'a> Ramp<'a> {
         self.expansions(lags, |k, strain| drive.expansion[k] = strain);
         drive.push.clear();
         drive.push.extend_from_slice(self.push);
+        drive.push.iter_mut().zip(self.push_rate).for_each(|(push, rate)| *push += rate * s);
         let first = self.electrics.voltages();
         drive.turning = 0.0;
         for (k, value) in drive.inputs.iter_mut().enumerate() {
@@ -234,6 +256,7 @@ impl<'a> Ramp<'a> {
         }
         (rate.load, rate.turning) = (0.0, 0.0);
         rate.push.clear();
+        rate.push.extend_from_slice(self.push_rate);
     }
 
     /// The change of the drive at time `s` with the final voltage of source `port`.

@@ -85,6 +85,13 @@ impl<'a> Bodies<'a> {
         (0.5 * moved).hypot(1.5 * pressed * contact)
     }
 
+    /// The error of displacements that a step between two ends may have, in the norm of masses; none where another one counts.
+    pub fn allowed(&self, ends: [&Motion; 2], tol: f64) -> Option<f64> {
+        let alone = self.weights.mass > 0.0 && self.weights.dragged.is_empty();
+        let (_, may) = self.of_masses(ends, ends[0], 0.0, tol).filter(|_| alone)?;
+        Some(may)
+    }
+
     /// By how much forces that grow from zero over a step of length `h` (s) move the masses where nothing holds these, over the error that the step may have.
     pub fn would_move(&self, motion: &Motion, force: &[Pose], h: f64, tol: f64) -> f64 {
         let Some((_, may)) = self.of_masses([motion, motion], motion, h, tol) else { return f64::INFINITY };
