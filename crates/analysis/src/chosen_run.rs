@@ -202,8 +202,12 @@ struct Pace {
 }
 
 impl Pace {
-    /// After a step to this part of the run (1): false where steps have collapsed.
+    /// After a step to this part of the run (1), or one of a companion run (0): false where steps have collapsed.
     fn goes_on(&mut self, fraction: f64) -> bool {
+        if fraction == 0.0 {
+            self.done.clear();
+            return !self.collapsed;
+        }
         if self.done.back().is_some_and(|last| fraction < *last) {
             // the next run
             self.done.clear();
@@ -235,7 +239,7 @@ impl Pace {
 mod tests {
     use super::*;
 
-    /// Steps that grow from the shortest first one, and 10⁷ equal ones, go on; 100 steps of 10⁻⁸ of the run do not, in a second run either.
+    /// Steps that grow from the shortest first one, 10⁷ equal ones, and those of a companion go on; 100 steps of 10⁻⁸ of the run do not, in a second run either.
     #[test]
     fn steps_that_collapse_end_a_run() {
         let mut pace = Pace::default();
@@ -246,6 +250,7 @@ mod tests {
             assert!(pace.goes_on(at), "{at:e}");
             step = f64::min(5.0 * step, 1e-7 * 1.01);
         }
+        assert!((0..1000).all(|_| pace.goes_on(0.0)));
         for run in 0..2 {
             let goes_on = (1..=SLOW + 1).map(|k| pace.goes_on(1e-8 * k as f64)).take_while(|on| *on).count();
             assert_eq!(goes_on, SLOW, "run {run}");

@@ -9,13 +9,13 @@
 //!
 //! Rigid parts on flexures are the other case. Where they outweigh the flexures and close no loop, large rotations are linear in the
 //! joint coordinates and curved in those of the bodies. Steps in joint coordinates are as long as those of small rotations then:
-//! rcr with the method of the bodies ([`outweighed_tree`]), unless parts may touch. Loops cancel the advantage, and so do flexures of many
-//! segments. Beams are cut otherwise in joint coordinates, so that this choice comes before the mesh ([`in_joints`]), and the other after it
+//! rcr with the method of the bodies ([`outweighed_tree`]), unless parts may touch. Loops cancel the advantage. Flexures of many segments may do so, and
+//! then coarse runs decide. Beams are cut otherwise in joint coordinates, so that this choice comes before the mesh ([`in_joints`]), and the other after it
 //! ([`of_run`]).
 //!
-//! Other mechanisms have bodies first. The first coarse run of the search for their mesh propagates the error of its steps. Where this is of the size of the
-//! motion, the way is curved in the coordinates of the bodies, and their steps would become several times as many. Joint coordinates are then
-//! taken if their own coarse run has a smaller error and a mesh of their own holds the tolerance ([`may_take_joints`], `mesh::fitted_in_time`).
+//! Other mechanisms have bodies first. The first coarse run of the search for their mesh propagates the error of its steps. This and the number of its steps
+//! predict the work of all runs until the tolerance holds ([`super::step_error`]). Where it is large enough for a trial, a coarse run in joint coordinates
+//! makes the same prediction. They are taken if the work is less, and if a mesh of their own holds the tolerance ([`may_take_joints`], `mesh::fitted_in_time`).
 //!
 //! Every front end has all of them by the search for the mesh and by the run. [`taken`] reports the choice.
 
@@ -43,7 +43,8 @@ const FEW: f64 = 3e3;
 /// of bodies, and up to 34 times where flexures were soft; those above took 0.005 to 1.5 times.
 const OUTWEIGHING: f64 = 30.0;
 
-/// Segments of a flexure at most: short ones that move fast shorten the steps in joint coordinates, whose matrix omits their rates.
+/// Segments of a flexure up to which no coarse run of the bodies is needed: short ones that move fast shorten the steps in joint coordinates, whose
+/// matrix omits their rates.
 const MOST_SEGMENTS: usize = 8;
 
 /// Choice of `auto`.
@@ -66,9 +67,8 @@ pub fn taken(moving: &CompiledModel, options: &TransientOptions<'_>) -> Option<C
     match (moving.requested.formulation, moving.options.formulation) {
         (Formulation::Auto, Formulation::Auto) => Some(of_run(moving, options).0),
         (Formulation::Auto, formulation @ Formulation::Rcr) => {
-            let why = outweighed_tree(moving).unwrap_or_else(|| {
-                "in a coarse run of the bodies the error of the steps is of the size of the motion".to_owned()
-            });
+            let why = outweighed_tree(moving)
+                .unwrap_or_else(|| "coarse runs predict less work of the steps in joint coordinates".to_owned());
             Some(ChosenFormulation { formulation, why })
         }
         _ => None,

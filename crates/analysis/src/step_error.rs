@@ -33,7 +33,7 @@ use crate::reduced::Directions;
 use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::Formulation;
-use companion::{companion, compared, from_companion, is_made_again};
+use companion::{EstimatedRun, companion, compared, is_made_again, with_companion};
 pub use run::RunFunction;
 use run::{AT_THE_END, MAX_AGAIN};
 pub use run::{beyond, unknown};
@@ -44,6 +44,9 @@ use std::cell::Cell;
 /// The exponent with which an error is supposed to fall with the tolerance, and the range in which two runs teach another.
 const EXPONENT: f64 = 0.6;
 const EXPONENTS: (f64, f64) = (0.35, 1.0);
+/// The exponent with which the number of steps grows as the tolerance falls, and the steps of a companion run, of those of its run.
+const STEPS: f64 = 0.25;
+const COMPANION_STEPS: f64 = 0.56;
 /// Least and largest ratio of the tolerances of two runs.
 const RATIOS: (f64, f64) = (0.01, 0.7);
 /// Runs at most.
@@ -90,21 +93,31 @@ fn held<T>(
     let mut made = sharper(made, &estimated, model, run, watch)?;
     let found = made.result.step_error.unwrap_or(0.0);
     let room = options.errors().left_for_steps(made.result.estimated_error);
-    let (hopeless, damped) = (found > HOPELESS, made.result.damped.filter(|damped| *damped > room.max(found)));
-    let apart = match damped {
-        // samples that have been sent cannot be compared
-        Some(damped) if made.long => Some(damped),
-        Some(_) => from_companion(&options.with_tolerance(made.steps.requested()), model, run, watch)?,
-        None => None,
+    let damped = made.result.damped.filter(|damped| *damped > room.max(found));
+    let compared_run = match damped {
+        Some(_) if !made.long => {
+            let (options, picked) =
+                (options.with_tolerance(made.steps.requested()), SelectedSamples::of(options, &made.kept));
+            Some(with_companion(&options, model, (&made.result, picked), run, watch)?)
+        }
+        _ => None,
     };
-    if (hopeless || apart.is_some_and(|apart| apart > room)) && !made.long {
+    // samples that have been sent cannot be compared
+    let apart = compared_run.as_ref().map_or(damped, |compared| compared.error);
+    if found > HOPELESS && !made.long {
         let mut kept = BufferedSamples::default();
         let companion = companion(options, model.unknowns(), run, watch)?;
         let again = compared(options, model, companion, run, &mut |t, values| kept.keep(t, values), watch)?;
-        if again.0.step_error.is_some_and(|error| !hopeless || error <= HOPELESS) {
+        if again.0.step_error.is_some_and(|error| error <= HOPELESS) {
             kept.send(sample);
             return Ok(again);
         }
+    } else if let Some(compared) = compared_run.filter(|c| c.is_made_again && c.error.is_some_and(|error| error > room))
+    {
+        let SampledRun { mut result, more, kept, steps, .. } = made;
+        result.step_error = compared.error;
+        let made = EstimatedRun { result, more, picked: compared.picked };
+        return companion::sharper(options, model, (made, kept, steps), run, sample, watch);
     }
     made.result.step_error = made.result.step_error.map(|error| error.max(apart.unwrap_or(0.0)));
     made.kept.send(sample);
@@ -231,7 +244,7 @@ fn sharper<T>(
         };
         let ratio = ratio.clamp(RATIOS.0, RATIOS.1);
         // the length of a step goes with the fourth root of its tolerance
-        if made.result.counters.steps as f64 * ratio.powf(-0.25) * unknowns > MAX_AGAIN {
+        if made.result.counters.steps as f64 * ratio.powf(-STEPS) * unknowns > MAX_AGAIN {
             break;
         }
         let options = options.with_tolerance(made.steps.within(ratio));
@@ -256,6 +269,24 @@ fn sharper<T>(
         }
     }
     Ok(made)
+}
+
+/// Work of the runs that a run at this tolerance is made of, from the work of a coarse one that chooses its mesh ([`ErrorBudget::mesh_run`]), the error of
+/// its steps and their damping (1). Errors fall at best in proportion to the tolerance, so that it is a lower bound.
+pub(super) fn predicted_work(coarse: f64, [error, damped]: [f64; 2], errors: ErrorBudget) -> f64 {
+    let mut ratio = errors.of_mesh_run();
+    let mut total = 0.0;
+    for run in 1.. {
+        let last = coarse * ratio.powf(-STEPS);
+        total += last;
+        let left = ratio * error;
+        if errors.holds(left) || run == RUNS || last > MAX_AGAIN {
+            let compared = ratio * damped > errors.requested().max(left);
+            return total + if compared { last * COMPANION_STEPS } else { 0.0 };
+        }
+        ratio *= errors.aim(left).clamp(RATIOS.0, RATIOS.1);
+    }
+    total
 }
 
 /// The estimate alone, for one of several runs that are alike, at `points` output times; and the tolerance that their steps have to follow

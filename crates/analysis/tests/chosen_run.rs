@@ -202,10 +202,10 @@ fn failed_steps_of_bodies_give_way_to_joints() {
     }
 }
 
-/// Where the steps of a coarse run of the bodies have an error of the size of the motion, `auto` makes one run, in joint coordinates. It has the bits of
+/// Where coarse runs predict more work of the steps over bodies than in joint coordinates, `auto` makes one run, in joint coordinates. It has the bits of
 /// `rcr`, and less than a third of the steps of the bodies. Under a small force the run is that of the bodies.
 #[test]
-fn unpredictable_steps_of_bodies_give_way_to_joints() {
+fn costly_steps_of_bodies_give_way_to_joints() {
     let run = |formulation, force: f64| {
         let set = vec![("F".to_owned(), Setting::Number(force))];
         let model = CompileOptions { formulation, set, ..CompileOptions::default() };
@@ -213,7 +213,7 @@ fn unpredictable_steps_of_bodies_give_way_to_joints() {
         (found.unwrap_or_else(|e| panic!("{e}")), samples, runs)
     };
     for (force, other, taken) in [
-        (7.4e-7, Formulation::Rcr, "rcr: in a coarse run of the bodies the error of the steps"),
+        (7.4e-7, Formulation::Rcr, "rcr: coarse runs predict less work of the steps"),
         (1e-8, Formulation::Compliant, "compliant: joints are elastic in every direction"),
     ] {
         let (mut chosen, samples, runs) = run(Formulation::Auto, force);

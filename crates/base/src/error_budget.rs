@@ -27,6 +27,10 @@ impl ErrorBudget {
     const STRAINS: f64 = 0.25;
     /// Fraction of the tolerance for the mesh of a large motion: its estimate is a difference of two runs.
     const LARGE_MOTION: f64 = 0.6;
+    /// Error of the steps of a run, of the error of its mesh by a difference of two, from which on steps may be the reason for it.
+    const OF_DIFFERENCE: f64 = 0.25;
+    /// Exponent with which a tolerance falls for a smaller error of the steps.
+    const PER_ERROR: f64 = 1.0 / 0.6;
     /// Fraction of the tolerance that one step may use: errors of many steps add up.
     const STEP: f64 = 1e-2;
     /// The same for a step that many points share: points with steps of their own would be far nearer.
@@ -234,6 +238,31 @@ impl ErrorBudget {
     /// For the steps of a run that chooses the mesh of a large motion.
     pub fn mesh_run(self) -> f64 {
         (Self::COMPANION * self.requested).min(Self::LOOSEST[1]).max(self.requested)
+    }
+
+    /// The tolerance, of that of such a run.
+    pub fn of_mesh_run(self) -> f64 {
+        self.requested / self.mesh_run()
+    }
+
+    /// The division of the tolerance of the steps of such a run.
+    #[must_use]
+    pub fn mesh_runs(self) -> Self {
+        Self::of(self.mesh_run())
+    }
+
+    /// The division for such runs again, whose steps had the division `before` and an error `own`: where their difference makes an error `found` of
+    /// the mesh that is too large, and steps may be the reason. Not beyond the requested tolerance.
+    #[must_use]
+    pub fn sharper_mesh_runs(self, before: Self, own: f64, found: f64) -> Option<Self> {
+        let goal = self.large_motion();
+        let matters = found > goal && own > Self::OF_DIFFERENCE * found && before.requested > self.requested;
+        let aim = Self::of(Self::OF_DIFFERENCE * goal).aim(own);
+        matters.then(|| before.scaled(aim.min(1.0).powf(Self::PER_ERROR)).max(self))
+    }
+
+    fn max(self, least: Self) -> Self {
+        Self::of(self.requested.max(least.requested))
     }
 
     /// For one step of an integrator.

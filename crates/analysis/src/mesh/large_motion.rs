@@ -11,8 +11,9 @@
 //!
 //! A run to a state in which parts touch is compared up to its first contact: impacts on two meshes have nothing else in common than their means.
 //!
-//! Where another formulation may be taken, the first coarse run propagates the error of its steps, by which a judge ends the search
-//! ([`SearchLimits`]).
+//! The first coarse run propagates the error of its steps. Steps that differ on both meshes are no error of a mesh. So where the difference is beyond the
+//! goal and this error may explain it, both runs are made again with sharper steps before segments are doubled. Where another formulation may be
+//! taken, a judge of the first coarse run ends the search ([`SearchLimits`]).
 //!
 //! If stiffness stays constant, but the motion outside the modes of the mesh exceeds the tolerance, only a bound could
 //! be reported. Such a run is made twice, too, and the difference of the two is reported instead.
@@ -25,6 +26,7 @@ use super::super::transient::{TransientOptions, TransientResult, Until, transien
 use super::excited_modes;
 use super::remeshed::{chosen, meshed};
 use crate::readout::expression::Expression;
+use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::doubling;
 use bimorph_model::refine::mesh_search::Mesh;
@@ -52,16 +54,16 @@ const ORDERS: (f64, f64) = (1.0, 2.0);
 
 /// Limits of a search.
 pub(super) struct SearchLimits<'j> {
-    /// Meshes that are tried, at most.
-    pub(super) passes: usize,
-    /// Whether to go on after the first coarse run, whose steps have this error of the amplitude; none: it is not estimated.
-    pub(super) judge: Option<&'j mut dyn FnMut(f64) -> bool>,
+    /// Work of the first coarse run, and of all runs (unknowns times steps), at most; a search that takes more ends without a mesh.
+    pub(super) work: [f64; 2],
+    /// Whether to go on after the first coarse run, where the error of its steps has an estimate.
+    pub(super) judge: Option<&'j mut dyn FnMut(&CoarseRun) -> bool>,
 }
 
 impl SearchLimits<'_> {
     /// Of the only search.
     pub(super) fn none() -> Self {
-        Self { passes: MAX_PASSES, judge: None }
+        Self { work: [f64::INFINITY; 2], judge: None }
     }
 }
 
@@ -99,22 +101,29 @@ pub(super) fn order(
         let estimated_error = order.estimated_error.zip(error).map(|(own, error)| own.max(error));
         Some(Mesh { segments: segments.to_vec(), estimated_error, ..order.clone() })
     };
-    let SearchLimits { passes, judge } = limits;
+    let SearchLimits { work: [first_work, mut work], judge } = limits;
+    let steps = moving.options.errors().mesh_runs();
     let first = pair(moving, &order.segments)
-        .and_then(|(from, to)| Some((run_on(moving, options, &from, judge.is_some())?, from, to)));
+        .and_then(|(from, to)| Some((run_on(moving, options, &from, (steps, true), first_work)?, from, to)));
     // a failure is reported when the run is made; a result without a comparison has no estimate
-    let Some(((mut coarse, steps), mut from, mut segments)) = first else { return Ok(on(&order.segments, None)) };
-    if let Some((error, goes_on)) = steps.zip(judge)
-        && !goes_on(error)
-    {
+    let Some((run, mut from, mut segments)) = first else { return Ok(on(&order.segments, None)) };
+    if run.is_beyond || run.steps.zip(judge).is_some_and(|(steps, goes_on)| !goes_on(&steps)) {
         return Ok(None);
     }
+    let error = run.steps.map(|steps| steps.error);
+    let mut coarse = CoarseSamples { samples: run.samples, steps, error };
+    work -= run.work;
     let (mut before, mut convergence) = (None, ORDERS.0);
     let mut last = on(&order.segments, None);
-    for _ in 0..passes {
-        let both = sample_run(moving, options, &segments)
-            .and_then(|fine| Some((apart(moving, options, &coarse, &fine)?, fine)));
-        let Some((difference, fine)) = both else { return Ok(last) };
+    for _ in 0..MAX_PASSES {
+        let steps = coarse.steps;
+        let compared = coarse.compared(moving, options, [&from, &segments], convergence, &mut work);
+        let (difference, fine, of_fine) = match compared {
+            Comparison::Made(difference, run) => (difference, run.samples, run.work),
+            Comparison::Failed => return Ok(last),
+            Comparison::BeyondLimit => return Ok(None),
+        };
+        before = before.filter(|_| coarse.steps == steps);
         if let Some(before) = before {
             convergence = f64::log2(before / difference).clamp(ORDERS.0, ORDERS.1);
         }
@@ -129,15 +138,19 @@ pub(super) fn order(
         let next = twice(moving, &segments).filter(|next| next.iter().sum::<usize>() <= MAX_SEGMENTS);
         if error <= goal || next.is_none() {
             let least = between(&order.segments, &segments, (error / (AIM * goal)).powf(1.0 / convergence));
-            let of_least = (least != segments).then(|| sample_run(moving, options, &least)).flatten();
+            let of_least = (least != segments).then(|| sample_run(moving, options, &least, coarse.steps)).flatten();
             let of_least = of_least.and_then(|run| apart(moving, options, &run, &fine)).map(|apart| apart + error);
             return Ok(match of_least.filter(|error| *error <= goal) {
                 Some(error) => on(&least, Some(error)),
                 None => on(&segments, Some(error)),
             });
         }
+        // the next mesh has twice the unknowns
+        if 2.0 * of_fine > work {
+            return Ok(None);
+        }
         last = on(&segments, Some(error));
-        (before, coarse, from) = (Some(difference), fine, segments);
+        (before, coarse.samples, from) = (Some(difference), fine, segments);
         segments = next.unwrap_or_default();
     }
     Ok(last)
@@ -164,7 +177,8 @@ fn pair(moving: &CompiledModel, segments: &[usize]) -> Option<(Vec<usize>, Vec<u
 /// Estimated error of the run on this mesh, relative to the amplitude; `None` where the runs fail.
 fn compared(moving: &CompiledModel, options: &TransientOptions<'_>, segments: &[usize]) -> Option<f64> {
     let (from, to) = pair(moving, segments)?;
-    let difference = apart(moving, options, &sample_run(moving, options, &from)?, &sample_run(moving, options, &to)?)?;
+    let run = |segments: &[usize]| sample_run(moving, options, segments, moving.options.errors().mesh_runs());
+    let difference = apart(moving, options, &run(&from)?, &run(&to)?)?;
     let of_finer = difference / (ORDERS.0.exp2() - 1.0);
     Some(if from == segments { difference + of_finer } else { of_finer })
 }
@@ -197,21 +211,103 @@ fn bends(moving: &CompiledModel, options: &TransientOptions<'_>, order: &Mesh) -
     Ok(excited_modes::reach(&model, &off) > STRAIGHT * excited_modes::reach(&model, &way))
 }
 
-/// The samples of a run on a mesh, as far as it came; none where it failed.
-fn sample_run(moving: &CompiledModel, options: &TransientOptions<'_>, segments: &[usize]) -> Option<Vec<Vec<f64>>> {
-    run_on(moving, options, segments, false).map(|(samples, _)| samples)
+/// Steps of a coarse run that came to its end.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CoarseRun {
+    /// Unknowns times steps, rejected ones included.
+    pub(super) work: f64,
+    /// Of all beams.
+    pub(super) segments: usize,
+    /// Error of the steps, of the amplitude (1).
+    pub(super) error: f64,
+    /// Largest change of the amplitude by the energy that the steps took (1).
+    pub(super) damped: f64,
 }
 
-/// The same, with the error of its steps of the amplitude where `judged`.
+/// A run on a mesh, as far as it came.
+struct MeshRun {
+    samples: Vec<Vec<f64>>,
+    /// Of a run that was to be judged and came to its end.
+    steps: Option<CoarseRun>,
+    /// Unknowns times steps.
+    work: f64,
+    /// It was ended by the limit of the search.
+    is_beyond: bool,
+}
+
+/// A run on the coarser of two meshes.
+struct CoarseSamples {
+    samples: Vec<Vec<f64>>,
+    /// The tolerance of its steps.
+    steps: ErrorBudget,
+    /// Their error, of the amplitude (1).
+    error: Option<f64>,
+}
+
+/// A comparison of two meshes.
+enum Comparison {
+    /// The difference, of the amplitude, and the run on the finer mesh.
+    Made(f64, MeshRun),
+    Failed,
+    BeyondLimit,
+}
+
+impl CoarseSamples {
+    /// Compares a mesh with the finer one, in at most so much `work`. Steps that differ on both meshes are no error of a mesh: where they may be the
+    /// difference, both runs are made again with sharper steps.
+    fn compared(
+        &mut self,
+        moving: &CompiledModel,
+        options: &TransientOptions<'_>,
+        [coarse, fine]: [&[usize]; 2],
+        convergence: f64,
+        work: &mut f64,
+    ) -> Comparison {
+        loop {
+            let Some(run) = run_on(moving, options, fine, (self.steps, false), *work) else {
+                return Comparison::Failed;
+            };
+            *work -= run.work;
+            if run.is_beyond {
+                return Comparison::BeyondLimit;
+            }
+            let Some(difference) = apart(moving, options, &self.samples, &run.samples) else {
+                return Comparison::Failed;
+            };
+            let error = difference / (convergence.exp2() - 1.0);
+            let sharper = self.error.and_then(|own| moving.options.errors().sharper_mesh_runs(self.steps, own, error));
+            let again = sharper.and_then(|steps| Some((run_on(moving, options, coarse, (steps, true), *work)?, steps)));
+            let Some((again, steps)) = again else { return Comparison::Made(difference, run) };
+            *work -= again.work;
+            if again.is_beyond {
+                return Comparison::BeyondLimit;
+            }
+            *self = Self { samples: again.samples, steps, error: again.steps.map(|steps| steps.error) };
+        }
+    }
+}
+
+/// The samples of a run on a mesh, as far as it came; none where it failed.
+fn sample_run(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+    segments: &[usize],
+    steps: ErrorBudget,
+) -> Option<Vec<Vec<f64>>> {
+    run_on(moving, options, segments, (steps, false), f64::INFINITY).map(|run| run.samples)
+}
+
+/// The same with steps of this tolerance, with the error of its steps where `judged`, in at most so much work.
 fn run_on(
     moving: &CompiledModel,
     options: &TransientOptions<'_>,
     segments: &[usize],
-    judged: bool,
-) -> Option<(Vec<Vec<f64>>, Option<f64>)> {
+    (tolerance, judged): (ErrorBudget, bool),
+    most: f64,
+) -> Option<MeshRun> {
     let model = meshed(moving, segments).ok()?;
     let start = options.release.map(|start| meshed(start, segments)).transpose().ok()?;
-    let loose = options.for_mesh(moving.options.errors().mesh_run(), points(options), start.as_deref());
+    let loose = options.for_mesh(tolerance.requested(), points(options), start.as_deref());
     let mut columns = vec![Vec::new(); options.signals.len()];
     let mut keep = |_: f64, values: &[f64]| {
         bimorph_base::budget::lay_out(size_of_val(values));
@@ -220,15 +316,23 @@ fn run_on(
     let (mut steps, unknowns) = (0.0, model.unknowns() as f64);
     let mut few = |_: f64| {
         steps += 1.0;
-        steps * unknowns <= MAX_WORK
+        steps * unknowns <= MAX_WORK.min(most)
     };
     let loose = if judged { loose.with_estimate() } else { loose };
-    let error = match transient(&model, &loose, &mut keep, &mut few) {
-        Ok(run) => run.step_error,
+    let coarse = match transient(&model, &loose, &mut keep, &mut few) {
+        Ok(run) => run.step_error.map(|error| CoarseRun {
+            work: (run.counters.steps + run.counters.rejected) as f64 * unknowns,
+            segments: segments.iter().sum(),
+            error,
+            damped: run.damped.unwrap_or(0.0),
+        }),
         Err(AnalysisError::Cancelled) => None,
         Err(_) => return None,
     };
-    columns.first().is_some_and(|column| column.len() >= MIN_SAMPLES).then_some((columns, error))
+    let work = steps * unknowns;
+    let run = MeshRun { samples: columns, steps: coarse.filter(|_| judged), work, is_beyond: work > most };
+    let reached = run.samples.first().is_some_and(|column| column.len() >= MIN_SAMPLES);
+    (reached || run.is_beyond).then_some(run)
 }
 
 fn points(options: &TransientOptions<'_>) -> usize {

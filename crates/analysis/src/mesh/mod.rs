@@ -40,9 +40,9 @@ mod warnings;
 use super::linear_stress::left_out;
 use super::statics::{OperatingPoint, operating_point};
 use super::transient::TransientOptions;
-use super::{AnalysisError, PortVoltages, formulation};
+use super::{AnalysisError, PortVoltages, formulation, step_error};
 use crate::readout::expression::Expression;
-use bimorph_base::Diagnostic;
+use bimorph_base::{Diagnostic, ErrorBudget};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::mesh_search::Mesh;
 use bimorph_multibody::planar::Pose;
@@ -60,18 +60,19 @@ use warnings::{of_fingers, of_heat, of_strength, of_stress};
 
 pub use equilibrium::{operating_point_warnings, transient_warnings};
 pub use in_circuit::{in_circuit, twice};
-use large_motion::SearchLimits;
+use large_motion::{CoarseRun, SearchLimits};
 pub use permanent_strain::static_backbent;
 pub use warnings::WARNING;
 pub use warnings::{beyond, warnings};
 
-/// Error of the steps of a coarse run of the bodies from which on joint coordinates are tried (1), at ten times the tolerance of the steps. Of 55 runs
-/// of random mechanisms those above took 0.06 to 17 times the time of joint coordinates, and those below 0.01 to 3 times.
-const UNPREDICTABLE: f64 = 0.4;
-/// Ratio of the error in joint coordinates to that of the bodies, at most, for which they are taken (1).
-const LESS: f64 = 0.1;
-/// Meshes that are tried in joint coordinates then: a mesh of more than twice their first segments would cost more than the steps of the bodies.
-const FEW_PASSES: usize = 2;
+/// Work of a step in joint coordinates over that of a step of as many unknowns of the bodies (1): it was measured as 1.0 to 1.35.
+const JOINTS: f64 = 1.2;
+/// Work of the rest of a search for a mesh after its first coarse run, of the work of that: the finer run has twice the unknowns, and more steps.
+const REST_OF_SEARCH: f64 = 3.0;
+/// Fraction of the work that bodies still need which a first run in joint coordinates of as much work as theirs may take at most.
+const TRIAL: f64 = 0.1;
+/// Fractions of that work that the first run in joint coordinates and all runs of the search for its mesh may take at most.
+const OF_REST: [f64; 2] = [0.15, 0.75];
 
 /// Request for a mesh.
 #[derive(Debug, Clone, Copy)]
@@ -172,22 +173,39 @@ fn in_suited_formulation<T>(
             detail: "the search for the mesh of a run ended without a mesh".into(),
         })
     };
+    let errors = moving.options.errors();
     if let Some((joints, start)) = formulation::in_joints(moving, options) {
-        return match search(&joints, &options.with_release(start.as_ref()), SearchLimits::none()) {
-            Ok(Some(found)) if formulation::suits_joints(&order(&found).segments) => Ok(found),
-            Err(AnalysisError::Cancelled) => Err(AnalysisError::Cancelled),
-            // joint coordinates were not requested, and refuse nothing
-            _ => of_bodies(SearchLimits::none()),
+        let mut own = None;
+        let mut note = |coarse: &CoarseRun| {
+            own = Some(*coarse);
+            true
         };
+        let limits = SearchLimits { judge: Some(&mut note), ..SearchLimits::none() };
+        let mut found = match search(&joints, &options.with_release(start.as_ref()), limits) {
+            Ok(Some(found)) if formulation::suits_joints(&order(&found).segments) => return Ok(found),
+            Err(AnalysisError::Cancelled) => return Err(AnalysisError::Cancelled),
+            // joint coordinates were not requested, and refuse nothing
+            found => found.ok().flatten().filter(|found| holds(order(found), errors)),
+        };
+        let work = own.zip(found.as_ref()).map(|(own, found)| work_on(&own, order(found), errors));
+        let Some(work) = work else { return of_bodies(SearchLimits::none()) };
+        let mut is_cheaper = false;
+        let mut judge = |coarse: &CoarseRun| {
+            is_cheaper = JOINTS * work < rest_of(coarse, errors);
+            !is_cheaper
+        };
+        let bodies = of_bodies(SearchLimits { judge: Some(&mut judge), ..SearchLimits::none() });
+        return found.take().filter(|_| is_cheaper).map_or(bodies, Ok);
     }
     let early = formulation::takes_joints(moving, options);
     if early || !formulation::may_take_joints(moving, options) || moving.parts.system.can_touch() {
         return of_bodies(SearchLimits::none());
     }
     let mut in_joints = None;
-    let mut judge = |error: f64| {
-        if error > UNPREDICTABLE {
-            in_joints = predictable_in_joints(moving, options, error, search, order);
+    let mut judge = |coarse: &CoarseRun| {
+        let rest = rest_of(coarse, errors);
+        if coarse.work <= TRIAL * rest {
+            in_joints = cheaper_in_joints(moving, options, rest, search, order);
         }
         in_joints.is_none()
     };
@@ -195,20 +213,37 @@ fn in_suited_formulation<T>(
     in_joints.map_or(found, Ok)
 }
 
-/// The mesh in joint coordinates, where that is little finer than their first one and the steps have a far smaller error in a coarse run than `error`,
-/// that of the bodies.
-fn predictable_in_joints<T>(
+/// The work of the steps of a run on this mesh, after its first coarse run.
+fn work_on(coarse: &CoarseRun, mesh: &Mesh, errors: ErrorBudget) -> f64 {
+    let finer = mesh.segments.iter().sum::<usize>() as f64 / coarse.segments.max(1) as f64;
+    step_error::predicted_work(finer * coarse.work, [coarse.error, coarse.damped], errors)
+}
+
+/// Whether a mesh has an estimate within the tolerance.
+fn holds(mesh: &Mesh, errors: ErrorBudget) -> bool {
+    mesh.estimated_error.is_some_and(|error| errors.holds(error))
+}
+
+/// The work that a run still needs after its first coarse run: the rest of the search for its mesh, and the steps.
+fn rest_of(coarse: &CoarseRun, errors: ErrorBudget) -> f64 {
+    REST_OF_SEARCH * coarse.work + step_error::predicted_work(coarse.work, [coarse.error, coarse.damped], errors)
+}
+
+/// The mesh in joint coordinates, where it holds the tolerance and both its search and the steps of the run need less work than the `rest` of that of the
+/// bodies.
+fn cheaper_in_joints<T>(
     moving: &CompiledModel,
     options: &TransientOptions<'_>,
-    error: f64,
+    rest: f64,
     search: LimitedSearch<'_, T>,
     order: &dyn Fn(&T) -> &Mesh,
 ) -> Option<T> {
     let (joints, start) = formulation::in_possible_joints(moving, options)?;
-    let mut judge = |own: f64| own < LESS * error;
-    let limits = SearchLimits { passes: FEW_PASSES, judge: Some(&mut judge) };
+    let errors = moving.options.errors();
+    let mut judge = |own: &CoarseRun| JOINTS * rest_of(own, errors) < rest;
+    let limits = SearchLimits { work: OF_REST.map(|part| part * rest / JOINTS), judge: Some(&mut judge) };
     let found = search(&joints, &options.with_release(start.as_ref()), limits).ok()??;
-    order(&found).estimated_error.is_some_and(|error| moving.options.errors().holds(error)).then_some(found)
+    holds(order(&found), errors).then_some(found)
 }
 
 /// The same in the formulation that the model was compiled for; none where the limits of the search end it.

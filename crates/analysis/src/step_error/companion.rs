@@ -22,6 +22,7 @@ use super::run::{AT_THE_END, MAX_AGAIN, MAX_WORK, RunFunction, beyond, unknown};
 use super::samples::{BufferedSamples, SelectedSamples, resolved, stride};
 use crate::formulation;
 use crate::reduced::Directions;
+use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
 
 /// Fraction of the difference that is reported.
@@ -44,48 +45,67 @@ pub(super) fn compared<T>(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: ProgressCallback<'_>,
 ) -> Result<(TransientResult, T, f64), AnalysisError> {
-    let unknowns = model.unknowns() as f64;
     let first = (companion, whole);
     if !is_made_again(options, model, &first) {
         let mut made = once(options, model, first, run, sample, watch)?;
         made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
         return Ok((made.result, made.more, options.errors().requested()));
     }
-    let mut now = options.clone();
     let mut kept = BufferedSamples::default();
-    let mut made = once(&now, model, first, run, &mut |t, values| kept.keep(t, values), watch)?;
+    let made = once(options, model, first, run, &mut |t, values| kept.keep(t, values), watch)?;
+    sharper(options, model, (made, kept, options.errors()), run, sample, watch)
+}
+
+/// Makes a compared run again at a tenth of its tolerance, with itself as the companion, until its error is within what the mesh leaves of the tolerance of
+/// `options`; returns the tolerance of its steps, too.
+///
+/// # Errors
+/// [`AnalysisError::Cancelled`].
+pub(super) fn sharper<T>(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    (mut made, mut kept, mut now): (EstimatedRun<T>, BufferedSamples, ErrorBudget),
+    run: RunFunction<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: ProgressCallback<'_>,
+) -> Result<(TransientResult, T, f64), AnalysisError> {
+    let unknowns = model.unknowns() as f64;
     let room = options.errors().left_for_steps(made.result.estimated_error);
     while made.result.step_error.is_some_and(|error| error > room)
         && MORE * made.result.counters.steps as f64 * unknowns <= MAX_AGAIN
-        && now.errors().requested() > options.errors().sharpest_run()
+        && now.requested() > options.errors().sharpest_run()
         && !made.result.directions.as_ref().is_some_and(Directions::are_all)
     {
-        let sharper = options.with_tolerance(now.errors().sharper_run());
+        let sharper = options.with_tolerance(now.sharper_run());
         let mut others = BufferedSamples::default();
         let companion = (Some(made.picked.clone()), true);
         match once(&sharper, model, companion, run, &mut |t, values| others.keep(t, values), watch) {
-            Ok(found) if found.result.step_error.is_some() => (made, kept, now) = (found, others, sharper),
+            Ok(found) if found.result.step_error.is_some() => (made, kept, now) = (found, others, sharper.errors()),
             Err(AnalysisError::Cancelled) => return Err(AnalysisError::Cancelled),
             _ => break,
         }
     }
     kept.send(sample);
     made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
-    Ok((made.result, made.more, now.errors().requested()))
+    Ok((made.result, made.more, now.requested()))
 }
 
-/// The error of a run by its companion (1); none where they cannot be compared.
+/// The companion of a run that has been made.
 ///
 /// # Errors
-/// Those of the run, and [`AnalysisError::Cancelled`].
-pub(super) fn from_companion<T>(
+/// [`AnalysisError::Cancelled`].
+pub(super) fn with_companion<T>(
     options: &TransientOptions<'_>,
     model: &CompiledModel,
+    (result, picked): (&TransientResult, SelectedSamples),
     run: RunFunction<'_, T>,
     watch: ProgressCallback<'_>,
-) -> Result<Option<f64>, AnalysisError> {
-    let companion = companion(options, model.unknowns(), run, watch)?;
-    Ok(once(options, model, companion, run, &mut |_, _| (), watch)?.result.step_error)
+) -> Result<ComparedRun, AnalysisError> {
+    let first = companion(options, model.unknowns(), run, watch)?;
+    let resolved = options.step.is_some() || resolved(&picked, result, options, model);
+    let picked = picked_of(picked, result);
+    let error = difference(options, model, (result, &picked), &first, resolved);
+    Ok(ComparedRun { error, picked, is_made_again: is_made_again(options, model, &first) })
 }
 
 /// Whether a run with this companion is made again where its error is too large: the samples of a long run are sent as they come.
@@ -103,10 +123,20 @@ pub(super) fn is_made_again(
 }
 
 /// A run with its estimate, and what a sharper one is compared with.
-struct EstimatedRun<T> {
-    result: TransientResult,
-    more: T,
-    picked: TransientResult,
+pub(super) struct EstimatedRun<T> {
+    pub(super) result: TransientResult,
+    pub(super) more: T,
+    pub(super) picked: TransientResult,
+}
+
+/// A comparison of a run that has been made.
+pub(super) struct ComparedRun {
+    /// The error by the companion (1); none where they cannot be compared.
+    pub(super) error: Option<f64>,
+    /// The samples of the run that are compared.
+    pub(super) picked: TransientResult,
+    /// Whether the run is short enough to be made again.
+    pub(super) is_made_again: bool,
 }
 
 /// One run, compared with its companion, which may have come to its end.
@@ -118,7 +148,6 @@ fn once<T>(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: ProgressCallback<'_>,
 ) -> Result<EstimatedRun<T>, AnalysisError> {
-    let reached = companion.as_ref().map_or(0, sampled);
     let mut picked = SelectedSamples::new(options);
     let directions = companion.as_ref().and_then(|c| c.directions.clone());
     let options = &options.with_directions(directions.or(options.directions.clone()));
@@ -129,36 +158,15 @@ fn once<T>(
     let (mut result, more) = run(options, &mut both, watch)?;
     // what both do not resolve they have in common
     let resolved = options.step.is_some() || resolved(&picked, &result, options, model);
-    let signals = picked.signals(&result.signals);
-    let picked = TransientResult {
-        signals,
-        counters: result.counters,
-        directions: result.directions.clone(),
-        ..TransientResult::default()
-    };
-    // one that took the same steps proves nothing
-    let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
+    let picked = picked_of(picked, &result);
     let least = |unit: &str| least(unit, options, model);
     let contact = first_contact(&result);
-    match companion.as_ref().filter(|c| (whole || reached >= MIN_SAMPLES) && other(c) && resolved) {
-        Some(companion) => {
-            // single values after a contact are judged on their own
-            let last = contact.map_or(usize::MAX, |t| (t / spacing(options)) as usize + 1);
-            let count = reached.min(sampled(&picked)).min(last);
-            let apart = largest_error(&cut(&picked, count), &cut(companion, count), &least);
-            let share = match options.until.is_some() || contact.is_some() {
-                true => 1.0,
-                false => ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64,
-            };
-            let (_, method) = formulation::of_run(model, options);
-            let reported = match &result.directions {
-                Some(_) => SHARE_OF_REDUCED,
-                None => reported_fraction(options, method),
-            };
-            result.step_error = Some(reported * apart / share.min(1.0));
-        }
+    let companion = (companion, whole);
+    match difference(options, model, (&result, &picked), &companion, resolved) {
+        Some(error) => result.step_error = Some(error),
         None => result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options))),
     }
+    let (companion, _) = companion;
     if contact.is_some() {
         let columns = |run: &TransientResult| run.signals.iter().map(|(_, _, c)| c.clone()).collect::<Vec<_>>();
         let (run, companion) = (columns(&picked), companion.as_ref().map(columns));
@@ -166,6 +174,45 @@ fn once<T>(
         judge(&pair, options, &least, &mut result);
     }
     Ok(EstimatedRun { result, more, picked })
+}
+
+/// The samples of a run that are compared, as a result.
+fn picked_of(picked: SelectedSamples, result: &TransientResult) -> TransientResult {
+    TransientResult {
+        signals: picked.signals(&result.signals),
+        counters: result.counters,
+        directions: result.directions.clone(),
+        ..TransientResult::default()
+    }
+}
+
+/// The error of a run by the difference to its companion, which may have come to its end (1); none where they cannot be compared.
+fn difference(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    (result, picked): (&TransientResult, &TransientResult),
+    (companion, whole): &(Option<TransientResult>, bool),
+    resolved: bool,
+) -> Option<f64> {
+    let reached = companion.as_ref().map_or(0, sampled);
+    // one that took the same steps proves nothing
+    let other = |c: &&TransientResult| c.counters.steps != result.counters.steps;
+    let companion = companion.as_ref().filter(|_| (*whole || reached >= MIN_SAMPLES) && resolved).filter(other)?;
+    let contact = first_contact(result);
+    // single values after a contact are judged on their own
+    let last = contact.map_or(usize::MAX, |t| (t / spacing(options)) as usize + 1);
+    let count = reached.min(sampled(picked)).min(last);
+    let apart = largest_error(&cut(picked, count), &cut(companion, count), &|unit| least(unit, options, model));
+    let share = match options.until.is_some() || contact.is_some() {
+        true => 1.0,
+        false => ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64,
+    };
+    let (_, method) = formulation::of_run(model, options);
+    let reported = match &result.directions {
+        Some(_) => SHARE_OF_REDUCED,
+        None => reported_fraction(options, method),
+    };
+    Some(reported * apart / share.min(1.0))
 }
 
 /// Fraction of the difference that is reported. Of a companion that is hardly looser it is more than all, since the error is at best
