@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// Points of this length that a step of the motion must hold (1).
 const LEAST_POINTS: f64 = 6.0;
 /// Points after a macro step of fewer points than [`LEAST_POINTS`] before another one is made.
-const PAUSE: u32 = 8;
+const PAUSE: u32 = 64;
 /// Groups of gaps with one voltage that are followed at most.
 const MAX_PAIRS: usize = 6;
 /// Relative difference of two voltages that are one (1).
@@ -333,7 +333,7 @@ impl Multirate {
                 if is_short(place) {
                     return None;
                 }
-                let (motion, first) = self.arrive(about, (place, parent), errors)?;
+                let (motion, _) = self.arrive(about, (place, parent), errors)?;
                 let mut offset = Motion { q: parent.q.clone(), v: parent.v.clone() };
                 offset.add(-1.0, &motion);
                 let expected = (0..self.pairs.len())
@@ -350,8 +350,8 @@ impl Multirate {
                     expected,
                     fastest: parent.fastest,
                     reach: parent.reach,
-                    informed: 1 + parent.macro_step.as_ref().map_or(0, |place| place.step.informed.min(1)),
-                    first,
+                    informed: 1 + place.step.informed.min(1),
+                    first: parent.next_step,
                 }
             }
         };
