@@ -38,7 +38,7 @@ impl ErrorBudget {
     /// Fraction of the tolerance by which points within a step may be off its motion: this does not add up.
     const WITHIN_STEP: f64 = 3e-2;
     /// The same of rates.
-    const RATES_WITHIN_STEP: f64 = 0.3;
+    const RATES_WITHIN_STEP: f64 = 0.05;
     /// Least fraction of the tolerance that is left to the steps beside the mesh.
     const LEAST_FOR_STEPS: f64 = 0.3;
     /// Ratio of the tolerance of a companion run to that of the run.
