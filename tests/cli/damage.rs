@@ -33,13 +33,13 @@ fn flip(bytes: &mut [u8], bit: usize) {
     bytes[bit / 8] ^= 1 << (bit % 8);
 }
 
-/// Flips a random bit of a file, if it has any.
+/// Flips a random bit behind the first line of a file, which names its sweep: with another name its lines are those of another sweep.
 fn flip_one(path: &Path, numbers: &mut Numbers) -> bool {
     let Ok(mut bytes) = fs::read(path) else { return false };
-    if bytes.is_empty() {
+    let Some(named) = bytes.iter().position(|byte| *byte == b'\n').filter(|named| named + 1 < bytes.len()) else {
         return false;
-    }
-    let bit = numbers.below(8 * bytes.len() as u64);
+    };
+    let bit = 8 * (named as u64 + 1) + numbers.below(8 * (bytes.len() - named - 1) as u64);
     flip(&mut bytes, usize::try_from(bit).expect("a place"));
     fs::write(path, bytes).is_ok()
 }
