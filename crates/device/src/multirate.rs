@@ -19,8 +19,8 @@ use std::sync::Arc;
 const LEAST_POINTS: f64 = 6.0;
 /// Points after a macro step of fewer points than [`LEAST_POINTS`] before another one is made.
 const PAUSE: u32 = 64;
-/// Groups of gaps with one voltage that are followed at most.
-const MAX_PAIRS: usize = 6;
+/// Groups of gaps with one voltage at most: a motion that is left out shows in the current of another pair, which is differentiated over short points.
+const MAX_PAIRS: usize = 1;
 /// Relative difference of two voltages that are one (1).
 const SAME: f64 = 1e-12;
 /// Motion since the equilibrium that a macro step follows, of the whole displacement (1).
@@ -79,7 +79,7 @@ impl Multirate {
         let n = system.bodies();
         let mut found = Self {
             patterns: vec![zeros(n); pairs.len()],
-            sees_rates: sees_rates || pairs.len() > 1,
+            sees_rates,
             pairs,
             stepper: Adaptive::new(n, Rodas4::new(system, &[])),
             drive: electrics.drive(),

@@ -6,12 +6,12 @@
 //! ```
 //! at most: what holds the bodies makes it smaller. [`DeviceSession::of_macro_step`] gives a motion where
 //!
-//! * nothing but voltages changes: no heaters, no agitation, no input of another kind that is not as it was, every body has its own coordinates and a mass
+//! * one voltage moves all gaps, and a current of theirs by its own change is larger than that by the motion that is left out;
+//! * nothing but that voltage changes: no heaters, no agitation, no input of another kind that is not as it was, every body has its own coordinates and a mass
 //!   where a gap pulls;
 //! * the step of the motion is as long as six points;
 //! * e is within the part of the tolerance that points within a step may leave out;
-//! * so is ė, of the largest rate so far, where something shows rates or the current of another electrode pair. A voltage that moves a pair makes a larger
-//!   current in that pair than the motion that is left out.
+//! * so is ė, of the largest rate so far, where something shows rates.
 //!
 //! Where e has grown to half of that, or the step ends, the next one begins at the parent, where the motion has come under the moments of V². The response
 //! of the motion within one point is left out of the partials; it is part of e.
