@@ -105,7 +105,7 @@ impl DeviceSession {
         }
         on_cubic([&place.step.motion, &flight.end], length, since / length, &mut self.motion);
         add_fading(&place.step.offset, length, since / length, &mut self.motion);
-        let place = InMacroStep { since, moments, points: place.points + 1, step: place.step };
+        let place = InMacroStep { since, moments, points: place.points.saturating_add(1), step: place.step };
         Some(MacroTrial { next, place })
     }
 }
