@@ -59,7 +59,7 @@ pub struct TrialReply {
     /// ∂current/∂voltage (S) (p×p); for ports that are not electrical ∂answered/∂given, with the mechanical response over
     /// this dt.
     pub di_dv: Vec<f64>,
-    /// ∂charge/∂voltage (F) (p×p), with the mechanical response over this dt.
+    /// ∂charge/∂voltage (F) (p×p), with the mechanical response over this dt; within a macro step ([`crate::macro_step`]) without it.
     pub dq_dv: Vec<f64>,
     /// Value of each opened signal in its own unit (s).
     pub outputs: Vec<f64>,

@@ -1,10 +1,9 @@
-//! The macro steps of a session ([`crate::macro_step`]): how they are made, and how the motion comes to the start of the next one.
+//! Multirate integration of a session: prediction of macro steps, and correction of the motion at their ends ([`crate::macro_step`]).
 
 use crate::Token;
-use crate::macro_step::{Expected, InMacroStep, MacroStep, line, moments, zeros};
+use crate::macro_step::{MacroStep, MacroStepPosition, PeakMotion, SquareExtrapolation, extended, fitted_line};
 use crate::states::Snapshot;
 use bimorph_base::ErrorBudget;
-use bimorph_domains::drive::Electrics;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::equations::Bodies;
@@ -15,148 +14,143 @@ use bimorph_solve::time::rodas4::Rodas4;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Points of this length that a step of the motion must hold (1).
-const LEAST_POINTS: f64 = 6.0;
-/// Points after a macro step of fewer points than [`LEAST_POINTS`] before another one is made.
+/// Points of the requested length that a macro step must hold (1).
+const MIN_POINTS: f64 = 6.0;
+/// Points without macro steps after one that ended within [`MIN_POINTS`].
 const PAUSE: u32 = 64;
-/// Groups of gaps with one voltage at most: a motion that is left out shows in the current of another pair, which is differentiated over short points.
-const MAX_PAIRS: usize = 1;
-/// Relative difference of two voltages that are one (1).
-const SAME: f64 = 1e-12;
-/// Motion since the equilibrium that a macro step follows, of the whole displacement (1).
-const LEAST_REACH: f64 = 1e-6;
-/// Macro steps that are kept.
-const KEPT: usize = 2;
-/// Internal steps from the start of a macro step to a point within it at most.
+/// Largest difference of rows of gap voltages that count as equal (1).
+const EQUAL_ROWS: f64 = 1e-12;
+/// Smallest motion since the equilibrium, relative to the displacement from the drawing, for which macro steps are made (1).
+const MIN_MOTION: f64 = 1e-6;
+/// Predicted macro steps in the cache.
+const CACHED: usize = 2;
+/// Internal steps of a correction at most.
 const MAX_STEPS: usize = 64;
 
-/// Storage for the trials of macro steps.
+/// Storage of multirate integration.
 #[derive(Debug)]
 pub(crate) struct Multirate {
-    /// Gaps with one voltage, and its change with each source.
-    pairs: Vec<(Vec<usize>, Vec<f64>)>,
-    /// Rates are seen.
+    /// Change of the voltage of all gaps with each source (1).
+    row: Vec<f64>,
+    /// Whether a signal or port shows a rate.
     sees_rates: bool,
     stepper: Adaptive<Rodas4>,
     drive: Drive,
-    unit: Drive,
-    /// Force of each group for a squared voltage of 1 V².
-    patterns: Vec<Vec<Pose>>,
+    change: Drive,
+    /// Force on each body per squared voltage (N/V², N·m/V²).
+    force: Vec<Pose>,
     push: Vec<Pose>,
     push_rate: Vec<Pose>,
     motion: Motion,
-    /// The last steps: of one point, trials of one length may go on in a step where those of another begin one.
-    known: VecDeque<Flight>,
-    /// The last state in a macro step that was left, as the motion has come there.
-    pub(crate) left: Option<(Token, Arc<Snapshot>)>,
+    /// Latest predictions. Trials of one point may continue a macro step or begin the next one, by their lengths.
+    cache: VecDeque<PredictedStep>,
+    /// Latest state that was corrected for steps without macro steps.
+    corrected: Option<(Token, Arc<Snapshot>)>,
 }
 
-/// A macro step as it is expected.
+/// Prediction of a macro step.
 #[derive(Debug)]
-pub(crate) struct Flight {
+pub(crate) struct PredictedStep {
     step: Arc<MacroStep>,
-    /// Its length, and that of the step that would come next (s); none where the motion has none.
+    /// Its length, and the proposed next one (s); none where the step failed.
     pub(crate) lengths: Option<[f64; 2]>,
-    /// The motion at its end.
+    /// Motion at its end.
     pub(crate) end: Motion,
-    /// Products of the accelerations by two groups, in the norm of masses.
-    gram: Vec<f64>,
-    /// Displacements and rates that points may leave out, in that norm.
-    may: [f64; 2],
+    /// Acceleration per squared voltage, in the norm of masses.
+    acceleration: f64,
+    /// Allowed errors of displacements and rates at points, in that norm.
+    allowed: [f64; 2],
 }
 
 impl Multirate {
-    /// None where no macro steps can be made.
+    /// None for a mechanism whose forces depend on more than one voltage, or act on bodies without mass.
     pub(crate) fn new(system: &System, sees_rates: bool) -> Option<Self> {
         let electrics = &system.electrics;
-        if electrics.heating.states() > 0 || electrics.heating.means() > 0 || !electrics.floating.is_empty() {
+        let (heating, others) = (&electrics.heating, electrics.inputs.len());
+        if heating.states() > 0 || heating.means() > 0 || others > 0 || !electrics.floating.is_empty() {
             return None;
         }
-        let pairs = pairs_of(electrics);
-        if pairs.is_empty() || pairs.len() > MAX_PAIRS {
+        let rows = &electrics.gap_rows;
+        let mut active = (0..rows.nrows()).filter(|gap| rows.row(*gap).iter().any(|x| *x != 0.0));
+        let first = active.next()?;
+        let equal =
+            |gap: usize| rows.row(gap).iter().zip(rows.row(first).iter()).all(|(a, b)| (a - b).abs() <= EQUAL_ROWS);
+        if !active.all(equal) {
             return None;
         }
         let n = system.bodies();
-        let mut found = Self {
-            patterns: vec![zeros(n); pairs.len()],
+        let mut multirate = Self {
+            row: rows.row(first).iter().copied().collect(),
             sees_rates,
-            pairs,
             stepper: Adaptive::new(n, Rodas4::new(system, &[])),
             drive: electrics.drive(),
-            unit: electrics.drive(),
-            push: zeros(n),
-            push_rate: zeros(n),
+            change: electrics.drive(),
+            force: vec![Pose::zeros(); n],
+            push: vec![Pose::zeros(); n],
+            push_rate: vec![Pose::zeros(); n],
             motion: Motion::zeros(n),
-            known: VecDeque::with_capacity(KEPT),
-            left: None,
+            cache: VecDeque::with_capacity(CACHED),
+            corrected: None,
         };
-        found.find_patterns(system, &zeros(n));
-        found.products(system).iter().all(|product| product.is_finite()).then_some(found)
+        multirate.evaluate_force(system, &vec![Pose::zeros(); n]);
+        multirate.acceleration(system).is_finite().then_some(multirate)
     }
 
-    /// Groups of gaps with one voltage.
-    pub(crate) fn pairs(&self) -> usize {
-        self.pairs.len()
+    /// Voltage of the gaps (V).
+    pub(crate) fn volts(&self, sources: &[f64]) -> f64 {
+        self.row.iter().zip(sources).map(|(row, source)| row * source).sum()
     }
 
-    /// Voltage of a group (V).
-    pub(crate) fn volts(&self, pair: usize, sources: &[f64]) -> f64 {
-        self.pairs[pair].1.iter().zip(sources).map(|(row, source)| row * source).sum()
+    /// Evaluates the force per squared voltage at displacements `q`.
+    fn evaluate_force(&mut self, system: &System, q: &[Pose]) {
+        for (gap, row) in system.electrics.gap_rows.row_iter().enumerate() {
+            let is_active = row.iter().any(|x| *x != 0.0);
+            // r contains −½·V²·∇C
+            (self.drive.volts[gap], self.change.volts[gap]) = if is_active { (1.0, 0.5) } else { (0.0, 0.0) };
+        }
+        self.change.load = 0.0;
+        system.drive_force(q, &self.drive, &self.change, &mut self.force);
+        self.force.iter_mut().for_each(|force| *force = -*force);
     }
 
-    /// Fills in the force of each group at displacements `q`, for 1 V².
-    fn find_patterns(&mut self, system: &System, q: &[Pose]) {
-        for ((gaps, _), pattern) in self.pairs.iter().zip(&mut self.patterns) {
-            self.drive.volts.fill(0.0);
-            self.unit.volts.fill(0.0);
-            self.unit.load = 0.0;
-            for &gap in gaps {
-                // r has −½·V²·∇C
-                (self.drive.volts[gap], self.unit.volts[gap]) = (1.0, 0.5);
-            }
-            system.drive_force(q, &self.drive, &self.unit, pattern);
-            pattern.iter_mut().for_each(|force| *force = -*force);
+    /// Sets the external force to that of a squared voltage which is linear in time: value (V²) and slope (V²/s).
+    fn set_push(&mut self, [value, slope]: [f64; 2]) {
+        for ((push, rate), force) in self.push.iter_mut().zip(&mut self.push_rate).zip(&self.force) {
+            *push = force * value;
+            *rate = force * slope;
         }
     }
 
-    /// Sum of the forces of the groups, each times the first and the second of its `sizes`.
-    fn fill_push(&mut self, sizes: impl Fn(usize) -> [f64; 2]) {
-        self.push.fill(Pose::zeros());
-        self.push_rate.fill(Pose::zeros());
-        for (k, pattern) in self.patterns.iter().enumerate() {
-            let [value, slope] = sizes(k);
-            for ((push, rate), force) in self.push.iter_mut().zip(&mut self.push_rate).zip(pattern) {
-                *push += force * value;
-                *rate += force * slope;
-            }
-        }
+    /// Acceleration per squared voltage, in the norm of masses; infinite where a gap acts on a body without mass.
+    fn acceleration(&self, system: &System) -> f64 {
+        let squared = |(j, force): (usize, &Pose)| -> f64 {
+            let mass = system.model.mass(j);
+            force.iter().zip(mass.iter()).filter(|(f, _)| **f != 0.0).map(|(f, m)| f * f / m).sum()
+        };
+        self.force.iter().enumerate().map(squared).sum::<f64>().sqrt()
     }
 
-    /// Where the motion is at the parent, under the moments of the voltages up to there, and the step that would come next (s). The sources go along lines
-    /// from those at the start; what these leave of the moments acts halfway.
-    pub(crate) fn arrive(
+    /// Motion at a state in a macro step, corrected with the integrals of its squared voltage, and the proposed next step (s). Sources are linear between both
+    /// states. The residual of the integrals acts as a force at the mean configuration.
+    fn correct(
         &mut self,
         (system, weights): (&System, &NormWeights),
-        (place, parent): (&InMacroStep, &Snapshot),
+        (position, state): (&MacroStepPosition, &Snapshot),
         errors: ErrorBudget,
     ) -> Option<(Motion, f64)> {
-        let (step, since) = (&place.step, place.since);
-        let errors = Self::tolerances((system, weights), step, errors)?;
-        let halfway = |(q, end): (&Pose, &Pose)| 0.5 * (q + end);
-        let q: Vec<Pose> = step.motion.q.iter().zip(&parent.q).map(halfway).collect();
-        self.find_patterns(system, &q);
-        let ends = [&step.sources, &parent.sources];
-        let rest: Vec<[f64; 2]> = (0..self.pairs.len())
-            .map(|k| {
-                let volts = ends.map(|sources| self.volts(k, sources));
-                let of_line = moments([0.0; 2], since, volts, volts[0].powi(2));
-                line([0, 1].map(|i| place.moments[k][i] - of_line[i]), since)
-            })
-            .collect();
-        self.fill_push(|k| rest[k]);
-        let ramp = Ramp::new(&system.electrics, ends[0], ends[1], &[], since).pushed_along(&self.push, &self.push_rate);
+        let (step, elapsed) = (&position.step, position.elapsed);
+        let errors = relative_errors((system, weights), step, errors)?;
+        let mean = |(q, end): (&Pose, &Pose)| 0.5 * (q + end);
+        let q: Vec<Pose> = step.motion.q.iter().zip(&state.q).map(mean).collect();
+        self.evaluate_force(system, &q);
+        let sources = [&step.sources, &state.sources];
+        let volts = sources.map(|sources| self.volts(sources));
+        let linear = extended([0.0; 2], elapsed, volts, volts[0].powi(2));
+        self.set_push(fitted_line([0, 1].map(|k| position.integrals[k] - linear[k]), elapsed));
+        let ramp = Ramp::new(&system.electrics, sources[0], sources[1], &[], elapsed)
+            .pushed_along(&self.push, &self.push_rate);
         self.motion.copy(&step.motion);
-        let mut h = step.first;
+        let mut h = step.trial_step;
         let advanced = self.stepper.advance(
             &mut Bodies::weighed(system, &ramp, weights),
             &mut self.motion,
@@ -168,31 +162,29 @@ impl Multirate {
         matches!(advanced, Ok(Advance::Done)).then(|| (self.motion.clone(), h))
     }
 
-    /// The tolerances of a macro step, which are relative to how far the motion has gone since its equilibrium.
-    fn tolerances(
+    /// Predicts a macro step: one step of the integrator under the extrapolated voltage.
+    fn predict(
+        &mut self,
         (system, weights): (&System, &NormWeights),
-        step: &MacroStep,
+        step: Arc<MacroStep>,
         errors: ErrorBudget,
-    ) -> Option<ErrorBudget> {
-        let still = Ramp::new(&system.electrics, &step.sources, &step.sources, &[], 1.0);
-        let whole = Bodies::weighed(system, &still, weights).allowed([&step.motion, &step.motion], 1.0)?;
-        (step.reach > LEAST_REACH * whole).then(|| errors.of_part(step.reach.min(whole), whole))
-    }
-
-    /// Makes a macro step under the expected forces.
-    fn fly(&mut self, (system, weights): (&System, &NormWeights), step: Arc<MacroStep>, errors: ErrorBudget) -> Flight {
-        let Some(relative) = Self::tolerances((system, weights), &step, errors) else {
-            return Flight { end: step.motion.clone(), step, lengths: None, gram: Vec::new(), may: [0.0; 2] };
+    ) -> PredictedStep {
+        let failed = |step: Arc<MacroStep>| PredictedStep {
+            end: step.motion.clone(),
+            step,
+            lengths: None,
+            acceleration: 0.0,
+            allowed: [0.0; 2],
         };
-        self.find_patterns(system, &step.motion.q);
-        self.fill_push(|k| step.expected[k].line());
-        let ramp = Ramp::new(&system.electrics, &step.sources, &step.sources, &[], step.first)
+        let Some(relative) = relative_errors((system, weights), &step, errors) else { return failed(step) };
+        self.evaluate_force(system, &step.motion.q);
+        self.set_push(step.extrapolation.line());
+        let ramp = Ramp::new(&system.electrics, &step.sources, &step.sources, &[], step.trial_step)
             .pushed_along(&self.push, &self.push_rate);
         self.motion.copy(&step.motion);
-        let (mut h, mut length) = (step.first, 0.0);
-        let bodies = &mut Bodies::weighed(system, &ramp, weights);
+        let (mut h, mut length) = (step.trial_step, 0.0);
         let advanced = self.stepper.advance(
-            bodies,
+            &mut Bodies::weighed(system, &ramp, weights),
             &mut self.motion,
             &mut h,
             Control::Tolerance(relative.shared_step()),
@@ -202,186 +194,169 @@ impl Multirate {
                 false
             },
         );
-        let may = bodies.allowed([&step.motion, &self.motion], relative.within_step());
-        let lengths = may.filter(|_| advanced.is_ok() && length > 0.0).map(|_| [length, h]);
-        let gram = match lengths {
-            Some(_) => self.products(system),
-            None => Vec::new(),
-        };
-        let rates = match self.sees_rates {
-            true => ErrorBudget::of(errors.rates_within_step()).within(step.fastest),
+        let ends = [&step.motion, &self.motion];
+        let allowed = weights.allowed_error(system, ends, relative.within_step());
+        let (Ok(_), Some(allowed)) = (advanced, allowed) else { return failed(step) };
+        let of_rates = match self.sees_rates {
+            true => ErrorBudget::of(errors.rates_within_step()).within(step.peak.rate),
             false => f64::INFINITY,
         };
-        Flight { step, lengths, end: self.motion.clone(), gram, may: [may.unwrap_or(0.0), rates] }
-    }
-
-    /// Products of the accelerations that the groups make, in the norm of masses; infinite where a gap pulls what has no mass.
-    fn products(&self, system: &System) -> Vec<f64> {
-        let product = |a: &[Pose], b: &[Pose]| -> f64 {
-            let of = |(j, (a, b)): (usize, (&Pose, &Pose))| -> f64 {
-                let mass = system.model.mass(j);
-                let parts = a.iter().zip(b.iter()).zip(mass.iter());
-                parts.filter(|((a, b), _)| **a != 0.0 && **b != 0.0).map(|((a, b), m)| a * b / m).sum()
-            };
-            a.iter().zip(b).enumerate().map(of).sum()
-        };
-        self.patterns.iter().flat_map(|a| self.patterns.iter().map(move |b| product(a, b))).collect()
-    }
-}
-
-impl Flight {
-    /// Displacements and rates that points have left out at most, over those that they may.
-    pub(crate) fn left_out(&self, since: f64, moments: &[[f64; 2]]) -> f64 {
-        let missed: Vec<[f64; 2]> = self
-            .step
-            .expected
-            .iter()
-            .zip(moments)
-            .map(|(expected, moments)| expected.missed(*moments, since))
-            .collect();
-        let n = moments.len();
-        let part = |order: usize| {
-            let product = |i: usize| self.gram[i] * missed[i / n][order] * missed[i % n][order];
-            let size = (0..n * n).map(product).sum::<f64>().max(0.0).sqrt();
-            // nothing is left out of nothing
-            if size == 0.0 { 0.0 } else { size / self.may[1 - order] }
-        };
-        // a sum: the larger of the two would hide what is not a number
-        let size = part(0) + part(1);
-        if size.is_nan() { f64::INFINITY } else { size }
-    }
-}
-
-/// Gaps with one voltage each, without those that have none.
-fn pairs_of(electrics: &Electrics) -> Vec<(Vec<usize>, Vec<f64>)> {
-    let rows = &electrics.gap_rows;
-    let mut pairs: Vec<(Vec<usize>, Vec<f64>)> = Vec::new();
-    for gap in 0..rows.nrows() {
-        let row: Vec<f64> = rows.row(gap).iter().copied().collect();
-        if row.iter().all(|x| *x == 0.0) {
-            continue;
-        }
-        let alike =
-            |(_, other): &&mut (Vec<usize>, Vec<f64>)| other.iter().zip(&row).all(|(a, b)| (a - b).abs() <= SAME);
-        match pairs.iter_mut().find(alike) {
-            Some((gaps, _)) => gaps.push(gap),
-            None => pairs.push((vec![gap], row)),
+        PredictedStep {
+            step,
+            lengths: (length > 0.0).then_some([length, h]),
+            end: self.motion.clone(),
+            acceleration: self.acceleration(system),
+            allowed: [allowed, of_rates],
         }
     }
-    pairs
-}
 
-impl Multirate {
-    /// The macro step as it is expected, made unless it is known.
-    pub(crate) fn flight(
+    /// Prediction of a macro step, from the cache or made again.
+    pub(crate) fn predicted(
         &mut self,
         about: (&System, &NormWeights),
         step: &Arc<MacroStep>,
         errors: ErrorBudget,
-    ) -> &Flight {
-        match self.known.iter().position(|flight| flight.step.start == step.start) {
-            Some(place) => &self.known[place],
+    ) -> &PredictedStep {
+        match self.cache.iter().position(|known| known.step.start == step.start) {
+            Some(place) => &self.cache[place],
             None => {
-                let flight = self.fly(about, Arc::clone(step), errors);
-                self.keep(flight)
+                let predicted = self.predict(about, Arc::clone(step), errors);
+                self.store(predicted)
             }
         }
     }
 
-    /// Puts a step among the last ones.
-    fn keep(&mut self, flight: Flight) -> &Flight {
-        if self.known.len() == KEPT {
-            self.known.pop_front();
+    fn store(&mut self, predicted: PredictedStep) -> &PredictedStep {
+        if self.cache.len() == CACHED {
+            self.cache.pop_front();
         }
-        self.known.push_back(flight);
-        &self.known[self.known.len() - 1]
+        self.cache.push_back(predicted);
+        &self.cache[self.cache.len() - 1]
     }
 
-    /// A macro step that begins at the parent, for a point of length `dt` (s).
+    /// Start of a macro step at the parent, for points of length `dt` (s). None where it would be too short, or the parent lies in one that was.
     pub(crate) fn begin(
         &mut self,
         about: (&System, &NormWeights),
         (dt, parent, token): (f64, &Snapshot, Token),
         errors: ErrorBudget,
-    ) -> Option<InMacroStep> {
-        let zero = vec![[0.0; 2]; self.pairs.len()];
-        let at_start = |flight: &Flight| {
-            let [length, _] = flight.lengths?;
-            let fits = dt * LEAST_POINTS <= length;
-            fits.then(|| InMacroStep { step: Arc::clone(&flight.step), since: 0.0, points: 0, moments: zero })
-        };
-        if parent.pause > 0 || dt * LEAST_POINTS > parent.next_step {
+    ) -> Option<MacroStepPosition> {
+        if parent.pause > 0 || dt * MIN_POINTS > parent.next_step || parent.macro_step.as_deref().is_some_and(is_short)
+        {
             return None;
         }
-        if let Some(known) = self.known.iter().find(|flight| flight.step.start == token) {
-            // of another trial of this point
-            return at_start(known);
-        }
-        let step = match &parent.macro_step {
-            None => MacroStep {
-                start: token,
-                motion: Motion { q: parent.q.clone(), v: parent.v.clone() },
-                offset: Motion::zeros(parent.q.len()),
-                sources: parent.sources.clone(),
-                expected: vec![Expected::default(); self.pairs.len()],
-                fastest: parent.fastest,
-                reach: parent.reach,
-                informed: 0,
-                first: parent.next_step,
-            },
-            Some(place) => {
-                if is_short(place) {
-                    return None;
-                }
-                let (motion, _) = self.arrive(about, (place, parent), errors)?;
-                let mut offset = Motion { q: parent.q.clone(), v: parent.v.clone() };
-                offset.add(-1.0, &motion);
-                let expected = (0..self.pairs.len())
-                    .map(|k| {
-                        let [then, now] = [&place.step.sources, &parent.sources].map(|s| self.volts(k, s).powi(2));
-                        place.step.expected[k].after(place.moments[k], place.since, then - now)
-                    })
-                    .collect();
-                MacroStep {
-                    start: token,
-                    motion,
-                    offset,
-                    sources: parent.sources.clone(),
-                    expected,
-                    fastest: parent.fastest,
-                    reach: parent.reach,
-                    informed: 1 + place.step.informed.min(1),
-                    first: parent.next_step,
-                }
+        let predicted = match self.cache.iter().position(|known| known.step.start == token) {
+            // by another trial of this point
+            Some(place) => &self.cache[place],
+            None => {
+                let step = self.next_step(about, (parent, token), errors)?;
+                let predicted = self.predict(about, Arc::new(step), errors);
+                self.store(predicted)
             }
         };
-        let flight = self.fly(about, Arc::new(step), errors);
-        at_start(self.keep(flight))
+        let [length, _] = predicted.lengths?;
+        (dt * MIN_POINTS <= length).then(|| MacroStepPosition {
+            step: Arc::clone(&predicted.step),
+            elapsed: 0.0,
+            points: 0,
+            integrals: [0.0; 2],
+        })
+    }
+
+    /// Macro step from the parent: from the corrected motion where it lies in one.
+    fn next_step(
+        &mut self,
+        about: (&System, &NormWeights),
+        (parent, token): (&Snapshot, Token),
+        errors: ErrorBudget,
+    ) -> Option<MacroStep> {
+        let displayed = Motion { q: parent.q.clone(), v: parent.v.clone() };
+        let (motion, extrapolation, history) = match parent.macro_step.as_deref() {
+            None => (displayed.clone(), SquareExtrapolation::default(), 0),
+            Some(position) => {
+                let (motion, _) = self.correct(about, (position, parent), errors)?;
+                let step = &position.step;
+                let [start, end] = [&step.sources, &parent.sources].map(|sources| self.volts(sources).powi(2));
+                let extrapolation = step.extrapolation.next(position.integrals, position.elapsed, start - end);
+                (motion, extrapolation, 1 + step.history.min(1))
+            }
+        };
+        Some(MacroStep {
+            start: token,
+            motion,
+            displayed,
+            sources: parent.sources.clone(),
+            extrapolation,
+            peak: parent.peak,
+            history,
+            trial_step: parent.next_step,
+        })
+    }
+
+    /// A state in a macro step with the corrected motion, from which steps without macro steps continue.
+    pub(crate) fn corrected_state(
+        &mut self,
+        about: (&System, &NormWeights),
+        (state, token): (&Snapshot, Token),
+        errors: ErrorBudget,
+    ) -> Option<Arc<Snapshot>> {
+        if let Some((_, known)) = self.corrected.as_ref().filter(|(of, _)| *of == token) {
+            return Some(Arc::clone(known));
+        }
+        let position = state.macro_step.as_deref()?;
+        let (motion, next_step) = self.correct(about, (position, state), errors)?;
+        let corrected = Arc::new(Snapshot { q: motion.q, v: motion.v, next_step, ..state.clone() });
+        self.corrected = Some((token, Arc::clone(&corrected)));
+        Some(corrected)
     }
 }
 
-/// Whether a macro step was not worth its making: the voltages were as two before it suggest for few points alone.
-fn is_short(place: &InMacroStep) -> bool {
-    place.step.informed == 2 && f64::from(place.points) < LEAST_POINTS
+impl PredictedStep {
+    /// Bound of the errors of displacements and rates at a time (s) after the start, relative to the allowed ones.
+    pub(crate) fn error_bound(&self, elapsed: f64, integrals: [f64; 2]) -> f64 {
+        let [rate, displacement] =
+            self.step.extrapolation.residual(integrals, elapsed).map(|x| x.abs() * self.acceleration);
+        // zero stays zero where the allowed error is zero
+        let relative = |error: f64, allowed: f64| if error == 0.0 { 0.0 } else { error / allowed };
+        // a sum propagates NaN, a maximum would not
+        let bound = relative(displacement, self.allowed[0]) + relative(rate, self.allowed[1]);
+        if bound.is_nan() { f64::INFINITY } else { bound }
+    }
 }
 
-/// Largest norms so far of the motion since the equilibrium, displacements and rates, after a state of the parent's.
-pub(crate) fn largest_after(system: &System, parent: &Snapshot, motion: &Motion) -> [f64; 2] {
-    let away = |(j, q): (usize, &Pose)| {
+/// Tolerances of a macro step: relative to the motion since the equilibrium in place of the displacement from the drawing.
+fn relative_errors(
+    (system, weights): (&System, &NormWeights),
+    step: &MacroStep,
+    errors: ErrorBudget,
+) -> Option<ErrorBudget> {
+    let whole = weights.allowed_error(system, [&step.motion, &step.motion], 1.0)?;
+    let motion = step.peak.displacement;
+    (motion > MIN_MOTION * whole).then(|| errors.of_part(motion.min(whole), whole))
+}
+
+/// Whether a macro step ended too early, though its extrapolation was based on two before it.
+fn is_short(position: &MacroStepPosition) -> bool {
+    position.step.history == 2 && f64::from(position.points) < MIN_POINTS
+}
+
+/// Largest motion since the equilibrium, after a step from `parent` to `motion`.
+pub(crate) fn peak_after(system: &System, parent: &Snapshot, motion: &Motion) -> PeakMotion {
+    let squared = |(j, q): (usize, &Pose)| {
         let x = q - parent.origin.get(j).copied().unwrap_or_default();
         system.model.mass(j).component_mul(&x).dot(&x)
     };
-    let moved = motion.q.iter().enumerate().map(away).sum::<f64>().sqrt();
+    let displacement = motion.q.iter().enumerate().map(squared).sum::<f64>().sqrt();
     let rate = system.model.mass_product(&motion.v, &motion.v).sqrt();
-    [parent.reach.max(moved), parent.fastest.max(rate)]
+    PeakMotion { displacement: parent.peak.displacement.max(displacement), rate: parent.peak.rate.max(rate) }
 }
 
-/// Points until a macro step may begin after a state of the parent's; `much` was left out of one that the state would lie in.
-pub(crate) fn pause_after(parent: &Snapshot, much: bool) -> u32 {
-    match &parent.macro_step {
-        Some(place) if is_short(place) => PAUSE,
+/// Points without macro steps after a state that lies in none; `exceeded`: the error bound of one was exceeded.
+pub(crate) fn pause_after(parent: &Snapshot, exceeded: bool) -> u32 {
+    match parent.macro_step.as_deref() {
+        Some(position) if is_short(position) => PAUSE,
         Some(_) => 0,
-        None if much => PAUSE,
+        None if exceeded => PAUSE,
         None => parent.pause.saturating_sub(1),
     }
 }

@@ -1,11 +1,11 @@
 //! Reply to a trial: currents, charges, outputs and their partials at the resulting state, and the bound of the
 //! circuit's next step.
 
-use super::multirate::{largest_after, pause_after};
+use super::macro_step::PeakMotion;
+use super::multirate::{pause_after, peak_after};
 use super::session::DeviceSession;
 use super::states::Snapshot;
 use super::step_history::{StepHistory, SteppingRule};
-
 use super::{Trial, TrialReply};
 use bimorph_analysis::readout::ports::PortResponse;
 use bimorph_analysis::readout::signal::{Signal, SignalView};
@@ -42,16 +42,11 @@ impl DeviceSession {
         let (shown, bound) = self.seen(compiled, system, request, from.map(|(_, before)| before), reply);
         reply.dt_next = bound;
         let carried = self.carried(from.is_some());
-        let (mut origin, mut largest) = (Arc::default(), [0.0; 2]);
-        if self.multirate.is_some() {
-            match from {
-                Some((_, before)) => {
-                    (origin, largest) = (before.origin.clone(), largest_after(system, before, &self.motion))
-                }
-                None => origin = self.motion.q.as_slice().into(),
-            }
-        }
-        let [reach, fastest] = largest;
+        let (origin, peak) = match (from, &self.multirate) {
+            (_, None) => Default::default(),
+            (Some((_, before)), _) => (Arc::clone(&before.origin), peak_after(system, before, &self.motion)),
+            (None, _) => (self.motion.q.as_slice().into(), PeakMotion::default()),
+        };
         let snapshot = Snapshot {
             shown,
             q: self.motion.q.clone(),
@@ -62,14 +57,13 @@ impl DeviceSession {
             next_step,
             elapsed: from.map_or(0.0, |(_, before)| before.elapsed + request.dt),
             carried,
-            pause: match (&self.place, from) {
-                (None, Some((_, before))) => pause_after(before, self.leaves_out_much),
+            pause: match (&self.position, from) {
+                (None, Some((_, before))) => pause_after(before, self.exceeds_bound),
                 _ => 0,
             },
-            fastest,
-            reach,
+            peak,
             origin,
-            macro_step: self.place.take(),
+            macro_step: self.position.take(),
         };
         reply.token = Some(self.states.insert(request, snapshot));
     }

@@ -5,7 +5,7 @@ pub(crate) mod reduction;
 use super::agitation::ThermalForce;
 use super::growth::{Difference, Growth};
 use super::held_motion::HeldMotion;
-use super::macro_step::InMacroStep;
+use super::macro_step::MacroStepPosition;
 use super::multirate::Multirate;
 use super::output_gradient::{OutputGradient, surroundings};
 use super::phase_error::PhaseErrorMonitor;
@@ -76,12 +76,12 @@ pub(super) struct DeviceSession {
     pub(super) difference: Difference,
     /// The motion that all trials of the point at hand lie about.
     pub(super) held: HeldMotion,
-    /// Storage for trials of macro steps; none where there are none.
+    /// Multirate integration; none for mechanisms without macro steps.
     pub(super) multirate: Option<Box<Multirate>>,
-    /// Where the trial at hand lies in one.
-    pub(super) place: Option<Box<InMacroStep>>,
-    /// It would leave too much out of one.
-    pub(super) leaves_out_much: bool,
+    /// Position of the current trial in a macro step.
+    pub(super) position: Option<Box<MacroStepPosition>>,
+    /// Whether the current trial exceeds the error bound of a macro step.
+    pub(super) exceeds_bound: bool,
 }
 
 /// Doubles for each port and body: stages, displacements, velocities, and those of states that are kept.
@@ -136,21 +136,19 @@ impl DeviceSession {
         };
         description.unknowns = reduction.as_ref().map_or(description.unknowns, |found| found.model.space.size());
         let held = HeldMotion::new(n, ports.len(), (heaters, electrics.heating.means()));
-        let steps_bodies = matches!(method, Formulated::Bodies(_));
+        let sees_rates = sees_rates(&signals, &ports);
+        let multirate = matches!(method, Formulated::Bodies(_)).then(|| Multirate::new(system, sees_rates)).flatten();
+        let multirate = multirate.map(Box::new);
         let session = Self {
             held,
-            multirate: if steps_bodies {
-                Multirate::new(system, sees_rates(&signals, &ports)).map(Box::new)
-            } else {
-                None
-            },
-            place: None,
-            leaves_out_much: false,
+            multirate,
+            position: None,
+            exceeds_bound: false,
             opened: request.clone(),
             shaken,
             stepper: Adaptive::new(n, method),
             reduction,
-            sees_rates: sees_rates(&signals, &ports),
+            sees_rates,
             full_because,
             takes_bodies: false,
             weights: NormWeights::new(&system.model),
@@ -195,36 +193,29 @@ impl DeviceSession {
             && numbers(&state.sources, self.sources.len())
             && (state.anchors.is_empty() || numbers(&state.anchors, self.equilibrium.sticking.anchors().len()))
             && state.next_step > 0.0
-            && state.fastest >= 0.0
-            && state.reach >= 0.0
+            && state.peak.displacement >= 0.0
+            && state.peak.rate >= 0.0
             && (state.origin.is_empty() || poses(&state.origin))
             && (0.0..f64::INFINITY).contains(&state.elapsed)
             && state.shown.numbers().into_iter().flatten().all(|x| x.is_finite())
             && (followed == 0 || followed == self.signals.len() + self.ports.len())
-            && state.macro_step.as_ref().is_none_or(|place| self.fits_in(place))
+            && state.macro_step.as_ref().is_none_or(|position| self.fits_in(position))
             && (state.carried.is_empty()
                 || state.carried.len() == carried.len() && state.carried.iter().zip(carried).all(alike))
     }
 
-    /// Whether a place in a macro step has the sizes and the sense that one of this session has.
-    fn fits_in(&self, place: &InMacroStep) -> bool {
-        let Some(multirate) = &self.multirate else { return false };
-        let (step, n) = (&place.step, self.motion.q.len());
-        let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
-        let motion = |motion: &Motion| {
-            [&motion.q, &motion.v].iter().all(|p| p.len() == n && p.iter().all(|p| finite(p.as_slice())))
-        };
-        motion(&step.motion)
-            && motion(&step.offset)
-            && (step.sources.len(), step.expected.len()) == (self.sources.len(), multirate.pairs())
-            && place.moments.len() == multirate.pairs()
-            && [&step.sources[..], &[step.first, step.fastest, step.reach, place.since]]
-                .iter()
-                .all(|numbers| finite(numbers))
-            && step.expected.iter().all(|e| finite(&[e.mean, e.value, e.slope]))
-            && finite(place.moments.as_flattened())
-            && step.first > 0.0
-            && place.since > 0.0
+    /// Whether a position in a macro step has the sizes of this session, and finite values.
+    fn fits_in(&self, position: &MacroStepPosition) -> bool {
+        let MacroStepPosition { step, elapsed, integrals, .. } = position;
+        let (e, n) = (step.extrapolation, self.motion.q.len());
+        let numbers = [step.trial_step, step.peak.displacement, step.peak.rate, *elapsed, e.mean, e.value, e.slope];
+        let poses = [&step.motion.q, &step.motion.v, &step.displayed.q, &step.displayed.v];
+        self.multirate.is_some()
+            && poses.iter().all(|poses| poses.len() == n && poses.iter().all(|p| p.iter().all(|x| x.is_finite())))
+            && step.sources.len() == self.sources.len()
+            && step.sources.iter().chain(&numbers).chain(integrals).all(|x| x.is_finite())
+            && step.trial_step > 0.0
+            && *elapsed > 0.0
     }
 
     /// The state that a small signal is about.

@@ -4,7 +4,7 @@
 //! original. Reading trusts nothing: lengths are bounded by the bytes that are there, and sizes by the model's.
 
 use super::contract::{Agitation, DeviceError, OpenRequest, Token, refused};
-use super::macro_step::{Expected, InMacroStep, MacroStep};
+use super::macro_step::{MacroStep, MacroStepPosition, PeakMotion, SquareExtrapolation};
 use super::states::{Snapshot, States};
 use super::step_history::StepHistory;
 use bimorph_multibody::planar::{DOF, Pose};
@@ -68,7 +68,7 @@ fn write_format(head: &[u8], parts: usize, opened: &OpenRequest, states: &States
             out.poses(&motion.v);
         }
         if head == HEAD {
-            out.macro_step(state);
+            out.multirate(state);
         }
     }
     out.0
@@ -103,26 +103,30 @@ impl SnapshotWriter {
         numbers.iter().for_each(|x| self.word(x.to_bits()));
     }
 
-    /// Where a state lies in a macro step.
-    fn macro_step(&mut self, state: &Snapshot) {
+    /// Multirate integration of a state.
+    fn multirate(&mut self, state: &Snapshot) {
         self.word(state.pause.into());
-        self.word(state.fastest.to_bits());
-        self.word(state.reach.to_bits());
+        self.peak(state.peak);
         self.poses(&state.origin);
         self.word(state.macro_step.is_some().into());
-        let Some(InMacroStep { step, since, points, moments }) = state.macro_step.as_deref() else { return };
-        self.word(since.to_bits());
-        self.word((*points).into());
-        self.numbers(moments.as_flattened());
+        let Some(MacroStepPosition { step, elapsed, points, integrals }) = state.macro_step.as_deref() else { return };
         self.word(step.start.0);
-        [&step.motion, &step.offset].iter().flat_map(|m| [&m.q, &m.v]).for_each(|poses| self.poses(poses));
+        [&step.motion, &step.displayed].iter().flat_map(|m| [&m.q, &m.v]).for_each(|poses| self.poses(poses));
         self.numbers(&step.sources);
-        let expected = step.expected.iter().map(|e| [e.mean, e.value, e.slope, e.goes_on.into()]);
-        self.numbers(expected.collect::<Vec<_>>().as_flattened());
-        self.word(step.fastest.to_bits());
-        self.word(step.reach.to_bits());
-        self.word(step.informed.into());
-        self.word(step.first.to_bits());
+        let SquareExtrapolation { mean, value, slope, is_linear } = step.extrapolation;
+        [mean, value, slope].iter().for_each(|x| self.word(x.to_bits()));
+        self.word(is_linear.into());
+        self.peak(step.peak);
+        self.word(step.history.into());
+        self.word(step.trial_step.to_bits());
+        self.word(elapsed.to_bits());
+        self.word((*points).into());
+        integrals.iter().for_each(|x| self.word(x.to_bits()));
+    }
+
+    fn peak(&mut self, PeakMotion { displacement, rate }: PeakMotion) {
+        self.word(displacement.to_bits());
+        self.word(rate.to_bits());
     }
 
     fn poses(&mut self, poses: &[Pose]) {
@@ -138,7 +142,7 @@ impl SnapshotReader<'_> {
     fn all(&mut self) -> Option<(OpenRequest, States, Option<u64>)> {
         let (head, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
-        let has_macro_steps = *head == HEAD;
+        let is_multirate = *head == HEAD;
         let (parts, tag) = match *head {
             HEAD | HEAD_3 => (StepHistory::PARTS, None),
             HEAD_REDUCED => (StepHistory::PARTS, Some(self.word()?)),
@@ -171,15 +175,11 @@ impl SnapshotReader<'_> {
                     }
                     carried
                 },
-                macro_step: None,
-                pause: 0,
-                fastest: 0.0,
-                reach: 0.0,
-                origin: Arc::default(),
+                ..Snapshot::default()
             };
-            if has_macro_steps {
-                (state.pause, state.fastest, state.reach) = (self.small()?, self.number()?, self.number()?);
-                (state.origin, state.macro_step) = (self.poses()?.into(), self.macro_step()?.map(Box::new));
+            if is_multirate {
+                (state.pause, state.peak) = (self.small()?, self.peak()?);
+                (state.origin, state.macro_step) = (self.poses()?.into(), self.macro_step()?);
             }
             states.put(token, (parent != 0).then_some(Token(parent)), state);
         }
@@ -215,37 +215,41 @@ impl SnapshotReader<'_> {
         Some(Motion { q: self.poses()?, v: self.poses()? })
     }
 
-    /// Where a state lies in a macro step.
-    fn macro_step(&mut self) -> Option<Option<InMacroStep>> {
-        match self.word()? {
-            0 => return Some(None),
-            1 => {}
-            _ => return None,
+    /// True or false; none for any other word.
+    fn flag(&mut self) -> Option<bool> {
+        [false, true].get(usize::try_from(self.word()?).ok()?).copied()
+    }
+
+    fn peak(&mut self) -> Option<PeakMotion> {
+        Some(PeakMotion { displacement: self.number()?, rate: self.number()? })
+    }
+
+    /// Position of a state in a macro step.
+    fn macro_step(&mut self) -> Option<Option<Box<MacroStepPosition>>> {
+        if !self.flag()? {
+            return Some(None);
         }
-        let (since, points, moments) = (self.number()?, self.small()?, self.numbers()?);
-        let (moments, rest) = moments.as_chunks::<2>();
         let step = MacroStep {
             start: Token(self.word()?),
             motion: self.motion()?,
-            offset: self.motion()?,
+            displayed: self.motion()?,
             sources: self.numbers()?,
-            expected: {
-                let numbers = self.numbers()?;
-                let (each, rest) = numbers.as_chunks::<4>();
-                let read = |&[mean, value, slope, goes_on]: &[f64; 4]| Expected {
-                    mean,
-                    value,
-                    slope,
-                    goes_on: goes_on != 0.0,
-                };
-                rest.is_empty().then(|| each.iter().map(read).collect())?
+            extrapolation: SquareExtrapolation {
+                mean: self.number()?,
+                value: self.number()?,
+                slope: self.number()?,
+                is_linear: self.flag()?,
             },
-            fastest: self.number()?,
-            reach: self.number()?,
-            informed: self.small()?,
-            first: self.number()?,
+            peak: self.peak()?,
+            history: self.small()?,
+            trial_step: self.number()?,
         };
-        rest.is_empty().then(|| Some(InMacroStep { step: Arc::new(step), since, points, moments: moments.to_vec() }))
+        Some(Some(Box::new(MacroStepPosition {
+            step: Arc::new(step),
+            elapsed: self.number()?,
+            points: self.small()?,
+            integrals: [self.number()?, self.number()?],
+        })))
     }
 
     fn noise(&mut self) -> Option<Option<Agitation>> {
@@ -323,26 +327,25 @@ mod tests {
                     .0,
                 carried,
                 macro_step: (of_macro_steps && k > 0).then(|| {
-                    Box::new(InMacroStep {
-                        step: Arc::new(MacroStep {
-                            start: Token(5),
-                            motion: Motion { q: pose(1.0), v: pose(2.0) },
-                            offset: Motion { q: pose(3.0), v: pose(4.0) },
-                            sources: vec![1.0, 2.0],
-                            expected: vec![Expected { mean: 0.5, value: 0.6, slope: 0.7, goes_on: true }],
-                            fastest: 1e-9,
-                            reach: 3e-9,
-                            informed: 2,
-                            first: 1e-7,
-                        }),
-                        since: 1e-8,
-                        points: 3,
-                        moments: vec![[1e-9, 2e-18]],
-                    })
+                    let motion = |x: f64| Motion { q: pose(x), v: pose(x + 1.0) };
+                    let step = MacroStep {
+                        start: Token(5),
+                        motion: motion(1.0),
+                        displayed: motion(3.0),
+                        sources: vec![1.0, 2.0],
+                        extrapolation: SquareExtrapolation { mean: 0.5, value: 0.6, slope: 0.7, is_linear: true },
+                        peak: PeakMotion { displacement: 3e-9, rate: 1e-9 },
+                        history: 2,
+                        trial_step: 1e-7,
+                    };
+                    let integrals = [1e-9, 2e-18];
+                    Box::new(MacroStepPosition { step: Arc::new(step), elapsed: 1e-8, points: 3, integrals })
                 }),
                 pause: u32::from(of_macro_steps),
-                fastest: if of_macro_steps { 2e-9 } else { 0.0 },
-                reach: if of_macro_steps { 4e-9 } else { 0.0 },
+                peak: match of_macro_steps {
+                    true => PeakMotion { displacement: 4e-9, rate: 2e-9 },
+                    false => PeakMotion::default(),
+                },
                 origin: if of_macro_steps { pose(5.0).into() } else { Arc::default() },
             };
             let voltages = [f64::from(k)];

@@ -1,6 +1,6 @@
 //! The states behind tokens: immutable, few, found by a hash of the request that made them.
 
-use super::macro_step::InMacroStep;
+use super::macro_step::{MacroStepPosition, PeakMotion};
 use super::step_history::StepHistory;
 use super::{Mode, Token, Trial};
 use bimorph_multibody::planar::Pose;
@@ -36,15 +36,13 @@ pub struct Snapshot {
     pub shown: StepHistory,
     /// State of a formulation between steps, beside the bodies' motion.
     pub carried: Vec<Motion>,
-    /// The macro step that it lies in, of many points.
-    pub macro_step: Option<Box<InMacroStep>>,
-    /// Points before another one is made.
+    /// Position in a macro step; none: the state follows steps of its own.
+    pub macro_step: Option<Box<MacroStepPosition>>,
+    /// Points until macro steps are made again.
     pub pause: u32,
-    /// Largest rates since the equilibrium, in the norm of masses.
-    pub fastest: f64,
-    /// The same of displacements from it.
-    pub reach: f64,
-    /// Displacements of that equilibrium; empty: none as drawn.
+    /// Largest motion since the equilibrium.
+    pub peak: PeakMotion,
+    /// Displacements of that equilibrium; empty for zero displacements.
     pub origin: Arc<[Pose]>,
 }
 
@@ -153,7 +151,8 @@ impl States {
 fn size(s: &Snapshot) -> usize {
     (s.q.len() + s.v.len()) * size_of::<Pose>()
         + s.carried.iter().map(|m| m.q.len() + m.v.len()).sum::<usize>() * size_of::<Pose>()
-        + s.macro_step.as_ref().map_or(0, |place| 8 * place.doubles())
+        + s.macro_step.as_ref().map_or(0, |position| position.bytes())
+        + size_of_val(&s.origin[..])
         + (s.rise.len() + s.sources.len() + s.anchors.len() + s.shown.doubles()) * 8
         + size_of::<Snapshot>()
 }

@@ -42,7 +42,7 @@ impl DeviceSession {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
         let electrics = &system.electrics;
-        self.place = None;
+        self.position = None;
         self.fill_sources(electrics, request.voltages);
         if let Err(error) = check_heat(compiled, electrics, &self.sources) {
             reply.status = Status::Fail(error.to_string());
@@ -144,13 +144,12 @@ impl DeviceSession {
         let errors = compiled.options.errors();
         let tol = errors.step();
         let beyond = self.is_beyond(&self.sources);
-        let slow = self.of_macro_step(system, (request, parent), errors);
-        let slow_next = slow.as_ref().map(|found| found.next);
-        self.place = slow.map(|found| Box::new(found.place));
-        let left =
-            parent.filter(|_| self.place.is_none()).and_then(|p| self.leave_macro_step(system, (request, p), errors));
-        let parent = left.as_deref().or(parent);
-        let held = slow_next.or_else(|| self.about_held(system, (request, parent), tol));
+        let next_step;
+        (next_step, self.position) = self.in_macro_step(system, (request, parent), errors).unzip();
+        let corrected = parent.filter(|_| next_step.is_none());
+        let corrected = corrected.and_then(|parent| self.corrected_parent(system, (request, parent), errors));
+        let parent = corrected.as_deref().or(parent);
+        let held = next_step.or_else(|| self.about_held(system, (request, parent), tol));
         if held.is_none() {
             self.begin(parent, beyond);
         }

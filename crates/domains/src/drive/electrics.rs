@@ -22,7 +22,7 @@ pub struct Drive {
     pub inputs: Vec<f64>,
     /// Rate of change of the frame's rate (rad/s²).
     pub turning: f64,
-    /// Force and moment on each body, as thermal agitation gives them; empty: none.
+    /// External force and moment on each body, of thermal agitation or of a voltage beside those of the sources; empty: none.
     pub push: Vec<Pose>,
 }
 

@@ -39,6 +39,21 @@ impl NormWeights {
     pub fn new(model: &Model) -> Self {
         Self { mass: model.bodies.iter().map(|b| b.mass).sum(), dragged: dragged(model) }
     }
+
+    /// Allowed error of displacements between two ends in the norm of masses; none for a model that has another norm.
+    pub fn allowed_error(&self, system: &System, ends: [&Motion; 2], tol: f64) -> Option<f64> {
+        let [before, after] = [self.norm(system, &ends[0].q)?, self.norm(system, &ends[1].q)?];
+        Some(self.allowed_of_norms(system, [before, after], tol))
+    }
+
+    /// Norm of displacements by the masses; none for a model that has another norm.
+    fn norm(&self, system: &System, q: &[Pose]) -> Option<f64> {
+        (self.mass > 0.0 && self.dragged.is_empty()).then(|| system.model.mass_product(q, q).sqrt())
+    }
+
+    fn allowed_of_norms(&self, system: &System, [before, after]: [f64; 2], tol: f64) -> f64 {
+        ErrorBudget::of(tol).within(before.max(after) + FLOOR * system.length_scale * self.mass.sqrt())
+    }
 }
 
 /// See the module.
@@ -85,13 +100,6 @@ impl<'a> Bodies<'a> {
         (0.5 * moved).hypot(1.5 * pressed * contact)
     }
 
-    /// The error of displacements that a step between two ends may have, in the norm of masses; none where another one counts.
-    pub fn allowed(&self, ends: [&Motion; 2], tol: f64) -> Option<f64> {
-        let alone = self.weights.mass > 0.0 && self.weights.dragged.is_empty();
-        let (_, may) = self.of_masses(ends, ends[0], 0.0, tol).filter(|_| alone)?;
-        Some(may)
-    }
-
     /// By how much forces that grow from zero over a step of length `h` (s) move the masses where nothing holds these, over the error that the step may have.
     pub fn would_move(&self, motion: &Motion, force: &[Pose], h: f64, tol: f64) -> f64 {
         let Some((_, may)) = self.of_masses([motion, motion], motion, h, tol) else { return f64::INFINITY };
@@ -122,14 +130,12 @@ impl<'a> Bodies<'a> {
 
     /// The norm of displacements by which errors are measured, where it is that of masses alone.
     pub(crate) fn reach(&self, q: &[Pose]) -> Option<f64> {
-        let NormWeights { mass, dragged } = &*self.weights;
-        (*mass > 0.0 && dragged.is_empty()).then(|| self.system.model.mass_product(q, q).sqrt())
+        self.weights.norm(self.system, q)
     }
 
     /// The error of a step of length `h` (s) over what it may be, between displacements of these norms and with an error of these; parts do not touch.
     pub(crate) fn share_of_norms(&self, [before, after]: [f64; 2], error: [f64; 2], h: f64, tol: f64) -> f64 {
-        let floor = FLOOR * self.system.length_scale * self.weights.mass.sqrt();
-        relative_error(error, h, ErrorBudget::of(tol).within(before.max(after) + floor), 0.0)
+        relative_error(error, h, self.weights.allowed_of_norms(self.system, [before, after], tol), 0.0)
     }
 
     /// The same with weights that have been found before.

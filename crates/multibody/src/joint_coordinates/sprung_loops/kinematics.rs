@@ -114,6 +114,40 @@ pub(super) struct RelativeOffset<T> {
     pub(super) beyond: [Vec2<T>; 3],
 }
 
+/// Geometry of a joint at its coordinates.
+struct DeflectedJoint<T> {
+    /// Axes of the frame, which turns with the mean of both bodies.
+    e1: Vec2<T>,
+    e2: Vec2<T>,
+    /// Half of the derivative of the shortening by bending.
+    bent: Vec2<T>,
+    /// The joint's displacement.
+    d: Vec2<T>,
+    /// Arms on the parent and on the body: turned, and less the undeformed ones.
+    r_parent: Vec2<T>,
+    r: Vec2<T>,
+    swing_parent: Vec2<T>,
+    swing: Vec2<T>,
+}
+
+impl<T: Real> DeflectedJoint<T> {
+    #[inline(always)]
+    fn new(shape: &JointGeometry<T>, parent: &RotationState<T>, own: &RotationState<T>, q: Vec3<T>) -> Self {
+        let ([stretch, g, p], [arm_parent, arm]) = (q, shape.arms);
+        let (swing_parent, swing) =
+            (parent.turn.rotation_minus_identity(arm_parent), own.turn.rotation_minus_identity(arm));
+        let e1 = own.turn.mean(&parent.turn, shape.axis);
+        let e2 = right_angle(e1);
+        let [gg, gp, pp] = shape.second;
+        let bent = [g * gg + p * gp, g * gp + p * pp];
+        let u = stretch - (bent[0] * g + bent[1] * p);
+        let d = [e1[0] * u + e2[0] * g, e1[1] * u + e2[1] * g];
+        let r_parent = [swing_parent[0] + arm_parent[0], swing_parent[1] + arm_parent[1]];
+        let r = [swing[0] + arm[0], swing[1] + arm[1]];
+        Self { e1, e2, bent, d, r_parent, r, swing_parent, swing }
+    }
+}
+
 /// A body with rotation `own` on a parent with rotation `parent`.
 #[inline(always)]
 pub(super) fn offset_from_parent<T: Real>(
@@ -122,20 +156,10 @@ pub(super) fn offset_from_parent<T: Real>(
     own: &RotationState<T>,
     at: &JointState<T>,
 ) -> RelativeOffset<T> {
-    let s = shape.sign;
-    let ([stretch, g, p], [arm_parent, arm]) = (at.q, shape.arms);
-    let (swing_parent, swing) =
-        (parent.turn.rotation_minus_identity(arm_parent), own.turn.rotation_minus_identity(arm));
-    // the frame turns with the mean of both
-    let e1 = own.turn.mean(&parent.turn, shape.axis);
-    let e2 = right_angle(e1);
-    let [gg, gp, pp] = shape.second;
-    let bent = [g * gg + p * gp, g * gp + p * pp];
-    let u = stretch - (bent[0] * g + bent[1] * p);
-    let d = [e1[0] * u + e2[0] * g, e1[1] * u + e2[1] * g];
+    let (s, [gg, gp, pp]) = (shape.sign, shape.second);
+    let DeflectedJoint { e1, e2, bent, d, r_parent, r, swing_parent, swing } =
+        DeflectedJoint::new(shape, parent, own, at.q);
     let t = right_angle(d);
-    let r_parent = [swing_parent[0] + arm_parent[0], swing_parent[1] + arm_parent[1]];
-    let r = [swing[0] + arm[0], swing[1] + arm[1]];
     let tr = right_angle(r);
     let lever = right_angle([r_parent[0] - r[0] + d[0] * s, r_parent[1] - r[1] + d[1] * s]);
     let mut columns = [e1, e2, t];
@@ -176,15 +200,8 @@ pub(super) fn acceleration_maps<T: Real>(
     own: &RotationState<T>,
     at: &JointState<T>,
 ) -> AccelerationMaps<T> {
-    let s = shape.sign;
-    let ([stretch, g, p], v, z, [arm_parent, arm]) = (at.q, at.v, at.z, shape.arms);
-    let (swing_parent, swing) =
-        (parent.turn.rotation_minus_identity(arm_parent), own.turn.rotation_minus_identity(arm));
-    let e1 = own.turn.mean(&parent.turn, shape.axis);
-    let e2 = right_angle(e1);
-    let [gg, gp, pp] = shape.second;
-    let bent = [g * gg + p * gp, g * gp + p * pp];
-    let u = stretch - (bent[0] * g + bent[1] * p);
+    let (s, [gg, gp, pp], v, z) = (shape.sign, shape.second, at.v, at.z);
+    let DeflectedJoint { e1, e2, bent, d, r_parent, r, .. } = DeflectedJoint::new(shape, parent, own, at.q);
     let frame = (parent.spin + own.spin) * 0.5;
     let rate_u = v[0] - (bent[0] * v[1] + bent[1] * v[2]) * 2.0;
     let curls = [(v[1] * gg + v[2] * gp) * 4.0, (v[1] * gp + v[2] * pp) * 4.0];
@@ -197,9 +214,6 @@ pub(super) fn acceleration_maps<T: Real>(
     for i in 0..2 {
         // components of arms and of what they become by a right angle's turn
         let turned = |x: Vec2<T>| if i == 0 { -x[1] } else { x[0] };
-        let r_parent = [swing_parent[0] + arm_parent[0], swing_parent[1] + arm_parent[1]];
-        let r = [swing[0] + arm[0], swing[1] + arm[1]];
-        let d = [e1[0] * u + e2[0] * g, e1[1] * u + e2[1] * g];
         let (x, y) = (e1[i], e2[i]);
         // with the rotations of the joint's frame, of the body and of the parent
         let with_frame =
