@@ -151,3 +151,19 @@ fn trials_are_pure() {
     // else nothing was tried
     assert!(in_macro_steps > 30, "{in_macro_steps} of 60");
 }
+
+/// Points of any length within a macro step have finite outputs and a positive bound of the next one, or fail.
+#[test]
+fn points_of_any_length_are_answered() {
+    let mut device = opened(&compiled(TOL));
+    let replies = run(&mut device, REST, edges(60));
+    let parent = replies[replies.len() - 1].token;
+    for dt in [f64::from_bits(1), f64::MIN_POSITIVE, 1e-300, 1e-25, 1e-15, 1e-9, 1.0] {
+        for volts in [REST, 0.0, -REST, 1e6, -1e30, f64::MAX] {
+            let mut reply = TrialReply::default();
+            device.trial(&Trial { mode: Mode::Transient, parent, t: 0.0, dt, voltages: &[volts] }, &mut reply).unwrap();
+            let finite = || reply.outputs.iter().chain(&reply.charges).chain(&reply.dq_dv).all(|x| x.is_finite());
+            assert!(reply.status != Status::Ok || finite() && reply.dt_next > 0.0, "{dt:e} s, {volts:e} V: {reply:?}");
+        }
+    }
+}

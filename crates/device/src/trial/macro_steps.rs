@@ -74,7 +74,8 @@ impl DeviceSession {
         let predicted = multirate.predicted(about, &step, errors);
         let [length, next_step] = predicted.lengths?;
         self.exceeds_bound = predicted.error_bound(elapsed, integrals) > 1.0;
-        if self.exceeds_bound {
+        // a step of its own reports points too short for its arithmetic
+        if self.exceeds_bound || dt < f64::EPSILON * length {
             return None;
         }
         interpolate([&step.displayed, &predicted.end], length, elapsed / length, &mut self.motion);
