@@ -8,7 +8,7 @@
 //! * no voltage across a gap, and no rise of a heater, changes by more than what is linear in the changes and as much again;
 //! * what is left out is at most [`SMALL`] of the error that a step may have, by an estimate.
 //!
-//! It is that of the bodies: a reduced model places them for each trial, which costs as much as a step of its own.
+//! A reduced model moves its coordinates, and places the bodies for each trial.
 //!
 //! Sensitivities may therefore be approximate: where nothing touches they take the tangent at the start of a step for all its stages.
 //!
@@ -57,9 +57,12 @@ impl DeviceSession {
             return None;
         }
         let most = if touching { SMALL_TOUCHING } else { SMALL };
+        // of a port beyond its range the full model has a motion of its own
+        let leaves = !parent.carried.is_empty() && self.is_beyond(&self.sources);
         let linear = self.shaken.is_none()
             && !self.takes_bodies
-            && self.stepper.method.has_linear_trials(&parent.carried)
+            && self.stepper.method.has_linear_trials()
+            && !leaves
             && self.changes_little(system, &parent.sources)
             && self.pushes_little(system, (request, parent), tol, touching);
         if !(linear || touching) {

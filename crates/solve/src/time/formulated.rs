@@ -119,13 +119,9 @@ impl Formulated {
         }
     }
 
-    /// Whether a motion from a state can be moved along its sensitivities ([`Formulated::move_by`]): that of every body's own coordinates.
-    pub fn has_linear_trials(&self, state: &[Motion]) -> bool {
-        match self {
-            Self::Bodies(_) => true,
-            Self::Joints(_) => false,
-            Self::Reduced(_) => state.is_empty(),
-        }
+    /// Whether a motion can be moved along its sensitivities ([`Formulated::move_by`]): that of every body's own coordinates, and that of a reduced model.
+    pub fn has_linear_trials(&self) -> bool {
+        !matches!(self, Self::Joints(_))
     }
 
     /// Whether sensitivities take the tangent at the start of a step for all its stages ([`Rodas4::first_tangent`]).
@@ -133,7 +129,10 @@ impl Formulated {
         match self {
             Self::Bodies(m) => m.first_tangent = keep,
             Self::Joints(_) => {}
-            Self::Reduced(m) => m.bodies.first_tangent = keep,
+            Self::Reduced(m) => {
+                m.bodies.first_tangent = keep;
+                m.reduced.keep_first_tangent(keep);
+            }
         }
     }
 
@@ -144,6 +143,9 @@ impl Formulated {
 
     /// Takes the motion of the bodies to the end `from` of a step, after which `carried` was carried, moved by its sensitivities times changes of the sources.
     pub fn move_by(&mut self, carried: &[Motion], from: &Motion, changes: &[f64], motion: &mut Motion) {
+        if let Some(reduced) = self.reduced_now() {
+            return reduced.move_by(carried, changes, motion);
+        }
         motion.copy(from);
         for (s, change) in carried.iter().zip(changes) {
             motion.add(*change, s);

@@ -64,6 +64,24 @@ impl ReducedRodas4 {
         }
     }
 
+    /// Takes the bodies to the end of a step, after which `carried` was carried, moved by its sensitivities times changes of the sources.
+    pub fn move_by(&mut self, carried: &[Motion], changes: &[f64], motion: &mut Motion) {
+        self.carried.iter_mut().zip(carried).for_each(|(to, from)| to.copy(from));
+        let (state, sensitivities) = self.carried.split_at_mut(2);
+        for (of_source, change) in sensitivities.chunks_exact(2).zip(changes) {
+            state.iter_mut().zip(of_source).for_each(|(to, s)| to.add(*change, s));
+        }
+        self.put_back();
+        self.place_end(motion);
+    }
+
+    /// Whether sensitivities take the matrices at the start of a step for all its stages.
+    pub fn keep_first_tangent(&mut self, keep: bool) {
+        if let Some(ports) = &mut self.ports {
+            ports.first_tangent = keep;
+        }
+    }
+
     /// The bodies where the last step or equilibrium placed them.
     pub fn bodies(&self) -> &[Pose] {
         &self.forces.placed.at
@@ -156,8 +174,8 @@ impl ReducedRodas4 {
     pub(super) fn solve_ports(&mut self, ramp: &Ramp<'_>, (i, s, h): (usize, f64, f64)) {
         let Some(mut ports) = self.ports.take() else { return };
         for p in 0..ports.len() {
-            let Self { polynomials: Some(stages), at, drive, .. } = self else { break };
-            ports.stage((&stages.of, &mut stages.forces), ramp, (p, i, s), (at, drive));
+            let Self { polynomials: Some(stages), at, drive, mass, damping, stiffness, .. } = self else { break };
+            ports.stage((&stages.of, &mut stages.forces), ramp, (p, i, s), (at, drive), [stiffness, damping, mass]);
             ports.at.combined(i, h, &ports.increments[p][..i], self.r1.as_mut_slice(), self.r2.as_mut_slice());
             self.solve_right(h, (&ports.force, &ports.forcing[p], GAMMA_I[i] * h));
             put_increments(GAMMA * h, (&self.right, &self.r1, &self.r2), &mut ports.increments[p][i]);

@@ -89,26 +89,117 @@ pub(super) fn put_increments(
     }
 }
 
+/// Calls a function of a fixed size, which the compiler unrolls, for the sizes that models have. Its operations are those of any size in their order.
+macro_rules! of_size {
+    ($size:expr, $of:ident($($given:expr),*)) => {
+        match $size {
+            2 => $of::<2>($($given),*),
+            3 => $of::<3>($($given),*),
+            4 => $of::<4>($($given),*),
+            5 => $of::<5>($($given),*),
+            6 => $of::<6>($($given),*),
+            7 => $of::<7>($($given),*),
+            8 => $of::<8>($($given),*),
+            _ => false,
+        }
+    };
+}
+
 /// `to += a·x`.
 #[inline]
 pub(super) fn add_product(a: &DMatrix<f64>, x: &[f64], to: &mut [f64]) {
-    for (column, x) in a.as_slice().chunks_exact(to.len()).zip(x) {
-        to.iter_mut().zip(column).for_each(|(to, a)| *to += a * x);
+    let a = a.as_slice();
+    if !of_size!(to.len(), add_fixed_product(a, x, to)) {
+        for (column, x) in a.chunks_exact(to.len()).zip(x) {
+            to.iter_mut().zip(column).for_each(|(to, a)| *to += a * x);
+        }
     }
+}
+
+/// The product of a size; false where the lengths are not those of it.
+#[inline]
+fn add_fixed_product<const M: usize>(a: &[f64], x: &[f64], to: &mut [f64]) -> bool {
+    let (columns, Ok(x), Ok(to)) = (a.as_chunks::<M>().0, <&[f64; M]>::try_from(x), <&mut [f64; M]>::try_from(to))
+    else {
+        return false;
+    };
+    let Ok(columns) = <&[[f64; M]; M]>::try_from(columns) else { return false };
+    let mut sum = *to;
+    for (column, x) in columns.iter().zip(x) {
+        sum.iter_mut().zip(column).for_each(|(to, a)| *to += a * x);
+    }
+    *to = sum;
+    true
 }
 
 /// `x` becomes (L·Lᵀ)⁻¹·x, with what is above the diagonal not read.
 #[inline]
 pub(super) fn solve_factored(l: &DMatrix<f64>, x: &mut [f64]) {
-    let m = x.len();
-    let columns = || l.as_slice().chunks_exact(m).enumerate();
-    for (j, column) in columns() {
-        x[j] /= column[j];
-        let (done, rest) = x.split_at_mut(j + 1);
-        rest.iter_mut().zip(&column[j + 1..]).for_each(|(x, l)| *x -= l * done[j]);
+    let (l, m) = (l.as_slice(), x.len());
+    if !of_size!(m, solve_fixed(l, x)) {
+        let columns = || l.chunks_exact(m).enumerate();
+        for (j, column) in columns() {
+            x[j] /= column[j];
+            let (done, rest) = x.split_at_mut(j + 1);
+            rest.iter_mut().zip(&column[j + 1..]).for_each(|(x, l)| *x -= l * done[j]);
+        }
+        for (j, column) in columns().rev() {
+            let known: f64 = x[j + 1..].iter().zip(&column[j + 1..]).map(|(x, l)| l * x).sum();
+            x[j] = (x[j] - known) / column[j];
+        }
     }
-    for (j, column) in columns().rev() {
-        let known: f64 = x[j + 1..].iter().zip(&column[j + 1..]).map(|(x, l)| l * x).sum();
-        x[j] = (x[j] - known) / column[j];
+}
+
+/// The solution of a size; false where the lengths are not those of it.
+#[inline]
+fn solve_fixed<const M: usize>(l: &[f64], x: &mut [f64]) -> bool {
+    let (columns, Ok(x)) = (l.as_chunks::<M>().0, <&mut [f64; M]>::try_from(x)) else { return false };
+    let Ok(columns) = <&[[f64; M]; M]>::try_from(columns) else { return false };
+    let mut y = *x;
+    for j in 0..M {
+        y[j] /= columns[j][j];
+        for i in j + 1..M {
+            y[i] -= columns[j][i] * y[j];
+        }
+    }
+    for j in (0..M).rev() {
+        let mut known = -0.0;
+        for i in j + 1..M {
+            known += columns[j][i] * y[i];
+        }
+        y[j] = (y[j] - known) / columns[j][j];
+    }
+    *x = y;
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Products and solutions of fixed sizes have the bits of those of any size.
+    #[test]
+    fn fixed_sizes_have_the_bits_of_any() {
+        for m in 1..12 {
+            let l = DMatrix::from_fn(m, m, |i, j| ((3 * i + 7 * j + m) as f64).sin() + if i == j { 3.0 } else { 0.0 });
+            let x: Vec<f64> = (0..m).map(|i| (i as f64 + 0.3).cos()).collect();
+            let mut product = x.clone();
+            add_product(&l, &x, &mut product);
+            let mut expected = x.clone();
+            (0..m).for_each(|j| (0..m).for_each(|i| expected[i] += l[(i, j)] * x[j]));
+            assert_eq!(product, expected);
+            let mut solved = x.clone();
+            solve_factored(&l, &mut solved);
+            let mut expected = x;
+            for j in 0..m {
+                expected[j] /= l[(j, j)];
+                (j + 1..m).for_each(|i| expected[i] -= l[(i, j)] * expected[j]);
+            }
+            for j in (0..m).rev() {
+                let known: f64 = (j + 1..m).map(|i| l[(i, j)] * expected[i]).sum();
+                expected[j] = (expected[j] - known) / l[(j, j)];
+            }
+            assert_eq!(solved, expected);
+        }
     }
 }

@@ -3,7 +3,7 @@
 //! The forces are those of polynomials, whose change along a motion costs about as much as the forces. Bodies follow by the exact kinematics of the
 //! tree over values with their derivatives, once at the end of a trial.
 
-use super::coordinates::ReducedMotion;
+use super::coordinates::{ReducedMotion, add_product};
 use crate::equations::Motion;
 use crate::reduced::ReducedSpace;
 use crate::reduced::polynomial::motion::{PolynomialForces, PolynomialMotion};
@@ -13,6 +13,7 @@ use bimorph_domains::{Drive, Ramp};
 use bimorph_multibody::joint_coordinates::sprung_loops::derivatives::Changes;
 use bimorph_multibody::joint_coordinates::sprung_loops::poses::LaneJointStates;
 use bimorph_multibody::planar::Pose;
+use nalgebra::DMatrix;
 
 /// Sources whose final voltages the motion is differentiated by.
 #[derive(Debug, Clone)]
@@ -32,6 +33,8 @@ pub(super) struct ReducedPortSensitivities {
     room: Vec<Pose>,
     /// ∂(bodies' motion)/∂(final voltage of a source).
     pub(super) bodies: Vec<Motion>,
+    /// Whether the matrices at the start of a step stand for the change of the forces with the motion in all its stages.
+    pub(super) first_tangent: bool,
 }
 
 impl ReducedPortSensitivities {
@@ -51,6 +54,7 @@ impl ReducedPortSensitivities {
             given: LaneJointStates::at_rest(&vec![Pose::zeros(); count]),
             room: vec![Pose::zeros(); count],
             bodies: vec![Motion::zeros(count); sources.len()],
+            first_tangent: false,
         }
     }
 
@@ -91,15 +95,17 @@ impl ReducedPortSensitivities {
         }
     }
 
-    /// The argument of stage `i` of source `p`, and ∂R/∂(final voltage) there in `force`, at time `s` (s) of the ramp.
+    /// The argument of stage `i` of source `p`, and ∂R/∂(final voltage) there in `force`, at time `s` (s) of the ramp. `matrices` are stiffness, damping and
+    /// mass at the start of the step.
     pub(super) fn stage(
         &mut self,
         (of, forces): (&PolynomialMotion, &mut PolynomialForces),
         ramp: &Ramp<'_>,
         (p, i, s): (usize, usize, f64),
         (motion, drive): (&ReducedMotion, &Drive),
+        matrices: [&DMatrix<f64>; 3],
     ) {
-        let Self { sources, now, at, increments, force, change, .. } = self;
+        let Self { sources, now, at, increments, force, change, first_tangent, .. } = self;
         at.copy(&now[p]);
         for (j, u) in increments[p][..i].iter().enumerate() {
             at.add(A[i][j], u);
@@ -110,7 +116,12 @@ impl ReducedPortSensitivities {
             // the start of a trial depends on no voltage yet
             return force.fill(0.0);
         }
-        forces.change(of, (motion.parts(), at.parts()), (drive, change), force);
+        if *first_tangent {
+            forces.forcing(of, drive, change, force);
+            matrices.iter().zip(at.parts()).for_each(|(matrix, x)| add_product(matrix, x, force));
+        } else {
+            forces.change(of, (motion.parts(), at.parts()), (drive, change), force);
+        }
     }
 
     /// After the last stage of a step.
