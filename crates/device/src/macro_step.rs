@@ -1,12 +1,14 @@
 //! Macro steps: one step of the motion for many points of the circuit (multirate integration).
 //!
 //! A circuit with nanosecond edges requests points far shorter than the steps of the motion. A macro step predicts the motion once, from an extrapolation
-//! of the squared voltage V². Its points interpolate that prediction. The state accumulates the integrals of V² over time, and the next macro step begins
-//! at the motion corrected with them, so no impulse is lost.
+//! of the square V² of each gap voltage. Its points interpolate that prediction. The state accumulates the integrals of V² over time, and the next macro step
+//! begins at the motion corrected with them, so no impulse is lost.
 //!
-//! The difference between the predicted and the corrected motion decays over the next macro step: the displayed motion is continuous with its rate.
+//! The difference between the predicted and the corrected motion decays over the next macro step, or over steps of its own as a [`DisplayOffset`]: the
+//! displayed motion is continuous with its rate.
 
 use crate::Token;
+use bimorph_multibody::planar::Pose;
 use bimorph_solve::time::method::Motion;
 use std::sync::Arc;
 
@@ -30,8 +32,8 @@ pub struct MacroStep {
     pub displayed: Motion,
     /// Source voltages at the start (V).
     pub sources: Vec<f64>,
-    /// Extrapolation of the squared voltage.
-    pub extrapolation: SquareExtrapolation,
+    /// Extrapolation of the square of each gap voltage.
+    pub extrapolations: Vec<SquareExtrapolation>,
     /// Largest motion up to the start.
     pub peak: PeakMotion,
     /// Consecutive macro steps that the extrapolation is based on, at most two.
@@ -92,8 +94,8 @@ pub struct MacroStepPosition {
     pub elapsed: f64,
     /// Points since its start.
     pub points: u32,
-    /// Integrals of the squared voltage since its start.
-    pub integrals: SquareIntegrals,
+    /// Integrals of the square of each gap voltage since its start.
+    pub integrals: Vec<SquareIntegrals>,
 }
 
 impl MacroStepPosition {
@@ -101,7 +103,12 @@ impl MacroStepPosition {
     pub fn bytes(&self) -> usize {
         let motions = [&self.step.motion, &self.step.displayed].into_iter();
         let poses = motions.map(|m| size_of_val(&m.q[..]) + size_of_val(&m.v[..]));
-        poses.sum::<usize>() + size_of_val(&self.step.sources[..]) + size_of::<MacroStep>() + size_of::<Self>()
+        let voltages = size_of_val(&self.step.extrapolations[..]) + size_of_val(&self.integrals[..]);
+        poses.sum::<usize>()
+            + size_of_val(&self.step.sources[..])
+            + voltages
+            + size_of::<MacroStep>()
+            + size_of::<Self>()
     }
 }
 
@@ -133,10 +140,54 @@ pub(crate) fn interpolate([from, to]: [&Motion; 2], h: f64, x: f64, out: &mut Mo
     }
 }
 
+/// Difference of the displayed motion from the integrated one where a macro step was left. It decays over `length` by the same polynomial, so that the
+/// displayed motion stays continuous with its rate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DisplayOffset {
+    /// The difference where it began.
+    pub start: Arc<Motion>,
+    /// Time until it is zero (s).
+    pub length: f64,
+    /// Time since it began (s).
+    pub elapsed: f64,
+}
+
+impl DisplayOffset {
+    /// Of a displayed motion from an integrated one.
+    pub(crate) fn between(displayed: [&[Pose]; 2], motion: &Motion, length: f64) -> Self {
+        let less = |a: &[Pose], b: &[Pose]| a.iter().zip(b).map(|(a, b)| a - b).collect();
+        let start = Motion { q: less(displayed[0], &motion.q), v: less(displayed[1], &motion.v) };
+        Self { start: Arc::new(start), length, elapsed: 0.0 }
+    }
+
+    /// The same a time `dt` later (s); none where it is zero.
+    pub(crate) fn after(&self, dt: f64) -> Option<Self> {
+        let elapsed = self.elapsed + dt;
+        (elapsed < self.length).then(|| Self { start: Arc::clone(&self.start), length: self.length, elapsed })
+    }
+
+    /// `to += factor` times the difference now.
+    pub(crate) fn add(&self, factor: f64, to: &mut Motion) {
+        let (x, h) = (self.elapsed / self.length, self.length);
+        let rest = 1.0 - x;
+        let of_q = [rest * rest * (1.0 + 2.0 * x), -6.0 * x * rest / h].map(|share| factor * share);
+        let of_v = [h * x * rest * rest, rest * (1.0 - 3.0 * x)].map(|share| factor * share);
+        let Motion { q, v } = &*self.start;
+        for (j, (q, v)) in q.iter().zip(v).enumerate() {
+            to.q[j] += q * of_q[0] + v * of_v[0];
+            to.v[j] += q * of_q[1] + v * of_v[1];
+        }
+    }
+
+    /// Bytes in memory.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&self.start.q[..]) + size_of_val(&self.start.v[..]) + size_of::<Self>()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bimorph_multibody::planar::Pose;
 
     /// Integrals of a piecewise linear voltage are those of its square, by Simpson's rule (exact for cubics), and the fitted line has them.
     #[test]
@@ -173,6 +224,28 @@ mod tests {
         }
         let e = 1e-5;
         near(&[(at(0.3 + e).q[0] - at(0.3 - e).q[0]) / (2.0 * e * h)], &at(0.3).v);
+    }
+
+    /// An offset is that of its start at first, ends at zero with its rate, and its rate is the derivative of its displacement.
+    #[test]
+    fn an_offset_decays_with_its_rate() {
+        let pose = |x: f64| vec![Pose::new(x, -x, 3.0 * x)];
+        let zero = Motion::zeros(1);
+        let offset = DisplayOffset::between([&pose(1.0), &pose(2.0)], &zero, 0.5);
+        let at = |t: f64| {
+            let mut motion = Motion::zeros(1);
+            if let Some(offset) = offset.after(t) {
+                offset.add(1.0, &mut motion);
+            }
+            motion
+        };
+        let near = |a: Pose, b: Pose| assert!((a - b).norm() < 1e-6, "{a:?} {b:?}");
+        near(at(0.0).q[0], pose(1.0)[0]);
+        near(at(0.0).v[0], pose(2.0)[0]);
+        let e = 1e-6;
+        near((at(0.2 + e).q[0] - at(0.2 - e).q[0]) / (2.0 * e), at(0.2).v[0]);
+        assert!(at(0.5 - e).q[0].norm() < 1e-9 && at(0.5 - e).v[0].norm() < 1e-3);
+        assert_eq!(at(0.5), zero);
     }
 
     /// The candidate that fits the last macro step is used for the next one, from the value at its end.

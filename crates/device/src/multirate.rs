@@ -1,7 +1,10 @@
 //! Multirate integration of a session: prediction of macro steps, and correction of the motion at their ends ([`crate::macro_step`]).
 
 use crate::Token;
-use crate::macro_step::{MacroStep, MacroStepPosition, PeakMotion, SquareExtrapolation, extended, fitted_line};
+use crate::macro_step::{
+    DisplayOffset, MacroStep, MacroStepPosition, PeakMotion, SquareExtrapolation, SquareIntegrals, extended,
+    fitted_line,
+};
 use crate::states::Snapshot;
 use bimorph_base::ErrorBudget;
 use bimorph_domains::{Drive, Ramp, System};
@@ -15,11 +18,13 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Points of the requested length that a macro step must hold (1).
-const MIN_POINTS: f64 = 6.0;
+const MIN_POINTS: f64 = 2.0;
 /// Points without macro steps after one that ended within [`MIN_POINTS`].
 const PAUSE: u32 = 64;
 /// Largest difference of rows of gap voltages that count as equal (1).
 const EQUAL_ROWS: f64 = 1e-12;
+/// Most different gap voltages.
+const MOST_VOLTAGES: usize = 16;
 /// Smallest motion since the equilibrium, relative to the displacement from the drawing, for which macro steps are made (1).
 const MIN_MOTION: f64 = 1e-6;
 /// Predicted macro steps in the cache.
@@ -30,15 +35,13 @@ const MAX_STEPS: usize = 64;
 /// Storage of multirate integration.
 #[derive(Debug)]
 pub(crate) struct Multirate {
-    /// Change of the voltage of all gaps with each source (1).
-    row: Vec<f64>,
-    /// Whether a signal or port shows a rate.
+    /// The gap voltages that differ by more than their sign.
+    voltages: Vec<SharedVoltage>,
+    /// Whether a signal or port shows a rate, or may.
     sees_rates: bool,
     stepper: Adaptive<Rodas4>,
     drive: Drive,
     change: Drive,
-    /// Force on each body per squared voltage (N/V², N·m/V²).
-    force: Vec<Pose>,
     push: Vec<Pose>,
     push_rate: Vec<Pose>,
     motion: Motion,
@@ -48,77 +51,21 @@ pub(crate) struct Multirate {
     corrected: Option<(Token, Arc<Snapshot>)>,
 }
 
-/// Prediction of a macro step.
+/// A voltage that lies across some gaps.
 #[derive(Debug)]
-pub(crate) struct PredictedStep {
-    step: Arc<MacroStep>,
-    /// Its length, and the proposed next one (s); none where the step failed.
-    pub(crate) lengths: Option<[f64; 2]>,
-    /// Motion at its end.
-    pub(crate) end: Motion,
-    /// Acceleration per squared voltage, in the norm of masses.
-    acceleration: f64,
-    /// Allowed errors of displacements and rates at points, in that norm.
-    allowed: [f64; 2],
+struct SharedVoltage {
+    /// Its change with each source (1).
+    row: Vec<f64>,
+    /// The gaps.
+    gaps: Vec<usize>,
+    /// Force on each body per squared voltage (N/V², N·m/V²).
+    force: Vec<Pose>,
 }
 
-impl Multirate {
-    /// None for a mechanism whose forces depend on more than one voltage, or act on bodies without mass.
-    pub(crate) fn new(system: &System, sees_rates: bool) -> Option<Self> {
-        let electrics = &system.electrics;
-        let (heating, others) = (&electrics.heating, electrics.inputs.len());
-        if heating.states() > 0 || heating.means() > 0 || others > 0 || !electrics.floating.is_empty() {
-            return None;
-        }
-        let rows = &electrics.gap_rows;
-        let mut active = (0..rows.nrows()).filter(|gap| rows.row(*gap).iter().any(|x| *x != 0.0));
-        let first = active.next()?;
-        let equal =
-            |gap: usize| rows.row(gap).iter().zip(rows.row(first).iter()).all(|(a, b)| (a - b).abs() <= EQUAL_ROWS);
-        if !active.all(equal) {
-            return None;
-        }
-        let n = system.bodies();
-        let mut multirate = Self {
-            row: rows.row(first).iter().copied().collect(),
-            sees_rates,
-            stepper: Adaptive::new(n, Rodas4::new(system, &[])),
-            drive: electrics.drive(),
-            change: electrics.drive(),
-            force: vec![Pose::zeros(); n],
-            push: vec![Pose::zeros(); n],
-            push_rate: vec![Pose::zeros(); n],
-            motion: Motion::zeros(n),
-            cache: VecDeque::with_capacity(CACHED),
-            corrected: None,
-        };
-        multirate.evaluate_force(system, &vec![Pose::zeros(); n]);
-        multirate.acceleration(system).is_finite().then_some(multirate)
-    }
-
-    /// Voltage of the gaps (V).
-    pub(crate) fn volts(&self, sources: &[f64]) -> f64 {
+impl SharedVoltage {
+    /// Its value (V).
+    fn volts(&self, sources: &[f64]) -> f64 {
         self.row.iter().zip(sources).map(|(row, source)| row * source).sum()
-    }
-
-    /// Evaluates the force per squared voltage at displacements `q`.
-    fn evaluate_force(&mut self, system: &System, q: &[Pose]) {
-        for (gap, row) in system.electrics.gap_rows.row_iter().enumerate() {
-            let is_active = row.iter().any(|x| *x != 0.0);
-            // r contains −½·V²·∇C
-            (self.drive.volts[gap], self.change.volts[gap]) = if is_active { (1.0, 0.5) } else { (0.0, 0.0) };
-        }
-        self.change.load = 0.0;
-        system.drive_force(q, &self.drive, &self.change, &mut self.force);
-        self.force.iter_mut().for_each(|force| *force = -*force);
-    }
-
-    /// Sets the external force to that of a squared voltage which is linear in time: value (V²) and slope (V²/s).
-    fn set_push(&mut self, [value, slope]: [f64; 2]) {
-        for ((push, rate), force) in self.push.iter_mut().zip(&mut self.push_rate).zip(&self.force) {
-            *push = force * value;
-            *rate = force * slope;
-        }
     }
 
     /// Acceleration per squared voltage, in the norm of masses; infinite where a gap acts on a body without mass.
@@ -129,8 +76,94 @@ impl Multirate {
         };
         self.force.iter().enumerate().map(squared).sum::<f64>().sqrt()
     }
+}
 
-    /// Motion at a state in a macro step, corrected with the integrals of its squared voltage, and the proposed next step (s). Sources are linear between both
+/// Prediction of a macro step.
+#[derive(Debug)]
+pub(crate) struct PredictedStep {
+    step: Arc<MacroStep>,
+    /// Its length, and the proposed next one (s); none where the step failed.
+    pub(crate) lengths: Option<[f64; 2]>,
+    /// Motion at its end.
+    pub(crate) end: Motion,
+    /// Acceleration per square of each voltage, in the norm of masses.
+    accelerations: Vec<f64>,
+    /// Allowed errors of displacements and rates at points, in that norm.
+    allowed: [f64; 2],
+}
+
+impl Multirate {
+    /// None for a mechanism with heaters, floating conductors or mechanical inputs, without gap voltages, or with gaps that act on bodies without mass.
+    pub(crate) fn new(system: &System, sees_rates: bool) -> Option<Self> {
+        let electrics = &system.electrics;
+        let (heating, others) = (&electrics.heating, electrics.inputs.len());
+        if heating.states() > 0 || heating.means() > 0 || others > 0 || !electrics.floating.is_empty() {
+            return None;
+        }
+        let n = system.bodies();
+        let voltages = gap_voltages(system);
+        if voltages.is_empty() || voltages.len() > MOST_VOLTAGES {
+            return None;
+        }
+        let mut multirate = Self {
+            // the current of a port at a constant voltage is that of the motion
+            sees_rates: sees_rates || voltages.len() > 1,
+            voltages,
+            stepper: Adaptive::new(n, Rodas4::new(system, &[])),
+            drive: electrics.drive(),
+            change: electrics.drive(),
+            push: vec![Pose::zeros(); n],
+            push_rate: vec![Pose::zeros(); n],
+            motion: Motion::zeros(n),
+            cache: VecDeque::with_capacity(CACHED),
+            corrected: None,
+        };
+        multirate.evaluate_forces(system, &vec![Pose::zeros(); n]);
+        multirate.voltages.iter().all(|voltage| voltage.acceleration(system).is_finite()).then_some(multirate)
+    }
+
+    /// Number of voltages across gaps.
+    pub(crate) fn voltages(&self) -> usize {
+        self.voltages.len()
+    }
+
+    /// Adds a time `dt` (s) over which the sources go linearly `from` some values `to` others to the integrals of a macro step.
+    pub(crate) fn extend(&self, step: &MacroStep, integrals: &mut [SquareIntegrals], dt: f64, [from, to]: [&[f64]; 2]) {
+        for (voltage, integrals) in self.voltages.iter().zip(integrals) {
+            let start = voltage.volts(&step.sources).powi(2);
+            *integrals = extended(*integrals, dt, [voltage.volts(from), voltage.volts(to)], start);
+        }
+    }
+
+    /// Evaluates the force per square of each voltage at displacements `q`.
+    fn evaluate_forces(&mut self, system: &System, q: &[Pose]) {
+        self.change.load = 0.0;
+        for SharedVoltage { gaps, force, .. } in &mut self.voltages {
+            self.drive.volts.fill(0.0);
+            self.change.volts.fill(0.0);
+            for &gap in &*gaps {
+                // r contains −½·V²·∇C
+                (self.drive.volts[gap], self.change.volts[gap]) = (1.0, 0.5);
+            }
+            system.drive_force(q, &self.drive, &self.change, force);
+            force.iter_mut().for_each(|force| *force = -*force);
+        }
+    }
+
+    /// Sets the external force to that of squared voltages which are linear in time: values (V²) and slopes (V²/s).
+    fn set_push(&mut self, lines: impl Iterator<Item = [f64; 2]>) {
+        let Self { voltages, push, push_rate, .. } = self;
+        push.fill(Pose::zeros());
+        push_rate.fill(Pose::zeros());
+        for (voltage, [value, slope]) in voltages.iter().zip(lines).filter(|(_, line)| *line != [0.0; 2]) {
+            for ((push, rate), force) in push.iter_mut().zip(&mut *push_rate).zip(&voltage.force) {
+                *push += force * value;
+                *rate += force * slope;
+            }
+        }
+    }
+
+    /// Motion at a state in a macro step, corrected with the integrals of squared voltages, and the proposed next step (s). Sources are linear between both
     /// states. The residual of the integrals acts as a force at the mean configuration.
     fn correct(
         &mut self,
@@ -142,11 +175,14 @@ impl Multirate {
         let errors = relative_errors((system, weights), step, errors)?;
         let mean = |(q, end): (&Pose, &Pose)| 0.5 * (q + end);
         let q: Vec<Pose> = step.motion.q.iter().zip(&state.q).map(mean).collect();
-        self.evaluate_force(system, &q);
-        let sources = [&step.sources, &state.sources];
-        let volts = sources.map(|sources| self.volts(sources));
-        let linear = extended([0.0; 2], elapsed, volts, volts[0].powi(2));
-        self.set_push(fitted_line([0, 1].map(|k| position.integrals[k] - linear[k]), elapsed));
+        self.evaluate_forces(system, &q);
+        let sources = [&step.sources[..], &state.sources[..]];
+        let mut linear = vec![[0.0; 2]; self.voltages.len()];
+        self.extend(step, &mut linear, elapsed, sources);
+        let residual = |(found, linear): (&SquareIntegrals, &SquareIntegrals)| {
+            fitted_line([0, 1].map(|k| found[k] - linear[k]), elapsed)
+        };
+        self.set_push(position.integrals.iter().zip(&linear).map(residual));
         let ramp = Ramp::new(&system.electrics, sources[0], sources[1], &[], elapsed)
             .pushed_along(&self.push, &self.push_rate);
         self.motion.copy(&step.motion);
@@ -173,12 +209,12 @@ impl Multirate {
             end: step.motion.clone(),
             step,
             lengths: None,
-            acceleration: 0.0,
+            accelerations: Vec::new(),
             allowed: [0.0; 2],
         };
         let Some(relative) = relative_errors((system, weights), &step, errors) else { return failed(step) };
-        self.evaluate_force(system, &step.motion.q);
-        self.set_push(step.extrapolation.line());
+        self.evaluate_forces(system, &step.motion.q);
+        self.set_push(step.extrapolations.iter().map(|square| square.line()));
         let ramp = Ramp::new(&system.electrics, &step.sources, &step.sources, &[], step.trial_step)
             .pushed_along(&self.push, &self.push_rate);
         self.motion.copy(&step.motion);
@@ -205,7 +241,7 @@ impl Multirate {
             step,
             lengths: (length > 0.0).then_some([length, h]),
             end: self.motion.clone(),
-            acceleration: self.acceleration(system),
+            accelerations: self.voltages.iter().map(|voltage| voltage.acceleration(system)).collect(),
             allowed: [allowed, of_rates],
         }
     }
@@ -245,6 +281,7 @@ impl Multirate {
         {
             return None;
         }
+        let voltages = self.voltages.len();
         let predicted = match self.cache.iter().position(|known| known.step.start == token) {
             // by another trial of this point
             Some(place) => &self.cache[place],
@@ -259,7 +296,7 @@ impl Multirate {
             step: Arc::clone(&predicted.step),
             elapsed: 0.0,
             points: 0,
-            integrals: [0.0; 2],
+            integrals: vec![[0.0; 2]; voltages],
         })
     }
 
@@ -271,14 +308,17 @@ impl Multirate {
         errors: ErrorBudget,
     ) -> Option<MacroStep> {
         let displayed = Motion { q: parent.q.clone(), v: parent.v.clone() };
-        let (motion, extrapolation, history) = match parent.macro_step.as_deref() {
-            None => (displayed.clone(), SquareExtrapolation::default(), 0),
+        let (motion, extrapolations, history) = match parent.macro_step.as_deref() {
+            None => (integrated(parent), vec![SquareExtrapolation::default(); self.voltages.len()], 0),
             Some(position) => {
                 let (motion, _) = self.correct(about, (position, parent), errors)?;
                 let step = &position.step;
-                let [start, end] = [&step.sources, &parent.sources].map(|sources| self.volts(sources).powi(2));
-                let extrapolation = step.extrapolation.next(position.integrals, position.elapsed, start - end);
-                (motion, extrapolation, 1 + step.history.min(1))
+                let next = |(k, square): (usize, &SquareExtrapolation)| {
+                    let [start, end] =
+                        [&step.sources, &parent.sources].map(|sources| self.voltages[k].volts(sources).powi(2));
+                    square.next(position.integrals[k], position.elapsed, start - end)
+                };
+                (motion, step.extrapolations.iter().enumerate().map(next).collect(), 1 + step.history.min(1))
             }
         };
         Some(MacroStep {
@@ -286,15 +326,16 @@ impl Multirate {
             motion,
             displayed,
             sources: parent.sources.clone(),
-            extrapolation,
+            extrapolations,
             peak: parent.peak,
             history,
             trial_step: parent.next_step,
         })
     }
 
-    /// A state in a macro step with the corrected motion, from which steps without macro steps continue.
-    pub(crate) fn corrected_state(
+    /// A state with the integrated motion, from which steps without macro steps continue, and with the offset of the displayed motion. None where both are
+    /// the same.
+    pub(crate) fn integrated_state(
         &mut self,
         about: (&System, &NormWeights),
         (state, token): (&Snapshot, Token),
@@ -303,19 +344,58 @@ impl Multirate {
         if let Some((_, known)) = self.corrected.as_ref().filter(|(of, _)| *of == token) {
             return Some(Arc::clone(known));
         }
-        let position = state.macro_step.as_deref()?;
-        let (motion, next_step) = self.correct(about, (position, state), errors)?;
-        let corrected = Arc::new(Snapshot { q: motion.q, v: motion.v, next_step, ..state.clone() });
+        let (Motion { q, v }, next_step, offset) = match state.macro_step.as_deref() {
+            None => (integrated(state), state.next_step, state.offset.clone()?),
+            Some(position) => {
+                let (motion, next_step) = self.correct(about, (position, state), errors)?;
+                let offset = DisplayOffset::between([&state.q, &state.v], &motion, next_step);
+                (motion, next_step, Box::new(offset))
+            }
+        };
+        let corrected = Arc::new(Snapshot { q, v, next_step, offset: Some(offset), ..state.clone() });
         self.corrected = Some((token, Arc::clone(&corrected)));
         Some(corrected)
     }
 }
 
+/// The motion that steps continue from: the displayed one less its offset.
+fn integrated(state: &Snapshot) -> Motion {
+    let mut motion = Motion { q: state.q.clone(), v: state.v.clone() };
+    if let Some(offset) = &state.offset {
+        offset.add(-1.0, &mut motion);
+    }
+    motion
+}
+
+/// The different voltages across gaps, with their gaps.
+fn gap_voltages(system: &System) -> Vec<SharedVoltage> {
+    let mut voltages: Vec<SharedVoltage> = Vec::new();
+    for (gap, row) in system.electrics.gap_rows.row_iter().enumerate() {
+        if row.iter().all(|x| *x == 0.0) {
+            continue;
+        }
+        let equal = |voltage: &&mut SharedVoltage| {
+            [1.0, -1.0].iter().any(|sign| row.iter().zip(&voltage.row).all(|(a, b)| (a - sign * b).abs() <= EQUAL_ROWS))
+        };
+        match voltages.iter_mut().find(equal) {
+            Some(voltage) => voltage.gaps.push(gap),
+            None => {
+                let force = vec![Pose::zeros(); system.bodies()];
+                voltages.push(SharedVoltage { row: row.iter().copied().collect(), gaps: vec![gap], force });
+            }
+        }
+    }
+    voltages
+}
+
 impl PredictedStep {
     /// Bound of the errors of displacements and rates at a time (s) after the start, relative to the allowed ones.
-    pub(crate) fn error_bound(&self, elapsed: f64, integrals: [f64; 2]) -> f64 {
-        let [rate, displacement] =
-            self.step.extrapolation.residual(integrals, elapsed).map(|x| x.abs() * self.acceleration);
+    pub(crate) fn error_bound(&self, elapsed: f64, integrals: &[SquareIntegrals]) -> f64 {
+        let squares = self.step.extrapolations.iter().zip(integrals).zip(&self.accelerations);
+        let errors = squares.map(|((square, integrals), acceleration)| {
+            square.residual(*integrals, elapsed).map(|x| x.abs() * acceleration)
+        });
+        let [rate, displacement] = errors.fold([0.0; 2], |[rate, displacement], [r, d]| [rate + r, displacement + d]);
         // zero stays zero where the allowed error is zero
         let relative = |error: f64, allowed: f64| if error == 0.0 { 0.0 } else { error / allowed };
         // a sum propagates NaN, a maximum would not

@@ -64,6 +64,7 @@ impl DeviceSession {
             peak,
             origin,
             macro_step: self.position.take(),
+            offset: self.offset.take(),
         };
         reply.token = Some(self.states.insert(request, snapshot));
     }

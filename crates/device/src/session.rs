@@ -5,7 +5,7 @@ pub(crate) mod reduction;
 use super::agitation::ThermalForce;
 use super::growth::{Difference, Growth};
 use super::held_motion::HeldMotion;
-use super::macro_step::MacroStepPosition;
+use super::macro_step::{DisplayOffset, MacroStepPosition};
 use super::multirate::Multirate;
 use super::output_gradient::{OutputGradient, surroundings};
 use super::phase_error::PhaseErrorMonitor;
@@ -80,6 +80,8 @@ pub(super) struct DeviceSession {
     pub(super) multirate: Option<Box<Multirate>>,
     /// Position of the current trial in a macro step.
     pub(super) position: Option<Box<MacroStepPosition>>,
+    /// Offset of the displayed motion after a step without macro steps.
+    pub(super) offset: Option<Box<DisplayOffset>>,
     /// Whether the current trial exceeds the error bound of a macro step.
     pub(super) exceeds_bound: bool,
 }
@@ -143,6 +145,7 @@ impl DeviceSession {
             held,
             multirate,
             position: None,
+            offset: None,
             exceeds_bound: false,
             opened: request.clone(),
             shaken,
@@ -200,6 +203,14 @@ impl DeviceSession {
             && state.shown.numbers().into_iter().flatten().all(|x| x.is_finite())
             && (followed == 0 || followed == self.signals.len() + self.ports.len())
             && state.macro_step.as_ref().is_none_or(|position| self.fits_in(position))
+            && state.offset.as_ref().is_none_or(|offset| {
+                let DisplayOffset { start, length, elapsed } = &**offset;
+                self.multirate.is_some()
+                    && poses(&start.q)
+                    && poses(&start.v)
+                    && length.is_finite()
+                    && (0.0..*length).contains(elapsed)
+            })
             && (state.carried.is_empty()
                 || state.carried.len() == carried.len() && state.carried.iter().zip(carried).all(alike))
     }
@@ -207,13 +218,17 @@ impl DeviceSession {
     /// Whether a position in a macro step has the sizes of this session, and finite values.
     fn fits_in(&self, position: &MacroStepPosition) -> bool {
         let MacroStepPosition { step, elapsed, integrals, .. } = position;
-        let (e, n) = (step.extrapolation, self.motion.q.len());
-        let numbers = [step.trial_step, step.peak.displacement, step.peak.rate, *elapsed, e.mean, e.value, e.slope];
+        let n = self.motion.q.len();
+        let Some(voltages) = self.multirate.as_ref().map(|multirate| multirate.voltages()) else { return false };
+        let numbers = [step.trial_step, step.peak.displacement, step.peak.rate, *elapsed];
+        let squares = step.extrapolations.iter().flat_map(|e| [e.mean, e.value, e.slope]);
         let poses = [&step.motion.q, &step.motion.v, &step.displayed.q, &step.displayed.v];
-        self.multirate.is_some()
-            && poses.iter().all(|poses| poses.len() == n && poses.iter().all(|p| p.iter().all(|x| x.is_finite())))
+        poses.iter().all(|poses| poses.len() == n && poses.iter().all(|p| p.iter().all(|x| x.is_finite())))
             && step.sources.len() == self.sources.len()
-            && step.sources.iter().chain(&numbers).chain(integrals).all(|x| x.is_finite())
+            && step.extrapolations.len() == voltages
+            && integrals.len() == voltages
+            && step.sources.iter().chain(&numbers).chain(integrals.as_flattened()).all(|x| x.is_finite())
+            && squares.into_iter().all(f64::is_finite)
             && step.trial_step > 0.0
             && *elapsed > 0.0
     }

@@ -4,7 +4,7 @@
 //! original. Reading trusts nothing: lengths are bounded by the bytes that are there, and sizes by the model's.
 
 use super::contract::{Agitation, DeviceError, OpenRequest, Token, refused};
-use super::macro_step::{MacroStep, MacroStepPosition, PeakMotion, SquareExtrapolation};
+use super::macro_step::{DisplayOffset, MacroStep, MacroStepPosition, PeakMotion, SquareExtrapolation};
 use super::states::{Snapshot, States};
 use super::step_history::StepHistory;
 use bimorph_multibody::planar::{DOF, Pose};
@@ -12,7 +12,7 @@ use bimorph_solve::time::method::Motion;
 use std::sync::Arc;
 
 /// Magic bytes: a name and the version of this format.
-const HEAD: [u8; 8] = *b"bimorph\x05";
+const HEAD: [u8; 8] = *b"bimorph\x06";
 /// Those of states of a reduced model: format 3 behind the name of its coordinates. They lie in no macro steps.
 const HEAD_REDUCED: [u8; 8] = *b"bimorph\x04";
 /// Those of format 3, whose states lie in no macro steps.
@@ -108,20 +108,28 @@ impl SnapshotWriter {
         self.word(state.pause.into());
         self.peak(state.peak);
         self.poses(&state.origin);
+        self.word(state.offset.is_some().into());
+        if let Some(DisplayOffset { start, length, elapsed }) = state.offset.as_deref() {
+            [&start.q, &start.v].iter().for_each(|poses| self.poses(poses));
+            [length, elapsed].iter().for_each(|x| self.word(x.to_bits()));
+        }
         self.word(state.macro_step.is_some().into());
         let Some(MacroStepPosition { step, elapsed, points, integrals }) = state.macro_step.as_deref() else { return };
         self.word(step.start.0);
         [&step.motion, &step.displayed].iter().flat_map(|m| [&m.q, &m.v]).for_each(|poses| self.poses(poses));
         self.numbers(&step.sources);
-        let SquareExtrapolation { mean, value, slope, is_linear } = step.extrapolation;
-        [mean, value, slope].iter().for_each(|x| self.word(x.to_bits()));
-        self.word(is_linear.into());
+        self.count(step.extrapolations.len());
+        for SquareExtrapolation { mean, value, slope, is_linear } in &step.extrapolations {
+            [mean, value, slope].iter().for_each(|x| self.word(x.to_bits()));
+            self.word((*is_linear).into());
+        }
         self.peak(step.peak);
         self.word(step.history.into());
         self.word(step.trial_step.to_bits());
         self.word(elapsed.to_bits());
         self.word((*points).into());
-        integrals.iter().for_each(|x| self.word(x.to_bits()));
+        self.count(integrals.len());
+        integrals.as_flattened().iter().for_each(|x| self.word(x.to_bits()));
     }
 
     fn peak(&mut self, PeakMotion { displacement, rate }: PeakMotion) {
@@ -179,7 +187,8 @@ impl SnapshotReader<'_> {
             };
             if is_multirate {
                 (state.pause, state.peak) = (self.small()?, self.peak()?);
-                (state.origin, state.macro_step) = (self.poses()?.into(), self.macro_step()?);
+                (state.origin, state.offset, state.macro_step) =
+                    (self.poses()?.into(), self.offset()?, self.macro_step()?);
             }
             states.put(token, (parent != 0).then_some(Token(parent)), state);
         }
@@ -224,6 +233,15 @@ impl SnapshotReader<'_> {
         Some(PeakMotion { displacement: self.number()?, rate: self.number()? })
     }
 
+    /// Offset of a displayed motion.
+    fn offset(&mut self) -> Option<Option<Box<DisplayOffset>>> {
+        if !self.flag()? {
+            return Some(None);
+        }
+        let start = Arc::new(self.motion()?);
+        Some(Some(Box::new(DisplayOffset { start, length: self.number()?, elapsed: self.number()? })))
+    }
+
     /// Position of a state in a macro step.
     fn macro_step(&mut self) -> Option<Option<Box<MacroStepPosition>>> {
         if !self.flag()? {
@@ -234,11 +252,13 @@ impl SnapshotReader<'_> {
             motion: self.motion()?,
             displayed: self.motion()?,
             sources: self.numbers()?,
-            extrapolation: SquareExtrapolation {
-                mean: self.number()?,
-                value: self.number()?,
-                slope: self.number()?,
-                is_linear: self.flag()?,
+            extrapolations: {
+                let mut extrapolations = Vec::new();
+                for _ in 0..self.count(32)? {
+                    let [mean, value, slope] = [self.number()?, self.number()?, self.number()?];
+                    extrapolations.push(SquareExtrapolation { mean, value, slope, is_linear: self.flag()? });
+                }
+                extrapolations
             },
             peak: self.peak()?,
             history: self.small()?,
@@ -248,7 +268,13 @@ impl SnapshotReader<'_> {
             step: Arc::new(step),
             elapsed: self.number()?,
             points: self.small()?,
-            integrals: [self.number()?, self.number()?],
+            integrals: {
+                let mut integrals = Vec::new();
+                for _ in 0..self.count(16)? {
+                    integrals.push([self.number()?, self.number()?]);
+                }
+                integrals
+            },
         })))
     }
 
@@ -333,13 +359,20 @@ mod tests {
                         motion: motion(1.0),
                         displayed: motion(3.0),
                         sources: vec![1.0, 2.0],
-                        extrapolation: SquareExtrapolation { mean: 0.5, value: 0.6, slope: 0.7, is_linear: true },
+                        extrapolations: vec![
+                            SquareExtrapolation { mean: 0.5, value: 0.6, slope: 0.7, is_linear: true },
+                            SquareExtrapolation::default(),
+                        ],
                         peak: PeakMotion { displacement: 3e-9, rate: 1e-9 },
                         history: 2,
                         trial_step: 1e-7,
                     };
-                    let integrals = [1e-9, 2e-18];
+                    let integrals = vec![[1e-9, 2e-18], [0.0, -0.0]];
                     Box::new(MacroStepPosition { step: Arc::new(step), elapsed: 1e-8, points: 3, integrals })
+                }),
+                offset: (of_macro_steps && k == 0).then(|| {
+                    let start = Arc::new(Motion { q: pose(1.0), v: pose(2.0) });
+                    Box::new(DisplayOffset { start, length: 1e-7, elapsed: 1e-8 })
                 }),
                 pause: u32::from(of_macro_steps),
                 peak: match of_macro_steps {

@@ -1,6 +1,6 @@
 //! The states behind tokens: immutable, few, found by a hash of the request that made them.
 
-use super::macro_step::{MacroStepPosition, PeakMotion};
+use super::macro_step::{DisplayOffset, MacroStepPosition, PeakMotion};
 use super::step_history::StepHistory;
 use super::{Mode, Token, Trial};
 use bimorph_multibody::planar::Pose;
@@ -38,6 +38,8 @@ pub struct Snapshot {
     pub carried: Vec<Motion>,
     /// Position in a macro step; none: the state follows steps of its own.
     pub macro_step: Option<Box<MacroStepPosition>>,
+    /// Offset of the displayed motion `q`, `v` from the integrated one, after a macro step.
+    pub offset: Option<Box<DisplayOffset>>,
     /// Points until macro steps are made again.
     pub pause: u32,
     /// Largest motion since the equilibrium.
@@ -152,6 +154,7 @@ fn size(s: &Snapshot) -> usize {
     (s.q.len() + s.v.len()) * size_of::<Pose>()
         + s.carried.iter().map(|m| m.q.len() + m.v.len()).sum::<usize>() * size_of::<Pose>()
         + s.macro_step.as_ref().map_or(0, |position| position.bytes())
+        + s.offset.as_ref().map_or(0, |offset| offset.bytes())
         + size_of_val(&s.origin[..])
         + (s.rise.len() + s.sources.len() + s.anchors.len() + s.shown.doubles()) * 8
         + size_of::<Snapshot>()

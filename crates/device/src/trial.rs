@@ -42,7 +42,7 @@ impl DeviceSession {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
         let electrics = &system.electrics;
-        self.position = None;
+        (self.position, self.offset) = (None, None);
         self.fill_sources(electrics, request.voltages);
         if let Err(error) = check_heat(compiled, electrics, &self.sources) {
             reply.status = Status::Fail(error.to_string());
@@ -146,9 +146,9 @@ impl DeviceSession {
         let beyond = self.is_beyond(&self.sources);
         let next_step;
         (next_step, self.position) = self.in_macro_step(system, (request, parent), errors).unzip();
-        let corrected = parent.filter(|_| next_step.is_none());
-        let corrected = corrected.and_then(|parent| self.corrected_parent(system, (request, parent), errors));
-        let parent = corrected.as_deref().or(parent);
+        let integrated = parent.filter(|_| next_step.is_none());
+        let integrated = integrated.and_then(|parent| self.integrated_parent(system, (request, parent), errors));
+        let parent = integrated.as_deref().or(parent);
         let held = next_step.or_else(|| self.about_held(system, (request, parent), tol));
         if held.is_none() {
             self.begin(parent, beyond);
@@ -203,6 +203,10 @@ impl DeviceSession {
         if let Some(runaway) = thermal_runaway(compiled, &self.sources, &self.rise) {
             reply.status = Status::Fail(runaway);
             return true;
+        }
+        self.offset = integrated.as_deref().and_then(|state| state.offset.as_ref()?.after(request.dt)).map(Box::new);
+        if let Some(offset) = &self.offset {
+            offset.add(1.0, &mut self.motion);
         }
         let rest = Snapshot::default();
         self.answer(compiled, request, Some((&from, parent.unwrap_or(&rest))), h, reply);

@@ -18,7 +18,7 @@
 //! The decision depends on the parent, the length and the voltages alone: trials are pure. Predictions are cached, and made again from the state where the
 //! cache has others.
 
-use crate::macro_step::{MacroStepPosition, extended, interpolate};
+use crate::macro_step::{MacroStepPosition, interpolate};
 use crate::multirate::Multirate;
 use crate::session::DeviceSession;
 use crate::states::Snapshot;
@@ -62,18 +62,17 @@ impl DeviceSession {
         let continued = parent.macro_step.as_deref().filter(|position| {
             let predicted = multirate.predicted(about, &position.step, errors);
             let fits = predicted.lengths.is_some_and(|[length, _]| position.elapsed + dt <= length);
-            fits && predicted.error_bound(position.elapsed, position.integrals) <= 0.5
+            fits && predicted.error_bound(position.elapsed, &position.integrals) <= 0.5
         });
-        let MacroStepPosition { step, elapsed, points, integrals } = match continued {
+        let MacroStepPosition { step, elapsed, points, mut integrals } = match continued {
             Some(position) => position.clone(),
             None => multirate.begin(about, (dt, parent, token), errors)?,
         };
-        let volts = [&parent.sources, &self.sources].map(|sources| multirate.volts(sources));
-        let integrals = extended(integrals, dt, volts, multirate.volts(&step.sources).powi(2));
+        multirate.extend(&step, &mut integrals, dt, [&parent.sources, &self.sources]);
         let elapsed = elapsed + dt;
         let predicted = multirate.predicted(about, &step, errors);
         let [length, next_step] = predicted.lengths?;
-        self.exceeds_bound = predicted.error_bound(elapsed, integrals) > 1.0;
+        self.exceeds_bound = predicted.error_bound(elapsed, &integrals) > 1.0;
         // a step of its own reports points too short for its arithmetic
         if self.exceeds_bound || dt < f64::EPSILON * length {
             return None;
@@ -83,14 +82,14 @@ impl DeviceSession {
         Some((next_step, Box::new(MacroStepPosition { step, elapsed, points, integrals })))
     }
 
-    /// The parent with the corrected motion. None where it lies in no macro step.
-    pub(crate) fn corrected_parent(
+    /// The parent with the integrated motion. None where that is the displayed one.
+    pub(crate) fn integrated_parent(
         &mut self,
         system: &System,
         (request, parent): (&Trial<'_>, &Snapshot),
         errors: ErrorBudget,
     ) -> Option<Arc<Snapshot>> {
         let multirate = self.multirate.as_mut()?;
-        multirate.corrected_state((system, &self.weights), (parent, request.parent?), errors)
+        multirate.integrated_state((system, &self.weights), (parent, request.parent?), errors)
     }
 }
