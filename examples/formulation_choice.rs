@@ -7,11 +7,14 @@
 //! lowest mode, undamped, at tolerances of 1e-2 and 1e-3.
 //!
 //! Each run has a line. `steps` are accepted ones, and `all_steps` those of all runs with rejected ones. `whole_ms` is the time of the analysis with its
-//! mesh, the least of some. The error is the root mean
+//! mesh, the least of some. `work` counts all runs: solves, forces and factorizations, weighted as `bimorph chart` does, times unknowns. Bodies also go by
+//! other methods, which are given up after twenty times the time of the default one. `scripts/profiles` draws performance profiles. The error is the root mean
 //! square of the worst signal, of its amplitude, from `auto` at a hundredth of the tolerance. A refusal stands in place of the numbers. The summary goes to
 //! standard error.
 
+use bimorph::analysis::chart::passes;
 use bimorph::analysis::chosen_run::{FittedRun, run_as_chosen};
+use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::step_error::with_step_error;
@@ -27,6 +30,10 @@ const TOLERANCES: [f64; 2] = [1e-2, 1e-3];
 const KINDS: [&str; 5] = ["chain", "tree", "held", "branches", "frame"];
 /// `rcr-elastic` is `rcr` with this method.
 const FIXED: [Formulation; 3] = [Formulation::Compliant, Formulation::Rcr, Formulation::Reduced];
+/// Other methods for bodies.
+const METHODS: [Integrator; 2] = [Integrator::GeneralizedAlpha { rho: Integrator::RHO }, Integrator::Radau5];
+/// Longest time of another method, relative to the default one.
+const LONGEST: f64 = 20.0;
 /// Tolerance from which on there are reduced models in time.
 const REDUCED: f64 = 5e-3;
 /// Work of `auto` relative to the best formulation that is accepted.
@@ -81,14 +88,35 @@ struct Done {
     /// Of all runs (ms).
     runs: f64,
     steps: u64,
+    /// Of all runs, in passes over one unknown.
+    work: f64,
     shortest: f64,
     segments: usize,
+}
+
+/// Formulation, method and tolerance of a run.
+#[derive(Clone, Copy)]
+struct Way {
+    formulation: Formulation,
+    method: Integrator,
+    tol: f64,
+    /// Longest time (s).
+    patience: f64,
+}
+
+impl Way {
+    /// By the default method.
+    fn by(formulation: Formulation, tol: f64) -> Self {
+        Self { formulation, method: Integrator::default(), tol, patience: PATIENCE }
+    }
 }
 
 fn main() {
     let given: Vec<usize> = std::env::args().skip(1).filter_map(|word| word.parse().ok()).collect();
     let (first, count) = (given.first().copied().unwrap_or(0), given.get(1).copied().unwrap_or(SCENES));
-    println!("scene,kind,tol,formulation,took,error,reported,steps,all_steps,runs_ms,whole_ms,shortest_s,segments");
+    println!(
+        "scene,kind,tol,formulation,took,error,reported,steps,all_steps,runs_ms,whole_ms,work,shortest_s,segments"
+    );
     let mut counts = Summary::default();
     for number in first..first + count {
         let Some(scene) = scene(number) else {
@@ -115,7 +143,7 @@ struct Summary {
 
 /// Every formulation on one mechanism at one tolerance.
 fn compare(number: usize, scene: &Scene, tol: f64, counts: &mut Summary) {
-    let reference = run(scene, Formulation::Auto, tol / 100.0, 1);
+    let reference = run(scene, Way::by(Formulation::Auto, tol / 100.0), 1);
     let line = |name: &str, done: &Result<Done, String>| {
         print!("{number},{},{tol:e},{name},", KINDS[number % KINDS.len()]);
         match done {
@@ -124,12 +152,13 @@ fn compare(number: usize, scene: &Scene, tol: f64, counts: &mut Summary) {
                 let took = took.split(':').next().unwrap_or_default();
                 let error = reference.as_ref().map_or(f64::NAN, |best| error(&best.result, &done.result));
                 println!(
-                    "{took},{error:.2e},{:.2e},{},{},{:.2},{:.2},{:.1e},{}",
+                    "{took},{error:.2e},{:.2e},{},{},{:.2},{:.2},{:.3e},{:.1e},{}",
                     reported(&done.result),
                     done.result.counters.steps,
                     done.steps,
                     done.runs,
                     done.whole,
+                    done.work,
                     done.shortest,
                     done.segments
                 );
@@ -141,14 +170,21 @@ fn compare(number: usize, scene: &Scene, tol: f64, counts: &mut Summary) {
             }
         }
     };
-    let auto = run(scene, Formulation::Auto, tol, 3);
+    let auto = run(scene, Way::by(Formulation::Auto, tol), 3);
     let error = line("auto", &auto);
     let mut best: Option<(u64, f64)> = None;
     let mut accepted = 0;
     for formulation in FIXED.into_iter().filter(|f| *f != Formulation::Reduced || tol >= REDUCED) {
-        let done = run(scene, formulation, tol, 3);
+        let done = run(scene, Way::by(formulation, tol), 3);
         line(formulation.name(), &done);
         accepted += usize::from(done.is_ok());
+        if formulation == Formulation::Compliant {
+            let longest = done.as_ref().map_or(PATIENCE, |done| (LONGEST * 1e-3 * done.whole).min(PATIENCE));
+            for method in METHODS {
+                let way = Way { method, patience: longest, ..Way::by(formulation, tol) };
+                line(method.name(), &run(scene, way, 3));
+            }
+        }
         // one whose error is beyond the tolerance has not answered
         let holds =
             |done: &Done| reference.as_ref().map_or(true, |best| self::error(&best.result, &done.result) <= tol);
@@ -205,11 +241,11 @@ fn error(reference: &TransientResult, found: &TransientResult) -> f64 {
 }
 
 /// The analysis of a front end, `times` times.
-fn run(scene: &Scene, formulation: Formulation, tol: f64, times: usize) -> Result<Done, String> {
+fn run(scene: &Scene, way: Way, times: usize) -> Result<Done, String> {
     let mut best: Option<Done> = None;
     let begun = Instant::now();
     for _ in 0..times {
-        let done = once(scene, formulation, tol)?;
+        let done = once(scene, way)?;
         let (whole, runs) = best.as_ref().map_or((f64::INFINITY, f64::INFINITY), |best| (best.whole, best.runs));
         let long = begun.elapsed().as_secs_f64() > 0.1;
         best = Some(Done { whole: done.whole.min(whole), runs: done.runs.min(runs), ..done });
@@ -224,7 +260,7 @@ fn ms(begin: Instant, end: Instant) -> f64 {
     1e3 * (end - begin).as_secs_f64()
 }
 
-fn once(scene: &Scene, formulation: Formulation, tol: f64) -> Result<Done, String> {
+fn once(scene: &Scene, Way { formulation, method, tol, patience }: Way) -> Result<Done, String> {
     let options = CompileOptions { tol, formulation, undamped: true, ..CompileOptions::default() };
     let begin = Instant::now();
     let moving = scene.compiled(&options, if scene.release { 0.0 } else { scene.force })?;
@@ -235,9 +271,10 @@ fn once(scene: &Scene, formulation: Formulation, tol: f64) -> Result<Done, Strin
         points: 101,
         tol,
         release: held.as_ref(),
+        method,
         ..TransientOptions::default()
     };
-    let (mut shortest, mut steps, mut segments, mut runs) = (f64::INFINITY, 0, 0, 0.0);
+    let (mut shortest, mut steps, mut work, mut segments, mut runs) = (f64::INFINITY, 0, 0.0, 0, 0.0);
     let mut attempt = |fitted: FittedRun, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
         let meshed = Instant::now();
         segments = fitted.moving.order.segments.iter().copied().max().unwrap_or(0);
@@ -249,10 +286,12 @@ fn once(scene: &Scene, formulation: Formulation, tol: f64) -> Result<Done, Strin
             let mut see = |fraction: f64| {
                 shortest = f64::min(shortest, (fraction - before) * options.stop);
                 before = fraction;
-                watch(fraction) && begin.elapsed().as_secs_f64() < PATIENCE
+                watch(fraction) && begin.elapsed().as_secs_f64() < patience
             };
             let result = transient(&fitted.moving, options, sample, &mut see)?;
             steps += result.counters.steps + result.counters.rejected;
+            let c = result.counters;
+            work += passes(c.factorizations, c.solves, c.forces) * result.unknowns as f64;
             Ok((result, ()))
         };
         let done = with_step_error(&options, &fitted.moving, &mut go, sample, watch);
@@ -261,7 +300,7 @@ fn once(scene: &Scene, formulation: Formulation, tol: f64) -> Result<Done, Strin
     };
     let found = run_as_chosen(&moving, &options, &mut attempt, &mut |_, _| (), &mut |_| true);
     let (result, ()) = found.map_err(|e| e.to_string())?;
-    Ok(Done { result, whole: ms(begin, Instant::now()), runs, steps, shortest, segments })
+    Ok(Done { result, whole: ms(begin, Instant::now()), runs, steps, work, shortest, segments })
 }
 
 impl Scene {

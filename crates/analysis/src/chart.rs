@@ -22,7 +22,7 @@ mod spec;
 pub mod steps;
 mod variant;
 
-pub use spec::{Chart, ChartError, ChartPart, ChartPoint, ChartSpec, Formulation, RunMeasurement};
+pub use spec::{Chart, ChartError, ChartPart, ChartPoint, ChartSpec, Formulation, RunMeasurement, passes};
 pub use variant::released;
 
 use super::modes::modes;

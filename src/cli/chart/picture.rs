@@ -1,5 +1,6 @@
 //! A chart as a picture: one panel for each part.
 
+use super::table::work;
 use bimorph::analysis::chart::{Chart, ChartPart, ChartPoint, RunMeasurement};
 use bimorph::results::plot::Picture;
 use bimorph::results::plot::axis::quantity;
@@ -12,7 +13,7 @@ pub(crate) enum CostMeasure {
     /// Wall-clock time
     #[default]
     Time,
-    /// Passes over the model; multiplications of a step
+    /// Factorizations, solves and force evaluations, weighted by their cost; times unknowns where models differ; multiplications of a step
     Counts,
 }
 
@@ -37,6 +38,9 @@ pub(super) fn draw(title: &str, chart: &Chart, work: CostMeasure) -> Picture {
     }
     if shown(ChartPart::Solvers) {
         notes.push("Solvers: one step of Rodas4, a tangent, a factorization and six solves.".into());
+    }
+    if work == CostMeasure::Counts && (shown(ChartPart::Precision) || shown(ChartPart::Order)) {
+        notes.push("Work: a force evaluation counts 1, a factorization with its tangent 2, a solve 0.23.".into());
     }
     if work == CostMeasure::Time {
         notes.push("Times are wall-clock times on one machine, medians.".into());
@@ -71,7 +75,7 @@ fn panel(chart: &Chart, part: ChartPart, work: CostMeasure) -> Option<LogPanel> 
             curves.len() - 1
         });
         if let Some(m) = &p.measured {
-            let work = effort(m, work);
+            let work = effort(p, m, work);
             match part {
                 ChartPart::Solvers => curves[k].points.push([p.unknowns as f64, work]),
                 ChartPart::Defaults => curves[k].points.push([p.tol, m.error.unwrap_or(f64::NAN)]),
@@ -87,7 +91,8 @@ fn panel(chart: &Chart, part: ChartPart, work: CostMeasure) -> Option<LogPanel> 
     }
     let run = match work {
         CostMeasure::Time => "time of a run [s]",
-        CostMeasure::Counts => "factorizations + solves + force evaluations",
+        CostMeasure::Counts if part == ChartPart::Order => "work [force evaluations × unknowns]",
+        CostMeasure::Counts => "work [force evaluations]",
     };
     Some(match part {
         ChartPart::Precision => LogPanel {
@@ -151,10 +156,10 @@ fn cost(chart: &Chart) -> Option<LogPanel> {
     })
 }
 
-fn effort(m: &RunMeasurement, work: CostMeasure) -> f64 {
-    match work {
+fn effort(p: &ChartPoint, m: &RunMeasurement, cost: CostMeasure) -> f64 {
+    match cost {
         CostMeasure::Time => m.seconds,
-        CostMeasure::Counts => m.count() as f64,
+        CostMeasure::Counts => work(p, m),
     }
 }
 
