@@ -35,9 +35,8 @@ impl ErrorBudget {
     const STEP: f64 = 1e-2;
     /// The same for a step that many points share: points with steps of their own would be far nearer.
     const SHARED_STEP: f64 = 1e-3;
-    /// Fraction of the tolerance by which points within a step may be off its motion. This does not add up, but a circuit differentiates it over points
-    /// that are far shorter than a step.
-    const WITHIN_STEP: f64 = 1e-3;
+    /// Fraction of the tolerance by which points within a step may be off its motion. This does not add up.
+    const WITHIN_STEP: f64 = 1e-2;
     /// The same of rates.
     const RATES_WITHIN_STEP: f64 = 0.05;
     /// Least fraction of the tolerance that is left to the steps beside the mesh.

@@ -1,6 +1,6 @@
 //! Macro steps: one step of the motion for many points of the circuit (multirate integration).
 //!
-//! A circuit with nanosecond edges requests points far shorter than the steps of the motion. A macro step predicts the motion once, from an extrapolation
+//! A circuit with nanosecond edges requests points far shorter than the steps of the motion. A macro step predicts the motion over two of these, from an extrapolation
 //! of the square V² of each gap voltage. Its points interpolate that prediction. The state accumulates the integrals of V² over time, and the next macro step
 //! begins at the motion corrected with them, so no impulse is lost.
 //!
@@ -126,22 +126,33 @@ pub(crate) fn fitted_line([once, twice]: SquareIntegrals, time: f64) -> [f64; 2]
     [once / time - 0.5 * slope * time, slope]
 }
 
-/// Cubic Hermite polynomial through the motion at both ends of a step of length `h` (s), at the fraction `x` of it.
-pub(crate) fn interpolate([from, to]: [&Motion; 2], h: f64, x: f64, out: &mut Motion) {
-    let (rest, square) = (1.0 - x, x * x);
-    let [a, b] = [rest * rest * (1.0 + 2.0 * x), square * (3.0 - 2.0 * x)];
-    let [c, d] = [h * x * rest * rest, -h * square * rest];
-    let bend = 6.0 * x * rest / h;
-    let [e, f] = [rest * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)];
-    for j in 0..out.q.len() {
-        let ([p, q], [v, w]) = ([from.q[j], to.q[j]], [from.v[j], to.v[j]]);
-        out.q[j] = p * a + q * b + v * c + w * d;
-        out.v[j] = (q - p) * bend + v * e + w * f;
-    }
+/// Hermite polynomial of fifth degree through three motions with their rates: shares of each displacement and of each rate in the displacement and in the
+/// rate at time `t` (s). The `times` of the second and the third follow that of the first, 0.
+pub(crate) fn hermite_shares(times: [f64; 2], t: f64) -> [[[f64; 2]; 2]; 3] {
+    let nodes = [0.0, times[0], times[1]];
+    std::array::from_fn(|i| {
+        let [j, k] = [(i + 1) % 3, (i + 2) % 3].map(|other| nodes[other]);
+        let x = t - nodes[i];
+        let [a, b] = [nodes[i] - j, nodes[i] - k].map(f64::recip);
+        // Lagrange's polynomial of the node, its slope, and its slope at the node
+        let [at_j, at_k] = [(t - j) * a, (t - k) * b];
+        let (value, slope, steep) = (at_j * at_k, a * at_k + b * at_j, a + b);
+        let square = [value * value, 2.0 * value * slope];
+        let level = 1.0 - 2.0 * steep * x;
+        [[level * square[0], level * square[1] - 2.0 * steep * square[0]], [x * square[0], x * square[1] + square[0]]]
+    })
 }
 
-/// Difference of the displayed motion from the integrated one where a macro step was left. It decays over `length` by the same polynomial, so that the
-/// displayed motion stays continuous with its rate.
+/// Shares of a displacement and of its rate in the displacement and in the rate a time `t` later (s), as both decay to zero over a `length` by a cubic
+/// polynomial.
+pub(crate) fn decay_shares(t: f64, length: f64) -> [[f64; 2]; 2] {
+    let x = t / length;
+    let rest = 1.0 - x;
+    [[rest * rest * (1.0 + 2.0 * x), -6.0 * x * rest / length], [t * rest * rest, rest * (1.0 - 3.0 * x)]]
+}
+
+/// Difference of the displayed motion from the integrated one where a macro step was left. It decays over `length`, so that the displayed motion stays
+/// continuous with its rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DisplayOffset {
     /// The difference where it began.
@@ -168,10 +179,7 @@ impl DisplayOffset {
 
     /// `to += factor` times the difference now.
     pub(crate) fn add(&self, factor: f64, to: &mut Motion) {
-        let (x, h) = (self.elapsed / self.length, self.length);
-        let rest = 1.0 - x;
-        let of_q = [rest * rest * (1.0 + 2.0 * x), -6.0 * x * rest / h].map(|share| factor * share);
-        let of_v = [h * x * rest * rest, rest * (1.0 - 3.0 * x)].map(|share| factor * share);
+        let [of_q, of_v] = decay_shares(self.elapsed, self.length).map(|shares| shares.map(|share| factor * share));
         let Motion { q, v } = &*self.start;
         for (j, (q, v)) in q.iter().zip(v).enumerate() {
             to.q[j] += q * of_q[0] + v * of_v[0];
@@ -206,24 +214,19 @@ mod tests {
         assert!((simpson(&|t| (1.5 - t) * of_line(t), 0.0, 1.5) - found[1]).abs() < 1e-12);
     }
 
-    /// The polynomial has the motion at both ends, and its rates are the derivatives of its displacements.
+    /// The polynomial has the motion at its nodes, its rates are the derivatives of its displacements, and it is exact for the fifth degree.
     #[test]
-    fn rates_are_derivatives_of_displacements() {
-        let pose = |x: f64| vec![Pose::new(x, -x, 3.0 * x)];
-        let (from, to) = (Motion { q: pose(1.0), v: pose(2.0) }, Motion { q: pose(-0.5), v: pose(0.7) });
-        let h = 0.5;
-        let at = |x: f64| {
-            let mut motion = Motion::zeros(1);
-            interpolate([&from, &to], h, x, &mut motion);
-            motion
-        };
-        let near = |a: &[Pose], b: &[Pose]| assert!((a[0] - b[0]).norm() < 1e-7, "{a:?} {b:?}");
-        for (found, expected) in [(at(0.0), &from), (at(1.0), &to)] {
-            near(&found.q, &expected.q);
-            near(&found.v, &expected.v);
+    fn interpolation_is_exact_for_the_fifth_degree() {
+        let q = |t: f64| 1.0 - 2.0 * t + 3.0 * t.powi(2) - t.powi(3) + 0.5 * t.powi(4) + 2.0 * t.powi(5);
+        let v = |t: f64| -2.0 + 6.0 * t - 3.0 * t * t + 2.0 * t.powi(3) + 10.0 * t.powi(4);
+        let times = [0.4, 1.1];
+        for t in [0.0, 0.1, 0.4, 0.75, 1.1] {
+            let mut found = [0.0; 2];
+            for (node, shares) in [0.0, 0.4, 1.1].into_iter().zip(hermite_shares(times, t)) {
+                (0..2).for_each(|k| found[k] += shares[0][k] * q(node) + shares[1][k] * v(node));
+            }
+            assert!((found[0] - q(t)).abs() < 1e-12 && (found[1] - v(t)).abs() < 1e-12, "{t}: {found:?}");
         }
-        let e = 1e-5;
-        near(&[(at(0.3 + e).q[0] - at(0.3 - e).q[0]) / (2.0 * e * h)], &at(0.3).v);
     }
 
     /// An offset is that of its start at first, ends at zero with its rate, and its rate is the derivative of its displacement.

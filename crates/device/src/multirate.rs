@@ -2,8 +2,8 @@
 
 use crate::Token;
 use crate::macro_step::{
-    DisplayOffset, MacroStep, MacroStepPosition, PeakMotion, SquareExtrapolation, SquareIntegrals, extended,
-    fitted_line,
+    DisplayOffset, MacroStep, MacroStepPosition, PeakMotion, SquareExtrapolation, SquareIntegrals, decay_shares,
+    extended, fitted_line, hermite_shares,
 };
 use crate::states::Snapshot;
 use bimorph_base::ErrorBudget;
@@ -18,7 +18,9 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Points of the requested length that a macro step must hold (1).
-const MIN_POINTS: f64 = 2.0;
+const MIN_POINTS: f64 = 6.0;
+/// Steps of the integrator that a macro step holds.
+const INTEGRATOR_STEPS: f64 = 2.0;
 /// Points without macro steps after one that ended within [`MIN_POINTS`].
 const PAUSE: u32 = 64;
 /// Largest difference of rows of gap voltages that count as equal (1).
@@ -82,10 +84,10 @@ impl SharedVoltage {
 #[derive(Debug)]
 pub(crate) struct PredictedStep {
     step: Arc<MacroStep>,
-    /// Its length, and the proposed next one (s); none where the step failed.
-    pub(crate) lengths: Option<[f64; 2]>,
-    /// Motion at its end.
-    pub(crate) end: Motion,
+    /// Times since its start at which its two steps of the integrator end (s), and the proposed next step (s); none where one failed.
+    pub(crate) ends: Option<([f64; 2], f64)>,
+    /// Motions there.
+    motions: [Motion; 2],
     /// Acceleration per square of each voltage, in the norm of masses.
     accelerations: Vec<f64>,
     /// Allowed errors of displacements and rates at points, in that norm.
@@ -198,7 +200,7 @@ impl Multirate {
         matches!(advanced, Ok(Advance::Done)).then(|| (self.motion.clone(), h))
     }
 
-    /// Predicts a macro step: one step of the integrator under the extrapolated voltage.
+    /// Predicts a macro step: two steps of the integrator under the extrapolated voltages.
     fn predict(
         &mut self,
         (system, weights): (&System, &NormWeights),
@@ -206,41 +208,44 @@ impl Multirate {
         errors: ErrorBudget,
     ) -> PredictedStep {
         let failed = |step: Arc<MacroStep>| PredictedStep {
-            end: step.motion.clone(),
+            motions: [step.motion.clone(), step.motion.clone()],
             step,
-            lengths: None,
+            ends: None,
             accelerations: Vec::new(),
             allowed: [0.0; 2],
         };
         let Some(relative) = relative_errors((system, weights), &step, errors) else { return failed(step) };
         self.evaluate_forces(system, &step.motion.q);
         self.set_push(step.extrapolations.iter().map(|square| square.line()));
-        let ramp = Ramp::new(&system.electrics, &step.sources, &step.sources, &[], step.trial_step)
+        let longest = INTEGRATOR_STEPS * step.trial_step;
+        let ramp = Ramp::new(&system.electrics, &step.sources, &step.sources, &[], longest)
             .pushed_along(&self.push, &self.push_rate);
         self.motion.copy(&step.motion);
-        let (mut h, mut length) = (step.trial_step, 0.0);
+        let (mut h, mut ends, mut middle) = (step.trial_step, Vec::new(), None);
         let advanced = self.stepper.advance(
             &mut Bodies::weighed(system, &ramp, weights),
             &mut self.motion,
             &mut h,
             Control::Tolerance(relative.shared_step()),
-            1,
-            &mut |_, taken, _, _| {
-                length = taken;
-                false
+            MAX_STEPS,
+            &mut |t, taken, _, after| {
+                ends.push(t + taken);
+                middle.get_or_insert_with(|| after.clone());
+                ends.len() < 2
             },
         );
-        let ends = [&step.motion, &self.motion];
-        let allowed = weights.allowed_error(system, ends, relative.within_step());
-        let (Ok(_), Some(allowed)) = (advanced, allowed) else { return failed(step) };
+        let allowed = weights.allowed_error(system, [&step.motion, &self.motion], relative.within_step());
+        let (Ok(_), Some(allowed), Some(middle), &[first, last]) = (advanced, allowed, middle, &ends[..]) else {
+            return failed(step);
+        };
         let of_rates = match self.sees_rates {
             true => ErrorBudget::of(errors.rates_within_step()).within(step.peak.rate),
             false => f64::INFINITY,
         };
         PredictedStep {
             step,
-            lengths: (length > 0.0).then_some([length, h]),
-            end: self.motion.clone(),
+            ends: (first > 0.0 && last > first).then_some(([first, last], h)),
+            motions: [middle, self.motion.clone()],
             accelerations: self.voltages.iter().map(|voltage| voltage.acceleration(system)).collect(),
             allowed: [allowed, of_rates],
         }
@@ -277,7 +282,9 @@ impl Multirate {
         (dt, parent, token): (f64, &Snapshot, Token),
         errors: ErrorBudget,
     ) -> Option<MacroStepPosition> {
-        if parent.pause > 0 || dt * MIN_POINTS > parent.next_step || parent.macro_step.as_deref().is_some_and(is_short)
+        if parent.pause > 0
+            || dt * MIN_POINTS > INTEGRATOR_STEPS * parent.next_step
+            || parent.macro_step.as_deref().is_some_and(is_short)
         {
             return None;
         }
@@ -291,7 +298,7 @@ impl Multirate {
                 self.store(predicted)
             }
         };
-        let [length, _] = predicted.lengths?;
+        let ([_, length], _) = predicted.ends?;
         (dt * MIN_POINTS <= length).then(|| MacroStepPosition {
             step: Arc::clone(&predicted.step),
             elapsed: 0.0,
@@ -389,6 +396,25 @@ fn gap_voltages(system: &System) -> Vec<SharedVoltage> {
 }
 
 impl PredictedStep {
+    /// Sets the displayed motion at a time (s) after the start, which `ends` at the given times.
+    pub(crate) fn display(&self, ends: [f64; 2], elapsed: f64, out: &mut Motion) {
+        let MacroStep { motion, displayed, .. } = &*self.step;
+        let ([start, middle, end], nodes) = (hermite_shares(ends, elapsed), [&self.motions[0], &self.motions[1]]);
+        let [of_q, of_v] = decay_shares(elapsed, ends[1]);
+        for j in 0..out.q.len() {
+            let ([q, v], [shown_q, shown_v]) = ([motion.q[j], motion.v[j]], [displayed.q[j], displayed.v[j]]);
+            let (off_q, off_v) = (shown_q - q, shown_v - v);
+            let at = |k: usize| {
+                let mut sum = q * start[0][k] + v * start[1][k] + off_q * of_q[k] + off_v * of_v[k];
+                for (node, shares) in nodes.iter().zip([middle, end]) {
+                    sum += node.q[j] * shares[0][k] + node.v[j] * shares[1][k];
+                }
+                sum
+            };
+            (out.q[j], out.v[j]) = (at(0), at(1));
+        }
+    }
+
     /// Bound of the errors of displacements and rates at a time (s) after the start, relative to the allowed ones.
     pub(crate) fn error_bound(&self, elapsed: f64, integrals: &[SquareIntegrals]) -> f64 {
         let squares = self.step.extrapolations.iter().zip(integrals).zip(&self.accelerations);

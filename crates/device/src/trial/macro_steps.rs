@@ -1,16 +1,16 @@
 //! Trials within macro steps ([`crate::macro_step`]): points that are far shorter than a step of the motion.
 //!
-//! With the predicted motion q(t) and the difference ΔV² of the squared voltage from its extrapolation, the error at a point is at most
+//! With the predicted motion q(t) and the difference ΔV² of each squared voltage from its extrapolation, the error at a point is at most
 //! ```text
-//! e(t) = |M⁻¹·½·∇C| · |∬ ΔV² dt²|
+//! e(t) = Σ |M⁻¹·½·∇C| · |∬ ΔV² dt²|
 //! ```
 //! in the norm of masses: elastic forces only reduce it. A trial interpolates q(t) if
 //!
 //! * every body has its own coordinates, and there is no thermal agitation;
-//! * the same voltage lies across all gaps, and no heater, floating conductor or input other than voltages exists. The displacement current of a voltage
-//!   change exceeds the motional current that is neglected, which the current of a second voltage would show;
-//! * the macro step holds six points of this length;
-//! * e is within the tolerance for points within a step, and so is ė where a signal shows a rate.
+//! * no heater, floating conductor or input other than voltages exists;
+//! * the macro step holds six points of this length, which is three in a step of the integrator;
+//! * e is within the tolerance for points within a step, and so is ė where a signal shows a rate, or gaps have different voltages: a current at a constant
+//!   voltage is that of the motion.
 //!
 //! Where e exceeds half of that at the parent, or the macro step ends, the next one begins at the parent. The partials neglect the response of the motion
 //! within the point, which is part of e.
@@ -18,7 +18,7 @@
 //! The decision depends on the parent, the length and the voltages alone: trials are pure. Predictions are cached, and made again from the state where the
 //! cache has others.
 
-use crate::macro_step::{MacroStepPosition, interpolate};
+use crate::macro_step::MacroStepPosition;
 use crate::multirate::Multirate;
 use crate::session::DeviceSession;
 use crate::states::Snapshot;
@@ -61,7 +61,7 @@ impl DeviceSession {
         let (about, dt) = ((system, &self.weights), request.dt);
         let continued = parent.macro_step.as_deref().filter(|position| {
             let predicted = multirate.predicted(about, &position.step, errors);
-            let fits = predicted.lengths.is_some_and(|[length, _]| position.elapsed + dt <= length);
+            let fits = predicted.ends.is_some_and(|([_, length], _)| position.elapsed + dt <= length);
             fits && predicted.error_bound(position.elapsed, &position.integrals) <= 0.5
         });
         let MacroStepPosition { step, elapsed, points, mut integrals } = match continued {
@@ -71,13 +71,13 @@ impl DeviceSession {
         multirate.extend(&step, &mut integrals, dt, [&parent.sources, &self.sources]);
         let elapsed = elapsed + dt;
         let predicted = multirate.predicted(about, &step, errors);
-        let [length, next_step] = predicted.lengths?;
+        let (ends, next_step) = predicted.ends?;
         self.exceeds_bound = predicted.error_bound(elapsed, &integrals) > 1.0;
         // a step of its own reports points too short for its arithmetic
-        if self.exceeds_bound || dt < f64::EPSILON * length {
+        if self.exceeds_bound || dt < f64::EPSILON * ends[1] {
             return None;
         }
-        interpolate([&step.displayed, &predicted.end], length, elapsed / length, &mut self.motion);
+        predicted.display(ends, elapsed, &mut self.motion);
         let points = points.saturating_add(1);
         Some((next_step, Box::new(MacroStepPosition { step, elapsed, points, integrals })))
     }
