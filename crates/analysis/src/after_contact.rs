@@ -2,12 +2,14 @@
 //!
 //! Impacts multiply differences: bounces that lose nothing are chaotic. A run that touches is therefore compared with a companion, at ten
 //! times the tolerance or in steps of twice the length. While both stay within ten tolerances of each other, of the amplitude of
-//! each signal, by root mean square over a twentieth of the run, the tolerance holds. From the first window after contact in which they do not, single values hold no more
+//! each signal, by root mean square over a twentieth of the run, the tolerance holds. A run on twice the segments may differ by
+//! one tolerance, by root mean square over the whole run. From the first window after contact in which they do not, single values hold no more
 //! ([`TransientResult::reliable_until`]): the result then has mean, root mean square and range of each signal over what is left
 //! ([`Statistics`]). The mean has a 95 % confidence interval, from the means of five windows of equal length by Student's t.
 
 use super::chart::error::{SMALL, half_range};
 use super::transient::{Statistics, TransientOptions, TransientResult};
+use std::ops::Range;
 
 /// Code of the warning that single values hold no more.
 pub const WARNING: &str = "W049";
@@ -27,6 +29,16 @@ pub(super) struct CompanionRuns<'a> {
     pub(super) run: &'a [Vec<f64>],
     /// Those of the companion as far as it came; none where it failed.
     pub(super) companion: Option<&'a [Vec<f64>]>,
+    pub(super) differs_in: MeshOrSteps,
+}
+
+/// A companion differs from its run in one of these.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum MeshOrSteps {
+    /// Its error is ten times as large.
+    LooserSteps,
+    /// It is on a finer mesh, and the difference is the error of the run.
+    FinerMesh,
 }
 
 /// When parts first touch in a run (s).
@@ -52,9 +64,17 @@ pub(super) fn judge(
     let from = if parted == first { contact } else { (parted - 1) as f64 * pair.spacing };
     result.reliable_until = Some(from);
     result.after_contact = statistics(pair, parted, result);
+    let why = match pair.differs_in {
+        MeshOrSteps::LooserSteps => {
+            "rebounds multiply small differences. Use means over the time that is left (after_contact), or a smaller `restitution` or --tol"
+        }
+        MeshOrSteps::FinerMesh => {
+            "the motion has modes that its mesh does not resolve: one of twice the segments has another. Use means over the time that is left \
+             (after_contact), or a smaller --tol"
+        }
+    };
     result.warnings.push(format!(
-        "{WARNING}: the tolerance {:e} holds up to {from:.4e} s; parts touch at {contact:.4e} s, and from then on rebounds multiply small \
-         differences. Use means over the time that is left (after_contact), or a smaller `restitution` or --tol",
+        "{WARNING}: the tolerance {:e} holds up to {from:.4e} s; parts touch at {contact:.4e} s, and from then on {why}",
         options.errors().requested()
     ));
 }
@@ -69,33 +89,39 @@ fn parted(
 ) -> Option<usize> {
     let Some(companion) = pair.companion else { return Some(first) };
     let both = companion.first().map_or(0, Vec::len).min(count);
-    let allowed = allowed(pair.run, options, result, least);
+    let allowed = allowed(pair, options, result, least);
     let window = (count / COMPARED).max(1);
-    let apart = |from: &usize| {
-        let over = *from..(from + window).min(both);
+    let agree = |over: Range<usize>| {
         let within = |((a, b), most): ((&Vec<f64>, &Vec<f64>), &f64)| {
             let squares: f64 = over.clone().map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum();
             (squares / over.len() as f64).sqrt() <= *most
         };
-        !pair.run.iter().zip(companion).zip(&allowed).all(within)
+        pair.run.iter().zip(companion).zip(&allowed).all(within)
     };
+    let apart = |from: &usize| !agree(*from..(from + window).min(both));
     // a run that ends at an event is a few samples longer or shorter
     let compared_all = result.stopped_at.is_some() || both + window >= count;
+    if pair.differs_in == MeshOrSteps::FinerMesh && compared_all && agree(0..both) {
+        return None;
+    }
     (first..both).step_by(window).find(apart).or_else(|| (!compared_all).then(|| both.max(first)))
 }
 
 /// How far two runs may be apart, signal by signal.
 fn allowed(
-    columns: &[Vec<f64>],
+    pair: &CompanionRuns<'_>,
     options: &TransientOptions<'_>,
     result: &TransientResult,
     least: &dyn Fn(&str) -> f64,
 ) -> Vec<f64> {
     let swings: Vec<(&str, f64)> =
-        result.signals.iter().zip(columns).map(|((_, unit, _), c)| (unit.as_str(), half_range(c))).collect();
+        result.signals.iter().zip(pair.run).map(|((_, unit, _), c)| (unit.as_str(), half_range(c))).collect();
     let largest = |of: &str| swings.iter().filter(|(unit, _)| *unit == of).map(|(_, swing)| *swing).fold(0.0, f64::max);
-    let one =
-        |(unit, swing): &(&str, f64)| options.errors().after_contact(swing.max(SMALL * largest(unit)).max(least(unit)));
+    let size = |(unit, swing): &(&str, f64)| swing.max(SMALL * largest(unit)).max(least(unit));
+    let one = |signal: &(&str, f64)| match pair.differs_in {
+        MeshOrSteps::LooserSteps => options.errors().after_contact(size(signal)),
+        MeshOrSteps::FinerMesh => options.errors().within(size(signal)),
+    };
     swings.iter().map(one).collect()
 }
 
@@ -138,7 +164,7 @@ mod tests {
         let t: Vec<f64> = (0..1000).map(|k| f64::from(k) / 1000.0).collect();
         let sine = t.iter().map(|t| 2.0 + (100.0 * std::f64::consts::PI * t).sin()).collect();
         let run = [sine, t];
-        let pair = CompanionRuns { spacing: 1e-3, run: &run, companion: None };
+        let pair = CompanionRuns { spacing: 1e-3, run: &run, companion: None, differs_in: MeshOrSteps::LooserSteps };
         let named = |name: &str| (name.to_owned(), "m".to_owned(), Vec::new());
         let result = TransientResult { signals: vec![named("a"), named("b")], ..TransientResult::default() };
         let found = statistics(&pair, 0, &result);

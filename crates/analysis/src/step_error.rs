@@ -18,9 +18,10 @@
 //!
 //! Runs without such an estimate are compared with a companion run (`companion.rs`). These are other methods, equal
 //! steps, rotating frames, and models whose parts may touch, where the error is propagated up to the first contact
-//! only. The companion of a run in a reduced model also lacks directions that the run has (`reduced::directions`).
+//! only. A run whose parts touched is compared with one on twice the segments, too (`finer_mesh.rs`). The companion of a run in a reduced model also lacks directions that the run has (`reduced::directions`).
 
 mod companion;
+mod finer_mesh;
 mod run;
 mod samples;
 

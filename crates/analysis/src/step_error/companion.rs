@@ -12,14 +12,15 @@
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
 //! is continued in proportion to time, as phases go.
 
-use super::super::after_contact::{CompanionRuns, first_contact, judge};
+use super::super::after_contact::{CompanionRuns, MeshOrSteps, first_contact, judge};
 use super::super::chart::error::largest_error;
 use super::super::integrator::Integrator;
 use super::super::transient::error_log::least;
 use super::super::transient::{TransientOptions, TransientResult};
 use super::super::{AnalysisError, ProgressCallback};
+use super::finer_mesh::judge_mesh;
 use super::run::{AT_THE_END, MAX_AGAIN, MAX_WORK, RunFunction, beyond, unknown};
-use super::samples::{BufferedSamples, SelectedSamples, resolved, stride};
+use super::samples::{BufferedSamples, SelectedSamples, columns, resolved, spacing, stride};
 use crate::formulation;
 use crate::reduced::Directions;
 use bimorph_base::ErrorBudget;
@@ -48,6 +49,7 @@ pub(super) fn compared<T>(
     let first = (companion, whole);
     if !is_made_again(options, model, &first) {
         let mut made = once(options, model, first, run, sample, watch)?;
+        made.judge_mesh(options, model, watch)?;
         made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
         return Ok((made.result, made.more, options.errors().requested()));
     }
@@ -85,6 +87,7 @@ pub(super) fn sharper<T>(
             _ => break,
         }
     }
+    made.judge_mesh(options, model, watch)?;
     kept.send(sample);
     made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
     Ok((made.result, made.more, now.requested()))
@@ -129,6 +132,19 @@ pub(super) struct EstimatedRun<T> {
     pub(super) picked: TransientResult,
 }
 
+impl<T> EstimatedRun<T> {
+    /// Compares the run after a contact with one on a finer mesh.
+    fn judge_mesh(
+        &mut self,
+        options: &TransientOptions<'_>,
+        model: &CompiledModel,
+        watch: ProgressCallback<'_>,
+    ) -> Result<(), AnalysisError> {
+        let least = |unit: &str| least(unit, options, model);
+        judge_mesh(options, model, (&mut self.result, &self.picked), &least, watch)
+    }
+}
+
 /// A comparison of a run that has been made.
 pub(super) struct ComparedRun {
     /// The error by the companion (1); none where they cannot be compared.
@@ -168,9 +184,9 @@ fn once<T>(
     }
     let (companion, _) = companion;
     if contact.is_some() {
-        let columns = |run: &TransientResult| run.signals.iter().map(|(_, _, c)| c.clone()).collect::<Vec<_>>();
-        let (run, companion) = (columns(&picked), companion.as_ref().map(columns));
-        let pair = CompanionRuns { spacing: spacing(options), run: &run, companion: companion.as_deref() };
+        let (run, companion) = (columns(&picked.signals), companion.as_ref().map(|run| columns(&run.signals)));
+        let (spacing, companion) = (spacing(options), companion.as_deref());
+        let pair = CompanionRuns { spacing, run: &run, companion, differs_in: MeshOrSteps::LooserSteps };
         judge(&pair, options, &least, &mut result);
     }
     Ok(EstimatedRun { result, more, picked })
@@ -223,11 +239,6 @@ fn reported_fraction(options: &TransientOptions<'_>, method: Integrator) -> f64 
         Some(_) => REPORTED_FRACTION,
         None => share.max(options.errors().of_companion_difference()),
     }
-}
-
-/// Distance of the output times that are compared (s).
-fn spacing(options: &TransientOptions<'_>) -> f64 {
-    stride(options) as f64 * options.stop / (options.points - 1) as f64
 }
 
 /// Number of samples of a run.

@@ -30,6 +30,16 @@ impl BufferedSamples {
     }
 }
 
+/// The samples of each signal.
+pub(super) fn columns(signals: &[(String, String, Vec<f64>)]) -> Vec<Vec<f64>> {
+    signals.iter().map(|(_, _, column)| column.clone()).collect()
+}
+
+/// Distance of the output times that are compared (s).
+pub(super) fn spacing(options: &TransientOptions<'_>) -> f64 {
+    stride(options) as f64 * options.stop / (options.points - 1) as f64
+}
+
 /// True where the displacements of a run exceed the floor of a step's error, or are rounding.
 pub(super) fn resolved(
     picked: &SelectedSamples,
