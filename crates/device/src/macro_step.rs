@@ -4,7 +4,7 @@
 //! of the square V² of each gap voltage. Its points interpolate that prediction. The state accumulates the integrals of V² over time, and the next macro step
 //! begins at the motion corrected with them, so no impulse is lost.
 //!
-//! The difference between the predicted and the corrected motion decays over the next macro step, or over steps of its own as a [`DisplayOffset`]: the
+//! The difference between the predicted and the corrected motion decays over the next macro step, or over ordinary steps as a [`DisplayOffset`]: the
 //! displayed motion is continuous with its rate.
 
 use crate::Token;

@@ -36,7 +36,7 @@ pub struct Snapshot {
     pub shown: StepHistory,
     /// State of a formulation between steps, beside the bodies' motion.
     pub carried: Vec<Motion>,
-    /// Position in a macro step; none: the state follows steps of its own.
+    /// Position in a macro step; none: the state lies in none.
     pub macro_step: Option<Box<MacroStepPosition>>,
     /// Offset of the displayed motion `q`, `v` from the integrated one, after a macro step.
     pub offset: Option<Box<DisplayOffset>>,

@@ -140,7 +140,7 @@ fn an_alternating_voltage_acts_by_its_mean_square() {
     assert!((alternating - steady).abs() < TOL * steady.abs(), "{alternating:e} {steady:e}");
 }
 
-/// The displayed motion has no jump where a macro step begins, ends, or is left for steps of its own, as an edge of the voltage in each hundred points makes
+/// The displayed motion has no jump where a macro step begins, ends, or is left for ordinary steps, as an edge of the voltage in each hundred points makes
 /// it: rates are those of the displacements.
 #[test]
 fn motion_has_no_jumps() {

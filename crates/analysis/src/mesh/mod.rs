@@ -31,7 +31,7 @@ mod path;
 mod permanent_strain;
 mod pull_in;
 mod refined;
-mod remeshed;
+pub(super) mod remeshed;
 mod section_inertia;
 mod signal_amplitudes;
 mod softening;

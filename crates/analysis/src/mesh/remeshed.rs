@@ -40,7 +40,7 @@ pub(super) fn warn_of_mesh(fitted: &mut CompiledModel) {
 }
 
 /// The model with so many segments.
-pub(super) fn meshed<'a>(
+pub(in super::super) fn meshed<'a>(
     compiled: &'a CompiledModel,
     segments: &[usize],
 ) -> Result<Cow<'a, CompiledModel>, AnalysisError> {

@@ -4,6 +4,7 @@
 //! off by more than the estimate of the mesh.
 
 use super::super::after_contact::{CompanionRuns, MeshOrSteps, first_contact, judge};
+use super::super::mesh::remeshed::meshed;
 use super::super::transient::{TransientOptions, TransientResult, transient};
 use super::super::{AnalysisError, ProgressCallback};
 use super::run::MAX_AGAIN;
@@ -11,7 +12,6 @@ use super::samples::{SelectedSamples, columns, spacing};
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::Formulation;
 use bimorph_model::refine::doubling;
-use bimorph_model::refine::mesh_search::Mesh;
 
 /// Work of a run on twice the segments, of that of the run (1).
 const FINER: f64 = 4.0;
@@ -35,9 +35,9 @@ pub(super) fn judge_mesh(
     }
     let finer = doubling::twice(&model.options, &model.order).filter(|finer| finer.segments != model.order.segments);
     let Some(finer) = finer else { return Ok(()) };
-    let on_finer = |of: &CompiledModel| of.with_order(Mesh { segments: finer.segments.clone(), ..of.order.clone() });
-    let (Ok(fine), Ok(start)) = (on_finer(model), options.release.map(on_finer).transpose()) else { return Ok(()) };
-    let options = options.with_release(start.as_ref());
+    let start = options.release.map(|start| meshed(start, &finer.segments)).transpose();
+    let (Ok(fine), Ok(start)) = (meshed(model, &finer.segments), start) else { return Ok(()) };
+    let options = options.with_release(start.as_deref());
     let mut samples = SelectedSamples::new(&options);
     // the run itself has come to its end
     let mut goes_on = |_: f64| watch(1.0);

@@ -57,7 +57,7 @@ impl DeviceSession {
             return None;
         }
         let most = if touching { SMALL_TOUCHING } else { SMALL };
-        // of a port beyond its range the full model has a motion of its own
+        // beyond the range of a port the full model makes the trial
         let leaves = !parent.carried.is_empty() && self.is_beyond(&self.sources);
         let linear = self.shaken.is_none()
             && !self.takes_bodies

@@ -30,7 +30,7 @@ use std::sync::Arc;
 
 impl DeviceSession {
     /// Sets the motion by a macro step and clears its sensitivities. Returns the proposed next internal step (s) and the position of the new state; none where
-    /// the trial requires steps of its own.
+    /// the trial integrates.
     pub(crate) fn in_macro_step(
         &mut self,
         system: &System,
@@ -73,7 +73,7 @@ impl DeviceSession {
         let predicted = multirate.predicted(about, &step, errors);
         let (ends, next_step) = predicted.ends?;
         self.exceeds_bound = predicted.error_bound(elapsed, &integrals) > 1.0;
-        // a step of its own reports points too short for its arithmetic
+        // the integrator reports points that are too short for its arithmetic
         if self.exceeds_bound || dt < f64::EPSILON * ends[1] {
             return None;
         }
