@@ -223,8 +223,8 @@ fn flexible_values(
 }
 
 /// Equilibria of the polynomials are those of the device within 1e-3 of the largest one in the range: a beam that stretches under forces of both
-/// signs, and the bank under the voltage of its heaters. Both have fewer than a fifth of the strains as coordinates. The capacitance of a comb follows the
-/// overlap alone.
+/// signs, and the bank under the voltage of its heaters. Both have fewer than a fifth of the strains as coordinates. The yoke of the bank moves
+/// across the fingers of its comb, which changes the capacitance by 6e-3.
 #[test]
 fn polynomials_have_the_equilibria_of_the_device() {
     let text = Arc::new(compile(&Bundle::from_text("beam.net", STRETCHED), &CompileOptions::default()).unwrap());
@@ -239,8 +239,7 @@ fn polynomials_have_the_equilibria_of_the_device() {
         let fitted = &written.fitted;
         let [displacements, capacitances] = fitted.errors;
         assert!(displacements <= 1e-3, "{signal}: {displacements:e}");
-        // the yoke moves across the fingers of its comb, which changes the capacitance of the full model by so much
-        assert!(capacitances <= if signal == "yoke.y" { 6e-3 } else { 0.0 }, "{signal}: {capacitances:e}");
+        assert!(capacitances <= if signal == "yoke.y" { 1e-3 } else { 0.0 }, "{signal}: {capacitances:e}");
         assert!(5 * fitted.model.size() <= written.strains.max(40), "{}", fitted.model.size());
         let most = values.iter().map(|[_, full]| full.abs()).fold(0.0, f64::max);
         for [found, full] in values {

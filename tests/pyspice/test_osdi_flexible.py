@@ -20,6 +20,15 @@ beam2d p [a m] [l=100u w=2u]
 beam2d p [m b] [l=100u w=2u]
 anchor p [b] []
 """
+SIDEWAYS = """process p = [ Youngsmodulus=160e9 density=2330 h=10u ]
+anchor p [a] []
+beam2d p [a m] [l=200u w=2u]
+beam2d p [m r] [l=20u w=10u]
+sense comb2de p [r s] [N=20 gap=2u l=10u L=20u misalign=0.1u]
+anchor p [s] []
+eground * [r] []
+drive port * [s] []
+"""
 OPTIONS = ".options reltol=1e-6 vntol=1e-9 abstol=1e-18\n"
 
 
@@ -165,19 +174,19 @@ def test_a_beam_stretches(tmp_path):
 
 
 def test_a_bank_is_heated(tmp_path):
-    """The bank of hot-arm actuators has the displacement and the temperature of the plug-in in `.op`, over voltages of its heaters, and through a pulse of
-    them."""
-    signals = ["yoke.y:1e6", "b1.hot.T"]
-    export(BANK, tmp_path, {"heat": "0:2", "sense": "0:20"}, signals)
-    sources = "Vheat n0 0 DC 1 PULSE(0 1.5 0 1u 1u 10 20)\nVsense n1 0 10\n"
+    """The bank of hot-arm actuators has the displacement, the temperature and the capacitance of the plug-in in `.op`, over voltages of its heaters, and through a
+    pulse of them. The comb at 40 V also pulls across its fingers, which changes the capacitance by 5e-3."""
+    signals = ["yoke.y:1e6", "b1.hot.T", "comb.C:1e12"]
+    export(BANK, tmp_path, {"heat": "0:2", "sense": "0:41"}, signals)
+    sources = "Vheat n0 0 DC 1 PULSE(0 1.5 0 1u 1u 10 20)\nVsense n1 0 40\n"
     control = {"op": "op", "dc": "dc Vheat 0 2 0.1", "tran": "tran 0.5u 300u 0 0.5u"}
     full, written = everywhere(BANK, tmp_path, ["heat", "sense"], signals, sources, control)
     pulse = 'vheat (n0 0) v type="pulse" val0=0 val1=1.5 delay=0 rise=1u fall=1u width=10 period=20\n'
-    bias, nodes = "vsense (n1 0) v dc=10\n", "n0 0 n1 0 s0 s1"
+    bias, nodes = "vsense (n1 0) v dc=40\n", "n0 0 n1 0 s0 s1 s2"
     vacask = in_vacask(tmp_path / "vacask", nodes, "vheat (n0 0) v dc=1\n" + bias, {"op": "analysis op op", "dc": swept("dc", "vheat", 0, 2, 0.1)})
     vacask |= in_vacask(tmp_path / "vacask-tran", nodes, pulse + bias, {"tran": "analysis tran tran step=0.5u stop=300u maxstep=0.5u"})
     for version, plots in written.items():
-        for name in ("v(s0)", "v(s1)", "i(vheat)"):
+        for name in ("v(s0)", "v(s1)", "v(s2)", "i(vheat)"):
             at = np.linspace(2e-6, 300e-6, 300)
             one, two = (np.interp(at, plot["tran"]["time"], plot["tran"][name]) for plot in (plots, vacask))
             hosts = [abs(vacask["op"][name][0] / plots["op"][name][0] - 1.0), apart(vacask["dc"], plots["dc"], name)]
@@ -190,3 +199,19 @@ def test_a_bank_is_heated(tmp_path):
             tran = np.max(np.abs(one - two)) / max(np.ptp(two), 1e-3 * np.max(np.abs(two)))
             print(f"bank in ngspice {version}: {name} .op {op:.1e}, .dc {dc:.1e}, .tran {tran:.1e}")
             assert op <= 1e-3 and dc <= 1e-3 and tran <= 1e-3, (version, name, op, dc, tran)
+
+
+def test_a_comb_pulls_across_its_fingers(tmp_path):
+    """Fingers on a cantilever, drawn 0.1 um off the middle of their gaps, pull in across them at 8.87 V. Up to 8.8 V displacement and capacitance are those of the
+    plug-in; the displacement grows fourfold in the last fifth."""
+    netlist = tmp_path / "comb.net"
+    netlist.write_text(SIDEWAYS)
+    signals = ["r.y:1e6", "sense.C:1e12"]
+    export(netlist, tmp_path, {"drive": "0:12"}, signals)
+    full, written = everywhere(netlist, tmp_path, ["drive"], signals, "Vdrive n0 0 0\n", {"dc": "dc Vdrive 0 8.8 0.2"})
+    vacask = in_vacask(tmp_path / "vacask", "n0 0 s0 s1", "vdrive (n0 0) v dc=0\n", {"dc": swept("dc", "vdrive", 0, 8.8, 0.2)})
+    for version, plots in written.items():
+        for name in ("v(s0)", "v(s1)"):
+            dc, hosts = apart(plots["dc"], full["dc"], name), apart(vacask["dc"], plots["dc"], name)
+            print(f"comb in ngspice {version}: {name} .dc {dc:.1e}; VACASK {hosts:.1e}")
+            assert dc <= 1e-3 and hosts <= 1e-4, (version, name, dc, hosts)

@@ -152,18 +152,19 @@ fn motion_is_that_of_the_full_model() {
 /// move it by less than the tolerance.
 #[test]
 fn polynomials_have_the_tangent_of_their_forces() {
-    type Case<'a> = (&'a str, &'a [(&'a str, f64)], f64);
-    let cases: [Case<'_>; 3] = [
-        ("quarter_stage/quarter_stage.net", &[("F", 20e-6), ("angle", 0.9)], 0.0),
-        ("bank/bank.net", &[], 1.5),
-        ("switch/switch.net", &[], 12.0),
+    type Case<'a> = (&'a str, &'a [(&'a str, f64)], &'a [f64]);
+    let cases: [Case<'_>; 4] = [
+        ("quarter_stage/quarter_stage.net", &[("F", 20e-6), ("angle", 0.9)], &[]),
+        ("bank/bank.net", &[], &[1.5]),
+        ("bank/bank.net", &[], &[1.5, 40.0]),
+        ("switch/switch.net", &[], &[12.0]),
     ];
     for (name, set, volts) in cases {
         let compiled = example(name, set, Formulation::Reduced, 1e-2);
         let system = &compiled.parts.system;
         let electrics = &system.electrics;
         let mut sources = vec![0.0; electrics.sources()];
-        sources.iter_mut().take(1).for_each(|source| *source = volts);
+        sources.iter_mut().zip(volts).for_each(|(source, volts)| *source = *volts);
         let mut drive = electrics.drive();
         electrics.steady(&sources, &mut vec![0.0; electrics.heating.states()], &mut drive);
         let inputs = InputBox::around(system, std::slice::from_ref(&drive), [-1.0, 1.0]);

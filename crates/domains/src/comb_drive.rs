@@ -9,7 +9,7 @@
 use super::approach::{Approach, ApproachDerivatives, MaterialPoint};
 use super::capacitor::Capacitor;
 use super::comb_field::{CombField, above_and_below};
-use super::comb_sides::{CombSides, substrate_share};
+use super::comb_sides::{CombLaw, CombSides, substrate_share};
 use super::contact::{Contact, touching_distance};
 use super::contact_loss::{Loss, snap_aside};
 use super::domain::{Chord, Configuration, Domain, SideContact, SideRoom};
@@ -35,7 +35,7 @@ pub struct CombDrive {
     /// C(u) of fingers in the middle of their gaps.
     pub capacitor: Capacitor,
     /// The motion across the fingers, and the field with it; none: SUGAR's comb, which has no side force.
-    pub sides: Option<(Approach, CombSides, SideRoom)>,
+    pub sides: Option<(Approach, CombLaw, SideRoom)>,
     /// Impact losses of the sides.
     pub loss: Loss,
 }
@@ -84,7 +84,7 @@ impl CombDrive {
             let middle = approach.axis * (length - 0.5 * comb.overlap).max(0.0);
             let (a, b) = (approach.a.beyond(middle), approach.b.beyond(-middle));
             let across = Approach { a, b, axis: Vector2::new(-approach.axis.y, approach.axis.x) };
-            let field = CombSides {
+            let sides = CombSides {
                 strength,
                 height: comb.height,
                 gap: comb.gap,
@@ -93,24 +93,20 @@ impl CombDrive {
                 contact: Contact { touch, area: 0.5 * comb.gaps * comb.height },
                 parasitic: comb.parasitic,
             };
-            (across, field, SideRoom { drawn: comb.misalignment, room: comb.gap - touch })
+            let law = CombLaw { sides, drawn: [comb.overlap, comb.misalignment] };
+            (across, law, SideRoom { drawn: comb.misalignment, room: comb.gap - touch })
         });
         Self { approach, capacitor, sides, loss: Loss::new(&comb.impact) }
     }
 
-    fn overlap(&self) -> f64 {
-        self.capacitor.distance(0.0)
-    }
-
     /// C over the approach `u` and the displacement `y` across (m).
     fn field(&self, u: f64, y: f64) -> Jet {
-        let Some((_, field, side)) = &self.sides else {
+        let Some((_, law, _)) = &self.sides else {
             let c = self.capacitor.at(u);
             return Jet { value: c.value, first: [c.slope, 0.0], second: [c.curvature, 0.0, 0.0] };
         };
-        let aside = side.drawn + y;
-        let found = field.at(self.overlap() + u, aside);
-        if aside.abs() > MIDDLE * field.gap {
+        let found = law.field([u, y]);
+        if law.aside(y).abs() > MIDDLE * law.sides.gap {
             return found;
         }
         // the square of such a distance is below rounding: the same number as without it
@@ -124,8 +120,8 @@ impl CombDrive {
 
     /// Energy of the contact at the sides over the same (J), where they touch.
     fn pressed(&self, u: f64, y: f64) -> Option<Jet> {
-        let (_, field, side) = self.sides.as_ref()?;
-        field.pressed(self.overlap() + u, side.drawn + y)
+        let (_, law, _) = self.sides.as_ref()?;
+        law.pressed([u, y])
     }
 
     /// That energy at a configuration.
@@ -220,7 +216,7 @@ impl FromStructure for CombDrive {
     }
 
     fn moved(self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self {
-        let sides = self.sides.map(|(across, field, side)| (across.moved(to), field, side));
+        let sides = self.sides.map(|(across, law, side)| (across.moved(to), law, side));
         Self { approach: self.approach.moved(to), sides, ..self }
     }
 }
@@ -329,16 +325,17 @@ impl Domain for CombDrive {
     }
 
     fn side_contact(&self, at: Configuration<'_>) -> Option<SideContact> {
-        let (across, field, side) = self.sides.as_ref()?;
-        let left = field.gap - (side.drawn + across.value(at.q, at.linear)).abs();
-        let faces = field.faces(self.overlap() + self.approach.value(at.q, at.linear));
-        faces.then_some(SideContact { left, touch: field.contact.touch, least: field.contact.least() })
+        let (across, law, _) = self.sides.as_ref()?;
+        let sides = &law.sides;
+        let left = sides.gap - law.aside(across.value(at.q, at.linear)).abs();
+        let faces = sides.faces(law.overlap(self.approach.value(at.q, at.linear)));
+        faces.then_some(SideContact { left, touch: sides.contact.touch, least: sides.contact.least() })
     }
 
     fn side_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
-        let Some((across, _, side)) = &self.sides else { return 0.0 };
+        let Some((across, law, _)) = &self.sides else { return 0.0 };
         let m = across.measure(at.q, at.linear);
-        -(side.drawn + m.value).signum() * across.change(&m, dq)
+        -law.aside(m.value).signum() * across.change(&m, dq)
     }
 
     /// Of the way across the fingers.
@@ -375,9 +372,9 @@ impl Domain for CombDrive {
     }
 
     fn add_closing(&self, at: Configuration<'_>, r: &mut [Pose]) -> f64 {
-        let Some((across, field, side)) = &self.sides else { return 0.0 };
+        let Some((across, law, side)) = &self.sides else { return 0.0 };
         across.add_force(&across.measure(at.q, at.linear), 1.0, r);
-        snap_aside(field.gap, side.room)
+        snap_aside(law.sides.gap, side.room)
     }
 
     fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
@@ -450,9 +447,20 @@ impl Domain for CombDrive {
         self.add_hessian(&seen, [force, aside], [slope, mixed, bend], pattern, tangent);
     }
 
-    /// That of fingers in the middle of their gaps, which do not touch.
+    /// That of both displacements; of SUGAR's comb, which has no side force, that of one.
     fn point_laws(&self) -> Vec<PointLaw> {
-        vec![PointLaw::of(Law::Field(self.capacitor, None))]
+        let Some((_, law, _)) = &self.sides else {
+            return vec![PointLaw::of(Law::Field(self.capacitor, None))];
+        };
+        let of_both = PointLaw { loss: self.loss.coefficient(), ..PointLaw::of(Law::Comb(*law)) };
+        vec![of_both, PointLaw::of(Law::Across)]
+    }
+
+    fn point_approaches(&self, at: Configuration<'_>, mut put: impl FnMut(f64)) {
+        put(self.approach.value(at.q, at.linear));
+        if let Some((across, ..)) = &self.sides {
+            put(across.value(at.q, at.linear));
+        }
     }
 
     /// That of fingers in the middle of their gaps.

@@ -52,6 +52,8 @@ impl CombField {
     pub const STEEPNESS: f64 = ENGAGEMENT[0];
     /// k of the engagement (1).
     pub const SHAPE: f64 = ENGAGEMENT[3];
+    /// b₁ and b₂ of the engagement, with b = b₁·c^b₂ (1).
+    pub const FADING: [f64; 2] = [ENGAGEMENT[1], ENGAGEMENT[2]];
 
     /// Of fingers `width` wide and `length` long with gaps `gap` between them (m); `strength` is N·ε·h (F).
     pub fn new(strength: f64, [gap, width, length]: [f64; 3]) -> Self {

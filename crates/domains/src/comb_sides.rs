@@ -49,6 +49,43 @@ pub struct CombSides {
     pub parasitic: f64,
 }
 
+/// The law of a comb over the approach of its sides along the fingers and their displacement across.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CombLaw {
+    /// The law over the overlap and the distance aside.
+    pub sides: CombSides,
+    /// Overlap and distance aside as drawn (m).
+    pub drawn: [f64; 2],
+}
+
+impl CombLaw {
+    /// The overlap at the approach `u` (m).
+    pub fn overlap(&self, u: f64) -> f64 {
+        self.drawn[0] + u
+    }
+
+    /// The distance aside at the displacement `y` across (m).
+    pub fn aside(&self, y: f64) -> f64 {
+        self.drawn[1] + y
+    }
+
+    /// C over both displacements (m).
+    pub fn field(&self, [u, y]: [f64; 2]) -> Jet {
+        self.sides.at(self.overlap(u), self.aside(y))
+    }
+
+    /// The potential of field and contact over both at a voltage.
+    pub fn potential(&self, at: [f64; 2], volts: f64) -> Jet {
+        let field = self.field(at) * (-0.5 * volts * volts);
+        self.pressed(at).map_or(field, |pressed| field + pressed)
+    }
+
+    /// Energy of the contact at the sides over both (J); none where they do not touch.
+    pub fn pressed(&self, [u, y]: [f64; 2]) -> Option<Jet> {
+        self.sides.pressed(self.overlap(u), self.aside(y))
+    }
+}
+
 impl CombSides {
     /// C over the overlap and the distance aside (m).
     pub fn at(&self, overlap: f64, aside: f64) -> Jet {

@@ -1,11 +1,12 @@
 //! Laws of single scalars: what a field, a contact or a film does at one point of its rule of integration.
 //!
 //! A member whose potential is a sum Σ φ_k(u_k) over such points has its forces from the approaches u_k(q) alone. A model that knows
-//! these as functions of few coordinates then needs no bodies. A comb or a pair of plates has one point; beams that face each other have
-//! those of their quadrature.
+//! these as functions of few coordinates then needs no bodies. A pair of plates has one point; beams that face each other have those of their
+//! quadrature. A comb has two, its approach along the fingers and its displacement across, whose common law stands with the first.
 
 use super::attraction::attraction;
 use super::capacitor::Capacitor;
+use super::comb_sides::CombLaw;
 use super::contact::Contact;
 use super::squeeze_film::SqueezeFilm;
 use super::stop::StopKind;
@@ -18,6 +19,10 @@ pub enum Law {
     Field(Capacitor, Option<Contact>),
     /// A stop with the ways to its two sides (m), and its adhesion.
     Stop([Option<f64>; 2], StopKind, Option<Adhesion>),
+    /// A comb, of this approach and the next one.
+    Comb(CombLaw),
+    /// The displacement of the comb before it across its fingers.
+    Across,
     /// Quadratic and cubic stiffness of a spring that the approach shortens (N/m², N/m³).
     Spring([f64; 2]),
 }
@@ -48,18 +53,27 @@ impl PointLaw {
         Self { law: Some(law), loss: 0.0, film: None }
     }
 
-    /// Capacitance at the approach `u` (m) (F).
-    pub fn capacitance(&self, u: f64) -> f64 {
+    /// Capacitance at the first of these approaches (m) (F); a comb has the next one, too.
+    pub fn capacitance(&self, approaches: &[f64]) -> f64 {
         match &self.law {
-            Some(Law::Field(capacitor, _)) => capacitor.at(u).value,
+            Some(Law::Field(capacitor, _)) => capacitor.at(approaches[0]).value,
+            Some(Law::Comb(comb)) => comb.field([approaches[0], approaches[1]]).value,
             _ => 0.0,
         }
     }
 
-    /// Force and stiffness at rest at the approach `u` (m) and `volts` (V).
+    /// The comb whose law it is.
+    pub fn comb(&self) -> Option<&CombLaw> {
+        match &self.law {
+            Some(Law::Comb(comb)) => Some(comb),
+            _ => None,
+        }
+    }
+
+    /// Force and stiffness at rest at the approach `u` (m) and `volts` (V), of a law of one approach.
     pub fn at(&self, u: f64, volts: f64) -> PointForce {
         match &self.law {
-            None => PointForce::default(),
+            None | Some(Law::Comb(_) | Law::Across) => PointForce::default(),
             Some(Law::Field(capacitor, contact)) => {
                 let (c, half) = (capacitor.at(u), -0.5 * volts * volts);
                 let pressed = contact.map_or((0.0, 0.0), |contact| contact.force(capacitor.distance(u)));

@@ -14,14 +14,17 @@
 //! | `u`, `s`, `f` | approach (µm), rate (m/s) and force (N) of one point of a gap |
 //! | `f1` … | forces over the shapes (N) |
 //! | `m1`, `a1` | force of a contact that is shown (N), and its radius (µm) |
+//! | `y0`, and others with `c` before a letter | displacement of a comb across its fingers (µm), and its law ([`super::comb_laws`]) |
 //! | `g1`, `c1`, `k1`, `d1` | voltage, capacitance, its slope and smallest distance of a gap |
 
+use super::comb_laws;
 use super::flexible::text::PolynomialText;
 use super::flexible::{FlexibleModel, FlexibleOutput};
 use super::laws::{bearing, capacitance, conductance, drag, nearer_way, pressing, radius, slope};
 use super::names::Pins;
 use super::noise_sources::{NoiseText, warm};
 use super::verilog_a::{ContributionSum, head};
+use bimorph_domains::comb_sides::CombLaw;
 use bimorph_domains::{Law, PointLaw};
 use bimorph_solve::reduced::polynomial::PolynomialModel;
 use bimorph_solve::reduced::polynomial::monomials::Polynomials;
@@ -198,9 +201,7 @@ impl FlexibleModule<'_> {
         let of = self.of;
         let (points, n) = (&of.approaches.members[m], m + 1);
         let _ = writeln!(self.body, "    // {}", self.model.names[m]);
-        let field = |law: &PointLaw| matches!(law.law, Some(Law::Field(capacitor, _)) if capacitor.acts());
-        let charged = points.laws.iter().any(field);
-        if charged {
+        if self.is_charged(m) {
             let volts = self.model.volts[m].clone().unwrap_or_else(|| "0".to_owned());
             self.set(&format!("g{n}"), &volts);
             self.set(&format!("c{n}"), "0");
@@ -217,14 +218,16 @@ impl FlexibleModule<'_> {
         let mut first = true;
         for (k, law) in points.laws.iter().enumerate() {
             let shares = self.shares(points.first + k);
-            let sum = |name: &str| {
-                let terms: Vec<String> =
-                    shares.iter().map(|(l, share)| format!("{share:e} * {name}{}", l + 1)).collect();
-                if terms.is_empty() { "0".to_owned() } else { terms.join(" + ").replace("+ -", "- ") }
-            };
-            self.set("u", &sum("y"));
+            if law.law == Some(Law::Across) {
+                continue;
+            }
+            self.set("u", &sum_of_shapes(&shares, "y"));
+            if let Some(comb) = law.comb() {
+                self.comb((n, k), (comb, law.loss), [&shares, &self.shares(points.first + k + 1)], [shows, weighs]);
+                continue;
+            }
             if law.film.is_some() || law.loss > 0.0 {
-                self.set("s", &format!("1e-6 * ({})", sum("z")));
+                self.set("s", &format!("1e-6 * ({})", sum_of_shapes(&shares, "z")));
             }
             let mut force: Vec<String> = Vec::new();
             if let Some(Law::Field(capacitor, _)) = &law.law
@@ -261,10 +264,46 @@ impl FlexibleModule<'_> {
             }
             if !force.is_empty() {
                 self.set("f", &force.join(" "));
-                for (l, share) in &shares {
-                    self.set(&format!("f{}", l + 1), &format!("f{} + ({share:e}) * f", l + 1));
-                }
+                self.press(&shares);
             }
+        }
+    }
+
+    /// A comb, point `k` of member `n`, with its shares along and across; `u` is set. Whether its overlap and its contact force are shown.
+    fn comb(
+        &mut self,
+        (n, k): (usize, usize),
+        (law, loss): (&CombLaw, f64),
+        [along, across]: [&[(usize, f64)]; 2],
+        [shows, weighs]: [bool; 2],
+    ) {
+        self.set("y0", &sum_of_shapes(across, "y"));
+        self.set("s", &if loss > 0.0 { format!("1e-6 * ({})", sum_of_shapes(across, "z")) } else { "0".to_owned() });
+        let bearing = comb_laws::bearing(law, loss, "s");
+        for (name, text) in comb_laws::field(law, ["u", "y0"]).into_iter().chain(bearing) {
+            self.set(name, &text);
+        }
+        self.set(&format!("c{n}"), &format!("c{n} + cc"));
+        self.set(&format!("k{n}"), &format!("k{n} + cu"));
+        if shows {
+            self.set(&format!("d{n}"), &if k == 0 { "co".to_owned() } else { format!("min(d{n}, co)") });
+        }
+        if weighs {
+            self.set(&format!("m{n}"), &format!("m{n} + {}", comb_laws::pressing(law)));
+        }
+        if loss > 0.0 {
+            self.point_noise(across, &format!("{loss:e} * {}", comb_laws::pressing(law)), "contact");
+        }
+        for (shares, [slope, pressed]) in [(along, ["cu", "cw"]), (across, ["cv", "cy"])] {
+            self.set("f", &format!("{pressed} - 0.5 * g{n} * g{n} * {slope}"));
+            self.press(shares);
+        }
+    }
+
+    /// Adds the force `f` of a point with these shares to those of the shapes.
+    fn press(&mut self, shares: &[(usize, f64)]) {
+        for (l, share) in shares {
+            self.set(&format!("f{}", l + 1), &format!("f{} + ({share:e}) * f", l + 1));
         }
     }
 
@@ -421,9 +460,19 @@ impl FlexibleModule<'_> {
 
     /// Whether a member has a field.
     fn is_charged(&self, m: usize) -> bool {
-        let field = |law: &PointLaw| matches!(law.law, Some(Law::Field(capacitor, _)) if capacitor.acts());
+        let field = |law: &PointLaw| match law.law {
+            Some(Law::Field(capacitor, _)) => capacitor.acts(),
+            Some(Law::Comb(_)) => true,
+            _ => false,
+        };
         self.of.approaches.members[m].laws.iter().any(field)
     }
+}
+
+/// The sum of variables of the shapes with these shares.
+fn sum_of_shapes(shares: &[(usize, f64)], name: &str) -> String {
+    let terms: Vec<String> = shares.iter().map(|(l, share)| format!("{share:e} * {name}{}", l + 1)).collect();
+    if terms.is_empty() { "0".to_owned() } else { terms.join(" + ").replace("+ -", "- ") }
 }
 
 /// A number, or 0 where it is rounding beside the largest.

@@ -110,24 +110,34 @@ fn engagement(fingers: &CombField, o: &str) -> [String; 2] {
 }
 
 /// q of the tips and their distance to the base.
-fn tips(fingers: &CombField, o: &str) -> [String; 2] {
+pub(super) fn tips(fingers: &CombField, o: &str) -> [String; 2] {
     let d = format!("({:e} - {o})", fingers.length);
     [format!("exp(-{:e} * max({d}, {:e}))", fingers.decay, fingers.closest()), d]
 }
 
 /// Slope of the tips' field with the overlap, for N·ε·h = 1.
-fn tip_slope(fingers: &CombField, q: &str) -> String {
+pub(super) fn tip_slope(fingers: &CombField, q: &str) -> String {
     let [facing, beside] = fingers.tips;
-    format!("{:e} * {q} * ({facing:e} / (1 - {q}) + {beside:e}) / (1 - {q})", 2.0 * fingers.decay)
+    format!("({:e} * {q} * ({facing:e} / (1 - {q}) + {beside:e}) / (1 - {q}))", 2.0 * fingers.decay)
 }
 
 /// C of the fingers in their plane at the overlap `o`.
 fn finger_value(fingers: &CombField, o: &str) -> String {
-    let ([n, y], [q, d], [facing, beside]) = (engagement(fingers, o), tips(fingers, o), fingers.tips);
+    let ([n, y], [q, d]) = (engagement(fingers, o), tips(fingers, o));
     let ends = format!("{:e} * (1 + {:e} * {y} / (1 + {y})) / (1 + {y})", fingers.ends, CombField::SHAPE);
+    format!("{:e} * ({o} / {:e} + {n} + {ends} + {})", fingers.strength, fingers.gap, tip_value(fingers, &q, &d))
+}
+
+/// Field of the tips, for N·ε·h = 1.
+pub(super) fn tip_value(fingers: &CombField, q: &str, d: &str) -> String {
+    let [facing, beside] = fingers.tips;
     let tip = format!("2 * ({facing:e} * {q} / (1 - {q}) - {beside:e} * ln(1 - {q}))");
-    let below = format!("max({:e} - {d}, 0) * {}", fingers.closest(), tip_slope(fingers, &q));
-    format!("{:e} * ({o} / {:e} + {n} + {ends} + {tip} + {below})", fingers.strength, fingers.gap)
+    format!("({tip} + max({:e} - {d}, 0) * {})", fingers.closest(), tip_slope(fingers, q))
+}
+
+/// e of [`bimorph_domains::comb_field`] at the text `rho`.
+pub(super) fn above(rho: &str) -> String {
+    format!("((({rho} + 2) * ln({rho} + 2) - {rho} * ln({rho})) / {PI:e})")
 }
 
 /// dC/du of the fingers in their plane at the overlap `o`.
@@ -147,7 +157,7 @@ fn share(u: &str, overlap: f64, blend: f64) -> String {
 /// Contact force against the approach `u` at its `rate`, a text in m/s (N); none where parts never touch.
 pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<String> {
     match law {
-        Law::Field(_, None) => None,
+        Law::Field(_, None) | Law::Comb(_) | Law::Across => None,
         Law::Field(capacitor, Some(contact)) => {
             let sign = if matches!(capacitor, Capacitor::Comb { .. }) { "+" } else { "-" };
             Some(lossy(
@@ -195,10 +205,10 @@ pub(super) fn contact_reading(
     }
 }
 
-/// Size of the elastic contact force at the approach `u` (N), as `GAP.N` shows it; 0 where parts never touch.
+/// Size of the elastic contact force at the approach `u` (N), as `GAP.N` shows it; 0 where parts never touch. Combs of two approaches have their own.
 pub(super) fn pressing(law: &Law, u: &str) -> String {
     match law {
-        Law::Field(_, None) | Law::Spring(_) => "0".to_owned(),
+        Law::Field(_, None) | Law::Spring(_) | Law::Comb(_) | Law::Across => "0".to_owned(),
         Law::Field(capacitor, Some(contact)) => {
             let sign = if matches!(capacitor, Capacitor::Comb { .. }) { "+" } else { "-" };
             pressed(contact, &format!("({:e} {sign} 1e-6 * {u})", capacitor.distance(0.0)))
@@ -268,7 +278,7 @@ pub(super) fn drag(film: Option<(f64, SqueezeFilm)>, u: &str, rate: &str) -> Opt
 }
 
 /// A contact force with the loss of an impact ([`bimorph_domains::contact_loss`]); `closing` is the sign of the closing speed in the rate.
-fn lossy(force: String, loss: f64, closing: &str, rate: &str) -> String {
+pub(super) fn lossy(force: String, loss: f64, closing: &str, rate: &str) -> String {
     if loss > 0.0 { format!("({force} * max(1 {closing} {loss:e} * {rate}, 0))") } else { force }
 }
 
@@ -280,7 +290,7 @@ fn attracted(adhesion: &Adhesion, d: &str) -> String {
 
 /// The force of a contact at the distance `d`, a text in metres. Beyond the range of the law it continues along its tangent, from where a
 /// simulator's iterations come back sooner.
-fn pressed(contact: &Contact, d: &str) -> String {
+pub(super) fn pressed(contact: &Contact, d: &str) -> String {
     let s = format!("max({:e} * ({:e} - {d}), 0)", 2.0 / contact.touch, contact.touch);
     let within = format!("min({s}, {DEEPEST:e})");
     format!("({:e} * {within} * {within} * (3 * {s} - 2 * {within}))", contact.area * PRESSURE)
@@ -288,71 +298,8 @@ fn pressed(contact: &Contact, d: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::expression_values::ExpressionValues;
     use super::*;
-
-    /// Value of an expression of numbers, `+ - * /`, brackets and functions, from its start; the rest of the text is left.
-    fn sum(text: &mut &str) -> f64 {
-        let mut value = product(text);
-        loop {
-            *text = text.trim_start();
-            match text.chars().next() {
-                Some('+') => value += rest(text, product),
-                Some('-') => value -= rest(text, product),
-                _ => return value,
-            }
-        }
-    }
-
-    fn product(text: &mut &str) -> f64 {
-        let mut value = factor(text);
-        loop {
-            *text = text.trim_start();
-            match text.chars().next() {
-                Some('*') => value *= rest(text, factor),
-                Some('/') => value /= rest(text, factor),
-                _ => return value,
-            }
-        }
-    }
-
-    fn rest(text: &mut &str, read: fn(&mut &str) -> f64) -> f64 {
-        *text = &text[1..];
-        read(text)
-    }
-
-    fn factor(text: &mut &str) -> f64 {
-        *text = text.trim_start();
-        if text.starts_with('-') {
-            return -rest(text, factor);
-        }
-        let end = text.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(text.len());
-        let name = &text[..end];
-        if text[end..].starts_with('(') {
-            *text = &text[end..];
-            let mut values = vec![rest(text, sum)];
-            while text.starts_with(',') {
-                values.push(rest(text, sum));
-            }
-            *text = text.strip_prefix(')').unwrap_or_else(|| panic!("no bracket: {text}"));
-            return match (name, values.as_slice()) {
-                ("", [x]) => *x,
-                ("ln", [x]) => x.ln(),
-                ("exp", [x]) => x.exp(),
-                ("abs", [x]) => x.abs(),
-                ("sqrt", [x]) => x.sqrt(),
-                ("min", [x, y]) => x.min(*y),
-                ("max", [x, y]) => x.max(*y),
-                _ => panic!("no function of SPICE and Verilog-A: {name}"),
-            };
-        }
-        let end = (1..=text.len())
-            .rev()
-            .find(|end| text[..*end].parse::<f64>().is_ok())
-            .unwrap_or_else(|| panic!("no number: {text}"));
-        let value = text[..end].parse().unwrap();
-        *text = &text[end..];
-        value
-    }
 
     /// The texts have the values of C and dC/du to rounding: of ideal and fringing plates and combs, open, close and below the range of their laws.
     #[test]
@@ -376,9 +323,7 @@ mod tests {
                     (capacitance(&capacitor, &format!("({u:e})")), c.value),
                     (slope(&capacitor, &format!("({u:e})")), c.slope),
                 ] {
-                    let mut left = text.as_str();
-                    let found = sum(&mut left);
-                    assert_eq!(left, "", "{text}");
+                    let found = ExpressionValues::default().value(&text);
                     let scale = value.abs().max(1e-22);
                     assert!((found - value).abs() < 1e-9 * scale, "{capacitor:?} {u}: {found} {value}\n{text}");
                 }
@@ -395,10 +340,7 @@ mod tests {
         let law = Law::Stop(ways, stop, Some(Adhesion { force: 2e-6, range: 20e-9 }));
         let read = |reading: &LumpedOutput, law: &Law, u: f64| {
             let text = contact_reading(reading, law, &format!("({u:e})"), |radius| format!("({radius})"));
-            let mut left = text.as_str();
-            let found = sum(&mut left);
-            assert_eq!(left, "", "{text}");
-            found
+            ExpressionValues::default().value(&text)
         };
         for u in [-0.303_f64, -0.29, 0.0, 0.2, 0.4999, 0.504] {
             let (ahead, back) = (0.5e-6 - 1e-6 * u, 0.3e-6 + 1e-6 * u);
@@ -439,9 +381,7 @@ mod tests {
                 [(Law::Stop(ways, stop, Some(adhesion)), side(ahead) - side(back)), (Law::Spring([1e5, 4e10]), spring)]
             {
                 let text = bearing(&law, 0.0, &format!("({u:e})"), "0").unwrap_or_default();
-                let mut left = text.as_str();
-                let found = sum(&mut left);
-                assert_eq!(left, "", "{text}");
+                let found = ExpressionValues::default().value(&text);
                 assert!((found - value).abs() < 1e-9 * value.abs().max(1e-9), "{u}: {found} {value}\n{text}");
             }
         }

@@ -12,7 +12,7 @@
 //! | [`osdi_deck`] | a deck of ngspice around such a module, compiled as OSDI |
 //! | [`lumped`] | the whole nonlinear model of rigid parts that only slide |
 //! | [`flexible`] | the nonlinear model of flexible parts, trained for ranges of the ports |
-//! | `laws` | gap functions as text |
+//! | `laws`, `comb_laws` | gap functions as text, and that of combs whose fingers lie aside |
 //! | [`lumped_spice`], [`lumped_verilog_a`] | the model of rigid parts as a subcircuit and as a module |
 //! | [`flexible_verilog_a`] | that of flexible parts as a module |
 //! | [`names`], `parts` | pins, and parts of a subcircuit |
@@ -24,7 +24,10 @@
 //! **Architecture invariant.** Below are [`bimorph_device`] and [`bimorph_results`]. Nothing here writes files: exports are text.
 
 pub mod basis;
+mod comb_laws;
 pub mod compare;
+#[cfg(test)]
+mod expression_values;
 pub mod file;
 pub mod flexible;
 pub mod flexible_verilog_a;

@@ -207,7 +207,7 @@ fn reading(signal: &Signal, coordinates: &[Coordinate], gaps: &[LumpedGap]) -> R
             }
             Law::Field(capacitor, _) => Ok(LumpedOutput::Distance(g, capacitor.distance(0.0), -1.0)),
             Law::Stop(..) => Ok(LumpedOutput::Way(g)),
-            Law::Spring(_) => Ok(LumpedOutput::Nothing),
+            Law::Spring(_) | Law::Comb(_) | Law::Across => Ok(LumpedOutput::Nothing),
         },
         Signal::Bearing(g) => Ok(LumpedOutput::Bearing(g)),
         Signal::Conductance(g, metals) => Ok(LumpedOutput::Conductance(g, metals)),

@@ -369,7 +369,7 @@ impl RowReader<'_> {
 
     /// Whether a member has points with two conductors, or with a stop.
     fn has_sides(&self, g: usize) -> bool {
-        let sides = |law: &PointLaw| matches!(law.law, Some(Law::Field(..) | Law::Stop(..)));
+        let sides = |law: &PointLaw| matches!(law.law, Some(Law::Field(..) | Law::Comb(_) | Law::Stop(..)));
         self.system.members[g].point_laws().iter().any(sides)
     }
 }

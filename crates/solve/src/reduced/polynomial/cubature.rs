@@ -155,7 +155,7 @@ fn weighted(
             let u = row.dot(&values);
             // at a volt the force is half of the slope of the capacitance
             let pull = -2.0 * law.at(u, 1.0).force;
-            block[(0, k)] = law.capacitance(u);
+            block[(0, k)] = law.capacitance(&[u]);
             block.view_mut((1, k), (m, 1)).copy_from(&(slopes.tr_mul(row) * pull));
         }
         // capacitance and forces count alike

@@ -12,7 +12,7 @@ use super::super::inputs::low_discrepancy;
 use super::super::space::{ReducedForces, ReducedSpace, dot};
 use super::cubature::thinned;
 use super::monomials::{Monomials, Polynomials};
-use super::shapes::{Probe, ShapeFunctions};
+use super::shapes::{CombMotion, Probe, ShapeFunctions, has_combs};
 use super::{Approaches, ClosureStrains, PolynomialModel};
 use bimorph_base::ErrorBudget;
 use bimorph_domains::System;
@@ -55,6 +55,44 @@ pub(super) struct Fit<'a> {
     amplitude: f64,
 }
 
+/// Samples of a space with both laws of its combs, each made on demand.
+pub(super) struct CombFits<'a, M> {
+    make: M,
+    along: Option<Fit<'a>>,
+    across: Option<Fit<'a>>,
+    /// Whether there are combs, and whether fingers that lie aside were nearer to the full model.
+    combs: bool,
+    nearer: bool,
+}
+
+impl<'a, M: Fn(CombMotion) -> Fit<'a>> CombFits<'a, M> {
+    /// Of a system.
+    pub(super) fn new(system: &System, make: M) -> Self {
+        Self { make, along: None, across: None, combs: has_combs(system), nearer: false }
+    }
+
+    /// The result of `of` with its error: of fingers in the middle of their gaps where that is within `enough`, or else of those with the least
+    /// error.
+    pub(super) fn least<T>(&mut self, enough: f64, of: impl Fn(&Fit<'a>) -> (f64, T)) -> (f64, T) {
+        let mut first = None;
+        if !self.nearer {
+            let along = of(self.along.get_or_insert_with(|| (self.make)(CombMotion::Along)));
+            if along.0 <= enough || !self.combs {
+                return along;
+            }
+            first = Some(along);
+        }
+        let across = of(self.across.get_or_insert_with(|| (self.make)(CombMotion::AlongAndAcross)));
+        match first {
+            Some(along) if along.0 <= across.0 => along,
+            _ => {
+                self.nearer = true;
+                across
+            }
+        }
+    }
+}
+
 impl<'a> Fit<'a> {
     /// Of a space of this system with equilibria, and what is read; where it `moves`, with its inertia.
     pub(super) fn new(
@@ -62,7 +100,7 @@ impl<'a> Fit<'a> {
         system: &'a System,
         equilibria: Vec<Vec<f64>>,
         probes: &'a [&'a Probe<'a>],
-        moves: bool,
+        (moves, combs): (bool, CombMotion),
     ) -> Self {
         let m = space.size();
         let rest = matrices(space, &vec![0.0; m]);
@@ -91,7 +129,7 @@ impl<'a> Fit<'a> {
         Self {
             space,
             system,
-            shapes: ShapeFunctions::new(&space.joints, system, probes, moves),
+            shapes: ShapeFunctions::new(&space.joints, system, probes, (moves, combs)),
             equilibria,
             damping: rotation.tr_mul(&(&rest.1 * &rotation)),
             mass: order.iter().map(|k| eigenvalues[*k].max(least)).collect(),

@@ -32,7 +32,7 @@ mod samples;
 pub mod shapes;
 pub mod statics;
 
-use bimorph_domains::Drive;
+use bimorph_domains::{Drive, Law};
 use monomials::{Monomials, Polynomials};
 use nalgebra::{DMatrix, DVector};
 use shapes::MemberPoints;
@@ -126,11 +126,21 @@ impl PolynomialModel {
         let unit = 1.0 / self.energy_unit();
         let approach = self.approaches(&values);
         let (mut first, mut second) = (DVector::zeros(approach.len()), DVector::zeros(approach.len()));
+        // of combs: first of two approaches, and the derivative with both
+        let mut mixed = Vec::new();
         for points in &self.approaches.members {
             let volts = drive.volts[points.member];
             for (k, law) in points.laws.iter().enumerate() {
-                let point = law.at(approach[points.first + k], volts);
-                (first[points.first + k], second[points.first + k]) = (point.force * unit, point.stiffness * unit);
+                let at = points.first + k;
+                if let Some(comb) = law.comb() {
+                    let potential = comb.potential([approach[at], approach[at + 1]], volts) * unit;
+                    first.rows_mut(at, 2).copy_from_slice(&potential.first);
+                    (second[at], second[at + 1]) = (potential.second[0], potential.second[2]);
+                    mixed.push((at, potential.second[1]));
+                } else if law.law != Some(Law::Across) {
+                    let point = law.at(approach[at], volts);
+                    (first[at], second[at]) = (point.force * unit, point.stiffness * unit);
+                }
             }
         }
         let given = DVector::from_iterator(
@@ -148,6 +158,13 @@ impl PolynomialModel {
             let moved = &self.approaches.mix * self.approaches.shapes.derivatives(&slopes);
             let mut weighted = moved.clone();
             weighted.row_iter_mut().zip(second.iter()).for_each(|(mut row, k)| row *= *k);
+            for (at, k) in mixed {
+                for [to, from] in [[at, at + 1], [at + 1, at]] {
+                    let added = moved.row(from) * k;
+                    let mut row = weighted.row_mut(to);
+                    row += added;
+                }
+            }
             *tangent = &self.stiffness + strains.tr_mul(&strains) + moved.tr_mul(&weighted);
             self.monomials.add_curvature(&by_monomial, x, tangent);
         }

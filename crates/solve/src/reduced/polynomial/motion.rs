@@ -14,6 +14,7 @@ use super::rows::{LaneColumns, PolynomialRows, add_gram};
 use super::shapes::MemberPoints;
 use super::{PolynomialModel, monomials::Polynomials};
 use bimorph_domains::capacitor::Capacitor;
+use bimorph_domains::comb_sides::CombLaw;
 use bimorph_domains::{Domain, Drive, Law, PointLaw, System};
 use bimorph_multibody::batch::{LANES, Lane8};
 use nalgebra::DMatrix;
@@ -26,18 +27,45 @@ struct PointState {
     force: f64,
     stiffness: f64,
     damping: f64,
+    /// Of a comb: derivative of its force with the next approach, and of the next force with its own.
+    mixed: [f64; 2],
 }
 
 impl PointState {
+    /// Both of a comb with the impact loss χ at its approaches (m) with their rates (m/s), under a voltage (V). Its contact resists across the fingers.
+    #[inline]
+    fn of_comb((comb, loss): (&CombLaw, f64), motion: [(f64, f64); 2], volts: f64) -> [Self; 2] {
+        let at = [motion[0].0, motion[1].0];
+        let potential = comb.potential(at, volts);
+        let [along, mixed, across] = potential.second;
+        let state = |k: usize, stiffness: f64| Self {
+            approach: at[k],
+            force: potential.first[k],
+            stiffness,
+            ..Self::default()
+        };
+        let mut both = [Self { mixed: [mixed; 2], ..state(0, along) }, state(1, across)];
+        if loss > 0.0
+            && let Some(pressed) = comb.pressed(at)
+        {
+            let force = pressed.first[1];
+            let (added, by_rate) = lost(loss, force.signum() * motion[1].1);
+            both[1].force += force * added;
+            both[1].stiffness += pressed.second[2] * added;
+            both[1].damping = force.abs() * by_rate;
+            both[0].mixed[1] += pressed.second[1] * added;
+        }
+        both
+    }
+
     /// Of a law at an approach (m) with its rate (m/s), under a voltage (V).
     #[inline]
     fn of(law: &PointLaw, (approach, rate): (f64, f64), volts: f64) -> Self {
         let pressed = law.at(approach, volts);
-        let mut state = Self { approach, force: pressed.force, stiffness: pressed.stiffness, damping: 0.0 };
+        let mut state = Self { approach, force: pressed.force, stiffness: pressed.stiffness, ..Self::default() };
         if law.loss > 0.0 {
             let bears = law.at(approach, 0.0);
-            let added = law.loss * rate;
-            let (share, by_rate) = if added > -1.0 { (added, law.loss) } else { (-1.0, 0.0) };
+            let (share, by_rate) = lost(law.loss, rate);
             state.force += bears.force * share;
             state.stiffness += bears.stiffness * share;
             state.damping += bears.force * by_rate;
@@ -50,6 +78,13 @@ impl PointState {
         }
         state
     }
+}
+
+/// Force of an impact loss χ (s/m) at a closing speed (m/s) over the elastic force, and its derivative with the speed.
+#[inline]
+fn lost(chi: f64, closing: f64) -> (f64, f64) {
+    let added = chi * closing;
+    if added > -1.0 { (added, chi) } else { (-1.0, 0.0) }
 }
 
 /// The polynomials of a space whose directions are turned as theirs are: z = A·x.
@@ -69,6 +104,8 @@ pub struct PolynomialMotion {
     members: Vec<MemberPoints>,
     /// Shapes × points.
     mix: DMatrix<f64>,
+    /// First points of combs, which depend on the next one, too.
+    combs: Vec<usize>,
     /// Whether laws of points resist rates.
     resists: bool,
     works: PolynomialRows,
@@ -104,16 +141,17 @@ pub struct PolynomialForces {
     combined_change: Vec<f64>,
 }
 
-/// Whether all that acts on a system has a law of points; of those that lose energy, contacts between plates alone. Floating conductors join the laws of
+/// Whether all that acts on a system has a law of points; of those that lose energy, contacts between plates and of combs alone. Floating conductors join the laws of
 /// several gaps.
 pub fn has_polynomials(system: &System) -> bool {
-    let between_plates = |law: &PointLaw| matches!(law.law, Some(Law::Field(Capacitor::Plates { .. }, Some(_))));
+    let with_contact =
+        |law: &PointLaw| matches!(law.law, Some(Law::Field(Capacitor::Plates { .. }, Some(_)) | Law::Comb(_)));
     let joined = !system.electrics.floating.is_empty();
     !joined
         && system.members.iter().all(|member| {
             let laws = member.point_laws();
             let has_none = laws.is_empty() && (member.is_gas() || member.is_active(1.0));
-            !(member.slides() || has_none) && laws.iter().all(|law| law.loss == 0.0 || between_plates(law))
+            !(member.slides() || has_none) && laws.iter().all(|law| law.loss == 0.0 || with_contact(law))
         })
 }
 
@@ -156,6 +194,10 @@ impl PolynomialMotion {
             shapes: rows(&model.approaches.shapes, 1.0),
             members: model.approaches.members.clone(),
             mix: model.approaches.mix.transpose(),
+            combs: (model.approaches.members.iter())
+                .flat_map(|points| (points.first..).zip(&points.laws))
+                .filter_map(|(point, law)| law.comb().map(|_| point))
+                .collect(),
             resists: laws().any(|law| law.film.is_some() || law.loss > 0.0),
             works: rows(&model.work, 1.0),
             loaded: model.work.coefficients.amax() > 0.0,
@@ -241,8 +283,16 @@ impl PolynomialForces {
             let volts = drive.volts[points.member];
             for (k, law) in points.laws.iter().enumerate() {
                 let point = points.first + k;
-                let rate = if of.resists { sum(point, &self.shape_rate) } else { 0.0 };
-                self.points[point] = PointState::of(law, (sum(point, &self.shape), rate), volts);
+                let motion = |point: usize| {
+                    let rate = if of.resists { sum(point, &self.shape_rate) } else { 0.0 };
+                    (sum(point, &self.shape), rate)
+                };
+                if let Some(comb) = law.comb() {
+                    let both = PointState::of_comb((comb, law.loss), [motion(point), motion(point + 1)], volts);
+                    self.points[point..point + 2].copy_from_slice(&both);
+                } else if law.law != Some(Law::Across) {
+                    self.points[point] = PointState::of(law, motion(point), volts);
+                }
             }
         }
         // the values of shapes are not needed any more: what acts on shapes stands in their place
@@ -288,6 +338,15 @@ impl PolynomialForces {
                 for (b, second) in shares.iter().enumerate().take(a + 1) {
                     by_approach[(a, b)] += state.stiffness * first * second;
                     by_rate[(a, b)] += state.damping * first * second;
+                }
+            }
+            if of.combs.contains(&point) {
+                // as in the full model, the tangent has the mean of both
+                let (mixed, next) = (0.5 * (state.mixed[0] + state.mixed[1]), of.mix.column(point + 1));
+                for a in 0..shapes {
+                    for b in 0..=a {
+                        by_approach[(a, b)] += mixed * (shares[a] * next[b] + next[a] * shares[b]);
+                    }
                 }
             }
         }
@@ -367,10 +426,15 @@ impl PolynomialForces {
             let both = drive.volts[points.member] * change.volts[points.member];
             for (k, law) in points.laws.iter().enumerate().filter(|_| both != 0.0) {
                 let point = points.first + k;
-                if let Some(Law::Field(capacitor, _)) = &law.law {
-                    let force = -both * capacitor.at(self.points[point].approach).slope;
+                let approach = |k: usize| self.points[point + k].approach;
+                let slopes = match &law.law {
+                    Some(Law::Field(capacitor, _)) => [capacitor.at(approach(0)).slope, 0.0],
+                    Some(Law::Comb(comb)) => comb.field([approach(0), approach(1)]).first,
+                    _ => continue,
+                };
+                for (point, slope) in (point..).zip(slopes).filter(|(_, slope)| *slope != 0.0) {
                     let shares = of.mix.column(point);
-                    self.shape.iter_mut().zip(shares.iter()).for_each(|(to, share)| *to += share * force);
+                    self.shape.iter_mut().zip(shares.iter()).for_each(|(to, share)| *to += share * (-both * slope));
                 }
             }
         }
@@ -420,6 +484,11 @@ impl PolynomialForces {
         };
         for (point, state) in self.points.iter().enumerate() {
             force[point] = state.stiffness * sum(point, &self.shape_rate);
+        }
+        for &point in &of.combs {
+            for (k, mixed) in self.points[point].mixed.into_iter().enumerate() {
+                force[point + k] += mixed * sum(point + 1 - k, &self.shape_rate);
+            }
         }
         if of.resists {
             of.shapes.values(&self.change.rates, &mut self.shape_rate);

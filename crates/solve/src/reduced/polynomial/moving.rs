@@ -6,7 +6,7 @@
 use super::super::space::{ReducedForces, ReducedSpace};
 use super::super::statics::solve;
 use super::super::training::Training;
-use super::fit::Fit;
+use super::fit::{CombFits, Fit};
 use super::motion::{PolynomialForces, PolynomialMotion, has_polynomials};
 use super::statics::groups;
 use bimorph_base::ErrorBudget;
@@ -28,28 +28,34 @@ pub struct FittedMotion {
 }
 
 /// The turned space of a training and its polynomials for the motion of a system under a drive: of the lowest degree whose error at the equilibria
-/// is within its part of the tolerance. None where there is no such degree, or a law of a member is none of single points.
+/// is within its part of the tolerance. Fingers of combs stay in the middle of their gaps where that is within it, too. None where there is no such
+/// degree, or a law of a member is none of single points.
 pub fn of_motion(training: &Training, system: &System, drive: &Drive, errors: ErrorBudget) -> Option<FittedMotion> {
     if training.equilibria.is_empty() || !has_polynomials(system) {
         return None;
     }
     let space = training.space.of_system(system);
-    let fit = Fit::new(&space, system, training.equilibria.clone(), &[], true);
+    let mut fits =
+        CombFits::new(system, |combs| Fit::new(&space, system, training.equilibria.clone(), &[], (true, combs)));
     let groups = groups(system, &[]);
     let share = errors.reduced_statics();
     for (degree, most) in DEGREES {
         if space.size() > most {
             break;
         }
-        let model = fit.model(degree, share, &groups);
-        let turned = space.turned(&model.rotation);
-        let motion = PolynomialMotion::new(&model);
-        let states: Vec<Vec<f64>> = (training.equilibria.iter())
-            .map(|z| model.rotation.tr_mul(&DVector::from_column_slice(z)).as_slice().to_vec())
-            .collect();
-        if error(&motion, &turned, &states, drive, &model.mass) <= share {
+        let made = fits.least(share, |fit| {
+            let model = fit.model(degree, share, &groups);
+            let turned = space.turned(&model.rotation);
+            let motion = PolynomialMotion::new(&model);
+            let states: Vec<Vec<f64>> = (training.equilibria.iter())
+                .map(|z| model.rotation.tr_mul(&DVector::from_column_slice(z)).as_slice().to_vec())
+                .collect();
+            let error = error(&motion, &turned, &states, drive, &model.mass);
             let largest = states.iter().map(|z| mass_norm(z, &model.mass)).fold(0.0, f64::max);
-            return Some(FittedMotion { space: turned, polynomials: motion, largest });
+            (error, FittedMotion { space: turned, polynomials: motion, largest })
+        });
+        if made.0 <= share {
+            return Some(made.1);
         }
     }
     None

@@ -27,6 +27,28 @@ pub struct MemberPoints {
     pub laws: Vec<PointLaw>,
 }
 
+impl MemberPoints {
+    /// Its capacitance at the approaches of all points (F).
+    pub fn capacitance(&self, approaches: &[f64]) -> f64 {
+        let of = |(k, law): (usize, &PointLaw)| law.capacitance(&approaches[self.first + k..]);
+        self.laws.iter().enumerate().map(of).sum()
+    }
+}
+
+/// Variables of the laws of combs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CombMotion {
+    /// The overlap alone: fingers stay in the middle of their gaps.
+    Along,
+    /// The overlap and the distance aside.
+    AlongAndAcross,
+}
+
+/// Whether a system has combs whose fingers have a law of their distance aside.
+pub(super) fn has_combs(system: &System) -> bool {
+    system.members.iter().any(|member| member.point_laws().iter().any(|law| law.comb().is_some()))
+}
+
 /// Rows of a closure: its strains in which the energy is half the sum of their squares.
 #[derive(Debug, Clone)]
 struct ClosureRows<'a> {
@@ -45,11 +67,17 @@ pub(super) struct ShapeFunctions<'a> {
     probes: &'a [&'a Probe<'a>],
     /// Whether displacements of the bodies are among them.
     moves: bool,
+    combs: CombMotion,
 }
 
 impl<'a> ShapeFunctions<'a> {
     /// Of a system and what is read; where it `moves`, with the displacements of its bodies.
-    pub(super) fn new(joints: &'a Joints, system: &'a System, probes: &'a [&'a Probe<'a>], moves: bool) -> Self {
+    pub(super) fn new(
+        joints: &'a Joints,
+        system: &'a System,
+        probes: &'a [&'a Probe<'a>],
+        (moves, combs): (bool, CombMotion),
+    ) -> Self {
         let model = &joints.closures.model;
         let rows = |joint: &'a PackedJoint| {
             let columns = [0, 1, 2].map(|i| model.section(joint).stiffness.column(i));
@@ -58,14 +86,25 @@ impl<'a> ShapeFunctions<'a> {
         let mut first = 0;
         let mut members = Vec::new();
         for (member, of) in system.members.iter().enumerate() {
-            let laws = of.point_laws();
+            let mut laws = of.point_laws();
+            if combs == CombMotion::Along && laws.iter().any(|law| law.comb().is_some()) {
+                laws = of.laws().into_iter().map(|(_, law)| PointLaw::of(law)).collect();
+            }
             let count = laws.len();
             if count > 0 {
                 members.push(MemberPoints { member, merged: vec![member], first, laws });
                 first += count;
             }
         }
-        Self { joints, system, closures: joints.tree.closures.iter().map(rows).collect(), members, probes, moves }
+        Self {
+            joints,
+            system,
+            closures: joints.tree.closures.iter().map(rows).collect(),
+            members,
+            probes,
+            moves,
+            combs,
+        }
     }
 
     /// Rows of the blocks: closures, approaches, works, probes, and displacements times the roots of masses.
@@ -88,7 +127,11 @@ impl<'a> ShapeFunctions<'a> {
             out.extend(rows.of_stress.iter().map(|of| of.dot(&stress)));
         }
         for points in &self.members {
+            let first = out.len();
             self.system.point_approaches(points.member, q, |u| out.push(u));
+            if self.combs == CombMotion::Along {
+                out.truncate(first + points.laws.len());
+            }
         }
         out.push(self.system.loads.iter().map(|load| work(load, q)).sum());
         for input in &self.system.electrics.inputs {

@@ -8,7 +8,7 @@ use super::super::inputs::InputBox;
 use super::super::space::{ReducedForces, ReducedSpace};
 use super::super::statics::solve;
 use super::PolynomialModel;
-use super::fit::Fit;
+use super::fit::{CombFits, Fit};
 use super::samples::{FullEquilibrium, equilibria};
 use super::shapes::Probe;
 use bimorph_domains::{Drive, System};
@@ -60,8 +60,9 @@ pub fn fitted(
     let groups = groups(system, apart);
     let space = space.of_system(system);
     let sampled = equilibria(&space, system, inputs);
-    let made = sampled.iter().filter(|equilibrium| equilibrium.makes);
-    let fit = Fit::new(&space, system, made.map(|equilibrium| equilibrium.z.clone()).collect(), probes, false);
+    let made: Vec<Vec<f64>> =
+        sampled.iter().filter(|equilibrium| equilibrium.makes).map(|equilibrium| equilibrium.z.clone()).collect();
+    let mut fits = CombFits::new(system, |combs| Fit::new(&space, system, made.clone(), probes, (false, combs)));
     let references: Vec<Reference<'_>> = (sampled.iter().filter(|equilibrium| equilibrium.tests))
         .map(|at| Reference {
             at,
@@ -75,8 +76,11 @@ pub fn fitted(
         if degree > DEGREES[0] && space.size() > CUBIC {
             break;
         }
-        let model = fit.model(degree, tol, &groups);
-        let found = errors(&model, &space, &references);
+        let (_, (model, found)) = fits.least(tol, |fit| {
+            let model = fit.model(degree, tol, &groups);
+            let found = errors(&model, &space, &references);
+            (worse(&found), (model, found))
+        });
         // of two that exceed the tolerance, the largest error alone would be decided by the last digits of one that no degree changes
         if best.as_ref().is_none_or(|(_, least)| found.iter().sum::<f64>() < least.iter().sum::<f64>()) {
             best = Some((model, found));
@@ -85,7 +89,10 @@ pub fn fitted(
             break;
         }
     }
-    let (model, errors) = best.unwrap_or_else(|| (fit.model(DEGREES[0], tol, &groups), [f64::INFINITY; 2]));
+    let (model, errors) = best.unwrap_or_else(|| {
+        let (_, model) = fits.least(f64::INFINITY, |fit| (0.0, fit.model(DEGREES[0], tol, &groups)));
+        (model, [f64::INFINITY; 2])
+    });
     FittedPolynomials { model, error: worse(&errors), errors, compared: references.len() }
 }
 
@@ -133,10 +140,8 @@ fn errors(model: &PolynomialModel, space: &ReducedSpace, references: &[Reference
         let approach = model.approaches(&values);
         for points in &model.approaches.members {
             let whole: f64 = points.merged.iter().map(|g| reference.capacitances[*g]).sum();
-            let found: f64 =
-                points.laws.iter().enumerate().map(|(k, law)| law.capacitance(approach[points.first + k])).sum();
             if whole > 0.0 {
-                charged = charged.max((found / whole - 1.0).abs());
+                charged = charged.max((points.capacitance(approach.as_slice()) / whole - 1.0).abs());
             }
         }
     }

@@ -8,6 +8,7 @@
 
 use super::{PointState, PolynomialMotion};
 use crate::reduced::polynomial::rows::{LaneColumns, PolynomialRows};
+use bimorph_domains::Law;
 use bimorph_multibody::batch::{Kernel, LANES, Lane8, SimdReal, across};
 
 /// Rows that are summed at once: their additions do not wait for each other.
@@ -142,20 +143,31 @@ impl LanePolynomialForces {
             let volts = self.volts[points.member];
             for (k, law) in points.laws.iter().enumerate() {
                 let point = points.first + k;
-                let shares = of.mix.column(point);
-                let sum = |of_shapes: &[Lane8]| {
+                let sum = |point: usize, of_shapes: &[Lane8]| {
                     let mut sum = [none; LANES];
-                    for (share, y) in shares.iter().zip(of_shapes) {
+                    for (share, y) in of.mix.column(point).iter().zip(of_shapes) {
                         for lane in 0..LANES {
                             sum[lane] += share * y.0[lane];
                         }
                     }
                     sum
                 };
-                let approaches = sum(&self.shape);
-                let rates = if of.resists { sum(&self.shape_rate) } else { [0.0; LANES] };
-                for lane in (0..LANES).filter(|lane| active[*lane]) {
-                    self.points[point][lane] = PointState::of(law, (approaches[lane], rates[lane]), volts[lane]);
+                let motion = |point: usize| {
+                    let approaches = sum(point, &self.shape);
+                    let rates = if of.resists { sum(point, &self.shape_rate) } else { [0.0; LANES] };
+                    approaches.into_iter().zip(rates)
+                };
+                let active = |lane: &usize| active[*lane];
+                if let Some(comb) = law.comb() {
+                    let motions = motion(point).zip(motion(point + 1)).enumerate();
+                    for (lane, (along, across)) in motions.filter(|(lane, _)| active(lane)) {
+                        let both = PointState::of_comb((comb, law.loss), [along, across], volts[lane]);
+                        (self.points[point][lane], self.points[point + 1][lane]) = (both[0], both[1]);
+                    }
+                } else if law.law != Some(Law::Across) {
+                    for (lane, motion) in motion(point).enumerate().filter(|(lane, _)| active(lane)) {
+                        self.points[point][lane] = PointState::of(law, motion, volts[lane]);
+                    }
                 }
             }
         }
@@ -315,6 +327,21 @@ impl LanePolynomialForces {
                     for (to, of_point) in of_shapes[a * shapes + b].iter_mut().zip(&both) {
                         let more = W::load(simd, of_point) * *first * *second;
                         (W::load(simd, to) + more).store(to);
+                    }
+                }
+            }
+            if of.combs.contains(&point) {
+                let mut mixed = Lane8::of(0.0);
+                for lane in 0..LANES {
+                    let [own, other] = states[lane].mixed;
+                    mixed.0[lane] = 0.5 * (own + other);
+                }
+                let (mixed, next) = (W::load(simd, &mixed), of.mix.column(point + 1));
+                for a in 0..shapes {
+                    for b in 0..=a {
+                        let to = &mut of_shapes[a * shapes + b][0];
+                        let shared = W::splat(simd, shares[a] * next[b] + next[a] * shares[b]);
+                        (W::load(simd, to) + mixed * shared).store(to);
                     }
                 }
             }
