@@ -264,3 +264,33 @@ fn ranges_without_a_model_are_refused() {
     let buckled = refused(&strained, [-1e-6, 1e-6]);
     assert!(buckled.contains("--nonlinear writes no reduced model"), "{buckled}");
 }
+
+/// Fast coordinates of a comb have inertia where its fingers close across their gaps in the ranges, on a cantilever that pulls in at 8.87 V: the force of the
+/// impact would make them run away. Those of the bank, whose fingers stay apart, follow their forces at once.
+#[test]
+fn fast_coordinates_of_closing_fingers_have_inertia() {
+    let text = "process p = [Youngsmodulus=160e9 density=2330 h=10u]
+anchor p [a] []
+beam2d p [a m] [l=200u w=2u]
+beam2d p [m r] [l=20u w=10u]
+sense comb2de p [r s] [N=20 gap=2u l=10u L=20u misalign=0.1u]
+anchor p [s] []
+eground * [r] []
+drive port * [s] []
+";
+    let options = CompileOptions { tol: 1e-4, ..CompileOptions::default() };
+    let comb = Arc::new(compile(&Bundle::from_text("comb.net", text), &options).unwrap());
+    let bank = compiled("examples/bank/bank.net", CompileOptions::default());
+    let cases = [(comb, vec![("drive", 12.0)], "r.y"), (bank, vec![("heat", 2.0), ("sense", 41.0)], "yoke.y")];
+    let following = cases.map(|(model, ranges, signal)| {
+        let ports: Vec<&str> = ranges.iter().map(|(port, _)| *port).collect();
+        let mut request = request(&ports, &[signal], &[]);
+        request.within = 1e-3;
+        request.ranges = ranges.iter().map(|(port, most)| ((*port).to_owned(), [0.0, *most])).collect();
+        let fitted = flexible(&model, &request).unwrap().fitted;
+        let slowest = fitted.model.mass.iter().copied().fold(0.0, f64::max);
+        assert!(fitted.error <= 1e-3 && fitted.model.mass.iter().any(|mass| *mass < 1e-3 * slowest), "{signal}");
+        fitted.follows.iter().filter(|follows| **follows).count()
+    });
+    assert!(following[0] == 0 && following[1] > 0, "{following:?}");
+}

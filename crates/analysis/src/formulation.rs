@@ -134,7 +134,7 @@ pub fn outweighed_tree(compiled: &CompiledModel) -> Option<String> {
     let system = &compiled.parts.system;
     let model = &system.model;
     // steps in joint coordinates collapse where parts touch
-    if model.linear || !system.anchors.is_empty() || system.turns() || system.can_touch() {
+    if model.linear || !system.anchors.is_empty() || system.turns() || system.may_touch() {
         return None;
     }
     let beams = compiled.structure.beams.iter().zip(&compiled.order.segments).filter(|(_, segments)| **segments > 0);
@@ -178,7 +178,7 @@ pub fn suited(compiled: &CompiledModel, stop: Option<f64>) -> ChosenFormulation 
     if beams.clone().next().is_none() || beams.any(|s| !s.only_turns()) {
         return compliant("joints are elastic in every direction, where a step in joint coordinates costs more");
     }
-    if system.can_touch() {
+    if system.may_touch() {
         return compliant("joints only turn, but parts may touch, whose forces are too stiff for explicit steps");
     }
     let Ok(linkage) = linkage(Formulation::Rcr, system) else { return compliant("joint coordinates do not suit it") };

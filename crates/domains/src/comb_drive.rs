@@ -35,7 +35,7 @@ pub struct CombDrive {
     /// C(u) of fingers in the middle of their gaps.
     pub capacitor: Capacitor,
     /// The motion across the fingers, and the field with it; none: SUGAR's comb, which has no side force.
-    pub sides: Option<(Approach, CombLaw, SideRoom)>,
+    pub sides: Option<(Approach, CombLaw)>,
     /// Impact losses of the sides.
     pub loss: Loss,
 }
@@ -94,14 +94,14 @@ impl CombDrive {
                 parasitic: comb.parasitic,
             };
             let law = CombLaw { sides, drawn: [comb.overlap, comb.misalignment] };
-            (across, law, SideRoom { drawn: comb.misalignment, room: comb.gap - touch })
+            (across, law)
         });
         Self { approach, capacitor, sides, loss: Loss::new(&comb.impact) }
     }
 
     /// C over the approach `u` and the displacement `y` across (m).
     fn field(&self, u: f64, y: f64) -> Jet {
-        let Some((_, law, _)) = &self.sides else {
+        let Some((_, law)) = &self.sides else {
             let c = self.capacitor.at(u);
             return Jet { value: c.value, first: [c.slope, 0.0], second: [c.curvature, 0.0, 0.0] };
         };
@@ -120,19 +120,19 @@ impl CombDrive {
 
     /// Energy of the contact at the sides over the same (J), where they touch.
     fn pressed(&self, u: f64, y: f64) -> Option<Jet> {
-        let (_, law, _) = self.sides.as_ref()?;
+        let (_, law) = self.sides.as_ref()?;
         law.pressed([u, y])
     }
 
     /// That energy at a configuration.
     fn pressed_at(&self, at: Configuration<'_>) -> Option<Jet> {
-        let (across, ..) = self.sides.as_ref()?;
+        let (across, _) = self.sides.as_ref()?;
         self.pressed(self.approach.value(at.q, at.linear), across.value(at.q, at.linear))
     }
 
     fn seen(&self, at: Configuration<'_>) -> Seen {
         let along = self.approach.measure(at.q, at.linear);
-        let across = self.sides.as_ref().map(|(across, ..)| across.measure(at.q, at.linear));
+        let across = self.sides.as_ref().map(|(across, _)| across.measure(at.q, at.linear));
         let y = across.map_or(0.0, |m| m.value);
         Seen { along, across, field: self.field(along.value, y), pressed: self.pressed(along.value, y) }
     }
@@ -172,14 +172,14 @@ impl CombDrive {
         }
         self.pressed_at(at)?;
         let seen = self.seen(at);
-        let ((across, ..), pressed, m) = (self.sides.as_ref()?, seen.pressed?, seen.across?);
+        let ((across, _), pressed, m) = (self.sides.as_ref()?, seen.pressed?, seen.across?);
         Some((across, seen, pressed, m))
     }
 
     /// `r +=` the forces of a potential with these derivatives along and across.
     fn add(&self, seen: &Seen, first: [f64; 2], r: &mut [Pose]) {
         self.approach.add_force(&seen.along, first[0], r);
-        if let (Some((across, ..)), Some(m)) = (&self.sides, &seen.across)
+        if let (Some((across, _)), Some(m)) = (&self.sides, &seen.across)
             && first[1] != 0.0
         {
             across.add_force(m, first[1], r);
@@ -201,10 +201,14 @@ impl CombDrive {
 
     /// Changes of both displacements with a change of the configuration.
     fn changes(&self, seen: &Seen, dq: &[Pose]) -> [f64; 2] {
-        let across =
-            self.sides.as_ref().zip(seen.across.as_ref()).map_or(0.0, |((across, ..), m)| across.change(m, dq));
+        let across = self.sides.as_ref().zip(seen.across.as_ref()).map_or(0.0, |((across, _), m)| across.change(m, dq));
         [self.approach.change(&seen.along, dq), across]
     }
+}
+
+/// Room of the sides of fingers.
+fn room(law: &CombLaw) -> SideRoom {
+    SideRoom { drawn: law.drawn[1], room: law.sides.gap - law.sides.contact.touch }
 }
 
 impl FromStructure for CombDrive {
@@ -216,7 +220,7 @@ impl FromStructure for CombDrive {
     }
 
     fn moved(self, to: &dyn Fn(MaterialPoint) -> MaterialPoint) -> Self {
-        let sides = self.sides.map(|(across, law, side)| (across.moved(to), law, side));
+        let sides = self.sides.map(|(across, law)| (across.moved(to), law));
         Self { approach: self.approach.moved(to), sides, ..self }
     }
 }
@@ -286,7 +290,7 @@ impl Domain for CombDrive {
         let Some(seen) = self.acting(at, volts) else { return };
         let first = seen.potential(volts).first;
         self.approach.load_points(first[0], &mut lever);
-        if let Some((across, ..)) = &self.sides {
+        if let Some((across, _)) = &self.sides {
             across.load_points(first[1], lever);
         }
     }
@@ -321,11 +325,11 @@ impl Domain for CombDrive {
     }
 
     fn side_room(&self) -> Option<(&Approach, SideRoom)> {
-        self.sides.as_ref().map(|(across, _, side)| (across, *side))
+        self.sides.as_ref().map(|(across, law)| (across, room(law)))
     }
 
     fn side_contact(&self, at: Configuration<'_>) -> Option<SideContact> {
-        let (across, law, _) = self.sides.as_ref()?;
+        let (across, law) = self.sides.as_ref()?;
         let sides = &law.sides;
         let left = sides.gap - law.aside(across.value(at.q, at.linear)).abs();
         let faces = sides.faces(law.overlap(self.approach.value(at.q, at.linear)));
@@ -333,14 +337,14 @@ impl Domain for CombDrive {
     }
 
     fn side_change(&self, at: Configuration<'_>, dq: &[Pose]) -> f64 {
-        let Some((across, law, _)) = &self.sides else { return 0.0 };
+        let Some((across, law)) = &self.sides else { return 0.0 };
         let m = across.measure(at.q, at.linear);
         -law.aside(m.value).signum() * across.change(&m, dq)
     }
 
     /// Of the way across the fingers.
     fn closing_bound(&self, q: &[Pose]) -> f64 {
-        self.sides.as_ref().map_or(f64::INFINITY, |(across, ..)| across.bound(q))
+        self.sides.as_ref().map_or(f64::INFINITY, |(across, _)| across.bound(q))
     }
 
     fn bearing(&self, at: Configuration<'_>) -> f64 {
@@ -372,9 +376,9 @@ impl Domain for CombDrive {
     }
 
     fn add_closing(&self, at: Configuration<'_>, r: &mut [Pose]) -> f64 {
-        let Some((across, law, side)) = &self.sides else { return 0.0 };
+        let Some((across, law)) = &self.sides else { return 0.0 };
         across.add_force(&across.measure(at.q, at.linear), 1.0, r);
-        snap_aside(law.sides.gap, side.room)
+        snap_aside(law.sides.gap, room(law).room)
     }
 
     fn add_loss(&self, at: Configuration<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
@@ -396,7 +400,7 @@ impl Domain for CombDrive {
     fn add_quotient(&self, chord: &Chord<'_>, volts: f64, pattern: &Pattern, r: &mut [Pose], tangent: &mut BodyMatrix) {
         let [start, middle, end] = chord.at;
         let factor = -0.5 * volts * volts;
-        let [u, y] = [&Some(self.approach), &self.sides.as_ref().map(|(across, ..)| *across)].map(|approach| {
+        let [u, y] = [&Some(self.approach), &self.sides.as_ref().map(|(across, _)| *across)].map(|approach| {
             [start, end].map(|at| approach.as_ref().map_or(0.0, |approach| approach.value(at.q, at.linear)))
         });
         let touched = y.iter().any(|y| u.iter().any(|u| self.pressed(*u, *y).is_some()));
@@ -441,7 +445,7 @@ impl Domain for CombDrive {
             m.bend = m.bend.map(|bend| 0.5 * bend);
             m
         };
-        let across = self.sides.as_ref().map(|(across, ..)| own(across));
+        let across = self.sides.as_ref().map(|(across, _)| own(across));
         let seen = Seen { along: own(&self.approach), across, field: Jet::default(), pressed: None };
         self.add(&seen, [force, aside], r);
         self.add_hessian(&seen, [force, aside], [slope, mixed, bend], pattern, tangent);
@@ -449,7 +453,7 @@ impl Domain for CombDrive {
 
     /// That of both displacements; of SUGAR's comb, which has no side force, that of one.
     fn point_laws(&self) -> Vec<PointLaw> {
-        let Some((_, law, _)) = &self.sides else {
+        let Some((_, law)) = &self.sides else {
             return vec![PointLaw::of(Law::Field(self.capacitor, None))];
         };
         let of_both = PointLaw { loss: self.loss.coefficient(), ..PointLaw::of(Law::Comb(*law)) };
@@ -458,7 +462,7 @@ impl Domain for CombDrive {
 
     fn point_approaches(&self, at: Configuration<'_>, mut put: impl FnMut(f64)) {
         put(self.approach.value(at.q, at.linear));
-        if let Some((across, ..)) = &self.sides {
+        if let Some((across, _)) = &self.sides {
             put(across.value(at.q, at.linear));
         }
     }

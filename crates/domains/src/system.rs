@@ -305,6 +305,13 @@ impl System {
         self.members.iter().any(|member| member.touching().is_some())
     }
 
+    /// True where parts may touch by themselves: those drawn to touch, and fingers drawn off the middle of their gaps, which pull in across.
+    #[inline]
+    pub fn may_touch(&self) -> bool {
+        let aside = |member: &Member| member.side_room().is_some_and(|(_, side)| side.drawn != 0.0);
+        self.can_touch() || self.members.iter().any(aside)
+    }
+
     /// True where there is any contact, that of fingers at their sides included.
     #[inline]
     pub fn has_contacts(&self) -> bool {

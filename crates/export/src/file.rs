@@ -2,7 +2,6 @@
 
 use super::compare::{ModelFit, fit};
 use super::flexible::{FlexibleModel, flexible};
-use super::flexible_verilog_a::follows_at_once;
 use super::linear::{ReducedPort, SignalShown};
 use super::model_options::model_options;
 use super::names::{self, Pins};
@@ -329,7 +328,7 @@ fn about_reduced(compiled: &CompiledModel, model: &FlexibleModel, source: &str, 
         format!("slowest coordinate at rest: {:e} Hz", 1.0 / (TAU * of.mass[0].sqrt())),
         format!(
             "{} coordinates of 32 times that frequency or more follow their forces at once",
-            (0..of.size()).filter(|j| follows_at_once(of, *j)).count()
+            model.fitted.follows.iter().filter(|follows| **follows).count()
         ),
     ]);
     about.extend(warnings.iter().map(|warning| format!("warning: {warning}")));

@@ -36,14 +36,6 @@ const NONE: f64 = 1e-9;
 /// Largest angular frequency that scales a rate, over the least (1).
 const FASTEST: f64 = 1e4;
 
-/// Mass over that of the slowest coordinate below which a coordinate is 32 times as fast or more, and follows its forces at once (1).
-const FOLLOWS: f64 = 1e-3;
-
-/// Whether coordinate `j` has no inertia in a file: simulators would have to follow oscillations that ports do not see.
-pub(super) fn follows_at_once(of: &PolynomialModel, j: usize) -> bool {
-    of.mass[j] < FOLLOWS * of.mass.iter().copied().fold(0.0, f64::max)
-}
-
 /// The file: a descriptive header, and the module `name`.
 pub fn write(model: &FlexibleModel, pins: &Pins, name: &str, about: &[String]) -> String {
     let of = &model.fitted.model;
@@ -352,20 +344,20 @@ impl FlexibleModule<'_> {
 
     /// The equations of the coordinates.
     fn motion(&mut self) {
-        let (of, m) = (self.of, self.of.size());
+        let (of, m, follows) = (self.of, self.of.size(), &self.model.fitted.follows);
         let thermal = self.by_lag(&of.thermal);
         let unit = 1.0 / of.energy_unit();
         let (loads, strains) = (self.loads(), of.closures.strains.coefficients.nrows());
         for j in 0..m {
             let (n, second) = (j + 1, self.second(j));
             ContributionSum::begin(&format!("I(x{n}) <+ ddt({second:e} * V(x{n})) - V(v{n})")).end(&mut self.body);
-            let inertia = match follows_at_once(of, j) {
+            let inertia = match follows[j] {
                 true => "0".to_owned(),
                 false => format!("ddt({:e} * V(v{n}))", of.mass[j] / second),
             };
             let mut sum = ContributionSum::begin(&format!("I(v{n}) <+ {inertia}"));
             for k in 0..m {
-                if !follows_at_once(of, j) && !follows_at_once(of, k) {
+                if !follows[j] && !follows[k] {
                     let damping = significant(of.damping[(j, k)], of.damping.amax());
                     sum.add(damping / self.second(k), &format!("V(v{})", k + 1));
                 }
@@ -391,7 +383,7 @@ impl FlexibleModule<'_> {
     /// Noise of the damping, on coordinates that have inertia.
     fn drag_noise(&mut self) {
         let of = self.of;
-        let moving: Vec<usize> = (0..of.size()).filter(|&j| !follows_at_once(of, j)).collect();
+        let moving: Vec<usize> = (0..of.size()).filter(|&j| !self.model.fitted.follows[j]).collect();
         let largest = of.damping.amax();
         let entry = |i: usize, k: usize| significant(of.damping[(moving[i], moving[k])], largest);
         let damping = DMatrix::from_fn(moving.len(), moving.len(), entry);

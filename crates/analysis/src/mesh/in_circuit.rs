@@ -29,7 +29,7 @@ const HELD: usize = 3;
 /// times the tolerance. A warning reports an error of one of the two beyond the tolerance. Effects of voltages are
 /// unknown here.
 pub fn in_circuit(compiled: &CompiledModel) -> CompiledModel {
-    let turning = with_section_inertia(compiled);
+    let turning = with_section_inertia(compiled, false);
     let compiled = turning.as_deref().unwrap_or(compiled);
     let given = chosen(compiled) || compiled.options.band.is_some();
     let drawn = compiled.parts.system.model.unknowns();

@@ -158,11 +158,15 @@ pub(super) fn order(
 
 /// True where the run goes from rest to a state in which parts touch, on a mesh that is to be found.
 pub(super) fn ends_in_contact(moving: &CompiledModel, options: &TransientOptions<'_>) -> bool {
-    let system = &moving.parts.system;
     let free = !chosen(moving) && moving.options.band.is_none();
-    let asked = free && options.release.is_none() && !options.signals.is_empty();
+    free && options.release.is_none() && !options.signals.is_empty() && rests_in_contact(moving, options)
+}
+
+/// True where parts touch in the state to which the run goes, the sides of fingers included.
+pub(super) fn rests_in_contact(moving: &CompiledModel, options: &TransientOptions<'_>) -> bool {
+    let system = &moving.parts.system;
     let touches = |point: OperatingPoint| (0..system.members.len()).any(|g| system.touches(g, &point.q));
-    asked && system.can_touch() && operating_point(moving, &options.voltages).is_ok_and(touches)
+    system.has_contacts() && operating_point(moving, &options.voltages).is_ok_and(touches)
 }
 
 /// A mesh, and the one compared with it: half its segments, or twice as many for odd numbers. The coarser first.

@@ -198,7 +198,7 @@ fn in_suited_formulation<T>(
         return found.take().filter(|_| is_cheaper).map_or(bodies, Ok);
     }
     let early = formulation::takes_joints(moving, options);
-    if early || !formulation::may_take_joints(moving, options) || moving.parts.system.can_touch() {
+    if early || !formulation::may_take_joints(moving, options) || moving.parts.system.may_touch() {
         return of_bodies(SearchLimits::none());
     }
     let mut in_joints = None;
@@ -256,9 +256,10 @@ fn fitted_as_compiled(
     for name in options.signals.iter().filter(|name| !name.contains('[')) {
         Expression::of_run(moving, name, &[])?;
     }
-    let moving = &*with_section_inertia(moving)?;
+    let closes = large_motion::rests_in_contact(moving, options);
+    let moving = &*with_section_inertia(moving, closes)?;
     let Some(order) = limited_order_in_time(moving, options, limits)? else { return Ok(None) };
-    let start = options.release.map(|start| on(&*with_section_inertia(start)?, order.clone())).transpose()?;
+    let start = options.release.map(|start| on(&*with_section_inertia(start, closes)?, order.clone())).transpose()?;
     let mut moving = on(moving, order)?;
     let reported = run_warnings(&moving, start.as_ref(), &options.voltages);
     moving.warnings.items.extend(reported);

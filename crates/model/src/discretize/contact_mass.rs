@@ -23,7 +23,8 @@ pub(super) fn weighed(
         return bodies;
     }
     let light = LIGHT * bodies.iter().map(|body| body.mass).sum::<f64>();
-    for laid in members.iter().filter(|laid| laid.member.touching().is_some()) {
+    let touches = |member: &Member| member.touching().is_some() || member.side_room().is_some();
+    for laid in members.iter().filter(|laid| touches(&laid.member)) {
         laid.member.bodies(|id| match id {
             BodyId::Free(k) if bodies[k].mass == 0.0 => bodies[k].mass = light,
             _ => {}

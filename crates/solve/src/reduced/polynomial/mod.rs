@@ -12,6 +12,7 @@
 //! |---|---|
 //! | `chain` | values and derivatives of monomials, one factor at a time |
 //! | `cubature` | fewer points of gaps |
+//! | `fast_coordinates` | coordinates without inertia in a file |
 //! | [`monomials`] | monomials and sums of them |
 //! | [`motion`] | the polynomials in the stages of an integrator |
 //! | `moving` | the polynomials for a motion, with their error against exact kinematics |
@@ -23,6 +24,7 @@
 
 mod chain;
 mod cubature;
+mod fast_coordinates;
 pub mod fit;
 pub mod monomials;
 pub mod motion;

@@ -8,6 +8,7 @@ use super::super::inputs::InputBox;
 use super::super::space::{ReducedForces, ReducedSpace};
 use super::super::statics::solve;
 use super::PolynomialModel;
+use super::fast_coordinates::following;
 use super::fit::{CombFits, Fit};
 use super::samples::{FullEquilibrium, equilibria};
 use super::shapes::Probe;
@@ -39,6 +40,8 @@ pub struct FittedPolynomials {
     pub errors: [f64; 2],
     /// Equilibria of the full model that were compared.
     pub compared: usize,
+    /// Whether each coordinate has no inertia in a file: it is fast, and follows its forces at once.
+    pub follows: Vec<bool>,
 }
 
 /// A tested equilibrium with its readings.
@@ -93,7 +96,9 @@ pub fn fitted(
         let (_, model) = fits.least(f64::INFINITY, |fit| (0.0, fit.model(DEGREES[0], tol, &groups)));
         (model, [f64::INFINITY; 2])
     });
-    FittedPolynomials { model, error: worse(&errors), errors, compared: references.len() }
+    let states: Vec<Vec<f64>> = sampled.iter().map(|at| coordinates(&model, &at.z)).collect();
+    let follows = following(&model, &states);
+    FittedPolynomials { model, error: worse(&errors), errors, compared: references.len(), follows }
 }
 
 /// Members by their voltage, but for those that stay apart.
@@ -121,8 +126,7 @@ fn errors(model: &PolynomialModel, space: &ReducedSpace, references: &[Reference
     let (mut worst, mut charged) = (0.0f64, 0.0f64);
     for reference in references {
         bimorph_base::budget::check();
-        let mut x: Vec<f64> =
-            (model.rotation.tr_mul(&DVector::from_column_slice(&reference.at.z)) / model.scale).as_slice().to_vec();
+        let mut x = coordinates(model, &reference.at.z);
         if !equilibrium(model, &reference.at.drive, &mut x) {
             return [f64::INFINITY; 2];
         }
@@ -146,6 +150,11 @@ fn errors(model: &PolynomialModel, space: &ReducedSpace, references: &[Reference
         }
     }
     [worst, charged]
+}
+
+/// The coordinates of a state of the space.
+fn coordinates(model: &PolynomialModel, z: &[f64]) -> Vec<f64> {
+    (model.rotation.tr_mul(&DVector::from_column_slice(z)) / model.scale).as_slice().to_vec()
 }
 
 /// Newton's method from `x`; true where it ends at a stable equilibrium.
