@@ -14,7 +14,7 @@
 //! | `u`, `s`, `f` | approach (µm), rate (m/s) and force (N) of one point of a gap |
 //! | `f1` … | forces over the shapes (N) |
 //! | `m1`, `a1` | force of a contact that is shown (N), and its radius (µm) |
-//! | `y0`, and others with `c` before a letter | displacement of a comb across its fingers (µm), and its law ([`super::comb_laws`]) |
+//! | `y0`, and others with `c` before a letter | displacement of a comb across its fingers (µm), and its law (`comb_laws`) |
 //! | `g1`, `c1`, `k1`, `d1` | voltage, capacitance, its slope and smallest distance of a gap |
 
 use super::comb_laws;
