@@ -164,7 +164,7 @@ def test_a_beam_stretches(tmp_path):
     control = {"dc": "dc If -60u 60u 5u"}
     sources = "If 0 n0 0\n"
     vacask = in_vacask(tmp_path / "vacask", "n0 0 s0", "if (0 n0) i dc=0\n", {"dc": swept("dc", "if", "-60u", "60u", "5u")})
-    full = run(versions[max(versions)], tmp_path / "plug-in", sources, plug_in, control, plug_in=True, options=options)
+    full = run(versions[max(versions)], tmp_path / "plug-in", sources, plug_in, control, plug_in=True)
     for version, program in versions.items():
         plots = run(program, tmp_path / f"ngspice{version}", sources, osdi, control)
         worst = apart(plots["dc"], full["dc"], "v(s0)")
