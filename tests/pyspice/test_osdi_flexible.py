@@ -141,8 +141,8 @@ def test_a_switch_closes_in_time(tmp_path):
     signals = ["a(8).y:1e6"]
     export(SWITCH, tmp_path, {"drive": "0:20"}, signals)
     control = {"tran": "tran 2n 4u 0 2n"}
-    pulse = "Vdrive n0 0 PULSE(0 19 0 10n 10n 10 20)\n"
-    full, written = everywhere(SWITCH, tmp_path, ["drive"], signals, pulse, control, "reltol=1e-4")
+    source = "Vdrive n0 0 PULSE(0 19 0 10n 10n 10 20)\n"
+    full, written = everywhere(SWITCH, tmp_path, ["drive"], signals, source, control, "reltol=1e-4")
     pulse = 'vdrive (n0 0) v type="pulse" val0=0 val1=19 delay=0 rise=10n fall=10n width=10 period=20\n'
     equal = {"tran": "analysis tran tran step=0.5n stop=4u maxstep=0.5n"}
     vacask = in_vacask(tmp_path / "vacask", "n0 0 s0", pulse, equal, "tran_lteratio=1e4")["tran"]

@@ -190,7 +190,7 @@ mod tests {
             assert!((forces(y, 3.0, closing)[1] / at[1] - 1.6).abs() < 1e-9);
         }
         assert_eq!(forces(1.7e-6, 3.0, "0.2"), [0.0; 2]);
-        let [deep, step] = [1.86e-6, 1e-10].map(|y| y);
+        let (deep, step) = (1.86e-6, 1e-10);
         let slope = (forces(deep + step, 0.0, "0")[0] - forces(deep - step, 0.0, "0")[0]) / (2.0 * step);
         let over_overlap = forces(deep, 0.0, "0")[1] / 15.5e-6;
         assert!((slope / over_overlap - 1.0).abs() < 1e-5, "{slope} {over_overlap}");
