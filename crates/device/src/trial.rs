@@ -30,6 +30,10 @@ const PROPOSED_STEPS: f64 = 32.0;
 /// growing motion adds 18 % or more.
 const RESPONDS: f64 = 0.1;
 
+/// Remedy for an impact of fingers that were drawn in the middle of their gaps: such models have no inertia of sections.
+const NEEDS_INERTIA: &str =
+    "; fingers touch there, and sections of beams have no inertia: give the model `rotary_inertia=true`";
+
 impl DeviceSession {
     /// A static trial: from the parent's equilibrium along straight lines in voltage, or from rest.
     pub(super) fn balance(
@@ -183,7 +187,9 @@ impl DeviceSession {
                     return true;
                 }
                 Err(error) => {
-                    reply.status = Status::Fail(error.begun_at(request.t - request.dt).to_string());
+                    let near = system.sides_near(&self.motion.q, &self.motion.v, request.dt);
+                    let remedy = if near && !compiled.options.rotary_inertia { NEEDS_INERTIA } else { "" };
+                    reply.status = Status::Fail(format!("{}{remedy}", error.begun_at(request.t - request.dt)));
                     return !self.went_far(true);
                 }
             }

@@ -9,7 +9,7 @@
 use super::method::Motion;
 use super::pace::StepController;
 use super::rodas4::lanes::{Lane, LaneRodas4};
-use crate::equations::bodies::{self, FLOOR, contact_error, dragged};
+use crate::equations::bodies::{self, contact_error, dragged};
 use bimorph_base::ErrorBudget;
 use bimorph_domains::{Ramp, System};
 use bimorph_multibody::batch::LANES;
@@ -191,6 +191,6 @@ fn relative_error(method: &LaneRodas4, k: usize, system: &System, run: &RunningL
         return 0.0;
     }
     let norms = &method.norms;
-    let reach = norms.before[k].max(norms.after[k]) + FLOOR * system.length_scale * run.mass.sqrt();
+    let reach = bodies::reach([norms.before[k], norms.after[k]], system.length_scale * run.mass.sqrt());
     bodies::relative_error([norms.error_q[k], norms.error_v[k]], h, run.errors.within(reach), contact)
 }
