@@ -56,7 +56,7 @@ impl NormWeights {
     }
 
     fn allowed_of_norms(&self, system: &System, [before, after]: [f64; 2], tol: f64) -> f64 {
-        ErrorBudget::of(tol).within(reach([before, after], system.length_scale * self.mass.sqrt()))
+        ErrorBudget::of(tol).within(reach([before, after], [system.length_scale, self.mass.sqrt()]))
     }
 }
 
@@ -128,7 +128,7 @@ impl<'a> Bodies<'a> {
             false => own(x).hypot(drag(x).sqrt()),
         };
         let mass = mass + h * dragged.iter().map(|(_, _, c)| c).sum::<f64>();
-        let reach = reach([norm(&before.q), norm(&after.q)], system.length_scale * mass.sqrt());
+        let reach = reach([norm(&before.q), norm(&after.q)], [system.length_scale, mass.sqrt()]);
         Some(([norm(&error.q), norm(&error.v)], ErrorBudget::of(tol).within(reach)))
     }
 
@@ -190,10 +190,10 @@ impl Equations for Bodies<'_> {
     }
 }
 
-/// The displacement that an error is relative to, between ends of these norms and with a length scale in the same norm. It is 0 for a leap, and for an end
+/// The displacement that an error is relative to, between ends of these norms, with a length scale and the root of a mass. It is 0 for a leap, and for an end
 /// that is no number.
-pub(crate) fn reach([before, after]: [f64; 2], scale: f64) -> f64 {
-    if after <= LEAP * (before + scale) { before.max(after) + FLOOR * scale } else { 0.0 }
+pub(crate) fn reach([before, after]: [f64; 2], [scale, root]: [f64; 2]) -> f64 {
+    if after <= LEAP * (before + scale * root) { before.max(after) + FLOOR * scale * root } else { 0.0 }
 }
 
 /// The error of a step of length `h` (s) over what it `may` be: of displacements and rates in the norm of masses, and of contact.
@@ -254,8 +254,8 @@ mod tests {
     /// beside it.
     #[test]
     fn leaps_are_no_steps() {
-        assert_eq!([reach([2.0, 3.0], 1.0), reach([3.0, 2.0], 1.0), reach([0.0, 0.0], 1.0)], [3.0001, 3.0001, 1e-4]);
-        let error = |after: f64, error: f64| relative_error([error, 0.0], 1e-9, reach([1e-3, after], 1e-3), 0.0);
+        assert_eq!([[2.0, 3.0], [3.0, 2.0], [0.0, 0.0]].map(|ends| reach(ends, [1.0, 1.0])), [3.0001, 3.0001, 1e-4]);
+        let error = |after: f64, error: f64| relative_error([error, 0.0], 1e-9, reach([1e-3, after], [1e-3, 1.0]), 0.0);
         assert!(error(1.0, 1e-3) < 1.1e-3);
         for leap in [3.0, 1e100, f64::INFINITY, f64::NAN] {
             assert_eq!([error(leap, 1e-3), error(leap, 0.0)], [f64::INFINITY; 2], "{leap}");

@@ -181,7 +181,7 @@ impl<L: Loads> Equations for Constrained<'_, L> {
 
     fn share(&self, [before, after]: [&Motion<f64>; 2], error: &Motion<f64>, h: f64, tol: f64) -> f64 {
         let (eq, ev) = (self.norm(&error.q), self.norm(&error.v));
-        let reach = reach([self.norm(&before.q), self.norm(&after.q)], 1.0);
+        let reach = reach([self.norm(&before.q), self.norm(&after.q)], [1.0, 1.0]);
         let share = ErrorBudget::of(tol).used(eq.hypot(h * ev), reach);
         if share.is_nan() { f64::INFINITY } else { share }
     }
