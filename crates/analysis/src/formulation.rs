@@ -133,7 +133,7 @@ pub fn in_possible_joints(
 pub fn outweighed_tree(compiled: &CompiledModel) -> Option<String> {
     let system = &compiled.parts.system;
     let model = &system.model;
-    // steps in joint coordinates collapse where parts touch
+    // impacts take more steps in joint coordinates than in those of bodies
     if model.linear || !system.anchors.is_empty() || system.turns() || system.may_touch() {
         return None;
     }

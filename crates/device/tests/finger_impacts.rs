@@ -18,7 +18,7 @@ const COMB: &str = "process p = [ Youngsmodulus=160e9 density=2330 h=10u ]
     eground * [r] []
     drive port * [s] []";
 
-/// The last status of a ramp from 0 to 12 V in 60 µs, which closes the fingers, and the times of its points (s).
+/// The last status of a ramp from 0 to 12 V in 60 µs, which closes the fingers, and the time reached (s).
 fn ramp(options: &CompileOptions) -> (Status, f64) {
     let bundle = Bundle::from_text("comb.net", COMB);
     let compiled = draw(&NetlistSource::new(&bundle), options).and_then(|drawn| drawn.compile());

@@ -5,8 +5,8 @@
 //! the model's length scale. Where parts touch, the time of a bounce is nothing beside that of the motion, and a
 //! displacement beside its reach: there the error of the energy,
 //! |vᵀMe_v| + |work of the contact forces over e_q|, must also stay below tol·(kinetic energy + energy in the contacts), three times that where contact loses
-//! energy, and the error of a penetration below a tenth of it. A step that leaps beyond the law of contact, or a thousand length
-//! scales and displacements before it, is rejected, whatever its error is relative to where it ends.
+//! energy, and the error of a penetration below a tenth of it. A step that jumps beyond the law of contact is rejected, whatever its error
+//! is relative to where it ends. So is one that diverges: its displacement is a thousand times that before and the length scale, or NaN.
 
 use super::{Control, DegreeOfFreedom, Equations, Motion};
 use bimorph_base::ErrorBudget;
@@ -19,9 +19,9 @@ use std::borrow::Cow;
 /// Fraction of the length scale below which a displacement's relative error does not count.
 pub const FLOOR: f64 = 1e-4;
 
-/// Displacement after a step, of that before and the length scale, beyond which the step has exploded, however small its estimated error is beside it (1).
-/// A step is at most 5 times as long as the one before, in which a free mass comes at most 36 times as far.
-const LEAP: f64 = 1e3;
+/// Displacement after a step, relative to that before and the length scale, beyond which the step has diverged, however small its estimated error is
+/// beside it (1). A step is at most 5 times as long as the one before, and a free mass then moves at most 36 times as far.
+const DIVERGED: f64 = 1e3;
 
 /// Tolerance that equal steps are taken to have (1).
 const EQUAL: f64 = 1e-6;
@@ -56,7 +56,7 @@ impl NormWeights {
     }
 
     fn allowed_of_norms(&self, system: &System, [before, after]: [f64; 2], tol: f64) -> f64 {
-        ErrorBudget::of(tol).within(reach([before, after], [system.length_scale, self.mass.sqrt()]))
+        ErrorBudget::of(tol).within(error_scale([before, after], [system.length_scale, self.mass.sqrt()]))
     }
 }
 
@@ -128,8 +128,8 @@ impl<'a> Bodies<'a> {
             false => own(x).hypot(drag(x).sqrt()),
         };
         let mass = mass + h * dragged.iter().map(|(_, _, c)| c).sum::<f64>();
-        let reach = reach([norm(&before.q), norm(&after.q)], [system.length_scale, mass.sqrt()]);
-        Some(([norm(&error.q), norm(&error.v)], ErrorBudget::of(tol).within(reach)))
+        let scale = error_scale([norm(&before.q), norm(&after.q)], [system.length_scale, mass.sqrt()]);
+        Some(([norm(&error.q), norm(&error.v)], ErrorBudget::of(tol).within(scale)))
     }
 
     /// The norm of displacements by which errors are measured, where it is that of masses alone.
@@ -190,10 +190,12 @@ impl Equations for Bodies<'_> {
     }
 }
 
-/// The displacement that an error is relative to, between ends of these norms, with a length scale and the root of a mass. It is 0 for a leap, and for an end
-/// that is no number.
-pub(crate) fn reach([before, after]: [f64; 2], [scale, root]: [f64; 2]) -> f64 {
-    if after <= LEAP * (before + scale * root) { before.max(after) + FLOOR * scale * root } else { 0.0 }
+/// The displacement that the error of a step is relative to, from the norms of the displacements before and after it, a length scale, and the root of the mass.
+/// It is 0 for a step that diverges.
+pub(crate) fn error_scale([before, after]: [f64; 2], [length, root_mass]: [f64; 2]) -> f64 {
+    let size = length * root_mass;
+    // false for NaN
+    if after <= DIVERGED * (before + size) { before.max(after) + FLOOR * length * root_mass } else { 0.0 }
 }
 
 /// The error of a step of length `h` (s) over what it `may` be: of displacements and rates in the norm of masses, and of contact.
@@ -250,15 +252,19 @@ pub(crate) fn dragged(model: &Model) -> Vec<(usize, usize, f64)> {
 mod tests {
     use super::*;
 
-    /// Errors are relative to the larger end and a floor. A step that leaps, overflows or is no number has an infinite error, also where its estimate is small
-    /// beside it.
+    /// Errors are relative to the larger end and a floor. A step that diverges, overflows or ends at NaN has an infinite error, also where its estimate is
+    /// small beside its displacement.
     #[test]
-    fn leaps_are_no_steps() {
-        assert_eq!([[2.0, 3.0], [3.0, 2.0], [0.0, 0.0]].map(|ends| reach(ends, [1.0, 1.0])), [3.0001, 3.0001, 1e-4]);
-        let error = |after: f64, error: f64| relative_error([error, 0.0], 1e-9, reach([1e-3, after], [1e-3, 1.0]), 0.0);
+    fn steps_that_diverge_are_rejected() {
+        assert_eq!(
+            [[2.0, 3.0], [3.0, 2.0], [0.0, 0.0]].map(|ends| error_scale(ends, [1.0, 1.0])),
+            [3.0001, 3.0001, 1e-4]
+        );
+        let error =
+            |after: f64, error: f64| relative_error([error, 0.0], 1e-9, error_scale([1e-3, after], [1e-3, 1.0]), 0.0);
         assert!(error(1.0, 1e-3) < 1.1e-3);
-        for leap in [3.0, 1e100, f64::INFINITY, f64::NAN] {
-            assert_eq!([error(leap, 1e-3), error(leap, 0.0)], [f64::INFINITY; 2], "{leap}");
+        for end in [3.0, 1e100, f64::INFINITY, f64::NAN] {
+            assert_eq!([error(end, 1e-3), error(end, 0.0)], [f64::INFINITY; 2], "{end}");
         }
     }
 }

@@ -17,7 +17,7 @@
 //! not see them move.
 
 use super::anderson::Anderson;
-use super::bodies::reach;
+use super::bodies::{FLOOR, error_scale};
 use super::loads::Loads;
 use super::{Control, DegreeOfFreedom, Equations, Motion, SolverCounters, Stage, Staged, StepFailure, StepResult};
 use bimorph_base::ErrorBudget;
@@ -33,8 +33,6 @@ const PATIENCE: i32 = 6;
 const SLOW: f64 = 0.7;
 /// Corrections below this fraction of the coordinates that no longer shrink are rounding.
 const STALLED: f64 = 1e-10;
-/// Fraction of the size of a coordinate below which its relative error does not count.
-const FLOOR: f64 = 1e-4;
 /// Error of a stage against the motion in equal steps.
 const EQUAL: f64 = 1e-10;
 /// Fraction of the projection of moving loops at the end of a step that counts as error. Each step is late by the
@@ -181,8 +179,8 @@ impl<L: Loads> Equations for Constrained<'_, L> {
 
     fn share(&self, [before, after]: [&Motion<f64>; 2], error: &Motion<f64>, h: f64, tol: f64) -> f64 {
         let (eq, ev) = (self.norm(&error.q), self.norm(&error.v));
-        let reach = reach([self.norm(&before.q), self.norm(&after.q)], [1.0, 1.0]);
-        let share = ErrorBudget::of(tol).used(eq.hypot(h * ev), reach);
+        let scale = error_scale([self.norm(&before.q), self.norm(&after.q)], [1.0, 1.0]);
+        let share = ErrorBudget::of(tol).used(eq.hypot(h * ev), scale);
         if share.is_nan() { f64::INFINITY } else { share }
     }
 

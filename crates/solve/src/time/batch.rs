@@ -191,6 +191,6 @@ fn relative_error(method: &LaneRodas4, k: usize, system: &System, run: &RunningL
         return 0.0;
     }
     let norms = &method.norms;
-    let reach = bodies::reach([norms.before[k], norms.after[k]], [system.length_scale, run.mass.sqrt()]);
-    bodies::relative_error([norms.error_q[k], norms.error_v[k]], h, run.errors.within(reach), contact)
+    let scale = bodies::error_scale([norms.before[k], norms.after[k]], [system.length_scale, run.mass.sqrt()]);
+    bodies::relative_error([norms.error_q[k], norms.error_v[k]], h, run.errors.within(scale), contact)
 }

@@ -149,7 +149,7 @@ impl JointStages {
             *displacement = Pose::new(u[0].0[lane], u[1].0[lane], u[2].0[lane]);
             *rate = *displacement / gh - self.drift(j);
         }
-        // steps without drag multiply it by zero, and a rejected one may have been no number
+        // models without drag multiply it by zero, and the NaN of a rejected step would stay
         self.drift.fill(ZERO_POSE);
     }
 }
