@@ -2,6 +2,7 @@
 
 use bimorph::compile::CompiledModel;
 pub(crate) use bimorph::export::model_options::model_options as options;
+use bimorph::export::model_options::model_options_of_run;
 use std::fmt::Write;
 
 /// Rows shown of a long list.
@@ -37,4 +38,9 @@ pub(crate) fn columns(header: &[&str], rows: &[Vec<String>]) -> String {
 /// The last line of a report: mesh, unknowns and error estimate.
 pub(crate) fn footing(compiled: &CompiledModel, unknowns: usize) -> String {
     format!("{unknowns} unknowns, {}", options(compiled))
+}
+
+/// The same of a run in time.
+pub(crate) fn footing_of_run(compiled: &CompiledModel, unknowns: usize) -> String {
+    format!("{unknowns} unknowns, {}", model_options_of_run(compiled))
 }

@@ -142,13 +142,15 @@ pub(super) fn text(
             j.accelerations, j.singular_evaluations, j.coordinates, j.constraints, j.largest_gap_m
         ),
     };
-    let off = result.step_error.map_or_else(|| ", not compared".to_owned(), |e| format!(", estimated error {e:.1e}"));
+    let off = result
+        .step_error
+        .map_or_else(|| ", not compared".to_owned(), |e| format!(", estimated error of the steps {e:.1e}"));
     format!(
         "{}\n{events}{} samples, {} steps ({} rejected){off}, {work}; {}",
         report::columns(&["signal", "lowest sample", "highest sample", "at the end"], &rows),
         result.t.len(),
         c.steps,
         c.rejected,
-        report::footing(compiled, result.unknowns)
+        report::footing_of_run(compiled, result.unknowns)
     )
 }

@@ -9,6 +9,7 @@
 
 use super::chart::error::{SMALL, half_range};
 use super::transient::{Statistics, TransientOptions, TransientResult};
+use bimorph_solve::time::event::Direction;
 use std::ops::Range;
 
 /// Code of the warning that single values hold no more.
@@ -44,6 +45,16 @@ pub(super) enum MeshOrSteps {
 /// When parts first touch in a run (s).
 pub(super) fn first_contact(result: &TransientResult) -> Option<f64> {
     result.events.iter().find(|event| event.contact).map(|event| event.t)
+}
+
+/// When a gap first closes in a run that did not start with one closed (s).
+pub(super) fn first_closing(result: &TransientResult) -> Option<f64> {
+    result
+        .events
+        .iter()
+        .find(|event| event.contact)
+        .filter(|event| event.direction == Direction::Down)
+        .map(|event| event.t)
 }
 
 /// Compares a run that touches with its companion, and sets what `result` reports of the time after the contact. `least` is the

@@ -10,6 +10,16 @@ const ROUNDED: f64 = 5e-4;
 
 /// The options of a model in one line, with a line break at its end.
 pub fn model_options(compiled: &CompiledModel) -> String {
+    with_error(compiled, "estimated error")
+}
+
+/// The same of a run in time, whose steps have an estimated error of their own.
+pub fn model_options_of_run(compiled: &CompiledModel) -> String {
+    with_error(compiled, "estimated error of the mesh")
+}
+
+/// The options, with the estimated error by this name.
+fn with_error(compiled: &CompiledModel, name: &str) -> String {
     let options = &compiled.options;
     let mut text = format!("tolerance {:e}", options.errors().requested());
     if options.errors().requested() < ROUNDED {
@@ -37,7 +47,7 @@ pub fn model_options(compiled: &CompiledModel) -> String {
         }
     }
     if let Some(error) = compiled.order.estimated_error {
-        let _ = write!(text, ", estimated error {error:.1e}");
+        let _ = write!(text, ", {name} {error:.1e}");
     }
     text.push('\n');
     text

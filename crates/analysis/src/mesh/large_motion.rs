@@ -9,7 +9,8 @@
 //! the tolerance segments are doubled, until the tolerance holds. A coarser intermediate mesh that should hold it as
 //! well is run and compared; if it does, it is used. The reported error always belongs to a mesh that was actually run.
 //!
-//! A run to a state in which parts touch is compared up to its first contact: impacts on two meshes have nothing else in common than their means.
+//! A run to a state in which parts touch is compared up to its first contact, and in the time of that: impacts on two meshes have nothing else in common
+//! than their means. Where the contact comes early in the run, meshes are compared in the time up to it (`to_first_contact.rs`).
 //!
 //! The first coarse run propagates the error of its steps. Steps that differ on both meshes are no error of a mesh. So where the difference is beyond the
 //! goal and this error may explain it, both runs are made again with sharper steps before segments are doubled. Where another formulation may be
@@ -19,12 +20,14 @@
 //! be reported. Such a run is made twice, too, and the difference of the two is reported instead.
 
 use super::super::AnalysisError;
+use super::super::after_contact::first_closing;
 use super::super::chart::error::largest_error;
 use super::super::statics::{OperatingPoint, operating_point};
 use super::super::step_error;
 use super::super::transient::{TransientOptions, TransientResult, Until, transient};
 use super::excited_modes;
 use super::remeshed::{chosen, meshed};
+use super::to_first_contact;
 use crate::readout::expression::Expression;
 use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
@@ -96,19 +99,52 @@ pub(super) fn order(
             error => at_least(error.map_or(left, |error| error.min(left))),
         }));
     }
+    if options.until == Some(Until::Contact) {
+        return to_first_contact::order(moving, options, &order, limits);
+    }
+    Ok(match search(moving, options, &order, limits)? {
+        SearchEnd::Found(mesh, _) => Some(mesh),
+        SearchEnd::Limit | SearchEnd::EarlyContact(_) => None,
+    })
+}
+
+/// What a search ends with.
+pub(super) enum SearchEnd {
+    /// A mesh, and when parts first touch in the finest run (s).
+    Found(Mesh, Option<f64>),
+    /// Its limit, without a mesh.
+    Limit,
+    /// When parts touch in the first coarse run (s): before it has enough samples to compare.
+    EarlyContact(f64),
+}
+
+/// Doubles the segments of a mesh until the run on it holds the tolerance.
+pub(super) fn search(
+    moving: &CompiledModel,
+    options: &TransientOptions<'_>,
+    order: &Mesh,
+    limits: SearchLimits<'_>,
+) -> Result<SearchEnd, AnalysisError> {
+    let goal = moving.options.errors().large_motion();
     let given = chosen(moving) || moving.options.band.is_some();
     let on = |segments: &[usize], error: Option<f64>| {
         let estimated_error = order.estimated_error.zip(error).map(|(own, error)| own.max(error));
-        Some(Mesh { segments: segments.to_vec(), estimated_error, ..order.clone() })
+        Mesh { segments: segments.to_vec(), estimated_error, ..order.clone() }
     };
     let SearchLimits { work: [first_work, mut work], judge } = limits;
     let steps = moving.options.errors().mesh_runs();
     let first = pair(moving, &order.segments)
         .and_then(|(from, to)| Some((run_on(moving, options, &from, (steps, true), first_work)?, from, to)));
     // a failure is reported when the run is made; a result without a comparison has no estimate
-    let Some((run, mut from, mut segments)) = first else { return Ok(on(&order.segments, None)) };
+    let Some((run, mut from, mut segments)) = first else {
+        return Ok(SearchEnd::Found(on(&order.segments, None), None));
+    };
     if run.is_beyond || run.steps.zip(judge).is_some_and(|(steps, goes_on)| !goes_on(&steps)) {
-        return Ok(None);
+        return Ok(SearchEnd::Limit);
+    }
+    let is_early = options.until == Some(Until::Contact) && run.samples.count() < POINTS.0;
+    if let Some(contact) = run.samples.contact.filter(|_| is_early) {
+        return Ok(SearchEnd::EarlyContact(contact));
     }
     let error = run.steps.map(|steps| steps.error);
     let mut coarse = CoarseSamples { samples: run.samples, steps, error };
@@ -120,9 +156,10 @@ pub(super) fn order(
         let compared = coarse.compared(moving, options, [&from, &segments], convergence, &mut work);
         let (difference, fine, of_fine) = match compared {
             Comparison::Made(difference, run) => (difference, run.samples, run.work),
-            Comparison::Failed => return Ok(last),
-            Comparison::BeyondLimit => return Ok(None),
+            Comparison::Failed => break,
+            Comparison::BeyondLimit => return Ok(SearchEnd::Limit),
         };
+        let contact = fine.contact;
         before = before.filter(|_| coarse.steps == steps);
         if let Some(before) = before {
             convergence = f64::log2(before / difference).clamp(ORDERS.0, ORDERS.1);
@@ -130,30 +167,31 @@ pub(super) fn order(
         let error = difference / (convergence.exp2() - 1.0);
         let of_coarse = difference + error;
         if from == order.segments && (given || of_coarse <= goal) {
-            return Ok(on(&from, Some(of_coarse)));
+            return Ok(SearchEnd::Found(on(&from, Some(of_coarse)), contact));
         }
         if segments == order.segments && error <= goal {
-            return Ok(on(&segments, Some(error)));
+            return Ok(SearchEnd::Found(on(&segments, Some(error)), contact));
         }
         let next = twice(moving, &segments).filter(|next| next.iter().sum::<usize>() <= MAX_SEGMENTS);
         if error <= goal || next.is_none() {
             let least = between(&order.segments, &segments, (error / (AIM * goal)).powf(1.0 / convergence));
             let of_least = (least != segments).then(|| sample_run(moving, options, &least, coarse.steps)).flatten();
             let of_least = of_least.and_then(|run| apart(moving, options, &run, &fine)).map(|apart| apart + error);
-            return Ok(match of_least.filter(|error| *error <= goal) {
+            let found = match of_least.filter(|error| *error <= goal) {
                 Some(error) => on(&least, Some(error)),
                 None => on(&segments, Some(error)),
-            });
+            };
+            return Ok(SearchEnd::Found(found, contact));
         }
         // the next mesh has twice the unknowns
         if 2.0 * of_fine > work {
-            return Ok(None);
+            return Ok(SearchEnd::Limit);
         }
         last = on(&segments, Some(error));
         (before, coarse.samples, from) = (Some(difference), fine, segments);
         segments = next.unwrap_or_default();
     }
-    Ok(last)
+    Ok(SearchEnd::Found(last, None))
 }
 
 /// True where the run goes from rest to a state in which parts touch, on a mesh that is to be found.
@@ -228,9 +266,23 @@ pub(super) struct CoarseRun {
     pub(super) damped: f64,
 }
 
+/// What is compared of a run.
+struct MeshSamples {
+    /// Samples of each signal.
+    columns: Vec<Vec<f64>>,
+    /// When parts first touch (s).
+    contact: Option<f64>,
+}
+
+impl MeshSamples {
+    fn count(&self) -> usize {
+        self.columns.first().map_or(0, Vec::len)
+    }
+}
+
 /// A run on a mesh, as far as it came.
 struct MeshRun {
-    samples: Vec<Vec<f64>>,
+    samples: MeshSamples,
     /// Of a run that was to be judged and came to its end.
     steps: Option<CoarseRun>,
     /// Unknowns times steps.
@@ -241,7 +293,7 @@ struct MeshRun {
 
 /// A run on the coarser of two meshes.
 struct CoarseSamples {
-    samples: Vec<Vec<f64>>,
+    samples: MeshSamples,
     /// The tolerance of its steps.
     steps: ErrorBudget,
     /// Their error, of the amplitude (1).
@@ -297,7 +349,7 @@ fn sample_run(
     options: &TransientOptions<'_>,
     segments: &[usize],
     steps: ErrorBudget,
-) -> Option<Vec<Vec<f64>>> {
+) -> Option<MeshSamples> {
     run_on(moving, options, segments, (steps, false), f64::INFINITY).map(|run| run.samples)
 }
 
@@ -323,19 +375,24 @@ fn run_on(
         steps * unknowns <= MAX_WORK.min(most)
     };
     let loose = if judged { loose.with_estimate() } else { loose };
+    let mut contact = None;
     let coarse = match transient(&model, &loose, &mut keep, &mut few) {
-        Ok(run) => run.step_error.map(|error| CoarseRun {
-            work: (run.counters.steps + run.counters.rejected) as f64 * unknowns,
-            segments: segments.iter().sum(),
-            error,
-            damped: run.damped.unwrap_or(0.0),
-        }),
+        Ok(run) => {
+            contact = first_closing(&run);
+            run.step_error.map(|error| CoarseRun {
+                work: (run.counters.steps + run.counters.rejected) as f64 * unknowns,
+                segments: segments.iter().sum(),
+                error,
+                damped: run.damped.unwrap_or(0.0),
+            })
+        }
         Err(AnalysisError::Cancelled) => None,
         Err(_) => return None,
     };
     let work = steps * unknowns;
-    let run = MeshRun { samples: columns, steps: coarse.filter(|_| judged), work, is_beyond: work > most };
-    let reached = run.samples.first().is_some_and(|column| column.len() >= MIN_SAMPLES);
+    let samples = MeshSamples { columns, contact };
+    let reached = contact.is_some() || samples.count() >= MIN_SAMPLES;
+    let run = MeshRun { samples, steps: coarse.filter(|_| judged), work, is_beyond: work > most };
     (reached || run.is_beyond).then_some(run)
 }
 
@@ -347,14 +404,17 @@ fn points(options: &TransientOptions<'_>) -> usize {
     }
 }
 
-/// How far two runs are apart, of the amplitude.
+/// How far two runs are apart, of the amplitude, and where they end at a contact in its time, of the time up to it.
 fn apart(
     moving: &CompiledModel,
     options: &TransientOptions<'_>,
-    coarse: &[Vec<f64>],
-    fine: &[Vec<f64>],
+    coarse: &MeshSamples,
+    fine: &MeshSamples,
 ) -> Option<f64> {
-    let both = coarse.first()?.len().min(fine.first()?.len());
+    let both = coarse.count().min(fine.count());
+    if both == 0 {
+        return None;
+    }
     let named = |columns: &[Vec<f64>]| {
         let signal = |(name, column): (&String, &Vec<f64>)| {
             let unit = Expression::of_run(moving, name, &[]).ok()?.unit().to_owned();
@@ -363,10 +423,27 @@ fn apart(
         let signals = options.signals.iter().zip(columns).map(signal).collect::<Option<_>>()?;
         Some(TransientResult { signals, ..TransientResult::default() })
     };
-    let (coarse, fine) = (named(coarse)?, named(fine)?);
-    let error = largest_error(&fine, &coarse, &|unit| step_error::least(unit, options, moving));
+    let error = largest_error(&named(&fine.columns)?, &named(&coarse.columns)?, &|unit| {
+        step_error::least(unit, options, moving)
+    });
+    if options.until == Some(Until::Contact) {
+        let spacing = options.stop / (points(options) - 1) as f64;
+        return Some(error.max(apart_in_contact(spacing, coarse, fine)));
+    }
     // a run that ends at an event is whole
     let whole = options.until.is_some();
     let share = if whole { 1.0 } else { (both - 1) as f64 / (points(options) - 1) as f64 };
     Some(error / share.min(1.0))
+}
+
+/// Difference of the times of the first contact of two runs, of the larger one (1); at least, where one of them ended before. Output times have this
+/// distance (s).
+fn apart_in_contact(spacing: f64, coarse: &MeshSamples, fine: &MeshSamples) -> f64 {
+    let reached = |run: &MeshSamples| (run.count() - 1) as f64 * spacing;
+    match (coarse.contact, fine.contact) {
+        (Some(coarse), Some(fine)) => (coarse - fine).abs() / coarse.max(fine),
+        (Some(contact), None) => (1.0 - contact / reached(fine)).max(0.0),
+        (None, Some(contact)) => (1.0 - contact / reached(coarse)).max(0.0),
+        (None, None) => 0.0,
+    }
 }

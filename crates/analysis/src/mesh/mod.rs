@@ -11,7 +11,7 @@
 //! | frequency response | the response itself and the modes within the band, compared with those of twice the segments | `in_band` |
 //! | transient | the states it starts from and goes to, and the modes that the difference of the two excites | `excited_modes` |
 //! | transient with changing stiffness, or with a part in none of the modes | the run itself, compared with that of half the segments | `large_motion` |
-//! | transient that closes a gap | the run up to its first contact, compared with that of half the segments | `large_motion` |
+//! | transient that closes a gap | the run up to its first contact, compared with that of half the segments | `large_motion`, `to_first_contact` |
 //!
 //! A given number of segments is used as it is, with the estimate of its error. A given band requires at least the mesh
 //! for that band. The estimate is in [`CompiledModel::order`]; where it is missing or beyond the tolerance, a warning
@@ -35,6 +35,7 @@ pub(super) mod remeshed;
 mod section_inertia;
 mod signal_amplitudes;
 mod softening;
+mod to_first_contact;
 mod warnings;
 
 use super::linear_stress::left_out;

@@ -9,10 +9,12 @@
 //! tenth of the tolerance, with the previous run as its companion. For a method of order four or more this costs less
 //! than twice the steps.
 //!
+//! Runs that touch are compared up to the first contact, and in the time at which a gap first closes.
+//!
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
 //! is continued in proportion to time, as phases go.
 
-use super::super::after_contact::{CompanionRuns, MeshOrSteps, first_contact, judge};
+use super::super::after_contact::{CompanionRuns, MeshOrSteps, first_closing, first_contact, judge};
 use super::super::chart::error::largest_error;
 use super::super::integrator::Integrator;
 use super::super::transient::error_log::least;
@@ -198,6 +200,7 @@ fn picked_of(picked: SelectedSamples, result: &TransientResult) -> TransientResu
         signals: picked.signals(&result.signals),
         counters: result.counters,
         directions: result.directions.clone(),
+        events: result.events.clone(),
         ..TransientResult::default()
     }
 }
@@ -218,7 +221,14 @@ fn difference(
     // single values after a contact are judged on their own
     let last = contact.map_or(usize::MAX, |t| (t / spacing(options)) as usize + 1);
     let count = reached.min(sampled(picked)).min(last);
+    let in_time =
+        first_closing(result).zip(first_closing(companion)).map(|(run, other)| (run - other).abs() / run.max(other));
+    // the start alone says nothing of the steps
+    if count < 2 && in_time.is_none() {
+        return None;
+    }
     let apart = largest_error(&cut(picked, count), &cut(companion, count), &|unit| least(unit, options, model));
+    let apart = apart.max(in_time.unwrap_or(0.0));
     let share = match options.until.is_some() || contact.is_some() {
         true => 1.0,
         false => ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64,
@@ -284,6 +294,7 @@ pub(super) fn companion<T>(
     let ended = run(&looser, &mut keep, &mut few);
     let counters = ended.as_ref().map_or_else(|_| Default::default(), |(result, _)| result.counters);
     let directions = ended.as_ref().ok().and_then(|(result, _)| result.directions.clone());
+    let events = ended.as_ref().map_or_else(|_| Vec::new(), |(result, _)| result.events.clone());
     if stopped {
         return Err(AnalysisError::Cancelled);
     }
@@ -296,6 +307,7 @@ pub(super) fn companion<T>(
                     signals: picked.signals(&names),
                     counters,
                     directions,
+                    events,
                     ..TransientResult::default()
                 }),
                 whole,

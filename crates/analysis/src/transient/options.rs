@@ -175,6 +175,12 @@ impl<'a> TransientOptions<'a> {
         Self { method, ..self.clone() }
     }
 
+    /// With another end time (s).
+    #[must_use]
+    pub fn with_stop(&self, stop: f64) -> Self {
+        Self { stop, ..self.clone() }
+    }
+
     /// With another condition that ends the run.
     #[must_use]
     pub fn with_end(&self, until: Option<Until>) -> Self {
