@@ -27,7 +27,7 @@ use super::super::step_error;
 use super::super::transient::{TransientOptions, TransientResult, Until, transient};
 use super::excited_modes;
 use super::remeshed::{chosen, meshed};
-use super::to_first_contact;
+use super::to_first_contact::{self, SearchEnd};
 use crate::readout::expression::Expression;
 use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
@@ -100,7 +100,11 @@ pub(super) fn order(
         }));
     }
     if options.until == Some(Until::Contact) {
-        return to_first_contact::order(moving, options, &order, limits);
+        let SearchLimits { work, mut judge } = limits;
+        return to_first_contact::order(options, &order, &mut |options, order| {
+            let limits = SearchLimits { work, judge: judge.as_mut().map(|judge| &mut **judge as _) };
+            search(moving, options, order, limits)
+        });
     }
     Ok(match search(moving, options, &order, limits)? {
         SearchEnd::Found(mesh, _) => Some(mesh),
@@ -108,18 +112,8 @@ pub(super) fn order(
     })
 }
 
-/// What a search ends with.
-pub(super) enum SearchEnd {
-    /// A mesh, and when parts first touch in the finest run (s).
-    Found(Mesh, Option<f64>),
-    /// Its limit, without a mesh.
-    Limit,
-    /// When parts touch in the first coarse run (s): before it has enough samples to compare.
-    EarlyContact(f64),
-}
-
 /// Doubles the segments of a mesh until the run on it holds the tolerance.
-pub(super) fn search(
+fn search(
     moving: &CompiledModel,
     options: &TransientOptions<'_>,
     order: &Mesh,
@@ -266,7 +260,7 @@ pub(super) struct CoarseRun {
     pub(super) damped: f64,
 }
 
-/// What is compared of a run.
+/// The part of a run that is compared.
 struct MeshSamples {
     /// Samples of each signal.
     columns: Vec<Vec<f64>>,

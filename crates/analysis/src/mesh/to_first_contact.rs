@@ -6,8 +6,6 @@
 
 use super::super::AnalysisError;
 use super::super::transient::TransientOptions;
-use super::large_motion::{SearchEnd, SearchLimits, search};
-use bimorph_model::compile::CompiledModel;
 use bimorph_model::refine::mesh_search::Mesh;
 
 /// Time in which meshes are compared, of that of an early contact (1).
@@ -15,18 +13,28 @@ const WINDOW: f64 = 8.0;
 /// Such times, at most.
 const WINDOWS: usize = 10;
 
-/// The mesh for a run that ends at its first contact; none where the limits of the search end it.
+/// The end of a search for a mesh.
+pub(super) enum SearchEnd {
+    /// A mesh, and when parts first touch in the finest run (s).
+    Found(Mesh, Option<f64>),
+    /// Its limit, without a mesh.
+    Limit,
+    /// When parts touch in the first coarse run (s): before it has enough samples to compare.
+    EarlyContact(f64),
+}
+
+/// Searches a mesh from another one.
+type Search<'s> = &'s mut dyn FnMut(&TransientOptions<'_>, &Mesh) -> Result<SearchEnd, AnalysisError>;
+
+/// The mesh for a run that ends at its first contact; none where the limits of the `search` end it.
 pub(super) fn order(
-    moving: &CompiledModel,
     options: &TransientOptions<'_>,
     order: &Mesh,
-    limits: SearchLimits<'_>,
+    search: Search<'_>,
 ) -> Result<Option<Mesh>, AnalysisError> {
-    let SearchLimits { work, mut judge } = limits;
     let (mut order, mut stop) = (order.clone(), options.stop);
     for _ in 0..WINDOWS {
-        let limits = SearchLimits { work, judge: judge.as_mut().map(|judge| &mut **judge as _) };
-        match search(moving, &options.with_stop(stop), &order, limits)? {
+        match search(&options.with_stop(stop), &order)? {
             SearchEnd::Limit => return Ok(None),
             SearchEnd::EarlyContact(contact) => stop = (WINDOW * contact).min(stop),
             SearchEnd::Found(mesh, contact) if contact.is_some() || stop >= options.stop => return Ok(Some(mesh)),

@@ -59,12 +59,14 @@ pub use crate::options::{Anchors, Junctions, Scheme};
 use bimorph_multibody::planar::DOF;
 pub use error::{DiscretizeError, MAX_SEGMENTS};
 use free_rotation::BodyActions;
+use junction_springs::JunctionEnd;
+use scheme::Bar;
 
 use crate::options::CompileOptions;
 use bimorph_base::budget;
 use bimorph_domains::{BeamLine, DeadLoad, Domain, MaterialPoint, Member, PlacedMember, Station, System};
 use bimorph_multibody::{BodyId, Coupling, Damper, Joint, Model};
-use bimorph_structure::Structure;
+use bimorph_structure::{Beam, Structure};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use std::sync::Arc;
 
@@ -92,6 +94,18 @@ pub struct Assembly {
     pub heaters: Vec<usize>,
     /// Name of each gap of the system, which come before what acts without two sides.
     pub gap_names: Vec<String>,
+}
+
+impl Assembly {
+    /// The bar of each beam between its junctions, as the model has it: with calibrated junctions and at elastic anchors it is flexible in shear.
+    pub(crate) fn bars(&self, structure: &Structure, options: &CompileOptions) -> Vec<Bar> {
+        let one = |(beam, ends): (&Beam, &[JunctionEnd; 2])| {
+            let springs = options.junctions == Junctions::Calibrated || ends.iter().any(|end| end.elastic);
+            let bar = bar::bar(beam, options.shear || springs, options.rotary_inertia);
+            Bar { length: beam.length - ends[0].offset - ends[1].offset, ..bar }
+        };
+        structure.beams.iter().zip(&self.ends.beams).map(one).collect()
+    }
 }
 
 /// Turns a drawing into a system.

@@ -72,7 +72,8 @@ pub type BatchVariant<'a> = (&'a Structure, &'a CompileOptions, &'a Assembly);
 
 /// The beams of a variant.
 fn beams((structure, options, parts): BatchVariant<'_>) -> Vec<BeamSpan> {
-    spans(structure, options, (&parts.beams, &parts.offsets), true)
+    let bars = parts.bars(structure, options);
+    spans(structure, options, (&parts.beams, &parts.offsets, &bars), true)
 }
 
 fn body(id: BodyId) -> Option<u32> {

@@ -36,6 +36,7 @@ use super::reference::{Pencil, ReferenceModes, compare};
 use super::span::{BeamSpan, spans};
 use crate::discretize::bar::bar;
 use crate::discretize::frame::{ElementCount, FrameGaps, FrameOptions, LinearFrame, assemble};
+use crate::discretize::scheme::Bar;
 use crate::discretize::{Assembly, cubic, order};
 use crate::options::{CompileOptions, Scheme};
 use bimorph_multibody::linear_system::LinearSystem;
@@ -66,16 +67,16 @@ pub fn strain_shares(
     lambda: &[f64],
     shapes: &[Vec<Pose>],
 ) -> Vec<Vec<f64>> {
-    let spans = spans(structure, options, (&parts.beams, &parts.offsets), false);
+    let bars = parts.bars(structure, options);
+    let spans = spans(structure, options, (&parts.beams, &parts.offsets, &bars), false);
     let share = |(shape, lambda): (&Vec<Pose>, &f64)| {
-        let one = |(span, beam): (&BeamSpan, &bimorph_structure::Beam)| {
+        let one = |(span, bar): (&BeamSpan, &Bar)| {
             let n = span.points.len() - 1;
-            let bar = bar(beam, options.shear, options.rotary_inertia);
-            let stiffness = cubic::stiffness(&bar, span.length / n as f64);
+            let stiffness = cubic::stiffness(bar, span.length / n as f64);
             let x = span.local(shape);
             span.segments(&x, &stiffness).iter().zip(&x).map(|(f, x)| f.dot(x)).sum::<f64>() / lambda
         };
-        spans.iter().zip(&structure.beams).map(one).collect()
+        spans.iter().zip(&bars).map(one).collect()
     };
     shapes.iter().zip(lambda).map(share).collect()
 }
@@ -156,9 +157,10 @@ fn compared(
     (lambda, shapes): (&[f64], &[Vec<Pose>]),
 ) -> Option<(ReferenceModes, Vec<BeamSpan>)> {
     let model = &parts.system.model;
-    let mut spans = spans(structure, options, (&parts.beams, &parts.offsets), true);
-    for ((span, beam), force) in spans.iter_mut().zip(&structure.beams).zip(axial) {
-        span.tighten(&bar(beam, options.shear, options.rotary_inertia), *force);
+    let bars = parts.bars(structure, options);
+    let mut spans = spans(structure, options, (&parts.beams, &parts.offsets, &bars), true);
+    for ((span, bar), force) in spans.iter_mut().zip(&bars).zip(axial) {
+        span.tighten(bar, *force);
     }
     let mass = |x: &[Pose]| x.iter().enumerate().map(|(k, x)| model.mass(k).component_mul(x)).collect();
     let project = |x: &mut [Pose]| model.project(x);
@@ -199,7 +201,9 @@ fn by_frame(
         factor.factor(&system.pattern).ok()?;
     }
     let shapes: Vec<Vec<Pose>> = shapes.iter().map(|x| to_frame(&parts.system.model, parts, &frame, x)).collect();
-    let spans = spans(structure, options, (&frame.beams, &parts.offsets), false);
+    // those of the frame, which has no junctions
+    let bars: Vec<Bar> = structure.beams.iter().map(|beam| bar(beam, options.shear, options.rotary_inertia)).collect();
+    let spans = spans(structure, options, (&frame.beams, &parts.offsets, &bars), false);
     let mass = |x: &[Pose]| multiply(system, x);
     let project = |x: &mut [Pose]| system.project(x);
     let pencil = Pencil { factor: &factor, pattern: &system.pattern, shift, mass: &mass, project: &project };

@@ -3,14 +3,13 @@
 //! Directions along and across a beam are those of the drawing, also about an equilibrium: right as long as beams turn by
 //! small angles.
 
-use crate::discretize::bar::bar;
 use crate::discretize::cubic;
 use crate::discretize::scheme::{Bar, BeamSegment};
 use crate::options::CompileOptions;
 use bimorph_domains::MaterialPoint;
 use bimorph_multibody::BodyId;
 use bimorph_multibody::planar::Pose;
-use bimorph_structure::Structure;
+use bimorph_structure::{Beam, Structure};
 use nalgebra::{Matrix6, Vector2, Vector3, Vector6};
 
 /// A beam over the points of what is cut of it: between the edges of junctions, where there are any.
@@ -127,17 +126,16 @@ fn lighten(f: &mut Vector3<f64>, x: &Vector3<f64>, lump: &BeamSegment) {
     f.z -= lump.first * x.y + lump.second * x.z;
 }
 
-/// Every beam over its `points`, less the offsets at both ends.
+/// Every beam over its `points`, less the offsets at both ends, as a bar.
 pub(super) fn spans<P: AsRef<[MaterialPoint]>>(
     structure: &Structure,
     options: &CompileOptions,
-    (beams, offsets): (&[P], &[[f64; 2]]),
+    (beams, offsets, bars): (&[P], &[[f64; 2]], &[Bar]),
     lumped: bool,
 ) -> Vec<BeamSpan> {
-    let span = |((beam, points), [first, last]): ((&bimorph_structure::Beam, &P), &[f64; 2])| {
+    let span = |(((beam, points), [first, last]), bar): (((&Beam, &P), &[f64; 2]), &Bar)| {
         let points = points.as_ref();
         let n = points.len() - 1;
-        let bar = Bar { length: beam.length - first - last, ..bar(beam, options.shear, options.rotary_inertia) };
         let h = bar.length / n as f64;
         let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
         let mut points = points.to_vec();
@@ -145,17 +143,17 @@ pub(super) fn spans<P: AsRef<[MaterialPoint]>>(
         points[n] = points[n].beyond(along * -*last);
         let mut lumps = Vec::new();
         if lumped {
-            options.scheme.parts_into(&bar, n, &mut lumps);
+            options.scheme.parts_into(bar, n, &mut lumps);
         }
         BeamSpan {
             points,
             length: bar.length,
             along,
-            mass: if lumped { cubic::mass(&bar, h) } else { Matrix6::zeros() },
-            second: cubic::second_mass(&bar, h),
+            mass: if lumped { cubic::mass(bar, h) } else { Matrix6::zeros() },
+            second: cubic::second_mass(bar, h),
             softer: Matrix6::zeros(),
             lumps,
         }
     };
-    structure.beams.iter().zip(beams).zip(offsets).map(span).collect()
+    structure.beams.iter().zip(beams).zip(offsets).zip(bars).map(span).collect()
 }
