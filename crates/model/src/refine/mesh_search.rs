@@ -94,8 +94,11 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &MeshTar
                 break;
             }
         } else {
-            for (next, n) in next.iter_mut().zip(&segments) {
-                *next = (*next).max(*n);
+            no_coarser(&mut next, &segments);
+            if next == segments {
+                // beams share what a mode has alone; next to another of nearly its frequency its error is larger
+                next = predicted(options, aim, &groups, &error.scaled_to_whole(), now.modes, (&segments, &floor));
+                no_coarser(&mut next, &segments);
             }
             if holds.as_ref().is_some_and(|(h, _)| total(&next) >= total(&h.segments)) {
                 break;
@@ -115,6 +118,13 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &MeshTar
         stiffen(structure, &bare, options, aim, &groups, &elastic, &mut order)?;
     }
     Ok(order)
+}
+
+/// Raises the segments of every beam to those of `than`.
+fn no_coarser(segments: &mut [usize], than: &[usize]) {
+    for (n, than) in segments.iter_mut().zip(than) {
+        *n = (*n).max(*than);
+    }
 }
 
 /// The segments that E4 needs for half of the tolerance, where Es has no estimate of its own. With as many segments its

@@ -58,6 +58,18 @@ pub struct ModeErrors {
     pub shares: Vec<Vec<f64>>,
 }
 
+impl ModeErrors {
+    /// The same with shares that add up to no less than the error of their mode.
+    pub(super) fn scaled_to_whole(&self) -> Self {
+        let scaled = |(shares, error): (&Vec<f64>, &f64)| {
+            let sum: f64 = shares.iter().map(|share| share.abs()).sum();
+            let scale = if sum > 0.0 { (error.abs() / sum).max(1.0) } else { 1.0 };
+            shares.iter().map(|share| share * scale).collect()
+        };
+        Self { shares: self.shares.iter().zip(&self.relative).map(scaled).collect(), ..self.clone() }
+    }
+}
+
 /// For each mode, the share of each beam in its strain energy (1): a beam held rigid raises the frequency by about half of
 /// it, relatively.
 pub fn strain_shares(
