@@ -41,6 +41,11 @@ use std::f64::consts::TAU;
 /// Modes computed first, and at most.
 const FIRST_MODES: usize = 6;
 const MAX_MODES: usize = 48;
+/// Band of a mesh, of the highest frequency that it must resolve.
+const BAND: f64 = 1.01;
+/// Factor by which a band is widened where modes of the drawing lie above it, and how often at most: to four times.
+const WIDER: f64 = 1.1;
+const MAX_WIDER: usize = 15;
 /// Error assigned to a waveform unrelated to the reference.
 const UNRELATED_ERROR: f64 = 0.3;
 
@@ -114,8 +119,8 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
         // measured frequency errors exceeded their estimates: the modes get a part of the tolerance, and the estimate
         // is reported
         let sharper = tolerances.iter().map(|t| ErrorBudget::of(*t).frequency_estimate()).collect();
-        let aim = MeshTarget { band: 1.01 * modes[highest].frequency, tolerances: sharper, rigid: false };
-        let order = mesh_search::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
+        let aim = MeshTarget { band: BAND * modes[highest].frequency, tolerances: sharper, rigid: false };
+        let order = with_every_mode(moving, aim)?;
         let order = order.with_estimate_times(ErrorBudget::of_modes_estimate(looser));
         let mesh = merged(&still, &order);
         if order.estimated_error.is_some() {
@@ -124,6 +129,20 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
         let fitted = doubling::fit(&moving.structure, &moving.options, mesh.segments.clone(), &mut analyse);
         return Ok((fitted.map_or(mesh, |fitted| merged(&still, &fitted.with_estimate_times(looser))), left));
     }
+}
+
+/// The mesh for a band of the drawing in which every mode with a tolerance lies: what softens a mode where the run goes to lowers its frequency there alone.
+fn with_every_mode(moving: &CompiledModel, mut aim: MeshTarget) -> Result<Mesh, AnalysisError> {
+    let choose = |aim: &MeshTarget| mesh_search::choose_for(&moving.structure, &moving.options, aim).map_err(refused);
+    let mut order = choose(&aim)?;
+    for _ in 0..MAX_WIDER {
+        if order.modes_in_band >= aim.tolerances.len() || order.estimated_error.is_none() {
+            break;
+        }
+        aim.band *= WIDER;
+        order = choose(&aim)?;
+    }
+    Ok(order)
 }
 
 /// Warnings about a run on its mesh: equal steps longer than its motion allows, and missing rotary inertia.
