@@ -144,7 +144,7 @@ fn search(
     let mut coarse = CoarseSamples { samples: run.samples, steps, error };
     work -= run.work;
     let (mut before, mut convergence) = (None, ORDERS.0);
-    let mut last = on(&order.segments, None);
+    let mut last = SearchEnd::Found(on(&order.segments, None), None);
     for _ in 0..MAX_PASSES {
         let steps = coarse.steps;
         let compared = coarse.compared(moving, options, [&from, &segments], convergence, &mut work);
@@ -181,11 +181,11 @@ fn search(
         if 2.0 * of_fine > work {
             return Ok(SearchEnd::Limit);
         }
-        last = on(&segments, Some(error));
+        last = SearchEnd::Found(on(&segments, Some(error)), contact);
         (before, coarse.samples, from) = (Some(difference), fine, segments);
         segments = next.unwrap_or_default();
     }
-    Ok(SearchEnd::Found(last, None))
+    Ok(last)
 }
 
 /// True where the run goes from rest to a state in which parts touch, on a mesh that is to be found.

@@ -2,7 +2,8 @@
 //!
 //! A part that is close to a stop may touch it in a small fraction of the run, within few of its output times or none. Then meshes are compared over
 //! [`WINDOW`] times the time of the contact in the coarse run, so that hundreds of samples lie before it. A finer mesh may touch later: where none of the runs
-//! in this time does, the time is taken [`WINDOW`] times as long, from the mesh found so far.
+//! in this time does, the time is taken [`WINDOW`] times as long, from the mesh found so far. A mesh without an estimate ends the search.
+//! A contact within [`EARLIEST`] of the run looks like a start in contact: the mesh stays as it is, without an estimate.
 
 use super::super::AnalysisError;
 use super::super::transient::TransientOptions;
@@ -10,6 +11,8 @@ use bimorph_model::refine::mesh_search::Mesh;
 
 /// Time in which meshes are compared, of that of an early contact (1).
 const WINDOW: f64 = 8.0;
+/// Earliest contact up to which meshes are compared, of the run (1).
+const EARLIEST: f64 = 1e-4;
 /// Such times, at most.
 const WINDOWS: usize = 10;
 
@@ -32,13 +35,19 @@ pub(super) fn order(
     order: &Mesh,
     search: Search<'_>,
 ) -> Result<Option<Mesh>, AnalysisError> {
+    let earliest = EARLIEST * options.stop;
     let (mut order, mut stop) = (order.clone(), options.stop);
     for _ in 0..WINDOWS {
         match search(&options.with_stop(stop), &order)? {
             SearchEnd::Limit => return Ok(None),
+            SearchEnd::EarlyContact(contact) if contact < earliest => break,
             SearchEnd::EarlyContact(contact) => stop = (WINDOW * contact).min(stop),
-            SearchEnd::Found(mesh, contact) if contact.is_some() || stop >= options.stop => return Ok(Some(mesh)),
-            SearchEnd::Found(mesh, _) => (order, stop) = (mesh, (WINDOW * stop).min(options.stop)),
+            SearchEnd::Found(mesh, contact) => {
+                if contact.is_some() || stop >= options.stop || mesh.estimated_error.is_none() {
+                    return Ok(Some(mesh));
+                }
+                (order, stop) = (mesh, (WINDOW * stop).min(options.stop));
+            }
         }
     }
     Ok(Some(Mesh { estimated_error: None, ..order }))

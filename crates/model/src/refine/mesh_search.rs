@@ -96,7 +96,7 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &MeshTar
         } else {
             no_coarser(&mut next, &segments);
             if next == segments {
-                // beams share what a mode has alone; next to another of nearly its frequency its error is larger
+                // the shares of beams leave out what modes of nearly one frequency do to each other
                 next = predicted(options, aim, &groups, &error.scaled_to_whole(), now.modes, (&segments, &floor));
                 no_coarser(&mut next, &segments);
             }
