@@ -12,7 +12,7 @@ use bimorph_model::refine::mesh_search::Mesh;
 /// Time in which meshes are compared, of that of an early contact (1).
 const WINDOW: f64 = 8.0;
 /// Earliest contact up to which meshes are compared, of the run (1).
-const EARLIEST: f64 = 1e-4;
+const EARLIEST: f64 = 1e-5;
 /// Such times, at most.
 const WINDOWS: usize = 10;
 
