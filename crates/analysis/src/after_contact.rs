@@ -57,6 +57,11 @@ pub(super) fn first_closing(result: &TransientResult) -> Option<f64> {
         .map(|event| event.t)
 }
 
+/// Difference of two times of a contact, of the later one (1).
+pub(super) fn apart_in_time(a: f64, b: f64) -> f64 {
+    if a == b { 0.0 } else { (a - b).abs() / a.max(b) }
+}
+
 /// Compares a run that touches with its companion, and sets what `result` reports of the time after the contact. `least` is the
 /// amplitude below which a signal of a unit stands still.
 pub(super) fn judge(

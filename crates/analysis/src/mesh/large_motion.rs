@@ -20,7 +20,7 @@
 //! be reported. Such a run is made twice, too, and the difference of the two is reported instead.
 
 use super::super::AnalysisError;
-use super::super::after_contact::first_closing;
+use super::super::after_contact::{apart_in_time, first_closing};
 use super::super::chart::error::largest_error;
 use super::super::statics::{OperatingPoint, operating_point};
 use super::super::step_error;
@@ -435,7 +435,7 @@ fn apart(
 fn apart_in_contact(spacing: f64, coarse: &MeshSamples, fine: &MeshSamples) -> f64 {
     let reached = |run: &MeshSamples| (run.count() - 1) as f64 * spacing;
     match (coarse.contact, fine.contact) {
-        (Some(coarse), Some(fine)) => (coarse - fine).abs() / coarse.max(fine),
+        (Some(coarse), Some(fine)) => apart_in_time(coarse, fine),
         (Some(contact), None) => (1.0 - contact / reached(fine)).max(0.0),
         (None, Some(contact)) => (1.0 - contact / reached(coarse)).max(0.0),
         (None, None) => 0.0,

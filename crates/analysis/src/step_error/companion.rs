@@ -14,7 +14,7 @@
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
 //! is continued in proportion to time, as phases go.
 
-use super::super::after_contact::{CompanionRuns, MeshOrSteps, first_closing, first_contact, judge};
+use super::super::after_contact::{CompanionRuns, MeshOrSteps, apart_in_time, first_closing, first_contact, judge};
 use super::super::chart::error::largest_error;
 use super::super::integrator::Integrator;
 use super::super::transient::error_log::least;
@@ -221,8 +221,7 @@ fn difference(
     // single values after a contact are judged on their own
     let last = contact.map_or(usize::MAX, |t| (t / spacing(options)) as usize + 1);
     let count = reached.min(sampled(picked)).min(last);
-    let in_time =
-        first_closing(result).zip(first_closing(companion)).map(|(run, other)| (run - other).abs() / run.max(other));
+    let in_time = first_closing(result).zip(first_closing(companion)).map(|(run, other)| apart_in_time(run, other));
     // the start alone says nothing of the steps
     if count < 2 && in_time.is_none() {
         return None;
