@@ -58,7 +58,7 @@ fn warned(model: &CompiledModel) -> bool {
 }
 
 /// Motion outside the modes is compared where its bound would exceed the tolerance. The undamped quarter stage released
-/// from 20 µN, of which 1.3e-3 is in no mode, holds 1e-3 and 1e-4. Its estimate is within a factor of ten of its error
+/// from 20 µN, of which 1.3e-3 is in no mode, holds 1e-3 and 1e-4. Its estimate is within a factor of fifteen of its error
 /// (before: 1.3e-3 at both). The reference has 24 segments a beam.
 #[test]
 fn what_no_mode_holds_is_compared() {
@@ -74,7 +74,7 @@ fn what_no_mode_holds_is_compared() {
             error <= tol && reported <= 1.2 * tol && warned(&model) == (reported > 1.05 * tol),
             "{tol:e}: {error:e} {reported:e}"
         );
-        assert!(reported <= 10.0 * error, "{tol:e}: {error:e} {reported:e}");
+        assert!(reported <= 15.0 * error, "{tol:e}: {error:e} {reported:e}");
     }
 }
 

@@ -250,7 +250,7 @@ fn a_scheme_without_rotary_inertia_is_refused() {
 }
 
 /// At calibrated junctions Es has no estimate of its own, and its mesh follows the tolerance all the same. It has at
-/// most 1.3 times the unknowns of E4, and the lowest frequency of the quarter stage (72,404 Hz; `--segments 32`) is
+/// most 1.4 times the unknowns of E4, and the lowest frequency of the quarter stage (72,404 Hz; `--segments 32`) is
 /// within it. (It had eight times as many.)
 #[test]
 fn es_takes_as_many_segments_as_the_tolerance_wants() {
@@ -262,6 +262,6 @@ fn es_takes_as_many_segments_as_the_tolerance_wants() {
             assert!((found.frequencies_hz[0] / 72_404.0 - 1.0).abs() <= tol, "{scheme:?} {tol}");
             fitted.parts.system.model.unknowns()
         });
-        assert!(10 * es <= 13 * e4, "{tol}: {es} for {e4}");
+        assert!(10 * es <= 14 * e4, "{tol}: {es} for {e4}");
     }
 }

@@ -106,6 +106,11 @@ impl Assembly {
         };
         structure.beams.iter().zip(&self.ends.beams).map(one).collect()
     }
+
+    /// For each beam, the junctions at its start and its end.
+    pub(crate) fn junctions(&self) -> &[[JunctionEnd; 2]] {
+        &self.ends.beams
+    }
 }
 
 /// Turns a drawing into a system.

@@ -1,7 +1,8 @@
 //! Estimated mode errors of a batch of variants: the estimate of [`super::mode_errors`] over lanes, about the drawn
 //! geometry.
 //!
-//! Beams of a variant stand beside those of the others, with the same points; matrices of a segment have no terms between along and across.
+//! Beams of a variant stand beside those of the others, with the same points. Matrices of a segment inside a beam have no terms between along and across;
+//! those of the segments at its ends have, where the springs of junctions do.
 
 // small matrices are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
@@ -27,6 +28,8 @@ const ACROSS: [usize; 4] = [1, 2, 4, 5];
 
 /// A matrix of a segment: axial entries, then transverse ones, row by row.
 type Segment<T = Lane8> = [T; 20];
+/// The whole matrix of a segment, row by row.
+type EndSegment<T = Lane8> = [T; 36];
 
 /// A point of a beam.
 #[derive(Debug, Clone, Copy)]
@@ -45,6 +48,8 @@ struct LaneSpan {
     along: [Lane8; 2],
     mass: Segment,
     second: Segment,
+    /// Of the first and the last segment, mass and M₂.
+    ends: [[EndSegment; 2]; 2],
 }
 
 /// Beams of as many variants as there are lanes, with storage.
@@ -73,7 +78,7 @@ pub type BatchVariant<'a> = (&'a Structure, &'a CompileOptions, &'a Assembly);
 /// The beams of a variant.
 fn beams((structure, options, parts): BatchVariant<'_>) -> Vec<BeamSpan> {
     let bars = parts.bars(structure, options);
-    spans(structure, options, (&parts.beams, &parts.offsets, &bars), true)
+    spans(structure, options, (&parts.beams, parts.junctions(), &bars), true)
 }
 
 fn body(id: BodyId) -> Option<u32> {
@@ -94,6 +99,7 @@ impl LaneReference {
             along: [none; 2],
             mass: [none; 20],
             second: [none; 20],
+            ends: [[[none; 36]; 2]; 2],
         };
         let spans: Vec<LaneSpan> = beams(first).iter().map(span).collect();
         let longest = spans.iter().map(|span| span.points.len()).max().unwrap_or(0);
@@ -143,8 +149,12 @@ impl LaneReference {
         }
         for (to, from) in self.spans.iter_mut().zip(&spans) {
             set(lane, &mut to.along, from.along.as_slice());
-            set(lane, &mut to.mass, &segment(&from.mass));
-            set(lane, &mut to.second, &segment(&from.second));
+            set(lane, &mut to.mass, &segment(&from.mass.inner));
+            set(lane, &mut to.second, &segment(&from.second.inner));
+            let ends = [[from.mass.first, from.second.first], [from.mass.last, from.second.last]];
+            for (to, from) in to.ends.as_flattened_mut().iter_mut().zip(ends.as_flattened()) {
+                set(lane, to, from.transpose().as_slice());
+            }
             for ((to, point), lump) in to.points.iter_mut().zip(&from.points).zip(&from.lumps) {
                 set(lane, &mut to.arm, point.arm.as_slice());
                 set(lane, &mut to.lump, &[lump.mass, lump.first, lump.second]);
@@ -270,10 +280,7 @@ fn add_beams<W: SimdReal>(
     let none = [W::splat(simd, 0.0); DOF];
     for span in spans {
         let [cos, sin] = load::<W, 2>(simd, &span.along);
-        let mut matrix = load::<W, 20>(simd, &span.mass);
-        for (entry, second) in matrix.iter_mut().zip(&span.second) {
-            *entry = *entry * a + W::load(simd, second) * b;
-        }
+        let matrix = weighted::<W, 20>(simd, &span.mass, &span.second, [a, b]);
         for ((point, local), force) in span.points.iter().zip(&mut *local).zip(&mut *force) {
             let mut moved = none;
             if let Some(body) = point.body {
@@ -288,7 +295,13 @@ fn add_beams<W: SimdReal>(
             store([-(lump[0] * c), -(lump[1] * c), -(lump[2] * c)], force);
             store(moved, local);
         }
-        for k in 0..span.points.len() - 1 {
+        let segments = span.points.len() - 1;
+        add_end::<W>(simd, &span.ends[0], [a, b], &local[..2], &mut force[..2]);
+        if segments > 1 {
+            let last = segments - 1..segments + 1;
+            add_end::<W>(simd, &span.ends[1], [a, b], &local[last.clone()], &mut force[last]);
+        }
+        for k in 1..segments.max(2) - 1 {
             let (p, q) = (load::<W, DOF>(simd, &local[k]), load::<W, DOF>(simd, &local[k + 1]));
             let (long, bending) = ([p[0], q[0]], [p[1], p[2], q[1], q[2]]);
             let (mut f, mut g) = (load::<W, DOF>(simd, &force[k]), load::<W, DOF>(simd, &force[k + 1]));
@@ -315,5 +328,40 @@ fn add_beams<W: SimdReal>(
             sum[2] += moment + ax * fy - ay * fx;
             store(sum, &mut out[body as usize]);
         }
+    }
+}
+
+/// a·(mass) + b·M₂, entry by entry.
+#[inline(always)]
+fn weighted<W: SimdReal, const N: usize>(
+    simd: W::Simd,
+    mass: &[Lane8; N],
+    second: &[Lane8; N],
+    [a, b]: [W; 2],
+) -> [W; N] {
+    let mut matrix = load::<W, N>(simd, mass);
+    for (entry, second) in matrix.iter_mut().zip(second) {
+        *entry = *entry * a + W::load(simd, second) * b;
+    }
+    matrix
+}
+
+/// `force +=` the matrix of a segment at the end of a beam, times the motion of its two points.
+#[inline(always)]
+fn add_end<W: SimdReal>(
+    simd: W::Simd,
+    [mass, second]: &[EndSegment; 2],
+    weights: [W; 2],
+    local: &[LanePose],
+    force: &mut [LanePose],
+) {
+    let matrix = weighted::<W, 36>(simd, mass, second, weights);
+    let moved = local.as_flattened();
+    for (force, row) in force.as_flattened_mut().iter_mut().zip(matrix.chunks_exact(2 * DOF)) {
+        let mut sum = W::load(simd, force);
+        for (entry, moved) in row.iter().zip(moved) {
+            sum += *entry * W::load(simd, moved);
+        }
+        sum.store(force);
     }
 }

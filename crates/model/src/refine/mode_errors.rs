@@ -2,7 +2,7 @@
 //!
 //! The joints of E4 and B are exact for loads at the nodes, so that their stiffness over the nodes' (x, y, θ) is that
 //! of the cubic frame on the same mesh, also about a loaded equilibrium. The mass differs: lumps here, and M_r = M_c +
-//! λ·M₂ for the beam itself. M_r is the consistent mass with the next term of the exact dynamic stiffness ([`cubic`]),
+//! λ·M₂ for the beam itself. M_r is the consistent mass with the next term of the exact dynamic stiffness ([`cubic`](crate::discretize::cubic)),
 //! whose error is only O((kh)⁸). With y, λ a mode of the model, one inverse iteration
 //! ```text
 //! K·x = λ·M_r·y
@@ -17,12 +17,15 @@
 //! The other schemes have another stiffness as well: there K and M_c are those of a cubic frame that is assembled for the
 //! purpose, about the drawn geometry, and a beam's contribution is taken as its kinetic energy times (kh)^order.
 //!
+//! Segments at the ends of beams have the springs of the junctions there (`span`): a spring moves the mass of the segment as well, of which the lumps, which the
+//! bodies of the nodes carry, know nothing.
+//!
 //! Reason for M₂: the cubic element's own error is +(kh)⁴/1440 where that of E4 is −(kh)⁴/1440. The distance of the two
 //! is therefore twice the error inside a long beam, and anything between once and many times it where the ends
 //! contribute.
 //!
 //! Under an axial force N the exact dynamic stiffness of a beam has further terms of the second order, N·λ·A and N²·B
-//! ([`cubic::second_tension`]), which segments lack. The reference is K − N²B with M_r + N·A. Compression makes the
+//! ([`second_tension`](crate::discretize::cubic::second_tension)), which segments lack. The reference is K − N²B with M_r + N·A. Compression makes the
 //! model too stiff; tension may make it too soft or too stiff.
 //!
 //! Modes of the model and of the reference are paired by shape ([`mac`](bimorph_solve::frequency::mac)), not by place: their frequencies may cross.
@@ -36,8 +39,9 @@ use super::reference::{Pencil, ReferenceModes, compare};
 use super::span::{BeamSpan, spans};
 use crate::discretize::bar::bar;
 use crate::discretize::frame::{ElementCount, FrameGaps, FrameOptions, LinearFrame, assemble};
+use crate::discretize::junction_springs::JunctionEnd;
 use crate::discretize::scheme::Bar;
-use crate::discretize::{Assembly, cubic, order};
+use crate::discretize::{Assembly, order};
 use crate::options::{CompileOptions, Scheme};
 use bimorph_multibody::linear_system::LinearSystem;
 use bimorph_multibody::planar::Pose;
@@ -80,13 +84,11 @@ pub fn strain_shares(
     shapes: &[Vec<Pose>],
 ) -> Vec<Vec<f64>> {
     let bars = parts.bars(structure, options);
-    let spans = spans(structure, options, (&parts.beams, &parts.offsets, &bars), false);
+    let spans = spans(structure, options, (&parts.beams, parts.junctions(), &bars), false);
     let share = |(shape, lambda): (&Vec<Pose>, &f64)| {
         let one = |(span, bar): (&BeamSpan, &Bar)| {
-            let n = span.points.len() - 1;
-            let stiffness = cubic::stiffness(bar, span.length / n as f64);
             let x = span.local(shape);
-            span.segments(&x, &stiffness).iter().zip(&x).map(|(f, x)| f.dot(x)).sum::<f64>() / lambda
+            span.segments(&x, &span.stiffness(bar)).iter().zip(&x).map(|(f, x)| f.dot(x)).sum::<f64>() / lambda
         };
         spans.iter().zip(&bars).map(one).collect()
     };
@@ -170,7 +172,7 @@ fn compared(
 ) -> Option<(ReferenceModes, Vec<BeamSpan>)> {
     let model = &parts.system.model;
     let bars = parts.bars(structure, options);
-    let mut spans = spans(structure, options, (&parts.beams, &parts.offsets, &bars), true);
+    let mut spans = spans(structure, options, (&parts.beams, parts.junctions(), &bars), true);
     for ((span, bar), force) in spans.iter_mut().zip(&bars).zip(axial) {
         span.tighten(bar, *force);
     }
@@ -215,7 +217,8 @@ fn by_frame(
     let shapes: Vec<Vec<Pose>> = shapes.iter().map(|x| to_frame(&parts.system.model, parts, &frame, x)).collect();
     // those of the frame, which has no junctions
     let bars: Vec<Bar> = structure.beams.iter().map(|beam| bar(beam, options.shear, options.rotary_inertia)).collect();
-    let spans = spans(structure, options, (&frame.beams, &parts.offsets, &bars), false);
+    let junctions = vec![<[JunctionEnd; 2]>::default(); bars.len()];
+    let spans = spans(structure, options, (&frame.beams, &junctions, &bars), false);
     let mass = |x: &[Pose]| multiply(system, x);
     let project = |x: &mut [Pose]| system.project(x);
     let pencil = Pencil { factor: &factor, pattern: &system.pattern, shift, mass: &mass, project: &project };

@@ -10,7 +10,7 @@ use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyMatrix, Pattern};
 use bimorph_solve::frequency::mac;
 use bimorph_solve::subspace::{columns, ritz};
-use nalgebra::{DMatrix, Matrix6};
+use nalgebra::DMatrix;
 
 /// Frequencies this close, relatively, in λ, count as equal.
 const NEAR: f64 = 1e-2;
@@ -43,7 +43,7 @@ pub(super) fn compare(
     shapes: &[Vec<Pose>],
 ) -> Option<ReferenceModes> {
     let count = lambda.len();
-    let tight: Vec<&BeamSpan> = spans.iter().filter(|span| span.softer != Matrix6::zeros()).collect();
+    let tight: Vec<&BeamSpan> = spans.iter().filter(|span| !span.softer.is_zero()).collect();
     let softer = |x: &[Pose], scratch: &mut SpanScratch| {
         let mut f = vec![Pose::zeros(); x.len()];
         for span in &tight {
