@@ -77,7 +77,7 @@ fn trained(cases: &[(&System, InputBox)], tol: f64, moments: usize) -> Result<Tr
     let (moving, _) = cases.first().ok_or_else(|| reason(ReductionError::NoInput))?;
     let joints = spanned(moving).map_err(reason)?;
     let cases: Vec<TrainingCase<'_>> =
-        cases.iter().map(|(system, inputs)| TrainingCase { system, inputs: inputs.clone() }).collect();
+        cases.iter().map(|(system, inputs)| TrainingCase { system, inputs: inputs.clone(), motions: &[] }).collect();
     train(&joints, &cases, TrainingOptions { errors: ErrorBudget::of(tol), moments }).map_err(reason)
 }
 

@@ -171,7 +171,7 @@ fn polynomials_have_the_tangent_of_their_forces() {
         let joints = spanned(system).unwrap();
         let training = train(
             &joints,
-            &[TrainingCase { system, inputs }],
+            &[TrainingCase { system, inputs, motions: &[] }],
             TrainingOptions { errors: ErrorBudget::of(1e-2), moments: 2 },
         )
         .unwrap();

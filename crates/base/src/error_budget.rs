@@ -82,6 +82,11 @@ impl ErrorBudget {
     const SINGULAR_VALUES: [f64; 2] = [0.3, 0.02];
     /// Fraction of the tolerance for the forces of a field at fewer points.
     const REDUCED_FIELD: f64 = 0.1;
+    /// Change of a mass of a file from which it varies.
+    const MASS: f64 = 0.1;
+    /// Share of the motion after a step of an input from which a file has a mode. Its static directions have what is left out, at
+    /// another frequency.
+    const SUDDEN_MODE: f64 = 10.0;
     /// Root mean square of a strain of closures that a polynomial model leaves out, over the root of the tolerance (√E): energies go with its square.
     const CLOSURES: f64 = 0.03;
     /// Fraction of the tolerance below which approaches of electrodes, relative to the largest, are left out of a polynomial model: forces
@@ -364,6 +369,16 @@ impl ErrorBudget {
     /// For the forces of a field at fewer points.
     pub fn reduced_field(self) -> f64 {
         Self::REDUCED_FIELD * self.requested
+    }
+
+    /// Relative change of a mass below which a file has it constant (1).
+    pub fn constant_mass(self) -> f64 {
+        Self::MASS * self.requested
+    }
+
+    /// Share of the motion after a step of an input below which a file leaves out a mode (1).
+    pub fn sudden_mode(self) -> f64 {
+        Self::SUDDEN_MODE * self.requested
     }
 
     /// Strains of closures that a polynomial model leaves out (√E).

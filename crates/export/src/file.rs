@@ -1,7 +1,7 @@
 //! The file of an export as text, with a summary of the model in it: what the command writes and a server sends.
 
 use super::compare::{ModelFit, fit};
-use super::flexible::{FlexibleModel, flexible};
+use super::flexible::{FlexibleModel, FlexibleOutput, flexible};
 use super::linear::{ReducedPort, SignalShown};
 use super::model_options::model_options;
 use super::names::{self, Pins};
@@ -13,6 +13,8 @@ use std::sync::Arc;
 
 /// Longest line of a file, roughly (byte).
 const LINE: usize = 64;
+/// Volts across a port below which simulators with a `vntol` of 1 µV lack digits (V).
+const RESOLVED: f64 = 1e-3;
 
 /// Language of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -218,6 +220,7 @@ impl FileRequest {
                 model.fitted.error, self.model.within
             ));
         }
+        warnings.extend(unresolved(&model));
         let about = about_reduced(compiled, &model, source, &warnings);
         let text = flexible_verilog_a::write(&model, &pins, &name, &about);
         let content = FileContent::Reduced(ReducedSummary {
@@ -324,8 +327,9 @@ fn about_reduced(compiled: &CompiledModel, model: &FlexibleModel, source: &str, 
             "largest relative deviation from the full model in {} equilibria in these ranges: displacements {:.1e}, capacitances {:.1e}",
             model.fitted.compared, model.fitted.errors[0], model.fitted.errors[1]
         ),
-        format!("constant masses: that of the slowest coordinate changes by {:.1e} in them", of.mass_change),
+        masses(model),
         format!("slowest coordinate at rest: {:e} Hz", 1.0 / (TAU * of.mass[0].sqrt())),
+        sudden(model),
         format!(
             "{} coordinates of 32 times that frequency or more follow their forces at once",
             model.fitted.follows.iter().filter(|follows| **follows).count()
@@ -334,6 +338,46 @@ fn about_reduced(compiled: &CompiledModel, model: &FlexibleModel, source: &str, 
     about.extend(warnings.iter().map(|warning| format!("warning: {warning}")));
     about.extend(model.signals.iter().map(meaning));
     about
+}
+
+/// The masses of a model.
+fn masses(model: &FlexibleModel) -> String {
+    let of = &model.fitted.model;
+    match of.mass_slopes.iter().filter(|slope| **slope != 0.0).count() {
+        0 => format!("constant masses: that of the slowest coordinate changes by {:.1e} in them", of.mass_change),
+        count => format!(
+            "masses linear in the coordinates, {count} slopes: that of the slowest coordinate is off by {:.1e} in them",
+            of.mass_change
+        ),
+    }
+}
+
+/// The modes at rest that are in a model.
+fn sudden(model: &FlexibleModel) -> String {
+    let highest = model.motion.modes.iter().map(|mode| mode.lambda.sqrt() / TAU).fold(0.0, f64::max);
+    match model.motion.modes.len() {
+        0 => "no modes at rest are among the coordinates: dynamics by the shapes of equilibria and one moment of each input".to_owned(),
+        count => format!(
+            "modes at rest among the coordinates: {count}, up to {highest:.3e} Hz; another up to 32 times the lowest frequency has at most {:.1e} of the motion after a step of an input",
+            model.motion.left_out
+        ),
+    }
+}
+
+/// Warnings of ports across which less appears than simulators resolve.
+fn unresolved(model: &FlexibleModel) -> Vec<String> {
+    let small = |((port, row), scale): ((&ReducedPort, &FlexibleOutput), &f64)| {
+        let FlexibleOutput::Probe(probe) = row else { return None };
+        let volts = model.motion.readings.get(*probe)?.abs() * scale.abs();
+        (port.kind.given_flow() && volts > 0.0 && volts < RESOLVED).then(|| {
+            let power = (1.0 / volts).log10().round();
+            format!(
+                "about {volts:.1e} V appear across port {} in these ranges, which a simulator cannot tell from its vntol of 1e-6 V: steps in time collapse; give --ports {}:{:.0e}",
+                port.name, port.name, scale.abs() * 10f64.powf(power)
+            )
+        })
+    };
+    model.ports.iter().zip(&model.rows).zip(&model.scales).filter_map(small).collect()
 }
 
 /// Meaning of a volt of a signal.

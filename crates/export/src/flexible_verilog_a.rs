@@ -353,7 +353,7 @@ impl FlexibleModule<'_> {
             ContributionSum::begin(&format!("I(x{n}) <+ ddt({second:e} * V(x{n})) - V(v{n})")).end(&mut self.body);
             let inertia = match follows[j] {
                 true => "0".to_owned(),
-                false => format!("ddt({:e} * V(v{n}))", of.mass[j] / second),
+                false => format!("ddt({} * V(v{n}))", self.mass(j)),
             };
             let mut sum = ContributionSum::begin(&format!("I(v{n}) <+ {inertia}"));
             for k in 0..m {
@@ -362,6 +362,11 @@ impl FlexibleModule<'_> {
                     sum.add(damping / self.second(k), &format!("V(v{})", k + 1));
                 }
                 sum.add(significant(of.stiffness[(j, k)], of.stiffness.amax()), &format!("q{}", k + 1));
+            }
+            // what the masses of others do with this coordinate
+            for i in 0..m {
+                let rate = self.second(i);
+                sum.add(-0.5 * of.mass_slopes[(i, j)] / (rate * rate), &format!("V(v{0}) * V(v{0})", i + 1));
             }
             sum.add(-of.built_in[j], "1");
             for l in 0..self.model.heat.lags.len() {
@@ -378,6 +383,18 @@ impl FlexibleModule<'_> {
             }
             sum.end(&mut self.body);
         }
+    }
+
+    /// Mass of a coordinate over the seconds of its rate.
+    fn mass(&self, j: usize) -> String {
+        let (of, second) = (self.of, self.second(j));
+        let slopes = of.mass_slopes.row(j);
+        let terms: Vec<String> = (slopes.iter().enumerate())
+            .filter(|(_, slope)| **slope != 0.0)
+            .map(|(l, slope)| format!(" + ({:e}) * q{}", slope / second, l + 1))
+            .collect();
+        let rest = format!("{:e}", of.mass[j] / second);
+        if terms.is_empty() { rest } else { format!("({rest}{})", terms.concat()) }
     }
 
     /// Noise of the damping, on coordinates that have inertia.

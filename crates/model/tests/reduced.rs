@@ -81,7 +81,7 @@ fn trained(system: &System, inputs: &InputBox, tol: f64) -> Training {
 }
 
 fn trained_with(system: &System, inputs: &InputBox, options: TrainingOptions) -> Training {
-    let case = TrainingCase { system, inputs: inputs.clone() };
+    let case = TrainingCase { system, inputs: inputs.clone(), motions: &[] };
     train(&spanned(system).unwrap(), &[case], options).unwrap_or_else(|e| panic!("{e}"))
 }
 

@@ -6,6 +6,7 @@
 
 pub mod heat;
 pub mod johnson;
+pub mod motions;
 pub mod ports;
 pub mod text;
 
@@ -32,6 +33,7 @@ use bimorph_solve::reduced::{InputBox, ReductionError, TrainingCase, TrainingOpt
 use bimorph_structure::OhmicContact;
 use heat::HeatCourses;
 use johnson::ConductedNoise;
+use motions::{SuddenMotion, sudden_motion};
 use ports::{SourceText, sum_of};
 
 /// Moments of each input for motion.
@@ -95,6 +97,8 @@ pub struct FlexibleModel {
     pub johnson: ConductedNoise,
     /// Strains of the full model.
     pub strains: usize,
+    /// Modes at rest among the directions, and what others would have of a sudden motion.
+    pub motion: SuddenMotion,
 }
 
 /// The model of a request, trained for its ranges to its tolerance.
@@ -141,7 +145,7 @@ pub fn flexible(compiled: &CompiledModel, request: &ExportRequest) -> Result<Fle
     let probes: Vec<Box<Probe<'_>>> = read.iter().map(probe).collect();
     let probes: Vec<&Probe<'_>> = probes.iter().map(|probe| &**probe).collect();
     let apart: Vec<usize> = rows.iter().filter_map(read_gap).collect();
-    let (fitted, strains) =
+    let (fitted, motion, strains) =
         trained(system, &range_inputs(system, &opened.sources, &ranges), &probes, (request.within, &apart))?;
     let points = &fitted.model.approaches.members;
     let electrics = &system.electrics;
@@ -168,6 +172,7 @@ pub fn flexible(compiled: &CompiledModel, request: &ExportRequest) -> Result<Fle
         signals,
         ranges,
         strains,
+        motion,
         fitted,
     })
 }
@@ -256,20 +261,25 @@ fn ranges(request: &ExportRequest, names: &[String]) -> Result<Vec<[f64; 2]>, Ex
     Ok(names.iter().map(of).collect())
 }
 
-/// The polynomials of the space for a box, and the strains of the full model.
+/// The polynomials of the space for a box, the modes in it, and the strains of the full model.
 fn trained(
     system: &System,
     inputs: &InputBox,
     probes: &[&Probe<'_>],
     (within, apart): (f64, &[usize]),
-) -> Result<(FittedPolynomials, usize), ExportError> {
+) -> Result<(FittedPolynomials, SuddenMotion, usize), ExportError> {
     let refused = |error: ReductionError| ExportError::NotFlexible { why: reason(&error) };
     let joints = spanned(system).map_err(refused)?;
-    let case = TrainingCase { system, inputs: inputs.clone() };
+    let mut motion = sudden_motion(system, inputs, probes, ErrorBudget::of(within).sudden_mode());
+    let motions: Vec<Vec<Pose>> = motion.modes.iter().map(|mode| mode.shape.clone()).collect();
+    let case = TrainingCase { system, inputs: inputs.clone(), motions: &motions };
     let training = train(&joints, &[case], TrainingOptions { errors: ErrorBudget::of(within), moments: MOMENTS })
         .map_err(refused)?;
     if training.space.size() == 0 {
         return Err(refused(ReductionError::NoInput));
+    }
+    for mode in motion.modes.split_off(training.motions) {
+        motion.left_out = motion.left_out.max(mode.share);
     }
     let found = fitted(&training.space, system, inputs, probes, (within, apart));
     if found.compared == 0 {
@@ -279,7 +289,7 @@ fn trained(
         let why = "its polynomials have no equilibrium next to one of the full model; take a narrower --range, or a smaller --within";
         return Err(ExportError::NotFlexible { why: why.to_owned() });
     }
-    Ok((found, joints.tree.coordinates))
+    Ok((found, motion, joints.tree.coordinates))
 }
 
 /// Why a space cannot be trained, with a way out for an export.

@@ -5,6 +5,7 @@
 //! 3. Moments K₀⁻¹·(M·K₀⁻¹)ʲ·f of every input, for motion.
 //! 4. Reduced statics at corners and points of the box, checked by a Newton step of the full model. Where the estimate fails, or the
 //!    branch ends, equilibria of the full model join the directions, and the check is repeated.
+//! 5. Motions that the caller names, such as modes.
 //!
 //! Every step is deterministic: points, signs and orders depend on the mechanism, the box and the tolerance alone.
 
@@ -55,6 +56,8 @@ pub struct TrainingCase<'a> {
     pub system: &'a System,
     /// Its inputs.
     pub inputs: InputBox,
+    /// Motions of the bodies from rest that join the directions, the most important first, as far as the strains allow.
+    pub motions: &'a [Vec<Pose>],
 }
 
 /// A trained space.
@@ -66,6 +69,8 @@ pub struct Training {
     pub error: f64,
     /// Directions that came from full equilibria.
     pub added: usize,
+    /// Motions of the cases that joined the directions, or were in them.
+    pub motions: usize,
     /// Independent inputs.
     pub inputs: usize,
     /// z of stable equilibria in the box, by the last check.
@@ -109,8 +114,12 @@ pub fn train(
         let more = trainer.basis.len() - before;
         space = trainer.space(&samples, &states);
         if more == 0 {
+            let motions = trainer.add_motions();
+            if motions > 0 {
+                space = trainer.space(&samples, &states);
+            }
             let equilibria = states.iter().map(|s| trainer.coordinates(s)).collect();
-            return Ok(Training { space, error, added, inputs: count, equilibria });
+            return Ok(Training { space, error, added, motions, inputs: count, equilibria });
         }
         (added, rounds) = (added + more, rounds + 1);
         trainer.affordable()?;
@@ -210,10 +219,32 @@ impl Trainer<'_> {
         Ok(())
     }
 
+    /// The motions of the cases, as long as directions are affordable. Returns how many of them are among the directions.
+    fn add_motions(&mut self) -> usize {
+        let rest = vec![Pose::zeros(); self.joints.tree.links.len()];
+        let mut taken = 0;
+        for motion in self.cases.iter().flat_map(|case| case.motions) {
+            if self.basis.len() >= self.most() {
+                break;
+            }
+            let mut s = rest.clone();
+            self.joints.tree.rates_at(&rest, motion, &mut s);
+            self.product.extend(&mut self.basis, s, NEW);
+            taken += 1;
+        }
+        taken
+    }
+
+    /// The most directions that cost less than the full model.
+    fn most(&self) -> usize {
+        let strains = self.joints.tree.coordinates;
+        (strains / WORTH).max(FEW).min(strains)
+    }
+
     /// Rejects what would cost more than the full model.
     fn affordable(&self) -> Result<(), ReductionError> {
         let (directions, strains) = (self.basis.len(), self.joints.tree.coordinates);
-        if directions > (strains / WORTH).max(FEW) || directions > strains {
+        if directions > self.most() {
             return Err(ReductionError::TooMany { directions, strains });
         }
         Ok(())

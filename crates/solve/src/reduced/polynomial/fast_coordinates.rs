@@ -8,7 +8,7 @@
 use super::PolynomialModel;
 
 /// Mass over that of the slowest coordinate below which a coordinate is 32 times as fast or more (1).
-const FAST: f64 = 1e-3;
+pub const FAST: f64 = 1e-3;
 
 /// Whether each coordinate follows its forces at once: the fast ones, unless fingers of a comb touch across their gaps at one of these states.
 pub(super) fn following(model: &PolynomialModel, states: &[Vec<f64>]) -> Vec<bool> {

@@ -9,16 +9,14 @@
 //!    small part of the tolerance.
 
 use super::super::inputs::low_discrepancy;
-use super::super::space::{ReducedForces, ReducedSpace, dot};
+use super::super::space::{ReducedForces, ReducedSpace};
 use super::cubature::thinned;
 use super::monomials::{Monomials, Polynomials};
 use super::shapes::{CombMotion, Probe, ShapeFunctions, has_combs};
+use super::varying_mass::{matrices, slopes};
 use super::{Approaches, ClosureStrains, PolynomialModel};
 use bimorph_base::ErrorBudget;
 use bimorph_domains::System;
-use bimorph_multibody::forces::add_damping;
-use bimorph_multibody::joint_coordinates::sprung_loops::poses::TreeKinematics;
-use bimorph_multibody::planar::Pose;
 use nalgebra::{DMatrix, DVector, SVD, SymmetricEigen};
 use std::sync::Arc;
 
@@ -48,7 +46,10 @@ pub(super) struct Fit<'a> {
     rotation: DMatrix<f64>,
     mass: Vec<f64>,
     damping: DMatrix<f64>,
-    mass_change: f64,
+    /// For each of the equilibria, the relative change of the mass of the slowest coordinate.
+    mass_changes: Vec<f64>,
+    /// For a motion in the product, whose inertia follows the bodies.
+    moves: bool,
     /// Largest |z_k| of the points of the fit.
     reach: Vec<f64>,
     /// Largest |z| of the equilibria.
@@ -116,8 +117,8 @@ impl<'a> Fit<'a> {
         // that of the slowest coordinate: others are small beside their springs
         let slowest = rotation.column(0).into_owned();
         let mass_of = |mass: &DMatrix<f64>| slowest.dot(&(mass * &slowest));
-        let change = |z: &Vec<f64>| (mass_of(&matrices(space, z).0) / mass_of(&rest.0) - 1.0).abs();
-        let mass_change = equilibria.iter().map(change).fold(0.0, f64::max);
+        let change = |z: &Vec<f64>| mass_of(&matrices(space, z).0) / mass_of(&rest.0) - 1.0;
+        let mass_changes = equilibria.iter().map(change).collect();
         let least = eigenvalues.amax() * f64::EPSILON;
         let amplitude = equilibria.iter().map(|z| z.iter().map(|z| z * z).sum::<f64>().sqrt()).fold(0.0, f64::max);
         // samples of the training may lie beyond contact, where the mechanism cannot go
@@ -133,7 +134,8 @@ impl<'a> Fit<'a> {
             equilibria,
             damping: rotation.tr_mul(&(&rest.1 * &rotation)),
             mass: order.iter().map(|k| eigenvalues[*k].max(least)).collect(),
-            mass_change,
+            mass_changes,
+            moves,
             reach,
             amplitude,
             rotation,
@@ -215,6 +217,11 @@ impl<'a> Fit<'a> {
             .collect();
         let approaches = thinned(&approaches, groups, &of_gaps, &monomials, errors);
         let (stiffness, thermal, built_in) = self.tree_forces(scale);
+        let turned = (&self.rotation, scale);
+        let mass_slopes = match self.moves {
+            true => DMatrix::zeros(m, m),
+            false => slopes(self.space, turned, (&self.mass, &reach), ErrorBudget::of(tol).constant_mass()),
+        };
         PolynomialModel {
             scale,
             rotation: self.rotation.clone(),
@@ -229,10 +236,20 @@ impl<'a> Fit<'a> {
             inertia,
             mass: self.mass.clone(),
             damping: self.damping.clone(),
-            mass_change: self.mass_change,
+            mass_change: self.mass_change(&mass_slopes, scale),
+            mass_slopes,
             fit_error,
             monomials,
         }
+    }
+
+    /// The largest relative change of the mass of the slowest coordinate over the equilibria, beyond that of its slopes.
+    fn mass_change(&self, slopes: &DMatrix<f64>, scale: f64) -> f64 {
+        let beyond = |(z, change): (&Vec<f64>, &f64)| {
+            let x = self.rotation.tr_mul(&DVector::from_column_slice(z)) / scale;
+            (change - slopes.row(0).transpose().dot(&x) / self.mass[0]).abs()
+        };
+        self.equilibria.iter().zip(&self.mass_changes).map(beyond).fold(0.0, f64::max)
     }
 
     /// Derivatives of all functions with x at rest, coordinates × functions: central differences of exact kinematics.
@@ -316,32 +333,6 @@ fn independent(columns: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
     }
     let rows: Vec<_> = rows.iter().map(DVector::transpose).collect();
     if rows.is_empty() { DMatrix::zeros(0, n) } else { DMatrix::from_rows(&rows) }
-}
-
-/// Masses and damping over z at a state (s², s).
-fn matrices(space: &ReducedSpace, z: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
-    let model = &space.joints.closures.model;
-    let mut forces = ReducedForces::new(space);
-    forces.place_at_rest(space, z);
-    let placed: &TreeKinematics = &forces.placed;
-    let moved: Vec<Vec<Pose>> = (space.directions.iter())
-        .map(|direction| {
-            let mut moved = vec![Pose::zeros(); direction.len()];
-            placed.spread(&space.joints.tree, direction, &mut moved);
-            moved
-        })
-        .collect();
-    let m = space.size();
-    let mass = DMatrix::from_fn(m, m, |k, l| model.mass_product(&moved[k], &moved[l]));
-    let dragged: Vec<Vec<Pose>> = (moved.iter())
-        .map(|moved| {
-            let mut drag = vec![Pose::zeros(); moved.len()];
-            add_damping(model, moved, &mut drag);
-            drag
-        })
-        .collect();
-    let damping = DMatrix::from_fn(m, m, |k, l| dot(&moved[k], &dragged[l]));
-    ((&mass + mass.transpose()) * 0.5, damping)
 }
 
 /// The coefficients with which `table` comes closest to `given`, one column each. Rows count as their states are near rest, by their sizes, so that

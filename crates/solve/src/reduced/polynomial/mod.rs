@@ -6,7 +6,7 @@
 //! ```
 //! The first term is exact. The strains e_c of the joints that close loops, the approaches u_k of gaps and the works W_i of loads are
 //! polynomials of degree 2 or 3. The energy of closures is a sum of squares and never negative, unlike a truncated one. The laws φ_k of gaps are
-//! those of the full model. Masses are those at rest, and the coordinates are chosen such that they and the tangent at rest are diagonal.
+//! those of the full model. Masses are those at rest, in a file with their slopes, and the coordinates are chosen such that they and the tangent at rest are diagonal.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -21,10 +21,11 @@
 //! | [`shapes`] | the functions of a configuration that become polynomials |
 //! | [`fit`] | least squares at states that the space was trained for, and compression |
 //! | [`statics`] | equilibria, and their error against the full model |
+//! | `varying_mass` | masses of a file that vary with the coordinates |
 
 mod chain;
 mod cubature;
-mod fast_coordinates;
+pub mod fast_coordinates;
 pub mod fit;
 pub mod monomials;
 pub mod motion;
@@ -33,6 +34,7 @@ mod rows;
 mod samples;
 pub mod shapes;
 pub mod statics;
+mod varying_mass;
 
 use bimorph_domains::{Drive, Law};
 use monomials::{Monomials, Polynomials};
@@ -94,7 +96,9 @@ pub struct PolynomialModel {
     pub mass: Vec<f64>,
     /// Damping matrix of dampers and drag (s).
     pub damping: DMatrix<f64>,
-    /// Largest relative change of the mass matrix over the states (1).
+    /// Change of each diagonal entry with each coordinate, coordinates × coordinates; zero where only motions in the product are wanted (s²).
+    pub mass_slopes: DMatrix<f64>,
+    /// Largest relative change of the mass of the slowest coordinate over the equilibria, beyond that of its slopes (1).
     pub mass_change: f64,
     /// Largest error of a polynomial at states that did not make it, relative to its largest value (1).
     pub fit_error: f64,
