@@ -356,7 +356,7 @@ fn masses(model: &FlexibleModel) -> String {
 fn sudden(model: &FlexibleModel) -> String {
     let highest = model.motion.modes.iter().map(|mode| mode.lambda.sqrt() / TAU).fold(0.0, f64::max);
     match model.motion.modes.len() {
-        0 => "no modes at rest are among the coordinates: dynamics by the shapes of equilibria and one moment of each input".to_owned(),
+        0 => "no modes at rest are among the coordinates: dynamics by the shapes of equilibria and two moments of each input".to_owned(),
         count => format!(
             "modes at rest among the coordinates: {count}, up to {highest:.3e} Hz; another up to 32 times the lowest frequency has at most {:.1e} of the motion after a step of an input",
             model.motion.left_out
