@@ -218,7 +218,8 @@ class Page:
         log = self.folder / f".server{self.shell.count}"
         command = re.sub(r"(\s#.*)?(\s&)?\s*$", "", command)
         wait = f"for k in $(seq 200); do grep -q '{ready}' {log} && break; kill -0 $! 2>/dev/null || break; sleep 0.05; done; cat {log}; grep -q '{ready}' {log}"
-        return f"{command} >{log} 2>&1 & {wait}"
+        # the output exists before the server does
+        return f": >{log}; {command} >>{log} 2>&1 & {wait}"
 
     def _named(self, line: int, command: str) -> None:
         """A command that is not run here: the scripts, targets and examples that it names are there."""

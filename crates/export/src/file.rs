@@ -1,7 +1,7 @@
 //! The file of an export as text, with a summary of the model in it: what the command writes and a server sends.
 
 use super::compare::{ModelFit, fit};
-use super::flexible::{FlexibleModel, FlexibleOutput, flexible};
+use super::flexible::{FlexibleModel, flexible};
 use super::linear::{ReducedPort, SignalShown};
 use super::model_options::model_options;
 use super::names::{self, Pins};
@@ -13,8 +13,6 @@ use std::sync::Arc;
 
 /// Longest line of a file, roughly (byte).
 const LINE: usize = 64;
-/// Volts across a port below which simulators with a `vntol` of 1 µV lack digits (V).
-const RESOLVED: f64 = 1e-3;
 
 /// Language of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -220,7 +218,6 @@ impl FileRequest {
                 model.fitted.error, self.model.within
             ));
         }
-        warnings.extend(unresolved(&model));
         let about = about_reduced(compiled, &model, source, &warnings);
         let text = flexible_verilog_a::write(&model, &pins, &name, &about);
         let content = FileContent::Reduced(ReducedSummary {
@@ -362,22 +359,6 @@ fn sudden(model: &FlexibleModel) -> String {
             model.motion.left_out
         ),
     }
-}
-
-/// Warnings of ports across which less appears than simulators resolve.
-fn unresolved(model: &FlexibleModel) -> Vec<String> {
-    let small = |((port, row), scale): ((&ReducedPort, &FlexibleOutput), &f64)| {
-        let FlexibleOutput::Probe(probe) = row else { return None };
-        let volts = model.motion.readings.get(*probe)?.abs() * scale.abs();
-        (port.kind.given_flow() && volts > 0.0 && volts < RESOLVED).then(|| {
-            let power = (1.0 / volts).log10().round();
-            format!(
-                "about {volts:.1e} V appear across port {} in these ranges, which a simulator cannot tell from its vntol of 1e-6 V: steps in time collapse; give --ports {}:{:.0e}",
-                port.name, port.name, scale.abs() * 10f64.powf(power)
-            )
-        })
-    };
-    model.ports.iter().zip(&model.rows).zip(&model.scales).filter_map(small).collect()
 }
 
 /// Meaning of a volt of a signal.

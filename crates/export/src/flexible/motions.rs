@@ -50,8 +50,6 @@ pub struct SuddenMotion {
     pub modes: Vec<SuddenMode>,
     /// The largest share of another mode up to 32 times the slowest frequency (1).
     pub left_out: f64,
-    /// Each reading at the ends of all ranges, linear about the rest.
-    pub readings: Vec<f64>,
 }
 
 /// The motion that inputs excite, with modes of a share of `least` or more.
@@ -61,15 +59,11 @@ pub fn sudden_motion(system: &System, inputs: &InputBox, probes: &[&Probe<'_>], 
     let (mut tangent, mut at_rest) = (BodyMatrix::new(&model.pattern), rest.clone());
     system.tangent(&rest, &inputs.none, &mut tangent, &mut at_rest);
     let Some(forces) = forces(system, inputs, &tangent, &at_rest) else { return SuddenMotion::default() };
-    let mut whole = vec![0.0; probes.len()];
-    for input in &forces {
-        whole.iter_mut().zip(readings(system, probes, &input.motion)).for_each(|(whole, one)| *whole += one.abs());
-    }
     let mut count = FIRST;
     loop {
         let found = modal::lowest(system, (&rest, &inputs.none), &tangent, count).ok();
         let Some(found) = found.filter(|found| found.lambda.iter().all(|lambda| *lambda > 0.0)) else {
-            return SuddenMotion { readings: whole, ..SuddenMotion::default() };
+            return SuddenMotion::default();
         };
         let shares = shares(system, &forces, probes, &found.lambda, &found.shapes);
         let excited = (0..shares.len()).filter(|&j| shares[j] >= least);
@@ -83,7 +77,7 @@ pub fn sudden_motion(system: &System, inputs: &InputBox, probes: &[&Probe<'_>], 
             let left_out = others.map(|j| shares[j]).fold(0.0, f64::max);
             let mode =
                 |j: usize| SuddenMode { shape: found.shapes[j].clone(), lambda: found.lambda[j], share: shares[j] };
-            return SuddenMotion { modes: taken.into_iter().map(mode).collect(), left_out, readings: whole };
+            return SuddenMotion { modes: taken.into_iter().map(mode).collect(), left_out };
         }
         count *= 2;
     }
