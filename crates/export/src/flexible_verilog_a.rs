@@ -350,7 +350,12 @@ impl FlexibleModule<'_> {
         let (loads, strains) = (self.loads(), of.closures.strains.coefficients.nrows());
         for j in 0..m {
             let (n, second) = (j + 1, self.second(j));
-            ContributionSum::begin(&format!("I(x{n}) <+ ddt({second:e} * V(x{n})) - V(v{n})")).end(&mut self.body);
+            // one that follows its forces at once has a rate that jumps with theirs, where simulators take ever shorter steps
+            let rate = match follows[j] && !self.moves() {
+                true => String::new(),
+                false => format!("ddt({second:e} * V(x{n})) "),
+            };
+            ContributionSum::begin(&format!("I(x{n}) <+ {rate}- V(v{n})")).end(&mut self.body);
             let inertia = match follows[j] {
                 true => "0".to_owned(),
                 false => format!("ddt({} * V(v{n}))", self.mass(j)),
