@@ -326,11 +326,11 @@ fn about_reduced(compiled: &CompiledModel, model: &FlexibleModel, source: &str, 
         ),
         masses(model),
         format!("slowest coordinate at rest: {:e} Hz", 1.0 / (TAU * of.mass[0].sqrt())),
-        sudden(model),
         format!(
             "{} coordinates of 32 times that frequency or more follow their forces at once",
             model.fitted.follows.iter().filter(|follows| **follows).count()
         ),
+        sudden(model),
     ]);
     about.extend(warnings.iter().map(|warning| format!("warning: {warning}")));
     about.extend(model.signals.iter().map(meaning));

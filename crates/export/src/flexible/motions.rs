@@ -11,7 +11,7 @@
 
 use super::super::mechanism::dot;
 use bimorph_analysis::harmonic::modal;
-use bimorph_domains::{Drive, System};
+use bimorph_domains::System;
 use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use bimorph_solve::reduced::InputBox;
@@ -89,19 +89,14 @@ fn forces(system: &System, inputs: &InputBox, tangent: &BodyMatrix, at_rest: &[P
     let mut factor = tangent.clone();
     model.project_matrix(&mut factor);
     factor.factor(&model.pattern).ok()?;
-    let rest = vec![Pose::zeros(); system.bodies()];
-    let of = |unit: &Drive| {
-        let mut force = rest.clone();
-        system.residual(&rest, unit, &mut force);
-        force.iter_mut().zip(at_rest).for_each(|(force, at_rest)| *force = at_rest - *force);
+    let of = |input: usize| {
+        let mut force = inputs.force(system, input, at_rest);
         model.project(&mut force);
         let mut motion = force.clone();
         factor.solve(&model.pattern, &mut motion);
         RestInput { force, motion }
     };
-    let count = inputs.inputs.len();
-    let unit = |i: usize| (0..count).map(|k| if k == i { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
-    Some((0..count).map(|i| of(&inputs.drive(&unit(i)))).collect())
+    Some((0..inputs.inputs.len()).map(of).collect())
 }
 
 /// The largest share of each mode.

@@ -34,7 +34,7 @@ impl SegmentMatrices {
         Self { first: zeros, inner: zeros, last: zeros }
     }
 
-    /// The same matrix of every segment over the motion of its own ends, seen from the points.
+    /// A matrix over the motion of a segment's own ends, carried over to the motion of the points.
     fn of(inner: Matrix6<f64>, ends: &[SprungEnd; 2]) -> Self {
         let [first, last] = ends.each_ref().map(|end| end.motion.transpose() * inner * end.motion);
         Self { first, inner, last }

@@ -4,6 +4,7 @@
 //! Forces at rest are linear in each of them. Parts that vary in proportion in a whole run count as one.
 
 use bimorph_domains::{Drive, System};
+use bimorph_multibody::planar::Pose;
 
 /// Most inputs of a reduced model.
 pub const MAX_INPUTS: usize = 12;
@@ -77,6 +78,16 @@ impl InputBox {
             drive.inputs.iter_mut().zip(&unit.inputs).for_each(|(x, unit)| *x += unit * u);
         }
         drive
+    }
+
+    /// Force of a unit of one input on the bodies at rest, where `at_rest` is the residual without any input (N, N·m).
+    pub fn force(&self, system: &System, input: usize, at_rest: &[Pose]) -> Vec<Pose> {
+        let values: Vec<f64> = (0..self.inputs.len()).map(|k| if k == input { 1.0 } else { 0.0 }).collect();
+        let rest = vec![Pose::zeros(); system.bodies()];
+        let mut force = rest.clone();
+        system.residual(&rest, &self.drive(&values), &mut force);
+        force.iter_mut().zip(at_rest).for_each(|(force, at_rest)| *force = at_rest - *force);
+        force
     }
 
     /// Corners of the box, where there are few inputs, and `count` points within, the same in every run. Values stay within −1 and 1, and

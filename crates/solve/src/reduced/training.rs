@@ -197,10 +197,7 @@ impl Trainer<'_> {
             return Err(ReductionError::Free { body: model.bodies[pivot.body].name.to_string() });
         }
         for i in 0..inputs.inputs.len() {
-            let values: Vec<f64> = (0..inputs.inputs.len()).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
-            let mut y = rest.clone();
-            system.residual(&rest, &inputs.drive(&values), &mut y);
-            y.iter_mut().zip(&at_rest).for_each(|(y, r)| *y = r - *y);
+            let mut y = inputs.force(system, i, &at_rest);
             tangent.solve(&model.pattern, &mut y);
             for _ in 0..self.options.moments {
                 y.iter_mut().enumerate().for_each(|(j, y)| *y = model.mass(j).component_mul(y));
