@@ -413,8 +413,8 @@ fn meshes_of_shaken_beams() {
     let drawn = compiled_with(&text, &CompileOptions { segments: None, ..options(&[]) });
     let (fitted, _) = fitted_in_time(&drawn, &asked).unwrap_or_else(|e| panic!("{e}"));
     let found = transient(&fitted, &asked.with_tolerance(1e-3), &mut |_, _| {}, &mut |_| true).unwrap();
-    let fine = compiled_with(&text, &CompileOptions { segments: Some(32), ..options(&[]) });
-    let wanted = transient(&fine, &asked.with_tolerance(1e-6), &mut |_, _| {}, &mut |_| true).unwrap();
+    let fine = compiled_with(&text, &CompileOptions { segments: Some(96), ..options(&[]) });
+    let wanted = transient(&fine, &asked.with_tolerance(1e-5), &mut |_, _| {}, &mut |_| true).unwrap();
     let (got, want) = (&found.signals[0].2, &wanted.signals[0].2);
     let size = want.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let off = got.iter().zip(want).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt() / 301f64.sqrt() / size;

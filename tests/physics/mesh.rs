@@ -222,6 +222,26 @@ fn errors_at_junctions_are_estimated() {
     }
 }
 
+/// The band of the six lowest modes is theirs where a first mesh has fewer modes or higher ones: each holds the tolerance against 64 segments a beam, on fewer
+/// than 300 unknowns (before: 490 and 615 at 1e-4).
+#[test]
+fn meshes_of_the_lowest_modes_are_no_finer_than_needed() {
+    for (path, most) in [("examples/column/column.net", 300), ("examples/chevron/chevron.net", 300)] {
+        let bundle = read_bundle(Path::new(path), &[]).unwrap();
+        let with =
+            |segments, tol| compile(&bundle, &CompileOptions { segments, tol, ..CompileOptions::default() }).unwrap();
+        let reference = modes(&with(Some(64), 1e-3), 6, &[]).unwrap().frequencies_hz;
+        for tol in [1e-2, 1e-3, 1e-4] {
+            let (model, found, _) = modes_fitted(&with(None, tol), 6, &[]).unwrap();
+            println!("{path} {tol:e}: {} unknowns", model.unknowns());
+            assert!(model.unknowns() < most, "{}", model.unknowns());
+            for (f, reference) in found.frequencies_hz.iter().zip(&reference) {
+                assert!((f / reference - 1.0).abs() < 1.05 * tol, "{path} {tol:e}: {f:e} {reference:e}");
+            }
+        }
+    }
+}
+
 /// The mesh of a run resolves every mode that it excites where a voltage softens them: an elbow with a plate at half of its pull-in has its second mode 1.3 % lower than as
 /// drawn. Each coordinate of the tip holds the tolerance against 32 segments a beam. With the second mode left out the error was twice the tolerance.
 #[test]

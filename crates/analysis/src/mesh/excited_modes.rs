@@ -19,9 +19,10 @@ use super::super::statics::{OperatingPoint, operating_point};
 use super::super::transient::TransientOptions;
 use super::super::transient::record::at_anchors;
 use super::super::{AnalysisError, PortVoltages};
+use super::driven::{SuddenAnchorMotion, add_driven};
 use super::equilibrium;
 use super::remeshed::{chosen, meshed};
-use super::signal_amplitudes::SignalAmplitudes;
+use super::signal_amplitudes::{SignalAmplitudes, reach};
 use super::warnings::{of_rotary, of_steps};
 use bimorph_base::Diagnostic;
 use bimorph_base::ErrorBudget;
@@ -34,7 +35,7 @@ use bimorph_model::refine::lowest_modes;
 use bimorph_model::refine::mesh_search::{self, Mesh, MeshTarget};
 use bimorph_multibody::forces::add_damping;
 use bimorph_multibody::planar::Pose;
-use bimorph_multibody::{BodyId, BodyMatrix, Model};
+use bimorph_multibody::{BodyMatrix, Model};
 use bimorph_solve::eigen::lowest_modes;
 use std::f64::consts::TAU;
 
@@ -259,6 +260,7 @@ fn excited(
     let mut way = pushed(&model, &from, options.shock.as_ref(), &drive, &stiffness)
         .unwrap_or_else(|| from.q.iter().zip(&to.q).map(|(a, b)| a - b).collect());
     add_driven(&model, options, &stiffness, &mut way);
+    let mut sudden = SuddenAnchorMotion::of_run(&model, options, &stiffness);
     let size = reach(&model, &way);
     if size == 0.0 {
         return Ok((Vec::new(), 0.0));
@@ -277,10 +279,12 @@ fn excited(
             for (way, x) in way.iter_mut().zip(x) {
                 *way -= x * share;
             }
-            swings.push(seen.of(x, omega).iter().map(|swing| swing * share.abs() / lags(omega)).collect());
+            let jumps: f64 = sudden.iter_mut().map(|motion| motion.take_mode(&model, x, omega)).sum();
+            let amplitude = share.abs() / lags(omega) + jumps;
+            swings.push(seen.of(x, omega).iter().map(|swing| swing * amplitude).collect());
             ExcitedMode {
                 frequency: omega / TAU,
-                amplitude: (share.abs() * reach(&model, x) / size / lags(omega)).min(1.0),
+                amplitude: (reach(&model, x) * amplitude / size).min(1.0),
                 decay: damping(&system.model, x),
                 rotary: rotary_inertia_error::too_high(&model, x),
             }
@@ -292,8 +296,13 @@ fn excited(
     for (mode, swing) in modes.iter_mut().zip(&swings[1..]) {
         mode.amplitude = mode.amplitude.max(largest(swing)).min(1.0);
     }
-    let rest: Vec<f64> = seen.of(&way, last).iter().map(|swing| swing / lags(last)).collect();
-    Ok((modes, (reach(&model, &way) / size / lags(last)).max(largest(&rest))))
+    // what is in none of the modes
+    let of_rest = |rest: &[Pose], slower: f64| {
+        let swings: Vec<f64> = seen.of(rest, last).iter().map(|swing| swing / slower).collect();
+        (reach(&model, rest) / size / slower).max(largest(&swings))
+    };
+    let of_jumps: f64 = sudden.iter().map(|motion| of_rest(&motion.beyond(last), 1.0)).sum();
+    Ok((modes, of_rest(&way, lags(last)) + of_jumps))
 }
 
 /// K⁻¹·r with the unbalanced forces r at the start of the run, under its further drive; `None` for a floating part. For
@@ -331,42 +340,6 @@ fn pushed(
     x.iter().all(|x| x.iter().all(|v| v.is_finite())).then_some(x)
 }
 
-/// `way +=` the shapes that moving anchors excite: those of the inertia forces of the whole mechanism moving with them, as large as the motion of
-/// each anchor.
-fn add_driven(model: &CompiledModel, options: &TransientOptions<'_>, stiffness: &BodyMatrix, way: &mut [Pose]) {
-    let system = &model.parts.system;
-    for (name, wave) in &options.motions {
-        let Some((anchor, direction)) = system.anchor_source(name).and_then(|source| system.anchor_input(source))
-        else {
-            continue;
-        };
-        let BodyId::Free(held) = system.anchors[anchor].point.body else { continue };
-        let mut amplitude = (wave.farthest() - wave.at(0.0)[0]).abs();
-        let mut x = vec![Pose::zeros(); system.bodies()];
-        let about = system.model.bodies[held].center + system.anchors[anchor].point.arm;
-        for (k, (x, body)) in x.iter_mut().zip(&system.model.bodies).enumerate() {
-            let arm = body.center - about;
-            let moved = [Pose::x(), Pose::y(), Pose::new(-arm.y, arm.x, 1.0)][direction];
-            *x = system.model.mass(k).component_mul(&moved);
-        }
-        if direction == 2 {
-            amplitude *= model.structure.extent();
-        }
-        let mut factor = stiffness.clone();
-        system.model.project_matrix(&mut factor);
-        system.model.project(&mut x);
-        if factor.factor(&system.model.pattern).is_err() {
-            continue;
-        }
-        factor.solve(&system.model.pattern, &mut x);
-        system.model.project(&mut x);
-        let size = reach(model, &x);
-        if size > 0.0 && size.is_finite() {
-            way.iter_mut().zip(&x).for_each(|(way, x)| *way += x * (amplitude / size));
-        }
-    }
-}
-
 /// The way from one state to another, if the stiffness all along were that at its end; none for a part that floats.
 pub(super) fn linear_way(model: &CompiledModel, from: &OperatingPoint, to: &OperatingPoint) -> Option<Vec<Pose>> {
     let system = &model.parts.system;
@@ -376,11 +349,6 @@ pub(super) fn linear_way(model: &CompiledModel, from: &OperatingPoint, to: &Oper
     let mut residual = to.q.clone();
     system.tangent(&to.q, &drive, &mut stiffness, &mut residual);
     pushed(model, from, None, &drive, &stiffness)
-}
-
-/// Largest displacement of a node (m), of a small motion `x`.
-pub(super) fn reach(model: &CompiledModel, x: &[Pose]) -> f64 {
-    model.parts.nodes.iter().flatten().map(|p| p.displacement(x, true).norm()).fold(0.0, f64::max)
 }
 
 /// xᵀCx of a mode with xᵀMx = 1 (1/s).

@@ -27,6 +27,7 @@ use super::super::step_error;
 use super::super::transient::{TransientOptions, TransientResult, Until, transient};
 use super::excited_modes;
 use super::remeshed::{chosen, meshed};
+use super::signal_amplitudes::reach;
 use super::to_first_contact::{self, SearchEnd};
 use crate::readout::expression::Expression;
 use bimorph_base::ErrorBudget;
@@ -244,7 +245,7 @@ fn bends(moving: &CompiledModel, options: &TransientOptions<'_>, order: &Mesh) -
     let Some(straight) = excited_modes::linear_way(&model, &from, &to) else { return Ok(true) };
     let way: Vec<Pose> = from.q.iter().zip(&to.q).map(|(a, b)| a - b).collect();
     let off: Vec<Pose> = way.iter().zip(&straight).map(|(a, b)| a - b).collect();
-    Ok(excited_modes::reach(&model, &off) > STRAIGHT * excited_modes::reach(&model, &way))
+    Ok(reach(&model, &off) > STRAIGHT * reach(&model, &way))
 }
 
 /// Steps of a coarse run that came to its end.

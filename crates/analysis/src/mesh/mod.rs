@@ -18,6 +18,7 @@
 //! is added.
 
 mod doubled_mesh;
+mod driven;
 mod equilibrium;
 mod excited_modes;
 mod frequencies;

@@ -14,6 +14,11 @@ use crate::readout::signal::SignalView;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 
+/// Largest displacement of a node (m), of a small motion `x`.
+pub(super) fn reach(model: &CompiledModel, x: &[Pose]) -> f64 {
+    model.parts.nodes.iter().flatten().map(|p| p.displacement(x, true).norm()).fold(0.0, f64::max)
+}
+
 /// The signals of a run about a state.
 pub(super) struct SignalAmplitudes<'a> {
     model: &'a CompiledModel,

@@ -97,6 +97,19 @@ impl InputWaveform {
         values.into_iter().fold(start, farther)
     }
 
+    /// The largest jump of its rate; both ends of a ramp together.
+    pub fn jump_of_rate(&self) -> f64 {
+        match self {
+            Self::Sine { amplitude, frequency, .. } => (TAU * frequency * amplitude).abs(),
+            Self::Pulse { low, high, lengths: [rise, _, fall], .. } => 2.0 * (high - low).abs() / rise.min(*fall),
+            Self::Lines(points) => {
+                let inner = points.windows(2).map(|ends| (ends[1][1] - ends[0][1]) / (ends[1][0] - ends[0][0]));
+                let slopes: Vec<f64> = std::iter::once(0.0).chain(inner).chain(std::iter::once(0.0)).collect();
+                2.0 * slopes.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max)
+            }
+        }
+    }
+
     /// The first time after `t` at which its slope jumps (s); infinite without one.
     pub fn corner_after(&self, t: f64) -> f64 {
         let later = |corner: &f64| *corner > t + SAME_TIME * (t.abs() + corner.abs());
@@ -165,6 +178,8 @@ mod tests {
             [1.0, 3.0, f64::INFINITY]
         );
         assert_eq!([sine.farthest(), again.farthest(), lines.farthest()], [3.0, 3.0, -2.0]);
+        let jumps = [sine.jump_of_rate(), again.jump_of_rate(), lines.jump_of_rate()];
+        assert_eq!(jumps, [TAU * 0.5, 8.0, 4.0]);
     }
 
     /// Impossible waveforms are refused: times that do not ascend, pulses longer than their period, steps without a rise.

@@ -5,8 +5,8 @@
 //! Then [`mesh_search`] chooses the mesh for that band, and the band is determined again on it
 //! until the requested modes lie within.
 //!
-//! On a mesh of few segments the axial motions of slender beams are among the lowest. Where the band would have many bending waves on a beam, the frequency is
-//! determined on twice the segments first: a band of axial motions takes thousands of segments of a beam with a slenderness of 10⁸.
+//! On a mesh of few segments higher modes are too high or missing, and axial motions of slender beams are among the lowest. Where the frequency is below nine
+//! tenths on twice the segments, these are the first mesh: a band of axial motions takes thousands of segments of a beam with a slenderness of 10⁸.
 
 use super::band_modes::mechanics;
 use super::mesh_search;
@@ -24,10 +24,8 @@ use std::f64::consts::TAU;
 const MAX_PASSES: usize = 12;
 /// Fraction by which the band lies above the highest requested mode.
 const ABOVE: f64 = 0.01;
-/// Phase of bending waves along a beam above which a frequency is compared with that on twice the segments (rad).
-const MANY_WAVES: f64 = 256.0;
 /// Fraction of the frequency of a mesh below which that of twice the segments replaces it (1).
-const FAR_BELOW: f64 = 0.1;
+const FAR_BELOW: f64 = 0.9;
 /// Frequencies within which modes are looked for (Hz).
 const LOWEST: f64 = 1e-6;
 const HIGHEST: f64 = 1e13;
@@ -76,9 +74,6 @@ fn far_below(
     frequency: f64,
     count: usize,
 ) -> Result<Option<Vec<usize>>, DiscretizeError> {
-    if bare.beams.iter().all(|beam| order::waves(beam, frequency) <= MANY_WAVES) {
-        return Ok(None);
-    }
     let finer: Vec<usize> = segments.iter().map(|&n| options.scheme.segments(2 * n)).collect();
     if finer == segments || finer.iter().sum::<usize>() > mesh_search::MAX_SEGMENTS {
         return Ok(None);
