@@ -6,11 +6,12 @@
 //! M·ü + C·u̇ + K·u = −M·r·d̈
 //! ```
 //!
-//! Where d follows the mechanism slowly, u is K⁻¹·M·r·d̈. A jump of the rate ḋ by Δ is a sudden velocity: the mode x, with xᵀMx = 1, begins to swing with the
-//! amplitude xᵀMr·Δ/ω. The modes of a beam have amplitudes of the third power of their number then, of the fifth by a slow motion.
+//! Where d varies slowly, u is −K⁻¹·M·r·d̈. A jump of the rate ḋ by Δ is a sudden velocity: the mode x, with xᵀMx = 1, begins to swing with the
+//! amplitude xᵀMr·Δ/ω. The amplitudes of a beam's modes then fall with the third power of their number.
 
 use super::super::transient::TransientOptions;
 use super::signal_amplitudes::reach;
+use bimorph_domains::InputWaveform;
 use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyId, BodyMatrix};
@@ -29,8 +30,7 @@ impl SuddenAnchorMotion {
     /// Those of a run.
     pub(super) fn of_run(model: &CompiledModel, options: &TransientOptions<'_>, stiffness: &BodyMatrix) -> Vec<Self> {
         let system = &model.parts.system;
-        let one = |(name, wave): &(String, _)| {
-            let wave: &bimorph_domains::InputWaveform = wave;
+        let one = |(name, wave): &(String, InputWaveform)| {
             let (anchor, direction) = system.anchor_source(name).and_then(|source| system.anchor_input(source))?;
             let anchor = &system.anchors[anchor];
             let BodyId::Free(held) = anchor.point.body else { return None };
