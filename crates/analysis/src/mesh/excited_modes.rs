@@ -95,10 +95,18 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
                 merged(&still, &counted)
             }
         };
-        let (modes, left) = excited(moving, options, &mesh.segments, count)?;
+        let (mut modes, mut left) = excited(moving, options, &mesh.segments, (count, true))?;
         if left > errors.negligible_amplitude() && modes.len() >= count && count < MAX_MODES {
             count = (2 * count).min(MAX_MODES);
             continue;
+        }
+        if left > errors.requested() && !options.motions.is_empty() {
+            // no mesh resolves the jumps: that for the slow motion, with what they add to it
+            let (slow, rest) = excited(moving, options, &mesh.segments, (count, false))?;
+            let added =
+                modes.iter().zip(&slow).map(|(all, slow)| (all.amplitude - slow.amplitude).powi(2)).sum::<f64>();
+            left = rest.hypot(left).hypot(added.sqrt());
+            modes = slow;
         }
         // the motion outside the modes may have an error of its whole amplitude
         let left = if left > errors.negligible_amplitude() { 2f64.sqrt() * left } else { 0.0 };
@@ -148,7 +156,9 @@ fn with_every_mode(moving: &CompiledModel, mut aim: MeshTarget) -> Result<Mesh, 
 
 /// Warnings about a run on its mesh: equal steps longer than its motion allows, and missing rotary inertia.
 pub(super) fn motion_warnings(moving: &CompiledModel, options: &TransientOptions<'_>) -> Vec<Diagnostic> {
-    let Ok((modes, _)) = excited(moving, options, &moving.order.segments, FIRST_MODES) else { return Vec::new() };
+    let Ok((modes, _)) = excited(moving, options, &moving.order.segments, (FIRST_MODES, true)) else {
+        return Vec::new();
+    };
     let missed = options.step.and_then(|step| Some(of_steps(step, outrun(moving, step, &modes)?)));
     missed.into_iter().chain(of_rotary(moving, phase_error(&modes, options.stop))).collect()
 }
@@ -227,12 +237,13 @@ fn merged(a: &Mesh, b: &Mesh) -> Mesh {
     }
 }
 
-/// The lowest modes about where the run goes to, with their amplitudes; and the share of the way there that is in none of them.
+/// The lowest modes about where the run goes to, so many and with jumps of rates or without, with their amplitudes; and the share of the way there that is
+/// in none of them.
 fn excited(
     moving: &CompiledModel,
     options: &TransientOptions<'_>,
     segments: &[usize],
-    count: usize,
+    (count, jumps): (usize, bool),
 ) -> Result<(Vec<ExcitedMode>, f64), AnalysisError> {
     let model = meshed(moving, segments)?;
     let system = &model.parts.system;
@@ -260,7 +271,7 @@ fn excited(
     let mut way = pushed(&model, &from, options.shock.as_ref(), &drive, &stiffness)
         .unwrap_or_else(|| from.q.iter().zip(&to.q).map(|(a, b)| a - b).collect());
     add_driven(&model, options, &stiffness, &mut way);
-    let mut sudden = SuddenAnchorMotion::of_run(&model, options, &stiffness);
+    let mut sudden = if jumps { SuddenAnchorMotion::of_run(&model, options, &stiffness) } else { Vec::new() };
     let size = reach(&model, &way);
     if size == 0.0 {
         return Ok((Vec::new(), 0.0));
