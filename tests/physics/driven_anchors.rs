@@ -422,6 +422,34 @@ fn meshes_of_shaken_beams() {
     assert!(fitted.unknowns() < fine.unknowns(), "{} {}", fitted.unknowns(), fine.unknowns());
 }
 
+/// No mesh resolves the waves that an anchor sends out when it moves within 1 ns. The mesh is that of a slow motion, and the estimate says what they add: half
+/// of the motion or so, no less than the difference to 24 segments a beam.
+#[test]
+fn a_step_of_an_anchor_asks_for_no_useless_mesh() {
+    let drawn = compiled_with(BRIDGE, &CompileOptions { segments: None, ..options(&[]) });
+    let asked = TransientOptions {
+        stop: 3e-6,
+        points: 301,
+        signals: vec!["m.y".into()],
+        motions: vec![(
+            "b.uy".to_owned(),
+            InputWaveform::Pulse { low: 0.0, high: 1e-7, delay: 0.0, lengths: [1e-9, 1e-5, 1e-9], period: None },
+        )],
+        ..TransientOptions::default()
+    };
+    let (fitted, _) = fitted_in_time(&drawn, &asked).unwrap_or_else(|e| panic!("{e}"));
+    let reported = fitted.order.estimated_error.unwrap();
+    assert!(fitted.unknowns() < 200 && reported > 0.1, "{} {reported:e}", fitted.unknowns());
+    let run = |model: &CompiledModel| {
+        transient(model, &asked.with_tolerance(1e-4), &mut |_, _| {}, &mut |_| true).unwrap().signals[0].2.clone()
+    };
+    let fine = compiled_with(BRIDGE, &CompileOptions { segments: Some(24), ..options(&[]) });
+    let (got, want) = (run(&fitted), run(&fine));
+    let (low, high) = want.iter().fold((0.0f64, 0.0f64), |(low, high), x| (low.min(*x), high.max(*x)));
+    let off = got.iter().zip(&want).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt() / 301f64.sqrt();
+    assert!(off <= reported * 0.5 * (high - low), "{off:e} of {:e}, {reported:e}", 0.5 * (high - low));
+}
+
 struct Session(LocalDevice);
 
 impl Session {

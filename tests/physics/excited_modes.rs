@@ -106,6 +106,6 @@ fn rates_have_their_own_swing() {
     let (reference, _) = release(&CompileOptions { tol: 1e-5, segments: Some(40), ..CompileOptions::default() });
     let (found, model) = release(&CompileOptions { tol: 1e-2, ..CompileOptions::default() });
     let (error, reported) = (relative_error(&reference, &found), found.estimated_error.unwrap());
-    println!("{error:.1e}, told {reported:.1e}, {} unknowns, segments {:?}", found.unknowns, model.order.segments);
+    println!("{error:.1e}, estimated {reported:.1e}, {} unknowns, segments {:?}", found.unknowns, model.order.segments);
     assert!(error <= 1e-2 && reported <= 1e-2 && found.unknowns < 300, "{error:e} {reported:e} {}", found.unknowns);
 }

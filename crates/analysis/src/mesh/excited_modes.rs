@@ -105,7 +105,7 @@ pub(super) fn order(moving: &CompiledModel, options: &TransientOptions<'_>) -> R
             let (slow, rest) = excited(moving, options, &mesh.segments, (count, false))?;
             let added =
                 modes.iter().zip(&slow).map(|(all, slow)| (all.amplitude - slow.amplitude).powi(2)).sum::<f64>();
-            left = rest.hypot(left).hypot(added.sqrt());
+            left = rest + (left - rest).hypot(added.sqrt());
             modes = slow;
         }
         // the motion outside the modes may have an error of its whole amplitude
