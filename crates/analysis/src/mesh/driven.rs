@@ -16,6 +16,42 @@ use bimorph_model::compile::CompiledModel;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyId, BodyMatrix};
 
+/// An anchor that moves in a run.
+struct MovedAnchor<'a> {
+    /// Its place among the anchors, and its body.
+    anchor: usize,
+    held: usize,
+    /// Along x or y, or about z.
+    direction: usize,
+    wave: &'a InputWaveform,
+}
+
+/// The anchors that move in a run.
+fn moved<'a>(model: &'a CompiledModel, options: &'a TransientOptions<'_>) -> impl Iterator<Item = MovedAnchor<'a>> {
+    let system = &model.parts.system;
+    options.motions.iter().filter_map(|(name, wave)| {
+        let (anchor, direction) = system.anchor_source(name).and_then(|source| system.anchor_input(source))?;
+        let BodyId::Free(held) = system.anchors[anchor].point.body else { return None };
+        Some(MovedAnchor { anchor, held, direction, wave })
+    })
+}
+
+/// The factor of the stiffness of a run in which anchors move; none for a floating part.
+pub(super) fn factored(
+    model: &CompiledModel,
+    options: &TransientOptions<'_>,
+    stiffness: &BodyMatrix,
+) -> Option<BodyMatrix> {
+    if options.motions.is_empty() {
+        return None;
+    }
+    let of = &model.parts.system.model;
+    let mut factor = stiffness.clone();
+    of.project_matrix(&mut factor);
+    factor.factor(&of.pattern).ok()?;
+    Some(factor)
+}
+
 /// A motion of an anchor whose rate jumps.
 pub(super) struct SuddenAnchorMotion {
     /// The static shape of the anchor's unit displacement, less modes.
@@ -28,19 +64,15 @@ pub(super) struct SuddenAnchorMotion {
 
 impl SuddenAnchorMotion {
     /// Those of a run.
-    pub(super) fn of_run(model: &CompiledModel, options: &TransientOptions<'_>, stiffness: &BodyMatrix) -> Vec<Self> {
+    pub(super) fn of_run(model: &CompiledModel, options: &TransientOptions<'_>, factor: &BodyMatrix) -> Vec<Self> {
         let system = &model.parts.system;
-        let one = |(name, wave): &(String, InputWaveform)| {
-            let (anchor, direction) = system.anchor_source(name).and_then(|source| system.anchor_input(source))?;
+        let one = |MovedAnchor { anchor, held, direction, wave }: MovedAnchor<'_>| {
             let anchor = &system.anchors[anchor];
-            let BodyId::Free(held) = anchor.point.body else { return None };
             let (arm, k) = (anchor.point.arm, anchor.stiffness[direction]);
             let mut left = vec![Pose::zeros(); system.bodies()];
             left[held] =
                 [Pose::new(k, 0.0, -arm.y * k), Pose::new(0.0, k, arm.x * k), Pose::new(0.0, 0.0, k)][direction];
-            let mut factor = stiffness.clone();
-            system.model.project_matrix(&mut factor);
-            factor.factor(&system.model.pattern).ok()?;
+            system.model.project(&mut left);
             factor.solve(&system.model.pattern, &mut left);
             system.model.project(&mut left);
             // the anchor itself moves as it must
@@ -48,7 +80,7 @@ impl SuddenAnchorMotion {
             let (jump, farthest) = (wave.jump_of_rate(), (wave.farthest() - wave.at(0.0)[0]).abs());
             Some(Self { left, jump, farthest }).filter(|sudden| sudden.jump > 0.0)
         };
-        options.motions.iter().filter_map(one).collect()
+        moved(model, options).filter_map(one).collect()
     }
 
     /// Amplitude of the mode `x` with xᵀMx = 1 (m·√kg); takes it out of what is left.
@@ -73,19 +105,9 @@ impl SuddenAnchorMotion {
 
 /// `way +=` the shapes that moving anchors excite: those of the inertia forces of the whole mechanism moving with them, as large as the motion of
 /// each anchor.
-pub(super) fn add_driven(
-    model: &CompiledModel,
-    options: &TransientOptions<'_>,
-    stiffness: &BodyMatrix,
-    way: &mut [Pose],
-) {
+pub(super) fn add_driven(model: &CompiledModel, options: &TransientOptions<'_>, factor: &BodyMatrix, way: &mut [Pose]) {
     let system = &model.parts.system;
-    for (name, wave) in &options.motions {
-        let Some((anchor, direction)) = system.anchor_source(name).and_then(|source| system.anchor_input(source))
-        else {
-            continue;
-        };
-        let BodyId::Free(held) = system.anchors[anchor].point.body else { continue };
+    for MovedAnchor { anchor, held, direction, wave } in moved(model, options) {
         let mut amplitude = (wave.farthest() - wave.at(0.0)[0]).abs();
         let mut x = vec![Pose::zeros(); system.bodies()];
         let about = system.model.bodies[held].center + system.anchors[anchor].point.arm;
@@ -97,12 +119,7 @@ pub(super) fn add_driven(
         if direction == 2 {
             amplitude *= model.structure.extent();
         }
-        let mut factor = stiffness.clone();
-        system.model.project_matrix(&mut factor);
         system.model.project(&mut x);
-        if factor.factor(&system.model.pattern).is_err() {
-            continue;
-        }
         factor.solve(&system.model.pattern, &mut x);
         system.model.project(&mut x);
         let size = reach(model, &x);

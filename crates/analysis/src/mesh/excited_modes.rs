@@ -19,7 +19,7 @@ use super::super::statics::{OperatingPoint, operating_point};
 use super::super::transient::TransientOptions;
 use super::super::transient::record::at_anchors;
 use super::super::{AnalysisError, PortVoltages};
-use super::driven::{SuddenAnchorMotion, add_driven};
+use super::driven::{SuddenAnchorMotion, add_driven, factored};
 use super::equilibrium;
 use super::remeshed::{chosen, meshed};
 use super::signal_amplitudes::{SignalAmplitudes, reach};
@@ -270,8 +270,12 @@ fn excited(
 
     let mut way = pushed(&model, &from, options.shock.as_ref(), &drive, &stiffness)
         .unwrap_or_else(|| from.q.iter().zip(&to.q).map(|(a, b)| a - b).collect());
-    add_driven(&model, options, &stiffness, &mut way);
-    let mut sudden = if jumps { SuddenAnchorMotion::of_run(&model, options, &stiffness) } else { Vec::new() };
+    let factor = factored(&model, options, &stiffness);
+    if let Some(factor) = &factor {
+        add_driven(&model, options, factor, &mut way);
+    }
+    let of_run = |factor: &BodyMatrix| SuddenAnchorMotion::of_run(&model, options, factor);
+    let mut sudden = factor.as_ref().filter(|_| jumps).map_or_else(Vec::new, of_run);
     let size = reach(&model, &way);
     if size == 0.0 {
         return Ok((Vec::new(), 0.0));
