@@ -310,6 +310,33 @@ fn weak_peaks_and_their_zeros() {
     }
 }
 
+/// The first zero of a plate between two beams is that of 96 segments a beam on coarse meshes, too: at a zero the beams resonate while the plate is at
+/// rest, where the elimination of the beams has no pivot (before: no zero below 20 segments). Damped and undamped.
+#[test]
+fn zeros_of_coarse_meshes() {
+    let text = |viscosity: f64| {
+        format!(
+            "process p = [Youngsmodulus=160e9 density=2330 h=20u viscosity={viscosity} fluid=2u]\nplate2d p [s] [l=100u w=100u]\n\
+             for k=0:1 [\nlink2d * [s q(k)] [l=50u oz=k*pi+pi/2]\nbeam2d p [q(k) e(k)] [l=200u w=2u oz=k*pi+pi/2]\n\
+             anchor p [e(k)] []\n]\n"
+        )
+    };
+    let options = asked("s.fx", &["s.x"], 1e3, 2e6);
+    for viscosity in [1.8e-5, 0.0] {
+        let first = |segments: usize| {
+            let drawn =
+                model(&text(viscosity), CompileOptions { segments: Some(segments), ..CompileOptions::default() });
+            let zeros = run(&drawn, &options).signals[0].zeros.clone().expect("zeros");
+            zeros.first().expect("a zero").frequency_hz()
+        };
+        let exact = first(96);
+        for (segments, most) in [(4, 2e-3), (6, 3e-4), (8, 1e-4), (12, 3e-5), (16, 1e-5)] {
+            let error = first(segments) / exact - 1.0;
+            assert!(error.abs() <= most, "{segments} segments: {error:.1e}");
+        }
+    }
+}
+
 /// Two masses on a spring that nothing holds: no response at rest, at others (k − mω²)/(m²ω⁴ − 2kmω²), and one resonance at 2k/m.
 #[test]
 fn a_part_that_floats() {

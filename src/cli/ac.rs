@@ -16,10 +16,7 @@ use serde::Serialize;
 /// Frequency response about the operating point: magnitude and phase of what a small sinusoid at one place does.
 ///
 /// Drive: NODE.fx, NODE.fy [N], NODE.m [N·m], NODE.ux, .uy [m] or .urz [rad] of a driven anchor, a port of the netlist [V], BEAM.T (heat) [W], frame.ax, frame.ay [m/s²],
-/// frame.wz [rad/s]. Signals: those of `tran` over the unit of the drive, and PORT.i [A], the current into a port. Rows
-/// keep their own scale, which makes elimination with rows of very different weight stable. See A. J. Cox, N. J.
-/// Higham, "Stability of Householder QR factorization for weighted least squares problems", 1998. See also C. C. Paige,
-/// "Computer solution and perturbation analysis of generalized linear least squares problems", Math.
+/// frame.wz [rad/s]. Signals: those of `tran` over the unit of the drive, and PORT.i [A], the current into a port.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph ac examples/bank/bank.net --drive yoke.fy --signals yoke.y --from 10k --to 1M --out bank.png\n  \

@@ -15,6 +15,9 @@ use bimorph_solve::frequency::refined::Refined;
 use bimorph_solve::harmonic::{ComplexPose, Harmonic};
 use nalgebra::Complex;
 
+/// Distance to a frequency at which a pivot vanishes, as a fraction of |s|; no pivot vanishes there.
+const ASIDE: f64 = 1e-11;
+
 /// A mechanism at its operating point, with what drives it and what is seen of it.
 #[derive(Debug)]
 pub(crate) struct ExactResponse<'a> {
@@ -156,6 +159,11 @@ impl<'a> ExactResponse<'a> {
         };
         let values: Vec<Complex<f64>> = self.rows.iter().map(|row| row.sum(value)).collect();
         values.iter().all(|v| v.re.is_finite() && v.im.is_finite()).then_some(values)
+    }
+
+    /// The same at `s`, or next to it where a pivot vanishes: there a branch alone resonates, which is a zero of what it hangs on.
+    pub(super) fn beside(&mut self, s: Complex<f64>) -> Option<Vec<Complex<f64>>> {
+        self.at(s).or_else(|| self.at(s * (1.0 + ASIDE)))
     }
 }
 

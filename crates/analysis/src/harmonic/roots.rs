@@ -227,7 +227,7 @@ fn secant(exact: &mut ExactResponse<'_>, row: usize, guess: Complex<f64>, undamp
         true if guess.im.abs() < NEAR * ROOT_TOLERANCE * guess.norm() => Complex::new(s.re, 0.0),
         _ => s,
     };
-    let mut value = |s: Complex<f64>| exact.at(s).map(|values| values[row]);
+    let mut value = |s: Complex<f64>| exact.beside(s).map(|values| values[row]);
     let (mut before, mut now) = (on(guess * (1.0 + SECANT_OFFSET)), on(guess));
     let mut past = value(before)?;
     let mut last = f64::INFINITY;
