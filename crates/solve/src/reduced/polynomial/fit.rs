@@ -142,8 +142,9 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The model of a degree, for a tolerance, with groups of members that have one voltage.
-    pub(super) fn model(&self, degree: usize, tol: f64, groups: &[Vec<usize>]) -> PolynomialModel {
+    /// The model of a degree, for a tolerance, with groups of members that have one voltage. Strains of closures below `closures` times their part of
+    /// the tolerance are left out.
+    pub(super) fn model(&self, (degree, closures): (usize, f64), tol: f64, groups: &[Vec<usize>]) -> PolynomialModel {
         let monomials = Arc::new(Monomials::new(self.space.size(), degree));
         let scale = self.amplitude.max(f64::MIN_POSITIVE);
         let mut states = self.states(monomials.count());
@@ -188,7 +189,8 @@ impl<'a> Fit<'a> {
         let root = (table.nrows() as f64).sqrt();
         let typical = table * &coefficients / root;
         let apart = ErrorBudget::of(tol).reduced_statics(); // of displacements, whose squares have masses
-        let inertia = independent(&coefficients.columns(in_energy(counts)[1].0, counts[4]).into_owned(), apart * apart);
+        let inertia = coefficients.columns(in_energy(counts)[1].0, counts[4]).into_owned();
+        let inertia = independent(&inertia, apart * apart, (m, apart));
         let mut inertia = Polynomials { monomials: Arc::clone(&monomials), coefficients: inertia };
         for (c, factors) in monomials.factors.iter().enumerate() {
             let size: f64 = factors.iter().map(|i| reach[*i]).product();
@@ -197,7 +199,7 @@ impl<'a> Fit<'a> {
         }
         let all = Polynomials { monomials: Arc::clone(&monomials), coefficients: coefficients.transpose() };
         let [c, a, w, p, _] = counts;
-        let (errors, least) = (ErrorBudget::of(tol), ErrorBudget::of(tol).closures());
+        let (errors, least) = (ErrorBudget::of(tol), closures * ErrorBudget::of(tol).closures());
         let closed = principal(&typical.columns(0, c).into_owned(), |_| least);
         let near = principal(&typical.columns(c, a).into_owned(), |largest| errors.approaches(largest));
         let (thermal, built_in) = self.shapes.rests();
@@ -316,14 +318,22 @@ fn in_energy(counts: [usize; 5]) -> [(usize, usize); 2] {
     [(0, counts[0]), (counts[..4].iter().sum(), counts[4])]
 }
 
-/// Few rows with the products RᵀR of all rows, given as columns, but for `least` of their trace: a Cholesky factorization with diagonal pivots.
-fn independent(columns: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
+/// Few rows with the products RᵀR of all rows, given as columns, but for `least` of their trace and for a fraction `own` of the product of each
+/// of the first `m` with itself: a Cholesky factorization with diagonal pivots. These are coordinates, which must not lose their masses.
+fn independent(columns: &DMatrix<f64>, least: f64, (m, own): (usize, f64)) -> DMatrix<f64> {
     let n = columns.nrows();
     let mut left = columns * columns.transpose();
     let bound = least * left.trace();
+    let bounds: Vec<f64> = (0..m).map(|k| own * left[(k, k)]).collect();
     let mut rows: Vec<DVector<f64>> = Vec::new();
-    while rows.len() < n && left.diagonal().sum() > bound {
-        let pivot = left.diagonal().imax();
+    while rows.len() < n {
+        let pivot = if left.diagonal().sum() > bound {
+            left.diagonal().imax()
+        } else if let Some(light) = (0..m).find(|&k| left[(k, k)] > bounds[k]) {
+            light
+        } else {
+            break;
+        };
         if left[(pivot, pivot)] <= 0.0 {
             break;
         }

@@ -13,8 +13,9 @@ use bimorph_base::ErrorBudget;
 use bimorph_domains::{Drive, System};
 use nalgebra::{DMatrix, DVector};
 
-/// Degrees of the polynomials, and most coordinates of each.
-const DEGREES: [(usize, usize); 2] = [(2, 40), (3, 12)];
+/// Degrees of the polynomials, most coordinates of each, and the factor of what closures leave out: soft coordinates may see strains whose energy
+/// is small beside that of stiff ones.
+const ATTEMPTS: [(usize, usize, f64); 4] = [(2, 40, 1.0), (2, 40, 0.1), (3, 12, 1.0), (3, 12, 0.1)];
 
 /// Polynomials for a motion.
 #[derive(Debug, Clone)]
@@ -27,9 +28,9 @@ pub struct FittedMotion {
     pub largest: f64,
 }
 
-/// The turned space of a training and its polynomials for the motion of a system under a drive: of the lowest degree whose error at the equilibria
-/// is within its part of the tolerance. Fingers of combs stay in the middle of their gaps where that is within it, too. None where there is no such
-/// degree, or a law of a member is none of single points.
+/// The turned space of a training and its polynomials for the motion of a system under a drive: of the lowest degree and the fewest strains whose error at the equilibria
+/// is within its part of the tolerance. Fingers of combs stay in the middle of their gaps where that is within it, too. None where there are no such
+/// polynomials, or a law of a member is none of single points.
 pub fn of_motion(training: &Training, system: &System, drive: &Drive, errors: ErrorBudget) -> Option<FittedMotion> {
     if training.equilibria.is_empty() || !has_polynomials(system) {
         return None;
@@ -39,12 +40,12 @@ pub fn of_motion(training: &Training, system: &System, drive: &Drive, errors: Er
         CombFits::new(system, |combs| Fit::new(&space, system, training.equilibria.clone(), &[], (true, combs)));
     let groups = groups(system, &[]);
     let share = errors.reduced_statics();
-    for (degree, most) in DEGREES {
+    for (degree, most, closures) in ATTEMPTS {
         if space.size() > most {
             break;
         }
         let made = fits.least(share, |fit| {
-            let model = fit.model(degree, share, &groups);
+            let model = fit.model((degree, closures), share, &groups);
             let turned = space.turned(&model.rotation);
             let motion = PolynomialMotion::new(&model);
             let states: Vec<Vec<f64>> = (training.equilibria.iter())
