@@ -153,9 +153,13 @@ impl Continuation {
         traced: &mut TracedPath,
     ) -> Option<PathState> {
         if here.ds * next.ds < 0.0 {
-            let (fold, located) = self.find_fold(family, here, next, step);
+            let (mut fold, located) = self.find_fold(family, here, next, step);
             // a fold changes the inertia; where s turns back without, this is a branch that comes back to its path
             let crossing = here.negative == next.negative;
+            if crossing {
+                // the pivot that vanishes there has a sign by rounding
+                fold.negative = here.negative;
+            }
             traced.events.push((if crossing { PathEvent::Bifurcation } else { PathEvent::Fold }, traced.points.len()));
             traced.rough.extend((!located).then_some(traced.points.len()));
             traced.points.push(point(&fold));

@@ -5,8 +5,15 @@ use super::options::Branch;
 use crate::family::LoadFamily;
 use bimorph_multibody::planar::Pose;
 
+/// Where bisection looks between its ends, in turn, and Illinois where its own place has none (1).
+const ASIDE: [f64; 3] = [0.5, 0.3, 0.7];
+/// Part of a step within which a bifurcation is located, where Newton's method comes no nearer (1).
+const CLOSE: f64 = 1e-6;
+/// Part of the load to which a fold is located, where rounding hides its place along the path (1).
+const CLOSE_IN_S: f64 = 1e-7;
+
 impl Continuation {
-    /// Illinois on s′ over the step; and whether it came to its end.
+    /// Illinois on s′ over the step; and whether it came to its end. Where a branch returns to its path, rounding hides where s′ vanishes, but not s.
     pub(super) fn find_fold(
         &mut self,
         family: &mut LoadFamily,
@@ -17,8 +24,8 @@ impl Continuation {
         let (mut a, mut fa, mut b, mut fb) = (0.0, here.ds, step, next.ds);
         let mut best = next.clone();
         for _ in 0..40 {
-            let middle = (a * fb - b * fa) / (fb - fa);
-            let Some((place, _)) = self.probe(family, here, middle) else { break };
+            let places = std::iter::once((a * fb - b * fa) / (fb - fa)).chain(ASIDE.map(|share| a + share * (b - a)));
+            let Some((middle, place)) = self.first_probe(family, here, places) else { break };
             let f = place.ds;
             best = place;
             if f.abs() < 1e-9 || (b - a).abs() < 1e-12 * step {
@@ -31,7 +38,8 @@ impl Continuation {
             }
             (b, fb) = (middle, f);
         }
-        (best, false)
+        let located = (best.ds * (b - a)).abs() < CLOSE_IN_S;
+        (best, located)
     }
 
     /// Bisection on the number of negative pivots; the place on the near side, and whether it came to its end.
@@ -44,18 +52,28 @@ impl Continuation {
     ) -> (PathState, bool) {
         let (mut low, mut high) = (0.0, step);
         let mut best = here.clone();
-        for _ in 0..40 {
-            let middle = f64::midpoint(low, high);
-            match self.probe(family, here, middle) {
-                Some((place, _)) if place.negative == after => high = middle,
-                Some((place, _)) => (low, best) = (middle, place),
+        for _ in 0..60 {
+            // Newton's method may fail next to the singular tangent itself
+            match self.first_probe(family, here, ASIDE.iter().map(|share| low + share * (high - low))) {
+                Some((middle, place)) if place.negative == after => high = middle,
+                Some((middle, place)) => (low, best) = (middle, place),
                 None => break,
             }
             if high - low < 1e-8 * step {
                 return (best, true);
             }
         }
-        (best, false)
+        (best, high - low < CLOSE * step)
+    }
+
+    /// The first of these distances from `here` at which Newton's method finds a place.
+    fn first_probe(
+        &mut self,
+        family: &mut LoadFamily,
+        here: &PathState,
+        mut distances: impl Iterator<Item = f64>,
+    ) -> Option<(f64, PathState)> {
+        distances.find_map(|distance| self.probe(family, here, distance).map(|(place, _)| (distance, place)))
     }
 
     /// First point on the branch that leaves along the null vector.
