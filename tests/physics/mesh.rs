@@ -242,6 +242,25 @@ fn meshes_of_the_lowest_modes_are_no_finer_than_needed() {
     }
 }
 
+/// The three lowest modes of a frame on a mesh of few segments hold 1e-2 against 32 segments a beam, or report more. The estimate of the third was a
+/// tenth of its error of 2.5e-2 there: the reference took a higher mode, which the mesh has at twice its frequency, with the mass of that frequency.
+#[test]
+fn modes_above_the_band_leave_the_estimates_of_those_within() {
+    let text = "process s = [Youngsmodulus=160e9 Poisson=0.22 density=2330 h=2u]\nanchor s [o] []\nbeam2d s [o m] [l=97.9u w=3.34u \
+                oz=deg(-30)]\nbeam2d s [m t] [l=155.3u w=1.73u oz=deg(-30)]\nplate2d s [t] [l=74.1u w=32.7u]\nanchor s [e] []\n\
+                beam2d s [m e] [l=176.6u w=2.87u oz=deg(60)]\n";
+    let with = |segments| {
+        let options = CompileOptions { segments, tol: 1e-2, ..CompileOptions::default() };
+        compile(&Bundle::from_text("frame.net", text), &options).unwrap()
+    };
+    let reference = modes(&with(Some(32)), 3, &[]).unwrap().frequencies_hz;
+    let (_, found, _) = modes_fitted(&with(None), 3, &[]).unwrap();
+    for (f, reference) in found.frequencies_hz.iter().zip(&reference) {
+        let error = (f / reference - 1.0).abs();
+        assert!(error <= found.estimated_error.unwrap().max(1e-2), "{error:e} of {reference:e}");
+    }
+}
+
 /// The mesh of a run resolves every mode that it excites where a voltage softens them: an elbow with a plate at half of its pull-in has its second mode 1.3 % lower than as
 /// drawn. Each coordinate of the tip holds the tolerance against 32 segments a beam. With the second mode left out the error was twice the tolerance.
 #[test]
