@@ -153,10 +153,12 @@ fn motion_is_that_of_the_full_model() {
 #[test]
 fn polynomials_have_the_tangent_of_their_forces() {
     type Case<'a> = (&'a str, &'a [(&'a str, f64)], &'a [f64]);
-    let cases: [Case<'_>; 4] = [
+    let cases: [Case<'_>; 6] = [
         ("quarter_stage/quarter_stage.net", &[("F", 20e-6), ("angle", 0.9)], &[]),
         ("bank/bank.net", &[], &[1.5]),
+        ("bank/bank.net", &[], &[1.5, 30.0]),
         ("bank/bank.net", &[], &[1.5, 40.0]),
+        ("bank/bank.net", &[], &[1.5, 45.0]),
         ("switch/switch.net", &[], &[12.0]),
     ];
     for (name, set, volts) in cases {

@@ -89,6 +89,8 @@ impl ErrorBudget {
     const SUDDEN_MODE: f64 = 10.0;
     /// Root mean square of a strain of closures that a polynomial model leaves out, over the root of the tolerance (√E): energies go with its square.
     const CLOSURES: f64 = 0.03;
+    /// The same for soft coordinates, which may see strains whose energy is small beside that of stiff ones.
+    const FINE_CLOSURES: f64 = 0.003;
     /// Fraction of the tolerance below which approaches of electrodes, relative to the largest, are left out of a polynomial model: forces
     /// grow steeply with them.
     const APPROACHES: f64 = 3e-3;
@@ -384,6 +386,11 @@ impl ErrorBudget {
     /// Strains of closures that a polynomial model leaves out (√E).
     pub fn closures(self) -> f64 {
         Self::CLOSURES * self.requested.sqrt()
+    }
+
+    /// The same where soft coordinates see strains that are left out there (√E).
+    pub fn fine_closures(self) -> f64 {
+        Self::FINE_CLOSURES * self.requested.sqrt()
     }
 
     /// Approaches of electrodes that it leaves out, in the unit of the largest.

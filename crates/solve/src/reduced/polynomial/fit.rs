@@ -17,7 +17,7 @@ use super::varying_mass::{matrices, slopes};
 use super::{Approaches, ClosureStrains, PolynomialModel};
 use bimorph_base::ErrorBudget;
 use bimorph_domains::System;
-use nalgebra::{DMatrix, DVector, SVD, SymmetricEigen};
+use nalgebra::{DMatrix, DMatrixView, DVector, SVD, SymmetricEigen};
 use std::sync::Arc;
 
 /// Points of the box of coordinates and points about the equilibria, per monomial.
@@ -142,9 +142,9 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The model of a degree, for a tolerance, with groups of members that have one voltage. Strains of closures below `closures` times their part of
-    /// the tolerance are left out.
-    pub(super) fn model(&self, (degree, closures): (usize, f64), tol: f64, groups: &[Vec<usize>]) -> PolynomialModel {
+    /// The model of a degree, for a tolerance, with groups of members that have one voltage. A fine one leaves out fewer strains
+    /// of closures.
+    pub(super) fn model(&self, (degree, fine): (usize, bool), tol: f64, groups: &[Vec<usize>]) -> PolynomialModel {
         let monomials = Arc::new(Monomials::new(self.space.size(), degree));
         let scale = self.amplitude.max(f64::MIN_POSITIVE);
         let mut states = self.states(monomials.count());
@@ -189,8 +189,7 @@ impl<'a> Fit<'a> {
         let root = (table.nrows() as f64).sqrt();
         let typical = table * &coefficients / root;
         let apart = ErrorBudget::of(tol).reduced_statics(); // of displacements, whose squares have masses
-        let inertia = coefficients.columns(in_energy(counts)[1].0, counts[4]).into_owned();
-        let inertia = independent(&inertia, apart * apart, (m, apart));
+        let inertia = independent(coefficients.columns(in_energy(counts)[1].0, counts[4]), apart * apart, (m, apart));
         let mut inertia = Polynomials { monomials: Arc::clone(&monomials), coefficients: inertia };
         for (c, factors) in monomials.factors.iter().enumerate() {
             let size: f64 = factors.iter().map(|i| reach[*i]).product();
@@ -199,7 +198,8 @@ impl<'a> Fit<'a> {
         }
         let all = Polynomials { monomials: Arc::clone(&monomials), coefficients: coefficients.transpose() };
         let [c, a, w, p, _] = counts;
-        let (errors, least) = (ErrorBudget::of(tol), closures * ErrorBudget::of(tol).closures());
+        let errors = ErrorBudget::of(tol);
+        let least = if fine { errors.fine_closures() } else { errors.closures() };
         let closed = principal(&typical.columns(0, c).into_owned(), |_| least);
         let near = principal(&typical.columns(c, a).into_owned(), |largest| errors.approaches(largest));
         let (thermal, built_in) = self.shapes.rests();
@@ -320,7 +320,7 @@ fn in_energy(counts: [usize; 5]) -> [(usize, usize); 2] {
 
 /// Few rows with the products RᵀR of all rows, given as columns, but for `least` of their trace and for a fraction `own` of the product of each
 /// of the first `m` with itself: a Cholesky factorization with diagonal pivots. These are coordinates, which must not lose their masses.
-fn independent(columns: &DMatrix<f64>, least: f64, (m, own): (usize, f64)) -> DMatrix<f64> {
+fn independent(columns: DMatrixView<'_, f64>, least: f64, (m, own): (usize, f64)) -> DMatrix<f64> {
     let n = columns.nrows();
     let mut left = columns * columns.transpose();
     let bound = least * left.trace();
@@ -397,4 +397,21 @@ fn principal(typical: &DMatrix<f64>, least: impl Fn(f64) -> f64) -> DMatrix<f64>
     };
     let columns: Vec<DVector<f64>> = order.into_iter().filter(|k| sigma[*k] > least).map(signed).collect();
     if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of inertia have the mass of each coordinate within the given fraction, also where it has 1e-10 of all, and leave out light products
+    /// of others.
+    #[test]
+    fn coordinates_keep_their_masses() {
+        let columns = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 1e-5, 1e-4]));
+        let rows = independent(columns.as_view(), 1e-5, (2, 1e-3));
+        assert_eq!(rows.nrows(), 2);
+        let mass = |k: usize| rows.column(k).norm_squared();
+        assert!((mass(0) - 1.0).abs() <= 1e-3 && (mass(1) / 1e-10 - 1.0).abs() <= 1e-3, "{rows}");
+        assert!(mass(2) == 0.0, "{rows}");
+    }
 }

@@ -13,9 +13,8 @@ use bimorph_base::ErrorBudget;
 use bimorph_domains::{Drive, System};
 use nalgebra::{DMatrix, DVector};
 
-/// Degrees of the polynomials, most coordinates of each, and the factor of what closures leave out: soft coordinates may see strains whose energy
-/// is small beside that of stiff ones.
-const ATTEMPTS: [(usize, usize, f64); 4] = [(2, 40, 1.0), (2, 40, 0.1), (3, 12, 1.0), (3, 12, 0.1)];
+/// Degrees of the polynomials, most coordinates of each, and whether few strains are left out.
+const ATTEMPTS: [(usize, usize, bool); 4] = [(2, 40, false), (2, 40, true), (3, 12, false), (3, 12, true)];
 
 /// Polynomials for a motion.
 #[derive(Debug, Clone)]
@@ -40,12 +39,12 @@ pub fn of_motion(training: &Training, system: &System, drive: &Drive, errors: Er
         CombFits::new(system, |combs| Fit::new(&space, system, training.equilibria.clone(), &[], (true, combs)));
     let groups = groups(system, &[]);
     let share = errors.reduced_statics();
-    for (degree, most, closures) in ATTEMPTS {
+    for (degree, most, fine) in ATTEMPTS {
         if space.size() > most {
             break;
         }
         let made = fits.least(share, |fit| {
-            let model = fit.model((degree, closures), share, &groups);
+            let model = fit.model((degree, fine), share, &groups);
             let turned = space.turned(&model.rotation);
             let motion = PolynomialMotion::new(&model);
             let states: Vec<Vec<f64>> = (training.equilibria.iter())

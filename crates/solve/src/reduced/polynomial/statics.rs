@@ -80,7 +80,7 @@ pub fn fitted(
             break;
         }
         let (_, (model, found)) = fits.least(tol, |fit| {
-            let model = fit.model((degree, 1.0), tol, &groups);
+            let model = fit.model((degree, false), tol, &groups);
             let found = errors(&model, &space, &references);
             (worse(&found), (model, found))
         });
@@ -93,7 +93,7 @@ pub fn fitted(
         }
     }
     let (model, errors) = best.unwrap_or_else(|| {
-        let (_, model) = fits.least(f64::INFINITY, |fit| (0.0, fit.model((DEGREES[0], 1.0), tol, &groups)));
+        let (_, model) = fits.least(f64::INFINITY, |fit| (0.0, fit.model((DEGREES[0], false), tol, &groups)));
         (model, [f64::INFINITY; 2])
     });
     let states: Vec<Vec<f64>> = sampled.iter().map(|at| coordinates(&model, &at.z)).collect();
