@@ -21,7 +21,7 @@ const UNLIKE: &str = "
 /// of one table differ by more than ten. (One for all was the largest: 5e4 times the error of the best mode.)
 #[test]
 fn each_mode_has_its_own_estimate_about_a_loaded_state() {
-    const COUNT: usize = 8;
+    const COUNT: usize = 9;
     let with = |segments, tol| model(UNLIKE, &CompileOptions { segments, tol, ..CompileOptions::default() });
     let reference = modes(&with(Some(40), 1e-3), COUNT, &[]).unwrap().frequencies_hz;
     for (segments, tol) in [(Some(4), 1e-2), (None, 1e-2)] {

@@ -161,7 +161,7 @@ impl<'a> ExactResponse<'a> {
         values.iter().all(|v| v.re.is_finite() && v.im.is_finite()).then_some(values)
     }
 
-    /// The same at `s`, or next to it where a pivot vanishes: there a branch alone resonates, which is a zero of what it hangs on.
+    /// The same at `s`, or next to it where a pivot vanishes: there a branch alone resonates, which is a zero of its parent.
     pub(super) fn beside(&mut self, s: Complex<f64>) -> Option<Vec<Complex<f64>>> {
         self.at(s).or_else(|| self.at(s * (1.0 + ASIDE)))
     }

@@ -1,6 +1,7 @@
 //! Effect of the options on a beam's section: a bar, with or without shear and rotary inertia.
 
-use super::scheme::Bar;
+use super::scheme::{Bar, POINT_EXCESS};
+use crate::options::CompileOptions;
 use bimorph_structure::Beam;
 
 /// Shear coefficient of a rectangular section: G·As = κ·G·A.
@@ -18,7 +19,14 @@ pub fn bar(beam: &Beam, shear: bool, rotary: bool) -> Bar {
         shear: if shear { shear_flexibility(beam) } else { 0.0 },
         line_mass: m.density * beam.width * beam.thickness,
         rotary: if rotary { beam.width * beam.width / 12.0 } else { 0.0 },
+        end_excess: [POINT_EXCESS; 2],
     }
+}
+
+/// The bar of a beam between its junctions, which take these lengths of it (m).
+pub(super) fn bar_between(beam: &Beam, options: &CompileOptions, offsets: [f64; 2]) -> Bar {
+    let bar = bar(beam, options.shear, options.rotary_inertia);
+    Bar { length: beam.length - (offsets[0] + offsets[1]), ..bar }
 }
 
 /// Shear flexibility 1/(G·As) of a beam's section (1/N).

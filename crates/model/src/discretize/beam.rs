@@ -4,17 +4,18 @@
 //! rods outside it belong to the bodies of the nodes. The springs' compliance is added to that of the first and the
 //! last joint.
 
+use super::bar::bar_between;
 use super::bar::shear_flexibility;
 pub use super::bar::{SHEAR_COEFFICIENT, bar};
 use super::junction_springs::JunctionEnd;
 use super::rigid::{Lump, RigidGroups};
-use super::scheme::{Bar, SegmentJoint, SegmentedBeam};
+use super::scheme::{Bar, BeamSegment, EndExcess, SegmentJoint, SegmentedBeam};
 use super::sprung::second_strain;
 use super::stressed::SegmentSpan;
 use crate::options::{CompileOptions, Junctions, Scheme};
 use bimorph_domains::MaterialPoint;
 use bimorph_multibody::{BodyName, Coupling, Joint};
-use bimorph_structure::Beam;
+use bimorph_structure::{Beam, Structure};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use std::sync::Arc;
 
@@ -36,6 +37,15 @@ pub struct JointBuilder {
 /// Most cached beams.
 const MAX_CACHED_BEAMS: usize = 16;
 
+/// Ends of a beam that meet others.
+#[derive(Debug, Clone, Copy)]
+pub struct BeamEnds<'a> {
+    /// The junctions at its start and its end.
+    pub junctions: &'a [JunctionEnd; 2],
+    /// Excess of their masses and of their drag.
+    pub excess: EndExcess,
+}
+
 /// Discretizes a beam: adds its inner bodies, masses and joints. Returns the equally spaced points along it, the drawn
 /// ends included.
 pub fn lay(
@@ -43,20 +53,21 @@ pub fn lay(
     segments: usize,
     heater: Option<usize>,
     options: &CompileOptions,
-    ends: &[JunctionEnd; 2],
+    ends: &BeamEnds<'_>,
     rigid: &mut RigidGroups,
     out: &mut JointBuilder,
 ) -> Vec<MaterialPoint> {
+    let &BeamEnds { junctions: ends, excess } = ends;
     let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
     let drawn = [rigid.point(beam.a.0), rigid.point(beam.b.0)];
     let shift = [along * ends[0].offset, along * -ends[1].offset];
     let (start, end) = (rigid.position(beam.a.0) + shift[0], rigid.position(beam.b.0) + shift[1]);
-    let mut bar = bar(beam, options.shear, options.rotary_inertia);
-    bar.length -= ends[0].offset + ends[1].offset;
+    let bar = Bar { end_excess: excess.mass, ..bar_between(beam, options, ends.each_ref().map(|end| end.offset)) };
     let give = shear_flexibility(beam);
-    let drawn_as = JointProperties { bar, give, segments, wall: rigid.grounded(beam.b.0), ends: *ends };
+    let wall = rigid.grounded(beam.b.0);
+    let drawn_as = JointProperties { bar, give, segments, wall, ends: *ends, drag_excess: excess.drag };
     let JointBuilder { joints, couplings, bodies, of_beams, known } = out;
-    let StiffenedBeam { cut, strained, .. } = sprung(known, drawn_as, options);
+    let StiffenedBeam { cut, strained, dragged, .. } = sprung(known, drawn_as, options);
     let segments = segments.max(1);
     let last = cut.parts.len() - 1;
     let name = if last > 1 { Arc::from(beam.name.as_str()) } else { Arc::default() };
@@ -68,14 +79,9 @@ pub fn lay(
         k => rigid.add_segment(BodyName::segment(&name, k), place(cut.parts[k].at)),
     }));
     let drag_per_mass = drag_per_mass(beam, options.undamped);
-    for (part, &point) in cut.parts.iter().zip(&*bodies) {
-        if part.mass > 0.0 {
-            let lump = Lump { amount: part.mass, first: along * part.first, second: part.second };
-            rigid.add_mass(point, &lump, drag_per_mass);
-        }
-    }
-    for (point, end, inwards) in [(drawn[0], &ends[0], 1.0), (drawn[1], &ends[1], -1.0)] {
-        add_rod(beam, end.offset, along * inwards, drag_per_mass, point, rigid);
+    for ((part, drag), &point) in cut.parts.iter().zip(dragged).zip(&*bodies) {
+        rigid.add_mass(point, &part.lump(along), 0.0);
+        rigid.add_drag(point, &drag.lump(along), drag_per_mass);
     }
     let m = &beam.material;
     let strain = beam.temperature.map_or(0.0, |t| m.free_strain(t)) - m.stress / m.youngs_modulus;
@@ -125,6 +131,8 @@ struct JointProperties {
     /// Its far end is part of the ground.
     wall: bool,
     ends: [JunctionEnd; 2],
+    /// [`EndExcess::drag`].
+    drag_excess: [f64; 2],
 }
 
 /// Stress per strain of a joint, and its second-order axial strain.
@@ -135,6 +143,8 @@ type JointStress = (Matrix3<f64>, Matrix2<f64>);
 struct StiffenedBeam {
     drawn: JointProperties,
     cut: SegmentedBeam,
+    /// Its parts with the ends of drag, which does positive work on each body.
+    dragged: Vec<BeamSegment>,
     strained: Vec<JointStress>,
 }
 
@@ -160,7 +170,12 @@ fn sprung<'a>(
     } else {
         cut.pins.iter().map(|pin| (pin.stiffness, pin.second)).collect()
     };
-    known.push(StiffenedBeam { drawn, cut, strained });
+    let ends_of_drag = Bar { end_excess: drawn.drag_excess, ..drawn.bar };
+    let mut dragged = cut.parts.clone();
+    if matches!(scheme, Scheme::E4 | Scheme::Auto) {
+        scheme.parts_into(&ends_of_drag, drawn.segments, &mut dragged);
+    }
+    known.push(StiffenedBeam { drawn, cut, dragged, strained });
     &known[known.len() - 1]
 }
 
@@ -246,6 +261,22 @@ impl Springs {
 pub fn drag_per_mass(beam: &Beam, undamped: bool) -> f64 {
     let m = &beam.material;
     if undamped || m.viscosity == 0.0 { 0.0 } else { m.viscosity / (m.fluid * m.density * beam.thickness) }
+}
+
+/// Adds the rods that junctions make part of their nodes' bodies.
+pub(super) fn add_rods(
+    structure: &Structure,
+    options: &CompileOptions,
+    ends: &[[JunctionEnd; 2]],
+    rigid: &mut RigidGroups,
+) {
+    for (beam, ends) in structure.beams.iter().zip(ends) {
+        let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
+        let drag_per_mass = drag_per_mass(beam, options.undamped);
+        for (node, end, inwards) in [(beam.a, &ends[0], 1.0), (beam.b, &ends[1], -1.0)] {
+            add_rod(beam, end.offset, along * inwards, drag_per_mass, rigid.point(node.0), rigid);
+        }
+    }
 }
 
 /// The rod of that length that a junction makes part of its node's body.

@@ -152,7 +152,8 @@ mod tests {
     use super::*;
     use nalgebra::Vector6;
 
-    const SLENDER: Bar = Bar { length: 1.0, ea: 5.0, ei: 1.0, shear: 0.0, line_mass: 1.0, rotary: 0.0 };
+    const SLENDER: Bar =
+        Bar { length: 1.0, ea: 5.0, ei: 1.0, shear: 0.0, line_mass: 1.0, rotary: 0.0, end_excess: [0.0; 2] };
 
     /// A rigid motion has its exact kinetic energy and no strain, with and without shear and rotary inertia.
     #[test]

@@ -63,7 +63,7 @@ impl Excess {
         let point = rigid.point(self.node);
         rigid.add_mass(point, &self.mass, self.drag_per_mass);
         if let Some(drag) = &self.drag {
-            rigid.add_drag(point, drag);
+            rigid.add_drag(point, drag, 1.0);
         }
     }
 }

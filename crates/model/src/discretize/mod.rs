@@ -20,6 +20,7 @@
 //! | [`junction_table`] | the springs' numbers, from plane stress |
 //! | `sprung` | the second-order strain of segments that end in those springs |
 //! | `junction_mass` | mass and drag that junctions have twice, or lack |
+//! | [`end_masses`] | how scheme E4 shares the mass of a beam's ends with the bodies of its nodes |
 //! | [`overlap`] | mass that is drawn twice where beams meet |
 //! | [`scheme`] | ways to cut a beam: places, stiffness and second-order strain of joints, masses |
 //! | [`beam`] | a cut beam in the drawing: bodies, masses, joints, points |
@@ -36,6 +37,7 @@ pub mod beam;
 mod contact_mass;
 pub mod cubic;
 mod driven_anchors;
+pub mod end_masses;
 mod error;
 pub mod fillet;
 pub mod frame;
@@ -88,6 +90,8 @@ pub struct Assembly {
     pub offsets: Vec<[f64; 2]>,
     /// Effects of junctions on the structure.
     ends: Arc<junction::JunctionEnds>,
+    /// For each beam, the excess of its ends.
+    end_excess: Vec<scheme::EndExcess>,
     /// For each beam, its joints, for the stress along it.
     pub stressed: Vec<stressed::StressedBeam>,
     /// For each heater of the electrics, its beam in the structure.
@@ -99,12 +103,12 @@ pub struct Assembly {
 impl Assembly {
     /// The bar of each beam between its junctions, as the model has it: with calibrated junctions and at elastic anchors it is flexible in shear.
     pub(crate) fn bars(&self, structure: &Structure, options: &CompileOptions) -> Vec<Bar> {
-        let one = |(beam, ends): (&Beam, &[JunctionEnd; 2])| {
+        let one = |((beam, ends), excess): ((&Beam, &[JunctionEnd; 2]), &scheme::EndExcess)| {
             let springs = options.junctions == Junctions::Calibrated || ends.iter().any(|end| end.elastic);
             let bar = bar::bar(beam, options.shear || springs, options.rotary_inertia);
-            Bar { length: beam.length - ends[0].offset - ends[1].offset, ..bar }
+            Bar { length: beam.length - ends[0].offset - ends[1].offset, end_excess: excess.mass, ..bar }
         };
-        structure.beams.iter().zip(&self.ends.beams).map(one).collect()
+        structure.beams.iter().zip(&self.ends.beams).zip(&self.end_excess).map(one).collect()
     }
 
     /// For each beam, the junctions at its start and its end.
@@ -166,21 +170,18 @@ pub fn discretize_like(
         Some(other) => Arc::clone(&other.ends),
         None => Arc::new(junction::find(structure, &rigid, options)),
     };
+    weigh_nodes(structure, options, &ends, &mut rigid);
+    let end_excess = end_masses::excess(structure, options, &ends.beams, segments, &rigid);
     for (index, drawn) in structure.beams.iter().enumerate() {
         budget::check();
         let heater = drawn.heater.is_some().then(|| {
             heaters.push(index);
             heaters.len() - 1
         });
-        beams.push(beam::lay(drawn, segments[index], heater, options, &ends.beams[index], &mut rigid, &mut laid));
-    }
-    for excess in &ends.excess {
-        excess.add_to(&mut rigid);
+        let ends = beam::BeamEnds { junctions: &ends.beams[index], excess: end_excess[index] };
+        beams.push(beam::lay(drawn, segments[index], heater, options, &ends, &mut rigid, &mut laid));
     }
     let beam::JointBuilder { mut joints, couplings: mut coupled, of_beams, .. } = laid;
-    for mass in &structure.masses {
-        rigid.add_plate(mass, options.undamped);
-    }
     for spring in &structure.springs {
         lay_spring(spring, options.undamped, &rigid, &mut joints, &mut dampers);
     }
@@ -234,7 +235,7 @@ pub fn discretize_like(
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n)))).collect();
     let offsets = ends.beams.iter().map(|[a, b]| [a.offset, b.offset]).collect();
-    Ok(Assembly { system, nodes, beams, offsets, ends, stressed, heaters, gap_names })
+    Ok(Assembly { system, nodes, beams, offsets, ends, end_excess, stressed, heaters, gap_names })
 }
 
 impl Assembly {
@@ -261,6 +262,22 @@ fn line(drawn: &bimorph_structure::Beam, points: &Arc<[MaterialPoint]>) -> BeamL
         length: drawn.length,
         rigidity: drawn.material.youngs_modulus * drawn.thickness * drawn.width.powi(3) / 12.0,
         width: drawn.width,
+    }
+}
+
+/// Adds what the bodies of nodes weigh without the beams between their junctions.
+fn weigh_nodes(
+    structure: &Structure,
+    options: &CompileOptions,
+    ends: &junction::JunctionEnds,
+    rigid: &mut rigid::RigidGroups,
+) {
+    beam::add_rods(structure, options, &ends.beams, rigid);
+    for excess in &ends.excess {
+        excess.add_to(rigid);
+    }
+    for mass in &structure.masses {
+        rigid.add_plate(mass, options.undamped);
     }
 }
 

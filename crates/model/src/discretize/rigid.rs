@@ -18,6 +18,9 @@ use std::sync::Arc;
 /// Stiffness of a hinge over that of the stiffest beam or spring.
 const HINGE: f64 = 1e6;
 
+/// Second moment about the centre, over that about another point, which a sum of lumps may have by rounding (1).
+const ROUNDING: f64 = 1e-13;
+
 /// Mass, first and second moment of something, and the same for its drag.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Lump {
@@ -39,6 +42,13 @@ impl Lump {
 
     fn center(&self) -> Vector2<f64> {
         if self.amount > 0.0 { self.first / self.amount } else { Vector2::zeros() }
+    }
+
+    /// Second moment about the centre; 0 where rounding leaves no more.
+    pub(super) fn central(&self) -> f64 {
+        let shifted = self.amount * self.center().norm_squared();
+        let central = self.second - shifted;
+        if central > ROUNDING * self.second.abs().max(shifted) { central } else { 0.0 }
     }
 }
 
@@ -156,10 +166,10 @@ impl RigidGroups {
         }
     }
 
-    /// Adds drag to the body of a point; `lump` is about that point.
-    pub fn add_drag(&mut self, point: MaterialPoint, lump: &Lump) {
+    /// Adds `factor` times a drag to the body of a point; `lump` is about that point.
+    pub fn add_drag(&mut self, point: MaterialPoint, lump: &Lump, factor: f64) {
         if let Some(body) = self.moving(point) {
-            body.drag.add(lump, point.arm, 1.0);
+            body.drag.add(lump, point.arm, factor);
         }
     }
 
@@ -385,6 +395,21 @@ impl UnfinishedBody {
         self.fixed_angle |= held[2];
     }
 
+    /// Its mass so far, about the reference point.
+    pub(super) fn mass(&self) -> &Lump {
+        &self.mass
+    }
+
+    /// Its drag so far, likewise.
+    pub(super) fn drag(&self) -> &Lump {
+        &self.drag
+    }
+
+    /// Whether its rotation is an unknown.
+    pub(super) fn turns(&self) -> bool {
+        !self.fixed_angle
+    }
+
     /// Makes it an anchor that moves, and may turn.
     fn anchor(&mut self, turns: bool) {
         self.anchored = true;
@@ -414,7 +439,7 @@ impl UnfinishedBody {
             name: self.name.clone(),
             center: self.reference + center,
             mass: self.mass.amount,
-            inertia: (self.mass.second - self.mass.amount * center.norm_squared()).max(0.0),
+            inertia: self.mass.central(),
             drag: Drag { amount: drag.amount, first: drag.first, second: drag.second },
             free: self.projector().map(Box::new),
         }

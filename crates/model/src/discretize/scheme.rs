@@ -20,12 +20,16 @@
 //! Reference: D. O. Popa et al., "Computationally efficient dynamic modeling of MEMS" (2004), for A0 and the joint types;
 //! the end corrections of C1, E4 and Es are those of the Euler–Maclaurin sum for the strain and the kinetic energy.
 
+use super::rigid::Lump;
 use crate::options::Scheme;
 use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2};
 
 /// Stiffness of a locked direction over EA/h. The beam's own stretch is then wrong by 1e-4 of itself, which a model without
 /// stretch leaves out anyway, while bending keeps ten digits of a beam a hundred times as long as wide.
 pub const PENALTY: f64 = 1e4;
+
+/// Mass that the end of an E4 beam takes from the node next to it so that it is a point mass, over ρA·h (1).
+pub const POINT_EXCESS: f64 = 1.0 / 48.0;
 
 /// Beam data required by a scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +46,17 @@ pub struct Bar {
     pub line_mass: f64,
     /// Rotary inertia of the section over its mass I/A (m²); 0 for an Euler–Bernoulli beam.
     pub rotary: f64,
+    /// Mass that each end takes from the node next to it, over ρA·h (1): [`super::end_masses`].
+    pub end_excess: [f64; 2],
+}
+
+/// Excess of the ends of a beam over ρA·h, at its start and its end (1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EndExcess {
+    /// [`Bar::end_excess`].
+    pub mass: [f64; 2],
+    /// The same of its drag, which plates may have without mass, and mass without drag.
+    pub drag: [f64; 2],
 }
 
 /// A body of a cut beam.
@@ -55,6 +70,13 @@ pub struct BeamSegment {
     pub first: f64,
     /// Second moment about the reference point (kg·m²).
     pub second: f64,
+}
+
+impl BeamSegment {
+    /// The same as a lump of a beam along that direction.
+    pub(super) fn lump(&self, along: Vector2<f64>) -> Lump {
+        Lump { amount: self.mass, first: along * self.first, second: self.second }
+    }
 }
 
 /// A joint of a cut beam, between parts k and k + 1.
@@ -205,18 +227,21 @@ impl Scheme {
 
     /// Masses at the nodes: E4 or Es.
     fn points(self, bar: &Bar, n: usize) -> impl Iterator<Item = BeamSegment> {
+        (0..=n).map(move |k| self.point(bar, n, k))
+    }
+
+    /// Mass at node `k` of `n` segments: E4 or Es.
+    pub(super) fn point(self, bar: &Bar, n: usize, k: usize) -> BeamSegment {
         let h = bar.length / n as f64;
-        let (unit, rotary) = (bar.line_mass * h, bar.rotary);
-        (0..=n).map(move |k| {
-            let (mass, first, second) = if self == Self::Es { tuned(n, k) } else { shares(n, k) };
-            let mass = mass * unit;
-            BeamSegment {
-                at: k as f64 * h,
-                mass,
-                first: first * h * unit,
-                second: second * h * h * unit + rotary * mass,
-            }
-        })
+        let unit = bar.line_mass * h;
+        let (mass, first, second) = if self == Self::Es { tuned(n, k) } else { shares(n, k, bar.end_excess) };
+        let mass = mass * unit;
+        BeamSegment {
+            at: k as f64 * h,
+            mass,
+            first: first * h * unit,
+            second: second * h * h * unit + bar.rotary * mass,
+        }
     }
 }
 
@@ -227,16 +252,25 @@ const SIGMA: f64 = (1.0 - SQRT_FIFTH) / 24.0;
 const ALPHA: f64 = (1.0 + SQRT_FIFTH) / 24.0;
 const SQRT_FIFTH: f64 = 0.447_213_595_499_957_9;
 
-/// Mass, first and second moment of E4 about node `k` of `n` segments, in units of ρA·h, ρA·h², ρA·h³.
-fn shares(n: usize, k: usize) -> (f64, f64, f64) {
-    let inwards = if k == 0 { 1.0 } else { -1.0 };
+/// Mass, first and second moment of E4 about node `k` of `n` segments, in units of ρA·h, ρA·h², ρA·h³. `excess`: [`Bar::end_excess`].
+fn shares(n: usize, k: usize, excess: [f64; 2]) -> (f64, f64, f64) {
     let gauss = 0.5 - 0.5 / 3f64.sqrt();
     match (n, k) {
-        (1, _) => (0.5, inwards * 0.5 * gauss, 0.5 * gauss * gauss),
-        (_, k) if k == 0 || k == n => (25.0 / 48.0, inwards * 5.0 / 48.0, 1.0 / 48.0),
-        (2, _) => (46.0 / 48.0, 0.0, 0.0),
-        (_, k) if k == 1 || k == n - 1 => (47.0 / 48.0, 0.0, 0.0),
-        _ => (1.0, 0.0, 0.0),
+        (1, 0) => (0.5, 0.5 * gauss, 0.5 * gauss * gauss),
+        (1, _) => (0.5, -0.5 * gauss, 0.5 * gauss * gauss),
+        _ => {
+            let [start, end] = [end_share(k, excess[0]), end_share(n - k, excess[1])];
+            (1.0 + start.0 + end.0, start.1 - end.1, start.2 + end.2)
+        }
+    }
+}
+
+/// Mass, first moment inwards and second moment that an end adds to the mass 1 of the node so many segments away: [`super::end_masses`].
+fn end_share(away: usize, excess: f64) -> (f64, f64, f64) {
+    match away {
+        0 => (excess - 0.5, 1.0 / 12.0 + excess, excess),
+        1 => (-excess, 0.0, 0.0),
+        _ => (0.0, 0.0, 0.0),
     }
 }
 
@@ -254,7 +288,7 @@ fn middles(n: usize, h: f64) -> Vec<f64> {
 }
 
 /// Rods between the joints; the outer ones belong to the end nodes.
-fn rods(bar: &Bar, places: &[f64]) -> Vec<BeamSegment> {
+pub(super) fn rods(bar: &Bar, places: &[f64]) -> Vec<BeamSegment> {
     let count = places.len();
     (0..=count)
         .map(|k| {
@@ -314,7 +348,8 @@ fn couple_ends(pins: &mut [SegmentJoint], unit: f64) -> Vec<(usize, usize, f64)>
 mod tests {
     use super::*;
 
-    const BAR: Bar = Bar { length: 3.0, ea: 7.0, ei: 2.0, shear: 0.0, line_mass: 1.5, rotary: 0.0 };
+    const BAR: Bar =
+        Bar { length: 3.0, ea: 7.0, ei: 2.0, shear: 0.0, line_mass: 1.5, rotary: 0.0, end_excess: [POINT_EXCESS; 2] };
 
     /// Mass and first moment of the whole beam are exact for every scheme and number of segments, the second moment too but
     /// for Es, whose rotary inertia is tuned.
