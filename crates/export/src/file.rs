@@ -6,13 +6,16 @@ use super::linear::{ReducedPort, SignalShown};
 use super::model_options::model_options;
 use super::names::{self, Pins};
 use super::{ExportError, ExportRequest, flexible_verilog_a, lumped, lumped_spice, lumped_verilog_a, spice, verilog_a};
-use bimorph_analysis::mesh::beyond;
+use bimorph_analysis::mesh::{beyond, twice};
 use bimorph_model::compile::CompiledModel;
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Longest line of a file, roughly (byte).
 const LINE: usize = 64;
+/// Unknowns beyond which a mesh stays as it is.
+const FINE_ENOUGH: usize = 3000;
 
 /// Language of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -105,6 +108,20 @@ pub struct LinearSummary {
     pub band_hz: [f64; 2],
     /// Mechanical unknowns of the full model.
     pub unknowns: usize,
+}
+
+/// The model on four times the segments where parts may touch and none are given: simulators step over a contact that closes point by point along a
+/// beam, and stop at one that closes at few points.
+fn for_contact(compiled: &CompiledModel) -> Cow<'_, CompiledModel> {
+    let (system, options) = (&compiled.parts.system, &compiled.options);
+    let touches = (0..system.members.len()).any(|member| system.touching(member).is_some());
+    let given = options.segments.is_some() || options.band.is_some();
+    if !touches || given || compiled.unknowns() > FINE_ENOUGH {
+        return Cow::Borrowed(compiled);
+    }
+    let tol = options.errors().requested();
+    let finer = twice(compiled, tol).and_then(|finer| twice(&finer, tol));
+    finer.map_or(Cow::Borrowed(compiled), Cow::Owned)
 }
 
 impl FileRequest {
@@ -203,7 +220,7 @@ impl FileRequest {
         source: &str,
         name: String,
     ) -> Result<(ExportedFile, Vec<ReducedPort>), ExportError> {
-        let model = flexible(compiled, &self.model)?;
+        let model = flexible(&for_contact(compiled), &self.model)?;
         let pins = Pins::of(&model.ports, &model.signals)?;
         let of = &model.fitted.model;
         let points = of.approaches.mix.nrows();

@@ -28,6 +28,8 @@ const SAME: f64 = 1e-9;
 /// Degrees of the polynomials, and the most coordinates of the higher one.
 const DEGREES: [usize; 2] = [2, 3];
 const CUBIC: usize = 12;
+/// Part of the errors of degree 2 that those of degree 3 have at most where they exceed the tolerance, too (1): simulators step cubic forces worse.
+const WORTH: f64 = 0.7;
 
 /// A polynomial model with its error.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,8 +86,9 @@ pub fn fitted(
             let found = errors(&model, &space, &references);
             (worse(&found), (model, found))
         });
-        // of two that exceed the tolerance, the largest error alone would be decided by the last digits of one that no degree changes
-        if best.as_ref().is_none_or(|(_, least)| found.iter().sum::<f64>() < least.iter().sum::<f64>()) {
+        // where both exceed the tolerance by errors that no degree changes, these do not decide by their last digits
+        let better = |least: &[f64; 2]| found.iter().sum::<f64>() < WORTH * least.iter().sum::<f64>();
+        if best.as_ref().is_none_or(|(_, least)| worse(&found) <= tol || better(least)) {
             best = Some((model, found));
         }
         if best.as_ref().is_some_and(|(_, found)| worse(found) <= tol) {
