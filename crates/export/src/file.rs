@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// Longest line of a file, roughly (byte).
 const LINE: usize = 64;
-/// Unknowns beyond which a mesh stays as it is.
+/// Unknowns beyond which parts that may touch keep the mesh of a deck.
 const FINE_ENOUGH: usize = 3000;
 
 /// Language of a file.

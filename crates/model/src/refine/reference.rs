@@ -87,10 +87,10 @@ pub(super) fn compare(
     let transposed = columns(&x).transpose();
     let a = &transposed * columns(&kx);
     let mut b = &transposed * columns(&mx);
-    // of a mode that the mesh has far too high, λ is that of the iterate: with the model's own, λ·M₂ draws modes below towards it
-    let own: Vec<f64> = (0..count).map(|i| lambda[i].max(0.0).min(a[(i, i)] / b[(i, i)])).collect();
+    // where the mesh has a mode far too high, λ is the Rayleigh quotient of its iterate: its own λ would lower the values of other modes
+    let own: Vec<f64> = (0..count).map(|i| lambda[i].min(a[(i, i)] / b[(i, i)]).max(0.0)).collect();
     // λ·M₂ between two modes at the geometric mean of theirs, which keeps the sum definite
-    let mean = |i: usize, j: usize| (own[i].max(0.0) * own[j].max(0.0)).sqrt();
+    let mean = |i: usize, j: usize| (own[i] * own[j]).sqrt();
     let bent = &transposed * columns(&second);
     for i in 0..count {
         for j in 0..count {
