@@ -76,12 +76,12 @@ def test_a_relay_has_noise(tmp_path):
 
 
 def test_a_bank_has_noise(tmp_path):
-    """Drag moves the yoke of a heated bank as in the plug-in, near its resonance to 1e-3 at 1 V on the heaters and to 3e-3 at 2 V, and its warm resistances
-    make the noise of the port to 1e-6. With constant masses it was 2.0e-3 and 1.2e-2."""
+    """Drag moves the yoke of a heated bank as in the plug-in, near its resonance to 1e-3 at 1 V and at 2 V on the heaters, and its warm resistances
+    make the noise of the port to 1e-6. With constant masses it was 2.0e-3 and 1.2e-2, with constant damping 1.9e-3 at 2 V."""
     signals = ["yoke.y:1e6"]
     export(BANK, tmp_path, {"heat": "0:2", "sense": "0:20"}, signals)
     control = {"yoke": spectrum("s0", "Vheat", 100, "100k"), "port": spectrum("n0", "Vheat", 100, "100k")}
-    for heat, most in ((1, 1e-3), (2, 3e-3)):
+    for heat in (1, 2):
         folder = tmp_path / f"{heat}V"
         folder.mkdir()
         shutil.copy(tmp_path / "part.osdi", folder)
@@ -90,7 +90,7 @@ def test_a_bank_has_noise(tmp_path):
         for version, plot in plots.items():
             worst = {name: np.max(np.abs(density(plot[name]) / density(full[name]) - 1.0)) for name in control}
             print(f"bank at {heat} V in ngspice {version}: noise of the yoke {worst['yoke']:.1e}, of the port {worst['port']:.1e}")
-            assert worst["yoke"] <= most and worst["port"] <= 1e-6, (version, worst)
+            assert worst["yoke"] <= 1e-3 and worst["port"] <= 1e-6, (version, worst)
 
 
 def linear(netlist, folder, bias, signals, *options):

@@ -78,7 +78,7 @@ fn trained(cases: &[(&System, InputBox)], tol: f64, moments: usize) -> Result<Tr
     let joints = spanned(moving).map_err(reason)?;
     let cases: Vec<TrainingCase<'_>> =
         cases.iter().map(|(system, inputs)| TrainingCase { system, inputs: inputs.clone(), motions: &[] }).collect();
-    train(&joints, &cases, TrainingOptions { errors: ErrorBudget::of(tol), moments }).map_err(reason)
+    train(&joints, &cases, TrainingOptions { errors: ErrorBudget::of(tol), moments, beyond: false }).map_err(reason)
 }
 
 /// The warning of an analysis that takes the full model instead.

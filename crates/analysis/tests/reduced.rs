@@ -174,7 +174,7 @@ fn polynomials_have_the_tangent_of_their_forces() {
         let training = train(
             &joints,
             &[TrainingCase { system, inputs, motions: &[] }],
-            TrainingOptions { errors: ErrorBudget::of(1e-2), moments: 2 },
+            TrainingOptions { errors: ErrorBudget::of(1e-2), moments: 2, beyond: false },
         )
         .unwrap();
         let fitted = of_motion(&training, system, &drive, ErrorBudget::of(1e-2)).unwrap();

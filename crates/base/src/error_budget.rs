@@ -75,6 +75,7 @@ impl ErrorBudget {
     const STAGE: f64 = 1e-2;
     /// Fraction of the tolerance for the statics of a reduced model.
     const REDUCED_STATICS: f64 = 0.3;
+    const STATICS_BEYOND: f64 = 0.1;
     /// Ratio of the error of the polynomials of a reduced run to that of the run before, with which it is compared.
     const NEXT_POLYNOMIALS: f64 = 0.3;
     /// Fraction of the tolerance below which singular values, relative to the largest, are left out of a reduced model: for statics, whose
@@ -83,7 +84,7 @@ impl ErrorBudget {
     /// Fraction of the tolerance for the forces of a field at fewer points.
     const REDUCED_FIELD: f64 = 0.1;
     /// Change of a mass of a file from which it varies.
-    const MASS: f64 = 0.1;
+    const MASS: f64 = 0.02;
     /// Share of the motion after a step of an input from which a file has a mode. Its static directions have what is left out, at
     /// another frequency.
     const SUDDEN_MODE: f64 = 10.0;
@@ -355,6 +356,11 @@ impl ErrorBudget {
     /// For the statics of a reduced model.
     pub fn reduced_statics(self) -> f64 {
         Self::REDUCED_STATICS * self.requested
+    }
+
+    /// The same beyond a pull-in, where capacitances depend on what is left of gaps.
+    pub fn statics_beyond(self) -> f64 {
+        Self::STATICS_BEYOND * self.requested
     }
 
     /// For the polynomials of a reduced run after one with this division.

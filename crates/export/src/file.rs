@@ -235,6 +235,13 @@ impl FileRequest {
                 model.fitted.error, self.model.within
             ));
         }
+        if model.fitted.missed > 0 {
+            warnings.push(format!(
+                "{} of {} equilibria lie beyond a pull-in where the file has none: it releases at other inputs than the full model; take a narrower \
+                 --range, or a smaller --within, which adds coordinates",
+                model.fitted.missed, model.fitted.compared
+            ));
+        }
         let about = about_reduced(compiled, &model, source, &warnings);
         let text = flexible_verilog_a::write(&model, &pins, &name, &about);
         let content = FileContent::Reduced(ReducedSummary {
@@ -344,7 +351,7 @@ fn about_reduced(compiled: &CompiledModel, model: &FlexibleModel, source: &str, 
         masses(model),
         format!("slowest coordinate at rest: {:e} Hz", 1.0 / (TAU * of.mass[0].sqrt())),
         format!(
-            "{} coordinates of 32 times that frequency or more follow their forces at once",
+            "{} fast coordinates follow their forces at once",
             model.fitted.follows.iter().filter(|follows| **follows).count()
         ),
         sudden(model),
@@ -360,7 +367,7 @@ fn masses(model: &FlexibleModel) -> String {
     match of.mass_slopes.iter().filter(|slope| **slope != 0.0).count() {
         0 => format!("constant masses: that of the slowest coordinate changes by {:.1e} in them", of.mass_change),
         count => format!(
-            "masses linear in the coordinates, {count} slopes: that of the slowest coordinate is off by {:.1e} in them",
+            "masses and damping linear in the coordinates, {count} slopes of masses: that of the slowest coordinate is off by {:.1e} in them",
             of.mass_change
         ),
     }

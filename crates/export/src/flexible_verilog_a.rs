@@ -42,6 +42,7 @@ pub fn write(model: &FlexibleModel, pins: &Pins, name: &str, about: &[String]) -
     let noise = NoiseText::default();
     let mut module = FlexibleModule { model, of, body: String::new(), reals: Vec::new(), noise };
     module.coordinates();
+    module.drag_gains();
     module.heat();
     module.closures();
     module.gaps();
@@ -364,7 +365,8 @@ impl FlexibleModule<'_> {
             for k in 0..m {
                 if !follows[j] && !follows[k] {
                     let damping = significant(of.damping[(j, k)], of.damping.amax());
-                    sum.add(damping / self.second(k), &format!("V(v{})", k + 1));
+                    let gains = [j, k].map(|of| self.drag_gain(of).map_or(String::new(), |gain| format!("{gain} * ")));
+                    sum.add(damping / self.second(k), &format!("{}V(v{})", gains.concat(), k + 1));
                 }
                 sum.add(significant(of.stiffness[(j, k)], of.stiffness.amax()), &format!("q{}", k + 1));
             }
@@ -390,6 +392,24 @@ impl FlexibleModule<'_> {
         }
     }
 
+    /// The variable by which the damping of a coordinate varies; none where it does not.
+    fn drag_gain(&self, j: usize) -> Option<String> {
+        let varies = !self.model.fitted.follows[j] && self.of.damping_slopes.row(j).amax() > 0.0;
+        varies.then(|| format!("drag{}", j + 1))
+    }
+
+    fn drag_gains(&mut self) {
+        let slopes = &self.of.damping_slopes;
+        for j in 0..self.of.size() {
+            let Some(name) = self.drag_gain(j) else { continue };
+            let terms: Vec<String> = (slopes.row(j).iter().enumerate())
+                .filter(|(_, slope)| **slope != 0.0)
+                .map(|(l, slope)| format!(" + ({slope:e}) * q{}", l + 1))
+                .collect();
+            self.set(&name, &format!("1{}", terms.concat()));
+        }
+    }
+
     /// Mass of a coordinate over the seconds of its rate.
     fn mass(&self, j: usize) -> String {
         let (of, second) = (self.of, self.second(j));
@@ -410,8 +430,9 @@ impl FlexibleModule<'_> {
         let entry = |i: usize, k: usize| significant(of.damping[(moving[i], moving[k])], largest);
         let damping = DMatrix::from_fn(moving.len(), moving.len(), entry);
         let targets: Vec<_> = moving.iter().map(|j| (format!("I(v{})", j + 1), 1.0)).collect();
+        let gains: Vec<_> = moving.iter().map(|&j| self.drag_gain(j)).collect();
         let power = format!("{:e}", warm(self.model.johnson.temperature) / of.energy_unit());
-        self.noise.matrix(&damping, &targets, &power, "dampers");
+        self.noise.matrix_with_gains(&damping, (&targets, &gains), &power, "dampers");
     }
 
     /// Noise of resistances between ports at their own temperatures.

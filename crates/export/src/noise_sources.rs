@@ -97,10 +97,24 @@ impl NoiseText {
 
     /// The sources of a symmetric matrix, each row on its target with its unit, times the spectral density `power`.
     pub(super) fn matrix(&mut self, matrix: &DMatrix<f64>, targets: &[(String, f64)], power: &str, name: &str) {
+        self.matrix_with_gains(matrix, (targets, &vec![None; targets.len()]), power, name);
+    }
+
+    /// The same with a further gain of each target, an expression.
+    pub(super) fn matrix_with_gains(
+        &mut self,
+        matrix: &DMatrix<f64>,
+        (targets, gains): (&[(String, f64)], &[Option<String>]),
+        power: &str,
+        name: &str,
+    ) {
         for column in columns(matrix) {
-            let shares = column.iter().zip(targets).filter(|(share, _)| **share != 0.0);
-            let shares: Vec<_> =
-                shares.map(|(share, (target, unit))| (target.clone(), format!("({:e})", share / unit))).collect();
+            let shares = column.iter().zip(targets.iter().zip(gains)).filter(|(share, _)| **share != 0.0);
+            let gain = |(share, ((target, unit), gain)): (&f64, (&(String, f64), &Option<String>))| {
+                let gain = gain.as_ref().map_or(String::new(), |gain| format!(" * {gain}"));
+                (target.clone(), format!("({:e}){gain}", share / unit))
+            };
+            let shares: Vec<_> = shares.map(gain).collect();
             self.source(&shares, power, name);
         }
     }

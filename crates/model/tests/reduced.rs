@@ -11,6 +11,7 @@ use bimorph_solve::equations::{Bodies, Motion};
 use bimorph_solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph_solve::path::LoadPath;
 use bimorph_solve::reduced::check::FullCheck;
+use bimorph_solve::reduced::polynomial::statics::fitted;
 use bimorph_solve::reduced::space::spanned;
 use bimorph_solve::reduced::statics::ReducedStatics;
 use bimorph_solve::reduced::taylor::DriveRay;
@@ -77,7 +78,7 @@ fn stage(newtons: f64) -> (CompiledModel, System, InputBox) {
 }
 
 fn trained(system: &System, inputs: &InputBox, tol: f64) -> Training {
-    trained_with(system, inputs, TrainingOptions { errors: ErrorBudget::of(tol), moments: 0 })
+    trained_with(system, inputs, TrainingOptions { errors: ErrorBudget::of(tol), moments: 0, beyond: false })
 }
 
 fn trained_with(system: &System, inputs: &InputBox, options: TrainingOptions) -> Training {
@@ -209,6 +210,35 @@ fn statics_of_a_bank() {
     }
 }
 
+/// The switch with its voltage from 0 to so many volts.
+fn switch(most: f64) -> (CompiledModel, InputBox) {
+    let compiled = example("switch/switch.net", &[]);
+    let electrics = &compiled.parts.system.electrics;
+    let none = Drive { load: 0.0, ..electrics.drive() };
+    let mut unit = none.clone();
+    electrics.apply(&[most], &[], &mut unit);
+    let inputs = InputBox { none, inputs: vec![TrainingInput { unit, range: [0.0, 1.0] }] };
+    (compiled, inputs)
+}
+
+/// Polynomials of a switch up to 20 V have the closed states of the full model down to its release at 11.2 V (ANSYS VM236: 11.21 V), to the
+/// tolerance of 1e-3, where the space is trained for them. They miss them by 1e-2 where it has the states of a rising voltage alone.
+#[test]
+fn closed_states_of_a_switch() {
+    let (compiled, inputs) = switch(20.0);
+    let system = &compiled.parts.system;
+    let [with, without] = [true, false].map(|beyond| {
+        let options = TrainingOptions { errors: ErrorBudget::of(1e-3), moments: 0, beyond };
+        let space = trained_with(system, &inputs, options).space;
+        let found = fitted(&space, system, &inputs, &[], (1e-3, &[]));
+        println!("beyond pull-in {beyond}: {} directions, {} states, {:?}", space.size(), found.compared, found.errors);
+        (found.error, found.compared)
+    });
+    assert!(with.0 <= 1e-3 && without.0 > 2e-3, "{with:?} {without:?}");
+    // 17 states of a rising voltage, and the closed ones above release
+    assert!(with.1 >= 24 && with.1 == without.1, "{with:?} {without:?}");
+}
+
 /// The switch under voltage, with the exact law of its gaps on every body: four Taylor directions in V² have pull-in within 5e-4 of the
 /// full model's, and the displacement below pull-in within a third of the tolerance. The study finds 17.84 V with three or four.
 #[test]
@@ -306,7 +336,8 @@ fn the_quarter_stage_in_time() {
     let (_, adaptive) = run(about, &ramp, Rodas4::new(&system, &[]), &begun, Control::Tolerance(1e-3));
     println!("quarter stage in time: bodies {adaptive} adaptive steps");
     let (tol, moments, most) = (1e-2, 2, 6e-3);
-    let trained = trained_with(&system, &inputs, TrainingOptions { errors: ErrorBudget::of(tol), moments });
+    let trained =
+        trained_with(&system, &inputs, TrainingOptions { errors: ErrorBudget::of(tol), moments, beyond: false });
     let space = Arc::new(trained.space);
     let method = || ReducedRodas4::new(Arc::clone(&space), 1e-9);
     // each model is released from its own equilibrium

@@ -273,8 +273,9 @@ fn trained(
     let mut motion = sudden_motion(system, inputs, probes, ErrorBudget::of(within).sudden_mode());
     let motions: Vec<Vec<Pose>> = motion.modes.iter().map(|mode| mode.shape.clone()).collect();
     let case = TrainingCase { system, inputs: inputs.clone(), motions: &motions };
-    let training = train(&joints, &[case], TrainingOptions { errors: ErrorBudget::of(within), moments: MOMENTS })
-        .map_err(refused)?;
+    let training =
+        train(&joints, &[case], TrainingOptions { errors: ErrorBudget::of(within), moments: MOMENTS, beyond: true })
+            .map_err(refused)?;
     if training.space.size() == 0 {
         return Err(refused(ReductionError::NoInput));
     }
@@ -284,6 +285,11 @@ fn trained(
     let found = fitted(&training.space, system, inputs, probes, (within, apart));
     if found.compared == 0 {
         return Err(ExportError::NotFlexible { why: "the full model has no equilibrium in these ranges".to_owned() });
+    }
+    if found.error.is_finite() && found.error > 1.0 {
+        let why =
+            format!("its polynomials deviate by {:.1e} from the full model; take a narrower --range", found.error);
+        return Err(ExportError::NotFlexible { why });
     }
     if !found.error.is_finite() {
         let why = "its polynomials have no equilibrium next to one of the full model; take a narrower --range, or a smaller --within";

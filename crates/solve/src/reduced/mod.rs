@@ -10,6 +10,7 @@
 //! | [`energy`] | the product in the energy of the tangent at rest, orthonormal vectors in it |
 //! | [`inputs`] | what acts on the mechanism, with its range, and the box of all inputs |
 //! | [`taylor`] | Taylor terms of the statics at rest over the inputs |
+//! | `branches` | equilibria of the full model in the box, also beyond pull-in |
 //! | [`training`] | the directions of a mechanism for a box of inputs and a tolerance |
 //! | [`statics`] | static equilibrium over z |
 //! | [`enrichment`] | directions that a motion lacks, from the full model's corrections along it |
@@ -20,6 +21,7 @@
 //! inputs, see S. R. Idelsohn, A. Cardona, "A reduction method for nonlinear structural dynamic analysis", Comput. Methods
 //! Appl. Mech. Eng. 49 (1985). Moments at zero frequency: E. J. Grimme, "Krylov projection methods for model reduction" (1997).
 
+mod branches;
 pub mod check;
 pub mod energy;
 pub mod enrichment;

@@ -5,11 +5,13 @@
 //! 3. Moments K₀⁻¹·(M·K₀⁻¹)ʲ·f of every input, for motion.
 //! 4. Reduced statics at corners and points of the box, checked by a Newton step of the full model. Where the estimate fails, or the
 //!    branch ends, equilibria of the full model join the directions, and the check is repeated.
+//!    For statics beyond a pull-in the branch there is followed back in the full model, and its equilibria are checked, too.
 //! 5. Motions that the caller names, such as modes.
 //!
 //! Every step is deterministic: points, signs and orders depend on the mechanism, the box and the tolerance alone.
 
 use super::ReductionError;
+use super::branches::{BranchState, StaticBranch, branch_states};
 use super::check::{FullCheck, StateCheck};
 use super::energy::{EnergyProduct, EnergyVector};
 use super::inputs::{InputBox, MAX_INPUTS};
@@ -23,6 +25,7 @@ use bimorph_domains::{Drive, System};
 use bimorph_multibody::BodyMatrix;
 use bimorph_multibody::planar::Pose;
 use nalgebra::DMatrix;
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 /// Points of the box at which the polynomial is sampled.
@@ -31,6 +34,8 @@ const POINTS: usize = 300;
 const CHECKS: usize = 8;
 /// Rounds of checks.
 const ROUNDS: usize = 5;
+/// The same with the states beyond a pull-in.
+const ROUNDS_BEYOND: usize = 12;
 /// Part of a moment or of an equilibrium that must be new (1).
 const NEW: f64 = 1e-5;
 /// Part of a Taylor term that must be new (1): below, it is rounding of the samples.
@@ -47,6 +52,8 @@ pub struct TrainingOptions {
     pub errors: ErrorBudget,
     /// Moments of each input; 0 for statics.
     pub moments: usize,
+    /// Whether the statics beyond a pull-in count, down to where parts release.
+    pub beyond: bool,
 }
 
 /// A system with the box of its inputs: what moves, or what it is released from. All have the bodies and joints of one tree.
@@ -93,7 +100,8 @@ pub fn train(
     if count > MAX_INPUTS {
         return Err(ReductionError::TooManyInputs { count, most: MAX_INPUTS });
     }
-    let mut trainer = Trainer { joints, cases, options, product: EnergyProduct::at_rest(joints), basis: Vec::new() };
+    let (product, basis) = (EnergyProduct::at_rest(joints), Vec::new());
+    let mut trainer = Trainer { joints, cases, options, product, basis, beyond: vec![OnceCell::new(); cases.len()] };
     let mut samples = Vec::new();
     let acting = || cases.iter().filter(|case| !case.inputs.inputs.is_empty());
     for case in acting() {
@@ -105,10 +113,11 @@ pub fn train(
     trainer.affordable()?;
     let (mut added, mut space) = (0, trainer.space(&samples, &[]));
     let mut rounds = 0;
+    let most = if options.beyond { ROUNDS_BEYOND } else { ROUNDS };
     loop {
         let (error, worst, states) = trainer.check(&space);
         let before = trainer.basis.len();
-        for s in worst.into_iter().flatten().filter(|_| rounds < ROUNDS) {
+        for s in worst.into_iter().flatten().filter(|_| rounds < most) {
             trainer.product.extend(&mut trainer.basis, s, NEW);
         }
         let more = trainer.basis.len() - before;
@@ -132,6 +141,8 @@ struct Trainer<'a> {
     options: TrainingOptions,
     product: EnergyProduct<'a>,
     basis: Vec<EnergyVector>,
+    /// Of each case the equilibria beyond a pull-in, once there is one.
+    beyond: Vec<OnceCell<Vec<BranchState>>>,
 }
 
 /// Equilibria that the directions lack, over the coordinates of the tree.
@@ -272,20 +283,27 @@ impl Trainer<'_> {
     fn check(&self, space: &ReducedSpace) -> (f64, Lacking, Vec<Vec<Pose>>) {
         let mut statics = ReducedStatics::new(space);
         let (mut error, mut worst, mut states) = (0.0f64, None, Vec::new());
-        for case in self.cases {
+        for (case, beyond) in self.cases.iter().zip(&self.beyond) {
             // the forces over z are those of one system alone: others have other loads
-            self.check_case(&space.of_system(case.system), case, &mut statics, (&mut error, &mut worst, &mut states));
+            let space = space.of_system(case.system);
+            let found = (&mut error, &mut worst, &mut states);
+            if self.check_case(&space, case, &mut statics, found) && self.options.beyond {
+                let found = (&mut error, &mut worst, &mut states);
+                self.check_beyond(&space, case, (beyond, &mut statics), found);
+            }
         }
         (error, worst, states)
     }
 
+    /// Returns whether a branch from rest ends in the box.
     fn check_case(
         &self,
         space: &ReducedSpace,
         case: &TrainingCase<'_>,
         statics: &mut ReducedStatics,
         (error, worst, states): (&mut f64, &mut Lacking, &mut Vec<Vec<Pose>>),
-    ) {
+    ) -> bool {
+        let mut ends = false;
         let (system, inputs) = (case.system, &case.inputs);
         let mut full = FullCheck::new(system);
         let share = self.options.errors.reduced_statics();
@@ -302,6 +320,7 @@ impl Trainer<'_> {
                 false => StateCheck { error: f64::INFINITY, negative: 1 },
             };
             let stable = found.negative == 0;
+            ends |= !stable;
             if stable {
                 let mut s = vec![Pose::zeros(); system.bodies()];
                 space.strains(&z, &mut s);
@@ -315,6 +334,41 @@ impl Trainer<'_> {
                     *worst = lacking;
                 }
             }
+        }
+        ends
+    }
+
+    /// The same for the states beyond a pull-in, each at its place in the space. The one with the largest error joins what is lacking.
+    fn check_beyond(
+        &self,
+        space: &ReducedSpace,
+        case: &TrainingCase<'_>,
+        (beyond, statics): (&OnceCell<Vec<BranchState>>, &mut ReducedStatics),
+        (error, worst, states): (&mut f64, &mut Lacking, &mut Vec<Vec<Pose>>),
+    ) {
+        let (system, inputs) = (case.system, &case.inputs);
+        let beyond = beyond.get_or_init(|| {
+            let mut found = branch_states(system, inputs, &inputs.points(CHECKS, true));
+            found.retain(|state| state.branch != StaticBranch::Rest);
+            found
+        });
+        let mut full = FullCheck::new(system);
+        let mut most = (self.options.errors.statics_beyond(), None);
+        for state in beyond {
+            let mut s = vec![Pose::zeros(); system.bodies()];
+            self.joints.tree.coordinates_at(&state.q, &mut s);
+            statics.forces.place_at_rest(space, &self.coordinates(&s));
+            let found = full.of(system, &statics.forces.placed.at, &state.drive, None).error;
+            if found > most.0 {
+                most = (found, Some(s.clone()));
+            }
+            if state.branch != StaticBranch::Release {
+                *error = error.max(found);
+                states.push(s);
+            }
+        }
+        if let Some(s) = most.1 {
+            worst.get_or_insert_default().push(s);
         }
     }
 

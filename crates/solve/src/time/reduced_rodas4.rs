@@ -15,13 +15,14 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 (RODAS).
 
-mod circuit;
+#[macro_use]
 mod coordinates;
+mod circuit;
 pub mod lanes;
 mod ports;
 
 use super::method::{Method, Motion, SolverCounters, StepFailure, StepResult};
-use super::rodas4::tableau::{A, ALPHA, GAMMA, GAMMA_I};
+use super::rodas4::tableau::{A, ALPHA, GAMMA};
 use super::rosenbrock::{self, CONSISTENT, RosenbrockStep};
 use super::stage_loss::StageLoss;
 use crate::equations::{Bodies, Joints};
@@ -38,7 +39,7 @@ use bimorph_multibody::joint_coordinates::sprung_loops::columns::Four;
 use bimorph_multibody::joint_coordinates::sprung_loops::directions::DirectionRows;
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyMatrix, forces};
-use coordinates::{ReducedMotion, add_product, put_increments, solve_factored};
+use coordinates::{ReducedMotion, StageForces, StageRoom, StepMatrices, add_product};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use ports::ReducedPortSensitivities;
 use std::sync::Arc;
@@ -70,8 +71,8 @@ struct ReductionEstimate {
 struct PolynomialStages {
     of: Arc<PolynomialMotion>,
     forces: PolynomialForces,
-    /// Motion of the bodies per unit of each direction at rest: near enough for the size of an error.
-    moved: Vec<Vec<Pose>>,
+    /// Motion of the bodies per unit of each direction at rest, those of a body together: near enough for the size of an error.
+    moved: Vec<Pose>,
     /// Largest error of z over the largest z, both in the mass norm (1).
     share: f64,
     /// The largest z in that norm, of equilibria of the training or so far.
@@ -101,10 +102,8 @@ pub struct ReducedRodas4 {
     force: Vec<f64>,
     forcing: Vec<f64>,
     right: DVector<f64>,
-    /// r₁ and r₂ of the stage at hand, and room for their products with M and C.
-    r1: DVector<f64>,
-    r2: DVector<f64>,
     product: DVector<f64>,
+    stage: StageRoom,
     room: Vec<Pose>,
     gathered: Vec<Four>,
     drive: Drive,
@@ -149,9 +148,8 @@ impl ReducedRodas4 {
             force: vec![0.0; m],
             forcing: vec![0.0; m],
             right: DVector::zeros(m),
-            r1: DVector::zeros(m),
-            r2: DVector::zeros(m),
             product: DVector::zeros(m),
+            stage: StageRoom::new(m),
             room: vec![Pose::zeros(); count],
             gathered: vec![Four::ZERO; count],
             drive: closures.electrics.drive(),
@@ -196,7 +194,9 @@ impl ReducedRodas4 {
             forces.placed.spread(&space.joints.tree, x, &mut to);
             to
         };
-        let moved = space.directions.iter().map(moved).collect();
+        let by_direction: Vec<Vec<Pose>> = space.directions.iter().map(moved).collect();
+        let of_body = |j: usize| by_direction.iter().map(move |moved| moved[j]);
+        let moved = (0..space.joints.tree.links.len()).flat_map(of_body).collect();
         let forces = PolynomialForces::new(&of);
         self.polynomials = Some(Box::new(PolynomialStages { of: Arc::new(of), forces, moved, share, largest }));
         self
@@ -221,14 +221,14 @@ impl ReducedRodas4 {
 
     /// Coordinates z.
     pub fn coordinates(&self) -> &[f64] {
-        &self.now.z
+        self.now.z()
     }
 
     /// Forces R at `at`; the first stage also begins K.
     fn residual(&mut self, first: bool) {
         let Self { polynomials, at, force, drive, .. } = self;
         match polynomials {
-            Some(stages) => stages.forces.residual(&stages.of, [&at.z, &at.v, &at.w], drive, force),
+            Some(stages) => stages.forces.residual(&stages.of, at.parts(), drive, force),
             None => self.exact_residual(first),
         }
         self.work.forces += 1;
@@ -237,7 +237,7 @@ impl ReducedRodas4 {
     /// The same by exact kinematics.
     fn exact_residual(&mut self, first: bool) {
         let Self { space, forces, at, loss, force, drive, .. } = self;
-        forces.place(space, [&at.z, &at.v, &at.w]);
+        forces.place(space, at.parts());
         forces.set_motion_forces(space);
         if let Some(loss) = loss {
             let (placed, wrench) = forces.placed_and_wrench();
@@ -325,36 +325,18 @@ impl ReducedRodas4 {
     }
 
     fn solve_stage(&mut self, i: usize, h: f64) {
-        let Self { increments, at, r1, r2, .. } = self;
-        at.combined(i, h, &increments[..i], r1.as_mut_slice(), r2.as_mut_slice());
-        let (force, forcing) = (std::mem::take(&mut self.force), std::mem::take(&mut self.forcing));
-        self.solve_right(h, (&force, &forcing, GAMMA_I[i] * h));
-        (self.force, self.forcing) = (force, forcing);
-        put_increments(GAMMA * h, (&self.right, &self.r1, &self.r2), &mut self.increments[i]);
-    }
-
-    /// Uz = W⁻¹·(M·(r₁/(γh) + r₂) + C·r₁ − force − shift·forcing).
-    fn solve_right(&mut self, h: f64, (force, forcing, shift): (&[f64], &[f64], f64)) {
-        let gh = GAMMA * h;
-        let Self { mass, damping, right, r1, r2, product, .. } = self;
-        product.iter_mut().zip(r1.iter()).zip(r2.iter()).for_each(|((x, r1), r2)| *x = r1 / gh + r2);
-        right.fill(0.0);
-        add_product(mass, product.as_slice(), right.as_mut_slice());
-        if self.damped {
-            add_product(damping, r1.as_slice(), right.as_mut_slice());
+        let Self { mass, damping, damped, factor, at, force, forcing, increments, stage, work, .. } = self;
+        if let Some(factor) = factor {
+            let damping = damped.then_some(&*damping);
+            let step = StepMatrices { mass, damping, factor: factor.l_dirty(), h };
+            stage.solve(step, StageForces { i, at, force, forcing }, increments);
         }
-        for (right, (force, forcing)) in right.iter_mut().zip(force.iter().zip(forcing)) {
-            *right -= force + shift * forcing;
-        }
-        if let Some(factor) = &self.factor {
-            solve_factored(factor.l_dirty(), right.as_mut_slice());
-        }
-        self.work.solves += 1;
+        work.solves += 1;
     }
 
     /// Accelerations that the forces at z and its rate bring.
     fn make_consistent(&mut self) -> StepResult {
-        self.now.w.fill(0.0);
+        self.now.parts_mut()[2].fill(0.0);
         self.at.copy(&self.now);
         self.residual(true);
         let gh = CONSISTENT * self.shortest;
@@ -363,7 +345,8 @@ impl ReducedRodas4 {
         if let Some(factor) = &self.factor {
             factor.solve_mut(&mut self.right);
         }
-        self.now.w.iter_mut().zip(self.right.iter()).for_each(|(w, x)| *w = x / (gh * gh));
+        let [_, _, w] = self.now.parts_mut();
+        w.iter_mut().zip(self.right.iter()).for_each(|(w, x)| *w = x / (gh * gh));
         self.work.solves += 1;
         self.keep();
         Ok(())
@@ -382,7 +365,7 @@ impl ReducedRodas4 {
             self.put_back(); // the next step fails, and says why
         }
         let Self { space, forces, now, .. } = self;
-        forces.place(space, [&now.z, &now.v, &now.w]);
+        forces.place(space, now.parts());
     }
 
     /// The error of z by the polynomials at the motion now, and z, both in the mass norm (√(N·m)·s).
@@ -398,18 +381,19 @@ impl ReducedRodas4 {
             x.iter().zip(product.iter()).map(|(x, p)| x * p).sum::<f64>().max(0.0).sqrt()
         };
         let error = solve(stiffness, right).map_or(f64::INFINITY, |(off, _)| norm(off.as_slice()));
-        [error, norm(&now.z)]
+        [error, norm(now.z())]
     }
 
     /// Coordinates and rates become those of a motion of the bodies.
     fn project(&mut self, motion: &Motion) {
-        [self.now.z, self.now.v] = projected(&self.space, motion);
+        let found = projected(&self.space, motion);
+        self.now.parts_mut().into_iter().zip(&found).for_each(|(to, from)| to.copy_from_slice(from));
     }
 
     /// Places the bodies at the end of a step.
     fn place_end(&mut self, motion: &mut Motion) {
         let Self { space, forces, now, .. } = self;
-        forces.place(space, [&now.z, &now.v, &now.w]);
+        forces.place(space, now.parts());
         motion.q.copy_from_slice(&forces.placed.at);
         motion.v.copy_from_slice(&forces.placed.rate);
         self.keep();
@@ -419,12 +403,10 @@ impl ReducedRodas4 {
     pub(super) fn fill_error(&mut self, error: &mut Motion) {
         let Self { space, forces, increments, room, polynomials, .. } = self;
         let last = &increments[ALPHA.len() - 1];
-        for (u, to) in [(&last.z, &mut error.q), (&last.v, &mut error.v)] {
+        let [z, v, _] = last.parts();
+        for (u, to) in [(z, &mut error.q), (v, &mut error.v)] {
             if let Some(stages) = polynomials {
-                to.fill(Pose::zeros());
-                for (moved, u) in stages.moved.iter().zip(u) {
-                    to.iter_mut().zip(moved).for_each(|(to, moved)| *to += moved * *u);
-                }
+                of_size!(u.len(), m => move_bodies(m, &stages.moved, u, to));
             } else {
                 space.strains(u, room);
                 forces.placed.spread(&space.joints.tree, room, to);
@@ -438,6 +420,17 @@ impl ReducedRodas4 {
 
     fn put_back(&mut self) {
         self.now.unpack(&self.carried[..2]);
+    }
+}
+
+/// The motion of the bodies with coordinates `u`, from that per unit of each, those of a body together.
+#[inline(always)]
+fn move_bodies(m: usize, moved: &[Pose], u: &[f64], to: &mut [Pose]) {
+    let u = &u[..m];
+    for (to, moved) in to.iter_mut().zip(moved.chunks_exact(m)) {
+        let mut sum = Pose::zeros();
+        moved.iter().zip(u).for_each(|(moved, u)| sum += moved * *u);
+        *to = sum;
     }
 }
 
@@ -480,10 +473,7 @@ impl RosenbrockStep for ReducedStep<'_> {
 
     fn argument(&mut self, i: usize) {
         let ReducedRodas4 { now, at, increments, .. } = &mut *self.rodas;
-        at.copy(now);
-        for (j, u) in increments[..i].iter().enumerate() {
-            at.add(A[i][j], u);
-        }
+        at.set_sum(now, &A[i], &increments[..i]);
     }
 
     fn residual(&mut self, i: usize) {
@@ -507,10 +497,7 @@ impl RosenbrockStep for ReducedStep<'_> {
 
     fn finish(&mut self) {
         let ReducedRodas4 { now, at, increments, .. } = &mut *self.rodas;
-        let last = &increments[ALPHA.len() - 1];
-        for ((now, at), u) in now.all().into_iter().zip(at.all()).zip([&last.z, &last.v, &last.w]) {
-            now.iter_mut().zip(at.iter()).zip(u).for_each(|((now, at), u)| *now = at + u);
-        }
+        now.set_sum(at, &[1.0], &increments[ALPHA.len() - 1..]);
         self.rodas.place_end(self.motion);
         self.rodas.fill_error(self.error);
         let ReducedRodas4 { ports, carried, .. } = &mut *self.rodas;
@@ -547,7 +534,7 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
     }
 
     fn accepted(&mut self, bodies: &mut Bodies<'_>, (t, h): (f64, f64), ends: [&Motion; 2], _: &[Motion]) {
-        self.excess = self.excess.max(self.space.excess(&self.now.z));
+        self.excess = self.excess.max(self.space.excess(self.now.z()));
         if self.ports.is_some() {
             return; // a trial depends on its request alone
         }

@@ -15,8 +15,20 @@ pub(super) struct MonomialChain {
     pub(super) links: Vec<[usize; 2]>,
     /// Monomials with the coordinates that they have.
     pub(super) touched: Vec<[usize; 2]>,
+    /// The same by runs.
+    runs: Vec<MonomialRun>,
     /// Monomials with two of their factors, and the place of the product of the others.
     pub(super) pairs: Vec<[usize; 4]>,
+}
+
+/// Neighbours that are products of one monomial with coordinates in their order.
+#[derive(Debug, Clone, Copy)]
+struct MonomialRun {
+    /// The monomial; the constant 1 has the place behind the last.
+    of: usize,
+    first_coordinate: usize,
+    first: usize,
+    count: usize,
 }
 
 /// Values at a state.
@@ -36,10 +48,16 @@ impl MonomialChain {
     pub(super) fn new(of: &Monomials) -> Self {
         let one = of.count();
         let place = |factors: &[usize]| of.factors.iter().position(|known| known == factors).unwrap_or(one);
-        let mut chain = Self { size: of.size, links: Vec::new(), touched: Vec::new(), pairs: Vec::new() };
+        let mut chain =
+            Self { size: of.size, links: Vec::new(), touched: Vec::new(), runs: Vec::new(), pairs: Vec::new() };
         for (k, factors) in of.factors.iter().enumerate() {
             let (last, before) = factors.split_last().map_or((0, &[][..]), |(last, before)| (*last, before));
-            chain.links.push([place(before), last]);
+            let shorter = place(before);
+            chain.links.push([shorter, last]);
+            match chain.runs.last_mut().filter(|run| run.of == shorter && run.first_coordinate + run.count == last) {
+                Some(run) => run.count += 1,
+                None => chain.runs.push(MonomialRun { of: shorter, first_coordinate: last, first: k, count: 1 }),
+            }
             let mut coordinates = factors.clone();
             coordinates.dedup();
             chain.touched.extend(coordinates.into_iter().map(|i| [k, i]));
@@ -73,19 +91,24 @@ impl MonomialChain {
     }
 
     /// Values and their derivatives in time at coordinates, rates and accelerations.
-    #[inline]
+    #[inline(always)]
     pub(super) fn place(&self, [x, v, w]: [&[f64]; 3], at: &mut MonomialValues) {
         let MonomialValues { values, rates, pushes, .. } = at;
-        for (k, &[of, i]) in self.links.iter().enumerate() {
+        for &MonomialRun { of, first_coordinate, first, count } in &self.runs {
             let (a, b, c) = (values[of], rates[of], pushes[of]);
-            values[k] = a * x[i];
-            rates[k] = b * x[i] + a * v[i];
-            pushes[k] = c * x[i] + 2.0 * (b * v[i]) + a * w[i];
+            let given = x[first_coordinate..].iter().zip(&v[first_coordinate..]).zip(&w[first_coordinate..]);
+            let run = first..first + count;
+            let of_run = values[run.clone()].iter_mut().zip(&mut rates[run.clone()]).zip(&mut pushes[run]);
+            for (((value, rate), push), ((x, v), w)) in of_run.zip(given) {
+                *value = a * x;
+                *rate = b * x + a * v;
+                *push = c * x + 2.0 * (b * v) + a * w;
+            }
         }
     }
 
     /// `to +=` the gradient at the placed state of the sum with these coefficients, which are used up.
-    #[inline]
+    #[inline(always)]
     pub(super) fn add_gradient(&self, x: &[f64], at: &MonomialValues, coefficients: &mut [f64], to: &mut [f64]) {
         for (k, &[of, i]) in self.links.iter().enumerate().rev() {
             let c = coefficients[k];
@@ -95,7 +118,7 @@ impl MonomialChain {
     }
 
     /// Changes of the values and their derivatives in time at the placed state, where coordinates, rates and accelerations change.
-    #[inline]
+    #[inline(always)]
     pub(super) fn place_change(
         &self,
         [x, v, w]: [&[f64]; 3],
@@ -114,7 +137,7 @@ impl MonomialChain {
     }
 
     /// `to +=` the change of the gradient of a sum, where coordinates change by `dx` and values as placed; `coefficients` and their changes are used up.
-    #[inline]
+    #[inline(always)]
     pub(super) fn add_gradient_change(
         &self,
         [x, dx]: [&[f64]; 2],
@@ -131,7 +154,7 @@ impl MonomialChain {
     }
 
     /// Derivatives with the coordinates at the placed state.
-    #[inline]
+    #[inline(always)]
     pub(super) fn differentiate(&self, x: &[f64], at: &mut MonomialValues) {
         let (m, one) = (self.size, self.count());
         for &[k, i] in &self.touched {
@@ -150,7 +173,7 @@ impl MonomialChain {
     }
 
     /// `to +=` the second derivatives at the placed state of the sum with these coefficients.
-    #[inline]
+    #[inline(always)]
     pub(super) fn add_curvature(&self, at: &MonomialValues, coefficients: &[f64], to: &mut DMatrix<f64>) {
         for &[k, i, j, others] in &self.pairs {
             let value = coefficients[k] * at.values[others];

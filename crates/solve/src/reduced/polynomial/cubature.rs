@@ -2,7 +2,8 @@
 //!
 //! Gaps along beams have hundreds of points of integration, between which the few shapes of a reduced model hardly change. Of a field some of
 //! them stay, with non-negative weights by least squares: capacitance and forces over the coordinates at sampled states are those of all. Points
-//! of contact and of films become sums of neighbours at their mean approach, so that no part of a gap is left without contact.
+//! of contact and of films become sums of neighbours at their mean approach, so that no part of a gap is left without contact. These sums are finer where
+//! parts press on each other in a sampled state.
 //! Weights are factors of capacitance, area and damping, so that charge and force still come from one energy.
 //!
 //! References: C. Lawson, R. Hanson, "Solving least squares problems" (1974), chapter 23; C. Farhat and others, "Dimensional reduction of
@@ -18,8 +19,10 @@ use nalgebra::{DMatrix, DVector, SVD};
 
 /// Points of a kind up to which all of them stay.
 const FEW: usize = 12;
-/// Points of contact, and of films, of all gaps of a group.
+/// Points of films of all gaps of a group, and of contact of those parts that press on each other in no state.
 const NEIGHBOURS: usize = 32;
+/// Points of contact of the parts that do.
+const PRESSED: usize = 32;
 /// Most points of a field.
 const MOST: usize = 60;
 /// Weight that counts as 0 (1).
@@ -102,7 +105,12 @@ pub(super) fn thinned(
                     let of: Vec<&MixedPoint> = chosen.iter().map(|(_, point)| point).collect();
                     weighted(&of, all, states, monomials, errors.reduced_field())
                 }
-                PointKind::Contact | PointKind::Film if chosen.len() > NEIGHBOURS => joined(&chosen),
+                PointKind::Contact | PointKind::Film if chosen.len() > NEIGHBOURS => {
+                    let values: Vec<_> = states.iter().map(|x| all.shapes.values(&monomials.values(x))).collect();
+                    joined(&chosen, |(law, row)| {
+                        wanted == PointKind::Contact && values.iter().any(|at| law.at(row.dot(at), 0.0).force > 0.0)
+                    })
+                }
                 _ => chosen.into_iter().map(|(_, point)| point.clone()).collect(),
             });
         }
@@ -119,11 +127,16 @@ pub(super) fn thinned(
     Approaches { members, shapes: all.shapes.clone(), mix }
 }
 
-/// Neighbours of one member as one point each, with their mean approach.
-fn joined(points: &[&(usize, MixedPoint)]) -> Vec<MixedPoint> {
+/// Neighbours of one member as one point each, with their mean approach: those that press together, and the others.
+fn joined(points: &[&(usize, MixedPoint)], presses: impl Fn(&MixedPoint) -> bool) -> Vec<MixedPoint> {
+    let pressed: Vec<_> = points.iter().map(|point| (presses(&point.1), *point)).collect();
+    let of_kind = |which: bool| pressed.iter().filter(|(pressed, _)| *pressed == which).count();
+    let (pressing, apart) = (of_kind(true), of_kind(false));
     let mut found = Vec::new();
-    for of in points.chunk_by(|a, b| a.0 == b.0) {
-        let count = (NEIGHBOURS * of.len()).div_ceil(points.len()).min(of.len());
+    for of in pressed.chunk_by(|(a, one), (b, other)| a == b && one.0 == other.0) {
+        let (most, all) = if of[0].0 { (PRESSED, pressing) } else { (NEIGHBOURS, apart) };
+        let of: Vec<_> = of.iter().map(|(_, point)| *point).collect();
+        let count = (most * of.len()).div_ceil(all).min(of.len());
         for part in 0..count {
             let part = &of[part * of.len() / count..(part + 1) * of.len() / count];
             let whole: f64 = part.iter().map(|(_, (law, _))| extent(law)).sum();

@@ -220,8 +220,8 @@ impl<'a> Fit<'a> {
         let approaches = thinned(&approaches, groups, &of_gaps, &monomials, errors);
         let (stiffness, thermal, built_in) = self.tree_forces(scale);
         let turned = (&self.rotation, scale);
-        let mass_slopes = match self.moves {
-            true => DMatrix::zeros(m, m),
+        let [mass_slopes, damping_slopes] = match self.moves {
+            true => [DMatrix::zeros(m, m), DMatrix::zeros(m, m)],
             false => slopes(self.space, turned, (&self.mass, &reach), ErrorBudget::of(tol).constant_mass()),
         };
         PolynomialModel {
@@ -240,6 +240,7 @@ impl<'a> Fit<'a> {
             damping: self.damping.clone(),
             mass_change: self.mass_change(&mass_slopes, scale),
             mass_slopes,
+            damping_slopes,
             fit_error,
             monomials,
         }

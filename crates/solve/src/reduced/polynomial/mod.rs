@@ -98,6 +98,8 @@ pub struct PolynomialModel {
     pub damping: DMatrix<f64>,
     /// Change of each diagonal entry with each coordinate, coordinates × coordinates; zero where only motions in the product are wanted (s²).
     pub mass_slopes: DMatrix<f64>,
+    /// Relative change of the root of each diagonal entry of the damping with each coordinate, coordinates × coordinates; as for masses (1).
+    pub damping_slopes: DMatrix<f64>,
     /// Largest relative change of the mass of the slowest coordinate over the equilibria, beyond that of its slopes (1).
     pub mass_change: f64,
     /// Largest error of a polynomial at states that did not make it, relative to its largest value (1).

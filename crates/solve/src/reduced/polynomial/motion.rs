@@ -8,84 +8,17 @@
 //! The mass matrix is (∂p/∂z)ᵀ·(∂p/∂z) at each state, and forces quadratic in rates are in p̈. No body is placed.
 
 pub mod lanes;
+mod point_state;
 
 use super::chain::{MonomialChain, MonomialValues};
 use super::rows::{LaneColumns, PolynomialRows, add_gram};
 use super::shapes::MemberPoints;
 use super::{PolynomialModel, monomials::Polynomials};
 use bimorph_domains::capacitor::Capacitor;
-use bimorph_domains::comb_sides::CombLaw;
 use bimorph_domains::{Domain, Drive, Law, PointLaw, System};
-use bimorph_multibody::batch::{LANES, Lane8};
+use bimorph_multibody::batch::{Kernel, LANES, Lane8, SimdReal, everywhere};
 use nalgebra::DMatrix;
-
-/// A point of a gap that has its share in shapes.
-#[derive(Debug, Clone, Copy, Default)]
-struct PointState {
-    approach: f64,
-    /// Force of its law, its gas and its loss, and their derivatives with the approach and with its rate.
-    force: f64,
-    stiffness: f64,
-    damping: f64,
-    /// Of a comb: derivative of its force with the next approach, and of the next force with its own.
-    mixed: [f64; 2],
-}
-
-impl PointState {
-    /// Both of a comb with the impact loss χ at its approaches (m) with their rates (m/s), under a voltage (V). Its contact resists across the fingers.
-    #[inline]
-    fn of_comb((comb, loss): (&CombLaw, f64), motion: [(f64, f64); 2], volts: f64) -> [Self; 2] {
-        let at = [motion[0].0, motion[1].0];
-        let potential = comb.potential(at, volts);
-        let [along, mixed, across] = potential.second;
-        let state = |k: usize, stiffness: f64| Self {
-            approach: at[k],
-            force: potential.first[k],
-            stiffness,
-            ..Self::default()
-        };
-        let mut both = [Self { mixed: [mixed; 2], ..state(0, along) }, state(1, across)];
-        if loss > 0.0
-            && let Some(pressed) = comb.pressed(at)
-        {
-            let force = pressed.first[1];
-            let (added, by_rate) = lost(loss, force.signum() * motion[1].1);
-            both[1].force += force * added;
-            both[1].stiffness += pressed.second[2] * added;
-            both[1].damping = force.abs() * by_rate;
-            both[0].mixed[1] += pressed.second[1] * added;
-        }
-        both
-    }
-
-    /// Of a law at an approach (m) with its rate (m/s), under a voltage (V).
-    #[inline]
-    fn of(law: &PointLaw, (approach, rate): (f64, f64), volts: f64) -> Self {
-        let pressed = law.at(approach, volts);
-        let mut state = Self { approach, force: pressed.force, stiffness: pressed.stiffness, ..Self::default() };
-        if law.loss > 0.0 {
-            let bears = law.at(approach, 0.0);
-            let (share, by_rate) = lost(law.loss, rate);
-            state.force += bears.force * share;
-            state.stiffness += bears.stiffness * share;
-            state.damping += bears.force * by_rate;
-        }
-        if let Some((drawn, film)) = law.film {
-            let (damping, by_distance) = film.damping(drawn - approach);
-            state.force += damping * rate;
-            state.stiffness -= by_distance * rate;
-            state.damping += damping;
-        }
-        state
-    }
-}
-
-/// Force of an impact loss χ (s/m) at a closing speed (m/s) over the elastic force, and its derivative with the speed.
-#[inline]
-fn lost(chi: f64, closing: f64) -> (f64, f64) {
-    let added = chi * closing;
-    if added > -1.0 { (added, chi) } else { (-1.0, 0.0) }
-}
+use point_state::PointState;
 
 /// The polynomials of a space whose directions are turned as theirs are: z = A·x.
 #[derive(Debug, Clone)]
@@ -238,27 +171,38 @@ impl PolynomialForces {
 
     /// The force R at coordinates, rates and accelerations.
     pub fn residual(&mut self, of: &PolynomialMotion, motion: [&[f64]; 3], drive: &Drive, force: &mut [f64]) {
+        everywhere(ResidualKernel { forces: self, of, motion, drive, force });
+    }
+
+    #[inline(always)]
+    fn fill_residual<W: SimdReal>(
+        &mut self,
+        simd: W::Simd,
+        of: &PolynomialMotion,
+        (motion, drive): ([&[f64]; 3], &Drive),
+        force: &mut [f64],
+    ) {
         let m = force.len();
         let [z, v, _] = motion;
         self.given[..m].copy_from_slice(z);
         self.given[m..2 * m].copy_from_slice(v);
         give(m, drive, &mut self.given);
         of.chain.place(motion, &mut self.at);
-        of.strains.values(&self.at.values, &mut self.stress);
-        of.rests.add_product(&self.given[2 * m..], &mut self.stress);
-        of.inertia.values(&self.at.pushes, &mut self.push);
+        of.strains.values::<W>(simd, &self.at.values, &mut self.stress);
+        of.rests.add_product::<W>(simd, &self.given[2 * m..], &mut self.stress);
+        of.inertia.values::<W>(simd, &self.at.pushes, &mut self.push);
         self.combined.fill(0.0);
-        of.strains.add_combined(&self.stress, &mut self.combined);
-        of.inertia.add_combined(&self.push, &mut self.combined);
+        of.strains.add_combined::<W>(simd, &self.stress, &mut self.combined);
+        of.inertia.add_combined::<W>(simd, &self.push, &mut self.combined);
         if !self.points.is_empty() {
-            self.press(of, drive);
+            self.press::<W>(simd, of, drive);
         }
         if of.loaded {
             self.load(drive);
-            of.works.add_combined(&self.work, &mut self.combined);
+            of.works.add_combined::<W>(simd, &self.work, &mut self.combined);
         }
         self.force.fill(0.0);
-        of.linear.add_product(&self.given, &mut self.force);
+        of.linear.add_product::<W>(simd, &self.given, &mut self.force);
         self.reversed.copy_from_slice(&self.combined);
         of.chain.add_gradient(z, &self.at, &mut self.reversed, &mut self.force);
         force.copy_from_slice(&self.force[..m]);
@@ -271,10 +215,11 @@ impl PolynomialForces {
     }
 
     /// The laws of all points, and what they bring to the monomials.
-    fn press(&mut self, of: &PolynomialMotion, drive: &Drive) {
-        of.shapes.values(&self.at.values, &mut self.shape);
+    #[inline(always)]
+    fn press<W: SimdReal>(&mut self, simd: W::Simd, of: &PolynomialMotion, drive: &Drive) {
+        of.shapes.values::<W>(simd, &self.at.values, &mut self.shape);
         if of.resists {
-            of.shapes.values(&self.at.rates, &mut self.shape_rate);
+            of.shapes.values::<W>(simd, &self.at.rates, &mut self.shape_rate);
         }
         let sum = |point: usize, of_shapes: &[f64]| -> f64 {
             of.mix.column(point).iter().zip(of_shapes).map(|(share, y)| share * y).sum()
@@ -300,7 +245,7 @@ impl PolynomialForces {
         for (point, state) in self.points.iter().enumerate() {
             self.shape.iter_mut().zip(of.mix.column(point).iter()).for_each(|(to, share)| *to += share * state.force);
         }
-        of.shapes.add_combined(&self.shape, &mut self.combined);
+        of.shapes.add_combined::<W>(simd, &self.shape, &mut self.combined);
     }
 
     /// Mass, damping and stiffness where the residual was taken last.
@@ -311,24 +256,41 @@ impl PolynomialForces {
         damping: &mut DMatrix<f64>,
         stiffness: &mut DMatrix<f64>,
     ) {
+        everywhere(MatricesKernel { forces: self, of, to: [mass, damping, stiffness] });
+    }
+
+    #[inline(always)]
+    fn fill_matrices<W: SimdReal>(
+        &mut self,
+        simd: W::Simd,
+        of: &PolynomialMotion,
+        [mass, damping, stiffness]: [&mut DMatrix<f64>; 3],
+    ) {
         let m = mass.nrows();
         of.chain.differentiate(&self.given[..m], &mut self.at);
         stiffness.copy_from(&of.stiffness);
-        of.strains.slopes(&of.chain, &self.at, m, &mut self.strain_slopes);
-        add_gram(&self.strain_slopes, stiffness);
-        of.inertia.slopes(&of.chain, &self.at, m, &mut self.inertia_slopes);
+        of.strains.slopes::<W>(simd, &of.chain, &self.at, m, &mut self.strain_slopes);
+        add_gram::<W>(simd, &self.strain_slopes, stiffness);
+        of.inertia.slopes::<W>(simd, &of.chain, &self.at, m, &mut self.inertia_slopes);
         mass.fill(0.0);
-        add_gram(&self.inertia_slopes, mass);
+        add_gram::<W>(simd, &self.inertia_slopes, mass);
         damping.copy_from(&of.damping);
         if !self.points.is_empty() {
-            self.add_point_matrices(of, damping, stiffness);
+            self.add_point_matrices::<W>(simd, of, damping, stiffness);
         }
         of.chain.add_curvature(&self.at, &self.combined, stiffness);
     }
 
-    fn add_point_matrices(&mut self, of: &PolynomialMotion, damping: &mut DMatrix<f64>, stiffness: &mut DMatrix<f64>) {
+    #[inline(always)]
+    fn add_point_matrices<W: SimdReal>(
+        &mut self,
+        simd: W::Simd,
+        of: &PolynomialMotion,
+        damping: &mut DMatrix<f64>,
+        stiffness: &mut DMatrix<f64>,
+    ) {
         let (m, shapes) = (stiffness.nrows(), of.shapes.count);
-        of.shapes.slopes(&of.chain, &self.at, m, &mut self.shape_slopes);
+        of.shapes.slopes::<W>(simd, &of.chain, &self.at, m, &mut self.shape_slopes);
         let [by_approach, by_rate] = &mut self.of_shapes;
         by_approach.fill(0.0);
         by_rate.fill(0.0);
@@ -385,6 +347,17 @@ impl PolynomialForces {
         beside: Option<[&Drive; 2]>,
         out: &mut [f64],
     ) {
+        everywhere(ForcingKernel { forces: self, of, drives: [drive, rate], beside, out });
+    }
+
+    #[inline(always)]
+    fn fill_forcing<W: SimdReal>(
+        &mut self,
+        simd: W::Simd,
+        of: &PolynomialMotion,
+        ([drive, rate], beside): ([&Drive; 2], Option<[&Drive; 2]>),
+        out: &mut [f64],
+    ) {
         let m = out.len();
         self.reversed.fill(0.0);
         self.force.fill(0.0);
@@ -395,8 +368,8 @@ impl PolynomialForces {
             self.given_change[..2 * m].fill(0.0);
             give(m, rate, &mut self.given_change);
             self.stress.fill(0.0);
-            of.rests.add_product(&self.given_change[2 * m..], &mut self.stress);
-            of.strains.add_combined(&self.stress, &mut self.reversed);
+            of.rests.add_product::<W>(simd, &self.given_change[2 * m..], &mut self.stress);
+            of.strains.add_combined::<W>(simd, &self.stress, &mut self.reversed);
         }
         if charges {
             self.shape.fill(0.0);
@@ -404,18 +377,18 @@ impl PolynomialForces {
             if let Some([drive, rate]) = beside {
                 self.charge(of, drive, rate);
             }
-            of.shapes.add_combined(&self.shape, &mut self.reversed);
+            of.shapes.add_combined::<W>(simd, &self.shape, &mut self.reversed);
         }
         if loads {
             self.load(rate);
-            of.works.add_combined(&self.work, &mut self.reversed);
+            of.works.add_combined::<W>(simd, &self.work, &mut self.reversed);
         }
         if warms || charges || loads {
             of.chain.add_gradient(&self.given[..m], &self.at, &mut self.reversed, &mut self.force);
         }
         if warms {
             // coordinates and rates have their shares in the tangent
-            of.linear.add_product(&self.given_change, &mut self.force);
+            of.linear.add_product::<W>(simd, &self.given_change, &mut self.force);
         }
         out.copy_from_slice(&self.force[..m]);
     }
@@ -448,26 +421,38 @@ impl PolynomialForces {
         (drive, change): (&Drive, &Drive),
         out: &mut [f64],
     ) {
+        everywhere(ChangeKernel { forces: self, of, motions: [motion, moved], drives: [drive, change], out });
+    }
+
+    #[inline(always)]
+    fn fill_change<W: SimdReal>(
+        &mut self,
+        simd: W::Simd,
+        of: &PolynomialMotion,
+        [motion, moved]: [[&[f64]; 3]; 2],
+        [drive, change]: [&Drive; 2],
+        out: &mut [f64],
+    ) {
         let m = out.len();
         self.given_change[..m].copy_from_slice(moved[0]);
         self.given_change[m..2 * m].copy_from_slice(moved[1]);
         give(m, change, &mut self.given_change);
         of.chain.place_change(motion, moved, &self.at, &mut self.change);
-        of.strains.values(&self.change.values, &mut self.stress);
-        of.rests.add_product(&self.given_change[2 * m..], &mut self.stress);
-        of.inertia.values(&self.change.pushes, &mut self.push);
+        of.strains.values::<W>(simd, &self.change.values, &mut self.stress);
+        of.rests.add_product::<W>(simd, &self.given_change[2 * m..], &mut self.stress);
+        of.inertia.values::<W>(simd, &self.change.pushes, &mut self.push);
         self.combined_change.fill(0.0);
-        of.strains.add_combined(&self.stress, &mut self.combined_change);
-        of.inertia.add_combined(&self.push, &mut self.combined_change);
+        of.strains.add_combined::<W>(simd, &self.stress, &mut self.combined_change);
+        of.inertia.add_combined::<W>(simd, &self.push, &mut self.combined_change);
         if !self.points.is_empty() {
-            self.press_change(of, drive, change);
+            self.press_change::<W>(simd, of, drive, change);
         }
         if of.loaded {
             self.load(change);
-            of.works.add_combined(&self.work, &mut self.combined_change);
+            of.works.add_combined::<W>(simd, &self.work, &mut self.combined_change);
         }
         self.force.fill(0.0);
-        of.linear.add_product(&self.given_change, &mut self.force);
+        of.linear.add_product::<W>(simd, &self.given_change, &mut self.force);
         self.reversed.copy_from_slice(&self.combined);
         let coefficients = [&mut self.reversed[..], &mut self.combined_change[..]];
         of.chain.add_gradient_change([motion[0], moved[0]], [&self.at, &self.change], coefficients, &mut self.force);
@@ -475,9 +460,10 @@ impl PolynomialForces {
     }
 
     /// Changes of the forces of all points, over the monomials.
-    fn press_change(&mut self, of: &PolynomialMotion, drive: &Drive, change: &Drive) {
+    #[inline(always)]
+    fn press_change<W: SimdReal>(&mut self, simd: W::Simd, of: &PolynomialMotion, drive: &Drive, change: &Drive) {
         // changes of the shapes and of their rates, point by point; then what acts on the shapes
-        of.shapes.values(&self.change.values, &mut self.shape_rate);
+        of.shapes.values::<W>(simd, &self.change.values, &mut self.shape_rate);
         let mut force = std::mem::take(&mut self.point_change);
         let sum = |point: usize, of_shapes: &[f64]| -> f64 {
             of.mix.column(point).iter().zip(of_shapes).map(|(share, y)| share * y).sum()
@@ -491,7 +477,7 @@ impl PolynomialForces {
             }
         }
         if of.resists {
-            of.shapes.values(&self.change.rates, &mut self.shape_rate);
+            of.shapes.values::<W>(simd, &self.change.rates, &mut self.shape_rate);
             for (point, state) in self.points.iter().enumerate() {
                 force[point] += state.damping * sum(point, &self.shape_rate);
             }
@@ -502,7 +488,69 @@ impl PolynomialForces {
         }
         self.point_change = force;
         self.charge(of, drive, change);
-        of.shapes.add_combined(&self.shape, &mut self.combined_change);
+        of.shapes.add_combined::<W>(simd, &self.shape, &mut self.combined_change);
+    }
+}
+
+/// [`PolynomialForces::residual`] in the instructions at hand.
+struct ResidualKernel<'a> {
+    forces: &'a mut PolynomialForces,
+    of: &'a PolynomialMotion,
+    motion: [&'a [f64]; 3],
+    drive: &'a Drive,
+    force: &'a mut [f64],
+}
+
+impl Kernel for ResidualKernel<'_> {
+    #[inline(always)]
+    fn run<W: SimdReal>(self, simd: W::Simd) {
+        self.forces.fill_residual::<W>(simd, self.of, (self.motion, self.drive), self.force);
+    }
+}
+
+/// [`PolynomialForces::matrices`] in the instructions at hand.
+struct MatricesKernel<'a> {
+    forces: &'a mut PolynomialForces,
+    of: &'a PolynomialMotion,
+    to: [&'a mut DMatrix<f64>; 3],
+}
+
+impl Kernel for MatricesKernel<'_> {
+    #[inline(always)]
+    fn run<W: SimdReal>(self, simd: W::Simd) {
+        self.forces.fill_matrices::<W>(simd, self.of, self.to);
+    }
+}
+
+/// [`PolynomialForces::forcing_beside`] in the instructions at hand.
+struct ForcingKernel<'a> {
+    forces: &'a mut PolynomialForces,
+    of: &'a PolynomialMotion,
+    drives: [&'a Drive; 2],
+    beside: Option<[&'a Drive; 2]>,
+    out: &'a mut [f64],
+}
+
+impl Kernel for ForcingKernel<'_> {
+    #[inline(always)]
+    fn run<W: SimdReal>(self, simd: W::Simd) {
+        self.forces.fill_forcing::<W>(simd, self.of, (self.drives, self.beside), self.out);
+    }
+}
+
+/// [`PolynomialForces::change`] in the instructions at hand.
+struct ChangeKernel<'a> {
+    forces: &'a mut PolynomialForces,
+    of: &'a PolynomialMotion,
+    motions: [[&'a [f64]; 3]; 2],
+    drives: [&'a Drive; 2],
+    out: &'a mut [f64],
+}
+
+impl Kernel for ChangeKernel<'_> {
+    #[inline(always)]
+    fn run<W: SimdReal>(self, simd: W::Simd) {
+        self.forces.fill_change::<W>(simd, self.of, self.motions, self.drives, self.out);
     }
 }
 

@@ -4,7 +4,8 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::chain::{MonomialChain, MonomialValues};
-use bimorph_multibody::batch::{Kernel, LANES, Lane8, SimdReal, everywhere};
+use bimorph_multibody::batch::{LANES, Lane8, SimdReal};
+use bimorph_multibody::scalar::Lanes;
 use nalgebra::DMatrix;
 
 /// Groups of lanes that are summed at once: their additions do not wait for each other.
@@ -50,9 +51,16 @@ impl LaneColumns {
     }
 
     /// `to +=` the product with the first numbers of `x`; `to` has all groups.
-    #[inline]
-    pub(super) fn add_product(&self, x: &[f64], to: &mut [f64]) {
-        everywhere(WeightedSums { columns: &self.lanes, weights: &x[..self.columns], to });
+    #[inline(always)]
+    pub(super) fn add_product<W: SimdReal>(&self, simd: W::Simd, x: &[f64], to: &mut [f64]) {
+        let weights = &x[..self.columns];
+        let (mut lanes, mut to) = (&self.lanes[..], to.as_chunks_mut::<LANES>().0);
+        while to.len() >= TOGETHER {
+            add_sums::<W, TOGETHER>(simd, &mut lanes, weights, &mut to);
+        }
+        while !to.is_empty() && !weights.is_empty() {
+            add_sums::<W, 1>(simd, &mut lanes, weights, &mut to);
+        }
     }
 }
 
@@ -103,84 +111,30 @@ impl PolynomialRows {
     }
 
     /// Values where the monomials have these.
-    #[inline]
-    pub(super) fn values(&self, monomials: &[f64], out: &mut [f64]) {
+    #[inline(always)]
+    pub(super) fn values<W: SimdReal>(&self, simd: W::Simd, monomials: &[f64], out: &mut [f64]) {
         out.fill(0.0);
-        self.of_rows.add_product(monomials, out);
+        self.of_rows.add_product::<W>(simd, monomials, out);
     }
 
     /// `to +=` the coefficients of each monomial in the sum of the rows with these weights.
-    #[inline]
-    pub(super) fn add_combined(&self, weights: &[f64], to: &mut [f64]) {
-        self.of_monomials.add_product(weights, to);
+    #[inline(always)]
+    pub(super) fn add_combined<W: SimdReal>(&self, simd: W::Simd, weights: &[f64], to: &mut [f64]) {
+        self.of_monomials.add_product::<W>(simd, weights, to);
     }
 
     /// Derivatives with `size` coordinates at a state: those of a group of rows together, a coordinate after the other.
-    #[inline]
-    pub(super) fn slopes(&self, chain: &MonomialChain, at: &MonomialValues, size: usize, out: &mut [Lane8]) {
-        everywhere(RowSlopes { columns: &self.of_rows, chain, at, size, out });
-    }
-}
-
-/// `to +=` sums of columns, each a group of lanes for each weight.
-struct WeightedSums<'a> {
-    columns: &'a [Lane8],
-    weights: &'a [f64],
-    to: &'a mut [f64],
-}
-
-impl Kernel for WeightedSums<'_> {
     #[inline(always)]
-    fn run<W: SimdReal>(self, simd: W::Simd) {
-        let Self { columns, weights, to } = self;
-        let n = weights.len();
-        let groups = if n == 0 { 0 } else { to.len() / LANES };
-        let mut g = 0;
-        while g + TOGETHER <= groups {
-            add_sums::<W, TOGETHER>(simd, &columns[g * n..], weights, &mut to[g * LANES..]);
-            g += TOGETHER;
-        }
-        while g < groups {
-            add_sums::<W, 1>(simd, &columns[g * n..], weights, &mut to[g * LANES..]);
-            g += 1;
-        }
-    }
-}
-
-/// `to +=` those of `K` groups.
-#[inline(always)]
-fn add_sums<W: SimdReal, const K: usize>(simd: W::Simd, columns: &[Lane8], weights: &[f64], to: &mut [f64]) {
-    let n = weights.len();
-    let mut sums = [W::splat(simd, 0.0); K];
-    for k in 0..n {
-        let weight = W::splat(simd, weights[k]);
-        for i in 0..K {
-            sums[i] += W::load(simd, &columns[i * n + k]) * weight;
-        }
-    }
-    for i in 0..K {
-        let mut found = Lane8::NONE;
-        sums[i].store(&mut found);
-        for lane in 0..LANES {
-            to[i * LANES + lane] += found.0[lane];
-        }
-    }
-}
-
-struct RowSlopes<'a> {
-    columns: &'a LaneColumns,
-    chain: &'a MonomialChain,
-    at: &'a MonomialValues,
-    size: usize,
-    out: &'a mut [Lane8],
-}
-
-impl Kernel for RowSlopes<'_> {
-    #[inline(always)]
-    fn run<W: SimdReal>(self, simd: W::Simd) {
-        let Self { columns, chain, at, size, out } = self;
+    pub(super) fn slopes<W: SimdReal>(
+        &self,
+        simd: W::Simd,
+        chain: &MonomialChain,
+        at: &MonomialValues,
+        size: usize,
+        out: &mut [Lane8],
+    ) {
         out.fill(Lane8::NONE);
-        for (columns, out) in columns.lanes.chunks_exact(columns.columns).zip(out.chunks_exact_mut(size)) {
+        for (columns, out) in self.of_rows.lanes.chunks_exact(self.of_rows.columns).zip(out.chunks_exact_mut(size)) {
             chain.each_slope(at, |k, i, slope| {
                 let sum = W::load(simd, &out[i]) + W::load(simd, &columns[k]) * W::splat(simd, slope);
                 sum.store(&mut out[i]);
@@ -189,35 +143,51 @@ impl Kernel for RowSlopes<'_> {
     }
 }
 
+/// `to +=` the sums of `K` groups of lanes, which both slices lose.
+#[inline(always)]
+fn add_sums<W: SimdReal, const K: usize>(
+    simd: W::Simd,
+    columns: &mut &[Lane8],
+    weights: &[f64],
+    to: &mut &mut [[f64; LANES]],
+) {
+    let n = weights.len();
+    let (here, further) = columns.split_at(K * n);
+    *columns = further;
+    let mut sums = [W::splat(simd, 0.0); K];
+    for k in 0..n {
+        let weight = W::splat(simd, weights[k]);
+        for i in 0..K {
+            sums[i] += W::load(simd, &here[i * n + k]) * weight;
+        }
+    }
+    let (now, later) = std::mem::take(to).split_at_mut(K);
+    *to = later;
+    for i in 0..K {
+        let sum = W::load(simd, &Lanes(now[i])) + sums[i];
+        let mut found = Lane8::NONE;
+        sum.store(&mut found);
+        now[i] = found.0;
+    }
+}
+
 /// `to +=` the products Jᵀ·J of derivatives, groups of rows × coordinates.
-pub(super) fn add_gram(slopes: &[Lane8], to: &mut DMatrix<f64>) {
-    everywhere(Gram { slopes, to });
-}
-
-struct Gram<'a> {
-    slopes: &'a [Lane8],
-    to: &'a mut DMatrix<f64>,
-}
-
-impl Kernel for Gram<'_> {
-    #[inline(always)]
-    fn run<W: SimdReal>(self, simd: W::Simd) {
-        let Self { slopes, to } = self;
-        let m = to.nrows();
-        for i in 0..m {
-            for j in 0..=i {
-                let mut sum = W::splat(simd, 0.0);
-                for of in slopes.chunks_exact(m) {
-                    sum += W::load(simd, &of[i]) * W::load(simd, &of[j]);
-                }
-                let mut lanes = Lane8::NONE;
-                sum.store(&mut lanes);
-                let [a, b, c, d, e, f, g, h] = lanes.0;
-                let sum = ((a + b) + (c + d)) + ((e + f) + (g + h));
-                to[(i, j)] += sum;
-                if i != j {
-                    to[(j, i)] += sum;
-                }
+#[inline(always)]
+pub(super) fn add_gram<W: SimdReal>(simd: W::Simd, slopes: &[Lane8], to: &mut DMatrix<f64>) {
+    let m = to.nrows();
+    for i in 0..m {
+        for j in 0..=i {
+            let mut sum = W::splat(simd, 0.0);
+            for of in slopes.chunks_exact(m) {
+                sum += W::load(simd, &of[i]) * W::load(simd, &of[j]);
+            }
+            let mut lanes = Lane8::NONE;
+            sum.store(&mut lanes);
+            let [a, b, c, d, e, f, g, h] = lanes.0;
+            let sum = ((a + b) + (c + d)) + ((e + f) + (g + h));
+            to[(i, j)] += sum;
+            if i != j {
+                to[(j, i)] += sum;
             }
         }
     }

@@ -42,6 +42,8 @@ pub struct FittedPolynomials {
     pub errors: [f64; 2],
     /// Equilibria of the full model that were compared.
     pub compared: usize,
+    /// Those beyond a pull-in next to which the polynomials have none.
+    pub missed: usize,
     /// Whether each coordinate has no inertia in a file: it is fast, and follows its forces at once.
     pub follows: Vec<bool>,
 }
@@ -51,6 +53,23 @@ struct Reference<'a> {
     at: &'a FullEquilibrium,
     read: Vec<f64>,
     capacitances: Vec<f64>,
+}
+
+/// Largest errors of displacements and readings, and of capacitances; and the states beyond a pull-in next to which there is no equilibrium.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct FittedErrors {
+    of: [f64; 2],
+    missed: usize,
+}
+
+impl FittedErrors {
+    /// Without an equilibrium next to one of the full model.
+    const NONE: Self = Self { of: [f64::INFINITY; 2], missed: 0 };
+
+    /// The larger error; each missed state counts as one of 1.
+    fn rank(&self) -> f64 {
+        self.of[0].max(self.of[1]) + self.missed as f64
+    }
 }
 
 /// The polynomials of a trained space: of degree 3 where those of degree 2 do not come within `tol`. Members in `apart` stay as they are; others
@@ -75,8 +94,7 @@ pub fn fitted(
             capacitances: (0..system.members.len()).map(|g| system.capacitance(g, &at.q)).collect(),
         })
         .collect();
-    let mut best: Option<(PolynomialModel, [f64; 2])> = None;
-    let worse = |errors: &[f64; 2]| errors[0].max(errors[1]);
+    let mut best: Option<(PolynomialModel, FittedErrors)> = None;
     for degree in DEGREES {
         if degree > DEGREES[0] && space.size() > CUBIC {
             break;
@@ -84,24 +102,26 @@ pub fn fitted(
         let (_, (model, found)) = fits.least(tol, |fit| {
             let model = fit.model((degree, false), tol, &groups);
             let found = errors(&model, &space, &references);
-            (worse(&found), (model, found))
+            (found.rank(), (model, found))
         });
         // where both exceed the tolerance by errors that no degree changes, these do not decide by their last digits
-        let better = |least: &[f64; 2]| found.iter().sum::<f64>() < WORTH * least.iter().sum::<f64>();
-        if best.as_ref().is_none_or(|(_, least)| worse(&found) <= tol || better(least)) {
+        let sum = |errors: &FittedErrors| errors.of.iter().sum::<f64>() + errors.missed as f64;
+        if best.as_ref().is_none_or(|(_, least)| found.rank() <= tol || sum(&found) < WORTH * sum(least)) {
             best = Some((model, found));
         }
-        if best.as_ref().is_some_and(|(_, found)| worse(found) <= tol) {
+        if best.as_ref().is_some_and(|(_, found)| found.rank() <= tol) {
             break;
         }
     }
     let (model, errors) = best.unwrap_or_else(|| {
         let (_, model) = fits.least(f64::INFINITY, |fit| (0.0, fit.model((DEGREES[0], false), tol, &groups)));
-        (model, [f64::INFINITY; 2])
+        (model, FittedErrors::NONE)
     });
     let states: Vec<Vec<f64>> = sampled.iter().map(|at| coordinates(&model, &at.z)).collect();
     let follows = following(&model, &states);
-    FittedPolynomials { model, error: worse(&errors), errors, compared: references.len(), follows }
+    let FittedErrors { of: errors, missed } = errors;
+    let error = errors[0].max(errors[1]);
+    FittedPolynomials { model, error, errors, compared: references.len(), missed, follows }
 }
 
 /// Members by their voltage, but for those that stay apart.
@@ -118,20 +138,23 @@ pub(super) fn groups(system: &System, apart: &[usize]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// The largest errors of a model's equilibria, of displacements and readings and of capacitances; infinite where it has none next to one of
-/// the full model.
-fn errors(model: &PolynomialModel, space: &ReducedSpace, references: &[Reference<'_>]) -> [f64; 2] {
+/// The largest errors of a model's equilibria; infinite where it has none next to one of the full model on the branch from rest.
+fn errors(model: &PolynomialModel, space: &ReducedSpace, references: &[Reference<'_>]) -> FittedErrors {
     let mut forces = ReducedForces::new(space);
     let scale = space.joints.closures.length_scale;
     let extent = |x: &[Pose]| x.iter().map(|x| x.xy().norm().max(x.z.abs() * scale)).fold(0.0, f64::max);
     let most = |p: usize| references.iter().map(|reference| reference.read[p].abs()).fold(0.0, f64::max);
     let farthest = references.iter().map(|reference| extent(&reference.at.q)).fold(1e-6 * scale, f64::max);
-    let (mut worst, mut charged) = (0.0f64, 0.0f64);
+    let (mut worst, mut charged, mut missed) = (0.0f64, 0.0f64, 0);
     for reference in references {
         bimorph_base::budget::check();
         let mut x = coordinates(model, &reference.at.z);
         if !equilibrium(model, &reference.at.drive, &mut x) {
-            return [f64::INFINITY; 2];
+            if reference.at.beyond {
+                missed += 1;
+                continue;
+            }
+            return FittedErrors::NONE;
         }
         let z = &model.rotation * DVector::from_column_slice(&x) * model.scale;
         forces.place_at_rest(space, z.as_slice());
@@ -152,7 +175,7 @@ fn errors(model: &PolynomialModel, space: &ReducedSpace, references: &[Reference
             }
         }
     }
-    [worst, charged]
+    FittedErrors { of: [worst, charged], missed }
 }
 
 /// The coordinates of a state of the space.

@@ -1,12 +1,11 @@
 //! The method in a circuit: trials from given states with their sensitivities, and equilibria of the same polynomials.
 
 use super::ReducedRodas4;
-use super::coordinates::put_increments;
+use super::coordinates::{StageForces, StepMatrices};
 use super::ports::ReducedPortSensitivities;
 use crate::equations::Motion;
 use crate::reduced::ReducedSpace;
 use crate::reduced::statics::solve;
-use crate::time::rodas4::tableau::{GAMMA, GAMMA_I};
 use bimorph_domains::{Drive, Ramp};
 use bimorph_multibody::planar::Pose;
 
@@ -101,7 +100,7 @@ impl ReducedRodas4 {
 
     /// How far the state is beyond the trained ones (1), see [`ReducedSpace::excess`].
     pub fn excess_now(&self) -> f64 {
-        self.space.excess(&self.now.z)
+        self.space.excess(self.now.z())
     }
 
     /// Whether the polynomials are within their part of the tolerance at the end of the last step, where the drive is `drive`.
@@ -119,12 +118,13 @@ impl ReducedRodas4 {
     pub fn balance(&mut self, z: &[f64], drive: &Drive) -> Option<f64> {
         self.carried.iter_mut().for_each(Motion::clear);
         self.now.clear();
-        self.now.z.copy_from_slice(z);
+        self.now.parts_mut()[0].copy_from_slice(z);
         let (mut last, mut done) = (f64::INFINITY, false);
         for _ in 0..ITERATIONS {
             let negative = self.tangent(drive)?;
             let size = self.right.norm() / self.space.amplitude;
-            self.now.z.iter_mut().zip(self.right.iter()).for_each(|(z, dz)| *z -= dz);
+            let [z, _, _] = self.now.parts_mut();
+            z.iter_mut().zip(self.right.iter()).for_each(|(z, dz)| *z -= dz);
             done = size <= TOLERANCE || size <= STALLED && size > 0.1 * last;
             last = size;
             if !size.is_finite() || negative > 0 {
@@ -140,8 +140,8 @@ impl ReducedRodas4 {
         // the tangent of the sensitivities is that of the state
         self.tangent(drive)?;
         self.keep();
-        self.forces.place_at_rest(&self.space, &self.now.z);
-        let off = self.now.z.iter().zip(z).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
+        self.forces.place_at_rest(&self.space, self.now.z());
+        let off = self.now.z().iter().zip(z).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
         Some(off / self.space.amplitude)
     }
 
@@ -165,7 +165,8 @@ impl ReducedRodas4 {
         stages.forces.change(&stages.of, (now.parts(), at.parts()), (drive, change), force);
         right.as_mut_slice().copy_from_slice(force);
         if let Some((moved, _)) = solve(stiffness, right) {
-            at.z.iter_mut().zip(moved.iter()).for_each(|(to, x)| *to = -x);
+            let [z, _, _] = at.parts_mut();
+            z.iter_mut().zip(moved.iter()).for_each(|(to, x)| *to = -x);
         }
         at.pack(&mut carried[2 + 2 * p..4 + 2 * p]);
     }
@@ -174,11 +175,16 @@ impl ReducedRodas4 {
     pub(super) fn solve_ports(&mut self, ramp: &Ramp<'_>, (i, s, h): (usize, f64, f64)) {
         let Some(mut ports) = self.ports.take() else { return };
         for p in 0..ports.len() {
-            let Self { polynomials: Some(stages), at, drive, mass, damping, stiffness, .. } = self else { break };
-            ports.stage((&stages.of, &mut stages.forces), ramp, (p, i, s), (at, drive), [stiffness, damping, mass]);
-            ports.at.combined(i, h, &ports.increments[p][..i], self.r1.as_mut_slice(), self.r2.as_mut_slice());
-            self.solve_right(h, (&ports.force, &ports.forcing[p], GAMMA_I[i] * h));
-            put_increments(GAMMA * h, (&self.right, &self.r1, &self.r2), &mut ports.increments[p][i]);
+            let Self { polynomials: Some(stages), factor: Some(factor), at, drive, mass, damping, .. } = self else {
+                break;
+            };
+            let matrices = [&self.stiffness, &*damping, &*mass];
+            ports.stage((&stages.of, &mut stages.forces), ramp, (p, i, s), (at, drive), matrices);
+            let ReducedPortSensitivities { at, force, forcing, increments, .. } = &mut *ports;
+            let damping = self.damped.then_some(&*damping);
+            let step = StepMatrices { mass, damping, factor: factor.l_dirty(), h };
+            self.stage.solve(step, StageForces { i, at, force, forcing: &forcing[p] }, &mut increments[p]);
+            self.work.solves += 1;
         }
         self.ports = Some(ports);
     }

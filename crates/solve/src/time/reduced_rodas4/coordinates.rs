@@ -1,57 +1,94 @@
 //! Motions over the coordinates of a reduced model, and the few operations of dense matrices of a step.
 
-use crate::equations::Motion;
-use crate::time::rodas4::tableau::C;
-use bimorph_multibody::planar::DOF;
-use nalgebra::{DMatrix, DVector};
+// triangles are indexed as they are written
+#![allow(clippy::needless_range_loop)]
 
-/// Coordinates, rates and accelerations.
+use crate::equations::Motion;
+use crate::time::rodas4::tableau::{C, GAMMA, GAMMA_I};
+use bimorph_multibody::planar::DOF;
+use nalgebra::DMatrix;
+
+/// Evaluates an expression for the number of coordinates: of a small one the compiler knows the number, and unrolls its loops. Operations are the same in
+/// the same order.
+macro_rules! of_size {
+    ($size:expr, $m:ident => $of:expr) => {
+        match $size {
+            2 => of_size!(@ 2, $m, $of),
+            3 => of_size!(@ 3, $m, $of),
+            4 => of_size!(@ 4, $m, $of),
+            5 => of_size!(@ 5, $m, $of),
+            6 => of_size!(@ 6, $m, $of),
+            7 => of_size!(@ 7, $m, $of),
+            8 => of_size!(@ 8, $m, $of),
+            $m => $of,
+        }
+    };
+    (@ $number:literal, $m:ident, $of:expr) => {{
+        let $m: usize = $number;
+        $of
+    }};
+}
+
+/// Coordinates, rates and accelerations, one behind the other.
 #[derive(Debug, Clone)]
 pub(super) struct ReducedMotion {
-    pub(super) z: Vec<f64>,
-    pub(super) v: Vec<f64>,
-    pub(super) w: Vec<f64>,
+    all: Vec<f64>,
 }
 
 impl ReducedMotion {
     pub(super) fn zeros(m: usize) -> Self {
-        Self { z: vec![0.0; m], v: vec![0.0; m], w: vec![0.0; m] }
+        Self { all: vec![0.0; 3 * m] }
+    }
+
+    /// Number of coordinates.
+    #[inline(always)]
+    fn size(&self) -> usize {
+        self.all.len() / 3
     }
 
     pub(super) fn copy(&mut self, from: &Self) {
-        for (to, from) in self.all().into_iter().zip(from.parts()) {
-            to.copy_from_slice(from);
-        }
+        self.all.copy_from_slice(&from.all);
     }
 
-    pub(super) fn all(&mut self) -> [&mut Vec<f64>; 3] {
-        [&mut self.z, &mut self.v, &mut self.w]
+    pub(super) fn z(&self) -> &[f64] {
+        self.parts()[0]
     }
 
-    /// All three.
+    /// Coordinates, rates and accelerations.
+    #[inline(always)]
     pub(super) fn parts(&self) -> [&[f64]; 3] {
-        [&self.z, &self.v, &self.w]
+        let m = self.size();
+        let (z, (v, w)) = (&self.all[..m], self.all[m..].split_at(m));
+        [z, v, w]
+    }
+
+    /// The same to be changed.
+    #[inline(always)]
+    pub(super) fn parts_mut(&mut self) -> [&mut [f64]; 3] {
+        let m = self.size();
+        let (z, rest) = self.all.split_at_mut(m);
+        let (v, w) = rest.split_at_mut(m);
+        [z, v, w]
     }
 
     pub(super) fn is_zero(&self) -> bool {
-        self.parts().iter().all(|x| x.iter().all(|x| *x == 0.0))
+        self.all.iter().all(|x| *x == 0.0)
     }
 
     pub(super) fn clear(&mut self) {
-        self.all().into_iter().for_each(|x| x.fill(0.0));
+        self.all.fill(0.0);
     }
 
-    /// `self += share·more`.
-    pub(super) fn add(&mut self, share: f64, more: &Self) {
-        for (to, x) in self.all().into_iter().zip(more.parts()) {
-            to.iter_mut().zip(x).for_each(|(to, x)| *to += share * x);
-        }
+    /// `self = of + Σ share·more`.
+    #[inline]
+    pub(super) fn set_sum(&mut self, of: &Self, shares: &[f64], more: &[Self]) {
+        of_size!(of.size(), m => set_sum(3 * m, &mut self.all, of, shares, more));
     }
 
     /// As two motions of poses: z and v, then w, three numbers to a pose.
     pub(super) fn pack(&self, to: &mut [Motion]) {
-        let [position, push] = to else { return };
-        for (to, from) in [(&mut position.q, &self.z), (&mut position.v, &self.v), (&mut push.q, &self.w)] {
+        let ([position, push], [z, v, w]) = (to, self.parts()) else { return };
+        for (to, from) in [(&mut position.q, z), (&mut position.v, v), (&mut push.q, w)] {
             from.iter().enumerate().for_each(|(k, x)| to[k / DOF][k % DOF] = *x);
         }
     }
@@ -59,118 +96,131 @@ impl ReducedMotion {
     /// Inverse of [`ReducedMotion::pack`].
     pub(super) fn unpack(&mut self, from: &[Motion]) {
         let [position, push] = from else { return };
-        for (to, from) in self.all().into_iter().zip([&position.q, &position.v, &push.q]) {
+        for (to, from) in self.parts_mut().into_iter().zip([&position.q, &position.v, &push.q]) {
             to.iter_mut().enumerate().for_each(|(k, x)| *x = from[k / DOF][k % DOF]);
         }
     }
+}
 
-    /// r₁ and r₂ of stage `i` of a step of length `h` (s), from the increments of the stages before it.
-    pub(super) fn combined(&self, i: usize, h: f64, before: &[Self], r1: &mut [f64], r2: &mut [f64]) {
-        r1.copy_from_slice(&self.v);
-        r2.copy_from_slice(&self.w);
-        for (c, u) in C[i].iter().zip(before) {
-            for (r, u) in [(&mut *r1, &u.z), (&mut *r2, &u.v)] {
-                r.iter_mut().zip(u).for_each(|(r, u)| *r += c / h * u);
-            }
+/// The same over slices of `n` numbers.
+#[inline(always)]
+fn set_sum(n: usize, to: &mut [f64], of: &ReducedMotion, shares: &[f64], more: &[ReducedMotion]) {
+    let to = &mut to[..n];
+    to.copy_from_slice(&of.all[..n]);
+    for (share, more) in shares.iter().zip(more) {
+        to.iter_mut().zip(&more.all[..n]).for_each(|(to, x)| *to += share * x);
+    }
+}
+
+/// Matrices of a step, by columns, and the length of the step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StepMatrices<'a> {
+    pub(super) mass: &'a DMatrix<f64>,
+    pub(super) damping: Option<&'a DMatrix<f64>>,
+    /// Cholesky's factor of W; what is above the diagonal is not read.
+    pub(super) factor: &'a DMatrix<f64>,
+    /// Length of the step (s).
+    pub(super) h: f64,
+}
+
+/// A stage: its number, where it evaluates, force and ∂R/∂t there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StageForces<'a> {
+    pub(super) i: usize,
+    pub(super) at: &'a ReducedMotion,
+    pub(super) force: &'a [f64],
+    pub(super) forcing: &'a [f64],
+}
+
+/// Room for the solve of a stage: r₁, r₂ and their sum r₁/(γh) + r₂.
+#[derive(Debug, Clone)]
+pub(super) struct StageRoom([Vec<f64>; 3]);
+
+impl StageRoom {
+    pub(super) fn new(m: usize) -> Self {
+        Self([(); 3].map(|()| vec![0.0; m]))
+    }
+
+    /// The increments of a stage behind those of the stages before it.
+    #[inline]
+    pub(super) fn solve(&mut self, step: StepMatrices<'_>, stage: StageForces<'_>, increments: &mut [ReducedMotion]) {
+        let (before, rest) = increments.split_at_mut(stage.i);
+        if let Some(to) = rest.first_mut() {
+            of_size!(stage.force.len(), m => solve_stage(m, (step, stage), before, &mut self.0, &mut to.all));
         }
     }
 }
 
-/// The increments of a stage with Uz on the right side; `gh` is γ times the length of the step (s).
-pub(super) fn put_increments(
-    gh: f64,
-    (right, r1, r2): (&DVector<f64>, &DVector<f64>, &DVector<f64>),
-    u: &mut ReducedMotion,
+/// Uz = W⁻¹·(M·(r₁/(γh) + r₂) + C·r₁ − force − γ_i·h·forcing), Uv = Uz/(γh) − r₁ and Uw = Uv/(γh) − r₂.
+#[inline(always)]
+fn solve_stage(
+    m: usize,
+    (step, stage): (StepMatrices<'_>, StageForces<'_>),
+    before: &[ReducedMotion],
+    [r1, r2, product]: &mut [Vec<f64>; 3],
+    to: &mut [f64],
 ) {
-    for (k, (z, (r1, r2))) in right.iter().zip(r1.iter().zip(r2.iter())).enumerate() {
-        u.z[k] = *z;
-        u.v[k] = u.z[k] / gh - r1;
-        u.w[k] = u.v[k] / gh - r2;
+    let (h, gh, shift) = (step.h, GAMMA * step.h, GAMMA_I[stage.i] * step.h);
+    let (r1, r2, product) = (&mut r1[..m], &mut r2[..m], &mut product[..m]);
+    let [_, v, w] = stage.at.parts();
+    r1.copy_from_slice(&v[..m]);
+    r2.copy_from_slice(&w[..m]);
+    for (c, u) in C[stage.i].iter().zip(before) {
+        let (share, [z, v, _]) = (c / h, u.parts());
+        r1.iter_mut().zip(&z[..m]).for_each(|(r, u)| *r += share * u);
+        r2.iter_mut().zip(&v[..m]).for_each(|(r, u)| *r += share * u);
     }
-}
-
-/// Calls a function of a fixed size, which the compiler unrolls, for the sizes that models have. Its operations are those of any size in their order.
-macro_rules! of_size {
-    ($size:expr, $of:ident($($given:expr),*)) => {
-        match $size {
-            2 => $of::<2>($($given),*),
-            3 => $of::<3>($($given),*),
-            4 => $of::<4>($($given),*),
-            5 => $of::<5>($($given),*),
-            6 => $of::<6>($($given),*),
-            7 => $of::<7>($($given),*),
-            8 => $of::<8>($($given),*),
-            _ => false,
-        }
-    };
+    product.iter_mut().zip(&*r1).zip(&*r2).for_each(|((x, r1), r2)| *x = r1 / gh + r2);
+    let (z, rest) = to.split_at_mut(m);
+    z.fill(0.0);
+    add_columns(m, step.mass.as_slice(), product, z);
+    if let Some(damping) = step.damping {
+        add_columns(m, damping.as_slice(), r1, z);
+    }
+    for (right, (force, forcing)) in z.iter_mut().zip(stage.force[..m].iter().zip(&stage.forcing[..m])) {
+        *right -= force + shift * forcing;
+    }
+    solve_factored(m, step.factor.as_slice(), z);
+    let (of_rates, of_pushes) = rest.split_at_mut(m);
+    let of_stage = z.iter().zip(&mut *of_rates).zip(&mut of_pushes[..m]);
+    for (((z, v), w), (r1, r2)) in of_stage.zip(r1.iter().zip(&*r2)) {
+        *v = z / gh - r1;
+        *w = *v / gh - r2;
+    }
 }
 
 /// `to += a·x`.
 #[inline]
 pub(super) fn add_product(a: &DMatrix<f64>, x: &[f64], to: &mut [f64]) {
-    let a = a.as_slice();
-    if !of_size!(to.len(), add_fixed_product(a, x, to)) {
-        for (column, x) in a.chunks_exact(to.len()).zip(x) {
-            to.iter_mut().zip(column).for_each(|(to, a)| *to += a * x);
-        }
-    }
+    of_size!(to.len(), m => add_columns(m, a.as_slice(), x, to));
 }
 
-/// The product of a size; false where the lengths are not those of it.
-#[inline]
-fn add_fixed_product<const M: usize>(a: &[f64], x: &[f64], to: &mut [f64]) -> bool {
-    let (columns, Ok(x), Ok(to)) = (a.as_chunks::<M>().0, <&[f64; M]>::try_from(x), <&mut [f64; M]>::try_from(to))
-    else {
-        return false;
-    };
-    let Ok(columns) = <&[[f64; M]; M]>::try_from(columns) else { return false };
-    let mut sum = *to;
-    for (column, x) in columns.iter().zip(x) {
-        sum.iter_mut().zip(column).for_each(|(to, a)| *to += a * x);
+/// The same of an order.
+#[inline(always)]
+fn add_columns(m: usize, a: &[f64], x: &[f64], to: &mut [f64]) {
+    let to = &mut to[..m];
+    for (column, x) in a.chunks_exact(m).zip(&x[..m]) {
+        to.iter_mut().zip(column).for_each(|(to, a)| *to += a * x);
     }
-    *to = sum;
-    true
 }
 
 /// `x` becomes (L·Lᵀ)⁻¹·x, with what is above the diagonal not read.
-#[inline]
-pub(super) fn solve_factored(l: &DMatrix<f64>, x: &mut [f64]) {
-    let (l, m) = (l.as_slice(), x.len());
-    if !of_size!(m, solve_fixed(l, x)) {
-        let columns = || l.chunks_exact(m).enumerate();
-        for (j, column) in columns() {
-            x[j] /= column[j];
-            let (done, rest) = x.split_at_mut(j + 1);
-            rest.iter_mut().zip(&column[j + 1..]).for_each(|(x, l)| *x -= l * done[j]);
-        }
-        for (j, column) in columns().rev() {
-            let known: f64 = x[j + 1..].iter().zip(&column[j + 1..]).map(|(x, l)| l * x).sum();
-            x[j] = (x[j] - known) / column[j];
+#[inline(always)]
+fn solve_factored(m: usize, l: &[f64], x: &mut [f64]) {
+    let (l, x) = (&l[..m * m], &mut x[..m]);
+    for j in 0..m {
+        x[j] /= l[j * m + j];
+        for i in j + 1..m {
+            x[i] -= l[j * m + i] * x[j];
         }
     }
-}
-
-/// The solution of a size; false where the lengths are not those of it.
-#[inline]
-fn solve_fixed<const M: usize>(l: &[f64], x: &mut [f64]) -> bool {
-    let (columns, Ok(x)) = (l.as_chunks::<M>().0, <&mut [f64; M]>::try_from(x)) else { return false };
-    let Ok(columns) = <&[[f64; M]; M]>::try_from(columns) else { return false };
-    let mut y = *x;
-    for j in 0..M {
-        y[j] /= columns[j][j];
-        for i in j + 1..M {
-            y[i] -= columns[j][i] * y[j];
-        }
-    }
-    for j in (0..M).rev() {
+    for j in (0..m).rev() {
         let mut known = -0.0;
-        for i in j + 1..M {
-            known += columns[j][i] * y[i];
+        for i in j + 1..m {
+            known += l[j * m + i] * x[i];
         }
-        y[j] = (y[j] - known) / columns[j][j];
+        x[j] = (x[j] - known) / l[j * m + j];
     }
-    *x = y;
-    true
 }
 
 #[cfg(test)]
@@ -189,7 +239,7 @@ mod tests {
             (0..m).for_each(|j| (0..m).for_each(|i| expected[i] += l[(i, j)] * x[j]));
             assert_eq!(product, expected);
             let mut solved = x.clone();
-            solve_factored(&l, &mut solved);
+            of_size!(m, m => solve_factored(m, l.as_slice(), &mut solved));
             let mut expected = x;
             for j in 0..m {
                 expected[j] /= l[(j, j)];

@@ -7,7 +7,7 @@
 // blocks of fixed size are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
 
-use super::{ReducedMotion, ReducedRodas4};
+use super::ReducedRodas4;
 use crate::reduced::polynomial::motion::PolynomialMotion;
 use crate::reduced::polynomial::motion::lanes::{LanePolynomialForces, LaneReducedMotion};
 use crate::time::method::{Motion, StepResult};
@@ -43,8 +43,8 @@ pub struct LaneReducedRodas4 {
     active: [bool; LANES],
     /// Lanes whose matrix has no factor.
     vanished: [bool; LANES],
-    /// Motion of the bodies per unit of each direction, and their masses (kg, kg·m²).
-    moved: Vec<Vec<Pose>>,
+    /// Motion of the bodies per unit of each direction, those of a body together, and their masses (kg, kg·m²).
+    moved: Vec<Pose>,
     mass: Vec<Pose>,
     /// Norms √(eᵀMe) of the error of the last step, of displacements and of rates.
     errors: [[f64; LANES]; 2],
@@ -113,13 +113,13 @@ impl LaneReducedRodas4 {
     /// The end of the step of a lane goes to its own method, which places the bodies there.
     pub fn give(&self, lane: usize, method: &mut ReducedRodas4, motion: &mut Motion) {
         let last = &self.increments[STAGES - 1];
-        let all = self.at.parts().into_iter().zip(last.parts()).zip(method.now.all());
+        let all = self.at.parts().into_iter().zip(last.parts()).zip(method.now.parts_mut());
         for ((at, u), now) in all {
             for ((at, u), now) in at.iter().zip(u).zip(now) {
                 *now = at.lane(lane) + u.lane(lane);
             }
         }
-        let ReducedMotion { z, v, .. } = &mut method.increments[STAGES - 1];
+        let [z, v, _] = method.increments[STAGES - 1].parts_mut();
         for (to, from) in [(z, &last.z), (v, &last.v)] {
             to.iter_mut().zip(from).for_each(|(to, from)| *to = from.lane(lane));
         }
@@ -246,12 +246,12 @@ impl Kernel for ErrorNorms<'_> {
         for (u, norms) in [&last.z, &last.v].into_iter().zip(errors) {
             // a sum begins as that of `f64` does
             let mut sum = W::splat(simd, std::iter::empty::<f64>().sum());
-            for (j, mass) in mass.iter().enumerate() {
+            for (mass, moved) in mass.iter().zip(moved.chunks_exact(u.len())) {
                 let mut error = [W::splat(simd, 0.0); DOF];
                 for (moved, u) in moved.iter().zip(u) {
                     let u = W::load(simd, u);
                     for i in 0..DOF {
-                        error[i] += W::splat(simd, moved[j][i]) * u;
+                        error[i] += W::splat(simd, moved[i]) * u;
                     }
                 }
                 let [x, y, turn] = error;

@@ -106,10 +106,7 @@ impl ReducedPortSensitivities {
         matrices: [&DMatrix<f64>; 3],
     ) {
         let Self { sources, now, at, increments, force, change, first_tangent, .. } = self;
-        at.copy(&now[p]);
-        for (j, u) in increments[p][..i].iter().enumerate() {
-            at.add(A[i][j], u);
-        }
+        at.set_sum(&now[p], &A[i], &increments[p][..i]);
         ramp.sensitivity(s, sources[p], change);
         let parts = [&change.volts, &change.expansion, &change.inputs];
         if parts.iter().all(|x| x.iter().all(|x| *x == 0.0)) && at.is_zero() {
@@ -129,12 +126,8 @@ impl ReducedPortSensitivities {
         let Self { now, at, increments, .. } = self;
         let last = ALPHA.len() - 1;
         for (now, increments) in now.iter_mut().zip(&*increments) {
-            at.copy(now);
-            for (j, u) in increments[..last].iter().enumerate() {
-                at.add(A[last][j], u);
-            }
-            now.copy(at);
-            now.add(1.0, &increments[last]);
+            at.set_sum(now, &A[last], &increments[..last]);
+            now.set_sum(at, &[1.0], &increments[last..]);
         }
     }
 
@@ -144,12 +137,13 @@ impl ReducedPortSensitivities {
         let tree = &space.joints.tree;
         for (now, bodies) in now.iter().zip(bodies) {
             if !rates {
-                space.strains(&now.z, room);
+                space.strains(now.z(), room);
                 forces.placed.spread(tree, room, &mut bodies.q);
                 bodies.v.fill(Pose::zeros());
                 continue;
             }
-            space.place_strains([&now.z, &now.v, &[]], given);
+            let [z, v, _] = now.parts();
+            space.place_strains([z, v, &[]], given);
             changes.place(tree, &forces.given, given);
             for (j, (q, v)) in bodies.q.iter_mut().zip(&mut bodies.v).enumerate() {
                 [*q, *v, _] = changes.of(j);
