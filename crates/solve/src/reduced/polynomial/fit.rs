@@ -188,7 +188,8 @@ impl<'a> Fit<'a> {
         let fit_error = largest_error(&(&kept * &coefficients), &wanted);
         let root = (table.nrows() as f64).sqrt();
         let typical = table * &coefficients / root;
-        let apart = ErrorBudget::of(tol).reduced_statics(); // of displacements, whose squares have masses
+        let errors = ErrorBudget::of(tol);
+        let apart = errors.reduced_statics(); // of displacements, whose squares have masses
         let inertia = independent(coefficients.columns(in_energy(counts)[1].0, counts[4]), apart * apart, (m, apart));
         let mut inertia = Polynomials { monomials: Arc::clone(&monomials), coefficients: inertia };
         for (c, factors) in monomials.factors.iter().enumerate() {
@@ -198,7 +199,6 @@ impl<'a> Fit<'a> {
         }
         let all = Polynomials { monomials: Arc::clone(&monomials), coefficients: coefficients.transpose() };
         let [c, a, w, p, _] = counts;
-        let errors = ErrorBudget::of(tol);
         let least = if fine { errors.fine_closures() } else { errors.closures() };
         let closed = principal(&typical.columns(0, c).into_owned(), |_| least);
         let near = principal(&typical.columns(c, a).into_owned(), |largest| errors.approaches(largest));
@@ -219,10 +219,9 @@ impl<'a> Fit<'a> {
             .collect();
         let approaches = thinned(&approaches, groups, &of_gaps, &monomials, errors);
         let (stiffness, thermal, built_in) = self.tree_forces(scale);
-        let turned = (&self.rotation, scale);
         let [mass_slopes, damping_slopes] = match self.moves {
             true => [DMatrix::zeros(m, m), DMatrix::zeros(m, m)],
-            false => slopes(self.space, turned, (&self.mass, &reach), ErrorBudget::of(tol).constant_mass()),
+            false => slopes(self.space, (&self.rotation, scale), (&self.mass, &reach), errors.constant_mass()),
         };
         PolynomialModel {
             scale,

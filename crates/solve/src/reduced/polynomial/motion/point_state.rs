@@ -1,4 +1,4 @@
-//! What the law of a point of a gap brings to the forces: its force with the derivatives, at an approach and its rate.
+//! The law of a point of a gap at an approach and its rate: its force with the derivatives.
 
 use bimorph_domains::PointLaw;
 use bimorph_domains::comb_sides::CombLaw;
