@@ -237,9 +237,10 @@ impl FileRequest {
         }
         if model.fitted.missed > 0 {
             warnings.push(format!(
-                "{} of {} equilibria lie beyond a pull-in where the file has none: it releases at other inputs than the full model; take a narrower \
+                "{} of {} equilibria lie beyond a pull-in where the file has none: it goes back at other inputs than the full model; take a narrower \
                  --range, or a smaller --within, which adds coordinates",
-                model.fitted.missed, model.fitted.compared
+                model.fitted.missed,
+                model.fitted.compared + model.fitted.missed
             ));
         }
         let about = about_reduced(compiled, &model, source, &warnings);

@@ -115,9 +115,13 @@ pub fn train(
     let mut rounds = 0;
     let most = if options.beyond { ROUNDS_BEYOND } else { ROUNDS };
     loop {
-        let (error, worst, states) = trainer.check(&space);
+        let BoxCheck { error, lacking, beyond, states } = trainer.check(&space);
         let before = trainer.basis.len();
-        for s in worst.into_iter().flatten().filter(|_| rounds < most) {
+        for s in lacking.into_iter().flatten().filter(|_| rounds < most) {
+            trainer.product.extend(&mut trainer.basis, s, NEW);
+        }
+        // a state beyond a pull-in is worth a direction, but not the whole model
+        if let Some((_, s)) = beyond.filter(|_| rounds < most && trainer.basis.len() < trainer.most()) {
             trainer.product.extend(&mut trainer.basis, s, NEW);
         }
         let more = trainer.basis.len() - before;
@@ -147,6 +151,19 @@ struct Trainer<'a> {
 
 /// Equilibria that the directions lack, over the coordinates of the tree.
 type Lacking = Option<Vec<Vec<Pose>>>;
+
+/// The statics of a space in the boxes; states are over the coordinates of the tree.
+#[derive(Debug, Default)]
+struct BoxCheck {
+    /// The largest error (1).
+    error: f64,
+    /// The equilibria that are lacking at the worst point.
+    lacking: Lacking,
+    /// The worst state beyond a pull-in whose error is not within its part of the tolerance, with that error (1).
+    beyond: Option<(f64, Vec<Pose>)>,
+    /// All states.
+    states: Vec<Vec<Pose>>,
+}
 
 impl Trainer<'_> {
     /// Steps 1 and 2. Returns the samples over the coordinates of the tree.
@@ -279,20 +296,17 @@ impl Trainer<'_> {
         self.basis.iter().map(|b| self.product.product(b, &s)).collect()
     }
 
-    /// Step 4: the largest error in the boxes, the equilibria that are lacking at the worst point, and all reduced states.
-    fn check(&self, space: &ReducedSpace) -> (f64, Lacking, Vec<Vec<Pose>>) {
-        let mut statics = ReducedStatics::new(space);
-        let (mut error, mut worst, mut states) = (0.0f64, None, Vec::new());
+    /// Step 4.
+    fn check(&self, space: &ReducedSpace) -> BoxCheck {
+        let (mut statics, mut found) = (ReducedStatics::new(space), BoxCheck::default());
         for (case, beyond) in self.cases.iter().zip(&self.beyond) {
             // the forces over z are those of one system alone: others have other loads
             let space = space.of_system(case.system);
-            let found = (&mut error, &mut worst, &mut states);
-            if self.check_case(&space, case, &mut statics, found) && self.options.beyond {
-                let found = (&mut error, &mut worst, &mut states);
-                self.check_beyond(&space, case, (beyond, &mut statics), found);
+            if self.check_case(&space, case, &mut statics, &mut found) && self.options.beyond {
+                self.check_beyond(&space, case, (beyond, &mut statics), &mut found);
             }
         }
-        (error, worst, states)
+        found
     }
 
     /// Returns whether a branch from rest ends in the box.
@@ -301,7 +315,7 @@ impl Trainer<'_> {
         space: &ReducedSpace,
         case: &TrainingCase<'_>,
         statics: &mut ReducedStatics,
-        (error, worst, states): (&mut f64, &mut Lacking, &mut Vec<Vec<Pose>>),
+        BoxCheck { error, lacking: worst, states, .. }: &mut BoxCheck,
     ) -> bool {
         let mut ends = false;
         let (system, inputs) = (case.system, &case.inputs);
@@ -338,13 +352,13 @@ impl Trainer<'_> {
         ends
     }
 
-    /// The same for the states beyond a pull-in, each at its place in the space. The one with the largest error joins what is lacking.
+    /// The same for the states beyond a pull-in, each at its place in the space.
     fn check_beyond(
         &self,
         space: &ReducedSpace,
         case: &TrainingCase<'_>,
         (beyond, statics): (&OnceCell<Vec<BranchState>>, &mut ReducedStatics),
-        (error, worst, states): (&mut f64, &mut Lacking, &mut Vec<Vec<Pose>>),
+        BoxCheck { error, beyond: worst, states, .. }: &mut BoxCheck,
     ) {
         let (system, inputs) = (case.system, &case.inputs);
         let beyond = beyond.get_or_init(|| {
@@ -353,22 +367,19 @@ impl Trainer<'_> {
             found
         });
         let mut full = FullCheck::new(system);
-        let mut most = (self.options.errors.statics_beyond(), None);
+        let share = self.options.errors.statics_beyond();
         for state in beyond {
             let mut s = vec![Pose::zeros(); system.bodies()];
             self.joints.tree.coordinates_at(&state.q, &mut s);
             statics.forces.place_at_rest(space, &self.coordinates(&s));
             let found = full.of(system, &statics.forces.placed.at, &state.drive, None).error;
-            if found > most.0 {
-                most = (found, Some(s.clone()));
+            if found > worst.as_ref().map_or(share, |(error, _)| *error) {
+                *worst = Some((found, s.clone()));
             }
             if state.branch != StaticBranch::Release {
                 *error = error.max(found);
                 states.push(s);
             }
-        }
-        if let Some(s) = most.1 {
-            worst.get_or_insert_default().push(s);
         }
     }
 

@@ -121,7 +121,7 @@ pub fn fitted(
     let follows = following(&model, &states);
     let FittedErrors { of: errors, missed } = errors;
     let error = errors[0].max(errors[1]);
-    FittedPolynomials { model, error, errors, compared: references.len(), missed, follows }
+    FittedPolynomials { model, error, errors, compared: references.len() - missed, missed, follows }
 }
 
 /// Members by their voltage, but for those that stay apart.

@@ -4,7 +4,7 @@
 //! T/E = ½·Σ_j (M_j + Σ_l D_jl·x_l)·ẋ_j²      d/dt((M_j + Σ_l D_jl·x_l)·ẋ_j) − ½·Σ_i D_ij·ẋ_i²
 //! ```
 //! The first is the kinetic energy, the second its part of the equation of coordinate j. M_j are the masses at rest, where the mass matrix is
-//! diagonal. Entries between two coordinates change a frequency in the second order only, and are left out. So are changes below a tenth of the
+//! diagonal. Entries between two coordinates change a frequency in the second order only, and are left out. So are changes below a fiftieth of the
 //! tolerance, and those of fast coordinates, whose masses are small beside their springs.
 //!
 //! Drag of bodies varies as their masses do:
