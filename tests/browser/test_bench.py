@@ -126,6 +126,8 @@ def test_a_transient(bench: Any) -> None:
     rest = page.wait("return document.querySelector('.figure canvas').toDataURL()")
     page.run("const s = page.tabs[3].scrub; s.value = 700; s.dispatchEvent(new Event('input'))")
     page.wait("return document.querySelector('.figure canvas').toDataURL() !== arguments[0]", rest)
+    # a run under way still shows its answer
+    page.wait("const of = page.latest('transient'); return !of.running && !of.waiting")
     page.run("const w = page.tabs[3].waves[0]; page.tabs[3].answer = null; w.input.value = 'PULSE(0 40 10u 1u 1u 200u)'; w.input.dispatchEvent(new Event('change'))")
     page.wait("return page.tabs[3].answer && page.tabs[3].answer.t.length > 100")
     moved = page.run("const a = page.tabs[3].answer, s = a.signals[0][2]; return [a.t, s]")
