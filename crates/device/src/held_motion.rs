@@ -17,6 +17,8 @@ pub(crate) struct HeldMotion {
     pub(crate) motion: Motion,
     /// State of the method at the end, with the sensitivities.
     pub(crate) carried: Vec<Motion>,
+    /// Sensitivities of the bodies at the end, one for each port.
+    pub(crate) sensitivities: Vec<Motion>,
     /// Rises at the end (K), and their change with the source of each port.
     pub(crate) rise: Vec<f64>,
     pub(crate) rise_slope: Vec<Vec<f64>>,
@@ -36,6 +38,7 @@ impl HeldMotion {
             ends: Vec::new(),
             motion: zeros(),
             carried: Vec::new(),
+            sensitivities: vec![zeros(); ports],
             rise: vec![0.0; rises],
             rise_slope: vec![vec![0.0; means]; ports],
             changes: vec![0.0; ports],

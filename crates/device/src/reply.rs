@@ -93,7 +93,10 @@ impl DeviceSession {
                         None => row.iter().zip(&self.sources).map(|(g, u)| g * u).sum(),
                     };
                     reply.di_dv.extend(self.ports.sources.iter().map(|&other| row[other]));
-                    let of = |g: usize| electrics.gap_rows[(g, port)] * system.charge(g, view.q, view.volts);
+                    let of = |g: usize| match electrics.gap_rows[(g, port)] {
+                        0.0 => 0.0,
+                        share => share * system.charge(g, view.q, view.volts),
+                    };
                     charge = (0..gaps).map(of).sum();
                 }
                 PortResponse::Motion(signal) => current = signal.value(compiled, &view),

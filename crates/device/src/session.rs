@@ -47,8 +47,6 @@ pub(super) struct DeviceSession {
     pub(super) reduction: Option<SessionReduction>,
     /// Why trials have the full model, though a reduced one was requested.
     pub(super) full_because: Option<String>,
-    /// Whether a signal or port shows a rate.
-    pub(super) sees_rates: bool,
     /// The trial at hand is taken again in the full model.
     pub(super) takes_bodies: bool,
     /// Carries ∂motion/∂(final voltage), one for each opened port.
@@ -151,7 +149,6 @@ impl DeviceSession {
             shaken,
             stepper: Adaptive::new(n, method),
             reduction,
-            sees_rates,
             full_because,
             takes_bodies: false,
             weights: NormWeights::new(&system.model),

@@ -5,7 +5,6 @@ mod held;
 mod macro_steps;
 mod reduced;
 
-use super::agitation::ThermalForce;
 use super::contact_steps::MAX_ERROR;
 use super::growth::{Bound, rate_along};
 use super::session::DeviceSession;
@@ -136,8 +135,8 @@ impl DeviceSession {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
         self.fill_sources(&system.electrics, request.voltages);
-        let from = parent.map_or_else(|| vec![0.0; self.sources.len()], |p| p.sources.clone());
-        let electrics = &system.electrics;
+        let (electrics, rest) = (&system.electrics, vec![0.0; self.sources.len()]);
+        let from = parent.map_or(rest, |p| p.sources.clone());
         if let Some(shaken) = &mut self.shaken {
             let start = parent.map_or(0.0, |p| p.elapsed);
             if let Err(longest) = shaken.over(compiled, start, request.dt) {
@@ -145,20 +144,22 @@ impl DeviceSession {
                 return true;
             }
         }
-        let errors = compiled.options.errors();
+        let (errors, beyond) = (compiled.options.errors(), self.is_beyond(&self.sources));
         let tol = errors.step();
-        let beyond = self.is_beyond(&self.sources);
         let next_step;
         (next_step, self.position) = self.in_macro_step(system, (request, parent), errors).unzip();
         let integrated = parent.filter(|_| next_step.is_none());
         let integrated = integrated.and_then(|parent| self.integrated_parent(system, (request, parent), errors));
         let parent = integrated.as_deref().or(parent);
-        let held = next_step.or_else(|| self.about_held(system, (request, parent), tol));
+        let states = electrics.heating.states();
+        let (to, rise) = (self.sources.clone(), parent.map_or_else(|| vec![0.0; states], |p| p.rise.clone()));
+        let ramp = Ramp::new(electrics, &from, &to, &rise, request.dt);
+        let held = next_step.or_else(|| self.about_held(system, (request, parent), &ramp, tol));
         if held.is_none() {
             self.begin(parent, beyond);
         }
-        let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
-        let mut ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
+        let push = self.shaken.as_ref().map_or_else(Vec::new, |shaken| shaken.mean().to_vec());
+        let ramp = ramp.pushed(&push);
         if let Err(error) = check_course(compiled, &ramp) {
             reply.status = Status::Fail(error.to_string());
             return true;
@@ -169,8 +170,6 @@ impl DeviceSession {
         if held.is_none() && !(kept && self.stepper.along(bodies, &mut self.motion, ends, (tol, MAX_ERROR))) {
             self.begin(parent, beyond);
             h = parent.map_or(self.first_step, |p| p.next_step);
-            let push = self.shaken.as_ref().map_or(&[][..], ThermalForce::mean);
-            ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
             let advanced = self.stepper.advance(
                 &mut Bodies::weighed(system, &ramp, &self.weights),
                 &mut self.motion,
@@ -197,7 +196,9 @@ impl DeviceSession {
         if self.went_far(false) {
             return false;
         }
-        self.stepper.method.place_sensitivities(self.sees_rates);
+        if held.is_none() {
+            self.stepper.method.place_sensitivities();
+        }
         let energised = |gap: usize| electrics.is_energised(gap, &self.sources);
         if let Err(error) = within_contact_range(compiled, &self.motion.q, energised) {
             reply.status = Status::Fail(error.to_string());
@@ -214,8 +215,7 @@ impl DeviceSession {
         if let Some(offset) = &self.offset {
             offset.add(1.0, &mut self.motion);
         }
-        let rest = Snapshot::default();
-        self.answer(compiled, request, Some((&from, parent.unwrap_or(&rest))), h, reply);
+        self.answer(compiled, request, Some((&from, parent.unwrap_or(&Snapshot::default()))), h, reply);
         let cell = self.shaken.as_ref().map_or(f64::INFINITY, |shaken| shaken.cell);
         reply.dt_next = reply.dt_next.min(PROPOSED_STEPS * h).min(cell);
         let rate = self.growth_rate(system, reply);
@@ -253,7 +253,8 @@ impl DeviceSession {
         for (p, &source) in self.ports.sources.iter().enumerate() {
             let row: Vec<f64> = (0..self.drive.volts.len()).map(|g| electrics.gap_rows[(g, source)]).collect();
             let unit = system.gap_voltages(&self.motion.q, &row);
-            let fixed: f64 = (0..row.len()).map(|g| row[g] * unit[g] * system.capacitance(g, &self.motion.q)).sum();
+            let driven = (0..row.len()).filter(|g| row[*g] != 0.0);
+            let fixed: f64 = driven.map(|g| row[g] * unit[g] * system.capacitance(g, &self.motion.q)).sum();
             let moving = reply.dq_dv[p * (ports + 1)] - fixed;
             if moving.abs() > RESPONDS * fixed.abs() {
                 let response = &self.stepper.method.sensitivity()[p].q;

@@ -93,10 +93,9 @@ impl System {
             let volts = self.floated(q, volts);
             return self.capacitance(gap, q) * change[gap] + self.capacitance_slope(gap, q, dq) * volts[gap];
         }
-        match change {
-            None => self.capacitance_slope(gap, q, dq) * volts[gap],
-            Some(change) => self.capacitance(gap, q) * change[gap] + self.capacitance_slope(gap, q, dq) * volts[gap],
-        }
+        let changed = change.map_or(0.0, |change| change[gap]);
+        let charged = if changed == 0.0 { 0.0 } else { self.capacitance(gap, q) * changed };
+        charged + if volts[gap] == 0.0 { 0.0 } else { self.capacitance_slope(gap, q, dq) * volts[gap] }
     }
 
     /// `tangent +=` a fraction of k·S⁻¹·kᵀ, k the change of the forces with the potentials of floating conductors, at the voltages `volts` of gaps.

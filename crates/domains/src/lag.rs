@@ -90,16 +90,15 @@ impl Lags {
 
     /// Of a time constant (s), which is not zero.
     #[inline]
-    pub fn of(&mut self, time_constant: f64) -> Lag {
-        for kept in self.kept.iter().flatten() {
-            if kept.time_constant == time_constant {
-                return *kept;
-            }
-        }
-        let lag = Lag::new(time_constant, self.t);
-        self.kept[self.next] = Some(lag);
-        self.next = (self.next + 1) % CACHED_LAGS;
-        lag
+    pub fn of(&mut self, time_constant: f64) -> &Lag {
+        let has = |kept: &Option<Lag>| kept.as_ref().is_some_and(|lag| lag.time_constant == time_constant);
+        let place = self.kept.iter().position(has).unwrap_or_else(|| {
+            let place = self.next;
+            self.next = (place + 1) % CACHED_LAGS;
+            self.kept[place] = None;
+            place
+        });
+        self.kept[place].get_or_insert_with(|| Lag::new(time_constant, self.t))
     }
 }
 
@@ -128,7 +127,7 @@ mod tests {
         let mut lags = Lags::new(1.3e-6);
         for k in [0, 1, 2, 0, 3, 4, 5, 1, 0, 5, 5, 2] {
             let tau = 1e-6 * (1.0 + f64::from(k));
-            assert_eq!(lags.of(tau), Lag::new(tau, 1.3e-6));
+            assert_eq!(*lags.of(tau), Lag::new(tau, 1.3e-6));
         }
     }
 }

@@ -43,6 +43,8 @@ pub struct Heating {
     form: Vec<f64>,
     /// Heater by heater, its current for each volt of the sources that drive the network (S).
     currents: Vec<DVector<f64>>,
+    /// Whether a source heats anything, one for each with the inputs behind.
+    warms: Vec<bool>,
     /// Nodes that stay at ambient.
     sink: Vec<bool>,
     /// Heater by heater, its rise for each watt of the inputs that follow the sources (K/W).
@@ -92,7 +94,11 @@ impl Heating {
             let delays = conduction.delays(&heaters, &watts);
             heaters.iter_mut().zip(delays).filter(|(h, _)| h.delayed).for_each(|(h, tau)| h.time_constant = tau);
         }
-        Ok(Self { heaters, sources, form, currents, sink: sink.to_vec(), ..Self::default() })
+        let warms = |i: usize| {
+            form.chunks_exact(sources * sources).any(|q| q[i * sources..][..sources].iter().any(|q| *q != 0.0))
+        };
+        let warms = (0..sources).map(warms).collect();
+        Ok(Self { heaters, sources, form, currents, warms, sink: sink.to_vec(), ..Self::default() })
     }
 
     /// The same with properties that depend on temperature, where heaters of the circuit have such. `held[node]` is the rise of a node at a given
@@ -131,14 +137,21 @@ impl Heating {
             _ => None,
         });
         let heated_by: Vec<Option<usize>> = heated_by.collect();
+        let warms = self.warms[..self.sources].iter().copied().chain(heated_by.iter().map(Option::is_some)).collect();
         let heated = heated_by.iter().enumerate().filter_map(|(i, k)| Some((self.sources + i, (*k)?)));
         let hot = self.hot.as_ref().map(|hot| Arc::new(hot.heated(heated.collect())));
-        Self { heat, heated_by, hot, ..self.clone() }
+        Self { heat, heated_by, hot, warms, ..self.clone() }
     }
 
     /// Inputs behind the sources.
     fn inputs(&self) -> usize {
         self.heat.len().checked_div(self.heaters.len()).unwrap_or(0)
+    }
+
+    /// Whether a source heats anything at properties that do not depend on temperature.
+    #[inline]
+    pub fn is_warmed_by(&self, source: usize) -> bool {
+        self.warms.get(source).is_some_and(|warms| *warms)
     }
 
     /// Rise of heater `k` for each unit of source `source` in so far as that is heat (K/W).
@@ -184,6 +197,9 @@ impl Heating {
     /// c₀ + c₁·x + c₂·x² (K).
     #[inline]
     pub fn between(&self, k: usize, from: &[f64], to: &[f64]) -> [f64; 3] {
+        if from == to {
+            return [self.mixed(k, from, from) + self.heated(k, from), 0.0, 0.0];
+        }
         let (a, b, c) = (self.mixed(k, from, from), self.mixed(k, from, to), self.mixed(k, to, to));
         let (before, after) = (self.heated(k, from), self.heated(k, to));
         [a + before, 2.0 * (b - a) + (after - before), a - 2.0 * b + c]

@@ -8,7 +8,7 @@
 //! * no voltage across a gap, and no rise of a heater, changes by more than what is linear in the changes and as much again;
 //! * what is left out is at most [`SMALL`] of the error that a step may have, by an estimate.
 //!
-//! A reduced model moves its coordinates, and places the bodies for each trial.
+//! A reduced model moves its coordinates and the bodies alike.
 //!
 //! Sensitivities may therefore be approximate: where nothing touches they take the tangent at the start of a step for all its stages.
 //!
@@ -45,6 +45,7 @@ impl DeviceSession {
         &mut self,
         system: &System,
         (request, parent): (&Trial<'_>, Option<&Snapshot>),
+        ramp: &Ramp<'_>,
         tol: f64,
     ) -> Option<f64> {
         let of = request.parent.map(|token| (token, request.dt.to_bits()));
@@ -64,7 +65,7 @@ impl DeviceSession {
             && self.stepper.method.has_linear_trials()
             && !leaves
             && self.changes_little(system, &parent.sources)
-            && self.pushes_little(system, (request, parent), tol, touching);
+            && self.pushes_little(system, (request, parent), ramp, (tol, touching));
         if !(linear || touching) {
             return None;
         }
@@ -80,14 +81,14 @@ impl DeviceSession {
         for (change, &source) in held.changes.iter_mut().zip(&self.ports.sources) {
             *change = self.sources[source] - parent.sources[source];
         }
-        let ramp = Ramp::new(&system.electrics, &parent.sources, &self.sources, &self.rise, request.dt);
-        if !warms_little(&ramp, held, &mut self.rise_slope) {
+        if !warms_little(ramp, held, &mut self.rise_slope) {
             return None;
         }
-        self.stepper.method.move_by(&held.carried, &held.motion, &held.changes, &mut self.motion);
+        let end = (&held.motion, &held.sensitivities[..]);
+        self.stepper.method.move_by(&held.carried, end, &held.changes, &mut self.motion);
         held.change.copy(&self.motion);
         held.change.add(-1.0, &held.motion);
-        let bodies = Bodies::weighed(system, &ramp, &self.weights);
+        let bodies = Bodies::weighed(system, ramp, &self.weights);
         let left_out = bodies.left_out([&held.motion, &self.motion], &held.change, request.dt, tol);
         (left_out <= most).then_some(held.next)
     }
@@ -111,8 +112,8 @@ impl DeviceSession {
         &mut self,
         system: &System,
         (request, parent): (&Trial<'_>, &Snapshot),
-        tol: f64,
-        touching: bool,
+        ramp: &Ramp<'_>,
+        (tol, touching): (f64, bool),
     ) -> bool {
         let slides = || system.members.iter().any(|member| member.slides());
         let most = match touching {
@@ -124,14 +125,13 @@ impl DeviceSession {
             return true;
         }
         self.begin(Some(parent), false);
-        let [held, ramp] = [&parent.sources, &self.sources]
-            .map(|to| Ramp::new(&system.electrics, &parent.sources, to, &self.rise, request.dt));
+        let held = Ramp::new(&system.electrics, &parent.sources, &parent.sources, &self.rise, request.dt);
         held.at(request.dt, &mut self.change);
         ramp.at(request.dt, &mut self.drive);
         self.change.change_to(&self.drive);
         let force = &mut self.held.change.q;
         system.drive_force(&self.motion.q, &self.drive, &self.change, force);
-        let bodies = Bodies::weighed(system, &ramp, &self.weights);
+        let bodies = Bodies::weighed(system, ramp, &self.weights);
         bodies.would_move(&self.motion, force, request.dt, tol) <= most
     }
 
@@ -167,6 +167,8 @@ impl DeviceSession {
             return;
         }
         held.motion.copy(&self.motion);
+        self.stepper.method.place_sensitivities();
+        held.sensitivities.iter_mut().zip(self.stepper.method.sensitivity()).for_each(|(held, now)| held.copy(now));
         let carried = self.stepper.method.all_carried();
         held.carried.resize_with(carried.len(), || Motion { q: Vec::new(), v: Vec::new() });
         held.carried.iter_mut().zip(carried).for_each(|(held, carried)| held.clone_from(carried));

@@ -91,7 +91,7 @@ impl DeviceSession {
             system.electrics.steady_slope((&self.sources, &self.rise), &self.unit, &mut self.change);
             method.balance_port(p, &self.drive, &self.change);
         }
-        method.place_sensitivities(false);
+        method.place_sensitivities();
     }
 
     /// Whether a step in the reduced model cannot be used: it failed, or went far beyond the trained motion.

@@ -252,6 +252,9 @@ impl Electrics {
             (0..count).for_each(|k| put(k, course.mean(k, s)[0]));
             return;
         }
+        if !self.heating.is_warmed_by(port) {
+            return (0..count).for_each(|k| put(k, 0.0));
+        }
         let mut lags = Lags::new(s);
         for (k, heater) in self.heating.heaters.iter().enumerate() {
             let [p1, p2] = self.heat_course_change(k, way, dt, port);

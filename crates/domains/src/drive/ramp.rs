@@ -41,6 +41,8 @@ pub struct Ramp<'a> {
     course: Option<HotCourse>,
     /// Source by source, its change with the final voltage, once it is needed.
     changes: Vec<OnceLock<HotCourse>>,
+    /// Source by source, the change of the second and third coefficient of `heat` with the final voltage, once it is needed; empty: none.
+    heat_changes: Vec<OnceLock<Vec<[f64; 2]>>>,
 }
 
 impl<'a> Ramp<'a> {
@@ -65,6 +67,7 @@ impl<'a> Ramp<'a> {
             heat,
             course,
             changes,
+            heat_changes: vec![OnceLock::new(); from.len()],
         }
     }
 
@@ -100,6 +103,15 @@ impl<'a> Ramp<'a> {
         let line = SourceLine { from: self.from, to: self.to, dt: self.dt };
         let start = &self.rise[heating.means()..];
         Some(change.get_or_init(|| hot.course_change(line, start, source)).mean(k, s))
+    }
+
+    /// Change of the second and third coefficient of the steady rise of each heater with the final voltage of a source; empty: it heats nothing.
+    fn heat_change(&self, source: usize) -> &[[f64; 2]] {
+        self.heat_changes[source].get_or_init(|| {
+            let heating = &self.electrics.heating;
+            let count = if heating.is_warmed_by(source) { heating.heaters.len() } else { 0 };
+            (0..count).map(|k| self.electrics.heat_course_change(k, (self.from, self.to), self.dt, source)).collect()
+        })
     }
 
     /// Which value of the course is the free strain of heater `k`; none where that is its mean rise times a constant.
@@ -259,9 +271,10 @@ impl<'a> Ramp<'a> {
         rate.push.extend_from_slice(self.push_rate);
     }
 
-    /// The change of the drive at time `s` with the final voltage of source `port`.
+    /// The change of the drive with the final voltage of source `port`, at the time of `lags` after the start.
     #[inline]
-    pub fn sensitivity(&self, s: f64, port: usize, out: &mut Drive) {
+    pub fn sensitivity(&self, lags: &mut Lags, port: usize, out: &mut Drive) {
+        let s = lags.t;
         let x = s / self.dt;
         for (g, v) in out.volts.iter_mut().enumerate() {
             *v = self.electrics.gap_rows[(g, port)] * x;
@@ -274,8 +287,15 @@ impl<'a> Ramp<'a> {
                 out.expansion[k] = curved.map_or_else(|| heater.expansion * change(k), change);
             }
         } else {
-            let put = |k: usize, rise: f64| out.expansion[k] = heaters[k].expansion * rise;
-            self.electrics.rise_sensitivities(((self.from, self.to), self.rise), self.dt, s, port, put);
+            let changes = self.heat_change(port);
+            if changes.is_empty() {
+                out.expansion.fill(0.0);
+            }
+            for ((strain, heater), [p1, p2]) in out.expansion.iter_mut().zip(heaters).zip(changes) {
+                let tau = heater.time_constant;
+                let rise = if tau > 0.0 { lags.of(tau).rise(0.0, [0.0, *p1, *p2]) } else { s * (p1 + s * p2) };
+                *strain = heater.expansion * rise;
+            }
         }
         out.load = 0.0;
         out.push.clear();
@@ -290,14 +310,15 @@ impl<'a> Ramp<'a> {
         Some(self.electrics.inputs[k])
     }
 
-    /// The change of [`Ramp::at_and_rate`] at time `s` with the final voltage of source `port`.
-    pub fn rate_sensitivity(&self, s: f64, port: usize, out: &mut Drive) {
+    /// The change of the rate of the drive with the final voltage of source `port`, at the time of `lags` after the start.
+    pub fn rate_sensitivity(&self, lags: &mut Lags, port: usize, out: &mut Drive) {
+        let s = lags.t;
         for (g, v) in out.volts.iter_mut().enumerate() {
             *v = self.electrics.gap_rows[(g, port)] / self.dt;
         }
-        let mut lags = Lags::new(s);
+        let changes = if self.course.is_some() { &[][..] } else { self.heat_change(port) };
         for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
-            let [p1, p2] = self.electrics.heat_course_change(k, (self.from, self.to), self.dt, port);
+            let [p1, p2] = changes.get(k).copied().unwrap_or_default();
             if let Some([_, rate]) = self.strain_series(k).and_then(|series| self.hot_change(series, s, port)) {
                 out.expansion[k] = rate;
                 continue;

@@ -84,7 +84,7 @@ impl<'a> Bodies<'a> {
     /// Directions without inertia follow at once and weigh as much as the mean of the bodies, rotations at the length scale. Infinite where nothing has mass.
     pub fn left_out(&self, ends: [&Motion; 2], change: &Motion, h: f64, tol: f64) -> f64 {
         let (bodies, mass) = (&self.system.model.bodies, self.weights.mass);
-        let Some(([q, v], may)) = self.of_masses(ends, change, h, tol).filter(|_| mass > 0.0) else {
+        let Some(([q, v], may)) = self.of_masses(ends, Some(change), h, tol).filter(|_| mass > 0.0) else {
             return f64::INFINITY;
         };
         let turned = |q: &Pose| (q.z * self.system.length_scale).powi(2);
@@ -106,7 +106,7 @@ impl<'a> Bodies<'a> {
 
     /// By how much forces that grow from zero over a step of length `h` (s) move the masses where nothing holds these, over the error that the step may have.
     pub fn would_move(&self, motion: &Motion, force: &[Pose], h: f64, tol: f64) -> f64 {
-        let Some((_, may)) = self.of_masses([motion, motion], motion, h, tol) else { return f64::INFINITY };
+        let Some((_, may)) = self.of_masses([motion; 2], None, h, tol) else { return f64::INFINITY };
         let push = |(j, force): (usize, &Pose)| -> f64 {
             let mass = self.system.model.mass(j);
             force.iter().zip(mass.iter()).filter(|(_, m)| **m > 0.0).map(|(f, m)| f * f / m).sum()
@@ -115,7 +115,13 @@ impl<'a> Bodies<'a> {
     }
 
     /// Norms of an error of displacements and of rates, and what they may be; none where nothing moves in time, with neither mass nor drag.
-    fn of_masses(&self, [before, after]: [&Motion; 2], error: &Motion, h: f64, tol: f64) -> Option<([f64; 2], f64)> {
+    fn of_masses(
+        &self,
+        [before, after]: [&Motion; 2],
+        error: Option<&Motion>,
+        h: f64,
+        tol: f64,
+    ) -> Option<([f64; 2], f64)> {
         let (system, NormWeights { mass, dragged }) = (self.system, &*self.weights);
         if *mass == 0.0 && dragged.is_empty() {
             return None;
@@ -128,8 +134,10 @@ impl<'a> Bodies<'a> {
             false => own(x).hypot(drag(x).sqrt()),
         };
         let mass = mass + h * dragged.iter().map(|(_, _, c)| c).sum::<f64>();
-        let scale = error_scale([norm(&before.q), norm(&after.q)], [system.length_scale, mass.sqrt()]);
-        Some(([norm(&error.q), norm(&error.v)], ErrorBudget::of(tol).within(scale)))
+        let first = norm(&before.q);
+        let last = if std::ptr::eq(before, after) { first } else { norm(&after.q) };
+        let scale = error_scale([first, last], [system.length_scale, mass.sqrt()]);
+        Some((error.map_or([0.0; 2], |x| [norm(&x.q), norm(&x.v)]), ErrorBudget::of(tol).within(scale)))
     }
 
     /// The norm of displacements by which errors are measured, where it is that of masses alone.
@@ -167,7 +175,7 @@ impl Equations for Bodies<'_> {
     }
 
     fn share(&self, ends: [&Motion; 2], error: &Motion, h: f64, tol: f64) -> f64 {
-        let Some((norms, may)) = self.of_masses(ends, error, h, tol) else { return 0.0 };
+        let Some((norms, may)) = self.of_masses(ends, Some(error), h, tol) else { return 0.0 };
         relative_error(norms, h, may, contact_error(self.system, ends.into(), error, tol))
     }
 

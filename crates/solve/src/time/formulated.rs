@@ -112,10 +112,10 @@ impl Formulated {
         }
     }
 
-    /// Makes the sensitivities those of the bodies at the end of the steps taken; those of rates may be left out unless `rates`.
-    pub fn place_sensitivities(&mut self, rates: bool) {
+    /// Makes the sensitivities those of the bodies at the end of the steps taken.
+    pub fn place_sensitivities(&mut self) {
         if let Some(reduced) = self.reduced_now() {
-            reduced.place_sensitivities(rates);
+            reduced.place_sensitivities();
         }
     }
 
@@ -142,15 +142,21 @@ impl Formulated {
     }
 
     /// Takes the motion of the bodies to the end `from` of a step, after which `carried` was carried, moved by its sensitivities times changes of the sources.
-    pub fn move_by(&mut self, carried: &[Motion], from: &Motion, changes: &[f64], motion: &mut Motion) {
+    pub fn move_by(
+        &mut self,
+        carried: &[Motion],
+        (from, sensitivities): (&Motion, &[Motion]),
+        changes: &[f64],
+        motion: &mut Motion,
+    ) {
         if let Some(reduced) = self.reduced_now() {
-            return reduced.move_by(carried, changes, motion);
+            reduced.move_by(carried, changes);
         }
         motion.copy(from);
-        for (s, change) in carried.iter().zip(changes) {
+        for (s, change) in sensitivities.iter().zip(changes) {
             motion.add(*change, s);
         }
-        self.sensitivity_mut().iter_mut().zip(carried).for_each(|(to, s)| to.copy(s));
+        self.sensitivity_mut().iter_mut().zip(sensitivities).for_each(|(to, s)| to.copy(s));
     }
 
     /// State for the next step beside the bodies' motion.

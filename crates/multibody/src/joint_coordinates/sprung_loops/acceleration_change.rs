@@ -60,6 +60,30 @@ impl AccelerationChange {
         }
     }
 
+    /// `rates +=` how the rates of the bodies change as these move by `turn`, with changes `joint` of the coordinates, at held rates of the coordinates.
+    ///
+    /// The accelerations have a part quadratic in the rates, J̇·v: that of the rates with the place is half of its change with the rates along the same
+    /// direction.
+    #[inline]
+    pub fn add_rates(&mut self, tree: &Tree, joint: &[LaneJointStates], turn: &[Pose], rates: &mut [Pose]) {
+        for (j, up) in tree.upward.iter().enumerate().rev() {
+            let (above, turn) = match up.parent {
+                TreeParent::Free => {
+                    self.sums[j] = [0.0; 2];
+                    continue;
+                }
+                TreeParent::Ground => ([0.0; 2], 0.0),
+                TreeParent::Body(p) => (self.sums[p as usize], turn[p as usize].z),
+            };
+            let (tile, lane) = place_of(j);
+            let of = |i: usize| self.maps[tile][1][i].0[lane];
+            let map = MotionMap { lever: [of(0), of(1)], columns: [[of(2), of(3)], [of(4), of(5)], [of(6), of(7)]] };
+            let [x, y] = map.along(turn, &joint[tile].q.map(|x| x.0[lane]));
+            self.sums[j] = [above[0] + 0.5 * x, above[1] + 0.5 * y];
+            rates[j] += self.of(j);
+        }
+    }
+
     /// Change of the acceleration of body `j`, which leaves that of its rotation.
     #[inline(always)]
     pub fn of(&self, j: usize) -> Pose {
@@ -98,7 +122,7 @@ mod tests {
     use super::*;
     use nalgebra::Matrix2;
 
-    /// The change is that of the kinematics over values with their derivatives (1e-12), for any motion of a frame with a loop.
+    /// The changes of accelerations and of rates are those of the kinematics over values with their derivatives (1e-12), for any motion of a frame with a loop.
     #[test]
     fn the_change_is_the_derivative() {
         let tree = Tree::elastic(&frame(Matrix2::new(1e4, 0.1, 0.1, 1e-6))).unwrap();
@@ -121,6 +145,14 @@ mod tests {
         placed.spread(&tree, &dv, &mut moved[1]);
         let mut change = AccelerationChange::new(&tree);
         change.fill(&tree, &placed, &given);
+        change.spread(&tree, |j| [dq[j], dv[j]], |j| [moved[0][j].z, moved[1][j].z]);
+        let mut rates = moved[1].clone();
+        let joint = LaneJointStates::at_rest(&dq);
+        change.add_rates(&tree, &joint, &moved[0], &mut rates);
+        let fastest = (0..tree.links.len()).map(|j| exact.of(j)[1].norm()).fold(0.0, f64::max);
+        for (j, rate) in rates.iter().enumerate() {
+            assert!((rate - exact.of(j)[1]).norm() < 1e-12 * fastest, "{j}: {rate} {}", exact.of(j)[1]);
+        }
         change.spread(&tree, |j| [dq[j], dv[j]], |j| [moved[0][j].z, moved[1][j].z]);
         let largest = (0..tree.links.len()).map(|j| exact.of(j)[2].norm()).fold(0.0, f64::max);
         for j in 0..tree.links.len() {

@@ -47,6 +47,28 @@ impl TreeKinematics {
     }
 }
 
+impl TreeKinematics {
+    /// Motions of the bodies with changes of the coordinates and of their rates at the place held: those of both together.
+    #[inline]
+    pub fn spread_motion(&self, tree: &Tree, s: &[LaneJointStates], [q, v]: [&mut [Pose]; 2]) {
+        for (j, up) in tree.upward.iter().enumerate().rev() {
+            let ((tile, lane), map) = (place_of(j), self.map(j));
+            let [of_q, of_v, _] = s[tile].of(lane);
+            for (out, s) in [(&mut *q, of_q), (&mut *v, of_v)] {
+                let above = match up.parent {
+                    TreeParent::Free => {
+                        out[j] = s;
+                        continue;
+                    }
+                    TreeParent::Ground => [0.0; 3],
+                    TreeParent::Body(p) => triple(&out[p as usize]),
+                };
+                out[j] = Pose::from(map.apply(up.sign, &above, &triple(&s)));
+            }
+        }
+    }
+}
+
 struct Resist<'a> {
     placed: &'a TreeKinematics,
     tree: &'a Tree,

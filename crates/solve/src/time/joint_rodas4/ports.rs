@@ -7,7 +7,7 @@ use super::stages::JointStages;
 use crate::equations::Joints;
 use crate::time::method::Motion;
 use crate::time::stage_loss::StageLoss;
-use bimorph_domains::{Drive, Ramp};
+use bimorph_domains::{Drive, Lags, Ramp};
 use bimorph_multibody::joint_coordinates::sprung_loops::columns::Four;
 use bimorph_multibody::joint_coordinates::sprung_loops::derivatives::Changes;
 use bimorph_multibody::joint_coordinates::sprung_loops::poses::place_of;
@@ -72,15 +72,16 @@ impl JointPortSensitivities {
         (drive, rate): (&Drive, &Drive),
     ) {
         let Joints { tree, closures, .. } = joints;
+        let mut lags = Lags::new(s);
         for ((bodies, springs), &source) in self.forcing.iter_mut().zip(&self.sources) {
-            ramp.rate_sensitivity(s, source, &mut self.change);
+            ramp.rate_sensitivity(&mut lags, source, &mut self.change);
             closures.drive_force(poses, drive, &self.change, bodies);
             let rest = self.change.rest();
             for (out, link) in springs.iter_mut().zip(&tree.links) {
                 *out = link.stiffness.column(0) * -link.offset(&rest);
             }
             // forces are quadratic in gap voltages: the voltage that rate acts on changes too
-            ramp.sensitivity(s, source, &mut self.change);
+            ramp.sensitivity(&mut lags, source, &mut self.change);
             self.change.keep_quadratic(&closures.electrics);
             closures.add_drive_force(poses, rate, &self.change, bodies);
         }
@@ -99,7 +100,7 @@ impl JointPortSensitivities {
         start: &[Motion],
     ) -> u64 {
         let Joints { tree, closures, .. } = joints;
-        let model = &closures.model;
+        let (model, mut lags) = (&closures.model, Lags::new(s));
         for (p, &source) in self.sources.iter().enumerate() {
             let stages = &mut self.stages[p];
             if i == 0 {
@@ -125,7 +126,7 @@ impl JointPortSensitivities {
             if let Some(loss) = loss {
                 loss.add_skew(&self.share, &mut self.wrench);
             }
-            ramp.sensitivity(s, source, &mut self.change);
+            ramp.sensitivity(&mut lags, source, &mut self.change);
             closures.add_drive_force(poses, drive, &self.change, &mut self.wrench);
             self.changes.gather(tree, &self.force, &self.wrench, &mut self.share);
             let rest = self.change.rest();

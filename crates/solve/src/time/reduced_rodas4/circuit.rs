@@ -6,7 +6,7 @@ use super::ports::ReducedPortSensitivities;
 use crate::equations::Motion;
 use crate::reduced::ReducedSpace;
 use crate::reduced::statics::solve;
-use bimorph_domains::{Drive, Ramp};
+use bimorph_domains::{Drive, Lags, Ramp};
 use bimorph_multibody::planar::Pose;
 
 /// Iterations of Newton's method for an equilibrium.
@@ -55,23 +55,22 @@ impl ReducedRodas4 {
         self.ports.as_mut().map_or(&mut [], |ports| &mut ports.bodies)
     }
 
-    /// Makes the sensitivities of the bodies those of the motion now: of displacements, and of rates where `rates`.
-    pub fn place_sensitivities(&mut self, rates: bool) {
+    /// Makes the sensitivities of the bodies those of the motion now.
+    pub fn place_sensitivities(&mut self) {
         if let Some(ports) = &mut self.ports {
             ports.take(&self.carried[2..]);
-            ports.place_bodies(&self.space, &self.forces, rates);
+            ports.place_bodies(&self.space, &self.forces);
         }
     }
 
-    /// Takes the bodies to the end of a step, after which `carried` was carried, moved by its sensitivities times changes of the sources.
-    pub fn move_by(&mut self, carried: &[Motion], changes: &[f64], motion: &mut Motion) {
+    /// Takes the coordinates to the end of a step, after which `carried` was carried, moved by their sensitivities times changes of the sources.
+    pub fn move_by(&mut self, carried: &[Motion], changes: &[f64]) {
         self.carried.iter_mut().zip(carried).for_each(|(to, from)| to.copy(from));
         let (state, sensitivities) = self.carried.split_at_mut(2);
         for (of_source, change) in sensitivities.chunks_exact(2).zip(changes) {
             state.iter_mut().zip(of_source).for_each(|(to, s)| to.add(*change, s));
         }
         self.put_back();
-        self.place_end(motion);
     }
 
     /// Whether sensitivities take the matrices at the start of a step for all its stages.
@@ -174,12 +173,13 @@ impl ReducedRodas4 {
     /// The increments of stage `i` of the sensitivities, at time `s` (s) of the ramp.
     pub(super) fn solve_ports(&mut self, ramp: &Ramp<'_>, (i, s, h): (usize, f64, f64)) {
         let Some(mut ports) = self.ports.take() else { return };
+        let mut lags = Lags::new(s);
         for p in 0..ports.len() {
             let Self { polynomials: Some(stages), factor: Some(factor), at, drive, mass, damping, .. } = self else {
                 break;
             };
             let matrices = [&self.stiffness, &*damping, &*mass];
-            ports.stage((&stages.of, &mut stages.forces), ramp, (p, i, s), (at, drive), matrices);
+            ports.stage((&stages.of, &mut stages.forces), (ramp, &mut lags), (p, i), (at, drive), matrices);
             let ReducedPortSensitivities { at, force, forcing, increments, .. } = &mut *ports;
             let damping = self.damped.then_some(&*damping);
             let step = StepMatrices { mass, damping, factor: factor.l_dirty(), h };

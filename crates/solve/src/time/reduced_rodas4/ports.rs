@@ -1,7 +1,7 @@
 //! Sensitivities with respect to final source voltages: the same stages with the exact change of each stage's forces.
 //!
-//! The forces are those of polynomials, whose change along a motion costs about as much as the forces. Bodies follow by the exact kinematics of the
-//! tree over values with their derivatives, once at the end of a trial.
+//! The forces are those of polynomials, whose change along a motion costs about as much as the forces. Bodies follow by the exact derivatives of the
+//! kinematics of the tree, once at the end of a trial.
 
 use super::coordinates::{ReducedMotion, add_product};
 use crate::equations::Motion;
@@ -9,8 +9,8 @@ use crate::reduced::ReducedSpace;
 use crate::reduced::polynomial::motion::{PolynomialForces, PolynomialMotion};
 use crate::reduced::space::ReducedForces;
 use crate::time::rodas4::tableau::{A, ALPHA};
-use bimorph_domains::{Drive, Ramp};
-use bimorph_multibody::joint_coordinates::sprung_loops::derivatives::Changes;
+use bimorph_domains::{Drive, Lags, Ramp};
+use bimorph_multibody::joint_coordinates::sprung_loops::acceleration_change::AccelerationChange;
 use bimorph_multibody::joint_coordinates::sprung_loops::poses::LaneJointStates;
 use bimorph_multibody::planar::Pose;
 use nalgebra::DMatrix;
@@ -28,9 +28,8 @@ pub(super) struct ReducedPortSensitivities {
     pub(super) force: Vec<f64>,
     change: Drive,
     also: Drive,
-    changes: Changes,
+    turning: AccelerationChange,
     given: Vec<LaneJointStates>,
-    room: Vec<Pose>,
     /// ∂(bodies' motion)/∂(final voltage of a source).
     pub(super) bodies: Vec<Motion>,
     /// Whether the matrices at the start of a step stand for the change of the forces with the motion in all its stages.
@@ -50,9 +49,8 @@ impl ReducedPortSensitivities {
             force: vec![0.0; m],
             change: space.joints.closures.electrics.drive(),
             also: space.joints.closures.electrics.drive(),
-            changes: Changes::new(tree),
+            turning: AccelerationChange::new(tree),
             given: LaneJointStates::at_rest(&vec![Pose::zeros(); count]),
-            room: vec![Pose::zeros(); count],
             bodies: vec![Motion::zeros(count); sources.len()],
             first_tangent: false,
         }
@@ -86,28 +84,29 @@ impl ReducedPortSensitivities {
         [drive, rate]: [&Drive; 2],
     ) {
         let Self { sources, forcing, also, change, .. } = self;
+        let mut lags = Lags::new(s);
         for (forcing, &source) in forcing.iter_mut().zip(&*sources) {
-            ramp.rate_sensitivity(s, source, change);
+            ramp.rate_sensitivity(&mut lags, source, change);
             // forces are quadratic in gap voltages: the voltage that rate acts on changes too
-            ramp.sensitivity(s, source, also);
+            ramp.sensitivity(&mut lags, source, also);
             let beside = also.volts.iter().any(|v| *v != 0.0).then_some([rate, &*also]);
             forces.forcing_beside(of, [drive, change], beside, forcing);
         }
     }
 
-    /// The argument of stage `i` of source `p`, and ∂R/∂(final voltage) there in `force`, at time `s` (s) of the ramp. `matrices` are stiffness, damping and
-    /// mass at the start of the step.
+    /// The argument of stage `i` of source `p`, and ∂R/∂(final voltage) there in `force`, at the time of `lags` after the start of the ramp. `matrices` are
+    /// stiffness, damping and mass at the start of the step.
     pub(super) fn stage(
         &mut self,
         (of, forces): (&PolynomialMotion, &mut PolynomialForces),
-        ramp: &Ramp<'_>,
-        (p, i, s): (usize, usize, f64),
+        (ramp, lags): (&Ramp<'_>, &mut Lags),
+        (p, i): (usize, usize),
         (motion, drive): (&ReducedMotion, &Drive),
         matrices: [&DMatrix<f64>; 3],
     ) {
         let Self { sources, now, at, increments, force, change, first_tangent, .. } = self;
         at.set_sum(&now[p], &A[i], &increments[p][..i]);
-        ramp.sensitivity(s, sources[p], change);
+        ramp.sensitivity(lags, sources[p], change);
         let parts = [&change.volts, &change.expansion, &change.inputs];
         if parts.iter().all(|x| x.iter().all(|x| *x == 0.0)) && at.is_zero() {
             // the start of a trial depends on no voltage yet
@@ -131,23 +130,16 @@ impl ReducedPortSensitivities {
         }
     }
 
-    /// The change of the bodies' motion, where these are placed by `forces`; of rates where `rates`, else they stay 0.
-    pub(super) fn place_bodies(&mut self, space: &ReducedSpace, forces: &ReducedForces, rates: bool) {
-        let Self { now, changes, given, room, bodies, .. } = self;
+    /// The change of the bodies' motion, where these are placed by `forces`.
+    pub(super) fn place_bodies(&mut self, space: &ReducedSpace, forces: &ReducedForces) {
+        let Self { now, turning, given, bodies, .. } = self;
         let tree = &space.joints.tree;
+        turning.fill(tree, &forces.placed, &forces.given);
         for (now, bodies) in now.iter().zip(bodies) {
-            if !rates {
-                space.strains(now.z(), room);
-                forces.placed.spread(tree, room, &mut bodies.q);
-                bodies.v.fill(Pose::zeros());
-                continue;
-            }
             let [z, v, _] = now.parts();
             space.place_strains([z, v, &[]], given);
-            changes.place(tree, &forces.given, given);
-            for (j, (q, v)) in bodies.q.iter_mut().zip(&mut bodies.v).enumerate() {
-                [*q, *v, _] = changes.of(j);
-            }
+            forces.placed.spread_motion(tree, given, [&mut bodies.q, &mut bodies.v]);
+            turning.add_rates(tree, given, &bodies.q, &mut bodies.v);
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::equations::linear::LinearSolver;
 use crate::method::Motion;
 use crate::time::gyration::{Gyration, held_out, skew};
 use crate::time::stage_loss::StepMatrix;
-use bimorph_domains::{Drive, Ramp, System};
+use bimorph_domains::{Drive, Lags, Ramp, System};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyMatrix, Model, Pattern};
 
@@ -70,11 +70,12 @@ impl PortSensitivities {
         q: &[Pose],
         (drive, rate): (&Drive, &Drive),
     ) {
+        let mut lags = Lags::new(s);
         for (stages, &source) in self.stages.iter_mut().zip(&self.sources) {
-            ramp.rate_sensitivity(s, source, &mut self.change);
+            ramp.rate_sensitivity(&mut lags, source, &mut self.change);
             system.drive_force(q, drive, &self.change, &mut stages.forcing);
             // forces are quadratic in gap voltages: the voltage that rate acts on changes too
-            ramp.sensitivity(s, source, &mut self.change);
+            ramp.sensitivity(&mut lags, source, &mut self.change);
             self.change.keep_quadratic(&system.electrics);
             system.add_drive_force(q, rate, &self.change, &mut stages.forcing);
         }
@@ -90,8 +91,9 @@ impl PortSensitivities {
         (v, rate): (&[Pose], Gyration),
         start: &[Motion],
     ) {
+        let mut lags = Lags::new(s);
         for ((stages, &source), start) in self.stages.iter_mut().zip(&self.sources).zip(start) {
-            ramp.rate_sensitivity(s, source, &mut self.change);
+            ramp.rate_sensitivity(&mut lags, source, &mut self.change);
             let change = system.frame(&self.change).map(Gyration::new).unwrap_or_default();
             for (k, body) in system.model.bodies.iter().enumerate() {
                 let force = skew(body, change.rate, &v[k]) + skew(body, rate.rate, &start.v[k]);
@@ -114,7 +116,7 @@ impl PortSensitivities {
         start: &mut [Motion],
     ) -> u64 {
         let model = &system.model;
-        let mut solves = self.sources.len();
+        let (mut solves, mut lags) = (self.sources.len(), Lags::new(s));
         for ((stages, &source), start) in self.stages.iter_mut().zip(&self.sources).zip(start) {
             stages.begin(model, i, h, start);
             if let Some((_, turning)) = turning {
@@ -131,7 +133,7 @@ impl PortSensitivities {
             if let Some(loss) = matrix.loss {
                 loss.add_skew(at, force);
             }
-            ramp.sensitivity(s, source, &mut self.change);
+            ramp.sensitivity(&mut lags, source, &mut self.change);
             if let Some((motion, turning)) = turning {
                 let change = system.frame(&self.change).map(Gyration::new).unwrap_or_default();
                 for (k, body) in model.bodies.iter().enumerate() {
