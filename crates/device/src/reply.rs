@@ -37,6 +37,9 @@ impl DeviceSession {
     ) {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
+        let Self { capacitances, motion, .. } = self;
+        capacitances.clear();
+        capacitances.extend((0..system.electrics.gap_rows.nrows()).map(|gap| system.capacitance(gap, &motion.q)));
         self.values(compiled, system, reply);
         self.partials(compiled, system, from.map(|(from, before)| ((from, before.rise.as_slice()), request.dt)), reply);
         let (shown, bound) = self.seen(compiled, system, request, from.map(|(_, before)| before), reply);
@@ -93,9 +96,11 @@ impl DeviceSession {
                         None => row.iter().zip(&self.sources).map(|(g, u)| g * u).sum(),
                     };
                     reply.di_dv.extend(self.ports.sources.iter().map(|&other| row[other]));
-                    let of = |g: usize| match electrics.gap_rows[(g, port)] {
-                        0.0 => 0.0,
-                        share => share * system.charge(g, view.q, view.volts),
+                    let of = |g: usize| {
+                        let is_floating = electrics.floating.of_gap(g).is_some();
+                        let own = || self.capacitances[g] * view.volts[g];
+                        electrics.gap_rows[(g, port)]
+                            * if is_floating { system.charge(g, view.q, view.volts) } else { own() }
                     };
                     charge = (0..gaps).map(of).sum();
                 }
@@ -123,6 +128,8 @@ impl DeviceSession {
         let electrics = &system.electrics;
         let (ports, gaps) = (self.ports.len(), self.drive.volts.len());
         let view = SignalView { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts };
+        // points within a macro step have no sensitivities
+        let moves = self.position.is_none();
         reply.dq_dv.clear();
         reply.dq_dv.resize(ports * ports, 0.0);
         reply.doutputs_dv.clear();
@@ -155,7 +162,13 @@ impl DeviceSession {
                 }
             }
             for g in 0..gaps {
-                let dq = system.charge_slope(g, (view.q, view.volts), (&s.q, Some(&gap_row)));
+                let dq = if electrics.floating.of_gap(g).is_some() {
+                    system.charge_slope(g, (view.q, view.volts), (&s.q, Some(&gap_row)))
+                } else {
+                    let is_moved = moves && view.volts[g] != 0.0;
+                    let moved = if is_moved { system.capacitance_slope(g, view.q, &s.q) * view.volts[g] } else { 0.0 };
+                    self.capacitances[g] * gap_row[g] + moved
+                };
                 for (row, &other) in self.ports.sources.iter().enumerate() {
                     if self.ports.answers[row] == PortResponse::Current {
                         reply.dq_dv[row * ports + p] += electrics.gap_rows[(g, other)] * dq;

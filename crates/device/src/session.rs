@@ -59,6 +59,8 @@ pub(super) struct DeviceSession {
     pub(super) sources: Vec<f64>,
     pub(super) unit: Vec<f64>,
     pub(super) drive: Drive,
+    /// Capacitance of each gap at the motion at hand (F).
+    pub(super) capacitances: Vec<f64>,
     pub(super) change: Drive,
     pub(super) linear: Option<(Token, BodyMatrix)>,
     pub(super) harmonic: Harmonic,
@@ -163,6 +165,7 @@ impl DeviceSession {
             sources: vec![0.0; electrics.sources()],
             unit: vec![0.0; electrics.sources()],
             drive: electrics.drive(),
+            capacitances: Vec::with_capacity(electrics.gap_rows.nrows()),
             change: electrics.drive(),
             linear: None,
             harmonic: Harmonic::new(system),

@@ -218,7 +218,7 @@ impl DeviceSession {
         self.answer(compiled, request, Some((&from, parent.unwrap_or(&Snapshot::default()))), h, reply);
         let cell = self.shaken.as_ref().map_or(f64::INFINITY, |shaken| shaken.cell);
         reply.dt_next = reply.dt_next.min(PROPOSED_STEPS * h).min(cell);
-        let rate = self.growth_rate(system, reply);
+        let rate = self.growth_rate(system, reply, next_step.is_some());
         match self.growth.tried(rate, request.dt) {
             Bound::Next(longest) => reply.dt_next = reply.dt_next.min(longest),
             Bound::This(longest) => (reply.status, reply.token) = (Status::NeedDt(longest), None),
@@ -247,14 +247,17 @@ impl DeviceSession {
     }
 
     /// Rate at which the motion at the end of a trial grows at fixed voltages (1/s); 0 where nothing shows that it does.
-    fn growth_rate(&mut self, system: &System, reply: &TrialReply) -> f64 {
+    fn growth_rate(&mut self, system: &System, reply: &TrialReply, in_macro_step: bool) -> f64 {
+        if in_macro_step {
+            return 0.0; // it has no response
+        }
         let (electrics, ports) = (&system.electrics, self.ports.len());
         let mut fastest = 0.0f64;
         for (p, &source) in self.ports.sources.iter().enumerate() {
             let row: Vec<f64> = (0..self.drive.volts.len()).map(|g| electrics.gap_rows[(g, source)]).collect();
             let unit = system.gap_voltages(&self.motion.q, &row);
             let driven = (0..row.len()).filter(|g| row[*g] != 0.0);
-            let fixed: f64 = driven.map(|g| row[g] * unit[g] * system.capacitance(g, &self.motion.q)).sum();
+            let fixed: f64 = driven.map(|g| row[g] * unit[g] * self.capacitances[g]).sum();
             let moving = reply.dq_dv[p * (ports + 1)] - fixed;
             if moving.abs() > RESPONDS * fixed.abs() {
                 let response = &self.stepper.method.sensitivity()[p].q;

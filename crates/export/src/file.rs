@@ -366,7 +366,14 @@ fn about_reduced(compiled: &CompiledModel, model: &FlexibleModel, source: &str, 
 fn masses(model: &FlexibleModel) -> String {
     let of = &model.fitted.model;
     match of.mass_slopes.iter().filter(|slope| **slope != 0.0).count() {
-        0 => format!("constant masses: that of the slowest coordinate changes by {:.1e} in them", of.mass_change),
+        0 => {
+            let varies = of.damping_slopes.iter().any(|slope| *slope != 0.0);
+            let damping = if varies { " (damping is linear in the coordinates)" } else { "" };
+            format!(
+                "constant masses{damping}: that of the slowest coordinate changes by {:.1e} in them",
+                of.mass_change
+            )
+        }
         count => format!(
             "masses and damping linear in the coordinates, {count} slopes of masses: that of the slowest coordinate is off by {:.1e} in them",
             of.mass_change
