@@ -38,7 +38,7 @@ impl HeldMotion {
             ends: Vec::new(),
             motion: zeros(),
             carried: Vec::new(),
-            sensitivities: vec![zeros(); ports],
+            sensitivities: Vec::new(),
             rise: vec![0.0; rises],
             rise_slope: vec![vec![0.0; means]; ports],
             changes: vec![0.0; ports],

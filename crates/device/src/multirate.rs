@@ -6,13 +6,17 @@ use crate::macro_step::{
     extended, fitted_line, hermite_shares,
 };
 use crate::states::Snapshot;
+use bimorph_analysis::reduced::TRAINED;
 use bimorph_base::ErrorBudget;
 use bimorph_domains::{Drive, Ramp, System};
 use bimorph_multibody::planar::Pose;
+use bimorph_solve::SolveError;
 use bimorph_solve::equations::Bodies;
 use bimorph_solve::equations::bodies::NormWeights;
 use bimorph_solve::time::adaptive::{Adaptive, Advance, Control};
+use bimorph_solve::time::formulated::Formulated;
 use bimorph_solve::time::method::Motion;
+use bimorph_solve::time::reduced_rodas4::ReducedRodas4;
 use bimorph_solve::time::rodas4::Rodas4;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -41,7 +45,7 @@ pub(crate) struct Multirate {
     voltages: Vec<SharedVoltage>,
     /// Whether a signal or port shows a rate, or may.
     sees_rates: bool,
-    stepper: Adaptive<Rodas4>,
+    stepper: MacroStepper,
     drive: Drive,
     change: Drive,
     push: Vec<Pose>,
@@ -53,6 +57,55 @@ pub(crate) struct Multirate {
     corrected: Option<(Token, Arc<Snapshot>)>,
 }
 
+/// Steps of the motion between the sources' values at the start of a macro step, with the forces of squared voltages beside these.
+#[derive(Debug)]
+pub(crate) enum MacroStepper {
+    /// Every body has its own coordinates.
+    Bodies(Box<Adaptive<Rodas4>>),
+    /// A reduced model.
+    Reduced(Box<Adaptive<ReducedRodas4>>),
+}
+
+impl MacroStepper {
+    /// Of the formulation in which a session steps; none: it has no macro steps.
+    pub(crate) fn new(method: &Formulated, reduced: Option<ReducedRodas4>, system: &System) -> Option<Self> {
+        let n = system.bodies();
+        Some(match (method, reduced) {
+            (Formulated::Joints(_), _) => return None,
+            (_, Some(reduced)) => Self::Reduced(Box::new(Adaptive::new(n, reduced.with_ports(&[])))),
+            (_, None) => Self::Bodies(Box::new(Adaptive::new(n, Rodas4::new(system, &[])))),
+        })
+    }
+
+    /// Whether a reduced model holds where the last step ended: within the trained amplitude, its polynomials within their part of the tolerance.
+    fn holds(&mut self, drive: &Drive) -> bool {
+        match self {
+            Self::Bodies(_) => true,
+            Self::Reduced(stepper) => stepper.method.excess_now() <= TRAINED && stepper.method.holds(drive),
+        }
+    }
+
+    /// Steps from a motion, at most to the end of the ramp.
+    fn advance(
+        &mut self,
+        bodies: &mut Bodies<'_>,
+        motion: &mut Motion,
+        h: &mut f64,
+        tol: f64,
+        observe: &mut dyn FnMut(f64, f64, &Motion) -> bool,
+    ) -> Result<Advance, SolveError> {
+        let control = Control::Tolerance(tol);
+        let mut observe = |t: f64, taken: f64, _: &Motion, after: &Motion| observe(t, taken, after);
+        match self {
+            Self::Bodies(stepper) => stepper.advance(bodies, motion, h, control, MAX_STEPS, &mut observe),
+            Self::Reduced(stepper) => {
+                stepper.method.resume(None);
+                stepper.advance(bodies, motion, h, control, MAX_STEPS, &mut observe)
+            }
+        }
+    }
+}
+
 /// A voltage that lies across some gaps.
 #[derive(Debug)]
 struct SharedVoltage {
@@ -62,6 +115,8 @@ struct SharedVoltage {
     gaps: Vec<usize>,
     /// Force on each body per squared voltage (N/V², N·m/V²).
     force: Vec<Pose>,
+    /// Force over the directions of a reduced model per squared voltage (√(N·m)/V²); empty with every body's own coordinates.
+    over_directions: Vec<f64>,
 }
 
 impl SharedVoltage {
@@ -96,7 +151,7 @@ pub(crate) struct PredictedStep {
 
 impl Multirate {
     /// None for a mechanism with heaters, floating conductors or mechanical inputs, without gap voltages, or with gaps that act on bodies without mass.
-    pub(crate) fn new(system: &System, sees_rates: bool) -> Option<Self> {
+    pub(crate) fn new(system: &System, sees_rates: bool, stepper: MacroStepper) -> Option<Self> {
         let electrics = &system.electrics;
         let (heating, others) = (&electrics.heating, electrics.inputs.len());
         if heating.states() > 0 || heating.means() > 0 || others > 0 || !electrics.floating.is_empty() {
@@ -111,7 +166,7 @@ impl Multirate {
             // the current of a port at a constant voltage is that of the motion
             sees_rates: sees_rates || voltages.len() > 1,
             voltages,
-            stepper: Adaptive::new(n, Rodas4::new(system, &[])),
+            stepper,
             drive: electrics.drive(),
             change: electrics.drive(),
             push: vec![Pose::zeros(); n],
@@ -140,7 +195,7 @@ impl Multirate {
     /// Evaluates the force per square of each voltage at displacements `q`.
     fn evaluate_forces(&mut self, system: &System, q: &[Pose]) {
         self.change.load = 0.0;
-        for SharedVoltage { gaps, force, .. } in &mut self.voltages {
+        for SharedVoltage { gaps, force, over_directions, .. } in &mut self.voltages {
             self.drive.volts.fill(0.0);
             self.change.volts.fill(0.0);
             for &gap in &*gaps {
@@ -149,14 +204,21 @@ impl Multirate {
             }
             system.drive_force(q, &self.drive, &self.change, force);
             force.iter_mut().for_each(|force| *force = -*force);
+            if let MacroStepper::Reduced(stepper) = &mut self.stepper {
+                *over_directions = stepper.method.drive_force(q, &self.drive, &self.change);
+            }
         }
     }
 
     /// Sets the external force to that of squared voltages which are linear in time: values (V²) and slopes (V²/s).
     fn set_push(&mut self, lines: impl Iterator<Item = [f64; 2]>) {
-        let Self { voltages, push, push_rate, .. } = self;
+        let Self { voltages, push, push_rate, stepper, .. } = self;
         push.fill(Pose::zeros());
         push_rate.fill(Pose::zeros());
+        if let MacroStepper::Reduced(stepper) = stepper {
+            let lines = voltages.iter().zip(lines).map(|(voltage, line)| (&voltage.over_directions[..], line));
+            return stepper.method.set_push(lines);
+        }
         for (voltage, [value, slope]) in voltages.iter().zip(lines).filter(|(_, line)| *line != [0.0; 2]) {
             for ((push, rate), force) in push.iter_mut().zip(&mut *push_rate).zip(&voltage.force) {
                 *push += force * value;
@@ -193,9 +255,8 @@ impl Multirate {
             &mut Bodies::weighed(system, &ramp, weights),
             &mut self.motion,
             &mut h,
-            Control::Tolerance(errors.shared_step()),
-            MAX_STEPS,
-            &mut |_, _, _, _| true,
+            errors.shared_step(),
+            &mut |_, _, _| true,
         );
         matches!(advanced, Ok(Advance::Done)).then(|| (self.motion.clone(), h))
     }
@@ -226,15 +287,18 @@ impl Multirate {
             &mut Bodies::weighed(system, &ramp, weights),
             &mut self.motion,
             &mut h,
-            Control::Tolerance(relative.shared_step()),
-            MAX_STEPS,
-            &mut |t, taken, _, after| {
+            relative.shared_step(),
+            &mut |t, taken, after| {
                 ends.push(t + taken);
                 middle.get_or_insert_with(|| after.clone());
                 ends.len() < 2
             },
         );
+        let mut drive = self.drive.clone();
+        ramp.at(ends.last().copied().unwrap_or_default(), &mut drive);
+        let holds = self.stepper.holds(&drive);
         let allowed = weights.allowed_error(system, [&step.motion, &self.motion], relative.within_step());
+        let allowed = allowed.filter(|_| holds);
         let (Ok(_), Some(allowed), Some(middle), &[first, last]) = (advanced, allowed, middle, &ends[..]) else {
             return failed(step);
         };
@@ -275,19 +339,21 @@ impl Multirate {
         &self.cache[self.cache.len() - 1]
     }
 
-    /// Start of a macro step at the parent, for points of length `dt` (s). None where it would be too short, or the parent lies in one that was.
+    /// Whether a macro step may begin at the parent for points of length `dt` (s): by the steps of the integrator it is long enough, and the parent lies in
+    /// none that was too short.
+    pub(crate) fn may_begin(dt: f64, parent: &Snapshot) -> bool {
+        parent.pause == 0
+            && dt * MIN_POINTS <= INTEGRATOR_STEPS * parent.next_step
+            && !parent.macro_step.as_deref().is_some_and(is_short)
+    }
+
+    /// Start of a macro step at the parent, for points of length `dt` (s). None where it would be too short.
     pub(crate) fn begin(
         &mut self,
         about: (&System, &NormWeights),
         (dt, parent, token): (f64, &Snapshot, Token),
         errors: ErrorBudget,
     ) -> Option<MacroStepPosition> {
-        if parent.pause > 0
-            || dt * MIN_POINTS > INTEGRATOR_STEPS * parent.next_step
-            || parent.macro_step.as_deref().is_some_and(is_short)
-        {
-            return None;
-        }
         let voltages = self.voltages.len();
         let predicted = match self.cache.iter().position(|known| known.step.start == token) {
             // by another trial of this point
@@ -388,7 +454,8 @@ fn gap_voltages(system: &System) -> Vec<SharedVoltage> {
             Some(voltage) => voltage.gaps.push(gap),
             None => {
                 let force = vec![Pose::zeros(); system.bodies()];
-                voltages.push(SharedVoltage { row: row.iter().copied().collect(), gaps: vec![gap], force });
+                let row = row.iter().copied().collect();
+                voltages.push(SharedVoltage { row, gaps: vec![gap], force, over_directions: Vec::new() });
             }
         }
     }

@@ -6,7 +6,7 @@ use super::agitation::ThermalForce;
 use super::growth::{Difference, Growth};
 use super::held_motion::HeldMotion;
 use super::macro_step::{DisplayOffset, MacroStepPosition};
-use super::multirate::Multirate;
+use super::multirate::{MacroStepper, Multirate};
 use super::output_gradient::{OutputGradient, surroundings};
 use super::phase_error::PhaseErrorMonitor;
 use super::states::{Snapshot, States};
@@ -139,7 +139,9 @@ impl DeviceSession {
         description.unknowns = reduction.as_ref().map_or(description.unknowns, |found| found.model.space.size());
         let held = HeldMotion::new(n, ports.len(), (heaters, electrics.heating.means()));
         let sees_rates = sees_rates(&signals, &ports);
-        let multirate = matches!(method, Formulated::Bodies(_)).then(|| Multirate::new(system, sees_rates)).flatten();
+        let own = reduction.as_ref().map(|found| found.model.method());
+        let stepper = MacroStepper::new(&method, own, system);
+        let multirate = stepper.and_then(|stepper| Multirate::new(system, sees_rates, stepper));
         let multirate = multirate.map(Box::new);
         let session = Self {
             held,

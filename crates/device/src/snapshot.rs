@@ -13,8 +13,10 @@ use std::sync::Arc;
 
 /// Magic bytes: a name and the version of this format.
 const HEAD: [u8; 8] = *b"bimorph\x06";
-/// Those of states of a reduced model: format 3 behind the name of its coordinates. They lie in no macro steps.
-const HEAD_REDUCED: [u8; 8] = *b"bimorph\x04";
+/// Those of states of a reduced model: the same behind the name of its coordinates.
+const HEAD_REDUCED: [u8; 8] = *b"bimorph\x07";
+/// Those of format 4, whose states of a reduced model lie in no macro steps.
+const HEAD_4: [u8; 8] = *b"bimorph\x04";
 /// Those of format 3, whose states lie in no macro steps.
 const HEAD_3: [u8; 8] = *b"bimorph\x03";
 /// Those of format 2, whose histories of steps count no alternations and whose states have no anchors.
@@ -67,7 +69,7 @@ fn write_format(head: &[u8], parts: usize, opened: &OpenRequest, states: &States
             out.poses(&motion.q);
             out.poses(&motion.v);
         }
-        if head == HEAD {
+        if head.starts_with(&HEAD) || head.starts_with(&HEAD_REDUCED) {
             out.multirate(state);
         }
     }
@@ -150,10 +152,10 @@ impl SnapshotReader<'_> {
     fn all(&mut self) -> Option<(OpenRequest, States, Option<u64>)> {
         let (head, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
-        let is_multirate = *head == HEAD;
+        let is_multirate = [HEAD, HEAD_REDUCED].contains(head);
         let (parts, tag) = match *head {
             HEAD | HEAD_3 => (StepHistory::PARTS, None),
-            HEAD_REDUCED => (StepHistory::PARTS, Some(self.word()?)),
+            HEAD_REDUCED | HEAD_4 => (StepHistory::PARTS, Some(self.word()?)),
             HEAD_2 => (StepHistory::PARTS_OF_FORMAT_2, None),
             _ => return None,
         };
@@ -391,7 +393,7 @@ mod tests {
 
     #[test]
     fn states_come_back() {
-        for (tag, of_macro_steps) in [(None, false), (Some(7), false), (None, true)] {
+        for (tag, of_macro_steps) in [(None, false), (Some(7), false), (None, true), (Some(7), true)] {
             let (opened, states) = some(of_macro_steps);
             let bytes = write(&opened, &states, tag);
             let (read_opened, read_states, read_tag) = read(&bytes).expect("its own bytes");
@@ -400,15 +402,17 @@ mod tests {
         }
     }
 
-    /// Snapshots of formats 2 and 3 come back: with histories that have counted no alternations, and with states in no macro steps.
+    /// Snapshots of formats 2 to 4 come back: with histories that have counted no alternations, and with states in no macro steps.
     #[test]
     fn states_of_earlier_formats_come_back() {
-        for (head, parts) in [(HEAD_2, StepHistory::PARTS_OF_FORMAT_2), (HEAD_3, StepHistory::PARTS)] {
+        let of_reduced = [HEAD_4, 9u64.to_le_bytes()].concat();
+        let formats = [(&HEAD_2[..], StepHistory::PARTS_OF_FORMAT_2), (&HEAD_3, StepHistory::PARTS)];
+        for (head, parts) in formats.into_iter().chain([(&of_reduced[..], StepHistory::PARTS)]) {
             let (opened, states) = some(false);
-            let bytes = write_format(&head, parts, &opened, &states);
+            let bytes = write_format(head, parts, &opened, &states);
             let (read_opened, read_states, _) = read(&bytes).expect("bytes of an earlier format");
             assert_eq!(read_opened, opened);
-            assert_eq!(write_format(&head, parts, &read_opened, &read_states), bytes);
+            assert_eq!(write_format(head, parts, &read_opened, &read_states), bytes);
         }
     }
 

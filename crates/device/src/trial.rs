@@ -18,6 +18,7 @@ use bimorph_multibody::planar::Pose;
 use bimorph_solve::equations::Bodies;
 use bimorph_solve::path::SourcePath;
 use bimorph_solve::time::adaptive::{Advance, Control};
+use reduced::state_of;
 
 /// Internal steps in one circuit step before the device requires a shorter one.
 const MAX_INTERNAL_STEPS: usize = 512;
@@ -193,7 +194,7 @@ impl DeviceSession {
                 }
             }
         }
-        if self.went_far(false) {
+        if next_step.is_none() && self.went_far(false) {
             return false;
         }
         if held.is_none() {
@@ -240,7 +241,7 @@ impl DeviceSession {
                 self.rise.fill(0.0);
             }
         }
-        self.stepper.method.begin(parent.map(|p| &p.carried[..]));
+        self.stepper.method.begin(parent.and_then(|p| state_of(p, self.reduction.is_some())));
         if beyond || self.takes_bodies {
             self.stepper.method.take_bodies();
         }

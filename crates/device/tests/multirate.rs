@@ -3,7 +3,8 @@
 
 use bimorph_device::local::LocalDevice;
 use bimorph_device::{Device, Mode, OpenRequest, Status, Token, Trial, TrialReply};
-use bimorph_model::compile::{CompileOptions, CompiledModel, Junctions, draw};
+use bimorph_model::compile::{CompileOptions, CompiledModel, Formulation, Junctions, draw};
+use bimorph_model::options::PortRanges;
 use bimorph_netlist::{NetlistSource, read_bundle};
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -17,25 +18,47 @@ struct MultirateExample {
     rest: &'static [f64],
     /// Factor of the lengths of points: the mechanisms differ in speed (1).
     pace: f64,
+    /// Ranges of the ports of a reduced model; none: the full one.
+    ranges: Option<&'static str>,
+}
+
+impl MultirateExample {
+    /// A tolerance that its formulation has.
+    fn tol(&self) -> f64 {
+        if self.ranges.is_some() { 1e-2 } else { TOL }
+    }
 }
 
 /// One voltage across all gaps; the switch closes at 17.84 V.
-const SWITCH: MultirateExample =
-    MultirateExample { file: "switch/switch.net", signals: ["a(8).y", "a(8).vy"], rest: &[4.0], pace: 1.0 };
+const SWITCH: MultirateExample = MultirateExample {
+    file: "switch/switch.net",
+    signals: ["a(8).y", "a(8).vy"],
+    rest: &[4.0],
+    pace: 1.0,
+    ranges: None,
+};
 /// Two voltages; that of the second comb is constant, so that its current is one of the motion.
 const COMB: MultirateExample = MultirateExample {
     file: "comb_resonator/comb_resonator.net",
     signals: ["shuttle.x", "shuttle.vx"],
     rest: &[4.0, 20.0],
     pace: 30.0,
+    ranges: None,
 };
+/// The same in a reduced model, which makes macro steps of its own.
+const REDUCED_COMB: MultirateExample = MultirateExample { ranges: Some("drive:0:20,sense:0:25"), ..COMB };
 const TOL: f64 = 1e-3;
 
 fn compiled(example: &MultirateExample, tol: f64) -> Arc<CompiledModel> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples").join(example.file);
     let bundle = read_bundle(&path, &[]).unwrap();
     let junctions = Junctions::Centreline;
-    let options = CompileOptions { junctions, segments: Some(1), tol, ..CompileOptions::default() };
+    let (formulation, segments) = match example.ranges {
+        Some(_) => (Formulation::Reduced, Some(2)),
+        None => (Formulation::default(), Some(1)),
+    };
+    let ranges = example.ranges.map(|text| PortRanges::parse(text).unwrap());
+    let options = CompileOptions { junctions, segments, tol, formulation, ranges, ..CompileOptions::default() };
     Arc::new(
         draw(&NetlistSource::new(&bundle), &options)
             .and_then(|drawn| drawn.compile())
@@ -101,12 +124,14 @@ fn run(
 /// Rates are those of higher modes in part, which edges set off and the error of a step weighs little: 1.5e-2 of the switch, 1.2e-2 with steps at every point.
 #[test]
 fn no_impulse_is_lost() {
-    for example in [&SWITCH, &COMB] {
-        let [run, exact] = [TOL, 1e-3 * TOL].map(|tol| {
+    for example in [&SWITCH, &COMB, &REDUCED_COMB] {
+        let tol = example.tol();
+        // at a thousandth of the tolerance a reduced model is the full one
+        let [run, exact] = [tol, 1e-3 * TOL].map(|tol| {
             let device = &mut opened(example, &compiled(example, tol));
             run((example, device), example.rest[0], edges(example, 3000, 7))
         });
-        for (k, most) in [0.5 * TOL, 2e-2].into_iter().enumerate() {
+        for (k, most) in [0.5 * tol, 2e-2].into_iter().enumerate() {
             let range = exact.iter().fold(0.0f64, |all, reply| all.max((reply.outputs[k] - exact[0].outputs[k]).abs()));
             let ends = run.iter().zip(&exact);
             let worst = ends.map(|(a, b)| (a.outputs[k] - b.outputs[k]).abs()).fold(0.0, f64::max) / range;
@@ -144,9 +169,9 @@ fn an_alternating_voltage_acts_by_its_mean_square() {
 /// it: rates are those of the displacements.
 #[test]
 fn motion_has_no_jumps() {
-    for (example, height) in [(&SWITCH, 8.0), (&SWITCH, 4.0), (&COMB, 10.0)] {
+    for (example, height) in [(&SWITCH, 8.0), (&SWITCH, 4.0), (&COMB, 10.0), (&REDUCED_COMB, 10.0)] {
         let dt = example.pace * 5e-10;
-        let device = &mut opened(example, &compiled(example, TOL));
+        let device = &mut opened(example, &compiled(example, example.tol()));
         let steps = (0..2000).map(|k| (dt, if k % 100 < 50 { 8.0 } else { height }));
         let replies = run((example, device), example.rest[0], steps);
         let largest = replies.iter().fold(0.0f64, |all, reply| all.max(reply.outputs[1].abs()));
@@ -162,20 +187,22 @@ fn motion_has_no_jumps() {
 /// nanosecond, too, in which an edge of the other voltage ends a macro step. A jump of the displayed motion there makes 5e-4 of the largest speed.
 #[test]
 fn currents_of_the_motion_have_no_spikes() {
-    let device = &mut opened(&COMB, &compiled(&COMB, TOL));
-    let points: Vec<(f64, f64)> =
-        (0..2000).map(|k| (if k % 50 == 0 { 1e-10 } else { 1e-8 }, if k % 100 < 50 { 9.0 } else { 2.0 })).collect();
-    let replies = run((&COMB, device), COMB.rest[0], points.iter().copied());
-    let largest = replies.iter().fold(0.0f64, |all, reply| all.max(reply.outputs[1].abs()));
-    let way = |ends: &[TrialReply]| ends[1].outputs[0] - ends[0].outputs[0];
-    let charge = |ends: &[TrialReply]| ends[1].charges[1] - ends[0].charges[1];
-    // of the longest way in a point, where differences have the most digits
-    let longest = replies.windows(2).max_by(|a, b| way(a).abs().total_cmp(&way(b).abs())).unwrap();
-    let per_way = charge(longest) / way(longest);
-    for (ends, (dt, _)) in replies.windows(2).zip(&points) {
-        let speed = 0.5 * (ends[0].outputs[1] + ends[1].outputs[1]);
-        let spike = (charge(ends) / (per_way * dt) - speed).abs();
-        assert!(spike < 5e-5 * largest, "{spike:e} of {largest:e} m/s in {dt:e} s");
+    for example in [&COMB, &REDUCED_COMB] {
+        let device = &mut opened(example, &compiled(example, example.tol()));
+        let points: Vec<(f64, f64)> =
+            (0..2000).map(|k| (if k % 50 == 0 { 1e-10 } else { 1e-8 }, if k % 100 < 50 { 9.0 } else { 2.0 })).collect();
+        let replies = run((example, device), example.rest[0], points.iter().copied());
+        let largest = replies.iter().fold(0.0f64, |all, reply| all.max(reply.outputs[1].abs()));
+        let way = |ends: &[TrialReply]| ends[1].outputs[0] - ends[0].outputs[0];
+        let charge = |ends: &[TrialReply]| ends[1].charges[1] - ends[0].charges[1];
+        // of the longest way in a point, where differences have the most digits
+        let longest = replies.windows(2).max_by(|a, b| way(a).abs().total_cmp(&way(b).abs())).unwrap();
+        let per_way = charge(longest) / way(longest);
+        for (ends, (dt, _)) in replies.windows(2).zip(&points) {
+            let speed = 0.5 * (ends[0].outputs[1] + ends[1].outputs[1]);
+            let spike = (charge(ends) / (per_way * dt) - speed).abs();
+            assert!(spike < 5e-5 * largest, "{spike:e} of {largest:e} m/s in {dt:e} s");
+        }
     }
 }
 
@@ -183,8 +210,8 @@ fn currents_of_the_motion_have_no_spikes() {
 /// devices that continue from a snapshot.
 #[test]
 fn trials_are_pure() {
-    for example in [&SWITCH, &COMB] {
-        let compiled = compiled(example, TOL);
+    for example in [&SWITCH, &COMB, &REDUCED_COMB] {
+        let compiled = compiled(example, example.tol());
         // macro steps have tolerances relative to the motion so far
         let steps = (0..30).map(|_| (example.pace * 2e-8, 8.0));
         let points: Vec<(f64, f64)> = steps.chain(edges(example, 400, 100)).collect();
@@ -222,8 +249,8 @@ fn trials_are_pure() {
 /// Points of any length within a macro step have finite outputs and a positive bound of the next one, or fail.
 #[test]
 fn points_of_any_length_are_answered() {
-    for example in [&SWITCH, &COMB] {
-        let device = &mut opened(example, &compiled(example, TOL));
+    for example in [&SWITCH, &COMB, &REDUCED_COMB] {
+        let device = &mut opened(example, &compiled(example, example.tol()));
         let rest = example.rest[0];
         let replies = run((example, device), rest, edges(example, 60, 7));
         let parent = replies[replies.len() - 1].token;

@@ -50,8 +50,11 @@ impl SessionReduction {
         }
         let error = &mut self.error;
         error.accepted += 1;
-        if error.accepted % EVERY == 1 && !carried.is_empty() {
-            let push = method.accelerations(carried);
+        if error.accepted % EVERY == 1 {
+            let push = match carried {
+                [] => method.consistent_accelerations(&Motion { q: q.to_vec(), v: v.to_vec() }, drive),
+                _ => method.accelerations(carried),
+            };
             let mut taken: Vec<Pose> =
                 push.iter().enumerate().map(|(j, push)| system.model.mass(j).component_mul(push)).collect();
             forces::add_damping(&system.model, v, &mut taken);

@@ -59,7 +59,7 @@ impl DeviceSession {
         }
         let most = if touching { SMALL_TOUCHING } else { SMALL };
         // beyond the range of a port the full model makes the trial
-        let leaves = !parent.carried.is_empty() && self.is_beyond(&self.sources);
+        let leaves = self.is_reduced_state(parent) && self.is_beyond(&self.sources);
         let linear = self.shaken.is_none()
             && !self.takes_bodies
             && self.stepper.method.has_linear_trials()
@@ -168,10 +168,12 @@ impl DeviceSession {
         }
         held.motion.copy(&self.motion);
         self.stepper.method.place_sensitivities();
-        held.sensitivities.iter_mut().zip(self.stepper.method.sensitivity()).for_each(|(held, now)| held.copy(now));
-        let carried = self.stepper.method.all_carried();
-        held.carried.resize_with(carried.len(), || Motion { q: Vec::new(), v: Vec::new() });
-        held.carried.iter_mut().zip(carried).for_each(|(held, carried)| held.clone_from(carried));
+        let keep = |held: &mut Vec<Motion>, now: &[Motion]| {
+            held.resize_with(now.len(), || Motion { q: Vec::new(), v: Vec::new() });
+            held.iter_mut().zip(now).for_each(|(held, now)| held.clone_from(now));
+        };
+        keep(&mut held.sensitivities, self.stepper.method.sensitivity());
+        keep(&mut held.carried, self.stepper.method.all_carried());
         ramp.end_rises(&mut held.rise);
         let way = ((&parent.sources[..], &parent.sources[..]), &parent.rise[..]);
         for (slopes, &source) in held.rise_slope.iter_mut().zip(&self.ports.sources) {

@@ -6,7 +6,7 @@
 //! ```
 //! in the norm of masses: elastic forces only reduce it. A trial interpolates q(t) if
 //!
-//! * every body has its own coordinates, and there is no thermal agitation;
+//! * every body has its own coordinates, or the model is reduced, and there is no thermal agitation;
 //! * no heater, floating conductor or input other than voltages exists;
 //! * the macro step holds six points of this length, which is three in a step of the integrator;
 //! * e is within the tolerance for points within a step, and so is ė where a signal shows a rate, or gaps have different voltages: a current at a constant
@@ -14,6 +14,9 @@
 //!
 //! Where e exceeds half of that at the parent, or the macro step ends, the next one begins at the parent. The partials neglect the response of the motion
 //! within the point, which is part of e.
+//!
+//! A reduced model makes its own macro steps, where these end within the trained amplitude and its polynomials hold there. States within them carry no
+//! coordinates: steps that follow begin with those of the corrected motion.
 //!
 //! The decision depends on the parent, the length and the voltages alone: trials are pure. Predictions are cached, and made again from the state where the
 //! cache has others.
@@ -39,7 +42,9 @@ impl DeviceSession {
     ) -> Option<(f64, Box<MacroStepPosition>)> {
         self.exceeds_bound = false;
         let (parent, token) = (parent?, request.parent?);
-        if self.shaken.is_some() {
+        // in a session with a reduced model the full one has none, and takes over beyond the ranges
+        let is_left = || !self.is_reduced_state(parent) || self.is_beyond(&self.sources);
+        if self.shaken.is_some() || self.reduction.is_some() && is_left() {
             return None;
         }
         let mut multirate = self.multirate.take()?;
@@ -66,7 +71,13 @@ impl DeviceSession {
         });
         let MacroStepPosition { step, elapsed, points, mut integrals } = match continued {
             Some(position) => position.clone(),
-            None => multirate.begin(about, (dt, parent, token), errors)?,
+            None if !Multirate::may_begin(dt, parent) => return None,
+            None => {
+                let begun = multirate.begin(about, (dt, parent, token), errors);
+                // the prediction would cost as much as the steps of a reduced model that it does not save
+                self.exceeds_bound = begun.is_none() && self.reduction.is_some();
+                begun?
+            }
         };
         multirate.extend(&step, &mut integrals, dt, [&parent.sources, &self.sources]);
         let elapsed = elapsed + dt;

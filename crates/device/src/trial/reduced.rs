@@ -1,7 +1,7 @@
 //! Trials in a reduced model, and where the full model takes over from it.
 //!
-//! A state of the reduced model carries its coordinates ([`Snapshot::carried`]); one of the full model carries none, and the trials from it are those of
-//! the full model. Every decision follows from the request and its parent alone, so that trials stay pure:
+//! A state of the reduced model carries its coordinates ([`Snapshot::carried`]), unless it lies in a macro step; one of the full model carries none, and the
+//! trials from it are those of the full model. Every decision follows from the request and its parent alone, so that trials stay pure:
 //!
 //! * An equilibrium is reduced where the reduced branch from a reduced parent reaches it, the polynomials have it within the trained amplitude, and the
 //!   residual of the full model there is an error within the tolerance.
@@ -30,7 +30,18 @@ const LEFT: f64 = 1e6;
 /// Code of the warnings.
 const WARNING: &str = "W053";
 
+/// Coordinates that a method continues from at a state, in a session with a reduced model if `reduced`; none: those of the motion of the bodies.
+pub(super) fn state_of(state: &Snapshot, reduced: bool) -> Option<&[Motion]> {
+    let is_projected = reduced && state.carried.is_empty() && state.macro_step.is_some();
+    (!is_projected).then_some(&state.carried)
+}
+
 impl DeviceSession {
+    /// Whether trials from a state are those of the reduced model.
+    pub(crate) fn is_reduced_state(&self, state: &Snapshot) -> bool {
+        self.reduction.is_some() && (!state.carried.is_empty() || state.macro_step.is_some())
+    }
+
     /// Whether a port is given more than the reduced model is trained for.
     pub(crate) fn is_beyond(&self, sources: &[f64]) -> bool {
         self.reduction.as_ref().is_some_and(|reduction| reduction.model.beyond(sources).is_some())
@@ -57,12 +68,16 @@ impl DeviceSession {
         if self.is_beyond(&self.sources) {
             return false;
         }
-        self.stepper.method.begin(parent.map(|p| &p.carried[..]));
+        let state = parent.map(|p| state_of(p, self.reduction.is_some()));
+        self.stepper.method.begin(state.flatten());
         let Some(reduction) = &mut self.reduction else { return false };
         let Some(method) = self.stepper.method.reduced_now() else { return false };
         let SessionReduction { model, statics, check, .. } = reduction;
         let mut z = vec![0.0; model.space.size()];
-        if parent.is_some() {
+        if state.is_some() {
+            if state == Some(None) {
+                method.project(&self.motion);
+            }
             z.copy_from_slice(method.coordinates());
         }
         let mut drive = system.electrics.drive();
@@ -102,6 +117,9 @@ impl DeviceSession {
 
     /// The coordinates that the state after a trial carries; `moves`: of a step.
     pub(crate) fn carried(&mut self, moves: bool) -> Vec<Motion> {
+        if self.position.is_some() {
+            return Vec::new();
+        }
         let drive = &self.drive;
         let Some(method) = self.stepper.method.reduced_now() else {
             return if moves { self.stepper.method.state().to_vec() } else { Vec::new() };
@@ -130,7 +148,7 @@ impl DeviceSession {
         let mut found: Vec<_> = self.left_warning(compiled, state).into_iter().map(|warning| (warning, LEFT)).collect();
         let mut drive = system.electrics.drive();
         system.electrics.apply(&state.sources, &state.rise, &mut drive);
-        self.stepper.method.begin(Some(&state.carried));
+        self.stepper.method.begin(state_of(state, self.reduction.is_some()));
         if let (Some(reduction), Some(method)) = (&mut self.reduction, self.stepper.method.reduced_now()) {
             let about = (&state.q[..], &state.v[..], &state.carried[..]);
             let error = reduction.seen(system, method, about, (&drive, state.elapsed == 0.0));
@@ -149,7 +167,7 @@ impl DeviceSession {
         if let Some(why) = &self.full_because {
             return Some(Diagnostic::warning(WARNING, taken(why), help));
         }
-        let reduction = self.reduction.as_ref().filter(|_| state.carried.is_empty())?;
+        let reduction = self.reduction.as_ref().filter(|_| !self.is_reduced_state(state))?;
         let text = match reduction.model.beyond(&state.sources) {
             Some((port, given, [low, high])) => {
                 let kind = self.ports.kinds[port];

@@ -108,6 +108,9 @@ pub struct ReducedRodas4 {
     gathered: Vec<Four>,
     drive: Drive,
     rate: Drive,
+    /// Force over z beside that of the drive at the start of the ramp, and its rate; none: no such. The time at hand after that start (s).
+    push: Option<Box<[Vec<f64>; 2]>>,
+    time: f64,
     shortest: f64,
     /// Accepted steps.
     taken: u64,
@@ -154,6 +157,8 @@ impl ReducedRodas4 {
             gathered: vec![Four::ZERO; count],
             drive: closures.electrics.drive(),
             rate: closures.electrics.drive(),
+            push: None,
+            time: 0.0,
             shortest,
             estimate: None,
             ports: None,
@@ -231,6 +236,10 @@ impl ReducedRodas4 {
             Some(stages) => stages.forces.residual(&stages.of, at.parts(), drive, force),
             None => self.exact_residual(first),
         }
+        if let Some(push) = &self.push {
+            let lines = push[0].iter().zip(&push[1]);
+            self.force.iter_mut().zip(lines).for_each(|(force, (value, rate))| *force -= value + rate * self.time);
+        }
         self.work.forces += 1;
     }
 
@@ -305,7 +314,11 @@ impl ReducedRodas4 {
     /// ∂R/∂t over z, after [`ReducedRodas4::factor`].
     fn fill_forcing(&mut self) {
         if let Some(stages) = &mut self.polynomials {
-            return stages.forces.forcing(&stages.of, &self.drive, &self.rate, &mut self.forcing);
+            stages.forces.forcing(&stages.of, &self.drive, &self.rate, &mut self.forcing);
+            if let Some(push) = &self.push {
+                self.forcing.iter_mut().zip(&push[1]).for_each(|(forcing, rate)| *forcing -= rate);
+            }
+            return;
         }
         let Self { space, forces, forcing, drive, rate, room, gathered, .. } = self;
         let Joints { closures, tree, .. } = &*space.joints;
@@ -385,7 +398,7 @@ impl ReducedRodas4 {
     }
 
     /// Coordinates and rates become those of a motion of the bodies.
-    fn project(&mut self, motion: &Motion) {
+    pub fn project(&mut self, motion: &Motion) {
         let found = projected(&self.space, motion);
         self.now.parts_mut().into_iter().zip(&found).for_each(|(to, from)| to.copy_from_slice(from));
     }
@@ -462,13 +475,14 @@ struct ReducedStep<'a> {
 impl RosenbrockStep for ReducedStep<'_> {
     fn begin(&mut self) -> StepResult {
         self.ramp.at_and_rate(self.s, &mut self.rodas.drive, &mut self.rodas.rate);
-        self.rodas.drive.load = 1.0;
+        (self.rodas.drive.load, self.rodas.time) = (1.0, self.s);
         Ok(())
     }
 
     fn drive_at(&mut self, alpha: f64) {
-        self.ramp.at(self.s + alpha * self.h, &mut self.rodas.drive);
-        self.rodas.drive.load = 1.0;
+        let time = self.s + alpha * self.h;
+        self.ramp.at(time, &mut self.rodas.drive);
+        (self.rodas.drive.load, self.rodas.time) = (1.0, time);
     }
 
     fn argument(&mut self, i: usize) {
@@ -521,7 +535,7 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
             self.project(motion);
         }
         bodies.ramp.at(0.0, &mut self.drive);
-        self.drive.load = 1.0;
+        (self.drive.load, self.time) = (1.0, 0.0);
         self.make_consistent()
     }
 

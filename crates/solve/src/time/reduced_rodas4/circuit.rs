@@ -40,6 +40,30 @@ impl ReducedRodas4 {
         self.put_back();
     }
 
+    /// Minus the change of the forces over the directions, at bodies at `q` under `drive`, with a change of the drive.
+    pub fn drive_force(&mut self, q: &[Pose], drive: &Drive, change: &Drive) -> Vec<f64> {
+        let [z, _] = super::projected(&self.space, &Motion { q: q.to_vec(), v: vec![Pose::zeros(); q.len()] });
+        let mut force = vec![0.0; z.len()];
+        if let Some(stages) = &mut self.polynomials {
+            let rest = vec![0.0; z.len()];
+            stages.forces.residual(&stages.of, [&z, &rest, &rest], drive, &mut force);
+            stages.forces.forcing(&stages.of, drive, change, &mut force);
+        }
+        force.iter_mut().for_each(|force| *force = -*force);
+        force
+    }
+
+    /// Sets the force over the directions that acts beside the drive: sums of some forces times lines in time, values and slopes (1/s).
+    pub fn set_push<'a>(&mut self, lines: impl Iterator<Item = (&'a [f64], [f64; 2])>) {
+        let push = self.push.get_or_insert_with(|| Box::new([(); 2].map(|()| vec![0.0; self.force.len()])));
+        push.iter_mut().for_each(|part| part.fill(0.0));
+        for (force, line) in lines {
+            for (part, share) in push.iter_mut().zip(line) {
+                part.iter_mut().zip(force).for_each(|(part, force)| *part += share * force);
+            }
+        }
+    }
+
     /// The space.
     pub fn space(&self) -> &ReducedSpace {
         &self.space
@@ -93,6 +117,19 @@ impl ReducedRodas4 {
     /// Accelerations of the bodies in a state.
     pub fn accelerations(&mut self, state: &[Motion]) -> &[Pose] {
         self.resume(Some(state));
+        self.forces.place(&self.space, self.now.parts());
+        &self.forces.placed.acceleration
+    }
+
+    /// The same at a motion of the bodies alone, with what the forces at `drive` bring.
+    pub fn consistent_accelerations(&mut self, motion: &Motion, drive: &Drive) -> &[Pose] {
+        self.resume(None);
+        self.project(motion);
+        self.drive.clone_from(drive);
+        if self.make_consistent().is_err() {
+            let [_, _, w] = self.now.parts_mut();
+            w.fill(f64::NAN);
+        }
         self.forces.place(&self.space, self.now.parts());
         &self.forces.placed.acceleration
     }
