@@ -108,6 +108,9 @@ impl PhaseErrorMonitor {
             for n in (0..count).filter(|n| charges[*n]) {
                 let (sum, largest) = self.higher.of(n);
                 let range = self.courses[count + n].range();
+                if range == 0.0 {
+                    continue; // the charge has not changed
+                }
                 let error = self.errors[n] + sum / range;
                 let most = largest.filter(|of| of.error > self.errors[n] * range);
                 if let Some(of) = most.filter(|_| error > worst.error) {
@@ -225,6 +228,20 @@ mod tests {
             assert_eq!(worst(&MODE, 0.1, |t| (TAU * frequency * t).sin()), 0.0, "{frequency} Hz");
         }
         assert_eq!(worst(&MODE, 0.1, |t| t), 0.0);
+    }
+
+    /// A charge that does not change has no error of its current, whatever rounding makes of the higher modes at rest.
+    #[test]
+    fn a_current_of_zero_has_no_error() {
+        let modes = [HigherMode { frequency_hz: 1e4, quality: f64::INFINITY, error: 1e-2, shape: Vec::new() }];
+        let mut ringing = PhaseErrorMonitor::default();
+        for k in 1..4000 {
+            let t = f64::from(k) * 5e-6;
+            let rate = 1e-20 * (TAU * 1e4 * t).cos();
+            let split = Split { modes: &modes, rates: &[rate], step: 1e-7, coupling: &|_, _| 1.0 };
+            let worst = ringing.observe(&MODE, AcceptedState { t, values: &[1.0] }, &[true], Some(&split));
+            assert_eq!(worst.error, 0.0, "at {t:e} s");
+        }
     }
 
     /// In this current a mode of ten times the lowest frequency makes a quarter of the range, with a frequency error
