@@ -45,7 +45,7 @@ const COMB: MultirateExample = MultirateExample {
     pace: 30.0,
     ranges: None,
 };
-/// The same in a reduced model, which makes macro steps of its own.
+/// The comb as a reduced model.
 const REDUCED_COMB: MultirateExample = MultirateExample { ranges: Some("drive:0:20,sense:0:25"), ..COMB };
 const TOL: f64 = 1e-3;
 
